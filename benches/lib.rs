@@ -1,0 +1,128 @@
+//! What the benches measure with: a mesh in a cage, and the stages of a bind one by one.
+//!
+//! The mesh and cage are the animal of `cagework_tests::creature`, or the files that the environment variables
+//! `CAGEWORK_BENCH_MESH` and `CAGEWORK_BENCH_CAGE` name (OBJ, glTF, GLB).
+
+use std::time::Instant;
+
+use cagework_core::bind::{BindOptions, Method, Solver, bind};
+use cagework_core::grid::Grid;
+use cagework_core::progress::Silent;
+use cagework_core::sample::Stencils;
+use cagework_core::sample::embedded::Sampler;
+use cagework_core::solve::hierarchy::Hierarchy;
+use cagework_core::solve::multigrid::{Stop, Workspace};
+use cagework_core::voxelize::embedded::{EmbeddedCells, classify, shoot_lines};
+use cagework_core::{Binding, Cage};
+use cagework_io::Model;
+use cagework_tests::creature::{creature, creature_cage};
+use glam::Vec3;
+
+/// The grids that whole binds are measured on.
+pub const GRIDS: [u32; 3] = [32, 64, 128];
+
+/// The default threshold for delta.
+const TAU: f64 = 1e-5;
+
+/// What is bound.
+#[derive(Debug)]
+pub struct Input {
+    /// Mesh vertices, object units.
+    pub points: Vec<Vec3>,
+    /// The cage around them.
+    pub cage: Cage,
+}
+
+impl Input {
+    /// The files that the environment names, or the generated animal.
+    ///
+    /// # Panics
+    /// If only one file is named, or one cannot be read: there is nothing to measure.
+    #[must_use]
+    pub fn load() -> Self {
+        let [mesh, cage] =
+            ["CAGEWORK_BENCH_MESH", "CAGEWORK_BENCH_CAGE"].map(|name| std::env::var(name).ok());
+        let input = match (mesh, cage) {
+            (None, None) => Self {
+                points: creature().positions,
+                cage: Cage::new(&creature_cage()).expect("the generated cage is one"),
+            },
+            (Some(mesh), Some(cage)) => Self {
+                points: read(&mesh).tri_mesh().positions,
+                cage: Cage::new(&read(&cage).cage_mesh()).expect("CAGEWORK_BENCH_CAGE is a cage"),
+            },
+            _ => panic!("set both CAGEWORK_BENCH_MESH and CAGEWORK_BENCH_CAGE, or neither"),
+        };
+        println!("{} vertices, {}-vertex cage", input.points.len(), input.cage.n_vertices());
+        input
+    }
+
+    /// Binds at the default tau.
+    ///
+    /// # Panics
+    /// If the input cannot be bound.
+    #[must_use]
+    pub fn bind(&self, method: Method, solver: Solver, grid: u32, threads: usize) -> Binding {
+        let options = BindOptions { method, solver, grid, threads, ..BindOptions::default() };
+        bind(&self.points, &self.cage, &options, &Silent).expect("the input can be bound")
+    }
+
+    /// The embedded levels, as a bind makes them.
+    #[must_use]
+    pub fn hierarchy(&self, grid: u32) -> Hierarchy {
+        let grid = Grid::cubic(self.cage.bounds(), grid);
+        let lines = shoot_lines(&self.cage, &grid);
+        let (inside, _) = classify(&lines, &grid);
+        let cells = EmbeddedCells::finest(&self.cage, &lines, grid, inside);
+        Hierarchy::new(cells, self.cage.n_vertices(), EmbeddedCells::coarsened)
+    }
+
+    /// Sampling stencils of all vertices.
+    #[must_use]
+    pub fn stencils(&self, hierarchy: &Hierarchy) -> Stencils {
+        let sampler = Sampler::new(&self.cage, &hierarchy.levels[0]);
+        sampler.stencils(self.points.iter().map(|p| p.as_dvec3()))
+    }
+}
+
+fn read(path: &str) -> Model {
+    let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{path}: {error}"));
+    Model::read(path, &bytes, &mut |_| None).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// Solves one batch of columns as a bind does.
+pub fn solve_batch(workspace: &mut Workspace, hierarchy: &Hierarchy, batch: usize) {
+    let stop = Stop { tolerance: TAU / (hierarchy.n_batches() as f64).sqrt(), max_cycles: 20_000 };
+    let report = workspace.solve(hierarchy, batch, stop, |_, _| true);
+    debug_assert!(report.is_some(), "nobody cancels");
+}
+
+/// Solves all columns, one batch after the other in one workspace.
+pub fn solve_all(workspace: &mut Workspace, hierarchy: &Hierarchy) {
+    for batch in 0..hierarchy.n_batches() {
+        solve_batch(workspace, hierarchy, batch);
+    }
+}
+
+/// One workspace per batch, solved: so that a sweep over all columns meets every field in memory, not in the cache.
+#[must_use]
+pub fn resident_workspaces(hierarchy: &Hierarchy) -> Vec<Workspace> {
+    (0..hierarchy.n_batches())
+        .map(|batch| {
+            let mut workspace = Workspace::new(hierarchy);
+            solve_batch(&mut workspace, hierarchy, batch);
+            workspace
+        })
+        .collect()
+}
+
+/// Fastest of `times` calls, milliseconds: what the work takes when nothing else runs, also on a machine where at times
+/// something does.
+pub fn fastest_ms(times: usize, mut call: impl FnMut()) -> f64 {
+    let measured = (0..times.max(1)).map(|_| {
+        let begin = Instant::now();
+        call();
+        begin.elapsed().as_secs_f64() * 1e3
+    });
+    measured.fold(f64::INFINITY, f64::min)
+}

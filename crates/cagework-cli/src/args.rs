@@ -1,0 +1,363 @@
+//! The command line: what can be said, and what is refused before any work starts (exit code 2).
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use cagework_core::bind::{BindOptions, CellShape, DeltaNorm, Method, OutsidePolicy, Solver};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Bind a 3-D model to a cage by harmonic coordinates, then deform it by moving the cage.
+#[derive(Debug, Parser)]
+#[command(name = "cagework", version, propagate_version = true, max_term_width = 100)]
+#[command(
+    after_help = "Models and cages are read from .obj, .gltf and .glb files. Errors go to stderr; the exit \
+    code is 1 after an error and 2 after a wrong command line.\n\n\
+    Examples:\n  \
+    cagework demo\n  \
+    cagework info horse.glb\n  \
+    cagework bind horse.glb --cage cage.obj --weights horse.npz --report horse.json\n  \
+    cagework deform horse.glb --cage cage.obj --weights horse.npz --pose gallop.obj -o gallop.glb"
+)]
+pub(crate) struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// Print the result as JSON on stdout, and no text.
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Say what is in a model, and whether it would do as a cage.
+    Info(InfoArgs),
+    /// Compute the weights that tie a mesh to a cage.
+    Bind(BindArgs),
+    /// Move the cage, and the mesh with it.
+    Deform(DeformArgs),
+    /// Make a cage for a model: a subdivided box.
+    Cage(CageArgs),
+    /// Time the paper's way against the default, on one thread and on all.
+    Bench(BenchArgs),
+    /// Run the paper's evaluation anew: times, errors and reconstructions, as CSV, SVG, GLB and words.
+    Evaluate(EvaluateArgs),
+    /// Bind and deform the built-in sample, and say what happened.
+    Demo(DemoArgs),
+}
+
+/// `cagework info`
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:\n  cagework info horse.glb\n  cagework info cage.obj --json")]
+pub(crate) struct InfoArgs {
+    /// Model to look at (.obj, .gltf, .glb).
+    pub(crate) model: PathBuf,
+}
+
+/// `cagework bind`
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:\n  \
+    cagework bind horse.glb --cage cage.obj --weights horse.npz\n  \
+    cagework bind horse.glb --cage cage.obj -g 128 --sparsify 1e-5 --report horse.json\n  \
+    cagework bind horse.obj --cage box:3 --save-cage box.obj -o rest.glb\n  \
+    cagework bind horse.obj --cage cage.obj --method classic --threads 1   (the paper's way)")]
+pub(crate) struct BindArgs {
+    /// Mesh to bind (.obj, .gltf, .glb).
+    pub(crate) mesh: PathBuf,
+    /// Cage: a file, or box or box:DIVISIONS for a subdivided box around the mesh (box means box:2).
+    #[arg(long, value_name = "CAGE")]
+    pub(crate) cage: CageSource,
+    /// Cells along the longest side of the cage, 8 to 512.
+    #[arg(short, long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(8..=512))]
+    pub(crate) grid: u32,
+    /// Write the rest pose as the weights reconstruct it (.glb, .obj).
+    #[arg(short, long, value_name = "FILE", value_parser = model_output)]
+    pub(crate) output: Option<PathBuf>,
+    /// Write the weights (.npz; one row per vertex of the mesh file, one column per cage vertex).
+    #[arg(long, value_name = "FILE", value_parser = npz_output)]
+    pub(crate) weights: Option<PathBuf>,
+    /// Write the report as JSON; - for stdout.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) report: Option<PathBuf>,
+    /// Write the cage that was used (.obj).
+    #[arg(long, value_name = "FILE", value_parser = obj_output)]
+    pub(crate) save_cage: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) solve: SolveArgs,
+}
+
+/// How to solve: shared by `bind` and what else binds.
+#[derive(Args, Debug)]
+pub(crate) struct SolveArgs {
+    /// How the cage meets the grid: as published, or where it really is.
+    #[arg(long, value_enum, default_value_t = MethodArg::Embedded)]
+    method: MethodArg,
+    /// How Laplace's equation is solved [default: multigrid; jacobi with --method classic].
+    #[arg(long, value_enum)]
+    solver: Option<SolverArg>,
+    /// Threads; 0 for all.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    threads: usize,
+    /// Stop when delta (the paper's Eq. 2) falls below this.
+    #[arg(long, default_value = "1e-5", value_parser = positive)]
+    tau: f32,
+    /// Stop after this many Jacobi sweeps or V-cycles in any case.
+    #[arg(long, default_value_t = 20_000, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    max_iterations: u32,
+    /// Drop weights below this, then restore each row's sum and rest position; 0 keeps all.
+    #[arg(long, default_value_t = 0.0, value_name = "WEIGHT", value_parser = fraction)]
+    sparsify: f32,
+    /// Shape of the classic method's cells: of the cage's box (as published), or cubic.
+    #[arg(long, value_enum, default_value_t = CellsArg::Box)]
+    cells: CellsArg,
+    /// How Eq. 2 is read: as a Euclidean norm, or to the letter.
+    #[arg(long, value_enum, default_value_t = DeltaArg::Euclidean)]
+    delta: DeltaArg,
+    /// What to do with vertices outside the cage: bind them to its closest point, or end with an error.
+    #[arg(long, value_enum, default_value_t = OutsideArg::ClosestPoint)]
+    outside: OutsideArg,
+    /// Refuse to start above this much working memory, in MiB.
+    #[arg(long, default_value_t = 4096, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    memory_limit: u64,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value_t = BackendArg::Cpu)]
+    backend: BackendArg,
+}
+
+impl SolveArgs {
+    /// The options of a bind on `grid` cells.
+    pub(crate) fn options(&self, grid: u32) -> BindOptions {
+        // One back end so far: naming it is allowed, so that scripts can already say what they mean.
+        let BackendArg::Cpu = self.backend;
+        let method = match self.method {
+            MethodArg::Classic => Method::Classic,
+            MethodArg::Embedded => Method::Embedded,
+        };
+        let solver = match (self.solver, method) {
+            (Some(SolverArg::Jacobi), _) | (None, Method::Classic) => Solver::Jacobi,
+            (Some(SolverArg::Multigrid), _) | (None, Method::Embedded) => Solver::Multigrid,
+        };
+        BindOptions {
+            grid,
+            method,
+            solver,
+            cell_shape: match self.cells {
+                CellsArg::Box => CellShape::Box,
+                CellsArg::Cubic => CellShape::Cubic,
+            },
+            delta_norm: match self.delta {
+                DeltaArg::Euclidean => DeltaNorm::Euclidean,
+                DeltaArg::Literal => DeltaNorm::Literal,
+            },
+            threads: self.threads,
+            tau: self.tau,
+            max_iterations: self.max_iterations,
+            sparsify: self.sparsify,
+            memory_limit: self.memory_limit << 20,
+            outside: match self.outside {
+                OutsideArg::ClosestPoint => OutsidePolicy::ClosestPoint,
+                OutsideArg::Refuse => OutsidePolicy::Refuse,
+            },
+        }
+    }
+}
+
+/// `cagework deform`
+#[derive(Args, Debug)]
+#[command(
+    after_help = "One pose gives the deformed model, several give a GLB with one morph target per pose and an \
+    animation that plays them.\n\n\
+    Examples:\n  \
+    cagework deform horse.glb --cage cage.obj --weights horse.npz --pose gallop.obj -o gallop.glb\n  \
+    cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj -o poses.glb"
+)]
+pub(crate) struct DeformArgs {
+    /// The mesh that was bound (.obj, .gltf, .glb).
+    pub(crate) mesh: PathBuf,
+    /// The cage that it was bound to: a file, or the same box or box:DIVISIONS.
+    #[arg(long, value_name = "CAGE")]
+    pub(crate) cage: CageSource,
+    /// The weights that `cagework bind --weights` wrote.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) weights: PathBuf,
+    /// The cage, moved: same vertices in the same order. May be given several times.
+    #[arg(long, value_name = "FILE", required = true)]
+    pub(crate) pose: Vec<PathBuf>,
+    /// File to write (.glb, .obj).
+    #[arg(short, long, value_name = "FILE", value_parser = model_output)]
+    pub(crate) output: PathBuf,
+}
+
+/// `cagework cage`
+#[derive(Args, Debug)]
+#[command(after_help = "Example:\n  cagework cage horse.glb -o cage.obj --divisions 3")]
+pub(crate) struct CageArgs {
+    /// Model to make a cage for (.obj, .gltf, .glb).
+    pub(crate) model: PathBuf,
+    /// File to write (.obj).
+    #[arg(short, long, value_name = "FILE", value_parser = obj_output)]
+    pub(crate) output: PathBuf,
+    /// Quads along each edge of the box.
+    #[arg(long, default_value_t = DEFAULT_DIVISIONS, value_name = "N", value_parser = divisions)]
+    pub(crate) divisions: u32,
+    /// Room around the model, as a fraction of its bounding box's diagonal.
+    #[arg(long, default_value_t = DEFAULT_MARGIN, value_name = "FRACTION", value_parser = positive)]
+    pub(crate) margin: f32,
+}
+
+/// `cagework bench`
+#[derive(Args, Debug)]
+#[command(after_help = "Without a mesh, the built-in sample is timed.\n\n\
+    Examples:\n  cagework bench\n  cagework bench horse.obj --cage cage.obj -g 32,64,128 --runs 5 --json")]
+pub(crate) struct BenchArgs {
+    /// Mesh to bind (.obj, .gltf, .glb).
+    #[arg(requires = "cage")]
+    pub(crate) mesh: Option<PathBuf>,
+    /// Cage: a file, box or box:DIVISIONS.
+    #[arg(long, value_name = "CAGE", requires = "mesh")]
+    pub(crate) cage: Option<CageSource>,
+    /// Cells along the longest side of the cage; several, separated by commas.
+    #[arg(short, long, value_delimiter = ',', default_value = "64", value_parser = clap::value_parser!(u32).range(8..=512))]
+    pub(crate) grid: Vec<u32>,
+    /// Binds of each kind; medians are reported.
+    #[arg(long, default_value_t = 5, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) runs: u32,
+}
+
+/// `cagework evaluate`
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Examples:\n  cagework evaluate\n  cagework evaluate --mesh horse.obj --cage cage.obj -o horse"
+)]
+pub(crate) struct EvaluateArgs {
+    /// Mesh to bind (.obj, .gltf, .glb); the built-in sample unless given.
+    #[arg(long, requires = "cage")]
+    pub(crate) mesh: Option<PathBuf>,
+    /// Cage: a file, box or box:DIVISIONS.
+    #[arg(long, value_name = "CAGE")]
+    pub(crate) cage: Option<CageSource>,
+    /// Folder to write to; it is made if it is missing.
+    #[arg(short, long, value_name = "FOLDER", default_value = "evaluation")]
+    pub(crate) output: PathBuf,
+    /// Timed binds of each kind; the median is reported.
+    #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub(crate) runs: u32,
+}
+
+/// `cagework demo`
+#[derive(Args, Debug)]
+#[command(after_help = "Example:\n  cagework demo -o out")]
+pub(crate) struct DemoArgs {
+    /// Folder to write to; it is made if it is missing.
+    #[arg(short, long, value_name = "FOLDER", default_value = "out")]
+    pub(crate) output: PathBuf,
+}
+
+/// Quads along each edge of a box cage unless said otherwise.
+pub(crate) const DEFAULT_DIVISIONS: u32 = 2;
+/// Room around the model in a box cage, as a fraction of its bounding box's diagonal.
+pub(crate) const DEFAULT_MARGIN: f32 = 0.05;
+/// 16 divisions make 1,538 cage vertices: more than anyone moves by hand, and still solved in minutes.
+const MAX_DIVISIONS: u32 = 16;
+
+/// Where a cage comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum CageSource {
+    /// A file.
+    File(PathBuf),
+    /// A subdivided box around the mesh.
+    Box {
+        /// Quads along each edge.
+        divisions: u32,
+    },
+}
+
+impl FromStr for CageSource {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once(':') {
+            None if text == "box" => Ok(Self::Box { divisions: DEFAULT_DIVISIONS }),
+            Some(("box", number)) => Ok(Self::Box { divisions: divisions(number)? }),
+            _ => Ok(Self::File(PathBuf::from(text))),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum MethodArg {
+    Classic,
+    Embedded,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SolverArg {
+    Jacobi,
+    Multigrid,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum CellsArg {
+    Box,
+    Cubic,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum DeltaArg {
+    Euclidean,
+    Literal,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum OutsideArg {
+    ClosestPoint,
+    Refuse,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum BackendArg {
+    Cpu,
+}
+
+fn positive(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("not a positive number".into()),
+    }
+}
+
+fn fraction(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
+        _ => Err("not a number from 0 to below 1".into()),
+    }
+}
+
+fn divisions(text: &str) -> Result<u32, String> {
+    match text.parse() {
+        Ok(n) if (1..=MAX_DIVISIONS).contains(&n) => Ok(n),
+        _ => Err(format!("divisions of a box cage are a whole number from 1 to {MAX_DIVISIONS}")),
+    }
+}
+
+fn model_output(text: &str) -> Result<PathBuf, String> {
+    output(text, &["glb", "obj"])
+}
+
+fn npz_output(text: &str) -> Result<PathBuf, String> {
+    output(text, &["npz"])
+}
+
+fn obj_output(text: &str) -> Result<PathBuf, String> {
+    output(text, &["obj"])
+}
+
+fn output(text: &str, extensions: &[&str]) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let given = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    if extensions.contains(&given.as_str()) {
+        return Ok(path);
+    }
+    let known = extensions.iter().map(|e| format!(".{e}")).collect::<Vec<_>>().join(" or ");
+    Err(format!("the name must end in {known}"))
+}

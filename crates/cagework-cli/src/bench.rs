@@ -1,0 +1,222 @@
+//! `cagework bench`: the paper's way and the default, on one thread and on all, in one process.
+
+use std::fmt::Write as _;
+
+use cagework_core::bind::{BindOptions, Method, Solver};
+use cagework_core::report::Timings;
+use cagework_core::{BindReport, Cage};
+use cagework_io::Model;
+use serde::Serialize;
+
+use crate::args::{BenchArgs, CageSource, DEFAULT_DIVISIONS};
+use crate::bind::bind_model;
+use crate::card::duration;
+use crate::error::CliError;
+use crate::files::{json, print};
+use crate::load::{generated_model, load_cage, load_model};
+use crate::sample;
+
+/// Results of all grids; its JSON is the output of `--json`.
+#[derive(Debug, Serialize)]
+struct Bench {
+    mesh: String,
+    vertices: usize,
+    cage_vertices: usize,
+    /// Threads of the machine, which "all threads" means.
+    threads: usize,
+    runs: u32,
+    grids: Vec<GridBench>,
+}
+
+/// Results on one grid.
+#[derive(Debug, Serialize)]
+struct GridBench {
+    grid: u32,
+    cases: Vec<Case>,
+    /// Quotients of median total times.
+    ratios: Ratios,
+}
+
+/// One kind of bind.
+#[derive(Debug, Serialize)]
+struct Case {
+    method: Method,
+    solver: Solver,
+    threads: usize,
+    iterations: u32,
+    converged: bool,
+    /// Medians of the stages, each over all runs.
+    median_ms: Timings,
+    min_total_ms: f64,
+    max_total_ms: f64,
+}
+
+/// How many times faster, by the medians of the whole bind.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Ratios {
+    /// Classic Jacobi over embedded multigrid, both on one thread.
+    classic_over_embedded_one_thread: f64,
+    /// Classic Jacobi over embedded multigrid, both on all threads.
+    classic_over_embedded_all_threads: f64,
+    /// Classic Jacobi on one thread over all threads.
+    classic_threads: f64,
+    /// Embedded multigrid on one thread over all threads.
+    embedded_threads: f64,
+}
+
+/// Method, solver, threads (0: all), in the order of [`Ratios::of`].
+const CASES: [(Method, Solver, usize); 4] = [
+    (Method::Classic, Solver::Jacobi, 1),
+    (Method::Classic, Solver::Jacobi, 0),
+    (Method::Embedded, Solver::Multigrid, 1),
+    (Method::Embedded, Solver::Multigrid, 0),
+];
+
+/// Runs `cagework bench`.
+///
+/// # Errors
+/// When a file cannot be read or a bind fails or is cancelled.
+pub(crate) fn run(args: &BenchArgs, as_json: bool) -> Result<(), CliError> {
+    let (name, model, cage) = match (&args.mesh, &args.cage) {
+        (Some(mesh), Some(cage)) => {
+            let model = load_model(mesh)?;
+            let cage = load_cage(cage, &model)?.cage;
+            (mesh.display().to_string(), model, cage)
+        }
+        _ => built_in()?,
+    };
+    let grids =
+        args.grid.iter().map(|&g| bench_grid(&model, &cage, g, args.runs)).collect::<Result<_, _>>()?;
+    let bench = Bench {
+        mesh: name,
+        vertices: model.positions.len(),
+        cage_vertices: cage.positions().len(),
+        threads: std::thread::available_parallelism().map_or(1, usize::from),
+        runs: args.runs,
+        grids,
+    };
+    print(&if as_json { json(&bench) } else { text(&bench) })
+}
+
+fn built_in() -> Result<(String, Model, Cage), CliError> {
+    let model = generated_model("creature.obj", &sample::creature())?;
+    let cage = load_cage(&CageSource::Box { divisions: DEFAULT_DIVISIONS }, &model)?.cage;
+    Ok(("built-in sample".into(), model, cage))
+}
+
+fn bench_grid(model: &Model, cage: &Cage, grid: u32, runs: u32) -> Result<GridBench, CliError> {
+    let mut reports: [Vec<BindReport>; CASES.len()] = Default::default();
+    // Round-robin: a machine that slows down meanwhile slows all cases alike, so ratios hold.
+    for _ in 0..runs {
+        for (reports, (method, solver, threads)) in reports.iter_mut().zip(CASES) {
+            let options = BindOptions { grid, method, solver, threads, ..BindOptions::default() };
+            reports.push(bind_model(model, cage, &options)?.report);
+        }
+    }
+    let cases = reports.each_ref().map(|reports| Case::of(reports));
+    let ratios = Ratios::of(&cases);
+    Ok(GridBench { grid, cases: cases.into(), ratios })
+}
+
+impl Case {
+    /// The case that all `reports` are of, at least one.
+    fn of(reports: &[BindReport]) -> Self {
+        let sorted = |time: fn(&Timings) -> f64| -> Vec<f64> {
+            let mut times: Vec<f64> = reports.iter().map(|r| time(&r.timings_ms)).collect();
+            times.sort_by(f64::total_cmp);
+            times
+        };
+        let total = sorted(|t| t.total);
+        let last = &reports[reports.len() - 1];
+        Self {
+            method: last.method,
+            solver: last.solver,
+            threads: last.threads,
+            iterations: last.iterations,
+            converged: last.converged,
+            median_ms: Timings {
+                voxelize: median(&sorted(|t| t.voxelize)),
+                solve: median(&sorted(|t| t.solve)),
+                sample: median(&sorted(|t| t.sample)),
+                total: median(&total),
+            },
+            min_total_ms: total[0],
+            max_total_ms: total[total.len() - 1],
+        }
+    }
+}
+
+impl Ratios {
+    fn of(cases: &[Case; CASES.len()]) -> Self {
+        let [classic_one, classic_all, embedded_one, embedded_all] =
+            cases.each_ref().map(|case| case.median_ms.total);
+        Self {
+            classic_over_embedded_one_thread: classic_one / embedded_one,
+            classic_over_embedded_all_threads: classic_all / embedded_all,
+            classic_threads: classic_one / classic_all,
+            embedded_threads: embedded_one / embedded_all,
+        }
+    }
+}
+
+/// Median of sorted values, at least one.
+fn median(sorted: &[f64]) -> f64 {
+    let n = sorted.len();
+    0.5 * (sorted[(n - 1) / 2] + sorted[n / 2])
+}
+
+fn text(bench: &Bench) -> String {
+    let mut out = format!(
+        "{}: {} vertices, {} cage vertices; medians of {} binds\n",
+        bench.mesh, bench.vertices, bench.cage_vertices, bench.runs
+    );
+    for grid in &bench.grids {
+        let _ = writeln!(
+            out,
+            "\ngrid {}\n  {:<22}{:>8}{:>12}{:>12}{:>12}{:>12}{:>12}",
+            grid.grid, "method", "threads", "iterations", "voxelize", "solve", "sample", "total"
+        );
+        for case in &grid.cases {
+            let name = match case.method {
+                Method::Classic => "classic Jacobi",
+                Method::Embedded => "embedded multigrid",
+            };
+            let t = case.median_ms;
+            let _ = writeln!(
+                out,
+                "  {name:<22}{:>8}{:>12}{:>12}{:>12}{:>12}{:>12}{}",
+                case.threads,
+                case.iterations,
+                duration(t.voxelize),
+                duration(t.solve),
+                duration(t.sample),
+                duration(t.total),
+                if case.converged { "" } else { "  NOT converged" }
+            );
+        }
+        let r = grid.ratios;
+        let _ = writeln!(
+            out,
+            "  embedded multigrid is {:.0} times as fast as classic Jacobi on one thread, {:.0} times on all;\n  \
+             all threads are {:.2} times as fast as one for classic Jacobi, {:.2} times for embedded multigrid",
+            r.classic_over_embedded_one_thread,
+            r.classic_over_embedded_all_threads,
+            r.classic_threads,
+            r.embedded_threads
+        );
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::median;
+
+    #[test]
+    #[expect(clippy::float_cmp, reason = "halves of small whole numbers are exact")]
+    fn median_is_the_middle_or_between_the_two_in_the_middle() {
+        assert_eq!(median(&[3.0]), 3.0);
+        assert_eq!(median(&[1.0, 2.0, 9.0]), 2.0);
+        assert_eq!(median(&[1.0, 2.0, 5.0, 9.0]), 3.5);
+    }
+}

@@ -1,0 +1,86 @@
+//! `cagework bind`: from a mesh and a cage to weights, a report and the reconstructed rest pose.
+
+use std::path::{Path, PathBuf};
+
+use cagework_core::bind::{BindOptions, Binding};
+use cagework_core::deform::deform_bound;
+use cagework_core::{Cage, bind};
+use cagework_io::{Model, write_cage_obj, write_weights_npz};
+use glam::Vec3;
+
+use crate::args::{BindArgs, CageSource};
+use crate::card;
+use crate::error::CliError;
+use crate::files::{check_outputs, json, print, write};
+use crate::load::{load_cage, load_model};
+use crate::progress::Bar;
+
+/// Runs `cagework bind`.
+///
+/// # Errors
+/// When a file cannot be read or written, the cage is no cage, or the bind fails or is cancelled.
+pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
+    let report_file = args.report.as_deref().filter(|path| *path != Path::new("-"));
+    let report_to_stdout = as_json || (args.report.is_some() && report_file.is_none());
+    let outputs: Vec<&Path> =
+        [args.output.as_deref(), args.weights.as_deref(), report_file, args.save_cage.as_deref()]
+            .into_iter()
+            .flatten()
+            .collect();
+    let mut inputs = vec![args.mesh.as_path()];
+    if let CageSource::File(path) = &args.cage {
+        inputs.push(path);
+    }
+    check_outputs(&outputs, &inputs)?;
+
+    let model = load_model(&args.mesh)?;
+    let cage = load_cage(&args.cage, &model)?.cage;
+    let binding = bind_model(&model, &cage, &args.solve.options(args.grid))?;
+
+    if let Some(path) = &args.weights {
+        write(path, &write_weights_npz(&binding.weights, &binding.outside))?;
+    }
+    if let Some(path) = &args.output {
+        write(path, &export(&model, &deform(&binding, cage.positions()), path)?)?;
+    }
+    if let Some(path) = &args.save_cage {
+        write(path, &write_cage_obj(&cage.to_polygon_mesh()))?;
+    }
+    let report = json(&binding.report);
+    if let Some(path) = report_file {
+        write(path, report.as_bytes())?;
+    }
+    if report_to_stdout {
+        return print(&report);
+    }
+    let written: Vec<PathBuf> = outputs.iter().map(|path| path.to_path_buf()).collect();
+    print(&card::of(&binding.report, &model.notices, &written))
+}
+
+/// Binds all vertices of a model, with progress on the terminal.
+///
+/// # Errors
+/// When the bind fails or is cancelled.
+pub(crate) fn bind_model(model: &Model, cage: &Cage, options: &BindOptions) -> Result<Binding, CliError> {
+    let bar = Bar::start();
+    Ok(bind(&model.positions, cage, options, &bar)?)
+}
+
+/// Where the bound vertices go for a posed cage. `[n_vertices]`, object units.
+pub(crate) fn deform(binding: &Binding, cage_positions: &[Vec3]) -> Vec<Vec3> {
+    deform_bound(&binding.weights, &binding.outside, cage_positions)
+}
+
+/// The model's own document with new positions, in the format that the name asks for.
+///
+/// # Errors
+/// When the model cannot be written in that format.
+pub(crate) fn export(model: &Model, positions: &[Vec3], path: &Path) -> Result<Vec<u8>, CliError> {
+    let bytes = if is_obj(path) { model.write_obj(positions) } else { model.write_glb(positions) };
+    bytes.map_err(|e| CliError::file(path, e))
+}
+
+/// Whether a name asks for an OBJ; the command line has let only .obj and .glb through.
+pub(crate) fn is_obj(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"))
+}

@@ -1,0 +1,121 @@
+//! The result card: a bind's report in a dozen lines for people.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use cagework_core::BindReport;
+use cagework_core::bind::{CellShape, Method, Solver};
+
+/// Lines on one bind. `model_notices`: what reading the mesh had to say; `written`: files that were written.
+pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathBuf]) -> String {
+    let mut out = format!("bound {} vertices to {} cage vertices\n", report.vertices, report.cage_vertices);
+    let mut row = |name: &str, value: String| {
+        let _ = writeln!(out, "  {name:<12}{value}");
+    };
+    let threads = if report.threads == 1 { "1 thread".into() } else { format!("{} threads", report.threads) };
+    row("method", format!("{}, {}, {} ({threads})", method(report), solver(report.solver), report.backend));
+    let [x, y, z] = report.dims;
+    row("grid", format!("{} ({x} x {y} x {z} cells)", report.grid));
+    let cells = report.cells;
+    row(
+        "cells",
+        format!("{} interior, {} boundary, {} exterior", cells.interior, cells.boundary, cells.exterior),
+    );
+    let unit = match report.solver {
+        Solver::Jacobi => "sweeps",
+        Solver::Multigrid => "V-cycles",
+    };
+    let delta = report.delta_history.last().map_or(String::new(), |d| format!(", delta {d:.1e}"));
+    let state = if report.converged { "converged" } else { "NOT converged" };
+    row("solve", format!("{} {unit}, {state}{delta}", report.iterations));
+    let t = report.timings_ms;
+    row(
+        "time",
+        format!(
+            "{} (voxelize {}, solve {}, sample {})",
+            duration(t.total),
+            duration(t.voxelize),
+            duration(t.solve),
+            duration(t.sample)
+        ),
+    );
+    let memory = report.memory_bytes;
+    row("memory", format!("{} (estimated {})", mebibytes(memory.peak), mebibytes(memory.estimated)));
+    let error = report.rest_error;
+    row(
+        "rest error",
+        format!("mean {:.1e}, max {:.1e} of the cage's diagonal", error.mean_rel, error.max_rel),
+    );
+    let weights = report.weights;
+    row(
+        "weights",
+        format!(
+            "{} stored ({:.1} per vertex), min {:.1e}, |sum - 1| at most {:.1e}",
+            weights.nonzeros,
+            weights.nonzeros as f64 / report.vertices.max(1) as f64,
+            weights.min,
+            weights.max_sum_error
+        ),
+    );
+    row("outside", format!("{} vertices outside the cage", report.outside_vertices));
+
+    if !report.converged {
+        let _ = writeln!(
+            out,
+            "warning: delta did not fall below {:e} within {} iterations: raise --max-iterations or --tau",
+            report.tau, report.iterations
+        );
+    }
+    if report.ambiguous_cells > 0 {
+        let _ = writeln!(out, "note: the axes disagree about {} cells of the grid", report.ambiguous_cells);
+    }
+    for notice in model_notices.iter().chain(&report.notices) {
+        let _ = writeln!(out, "note: {notice}");
+    }
+    for path in written {
+        let _ = writeln!(out, "wrote {}", path.display());
+    }
+    out
+}
+
+fn method(report: &BindReport) -> &'static str {
+    match (report.method, report.cell_shape) {
+        (Method::Embedded, _) => "embedded",
+        (Method::Classic, CellShape::Box) => "classic",
+        (Method::Classic, CellShape::Cubic) => "classic with cubic cells",
+    }
+}
+
+fn solver(solver: Solver) -> &'static str {
+    match solver {
+        Solver::Jacobi => "Jacobi",
+        Solver::Multigrid => "multigrid",
+    }
+}
+
+/// Milliseconds for people.
+pub(crate) fn duration(ms: f64) -> String {
+    if ms < 10.0 {
+        format!("{ms:.1} ms")
+    } else if ms < 1000.0 {
+        format!("{ms:.0} ms")
+    } else {
+        format!("{:.2} s", ms / 1000.0)
+    }
+}
+
+fn mebibytes(bytes: u64) -> String {
+    format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::duration;
+
+    #[test]
+    fn durations_choose_their_unit() {
+        assert_eq!(duration(0.44), "0.4 ms");
+        assert_eq!(duration(46.2), "46 ms");
+        assert_eq!(duration(12_345.0), "12.35 s");
+    }
+}

@@ -1,0 +1,116 @@
+//! `cagework deform`: the mesh follows a moved cage.
+
+use std::path::Path;
+use std::time::Instant;
+
+use cagework_core::deform::deform_bound;
+use cagework_io::read_weights_npz;
+use glam::Vec3;
+use serde::Serialize;
+
+use crate::args::{CageSource, DeformArgs};
+use crate::bind::{export, is_obj};
+use crate::error::CliError;
+use crate::files::{check_outputs, json, print, read, write};
+use crate::load::{load_cage, load_model};
+
+/// What was done; its JSON is the output of `--json`.
+#[derive(Debug, Serialize)]
+struct Deformed {
+    output: String,
+    vertices: usize,
+    cage_vertices: usize,
+    outside_vertices: usize,
+    poses: Vec<String>,
+    /// Computing all poses, without reading and writing files.
+    deform_ms: f64,
+    notices: Vec<String>,
+}
+
+/// Runs `cagework deform`.
+///
+/// # Errors
+/// When a file cannot be read or written, or files do not belong together.
+pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
+    let mut inputs = vec![args.mesh.as_path(), args.weights.as_path()];
+    inputs.extend(args.pose.iter().map(AsRef::<Path>::as_ref));
+    if let CageSource::File(path) = &args.cage {
+        inputs.push(path);
+    }
+    check_outputs(&[&args.output], &inputs)?;
+    if is_obj(&args.output) && args.pose.len() > 1 {
+        return Err(CliError::Mismatch {
+            message: format!(
+                "{}: an OBJ holds one pose, but {} were given",
+                args.output.display(),
+                args.pose.len()
+            ),
+            hint: "write a .glb, which gets one morph target per pose, or run the command once per pose",
+        });
+    }
+
+    let model = load_model(&args.mesh)?;
+    let cage = load_cage(&args.cage, &model)?;
+    let (weights, outside) =
+        read_weights_npz(&read(&args.weights)?).map_err(|e| CliError::file(&args.weights, e))?;
+    let n_vertices = model.positions.len();
+    let n_cage = cage.cage.positions().len();
+    if (weights.n_rows(), weights.n_columns()) != (n_vertices, n_cage) {
+        return Err(CliError::Mismatch {
+            message: format!(
+                "{}: holds weights of {} mesh vertices for {} cage vertices, but the mesh has {n_vertices} \
+                 vertices and the cage {n_cage}",
+                args.weights.display(),
+                weights.n_rows(),
+                weights.n_columns(),
+            ),
+            hint: "use the mesh and the cage that were bound, or bind these two",
+        });
+    }
+    let poses = args.pose.iter().map(|path| cage.load_pose(path)).collect::<Result<Vec<_>, _>>()?;
+
+    let started = Instant::now();
+    let deformed: Vec<Vec<Vec3>> = poses.iter().map(|pose| deform_bound(&weights, &outside, pose)).collect();
+    let deform_ms = started.elapsed().as_secs_f64() * 1e3;
+
+    let names: Vec<String> = args.pose.iter().map(|path| pose_name(path)).collect();
+    let bytes = if let [only] = deformed.as_slice() {
+        export(&model, only, &args.output)?
+    } else {
+        let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(deformed).collect();
+        model.write_glb_poses(&model.positions, &named).map_err(|e| CliError::file(&args.output, e))?
+    };
+    write(&args.output, &bytes)?;
+
+    let done = Deformed {
+        output: args.output.display().to_string(),
+        vertices: n_vertices,
+        cage_vertices: n_cage,
+        outside_vertices: outside.len(),
+        poses: names,
+        deform_ms,
+        notices: model.notices,
+    };
+    print(&if as_json { json(&done) } else { text(&done) })
+}
+
+/// A pose is called as its file is, without folder and ending.
+fn pose_name(path: &Path) -> String {
+    path.file_stem().map_or_else(|| "pose".into(), |stem| stem.to_string_lossy().into_owned())
+}
+
+fn text(done: &Deformed) -> String {
+    let poses = if let [only] = done.poses.as_slice() {
+        format!("pose {only}")
+    } else {
+        format!("{} poses as morph targets ({}) and an animation", done.poses.len(), done.poses.join(", "))
+    };
+    let mut out = format!(
+        "deformed {} vertices by {} cage vertices in {:.1} ms\nwrote {}: {poses}\n",
+        done.vertices, done.cage_vertices, done.deform_ms, done.output
+    );
+    for notice in &done.notices {
+        out += &format!("note: {notice}\n");
+    }
+    out
+}

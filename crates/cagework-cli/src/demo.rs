@@ -1,0 +1,111 @@
+//! `cagework demo`: the whole way once, on the built-in sample.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use cagework_core::bind::BindOptions;
+use cagework_core::{BindReport, PolygonMesh};
+use cagework_io::{Model, write_cage_obj, write_weights_npz};
+use glam::Vec3;
+use serde::Serialize;
+
+use crate::args::{CageSource, DEFAULT_DIVISIONS, DemoArgs};
+use crate::bind::{bind_model, deform};
+use crate::card;
+use crate::error::CliError;
+use crate::files::{json, make_folder, print, write};
+use crate::load::{generated_model, load_cage};
+use crate::sample;
+
+/// What was done; its JSON is the output of `--json`.
+#[derive(Debug, Serialize)]
+struct Done<'a> {
+    folder: String,
+    files: Vec<String>,
+    total_ms: f64,
+    report: &'a BindReport,
+}
+
+/// Runs `cagework demo`.
+///
+/// # Errors
+/// When the folder cannot be written to or the bind is cancelled.
+pub(crate) fn run(args: &DemoArgs, as_json: bool) -> Result<(), CliError> {
+    let started = Instant::now();
+    let folder = args.output.as_path();
+    make_folder(folder)?;
+    let mut files = Files { folder, written: Vec::new() };
+
+    let creature = sample::creature();
+    let model = generated_model("creature.obj", &creature)?;
+    let cage = load_cage(&CageSource::Box { divisions: DEFAULT_DIVISIONS }, &model)?.cage;
+    let binding = bind_model(&model, &cage, &BindOptions::default())?;
+
+    files.write("creature.obj", &write_cage_obj(&creature))?;
+    files.write("cage.obj", &write_cage_obj(&cage.to_polygon_mesh()))?;
+    files.write("weights.npz", &write_weights_npz(&binding.weights, &binding.outside))?;
+    files.write("report.json", json(&binding.report).as_bytes())?;
+    files.write_glb("rest.glb", &model, &deform(&binding, cage.positions()))?;
+    let mut poses = Vec::new();
+    for (name, posed) in [("bow", sample::bow(cage.positions())), ("twist", sample::twist(cage.positions()))]
+    {
+        let deformed = deform(&binding, &posed);
+        files.write_glb(&format!("{name}.glb"), &model, &deformed)?;
+        let cage = PolygonMesh { positions: posed, ..cage.to_polygon_mesh() };
+        files.write(&format!("{name}-cage.obj"), &write_cage_obj(&cage))?;
+        poses.push((name.to_owned(), deformed));
+    }
+    let animated = model.write_glb_poses(&model.positions, &poses).map_err(|e| CliError::file(folder, e))?;
+    files.write("poses.glb", &animated)?;
+
+    let total_ms = started.elapsed().as_secs_f64() * 1e3;
+    if as_json {
+        let written = files.written.iter().map(|path| path.display().to_string()).collect();
+        let folder = folder.display().to_string();
+        return print(&json(&Done { folder, files: written, total_ms, report: &binding.report }));
+    }
+    print(&text(folder, &binding.report, &files.written, total_ms))
+}
+
+/// Files of one folder.
+struct Files<'a> {
+    folder: &'a Path,
+    written: Vec<PathBuf>,
+}
+
+impl Files<'_> {
+    fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), CliError> {
+        let path = self.folder.join(name);
+        write(&path, bytes)?;
+        self.written.push(path);
+        Ok(())
+    }
+
+    fn write_glb(&mut self, name: &str, model: &Model, positions: &[Vec3]) -> Result<(), CliError> {
+        let bytes = model.write_glb(positions).map_err(|e| CliError::file(&self.folder.join(name), e))?;
+        self.write(name, &bytes)
+    }
+}
+
+fn text(folder: &Path, report: &BindReport, written: &[PathBuf], total_ms: f64) -> String {
+    let at = |name: &str| folder.join(name).display().to_string();
+    format!(
+        "Cagework made a creature of {} vertices and a box cage of {} vertices around it, bound one to the other by \
+         harmonic coordinates in {}, and moved the cage twice. All in all {}.\n\n\
+         {}\n\
+         Look at {} (the creature bows and twists). To go on from here:\n  \
+         cagework deform {} --cage {} --weights {} --pose {} -o {}\n\
+         where cagework is target/release/cagework, and the pose any edit of the cage that keeps its vertices.",
+        report.vertices,
+        report.cage_vertices,
+        card::duration(report.timings_ms.total),
+        card::duration(total_ms),
+        card::of(report, &[], written),
+        at("poses.glb"),
+        at("creature.obj"),
+        at("cage.obj"),
+        at("weights.npz"),
+        at("bow-cage.obj"),
+        at("mine.glb"),
+    )
+}

@@ -1,0 +1,89 @@
+//! What can go wrong with a command, said once on stderr.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use cagework_core::bind::BindError;
+use cagework_core::cage::CageError;
+use thiserror::Error;
+
+/// Why a command failed.
+#[derive(Debug, Error)]
+pub(crate) enum CliError {
+    /// Something about a file.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What about it.
+        source: Box<dyn Error + Send + Sync>,
+    },
+    /// A file's own reader already names it.
+    #[error(transparent)]
+    Read(#[from] cagework_io::ReadError),
+    /// A pose is not one of the cage.
+    #[error(transparent)]
+    Pose(#[from] cagework_io::PoseError),
+    /// The cage is not one.
+    #[error("{name}: {source}")]
+    Cage {
+        /// File or description of the cage.
+        name: String,
+        /// What is wrong with it.
+        source: CageError,
+    },
+    /// The bind did not come about.
+    #[error(transparent)]
+    Bind(#[from] BindError),
+    /// A plot could not be drawn.
+    #[error("a plot cannot be drawn: {message}")]
+    Plot {
+        /// Why.
+        message: String,
+    },
+    /// Files that do not belong together, outputs that would destroy inputs and the like.
+    #[error("{message}")]
+    Mismatch {
+        /// What is wrong, with both numbers or names.
+        message: String,
+        /// What to do.
+        hint: &'static str,
+    },
+}
+
+impl CliError {
+    /// A failure that concerns one file.
+    pub(crate) fn file(path: &Path, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self::File { path: path.to_path_buf(), source: source.into() }
+    }
+
+    /// The whole message: the error and its causes, each once.
+    pub(crate) fn message(&self) -> String {
+        let mut text = self.to_string();
+        let mut cause = self.source();
+        while let Some(error) = cause {
+            let said = error.to_string();
+            // Some errors quote their cause, others leave that to us.
+            if !text.contains(&said) {
+                text = format!("{text}: {said}");
+            }
+            cause = error.source();
+        }
+        text
+    }
+
+    /// What to do about it, where that is known and not yet said.
+    pub(crate) fn hint(&self) -> Option<&'static str> {
+        match self {
+            Self::Mismatch { hint, .. } => Some(hint),
+            Self::Cage { source: CageError::Empty, .. } => {
+                Some("a cage is a closed mesh around the model; `--cage box` makes a simple one")
+            }
+            Self::Bind(BindError::Outside { .. }) => {
+                Some("`--outside closest-point` binds such vertices to the closest point of the cage")
+            }
+            Self::Bind(BindError::Memory { .. }) => Some("the limit is set by --memory-limit, in MiB"),
+            _ => None,
+        }
+    }
+}

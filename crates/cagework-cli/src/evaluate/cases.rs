@@ -1,0 +1,215 @@
+//! What is run: the paper's cases, and ours beside them.
+
+use cagework_core::bind::{BindOptions, Binding, Method, Solver};
+use cagework_core::{BindReport, Cage, Weights};
+use cagework_io::Model;
+use serde::Serialize;
+
+use crate::args::EvaluateArgs;
+use crate::bind::bind_model;
+use crate::error::CliError;
+
+/// A way to the weights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Way {
+    /// The published algorithm on one thread.
+    PaperOneThread,
+    /// The same on all threads.
+    PaperThreads,
+    /// Embedded multigrid on one thread.
+    MultigridOneThread,
+    /// Embedded multigrid on all threads.
+    MultigridThreads,
+}
+
+impl Way {
+    /// In the order of the plots.
+    pub(super) const ALL: [Self; 4] =
+        [Self::PaperOneThread, Self::PaperThreads, Self::MultigridOneThread, Self::MultigridThreads];
+
+    /// Name in tables and plots.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::PaperOneThread => "paper, one thread",
+            Self::PaperThreads => "paper, all threads",
+            Self::MultigridOneThread => "multigrid, one thread",
+            Self::MultigridThreads => "multigrid, all threads",
+        }
+    }
+
+    /// Name in CSV files.
+    pub(super) fn id(self) -> &'static str {
+        match self {
+            Self::PaperOneThread => "paper-one-thread",
+            Self::PaperThreads => "paper-threads",
+            Self::MultigridOneThread => "multigrid-one-thread",
+            Self::MultigridThreads => "multigrid-threads",
+        }
+    }
+
+    /// Whether it is the paper's method.
+    pub(super) fn is_paper(self) -> bool {
+        matches!(self, Self::PaperOneThread | Self::PaperThreads)
+    }
+
+    fn options(self, grid: u32, tau: f32) -> BindOptions {
+        let threads = match self {
+            Self::PaperOneThread | Self::MultigridOneThread => 1,
+            Self::PaperThreads | Self::MultigridThreads => 0,
+        };
+        let (method, solver) = if self.is_paper() {
+            (Method::Classic, Solver::Jacobi)
+        } else {
+            (Method::Embedded, Solver::Multigrid)
+        };
+        BindOptions { grid, tau, method, solver, threads, ..BindOptions::default() }
+    }
+}
+
+/// One bind of the evaluation.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Run {
+    pub(super) way: Way,
+    pub(super) report: BindReport,
+}
+
+impl Run {
+    /// (milliseconds of solving, delta) after each iteration. Iterations of one solve cost the same.
+    pub(super) fn delta_over_time(&self) -> impl Iterator<Item = (f64, f32)> + '_ {
+        let each = self.report.timings_ms.solve / f64::from(self.report.iterations.max(1));
+        self.report.delta_history.iter().enumerate().map(move |(k, &delta)| (each * (k + 1) as f64, delta))
+    }
+}
+
+/// A reconstruction of the rest pose: figures 2 to 5.
+#[derive(Clone, Debug)]
+pub(super) struct Reconstruction {
+    /// File name without its end.
+    pub(super) figure: &'static str,
+    /// What it shows.
+    pub(super) caption: &'static str,
+    pub(super) report: BindReport,
+    pub(super) weights: Weights,
+}
+
+/// Everything that was run.
+#[derive(Clone, Debug)]
+pub(super) struct Evaluation {
+    pub(super) mesh: String,
+    pub(super) n_vertices: usize,
+    pub(super) n_cage: usize,
+    pub(super) threads: usize,
+    pub(super) runs: u32,
+    /// Figures 8 to 11: every way at every g and tau; medians of the total time.
+    pub(super) timed: Vec<Run>,
+    /// Figure 12.
+    pub(super) errors: Vec<Run>,
+    pub(super) reconstructions: Vec<Reconstruction>,
+}
+
+/// The JSON of `--json`.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary<'a> {
+    mesh: &'a str,
+    vertices: usize,
+    cage_vertices: usize,
+    threads: usize,
+    runs: u32,
+    timed: &'a [Run],
+    errors: &'a [Run],
+}
+
+/// Grids and thresholds of figures 8 to 11.
+pub(super) const TIMED_GRIDS: [u32; 2] = [32, 64];
+/// See [`TIMED_GRIDS`].
+pub(super) const TIMED_TAUS: [f32; 2] = [1e-4, 1e-5];
+/// Grids and thresholds of figure 12.
+pub(super) const ERROR_GRIDS: [u32; 3] = [16, 32, 64];
+/// See [`ERROR_GRIDS`].
+pub(super) const ERROR_TAUS: [f32; 3] = [1e-3, 1e-4, 1e-5];
+
+impl Evaluation {
+    /// Runs all cases.
+    pub(super) fn run(name: &str, model: &Model, cage: &Cage, args: &EvaluateArgs) -> Result<Self, CliError> {
+        let bind = |way: Way, grid, tau| -> Result<Binding, CliError> {
+            eprintln!("{}, g = {grid}, tau = {tau:e}", way.name());
+            bind_model(model, cage, &way.options(grid, tau))
+        };
+        let (mut timed, mut errors) = (Vec::new(), Vec::new());
+        for grid in TIMED_GRIDS {
+            for tau in TIMED_TAUS {
+                for way in Way::ALL {
+                    let mut reports = (0..args.runs)
+                        .map(|_| bind(way, grid, tau).map(|b| b.report))
+                        .collect::<Result<Vec<_>, _>>()?;
+                    reports.sort_by(|a, b| a.timings_ms.total.total_cmp(&b.timings_ms.total));
+                    let report = reports.swap_remove(reports.len() / 2);
+                    timed.push(Run { way, report });
+                }
+            }
+        }
+        for grid in ERROR_GRIDS {
+            for tau in ERROR_TAUS {
+                let way = Way::PaperThreads;
+                errors.push(Run { way, report: bind(way, grid, tau)?.report });
+            }
+            let way = Way::MultigridThreads;
+            errors.push(Run { way, report: bind(way, grid, 1e-5)?.report });
+        }
+        let figures: [(&str, &str, Way, u32, f32); 4] = [
+            ("figure-2", "g = 32, tau = 1e-3: insufficient smoothing", Way::PaperThreads, 32, 1e-3),
+            ("figure-3", "g = 32, tau = 1e-5", Way::PaperThreads, 32, 1e-5),
+            ("figure-4", "g = 16, tau = 1e-5: quantisation", Way::PaperThreads, 16, 1e-5),
+            ("figure-5-ours", "embedded multigrid, g = 16, tau = 1e-5", Way::MultigridThreads, 16, 1e-5),
+        ];
+        let reconstructions = figures
+            .into_iter()
+            .map(|(figure, caption, way, grid, tau)| {
+                let Binding { weights, report, .. } = bind(way, grid, tau)?;
+                Ok(Reconstruction { figure, caption, report, weights })
+            })
+            .collect::<Result<_, CliError>>()?;
+        Ok(Self {
+            mesh: name.to_owned(),
+            n_vertices: model.positions.len(),
+            n_cage: cage.n_vertices(),
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            runs: args.runs,
+            timed,
+            errors,
+            reconstructions,
+        })
+    }
+
+    /// The timed run of a way at one g and tau.
+    pub(super) fn timed(&self, way: Way, grid: u32, tau: f32) -> Option<&Run> {
+        self.timed.iter().find(|run| run.way == way && run.report.grid == grid && run.report.tau == tau)
+    }
+
+    /// The run of figure 7.
+    pub(super) fn delta_run(&self, way: Way) -> Option<&Run> {
+        self.timed(way, 32, 1e-5)
+    }
+
+    /// Mean error over the cage's diagonal at one g and tau.
+    pub(super) fn mean_rel(&self, way: Way, grid: u32, tau: f32) -> Option<f64> {
+        self.errors
+            .iter()
+            .find(|run| run.way == way && run.report.grid == grid && run.report.tau == tau)
+            .map(|run| run.report.rest_error.mean_rel)
+    }
+
+    /// What `--json` prints.
+    pub(super) fn summary(&self) -> Summary<'_> {
+        Summary {
+            mesh: &self.mesh,
+            vertices: self.n_vertices,
+            cage_vertices: self.n_cage,
+            threads: self.threads,
+            runs: self.runs,
+            timed: &self.timed,
+            errors: &self.errors,
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! `cagework evaluate`: the paper's evaluation run anew, with our method beside it.
+//!
+//! Figures are numbered as in the paper: 2-5 reconstructions, 7 delta over time, 8-11 time to completion, 12 error.
+
+mod cases;
+mod plots;
+mod words;
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use cagework_core::Cage;
+use cagework_io::Model;
+
+use crate::args::{CageSource, DEFAULT_DIVISIONS, EvaluateArgs};
+use crate::bind::export;
+use crate::error::CliError;
+use crate::files::{json, make_folder, print, write};
+use crate::load::{generated_model, load_cage, load_model};
+use crate::sample;
+
+use cases::{Evaluation, Way};
+
+/// Runs `cagework evaluate`.
+///
+/// # Errors
+/// When a file cannot be read or written, or a bind fails or is cancelled.
+pub(crate) fn run(args: &EvaluateArgs, as_json: bool) -> Result<(), CliError> {
+    let (name, model, cage) = input(args)?;
+    make_folder(&args.output)?;
+    let evaluation = Evaluation::run(&name, &model, &cage, args)?;
+    let directory = args.output.as_path();
+    reconstructions(&model, &cage, &evaluation, directory)?;
+    write(&directory.join("time.csv"), time_csv(&evaluation).as_bytes())?;
+    write(&directory.join("error.csv"), error_csv(&evaluation).as_bytes())?;
+    write(&directory.join("delta.csv"), delta_csv(&evaluation).as_bytes())?;
+    for (file, svg) in plots::all(&evaluation)? {
+        write(&directory.join(file), svg.as_bytes())?;
+    }
+    let report = words::report(&evaluation);
+    write(&directory.join("report.md"), report.as_bytes())?;
+    print(&if as_json {
+        json(&evaluation.summary())
+    } else {
+        format!("{}\nwrote {}\n", words::verdicts(&evaluation), directory.join("report.md").display())
+    })
+}
+
+fn input(args: &EvaluateArgs) -> Result<(String, Model, Cage), CliError> {
+    let (name, model) = match &args.mesh {
+        Some(path) => (path.display().to_string(), load_model(path)?),
+        None => ("built-in sample".to_owned(), generated_model("creature.obj", &sample::creature())?),
+    };
+    let source = args.cage.clone().unwrap_or(CageSource::Box { divisions: DEFAULT_DIVISIONS });
+    let cage = load_cage(&source, &model)?.cage;
+    Ok((name, model, cage))
+}
+
+/// Figures 2 to 5: the rest pose as each way's weights reconstruct it.
+fn reconstructions(
+    model: &Model,
+    cage: &Cage,
+    evaluation: &Evaluation,
+    directory: &Path,
+) -> Result<(), CliError> {
+    for reconstruction in &evaluation.reconstructions {
+        let positions = cagework_core::deform::deform_vertices(&reconstruction.weights, cage.positions());
+        let path = directory.join(format!("{}.glb", reconstruction.figure));
+        write(&path, &export(model, &positions, &path)?)?;
+    }
+    Ok(())
+}
+
+fn time_csv(evaluation: &Evaluation) -> String {
+    let mut csv = String::from("way,g,tau,threads,iterations,converged,solve_ms,total_ms\n");
+    for run in &evaluation.timed {
+        let r = &run.report;
+        let _ = writeln!(
+            csv,
+            "{},{},{:e},{},{},{},{:.3},{:.3}",
+            run.way.id(),
+            r.grid,
+            r.tau,
+            r.threads,
+            r.iterations,
+            r.converged,
+            r.timings_ms.solve,
+            r.timings_ms.total
+        );
+    }
+    csv
+}
+
+fn error_csv(evaluation: &Evaluation) -> String {
+    let mut csv = String::from("way,g,tau,iterations,mean_error,mean_rel,max_rel\n");
+    for run in &evaluation.errors {
+        let (r, e) = (&run.report, &run.report.rest_error);
+        let _ = writeln!(
+            csv,
+            "{},{},{:e},{},{:e},{:e},{:e}",
+            run.way.id(),
+            r.grid,
+            r.tau,
+            r.iterations,
+            e.mean,
+            e.mean_rel,
+            e.max_rel
+        );
+    }
+    csv
+}
+
+fn delta_csv(evaluation: &Evaluation) -> String {
+    let mut csv = String::from("way,iteration,time_ms,delta\n");
+    for way in [Way::PaperOneThread, Way::MultigridThreads] {
+        if let Some(run) = evaluation.delta_run(way) {
+            for (iteration, (time, delta)) in run.delta_over_time().enumerate() {
+                let _ = writeln!(csv, "{},{},{time:.4},{delta:e}", way.id(), iteration + 1);
+            }
+        }
+    }
+    csv
+}

@@ -1,0 +1,205 @@
+//! The paper's plots as SVG.
+
+use plotters::prelude::*;
+
+use crate::error::CliError;
+
+use super::cases::{ERROR_GRIDS, ERROR_TAUS, Evaluation, TIMED_GRIDS, TIMED_TAUS, Way};
+
+/// Width and height of a plot.
+const SIZE: (u32, u32) = (720, 440);
+
+/// Distinguishable without colour vision (Okabe and Ito 2008).
+const COLOURS: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(213, 94, 0),
+    RGBColor(86, 180, 233),
+];
+
+const FONT: (&str, u32) = ("sans-serif", 15);
+
+type Plot = Result<String, Box<dyn std::error::Error>>;
+
+/// All plots as (file name, SVG).
+///
+/// # Errors
+/// When a plot cannot be drawn.
+pub(super) fn all(evaluation: &Evaluation) -> Result<Vec<(String, String)>, CliError> {
+    let failed = |error: Box<dyn std::error::Error>| CliError::Plot { message: error.to_string() };
+    let mut plots = vec![
+        ("figure-7.svg".to_owned(), delta(evaluation).map_err(failed)?),
+        ("figure-12.svg".to_owned(), error(evaluation).map_err(failed)?),
+    ];
+    let mut number = 8;
+    for grid in TIMED_GRIDS {
+        for tau in TIMED_TAUS {
+            plots.push((format!("figure-{number}.svg"), times(evaluation, grid, tau).map_err(failed)?));
+            number += 1;
+        }
+    }
+    Ok(plots)
+}
+
+/// Figures 8 to 11: time to completion, logarithmic.
+fn times(evaluation: &Evaluation, grid: u32, tau: f32) -> Plot {
+    let bars: Vec<(Way, f64)> = Way::ALL
+        .into_iter()
+        .filter_map(|way| evaluation.timed(way, grid, tau).map(|run| (way, run.report.timings_ms.total)))
+        .collect();
+    let (low, high) = decades(bars.iter().map(|bar| bar.1));
+    let mut svg = String::new();
+    {
+        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        root.fill(&WHITE)?;
+        let n = bars.len();
+        let mut chart = ChartBuilder::on(&root)
+            .caption(format!("Time to completion, g = {grid}, tau = {tau:e}"), ("sans-serif", 20))
+            .margin(12)
+            .x_label_area_size(36)
+            .y_label_area_size(70)
+            .build_cartesian_2d(0.0..n as f64, (low..high).log_scale())?;
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .x_labels(0)
+            .y_desc("milliseconds")
+            .label_style(FONT)
+            .axis_desc_style(FONT)
+            .y_label_formatter(&|y| format!("{y}"))
+            .draw()?;
+        for (k, (way, time)) in bars.iter().enumerate() {
+            let (left, right) = (k as f64 + 0.15, k as f64 + 0.85);
+            chart.draw_series([Rectangle::new([(left, low), (right, *time)], COLOURS[k].filled())])?;
+            let label = format!("{time:.0} ms");
+            chart.draw_series([Text::new(label, (left, time * 1.45), ("sans-serif", 15))])?;
+            let name = Text::new(way.name(), (12 + 70 + 8 + (k as i32) * 157, 412), ("sans-serif", 14));
+            root.draw(&name)?;
+        }
+        root.present()?;
+    }
+    Ok(svg)
+}
+
+/// Figure 7: delta over time, both axes logarithmic.
+fn delta(evaluation: &Evaluation) -> Plot {
+    let series: Vec<(Way, Vec<(f64, f64)>)> = [Way::PaperOneThread, Way::PaperThreads, Way::MultigridThreads]
+        .into_iter()
+        .filter_map(|way| {
+            let run = evaluation.delta_run(way)?;
+            Some((way, run.delta_over_time().map(|(t, d)| (t.max(1e-3), f64::from(d).max(1e-12))).collect()))
+        })
+        .collect();
+    let (left, right) = decades(series.iter().flat_map(|s| s.1.iter().map(|p| p.0)));
+    let (low, high) = decades(series.iter().flat_map(|s| s.1.iter().map(|p| p.1)));
+    lines(
+        "Delta over time, g = 32, tau = 1e-5",
+        ["milliseconds of solving", "delta (Eq. 2)"],
+        [left, right],
+        [low, high],
+        &series.into_iter().map(|(way, points)| (way.name().to_owned(), points)).collect::<Vec<_>>(),
+        SeriesLabelPosition::UpperRight,
+    )
+}
+
+/// Figure 12: mean error over g and tau.
+fn error(evaluation: &Evaluation) -> Plot {
+    let mut series = Vec::new();
+    for grid in ERROR_GRIDS {
+        let points: Vec<(f64, f64)> = ERROR_TAUS
+            .into_iter()
+            .filter_map(|tau| Some((f64::from(tau), evaluation.mean_rel(Way::PaperThreads, grid, tau)?)))
+            .collect();
+        series.push((format!("paper, g = {grid}"), points));
+    }
+    for grid in ERROR_GRIDS {
+        if let Some(error) = evaluation.mean_rel(Way::MultigridThreads, grid, 1e-5) {
+            // Its tau bounds the solver's error; the plot shows the one run over the whole width.
+            let points = ERROR_TAUS.map(|tau| (f64::from(tau), error)).to_vec();
+            series.push((format!("embedded, g = {grid}"), points));
+        }
+    }
+    let (low, high) = decades(series.iter().flat_map(|s| s.1.iter().map(|p| p.1)));
+    lines(
+        "Mean reconstruction error",
+        ["tau", "error over the cage's diagonal"],
+        [8e-6, 1.3e-3],
+        [low, high],
+        &series,
+        SeriesLabelPosition::MiddleLeft,
+    )
+}
+
+fn lines(
+    title: &str,
+    [x_name, y_name]: [&str; 2],
+    [left, right]: [f64; 2],
+    [low, high]: [f64; 2],
+    series: &[(String, Vec<(f64, f64)>)],
+    labels: SeriesLabelPosition,
+) -> Plot {
+    let mut svg = String::new();
+    {
+        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        root.fill(&WHITE)?;
+        let mut chart = ChartBuilder::on(&root)
+            .caption(title, ("sans-serif", 20))
+            .margin(12)
+            .x_label_area_size(46)
+            .y_label_area_size(80)
+            .build_cartesian_2d((left..right).log_scale(), (low..high).log_scale())?;
+        chart
+            .configure_mesh()
+            .x_desc(x_name)
+            .y_desc(y_name)
+            .light_line_style(WHITE)
+            .label_style(FONT)
+            .axis_desc_style(FONT)
+            .x_label_formatter(&|x| format!("{x:.0e}"))
+            .y_label_formatter(&|y| format!("{y:.0e}"))
+            .draw()?;
+        for (k, (name, points)) in series.iter().enumerate() {
+            let style = COLOURS[k % COLOURS.len()].stroke_width(2);
+            chart
+                .draw_series(LineSeries::new(points.iter().copied(), style))?
+                .label(name.as_str())
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+            if points.len() < 20 {
+                chart.draw_series(points.iter().map(|&p| Circle::new(p, 3, style.filled())))?;
+            }
+        }
+        chart
+            .configure_series_labels()
+            .position(labels)
+            .background_style(WHITE.mix(0.85))
+            .border_style(BLACK.mix(0.25))
+            .label_font(FONT)
+            .draw()?;
+        root.present()?;
+    }
+    Ok(svg)
+}
+
+/// The decades around positive values.
+fn decades(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) =
+        values.filter(|v| *v > 0.0).fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
+    if low > high {
+        (0.1, 10.0)
+    } else {
+        (10f64.powf(low.log10().floor()), 10f64.powf((high * 1.5).log10().ceil()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::decades;
+
+    #[test]
+    fn decades_enclose_the_values() {
+        let (low, high) = decades([3.0, 250.0, 42.0].into_iter());
+        assert!((low - 1.0).abs() < 1e-9 && (high - 1000.0).abs() < 1e-6, "{low} {high}");
+    }
+}

@@ -1,0 +1,158 @@
+//! `cagework info`: what is in a model, and whether it would do as a cage.
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+
+use cagework_core::mesh::weld;
+use cagework_core::{Bounds, Cage};
+use cagework_io::{Format, Model};
+use serde::Serialize;
+
+use crate::args::InfoArgs;
+use crate::error::CliError;
+use crate::files::{json, print};
+use crate::load::load_model;
+
+/// What `info` says; its JSON is the output of `--json`.
+#[derive(Debug, Serialize)]
+struct Info {
+    file: String,
+    format: &'static str,
+    vertices: usize,
+    unique_vertices: usize,
+    triangles: usize,
+    nodes: usize,
+    primitives: usize,
+    materials: usize,
+    bounds: BoundsInfo,
+    /// Every edge belongs to two triangles, once equal positions are welded.
+    closed: bool,
+    cage: CageInfo,
+    notices: Vec<String>,
+}
+
+/// Corners and diagonal of the bounding box, object units.
+#[derive(Debug, Serialize)]
+struct BoundsInfo {
+    min: [f32; 3],
+    max: [f32; 3],
+    diagonal: f32,
+}
+
+/// Whether the model would do as a cage.
+#[derive(Debug, Serialize)]
+struct CageInfo {
+    valid: bool,
+    /// Why not.
+    problem: Option<String>,
+    notices: Vec<String>,
+}
+
+/// Runs `cagework info`.
+///
+/// # Errors
+/// When the model cannot be read.
+pub(crate) fn run(args: &InfoArgs, as_json: bool) -> Result<(), CliError> {
+    let model = load_model(&args.model)?;
+    let info = inspect(&args.model.display().to_string(), &model)?;
+    print(&if as_json { json(&info) } else { text(&info) })
+}
+
+fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
+    let counts = model.counts;
+    let bounds =
+        Bounds::of(&model.positions).ok_or_else(|| CliError::file(file.as_ref(), "has no vertices"))?;
+    let welded = weld(&model.positions);
+    let cage = match Cage::new(&model.cage_mesh()) {
+        Ok(cage) => CageInfo {
+            valid: true,
+            problem: None,
+            notices: cage.notices().iter().map(ToString::to_string).collect(),
+        },
+        Err(error) => CageInfo { valid: false, problem: Some(error.to_string()), notices: vec![] },
+    };
+    Ok(Info {
+        file: file.to_owned(),
+        format: match model.format() {
+            Format::Obj => "obj",
+            Format::Gltf => "gltf",
+        },
+        vertices: model.positions.len(),
+        unique_vertices: welded.first.len(),
+        triangles: model.triangles.len(),
+        nodes: counts.nodes,
+        primitives: counts.primitives,
+        materials: counts.materials,
+        bounds: BoundsInfo {
+            min: bounds.min.to_array(),
+            max: bounds.max.to_array(),
+            diagonal: bounds.diagonal(),
+        },
+        closed: is_closed(&model.triangles, &welded.unique_of),
+        cage,
+        notices: model.notices.clone(),
+    })
+}
+
+/// Whether every edge belongs to exactly two triangles; triangles without area between welded vertices do not count.
+fn is_closed(triangles: &[[u32; 3]], unique_of: &[u32]) -> bool {
+    let mut uses: HashMap<(u32, u32), u32> = HashMap::new();
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|i| unique_of[i as usize]);
+        if a == b || b == c || c == a {
+            continue;
+        }
+        for (i, j) in [(a, b), (b, c), (c, a)] {
+            *uses.entry((i.min(j), i.max(j))).or_default() += 1;
+        }
+    }
+    !uses.is_empty() && uses.values().all(|&n| n == 2)
+}
+
+fn text(info: &Info) -> String {
+    let mut out = format!("{} ({})\n", info.file, info.format);
+    let mut row = |name: &str, value: String| {
+        let _ = writeln!(out, "  {name:<12}{value}");
+    };
+    row("vertices", format!("{} ({} unique positions)", info.vertices, info.unique_vertices));
+    row("triangles", info.triangles.to_string());
+    row(
+        "document",
+        format!("{} nodes, {} primitives, {} materials", info.nodes, info.primitives, info.materials),
+    );
+    let [min, max] = [info.bounds.min, info.bounds.max];
+    row("bounds", format!("{min:?} to {max:?}, diagonal {}", info.bounds.diagonal));
+    row("surface", if info.closed { "closed".into() } else { "open".into() });
+    row(
+        "as a cage",
+        info.cage.problem.as_ref().map_or_else(|| "valid".into(), |why| format!("not valid: {why}")),
+    );
+    for notice in info.notices.iter().chain(&info.cage.notices) {
+        let _ = writeln!(out, "note: {notice}");
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_closed;
+
+    const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+
+    #[test]
+    fn tetrahedron_is_closed_and_open_without_a_face() {
+        let same = [0, 1, 2, 3];
+        assert!(is_closed(&TETRAHEDRON, &same));
+        assert!(!is_closed(&TETRAHEDRON[1..], &same));
+        assert!(!is_closed(&[], &same));
+    }
+
+    #[test]
+    fn seams_do_not_open_a_surface() {
+        // Vertex 4 is a second copy of vertex 0.
+        let mut split = TETRAHEDRON;
+        split[0][0] = 4;
+        assert!(!is_closed(&split, &[0, 1, 2, 3, 4]));
+        assert!(is_closed(&split, &[0, 1, 2, 3, 0]));
+    }
+}

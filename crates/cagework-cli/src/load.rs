@@ -1,0 +1,79 @@
+//! From files to models, cages and poses that fit each other.
+
+use std::path::Path;
+
+use cagework_core::{Bounds, Cage, CageError, PolygonMesh, subdivided_box};
+use cagework_io::{Model, write_cage_obj};
+use glam::Vec3;
+
+use crate::args::{CageSource, DEFAULT_MARGIN};
+use crate::error::CliError;
+use crate::files::{read, read_beside};
+
+/// A cage with the document that it came from, which knows how a pose of it is read.
+#[derive(Debug)]
+pub(crate) struct LoadedCage {
+    /// The cage.
+    pub(crate) cage: Cage,
+    model: Model,
+}
+
+/// Reads a model with faces.
+///
+/// # Errors
+/// When the file cannot be read or has no faces.
+pub(crate) fn load_model(path: &Path) -> Result<Model, CliError> {
+    let model = load_any(path)?;
+    model.require_faces()?;
+    Ok(model)
+}
+
+/// Reads a model, or a bare list of positions.
+fn load_any(path: &Path) -> Result<Model, CliError> {
+    let bytes = read(path)?;
+    Ok(Model::read(&path.display().to_string(), &bytes, &mut |relative| read_beside(path, relative))?)
+}
+
+/// A mesh made by formula as the model that its OBJ file would be.
+///
+/// # Errors
+/// When it has no vertices.
+pub(crate) fn generated_model(name: &str, mesh: &PolygonMesh) -> Result<Model, CliError> {
+    Ok(Model::read(name, &write_cage_obj(mesh), &mut |_| None)?)
+}
+
+/// The cage that `source` names, for a model.
+///
+/// # Errors
+/// When the file cannot be read or is no cage.
+pub(crate) fn load_cage(source: &CageSource, around: &Model) -> Result<LoadedCage, CliError> {
+    let model = match source {
+        CageSource::File(path) => load_model(path)?,
+        CageSource::Box { divisions } => {
+            generated_model("box cage", &box_mesh(&around.positions, *divisions, DEFAULT_MARGIN)?)?
+        }
+    };
+    let cage = Cage::new(&model.cage_mesh())
+        .map_err(|source| CliError::Cage { name: model.name.clone(), source })?;
+    Ok(LoadedCage { cage, model })
+}
+
+/// A subdivided box around positions. `margin`: fraction of their bounding box's diagonal.
+///
+/// # Errors
+/// When there are no positions.
+pub(crate) fn box_mesh(positions: &[Vec3], divisions: u32, margin: f32) -> Result<PolygonMesh, CliError> {
+    let bounds = Bounds::of(positions)
+        .ok_or_else(|| CliError::Cage { name: "box cage".into(), source: CageError::Empty })?;
+    Ok(subdivided_box(bounds, margin, [divisions; 3]))
+}
+
+impl LoadedCage {
+    /// The positions of a pose of this cage, in the cage's own order. `[n_cage]`, object units.
+    ///
+    /// # Errors
+    /// When the file cannot be read or has another number of vertices than the cage.
+    pub(crate) fn load_pose(&self, path: &Path) -> Result<Vec<Vec3>, CliError> {
+        Ok(self.model.pose_positions(&load_any(path)?)?)
+    }
+}

@@ -1,0 +1,79 @@
+//! Progress on a terminal, and Ctrl-C.
+
+use std::io::IsTerminal as _;
+use std::ops::ControlFlow;
+use std::sync::Once;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use cagework_core::progress::{Progress, ProgressEvent, Stage};
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Set by Ctrl-C.
+static CANCELLED: AtomicBool = AtomicBool::new(false);
+
+/// Steps of the bar: more than a terminal has columns.
+const STEPS: u64 = 1000;
+
+/// Exit code after a second Ctrl-C: 128 + SIGINT, as shells count.
+const INTERRUPTED: i32 = 130;
+
+/// A progress bar on stderr when that is a terminal, and nothing otherwise; cancels on Ctrl-C.
+pub(crate) struct Bar {
+    bar: ProgressBar,
+}
+
+impl Bar {
+    /// Shows the bar and starts to listen to Ctrl-C.
+    pub(crate) fn start() -> Self {
+        static LISTEN: Once = Once::new();
+        LISTEN.call_once(|| {
+            let listening = ctrlc::set_handler(|| {
+                // The first one ends the work in good order, the second one ends it.
+                if CANCELLED.swap(true, Ordering::Relaxed) {
+                    std::process::exit(INTERRUPTED);
+                }
+            });
+            // Without a handler Ctrl-C ends the program, which is what it is for.
+            drop(listening);
+        });
+        let bar =
+            if std::io::stderr().is_terminal() { ProgressBar::new(STEPS) } else { ProgressBar::hidden() };
+        let style = ProgressStyle::with_template("{prefix:10} [{bar:30}] {percent:>3}%  ETA {eta:<4} {msg}")
+            .expect("the template is a constant")
+            .progress_chars("=> ");
+        bar.set_style(style);
+        Self { bar }
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Progress for Bar {
+    fn report(&self, event: ProgressEvent) -> ControlFlow<()> {
+        if CANCELLED.load(Ordering::Relaxed) {
+            return ControlFlow::Break(());
+        }
+        if !self.bar.is_hidden() {
+            self.bar.set_prefix(stage_name(event.stage));
+            // Threads report out of order: a bar never goes back.
+            let position = (f64::from(event.fraction.clamp(0.0, 1.0)) * STEPS as f64) as u64;
+            self.bar.set_position(position.max(self.bar.position()));
+            if let Some(delta) = event.delta {
+                self.bar.set_message(format!("delta {delta:.1e} after {}", event.iteration));
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+fn stage_name(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Voxelize => "voxelizing",
+        Stage::Solve => "solving",
+        Stage::Sample => "sampling",
+    }
+}

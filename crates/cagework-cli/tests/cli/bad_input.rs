@@ -1,0 +1,148 @@
+//! Every bad input ends in exit code 1 and a message that names the file; nothing panics.
+
+use std::fs::File;
+
+use predicates::prelude::*;
+use predicates::str::contains;
+
+use crate::support::{CORNERS, Sandbox, box_obj, sphere_obj};
+
+/// The command fails in good order, and the message says all of `words`.
+fn assert_refused(sandbox: &Sandbox, args: &str, words: &[&str]) {
+    let assert = sandbox.run(args).code(1).stdout("");
+    let assert = assert.stderr(predicates::str::starts_with("error: ").and(contains("panicked").not()));
+    for word in words {
+        let said = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+        assert!(said.contains(word), "`cagework {args}` does not say '{word}': {said}");
+    }
+}
+
+/// A GLB header, and one chunk of JSON whose length is claimed to be `claimed`.
+fn glb(json: &str, claimed: u32) -> Vec<u8> {
+    let mut bytes = b"glTF".to_vec();
+    bytes.extend(2_u32.to_le_bytes());
+    bytes.extend((20 + json.len() as u32).to_le_bytes());
+    bytes.extend(claimed.to_le_bytes());
+    bytes.extend(b"JSON");
+    bytes.extend(json.as_bytes());
+    bytes
+}
+
+#[test]
+fn files_that_are_no_models_are_refused() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    let huge = r#"{"asset":{"version":"2.0"},"buffers":[{"byteLength":12}],"bufferViews":[{"buffer":0,"byteLength":12}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":4000000000,"type":"VEC3"}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}]} "#;
+    sandbox.write("empty.obj", "");
+    sandbox.write("empty.glb", "");
+    sandbox.write("text.glb", "this is not a glTF file, whatever its name says");
+    sandbox.write("text.gltf", "this is not a glTF file, whatever its name says");
+    sandbox.write("noise.obj", [0x80, 0xff, 0x00, 0x13, 0x37].repeat(50));
+    sandbox.write("truncated.glb", &glb(r#"{"asset":{"version":"2.0"}} "#, 28)[..22]);
+    sandbox.write("overlong.glb", glb(r#"{"asset":{"version":"2.0"}} "#, u32::MAX));
+    sandbox.write("huge.glb", glb(huge, huge.len() as u32));
+    sandbox.write("huge.gltf", huge);
+    sandbox.write("nan.obj", sphere_obj(0.7).replacen("v 0 0.7", "v 0 nan", 1));
+    sandbox.write("faceless.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+    sandbox.write("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
+    std::fs::create_dir(sandbox.path("folder.obj")).unwrap();
+    for file in [
+        "empty.obj",
+        "empty.glb",
+        "text.glb",
+        "text.gltf",
+        "noise.obj",
+        "truncated.glb",
+        "overlong.glb",
+        "huge.glb",
+        "huge.gltf",
+        "nan.obj",
+        "faceless.obj",
+        "index.obj",
+        "folder.obj",
+        "missing.obj",
+    ] {
+        assert_refused(&sandbox, &format!("info {file}"), &[file]);
+        assert_refused(&sandbox, &format!("bind {file} --cage cage.obj -g 8"), &[file]);
+        assert_refused(&sandbox, &format!("bind mesh.obj --cage {file} -g 8"), &[file]);
+        assert_refused(&sandbox, &format!("cage {file} -o new.obj"), &[file]);
+    }
+    assert_refused(&sandbox, "info folder.obj", &["is a folder"]);
+    assert_refused(&sandbox, "info missing.obj", &["no such file"]);
+    assert_refused(&sandbox, "info empty.obj", &["is empty"]);
+    assert_refused(&sandbox, "info faceless.obj", &["3 vertices", "no faces"]);
+}
+
+#[test]
+fn file_too_large_is_refused_without_reading_it() {
+    let sandbox = Sandbox::new();
+    // Sparse: takes no room on the disk.
+    File::create(sandbox.path("large.obj")).unwrap().set_len(3 << 30).unwrap();
+    assert_refused(&sandbox, "info large.obj", &["large.obj", "3072 MiB", "2048 MiB"]);
+}
+
+#[test]
+fn meshes_that_are_no_cages_are_refused_with_the_place() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    let closed = box_obj(&CORNERS);
+    sandbox.write("open.obj", closed.replace("f 5 6 8 7\n", ""));
+    sandbox.write("fin.obj", closed.clone() + "v 3 0 0\nf 1 2 9\n");
+    sandbox.write("flat.obj", box_obj(&CORNERS.map(|[x, y, _]| [x, y, 0.0])));
+    for file in ["open.obj", "fin.obj", "flat.obj"] {
+        assert_refused(&sandbox, &format!("bind mesh.obj --cage {file} -g 8"), &[file]);
+    }
+    assert_refused(&sandbox, "bind mesh.obj --cage open.obj -g 8", &["not closed", "edge"]);
+}
+
+#[test]
+fn outputs_are_checked_before_the_work() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    std::fs::create_dir(sandbox.path("dir.glb")).unwrap();
+    assert_refused(
+        &sandbox,
+        "bind mesh.obj --cage cage.obj -o nowhere/out.glb",
+        &["nowhere/out.glb", "no folder"],
+    );
+    assert_refused(&sandbox, "bind mesh.obj --cage cage.obj -o mesh.obj", &["mesh.obj", "overwritten"]);
+    assert_refused(&sandbox, "bind mesh.obj --cage cage.obj -o ./cage.obj", &["cage.obj", "overwritten"]);
+    assert_refused(&sandbox, "bind mesh.obj --cage cage.obj --report mesh.obj", &["mesh.obj", "overwritten"]);
+    assert_refused(
+        &sandbox,
+        "bind mesh.obj --cage box -o a.obj --save-cage a.obj",
+        &["a.obj", "two outputs"],
+    );
+    assert_refused(&sandbox, "bind mesh.obj --cage cage.obj -o dir.glb", &["dir.glb", "folder"]);
+    assert_refused(&sandbox, "cage mesh.obj -o mesh.obj", &["mesh.obj", "overwritten"]);
+    sandbox.write("blocked", "");
+    assert_refused(&sandbox, "demo -o blocked", &["blocked"]);
+}
+
+#[test]
+fn vertices_outside_the_cage_can_be_refused() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    sandbox.write("mesh.obj", sphere_obj(1.5));
+    assert_refused(
+        &sandbox,
+        "bind mesh.obj --cage cage.obj -g 8 --outside refuse",
+        &["outside the cage", "hint"],
+    );
+}
+
+#[test]
+fn memory_limit_is_kept_with_the_number() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    assert_refused(&sandbox, "bind mesh.obj --cage cage.obj -g 512 --memory-limit 1", &["MiB", "limit"]);
+}
+
+#[test]
+fn weights_files_that_are_none_are_refused() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    sandbox.write("empty.npz", "");
+    sandbox.write("text.npz", "not a zip archive");
+    sandbox.write("cut.npz", b"PK\x03\x04\x14\x00\x00\x00");
+    for file in ["empty.npz", "text.npz", "cut.npz", "missing.npz"] {
+        let args = format!("deform mesh.obj --cage cage.obj --weights {file} --pose cage.obj -o out.obj");
+        assert_refused(&sandbox, &args, &[file]);
+    }
+}

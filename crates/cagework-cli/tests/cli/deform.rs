@@ -1,0 +1,110 @@
+use predicates::prelude::*;
+use predicates::str::contains;
+
+use crate::support::{CORNERS, Sandbox, assert_close, box_obj, glb_json, obj_positions, sphere_obj};
+
+/// Weights are stored as `f32`, coordinates stay below 10.
+const TOLERANCE: f64 = 1e-4;
+
+/// An affine map that is none of the special ones.
+fn affine([x, y, z]: [f64; 3]) -> [f64; 3] {
+    [1.5 * x + 0.25 * y + 3.0, 0.75 * y - 0.5 * z, z + 0.1 * x - 2.0]
+}
+
+fn bound() -> Sandbox {
+    let sandbox = Sandbox::with_sphere_in_box();
+    sandbox.run("bind mesh.obj --cage cage.obj -g 16 --weights w.npz").success();
+    sandbox.write("affine.obj", box_obj(&CORNERS.map(affine)));
+    sandbox.write("lifted.obj", box_obj(&CORNERS.map(|[x, y, z]| [x, y + 0.5 * (z + 1.0), z])));
+    sandbox
+}
+
+#[test]
+fn affine_motion_of_the_cage_moves_the_mesh_alike() {
+    // Linear reproduction: sum w = 1 and sum w c = v give sum w A(c) = A(v).
+    let sandbox = bound();
+    sandbox
+        .run("deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj -o out.obj")
+        .success()
+        .stdout(contains("178 vertices").and(contains("wrote out.obj")));
+    let expected: Vec<_> = obj_positions(&sandbox.read("mesh.obj")).into_iter().map(affine).collect();
+    assert_close(&obj_positions(&sandbox.read("out.obj")), &expected, TOLERANCE);
+}
+
+#[test]
+fn vertices_outside_follow_rigidly() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    sandbox.write("mesh.obj", sphere_obj(1.2));
+    sandbox.run("bind mesh.obj --cage cage.obj -g 16 --weights w.npz").success();
+    let moved = |[x, y, z]: [f64; 3]| [-y + 1.0, x, z + 2.0];
+    sandbox.write("turned.obj", box_obj(&CORNERS.map(moved)));
+    let done =
+        sandbox.json("deform mesh.obj --cage cage.obj --weights w.npz --pose turned.obj -o out.obj --json");
+    assert!(done["outside_vertices"].as_u64().unwrap() > 0);
+    let expected: Vec<_> = obj_positions(&sandbox.read("mesh.obj")).into_iter().map(moved).collect();
+    assert_close(&obj_positions(&sandbox.read("out.obj")), &expected, TOLERANCE);
+}
+
+#[test]
+fn several_poses_become_morph_targets_and_an_animation() {
+    let sandbox = bound();
+    let done = sandbox.json(
+        "deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj --pose lifted.obj -o out.glb --json",
+    );
+    assert_eq!(done["poses"], serde_json::json!(["affine", "lifted"]));
+    let document = glb_json(&sandbox.read("out.glb"));
+    for primitive in document["meshes"][0]["primitives"].as_array().unwrap() {
+        assert_eq!(primitive["targets"].as_array().unwrap().len(), 2);
+    }
+    assert_eq!(document["animations"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn one_pose_makes_a_plain_glb() {
+    let sandbox = bound();
+    sandbox.run("deform mesh.obj --cage cage.obj --weights w.npz --pose lifted.obj -o out.glb").success();
+    let document = glb_json(&sandbox.read("out.glb"));
+    assert!(document["meshes"][0]["primitives"][0].get("targets").is_none());
+    assert!(document.get("animations").is_none());
+    // What was written is a model again, and still holds the mesh.
+    assert_eq!(sandbox.json("info out.glb --json")["unique_vertices"], 178);
+}
+
+#[test]
+fn several_poses_do_not_fit_an_obj() {
+    bound()
+        .run("deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj --pose lifted.obj -o out.obj")
+        .code(1)
+        .stderr(contains("one pose, but 2").and(contains("hint: ")));
+}
+
+#[test]
+fn pose_of_another_size_is_refused_with_both_numbers() {
+    let sandbox = bound();
+    sandbox.write("long.obj", box_obj(&CORNERS) + "v 0 0 0\n");
+    sandbox
+        .run("deform mesh.obj --cage cage.obj --weights w.npz --pose long.obj -o out.obj")
+        .code(1)
+        .stderr(contains("long.obj").and(contains("9 vertices")).and(contains("8")));
+}
+
+#[test]
+fn weights_of_another_mesh_or_cage_are_refused_with_the_numbers() {
+    let sandbox = bound();
+    sandbox
+        .run("deform cage.obj --cage cage.obj --weights w.npz --pose affine.obj -o out.obj")
+        .code(1)
+        .stderr(contains("w.npz").and(contains("178 mesh vertices")).and(contains("the mesh has 8")));
+    sandbox
+        .run("deform mesh.obj --cage box:2 --weights w.npz --pose affine.obj -o out.obj")
+        .code(1)
+        .stderr(contains("8 cage vertices").and(contains("the cage 26")));
+}
+
+#[test]
+fn output_does_not_overwrite_a_pose() {
+    bound()
+        .run("deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj -o affine.obj")
+        .code(1)
+        .stderr(contains("affine.obj").and(contains("overwritten")));
+}

@@ -1,0 +1,11 @@
+//! The command as a user runs it: files in, files and messages out, exit codes.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
+
+mod bad_input;
+mod bench_and_demo;
+mod bind;
+mod cage_and_info;
+mod deform;
+mod support;
+mod usage;

@@ -1,0 +1,45 @@
+use predicates::prelude::*;
+use predicates::str::contains;
+
+use crate::support::Sandbox;
+
+#[test]
+fn version_and_help_succeed() {
+    let sandbox = Sandbox::new();
+    sandbox.run("--version").success().stdout(contains(env!("CARGO_PKG_VERSION")));
+    for command in ["", "info", "bind", "deform", "cage", "bench", "demo"] {
+        sandbox
+            .run(&format!("{command} --help"))
+            .success()
+            .stdout(contains("Example").and(contains("cagework ")));
+    }
+}
+
+#[test]
+fn wrong_command_line_exits_with_2() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    for args in [
+        "",
+        "frobnicate",
+        "info",
+        "bind mesh.obj",
+        "bind mesh.obj --cage cage.obj -g 7",
+        "bind mesh.obj --cage cage.obj -g 513",
+        "bind mesh.obj --cage cage.obj -g many",
+        "bind mesh.obj --cage cage.obj --method quick",
+        "bind mesh.obj --cage cage.obj --tau 0",
+        "bind mesh.obj --cage cage.obj --tau NaN",
+        "bind mesh.obj --cage cage.obj --sparsify 1",
+        "bind mesh.obj --cage cage.obj --max-iterations 0",
+        "bind mesh.obj --cage cage.obj --threads -1",
+        "bind mesh.obj --cage box:0",
+        "bind mesh.obj --cage box:many",
+        "bind mesh.obj --cage cage.obj -o out.fbx",
+        "bind mesh.obj --cage cage.obj --weights out.txt",
+        "deform mesh.obj --cage cage.obj --weights w.npz -o out.glb",
+        "cage mesh.obj -o cage2.glb",
+        "bench mesh.obj",
+    ] {
+        sandbox.run(args).code(2).stdout("").stderr(contains("Usage").or(contains("--help")));
+    }
+}

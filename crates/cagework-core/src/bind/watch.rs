@@ -1,0 +1,86 @@
+//! Progress of a bind whose parts run on several threads.
+
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
+
+/// Share of the whole bind that each stage is given in the progress: where its fraction begins and ends.
+fn span(stage: Stage) -> [f32; 2] {
+    match stage {
+        Stage::Voxelize => [0.0, 0.1],
+        Stage::Solve => [0.1, 0.9],
+        Stage::Sample => [0.9, 1.0],
+    }
+}
+
+/// Passes progress on, from any thread, and remembers that it was cancelled.
+pub struct Watch<'a> {
+    progress: &'a dyn Progress,
+    cancelled: AtomicBool,
+    /// Largest fraction reported. Reports pass one at a time, so that none overtakes another and the bar never falls.
+    fraction: Mutex<f32>,
+    done: AtomicU32,
+}
+
+impl<'a> Watch<'a> {
+    /// Watches for whoever wants to know.
+    #[must_use]
+    pub fn new(progress: &'a dyn Progress) -> Self {
+        Self {
+            progress,
+            cancelled: AtomicBool::new(false),
+            fraction: Mutex::new(0.0),
+            done: AtomicU32::new(0),
+        }
+    }
+
+    /// Reports `fraction` of a stage.
+    ///
+    /// # Errors
+    /// [`Cancelled`], now or before.
+    pub fn report(
+        &self,
+        stage: Stage,
+        fraction: f32,
+        iteration: u32,
+        delta: Option<f32>,
+    ) -> Result<(), Cancelled> {
+        let [begin, end] = span(stage);
+        let mut latest = self.fraction.lock().unwrap_or_else(PoisonError::into_inner);
+        *latest = latest.max(begin + (end - begin) * fraction.clamp(0.0, 1.0));
+        let event = ProgressEvent { stage, fraction: *latest, iteration, delta };
+        if self.is_cancelled() || self.progress.report(event).is_break() {
+            self.cancelled.store(true, Ordering::Relaxed);
+            return Err(Cancelled);
+        }
+        Ok(())
+    }
+
+    /// Whether the work is to stop.
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+
+    /// One more piece of `total` is done.
+    ///
+    /// # Errors
+    /// [`Cancelled`], now or before.
+    pub fn piece_done(&self, stage: Stage, total: usize) -> Result<(), Cancelled> {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        self.report(stage, done as f32 / total as f32, 0, None)
+    }
+
+    /// How many pieces are done.
+    #[must_use]
+    pub fn done(&self) -> u32 {
+        self.done.load(Ordering::Relaxed)
+    }
+
+    /// The watcher's clock, milliseconds.
+    #[must_use]
+    pub fn now_ms(&self) -> f64 {
+        self.progress.now_ms()
+    }
+}

@@ -1,0 +1,223 @@
+//! The cage: a closed, oriented polygon mesh by construction, and its boundary values.
+//!
+//! Everything that later stages rely on is established here, once: every edge belongs to two faces that run along it
+//! in opposite directions, every face has an area, every component encloses a volume and faces away from the solid.
+//! The solid is what an odd number of components encloses, so a component inside another one bounds a cavity.
+//! What can be mended without changing the solid is mended with a [`CageNotice`]; everything else is a [`CageError`]
+//! that names the place. Vertices, faces and components are counted from 0. Self-intersection is not looked for.
+//!
+//! Boundary values ("hats"): see [`Cage::hats_at`].
+
+mod defects;
+mod hats;
+mod orient;
+mod polygon;
+#[cfg(test)]
+pub(crate) mod shapes;
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod tests_hats;
+mod topology;
+mod triangulate;
+
+use glam::{DVec2, DVec3, Vec3};
+
+use crate::mesh::{Bounds, PolygonMesh};
+
+pub use defects::{CageError, CageNotice, FaceDefect};
+use polygon::{Hats, Polygon};
+
+/// Smallest diagonal of a cage, object units: squares and cubes of lengths stay far from the end of f32 and f64.
+pub const MIN_DIAGONAL: f64 = 1e-12;
+/// Largest diagonal of a cage, object units; the reason is the same.
+pub const MAX_DIAGONAL: f64 = 1e12;
+
+/// Corners up to which hat values need no heap memory.
+const STACK_CORNERS: usize = 32;
+
+/// A closed, outward-oriented polygon mesh around the model.
+#[derive(Clone, Debug)]
+pub struct Cage {
+    positions: Vec<Vec3>,
+    faces: Vec<Vec<u32>>,
+    triangles: Vec<[u32; 3]>,
+    face_of_triangle: Vec<u32>,
+    /// Corners of each triangle as corners of its face.
+    local: Vec<[u32; 3]>,
+    polygons: Vec<Polygon>,
+    bounds: Bounds,
+    notices: Vec<CageNotice>,
+}
+
+impl Cage {
+    /// Checks a polygon mesh and makes it a cage.
+    ///
+    /// Mended, with a notice: faces turned the wrong way, vertices that were split at a seam (equal positions along
+    /// open edges, as exporters of glTF write them: the first one stands for all).
+    ///
+    /// # Errors
+    /// [`CageError`] naming the face, edge or vertex.
+    pub fn new(mesh: &PolygonMesh) -> Result<Self, CageError> {
+        let bounds = check_numbers(mesh)?;
+        let diagonal = bounds.max.as_dvec3().distance(bounds.min.as_dvec3());
+        let mut notices = Vec::new();
+        let mut surface = topology::close(mesh, &mut notices)?;
+        let polygons = orient::orient(&mesh.positions, &mut surface, diagonal, &mut notices)?;
+        topology::note_vertices(mesh, &surface, &mut notices);
+
+        let faces = surface.faces;
+        let mut cage = Self {
+            positions: mesh.positions.clone(),
+            triangles: Vec::new(),
+            face_of_triangle: Vec::new(),
+            local: Vec::new(),
+            faces,
+            polygons,
+            bounds,
+            notices,
+        };
+        for (f, (face, polygon)) in cage.faces.iter().zip(&cage.polygons).enumerate() {
+            for &local in &polygon.triangles {
+                cage.triangles.push(local.map(|k| face[k as usize]));
+                cage.face_of_triangle.push(f as u32);
+                cage.local.push(local);
+            }
+        }
+        Ok(cage)
+    }
+
+    /// Vertex positions, the input's order. `[n_cage]`, object units.
+    #[must_use]
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// Number of vertices: columns of the weights.
+    #[must_use]
+    pub fn n_vertices(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Vertex indices of each face, the input's order, counter-clockwise seen from outside. `[n_faces]`
+    #[must_use]
+    pub fn faces(&self) -> &[Vec<u32>] {
+        &self.faces
+    }
+
+    /// All faces cut into triangles, face by face, counter-clockwise seen from outside. `[n_triangles]`
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// The face that each triangle was cut from. `[n_triangles]`
+    #[must_use]
+    pub fn face_of_triangle(&self) -> &[u32] {
+        &self.face_of_triangle
+    }
+
+    /// Corners of one of [`Self::triangles`], object units.
+    #[must_use]
+    pub fn triangle_corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.triangles[triangle as usize].map(|i| self.positions[i as usize].as_dvec3())
+    }
+
+    /// Bounding box of the surface (vertices of no face do not count), object units.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// Diagonal of [`Self::bounds`], object units.
+    #[must_use]
+    pub fn diagonal(&self) -> f32 {
+        self.bounds.diagonal()
+    }
+
+    /// What was mended or is worth knowing.
+    #[must_use]
+    pub fn notices(&self) -> &[CageNotice] {
+        &self.notices
+    }
+
+    /// The cage as it is used: faces turned outward, seams closed.
+    #[must_use]
+    pub fn to_polygon_mesh(&self) -> PolygonMesh {
+        PolygonMesh { positions: self.positions.clone(), faces: self.faces.clone() }
+    }
+
+    /// Dirichlet values ("hats") of all cage vertices at a point of the surface, given by one of
+    /// [`Self::triangles`] and barycentric coordinates in it. Calls `each(cage vertex, value)` for every vertex whose
+    /// value is not zero; the values sum to 1 and reproduce the point.
+    ///
+    /// Linear on triangles; Meyer et al. 2002 on convex planar polygons (bilinear on a rectangle); mean value
+    /// coordinates (Hormann & Floater 2006) on other planar ones, where they may be slightly negative next to a
+    /// re-entrant corner. A polygon that is not planar is split into triangles and linear on each, because a curved
+    /// patch would reproduce points that are not on the triangles that rays meet. All are linear along edges, so
+    /// neighbouring faces agree.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    pub fn hats_at(&self, triangle: u32, barycentric: [f64; 3], each: &mut dyn FnMut(u32, f64)) {
+        let t = triangle as usize;
+        let f = self.face_of_triangle[t] as usize;
+        let (face, polygon) = (&self.faces[f], &self.polygons[f]);
+        if polygon.hats == Hats::Linear {
+            for (&i, b) in self.triangles[t].iter().zip(barycentric) {
+                if b != 0.0 {
+                    each(i, b);
+                }
+            }
+            return;
+        }
+        let corners = self.local[t].map(|k| polygon.outline[k as usize]);
+        let point = corners.iter().zip(barycentric).fold(DVec2::ZERO, |p, (&q, b)| p + b * q);
+        let (mut stack, mut heap);
+        let values: &mut [f64] = if face.len() <= STACK_CORNERS {
+            stack = [0.0; STACK_CORNERS];
+            &mut stack[..face.len()]
+        } else {
+            heap = vec![0.0; face.len()];
+            &mut heap
+        };
+        match polygon.hats {
+            Hats::Convex => hats::wachspress(&polygon.outline, point, values),
+            Hats::Linear | Hats::MeanValue => hats::mean_value(&polygon.outline, point, values),
+        }
+        for (&i, &value) in face.iter().zip(values.iter()) {
+            if value != 0.0 {
+                each(i, value);
+            }
+        }
+    }
+}
+
+/// What can be told without looking at edges; returns the bounds of the vertices that faces use.
+fn check_numbers(mesh: &PolygonMesh) -> Result<Bounds, CageError> {
+    let n = mesh.positions.len();
+    if mesh.faces.is_empty() || n == 0 {
+        return Err(CageError::Empty);
+    }
+    if let Some(vertex) = mesh.positions.iter().position(|p| !p.is_finite()) {
+        return Err(CageError::NotFinite { vertex: vertex as u32 });
+    }
+    for (f, face) in mesh.faces.iter().enumerate() {
+        let f = f as u32;
+        if face.len() < 3 {
+            return Err(CageError::TooFewCorners { face: f, corners: face.len() });
+        }
+        if let Some(&vertex) = face.iter().find(|&&i| i as usize >= n) {
+            return Err(CageError::Index { face: f, vertex, n });
+        }
+    }
+    topology::check_repeats(&mesh.faces)?;
+    let used: Vec<Vec3> = mesh.faces.iter().flatten().map(|&i| mesh.positions[i as usize]).collect();
+    let bounds = Bounds::of(&used).ok_or(CageError::Empty)?;
+    // In f64, because in f32 the square of a length overflows from 1e19 on.
+    let diagonal = bounds.max.as_dvec3().distance(bounds.min.as_dvec3());
+    if !(MIN_DIAGONAL..=MAX_DIAGONAL).contains(&diagonal) {
+        return Err(CageError::Size { diagonal });
+    }
+    Ok(bounds)
+}

@@ -1,0 +1,106 @@
+//! Which side of each component is outside: faces are turned away from the solid.
+
+use glam::{DVec3, Vec3};
+
+use super::defects::{CageError, CageNotice};
+use super::polygon::{FLAT_HEIGHT, Polygon};
+use super::topology::Surface;
+use crate::geometry::winding_number;
+
+/// Points of a component that are tested for lying inside another one. Odd, so that there is a majority; more than
+/// one, because a point may lie on the other component where they touch.
+const NESTING_SAMPLES: usize = 7;
+
+/// Turns the faces of every component away from the solid (outward, or into a cavity) and measures all faces.
+/// `diagonal` of the cage's bounding box.
+pub(super) fn orient(
+    positions: &[Vec3],
+    surface: &mut Surface,
+    diagonal: f64,
+    notices: &mut Vec<CageNotice>,
+) -> Result<Vec<Polygon>, CageError> {
+    let measure = |faces: &[Vec<u32>], f: usize| {
+        let corners: Vec<DVec3> = faces[f].iter().map(|&i| positions[i as usize].as_dvec3()).collect();
+        Polygon::new(&corners, diagonal).map_err(|why| CageError::DegenerateFace { face: f as u32, why })
+    };
+    let mut polygons =
+        (0..surface.faces.len()).map(|f| measure(&surface.faces, f)).collect::<Result<Vec<_>, _>>()?;
+
+    let mut components = vec![Vec::new(); surface.n_components];
+    let mut first_face = vec![u32::MAX; surface.n_components];
+    for (f, polygon) in polygons.iter().enumerate() {
+        let component = surface.component[f] as usize;
+        first_face[component] = first_face[component].min(f as u32);
+        let corner = |k: u32| positions[surface.faces[f][k as usize] as usize].as_dvec3();
+        components[component].extend(polygon.triangles.iter().map(|t| t.map(corner)));
+    }
+    let solids: Vec<Solid> = components.into_iter().map(Solid::new).collect();
+    for (component, solid) in solids.iter().enumerate() {
+        // Volume over area is the thickness of a sheet: flat if it is lost in the rounding of coordinates.
+        if solid.volume.abs() <= FLAT_HEIGHT * diagonal * solid.area {
+            return Err(CageError::Flat { component: component as u32, face: first_face[component] });
+        }
+    }
+    for (component, solid) in solids.iter().enumerate() {
+        let depth = (0..solids.len()).filter(|&k| k != component && solid.is_inside(&solids[k])).count();
+        let cavity = depth % 2 == 1;
+        let faces = (0..surface.faces.len()).filter(|&f| surface.component[f] as usize == component);
+        let faces: Vec<usize> = faces.collect();
+        if (solid.volume < 0.0) != cavity {
+            for &f in &faces {
+                surface.turn(f);
+                polygons[f] = measure(&surface.faces, f)?;
+            }
+        }
+        let component = component as u32;
+        let turned = faces.iter().filter(|&&f| surface.turned[f]).count();
+        if turned > 0 {
+            notices.push(CageNotice::Flipped { component, faces: turned, of: faces.len() });
+        }
+        if cavity {
+            notices.push(CageNotice::Cavity { component });
+        }
+    }
+    Ok(polygons)
+}
+
+/// One component as a closed set of triangles.
+struct Solid {
+    triangles: Vec<[DVec3; 3]>,
+    min: DVec3,
+    max: DVec3,
+    /// Positive if the triangles are counter-clockwise seen from outside.
+    volume: f64,
+    area: f64,
+}
+
+impl Solid {
+    fn new(triangles: Vec<[DVec3; 3]>) -> Self {
+        let corners = || triangles.iter().flatten();
+        let min = corners().fold(DVec3::INFINITY, |m, &p| m.min(p));
+        let max = corners().fold(DVec3::NEG_INFINITY, |m, &p| m.max(p));
+        // Tetrahedra to a point nearby: far from the origin, those to the origin would cancel.
+        let center = 0.5 * (min + max);
+        let (mut volume, mut area) = (0.0, 0.0);
+        for t in &triangles {
+            let [a, b, c] = t.map(|p| p - center);
+            volume += a.dot(b.cross(c)) / 6.0;
+            area += 0.5 * (b - a).cross(c - a).length();
+        }
+        Self { triangles, min, max, volume, area }
+    }
+
+    /// Whether this component lies inside `other`; they are taken not to intersect.
+    fn is_inside(&self, other: &Self) -> bool {
+        if self.min.cmplt(other.min).any() || self.max.cmpgt(other.max).any() {
+            return false;
+        }
+        let n = self.triangles.len();
+        let samples = NESTING_SAMPLES.min(if n.is_multiple_of(2) { n - 1 } else { n });
+        let inside = (0..samples).filter(|k| {
+            let [a, b, c] = self.triangles[k * n / samples];
+            winding_number((a + b + c) / 3.0, other.triangles.iter().copied()).abs() > 0.5
+        });
+        2 * inside.count() > samples
+    }
+}

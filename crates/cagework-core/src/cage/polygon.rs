@@ -1,0 +1,130 @@
+//! A face as a polygon in its plane: which hats it carries and how it is cut into triangles.
+
+use glam::{DVec2, DVec3};
+
+use super::defects::FaceDefect;
+use super::triangulate::{cross, ear_clip};
+
+/// A face lower than this fraction of the cage's diagonal has no area: it is lost in the rounding of f32 coordinates
+/// (6e-8 relative).
+pub(super) const FLAT_HEIGHT: f64 = 1e-7;
+
+/// A polygon is planar if its corners are within this fraction of the cage's diagonal of its plane. Six decimals of
+/// an OBJ file move the corners of a model of unit size by so much, and the rest pose can be off by no more.
+pub(super) const PLANAR: f64 = 2e-6;
+
+/// Smallest sine of a convex corner's turn for Meyer's formula: at a straight corner its hat vanishes, which would
+/// not fit the neighbouring faces; mean value coordinates have no trouble there.
+const MIN_TURN: f64 = 1e-3;
+
+/// Most corners for Meyer's formula, a product of one factor an edge: more could underflow.
+const MAX_CONVEX_CORNERS: usize = 32;
+
+/// How boundary values are interpolated on a face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Hats {
+    /// Linear on each triangle.
+    Linear,
+    /// Meyer et al. 2002.
+    Convex,
+    /// Hormann & Floater 2006.
+    MeanValue,
+}
+
+/// A face in its plane.
+#[derive(Clone, Debug)]
+pub(super) struct Polygon {
+    pub(super) hats: Hats,
+    /// Corners in the plane, counter-clockwise seen from outside; empty if hats are linear.
+    pub(super) outline: Vec<DVec2>,
+    /// Triangles that cover the face, as corners of it, turned like it.
+    pub(super) triangles: Vec<[u32; 3]>,
+}
+
+impl Polygon {
+    /// Measures a face with three corners or more; `diagonal` of the cage.
+    pub(super) fn new(corners: &[DVec3], diagonal: f64) -> Result<Self, FaceDefect> {
+        let n = corners.len();
+        let center = corners.iter().sum::<DVec3>() / n as f64;
+        let arms: Vec<DVec3> = corners.iter().map(|&p| p - center).collect();
+        // Newell's normal: its length is twice the area of the projection that has the largest one.
+        let normal: DVec3 = (0..n).map(|k| arms[k].cross(arms[(k + 1) % n])).sum();
+        let extent = 2.0 * arms.iter().map(|p| p.length()).fold(0.0, f64::max);
+        if normal.length() <= FLAT_HEIGHT * diagonal * extent {
+            return Err(FaceDefect::NoArea);
+        }
+        if n == 3 {
+            return Ok(Self { hats: Hats::Linear, outline: Vec::new(), triangles: vec![[0, 1, 2]] });
+        }
+        let normal = normal.normalize();
+        let outline = project(&arms, normal);
+        let height = arms.iter().map(|p| p.dot(normal).abs()).fold(0.0, f64::max);
+        if height > PLANAR * diagonal {
+            let triangles = if n == 4 { split_quad(&arms, normal) } else { ear_clip(&outline)? };
+            return Ok(Self { hats: Hats::Linear, outline: Vec::new(), triangles });
+        }
+        if is_convex(&outline) {
+            let hats = if n <= MAX_CONVEX_CORNERS { Hats::Convex } else { Hats::MeanValue };
+            let triangles = (2..n as u32).map(|k| [0, k - 1, k]).collect();
+            return Ok(Self { hats, outline, triangles });
+        }
+        if crosses_itself(&outline) {
+            return Err(FaceDefect::CrossesItself);
+        }
+        let triangles = ear_clip(&outline)?;
+        Ok(Self { hats: Hats::MeanValue, outline, triangles })
+    }
+}
+
+/// Coordinates in the plane with this normal, one axis along the longest side, so that a rectangle stays one.
+fn project(arms: &[DVec3], normal: DVec3) -> Vec<DVec2> {
+    let n = arms.len();
+    let side = (0..n)
+        .map(|k| arms[(k + 1) % n] - arms[k])
+        .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
+        .unwrap_or(DVec3::X);
+    let x = side.reject_from_normalized(normal).normalize_or(normal.any_orthonormal_vector());
+    let y = normal.cross(x);
+    arms.iter().map(|p| DVec2::new(p.dot(x), p.dot(y))).collect()
+}
+
+/// Whether all corners turn left, clearly, and the outline goes round once.
+fn is_convex(outline: &[DVec2]) -> bool {
+    let n = outline.len();
+    let mut total = 0.0;
+    for k in 0..n {
+        let before = (outline[k] - outline[(k + n - 1) % n]).normalize_or_zero();
+        let after = (outline[(k + 1) % n] - outline[k]).normalize_or_zero();
+        if before.perp_dot(after) < MIN_TURN {
+            return false;
+        }
+        total += before.angle_to(after);
+    }
+    total < 3.0 * std::f64::consts::PI
+}
+
+/// Whether two sides cross in a point inside both.
+fn crosses_itself(outline: &[DVec2]) -> bool {
+    let n = outline.len();
+    let side = |k: usize| (outline[k], outline[(k + 1) % n]);
+    (0..n).any(|j| {
+        (j + 2..n).any(|k| {
+            let ((a, b), (c, d)) = (side(j), side(k));
+            cross(a, b, c) * cross(a, b, d) < 0.0 && cross(c, d, a) * cross(c, d, b) < 0.0
+        })
+    })
+}
+
+/// Splits a quad that is not planar along its shorter diagonal (the first one if they are equal), unless that one lies
+/// outside of it seen along its normal.
+fn split_quad(arms: &[DVec3], normal: DVec3) -> Vec<[u32; 3]> {
+    let first = [[0, 1, 2], [0, 2, 3]];
+    let second = [[1, 2, 3], [1, 3, 0]];
+    let faces_out = |split: &[[usize; 3]; 2]| {
+        split.iter().all(|&[a, b, c]| (arms[b] - arms[a]).cross(arms[c] - arms[a]).dot(normal) > 0.0)
+    };
+    let shorter_first = arms[0].distance_squared(arms[2]) <= arms[1].distance_squared(arms[3]);
+    let take_first = if faces_out(&first) == faces_out(&second) { shorter_first } else { faces_out(&first) };
+    let split = if take_first { first } else { second };
+    split.iter().map(|t| t.map(|k| k as u32)).collect()
+}

@@ -1,0 +1,200 @@
+//! Boundary values on faces: they are barycentric coordinates of every kind of face.
+
+use glam::Vec3;
+use proptest::prelude::*;
+
+use super::shapes::*;
+use super::*;
+
+/// Rounding of f64 in coordinates of size 1, times the few dozen operations of a polygon.
+const ROUNDING: f64 = 1e-12;
+
+fn hats(cage: &Cage, triangle: u32, barycentric: [f64; 3]) -> Vec<f64> {
+    let mut values = vec![0.0; cage.n_vertices()];
+    cage.hats_at(triangle, barycentric, &mut |i, value| values[i as usize] += value);
+    values
+}
+
+/// Points of a triangle: corners, edges, inside, and next to corners and edges.
+fn barycentrics() -> Vec<[f64; 3]> {
+    let mut points = Vec::new();
+    for u in [0.0, 1e-16, 1e-9, 0.2, 0.5, 0.9, 1.0] {
+        for v in [0.0, 1e-16, 1e-9, 0.3, 0.5, 1.0] {
+            points.push([u, (1.0 - u) * v, (1.0 - u) * (1.0 - v)]);
+        }
+    }
+    points
+}
+
+fn assert_linear_reproduction(cage: &Cage, tolerance: f64) {
+    for t in 0..cage.triangles().len() as u32 {
+        for b in barycentrics() {
+            let values = hats(cage, t, b);
+            let [p, q, r] = cage.triangle_corners(t);
+            let point = b[0] * p + b[1] * q + b[2] * r;
+            let sum: f64 = values.iter().sum();
+            let combined: DVec3 = values.iter().zip(cage.positions()).map(|(&w, p)| w * p.as_dvec3()).sum();
+            assert!((sum - 1.0).abs() <= tolerance, "sum {sum} in triangle {t} at {b:?}");
+            assert!(combined.distance(point) <= tolerance, "{combined} is not {point}, triangle {t}, {b:?}");
+        }
+    }
+}
+
+#[test]
+fn hats_reproduce_points_on_every_kind_of_face() {
+    let straight = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
+    for mesh in [tetrahedron(), cube(), l_shape(), c_shape(), prism(&straight, 1.0), bent_cube()] {
+        assert_linear_reproduction(&Cage::new(&mesh).unwrap(), ROUNDING);
+    }
+}
+
+/// A cube with one corner pulled out, so that three of its quads are not planar.
+fn bent_cube() -> PolygonMesh {
+    let mut mesh = cube();
+    mesh.positions[7] = Vec3::splat(1.5);
+    mesh
+}
+
+#[test]
+fn hats_are_one_at_their_vertex_and_linear_on_edges() {
+    for mesh in [cube(), l_shape(), c_shape(), bent_cube()] {
+        let cage = Cage::new(&mesh).unwrap();
+        for (t, triangle) in cage.triangles().iter().enumerate() {
+            for k in 0..3 {
+                let mut b = [0.0; 3];
+                b[k] = 1.0;
+                let at_corner = hats(&cage, t as u32, b);
+                assert!((at_corner[triangle[k] as usize] - 1.0).abs() <= ROUNDING);
+                let (i, j) = (triangle[k], triangle[(k + 1) % 3]);
+                let face = &cage.faces()[cage.face_of_triangle()[t] as usize];
+                let n = face.len();
+                if !(0..n).any(|c| face[c] == i && face[(c + 1) % n] == j) {
+                    continue; // a diagonal of the face, not an edge
+                }
+                b[k] = 0.25;
+                b[(k + 1) % 3] = 0.75;
+                let on_edge = hats(&cage, t as u32, b);
+                assert!((on_edge[i as usize] - 0.25).abs() <= ROUNDING);
+                assert!((on_edge[j as usize] - 0.75).abs() <= ROUNDING);
+            }
+        }
+    }
+}
+
+#[test]
+fn hats_are_bilinear_on_a_box() {
+    let size = Vec3::new(1.0, 2.5, 0.75);
+    let cage = Cage::new(&cuboid(Vec3::ZERO, size)).unwrap();
+    for t in 0..cage.triangles().len() as u32 {
+        for b in barycentrics() {
+            let [p, q, r] = cage.triangle_corners(t);
+            let x = (b[0] * p + b[1] * q + b[2] * r) / size.as_dvec3();
+            for (i, value) in hats(&cage, t, b).into_iter().enumerate() {
+                let factor = |axis: usize| if i >> axis & 1 == 1 { x[axis] } else { 1.0 - x[axis] };
+                let trilinear = factor(0) * factor(1) * factor(2);
+                assert!((value - trilinear).abs() <= ROUNDING, "{value} is not {trilinear}");
+            }
+        }
+    }
+}
+
+#[test]
+fn bent_quad_is_split_along_its_shorter_diagonal() {
+    // Pulled out, corner 7 makes the diagonals that do not end in it the shorter ones.
+    let cage = Cage::new(&bent_cube()).unwrap();
+    for face in [1, 3, 5] {
+        let [first, second]: [[u32; 3]; 2] = (0..cage.triangles().len())
+            .filter(|&t| cage.face_of_triangle()[t] == face)
+            .map(|t| cage.triangles()[t])
+            .collect::<Vec<_>>()
+            .try_into()
+            .unwrap();
+        assert_eq!([first, second].iter().filter(|t| t.contains(&7)).count(), 1);
+    }
+}
+
+#[test]
+fn rotated_faces_count_as_planar() {
+    let turn = glam::Quat::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -0.7);
+    let mut mesh = l_shape();
+    for p in &mut mesh.positions {
+        *p = turn * *p * 0.37 + Vec3::new(5.0, -3.0, 2.0);
+    }
+    let cage = Cage::new(&mesh).unwrap();
+    assert!(cage.polygons.iter().all(|p| p.hats != Hats::Linear));
+    // f32 moves the corners out of their planes, and hats reproduce what is in the plane.
+    assert_linear_reproduction(&cage, 2.0 * polygon::PLANAR * f64::from(cage.diagonal()));
+}
+
+#[test]
+fn face_of_many_corners_has_hats() {
+    let outline: Vec<[f32; 2]> =
+        (0..100).map(|k| (k as f32 * std::f32::consts::TAU / 100.0).sin_cos()).map(|(y, x)| [x, y]).collect();
+    assert_linear_reproduction(&Cage::new(&prism(&outline, 1.0)).unwrap(), ROUNDING);
+}
+
+/// Star-shaped outlines: a distance from the origin for each of some ascending angles.
+fn outlines(distance: std::ops::Range<f64>) -> impl Strategy<Value = Vec<DVec2>> {
+    prop::collection::vec((0.2..1.0, distance), 4..12).prop_map(|corners| {
+        let total: f64 = corners.iter().map(|c| c.0).sum();
+        let mut angle = 0.0;
+        corners
+            .iter()
+            .map(|&(step, distance)| {
+                angle += step * std::f64::consts::TAU / total;
+                distance * DVec2::from_angle(angle)
+            })
+            .collect()
+    })
+}
+
+fn assert_coordinates(outline: &[DVec2], point: DVec2, values: &[f64]) {
+    let sum: f64 = values.iter().sum();
+    let combined: DVec2 = values.iter().zip(outline).map(|(&w, &q)| w * q).sum();
+    assert!((sum - 1.0).abs() <= ROUNDING, "sum {sum}");
+    assert!(combined.distance(point) <= ROUNDING, "{combined} is not {point}: {values:?}");
+}
+
+proptest! {
+    #[test]
+    fn wachspress_is_positive_and_linear_on_convex_polygons(
+        outline in outlines(1.0..1.0001), r in 0.0..0.9f64, angle in 0.0..6.3f64,
+    ) {
+        // Angles are at least 0.09 apart: an arc rises by 1e-3 between them, so all corners are convex. The origin may
+        // be outside, so start from the mean of the corners.
+        let center = outline.iter().sum::<DVec2>() / outline.len() as f64;
+        let toward = outline[(angle * 100.0) as usize % outline.len()];
+        let point = center + r * (toward - center);
+        let mut values = vec![0.0; outline.len()];
+        hats::wachspress(&outline, point, &mut values);
+        assert_coordinates(&outline, point, &values);
+        prop_assert!(values.iter().all(|&w| w >= 0.0));
+    }
+
+    #[test]
+    fn mean_value_is_linear_on_any_polygon(
+        outline in outlines(0.3..1.0), u in 0.0..1.0f64, v in 0.0..1.0f64, k in 0..4usize,
+    ) {
+        let (a, b) = (outline[k], outline[(k + 1) % outline.len()]);
+        let point = u * (v * a + (1.0 - v) * b);
+        let mut values = vec![0.0; outline.len()];
+        hats::mean_value(&outline, point, &mut values);
+        assert_coordinates(&outline, point, &values);
+    }
+
+    #[test]
+    fn ears_cover_the_polygon(outline in outlines(0.3..1.0)) {
+        let n = outline.len();
+        let twice_area: f64 = (0..n).map(|k| outline[k].perp_dot(outline[(k + 1) % n])).sum();
+        let triangles = triangulate::ear_clip(&outline).unwrap();
+        prop_assert_eq!(triangles.len(), n - 2);
+        // Triangles that face the right way and have the polygon's area in all neither overlap nor stick out.
+        let areas: Vec<f64> = triangles
+            .iter()
+            .map(|t| t.map(|k| outline[k as usize]))
+            .map(|[a, b, c]| triangulate::cross(a, b, c))
+            .collect();
+        prop_assert!(areas.iter().all(|&a| a > 0.0));
+        prop_assert!((areas.iter().sum::<f64>() - twice_area).abs() <= ROUNDING);
+    }
+}

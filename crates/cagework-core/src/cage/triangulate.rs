@@ -1,0 +1,72 @@
+//! Ear clipping: a simple polygon cut into triangles that use every corner, also straight ones, so that the triangles
+//! of neighbouring faces share whole edges and the cut surface is closed, too.
+
+use glam::DVec2;
+
+use super::defects::FaceDefect;
+
+/// Corners above which the first ear is taken, not the best: choosing costs `n^3`.
+const CHOOSY_CORNERS: usize = 128;
+
+/// An ear is straight if twice its area is below this fraction of the squared extent: rounding of f32 coordinates.
+const STRAIGHT: f64 = 1e-7;
+
+/// Twice the signed area of a triangle; positive if counter-clockwise.
+pub(super) fn cross(a: DVec2, b: DVec2, c: DVec2) -> f64 {
+    (b - a).perp_dot(c - a)
+}
+
+/// Triangles `[n - 2]` that cover a counter-clockwise polygon, as indices of its corners.
+pub(super) fn ear_clip(outline: &[DVec2]) -> Result<Vec<[u32; 3]>, FaceDefect> {
+    let extent = outline.iter().map(|p| p.length()).fold(0.0, f64::max);
+    let straight = STRAIGHT * extent * extent;
+    let mut left: Vec<usize> = (0..outline.len()).collect();
+    let mut triangles = Vec::with_capacity(outline.len().saturating_sub(2));
+    while left.len() > 3 {
+        // Straight ears only when there is nothing else: they would leave triangles without area.
+        let k = find_ear(outline, &left, straight)
+            .or_else(|| find_ear(outline, &left, -straight))
+            .ok_or(FaceDefect::CrossesItself)?;
+        triangles.push(ear(&left, k));
+        left.remove(k);
+    }
+    triangles.push([left[0], left[1], left[2]]);
+    Ok(triangles.iter().map(|t| t.map(|k| k as u32)).collect())
+}
+
+/// The triangle that is cut off at the `k`-th corner that is left.
+fn ear(left: &[usize], k: usize) -> [usize; 3] {
+    let n = left.len();
+    [left[(k + n - 1) % n], left[k], left[(k + 1) % n]]
+}
+
+/// The corner of `left` whose ear is the least pointed, if its doubled area exceeds `min_area` and no other corner is
+/// in it or, unless straight ears are allowed, on its rim.
+fn find_ear(outline: &[DVec2], left: &[usize], min_area: f64) -> Option<usize> {
+    let rim = -min_area;
+    let mut best: Option<(f64, usize)> = None;
+    for k in 0..left.len() {
+        let corners = ear(left, k);
+        let [a, b, c] = corners.map(|i| outline[i]);
+        let area = cross(a, b, c);
+        if area <= min_area {
+            continue;
+        }
+        let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+        let quality = area / longest;
+        if best.is_some_and(|(q, _)| q >= quality) {
+            continue;
+        }
+        let blocked = left.iter().any(|&i| {
+            let p = outline[i];
+            !corners.contains(&i) && cross(a, b, p) > rim && cross(b, c, p) > rim && cross(c, a, p) > rim
+        });
+        if !blocked {
+            best = Some((quality, k));
+            if left.len() > CHOOSY_CORNERS {
+                break;
+            }
+        }
+    }
+    best.map(|(_, k)| k)
+}

@@ -1,0 +1,114 @@
+//! Small exact-enough geometry in f64: closest point of a triangle, triangle against box, winding number.
+
+use glam::DVec3;
+
+/// Relative widening of the box in [`triangle_box_overlaps`]: above the rounding of f64, far below a cell.
+const BOX_WIDENING: f64 = 1e-9;
+
+/// A triangle lower than this fraction of its length is taken as a segment: its plane is lost in the rounding of f64.
+const STRAIGHT: f64 = 1e-12;
+
+/// The point of a triangle that is closest to some other point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClosestPoint {
+    /// The point, object units.
+    pub point: DVec3,
+    /// Its barycentric coordinates: not negative, sum 1.
+    pub barycentric: [f64; 3],
+}
+
+/// Closest point of `triangle` to `point`. A triangle without area is treated as the segment or point that it is.
+///
+/// Source: Ericson 2005, "Real-time collision detection", sections 3.4 and 5.1.2; not his faster 5.1.5, whose case
+/// distinction takes a wrong side of a triangle without area.
+#[must_use]
+pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> ClosestPoint {
+    let [a, b, c] = triangle;
+    let barycentric = projection_inside(point, triangle).unwrap_or_else(|| {
+        let [on_ab, on_bc, on_ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| share_of_segment(point, p, q));
+        let candidates = [[1.0 - on_ab, on_ab, 0.0], [0.0, 1.0 - on_bc, on_bc], [on_ca, 0.0, 1.0 - on_ca]];
+        let distance = |[u, v, w]: [f64; 3]| (u * a + v * b + w * c).distance_squared(point);
+        // The first of equally close ones.
+        let mut best = candidates[0];
+        for candidate in &candidates[1..] {
+            if distance(*candidate) < distance(best) {
+                best = *candidate;
+            }
+        }
+        best
+    });
+    let [u, v, w] = barycentric;
+    ClosestPoint { point: u * a + v * b + w * c, barycentric }
+}
+
+/// Barycentric coordinates of the projection of `point`, if it is in the triangle and the triangle has an area.
+fn projection_inside(point: DVec3, [a, b, c]: [DVec3; 3]) -> Option<[f64; 3]> {
+    let (ab, ac, ap) = (b - a, c - a, point - a);
+    let normal = ab.cross(ac);
+    let area_squared = normal.length_squared();
+    let longest_squared = ab.length_squared().max(ac.length_squared());
+    if area_squared <= (STRAIGHT * longest_squared).powi(2) {
+        return None;
+    }
+    let v = ap.cross(ac).dot(normal) / area_squared;
+    let w = ab.cross(ap).dot(normal) / area_squared;
+    let u = 1.0 - v - w;
+    (u >= 0.0 && v >= 0.0 && w >= 0.0).then_some([u, v, w])
+}
+
+/// Share of the way from `p` to `q` at which the segment is closest to `point`.
+fn share_of_segment(point: DVec3, p: DVec3, q: DVec3) -> f64 {
+    let way = q - p;
+    let length_squared = way.length_squared();
+    if length_squared > 0.0 { ((point - p).dot(way) / length_squared).clamp(0.0, 1.0) } else { 0.0 }
+}
+
+/// Whether a triangle and an axis-aligned box (centre, half edge lengths) have a point in common. A triangle that
+/// misses the box by less than 1e-9 of their size may count as touching, never the other way round: a surface
+/// must not slip between two boxes.
+///
+/// Source: Akenine-Moeller 2001, "Fast 3D triangle-box overlap testing" (separating axes).
+#[must_use]
+pub fn triangle_box_overlaps(center: DVec3, half: DVec3, triangle: [DVec3; 3]) -> bool {
+    let [a, b, c] = triangle.map(|p| p - center);
+    let size = half.max_element().max(a.abs().max_element());
+    let half = half + DVec3::splat(BOX_WIDENING * size);
+    if a.min(b).min(c).cmpgt(half).any() || a.max(b).max(c).cmplt(-half).any() {
+        return false;
+    }
+    let edges = [b - a, c - b, a - c];
+    let separates = |axis: DVec3| {
+        let (p, q, r) = (axis.dot(a), axis.dot(b), axis.dot(c));
+        let reach = half.dot(axis.abs());
+        p.min(q).min(r) > reach || p.max(q).max(r) < -reach
+    };
+    if separates(edges[0].cross(edges[1])) {
+        return false;
+    }
+    !edges.iter().any(|e| {
+        separates(DVec3::new(0.0, -e.z, e.y))
+            || separates(DVec3::new(e.z, 0.0, -e.x))
+            || separates(DVec3::new(-e.y, e.x, 0.0))
+    })
+}
+
+/// How often a closed set of triangles, counter-clockwise seen from outside, winds around `point`: 1 inside,
+/// 0 outside, in between on the surface itself. 1 inside a solid, also one with cavities.
+///
+/// Source: van Oosterom, Strackee 1983, "The solid angle of a plane triangle".
+#[must_use]
+pub fn winding_number(point: DVec3, triangles: impl IntoIterator<Item = [DVec3; 3]>) -> f64 {
+    let solid_angle: f64 = triangles
+        .into_iter()
+        .map(|triangle| {
+            let [a, b, c] = triangle.map(|p| p - point);
+            let (la, lb, lc) = (a.length(), b.length(), c.length());
+            let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+            2.0 * a.dot(b.cross(c)).atan2(denominator)
+        })
+        .sum();
+    solid_angle / (4.0 * std::f64::consts::PI)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,159 @@
+//! The grid: cell <-> index <-> point. The only place with index arithmetic.
+
+use glam::DVec3;
+
+use crate::mesh::Bounds;
+
+/// Smallest number of cells along the longest side.
+pub const MIN_GRID: u32 = 8;
+/// Largest number of cells along the longest side.
+pub const MAX_GRID: u32 = 512;
+
+/// Offset of the cell centres, in cells: small and irrational-looking, so that grid lines through an axis-aligned
+/// cage do not run along its edges and vertices.
+const SHIFT: DVec3 = DVec3::new(0.013_713_7, 0.007_071_1, 0.019_318_5);
+
+/// No cell: an index that no grid has.
+pub const NO_CELL: u32 = u32::MAX;
+
+/// A box of equal cells; unknowns sit at cell centres. x runs fastest, then y, then z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    /// Cells along x, y, z.
+    pub dims: [u32; 3],
+    /// Centre of cell (0, 0, 0), object units.
+    pub origin: DVec3,
+    /// Edge lengths of a cell, object units.
+    pub cell: DVec3,
+}
+
+impl Grid {
+    /// Cubic cells around `bounds`, `g` of them along its longest side and one more layer all around.
+    #[must_use]
+    pub fn cubic(bounds: Bounds, g: u32) -> Self {
+        let (min, extent) = (bounds.min.as_dvec3(), bounds.extent().as_dvec3());
+        let h = extent.max_element() / f64::from(g);
+        // Centres at -1/2, 1/2, ..., so that the first and the last layer lie outside the cage.
+        let dims = [0, 1, 2].map(|a| (extent[a] / h - SHIFT[a] + 0.5).ceil().max(1.0) as u32 + 1);
+        Self { dims, origin: min + h * (SHIFT - 0.5), cell: DVec3::splat(h) }
+    }
+
+    /// The grid of every second centre along each axis: `coarse(x, y, z)` is `fine(2x, 2y, 2z)`.
+    #[must_use]
+    pub fn coarsened(&self) -> Self {
+        Self { dims: self.dims.map(|d| (d - 1) / 2 + 1), origin: self.origin, cell: 2.0 * self.cell }
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn n_cells(&self) -> usize {
+        self.dims.iter().map(|&d| d as usize).product()
+    }
+
+    /// Index of a cell that is in the grid.
+    #[inline]
+    #[must_use]
+    pub fn index(&self, [x, y, z]: [u32; 3]) -> usize {
+        debug_assert!(x < self.dims[0] && y < self.dims[1] && z < self.dims[2]);
+        (z as usize * self.dims[1] as usize + y as usize) * self.dims[0] as usize + x as usize
+    }
+
+    /// The cell one step along `direction` (+x, -x, +y, -y, +z, -z), if it is in the grid.
+    #[inline]
+    #[must_use]
+    pub fn neighbour(&self, mut cell: [u32; 3], direction: usize) -> Option<[u32; 3]> {
+        let axis = direction / 2;
+        cell[axis] = if direction.is_multiple_of(2) { cell[axis] + 1 } else { cell[axis].checked_sub(1)? };
+        (cell[axis] < self.dims[axis]).then_some(cell)
+    }
+
+    /// The cell at `cell + offset`, if it is in the grid.
+    #[inline]
+    #[must_use]
+    pub fn offset(&self, cell: [u32; 3], offset: [i32; 3]) -> Option<[u32; 3]> {
+        let mut moved = cell;
+        for axis in 0..3 {
+            moved[axis] = cell[axis].checked_add_signed(offset[axis]).filter(|&x| x < self.dims[axis])?;
+        }
+        Some(moved)
+    }
+
+    /// Distance in the array between a cell and its neighbour one up along each axis.
+    #[must_use]
+    pub fn strides(&self) -> [usize; 3] {
+        let (nx, ny) = (self.dims[0] as usize, self.dims[1] as usize);
+        [1, nx, nx * ny]
+    }
+
+    /// All cells in index order.
+    pub fn cells(&self) -> impl Iterator<Item = [u32; 3]> + use<> {
+        let [nx, ny, nz] = self.dims;
+        (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
+    }
+
+    /// Cell coordinates of a point: cell centres are whole numbers.
+    #[inline]
+    #[must_use]
+    pub fn to_grid(&self, p: DVec3) -> DVec3 {
+        (p - self.origin) / self.cell
+    }
+
+    /// Centre of a cell, object units.
+    #[must_use]
+    pub fn center(&self, cell: [u32; 3]) -> DVec3 {
+        self.origin + self.cell * DVec3::from_array(cell.map(f64::from))
+    }
+
+    /// Colour of a cell in red-black order: 0 red, 1 black.
+    #[inline]
+    #[must_use]
+    pub fn colour(cell: [u32; 3]) -> usize {
+        ((cell[0] + cell[1] + cell[2]) & 1) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn longest_side_has_g_centres_inside() {
+        let bounds = Bounds { min: Vec3::new(-1.0, 0.0, 2.0), max: Vec3::new(3.0, 1.0, 4.0) };
+        for g in [8, 16, 33, 64] {
+            let grid = Grid::cubic(bounds, g);
+            for axis in 0..3 {
+                let inside = (0..grid.dims[axis])
+                    .map(|x| grid.center([x; 3])[axis])
+                    .filter(|&x| x > f64::from(bounds.min[axis]) && x < f64::from(bounds.max[axis]))
+                    .count() as f64;
+                let expected =
+                    f64::from(g) * f64::from(bounds.extent()[axis] / bounds.extent().max_element());
+                assert!((inside - expected).abs() <= 1.0, "g {g}, axis {axis}: {inside} centres inside");
+            }
+        }
+    }
+
+    #[test]
+    fn outermost_layers_lie_outside() {
+        let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::new(1.0, 0.7, 0.33) };
+        for g in 8..80 {
+            let grid = Grid::cubic(bounds, g);
+            for axis in 0..3 {
+                assert!(grid.center([0; 3])[axis] < f64::from(bounds.min[axis]));
+                assert!(grid.center(grid.dims.map(|d| d - 1))[axis] > f64::from(bounds.max[axis]));
+            }
+        }
+    }
+
+    #[test]
+    fn coarse_centres_are_fine_centres() {
+        let grid = Grid { dims: [9, 6, 3], origin: DVec3::new(0.5, -1.0, 2.0), cell: DVec3::splat(0.25) };
+        let coarse = grid.coarsened();
+        assert_eq!(coarse.dims, [5, 3, 2]);
+        for cell in coarse.cells() {
+            assert_eq!(coarse.center(cell), grid.center(cell.map(|x| 2 * x)));
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! Harmonic-coordinate cage deformation: the mathematics, and nothing else.
+//!
+//! Data flows one way: mesh and [`Cage`] -> grid -> levels -> (batch: solve, sample) -> [`Weights`] -> deform.
+//! No I/O, no GPU, no JavaScript; everything here compiles for `wasm32-unknown-unknown`.
+
+pub mod bind;
+pub mod cage;
+pub mod cage_gen;
+pub mod deform;
+pub mod geometry;
+pub mod grid;
+pub mod levels;
+pub mod mean_value;
+pub mod mesh;
+pub mod progress;
+pub mod report;
+pub mod sample;
+mod simd;
+pub mod solve;
+pub mod stencil;
+pub mod transfer;
+pub mod voxelize;
+pub mod weights;
+
+pub use bind::{BindError, BindOptions, Binding, bind};
+pub use cage::{Cage, CageError, CageNotice, FaceDefect};
+pub use cage_gen::subdivided_box;
+pub use mean_value::{MeanValueError, mean_value_weights};
+pub use mesh::{Bounds, PolygonMesh, TriMesh};
+pub use progress::{Cancelled, Progress, ProgressEvent, Stage};
+pub use report::BindReport;
+pub use weights::Weights;

@@ -1,0 +1,209 @@
+//! Mean value coordinates for closed triangle meshes: the closed-form alternative to compare harmonic ones with.
+//!
+//! They need no grid and no solver, but they are negative in places where the cage is not convex, and they see through
+//! its walls: a vertex in one leg follows the other leg. That is what harmonic coordinates were made for.
+//!
+//! Source: Ju, Schaefer, Warren 2005, "Mean value coordinates for closed triangular meshes".
+//!
+//! Changes versus the paper: weights are the mean vector's components along the corners' directions (section 3.2), with
+//! angles by arctangent. The robust form of section 3.3 takes the root of `1 - c^2`, which loses half of all digits near
+//! the plane of a triangle. Polygons are taken as the triangles that [`Cage::triangles`] cuts them into.
+
+use glam::{DVec3, Vec3};
+use thiserror::Error;
+
+use crate::cage::Cage;
+use crate::weights::Weights;
+
+/// Sine below which directions count as in one plane or along one line, and fraction of the cage's diagonal below
+/// which a point counts as on the surface: the root of the rounding of f64, where the error of the formula and of
+/// leaving a triangle out are the same, 1e-8.
+const ON_SURFACE: f64 = 1e-8;
+
+/// Angles of a triangle's sides that sum to a full turn up to this are seen from a point on it: ten times the angle that
+/// [`ON_SURFACE`] leaves open, because the nearness of an edge magnifies it.
+const ALL_AROUND: f64 = 1e-7;
+
+/// Why there are no mean value coordinates.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum MeanValueError {
+    /// A point is not a finite number.
+    #[error("mesh vertex {vertex} is not a finite number")]
+    NotFinite {
+        /// The point.
+        vertex: u32,
+    },
+    /// The weights of a point outside cancel out.
+    #[error(
+        "mean value coordinates are not defined at mesh vertex {vertex}, outside of the cage: enlarge the cage"
+    )]
+    Undefined {
+        /// The point.
+        vertex: u32,
+    },
+    /// There would be more weights than row pointers can count.
+    #[error("{rows} vertices times {columns} cage vertices are more than {} weights: use fewer", u32::MAX)]
+    TooMany {
+        /// Points.
+        rows: usize,
+        /// Cage vertices.
+        columns: usize,
+    },
+}
+
+/// Mean value coordinates of all cage vertices at `points` (`[n_vertices]`, object units, inside or outside of the
+/// cage). Dense: every row has all columns. `[n_vertices, n_cage]`
+///
+/// # Errors
+/// [`MeanValueError`]: a point is not finite, has no coordinates, or there are too many weights.
+pub fn mean_value_weights(points: &[Vec3], cage: &Cage) -> Result<Weights, MeanValueError> {
+    let (rows, columns) = (points.len(), cage.n_vertices());
+    if let Some(vertex) = points.iter().position(|p| !p.is_finite()) {
+        return Err(MeanValueError::NotFinite { vertex: vertex as u32 });
+    }
+    if rows.checked_mul(columns).is_none_or(|n| u32::try_from(n).is_err()) {
+        return Err(MeanValueError::TooMany { rows, columns });
+    }
+    let dense = crate::voxelize::map_indices(rows, |v| {
+        let mut row = vec![0.0; columns];
+        let defined = coordinates(points[v].as_dvec3(), cage, &mut row);
+        defined.then(|| row.into_iter().map(|w| w as f32).collect::<Vec<f32>>())
+    });
+    let mut data = Vec::with_capacity(rows * columns);
+    for (v, row) in dense.into_iter().enumerate() {
+        data.extend(row.ok_or(MeanValueError::Undefined { vertex: v as u32 })?);
+    }
+    let indptr = (0..=rows).map(|v| (v * columns) as u32).collect();
+    let indices = (0..rows).flat_map(|_| 0..columns as u32).collect();
+    Ok(Weights::new(columns as u32, indptr, indices, data)
+        .expect("full rows of finite numbers are a CSR matrix"))
+}
+
+/// Mean value coordinates at one point; `row` must be zero. `[n_cage]`. Whether they are defined there.
+fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
+    let near = ON_SURFACE * f64::from(cage.diagonal());
+    for (t, triangle) in cage.triangles().iter().enumerate() {
+        let arms = cage.triangle_corners(t as u32).map(|p| p - point);
+        let lengths = arms.map(DVec3::length);
+        if let Some(k) = lengths.iter().position(|&d| d <= near) {
+            row.fill(0.0);
+            row[triangle[k] as usize] = 1.0;
+            return true;
+        }
+        let directions = [0, 1, 2].map(|k| arms[k] / lengths[k]);
+        // Side k is across from corner k; its normal has the length of the sine of its angle.
+        let normals = [0, 1, 2].map(|k| directions[(k + 1) % 3].cross(directions[(k + 2) % 3]));
+        let sines = normals.map(DVec3::length);
+        let angles = [0, 1, 2].map(|k| sines[k].atan2(directions[(k + 1) % 3].dot(directions[(k + 2) % 3])));
+        let determinant = directions[0].dot(normals[0]);
+        // Over the largest sine it is that of the point's elevation over the plane; alone it would be small for every
+        // triangle that is far away.
+        if determinant.abs() <= ON_SURFACE * sines.into_iter().fold(0.0, f64::max) {
+            if std::f64::consts::TAU - angles.iter().sum::<f64>() > ALL_AROUND {
+                continue; // seen edge-on from outside of it: its solid angle is zero
+            }
+            let on_face = [0, 1, 2].map(|k| sines[k] * lengths[(k + 1) % 3] * lengths[(k + 2) % 3]);
+            let sum: f64 = on_face.iter().sum();
+            row.fill(0.0);
+            for (&i, w) in triangle.iter().zip(on_face) {
+                row[i as usize] = w / sum;
+            }
+            return true;
+        }
+        let mean: DVec3 = (0..3).map(|k| 0.5 * angles[k] / sines[k] * normals[k]).sum();
+        for k in 0..3 {
+            row[triangle[k] as usize] += normals[k].dot(mean) / (lengths[k] * determinant);
+        }
+    }
+    let sum: f64 = row.iter().sum();
+    let cancelled = sum.abs() <= ON_SURFACE * row.iter().map(|w| w.abs()).sum::<f64>();
+    for w in row {
+        *w /= sum;
+    }
+    !cancelled
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::cage::shapes;
+
+    /// [`ON_SURFACE`] in units of the shapes, over the few cosines that are smaller than 1.
+    const TOLERANCE: f64 = 1e-7;
+
+    fn at(cage: &Cage, point: DVec3) -> Vec<f64> {
+        let mut row = vec![0.0; cage.n_vertices()];
+        assert!(coordinates(point, cage, &mut row));
+        row
+    }
+
+    fn assert_reproduced(cage: &Cage, point: DVec3) {
+        let row = at(cage, point);
+        let sum: f64 = row.iter().sum();
+        let combined: DVec3 = row.iter().zip(cage.positions()).map(|(&w, p)| w * p.as_dvec3()).sum();
+        assert!((sum - 1.0).abs() <= TOLERANCE, "weights sum to {sum} at {point}");
+        assert!(combined.distance(point) <= TOLERANCE, "{combined} is not {point}");
+    }
+
+    #[test]
+    fn tetrahedron_gives_barycentric_coordinates() {
+        let cage = Cage::new(&shapes::tetrahedron()).unwrap();
+        let p = DVec3::new(0.2, 0.3, 0.1);
+        for (w, barycentric) in at(&cage, p).into_iter().zip([0.4, 0.2, 0.3, 0.1]) {
+            assert!((w - barycentric).abs() <= TOLERANCE);
+        }
+    }
+
+    #[test]
+    fn points_on_faces_edges_and_corners_are_reproduced() {
+        for mesh in [shapes::tetrahedron(), shapes::octahedron(), shapes::l_shape(), shapes::c_shape()] {
+            let cage = Cage::new(&mesh).unwrap();
+            for t in 0..cage.triangles().len() as u32 {
+                let [a, b, c] = cage.triangle_corners(t);
+                let normal = (b - a).cross(c - a);
+                for [u, v, w] in [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.2, 0.3, 0.5], [0.9, 0.1, 0.0]] {
+                    for height in [0.0, 1e-14, 1e-10, 1e-8, 1e-6, 1e-3] {
+                        assert_reproduced(&cage, u * a + v * b + w * c - height * normal);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn vertex_has_weight_one_at_itself() {
+        let cage = Cage::new(&shapes::c_shape()).unwrap();
+        let weights = mean_value_weights(cage.positions(), &cage).unwrap();
+        for (v, (columns, row)) in weights.rows().enumerate() {
+            assert_eq!(columns, (0..16).collect::<Vec<u32>>());
+            assert!(row.iter().enumerate().all(|(i, &w)| w == if i == v { 1.0 } else { 0.0 }));
+        }
+    }
+
+    #[test]
+    fn weights_go_negative_across_the_gap_of_a_c() {
+        // In the lower arm, next to the gap: the walls of the gap are seen from behind.
+        let cage = Cage::new(&shapes::c_shape()).unwrap();
+        let row = at(&cage, DVec3::new(2.5, 0.9, 0.5));
+        assert!(row.iter().any(|&w| w < -1e-3), "{row:?}");
+    }
+
+    #[test]
+    fn point_that_is_not_finite_is_named() {
+        let cage = Cage::new(&shapes::cube()).unwrap();
+        let points = [Vec3::ONE, Vec3::NAN];
+        assert_eq!(mean_value_weights(&points, &cage), Err(MeanValueError::NotFinite { vertex: 1 }));
+    }
+
+    proptest! {
+        #[test]
+        fn weights_sum_to_1_and_reproduce_points_inside(
+            x in 0.001..0.999f64, y in 0.001..2.999f64, z in 0.001..0.999f64,
+        ) {
+            // The back of the C.
+            assert_reproduced(&Cage::new(&shapes::c_shape()).unwrap(), DVec3::new(x, y, z));
+        }
+    }
+}

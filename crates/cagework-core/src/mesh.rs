@@ -1,0 +1,118 @@
+//! Meshes as plain arrays, their bounds, and welding of vertices that were split at seams.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+
+/// Axis-aligned bounding box, in object units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Smallest corner.
+    pub min: Vec3,
+    /// Largest corner.
+    pub max: Vec3,
+}
+
+impl Bounds {
+    /// Bounds of `points`; `None` when there are none.
+    #[must_use]
+    pub fn of(points: &[Vec3]) -> Option<Self> {
+        let first = *points.first()?;
+        Some(
+            points
+                .iter()
+                .fold(Self { min: first, max: first }, |b, &p| Self { min: b.min.min(p), max: b.max.max(p) }),
+        )
+    }
+
+    /// Edge lengths of the box.
+    #[must_use]
+    pub fn extent(&self) -> Vec3 {
+        self.max - self.min
+    }
+
+    /// Centre of the box.
+    #[must_use]
+    pub fn center(&self) -> Vec3 {
+        self.min + 0.5 * self.extent()
+    }
+
+    /// Length of the diagonal: the unit of every relative error in a report.
+    #[must_use]
+    pub fn diagonal(&self) -> f32 {
+        self.extent().length()
+    }
+}
+
+/// Triangle mesh: `positions` `[n_vertices, 3]` in object units, `triangles` `[n_triangles, 3]` counter-clockwise
+/// seen from outside.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriMesh {
+    /// Vertex positions.
+    pub positions: Vec<Vec3>,
+    /// Vertex indices, three a triangle.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Polygon mesh, faces of any size: what a cage is read from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PolygonMesh {
+    /// Vertex positions.
+    pub positions: Vec<Vec3>,
+    /// Vertex indices of each face, in order around it.
+    pub faces: Vec<Vec<u32>>,
+}
+
+/// Which vertices share one position, so that a vertex split at a UV or normal seam is bound once.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Weld {
+    /// For each unique position, the first input vertex that has it. `[n_unique]`
+    pub first: Vec<u32>,
+    /// For each input vertex, its unique position. `[n_vertices]`
+    pub unique_of: Vec<u32>,
+}
+
+/// Welds vertices whose positions are equal (`-0` equals `0`); the order of first occurrence is kept.
+#[must_use]
+pub fn weld(positions: &[Vec3]) -> Weld {
+    let mut seen: HashMap<[u32; 3], u32> = HashMap::with_capacity(positions.len());
+    let mut welded = Weld { first: Vec::new(), unique_of: Vec::with_capacity(positions.len()) };
+    for (v, p) in positions.iter().enumerate() {
+        // Adding zero turns -0 into +0, so that both have the same bits.
+        let key = (*p + Vec3::ZERO).to_array().map(f32::to_bits);
+        let unique = *seen.entry(key).or_insert_with(|| {
+            welded.first.push(v as u32);
+            welded.first.len() as u32 - 1
+        });
+        welded.unique_of.push(unique);
+    }
+    welded
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_positions_are_welded_in_order_of_first_occurrence() {
+        let (a, b) = (Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.0, -1.0, 0.0));
+        let same_as_b = Vec3::new(-0.0, -1.0, -0.0);
+        let next_to_a = Vec3::new(1.0f32.next_up(), 2.0, 3.0);
+        let welded = weld(&[a, b, a, same_as_b, next_to_a, a]);
+        assert_eq!(welded.first, [0, 1, 4]);
+        assert_eq!(welded.unique_of, [0, 1, 0, 1, 2, 0]);
+    }
+
+    #[test]
+    fn nothing_welds_to_nothing() {
+        assert_eq!(weld(&[]), Weld::default());
+    }
+
+    #[test]
+    fn bounds_hold_all_points() {
+        let bounds = Bounds::of(&[Vec3::new(1.0, -2.0, 3.0), Vec3::new(-1.0, 0.0, 1.0)]).unwrap();
+        assert_eq!((bounds.min, bounds.max), (Vec3::new(-1.0, -2.0, 1.0), Vec3::new(1.0, 0.0, 3.0)));
+        assert_eq!((bounds.extent(), bounds.center()), (Vec3::splat(2.0), Vec3::new(0.0, -1.0, 2.0)));
+        assert_eq!(Bounds::of(&[]), None);
+    }
+}

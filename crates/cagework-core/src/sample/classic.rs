@@ -1,0 +1,42 @@
+//! Sampling as published: a mesh vertex takes the weights of the cell it lies in.
+//!
+//! Where the paper is silent: a vertex in an exterior cell, which has no weights, counts as outside the cage.
+
+use glam::DVec3;
+
+use crate::cage::Cage;
+use crate::levels::Level;
+use crate::voxelize::classic::{CellKind, ClassicCells};
+
+use super::{Stencils, closest_on_cage};
+
+/// Stencils of points (object units): one cell each.
+#[must_use]
+pub fn stencils(
+    cage: &Cage,
+    cells: &ClassicCells,
+    level: &Level,
+    points: impl Iterator<Item = DVec3>,
+) -> Stencils {
+    let mut stencils = Stencils::new();
+    let mut stencil = super::Stencil::default();
+    for point in points {
+        stencil.clear();
+        let p = level.grid.to_grid(point).round();
+        let in_grid = (0..3).all(|a| p[a] >= 0.0 && p[a] < f64::from(level.grid.dims[a]));
+        let cell = in_grid.then(|| level.grid.index(p.to_array().map(|x| x as u32)));
+        match cell.map(|c| (c, cells.kinds[c])) {
+            Some((cell, CellKind::Interior)) => stencil.add_node(level.row_of[cell], 1.0),
+            Some((cell, CellKind::Boundary)) => {
+                let row = cells.boundary.row_of(cell as u32).expect("every boundary cell has values");
+                let (columns, values) = cells.boundary.row(row);
+                for (&column, &value) in columns.iter().zip(values) {
+                    stencil.add_hat(column, f64::from(value));
+                }
+            }
+            _ => stencils.push_outside(cage, closest_on_cage(cage, point), &mut stencil),
+        }
+        stencils.push(&stencil);
+    }
+    stencils
+}

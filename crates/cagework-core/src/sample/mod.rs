@@ -1,0 +1,201 @@
+//! From the solved field to weights at mesh vertices.
+//!
+//! A vertex's *stencil* (rows of the field with weights, and Dirichlet values with weights) depends on geometry only:
+//! it is computed once per bind and applied to every batch of columns.
+
+pub mod classic;
+pub mod embedded;
+pub mod triangles;
+
+use glam::DVec3;
+
+use crate::cage::Cage;
+use crate::geometry::closest_point_on_triangle;
+use crate::simd::dispatch;
+use crate::solve::rows::{LANES, Row, ZERO};
+
+/// A point this close to the cage (over the cage's diagonal) is on it, whatever side rounding put it on: the
+/// resolution of f32 coordinates.
+const ON_CAGE: f64 = 1e-6;
+
+/// A vertex outside the cage and the point of the cage closest to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outside {
+    /// Vertex.
+    pub vertex: u32,
+    /// Cage triangle with the closest point.
+    pub triangle: u32,
+    /// The closest point in it.
+    pub barycentric: [f64; 3],
+    /// Distance, object units.
+    pub distance: f64,
+}
+
+/// The point of the cage closest to `point`; `vertex` is left 0.
+#[must_use]
+pub fn closest_on_cage(cage: &Cage, point: DVec3) -> Outside {
+    let mut best = Outside { vertex: 0, triangle: 0, barycentric: [1.0, 0.0, 0.0], distance: f64::INFINITY };
+    for triangle in 0..cage.triangles().len() as u32 {
+        let closest = closest_point_on_triangle(point, cage.triangle_corners(triangle));
+        let distance = closest.point.distance(point);
+        if distance < best.distance {
+            best = Outside { vertex: 0, triangle, barycentric: closest.barycentric, distance };
+        }
+    }
+    best
+}
+
+/// Sampling stencils of all vertices. The weights of a stencil are positive and sum to 1.
+#[derive(Clone, Debug, Default)]
+pub struct Stencils {
+    node_start: Vec<u32>,
+    nodes: Vec<(u32, f32)>,
+    hat_start: Vec<u32>,
+    hats: Vec<(u32, f32)>,
+    /// Vertices outside the cage, ascending; their stencil is that of the closest point on the cage.
+    pub outside: Vec<Outside>,
+}
+
+/// One vertex's nodes or hats: (key, weight).
+pub type Entries<'a> = &'a [(u32, f32)];
+
+/// One vertex's stencil while it is made.
+#[derive(Clone, Debug, Default)]
+pub struct Stencil {
+    /// (row of the field, weight)
+    pub nodes: Vec<(u32, f64)>,
+    /// (control vertex, weight)
+    pub hats: Vec<(u32, f64)>,
+}
+
+impl Stencil {
+    /// Empties it.
+    pub fn clear(&mut self) {
+        self.nodes.clear();
+        self.hats.clear();
+    }
+
+    /// Adds weight to a row of the field.
+    pub fn add_node(&mut self, row: u32, weight: f64) {
+        accumulate(&mut self.nodes, row, weight);
+    }
+
+    /// Adds weight to a control vertex's Dirichlet value.
+    pub fn add_hat(&mut self, column: u32, weight: f64) {
+        accumulate(&mut self.hats, column, weight);
+    }
+}
+
+fn accumulate(list: &mut Vec<(u32, f64)>, key: u32, weight: f64) {
+    match list.iter_mut().find(|(k, _)| *k == key) {
+        Some((_, w)) => *w += weight,
+        None => list.push((key, weight)),
+    }
+}
+
+impl Stencils {
+    /// No stencils yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { node_start: vec![0], hat_start: vec![0], ..Self::default() }
+    }
+
+    /// Vertices so far.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.node_start.len() - 1
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Appends a vertex's stencil.
+    pub fn push(&mut self, stencil: &Stencil) {
+        let narrow = |&(key, w): &(u32, f64)| (key, w as f32);
+        self.nodes.extend(stencil.nodes.iter().filter(|(_, w)| *w != 0.0).map(narrow));
+        self.hats.extend(stencil.hats.iter().filter(|(_, w)| *w != 0.0).map(narrow));
+        self.node_start.push(self.nodes.len() as u32);
+        self.hat_start.push(self.hats.len() as u32);
+    }
+
+    /// Makes `stencil` that of the closest point on the cage, and lists the next vertex as outside unless it is on it.
+    pub fn push_outside(&mut self, cage: &Cage, closest: Outside, stencil: &mut Stencil) {
+        stencil.clear();
+        cage.hats_at(closest.triangle, closest.barycentric, &mut |column, hat| stencil.add_hat(column, hat));
+        if closest.distance > ON_CAGE * f64::from(cage.diagonal()) {
+            self.outside.push(Outside { vertex: self.len() as u32, ..closest });
+        }
+    }
+
+    /// Appends all of another's vertices.
+    pub fn append(&mut self, other: &Self) {
+        let (n, h, v) = (self.nodes.len() as u32, self.hats.len() as u32, self.len() as u32);
+        self.nodes.extend_from_slice(&other.nodes);
+        self.hats.extend_from_slice(&other.hats);
+        self.node_start.extend(other.node_start[1..].iter().map(|s| s + n));
+        self.hat_start.extend(other.hat_start[1..].iter().map(|s| s + h));
+        self.outside.extend(other.outside.iter().map(|o| Outside { vertex: o.vertex + v, ..*o }));
+    }
+
+    /// Weights of all vertices for the columns of one batch.
+    ///
+    /// `field`: the batch's solution. Returns `[n_vertices]` rows of lanes. GPU twin: `sample_weights`.
+    pub fn sample_weights(&self, batch: usize, field: &[Row], out: &mut Vec<Row>) {
+        dispatch(
+            #[inline(always)]
+            || self.sample_rows(batch, field, out),
+        );
+    }
+
+    #[inline(always)]
+    fn sample_rows(&self, batch: usize, field: &[Row], out: &mut Vec<Row>) {
+        out.clear();
+        let columns = (batch * LANES) as u32..(batch * LANES + LANES) as u32;
+        for (node, hat) in self.node_start.windows(2).zip(self.hat_start.windows(2)) {
+            let mut sum = ZERO;
+            for &(row, weight) in &self.nodes[node[0] as usize..node[1] as usize] {
+                let values = &field[row as usize];
+                for k in 0..LANES {
+                    sum[k] += weight * values[k];
+                }
+            }
+            for &(column, weight) in &self.hats[hat[0] as usize..hat[1] as usize] {
+                if columns.contains(&column) {
+                    sum[column as usize % LANES] += weight;
+                }
+            }
+            out.push(sum);
+        }
+    }
+
+    /// Each vertex's nodes (row of the field, weight) and hats (control vertex, weight).
+    pub fn iter(&self) -> impl Iterator<Item = (Entries<'_>, Entries<'_>)> {
+        self.node_start.windows(2).zip(self.hat_start.windows(2)).map(|(node, hat)| {
+            (&self.nodes[node[0] as usize..node[1] as usize], &self.hats[hat[0] as usize..hat[1] as usize])
+        })
+    }
+
+    /// Nodes and hats of all vertices together.
+    #[must_use]
+    pub fn n_entries(&self) -> (u64, u64) {
+        (self.nodes.len() as u64, self.hats.len() as u64)
+    }
+
+    /// Whether a vertex is outside the cage.
+    #[must_use]
+    pub fn is_outside(&self, vertex: usize) -> bool {
+        self.outside.binary_search_by_key(&(vertex as u32), |o| o.vertex).is_ok()
+    }
+
+    /// Bytes held.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice())
+            + size_of_val(self.hats.as_slice())
+            + size_of_val(self.node_start.as_slice())
+            + size_of_val(self.hat_start.as_slice())
+    }
+}

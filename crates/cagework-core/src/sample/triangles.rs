@@ -1,0 +1,175 @@
+//! Which cage triangles pass through a cell: short lists for the short rays of sampling.
+
+use glam::DVec3;
+
+use crate::cage::Cage;
+use crate::grid::Grid;
+
+/// Cells along a block's side. A block's list is filtered per cell, so it need only be short, not exact.
+const BLOCK: u32 = 8;
+
+/// Slack of the overlap tests, in cells, against rounding of the transformed corners (values up to 512 in f64).
+const SLACK: f64 = 1e-9;
+
+/// A cage triangle in cell coordinates.
+#[derive(Clone, Copy, Debug)]
+pub struct CellTriangle {
+    /// Corners.
+    pub corners: [DVec3; 3],
+    low: DVec3,
+    high: DVec3,
+    normal: DVec3,
+}
+
+/// Triangles of the cage, listed by blocks of cells.
+#[derive(Clone, Debug)]
+pub struct TriangleLists {
+    triangles: Vec<CellTriangle>,
+    n_blocks: [u32; 3],
+    start: Vec<u32>,
+    list: Vec<u32>,
+}
+
+impl TriangleLists {
+    /// Lists the cage's triangles by block.
+    #[must_use]
+    pub fn new(cage: &Cage, grid: &Grid) -> Self {
+        let points: Vec<DVec3> = cage.positions().iter().map(|p| grid.to_grid(p.as_dvec3())).collect();
+        let triangles: Vec<CellTriangle> = cage
+            .triangles()
+            .iter()
+            .map(|t| {
+                let corners = t.map(|i| points[i as usize]);
+                let [a, b, c] = corners;
+                CellTriangle {
+                    corners,
+                    low: a.min(b).min(c) - SLACK,
+                    high: a.max(b).max(c) + SLACK,
+                    normal: (b - a).cross(c - a),
+                }
+            })
+            .collect();
+        let n_blocks = grid.dims.map(|d| d.div_ceil(BLOCK));
+        let mut lists = Self { triangles, n_blocks, start: Vec::new(), list: Vec::new() };
+        let n: usize = n_blocks.iter().map(|&n| n as usize).product();
+        let mut counts = vec![0u32; n + 1];
+        lists.each_block(|block, _| counts[block + 1] += 1);
+        for b in 0..n {
+            counts[b + 1] += counts[b];
+        }
+        let mut next = counts.clone();
+        let mut list = vec![0; counts[n] as usize];
+        lists.each_block(|block, triangle| {
+            list[next[block] as usize] = triangle;
+            next[block] += 1;
+        });
+        (lists.start, lists.list) = (counts, list);
+        lists
+    }
+
+    fn each_block(&self, mut each: impl FnMut(usize, u32)) {
+        for (number, triangle) in self.triangles.iter().enumerate() {
+            let block = |x: f64, axis: usize| {
+                ((x / f64::from(BLOCK)).floor().max(0.0) as u32).min(self.n_blocks[axis] - 1)
+            };
+            let (low, high) = (triangle.low, triangle.high);
+            for z in block(low.z, 2)..=block(high.z, 2) {
+                for y in block(low.y, 1)..=block(high.y, 1) {
+                    for x in block(low.x, 0)..=block(high.x, 0) {
+                        each(self.block_index([x, y, z]), number as u32);
+                    }
+                }
+            }
+        }
+    }
+
+    fn block_index(&self, [x, y, z]: [u32; 3]) -> usize {
+        ((z * self.n_blocks[1] + y) * self.n_blocks[0] + x) as usize
+    }
+
+    /// Triangles that may meet the cube between centre `low` and centre `low + 1` (along every axis).
+    pub fn in_cube(&self, low: [u32; 3], found: &mut Vec<u32>) {
+        found.clear();
+        let cube_low = DVec3::from_array(low.map(f64::from));
+        let cube_high = cube_low + 1.0;
+        let middle = cube_low + 0.5;
+        // A cube may reach over a block's upper border by one cell centre: the block of its low corner and of its
+        // high corner may differ, but every triangle that meets the cube is listed in one of those blocks.
+        let first = low.map(|x| x / BLOCK);
+        let last = low.map(|x| (x + 1) / BLOCK);
+        for z in first[2]..=last[2].min(self.n_blocks[2] - 1) {
+            for y in first[1]..=last[1].min(self.n_blocks[1] - 1) {
+                for x in first[0]..=last[0].min(self.n_blocks[0] - 1) {
+                    let block = self.block_index([x, y, z]);
+                    for &number in &self.list[self.start[block] as usize..self.start[block + 1] as usize] {
+                        let t = &self.triangles[number as usize];
+                        if t.low.cmple(cube_high).all()
+                            && t.high.cmpge(cube_low).all()
+                            && (middle - t.corners[0]).dot(t.normal).abs()
+                                <= 0.5 * t.normal.abs().element_sum() * (1.0 + SLACK) + SLACK
+                            && !found.contains(&number)
+                        {
+                            found.push(number);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// One triangle.
+    #[must_use]
+    pub fn triangle(&self, number: u32) -> &CellTriangle {
+        &self.triangles[number as usize]
+    }
+
+    /// Bytes held.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.triangles.as_slice())
+            + size_of_val(self.start.as_slice())
+            + size_of_val(self.list.as_slice())
+    }
+}
+
+/// Where a line from a point meets a triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct Crossing {
+    /// Signed distance along the axis, in cells.
+    pub distance: f64,
+    /// Barycentric coordinates.
+    pub barycentric: [f64; 3],
+    /// Whether the triangle faces up the axis.
+    pub faces_up: bool,
+}
+
+impl CellTriangle {
+    /// Whether a point lies within `reach` cells of the triangle's plane.
+    #[inline]
+    #[must_use]
+    pub fn is_near_plane(&self, p: DVec3, reach: f64) -> bool {
+        let height = (p - self.corners[0]).dot(self.normal);
+        height * height <= reach * reach * self.normal.length_squared()
+    }
+
+    /// Where the line through `p` along `axis` meets the triangle, borders included.
+    #[inline]
+    #[must_use]
+    pub fn crossing(&self, p: DVec3, axis: usize) -> Option<Crossing> {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        if p[u] < self.low[u] || p[u] > self.high[u] || p[v] < self.low[v] || p[v] > self.high[v] {
+            return None;
+        }
+        let q = self.corners.map(|c| c - p);
+        let e = [(1, 2), (2, 0), (0, 1)].map(|(i, j): (usize, usize)| q[i][u] * q[j][v] - q[i][v] * q[j][u]);
+        let area = e[0] + e[1] + e[2];
+        let faces_up = area > 0.0;
+        let sign = if faces_up { 1.0 } else { -1.0 };
+        if area == 0.0 || e.iter().any(|e| e * sign < 0.0) {
+            return None;
+        }
+        let w = e.map(|e| e / area);
+        let distance = w[0] * q[0][axis] + w[1] * q[1][axis] + w[2] * q[2][axis];
+        Some(Crossing { distance, barycentric: w, faces_up })
+    }
+}

@@ -1,0 +1,117 @@
+//! All levels of one bind with their transfers and right-hand sides in batches: what every solver reads.
+
+use crate::levels::{Boundary, BoundaryTerm, Level};
+use crate::transfer::Transfer;
+use crate::voxelize::map_indices;
+
+use super::rows::{LANES, Row};
+
+/// Coarsening stops at this many unknowns: there, a few dozen sweeps cost nothing.
+const COARSEST_UNKNOWNS: usize = 200;
+
+/// Levels, finest first, and the transfers between neighbours.
+#[derive(Clone, Debug)]
+pub struct Hierarchy {
+    /// Levels, finest first; at least one.
+    pub levels: Vec<Level>,
+    /// `transfers[k]` lies between levels k and k + 1.
+    pub transfers: Vec<Transfer>,
+    /// Columns: control vertices.
+    pub n_columns: usize,
+    /// For each level, where each batch's terms start in `Level::boundary`, which is sorted by batch.
+    batches: Vec<Vec<u32>>,
+}
+
+impl Hierarchy {
+    /// One level only: for Jacobi.
+    #[must_use]
+    pub fn single(level: Level, n_columns: usize) -> Self {
+        let mut hierarchy =
+            Self { levels: vec![level], transfers: Vec::new(), n_columns, batches: Vec::new() };
+        hierarchy.sort_terms();
+        hierarchy
+    }
+
+    /// Levels of doubling cell size, until few unknowns remain. `coarsen` makes the next coarser boundary.
+    #[must_use]
+    pub fn new<B: Boundary + Sync>(finest: B, n_columns: usize, coarsen: impl Fn(&B) -> B) -> Self {
+        let mut boundaries = vec![finest];
+        loop {
+            let last = &boundaries[boundaries.len() - 1];
+            if last.count_unknowns() <= COARSEST_UNKNOWNS {
+                break;
+            }
+            let coarse = coarsen(last);
+            if coarse.count_unknowns() == 0 {
+                break;
+            }
+            boundaries.push(coarse);
+        }
+        let levels = map_indices(boundaries.len(), |k| Level::new(&boundaries[k]));
+        let transfers = map_indices(levels.len() - 1, |k| Transfer::new(&levels[k], &levels[k + 1]));
+        let mut hierarchy = Self { levels, transfers, n_columns, batches: Vec::new() };
+        hierarchy.sort_terms();
+        hierarchy
+    }
+
+    fn sort_terms(&mut self) {
+        let n_batches = self.n_batches();
+        let batch_of = |t: &BoundaryTerm| t.column as usize / LANES;
+        self.batches = self
+            .levels
+            .iter_mut()
+            .map(|level| {
+                level.boundary.sort_by_key(batch_of);
+                (0..=n_batches).map(|b| level.boundary.partition_point(|t| batch_of(t) < b) as u32).collect()
+            })
+            .collect();
+    }
+
+    /// Batches of [`LANES`] columns.
+    #[must_use]
+    pub fn n_batches(&self) -> usize {
+        self.n_columns.div_ceil(LANES)
+    }
+
+    fn terms(&self, level: usize, batch: usize) -> &[BoundaryTerm] {
+        let starts = &self.batches[level];
+        &self.levels[level].boundary[starts[batch] as usize..starts[batch + 1] as usize]
+    }
+
+    /// Dirichlet terms of a level for some columns.
+    pub fn boundary_terms(
+        &self,
+        level: usize,
+        columns: std::ops::Range<usize>,
+    ) -> impl Iterator<Item = &BoundaryTerm> {
+        let batches = columns.start / LANES..columns.end.min(self.n_columns).div_ceil(LANES);
+        batches
+            .flat_map(move |batch| self.terms(level, batch))
+            .filter(move |term| columns.contains(&(term.column as usize)))
+    }
+
+    /// Writes a batch's right-hand side of the finest level: one row per cut cell.
+    pub fn fill_cut_rhs(&self, batch: usize, f: &mut Vec<Row>) {
+        f.clear();
+        f.resize(self.levels[0].n_cut(), [0.0; LANES]);
+        for term in self.terms(0, batch) {
+            f[term.cut_cell as usize][term.column as usize % LANES] = term.value;
+        }
+    }
+
+    /// Writes a batch's right-hand side of a coarse level: one row per cell.
+    pub fn fill_dense_rhs(&self, level: usize, batch: usize, f: &mut [Row]) {
+        f.fill([0.0; LANES]);
+        for term in self.terms(level, batch) {
+            let row = self.levels[level].row_of_cut(term.cut_cell as usize);
+            f[row][term.column as usize % LANES] = term.value;
+        }
+    }
+
+    /// Bytes held by levels and transfers.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.levels.iter().map(Level::bytes).sum::<usize>()
+            + self.transfers.iter().map(Transfer::bytes).sum::<usize>()
+    }
+}

@@ -1,0 +1,120 @@
+//! Work shared among threads: each takes the next piece until none is left.
+//!
+//! No locks, no queue of cells: a piece is a whole batch of columns or a run of vertices, and the only shared state is
+//! one counter. Without the feature `parallel` (wasm) the same code runs on the caller's thread.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A fixed number of threads.
+#[derive(Debug)]
+pub struct Team {
+    #[cfg(feature = "parallel")]
+    pool: Option<rayon::ThreadPool>,
+    n_threads: usize,
+}
+
+impl Team {
+    /// A team of `threads` (0: one per processor). Falls back to the caller's thread if none can be started.
+    #[must_use]
+    pub fn new(threads: usize) -> Self {
+        #[cfg(feature = "parallel")]
+        {
+            let wanted = if threads == 0 {
+                std::thread::available_parallelism().map_or(1, usize::from)
+            } else {
+                threads
+            };
+            let pool = if wanted > 1 {
+                rayon::ThreadPoolBuilder::new().num_threads(wanted).build().ok()
+            } else {
+                None
+            };
+            let n_threads = if pool.is_some() { wanted } else { 1 };
+            Self { pool, n_threads }
+        }
+        #[cfg(not(feature = "parallel"))]
+        {
+            let _ = threads;
+            Self { n_threads: 1 }
+        }
+    }
+
+    /// Threads of the team.
+    #[must_use]
+    pub fn n_threads(&self) -> usize {
+        self.n_threads
+    }
+
+    /// Runs `member(thread)` once on each thread; results in thread order.
+    pub fn each<T: Send>(&self, member: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        #[cfg(feature = "parallel")]
+        if let Some(pool) = &self.pool {
+            return pool.broadcast(|context| member(context.index()));
+        }
+        vec![member(0)]
+    }
+
+    /// Runs `work` so that what it spawns runs on the team.
+    pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        #[cfg(feature = "parallel")]
+        if let Some(pool) = &self.pool {
+            return pool.install(work);
+        }
+        work()
+    }
+
+    /// Runs `work` on every state, in parallel.
+    pub fn each_mut<S: Send>(&self, states: &mut [S], work: impl Fn(&mut S) + Sync) {
+        #[cfg(feature = "parallel")]
+        if let Some(pool) = &self.pool {
+            use rayon::prelude::*;
+            return pool.install(|| states.par_iter_mut().for_each(&work));
+        }
+        states.iter_mut().for_each(work);
+    }
+
+    /// Runs `work(state, piece)` for every piece in `0..n_pieces`, whoever is free; `start` makes a thread's own state.
+    /// Results in the order of pieces.
+    pub fn share<S, T: Send>(
+        &self,
+        n_pieces: usize,
+        start: impl Fn() -> S + Sync,
+        work: impl Fn(&mut S, usize) -> T + Sync,
+    ) -> Vec<T> {
+        let next = AtomicUsize::new(0);
+        let done = self.each(|_| {
+            let mut state = None;
+            let mut results = Vec::new();
+            loop {
+                let piece = next.fetch_add(1, Ordering::Relaxed);
+                if piece >= n_pieces {
+                    return results;
+                }
+                results.push((piece, work(state.get_or_insert_with(&start), piece)));
+            }
+        });
+        let mut all: Vec<(usize, T)> = done.into_iter().flatten().collect();
+        all.sort_by_key(|(piece, _)| *piece);
+        all.into_iter().map(|(_, result)| result).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_piece_is_done_once_and_in_order() {
+        for threads in [1, 2, 3, 8] {
+            let doubled = Team::new(threads).share(
+                100,
+                || 0usize,
+                |count, piece| {
+                    *count += 1;
+                    piece * 2
+                },
+            );
+            assert_eq!(doubled, (0..100).map(|p| p * 2).collect::<Vec<_>>(), "{threads} threads");
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! The arrays that kernels and twins read: geometry flattened to plain numbers, ready to be uploaded.
+
+use glam::Vec4;
+
+use crate::bind::OutsideVertex;
+use crate::grid::NO_CELL;
+use crate::levels::Level;
+use crate::sample::Stencils;
+use crate::transfer::{ProlongRow, RestrictRow, Transfer};
+use crate::weights::Weights;
+
+/// Numbers before the coarse rows in an entry of a prolongation table.
+pub const ENTRY_HEAD: usize = 2;
+
+/// Vertices of a slice of [`SlicedWeights`]: 64 bytes of a GPU's memory in one go, and little padding. Measured on
+/// lavapipe, Armadillo three times over (50,000 vertices, 34 weights each), ms of processor time per frame: slices of 8
+/// 11, of 64 25 (62 entries a vertex instead of 53), compressed rows 11.5 to 18, all 110 columns 10 to 16; packing
+/// weights into 16 bits saves 3 more but costs 1e-5 of the distance to the origin.
+pub const SLICE: usize = 8;
+
+/// One level's stencils, an entry per row, zero rows included.
+#[derive(Clone, Debug, Default)]
+pub struct LevelTable {
+    /// Rows of the neighbours; a zero row where an arm is cut. Zero rows point to themselves. `[n_rows]`
+    pub neighbours: Vec<[u32; 6]>,
+    /// Sum of the arms' weights; 1 for zero rows. `[n_rows]`
+    pub diagonal: Vec<f32>,
+    /// Row of the right-hand side: the number of the cut cell on the finest level (`NO_CELL` for whole cells), the row
+    /// itself on coarser ones. `[n_rows]`
+    pub rhs_of_row: Vec<u32>,
+}
+
+/// How a level and the next coarser one exchange fields.
+#[derive(Clone, Debug, Default)]
+pub struct TransferTable {
+    /// Fine rows around each coarse row. `[n coarse rows]`
+    pub around: Vec<RestrictRow>,
+    /// Entries (fine row, bits of 1 over the number of coarse unknowns, 2 coarse rows).
+    pub faces: Vec<u32>,
+    /// Entries (fine row, bits of 1 over the number of coarse unknowns, 8 coarse rows).
+    pub corners: Vec<u32>,
+}
+
+/// Sampling stencils of all vertices.
+#[derive(Clone, Debug, Default)]
+pub struct SamplingTable {
+    /// Where each vertex's entries start in `nodes` and `hats`. `[n_vertices + 1]`
+    pub starts: Vec<[u32; 2]>,
+    /// (row of the field, bits of its weight)
+    pub nodes: Vec<[u32; 2]>,
+    /// (control vertex, bits of its weight)
+    pub hats: Vec<[u32; 2]>,
+}
+
+/// Weights in slices of [`SLICE`] rows, each slice as wide as its longest row and stored column by column, so that
+/// neighbouring GPU invocations read neighbouring entries.
+#[derive(Clone, Debug, Default)]
+pub struct SlicedWeights {
+    /// Where each slice starts in `entries`, over [`SLICE`]. `[n_slices + 1]`
+    pub slices: Vec<u32>,
+    /// (control vertex, bits of its weight); short rows end in weights of 0. `[slice][k][lane]`
+    pub entries: Vec<[u32; 2]>,
+}
+
+/// Offsets of vertices outside the cage.
+#[derive(Clone, Debug, Default)]
+pub struct OutsideTable {
+    /// (mesh vertex, three cage vertices)
+    pub corners: Vec<[u32; 4]>,
+    /// Offset in the triangle's frame, object units; w is 0.
+    pub offsets: Vec<Vec4>,
+}
+
+/// Each vertex's triangles.
+#[derive(Clone, Debug, Default)]
+pub struct NormalTable {
+    /// Where each vertex's triangles start in `others`. `[n_vertices + 1]`
+    pub starts: Vec<u32>,
+    /// A triangle's next two vertices, counter-clockwise after the one it is listed for, triangles ascending.
+    pub others: Vec<[u32; 2]>,
+}
+
+impl LevelTable {
+    /// The table of a level; `finest`: its right-hand side has one row per cut cell only.
+    #[must_use]
+    pub fn new(level: &Level, finest: bool) -> Self {
+        let n_rows = level.n_rows();
+        let itself = |row: usize| if finest { NO_CELL } else { row as u32 };
+        let mut table = Self {
+            neighbours: (0..n_rows as u32).map(|row| [row; 6]).collect(),
+            diagonal: vec![1.0; n_rows],
+            rhs_of_row: (0..n_rows).map(itself).collect(),
+        };
+        let mut number = 0;
+        for (colour, other) in [(0, 1), (1, 0)] {
+            let (own, first) = (level.first_row(colour), level.first_row(other) as u32);
+            for run in &level.colours[colour].runs {
+                for k in 0..run.len {
+                    let row = own + (run.start + k) as usize;
+                    let [my, py, mz, pz] = run.yz.map(|n| first + n + k);
+                    let x = first + run.x + k;
+                    table.neighbours[row] = [x + 1, x, py, my, pz, mz];
+                    table.diagonal[row] = 6.0;
+                }
+            }
+            for cut in &level.colours[colour].cut {
+                let row = own + cut.cell as usize;
+                table.neighbours[row] = cut.neighbours.map(|n| first + n);
+                table.diagonal[row] = cut.diagonal;
+                if finest {
+                    table.rhs_of_row[row] = number;
+                }
+                number += 1;
+            }
+        }
+        table
+    }
+}
+
+impl TransferTable {
+    /// The table of the transfer between `fine` and `coarse`.
+    #[must_use]
+    pub fn new(fine: &Level, coarse: &Level, transfer: &Transfer) -> Self {
+        let mut around = vec![[fine.zero_row(); 13]; coarse.n_rows()];
+        for (colour, rows) in transfer.restrict_rows.iter().enumerate() {
+            let first = coarse.first_row(colour);
+            around[first..first + rows.len()].copy_from_slice(rows);
+        }
+        let first_black = fine.first_row(1) as u32;
+        Self {
+            around,
+            faces: entries(first_black, &transfer.faces),
+            corners: entries(first_black, &transfer.corners),
+        }
+    }
+}
+
+fn entries<const N: usize>(first_black: u32, rows: &[ProlongRow<N>]) -> Vec<u32> {
+    let mut entries = Vec::with_capacity(rows.len() * (ENTRY_HEAD + N));
+    for row in rows {
+        entries.extend([first_black + row.cell, row.mean.to_bits()]);
+        entries.extend(row.coarse);
+    }
+    entries
+}
+
+impl SamplingTable {
+    /// The table of sampling stencils.
+    #[must_use]
+    pub fn new(stencils: &Stencils) -> Self {
+        let mut table = Self { starts: vec![[0; 2]], ..Self::default() };
+        for (nodes, hats) in stencils.iter() {
+            table.nodes.extend(nodes.iter().map(|&(row, w)| [row, w.to_bits()]));
+            table.hats.extend(hats.iter().map(|&(column, w)| [column, w.to_bits()]));
+            table.starts.push([table.nodes.len() as u32, table.hats.len() as u32]);
+        }
+        table
+    }
+}
+
+impl SlicedWeights {
+    /// Slices of a matrix of weights.
+    #[must_use]
+    pub fn new(weights: &Weights) -> Self {
+        let n_slices = weights.n_rows().div_ceil(SLICE);
+        let mut sliced = Self { slices: vec![0], entries: Vec::new() };
+        for slice in 0..n_slices {
+            let rows = slice * SLICE..weights.n_rows().min((slice + 1) * SLICE);
+            let width = rows.clone().map(|row| weights.row(row).0.len()).max().unwrap_or(0);
+            let begin = sliced.entries.len();
+            sliced.entries.resize(begin + width * SLICE, [0; 2]);
+            for (lane, row) in rows.enumerate() {
+                let (columns, data) = weights.row(row);
+                for (k, (&column, &weight)) in columns.iter().zip(data).enumerate() {
+                    sliced.entries[begin + k * SLICE + lane] = [column, weight.to_bits()];
+                }
+            }
+            sliced.slices.push((sliced.entries.len() / SLICE) as u32);
+        }
+        sliced
+    }
+}
+
+impl OutsideTable {
+    /// The table of a bind's outside vertices.
+    #[must_use]
+    pub fn new(outside: &[OutsideVertex]) -> Self {
+        Self {
+            corners: outside.iter().map(|o| [o.vertex, o.corners[0], o.corners[1], o.corners[2]]).collect(),
+            offsets: outside.iter().map(|o| o.offset.extend(0.0)).collect(),
+        }
+    }
+}
+
+impl NormalTable {
+    /// The table of a mesh; triangles that name a vertex beyond `n_vertices` are left out.
+    #[must_use]
+    pub fn new(n_vertices: usize, triangles: &[[u32; 3]]) -> Self {
+        let whole = || triangles.iter().filter(|t| t.iter().all(|&v| (v as usize) < n_vertices));
+        let mut starts = vec![0u32; n_vertices + 1];
+        for v in whole().flatten() {
+            starts[*v as usize + 1] += 1;
+        }
+        for v in 0..n_vertices {
+            starts[v + 1] += starts[v];
+        }
+        let mut next = starts.clone();
+        let mut others = vec![[0; 2]; starts[n_vertices] as usize];
+        for &[a, b, c] in whole() {
+            for (v, other) in [(a, [b, c]), (b, [c, a]), (c, [a, b])] {
+                others[next[v as usize] as usize] = other;
+                next[v as usize] += 1;
+            }
+        }
+        Self { starts, others }
+    }
+}

@@ -1,0 +1,126 @@
+//! Transfers between a level and the next coarser one.
+//!
+//! Prolongation is trilinear and gives cells outside the cage the value zero, which is the error's value on the cage.
+//! Restriction is its transpose, scaled by 1/2 because the coarse operator is `(2h)^2` times the Laplacian and a
+//! coarse cell gathers the weight of eight fine ones: `4 / 8`. A red-black sweep that ends with black leaves no
+//! residual on black cells, and one that starts with red overwrites whatever red cells hold: so restriction reads
+//! red cells only and prolongation writes black cells only.
+
+use crate::grid::{Grid, NO_CELL};
+use crate::levels::Level;
+
+/// Weights of restriction: of the fine cell that is the coarse cell's own centre, and of the twelve red cells next
+/// to it across an edge.
+pub const RESTRICT_CENTRE: f32 = 0.5;
+/// See [`RESTRICT_CENTRE`].
+pub const RESTRICT_EDGE: f32 = 0.125;
+
+/// Fine red cells around a coarse cell, rows of the fine level: its own centre first, then twelve edge neighbours.
+pub type RestrictRow = [u32; 13];
+
+/// A fine black cell between two coarse cells (one odd coordinate) or eight (three odd coordinates).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProlongRow<const N: usize> {
+    /// The cell, within black.
+    pub cell: u32,
+    /// Rows of the coarse level.
+    pub coarse: [u32; N],
+    /// 1 over the number of coarse cells that are unknowns; 0 if none is. Full multigrid's first guess is their mean,
+    /// because the solution, unlike the error, is not zero on the cage.
+    pub mean: f32,
+}
+
+/// How a level and the next coarser one exchange fields.
+#[derive(Clone, Debug)]
+pub struct Transfer {
+    /// For each coarse row but the zero rows: red, then black cells, in order.
+    pub restrict_rows: [Vec<RestrictRow>; 2],
+    /// Black cells with one odd coordinate, ascending.
+    pub faces: Vec<ProlongRow<2>>,
+    /// Black cells with three odd coordinates, ascending.
+    pub corners: Vec<ProlongRow<8>>,
+    /// Where each z-plane's faces and corners start. `[nz + 1]`
+    pub planes: Vec<[u32; 2]>,
+}
+
+/// The twelve edge neighbours of a cell.
+const EDGES: [[i32; 3]; 12] = [
+    [1, 1, 0],
+    [-1, 1, 0],
+    [1, -1, 0],
+    [-1, -1, 0],
+    [1, 0, 1],
+    [-1, 0, 1],
+    [1, 0, -1],
+    [-1, 0, -1],
+    [0, 1, 1],
+    [0, -1, 1],
+    [0, 1, -1],
+    [0, -1, -1],
+];
+
+impl Transfer {
+    /// Tables between `fine` and `coarse`, whose grid is `fine.grid.coarsened()`.
+    #[must_use]
+    pub fn new(fine: &Level, coarse: &Level) -> Self {
+        let mut restrict_rows = [Vec::new(), Vec::new()];
+        for cell in coarse.grid.cells().filter(|&c| coarse.row_of[coarse.grid.index(c)] != NO_CELL) {
+            let centre = cell.map(|x| 2 * x);
+            let mut row = [fine.row_at(centre, [0; 3]); 13];
+            for (slot, edge) in row[1..].iter_mut().zip(EDGES) {
+                *slot = fine.row_at(centre, edge);
+            }
+            restrict_rows[Grid::colour(cell)].push(row);
+        }
+        let (mut faces, mut corners, mut planes) = (Vec::new(), Vec::new(), Vec::new());
+        let first_black = fine.first_row(1) as u32;
+        let [nx, ny, nz] = fine.grid.dims;
+        for z in 0..nz {
+            planes.push([faces.len() as u32, corners.len() as u32]);
+            for y in 0..ny {
+                for x in (1 - (y + z) % 2..nx).step_by(2) {
+                    let row = fine.row_of[fine.grid.index([x, y, z])];
+                    if row == NO_CELL {
+                        continue;
+                    }
+                    let cell = row - first_black;
+                    let low = [x / 2, y / 2, z / 2];
+                    let odd = [x, y, z].map(|i| (i % 2) as i32);
+                    if odd == [1; 3] {
+                        corners.push(prolong_row(coarse, cell, low, |k| {
+                            [k & 1, k >> 1 & 1, k >> 2 & 1].map(|b| b as i32)
+                        }));
+                    } else {
+                        faces.push(prolong_row(coarse, cell, low, |k| odd.map(|o| o * k as i32)));
+                    }
+                }
+            }
+        }
+        planes.push([faces.len() as u32, corners.len() as u32]);
+        Self { restrict_rows, faces, corners, planes }
+    }
+
+    /// Bytes held.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.restrict_rows.iter().map(|r| size_of_val(r.as_slice())).sum::<usize>()
+            + size_of_val(self.faces.as_slice())
+            + size_of_val(self.corners.as_slice())
+            + size_of_val(self.planes.as_slice())
+    }
+}
+
+fn prolong_row<const N: usize>(
+    coarse: &Level,
+    cell: u32,
+    low: [u32; 3],
+    offset: impl Fn(usize) -> [i32; 3],
+) -> ProlongRow<N> {
+    let rows = std::array::from_fn(|k| coarse.row_at(low, offset(k)));
+    let unknowns = rows.iter().filter(|&&row| row != coarse.zero_row()).count();
+    let mean = if unknowns == 0 { 0.0 } else { 1.0 / unknowns as f32 };
+    ProlongRow { cell, coarse: rows, mean }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,291 @@
+//! Cell kinds and boundary values as published: a cell that the cage touches holds its values.
+//!
+//! Source: Smith, "CSC 473 Harmonic Coordinates", section 3.1, Algorithms 1 and 2.
+//!
+//! Changes versus the paper:
+//! - A triangle meets only the cells of its own rows (the paper proposes its bounding box), and slices of the grid are
+//!   independent, so that they run in parallel and the result does not depend on the number of threads.
+//! - A cell's values are taken at the point of the triangle closest to its centre: barycentric coordinates of the centre
+//!   itself can be negative and exceed 1, because it need not lie over the triangle.
+//! - Of several triangles in one cell the closest to the centre gives the values (the first of equally close ones). The
+//!   paper writes them one over the other, and weights of vertices of different triangles then sum past 1.
+//! - Faces may be polygons of any size; values are those of [`Cage::hats_at`].
+//! - The grid is larger than the cage's box by 1/1000 cell on each side, so that no face lies on its outermost plane.
+//! - Besides the paper's rectangular cells, which make its average over six neighbours something else than Laplace's
+//!   equation, cells can be cubes.
+//! - The exterior is flooded from all outermost cells (the paper's own proposal), row by row, without recursion.
+
+use glam::{DVec3, UVec3};
+
+use super::map_indices;
+use crate::bind::CellShape;
+use crate::cage::Cage;
+use crate::geometry::{closest_point_on_triangle, triangle_box_overlaps};
+
+/// Room between the cage's box and the grid's end, in cells.
+const PADDING: f64 = 1e-3;
+
+/// Cells by which ranges are widened against rounding; the overlap test decides.
+const RANGE_WIDENING: f64 = 1e-6;
+
+/// What a cell is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum CellKind {
+    /// Not yet known.
+    #[default]
+    Untyped,
+    /// The cage passes through it.
+    Boundary,
+    /// Enclosed by boundary cells.
+    Interior,
+    /// Connected to the outside.
+    Exterior,
+}
+
+/// Dirichlet values of boundary cells, compressed rows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BoundaryValues {
+    /// The boundary cells, ascending. `[n_boundary]`
+    pub cells: Vec<u32>,
+    /// Where each cell's values start. `[n_boundary + 1]`
+    pub indptr: Vec<u32>,
+    /// Cage vertex of each value.
+    pub indices: Vec<u32>,
+    /// The values; those of a cell sum to 1.
+    pub values: Vec<f32>,
+}
+
+impl BoundaryValues {
+    /// Row of a cell, if it is a boundary cell.
+    #[must_use]
+    pub fn row_of(&self, cell: u32) -> Option<usize> {
+        self.cells.binary_search(&cell).ok()
+    }
+
+    /// Cage vertices and values of one row.
+    #[must_use]
+    pub fn row(&self, row: usize) -> (&[u32], &[f32]) {
+        let range = self.indptr[row] as usize..self.indptr[row + 1] as usize;
+        (&self.indices[range.clone()], &self.values[range])
+    }
+}
+
+/// Cell kinds and boundary values of the classic method.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClassicCells {
+    /// Cells along x, y, z.
+    pub dims: [u32; 3],
+    /// Centre of cell (0, 0, 0), object units.
+    pub origin: DVec3,
+    /// Edge lengths of a cell, object units.
+    pub cell_size: DVec3,
+    /// x fastest, then y, z; none is untyped. `[nz, ny, nx]`
+    pub kinds: Vec<CellKind>,
+    /// Values of the boundary cells.
+    pub boundary: BoundaryValues,
+}
+
+/// Types all cells of a grid around the cage and gives boundary cells their values. `grid`: cells along each axis of
+/// the cage's box, or along the longest one if cells are to be cubes; 1 to 1,024.
+#[must_use]
+pub fn voxelize_classic(cage: &Cage, grid: u32, shape: CellShape) -> ClassicCells {
+    debug_assert!((1..=1024).contains(&grid), "cells are counted in u32");
+    let (dims, origin, cell_size) = place_grid(cage, grid, shape);
+    let slices = triangles_of_slices(cage, dims, origin, cell_size);
+    let marked =
+        map_indices(dims.z as usize, |z| mark_slice(cage, dims, origin, cell_size, z as u32, &slices[z]));
+
+    let slice = (dims.x * dims.y) as usize;
+    let mut kinds = vec![CellKind::Untyped; slice * dims.z as usize];
+    let mut boundary = BoundaryValues { indptr: vec![0], ..BoundaryValues::default() };
+    for (z, part) in marked.into_iter().enumerate() {
+        for &cell in &part.cells {
+            kinds[z * slice + cell as usize] = CellKind::Boundary;
+            boundary.cells.push((z * slice) as u32 + cell);
+        }
+        let before = boundary.indices.len() as u32;
+        boundary.indptr.extend(part.indptr[1..].iter().map(|&end| before + end));
+        boundary.indices.extend(part.indices);
+        boundary.values.extend(part.values);
+    }
+    fill_exterior(&mut kinds, dims);
+    for kind in &mut kinds {
+        if *kind == CellKind::Untyped {
+            *kind = CellKind::Interior;
+        }
+    }
+    ClassicCells { dims: dims.into(), origin, cell_size, kinds, boundary }
+}
+
+/// Dimensions, centre of the first cell, and cell size.
+pub(crate) fn place_grid(cage: &Cage, grid: u32, shape: CellShape) -> (UVec3, DVec3, DVec3) {
+    let (min, max) = (cage.bounds().min.as_dvec3(), cage.bounds().max.as_dvec3());
+    let extent = max - min;
+    let inner = f64::from(grid) - 2.0 * PADDING;
+    let (dims, cell_size) = match shape {
+        CellShape::Box => (UVec3::splat(grid), extent / inner),
+        CellShape::Cubic => {
+            let size = extent.max_element() / inner;
+            // Less a rounding error, so that the longest axis gets `grid` cells and not one more.
+            let needed = (extent / size + 2.0 * PADDING - 1e-9).ceil();
+            (needed.as_uvec3().clamp(UVec3::ONE, UVec3::splat(grid)), DVec3::splat(size))
+        }
+    };
+    let corner = 0.5 * (min + max) - 0.5 * dims.as_dvec3() * cell_size;
+    (dims, corner + 0.5 * cell_size, cell_size)
+}
+
+/// First and last cell that a range of coordinates, in cells from the grid's corner, may touch.
+fn cell_range(low: f64, high: f64, n: u32) -> std::ops::RangeInclusive<u32> {
+    // A cast to u32 clamps below at 0.
+    (low - RANGE_WIDENING) as u32..=((high + RANGE_WIDENING) as u32).min(n - 1)
+}
+
+/// For each slice of constant z, the triangles that may meet it, ascending. `[nz]`
+fn triangles_of_slices(cage: &Cage, dims: UVec3, origin: DVec3, cell_size: DVec3) -> Vec<Vec<u32>> {
+    let mut slices = vec![Vec::new(); dims.z as usize];
+    for t in 0..cage.triangles().len() as u32 {
+        let [a, b, c] = cage.triangle_corners(t).map(|p| (p.z - origin.z) / cell_size.z + 0.5);
+        for z in cell_range(a.min(b).min(c), a.max(b).max(c), dims.z) {
+            slices[z as usize].push(t);
+        }
+    }
+    slices
+}
+
+/// Boundary cells of one slice (counted from its own first cell) and their values.
+fn mark_slice(
+    cage: &Cage,
+    dims: UVec3,
+    origin: DVec3,
+    cell_size: DVec3,
+    z: u32,
+    triangles: &[u32],
+) -> BoundaryValues {
+    #[derive(Clone, Copy)]
+    struct Closest {
+        distance_squared: f64,
+        triangle: u32,
+        barycentric: [f64; 3],
+    }
+    let mut closest: Vec<Option<Closest>> = vec![None; (dims.x * dims.y) as usize];
+    let half = 0.5 * cell_size;
+    let (mut in_slice, mut in_row, mut scratch) = (Vec::new(), Vec::new(), Vec::new());
+    for &t in triangles {
+        let triangle = cage.triangle_corners(t);
+        // In cells from the grid's corner: a cell is [x, x + 1].
+        let in_cells = triangle.map(|p| (p - origin) / cell_size + DVec3::splat(0.5));
+        in_slice.clear();
+        in_slice.extend(in_cells);
+        clip(&mut in_slice, &mut scratch, 2, z);
+        let Some((low, high)) = range(&in_slice, 1) else { continue };
+        for y in cell_range(low, high, dims.y) {
+            in_row.clone_from(&in_slice);
+            clip(&mut in_row, &mut scratch, 1, y);
+            let Some((low, high)) = range(&in_row, 0) else { continue };
+            for x in cell_range(low, high, dims.x) {
+                let center = origin + UVec3::new(x, y, z).as_dvec3() * cell_size;
+                if !triangle_box_overlaps(center, half, triangle) {
+                    continue;
+                }
+                let found = closest_point_on_triangle(center, triangle);
+                let distance_squared = found.point.distance_squared(center);
+                let best = &mut closest[(x + dims.x * y) as usize];
+                if best.is_none_or(|b| distance_squared < b.distance_squared) {
+                    let barycentric = found.barycentric;
+                    *best = Some(Closest { distance_squared, triangle: t, barycentric });
+                }
+            }
+        }
+    }
+    let mut marked = BoundaryValues { indptr: vec![0], ..BoundaryValues::default() };
+    for (cell, best) in closest.iter().enumerate() {
+        if let Some(best) = best {
+            cage.hats_at(best.triangle, best.barycentric, &mut |i, value| {
+                marked.indices.push(i);
+                marked.values.push(value as f32);
+            });
+            marked.cells.push(cell as u32);
+            marked.indptr.push(marked.indices.len() as u32);
+        }
+    }
+    marked
+}
+
+/// Cuts a convex polygon to the layer of cells `at` along `axis`, slightly widened.
+fn clip(polygon: &mut Vec<DVec3>, scratch: &mut Vec<DVec3>, axis: usize, at: u32) {
+    let low = f64::from(at) - RANGE_WIDENING;
+    let high = f64::from(at) + 1.0 + RANGE_WIDENING;
+    for (sign, limit) in [(1.0, low), (-1.0, -high)] {
+        let depth = |p: DVec3| sign * p[axis] - limit;
+        scratch.clear();
+        for (k, &p) in polygon.iter().enumerate() {
+            let q = polygon[if k + 1 == polygon.len() { 0 } else { k + 1 }];
+            let (from, to) = (depth(p), depth(q));
+            if from >= 0.0 {
+                scratch.push(p);
+            }
+            if from * to < 0.0 {
+                scratch.push(p.lerp(q, from / (from - to)));
+            }
+        }
+        std::mem::swap(polygon, scratch);
+    }
+}
+
+/// Smallest and largest coordinate, if there are points.
+fn range(points: &[DVec3], axis: usize) -> Option<(f64, f64)> {
+    let coordinates = || points.iter().map(|p| p[axis]);
+    (!points.is_empty()).then(|| {
+        (coordinates().fold(f64::INFINITY, f64::min), coordinates().fold(f64::NEG_INFINITY, f64::max))
+    })
+}
+
+/// Marks as exterior all untyped cells that are connected to an outermost one.
+fn fill_exterior(kinds: &mut [CellKind], dims: UVec3) {
+    let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
+    let untyped = |kinds: &[CellKind], cell: usize| kinds[cell] == CellKind::Untyped;
+    // Cells of which each stands for the run of untyped cells along x around it.
+    let mut runs = Vec::new();
+    for row in 0..ny * nz {
+        let (y, z) = (row % ny, row / ny);
+        let outermost = y == 0 || y == ny - 1 || z == 0 || z == nz - 1;
+        let seeds: &mut dyn Iterator<Item = usize> =
+            if outermost { &mut (0..nx) } else { &mut [0, nx - 1].into_iter() };
+        for x in seeds {
+            runs.push(row * nx + x);
+            while let Some(cell) = runs.pop() {
+                if !untyped(kinds, cell) {
+                    continue;
+                }
+                let row = cell / nx;
+                let (first, end) = (row * nx, row * nx + nx);
+                let from = (first..cell).rev().take_while(|&c| untyped(kinds, c)).last().unwrap_or(cell);
+                let to = (cell..end).take_while(|&c| untyped(kinds, c)).last().unwrap_or(cell);
+                kinds[from..=to].fill(CellKind::Exterior);
+                let (y, z) = (row % ny, row / ny);
+                let neighbours = [
+                    (y > 0).then(|| row - 1),
+                    (y + 1 < ny).then_some(row + 1),
+                    (z > 0).then(|| row - ny),
+                    (z + 1 < nz).then_some(row + ny),
+                ];
+                for other in neighbours.into_iter().flatten() {
+                    let shifted = other * nx + (from - first)..=other * nx + (to - first);
+                    let mut in_run = false;
+                    for c in shifted {
+                        let is_untyped = untyped(kinds, c);
+                        if is_untyped && !in_run {
+                            runs.push(c);
+                        }
+                        in_run = is_untyped;
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,167 @@
+//! Kinds by formula, values against every cell with every triangle as in the paper's Algorithm 1.
+
+use glam::{Quat, Vec3};
+use proptest::prelude::*;
+
+use super::*;
+use crate::cage::shapes;
+use crate::geometry::winding_number;
+use crate::mesh::PolygonMesh;
+
+/// f32 values of up to eight vertices.
+const SUM_TOLERANCE: f32 = 1e-6;
+
+fn voxelized(mesh: &PolygonMesh, grid: u32, shape: CellShape) -> (Cage, ClassicCells) {
+    let cage = Cage::new(mesh).unwrap();
+    let cells = voxelize_classic(&cage, grid, shape);
+    (cage, cells)
+}
+
+fn count(cells: &ClassicCells, kind: CellKind) -> usize {
+    cells.kinds.iter().filter(|&&k| k == kind).count()
+}
+
+fn center(cells: &ClassicCells, cell: usize) -> DVec3 {
+    let [nx, ny, _] = cells.dims.map(|n| n as usize);
+    let at = UVec3::new((cell % nx) as u32, (cell / nx % ny) as u32, (cell / nx / ny) as u32);
+    cells.origin + at.as_dvec3() * cells.cell_size
+}
+
+/// Values sum to 1, no exterior cell is inside, and all interior ones are but those in pockets that boundary cells cut
+/// off from the outside (`pockets` allowed).
+fn assert_sound(cage: &Cage, cells: &ClassicCells, pockets: bool) {
+    let boundary: Vec<u32> =
+        (0u32..).zip(&cells.kinds).filter(|(_, k)| **k == CellKind::Boundary).map(|(c, _)| c).collect();
+    assert_eq!(cells.boundary.cells, boundary);
+    for (row, &cell) in boundary.iter().enumerate() {
+        let sum: f32 = cells.boundary.row(row).1.iter().sum();
+        assert!((sum - 1.0).abs() <= SUM_TOLERANCE);
+        assert_eq!(cells.boundary.row_of(cell), Some(row));
+    }
+    for (cell, kind) in cells.kinds.iter().enumerate() {
+        let inside = || {
+            let triangles = (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
+            winding_number(center(cells, cell), triangles) > 0.5
+        };
+        match kind {
+            CellKind::Boundary => {}
+            CellKind::Interior => assert!(pockets || inside(), "cell {cell} is outside"),
+            CellKind::Exterior => assert!(!inside(), "cell {cell} is inside"),
+            CellKind::Untyped => panic!("cell {cell} is untyped"),
+        }
+    }
+}
+
+#[test]
+fn box_has_one_layer_of_boundary() {
+    for shape in [CellShape::Box, CellShape::Cubic] {
+        let (cage, cells) = voxelized(&shapes::cube(), 9, shape);
+        assert_eq!(cells.dims, [9; 3]);
+        assert_eq!(count(&cells, CellKind::Interior), 7 * 7 * 7);
+        assert_eq!(count(&cells, CellKind::Boundary), 9 * 9 * 9 - 7 * 7 * 7);
+        assert_sound(&cage, &cells, false);
+    }
+}
+
+#[test]
+fn box_cells_are_as_many_and_cubic_cells_as_long_on_every_axis() {
+    let long = shapes::cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 1.0));
+    let (_, cells) = voxelized(&long, 16, CellShape::Box);
+    assert_eq!(cells.dims, [16; 3]);
+    // 16 cells and 1/500 less are the box's length.
+    assert!((cells.cell_size * (16.0 - 2.0 * PADDING) - DVec3::new(4.0, 2.0, 1.0)).length() < 1e-12);
+    let (cage, cells) = voxelized(&long, 16, CellShape::Cubic);
+    assert_eq!(cells.dims, [16, 9, 5], "half and a quarter of 16 cells and some padding");
+    assert_eq!(cells.cell_size, DVec3::splat(cells.cell_size.x));
+    assert_sound(&cage, &cells, false);
+}
+
+#[test]
+fn l_shape_has_the_kinds_of_its_outline() {
+    // 33 cells on a length of 2 (inner walls in the middle of cell 16), 17 on a height of 1.
+    let (cage, cells) = voxelized(&shapes::l_shape(), 33, CellShape::Cubic);
+    assert_eq!(cells.dims, [33, 33, 17]);
+    assert_eq!(count(&cells, CellKind::Exterior), 16 * 16 * 17);
+    assert_eq!(count(&cells, CellKind::Interior), (31 * 31 - 16 * 16) * 15);
+    assert_sound(&cage, &cells, false);
+}
+
+#[test]
+fn all_eight_corners_of_an_octahedron_are_exterior() {
+    // Each is cut off from the others: the paper's flood from the zeromost cell misses seven of them.
+    let (cage, cells) = voxelized(&shapes::octahedron(), 21, CellShape::Box);
+    for corner in 0..8usize {
+        let at = |axis: usize| (corner >> axis & 1) * 20;
+        assert_eq!(cells.kinds[at(0) + 21 * (at(1) + 21 * at(2))], CellKind::Exterior);
+    }
+    assert_sound(&cage, &cells, false);
+}
+
+#[test]
+fn cavity_is_enclosed_and_counts_as_interior() {
+    // As published: what the exterior's flood does not reach is interior.
+    let hollow = shapes::together(&shapes::cube(), &shapes::cuboid(Vec3::splat(0.3), Vec3::splat(0.7)));
+    let (_, cells) = voxelized(&hollow, 21, CellShape::Box);
+    assert_eq!(count(&cells, CellKind::Exterior), 0);
+    assert_eq!(cells.kinds[10 + 21 * (10 + 21 * 10)], CellKind::Interior);
+}
+
+#[test]
+fn boundary_values_are_those_of_the_closest_triangle_in_the_cell() {
+    for mesh in [shapes::octahedron(), shapes::l_shape()] {
+        let (cage, cells) = voxelized(&mesh, 11, CellShape::Box);
+        for cell in 0..cells.kinds.len() {
+            let center = center(&cells, cell);
+            let mut closest: Option<(f64, u32, [f64; 3])> = None;
+            for t in 0..cage.triangles().len() as u32 {
+                let triangle = cage.triangle_corners(t);
+                if triangle_box_overlaps(center, 0.5 * cells.cell_size, triangle) {
+                    let found = closest_point_on_triangle(center, triangle);
+                    let distance_squared = found.point.distance_squared(center);
+                    if closest.is_none_or(|c| distance_squared < c.0) {
+                        closest = Some((distance_squared, t, found.barycentric));
+                    }
+                }
+            }
+            let row = cells.boundary.row_of(cell as u32);
+            assert_eq!(row.is_some(), closest.is_some(), "cell {cell}");
+            if let (Some(row), Some((_, t, barycentric))) = (row, closest) {
+                let (mut indices, mut values) = (Vec::new(), Vec::new());
+                cage.hats_at(t, barycentric, &mut |i, value| {
+                    indices.push(i);
+                    values.push(value as f32);
+                });
+                assert_eq!(cells.boundary.row(row), (&indices[..], &values[..]), "cell {cell}");
+            }
+        }
+    }
+}
+
+#[cfg(feature = "parallel")]
+#[test]
+fn one_thread_and_many_give_the_same_cells() {
+    let cage = Cage::new(&shapes::c_shape()).unwrap();
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| voxelize_classic(&cage, 40, CellShape::Cubic))
+    };
+    assert_eq!(on(1), on(4));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn nothing_leaks_whatever_the_direction(
+        axis in [-1.0..1.0f32, -1.0..1.0, 0.1..1.0], angle in 0.0..6.3f32, grid in 1..30u32, cubic in any::<bool>(),
+    ) {
+        let turn = Quat::from_axis_angle(Vec3::from(axis).normalize(), angle);
+        let mut mesh = shapes::c_shape();
+        for p in &mut mesh.positions {
+            *p = turn * *p + Vec3::new(7.0, 0.0, -3.0);
+        }
+        let shape = if cubic { CellShape::Cubic } else { CellShape::Box };
+        let (cage, cells) = voxelized(&mesh, grid, shape);
+        assert_sound(&cage, &cells, true);
+    }
+}

@@ -1,0 +1,125 @@
+//! Axis-parallel grid lines through the cage: where each line of cell centres crosses it.
+//!
+//! Watertight: a triangle covers a line by the signs of three edge functions, and an edge's sign is evaluated from
+//! the same numbers in the same order for both triangles that share it. A line exactly through an edge or a vertex
+//! counts as one a little beside it, the same way for all edges (simulation of simplicity: Edelsbrunner, Muecke 1990),
+//! so that it crosses there exactly once or, at a silhouette, an even number of times.
+
+use glam::DVec3;
+
+use crate::cage::Cage;
+use crate::grid::Grid;
+
+/// One crossing of a grid line and the cage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Position along the line, in cells: cell centres are whole numbers.
+    pub t: f64,
+    /// Cage triangle.
+    pub triangle: u32,
+    /// Barycentric coordinates of the first two corners.
+    pub barycentric: [f64; 2],
+}
+
+/// All grid lines along one axis; the hits of a line ascend. Lines are numbered `u + n_u * v`, where u and v are the
+/// cell's coordinates along the next two axes in cyclic order.
+#[derive(Clone, Debug)]
+pub struct Lines {
+    axis: usize,
+    n_u: u32,
+    start: Vec<u32>,
+    hits: Vec<Hit>,
+}
+
+impl Lines {
+    /// Shoots all lines along `axis` through the cage.
+    #[must_use]
+    pub fn shoot(cage: &Cage, grid: &Grid, axis: usize) -> Self {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let points: Vec<DVec3> = cage.positions().iter().map(|p| grid.to_grid(p.as_dvec3())).collect();
+        let n_lines = grid.dims[u] as usize * grid.dims[v] as usize;
+        let mut found: Vec<(u32, Hit)> = Vec::new();
+        for (triangle, corners) in cage.triangles().iter().enumerate() {
+            cover(&points, *corners, grid, axis, |line, hit| {
+                found.push((line, Hit { triangle: triangle as u32, ..hit }));
+            });
+        }
+        // Stable counting sort by line, then each line's few hits by position.
+        let mut start = vec![0u32; n_lines + 1];
+        for (line, _) in &found {
+            start[*line as usize + 1] += 1;
+        }
+        for line in 0..n_lines {
+            start[line + 1] += start[line];
+        }
+        let mut next = start.clone();
+        let mut hits = vec![Hit { t: 0.0, triangle: 0, barycentric: [0.0; 2] }; found.len()];
+        for (line, hit) in found {
+            hits[next[line as usize] as usize] = hit;
+            next[line as usize] += 1;
+        }
+        for line in start.windows(2) {
+            hits[line[0] as usize..line[1] as usize].sort_by(|a, b| a.t.total_cmp(&b.t));
+        }
+        Self { axis, n_u: grid.dims[u], start, hits }
+    }
+
+    /// Hits of the line through a cell, ascending.
+    #[inline]
+    #[must_use]
+    pub fn through(&self, cell: [u32; 3]) -> &[Hit] {
+        let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
+        let line = (cell[u] + self.n_u * cell[v]) as usize;
+        &self.hits[self.start[line] as usize..self.start[line + 1] as usize]
+    }
+
+    /// Each line that crosses the cage, as (u, v, hits).
+    pub fn crossing(&self) -> impl Iterator<Item = (u32, u32, &[Hit])> {
+        self.start.windows(2).enumerate().filter(|(_, w)| w[0] < w[1]).map(|(line, w)| {
+            (line as u32 % self.n_u, line as u32 / self.n_u, &self.hits[w[0] as usize..w[1] as usize])
+        })
+    }
+
+    /// Bytes held.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.hits.as_slice()) + size_of_val(self.start.as_slice())
+    }
+}
+
+/// Calls `found(line, hit)` for every line along `axis` that the triangle covers.
+fn cover(points: &[DVec3], corners: [u32; 3], grid: &Grid, axis: usize, mut found: impl FnMut(u32, Hit)) {
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let p = corners.map(|i| points[i as usize]);
+    let range = |a: usize| {
+        let (low, high) = (p[0][a].min(p[1][a]).min(p[2][a]), p[0][a].max(p[1][a]).max(p[2][a]));
+        (low.ceil().max(0.0) as u32, high.floor().min(f64::from(grid.dims[a]) - 1.0) as i64)
+    };
+    let ((u_low, u_high), (v_low, v_high)) = (range(u), range(v));
+    // Twice the signed area of (edge from `a` to `b`, point), from the lower vertex index to the higher.
+    let edge = |a: usize, b: usize, c: (f64, f64)| {
+        let (lo, hi, sign) = if corners[a] < corners[b] { (p[a], p[b], 1.0) } else { (p[b], p[a], -1.0) };
+        let (du, dv) = (hi[u] - lo[u], hi[v] - lo[v]);
+        let e = du * (c.1 - lo[v]) - dv * (c.0 - lo[u]);
+        // On the edge: the line is moved by an infinitesimal step along u and an infinitely smaller one along v.
+        let left = if e != 0.0 { e > 0.0 } else { dv < 0.0 || (dv == 0.0 && du > 0.0) };
+        (sign * e, left == (sign > 0.0))
+    };
+    for iv in i64::from(v_low)..=v_high {
+        for iu in i64::from(u_low)..=u_high {
+            let c = (iu as f64, iv as f64);
+            let ((e0, s0), (e1, s1), (e2, s2)) = (edge(1, 2, c), edge(2, 0, c), edge(0, 1, c));
+            let area = e0 + e1 + e2;
+            if s0 != s1 || s1 != s2 || area == 0.0 {
+                continue;
+            }
+            let w = [e0, e1, e2].map(|e| (e / area).clamp(0.0, 1.0));
+            let t = w[0] * p[0][axis] + w[1] * p[1][axis] + w[2] * p[2][axis];
+            let hit = Hit { t, triangle: 0, barycentric: [w[0], w[1]] };
+            found(iu as u32 + grid.dims[u] * iv as u32, hit);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,96 @@
+//! Watertight: every line enters as often as it leaves, and parity is the winding number.
+
+use glam::{DQuat, Vec3};
+use proptest::prelude::*;
+
+use super::*;
+use crate::cage::shapes;
+use crate::geometry::winding_number;
+use crate::mesh::PolygonMesh;
+use crate::voxelize::embedded::{classify, shoot_lines};
+
+/// Asserts that lines cross the cage an even number of times and that parity along each axis and the winding number
+/// agree about every `every`-th centre.
+fn assert_watertight(cage: &Cage, grid: &Grid, every: usize) {
+    let lines = shoot_lines(cage, grid);
+    for lines in &lines {
+        for (u, v, hits) in lines.crossing() {
+            assert!(hits.len().is_multiple_of(2), "{} hits on line {u}, {v}", hits.len());
+            assert!(hits.windows(2).all(|w| w[0].t <= w[1].t));
+            for hit in hits {
+                let [a, b] = hit.barycentric;
+                assert!(a >= 0.0 && b >= 0.0 && a + b <= 1.0 + 1e-12, "hits lie in their triangle");
+            }
+        }
+    }
+    let (inside, ambiguous) = classify(&lines, grid);
+    assert_eq!(ambiguous, 0);
+    let triangles = || (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
+    for cell in grid.cells().step_by(every) {
+        let winding = winding_number(grid.center(cell), triangles());
+        // In between on the surface itself, where either is right.
+        if (winding - winding.round()).abs() < 1e-6 {
+            assert_eq!(inside[grid.index(cell)], winding > 0.5, "cell {cell:?}, winding number {winding}");
+        }
+    }
+}
+
+fn turned(mesh: &PolygonMesh, turn: DQuat) -> Cage {
+    let positions = mesh.positions.iter().map(|p| (turn * p.as_dvec3()).as_vec3()).collect();
+    Cage::new(&PolygonMesh { positions, faces: mesh.faces.clone() }).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn turned_cages_are_watertight(x in -3.2..3.2f64, y in -1.6..1.6f64, z in -3.2..3.2f64, g in 8u32..20) {
+        let turn = DQuat::from_euler(glam::EulerRot::XYZ, x, y, z);
+        for mesh in [shapes::c_shape(), shapes::octahedron(), shapes::tetrahedron()] {
+            let cage = turned(&mesh, turn);
+            assert_watertight(&cage, &Grid::cubic(cage.bounds(), g), 7);
+        }
+    }
+}
+
+/// Lines along edges, through vertices and in the planes of faces: whole numbers for the shapes' corners.
+#[test]
+fn lines_through_vertices_and_along_edges_are_counted_once() {
+    for mesh in [shapes::cube(), shapes::c_shape(), shapes::l_shape(), shapes::octahedron()] {
+        let cage = Cage::new(&mesh).unwrap();
+        for step in [1.0, 0.5, 0.25] {
+            let n = (6.0 / step) as u32 + 1;
+            let grid = Grid { dims: [n; 3], origin: DVec3::splat(-2.0), cell: DVec3::splat(step) };
+            for axis in 0..3 {
+                for (u, v, hits) in Lines::shoot(&cage, &grid, axis).crossing() {
+                    assert!(hits.len().is_multiple_of(2), "{} hits on line {u}, {v}", hits.len());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn axis_aligned_cages_in_their_own_grid_are_watertight() {
+    for mesh in [shapes::cube(), shapes::c_shape(), shapes::l_shape(), shapes::octahedron()] {
+        let cage = Cage::new(&mesh).unwrap();
+        for g in 8..24 {
+            assert_watertight(&cage, &Grid::cubic(cage.bounds(), g), 5);
+        }
+    }
+}
+
+#[test]
+fn hits_lie_on_the_cage() {
+    let cage = Cage::new(&shapes::cuboid(Vec3::ZERO, Vec3::new(1.0, 2.0, 4.0))).unwrap();
+    let grid = Grid::cubic(cage.bounds(), 16);
+    for axis in 0..3 {
+        let lines = Lines::shoot(&cage, &grid, axis);
+        assert!(lines.crossing().count() > 0);
+        for (_, _, hits) in lines.crossing() {
+            let ends: Vec<f64> = hits.iter().map(|h| grid.origin[axis] + grid.cell[axis] * h.t).collect();
+            // One face at 0, the other at the box's size.
+            assert!(ends.len() == 2 && ends[0].abs() < 1e-12);
+            assert!((ends[1] - f64::from(cage.bounds().max[axis])).abs() < 1e-12);
+        }
+    }
+}

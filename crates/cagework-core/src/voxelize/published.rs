@@ -1,0 +1,76 @@
+//! The classic method's cells as levels of unknowns: boundary cells are neighbours with fixed values.
+//!
+//! The finest level is the paper's: all six arms are one cell long, and each cell is the plain average of its
+//! neighbours. Coarser levels, which only multigrid asks for, keep every second cell; an arm ends at the first
+//! boundary cell on the way.
+
+use crate::grid::Grid;
+use crate::levels::Boundary;
+
+use super::classic::{CellKind, ClassicCells};
+
+/// The classic grid, on one level: level k looks at every 2^k-th cell.
+#[derive(Clone, Debug)]
+pub struct PublishedCells<'a> {
+    cells: &'a ClassicCells,
+    fine: Grid,
+    grid: Grid,
+    step: u32,
+}
+
+impl<'a> PublishedCells<'a> {
+    /// The finest level.
+    #[must_use]
+    pub fn finest(cells: &'a ClassicCells) -> Self {
+        let grid = Grid { dims: cells.dims, origin: cells.origin, cell: cells.cell_size };
+        Self { cells, fine: grid, grid, step: 1 }
+    }
+
+    /// The next coarser level.
+    #[must_use]
+    pub fn coarsened(&self) -> Self {
+        Self { grid: self.grid.coarsened(), step: 2 * self.step, ..*self }
+    }
+
+    fn kind(&self, cell: [u32; 3]) -> CellKind {
+        self.cells.kinds[self.fine.index(cell)]
+    }
+
+    /// The first boundary cell from a cell along a direction, at most `step` cells away, and its distance.
+    fn first_boundary(&self, cell: [u32; 3], direction: usize) -> Option<(u32, u32)> {
+        let mut at = cell.map(|x| x * self.step);
+        for distance in 1..=self.step {
+            at = self.fine.neighbour(at, direction)?;
+            if self.kind(at) == CellKind::Boundary {
+                return Some((self.fine.index(at) as u32, distance));
+            }
+        }
+        None
+    }
+}
+
+impl Boundary for PublishedCells<'_> {
+    fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    fn is_unknown(&self, cell: [u32; 3]) -> bool {
+        self.kind(cell.map(|x| x * self.step)) == CellKind::Interior
+    }
+
+    fn cut_arms(&self, cell: [u32; 3]) -> u8 {
+        (0..6)
+            .filter(|&direction| self.first_boundary(cell, direction).is_some())
+            .fold(0, |arms, direction| arms | 1 << direction)
+    }
+
+    fn arm(&self, cell: [u32; 3], direction: usize, hats: &mut dyn FnMut(u32, f64)) -> f64 {
+        let Some((at, distance)) = self.first_boundary(cell, direction) else { return 0.0 };
+        let row = self.cells.boundary.row_of(at).expect("every boundary cell has values");
+        let (columns, values) = self.cells.boundary.row(row);
+        for (&column, &value) in columns.iter().zip(values) {
+            hats(column, f64::from(value));
+        }
+        f64::from(self.step) / f64::from(distance)
+    }
+}

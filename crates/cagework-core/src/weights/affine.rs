@@ -1,0 +1,138 @@
+//! Restores `sum w = 1` and `sum w c = v` after weights were dropped or rounded.
+//!
+//! The correction is the smallest one relative to the weights themselves: among all corrections d of the row w that
+//! restore the four sums, it minimises `sum d_i^2 / w_i`. Its solution is `d_i = w_i phi_i . lambda` with the 4 x 4
+//! system `(sum w_i phi_i phi_i^T) lambda = e_1 - sum w_i phi_i`, `phi_i = (1, (c_i - v) / s)`, s the cage's diagonal.
+//! Zero weights stay zero, so the row stays as sparse as it was, and small weights change little, so it stays
+//! non-negative.
+
+use glam::{DMat4, DVec3, DVec4};
+
+use crate::cage::Cage;
+use crate::solve::rows::{LANES, Row, ZERO};
+
+/// Added to the diagonal of the 4 x 4 system, relative to its trace: on a face of the cage all weights lie in a plane
+/// and the system is singular in its normal direction, along which there is nothing to correct.
+const RIDGE: f64 = 1e-7;
+
+/// The cage's vertices as columns of weights: rows of lanes, as batches are.
+#[derive(Clone, Debug)]
+pub struct Columns {
+    /// Positions from the cage's centre over its diagonal. `[3][n_batches]`
+    scaled: [Vec<Row>; 3],
+    /// The same as f64, to measure with.
+    exact: [Vec<[f64; LANES]>; 3],
+    center: DVec3,
+    diagonal: f64,
+}
+
+impl Columns {
+    /// Columns of a cage in its rest pose.
+    #[must_use]
+    pub fn new(cage: &Cage) -> Self {
+        let (center, diagonal) = (cage.bounds().center().as_dvec3(), f64::from(cage.diagonal()));
+        let exact = [0, 1, 2].map(|axis| {
+            cage.positions()
+                .chunks(LANES)
+                .map(|batch| {
+                    let mut lanes = [0.0; LANES];
+                    for (lane, p) in lanes.iter_mut().zip(batch) {
+                        *lane = (f64::from(p[axis]) - center[axis]) / diagonal;
+                    }
+                    lanes
+                })
+                .collect::<Vec<_>>()
+        });
+        let scaled = exact.each_ref().map(|e| e.iter().map(|lanes| lanes.map(|x| x as f32)).collect());
+        Self { scaled, exact, center, diagonal }
+    }
+
+    /// A point in the columns' units.
+    #[must_use]
+    pub fn scale(&self, point: DVec3) -> DVec3 {
+        (point - self.center) / self.diagonal
+    }
+
+    /// (sum of a row, distance between `sum w c` and the target over the diagonal). `row`: `[n_batches]`.
+    #[inline(always)]
+    #[must_use]
+    pub fn sums(&self, row: &[Row], target: DVec3) -> (f64, f64) {
+        let [x, y, z] = &self.exact;
+        let mut sums = [[0.0f64; LANES]; 4];
+        for (((w, x), y), z) in row.iter().zip(x).zip(y).zip(z) {
+            for k in 0..LANES {
+                let w = f64::from(w[k]);
+                sums[0][k] += w;
+                sums[1][k] += w * x[k];
+                sums[2][k] += w * y[k];
+                sums[3][k] += w * z[k];
+            }
+        }
+        let [sum, x, y, z] = sums.map(|lanes| lanes.iter().sum::<f64>());
+        (sum, (DVec3::new(x, y, z) - target).length())
+    }
+
+    /// Where a row puts its vertex, in the columns' units. `row`: `[n_batches]`.
+    #[inline(always)]
+    #[must_use]
+    pub fn combined(&self, row: &[Row]) -> DVec3 {
+        let mut point = DVec3::ZERO;
+        for (batch, w) in row.iter().enumerate() {
+            for k in 0..LANES {
+                let at = self.exact.each_ref().map(|axis| axis[batch][k]);
+                point += f64::from(w[k]) * DVec3::from_array(at);
+            }
+        }
+        point
+    }
+
+    /// Corrects a row so that it sums to 1 and reproduces `target` ([`Self::scale`]d).
+    #[inline(always)]
+    pub fn restore_affine(&self, row: &mut [Row], target: DVec3) {
+        let t = target.as_vec3();
+        let [x, y, z] = &self.scaled;
+        // 1; x, y, z; xx, xy, xz, yy, yz, zz, each weighted and summed.
+        let mut moments = [ZERO; 10];
+        for (((w, x), y), z) in row.iter().zip(x).zip(y).zip(z) {
+            let (mut dx, mut dy, mut dz, mut wx, mut wy, mut wz) = (ZERO, ZERO, ZERO, ZERO, ZERO, ZERO);
+            for k in 0..LANES {
+                (dx[k], dy[k], dz[k]) = (x[k] - t.x, y[k] - t.y, z[k] - t.z);
+                (wx[k], wy[k], wz[k]) = (w[k] * dx[k], w[k] * dy[k], w[k] * dz[k]);
+            }
+            for k in 0..LANES {
+                moments[0][k] += w[k];
+                moments[1][k] += wx[k];
+                moments[2][k] += wy[k];
+                moments[3][k] += wz[k];
+                moments[4][k] += wx[k] * dx[k];
+                moments[5][k] += wx[k] * dy[k];
+                moments[6][k] += wx[k] * dz[k];
+                moments[7][k] += wy[k] * dy[k];
+                moments[8][k] += wy[k] * dz[k];
+                moments[9][k] += wz[k] * dz[k];
+            }
+        }
+        let m = moments.map(|lanes| lanes.iter().map(|&s| f64::from(s)).sum::<f64>());
+        let sums = DVec4::new(m[0], m[1], m[2], m[3]);
+        let matrix = DMat4::from_cols(
+            sums,
+            DVec4::new(m[1], m[4], m[5], m[6]),
+            DVec4::new(m[2], m[5], m[7], m[8]),
+            DVec4::new(m[3], m[6], m[8], m[9]),
+        );
+        let ridge = RIDGE * (m[0] + m[4] + m[7] + m[9]);
+        let lambda = (matrix + DMat4::from_diagonal(DVec4::splat(ridge))).inverse() * (DVec4::X - sums);
+        if !lambda.is_finite() {
+            return;
+        }
+        let l = lambda.as_vec4();
+        for (((w, x), y), z) in row.iter_mut().zip(x).zip(y).zip(z) {
+            for k in 0..LANES {
+                w[k] *= 1.0 + (l.x + l.y * (x[k] - t.x) + l.z * (y[k] - t.y) + l.w * (z[k] - t.z));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,261 @@
+//! From batches of sampled columns to one sparse row per vertex, with the statistics of what is stored.
+
+use glam::{DVec3, Vec3};
+
+use crate::cage::Cage;
+use crate::report::{RestError, WeightStats};
+use crate::simd::dispatch;
+use crate::solve::rows::{LANES, Row, ZERO};
+use crate::solve::team::Team;
+
+use super::Weights;
+use super::affine::Columns;
+
+/// Rows whose sums miss by less than this (of the cage's diagonal) are good: two units in the last place of an f32
+/// near 1.
+const GOOD_ENOUGH: f64 = 2e-7;
+
+/// Corrections are repeated until the sums hold, at most this often: once is enough but for rows in which the
+/// threshold dropped a large share of the weight.
+const MAX_CORRECTIONS: usize = 3;
+
+/// A row that misses by more (of the cage's diagonal) after small weights were dropped keeps them all: next to a face,
+/// the many small weights of the vertices off the face are what holds the vertex away from it.
+const NOT_RESTORED: f64 = 1e-6;
+
+/// Vertices that a thread takes at a time.
+const VERTEX_RUN: usize = 512;
+
+/// How rows are made from sampled values.
+#[derive(Clone, Copy, Debug)]
+pub struct RowOptions {
+    /// Weights below are dropped; 0 keeps all that are not zero. What is dropped changes neither a row's sum nor where
+    /// it puts its vertex.
+    pub threshold: f32,
+    /// Restore sum and rest position of every row. Off for the classic method, which shows its errors.
+    pub preserve_affine: bool,
+}
+
+/// What was stored.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Statistics {
+    /// Reconstruction of the rest pose by vertices inside the cage.
+    pub rest_error: RestError,
+    /// Of the weights.
+    pub weights: WeightStats,
+}
+
+/// The rows of one run of vertices in all batches, and what is found out about them.
+struct Run<'a> {
+    first: usize,
+    points: &'a [Vec3],
+    /// `[n_batches]` slices of the batches' blocks.
+    blocks: Vec<&'a mut [Row]>,
+    lengths: Vec<u32>,
+    /// Distance between `sum w c` and the vertex over the diagonal; none for vertices outside.
+    errors: Vec<f32>,
+    range: [f32; 2],
+    max_sum_error: f64,
+    /// The run's part of the result.
+    indices: &'a mut [u32],
+    data: &'a mut [f32],
+}
+
+/// Makes the matrix of weights. `blocks[batch][vertex]`: sampled values (used up as scratch space); `points`: rest
+/// positions; `is_outside(vertex)`: whether a vertex lies outside the cage.
+pub fn assemble(
+    cage: &Cage,
+    blocks: &mut [Vec<Row>],
+    points: &[Vec3],
+    options: RowOptions,
+    is_outside: impl Fn(usize) -> bool + Sync,
+    team: &Team,
+) -> (Weights, Statistics) {
+    let columns = Columns::new(cage);
+    let mut runs = runs_of(blocks, points);
+    team.each_mut(&mut runs, |run| {
+        dispatch(
+            #[inline(always)]
+            || run.correct(&columns, options, &is_outside),
+        );
+    });
+
+    let mut indptr = Vec::with_capacity(points.len() + 1);
+    let mut end = 0u32;
+    indptr.push(end);
+    for length in runs.iter().flat_map(|run| &run.lengths) {
+        end += length;
+        indptr.push(end);
+    }
+    let (mut indices, mut data) = (vec![0u32; end as usize], vec![0.0f32; end as usize]);
+    let (mut indices_left, mut data_left) = (indices.as_mut_slice(), data.as_mut_slice());
+    for run in &mut runs {
+        let n = run.lengths.iter().sum::<u32>() as usize;
+        run.indices = indices_left.split_off_mut(..n).expect("the lengths' sum was allocated");
+        run.data = data_left.split_off_mut(..n).expect("the lengths' sum was allocated");
+    }
+    team.each_mut(&mut runs, Run::store);
+    let statistics = statistics(&runs, end, f64::from(cage.diagonal()));
+    drop(runs);
+    (Weights::from_parts(cage.n_vertices() as u32, indptr, indices, data), statistics)
+}
+
+fn runs_of<'a>(blocks: &'a mut [Vec<Row>], points: &'a [Vec3]) -> Vec<Run<'a>> {
+    let mut runs: Vec<Run<'a>> = points
+        .chunks(VERTEX_RUN)
+        .enumerate()
+        .map(|(number, points)| Run {
+            first: number * VERTEX_RUN,
+            points,
+            blocks: Vec::new(),
+            lengths: Vec::with_capacity(points.len()),
+            errors: Vec::with_capacity(points.len()),
+            range: [f32::INFINITY, f32::NEG_INFINITY],
+            max_sum_error: 0.0,
+            indices: &mut [],
+            data: &mut [],
+        })
+        .collect();
+    for block in blocks {
+        for (run, rows) in runs.iter_mut().zip(block.chunks_mut(VERTEX_RUN)) {
+            run.blocks.push(rows);
+        }
+    }
+    runs
+}
+
+impl Run<'_> {
+    /// Copies a vertex's sampled values, those that exceed the threshold.
+    #[inline(always)]
+    fn load(&self, v: usize, threshold: f32, row: &mut [Row]) {
+        for (row, block) in row.iter_mut().zip(&self.blocks) {
+            *row = block[v];
+            // Solver and rounding leave some -1e-8: a harmonic coordinate is never negative.
+            for w in row.iter_mut() {
+                *w = if *w > threshold { *w } else { 0.0 };
+            }
+        }
+    }
+
+    /// Drops small weights, restores the rows' sums, and measures them.
+    #[inline(always)]
+    fn correct(&mut self, columns: &Columns, options: RowOptions, is_outside: &impl Fn(usize) -> bool) {
+        let mut row = vec![ZERO; self.blocks.len()];
+        for (v, point) in self.points.iter().enumerate() {
+            let target = columns.scale(point.as_dvec3());
+            let outside = is_outside(self.first + v);
+            self.load(v, 0.0, &mut row);
+            let goal = if options.preserve_affine && !outside {
+                Some(target)
+            } else if options.threshold > 0.0 {
+                // Errors, and the place of a vertex outside, are not sparsification's to change.
+                Some(columns.combined(&row))
+            } else {
+                None
+            };
+            let reached = goal.map(|goal| self.restore_row(v, columns, options.threshold, &mut row, goal));
+            let (sum, miss) = match reached {
+                Some(sums) if goal == Some(target) => sums,
+                _ => columns.sums(&row, target),
+            };
+            self.measure(&row, sum, (!outside).then_some(miss));
+            for (row, block) in row.iter().zip(&mut self.blocks) {
+                block[v] = *row;
+            }
+        }
+    }
+
+    /// Drops what is below the threshold and restores the row, or keeps all if that cannot be had. `row` holds the
+    /// vertex's sampled values. Returns (sum, distance from the goal over the diagonal).
+    #[inline(always)]
+    fn restore_row(
+        &self,
+        v: usize,
+        columns: &Columns,
+        threshold: f32,
+        row: &mut [Row],
+        goal: DVec3,
+    ) -> (f64, f64) {
+        if threshold > 0.0 {
+            self.load(v, threshold, row);
+            let (sum, miss) = restore(columns, row, goal);
+            if miss.max((sum - 1.0).abs()) <= NOT_RESTORED {
+                return (sum, miss);
+            }
+            self.load(v, 0.0, row);
+        }
+        restore(columns, row, goal)
+    }
+
+    #[inline(always)]
+    fn measure(&mut self, row: &[Row], sum: f64, miss: Option<f64>) {
+        let (mut low, mut high) = ([f32::INFINITY; LANES], ZERO);
+        let mut stored = [0u32; LANES];
+        for row in row {
+            for k in 0..LANES {
+                let is_stored = row[k] != 0.0;
+                stored[k] += u32::from(is_stored);
+                low[k] = low[k].min(if is_stored { row[k] } else { f32::INFINITY });
+                high[k] = high[k].max(row[k]);
+            }
+        }
+        self.lengths.push(stored.iter().sum());
+        self.range =
+            [low.into_iter().fold(self.range[0], f32::min), high.into_iter().fold(self.range[1], f32::max)];
+        self.max_sum_error = self.max_sum_error.max((sum - 1.0).abs());
+        self.errors.extend(miss.map(|miss| miss as f32));
+    }
+
+    /// Writes the stored weights into the result.
+    fn store(&mut self) {
+        let mut slots = self.indices.iter_mut().zip(self.data.iter_mut());
+        for v in 0..self.points.len() {
+            for (batch, block) in self.blocks.iter().enumerate() {
+                for (k, &weight) in block[v].iter().enumerate() {
+                    if weight != 0.0
+                        && let Some((index, value)) = slots.next()
+                    {
+                        (*index, *value) = ((batch * LANES + k) as u32, weight);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Corrects a row until it sums to 1 and puts its vertex at `goal`; returns its sum and how far it misses the goal.
+#[inline(always)]
+fn restore(columns: &Columns, row: &mut [Row], goal: DVec3) -> (f64, f64) {
+    let mut sums = (0.0, f64::INFINITY);
+    for _ in 0..MAX_CORRECTIONS {
+        columns.restore_affine(row, goal);
+        sums = columns.sums(row, goal);
+        if sums.1.max((sums.0 - 1.0).abs()) <= GOOD_ENOUGH {
+            break;
+        }
+    }
+    sums
+}
+
+fn statistics(runs: &[Run<'_>], nonzeros: u32, diagonal: f64) -> Statistics {
+    let mut errors: Vec<f32> = runs.iter().flat_map(|run| &run.errors).copied().collect();
+    let mut rest_error = RestError::default();
+    if !errors.is_empty() {
+        rest_error.mean_rel = errors.iter().map(|&e| f64::from(e)).sum::<f64>() / errors.len() as f64;
+        rest_error.max_rel = errors.iter().fold(0.0, |m, &e| m.max(f64::from(e)));
+        let rank = ((errors.len() as f64 * 0.99).ceil() as usize).clamp(1, errors.len()) - 1;
+        rest_error.p99 = diagonal * f64::from(*errors.select_nth_unstable_by(rank, f32::total_cmp).1);
+        rest_error.mean = diagonal * rest_error.mean_rel;
+        rest_error.max = diagonal * rest_error.max_rel;
+    }
+    let range = runs.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |range, run| {
+        [range[0].min(run.range[0]), range[1].max(run.range[1])]
+    });
+    let weights = WeightStats {
+        min: if nonzeros == 0 { 0.0 } else { range[0] },
+        max: if nonzeros == 0 { 0.0 } else { range[1] },
+        max_sum_error: runs.iter().fold(0.0, |m, run| m.max(run.max_sum_error)),
+        nonzeros: u64::from(nonzeros),
+    };
+    Statistics { rest_error, weights }
+}

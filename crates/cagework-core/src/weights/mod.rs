@@ -1,0 +1,155 @@
+//! Sparse weights: compressed sparse rows, one row per mesh vertex, one column per control vertex.
+
+pub mod affine;
+pub mod assemble;
+
+use thiserror::Error;
+
+/// A matrix of weights in compressed sparse rows (CSR). Dimensionless; each row sums to 1.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Weights {
+    n_columns: u32,
+    indptr: Vec<u32>,
+    indices: Vec<u32>,
+    data: Vec<f32>,
+}
+
+/// Why three arrays are not a CSR matrix.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum WeightsError {
+    /// `indptr` is empty, does not start at 0, or falls.
+    #[error("row pointers are not ascending from 0 (at row {row})")]
+    Pointers {
+        /// First row at which they are not.
+        row: usize,
+    },
+    /// The last row pointer, the indices and the data do not agree.
+    #[error("{indices} column indices and {data} weights do not match the last row pointer, {last}")]
+    Length {
+        /// Number of indices.
+        indices: usize,
+        /// Number of weights.
+        data: usize,
+        /// Last row pointer.
+        last: usize,
+    },
+    /// A column index is too large.
+    #[error("row {row} names column {column}, but there are {n_columns} columns")]
+    Column {
+        /// The row.
+        row: usize,
+        /// The column it names.
+        column: u32,
+        /// Columns there are.
+        n_columns: u32,
+    },
+    /// A weight is not a finite number.
+    #[error("row {row} has a weight that is not a finite number")]
+    NotFinite {
+        /// The row.
+        row: usize,
+    },
+}
+
+impl Weights {
+    /// A CSR matrix from its arrays: `indptr` `[n_rows + 1]`, `indices` and `data` `[n_nonzeros]`.
+    ///
+    /// # Errors
+    /// [`WeightsError`] when the arrays do not describe a matrix with `n_columns` columns.
+    pub fn new(
+        n_columns: u32,
+        indptr: Vec<u32>,
+        indices: Vec<u32>,
+        data: Vec<f32>,
+    ) -> Result<Self, WeightsError> {
+        if indptr.first() != Some(&0) {
+            return Err(WeightsError::Pointers { row: 0 });
+        }
+        if let Some(row) = indptr.windows(2).position(|w| w[0] > w[1]) {
+            return Err(WeightsError::Pointers { row });
+        }
+        let last = indptr[indptr.len() - 1] as usize;
+        if indices.len() != last || data.len() != last {
+            return Err(WeightsError::Length { indices: indices.len(), data: data.len(), last });
+        }
+        let weights = Self { n_columns, indptr, indices, data };
+        for (row, (indices, data)) in weights.rows().enumerate() {
+            if let Some(&column) = indices.iter().find(|&&c| c >= n_columns) {
+                return Err(WeightsError::Column { row, column, n_columns });
+            }
+            if data.iter().any(|w| !w.is_finite()) {
+                return Err(WeightsError::NotFinite { row });
+            }
+        }
+        Ok(weights)
+    }
+
+    /// A matrix from arrays that are right by construction.
+    pub(crate) fn from_parts(n_columns: u32, indptr: Vec<u32>, indices: Vec<u32>, data: Vec<f32>) -> Self {
+        debug_assert!(indices.iter().all(|&c| c < n_columns) && indices.len() == data.len());
+        Self { n_columns, indptr, indices, data }
+    }
+
+    /// The matrix whose row v is this one's row `row_of[v]`.
+    #[must_use]
+    pub fn with_rows(&self, row_of: &[u32]) -> Self {
+        let mut indptr = Vec::with_capacity(row_of.len() + 1);
+        indptr.push(0);
+        let (mut indices, mut data) = (Vec::new(), Vec::new());
+        for &row in row_of {
+            let (columns, weights) = self.row(row as usize);
+            indices.extend_from_slice(columns);
+            data.extend_from_slice(weights);
+            indptr.push(indices.len() as u32);
+        }
+        Self { n_columns: self.n_columns, indptr, indices, data }
+    }
+
+    /// Bytes held.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        4 * (self.indptr.len() + self.indices.len() + self.data.len())
+    }
+
+    /// Rows: mesh vertices.
+    #[must_use]
+    pub fn n_rows(&self) -> usize {
+        self.indptr.len().saturating_sub(1)
+    }
+
+    /// Columns: control vertices.
+    #[must_use]
+    pub fn n_columns(&self) -> usize {
+        self.n_columns as usize
+    }
+
+    /// Where each row starts in [`Self::indices`] and [`Self::data`]. `[n_rows + 1]`
+    #[must_use]
+    pub fn indptr(&self) -> &[u32] {
+        &self.indptr
+    }
+
+    /// Column of each stored weight. `[n_nonzeros]`
+    #[must_use]
+    pub fn indices(&self) -> &[u32] {
+        &self.indices
+    }
+
+    /// The stored weights. `[n_nonzeros]`
+    #[must_use]
+    pub fn data(&self) -> &[f32] {
+        &self.data
+    }
+
+    /// Columns and weights of one row.
+    #[must_use]
+    pub fn row(&self, row: usize) -> (&[u32], &[f32]) {
+        let range = self.indptr[row] as usize..self.indptr[row + 1] as usize;
+        (&self.indices[range.clone()], &self.data[range])
+    }
+
+    /// All rows in order.
+    pub fn rows(&self) -> impl Iterator<Item = (&[u32], &[f32])> {
+        (0..self.n_rows()).map(|row| self.row(row))
+    }
+}

@@ -1,0 +1,171 @@
+//! The bind on the GPU: geometry and assembly are the CPU's own, what lies between runs as kernels.
+
+use cagework_core::bind::pipeline::{FieldsOn, Prepared, Solved};
+use cagework_core::bind::{BindOptions, Solver, Watch};
+use cagework_core::solve::jacobi::StopRule;
+use cagework_core::solve::multigrid::{BatchReport, Stop, histories};
+use cagework_core::solve::rows::{LANES, Row, ZERO};
+use cagework_core::{Binding, Cage, Progress};
+use glam::Vec3;
+
+use crate::buffers::Allocator;
+use crate::deform::GpuWeights;
+use crate::device::GpuContext;
+use crate::error::GpuError;
+use crate::jacobi::{INTERVAL, Jacobi};
+use crate::multigrid::Multigrid;
+use crate::plan::Plan;
+use crate::sample::Sampler;
+use crate::stream::Stream;
+
+/// Delta falls roughly by this factor from the first sweep to tau: for the progress bar only.
+const JACOBI_DECADES: f32 = 4.0;
+
+/// V-cycles that a batch usually takes: for the progress bar only.
+const USUAL_CYCLES: f32 = 5.0;
+
+/// What a solve leaves besides its blocks.
+#[derive(Default)]
+struct Outcome {
+    iterations: u32,
+    converged: bool,
+    delta_history: Vec<f32>,
+    delta_interval: u32,
+    residual_history: Vec<f32>,
+    solve_ms: f64,
+}
+
+/// [`cagework_core::bind()`] on the GPU: the same grid, stencils and assembly, the same weights to 1e-4. The weights are
+/// on the GPU afterwards as well.
+///
+/// `options.memory_limit` holds for the GPU's buffers and for the CPU's arrays, each.
+///
+/// # Errors
+/// Those of a bind, [`crate::PlanError`] if it does not fit, or the GPU failed.
+pub async fn bind_gpu(
+    positions: &[Vec3],
+    cage: &Cage,
+    options: &BindOptions,
+    progress: &dyn Progress,
+    context: &GpuContext,
+) -> Result<(Binding, GpuWeights), GpuError> {
+    let watch = Watch::new(progress);
+    let prepared = Prepared::new(positions, cage, options, FieldsOn::Device, &watch)?;
+    let solved = solve_and_sample(&prepared, options, &watch, context).await?;
+    let binding = prepared.finish(solved, &watch)?;
+    let weights = GpuWeights::new(context, &binding.weights, &binding.outside).await?;
+    Ok((binding, weights))
+}
+
+async fn solve_and_sample(
+    prepared: &Prepared<'_>,
+    options: &BindOptions,
+    watch: &Watch<'_>,
+    context: &GpuContext,
+) -> Result<Solved, GpuError> {
+    let (hierarchy, stencils) = (prepared.hierarchy(), prepared.stencils());
+    let plan =
+        Plan::new(hierarchy, stencils, options.solver, context.max_binding_bytes, options.memory_limit)?;
+    let mut blocks: Vec<Vec<Row>> = vec![vec![ZERO; stencils.len()]; hierarchy.n_columns.div_ceil(LANES)];
+    let began = watch.now_ms();
+    let mut allocator = Allocator::new(context);
+    let mut stream = Stream::new(context, watch).await?;
+    let sampler = Sampler::new(&mut allocator, stencils, &plan).await?;
+    let outcome = match options.solver {
+        Solver::Multigrid => {
+            multigrid(prepared, options, &plan, &mut stream, &mut allocator, &sampler, &mut blocks).await?
+        }
+        Solver::Jacobi => {
+            jacobi(prepared, options, &plan, &mut stream, &mut allocator, &sampler, &mut blocks).await?
+        }
+    };
+    let all_ms = watch.now_ms() - began;
+    Ok(Solved {
+        blocks,
+        iterations: outcome.iterations,
+        converged: outcome.converged,
+        delta_history: outcome.delta_history,
+        delta_interval: outcome.delta_interval,
+        residual_history: outcome.residual_history,
+        field_bytes: allocator.allocated() as usize,
+        solve_share: if all_ms > 0.0 { outcome.solve_ms / all_ms } else { 1.0 },
+        adapter: Some(context.adapter_name()),
+    })
+}
+
+async fn multigrid(
+    prepared: &Prepared<'_>,
+    options: &BindOptions,
+    plan: &Plan,
+    stream: &mut Stream<'_>,
+    allocator: &mut Allocator<'_>,
+    sampler: &Sampler,
+    blocks: &mut [Vec<Row>],
+) -> Result<Outcome, GpuError> {
+    let hierarchy = prepared.hierarchy();
+    let began = stream.now_ms();
+    let stop = Stop {
+        // Batches add up in squares: each may keep its share of tau.
+        tolerance: f64::from(options.tau) / f64::from(plan.n_batches).sqrt(),
+        max_cycles: options.max_iterations,
+    };
+    let mut multigrid = Multigrid::new(stream, allocator, hierarchy, plan).await?;
+    let mut solve_ms = stream.now_ms() - began;
+    let mut reports: Vec<BatchReport> = Vec::new();
+    for batch in 0..plan.n_batches {
+        let began = stream.now_ms();
+        let first_column = batch * plan.n_lanes;
+        let report = multigrid
+            .solve(stream, hierarchy, first_column, stop, |stream, cycle, delta| {
+                let part = (cycle as f32 / USUAL_CYCLES).min(1.0);
+                let fraction = (batch as f32 + part) / plan.n_batches as f32;
+                stream.set_status(fraction, cycle, Some(delta as f32));
+            })
+            .await?;
+        solve_ms += stream.now_ms() - began;
+        reports.push(report);
+        sampler.sample(stream, multigrid.field(), first_column, blocks).await?;
+    }
+    let [delta_history, residual_history] = histories(&reports.iter().collect::<Vec<_>>());
+    Ok(Outcome {
+        iterations: delta_history.len() as u32,
+        converged: reports.iter().all(|r| r.converged),
+        delta_history,
+        delta_interval: 1,
+        residual_history,
+        solve_ms,
+    })
+}
+
+async fn jacobi(
+    prepared: &Prepared<'_>,
+    options: &BindOptions,
+    plan: &Plan,
+    stream: &mut Stream<'_>,
+    allocator: &mut Allocator<'_>,
+    sampler: &Sampler,
+    blocks: &mut [Vec<Row>],
+) -> Result<Outcome, GpuError> {
+    let began = stream.now_ms();
+    let stop = StopRule { tau: options.tau, max_sweeps: options.max_iterations, norm: options.delta_norm };
+    let jacobi = Jacobi::new(stream, allocator, prepared.hierarchy(), plan).await?;
+    let (sweeps, report) = jacobi
+        .solve(stream, stop, |stream, sweeps, delta| {
+            let to_go = (delta / options.tau).max(1.0).log10() / JACOBI_DECADES;
+            stream.set_status(1.0 - to_go, sweeps, Some(delta));
+        })
+        .await?;
+    let solve_ms = stream.now_ms() - began;
+    for batch in 0..plan.n_batches {
+        let field = jacobi.field(batch as usize, sweeps);
+        sampler.sample(stream, field, batch * plan.n_lanes, blocks).await?;
+    }
+    Ok(Outcome {
+        iterations: sweeps,
+        converged: report.converged,
+        delta_history: report.delta_history,
+        delta_interval: INTERVAL,
+        residual_history: Vec::new(),
+        solve_ms,
+    })
+}

@@ -1,0 +1,263 @@
+//! Moving the mesh: weights stay on the GPU, a moved cage is all that is uploaded, positions and normals land in the
+//! vertex buffers that are drawn.
+
+use bytemuck::Pod;
+use cagework_core::Weights;
+use cagework_core::bind::OutsideVertex;
+use cagework_core::stencil::tables::{NormalTable, OutsideTable, SLICE, SlicedWeights};
+use futures_channel::oneshot;
+use glam::{Vec3, Vec4};
+
+use crate::buffers::Allocator;
+use crate::device::GpuContext;
+use crate::error::GpuError;
+use crate::kernels;
+use crate::layout::Work;
+use crate::pipelines::Launch;
+
+/// Distance of two dispatches' parameters, the baseline's alignment of dynamic offsets, bytes.
+const WORK_STRIDE: u64 = 256;
+
+/// Workgroups along an axis, the baseline's limit.
+const MAX_GROUPS: u32 = 65_535;
+
+/// A bind's weights on the GPU.
+#[derive(Debug)]
+pub struct GpuWeights {
+    /// Parts whose entries fit into one binding, each a whole number of slices.
+    parts: Vec<Part>,
+    corners: wgpu::Buffer,
+    offsets: wgpu::Buffer,
+    n_outside: u32,
+    n_vertices: u32,
+    n_columns: u32,
+    bytes: u64,
+}
+
+#[derive(Debug)]
+struct Part {
+    first_vertex: u32,
+    n_vertices: u32,
+    slices: wgpu::Buffer,
+    entries: wgpu::Buffer,
+}
+
+impl GpuWeights {
+    /// Uploads weights and outside vertices.
+    ///
+    /// # Errors
+    /// As [`Allocator::zeros`].
+    pub async fn new(
+        context: &GpuContext,
+        weights: &Weights,
+        outside: &[OutsideVertex],
+    ) -> Result<Self, GpuError> {
+        let mut allocator = Allocator::new(context);
+        let sliced = SlicedWeights::new(weights);
+        let n_vertices = weights.n_rows() as u32;
+        let slice_bytes = (SLICE * size_of::<[u32; 2]>()) as u64;
+        let most = (context.max_binding_bytes / slice_bytes) as u32;
+        let n_slices = sliced.slices.len() - 1;
+        let mut parts = Vec::new();
+        let mut begin = 0;
+        while begin < n_slices {
+            let start = sliced.slices[begin];
+            let more = sliced.slices[begin + 1..].partition_point(|&end| end - start <= most);
+            let end = begin + more.max(1);
+            let starts: Vec<u32> = sliced.slices[begin..=end].iter().map(|s| s - start).collect();
+            let entries = start as usize * SLICE..sliced.slices[end] as usize * SLICE;
+            parts.push(Part {
+                first_vertex: (begin * SLICE) as u32,
+                n_vertices: ((end - begin) * SLICE).min(n_vertices as usize - begin * SLICE) as u32,
+                slices: allocator.table("slices of weights", &starts).await?,
+                entries: allocator.table("weights", &sliced.entries[entries]).await?,
+            });
+            begin = end;
+        }
+        let table = OutsideTable::new(outside);
+        Ok(Self {
+            parts,
+            corners: allocator.table("corners for outside vertices", &table.corners).await?,
+            offsets: allocator.table("offsets of outside vertices", &table.offsets).await?,
+            n_outside: outside.len() as u32,
+            n_vertices,
+            n_columns: weights.n_columns() as u32,
+            bytes: allocator.allocated(),
+        })
+    }
+
+    /// Bytes held on the GPU.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+}
+
+/// Deforms one mesh, frame after frame.
+#[derive(Debug)]
+pub struct Deformer {
+    cage: wgpu::Buffer,
+    positions: wgpu::Buffer,
+    normals: wgpu::Buffer,
+    /// Kernels in order, with the offsets of their parameters and their workgroups.
+    steps: Vec<(Launch, u32, [u32; 2])>,
+    n_vertices: u32,
+    n_columns: u32,
+}
+
+impl Deformer {
+    /// Makes vertex buffers for `weights` and the normals of `triangles`.
+    ///
+    /// # Errors
+    /// As [`Allocator::zeros`].
+    pub async fn new(
+        context: &GpuContext,
+        weights: &GpuWeights,
+        triangles: &[[u32; 3]],
+    ) -> Result<Self, GpuError> {
+        let mut allocator = Allocator::new(context);
+        let (n_vertices, n_columns) = (weights.n_vertices, weights.n_columns);
+        let vertex_usage = wgpu::BufferUsages::VERTEX
+            | wgpu::BufferUsages::STORAGE
+            | wgpu::BufferUsages::COPY_SRC
+            | wgpu::BufferUsages::COPY_DST;
+        let vertex_bytes = u64::from(n_vertices) * size_of::<Vec4>() as u64;
+        let cage =
+            allocator.storage("cage vertices", u64::from(n_columns) * size_of::<Vec4>() as u64).await?;
+        let positions = allocator.zeros("positions", vertex_bytes, vertex_usage).await?;
+        let normals = allocator.zeros("normals", vertex_bytes, vertex_usage).await?;
+        let table = NormalTable::new(n_vertices as usize, triangles);
+        let starts = allocator.table("starts of triangle lists", &table.starts).await?;
+        let others = allocator.table("triangle lists", &table.others).await?;
+        let n_steps = weights.parts.len() as u64 + 2;
+        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let works = allocator.zeros("work parameters", n_steps * WORK_STRIDE, usage).await?;
+
+        let launch = |kernel, buffers: &[&wgpu::Buffer]| {
+            context.pipelines.launch(&context.device, kernel, &works, buffers)
+        };
+        let mut deformer = Self { cage, positions, normals, steps: Vec::new(), n_vertices, n_columns };
+        let (cage, positions) = (deformer.cage.clone(), deformer.positions.clone());
+        for part in &weights.parts {
+            let launch = launch(&kernels::DEFORM_VERTICES, &[&part.slices, &part.entries, &cage, &positions]);
+            deformer.add(context, &works, launch, part.first_vertex, part.n_vertices);
+        }
+        if weights.n_outside > 0 {
+            let buffers = [&weights.corners, &weights.offsets, &cage, &positions];
+            let launch = launch(&kernels::OFFSET_OUTSIDE, &buffers);
+            deformer.add(context, &works, launch, 0, weights.n_outside);
+        }
+        let launch = launch(&kernels::VERTEX_NORMALS, &[&starts, &others, &positions, &deformer.normals]);
+        deformer.add(context, &works, launch, 0, n_vertices);
+        Ok(deformer)
+    }
+
+    fn add(
+        &mut self,
+        context: &GpuContext,
+        works: &wgpu::Buffer,
+        launch: Launch,
+        first_row: u32,
+        count: u32,
+    ) {
+        let groups = count.div_ceil(launch.workgroup);
+        let rows = groups.div_ceil(MAX_GROUPS).max(1);
+        let groups = [groups.div_ceil(rows), rows];
+        let work = Work { count, stride: groups[0] * launch.workgroup, first_row, ..Work::default() };
+        let offset = self.steps.len() as u64 * WORK_STRIDE;
+        context.queue.write_buffer(works, offset, bytemuck::bytes_of(&work));
+        self.steps.push((launch, offset as u32, groups));
+    }
+
+    /// Uploads the cage's pose, `[n_cage]`, object units; what `encode` records next follows it.
+    ///
+    /// # Panics
+    /// If there is not one position per cage vertex.
+    pub fn pose(&self, context: &GpuContext, cage_positions: &[Vec3]) {
+        assert_eq!(cage_positions.len(), self.n_columns as usize, "one position per cage vertex");
+        let padded: Vec<Vec4> = cage_positions.iter().map(|p| p.extend(1.0)).collect();
+        context.queue.write_buffer(&self.cage, 0, bytemuck::cast_slice(&padded));
+    }
+
+    /// Records the deformation: positions and normals are up to date for what comes after it.
+    pub fn encode(&self, encoder: &mut wgpu::CommandEncoder) {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("deform"),
+            ..wgpu::ComputePassDescriptor::default()
+        });
+        for (launch, offset, groups) in &self.steps {
+            pass.set_pipeline(&launch.pipeline);
+            pass.set_bind_group(0, &launch.bind_group, &[*offset]);
+            pass.dispatch_workgroups(groups[0], groups[1], 1);
+        }
+    }
+
+    /// Vertex buffer of positions: x, y, z, 1 as f32, stride 16 bytes, object units.
+    #[must_use]
+    pub fn positions(&self) -> &wgpu::Buffer {
+        &self.positions
+    }
+
+    /// Vertex buffer of unit normals: x, y, z, 0 as f32, stride 16 bytes.
+    #[must_use]
+    pub fn normals(&self) -> &wgpu::Buffer {
+        &self.normals
+    }
+
+    /// Number of mesh vertices.
+    #[must_use]
+    pub fn n_vertices(&self) -> u32 {
+        self.n_vertices
+    }
+
+    /// Deforms for the latest pose and waits until the GPU is done.
+    ///
+    /// # Errors
+    /// [`GpuError::DeviceLost`], [`GpuError::Refused`], [`GpuError::Timeout`].
+    pub async fn run(&self, context: &GpuContext) -> Result<(), GpuError> {
+        let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.encode(&mut encoder);
+        let submission = context.queue.submit([encoder.finish()]);
+        let (sender, done) = oneshot::channel();
+        context.queue.on_submitted_work_done(move || {
+            // The receiver lives until the wait below ends.
+            let _ = sender.send(());
+        });
+        context.wait(&submission, done).await
+    }
+
+    /// Reads positions back, for export. `[n_vertices]`, object units.
+    ///
+    /// # Errors
+    /// As [`Self::run`], and [`GpuError::OutOfMemory`].
+    pub async fn read_positions(&self, context: &GpuContext) -> Result<Vec<Vec3>, GpuError> {
+        let rows: Vec<Vec4> = read_all(context, &self.positions, self.n_vertices as usize).await?;
+        Ok(rows.into_iter().map(Vec4::truncate).collect())
+    }
+
+    /// Reads normals back. `[n_vertices]`
+    ///
+    /// # Errors
+    /// As [`Self::read_positions`].
+    pub async fn read_normals(&self, context: &GpuContext) -> Result<Vec<Vec3>, GpuError> {
+        let rows: Vec<Vec4> = read_all(context, &self.normals, self.n_vertices as usize).await?;
+        Ok(rows.into_iter().map(Vec4::truncate).collect())
+    }
+}
+
+/// Reads the first `count` elements of a buffer.
+pub(crate) async fn read_all<T: Pod>(
+    context: &GpuContext,
+    buffer: &wgpu::Buffer,
+    count: usize,
+) -> Result<Vec<T>, GpuError> {
+    let bytes = (count * size_of::<T>()) as u64;
+    if bytes == 0 {
+        return Ok(Vec::new());
+    }
+    let readback = Allocator::new(context).readback("results, read back", bytes).await?;
+    let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    encoder.copy_buffer_to_buffer(buffer, 0, &readback.buffer, 0, bytes);
+    let submission = context.queue.submit([encoder.finish()]);
+    readback.read(context, &submission, bytes, |bytes| bytemuck::pod_collect_to_vec(bytes)).await
+}

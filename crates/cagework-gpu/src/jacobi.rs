@@ -1,0 +1,130 @@
+//! The paper's smoothing on the GPU: Algorithm 3 with Eq. 2 as the stop rule.
+//!
+//! Changes versus the paper: two fields change roles instead of being copied, and every [`INTERVAL`] sweeps the one
+//! number delta comes back instead of the whole field. Eq. 2 couples all columns of a cell, so the fields of all batches
+//! are alive together, and batches add up in one buffer of changes, a number per cell.
+
+use cagework_core::bind::DeltaNorm;
+use cagework_core::solve::hierarchy::Hierarchy;
+use cagework_core::solve::jacobi::{SolveReport, StopRule};
+
+use crate::buffers::{Allocator, Readback};
+use crate::error::GpuError;
+use crate::kernels;
+use crate::layout::{Work, mode};
+use crate::levels::{GpuLevel, upload_rhs};
+use crate::multigrid::{n_groups, sum_into};
+use crate::pipelines::Launch;
+use crate::plan::Plan;
+use crate::stream::Stream;
+
+/// Sweeps between two looks at delta. Fixed, not adapted to the clock: the result must not depend on it.
+pub const INTERVAL: u32 = 10;
+
+/// Fields of all batches, with all kernels bound to them.
+#[derive(Debug)]
+pub struct Jacobi {
+    level: GpuLevel,
+    n_quads: u32,
+    batches: Vec<BatchFields>,
+    roots: Launch,
+    sum: Launch,
+    numbers: wgpu::Buffer,
+    readback: Readback,
+}
+
+/// One batch. Sweeps go from `fields[0]` to `fields[1]` and back.
+#[derive(Debug)]
+struct BatchFields {
+    fields: [wgpu::Buffer; 2],
+    sweeps: [Launch; 2],
+    changes: [Launch; 2],
+}
+
+impl Jacobi {
+    /// Uploads the finest level and all columns' values on the cage.
+    ///
+    /// # Errors
+    /// As [`Allocator::zeros`].
+    pub async fn new(
+        stream: &Stream<'_>,
+        allocator: &mut Allocator<'_>,
+        hierarchy: &Hierarchy,
+        plan: &Plan,
+    ) -> Result<Self, GpuError> {
+        let level = GpuLevel::new(allocator, &hierarchy.levels[0], true).await?;
+        let changes = allocator.storage("changes", 4 * u64::from(level.n_rows)).await?;
+        let partials = allocator.storage("partial sums", 4 * u64::from(n_groups(level.n_rows))).await?;
+        let numbers = allocator.storage("numbers", 4).await?;
+        let (n_quads, n_lanes) = (plan.n_quads(), plan.n_lanes);
+        let mut batches = Vec::new();
+        let mut scratch = Vec::new();
+        for batch in 0..plan.n_batches {
+            let rhs = level.rhs(allocator, n_quads).await?;
+            upload_rhs(stream.context(), hierarchy, 0, batch * n_lanes, n_lanes, &rhs, &mut scratch);
+            let fields = [level.field(allocator, n_quads).await?, level.field(allocator, n_quads).await?];
+            let sweep = |from, to| {
+                stream.launch(
+                    &kernels::JACOBI_CELLS,
+                    &[&level.neighbours, &level.diagonal, &level.rhs_of_row, &rhs, from, to],
+                )
+            };
+            let change = |old, new| stream.launch(&kernels::CHANGE_NORMS, &[old, new, &changes]);
+            let [a, b] = &fields;
+            let (sweeps, changes) = ([sweep(a, b), sweep(b, a)], [change(a, b), change(b, a)]);
+            batches.push(BatchFields { fields, sweeps, changes });
+        }
+        Ok(Self {
+            roots: stream.launch(&kernels::SUM_ROOTS, &[&changes, &partials]),
+            sum: stream.launch(&kernels::REDUCE_SUM, &[&partials, &numbers]),
+            readback: allocator.readback("delta, read back", 4).await?,
+            level,
+            n_quads,
+            batches,
+            numbers,
+        })
+    }
+
+    /// Sweeps until delta falls below tau. `checked(stream, sweeps, delta)` is told each time delta is known.
+    ///
+    /// # Errors
+    /// Cancelled, or the GPU failed.
+    pub async fn solve(
+        &self,
+        stream: &mut Stream<'_>,
+        stop: StopRule,
+        mut checked: impl FnMut(&mut Stream<'_>, u32, f32),
+    ) -> Result<(u32, SolveReport), GpuError> {
+        let mut report = SolveReport::default();
+        let absolute = if stop.norm == DeltaNorm::Literal { mode::CHANGE_ABSOLUTE } else { 0 };
+        let work = Work { n_quads: self.n_quads, ..Work::default() };
+        let mut done = 0;
+        while !report.converged && done < stop.max_sweeps {
+            let round = INTERVAL.min(stop.max_sweeps - done);
+            for (number, batch) in self.batches.iter().enumerate() {
+                for sweep in done..done + round {
+                    let launch = &batch.sweeps[sweep as usize % 2];
+                    stream.run(launch, work, self.level.n_rows * self.n_quads).await?;
+                }
+                let first = if number == 0 { mode::CHANGE_FIRST } else { 0 };
+                let launch = &batch.changes[(done + round - 1) as usize % 2];
+                stream.run(launch, Work { mode: absolute | first, ..work }, self.level.n_rows).await?;
+            }
+            done += round;
+            sum_into(stream, &self.roots, &self.sum, self.level.n_rows, 0).await?;
+            let sum =
+                stream.read(&self.numbers, &self.readback, 4, bytemuck::pod_read_unaligned::<f32>).await?;
+            let delta = (f64::from(sum) / f64::from(self.level.n_unknowns.max(1))) as f32;
+            report.delta_history.push(delta);
+            report.converged = delta < stop.tau;
+            checked(stream, done, delta);
+        }
+        Ok((done, report))
+    }
+
+    /// A batch's field after `sweeps` sweeps.
+    #[must_use]
+    pub fn field(&self, batch: usize, sweeps: u32) -> &wgpu::Buffer {
+        &self.batches[batch].fields[sweeps as usize % 2]
+    }
+}

@@ -1,0 +1,26 @@
+//! Cagework on the GPU: core WebGPU compute, the same kernels on lavapipe, a desktop GPU and in the browser.
+//!
+//! [`GpuContext`] holds the device and one pipeline per [`kernels`] row; [`bind_gpu`] solves batch after batch on it and
+//! reads back only the weights sampled at the mesh's vertices; [`Deformer`] keeps them on the GPU and moves the mesh.
+//! Everything is async and nothing blocks the web's event loop: work goes out in short slices ([`stream`]), awaited.
+
+pub mod bind;
+pub mod buffers;
+pub mod deform;
+pub mod device;
+pub mod error;
+pub mod jacobi;
+pub mod kernels;
+pub mod layout;
+pub mod levels;
+pub mod multigrid;
+pub mod pipelines;
+pub mod plan;
+pub mod sample;
+pub mod stream;
+
+pub use bind::bind_gpu;
+pub use deform::{Deformer, GpuWeights};
+pub use device::{ContextOptions, GpuContext};
+pub use error::GpuError;
+pub use plan::{Plan, PlanError};

@@ -1,0 +1,296 @@
+//! Full multigrid and V(2,1) cycles, batch after batch: the algorithm of `cagework_core::solve::multigrid`, step by step.
+//!
+//! Per cycle two numbers come back, the squares of the coarse correction (the stop rule's delta) and of the residual.
+
+use cagework_core::solve::hierarchy::Hierarchy;
+use cagework_core::solve::multigrid::{BatchReport, COARSEST_SWEEPS, Convergence, OMEGA, Stop};
+use cagework_core::stencil::REDUCE_VALUES;
+
+use crate::buffers::{Allocator, Readback};
+use crate::error::GpuError;
+use crate::kernels;
+use crate::layout::{Work, mode};
+use crate::levels::{GpuLevel, GpuTransfer, QUAD_BYTES, upload_rhs};
+use crate::pipelines::Launch;
+use crate::plan::Plan;
+use crate::stream::Stream;
+
+/// Slots of the numbers that are read back.
+const RESIDUAL: u32 = 0;
+const DELTA: u32 = 1;
+
+/// Fields of one batch on every level, with all kernels bound to them.
+#[derive(Debug)]
+pub struct Multigrid {
+    n_quads: u32,
+    levels: Vec<LevelWork>,
+    squares: Squares,
+    numbers: wgpu::Buffer,
+    readback: Readback,
+    scratch: Vec<f32>,
+}
+
+/// One level's fields and kernels.
+#[derive(Debug)]
+struct LevelWork {
+    level: GpuLevel,
+    field: wgpu::Buffer,
+    rhs: wgpu::Buffer,
+    relax: Launch,
+    /// None on the coarsest level.
+    coarser: Option<Coarser>,
+}
+
+/// The way to the next coarser level and back.
+#[derive(Debug)]
+struct Coarser {
+    residual: Launch,
+    restrict: Launch,
+    faces: Launch,
+    corners: Launch,
+    n_faces: u32,
+    n_corners: u32,
+}
+
+/// Sums of squares on the finest level.
+#[derive(Debug)]
+enum Squares {
+    /// Of the red residuals and of the coarse correction, and the sum of either's partial sums.
+    Levels { residual: Launch, correction: Launch, sum: Launch },
+    /// Of the change from the values kept in `before`: there is no coarser level.
+    Single { before: wgpu::Buffer, changes: Launch, sum: Launch },
+}
+
+impl Multigrid {
+    /// Uploads the hierarchy and makes room for one batch.
+    ///
+    /// # Errors
+    /// As [`Allocator::zeros`].
+    pub async fn new(
+        stream: &Stream<'_>,
+        allocator: &mut Allocator<'_>,
+        hierarchy: &Hierarchy,
+        plan: &Plan,
+    ) -> Result<Self, GpuError> {
+        let n_quads = plan.n_quads();
+        let mut levels: Vec<LevelWork> = Vec::new();
+        for (k, level) in hierarchy.levels.iter().enumerate() {
+            let level = GpuLevel::new(allocator, level, k == 0).await?;
+            let field = level.field(allocator, n_quads).await?;
+            let rhs = level.rhs(allocator, n_quads).await?;
+            let relax = stream.launch(
+                &kernels::RELAX_CELLS,
+                &[&level.neighbours, &level.diagonal, &level.rhs_of_row, &rhs, &field],
+            );
+            levels.push(LevelWork { level, field, rhs, relax, coarser: None });
+        }
+        // One buffer for all levels: the kernel writes each level's own zero row.
+        let red_bytes = u64::from(levels[0].level.colours[0].1 + 1) * u64::from(n_quads) * QUAD_BYTES;
+        let numbers = allocator.storage("numbers", 8).await?;
+        let squares = if levels.len() == 1 {
+            let finest = &levels[0].level;
+            let before = finest.field(allocator, n_quads).await?;
+            let changes = allocator.storage("changes", 4 * u64::from(finest.n_rows)).await?;
+            Squares::Single {
+                changes: stream.launch(&kernels::CHANGE_NORMS, &[&before, &levels[0].field, &changes]),
+                sum: stream.launch(&kernels::REDUCE_SUM, &[&changes, &numbers]),
+                before,
+            }
+        } else {
+            let red_residual = allocator.storage("residual", red_bytes).await?;
+            for k in 0..hierarchy.transfers.len() {
+                let transfer = GpuTransfer::new(allocator, hierarchy, k).await?;
+                let coarser = Coarser::new(stream, &levels[k], &levels[k + 1], &transfer, &red_residual);
+                levels[k].coarser = Some(coarser);
+            }
+            let most = n_groups(levels[0].level.n_rows * n_quads);
+            let partials = allocator.storage("partial sums", 4 * u64::from(most)).await?;
+            Squares::Levels {
+                residual: stream.launch(&kernels::SUM_SQUARES, &[&red_residual, &partials]),
+                correction: stream.launch(&kernels::SUM_SQUARES, &[&levels[1].field, &partials]),
+                sum: stream.launch(&kernels::REDUCE_SUM, &[&partials, &numbers]),
+            }
+        };
+        let readback = allocator.readback("numbers, read back", 8).await?;
+        Ok(Self { n_quads, levels, squares, numbers, readback, scratch: Vec::new() })
+    }
+
+    /// The finest level's field.
+    #[must_use]
+    pub fn field(&self) -> &wgpu::Buffer {
+        &self.levels[0].field
+    }
+
+    /// Solves the batch that starts at `first_column`. `cycle_done(stream, cycle, delta)` is told of each cycle.
+    ///
+    /// # Errors
+    /// Cancelled, or the GPU failed.
+    pub async fn solve(
+        &mut self,
+        stream: &mut Stream<'_>,
+        hierarchy: &Hierarchy,
+        first_column: u32,
+        stop: Stop,
+        mut cycle_done: impl FnMut(&mut Stream<'_>, u32, f64),
+    ) -> Result<BatchReport, GpuError> {
+        for (k, level) in self.levels.iter().enumerate() {
+            let n_lanes = 4 * self.n_quads;
+            let context = stream.context();
+            upload_rhs(context, hierarchy, k, first_column, n_lanes, &level.rhs, &mut self.scratch);
+        }
+        let coarsest = self.levels.len() - 1;
+        stream.clear(&self.levels[coarsest].field);
+        for k in (0..=coarsest).rev() {
+            if k < coarsest {
+                self.prolong(stream, k, mode::PROLONG_REPLACE).await?;
+            }
+            if k > 0 {
+                self.cycle(stream, k).await?;
+            }
+        }
+        let mut convergence = Convergence::new(stop);
+        loop {
+            self.cycle(stream, 0).await?;
+            let [residual, delta] = stream
+                .read(&self.numbers, &self.readback, 8, |bytes| {
+                    bytemuck::pod_read_unaligned::<[f32; 2]>(bytes).map(f64::from)
+                })
+                .await?;
+            let coarse = self.levels.get(1).map_or(&self.levels[0], |l| l).level.n_unknowns;
+            let n_unknowns = self.levels[0].level.n_unknowns;
+            let residual = if coarsest == 0 { 0.0 } else { residual / f64::from(n_unknowns) };
+            let done = convergence.cycle_done(delta / f64::from(coarse.max(1)), residual);
+            let (cycle, delta) = convergence.latest();
+            cycle_done(stream, cycle, delta);
+            if done {
+                return Ok(convergence.into_report());
+            }
+        }
+    }
+
+    /// One V(2,1) cycle from level k down.
+    async fn cycle(&self, stream: &mut Stream<'_>, k: usize) -> Result<(), GpuError> {
+        let coarsest = self.levels.len() - 1;
+        let n_quads = self.n_quads;
+        for fine in k..coarsest {
+            let (level, next) = (&self.levels[fine], &self.levels[fine + 1]);
+            self.relax(stream, fine, 0, 1.0).await?;
+            self.relax(stream, fine, 1, OMEGA).await?;
+            self.relax(stream, fine, 0, 1.0).await?;
+            self.relax(stream, fine, 1, 1.0).await?;
+            let Some(coarser) = &level.coarser else { continue };
+            let n_red = level.level.colours[0].1;
+            let work = Work { n_quads, ..Work::default() };
+            stream.run(&coarser.residual, work, (n_red + 1) * n_quads).await?;
+            if fine == 0
+                && let Squares::Levels { residual, sum, .. } = &self.squares
+            {
+                sum_into(stream, residual, sum, n_red * n_quads, RESIDUAL).await?;
+            }
+            stream.run(&coarser.restrict, work, next.level.n_rows * n_quads).await?;
+            stream.clear(&next.field);
+        }
+        self.relax_coarsest(stream, k == coarsest).await?;
+        for fine in (k..coarsest).rev() {
+            if fine == 0
+                && let Squares::Levels { correction, sum, .. } = &self.squares
+            {
+                sum_into(stream, correction, sum, self.levels[1].level.n_rows * n_quads, DELTA).await?;
+            }
+            self.prolong(stream, fine, 0).await?;
+            self.relax(stream, fine, 0, 1.0).await?;
+            self.relax(stream, fine, 1, 1.0).await?;
+        }
+        Ok(())
+    }
+
+    /// Sweeps on the coarsest level; measures the change if it is the only one.
+    async fn relax_coarsest(&self, stream: &mut Stream<'_>, only: bool) -> Result<(), GpuError> {
+        let coarsest = self.levels.len() - 1;
+        let LevelWork { level, field, .. } = &self.levels[coarsest];
+        let measured = match &self.squares {
+            Squares::Single { before, changes, sum } if only => Some((before, changes, sum)),
+            _ => None,
+        };
+        if let Some((before, _, _)) = measured {
+            let bytes = u64::from(level.n_rows) * u64::from(self.n_quads) * QUAD_BYTES;
+            stream.copy(field, before, bytes);
+        }
+        for _ in 0..COARSEST_SWEEPS {
+            self.relax(stream, coarsest, 0, 1.0).await?;
+            self.relax(stream, coarsest, 1, 1.0).await?;
+        }
+        if let Some((_, changes, sum)) = measured {
+            let work = Work { n_quads: self.n_quads, mode: mode::CHANGE_FIRST, ..Work::default() };
+            stream.run(changes, work, level.n_rows).await?;
+            let work = Work { first_row: DELTA, ..Work::default() };
+            stream.reduce(sum, work, level.n_rows, 1).await?;
+        }
+        Ok(())
+    }
+
+    async fn relax(
+        &self,
+        stream: &mut Stream<'_>,
+        k: usize,
+        colour: usize,
+        omega: f32,
+    ) -> Result<(), GpuError> {
+        let LevelWork { level, relax, .. } = &self.levels[k];
+        let (first_row, n_cells) = level.colours[colour];
+        let work = Work { n_quads: self.n_quads, first_row, omega, ..Work::default() };
+        stream.run(relax, work, n_cells * self.n_quads).await
+    }
+
+    async fn prolong(&self, stream: &mut Stream<'_>, k: usize, mode: u32) -> Result<(), GpuError> {
+        let Some(coarser) = &self.levels[k].coarser else { return Ok(()) };
+        let work = Work { n_quads: self.n_quads, mode, ..Work::default() };
+        let faces = Work { n_sources: 2, ..work };
+        stream.run(&coarser.faces, faces, coarser.n_faces * self.n_quads).await?;
+        let corners = Work { n_sources: 8, ..work };
+        stream.run(&coarser.corners, corners, coarser.n_corners * self.n_quads).await
+    }
+}
+
+impl Coarser {
+    fn new(
+        stream: &Stream<'_>,
+        fine: &LevelWork,
+        coarse: &LevelWork,
+        transfer: &GpuTransfer,
+        red_residual: &wgpu::Buffer,
+    ) -> Self {
+        let LevelWork { level, field, rhs, .. } = fine;
+        let prolong = |entries| stream.launch(&kernels::PROLONG_CORRECTION, &[entries, &coarse.field, field]);
+        Self {
+            residual: stream.launch(
+                &kernels::RESIDUAL,
+                &[&level.neighbours, &level.diagonal, &level.rhs_of_row, rhs, field, red_residual],
+            ),
+            restrict: stream
+                .launch(&kernels::RESTRICT_RESIDUAL, &[&transfer.around, red_residual, &coarse.rhs]),
+            faces: prolong(&transfer.faces),
+            corners: prolong(&transfer.corners),
+            n_faces: transfer.n_faces,
+            n_corners: transfer.n_corners,
+        }
+    }
+}
+
+/// Workgroups that reduce `count` values.
+pub(crate) fn n_groups(count: u32) -> u32 {
+    count.div_ceil(REDUCE_VALUES as u32)
+}
+
+/// The sum of `count` values' squares or roots, into `slot`.
+pub(crate) async fn sum_into(
+    stream: &mut Stream<'_>,
+    partial: &Launch,
+    sum: &Launch,
+    count: u32,
+    slot: u32,
+) -> Result<(), GpuError> {
+    let groups = n_groups(count);
+    stream.reduce(partial, Work::default(), count, groups).await?;
+    stream.reduce(sum, Work { first_row: slot, ..Work::default() }, groups, 1).await
+}

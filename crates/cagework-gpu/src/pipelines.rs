@@ -1,0 +1,113 @@
+//! One compute pipeline per row of the kernel table.
+
+use std::num::NonZeroU64;
+
+use crate::kernels::{ALL, Binding, Kernel};
+use crate::layout::Work;
+
+/// Pipelines of all kernels, in the table's order.
+#[derive(Debug)]
+pub(crate) struct Pipelines(Vec<Pipeline>);
+
+#[derive(Debug)]
+struct Pipeline {
+    compute: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+}
+
+/// A kernel with its buffers: what is dispatched.
+#[derive(Clone, Debug)]
+pub struct Launch {
+    pub(crate) pipeline: wgpu::ComputePipeline,
+    pub(crate) bind_group: wgpu::BindGroup,
+    pub(crate) workgroup: u32,
+    pub(crate) cost: u32,
+}
+
+impl Pipelines {
+    pub(crate) fn new(device: &wgpu::Device) -> Self {
+        Self(ALL.iter().map(|kernel| Pipeline::new(device, kernel)).collect())
+    }
+
+    /// A kernel bound to `buffers`, in the table's order after the uniform, which is `works`.
+    pub(crate) fn launch(
+        &self,
+        device: &wgpu::Device,
+        kernel: &Kernel,
+        works: &wgpu::Buffer,
+        buffers: &[&wgpu::Buffer],
+    ) -> Launch {
+        debug_assert_eq!(buffers.len() + 1, kernel.bindings.len(), "{}: one buffer per binding", kernel.name);
+        let number = ALL.iter().position(|k| k.name == kernel.name).expect("every kernel is in the table");
+        let pipeline = &self.0[number];
+        let work = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: works,
+            offset: 0,
+            size: NonZeroU64::new(size_of::<Work>() as u64),
+        });
+        let resources = std::iter::once(work).chain(buffers.iter().map(|b| b.as_entire_binding()));
+        let entries: Vec<_> = (0u32..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(kernel.name),
+            layout: &pipeline.layout,
+            entries: &entries,
+        });
+        Launch {
+            pipeline: pipeline.compute.clone(),
+            bind_group,
+            workgroup: kernel.workgroup,
+            cost: kernel.cost,
+        }
+    }
+}
+
+impl Pipeline {
+    fn new(device: &wgpu::Device, kernel: &Kernel) -> Self {
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(kernel.name),
+            source: wgpu::ShaderSource::Wgsl(kernel.wgsl.into()),
+        });
+        let entries: Vec<_> = (0u32..)
+            .zip(kernel.bindings)
+            .map(|(binding, kind)| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty: wgpu::BindingType::Buffer {
+                    ty: match kind {
+                        Binding::Uniform => wgpu::BufferBindingType::Uniform,
+                        Binding::Read => wgpu::BufferBindingType::Storage { read_only: true },
+                        Binding::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
+                    },
+                    has_dynamic_offset: *kind == Binding::Uniform,
+                    min_binding_size: None,
+                },
+                count: None,
+            })
+            .collect();
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(kernel.name),
+            entries: &entries,
+        });
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(kernel.name),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let compute = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(kernel.name),
+            layout: Some(&pipeline_layout),
+            module: &module,
+            entry_point: Some(kernel.name),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                // Every kernel writes all it reads from workgroup memory.
+                zero_initialize_workgroup_memory: false,
+                ..wgpu::PipelineCompilationOptions::default()
+            },
+            cache: None,
+        });
+        Self { compute, layout }
+    }
+}

@@ -1,0 +1,101 @@
+//! Weights at the mesh's vertices, from the field of a batch: all that ever comes back of a field.
+
+use cagework_core::sample::Stencils;
+use cagework_core::solve::rows::{LANES, Row};
+use cagework_core::stencil::tables::SamplingTable;
+
+use crate::buffers::{Allocator, Readback};
+use crate::error::GpuError;
+use crate::kernels;
+use crate::layout::Work;
+use crate::levels::QUAD_BYTES;
+use crate::plan::Plan;
+use crate::stream::Stream;
+
+/// Sampling stencils on the GPU and room for one block of weights.
+#[derive(Debug)]
+pub struct Sampler {
+    starts: wgpu::Buffer,
+    nodes: wgpu::Buffer,
+    hats: wgpu::Buffer,
+    block: wgpu::Buffer,
+    readback: Readback,
+    n_vertices: u32,
+    vertices_per_block: u32,
+    n_quads: u32,
+}
+
+impl Sampler {
+    /// Uploads the stencils.
+    ///
+    /// # Errors
+    /// As [`Allocator::zeros`].
+    pub async fn new(
+        allocator: &mut Allocator<'_>,
+        stencils: &Stencils,
+        plan: &Plan,
+    ) -> Result<Self, GpuError> {
+        let table = SamplingTable::new(stencils);
+        let n_quads = plan.n_quads();
+        let bytes = u64::from(plan.vertices_per_block) * u64::from(n_quads) * QUAD_BYTES;
+        Ok(Self {
+            starts: allocator.table("starts of sampling stencils", &table.starts).await?,
+            nodes: allocator.table("sampling nodes", &table.nodes).await?,
+            hats: allocator.table("sampling hats", &table.hats).await?,
+            block: allocator.storage("block of weights", bytes).await?,
+            readback: allocator.readback("block of weights, read back", bytes).await?,
+            n_vertices: stencils.len() as u32,
+            vertices_per_block: plan.vertices_per_block,
+            n_quads,
+        })
+    }
+
+    /// Samples `field`, the batch that starts at `first_column`, into `blocks`, the CPU's batches of [`LANES`] columns.
+    ///
+    /// # Errors
+    /// Cancelled, or the GPU failed.
+    pub async fn sample(
+        &self,
+        stream: &mut Stream<'_>,
+        field: &wgpu::Buffer,
+        first_column: u32,
+        blocks: &mut [Vec<Row>],
+    ) -> Result<(), GpuError> {
+        let launch = stream
+            .launch(&kernels::SAMPLE_WEIGHTS, &[&self.starts, &self.nodes, &self.hats, field, &self.block]);
+        let mut first_vertex = 0;
+        while first_vertex < self.n_vertices {
+            let n = self.vertices_per_block.min(self.n_vertices - first_vertex);
+            let work = Work {
+                n_quads: self.n_quads,
+                first_row: first_vertex,
+                first_quad: first_column / 4,
+                ..Work::default()
+            };
+            stream.run(&launch, work, n * self.n_quads).await?;
+            let bytes = u64::from(n) * u64::from(self.n_quads) * QUAD_BYTES;
+            stream
+                .read(&self.block, &self.readback, bytes, |bytes| {
+                    let n_quads = self.n_quads as usize;
+                    scatter(bytes, n_quads, first_column as usize, first_vertex as usize, blocks);
+                })
+                .await?;
+            first_vertex += n;
+        }
+        Ok(())
+    }
+}
+
+/// Puts a block, `[vertex][lane]`, where the CPU would have put its samples.
+fn scatter(bytes: &[u8], n_quads: usize, first_column: usize, first_vertex: usize, blocks: &mut [Vec<Row>]) {
+    for (v, row) in bytes.chunks_exact(n_quads * QUAD_BYTES as usize).enumerate() {
+        for (quad, values) in row.chunks_exact(QUAD_BYTES as usize).enumerate() {
+            let column = first_column + 4 * quad;
+            // The last batch's padding may reach beyond the CPU's.
+            if let Some(block) = blocks.get_mut(column / LANES) {
+                let values: [f32; 4] = bytemuck::pod_read_unaligned(values);
+                block[first_vertex + v][column % LANES..column % LANES + 4].copy_from_slice(&values);
+            }
+        }
+    }
+}

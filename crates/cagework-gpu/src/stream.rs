@@ -1,0 +1,292 @@
+//! Work goes to the GPU in short slices, so that a page stays smooth, no driver's watchdog wakes up, and progress and
+//! cancel come through.
+//!
+//! Dispatches are recorded until their estimated cost reaches a slice's budget, then submitted; one that is larger is
+//! split by items. The budget follows the measured time. At most two slices are in flight. Splitting changes no result:
+//! kernels treat items independently, and reductions are never split.
+
+use std::collections::VecDeque;
+
+use cagework_core::bind::Watch;
+use cagework_core::progress::Stage;
+use futures_channel::oneshot;
+
+use crate::buffers::{Allocator, Readback};
+use crate::device::GpuContext;
+use crate::error::GpuError;
+use crate::kernels::Kernel;
+use crate::layout::Work;
+use crate::pipelines::Launch;
+
+/// Time a slice should take, milliseconds: three frames at 60 Hz, far below the 2 s of a driver's watchdog.
+const SLICE_MS: f64 = 50.0;
+
+/// Slices in flight: one that runs and one behind it. More only adds latency to cancelling, and crashed iOS 26.
+const MAX_IN_FLIGHT: usize = 2;
+
+/// First budget, memory accesses: 10 to 100 ms on a software adapter with two threads, well below 1 ms on a GPU.
+const FIRST_BUDGET: u64 = 1 << 25;
+
+/// Budgets stay in here: below, overhead would dominate; above, one number would not be worth waiting for.
+const BUDGETS: [u64; 2] = [1 << 20, 1 << 36];
+
+/// Distance of two dispatches' parameters, the baseline's alignment of dynamic offsets, bytes.
+const WORK_STRIDE: u64 = 256;
+
+/// Dispatches in a slice.
+const MAX_WORKS: u64 = 1024;
+
+/// Workgroups along an axis, the baseline's limit.
+const MAX_GROUPS: u32 = 65_535;
+
+/// What is recorded for the next slice.
+#[derive(Debug)]
+enum Command {
+    Dispatch { launch: Launch, offset: u32, groups: [u32; 2] },
+    Clear(wgpu::Buffer),
+    Copy { from: wgpu::Buffer, to: wgpu::Buffer, bytes: u64 },
+}
+
+/// A slice that was submitted.
+#[derive(Debug)]
+struct Flight {
+    submission: wgpu::SubmissionIndex,
+    done: oneshot::Receiver<()>,
+    cost: u64,
+    submitted_ms: f64,
+}
+
+/// Where the solve is, for whoever watches.
+#[derive(Clone, Copy, Debug, Default)]
+struct Status {
+    fraction: f32,
+    iteration: u32,
+    delta: Option<f32>,
+}
+
+/// Records and submits one solve's work.
+pub struct Stream<'a> {
+    context: &'a GpuContext,
+    watch: &'a Watch<'a>,
+    works: wgpu::Buffer,
+    parameters: Vec<u8>,
+    commands: Vec<Command>,
+    cost: u64,
+    budget: u64,
+    in_flight: VecDeque<Flight>,
+    last_done_ms: f64,
+    status: Status,
+}
+
+impl<'a> Stream<'a> {
+    /// An empty stream.
+    ///
+    /// # Errors
+    /// As [`Allocator::zeros`].
+    pub async fn new(context: &'a GpuContext, watch: &'a Watch<'a>) -> Result<Self, GpuError> {
+        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let works = Allocator::new(context).zeros("work parameters", MAX_WORKS * WORK_STRIDE, usage).await?;
+        Ok(Self {
+            context,
+            watch,
+            works,
+            parameters: Vec::new(),
+            commands: Vec::new(),
+            cost: 0,
+            budget: FIRST_BUDGET,
+            in_flight: VecDeque::new(),
+            last_done_ms: 0.0,
+            status: Status::default(),
+        })
+    }
+
+    /// The context that work goes to.
+    #[must_use]
+    pub fn context(&self) -> &'a GpuContext {
+        self.context
+    }
+
+    /// The watcher's clock, milliseconds.
+    #[must_use]
+    pub fn now_ms(&self) -> f64 {
+        self.watch.now_ms()
+    }
+
+    /// A kernel with its buffers, in the table's order after the uniform.
+    #[must_use]
+    pub fn launch(&self, kernel: &Kernel, buffers: &[&wgpu::Buffer]) -> Launch {
+        self.context.pipelines.launch(&self.context.device, kernel, &self.works, buffers)
+    }
+
+    /// What the watcher is told with the next slices: the solve's fraction, iterations and delta so far.
+    pub fn set_status(&mut self, fraction: f32, iteration: u32, delta: Option<f32>) {
+        self.status = Status { fraction, iteration, delta };
+    }
+
+    /// Runs a kernel on `count` items; `work`'s own first, count and stride do not matter.
+    ///
+    /// # Errors
+    /// Cancelled, or the GPU failed.
+    pub async fn run(&mut self, launch: &Launch, work: Work, count: u32) -> Result<(), GpuError> {
+        let cost = u64::from(launch.cost.max(1));
+        let mut first = 0;
+        while first < count {
+            if self.cost >= self.budget {
+                self.submit().await?;
+            }
+            let room =
+                ((self.budget - self.cost) / cost).max(1).next_multiple_of(u64::from(launch.workgroup));
+            let part = u64::from(count - first).min(room) as u32;
+            let groups = part.div_ceil(launch.workgroup);
+            let rows = groups.div_ceil(MAX_GROUPS);
+            let groups = [groups.div_ceil(rows), rows];
+            let stride = groups[0] * launch.workgroup;
+            self.dispatch(
+                launch,
+                Work { first, count: part, stride, ..work },
+                groups,
+                cost * u64::from(part),
+            );
+            self.submit_if_full().await?;
+            first += part;
+        }
+        Ok(())
+    }
+
+    /// Runs a reducing kernel, `groups` workgroups over `count` values.
+    ///
+    /// # Errors
+    /// Cancelled, or the GPU failed.
+    pub async fn reduce(
+        &mut self,
+        launch: &Launch,
+        work: Work,
+        count: u32,
+        groups: u32,
+    ) -> Result<(), GpuError> {
+        self.dispatch(launch, Work { count, ..work }, [groups, 1], u64::from(count));
+        self.submit_if_full().await
+    }
+
+    /// Sets a buffer to zero.
+    pub fn clear(&mut self, buffer: &wgpu::Buffer) {
+        self.commands.push(Command::Clear(buffer.clone()));
+    }
+
+    /// Copies the start of a buffer to another's.
+    pub fn copy(&mut self, from: &wgpu::Buffer, to: &wgpu::Buffer, bytes: u64) {
+        self.commands.push(Command::Copy { from: from.clone(), to: to.clone(), bytes });
+    }
+
+    /// Finishes what was recorded and hands the first `bytes` of `from` to `take`.
+    ///
+    /// # Errors
+    /// Cancelled, or the GPU failed.
+    pub async fn read<T>(
+        &mut self,
+        from: &wgpu::Buffer,
+        through: &Readback,
+        bytes: u64,
+        take: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T, GpuError> {
+        self.copy(from, &through.buffer, bytes);
+        let submission = self.submit().await?;
+        let taken = through.read(self.context, &submission, bytes, take).await?;
+        while let Some(flight) = self.in_flight.pop_front() {
+            self.land(flight).await?;
+        }
+        Ok(taken)
+    }
+
+    fn dispatch(&mut self, launch: &Launch, work: Work, groups: [u32; 2], cost: u64) {
+        let offset = self.parameters.len() as u32;
+        self.parameters.extend_from_slice(bytemuck::bytes_of(&work));
+        self.parameters.resize(offset as usize + WORK_STRIDE as usize, 0);
+        self.commands.push(Command::Dispatch { launch: launch.clone(), offset, groups });
+        self.cost += cost;
+    }
+
+    async fn submit_if_full(&mut self) -> Result<(), GpuError> {
+        if self.cost >= self.budget || self.parameters.len() as u64 >= MAX_WORKS * WORK_STRIDE {
+            self.submit().await?;
+        }
+        Ok(())
+    }
+
+    /// Sends what was recorded on its way; waits until few enough slices are.
+    async fn submit(&mut self) -> Result<wgpu::SubmissionIndex, GpuError> {
+        let Status { fraction, iteration, delta } = self.status;
+        self.watch.report(Stage::Solve, fraction, iteration, delta)?;
+        if self.in_flight.len() >= MAX_IN_FLIGHT
+            && let Some(flight) = self.in_flight.pop_front()
+        {
+            self.land(flight).await?;
+        }
+        let queue = &self.context.queue;
+        if !self.parameters.is_empty() {
+            queue.write_buffer(&self.works, 0, &self.parameters);
+        }
+        let submitted_ms = self.now_ms();
+        let submission = queue.submit([encode(self.context, &self.commands)]);
+        let (sender, done) = oneshot::channel();
+        queue.on_submitted_work_done(move || {
+            // Nobody listens any more after a cancel.
+            let _ = sender.send(());
+        });
+        self.in_flight.push_back(Flight {
+            submission: submission.clone(),
+            done,
+            cost: self.cost,
+            submitted_ms,
+        });
+        self.commands.clear();
+        self.parameters.clear();
+        self.cost = 0;
+        Ok(submission)
+    }
+
+    /// Waits for a slice and learns from the time it took.
+    async fn land(&mut self, flight: Flight) -> Result<(), GpuError> {
+        self.context.wait(&flight.submission, flight.done).await?;
+        let now = self.now_ms();
+        let elapsed = now - self.last_done_ms.max(flight.submitted_ms);
+        self.last_done_ms = now;
+        // A slice that something else cut short says little about the cost of memory accesses.
+        if elapsed > 0.0 && 2 * flight.cost >= self.budget {
+            let wanted = (flight.cost as f64 * SLICE_MS / elapsed) as u64;
+            let [least, most] = BUDGETS;
+            self.budget = wanted.clamp(self.budget / 4, 2 * self.budget).clamp(least, most);
+        }
+        Ok(())
+    }
+}
+
+fn encode(context: &GpuContext, commands: &[Command]) -> wgpu::CommandBuffer {
+    let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None });
+    let mut rest = commands;
+    while let Some(command) = rest.first() {
+        match command {
+            Command::Dispatch { .. } => {
+                let n = rest.iter().take_while(|c| matches!(c, Command::Dispatch { .. })).count();
+                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+                for command in &rest[..n] {
+                    if let Command::Dispatch { launch, offset, groups } = command {
+                        pass.set_pipeline(&launch.pipeline);
+                        pass.set_bind_group(0, &launch.bind_group, &[*offset]);
+                        pass.dispatch_workgroups(groups[0], groups[1], 1);
+                    }
+                }
+                rest = &rest[n..];
+            }
+            Command::Clear(buffer) => {
+                encoder.clear_buffer(buffer, 0, None);
+                rest = &rest[1..];
+            }
+            Command::Copy { from, to, bytes } => {
+                encoder.copy_buffer_to_buffer(from, 0, to, 0, *bytes);
+                rest = &rest[1..];
+            }
+        }
+    }
+    encoder.finish()
+}

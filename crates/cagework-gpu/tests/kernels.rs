@@ -1,0 +1,406 @@
+//! Each kernel does one step as its twin in `cagework_core::stencil` does, on odd sizes.
+
+mod support;
+
+use cagework_core::bind::{BindOptions, DeltaNorm, OutsideVertex, Watch};
+use cagework_core::levels::Level;
+use cagework_core::progress::Silent;
+use cagework_core::sample::Stencils;
+use cagework_core::solve::hierarchy::Hierarchy;
+use cagework_core::solve::rows::Prolong;
+use cagework_core::stencil::tables::{
+    LevelTable, NormalTable, OutsideTable, SamplingTable, SlicedWeights, TransferTable,
+};
+use cagework_core::{Weights, stencil};
+use cagework_gpu::buffers::Allocator;
+use cagework_gpu::kernels::{self, Kernel};
+use cagework_gpu::layout::{Work, mode};
+use cagework_gpu::stream::Stream;
+use cagework_gpu::{GpuContext, GpuError};
+use glam::{Vec3, Vec4};
+use support::{Seeded, assert_close, cage, egg, flat, gpu, with_prepared};
+
+/// Sums of up to 14 numbers in [0, 1), times at most 6: fused multiply-adds and divisions of 2.5 ulp (WGSL's bound)
+/// leave a few ulp of 8.
+const ROW_TOLERANCE: f32 = 8e-6;
+
+/// Sums of thousands of positive numbers, relative: the order is the same, products may be fused.
+const SUM_TOLERANCE: f32 = 2e-6;
+
+/// Sums of dozens of products of weights and coordinates near 1.
+const POINT_TOLERANCE: f32 = 2e-6;
+
+/// Unit vectors: `inverseSqrt` is good to 2 ulp.
+const NORMAL_TOLERANCE: f32 = 2e-6;
+
+/// Columns: odd in quads, so that rows do not align with workgroups.
+const N_LANES: usize = 12;
+const N_QUADS: u32 = 3;
+
+/// Cells along the longest side: rows of odd and even length.
+const GRID: u32 = 13;
+
+fn hierarchy_of<T>(use_it: impl FnOnce(&Hierarchy, &Stencils) -> T) -> T {
+    let options = BindOptions { grid: GRID, ..BindOptions::default() };
+    // So large that it touches the cage and leaves it.
+    let positions: Vec<Vec3> = egg(7, 9).positions.iter().map(|p| 1.3 * p).collect();
+    with_prepared(&positions, &cage([2, 2, 3]), &options, |prepared| {
+        let hierarchy = prepared.hierarchy();
+        assert!(hierarchy.levels.len() >= 2, "a transfer is to be tested");
+        use_it(hierarchy, prepared.stencils())
+    })
+}
+
+/// Uploads `inputs`, runs the kernel once, and returns the last of them, as it is afterwards.
+fn run(kernel: &Kernel, work: Work, count: u32, inputs: &[&[u8]]) -> Vec<f32> {
+    pollster::block_on(step(&gpu(), kernel, work, count, inputs)).expect("one step runs")
+}
+
+async fn step(
+    context: &GpuContext,
+    kernel: &Kernel,
+    work: Work,
+    count: u32,
+    inputs: &[&[u8]],
+) -> Result<Vec<f32>, GpuError> {
+    let watch = Watch::new(&Silent);
+    let mut stream = Stream::new(context, &watch).await?;
+    let mut allocator = Allocator::new(context);
+    let mut buffers = Vec::new();
+    for input in inputs {
+        buffers.push(allocator.table(kernel.name, input).await?);
+    }
+    let launch = stream.launch(kernel, &buffers.iter().collect::<Vec<_>>());
+    if kernel.workgroup == stencil::REDUCE_LANES as u32 {
+        let groups =
+            if kernel.name == "reduce_sum" { 1 } else { count.div_ceil(stencil::REDUCE_VALUES as u32) };
+        stream.reduce(&launch, work, count, groups).await?;
+    } else {
+        stream.run(&launch, work, count).await?;
+    }
+    let bytes = inputs[inputs.len() - 1].len() as u64;
+    let through = allocator.readback("result", bytes).await?;
+    stream.read(&buffers[buffers.len() - 1], &through, bytes, bytemuck::pod_collect_to_vec).await
+}
+
+fn bytes<T: bytemuck::Pod>(data: &[T]) -> &[u8] {
+    bytemuck::cast_slice(data)
+}
+
+/// A field with zero rows where the level has them.
+fn field(seeded: &mut Seeded, level: &Level) -> Vec<f32> {
+    let mut values = seeded.values(level.n_rows() * N_LANES);
+    for row in [level.zero_row() as usize, level.n_rows() - 1] {
+        values[row * N_LANES..(row + 1) * N_LANES].fill(0.0);
+    }
+    values
+}
+
+/// Work of rows and quads.
+const ROWS: Work = Work {
+    first: 0,
+    count: 0,
+    stride: 0,
+    n_quads: N_QUADS,
+    first_row: 0,
+    first_quad: 0,
+    mode: 0,
+    n_sources: 0,
+    omega: 1.0,
+};
+
+#[test]
+fn relax_cells_matches_cpu() {
+    hierarchy_of(|hierarchy, _| {
+        for (k, omega, colour) in [(0, 1.0, 0), (0, 1.2, 1), (1, 1.0, 1), (1, 1.2, 0)] {
+            let level = &hierarchy.levels[k];
+            let table = LevelTable::new(level, k == 0);
+            let mut seeded = Seeded(1 + k as u64);
+            let n_rhs = if k == 0 { level.n_cut() } else { level.n_rows() };
+            let rhs = seeded.values(n_rhs * N_LANES);
+            let mut expected = field(&mut seeded, level);
+            let first = level.first_row(colour);
+            let n = level.colours[colour].n_cells;
+            let inputs = [
+                bytes(&table.neighbours),
+                bytes(&table.diagonal),
+                bytes(&table.rhs_of_row),
+                bytes(&rhs),
+                bytes(&expected),
+            ];
+            let work = Work { first_row: first as u32, omega, ..ROWS };
+            let result = run(&kernels::RELAX_CELLS, work, n * N_QUADS, &inputs);
+            stencil::relax_cells(first..first + n as usize, N_LANES, omega, &table, &rhs, &mut expected);
+            assert_close(&result, &expected, ROW_TOLERANCE);
+        }
+    });
+}
+
+#[test]
+fn jacobi_cells_matches_cpu() {
+    hierarchy_of(|hierarchy, _| {
+        let level = &hierarchy.levels[0];
+        let table = LevelTable::new(level, true);
+        let mut seeded = Seeded(2);
+        let rhs = seeded.values(level.n_cut() * N_LANES);
+        let u_in = field(&mut seeded, level);
+        let mut expected = vec![0.5; u_in.len()];
+        let inputs = [
+            bytes(&table.neighbours),
+            bytes(&table.diagonal),
+            bytes(&table.rhs_of_row),
+            bytes(&rhs),
+            bytes(&u_in),
+            bytes(&expected),
+        ];
+        let result = run(&kernels::JACOBI_CELLS, ROWS, level.n_rows() as u32 * N_QUADS, &inputs);
+        stencil::jacobi_cells(0..level.n_rows(), N_LANES, &table, &rhs, &u_in, &mut expected);
+        assert_close(&result, &expected, ROW_TOLERANCE);
+    });
+}
+
+#[test]
+fn change_norms_matches_cpu() {
+    const N_ROWS: usize = 1013;
+    for (norm, first) in
+        [(DeltaNorm::Euclidean, true), (DeltaNorm::Euclidean, false), (DeltaNorm::Literal, false)]
+    {
+        let mut seeded = Seeded(3);
+        let (old, new) = (seeded.values(N_ROWS * N_LANES), seeded.values(N_ROWS * N_LANES));
+        let mut expected = seeded.values(N_ROWS);
+        let absolute = if norm == DeltaNorm::Literal { mode::CHANGE_ABSOLUTE } else { 0 };
+        let work = Work { mode: absolute | if first { mode::CHANGE_FIRST } else { 0 }, ..ROWS };
+        let inputs = [bytes(&old), bytes(&new), bytes(&expected)];
+        let result = run(&kernels::CHANGE_NORMS, work, N_ROWS as u32, &inputs);
+        stencil::change_norms(N_LANES, norm, first, &old, &new, &mut expected);
+        assert_close(&result, &expected, ROW_TOLERANCE);
+    }
+}
+
+#[test]
+fn residual_matches_cpu() {
+    hierarchy_of(|hierarchy, _| {
+        for k in [0, 1] {
+            let level = &hierarchy.levels[k];
+            let table = LevelTable::new(level, k == 0);
+            let mut seeded = Seeded(4);
+            let n_rhs = if k == 0 { level.n_cut() } else { level.n_rows() };
+            let mut rhs = seeded.values(n_rhs * N_LANES);
+            if k > 0 {
+                // Coarse right-hand sides are zero where fields are.
+                let zero = level.zero_row() as usize;
+                rhs[zero * N_LANES..(zero + 1) * N_LANES].fill(0.0);
+            }
+            let u = field(&mut seeded, level);
+            let n_rows = level.first_row(1);
+            let mut expected = vec![0.5; n_rows * N_LANES];
+            let inputs = [
+                bytes(&table.neighbours),
+                bytes(&table.diagonal),
+                bytes(&table.rhs_of_row),
+                bytes(&rhs),
+                bytes(&u),
+                bytes(&expected),
+            ];
+            let result = run(&kernels::RESIDUAL, ROWS, n_rows as u32 * N_QUADS, &inputs);
+            stencil::residual(n_rows, N_LANES, &table, &rhs, &u, &mut expected);
+            assert_close(&result, &expected, ROW_TOLERANCE);
+            assert!(result[(n_rows - 1) * N_LANES..].iter().all(|&r| r == 0.0), "the zero row stays zero");
+        }
+    });
+}
+
+#[test]
+fn restrict_residual_matches_cpu() {
+    hierarchy_of(|hierarchy, _| {
+        let (fine, coarse) = (&hierarchy.levels[0], &hierarchy.levels[1]);
+        let table = TransferTable::new(fine, coarse, &hierarchy.transfers[0]);
+        let red = &field(&mut Seeded(5), fine)[..fine.first_row(1) * N_LANES];
+        let mut expected = vec![0.5; coarse.n_rows() * N_LANES];
+        let inputs = [bytes(&table.around), bytes(red), bytes(&expected)];
+        let result = run(&kernels::RESTRICT_RESIDUAL, ROWS, coarse.n_rows() as u32 * N_QUADS, &inputs);
+        stencil::restrict_residual(N_LANES, &table.around, red, &mut expected);
+        assert_close(&result, &expected, ROW_TOLERANCE);
+    });
+}
+
+#[test]
+fn prolong_correction_matches_cpu() {
+    hierarchy_of(|hierarchy, _| {
+        let (fine, coarse) = (&hierarchy.levels[0], &hierarchy.levels[1]);
+        let transfer = &hierarchy.transfers[0];
+        let table = TransferTable::new(fine, coarse, transfer);
+        for (prolong, bits) in [(Prolong::Correct, 0), (Prolong::Replace, mode::PROLONG_REPLACE)] {
+            for (n_sources, entries, count) in
+                [(2, &table.faces, transfer.faces.len()), (8, &table.corners, transfer.corners.len())]
+            {
+                let mut seeded = Seeded(6);
+                let from = field(&mut seeded, coarse);
+                let mut expected = field(&mut seeded, fine);
+                let inputs = [bytes(entries), bytes(&from), bytes(&expected)];
+                let work = Work { mode: bits, n_sources, ..ROWS };
+                let result = run(&kernels::PROLONG_CORRECTION, work, count as u32 * N_QUADS, &inputs);
+                stencil::prolong_correction(
+                    N_LANES,
+                    prolong,
+                    n_sources as usize,
+                    entries,
+                    &from,
+                    &mut expected,
+                );
+                assert_close(&result, &expected, ROW_TOLERANCE);
+            }
+        }
+    });
+}
+
+/// Compares relative to the largest number.
+#[track_caller]
+fn assert_sums_close(gpu: &[f32], cpu: &[f32]) {
+    let largest = cpu.iter().fold(0.0f32, |m, x| m.max(x.abs()));
+    assert_close(gpu, cpu, SUM_TOLERANCE * largest);
+}
+
+#[test]
+fn sum_squares_matches_cpu() {
+    for n_quads in [1, 255, 4096, 9001] {
+        let values = Seeded(7).values(4 * n_quads);
+        let expected = stencil::sum_squares(&values);
+        let room = vec![0.0f32; expected.len()];
+        let result = run(&kernels::SUM_SQUARES, ROWS, n_quads as u32, &[bytes(&values), bytes(&room)]);
+        assert_sums_close(&result, &expected);
+    }
+}
+
+#[test]
+fn sum_roots_matches_cpu() {
+    for n in [1, 257, 4097, 12_289] {
+        let values = Seeded(8).values(n);
+        let expected = stencil::sum_roots(&values);
+        let room = vec![0.0f32; expected.len()];
+        let result = run(&kernels::SUM_ROOTS, ROWS, n as u32, &[bytes(&values), bytes(&room)]);
+        assert_sums_close(&result, &expected);
+    }
+}
+
+#[test]
+fn reduce_sum_matches_cpu() {
+    for n in [1, 255, 256, 10_007] {
+        let values = Seeded(9).values(n);
+        let work = Work { first_row: 2, ..ROWS };
+        let result = run(&kernels::REDUCE_SUM, work, n as u32, &[bytes(&values), bytes(&[0.0f32; 3])]);
+        assert_sums_close(&result, &[0.0, 0.0, stencil::reduce_sum(&values)]);
+    }
+}
+
+#[test]
+fn sample_weights_matches_cpu() {
+    hierarchy_of(|hierarchy, stencils| {
+        let table = SamplingTable::new(stencils);
+        assert!(!table.hats.is_empty(), "some vertices are near the cage");
+        let u = field(&mut Seeded(10), &hierarchy.levels[0]);
+        // The second batch, and not from the first vertex.
+        let (first_vertex, first_column) = (5, N_LANES);
+        let n = stencils.len() - first_vertex;
+        let mut expected = vec![0.5; n * N_LANES];
+        let inputs =
+            [bytes(&table.starts), bytes(&table.nodes), bytes(&table.hats), bytes(&u), bytes(&expected)];
+        let work = Work { first_row: first_vertex as u32, first_quad: N_QUADS, ..ROWS };
+        let result = run(&kernels::SAMPLE_WEIGHTS, work, n as u32 * N_QUADS, &inputs);
+        let vertices = first_vertex..stencils.len();
+        stencil::sample_weights(vertices, N_LANES, first_column, &table, &u, &mut expected);
+        assert_close(&result, &expected, ROW_TOLERANCE);
+    });
+}
+
+/// A matrix of weights with rows of different lengths, some empty.
+fn random_weights(seeded: &mut Seeded, n_rows: usize, n_columns: u32) -> Weights {
+    let (mut indptr, mut indices, mut data) = (vec![0], Vec::new(), Vec::new());
+    for _ in 0..n_rows {
+        let stride = 1 + (seeded.bits() % 40) as u32;
+        let first = indices.len();
+        indices.extend((0..n_columns).step_by(stride as usize).skip(1));
+        let row = seeded.values(indices.len() - first);
+        let total: f32 = row.iter().sum();
+        data.extend(row.iter().map(|w| w / total));
+        indptr.push(indices.len() as u32);
+    }
+    Weights::new(n_columns, indptr, indices, data).expect("rows are built in order")
+}
+
+fn padded(points: &[Vec3], w: f32) -> Vec<Vec4> {
+    points.iter().map(|p| p.extend(w)).collect()
+}
+
+fn unpadded(values: &[f32]) -> Vec<f32> {
+    values.chunks(4).flat_map(|v| [v[0], v[1], v[2]]).collect()
+}
+
+#[test]
+fn deform_vertices_matches_cpu() {
+    let mut seeded = Seeded(12);
+    let weights = random_weights(&mut seeded, 203, 31);
+    let sliced = SlicedWeights::new(&weights);
+    let posed: Vec<Vec3> = (0..31).map(|_| seeded.point()).collect();
+    let mut expected = vec![Vec3::ZERO; 203];
+    let inputs = [
+        bytes(&sliced.slices).to_vec(),
+        bytes(&sliced.entries).to_vec(),
+        bytes(&padded(&posed, 1.0)).to_vec(),
+        bytes(&padded(&expected, 0.0)).to_vec(),
+    ];
+    let inputs: Vec<&[u8]> = inputs.iter().map(Vec::as_slice).collect();
+    let result = run(&kernels::DEFORM_VERTICES, ROWS, 203, &inputs);
+    stencil::deform_vertices(&sliced, &posed, &mut expected);
+    assert_close(&unpadded(&result), &flat(&expected), POINT_TOLERANCE);
+    let double = cagework_core::deform::deform_vertices(&weights, &posed);
+    assert_close(&unpadded(&result), &flat(&double), POINT_TOLERANCE);
+}
+
+#[test]
+fn offset_outside_matches_cpu() {
+    let mut seeded = Seeded(13);
+    let posed: Vec<Vec3> = (0..9).map(|_| seeded.point()).collect();
+    let outside: Vec<OutsideVertex> = (0..67u32)
+        .map(|k| OutsideVertex {
+            vertex: 2 * k + 1,
+            // Every seventh triangle has no area.
+            corners: [k % 9, (k + 1) % 9, if k % 7 == 0 { k % 9 } else { (k + 5) % 9 }],
+            offset: seeded.point() - 0.5,
+        })
+        .collect();
+    let table = OutsideTable::new(&outside);
+    let mut expected: Vec<Vec3> = (0..140).map(|_| seeded.point()).collect();
+    let inputs = [
+        bytes(&table.corners).to_vec(),
+        bytes(&table.offsets).to_vec(),
+        bytes(&padded(&posed, 1.0)).to_vec(),
+        bytes(&padded(&expected, 1.0)).to_vec(),
+    ];
+    let inputs: Vec<&[u8]> = inputs.iter().map(Vec::as_slice).collect();
+    let result = run(&kernels::OFFSET_OUTSIDE, ROWS, outside.len() as u32, &inputs);
+    stencil::offset_outside(&table, &posed, &mut expected);
+    assert_close(&unpadded(&result), &flat(&expected), POINT_TOLERANCE);
+}
+
+#[test]
+fn vertex_normals_matches_cpu() {
+    let mut mesh = egg(11, 13);
+    // A vertex of no triangle.
+    mesh.positions.push(Vec3::ONE);
+    let n = mesh.positions.len();
+    let table = NormalTable::new(n, &mesh.triangles);
+    let mut expected = vec![Vec3::ONE; n];
+    let inputs = [
+        bytes(&table.starts).to_vec(),
+        bytes(&table.others).to_vec(),
+        bytes(&padded(&mesh.positions, 1.0)).to_vec(),
+        bytes(&padded(&expected, 1.0)).to_vec(),
+    ];
+    let inputs: Vec<&[u8]> = inputs.iter().map(Vec::as_slice).collect();
+    let result = run(&kernels::VERTEX_NORMALS, ROWS, n as u32, &inputs);
+    stencil::vertex_normals(&table, &mesh.positions, &mut expected);
+    assert_close(&unpadded(&result), &flat(&expected), NORMAL_TOLERANCE);
+    let scattered = cagework_core::deform::vertex_normals(&mesh.positions, &mesh.triangles);
+    assert_close(&unpadded(&result), &flat(&scattered), NORMAL_TOLERANCE);
+}

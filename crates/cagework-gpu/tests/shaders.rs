@@ -1,0 +1,135 @@
+//! The shaders against the kernel table and the layouts, without a GPU: naga reads them as wgpu will.
+
+use std::mem::{offset_of, size_of};
+
+use cagework_core::stencil;
+use cagework_gpu::kernels::{self, ALL, Binding, Kernel};
+use cagework_gpu::layout::{Work, mode};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::{AddressSpace, Literal, StorageAccess, TypeInner};
+
+/// Baseline WebGPU's limits per stage.
+const MAX_STORAGE_BUFFERS: usize = 8;
+const MAX_INVOCATIONS: u32 = 256;
+
+/// Longest shader file, lines.
+const MAX_LINES: usize = 120;
+
+fn parse(kernel: &Kernel) -> naga::Module {
+    naga::front::wgsl::parse_str(kernel.wgsl)
+        .unwrap_or_else(|e| panic!("{}", e.emit_to_string_with_path(kernel.wgsl, kernel.name)))
+}
+
+#[test]
+fn shaders_are_baseline_webgpu() {
+    for kernel in ALL {
+        let module = parse(kernel);
+        Validator::new(ValidationFlags::all(), Capabilities::empty())
+            .validate(&module)
+            .unwrap_or_else(|e| panic!("{}", e.emit_to_string_with_path(kernel.wgsl, kernel.name)));
+        let n_storage = kernel.bindings.iter().filter(|b| **b != Binding::Uniform).count();
+        assert!(n_storage <= MAX_STORAGE_BUFFERS, "{}: {n_storage} storage buffers", kernel.name);
+        assert!(kernel.workgroup <= MAX_INVOCATIONS, "{}: {} invocations", kernel.name, kernel.workgroup);
+    }
+}
+
+#[test]
+fn bindings_and_workgroups_equal_the_table() {
+    for kernel in ALL {
+        let module = parse(kernel);
+        assert_eq!(module.entry_points.len(), 1, "{}", kernel.name);
+        let entry = &module.entry_points[0];
+        assert_eq!(entry.name, kernel.name, "the entry point is named as its file");
+        assert_eq!(entry.workgroup_size, [kernel.workgroup, 1, 1], "{}", kernel.name);
+        let mut found: Vec<_> = module
+            .global_variables
+            .iter()
+            .filter_map(|(_, variable)| {
+                let binding = variable.binding?;
+                let kind = match variable.space {
+                    AddressSpace::Uniform => Binding::Uniform,
+                    AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => {
+                        Binding::ReadWrite
+                    }
+                    AddressSpace::Storage { .. } => Binding::Read,
+                    space => panic!("{}: a binding in {space:?}", kernel.name),
+                };
+                Some((binding.group, binding.binding, kind))
+            })
+            .collect();
+        found.sort_by_key(|(group, binding, _)| (*group, *binding));
+        let wanted: Vec<_> = (0u32..).zip(kernel.bindings).map(|(i, kind)| (0, i, *kind)).collect();
+        assert_eq!(found, wanted, "{}", kernel.name);
+    }
+}
+
+#[test]
+fn work_mirrors_its_wgsl_struct() {
+    macro_rules! fields {
+        ($($field:ident),+) => { [$((stringify!($field).to_owned(), offset_of!(Work, $field))),+] };
+    }
+    let mirror = fields!(first, count, stride, n_quads, first_row, first_quad, mode, n_sources, omega);
+    for kernel in ALL {
+        let module = parse(kernel);
+        let (members, span) = module
+            .types
+            .iter()
+            .find_map(|(_, t)| match &t.inner {
+                TypeInner::Struct { members, span } if t.name.as_deref() == Some("Work") => {
+                    Some((members.clone(), *span))
+                }
+                _ => None,
+            })
+            .unwrap_or_else(|| panic!("{} has no struct Work", kernel.name));
+        let wgsl: Vec<_> =
+            members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset as usize)).collect();
+        assert_eq!(wgsl, mirror, "{}", kernel.name);
+        assert_eq!(span as usize, size_of::<Work>(), "{}", kernel.name);
+    }
+}
+
+/// Value of a shader's constant.
+fn constant(kernel: &Kernel, name: &str) -> f64 {
+    let module = parse(kernel);
+    let (_, constant) = module
+        .constants
+        .iter()
+        .find(|(_, c)| c.name.as_deref() == Some(name))
+        .unwrap_or_else(|| panic!("{} has no constant {name}", kernel.name));
+    match module.global_expressions[constant.init] {
+        naga::Expression::Literal(Literal::U32(x)) => f64::from(x),
+        naga::Expression::Literal(Literal::F32(x)) => f64::from(x),
+        naga::Expression::Literal(Literal::AbstractFloat(x)) => x,
+        naga::Expression::Literal(Literal::AbstractInt(x)) => x as f64,
+        ref other => panic!("{name} is {other:?}"),
+    }
+}
+
+#[test]
+fn constants_equal_rusts() {
+    let same = |kernel: &Kernel, name: &str, value: f64| {
+        assert_eq!(constant(kernel, name), value, "{name} in {}", kernel.name);
+    };
+    same(&kernels::CHANGE_NORMS, "CHANGE_ABSOLUTE", f64::from(mode::CHANGE_ABSOLUTE));
+    same(&kernels::CHANGE_NORMS, "CHANGE_FIRST", f64::from(mode::CHANGE_FIRST));
+    same(&kernels::PROLONG_CORRECTION, "PROLONG_REPLACE", f64::from(mode::PROLONG_REPLACE));
+    same(&kernels::PROLONG_CORRECTION, "ENTRY_HEAD", stencil::tables::ENTRY_HEAD as f64);
+    same(&kernels::DEFORM_VERTICES, "SLICE", stencil::tables::SLICE as f64);
+    same(&kernels::SUM_SQUARES, "REDUCE_LANES", stencil::REDUCE_LANES as f64);
+    same(&kernels::SUM_SQUARES, "REDUCE_VALUES", stencil::REDUCE_VALUES as f64);
+    let centre = f64::from(cagework_core::transfer::RESTRICT_CENTRE);
+    same(&kernels::RESTRICT_RESIDUAL, "RESTRICT_CENTRE", centre);
+    same(&kernels::RESTRICT_RESIDUAL, "RESTRICT_EDGE", f64::from(cagework_core::transfer::RESTRICT_EDGE));
+}
+
+#[test]
+fn every_shader_file_is_in_the_table_and_short() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shaders");
+    for file in std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()) {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let name = file.file_stem().unwrap().to_str().unwrap();
+        assert!(text.lines().count() <= MAX_LINES, "{name} has more than {MAX_LINES} lines");
+        assert!(text.starts_with("// "), "{name} does not say what it computes");
+        assert!(ALL.iter().any(|k| k.wgsl.contains(&text)), "{name} belongs to no kernel");
+    }
+}

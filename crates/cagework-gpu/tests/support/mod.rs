@@ -1,0 +1,123 @@
+//! What the GPU's tests share: one device, meshes, seeded numbers, comparing.
+#![allow(dead_code, reason = "every test binary uses its part")]
+
+use cagework_core::bind::pipeline::{FieldsOn, Prepared};
+use cagework_core::bind::{BindOptions, Watch};
+use cagework_core::progress::Silent;
+use cagework_core::{Bounds, Cage, TriMesh, subdivided_box};
+use cagework_gpu::{ContextOptions, GpuContext};
+use glam::Vec3;
+
+/// A context of its own. No GPU fails the test: the software adapter of mesa-vulkan-drivers will do.
+pub(crate) fn gpu() -> GpuContext {
+    gpu_with(&ContextOptions::default())
+}
+
+/// [`gpu`] with options.
+pub(crate) fn gpu_with(options: &ContextOptions) -> GpuContext {
+    match pollster::block_on(GpuContext::new(options)) {
+        Ok(context) => context,
+        Err(error) => panic!("these tests need a Vulkan adapter: {error}"),
+    }
+}
+
+/// Numbers that look random, the same in every run (splitmix64).
+pub(crate) struct Seeded(pub(crate) u64);
+
+impl Seeded {
+    pub(crate) fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// In [0, 1).
+    pub(crate) fn unit(&mut self) -> f32 {
+        (self.bits() >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    pub(crate) fn values(&mut self, n: usize) -> Vec<f32> {
+        (0..n).map(|_| self.unit()).collect()
+    }
+
+    pub(crate) fn point(&mut self) -> Vec3 {
+        Vec3::new(self.unit(), self.unit(), self.unit())
+    }
+}
+
+/// Fails at the worst value that differs by more than `tolerance`.
+#[track_caller]
+pub(crate) fn assert_close(gpu: &[f32], cpu: &[f32], tolerance: f32) {
+    assert_eq!(gpu.len(), cpu.len(), "lengths");
+    let worst = (0..gpu.len()).max_by(|&a, &b| {
+        // NaN counts as the worst of all: total order puts it last.
+        (gpu[a] - cpu[a]).abs().total_cmp(&(gpu[b] - cpu[b]).abs())
+    });
+    if let Some(i) = worst {
+        let difference = (gpu[i] - cpu[i]).abs();
+        assert!(
+            difference <= tolerance,
+            "value {i} of {}: GPU {}, CPU {}, difference {difference:e} > {tolerance:e}",
+            gpu.len(),
+            gpu[i],
+            cpu[i]
+        );
+    }
+}
+
+pub(crate) fn flat(points: &[Vec3]) -> Vec<f32> {
+    points.iter().flat_map(Vec3::to_array).collect()
+}
+
+/// A cage that is no box: the vertices of a subdivided one, moved about.
+pub(crate) fn cage(divisions: [u32; 3]) -> Cage {
+    let bounds = Bounds { min: Vec3::new(-1.0, -0.6, -0.8), max: Vec3::new(1.1, 0.7, 0.5) };
+    let mut mesh = subdivided_box(bounds, 0.0, divisions);
+    let mut seeded = Seeded(11);
+    for p in &mut mesh.positions {
+        *p += 0.12 * (seeded.point() - 0.5);
+    }
+    Cage::new(&mesh).expect("a box stays closed when its vertices move a little")
+}
+
+/// A closed surface of `n_rings * n_segments + 2` vertices inside [`cage`].
+pub(crate) fn egg(n_rings: u32, n_segments: u32) -> TriMesh {
+    let radii = Vec3::new(0.8, 0.45, 0.5);
+    let centre = Vec3::new(0.05, 0.05, -0.15);
+    let point = |ring: u32, segment: u32| {
+        let polar = std::f32::consts::PI * (ring + 1) as f32 / (n_rings + 1) as f32;
+        let azimuth = std::f32::consts::TAU * segment as f32 / n_segments as f32;
+        centre + radii * Vec3::new(polar.cos(), polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin())
+    };
+    let mut positions: Vec<Vec3> =
+        (0..n_rings).flat_map(|r| (0..n_segments).map(move |s| (r, s))).map(|(r, s)| point(r, s)).collect();
+    let (first, last) = (positions.len() as u32, positions.len() as u32 + 1);
+    positions.extend([centre + radii * Vec3::X, centre - radii * Vec3::X]);
+    let mut triangles = Vec::new();
+    for s in 0..n_segments {
+        let t = (s + 1) % n_segments;
+        triangles.push([first, s, t]);
+        for r in 0..n_rings - 1 {
+            let (a, b) = (r * n_segments, (r + 1) * n_segments);
+            triangles.extend([[a + s, b + s, b + t], [a + s, b + t, a + t]]);
+        }
+        let a = (n_rings - 1) * n_segments;
+        triangles.push([last, a + t, a + s]);
+    }
+    TriMesh { positions, triangles }
+}
+
+/// Hands a prepared bind to `use_it`.
+pub(crate) fn with_prepared<T>(
+    positions: &[Vec3],
+    cage: &Cage,
+    options: &BindOptions,
+    use_it: impl FnOnce(&Prepared<'_>) -> T,
+) -> T {
+    let watch = Watch::new(&Silent);
+    let prepared =
+        Prepared::new(positions, cage, options, FieldsOn::Device, &watch).expect("the tests' input is good");
+    use_it(&prepared)
+}

@@ -1,0 +1,58 @@
+//! Writes one exported GLB of every kind into a directory, for the Khronos validator (`tests/validate.mjs`).
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use cagework_io::Model;
+use common::{CUBE_OBJ, PNG, instanced, plain_cube, quantized, skinned, textured_square, twist};
+use glam::Vec3;
+use serde_json::json;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let directory = PathBuf::from(std::env::args().nth(1).ok_or("usage: export_samples DIRECTORY")?);
+    std::fs::create_dir_all(&directory)?;
+    let mut flat = plain_cube();
+    flat.json["nodes"][0]["scale"] = json!([1.0, 0.0, 1.0]);
+    let mut bare = plain_cube();
+    for key in ["nodes", "scenes", "scene"] {
+        bare.json.as_object_mut().ok_or("the document is an object")?.shift_remove(key);
+    }
+    let mut mirrored_skin = skinned();
+    mirrored_skin.json["nodes"][1]["scale"] = json!([-1.0, 1.0, 1.0]);
+    let inputs = [
+        ("plain.glb", plain_cube().glb()),
+        ("textured.glb", textured_square().glb()),
+        ("instanced.glb", instanced().glb()),
+        ("skinned.glb", skinned().glb()),
+        ("mirrored-skin.glb", mirrored_skin.glb()),
+        ("quantized.glb", quantized().glb()),
+        ("flattened.glb", flat.glb()),
+        ("no-nodes.glb", bare.glb()),
+        ("box.obj", CUBE_OBJ.as_bytes().to_vec()),
+        (
+            "smooth.obj",
+            CUBE_OBJ
+                .lines()
+                .filter(|l| !l.starts_with('v') || l.starts_with("v "))
+                .collect::<Vec<_>>()
+                .join("\n")
+                .into_bytes(),
+        ),
+    ];
+    for (name, bytes) in inputs {
+        let model = Model::read(name, &bytes, &mut |uri| (uri == "red dot.png").then(|| PNG.to_vec()))?;
+        let moved: Vec<Vec3> = model.positions.iter().map(|&p| twist(p)).collect();
+        let raised: Vec<Vec3> = model.positions.iter().map(|&p| p + Vec3::Z).collect();
+        let poses = [("twisted".to_owned(), moved.clone()), ("raised".to_owned(), raised)];
+        let stem = name.replace('.', "-");
+        std::fs::write(directory.join(format!("{stem}-deformed.glb")), model.write_glb(&moved)?)?;
+        std::fs::write(
+            directory.join(format!("{stem}-poses.glb")),
+            model.write_glb_poses(&model.positions, &poses)?,
+        )?;
+    }
+    Ok(())
+}

@@ -1,0 +1,231 @@
+//! Accessors: typed views into buffers, decoded with every bound checked.
+//!
+//! Own decoder: that of the crate `gltf` asserts `f32` positions (so it panics on KHR_mesh_quantization) and slices
+//! unchecked. No count is believed before the bytes behind it are there.
+
+use ::gltf::json::Root;
+use ::gltf::json::accessor::{ComponentType, Type};
+use ::gltf::json::validation::Checked;
+
+use super::{GltfError, get};
+
+/// Most elements of one accessor, and most vertices of a model: half a gigabyte of positions.
+pub(crate) const MAX_ELEMENTS: u64 = 1 << 25;
+
+/// What accessors are read from.
+#[derive(Clone, Copy)]
+pub(crate) struct Source<'a> {
+    pub(crate) root: &'a Root,
+    pub(crate) buffers: &'a [Vec<u8>],
+}
+
+/// One component as a number: `f32`, or an integer that is kept or normalised.
+#[derive(Clone, Copy)]
+struct Component {
+    kind: ComponentType,
+    normalized: bool,
+}
+
+impl Component {
+    /// Value of one component; `bytes` has its size. Normalisation as glTF 2.0, section 3.6.2.2.
+    fn float(self, bytes: &[u8]) -> f32 {
+        let (value, unit): (f32, f32) = match (self.kind, bytes) {
+            (ComponentType::I8, &[a]) => (f32::from(a as i8), 127.0),
+            (ComponentType::U8, &[a]) => (f32::from(a), 255.0),
+            (ComponentType::I16, &[a, b]) => (f32::from(i16::from_le_bytes([a, b])), 32767.0),
+            (ComponentType::U16, &[a, b]) => (f32::from(u16::from_le_bytes([a, b])), 65535.0),
+            (ComponentType::F32, &[a, b, c, d]) => return f32::from_le_bytes([a, b, c, d]),
+            _ => return f32::NAN,
+        };
+        if self.normalized { (value / unit).max(-1.0) } else { value }
+    }
+}
+
+fn unsigned(kind: ComponentType, bytes: &[u8]) -> u32 {
+    match (kind, bytes) {
+        (ComponentType::U8, &[a]) => u32::from(a),
+        (ComponentType::U16, &[a, b]) => u32::from(u16::from_le_bytes([a, b])),
+        (ComponentType::U32, &[a, b, c, d]) => u32::from_le_bytes([a, b, c, d]),
+        _ => u32::MAX,
+    }
+}
+
+/// Elements `offset + i * stride .. + size` of a buffer.
+struct Elements<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+    size: usize,
+}
+
+impl<'a> Elements<'a> {
+    fn get(&self, i: usize) -> &'a [u8] {
+        &self.bytes[i * self.stride..i * self.stride + self.size]
+    }
+}
+
+impl<'a> Source<'a> {
+    /// Vectors of `N` numbers; `what` names the attribute in errors.
+    pub(crate) fn floats<const N: usize>(
+        self,
+        accessor: u32,
+        what: &str,
+    ) -> Result<Vec<[f32; N]>, GltfError> {
+        let component = self.component(accessor)?;
+        if component.kind == ComponentType::U32 {
+            return Err(fault(accessor, format!("has 32-bit integers, which {what} cannot have")));
+        }
+        self.read(accessor, what, component.kind, 0.0, |bytes| component.float(bytes))
+    }
+
+    /// Vectors of `N` unsigned integers: indices, joints.
+    pub(crate) fn unsigned<const N: usize>(
+        self,
+        accessor: u32,
+        what: &str,
+    ) -> Result<Vec<[u32; N]>, GltfError> {
+        let kind = self.component(accessor)?.kind;
+        if !matches!(kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) {
+            return Err(fault(
+                accessor,
+                format!("has components that are not unsigned integers, as {what} needs"),
+            ));
+        }
+        self.read(accessor, what, kind, 0, |bytes| unsigned(kind, bytes))
+    }
+
+    /// Elements an accessor says it has.
+    pub(crate) fn count(self, accessor: u32) -> Result<u64, GltfError> {
+        Ok(get(&self.root.accessors, accessor as usize, "accessor", || "a primitive".into())?.count.0)
+    }
+
+    fn component(self, accessor: u32) -> Result<Component, GltfError> {
+        let a = get(&self.root.accessors, accessor as usize, "accessor", || "a primitive".into())?;
+        match a.component_type {
+            Checked::Valid(kind) => Ok(Component { kind: kind.0, normalized: a.normalized }),
+            Checked::Invalid => Err(fault(accessor, "has an unknown component type".into())),
+        }
+    }
+
+    fn read<const N: usize, T: Copy>(
+        self,
+        accessor: u32,
+        what: &str,
+        kind: ComponentType,
+        zero: T,
+        decode: impl Fn(&[u8]) -> T,
+    ) -> Result<Vec<[T; N]>, GltfError> {
+        let a = get(&self.root.accessors, accessor as usize, "accessor", || "a primitive".into())?;
+        let found = match a.type_ {
+            Checked::Valid(found) => found,
+            Checked::Invalid => return Err(fault(accessor, "has an unknown type".into())),
+        };
+        if found != type_of(N) {
+            return Err(fault(
+                accessor,
+                format!("is {found:?}, but {what} needs {:?}", type_of(N)).to_lowercase(),
+            ));
+        }
+        if a.count.0 > MAX_ELEMENTS {
+            return Err(GltfError::TooLarge {
+                what: "elements of an accessor",
+                count: a.count.0,
+                limit: MAX_ELEMENTS,
+            });
+        }
+        let (count, size) = (a.count.0 as usize, kind.size());
+        let decode_element = |bytes: &[u8]| {
+            let mut element = [zero; N];
+            for (value, bytes) in element.iter_mut().zip(bytes.chunks_exact(size)) {
+                *value = decode(bytes);
+            }
+            element
+        };
+        let mut values = match a.buffer_view {
+            // Zeros, to be changed by sparse values.
+            None => vec![[zero; N]; count],
+            Some(view) => {
+                let offset = a.byte_offset.map_or(0, |o| o.0);
+                let elements = self.elements(accessor, view.value(), offset, count, N * size)?;
+                (0..count).map(|i| decode_element(elements.get(i))).collect()
+            }
+        };
+        if let Some(sparse) = &a.sparse {
+            if sparse.count.0 > a.count.0 {
+                return Err(fault(
+                    accessor,
+                    format!("has {} sparse values for {count} elements", sparse.count.0),
+                ));
+            }
+            let n = sparse.count.0 as usize;
+            let Checked::Valid(index_kind) = sparse.indices.component_type else {
+                return Err(fault(accessor, "has sparse indices of an unknown type".into()));
+            };
+            let index_kind = index_kind.0;
+            let (places, offset) = (&sparse.indices, sparse.indices.byte_offset.0);
+            let places = self.elements(accessor, places.buffer_view.value(), offset, n, index_kind.size())?;
+            let (new, offset) = (&sparse.values, sparse.values.byte_offset.0);
+            let new = self.elements(accessor, new.buffer_view.value(), offset, n, N * size)?;
+            for i in 0..n {
+                let place = unsigned(index_kind, places.get(i));
+                let value = values.get_mut(place as usize).ok_or_else(|| {
+                    fault(
+                        accessor,
+                        format!("has a sparse value for element {place}, but has {count} elements"),
+                    )
+                })?;
+                *value = decode_element(new.get(i));
+            }
+        }
+        Ok(values)
+    }
+
+    /// The bytes of `count` elements of `size` bytes, all of them checked to be there.
+    fn elements(
+        self,
+        accessor: u32,
+        view: usize,
+        offset: u64,
+        count: usize,
+        size: usize,
+    ) -> Result<Elements<'a>, GltfError> {
+        let from = || format!("accessor {accessor}");
+        let v = get(&self.root.buffer_views, view, "buffer view", from)?;
+        let buffer = get(self.buffers, v.buffer.value(), "buffer", || format!("buffer view {view}"))?;
+        let stride = v.byte_stride.map(|s| s.0).filter(|&s| s > 0).unwrap_or(size);
+        let view_start = v.byte_offset.map_or(0, |o| o.0);
+        let view_end = view_start.checked_add(v.byte_length.0).filter(|&end| end <= buffer.len() as u64);
+        let Some(view_end) = view_end else {
+            return Err(fault(
+                accessor,
+                format!("lies in buffer view {view}, which is longer than its buffer"),
+            ));
+        };
+        let start = view_start.checked_add(offset);
+        let length = match count {
+            0 => Some(0),
+            // At most 2^25 elements, but a stride may be anything.
+            _ => (stride as u64).checked_mul(count as u64 - 1).and_then(|n| n.checked_add(size as u64)),
+        };
+        let end = start.zip(length).and_then(|(start, length)| start.checked_add(length));
+        match (start, end) {
+            (Some(start), Some(end)) if end <= view_end => {
+                Ok(Elements { bytes: &buffer[start as usize..end as usize], stride, size })
+            }
+            _ => Err(fault(accessor, format!("needs {count} elements, more than buffer view {view} has"))),
+        }
+    }
+}
+
+fn type_of(components: usize) -> Type {
+    match components {
+        1 => Type::Scalar,
+        2 => Type::Vec2,
+        3 => Type::Vec3,
+        4 => Type::Vec4,
+        _ => Type::Mat4,
+    }
+}
+
+fn fault(accessor: u32, problem: String) -> GltfError {
+    GltfError::Accessor { accessor, problem }
+}

@@ -1,0 +1,69 @@
+//! Morph targets and animations of an export.
+
+use std::collections::HashSet;
+
+use serde_json::{Value, json};
+
+use super::pack::{Pack, push};
+use super::patch::{Place, Pose};
+
+/// Seconds from one pose to the next.
+const SECONDS_PER_POSE: f32 = 1.0;
+
+/// Removes all that drove the original's morph targets: weights, their names, their animation.
+pub(crate) fn forget_morphs(json: &mut Value, places: &[Place]) {
+    for place in places {
+        for node in [Some(place.node), place.original].into_iter().flatten() {
+            if let Some(node) = json["nodes"][node].as_object_mut() {
+                node.shift_remove("weights");
+            }
+        }
+        let Some(mesh) = json["meshes"][place.mesh].as_object_mut() else { continue };
+        mesh.shift_remove("weights");
+        if let Some(extras) = mesh.get_mut("extras").and_then(Value::as_object_mut) {
+            extras.shift_remove("targetNames");
+        }
+    }
+    let Some(animations) = json.get_mut("animations").and_then(Value::as_array_mut) else { return };
+    let ours: HashSet<u64> = places.iter().filter_map(|p| Some(p.original? as u64)).collect();
+    for animation in &mut *animations {
+        let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) else { continue };
+        channels.retain(|channel| {
+            let target = &channel["target"];
+            let node = target["node"].as_u64();
+            target["path"] != "weights" || !node.is_some_and(|n| ours.contains(&n))
+        });
+    }
+    animations.retain(|animation| animation["channels"].as_array().is_none_or(|c| !c.is_empty()));
+    if animations.is_empty()
+        && let Value::Object(object) = json
+    {
+        object.shift_remove("animations");
+    }
+}
+
+/// Names the targets and plays them: rest, each pose in turn, rest.
+pub(crate) fn play_poses(json: &mut Value, pack: &mut Pack<'_>, places: &[Place], poses: &[Pose<'_>]) {
+    let names: Vec<&str> = poses.iter().map(|p| p.name).collect();
+    for place in places {
+        let mesh = &mut json["meshes"][place.mesh];
+        mesh["weights"] = json!(vec![0.0; poses.len()]);
+        if !mesh["extras"].is_object() {
+            mesh["extras"] = json!({});
+        }
+        mesh["extras"]["targetNames"] = json!(names);
+    }
+    let keys = poses.len() + 2;
+    let times: Vec<f32> = (0..keys).map(|k| k as f32 * SECONDS_PER_POSE).collect();
+    let weights: Vec<f32> = (0..keys)
+        .flat_map(|key| (0..poses.len()).map(move |pose| if key == pose + 1 { 1.0 } else { 0.0 }))
+        .collect();
+    let input = pack.push_floats(json, &times, 1, false, true);
+    let output = pack.push_floats(json, &weights, 1, false, false);
+    let channels: Vec<Value> = places
+        .iter()
+        .map(|place| json!({ "sampler": 0, "target": { "node": place.node, "path": "weights" } }))
+        .collect();
+    let sampler = json!({ "input": input, "output": output, "interpolation": "LINEAR" });
+    push(json, "animations", json!({ "name": "poses", "samplers": [sampler], "channels": channels }));
+}

@@ -1,0 +1,108 @@
+//! A new GLB from an OBJ file.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+use serde_json::{Value, json};
+
+use super::pack::{Pack, push};
+use crate::error::WriteError;
+use crate::obj::{NONE, ObjDocument};
+
+/// A GLB with the OBJ's shape at rest, and for each of its vertices the `v` line it came from.
+///
+/// One node, one mesh, one primitive for each `usemtl`; a vertex for each different corner (position, texture
+/// coordinate, normal). Without `vn` lines the normals are area-weighted and smooth. Materials have their names and a
+/// plain surface: `.mtl` files are not read.
+pub(crate) fn build_from_obj(
+    name: &str,
+    document: &ObjDocument,
+    rest: &[Vec3],
+) -> Result<(Vec<u8>, Vec<u32>), WriteError> {
+    let pairs = document.pairs(rest);
+    let mut json = json!({
+        "asset": { "version": "2.0", "generator": "Cagework" },
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "name": name, "mesh": 0 }],
+        "meshes": [{ "name": name, "primitives": [] }],
+    });
+    let mut pack = Pack::empty();
+    let mut sources = Vec::new();
+    for (material, triangles) in by_material(document) {
+        let mut part = Part::default();
+        for corner in triangles.into_iter().flatten() {
+            let (pair, vt) = (pairs.of_corner[corner as usize], document.corners[corner as usize].vt);
+            part.add(pair, vt);
+        }
+        let position = |&(pair, _): &(u32, u32)| rest[pairs.shading.vertex[pair as usize] as usize];
+        let positions: Vec<Vec3> = part.vertices.iter().map(position).collect();
+        let normals: Vec<Vec3> =
+            part.vertices.iter().map(|&(pair, _)| pairs.shading.normal[pair as usize]).collect();
+        let mut primitive = json!({
+            "attributes": {
+                "POSITION": pack.push_vec3(&mut json, &positions, true),
+                "NORMAL": pack.push_vec3(&mut json, &normals, false),
+            },
+            "indices": pack.push_indices(&mut json, part.indices.iter().copied()),
+        });
+        if part.vertices.iter().any(|&(_, vt)| vt != NONE) {
+            let uv = |&(_, vt): &(u32, u32)| {
+                document.texcoords.get(vt as usize).map_or([0.0, 0.0], |&[u, v]| [u, 1.0 - v])
+            };
+            let flat: Vec<f32> = part.vertices.iter().flat_map(uv).collect();
+            primitive["attributes"]["TEXCOORD_0"] = pack.push_floats(&mut json, &flat, 2, true, false).into();
+        }
+        if material != NONE {
+            primitive["material"] =
+                push(&mut json, "materials", plain(&document.materials[material as usize])).into();
+        }
+        push(&mut json["meshes"][0], "primitives", primitive);
+        sources.extend(part.vertices.iter().map(|&(pair, _)| pairs.shading.vertex[pair as usize]));
+    }
+    Ok((pack.finish(json)?, sources))
+}
+
+/// glTF's default is a rough mirror, which no OBJ means.
+fn plain(name: &str) -> Value {
+    json!({ "name": name, "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.9 } })
+}
+
+/// Triangles (of corners) of each material, in order of first use.
+fn by_material(document: &ObjDocument) -> Vec<(u32, Vec<[u32; 3]>)> {
+    let mut groups: Vec<(u32, Vec<[u32; 3]>)> = Vec::new();
+    let mut group_of = HashMap::new();
+    let mut face = 0;
+    for t in &document.triangles {
+        // Triangles come in the order of their faces, whose corners come one after another.
+        while document.face_starts[face + 1] <= t[0] {
+            face += 1;
+        }
+        let material = document.face_materials[face];
+        let group = *group_of.entry(material).or_insert_with(|| {
+            groups.push((material, Vec::new()));
+            groups.len() - 1
+        });
+        groups[group].1.push(*t);
+    }
+    groups
+}
+
+/// Vertices of one primitive: (pair, texture coordinate), and triangle corners.
+#[derive(Default)]
+struct Part {
+    numbers: HashMap<(u32, u32), u32>,
+    vertices: Vec<(u32, u32)>,
+    indices: Vec<u32>,
+}
+
+impl Part {
+    fn add(&mut self, pair: u32, vt: u32) {
+        let next = self.vertices.len() as u32;
+        let number = *self.numbers.entry((pair, vt)).or_insert(next);
+        if number == next {
+            self.vertices.push((pair, vt));
+        }
+        self.indices.push(number);
+    }
+}

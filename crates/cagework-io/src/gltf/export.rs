@@ -1,0 +1,75 @@
+//! glTF in, OBJ out.
+
+use ::gltf::json::mesh::Semantic;
+use glam::Vec3;
+
+use super::geometry::{attribute, world_normals};
+use super::patch::Rest;
+use super::scene::name_of;
+use super::{GltfDocument, Slot};
+use crate::error::WriteError;
+use crate::normals::Shading;
+use crate::obj::{ObjPart, write_new};
+
+/// A new OBJ file: vertices in the model's order, an `o` for each primitive, texture coordinates and normals where the
+/// document has them, materials by name.
+pub(crate) fn write_obj(
+    document: &GltfDocument,
+    rest: Rest<'_>,
+    positions: &[Vec3],
+) -> Result<Vec<u8>, WriteError> {
+    let mut original = vec![Vec3::ZERO; positions.len()];
+    let mut parts = Vec::with_capacity(document.slots.len());
+    for slot in &document.slots {
+        let normals = world_normals(document, slot)?;
+        if let Some(normals) = &normals {
+            original[range(slot)].copy_from_slice(normals);
+        }
+        parts.push(ObjPart {
+            name: part_name(document, slot),
+            material: material(document, slot),
+            start: slot.start,
+            texcoords: texcoords(document, slot),
+            normals: normals.unwrap_or_default(),
+            triangles: rest.triangles[slot.triangles.clone()].to_vec(),
+        });
+    }
+    let vertices = (0..positions.len() as u32).collect();
+    let shading = Shading::new(rest.positions, vertices, original, rest.triangles.to_vec());
+    let new = shading.normals(&shading.rotations(positions));
+    for (part, slot) in parts.iter_mut().zip(&document.slots) {
+        if !part.normals.is_empty() {
+            part.normals.copy_from_slice(&new[range(slot)]);
+        }
+    }
+    Ok(write_new(positions, &parts))
+}
+
+fn range(slot: &Slot) -> std::ops::Range<usize> {
+    slot.start as usize..(slot.start + slot.count) as usize
+}
+
+fn part_name(document: &GltfDocument, slot: &Slot) -> String {
+    let (instance, _) = document.primitive(slot);
+    let name = match instance.node {
+        Some(node) if document.json["nodes"][node as usize]["name"].is_string() => {
+            name_of(&document.json, "nodes", node, "node")
+        }
+        _ => name_of(&document.json, "meshes", instance.mesh, "mesh"),
+    };
+    if slot.primitive == 0 { name } else { format!("{name}.{}", slot.primitive) }
+}
+
+fn material(document: &GltfDocument, slot: &Slot) -> Option<String> {
+    let material = document.primitive(slot).1.material?;
+    Some(name_of(&document.json, "materials", material.value() as u32, "material"))
+}
+
+/// Texture coordinates, v upwards as OBJ has it; none if they are missing or damaged: the shape matters more.
+fn texcoords(document: &GltfDocument, slot: &Slot) -> Vec<[f32; 2]> {
+    attribute(document.primitive(slot).1, Semantic::TexCoords(0))
+        .and_then(|accessor| document.source().floats::<2>(accessor, "TEXCOORD_0").ok())
+        .filter(|uv| uv.len() == slot.count as usize && uv.iter().flatten().all(|x| x.is_finite()))
+        .map(|uv| uv.into_iter().map(|[u, v]| [u, 1.0 - v]).collect())
+        .unwrap_or_default()
+}

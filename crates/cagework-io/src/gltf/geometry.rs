@@ -1,0 +1,277 @@
+//! Primitives: positions in world space, triangles, normals and tangents.
+
+use ::gltf::json::Index;
+use ::gltf::json::accessor::Accessor;
+use ::gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
+use ::gltf::json::validation::Checked;
+use glam::{DMat3, DMat4, DVec3, Vec3};
+
+use super::accessor::{MAX_ELEMENTS, Source};
+use super::scene::{Instance, name_of};
+use super::{GltfDocument, GltfError, Slot, skin};
+
+/// Most triangles of a model.
+const MAX_TRIANGLES: u64 = 1 << 26;
+
+pub(crate) struct Geometry {
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) slots: Vec<Slot>,
+}
+
+impl GltfDocument {
+    pub(crate) fn source(&self) -> Source<'_> {
+        Source { root: &self.root, buffers: &self.buffers }
+    }
+
+    pub(super) fn primitive(&self, slot: &Slot) -> (&Instance, &Primitive) {
+        let instance = &self.instances[slot.instance as usize];
+        (instance, &self.root.meshes[instance.mesh as usize].primitives[slot.primitive as usize])
+    }
+}
+
+/// Reads the vertices and triangles of all instances.
+pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result<Geometry, GltfError> {
+    let mut geometry = Geometry { positions: Vec::new(), triangles: Vec::new(), slots: Vec::new() };
+    let (mut skipped, mut morphed, mut ragged) = (0, 0, 0);
+    for (number, instance) in document.instances.iter().enumerate() {
+        let mesh = &document.root.meshes[instance.mesh as usize];
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
+            let Some(position) = attribute(primitive, Semantic::Positions) else {
+                skipped += 1;
+                continue;
+            };
+            let Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) =
+                primitive.mode
+            else {
+                skipped += 1;
+                continue;
+            };
+            let start = geometry.positions.len();
+            let count = document.source().count(position)?;
+            limit("vertices", start as u64 + count, MAX_ELEMENTS)?;
+            let (local, n_morphed) = positions(document, instance, primitive, position)?;
+            morphed += n_morphed;
+            let frame = Frame::of(document, instance, primitive, local.len())?;
+            for (v, p) in local.iter().enumerate() {
+                let world = frame.world(v).transform_point3(*p).as_vec3();
+                if !world.is_finite() {
+                    return Err(GltfError::NotFinite { accessor: position, vertex: v });
+                }
+                geometry.positions.push(world);
+            }
+            let first = geometry.triangles.len();
+            let flip = !local.is_empty() && frame.world(0).determinant() < 0.0;
+            ragged +=
+                triangles(document, primitive, mode, start as u32, local.len() as u32, flip, &mut geometry)?;
+            check_attributes(document, primitive)?;
+            geometry.slots.push(Slot {
+                instance: number as u32,
+                primitive: p as u32,
+                start: start as u32,
+                count: local.len() as u32,
+                triangles: first..geometry.triangles.len(),
+            });
+        }
+        if instance.skin.is_some() {
+            let name =
+                instance.node.map_or_else(String::new, |n| name_of(&document.json, "nodes", n, "node"));
+            notices.push(format!("'{name}' is skinned: bound in its rest pose, exported without its skin"));
+        }
+        if let Some(node) = instance.node
+            && document.json["nodes"][node as usize]["extensions"].get("EXT_mesh_gpu_instancing").is_some()
+        {
+            notices.push(format!(
+                "node {node} draws its mesh many times over: only the one at the node is bound"
+            ));
+        }
+    }
+    if geometry.positions.is_empty() {
+        return Err(GltfError::NoTriangles);
+    }
+    if skipped > 0 {
+        notices.push(format!("{skipped} primitives are points or lines: left as they are"));
+    }
+    if morphed > 0 {
+        notices
+            .push(format!("{morphed} morph targets: bound at their default weights, exported without them"));
+    }
+    if ragged > 0 {
+        notices.push(format!("{ragged} indices are left over after the last whole triangle: ignored"));
+    }
+    Ok(geometry)
+}
+
+/// What an export will need must not fail only then, after a long bind.
+fn check_attributes(document: &GltfDocument, primitive: &Primitive) -> Result<(), GltfError> {
+    if let Some(normals) = attribute(primitive, Semantic::Normals) {
+        document.source().floats::<3>(normals, "NORMAL")?;
+    }
+    if let Some(tangents) = attribute(primitive, Semantic::Tangents) {
+        document.source().floats::<4>(tangents, "TANGENT")?;
+    }
+    Ok(())
+}
+
+fn limit(what: &'static str, count: u64, limit: u64) -> Result<(), GltfError> {
+    if count > limit { Err(GltfError::TooLarge { what, count, limit }) } else { Ok(()) }
+}
+
+pub(super) fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<u32> {
+    primitive.attributes.get(&Checked::Valid(semantic)).map(|a| a.value() as u32)
+}
+
+/// World from mesh, for a whole primitive or for each vertex.
+pub(super) enum Frame {
+    Rigid(DMat4),
+    Skinned(Vec<DMat4>),
+}
+
+impl Frame {
+    pub(super) fn of(
+        document: &GltfDocument,
+        instance: &Instance,
+        primitive: &Primitive,
+        count: usize,
+    ) -> Result<Self, GltfError> {
+        Ok(match instance.skin {
+            None => Self::Rigid(instance.world),
+            Some(skin) => Self::Skinned(skin::matrices(document, instance, skin, primitive, count)?),
+        })
+    }
+
+    pub(super) fn world(&self, v: usize) -> DMat4 {
+        match self {
+            Self::Rigid(world) => *world,
+            Self::Skinned(worlds) => worlds[v],
+        }
+    }
+}
+
+/// Mesh-local positions with morph targets at their default weights, and how many targets there are.
+fn positions(
+    document: &GltfDocument,
+    instance: &Instance,
+    primitive: &Primitive,
+    accessor: u32,
+) -> Result<(Vec<DVec3>, usize), GltfError> {
+    let mut local: Vec<DVec3> = vectors(document, accessor, "POSITION")?;
+    if let Some(vertex) = local.iter().position(|p| !p.is_finite()) {
+        return Err(GltfError::NotFinite { accessor, vertex });
+    }
+    add_morphs(document, instance, primitive, "POSITION", |t| t.positions, &mut local)?;
+    Ok((local, primitive.targets.as_ref().map_or(0, Vec::len)))
+}
+
+fn vectors(document: &GltfDocument, accessor: u32, what: &str) -> Result<Vec<DVec3>, GltfError> {
+    let values = document.source().floats::<3>(accessor, what)?;
+    Ok(values.into_iter().map(|p| Vec3::from_array(p).as_dvec3()).collect())
+}
+
+fn add_morphs(
+    document: &GltfDocument,
+    instance: &Instance,
+    primitive: &Primitive,
+    what: &str,
+    of: impl Fn(&MorphTarget) -> Option<Index<Accessor>>,
+    values: &mut [DVec3],
+) -> Result<(), GltfError> {
+    let node = instance.node.and_then(|n| document.root.nodes[n as usize].weights.as_ref());
+    let weights = node.or(document.root.meshes[instance.mesh as usize].weights.as_ref());
+    for (target, &weight) in primitive.targets.iter().flatten().zip(weights.into_iter().flatten()) {
+        let Some(accessor) = of(target).filter(|_| weight != 0.0) else { continue };
+        let deltas = vectors(document, accessor.value() as u32, what)?;
+        for (v, (value, delta)) in values.iter_mut().zip(deltas).enumerate() {
+            *value += f64::from(weight) * delta;
+            if !value.is_finite() {
+                return Err(GltfError::NotFinite { accessor: accessor.value() as u32, vertex: v });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Appends the triangles of a primitive; returns how many indices are left over.
+fn triangles(
+    document: &GltfDocument,
+    primitive: &Primitive,
+    mode: Mode,
+    start: u32,
+    count: u32,
+    flip: bool,
+    geometry: &mut Geometry,
+) -> Result<usize, GltfError> {
+    let indices: Vec<u32> = match primitive.indices {
+        None => (0..count).collect(),
+        Some(accessor) => {
+            let accessor = accessor.value() as u32;
+            let indices = document.source().unsigned::<1>(accessor, "indices")?;
+            if let Some(&[index]) = indices.iter().find(|&&[i]| i >= count) {
+                let from = format!("accessor {accessor}: a triangle");
+                return Err(GltfError::Index {
+                    from,
+                    what: "vertex",
+                    index: index.into(),
+                    count: count as usize,
+                });
+            }
+            indices.into_iter().flatten().collect()
+        }
+    };
+    let n = match mode {
+        Mode::Triangles => indices.len() / 3,
+        _ => indices.len().saturating_sub(2),
+    };
+    limit("triangles", (geometry.triangles.len() + n) as u64, MAX_TRIANGLES)?;
+    for k in 0..n {
+        let [a, b, c] = match mode {
+            Mode::Triangles => [3 * k, 3 * k + 1, 3 * k + 2],
+            // Every second triangle of a strip turns the other way (glTF 2.0, section 3.7.2.1).
+            Mode::TriangleStrip => [k, k + 1 + k % 2, k + 2 - k % 2],
+            _ => [k + 1, k + 2, 0],
+        }
+        .map(|i| start + indices[i]);
+        if a == b || b == c || c == a {
+            // Stitches of strips.
+            continue;
+        }
+        geometry.triangles.push(if flip { [a, c, b] } else { [a, b, c] });
+    }
+    Ok(if mode == Mode::Triangles { indices.len() % 3 } else { 0 })
+}
+
+/// Original unit normals of a slot in world space; none if the primitive has none.
+pub(super) fn world_normals(document: &GltfDocument, slot: &Slot) -> Result<Option<Vec<Vec3>>, GltfError> {
+    let (instance, primitive) = document.primitive(slot);
+    let Some(accessor) = attribute(primitive, Semantic::Normals) else { return Ok(None) };
+    let mut local = vectors(document, accessor, "NORMAL")?;
+    add_morphs(document, instance, primitive, "NORMAL", |t| t.normals, &mut local)?;
+    local.resize(slot.count as usize, DVec3::ZERO);
+    let frame = Frame::of(document, instance, primitive, local.len())?;
+    let world = local.iter().enumerate().map(|(v, &n)| {
+        let m = DMat3::from_mat4(frame.world(v));
+        // The cofactor matrix: the inverse transpose times the determinant, and it exists for flattened models too.
+        let cofactor =
+            DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+        let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
+        (sign * (cofactor * n)).normalize_or_zero().as_vec3()
+    });
+    Ok(Some(world.collect()))
+}
+
+/// Original tangents of a slot in world space, with their handedness; none if the primitive has none.
+pub(super) fn world_tangents(
+    document: &GltfDocument,
+    slot: &Slot,
+) -> Result<Option<Vec<(Vec3, f32)>>, GltfError> {
+    let (instance, primitive) = document.primitive(slot);
+    let Some(accessor) = attribute(primitive, Semantic::Tangents) else { return Ok(None) };
+    let mut local = document.source().floats::<4>(accessor, "TANGENT")?;
+    local.resize(slot.count as usize, [1.0, 0.0, 0.0, 1.0]);
+    let frame = Frame::of(document, instance, primitive, local.len())?;
+    let world = local.iter().enumerate().map(|(v, &[x, y, z, w])| {
+        let t = frame.world(v).transform_vector3(DVec3::new(x.into(), y.into(), z.into()));
+        (t.normalize_or_zero().as_vec3(), if w < 0.0 { -1.0 } else { 1.0 })
+    });
+    Ok(Some(world.collect()))
+}

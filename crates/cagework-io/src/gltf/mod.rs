@@ -1,0 +1,202 @@
+//! glTF 2.0 and GLB.
+//!
+//! The crate `gltf` reads the container and the typed JSON; its validation and its accessors stay unused, since the
+//! first refuses every required extension and the second panics on quantised or damaged files. The document itself is
+//! kept as plain JSON, so that an export keeps what nobody here knows about.
+//!
+//! What becomes vertices, and in which order, is said at the crate's root; [`scene`] and [`geometry`] do it.
+
+mod accessor;
+mod animate;
+mod build;
+mod container;
+mod export;
+mod geometry;
+mod pack;
+mod patch;
+mod scene;
+mod skin;
+
+use ::gltf::json::Root;
+use glam::Vec3;
+use serde_json::Value;
+use thiserror::Error;
+
+use crate::model::Counts;
+use scene::{Instance, Worlds};
+
+pub(crate) use build::build_from_obj;
+pub(crate) use export::write_obj;
+pub(crate) use patch::{Pose, Rest, patch};
+
+/// Why a glTF file could not be read.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum GltfError {
+    /// The binary container is damaged.
+    #[error("not a readable GLB: {0}")]
+    Container(String),
+    /// The JSON is damaged or not glTF 2.0.
+    #[error("not readable as glTF 2.0: {0}")]
+    Json(String),
+    /// Compressed geometry.
+    #[error(
+        "its geometry is compressed ({extension}); convert it first: npx @gltf-transform/cli copy {name} {output}"
+    )]
+    Compressed {
+        /// The extension.
+        extension: String,
+        /// Name of the file.
+        name: String,
+        /// Name to convert to.
+        output: String,
+    },
+    /// A file that this one refers to was not there.
+    #[error("it needs the file '{uri}', which is not there: keep it beside the .gltf, or use a .glb")]
+    MissingFile {
+        /// Its URI, decoded.
+        uri: String,
+    },
+    /// A buffer has too few bytes.
+    #[error("buffer {buffer} says it has {declared} bytes but has {found}: the file is cut off")]
+    Buffer {
+        /// The buffer.
+        buffer: usize,
+        /// Bytes it says.
+        declared: u64,
+        /// Bytes it has.
+        found: u64,
+    },
+    /// An index out of range.
+    #[error("{from} names {what} {index}, but there are {count}")]
+    Index {
+        /// Who names it.
+        from: String,
+        /// Kind of thing.
+        what: &'static str,
+        /// Index named.
+        index: u64,
+        /// Things there are.
+        count: usize,
+    },
+    /// An accessor that cannot be decoded.
+    #[error("accessor {accessor} {problem}")]
+    Accessor {
+        /// The accessor.
+        accessor: u32,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A position that is not a finite number.
+    #[error("accessor {accessor}: the position of its vertex {vertex} is not a finite number")]
+    NotFinite {
+        /// The accessor.
+        accessor: u32,
+        /// The vertex within it.
+        vertex: usize,
+    },
+    /// The nodes are no tree.
+    #[error("node {node} {problem}")]
+    Node {
+        /// The node.
+        node: u32,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// No triangles at all.
+    #[error("it has no triangles (points and lines are not surfaces)")]
+    NoTriangles,
+    /// More elements than are read.
+    #[error("{what}: {count}, more than the limit of {limit}")]
+    TooLarge {
+        /// What there is too much of.
+        what: &'static str,
+        /// How much.
+        count: u64,
+        /// The limit.
+        limit: u64,
+    },
+}
+
+/// An image that is not in a buffer view: its bytes and its media type.
+#[derive(Clone, Debug)]
+pub(crate) struct Image {
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) mime: String,
+}
+
+/// A glTF file as it was read.
+#[derive(Clone, Debug)]
+pub(crate) struct GltfDocument {
+    /// The JSON without the URIs of buffers.
+    pub(crate) json: Value,
+    /// The parts of it that geometry needs, typed.
+    pub(crate) root: Root,
+    /// Bytes of each buffer.
+    pub(crate) buffers: Vec<Vec<u8>>,
+    /// Images that came by URI and were found.
+    pub(crate) images: Vec<Option<Image>>,
+    worlds: Worlds,
+    /// Meshes shown, in vertex order.
+    instances: Vec<Instance>,
+    /// Where their primitives' vertices and triangles are.
+    slots: Vec<Slot>,
+}
+
+/// Where one primitive of one instance lies in the model's vertices and triangles.
+#[derive(Clone, Debug)]
+struct Slot {
+    instance: u32,
+    primitive: u32,
+    start: u32,
+    count: u32,
+    triangles: std::ops::Range<usize>,
+}
+
+/// A file that was read.
+pub(crate) struct GltfModel {
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) document: GltfDocument,
+    pub(crate) counts: Counts,
+    pub(crate) notices: Vec<String>,
+}
+
+/// Reads a glTF or GLB file; `resolve` fetches sibling files by their decoded relative URI.
+pub(crate) fn read(
+    name: &str,
+    bytes: &[u8],
+    resolve: &mut dyn FnMut(&str) -> Option<Vec<u8>>,
+) -> Result<GltfModel, GltfError> {
+    let mut notices = Vec::new();
+    let loaded = container::load(name, bytes, resolve, &mut notices)?;
+    let worlds = Worlds::new(&loaded.root)?;
+    let instances = scene::instances(&loaded.root, &worlds, &mut notices)?;
+    let mut document = GltfDocument {
+        json: loaded.json,
+        root: loaded.root,
+        buffers: loaded.buffers,
+        images: loaded.images,
+        worlds,
+        instances,
+        slots: Vec::new(),
+    };
+    let geometry = geometry::read(&document, &mut notices)?;
+    document.slots = geometry.slots;
+    let counts = scene::counts(&document);
+    Ok(GltfModel { positions: geometry.positions, triangles: geometry.triangles, document, counts, notices })
+}
+
+/// `list[index]`, or the error that says who named it.
+fn get<'a, T>(
+    list: &'a [T],
+    index: usize,
+    what: &'static str,
+    from: impl Fn() -> String,
+) -> Result<&'a T, GltfError> {
+    list.get(index).ok_or_else(|| GltfError::Index {
+        from: from(),
+        what,
+        index: index as u64,
+        count: list.len(),
+    })
+}

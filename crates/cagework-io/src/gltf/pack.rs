@@ -1,0 +1,264 @@
+//! The binary side of an export: new accessors in, unused ones out, one GLB.
+
+use std::borrow::Cow;
+
+use ::gltf::binary::{Glb, Header};
+use glam::Vec3;
+use serde_json::{Value, json};
+
+use super::GltfDocument;
+use crate::error::WriteError;
+
+const F32: u32 = 5126;
+const U32: u32 = 5125;
+const U16: u32 = 5123;
+/// Buffer view targets.
+const VERTICES: u32 = 34962;
+const INDICES: u32 = 34963;
+/// Every component type's size divides it.
+const ALIGN: usize = 4;
+
+/// Extensions that refer to accessors nowhere but in the places [`each_accessor`] visits. With any other extension
+/// nothing is thrown away: an index nobody here knows of must not move.
+const KNOWN_EXTENSIONS: [&str; 8] = [
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "KHR_lights_punctual",
+    "KHR_mesh_quantization",
+    "KHR_animation_pointer",
+    "KHR_xmp",
+    "EXT_mesh_gpu_instancing",
+];
+
+/// Bytes of all buffer views of a document under way.
+pub(crate) struct Pack<'a> {
+    /// In the order of `bufferViews`: bytes, and where they lay modulo [`ALIGN`]; none if they are not there.
+    views: Vec<Option<(Cow<'a, [u8]>, usize)>>,
+}
+
+impl<'a> Pack<'a> {
+    /// No views yet.
+    pub(crate) fn empty() -> Self {
+        Self { views: Vec::new() }
+    }
+
+    /// The views of a document.
+    pub(crate) fn of(document: &'a GltfDocument) -> Self {
+        let views = document.root.buffer_views.iter().map(|view| {
+            let start = usize::try_from(view.byte_offset.map_or(0, |o| o.0)).ok()?;
+            let end = start.checked_add(usize::try_from(view.byte_length.0).ok()?)?;
+            let bytes = document.buffers.get(view.buffer.value())?.get(start..end)?;
+            Some((bytes.into(), start % ALIGN))
+        });
+        Self { views: views.collect() }
+    }
+
+    /// A new buffer view.
+    pub(crate) fn push_view(&mut self, json: &mut Value, bytes: Vec<u8>, target: Option<u32>) -> usize {
+        let mut view = json!({ "buffer": 0, "byteLength": bytes.len() });
+        if let Some(target) = target {
+            view["target"] = target.into();
+        }
+        self.views.push(Some((bytes.into(), 0)));
+        push(json, "bufferViews", view)
+    }
+
+    /// A new accessor of 32-bit floats, `components` a piece; `bounds` adds minimum and maximum.
+    pub(crate) fn push_floats(
+        &mut self,
+        json: &mut Value,
+        values: &[f32],
+        components: usize,
+        attribute: bool,
+        bounds: bool,
+    ) -> usize {
+        let bytes = values.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let view = self.push_view(json, bytes, attribute.then_some(VERTICES));
+        let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][components - 1];
+        let count = values.len() / components;
+        let mut accessor = json!({ "bufferView": view, "componentType": F32, "count": count, "type": kind });
+        if bounds {
+            let fold = |f: fn(f32, f32) -> f32, start: f32| -> Vec<f32> {
+                let column = |c: usize| values.iter().skip(c).step_by(components).copied();
+                (0..components).map(|c| column(c).fold(start, f)).collect()
+            };
+            accessor["min"] = json!(fold(f32::min, f32::INFINITY));
+            accessor["max"] = json!(fold(f32::max, f32::NEG_INFINITY));
+        }
+        push(json, "accessors", accessor)
+    }
+
+    /// A new accessor of vectors as a vertex attribute.
+    pub(crate) fn push_vec3(&mut self, json: &mut Value, values: &[Vec3], bounds: bool) -> usize {
+        let flat: Vec<f32> = values.iter().flat_map(Vec3::to_array).collect();
+        self.push_floats(json, &flat, 3, true, bounds)
+    }
+
+    /// A new accessor of triangle corners; 16 bits where they suffice (0xffff is a strip's restart value).
+    pub(crate) fn push_indices(
+        &mut self,
+        json: &mut Value,
+        indices: impl Iterator<Item = u32> + Clone,
+    ) -> usize {
+        let short = indices.clone().all(|i| i < u32::from(u16::MAX));
+        let bytes: Vec<u8> = if short {
+            indices.flat_map(|i| (i as u16).to_le_bytes()).collect()
+        } else {
+            indices.flat_map(u32::to_le_bytes).collect()
+        };
+        let count = bytes.len() / if short { 2 } else { 4 };
+        let view = self.push_view(json, bytes, Some(INDICES));
+        let kind = if short { U16 } else { U32 };
+        push(
+            json,
+            "accessors",
+            json!({ "bufferView": view, "componentType": kind, "count": count, "type": "SCALAR" }),
+        )
+    }
+
+    /// Drops what is no longer used, lays out the buffer and writes the GLB.
+    pub(crate) fn finish(mut self, mut json: Value) -> Result<Vec<u8>, WriteError> {
+        if only_known_extensions(&json) {
+            drop_unused(&mut json, "accessors", each_accessor);
+            let kept = drop_unused(&mut json, "bufferViews", each_view);
+            let mut kept = kept.into_iter();
+            self.views.retain(|_| kept.next().unwrap_or(true));
+        }
+        let bin = self.lay_out(&mut json)?;
+        match &mut json {
+            Value::Object(object) if bin.is_empty() => drop(object.shift_remove("buffers")),
+            json => json["buffers"] = json!([{ "byteLength": bin.len() }]),
+        }
+        for key in ["accessors", "bufferViews"] {
+            if json[key].as_array().is_none_or(Vec::is_empty)
+                && let Value::Object(object) = &mut json
+            {
+                object.shift_remove(key);
+            }
+        }
+        let text = serde_json::to_vec(&json).map_err(|e| WriteError::Document(e.to_string()))?;
+        let bytes = 64 + text.len() as u64 + bin.len() as u64;
+        if bytes > u64::from(u32::MAX) {
+            return Err(WriteError::TooLarge { bytes });
+        }
+        let header = Header { magic: *b"glTF", version: 2, length: 0 };
+        let glb = Glb { header, json: text.into(), bin: (!bin.is_empty()).then(|| bin.into()) };
+        glb.to_vec().map_err(|e| WriteError::Document(e.to_string()))
+    }
+
+    fn lay_out(&self, json: &mut Value) -> Result<Vec<u8>, WriteError> {
+        let bytes: u64 = self.views.iter().flatten().map(|(b, _)| b.len() as u64 + 2 * ALIGN as u64).sum();
+        if bytes > u64::from(u32::MAX) {
+            return Err(WriteError::TooLarge { bytes });
+        }
+        let mut bin = Vec::with_capacity(bytes as usize);
+        for (number, view) in self.views.iter().enumerate() {
+            let Some((bytes, phase)) = view else {
+                return Err(WriteError::Document(format!("buffer view {number} is longer than its buffer")));
+            };
+            // Accessors are aligned within the buffer, not within their view: keep where the view lay.
+            bin.resize(bin.len().next_multiple_of(ALIGN) + phase, 0);
+            json["bufferViews"][number]["buffer"] = 0.into();
+            json["bufferViews"][number]["byteOffset"] = bin.len().into();
+            bin.extend_from_slice(bytes);
+        }
+        bin.resize(bin.len().next_multiple_of(ALIGN), 0);
+        Ok(bin)
+    }
+}
+
+/// Appends to a list of the document and returns the index.
+pub(crate) fn push(json: &mut Value, list: &str, item: Value) -> usize {
+    if !json[list].is_array() {
+        json[list] = json!([]);
+    }
+    let list = json[list].as_array_mut().expect("it was made an array above");
+    list.push(item);
+    list.len() - 1
+}
+
+fn only_known_extensions(json: &Value) -> bool {
+    json["extensionsUsed"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .all(|e| e.as_str().is_some_and(|e| KNOWN_EXTENSIONS.iter().any(|known| e.starts_with(known))))
+}
+
+type Visit<'v> = &'v mut dyn FnMut(&mut Value);
+
+/// Removes the items of `list` that `each` finds no reference to, and renumbers the references. Returns what was kept.
+fn drop_unused(json: &mut Value, list: &str, each: fn(&mut Value, Visit<'_>)) -> Vec<bool> {
+    let n = json[list].as_array().map_or(0, Vec::len);
+    let mut used = vec![false; n];
+    each(json, &mut |reference| {
+        if let Some(used) = reference.as_u64().and_then(|i| used.get_mut(i as usize)) {
+            *used = true;
+        }
+    });
+    let mut next = 0;
+    let renumbered: Vec<usize> = used
+        .iter()
+        .map(|&used| {
+            next += usize::from(used);
+            next.saturating_sub(1)
+        })
+        .collect();
+    each(json, &mut |reference| {
+        if let Some(&new) = reference.as_u64().and_then(|i| renumbered.get(i as usize)) {
+            *reference = new.into();
+        }
+    });
+    if let Some(items) = json[list].as_array_mut() {
+        let mut used = used.iter();
+        items.retain(|_| used.next().copied().unwrap_or(true));
+    }
+    used
+}
+
+/// Visits every reference to an accessor.
+fn each_accessor(json: &mut Value, visit: Visit<'_>) {
+    fn items<'v>(value: &'v mut Value, key: &str) -> impl Iterator<Item = &'v mut Value> {
+        value.get_mut(key).and_then(Value::as_array_mut).into_iter().flatten()
+    }
+    fn members(value: Option<&mut Value>, visit: Visit<'_>) {
+        value.and_then(Value::as_object_mut).into_iter().flat_map(|o| o.values_mut()).for_each(visit);
+    }
+    for mesh in items(json, "meshes") {
+        for primitive in items(mesh, "primitives") {
+            members(primitive.get_mut("attributes"), visit);
+            items(primitive, "targets").for_each(|target| members(Some(target), visit));
+            primitive.get_mut("indices").into_iter().for_each(&mut *visit);
+        }
+    }
+    for node in items(json, "nodes") {
+        members(node.pointer_mut("/extensions/EXT_mesh_gpu_instancing/attributes"), visit);
+    }
+    for animation in items(json, "animations") {
+        for sampler in items(animation, "samplers") {
+            sampler.get_mut("input").into_iter().for_each(&mut *visit);
+            sampler.get_mut("output").into_iter().for_each(&mut *visit);
+        }
+    }
+    for skin in items(json, "skins") {
+        skin.get_mut("inverseBindMatrices").into_iter().for_each(&mut *visit);
+    }
+}
+
+/// Visits every reference to a buffer view: all members of that name outside `extras`.
+fn each_view(json: &mut Value, visit: Visit<'_>) {
+    match json {
+        Value::Object(object) => {
+            for (key, value) in object {
+                match key.as_str() {
+                    "bufferView" => visit(value),
+                    "extras" => {}
+                    _ => each_view(value, visit),
+                }
+            }
+        }
+        Value::Array(items) => items.iter_mut().for_each(|item| each_view(item, visit)),
+        _ => {}
+    }
+}

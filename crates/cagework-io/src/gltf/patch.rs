@@ -1,0 +1,305 @@
+//! glTF out: the original document with the deformed shape in it.
+//!
+//! What becomes of the parts that know where vertices are:
+//! * POSITION is written back through the inverse of the node's world transform; NORMAL and TANGENT turn with the
+//!   surface ([`crate::normals`]); a primitive without normals gets none (viewers shade it flat, as before).
+//! * A mesh shown by several nodes becomes a mesh for each, since the nodes deform differently.
+//! * A skinned mesh loses its skin and moves to a new node at the top of the scene: joints and node transforms would
+//!   move vertices that are already where they belong. So does a mesh under a transform that flattens it.
+//! * Morph targets were bound at their default weights and are dropped, with the animations of those weights.
+
+use glam::{DMat3, DMat4, DVec3, Quat, Vec3};
+use serde_json::{Value, json};
+
+use super::geometry::{Frame, world_normals, world_tangents};
+use super::pack::{Pack, push};
+use super::scene::{Instance, name_of};
+use super::{GltfDocument, GltfError, Slot, animate};
+use crate::error::WriteError;
+use crate::normals::Shading;
+
+/// A determinant this small against its columns' lengths cannot be undone in f32.
+const FLAT: f64 = 1e-9;
+
+/// One named shape.
+#[derive(Clone, Copy)]
+pub(crate) struct Pose<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) positions: &'a [Vec3],
+}
+
+/// The model at rest: what the document says.
+#[derive(Clone, Copy)]
+pub(crate) struct Rest<'a> {
+    pub(crate) positions: &'a [Vec3],
+    pub(crate) triangles: &'a [[u32; 3]],
+}
+
+impl From<GltfError> for WriteError {
+    fn from(error: GltfError) -> Self {
+        Self::Document(error.to_string())
+    }
+}
+
+/// Writes the document with `base` as its shape and `poses` as morph targets with an animation.
+///
+/// All positions are in world space, in the model's vertex order; counts are the caller's to check.
+pub(crate) fn patch(
+    document: &GltfDocument,
+    rest: Rest<'_>,
+    base: &[Vec3],
+    poses: &[Pose<'_>],
+) -> Result<Vec<u8>, WriteError> {
+    let mut json = document.json.clone();
+    let mut pack = Pack::of(document);
+    embed_images(document, &mut json, &mut pack);
+    let places = place_meshes(document, &mut json);
+    let normals = Normals::new(document, rest)?;
+    let rotations = normals.shading.rotations(base);
+    let mut shapes = Vec::with_capacity(document.slots.len());
+    for (slot, has_normals) in document.slots.iter().zip(&normals.present) {
+        let place = &places[slot.instance as usize];
+        let shape = Shape::new(slot, place, *has_normals, &normals.shading, base, &rotations);
+        let tangents = tangents(document, slot, place, &shape, &rotations)?;
+        let flip = place.detached && is_mirrored(document, slot)?;
+        let indices = flip.then(|| {
+            let corners = rest.triangles[slot.triangles.clone()].iter().flatten().map(|&v| v - slot.start);
+            pack.push_indices(&mut json, corners)
+        });
+        let position = pack.push_vec3(&mut json, &shape.positions, true);
+        let normal = has_normals.then(|| pack.push_vec3(&mut json, &shape.normals, false));
+        let tangent = tangents.map(|t| pack.push_floats(&mut json, &t, 4, true, false));
+        let primitive = &mut json["meshes"][place.mesh]["primitives"][slot.primitive as usize];
+        patch_primitive(primitive, place.detached, [Some(position), normal, tangent], indices);
+        shapes.push(shape);
+    }
+    for pose in poses {
+        let rotations = normals.shading.rotations(pose.positions);
+        for ((slot, base), has_normals) in document.slots.iter().zip(&shapes).zip(&normals.present) {
+            let place = &places[slot.instance as usize];
+            let shape = Shape::new(slot, place, *has_normals, &normals.shading, pose.positions, &rotations);
+            let delta =
+                |a: &[Vec3], b: &[Vec3]| -> Vec<Vec3> { a.iter().zip(b).map(|(&a, &b)| a - b).collect() };
+            let positions = delta(&shape.positions, &base.positions);
+            let mut target = json!({ "POSITION": pack.push_vec3(&mut json, &positions, true) });
+            if *has_normals {
+                target["NORMAL"] =
+                    pack.push_vec3(&mut json, &delta(&shape.normals, &base.normals), false).into();
+            }
+            push(&mut json["meshes"][place.mesh]["primitives"][slot.primitive as usize], "targets", target);
+        }
+    }
+    animate::forget_morphs(&mut json, &places);
+    if !poses.is_empty() {
+        animate::play_poses(&mut json, &mut pack, &places, poses);
+    }
+    pack.finish(json)
+}
+
+/// Where an instance's mesh is in the new document.
+pub(crate) struct Place {
+    pub(crate) mesh: usize,
+    pub(crate) node: usize,
+    /// Node it was at in the original, if any.
+    pub(crate) original: Option<usize>,
+    /// At a node of its own without a transform.
+    detached: bool,
+    mesh_from_world: DMat4,
+}
+
+/// Gives every instance a mesh that is its own, at a node that can be undone.
+fn place_meshes(document: &GltfDocument, json: &mut Value) -> Vec<Place> {
+    let mut users = vec![0_usize; document.root.meshes.len()];
+    for mesh in document.root.nodes.iter().filter_map(|n| n.mesh) {
+        // Nodes outside the scene may name meshes that are not there.
+        if let Some(users) = users.get_mut(mesh.value()) {
+            *users += 1;
+        }
+    }
+    for instance in &document.instances {
+        if instance.node.is_some() {
+            users[instance.mesh as usize] -= 1;
+        }
+    }
+    let mut kept = vec![false; document.root.meshes.len()];
+    let mut places: Vec<Place> = Vec::with_capacity(document.instances.len());
+    for instance in &document.instances {
+        let m = instance.mesh as usize;
+        // The first one keeps the mesh, unless a node outside the scene shows it too.
+        let keeps = users[m] == 0 && !std::mem::replace(&mut kept[m], true);
+        let mesh = if keeps {
+            instance.mesh as usize
+        } else {
+            let copy = document.json["meshes"][instance.mesh as usize].clone();
+            push(json, "meshes", copy)
+        };
+        let mesh_from_world = instance.world.inverse();
+        let detached = instance.node.is_none() || instance.skin.is_some() || is_flat(instance.world);
+        let original = instance.node.map(|n| n as usize);
+        let node = match original {
+            Some(node) if !detached => node,
+            _ => detach(document, json, instance),
+        };
+        json["nodes"][node]["mesh"] = mesh.into();
+        let mesh_from_world = if detached { DMat4::IDENTITY } else { mesh_from_world };
+        places.push(Place { mesh, node, original, detached, mesh_from_world });
+    }
+    places
+}
+
+fn is_flat(world: DMat4) -> bool {
+    let m = DMat3::from_mat4(world);
+    let size = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
+    m.determinant().abs() <= FLAT * size || !world.inverse().is_finite()
+}
+
+/// Takes the mesh off its node and makes a node for it at the top of the scene.
+fn detach(document: &GltfDocument, json: &mut Value, instance: &Instance) -> usize {
+    let name = match instance.node {
+        Some(node) => name_of(&document.json, "nodes", node, "node"),
+        None => name_of(&document.json, "meshes", instance.mesh, "mesh"),
+    };
+    if let Some(old) = instance.node.and_then(|n| json["nodes"][n as usize].as_object_mut()) {
+        for key in ["mesh", "skin", "weights"] {
+            old.shift_remove(key);
+        }
+    }
+    let node = push(json, "nodes", json!({ "name": name }));
+    if document.root.scenes.is_empty() {
+        if document.root.nodes.is_empty() {
+            // Meshes without nodes are a library of parts; to be seen they need a scene.
+            if json["scenes"].as_array().is_none_or(Vec::is_empty) {
+                json["scenes"] = json!([{}]);
+                json["scene"] = 0.into();
+            }
+            push(&mut json["scenes"][0], "nodes", node.into());
+        }
+    } else {
+        let scene = document.root.scene.map_or(0, |s| s.value());
+        push(&mut json["scenes"][scene], "nodes", node.into());
+    }
+    node
+}
+
+struct Normals {
+    shading: Shading,
+    /// Whether each slot has normals in the original.
+    present: Vec<bool>,
+}
+
+impl Normals {
+    fn new(document: &GltfDocument, rest: Rest<'_>) -> Result<Self, WriteError> {
+        let mut normals = vec![Vec3::ZERO; rest.positions.len()];
+        let mut present = Vec::new();
+        for slot in &document.slots {
+            let world = world_normals(document, slot)?;
+            present.push(world.is_some());
+            if let Some(world) = world {
+                normals[slot.start as usize..][..slot.count as usize].copy_from_slice(&world);
+            }
+        }
+        let vertices = (0..rest.positions.len() as u32).collect();
+        let shading = Shading::new(rest.positions, vertices, normals, rest.triangles.to_vec());
+        Ok(Self { shading, present })
+    }
+}
+
+/// A primitive's deformed vertices in its mesh's own space.
+struct Shape {
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+}
+
+impl Shape {
+    fn new(
+        slot: &Slot,
+        place: &Place,
+        has_normals: bool,
+        shading: &Shading,
+        positions: &[Vec3],
+        rotations: &[Quat],
+    ) -> Self {
+        let range = slot.start as usize..(slot.start + slot.count) as usize;
+        let world_from_mesh = DMat3::from_mat4(place.mesh_from_world.inverse());
+        let to_mesh = |p: &Vec3| place.mesh_from_world.transform_point3(p.as_dvec3()).as_vec3();
+        let normal = |v: usize| {
+            let world = (rotations[v] * shading.normal[v]).as_dvec3();
+            unit(world_from_mesh.transpose() * world).as_vec3()
+        };
+        Self {
+            positions: positions[range.clone()].iter().map(to_mesh).collect(),
+            normals: if has_normals { range.map(normal).collect() } else { Vec::new() },
+        }
+    }
+}
+
+fn unit(v: DVec3) -> DVec3 {
+    v.normalize_or(DVec3::Z)
+}
+
+/// Tangents that turned with the surface, at right angles to the new normals; none without original ones.
+fn tangents(
+    document: &GltfDocument,
+    slot: &Slot,
+    place: &Place,
+    shape: &Shape,
+    rotations: &[Quat],
+) -> Result<Option<Vec<f32>>, WriteError> {
+    let Some(world) = world_tangents(document, slot)?.filter(|_| !shape.normals.is_empty()) else {
+        return Ok(None);
+    };
+    let mut out = Vec::with_capacity(4 * world.len());
+    for (k, (tangent, handedness)) in world.into_iter().enumerate() {
+        let turned = (rotations[slot.start as usize + k] * tangent).as_dvec3();
+        let local = place.mesh_from_world.transform_vector3(turned).normalize_or_zero();
+        let normal = shape.normals[k].as_dvec3();
+        let fallback = normal.any_orthonormal_vector();
+        let t = (local - normal * local.dot(normal)).normalize_or(fallback).as_vec3();
+        out.extend([t.x, t.y, t.z, handedness]);
+    }
+    Ok(Some(out))
+}
+
+/// Whether the original winding was turned round when the model was read.
+fn is_mirrored(document: &GltfDocument, slot: &Slot) -> Result<bool, WriteError> {
+    let (instance, primitive) = document.primitive(slot);
+    let frame = Frame::of(document, instance, primitive, slot.count as usize)?;
+    Ok(slot.count > 0 && frame.world(0).determinant() < 0.0)
+}
+
+fn patch_primitive(
+    primitive: &mut Value,
+    detached: bool,
+    [position, normal, tangent]: [Option<usize>; 3],
+    indices: Option<usize>,
+) {
+    if let Some(object) = primitive.as_object_mut() {
+        object.shift_remove("targets");
+        if let Some(indices) = indices {
+            object.insert("indices".into(), indices.into());
+            object.shift_remove("mode");
+        }
+    }
+    let Some(attributes) = primitive.get_mut("attributes").and_then(Value::as_object_mut) else { return };
+    for (key, accessor) in [("POSITION", position), ("NORMAL", normal), ("TANGENT", tangent)] {
+        match accessor {
+            Some(accessor) => drop(attributes.insert(key.into(), accessor.into())),
+            None => drop(attributes.shift_remove(key)),
+        }
+    }
+    if detached {
+        attributes.retain(|key, _| !key.starts_with("JOINTS_") && !key.starts_with("WEIGHTS_"));
+    }
+}
+
+/// Moves images that came by URI into the file: a GLB travels alone.
+fn embed_images(document: &GltfDocument, json: &mut Value, pack: &mut Pack<'_>) {
+    for (number, image) in document.images.iter().enumerate() {
+        let Some(image) = image else { continue };
+        let view = pack.push_view(json, image.bytes.clone(), None);
+        let Some(object) = json["images"][number].as_object_mut() else { continue };
+        object.shift_remove("uri");
+        object.insert("mimeType".into(), image.mime.clone().into());
+        object.insert("bufferView".into(), view.into());
+    }
+}

@@ -1,0 +1,175 @@
+//! The node tree: world transforms, and which mesh is shown where.
+
+use ::gltf::json::Root;
+use ::gltf::json::scene::Node;
+use glam::{DMat4, DQuat, DVec3, Mat4};
+use serde_json::Value;
+
+use super::{GltfDocument, GltfError, get};
+use crate::model::Counts;
+
+/// World transform of every node, in f64: a transform and its inverse must give back an f32.
+#[derive(Clone, Debug)]
+pub(crate) struct Worlds {
+    pub(crate) world: Vec<DMat4>,
+    parent: Vec<Option<u32>>,
+}
+
+/// One mesh shown by one node.
+#[derive(Clone, Debug)]
+pub(crate) struct Instance {
+    /// The node; none in a file that has meshes but no nodes.
+    pub(crate) node: Option<u32>,
+    pub(crate) mesh: u32,
+    pub(crate) skin: Option<u32>,
+    /// World from mesh.
+    pub(crate) world: DMat4,
+}
+
+impl Worlds {
+    /// # Errors
+    /// An index out of range, a node with two parents, a cycle, a transform that is not finite.
+    pub(crate) fn new(root: &Root) -> Result<Self, GltfError> {
+        let n = root.nodes.len();
+        let mut parent = vec![None; n];
+        for (node, children) in
+            root.nodes.iter().enumerate().filter_map(|(i, n)| Some((i, n.children.as_ref()?)))
+        {
+            for child in children {
+                get(&root.nodes, child.value(), "child node", || format!("node {node}"))?;
+                let place = &mut parent[child.value()];
+                if place.is_some() {
+                    return Err(GltfError::Node {
+                        node: child.value() as u32,
+                        problem: "has two parents: the nodes must be a tree",
+                    });
+                }
+                *place = Some(node as u32);
+            }
+        }
+        let mut world = vec![DMat4::IDENTITY; n];
+        let mut reached = vec![false; n];
+        let mut stack: Vec<usize> = (0..n).filter(|&i| parent[i].is_none()).collect();
+        while let Some(node) = stack.pop() {
+            let above = parent[node].map_or(DMat4::IDENTITY, |p| world[p as usize]);
+            world[node] = above * local(&root.nodes[node]);
+            reached[node] = true;
+            if !world[node].is_finite() {
+                return Err(GltfError::Node {
+                    node: node as u32,
+                    problem: "has a transform that is not finite",
+                });
+            }
+            stack.extend(root.nodes[node].children.iter().flatten().map(::gltf::json::Index::value));
+        }
+        match reached.iter().position(|&r| !r) {
+            Some(node) => Err(GltfError::Node {
+                node: node as u32,
+                problem: "is its own ancestor: the nodes must be a tree",
+            }),
+            None => Ok(Self { world, parent }),
+        }
+    }
+
+    /// Whether `node` or one of its ancestors is among `nodes` (a flag for each node).
+    fn under(&self, node: usize, nodes: &[bool]) -> bool {
+        std::iter::successors(Some(node), |&n| self.parent[n].map(|p| p as usize)).any(|n| nodes[n])
+    }
+}
+
+fn local(node: &Node) -> DMat4 {
+    if let Some(m) = node.matrix {
+        return Mat4::from_cols_array(&m).as_dmat4();
+    }
+    let vec = |v: Option<[f32; 3]>, default| v.map_or(default, |v| glam::Vec3::from_array(v).as_dvec3());
+    let rotation = node.rotation.map_or(DQuat::IDENTITY, |r| {
+        let q = DQuat::from_array(r.0.map(f64::from));
+        if q.length_squared() > 0.0 { q.normalize() } else { DQuat::IDENTITY }
+    });
+    DMat4::from_scale_rotation_translation(
+        vec(node.scale, DVec3::ONE),
+        rotation,
+        vec(node.translation, DVec3::ZERO),
+    )
+}
+
+/// Meshes of the default scene: by ascending mesh, then by ascending node.
+///
+/// This is the order of the file's meshes, not of a walk through the tree: for a file that shows each mesh once it is
+/// the order of its primitives, which other programs see too.
+pub(crate) fn instances(
+    root: &Root,
+    worlds: &Worlds,
+    notices: &mut Vec<String>,
+) -> Result<Vec<Instance>, GltfError> {
+    for (s, scene) in root.scenes.iter().enumerate() {
+        for node in &scene.nodes {
+            get(&root.nodes, node.value(), "node", || format!("scene {s}"))?;
+        }
+    }
+    if root.nodes.is_empty() {
+        let all = 0..root.meshes.len() as u32;
+        return Ok(all
+            .map(|mesh| Instance { node: None, mesh, skin: None, world: DMat4::IDENTITY })
+            .collect());
+    }
+    let mut tops = vec![root.scenes.is_empty(); root.nodes.len()];
+    let scene = root.scene.map_or(0, |s| s.value());
+    if !root.scenes.is_empty() {
+        for node in &get(&root.scenes, scene, "scene", || "the document".into())?.nodes {
+            tops[node.value()] = true;
+        }
+    }
+    let mut shown = Vec::new();
+    let mut elsewhere = Vec::new();
+    for (i, node) in root.nodes.iter().enumerate() {
+        let Some(mesh) = node.mesh else { continue };
+        get(&root.meshes, mesh.value(), "mesh", || format!("node {i}"))?;
+        if let Some(skin) = node.skin {
+            get(&root.skins, skin.value(), "skin", || format!("node {i}"))?;
+        }
+        let instance = Instance {
+            node: Some(i as u32),
+            mesh: mesh.value() as u32,
+            skin: node.skin.map(|s| s.value() as u32),
+            world: worlds.world[i],
+        };
+        if worlds.under(i, &tops) { shown.push(instance) } else { elsewhere.push(instance) }
+    }
+    if shown.is_empty() && !elsewhere.is_empty() {
+        notices.push(format!("scene {scene} shows no mesh: the meshes of all nodes are used"));
+        std::mem::swap(&mut shown, &mut elsewhere);
+    }
+    if !elsewhere.is_empty() {
+        notices.push(format!(
+            "{} nodes with a mesh are not in scene {scene}: left as they are",
+            elsewhere.len()
+        ));
+    }
+    shown.sort_by_key(|i| (i.mesh, i.node));
+    Ok(shown)
+}
+
+/// What the document has of everything.
+pub(crate) fn counts(document: &GltfDocument) -> Counts {
+    let count = |key: &str| document.json[key].as_array().map_or(0, Vec::len);
+    let targets = document.root.meshes.iter().map(|mesh| {
+        mesh.primitives.iter().map(|p| p.targets.as_ref().map_or(0, Vec::len)).max().unwrap_or(0)
+    });
+    Counts {
+        scenes: count("scenes"),
+        nodes: count("nodes"),
+        meshes: count("meshes"),
+        primitives: document.slots.len(),
+        materials: count("materials"),
+        textures: count("textures"),
+        skins: count("skins"),
+        animations: count("animations"),
+        morph_targets: targets.sum(),
+    }
+}
+
+/// `name` of an object, or its kind and number.
+pub(crate) fn name_of(json: &Value, list: &str, index: u32, kind: &str) -> String {
+    json[list][index as usize]["name"].as_str().map_or_else(|| format!("{kind} {index}"), str::to_owned)
+}

@@ -1,0 +1,22 @@
+//! Bytes to scene and back: OBJ, glTF/GLB, NPZ.
+//!
+//! No mathematics beyond transforms and normals, no file system, no clock; everything compiles for
+//! `wasm32-unknown-unknown`. A [`Model`] keeps the document it was read from, so that an export is the user's own file
+//! with new vertex positions: materials, texture coordinates, names and the node tree survive.
+//!
+//! Vertex order, the contract of the weights file: OBJ `v` lines in file order; glTF meshes in document order, for each
+//! mesh the nodes that show it by ascending index, for each node the mesh's triangle primitives in order (so a file
+//! whose meshes are shown once each has its primitives in document order), unwelded.
+
+mod error;
+mod gltf;
+mod model;
+mod normals;
+mod npz;
+mod obj;
+
+pub use error::{PoseError, ReadError, WriteError};
+pub use gltf::GltfError;
+pub use model::{Counts, Format, Model};
+pub use npz::{NpzError, read_weights_npz, write_weights_npz};
+pub use obj::{ObjError, write_cage_obj};

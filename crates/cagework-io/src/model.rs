@@ -1,0 +1,305 @@
+//! A model: vertices and triangles, and the document they came from.
+
+use cagework_core::mesh::weld;
+use cagework_core::{PolygonMesh, TriMesh};
+use glam::Vec3;
+
+use crate::error::{PoseError, ReadError, WriteError};
+use crate::gltf::{self, GltfDocument, Pose, Rest};
+use crate::obj::{self, ObjDocument};
+
+/// Format of a model's document.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Wavefront OBJ.
+    Obj,
+    /// glTF 2.0, as JSON or GLB.
+    Gltf,
+}
+
+/// How much of everything a document has. OBJ counts `o` and `g` lines as nodes, `usemtl` names as materials.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Scenes.
+    pub scenes: usize,
+    /// Nodes.
+    pub nodes: usize,
+    /// Meshes.
+    pub meshes: usize,
+    /// Triangle primitives in use; a mesh shown twice counts twice.
+    pub primitives: usize,
+    /// Materials.
+    pub materials: usize,
+    /// Textures.
+    pub textures: usize,
+    /// Skins.
+    pub skins: usize,
+    /// Animations.
+    pub animations: usize,
+    /// Morph targets of all meshes.
+    pub morph_targets: usize,
+}
+
+/// A model that was read from bytes.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Name the caller gave.
+    pub name: String,
+    /// World-space position of every vertex, in the order of the input (see the crate's root), not welded.
+    pub positions: Vec<Vec3>,
+    /// Triangles, counter-clockwise seen from outside; polygons are triangulated.
+    pub triangles: Vec<[u32; 3]>,
+    /// How much of everything there is.
+    pub counts: Counts,
+    /// What the user should know: each a sentence.
+    pub notices: Vec<String>,
+    document: Document,
+}
+
+#[derive(Clone, Debug)]
+enum Document {
+    Obj(Box<ObjDocument>),
+    Gltf(Box<GltfDocument>),
+}
+
+impl Model {
+    /// Reads an OBJ, glTF or GLB file; the content decides which, `name` helps with the error if it is none of them.
+    ///
+    /// `resolve` is asked for sibling files (buffers and textures of a `.gltf`) by relative path, percent-decoded;
+    /// `data:` URIs are decoded here. A file of vertices without faces is read: it may be a pose.
+    ///
+    /// # Errors
+    /// [`ReadError`], which names the line, accessor, node or file at fault.
+    pub fn read(
+        name: &str,
+        bytes: &[u8],
+        resolve: &mut dyn FnMut(&str) -> Option<Vec<u8>>,
+    ) -> Result<Self, ReadError> {
+        match sniff(name, bytes)? {
+            Format::Gltf => {
+                let fault = |source| ReadError::Gltf { name: name.into(), source };
+                let model = gltf::read(name, bytes, resolve).map_err(fault)?;
+                Ok(Self {
+                    name: name.into(),
+                    positions: model.positions,
+                    triangles: model.triangles,
+                    counts: model.counts,
+                    notices: model.notices,
+                    document: Document::Gltf(Box::new(model.document)),
+                })
+            }
+            Format::Obj => {
+                let model =
+                    obj::read(bytes).map_err(|source| ReadError::Obj { name: name.into(), source })?;
+                let corner = |c: u32| model.document.corners[c as usize].v;
+                Ok(Self {
+                    name: name.into(),
+                    triangles: model.document.triangles.iter().map(|t| t.map(corner)).collect(),
+                    positions: model.positions,
+                    counts: Counts {
+                        nodes: model.groups,
+                        meshes: 1,
+                        primitives: 1,
+                        materials: model.document.materials.len(),
+                        ..Counts::default()
+                    },
+                    notices: model.notices,
+                    document: Document::Obj(Box::new(model.document)),
+                })
+            }
+        }
+    }
+
+    /// Format of the document.
+    #[must_use]
+    pub fn format(&self) -> Format {
+        match self.document {
+            Document::Obj(_) => Format::Obj,
+            Document::Gltf(_) => Format::Gltf,
+        }
+    }
+
+    /// Number of faces: polygons of an OBJ, triangles of a glTF.
+    #[must_use]
+    pub fn n_faces(&self) -> usize {
+        match &self.document {
+            Document::Obj(document) => document.face_materials.len(),
+            Document::Gltf(_) => self.triangles.len(),
+        }
+    }
+
+    /// # Errors
+    /// [`ReadError::NoFaces`] for a file of vertices only, which is fit for a pose but not for a mesh or a cage.
+    pub fn require_faces(&self) -> Result<(), ReadError> {
+        if self.n_faces() > 0 {
+            return Ok(());
+        }
+        Err(ReadError::NoFaces { name: self.name.clone(), vertices: self.positions.len() })
+    }
+
+    /// Vertices and triangles as the core takes them.
+    #[must_use]
+    pub fn tri_mesh(&self) -> TriMesh {
+        TriMesh { positions: self.positions.clone(), triangles: self.triangles.clone() }
+    }
+
+    /// The model as a cage: an OBJ's `v` lines and polygons as they are; a glTF's triangles, welded by position in order
+    /// of first occurrence (vertices split at seams would make the cage look open), without those that collapse.
+    #[must_use]
+    pub fn cage_mesh(&self) -> PolygonMesh {
+        match &self.document {
+            Document::Obj(document) => {
+                let face =
+                    |f: &[u32]| document.corners[f[0] as usize..f[1] as usize].iter().map(|c| c.v).collect();
+                PolygonMesh {
+                    positions: self.positions.clone(),
+                    faces: document.face_starts.windows(2).map(face).collect(),
+                }
+            }
+            Document::Gltf(_) => {
+                let welded = weld(&self.positions);
+                let faces = self.triangles.iter().map(|t| t.map(|v| welded.unique_of[v as usize]));
+                PolygonMesh {
+                    positions: welded.first.iter().map(|&v| self.positions[v as usize]).collect(),
+                    faces: faces.filter(|[a, b, c]| a != b && b != c && c != a).map(Vec::from).collect(),
+                }
+            }
+        }
+    }
+
+    /// Positions of `pose` for each vertex of this model's [`Self::cage_mesh`].
+    ///
+    /// A glTF cage is welded at rest; its pose has either the same vertices before welding, or as many as after.
+    ///
+    /// # Errors
+    /// [`PoseError`] when the numbers of vertices do not agree.
+    pub fn pose_positions(&self, pose: &Self) -> Result<Vec<Vec3>, PoseError> {
+        let first = match self.document {
+            Document::Obj(_) => (0..self.positions.len() as u32).collect(),
+            Document::Gltf(_) => weld(&self.positions).first,
+        };
+        if pose.positions.len() == self.positions.len() {
+            return Ok(first.iter().map(|&v| pose.positions[v as usize]).collect());
+        }
+        if pose.positions.len() == first.len() {
+            return Ok(pose.positions.clone());
+        }
+        Err(PoseError {
+            pose: pose.name.clone(),
+            given: pose.positions.len(),
+            cage: self.name.clone(),
+            expected: first.len(),
+        })
+    }
+
+    /// The model with new positions as an OBJ file.
+    ///
+    /// An OBJ keeps everything but its coordinates and normals byte for byte; a glTF becomes a new OBJ with its vertices
+    /// in the same order. `positions`: world space, one for each vertex.
+    ///
+    /// # Errors
+    /// [`WriteError`] when there is not one finite position for each vertex.
+    pub fn write_obj(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        self.check(positions)?;
+        match &self.document {
+            Document::Obj(document) => Ok(obj::patch(document, &self.positions, positions)),
+            Document::Gltf(document) => gltf::write_obj(document, self.rest(), positions),
+        }
+    }
+
+    /// The model with new positions as a GLB file.
+    ///
+    /// A glTF keeps its materials, textures (those by URI are embedded), texture coordinates, names and nodes; see
+    /// the notices for what a deformed shape cannot keep. An OBJ becomes one mesh. `positions`: world space, one for
+    /// each vertex.
+    ///
+    /// # Errors
+    /// [`WriteError`] when there is not one finite position for each vertex, there are no triangles, or the file would
+    /// be too large.
+    pub fn write_glb(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        self.glb(positions, &[])
+    }
+
+    /// The model with `rest` as its shape and one morph target for each pose, with an animation that goes from rest
+    /// through all poses back to rest, a second each.
+    ///
+    /// # Errors
+    /// As [`Self::write_glb`].
+    pub fn write_glb_poses(
+        &self,
+        rest: &[Vec3],
+        poses: &[(String, Vec<Vec3>)],
+    ) -> Result<Vec<u8>, WriteError> {
+        let poses: Vec<Pose<'_>> = poses.iter().map(|(name, positions)| Pose { name, positions }).collect();
+        self.glb(rest, &poses)
+    }
+
+    fn glb(&self, base: &[Vec3], poses: &[Pose<'_>]) -> Result<Vec<u8>, WriteError> {
+        self.check(base)?;
+        poses.iter().try_for_each(|pose| self.check(pose.positions))?;
+        if self.triangles.is_empty() {
+            return Err(WriteError::NoFaces);
+        }
+        let document = match &self.document {
+            Document::Gltf(document) => return gltf::patch(document, self.rest(), base, poses),
+            Document::Obj(document) => document,
+        };
+        // One way to deform a GLB: make one of the shape at rest, then patch that.
+        let stem = self.name.rsplit_once('.').map_or(self.name.as_str(), |(stem, _)| stem);
+        let (glb, source) = gltf::build_from_obj(stem, document, &self.positions)?;
+        let built = gltf::read(&self.name, &glb, &mut |_| None)?;
+        let spread = |positions: &[Vec3]| source.iter().map(|&v| positions[v as usize]).collect::<Vec<_>>();
+        let spread_poses: Vec<Vec<Vec3>> = poses.iter().map(|pose| spread(pose.positions)).collect();
+        let poses: Vec<Pose<'_>> = poses
+            .iter()
+            .zip(&spread_poses)
+            .map(|(pose, positions)| Pose { name: pose.name, positions })
+            .collect();
+        let rest = Rest { positions: &built.positions, triangles: &built.triangles };
+        gltf::patch(&built.document, rest, &spread(base), &poses)
+    }
+
+    fn rest(&self) -> Rest<'_> {
+        Rest { positions: &self.positions, triangles: &self.triangles }
+    }
+
+    fn check(&self, positions: &[Vec3]) -> Result<(), WriteError> {
+        if positions.len() != self.positions.len() {
+            return Err(WriteError::Count { given: positions.len(), expected: self.positions.len() });
+        }
+        match positions.iter().position(|p| !p.is_finite()) {
+            Some(vertex) => Err(WriteError::NotFinite { vertex }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Format by content; a name that promises another, or content known to be something else, is an error that says so.
+fn sniff(name: &str, bytes: &[u8]) -> Result<Format, ReadError> {
+    let format = |found, hint| Err(ReadError::Format { name: name.into(), found, hint });
+    let export = "export it as GLB or OBJ";
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let extension = name.rsplit_once('.').map_or(String::new(), |(_, e)| e.to_ascii_lowercase());
+    match bytes {
+        [] => return format("empty", "the file has no bytes"),
+        [b'g', b'l', b'T', b'F', ..] => return Ok(Format::Gltf),
+        [b'P', b'K', 3, 4, ..] => return format("a zip archive", "unpack it first"),
+        [b'K', b'a', b'y', b'd', b'a', b'r', b'a', ..] => return format("an FBX file", export),
+        [b'B', b'L', b'E', b'N', b'D', b'E', b'R', ..] => return format("a Blender file", export),
+        [b'p', b'l', b'y', b'\n' | b'\r', ..] => return format("a PLY file", export),
+        _ => {}
+    }
+    if text.first() == Some(&b'{') {
+        return Ok(Format::Gltf);
+    }
+    match extension.as_str() {
+        "glb" => {
+            format("not a GLB", "its first four bytes are not 'glTF': it is damaged or has the wrong name")
+        }
+        "gltf" => format("not a glTF", "it does not begin with '{': it is damaged or has the wrong name"),
+        "stl" | "ply" | "fbx" | "dae" | "usdz" | "usd" | "3ds" | "blend" | "off" => {
+            format("not OBJ or glTF", export)
+        }
+        _ => Ok(Format::Obj),
+    }
+}

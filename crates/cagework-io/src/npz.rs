@@ -1,0 +1,276 @@
+//! Weights as NumPy `.npz`, the layout of `scipy.sparse.save_npz`.
+//!
+//! Arrays: `format` (`b"csr"`), `shape` (int64), `indptr`, `indices` (int32), `data` (float32); with vertices outside
+//! the cage also `outside_vertex` (int32), `outside_corners` (int32, [n, 3]) and `outside_offset` (float32, [n, 3]),
+//! which SciPy ignores. Written uncompressed, as `numpy.savez` does, with one fixed time stamp: the same weights give
+//! the same bytes. Reading takes what SciPy writes too: deflated, 32- or 64-bit indices, 32- or 64-bit floats.
+//!
+//! The array headers are read here and not by a library: `npyz` parses any Python literal, recursively, and a header
+//! of nested brackets would overflow the stack.
+
+use std::io::{Cursor, Read as _, Write as _};
+
+use cagework_core::Weights;
+use cagework_core::bind::OutsideVertex;
+use cagework_core::weights::WeightsError;
+use glam::Vec3;
+use thiserror::Error;
+use zip::result::ZipError;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
+
+/// Why a weights file could not be read.
+#[derive(Debug, Error)]
+pub enum NpzError {
+    /// Not a zip archive, or a damaged one.
+    #[error("not an .npz file, or a damaged one: {0}")]
+    Zip(String),
+    /// An array is not in the file.
+    #[error(
+        "array '{0}' is missing: is this a sparse matrix written by scipy.sparse.save_npz or cagework bind?"
+    )]
+    Missing(&'static str),
+    /// An array is not what it must be.
+    #[error("array '{array}': {problem}")]
+    Array {
+        /// Its name.
+        array: &'static str,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// The arrays are no CSR matrix.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+}
+
+impl From<ZipError> for NpzError {
+    fn from(error: ZipError) -> Self {
+        Self::Zip(error.to_string())
+    }
+}
+
+/// Most bytes of one array after decompression: a small file must not fill the memory.
+const MAX_ARRAY_BYTES: u64 = 4 << 30;
+/// NumPy aligns the data to this.
+const NPY_ALIGN: usize = 64;
+const NPY_MAGIC: &[u8; 6] = b"\x93NUMPY";
+
+/// Weights and the vertices outside the cage as an `.npz` file.
+#[must_use]
+pub fn write_weights_npz(weights: &Weights, outside: &[OutsideVertex]) -> Vec<u8> {
+    let n = outside.len();
+    let shape = [weights.n_rows() as i64, weights.n_columns() as i64];
+    let mut arrays = vec![
+        ("format", "|S3", vec![], b"csr".to_vec()),
+        ("shape", "<i8", vec![2], bytes_of(shape.map(i64::to_le_bytes))),
+        (
+            "indptr",
+            "<i4",
+            vec![weights.indptr().len()],
+            bytes_of(weights.indptr().iter().map(|x| x.to_le_bytes())),
+        ),
+        (
+            "indices",
+            "<i4",
+            vec![weights.indices().len()],
+            bytes_of(weights.indices().iter().map(|x| x.to_le_bytes())),
+        ),
+        ("data", "<f4", vec![weights.data().len()], bytes_of(weights.data().iter().map(|x| x.to_le_bytes()))),
+    ];
+    if n > 0 {
+        let vertices = outside.iter().map(|o| o.vertex.to_le_bytes());
+        let corners = outside.iter().flat_map(|o| o.corners).map(u32::to_le_bytes);
+        let offsets = outside.iter().flat_map(|o| o.offset.to_array()).map(f32::to_le_bytes);
+        arrays.push(("outside_vertex", "<i4", vec![n], bytes_of(vertices)));
+        arrays.push(("outside_corners", "<i4", vec![n, 3], bytes_of(corners)));
+        arrays.push(("outside_offset", "<f4", vec![n, 3], bytes_of(offsets)));
+    }
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    // The zip epoch, 1980: no clock.
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .last_modified_time(DateTime::default())
+        .large_file(weights.data().len() > (u32::MAX / 8) as usize);
+    for (name, dtype, shape, data) in arrays {
+        zip.start_file(format!("{name}.npy"), options).expect("names are distinct, memory does not fail");
+        zip.write_all(&npy_header(dtype, &shape)).expect("writing to memory does not fail");
+        zip.write_all(&data).expect("writing to memory does not fail");
+    }
+    zip.finish().expect("writing to memory does not fail").into_inner()
+}
+
+fn bytes_of<const N: usize>(values: impl IntoIterator<Item = [u8; N]>) -> Vec<u8> {
+    values.into_iter().flatten().collect()
+}
+
+fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
+    let shape = match shape {
+        [n] => format!("({n},)"),
+        _ => format!("({})", shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")),
+    };
+    let mut text = format!("{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}");
+    let unpadded = NPY_MAGIC.len() + 4 + text.len() + 1;
+    text.extend(std::iter::repeat_n(' ', unpadded.next_multiple_of(NPY_ALIGN) - unpadded));
+    text.push('\n');
+    let mut out = NPY_MAGIC.to_vec();
+    out.extend_from_slice(&[1, 0]);
+    out.extend_from_slice(&(text.len() as u16).to_le_bytes());
+    out.extend_from_slice(text.as_bytes());
+    out
+}
+
+/// Reads weights and the vertices outside the cage.
+///
+/// # Errors
+/// [`NpzError`] when the file is no archive, an array is missing or of a wrong type, or the arrays are no CSR matrix.
+pub fn read_weights_npz(bytes: &[u8]) -> Result<(Weights, Vec<OutsideVertex>), NpzError> {
+    let mut zip = ZipArchive::new(Cursor::new(bytes))?;
+    let format = required(&mut zip, "format")?;
+    if format.data != b"csr" {
+        let found = String::from_utf8_lossy(&format.data).into_owned();
+        return Err(
+            format.fault(&format!("is '{found}', but only csr is read: convert it with matrix.tocsr()"))
+        );
+    }
+    let shape = required(&mut zip, "shape")?.unsigned()?;
+    let [rows, columns] = shape[..] else {
+        return Err(NpzError::Array {
+            array: "shape",
+            problem: format!("has {} values, not 2", shape.len()),
+        });
+    };
+    let indptr = required(&mut zip, "indptr")?.unsigned()?;
+    if indptr.len() as u64 != u64::from(rows) + 1 {
+        let problem = format!("has {} values for {rows} rows; it must have one more than rows", indptr.len());
+        return Err(NpzError::Array { array: "indptr", problem });
+    }
+    let indices = required(&mut zip, "indices")?.unsigned()?;
+    let data = required(&mut zip, "data")?.floats()?;
+    let weights = Weights::new(columns, indptr, indices, data)?;
+    let outside = read_outside(&mut zip, rows, columns)?;
+    Ok((weights, outside))
+}
+
+fn read_outside(
+    zip: &mut ZipArchive<Cursor<&[u8]>>,
+    rows: u32,
+    columns: u32,
+) -> Result<Vec<OutsideVertex>, NpzError> {
+    let Some(vertices) = array(zip, "outside_vertex")? else { return Ok(Vec::new()) };
+    let vertices = vertices.unsigned()?;
+    let corners = required(zip, "outside_corners")?.unsigned()?;
+    let offsets = required(zip, "outside_offset")?.floats()?;
+    let fault = |array, problem: String| Err(NpzError::Array { array, problem });
+    let n = vertices.len();
+    if corners.len() != 3 * n || offsets.len() != 3 * n {
+        return fault("outside_corners", format!("{n} vertices need {n} x 3 corners and offsets"));
+    }
+    if let Some(v) = vertices.iter().find(|&&v| v >= rows) {
+        return fault("outside_vertex", format!("names vertex {v}, but there are {rows}"));
+    }
+    if let Some(c) = corners.iter().find(|&&c| c >= columns) {
+        return fault("outside_corners", format!("names cage vertex {c}, but there are {columns}"));
+    }
+    if offsets.iter().any(|x| !x.is_finite()) {
+        return fault("outside_offset", "has a value that is not a finite number".into());
+    }
+    let triples = corners.chunks_exact(3).zip(offsets.chunks_exact(3));
+    Ok(vertices
+        .iter()
+        .zip(triples)
+        .map(|(&vertex, (c, o))| OutsideVertex {
+            vertex,
+            corners: [c[0], c[1], c[2]],
+            offset: Vec3::from_slice(o),
+        })
+        .collect())
+}
+
+struct NpyArray {
+    name: &'static str,
+    dtype: String,
+    data: Vec<u8>,
+}
+
+fn required(zip: &mut ZipArchive<Cursor<&[u8]>>, name: &'static str) -> Result<NpyArray, NpzError> {
+    array(zip, name)?.ok_or(NpzError::Missing(name))
+}
+
+fn array(zip: &mut ZipArchive<Cursor<&[u8]>>, name: &'static str) -> Result<Option<NpyArray>, NpzError> {
+    let entry = match zip.by_name(&format!("{name}.npy")) {
+        Err(ZipError::FileNotFound) => return Ok(None),
+        other => other?,
+    };
+    let fault = |problem: String| NpzError::Array { array: name, problem };
+    let mut bytes = Vec::new();
+    // Grows as it reads: the size in the archive's directory is not to be trusted.
+    entry
+        .take(MAX_ARRAY_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|e| fault(format!("cannot be unpacked: {e}")))?;
+    if bytes.len() as u64 > MAX_ARRAY_BYTES {
+        return Err(fault(format!("is larger than the limit of {} GiB", MAX_ARRAY_BYTES >> 30)));
+    }
+    let bad = || fault("is not in NumPy's .npy format".into());
+    let (start, text) = header(&bytes).ok_or_else(bad)?;
+    let dtype = field(text, "'descr':").and_then(quoted).ok_or_else(bad)?.to_owned();
+    if field(text, "'fortran_order':").is_none_or(|f| !f.starts_with("False")) {
+        return Err(fault("is in Fortran order; save it in C order".into()));
+    }
+    bytes.drain(..start);
+    Ok(Some(NpyArray { name, dtype, data: bytes }))
+}
+
+/// Start of the data and text of the header of an `.npy` file, versions 1 to 3.
+fn header(bytes: &[u8]) -> Option<(usize, &str)> {
+    let rest = bytes.strip_prefix(NPY_MAGIC)?;
+    let (length, start) = match rest.first()? {
+        1 => (u32::from(u16::from_le_bytes(rest.get(2..4)?.try_into().ok()?)), 10),
+        _ => (u32::from_le_bytes(rest.get(2..6)?.try_into().ok()?), 12),
+    };
+    let end = start + length as usize;
+    Some((end, std::str::from_utf8(bytes.get(start..end)?).ok()?))
+}
+
+fn field<'a>(header: &'a str, key: &str) -> Option<&'a str> {
+    header.split_once(key).map(|(_, rest)| rest.trim_start())
+}
+
+fn quoted(text: &str) -> Option<&str> {
+    text.strip_prefix('\'')?.split_once('\'').map(|(inner, _)| inner)
+}
+
+impl NpyArray {
+    fn fault(&self, problem: &str) -> NpzError {
+        NpzError::Array { array: self.name, problem: problem.to_owned() }
+    }
+
+    fn chunks<const N: usize>(&self) -> Result<impl Iterator<Item = [u8; N]>, NpzError> {
+        let (chunks, rest) = self.data.as_chunks::<N>();
+        if rest.is_empty() { Ok(chunks.iter().copied()) } else { Err(self.fault("is cut off")) }
+    }
+
+    /// Values of an integer array; each must fit 32 bits and not be negative.
+    fn unsigned(&self) -> Result<Vec<u32>, NpzError> {
+        let range = |_| self.fault("has a value that is negative or does not fit 32 bits");
+        match self.dtype.as_str() {
+            "<i4" => self.chunks()?.map(|b| u32::try_from(i32::from_le_bytes(b)).map_err(range)).collect(),
+            "<u4" => Ok(self.chunks()?.map(u32::from_le_bytes).collect()),
+            "<i8" => self.chunks()?.map(|b| u32::try_from(i64::from_le_bytes(b)).map_err(range)).collect(),
+            "<u8" => self.chunks()?.map(|b| u32::try_from(u64::from_le_bytes(b)).map_err(range)).collect(),
+            other => {
+                Err(self.fault(&format!("is of type {other}; it must be int32 or int64, little-endian")))
+            }
+        }
+    }
+
+    fn floats(&self) -> Result<Vec<f32>, NpzError> {
+        match self.dtype.as_str() {
+            "<f4" => Ok(self.chunks()?.map(f32::from_le_bytes).collect()),
+            "<f8" => Ok(self.chunks()?.map(|b| f64::from_le_bytes(b) as f32).collect()),
+            other => {
+                Err(self.fault(&format!("is of type {other}; it must be float32 or float64, little-endian")))
+            }
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! Wavefront OBJ.
+//!
+//! Own reader: `tobj` numbers vertices anew for each group and drops those that no face uses, and it either splits
+//! polygons or hands them over without their lines; here the row of a weight is the number of a `v` line, cages keep
+//! their polygons, errors name a line, and an export is the user's file with other numbers in it.
+
+mod lex;
+mod read;
+mod triangulate;
+mod write;
+
+pub use read::ObjError;
+pub(crate) use read::{NONE, ObjDocument, read};
+pub use write::write_cage_obj;
+pub(crate) use write::{ObjPart, patch, write_new};

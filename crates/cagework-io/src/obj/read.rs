@@ -1,0 +1,288 @@
+//! OBJ in: every `v` line a vertex, every `f` line a polygon, nothing renumbered.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use glam::Vec3;
+use thiserror::Error;
+
+use super::lex::{Line, lines, shown, tokens};
+use super::triangulate::Triangulator;
+
+/// Why an OBJ file could not be read.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum ObjError {
+    /// A coordinate is missing or no number.
+    #[error("line {line}: {axis} coordinate is {found}; it must be a finite number such as 1.25")]
+    Coordinate {
+        /// Line, from 1.
+        line: usize,
+        /// Which coordinate.
+        axis: char,
+        /// What stands there.
+        found: String,
+    },
+    /// A corner of a face is no index.
+    #[error("line {line}: face corner '{found}' is not an index such as 7, 7/2, 7//3 or -1")]
+    Corner {
+        /// Line, from 1.
+        line: usize,
+        /// What stands there.
+        found: String,
+    },
+    /// A face names a vertex that does not exist.
+    #[error("line {line}: face names vertex {index}, but there are {vertices}")]
+    Vertex {
+        /// Line, from 1.
+        line: usize,
+        /// Index as written.
+        index: i64,
+        /// Vertices there are (so far, for a relative index).
+        vertices: usize,
+    },
+    /// A face with fewer than three corners.
+    #[error("line {line}: face has {corners} corners; it needs at least 3")]
+    Face {
+        /// Line, from 1.
+        line: usize,
+        /// Corners it has.
+        corners: usize,
+    },
+    /// No `v` line at all.
+    #[error("no vertices: an OBJ file has lines such as 'v 0 1 0'")]
+    Empty,
+    /// More elements than 32-bit indices can name.
+    #[error("line {line}: more than {limit} vertices or corners")]
+    TooLarge {
+        /// Line, from 1.
+        line: usize,
+        /// The limit.
+        limit: u32,
+    },
+}
+
+/// An index that is not there.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// One corner of a face, indices from 0; `vt` and `vn` may be [`NONE`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Corner {
+    pub(crate) v: u32,
+    pub(crate) vt: u32,
+    pub(crate) vn: u32,
+}
+
+/// What an export needs of the file.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ObjDocument {
+    /// The file itself.
+    pub(crate) bytes: Vec<u8>,
+    /// `vt` lines, as written (v upwards).
+    pub(crate) texcoords: Vec<[f32; 2]>,
+    /// `vn` lines; zero where one is no vector.
+    pub(crate) normals: Vec<Vec3>,
+    /// Corners of all faces, one after another.
+    pub(crate) corners: Vec<Corner>,
+    /// Where each face starts in `corners`. `[n_faces + 1]`
+    pub(crate) face_starts: Vec<u32>,
+    /// Material of each face, an index into `materials`, or [`NONE`].
+    pub(crate) face_materials: Vec<u32>,
+    /// Names after `usemtl`, in order of first use.
+    pub(crate) materials: Vec<String>,
+    /// Triangles as indices into `corners`.
+    pub(crate) triangles: Vec<[u32; 3]>,
+}
+
+/// A file that was read.
+pub(crate) struct ObjModel {
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) document: ObjDocument,
+    /// `o` and `g` lines.
+    pub(crate) groups: usize,
+    pub(crate) notices: Vec<String>,
+}
+
+struct Reader<'a> {
+    bytes: &'a [u8],
+    positions: Vec<Vec3>,
+    document: ObjDocument,
+    material_numbers: HashMap<&'a [u8], u32>,
+    material: u32,
+    /// Corners that name a vertex not yet defined: line and index.
+    forward: Vec<(usize, u32)>,
+    groups: usize,
+    bad_attributes: usize,
+    ignored: usize,
+}
+
+/// Reads an OBJ file.
+pub(crate) fn read(bytes: &[u8]) -> Result<ObjModel, ObjError> {
+    let mut reader = Reader {
+        bytes,
+        positions: Vec::new(),
+        document: ObjDocument { face_starts: vec![0], ..ObjDocument::default() },
+        material_numbers: HashMap::new(),
+        material: NONE,
+        forward: Vec::new(),
+        groups: 0,
+        bad_attributes: 0,
+        ignored: 0,
+    };
+    for line in lines(bytes) {
+        reader.line(&line)?;
+    }
+    reader.finish()
+}
+
+impl<'a> Reader<'a> {
+    fn line(&mut self, line: &Line) -> Result<(), ObjError> {
+        let bytes = self.bytes;
+        let mut words = tokens(bytes, line.range.clone());
+        let Some(keyword) = words.next() else { return Ok(()) };
+        match &bytes[keyword.clone()] {
+            b"v" => {
+                let mut p = [0.0; 3];
+                for (value, axis) in p.iter_mut().zip(['x', 'y', 'z']) {
+                    let token = words.next();
+                    *value = token.clone().and_then(|t| number(&bytes[t])).ok_or_else(|| {
+                        let found = token.map_or("missing".into(), |t| format!("'{}'", shown(&bytes[t])));
+                        ObjError::Coordinate { line: line.number, axis, found }
+                    })?;
+                }
+                self.positions.push(Vec3::from_array(p));
+                check_count(self.positions.len(), line.number)?;
+            }
+            b"vt" => {
+                let u = words.next().and_then(|t| number(&bytes[t]));
+                // A one-dimensional texture coordinate has no v.
+                let v = words.next().map_or(Some(0.0), |t| number(&bytes[t]));
+                self.bad_attributes += usize::from(u.is_none() || v.is_none());
+                self.document.texcoords.push([u.unwrap_or(0.0), v.unwrap_or(0.0)]);
+            }
+            b"vn" => {
+                let n: Vec<f32> = words.map_while(|t| number(&bytes[t])).collect();
+                self.bad_attributes += usize::from(n.len() < 3);
+                let n = if n.len() < 3 { Vec3::ZERO } else { Vec3::from_slice(&n) };
+                self.document.normals.push(n.as_dvec3().normalize_or_zero().as_vec3());
+            }
+            b"f" | b"fo" => self.face(line.number, words)?,
+            b"o" | b"g" => self.groups += 1,
+            b"usemtl" => self.use_material(line),
+            b"l" | b"p" | b"curv" | b"curv2" | b"surf" => self.ignored += 1,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn face(&mut self, line: usize, words: impl Iterator<Item = Range<usize>>) -> Result<(), ObjError> {
+        let start = self.document.corners.len();
+        for token in words {
+            let token = &self.bytes[token];
+            let bad = || ObjError::Corner { line, found: shown(token) };
+            let mut parts = token.split(|&b| b == b'/');
+            let index = parts.next().and_then(integer).ok_or_else(bad)?;
+            let v = resolve(index, self.positions.len()).ok_or(ObjError::Vertex {
+                line,
+                index,
+                vertices: self.positions.len(),
+            })?;
+            if v as usize >= self.positions.len() {
+                self.forward.push((line, v));
+            }
+            let mut attribute = |count: usize| match parts.next() {
+                None | Some(b"") => Ok(NONE),
+                Some(part) => {
+                    let index = integer(part).ok_or_else(bad)?;
+                    Ok(resolve(index, count).unwrap_or(NONE))
+                }
+            };
+            let vt = attribute(self.document.texcoords.len())?;
+            let vn = attribute(self.document.normals.len())?;
+            if parts.next().is_some() {
+                return Err(bad());
+            }
+            self.document.corners.push(Corner { v, vt, vn });
+        }
+        let corners = self.document.corners.len() - start;
+        if corners < 3 {
+            return Err(ObjError::Face { line, corners });
+        }
+        check_count(self.document.corners.len(), line)?;
+        self.document.face_starts.push(self.document.corners.len() as u32);
+        self.document.face_materials.push(self.material);
+        Ok(())
+    }
+
+    fn use_material(&mut self, line: &Line) {
+        let text = &self.bytes[line.range.clone()];
+        let name = text.trim_ascii().strip_prefix(b"usemtl").unwrap_or_default().trim_ascii();
+        let materials = &mut self.document.materials;
+        self.material = *self.material_numbers.entry(name).or_insert_with(|| {
+            materials.push(String::from_utf8_lossy(name).into_owned());
+            materials.len() as u32 - 1
+        });
+    }
+
+    fn finish(mut self) -> Result<ObjModel, ObjError> {
+        let vertices = self.positions.len();
+        if vertices == 0 {
+            return Err(ObjError::Empty);
+        }
+        if let Some(&(line, v)) = self.forward.iter().find(|&&(_, v)| v as usize >= vertices) {
+            return Err(ObjError::Vertex { line, index: i64::from(v) + 1, vertices });
+        }
+        let mut dangling = 0_usize;
+        let (n_vt, n_vn) = (self.document.texcoords.len(), self.document.normals.len());
+        for corner in &mut self.document.corners {
+            for (index, count) in [(&mut corner.vt, n_vt), (&mut corner.vn, n_vn)] {
+                if *index != NONE && *index as usize >= count {
+                    *index = NONE;
+                    dangling += 1;
+                }
+            }
+        }
+        self.triangulate();
+        let mut notices = Vec::new();
+        let mut notice = |count: usize, text: &str| {
+            if count > 0 {
+                notices.push(format!("{count} {text}"));
+            }
+        };
+        notice(dangling, "face corners name texture coordinates or normals that do not exist: ignored");
+        notice(self.bad_attributes, "'vt' or 'vn' lines are not numbers: read as zero");
+        notice(self.ignored, "line, point or curve elements are not surfaces: left as they are");
+        self.document.bytes = self.bytes.to_vec();
+        Ok(ObjModel { positions: self.positions, document: self.document, groups: self.groups, notices })
+    }
+
+    fn triangulate(&mut self) {
+        let document = &mut self.document;
+        let mut triangulator = Triangulator::new();
+        let mut polygon = Vec::new();
+        for face in document.face_starts.windows(2) {
+            let corners = &document.corners[face[0] as usize..face[1] as usize];
+            polygon.clear();
+            polygon.extend(corners.iter().map(|c| self.positions[c.v as usize]));
+            triangulator.triangulate(&polygon, face[0], &mut document.triangles);
+        }
+    }
+}
+
+fn check_count(count: usize, line: usize) -> Result<(), ObjError> {
+    if count >= NONE as usize { Err(ObjError::TooLarge { line, limit: NONE - 1 }) } else { Ok(()) }
+}
+
+/// A finite number, or nothing.
+fn number(token: &[u8]) -> Option<f32> {
+    std::str::from_utf8(token).ok()?.parse::<f32>().ok().filter(|x| x.is_finite())
+}
+
+fn integer(token: &[u8]) -> Option<i64> {
+    std::str::from_utf8(token).ok()?.parse().ok()
+}
+
+/// Index from 0 of an index as written: from 1, or negative, counted back from the `count` elements so far.
+fn resolve(index: i64, count: usize) -> Option<u32> {
+    let from_zero = if index < 0 { i64::try_from(count).ok()?.checked_add(index)? } else { index - 1 };
+    u32::try_from(from_zero).ok().filter(|&i| i != NONE)
+}

@@ -1,0 +1,230 @@
+//! OBJ out: a patched original, a new file, a cage.
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+
+use cagework_core::PolygonMesh;
+use glam::Vec3;
+
+use super::lex::{lines, tokens};
+use super::read::{NONE, ObjDocument};
+use crate::normals::Shading;
+
+/// Distinct (vertex, normal) pairs of a file's corners.
+pub(crate) struct Pairs {
+    /// The pairs as vertices for shading.
+    pub(crate) shading: Shading,
+    /// Pair of each corner.
+    pub(crate) of_corner: Vec<u32>,
+    /// `vn` line of each pair, or [`NONE`].
+    pub(crate) vn: Vec<u32>,
+}
+
+impl ObjDocument {
+    /// Pairs in order of first use, with the shape at rest.
+    pub(crate) fn pairs(&self, rest: &[Vec3]) -> Pairs {
+        let mut numbers = HashMap::new();
+        let (mut vertex, mut vn) = (Vec::new(), Vec::new());
+        let of_corner: Vec<u32> = self
+            .corners
+            .iter()
+            .map(|c| {
+                *numbers.entry((c.v, c.vn)).or_insert_with(|| {
+                    vertex.push(c.v);
+                    vn.push(c.vn);
+                    vertex.len() as u32 - 1
+                })
+            })
+            .collect();
+        let normal =
+            vn.iter().map(|&n| if n == NONE { Vec3::ZERO } else { self.normals[n as usize] }).collect();
+        let triangles = self.triangles.iter().map(|t| t.map(|c| of_corner[c as usize])).collect();
+        Pairs { shading: Shading::new(rest, vertex, normal, triangles), of_corner, vn }
+    }
+}
+
+/// The original file with new positions: coordinates of `v` lines and normals are replaced, all else is kept byte for
+/// byte (comments, vertex colours, materials, groups, line ends).
+///
+/// Each `vn` line becomes one line for each vertex that uses it, since two corners that shared a normal need not share
+/// it after the deformation; only if that changes the numbering are normal indices in faces rewritten. A file without
+/// `vn` lines gets none.
+pub(crate) fn patch(document: &ObjDocument, rest: &[Vec3], positions: &[Vec3]) -> Vec<u8> {
+    let normals = (!document.normals.is_empty()).then(|| PatchedNormals::new(document, rest, positions));
+    let bytes = &document.bytes;
+    let mut out = Vec::with_capacity(bytes.len() + bytes.len() / 4);
+    let (mut v, mut vn, mut corner) = (0, 0, 0);
+    for line in lines(bytes) {
+        let mut copied = line.range.start;
+        let mut words = tokens(bytes, line.range.clone());
+        let keyword = words.next().map_or(&b""[..], |k| &bytes[k]);
+        match (keyword, &normals) {
+            (b"v", _) => {
+                for (token, x) in words.by_ref().take(3).zip(positions[v].to_array()) {
+                    out.extend_from_slice(&bytes[copied..token.start]);
+                    out.extend_from_slice(x.to_string().as_bytes());
+                    copied = token.end;
+                }
+                v += 1;
+            }
+            (b"vn", Some(normals)) => {
+                if normals.write_line(vn, line_end(&bytes[line.range.clone()]), &mut out) {
+                    copied = line.range.end;
+                }
+                vn += 1;
+            }
+            (b"f" | b"fo", Some(normals)) => {
+                for token in words {
+                    let pair = normals.of_corner[corner];
+                    corner += 1;
+                    if normals.renumbered && normals.line_of_pair[pair as usize] != 0 {
+                        let slash = bytes[token.clone()].iter().rposition(|&b| b == b'/').unwrap_or(0);
+                        out.extend_from_slice(&bytes[copied..=token.start + slash]);
+                        out.extend_from_slice(normals.line_of_pair[pair as usize].to_string().as_bytes());
+                        copied = token.end;
+                    }
+                }
+            }
+            _ => {}
+        }
+        out.extend_from_slice(&bytes[copied..line.range.end]);
+    }
+    out
+}
+
+struct PatchedNormals {
+    /// New normals that take the place of each `vn` line.
+    lines: Vec<Vec<Vec3>>,
+    of_corner: Vec<u32>,
+    /// Number, from 1, of each pair's new line; 0 for a pair without a normal.
+    line_of_pair: Vec<u32>,
+    renumbered: bool,
+}
+
+impl PatchedNormals {
+    fn new(document: &ObjDocument, rest: &[Vec3], positions: &[Vec3]) -> Self {
+        let pairs = document.pairs(rest);
+        let new = pairs.shading.normals(&pairs.shading.rotations(positions));
+        let mut users: Vec<Vec<u32>> = vec![Vec::new(); document.normals.len()];
+        for (pair, &vn) in pairs.vn.iter().enumerate() {
+            if vn != NONE {
+                users[vn as usize].push(pair as u32);
+            }
+        }
+        let mut line_of_pair = vec![0; pairs.vn.len()];
+        let mut next = 1;
+        for users in &users {
+            for (k, &pair) in users.iter().enumerate() {
+                line_of_pair[pair as usize] = next + k as u32;
+            }
+            // A normal that nobody uses keeps its line, and so its number.
+            next += users.len().max(1) as u32;
+        }
+        Self {
+            renumbered: users.iter().any(|u| u.len() > 1),
+            lines: users.iter().map(|u| u.iter().map(|&p| new[p as usize]).collect()).collect(),
+            of_corner: pairs.of_corner,
+            line_of_pair,
+        }
+    }
+
+    /// Writes what replaces a `vn` line; false when the line stays.
+    fn write_line(&self, vn: usize, end: &[u8], out: &mut Vec<u8>) -> bool {
+        for n in &self.lines[vn] {
+            out.extend_from_slice(format!("vn {} {} {}", n.x, n.y, n.z).as_bytes());
+            out.extend_from_slice(end);
+        }
+        !self.lines[vn].is_empty()
+    }
+}
+
+/// Line end of a line as read; LF for a last line without one.
+fn line_end(line: &[u8]) -> &[u8] {
+    match line {
+        [.., b'\r', b'\n'] => b"\r\n",
+        [.., b'\r'] => b"\r",
+        _ => b"\n",
+    }
+}
+
+/// A part of a new OBJ file: vertices `start..start + n` of the model and their faces.
+pub(crate) struct ObjPart {
+    /// `o` line.
+    pub(crate) name: String,
+    /// `usemtl` line.
+    pub(crate) material: Option<String>,
+    /// First vertex of the part.
+    pub(crate) start: u32,
+    /// One for each vertex, v upwards, or none.
+    pub(crate) texcoords: Vec<[f32; 2]>,
+    /// One for each vertex, or none.
+    pub(crate) normals: Vec<Vec3>,
+    /// Of the model's vertices.
+    pub(crate) triangles: Vec<[u32; 3]>,
+}
+
+/// A new OBJ file: all vertices in the model's order, then each part.
+pub(crate) fn write_new(positions: &[Vec3], parts: &[ObjPart]) -> Vec<u8> {
+    let mut text = String::with_capacity(64 * positions.len());
+    for p in positions {
+        line(&mut text, format_args!("v {} {} {}", p.x, p.y, p.z));
+    }
+    let (mut n_vt, mut n_vn) = (0_u32, 0_u32);
+    for part in parts {
+        line(&mut text, format_args!("o {}", one_line(&part.name)));
+        if let Some(material) = &part.material {
+            line(&mut text, format_args!("usemtl {}", one_line(material)));
+        }
+        for [u, v] in &part.texcoords {
+            line(&mut text, format_args!("vt {u} {v}"));
+        }
+        for n in &part.normals {
+            line(&mut text, format_args!("vn {} {} {}", n.x, n.y, n.z));
+        }
+        for t in &part.triangles {
+            text.push('f');
+            for &v in t {
+                let local = v - part.start + 1;
+                let (vt, vn) = (n_vt + local, n_vn + local);
+                let written = match (part.texcoords.is_empty(), part.normals.is_empty()) {
+                    (true, true) => write!(text, " {}", v + 1),
+                    (false, true) => write!(text, " {}/{vt}", v + 1),
+                    (true, false) => write!(text, " {}//{vn}", v + 1),
+                    (false, false) => write!(text, " {}/{vt}/{vn}", v + 1),
+                };
+                written.expect("a String takes all text");
+            }
+            text.push('\n');
+        }
+        n_vt += part.texcoords.len() as u32;
+        n_vn += part.normals.len() as u32;
+    }
+    text.into_bytes()
+}
+
+/// A cage as an OBJ file: its vertices and polygons in order.
+#[must_use]
+pub fn write_cage_obj(cage: &PolygonMesh) -> Vec<u8> {
+    let mut text = String::with_capacity(64 * cage.positions.len());
+    for p in &cage.positions {
+        line(&mut text, format_args!("v {} {} {}", p.x, p.y, p.z));
+    }
+    for face in &cage.faces {
+        text.push('f');
+        for &v in face {
+            write!(text, " {}", u64::from(v) + 1).expect("a String takes all text");
+        }
+        text.push('\n');
+    }
+    text.into_bytes()
+}
+
+fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
+    text.write_fmt(content).expect("a String takes all text");
+    text.push('\n');
+}
+
+/// A name that cannot break its line.
+fn one_line(name: &str) -> String {
+    name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}

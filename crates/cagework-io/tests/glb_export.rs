@@ -1,0 +1,276 @@
+//! GLB out: the deformed shape in the original document.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
+
+mod common;
+
+use cagework_io::Model;
+use common::{
+    Builder, CUBE_OBJ, PNG, cube, instanced, json_of, plain_cube, quantized, read, relative_error, skinned,
+    textured_square, twist, volume,
+};
+use glam::Vec3;
+use serde_json::{Value, json};
+
+/// An f32 through a transform and back.
+const ROUND_TRIP: f32 = 1e-6;
+
+fn deformed(model: &Model) -> Vec<Vec3> {
+    model.positions.iter().map(|&p| twist(p)).collect()
+}
+
+fn square() -> Model {
+    let bytes = textured_square().glb();
+    Model::read("square.glb", &bytes, &mut |uri| (uri == "red dot.png").then(|| PNG.to_vec())).unwrap()
+}
+
+#[test]
+fn deformed_positions_come_back() {
+    let models = [plain_cube(), textured_square(), instanced(), skinned(), quantized()];
+    for (k, b) in models.iter().enumerate() {
+        let model = read("x.glb", &b.glb()).unwrap();
+        let expected = deformed(&model);
+        let again = read("y.glb", &model.write_glb(&expected).unwrap()).unwrap();
+        assert!(relative_error(&expected, &again.positions) < ROUND_TRIP, "model {k}");
+        let same_winding = volume(&again) * volume(&model) >= 0.0;
+        assert!(same_winding, "model {k}");
+        let obj = read("y.obj", &model.write_obj(&expected).unwrap()).unwrap();
+        assert!(relative_error(&expected, &obj.positions) < ROUND_TRIP, "model {k} as OBJ");
+        assert_eq!(obj.triangles, model.triangles, "model {k} as OBJ");
+    }
+}
+
+#[test]
+fn export_at_rest_is_the_original_shape() {
+    let model = square();
+    let again = read("y.glb", &model.write_glb(&model.positions).unwrap()).unwrap();
+    assert!(relative_error(&model.positions, &again.positions) < ROUND_TRIP);
+}
+
+#[test]
+fn materials_textures_names_and_nodes_survive() {
+    let model = square();
+    let (before, after) = (textured_square().json, json_of(&model.write_glb(&deformed(&model)).unwrap()));
+    for key in ["nodes", "materials", "textures", "scenes", "asset"] {
+        assert_eq!(before[key], after[key], "{key}");
+    }
+    let primitive = &after["meshes"][0]["primitives"][0];
+    assert_eq!((&primitive["material"], &after["meshes"][0]["name"]), (&json!(0), &json!("square")));
+    assert!(primitive["attributes"]["TEXCOORD_0"].is_u64());
+    let image = &after["images"][0];
+    assert_eq!((&image["mimeType"], &image["uri"]), (&json!("image/png"), &Value::Null));
+    let view = &after["bufferViews"][image["bufferView"].as_u64().unwrap() as usize];
+    assert_eq!(view["byteLength"], PNG.len());
+    // Four attributes and an image; what they replaced is gone.
+    assert_eq!(after["accessors"].as_array().unwrap().len(), 4);
+    assert_eq!(after["bufferViews"].as_array().unwrap().len(), 5);
+}
+
+#[test]
+fn missing_texture_is_a_notice_and_keeps_its_reference() {
+    let model = read("x.glb", &textured_square().glb()).unwrap();
+    assert!(model.notices[0].contains("'red dot.png' is not there"), "{:?}", model.notices);
+    let after = json_of(&model.write_glb(&model.positions).unwrap());
+    assert_eq!(after["images"][0]["uri"], "red%20dot.png");
+}
+
+#[test]
+fn bounds_are_those_of_the_new_positions() {
+    let model = read("x.glb", &plain_cube().glb()).unwrap();
+    let moved: Vec<Vec3> = cube().iter().map(|p| 2.0 * *p - Vec3::Y).collect();
+    let after = json_of(&model.write_glb(&moved).unwrap());
+    let position = after["meshes"][0]["primitives"][0]["attributes"]["POSITION"].as_u64().unwrap() as usize;
+    let accessor = &after["accessors"][position];
+    assert_eq!((&accessor["min"], &accessor["max"]), (&json!([0.0, -1.0, 0.0]), &json!([2.0, 1.0, 2.0])));
+}
+
+/// Attribute of the only primitive, as rows of floats.
+fn attribute(glb: &[u8], name: &str, width: usize) -> Vec<Vec<f32>> {
+    let json = json_of(glb);
+    let accessor = json["meshes"][0]["primitives"][0]["attributes"][name].as_u64().unwrap() as usize;
+    let view = &json["bufferViews"][json["accessors"][accessor]["bufferView"].as_u64().unwrap() as usize];
+    let start = view["byteOffset"].as_u64().unwrap() as usize;
+    let json_length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let bytes = &glb[28 + json_length + start..][..view["byteLength"].as_u64().unwrap() as usize];
+    let values: Vec<f32> = bytes.chunks(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+    values.chunks(width).map(<[f32]>::to_vec).collect()
+}
+
+#[test]
+fn normals_and_tangents_turn_with_the_surface() {
+    let mut b = textured_square();
+    b.json["nodes"] = json!([{ "mesh": 0 }]);
+    let model = read("x.glb", &b.glb()).unwrap();
+    // A quarter turn about x: y becomes z.
+    let turned: Vec<Vec3> = model.positions.iter().map(|p| Vec3::new(p.x, -p.z, p.y)).collect();
+    let glb = model.write_glb(&turned).unwrap();
+    for (normal, tangent) in attribute(&glb, "NORMAL", 3).iter().zip(attribute(&glb, "TANGENT", 4)) {
+        assert!(Vec3::from_slice(normal).distance(-Vec3::Y) < 1e-6, "{normal:?}");
+        assert!(Vec3::from_slice(&tangent).distance(Vec3::X) < 1e-6 && tangent[3] == 1.0, "{tangent:?}");
+    }
+}
+
+#[test]
+fn seams_stay_smooth() {
+    let mut b = textured_square();
+    b.json["nodes"] = json!([{ "mesh": 0 }]);
+    let model = read("x.glb", &b.glb()).unwrap();
+    // Fold along the diagonal, where the two triangles have vertices of their own.
+    let folded: Vec<Vec3> = model.positions.iter().map(|p| p.with_z((p.x - p.y).abs())).collect();
+    let normals = attribute(&model.write_glb(&folded).unwrap(), "NORMAL", 3);
+    // Vertices 0 and 3 are one corner of the square, 2 and 4 the opposite one.
+    assert_eq!((&normals[0], &normals[2]), (&normals[3], &normals[4]));
+    assert!((normals[0][2] - 1.0).abs() < 1e-6, "two mirrored slopes average to upright: {:?}", normals[0]);
+}
+
+#[test]
+fn each_instance_gets_its_own_mesh() {
+    let mut b = instanced();
+    let unseen = b.push("nodes", json!({ "name": "unseen", "mesh": 0 }));
+    let model = read("x.glb", &b.glb()).unwrap();
+    let after = json_of(&model.write_glb(&deformed(&model)).unwrap());
+    let mesh = |node: usize| after["nodes"][node]["mesh"].as_u64().unwrap();
+    assert_eq!(after["meshes"].as_array().unwrap().len(), 3);
+    assert!(mesh(0) != mesh(1) && mesh(0) != mesh(unseen) && mesh(1) != mesh(unseen));
+    assert_eq!(
+        after["meshes"][mesh(unseen) as usize],
+        b.json["meshes"][0],
+        "a node outside the scene keeps its mesh"
+    );
+}
+
+#[test]
+fn skin_and_its_attributes_are_gone_but_the_joints_stay() {
+    let model = read("x.glb", &skinned().glb()).unwrap();
+    let after = json_of(&model.write_glb(&deformed(&model)).unwrap());
+    let (node, names) = (&after["nodes"][3], [0, 1, 2].map(|n| after["nodes"][n]["name"].clone()));
+    assert_eq!(names, ["body", "low", "high"]);
+    assert_eq!(
+        (&node["name"], &node["skin"], &node["translation"]),
+        (&json!("body"), &Value::Null, &Value::Null)
+    );
+    assert_eq!(after["nodes"][0].get("mesh"), None);
+    assert_eq!(after["scenes"][0]["nodes"], json!([0, 1, 3]));
+    let mesh = &after["meshes"][0];
+    assert_eq!(mesh["primitives"][0]["attributes"].as_object().unwrap().len(), 1);
+    assert_eq!(mesh["primitives"][0]["targets"], Value::Null);
+    assert_eq!(mesh["extras"], json!({ "kept": 7 }));
+    assert_eq!(after["animations"].as_array().unwrap().len(), 1, "the morph's animation went with it");
+}
+
+#[test]
+fn flattening_transform_is_stepped_around() {
+    let mut b = plain_cube();
+    b.json["nodes"][0]["scale"] = json!([1.0, 1.0, 0.0]);
+    let model = read("x.glb", &b.glb()).unwrap();
+    let expected = deformed(&model);
+    let again = read("y.glb", &model.write_glb(&expected).unwrap()).unwrap();
+    assert!(relative_error(&expected, &again.positions) < ROUND_TRIP);
+}
+
+#[test]
+fn file_without_nodes_gets_one() {
+    let mut b = plain_cube();
+    for key in ["nodes", "scenes", "scene"] {
+        b.json.as_object_mut().unwrap().remove(key);
+    }
+    let model = read("x.glb", &b.glb()).unwrap();
+    let expected = deformed(&model);
+    let glb = model.write_glb(&expected).unwrap();
+    assert_eq!(json_of(&glb)["scenes"], json!([{ "nodes": [0] }]));
+    assert!(relative_error(&expected, &read("y.glb", &glb).unwrap().positions) < ROUND_TRIP);
+}
+
+#[test]
+fn unknown_extensions_keep_every_accessor() {
+    let mut b = plain_cube();
+    b.json["extensionsUsed"] = json!(["VENDOR_secret"]);
+    b.json["extensions"] = json!({ "VENDOR_secret": { "accessor": 1 } });
+    let model = read("x.glb", &b.glb()).unwrap();
+    let after = json_of(&model.write_glb(&deformed(&model)).unwrap());
+    assert_eq!(after["accessors"].as_array().unwrap().len(), 3);
+    assert_eq!(after["accessors"][1], b.json["accessors"][1]);
+}
+
+fn poses(model: &Model) -> Vec<(String, Vec<Vec3>)> {
+    let shift = model.positions.iter().map(|p| *p + Vec3::Z).collect();
+    vec![("twisted".into(), deformed(model)), ("raised".into(), shift)]
+}
+
+#[test]
+fn poses_are_morph_targets_with_an_animation() {
+    let obj = read("box.obj", CUBE_OBJ.as_bytes()).unwrap();
+    for model in [square(), obj, read("x.glb", &instanced().glb()).unwrap()] {
+        let poses = poses(&model);
+        let mut after = json_of(&model.write_glb_poses(&model.positions, &poses).unwrap());
+        let nodes = after["nodes"].as_array().unwrap().iter().filter(|n| n["mesh"].is_u64()).count();
+        for mesh in after["meshes"].as_array().unwrap() {
+            assert_eq!(mesh["extras"]["targetNames"], json!(["twisted", "raised"]));
+            assert!(
+                mesh["primitives"]
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .all(|p| p["targets"].as_array().unwrap().len() == 2)
+            );
+        }
+        let animation = after["animations"][0].take();
+        assert_eq!(animation["channels"].as_array().unwrap().len(), nodes);
+        let times = &after["accessors"][animation["samplers"][0]["input"].as_u64().unwrap() as usize];
+        assert_eq!((&times["count"], &times["max"]), (&json!(4), &json!([3.0])));
+    }
+}
+
+#[test]
+fn morph_target_at_weight_one_is_the_pose() {
+    let model = read("x.glb", &instanced().glb()).unwrap();
+    let poses = poses(&model);
+    let glb = model.write_glb_poses(&model.positions, &poses).unwrap();
+    for (k, (name, expected)) in poses.iter().enumerate() {
+        let mut json = json_of(&glb);
+        for mesh in json["meshes"].as_array_mut().unwrap() {
+            mesh["weights"][k] = 1.0.into();
+        }
+        let json_length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+        let posed = common::glb(&json, Some(&glb[28 + json_length..]));
+        let posed = read("y.glb", &posed).unwrap();
+        assert!(relative_error(expected, &posed.positions) < ROUND_TRIP, "{name}");
+    }
+}
+
+#[test]
+fn obj_becomes_a_glb_with_texture_coordinates_and_hard_edges() {
+    let model = read("box.obj", CUBE_OBJ.as_bytes()).unwrap();
+    let expected = deformed(&model);
+    let glb = model.write_glb(&expected).unwrap();
+    let json = json_of(&glb);
+    let primitives = json["meshes"][0]["primitives"].as_array().unwrap();
+    let materials: Vec<&Value> = primitives
+        .iter()
+        .map(|p| &json["materials"][p["material"].as_u64().unwrap() as usize]["name"])
+        .collect();
+    assert_eq!(materials, ["red", "blue"]);
+    assert!(primitives.iter().all(|p| p["attributes"]["TEXCOORD_0"].is_u64()));
+    let again = read("y.glb", &glb).unwrap();
+    // Four vertices a face: each has its own normal.
+    assert_eq!((again.positions.len(), again.triangles.len()), (24, 12));
+    assert!(again.positions.iter().all(|p| expected.contains(p)));
+    let mut before = model.clone();
+    before.positions = expected;
+    assert!((volume(&before) - volume(&again)).abs() < 1e-5);
+    let no_faces = read("p.obj", b"v 0 0 0").unwrap();
+    assert!(no_faces.write_glb(&no_faces.positions).unwrap_err().to_string().contains("no faces"));
+}
+
+#[test]
+fn gltf_becomes_an_obj_with_its_texture_coordinates_and_names() {
+    let model = square();
+    let text = String::from_utf8(model.write_obj(&model.positions).unwrap()).unwrap();
+    for line in ["o leaf", "usemtl paint", "vt 0.5 0", "f 1/1/1 2/2/2 3/3/3"] {
+        assert!(text.lines().any(|l| l == line), "{line}");
+    }
+    let instanced: Builder = instanced();
+    let text = read("x.glb", &instanced.glb()).unwrap();
+    let text = String::from_utf8(text.write_obj(&text.positions).unwrap()).unwrap();
+    assert!(text.contains("o left") && text.contains("o right") && !text.contains('/'));
+}

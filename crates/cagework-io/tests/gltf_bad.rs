@@ -1,0 +1,185 @@
+//! Damaged and unreadable glTF files: each ends in an error that says what and where.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
+
+mod common;
+
+use cagework_io::{GltfError, ReadError};
+use common::{Builder, floats, glb, plain_cube, read, skinned};
+use serde_json::json;
+
+fn fault(bytes: &[u8]) -> String {
+    read("x.glb", bytes).unwrap_err().to_string()
+}
+
+/// The plain cube after `change`, read: its error.
+fn fault_of(change: impl FnOnce(&mut Builder)) -> String {
+    let mut b = plain_cube();
+    change(&mut b);
+    fault(&b.glb())
+}
+
+#[test]
+fn every_truncation_is_an_error() {
+    let bytes = plain_cube().glb();
+    for length in 0..bytes.len() {
+        assert!(read("x.glb", &bytes[..length]).is_err(), "{length} of {} bytes", bytes.len());
+    }
+}
+
+#[test]
+fn damaged_headers_are_errors() {
+    let good = plain_cube().glb();
+    let with = |at: usize, word: u32| {
+        let mut bytes = good.clone();
+        bytes[at..at + 4].copy_from_slice(&word.to_le_bytes());
+        bytes
+    };
+    assert!(fault(&with(0, 0)).contains("not a GLB"));
+    assert!(fault(&with(4, 1)).contains("version 1"));
+    assert!(fault(&with(8, 3)).contains("says it has 3 bytes"));
+    assert!(fault(&with(8, u32::MAX)).contains("cut off"));
+    assert!(fault(&with(12, u32::MAX)).contains("not a readable GLB"));
+    assert!(fault(&with(16, 0)).contains("not a readable GLB"));
+    assert!(fault(&glb(&json!([1, 2]), None)).contains("version"));
+    assert!(fault(&glb(&json!({ "asset": { "version": "1.0" } }), None)).contains("1.0"));
+}
+
+#[test]
+fn indices_out_of_range_are_named() {
+    for (message, expected) in [
+        (fault_of(|b| b.json["nodes"][0]["mesh"] = 5.into()), "node 0 names mesh 5, but there are 1"),
+        (fault_of(|b| b.json["nodes"][0]["children"] = json!([9])), "node 0 names child node 9"),
+        (fault_of(|b| b.json["scene"] = 3.into()), "names scene 3, but there are 1"),
+        (fault_of(|b| b.json["scenes"][0]["nodes"] = json!([4])), "scene 0 names node 4"),
+        (fault_of(|b| b.json["nodes"][0]["skin"] = 0.into()), "node 0 names skin 0, but there are 0"),
+        (
+            fault_of(|b| b.primitive(0)["attributes"]["POSITION"] = 77.into()),
+            "names accessor 77, but there are 2",
+        ),
+        (fault_of(|b| b.primitive(0)["indices"] = 77.into()), "names accessor 77"),
+        (fault_of(|b| b.json["accessors"][0]["bufferView"] = 9.into()), "accessor 0 names buffer view 9"),
+        (fault_of(|b| b.json["bufferViews"][0]["buffer"] = 9.into()), "buffer view 0 names buffer 9"),
+        (
+            fault_of(|b| {
+                let indices = b.indices(&[0, 1, 8]);
+                b.primitive(0)["indices"] = indices.into();
+            }),
+            "accessor 2: a triangle names vertex 8, but there are 8",
+        ),
+    ] {
+        assert!(message.contains(expected), "{message} should say {expected}");
+    }
+    let mut b = skinned();
+    b.json["skins"][0]["joints"] = json!([1]);
+    assert!(fault(&b.glb()).contains("skin 0 names joint 1, but there are 1"));
+    b.json["skins"][0]["joints"] = json!([1, 99]);
+    assert!(fault(&b.glb()).contains("skin 0 names joint node 99"));
+}
+
+#[test]
+fn accessors_that_do_not_fit_are_errors() {
+    for (message, expected) in [
+        (fault_of(|b| b.json["accessors"][0]["count"] = 9.into()), "accessor 0 needs 9 elements"),
+        (
+            fault_of(|b| b.json["accessors"][0]["count"] = json!(1_u64 << 40)),
+            "more than the limit of 33554432",
+        ),
+        (fault_of(|b| b.json["accessors"][0]["byteOffset"] = json!(u64::MAX)), "accessor 0 needs 8 elements"),
+        (
+            fault_of(|b| b.json["bufferViews"][0]["byteStride"] = json!(1_u64 << 62)),
+            "accessor 0 needs 8 elements",
+        ),
+        (fault_of(|b| b.json["bufferViews"][0]["byteLength"] = 10_000.into()), "longer than its buffer"),
+        (fault_of(|b| b.json["bufferViews"][0]["byteOffset"] = json!(u64::MAX)), "longer than its buffer"),
+        (fault_of(|b| b.json["accessors"][0]["type"] = "VEC2".into()), "is vec2, but position needs vec3"),
+        (fault_of(|b| b.json["accessors"][0]["componentType"] = 1.into()), "unknown component type"),
+        (fault_of(|b| b.json["accessors"][1]["componentType"] = 5126.into()), "not unsigned integers"),
+    ] {
+        assert!(message.contains(expected), "{message} should say {expected}");
+    }
+    let message = fault_of(|b| {
+        let (places, values) = (b.view(&[8]), b.view(&floats(&[0.0; 3])));
+        b.json["accessors"][0]["sparse"] = json!({
+            "count": 1,
+            "indices": { "bufferView": places, "componentType": 5121 },
+            "values": { "bufferView": values },
+        });
+    });
+    assert!(message.contains("sparse value for element 8"), "{message}");
+}
+
+#[test]
+fn nodes_that_are_no_tree_are_errors() {
+    let nodes = |nodes| fault_of(move |b| b.json["nodes"] = nodes);
+    let cycle = json!([{ "mesh": 0 }, { "children": [2] }, { "children": [1] }]);
+    assert!(nodes(cycle).contains("node 1 is its own ancestor"));
+    let own = json!([{ "mesh": 0, "children": [0] }]);
+    assert!(nodes(own).contains("is its own ancestor"));
+    let shared = json!([{ "mesh": 0, "children": [2] }, { "children": [2] }, {}]);
+    assert!(nodes(shared).contains("node 2 has two parents"));
+}
+
+#[test]
+fn deep_trees_need_no_stack() {
+    let depth = 100_000;
+    let mut b = plain_cube();
+    let mut nodes: Vec<_> = (1..depth).map(|i| json!({ "children": [i] })).collect();
+    nodes.push(json!({ "mesh": 0 }));
+    b.json["nodes"] = nodes.into();
+    assert_eq!(read("x.glb", &b.glb()).unwrap().positions.len(), 8);
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_named() {
+    let message = fault_of(|b| {
+        let position = b.vec3(&[[0.0; 3], [0.0, f32::NAN, 0.0], [1.0; 3]]);
+        b.json["accessors"][position].as_object_mut().unwrap().remove("min");
+        *b.primitive(0) = json!({ "attributes": { "POSITION": position } });
+    });
+    assert!(message.contains("accessor 2: the position of its vertex 1 is not a finite number"), "{message}");
+    let message = fault_of(|b| b.json["nodes"][0]["scale"] = json!([1e39, 1.0, 1.0]));
+    assert!(message.contains("not finite"), "{message}");
+    let far =
+        json!([{ "scale": [1e38, 1.0, 1.0], "children": [1] }, { "scale": [10.0, 1.0, 1.0], "mesh": 0 }]);
+    let message = fault_of(|b| b.json["nodes"] = far);
+    assert!(message.contains("accessor 0: the position of its vertex 1"), "{message}");
+}
+
+#[test]
+fn compressed_geometry_says_how_to_convert() {
+    for extension in ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"] {
+        let required = |b: &mut Builder| b.json["extensionsRequired"] = json!([extension]);
+        let in_primitive =
+            |b: &mut Builder| b.primitive(0)["extensions"] = json!({ extension: { "bufferView": 0 } });
+        let in_view = |b: &mut Builder| b.json["bufferViews"][0]["extensions"] = json!({ extension: {} });
+        for message in [fault_of(required), fault_of(in_primitive), fault_of(in_view)] {
+            assert!(message.contains(extension), "{message}");
+            assert!(message.contains("npx @gltf-transform/cli copy x.glb x-plain.glb"), "{message}");
+        }
+    }
+}
+
+#[test]
+fn missing_files_are_named() {
+    let mut b = plain_cube();
+    b.json["buffers"] = json!([{ "byteLength": 100, "uri": "far%20away.bin" }]);
+    let text = serde_json::to_vec(&b.json).unwrap();
+    let error = read("x.gltf", &text).unwrap_err();
+    let expected = GltfError::MissingFile { uri: "far away.bin".into() };
+    assert_eq!(error, ReadError::Gltf { name: "x.gltf".into(), source: expected });
+    let short =
+        cagework_io::Model::read("x.gltf", &text, &mut |_| Some(vec![0; 10])).unwrap_err().to_string();
+    assert!(short.contains("buffer 0 says it has 100 bytes but has 10"), "{short}");
+}
+
+/// Found by the fuzz test: lists that are there but empty.
+#[test]
+fn empty_lists_are_as_good_as_missing_ones() {
+    let mut b = skinned();
+    b.json["scenes"] = json!([]);
+    let model = read("x.glb", &b.glb()).unwrap();
+    let again = read("y.glb", &model.write_glb(&model.positions).unwrap()).unwrap();
+    assert_eq!(again.positions, model.positions);
+    assert!(fault_of(|b| b.json["nodes"] = json!([])).contains("scene 0 names node 0, but there are 0"));
+}

@@ -1,0 +1,292 @@
+//! glTF in: every way a mesh may be stored.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
+
+mod common;
+
+use cagework_io::{Format, Model};
+use common::{
+    Builder, CUBE, CUBE_TRIANGLES, I16, U8, U32, cube, floats, glb, instanced, plain_cube, quantized, read,
+    relative_error, skinned, volume,
+};
+use glam::Vec3;
+use serde_json::json;
+
+/// One or two roundings to f32 in coordinates near 1.
+const ROUNDING: f32 = 1e-6;
+
+fn read_glb(b: &Builder) -> Model {
+    read("x.glb", &b.glb()).unwrap()
+}
+
+/// Reads as the outward unit cube.
+fn assert_cube(model: &Model, expected: &[Vec3]) {
+    assert!(relative_error(expected, &model.positions) < ROUNDING, "{:?}", model.positions);
+    assert_eq!(model.triangles.len(), 12);
+}
+
+#[test]
+fn plain_glb_and_gltf_with_files_read_the_same() {
+    let b = plain_cube();
+    let model = read_glb(&b);
+    assert_cube(&model, &cube());
+    assert_eq!((model.format(), model.counts.nodes, model.counts.primitives), (Format::Gltf, 1, 1));
+    assert!((volume(&model) - 1.0).abs() < ROUNDING);
+    let mut json = b.json.clone();
+    json["buffers"] = json!([{ "byteLength": b.bin.len(), "uri": "my%20cube.bin" }]);
+    let text = [b"\xef\xbb\xbf \n", serde_json::to_vec(&json).unwrap().as_slice()].concat();
+    let with_file =
+        Model::read("x.gltf", &text[..], &mut |uri| (uri == "my cube.bin").then(|| b.bin.clone()));
+    // A byte order mark is not JSON, but some exporters write it; blanks after it are JSON.
+    assert_eq!(with_file.unwrap().positions, cube());
+    let hex: String = b.bin.iter().map(|byte| format!("%{byte:02x}")).collect();
+    json["buffers"][0]["uri"] = format!("data:application/octet-stream,{hex}").into();
+    assert_eq!(read("x.gltf", &serde_json::to_vec(&json).unwrap()).unwrap().positions, cube());
+}
+
+#[test]
+fn indices_of_every_width_are_read() {
+    for component in [U8, common::U16, U32] {
+        let mut b = plain_cube();
+        let bytes: Vec<u8> = CUBE_TRIANGLES
+            .as_flattened()
+            .iter()
+            .flat_map(|i| {
+                i.to_le_bytes()[..match component {
+                    U8 => 1,
+                    U32 => 4,
+                    _ => 2,
+                }]
+                    .to_vec()
+            })
+            .collect();
+        let accessor = b.accessor(&bytes, component, 36, "SCALAR");
+        b.primitive(0)["indices"] = accessor.into();
+        assert_eq!(read_glb(&b).triangles, CUBE_TRIANGLES, "component type {component}");
+    }
+}
+
+#[test]
+fn non_indexed_triangles_are_read() {
+    let mut b = plain_cube();
+    let corners: Vec<[f32; 3]> = CUBE_TRIANGLES.as_flattened().iter().map(|&i| CUBE[i as usize]).collect();
+    let position = b.vec3(&corners);
+    *b.primitive(0) = json!({ "attributes": { "POSITION": position } });
+    let model = read_glb(&b);
+    assert_eq!((model.positions.len(), model.triangles.len()), (36, 12));
+    assert!((volume(&model) - 1.0).abs() < ROUNDING);
+    let cage = model.cage_mesh();
+    assert_eq!((cage.positions.len(), cage.faces.len()), (8, 12));
+    assert_eq!(
+        cage.positions[..3],
+        [Vec3::ZERO, Vec3::Y, Vec3::new(1.0, 1.0, 0.0)],
+        "first occurrence first"
+    );
+}
+
+#[test]
+fn strips_and_fans_keep_their_winding() {
+    let mut b = plain_cube();
+    let indices = b.indices(&[0, 1, 3, 2]);
+    b.primitive(0)["indices"] = indices.into();
+    b.primitive(0)["mode"] = 6.into();
+    // glTF 2.0, section 3.7.2.1: p_i = (v_(i + 1), v_(i + 2), v_0).
+    assert_eq!(read_glb(&b).triangles, [[1, 3, 0], [3, 2, 0]]);
+    let mut b = plain_cube();
+    let indices = b.indices(&[0, 1, 2, 3, 3, 5]);
+    b.primitive(0)["indices"] = indices.into();
+    b.primitive(0)["mode"] = 5.into();
+    // glTF 2.0, section 3.7.2.1: p_i = (v_i, v_(i + 1 + i % 2), v_(i + 2 - i % 2)); the stitch (3, 3) is dropped.
+    assert_eq!(read_glb(&b).triangles, [[0, 1, 2], [1, 3, 2]]);
+}
+
+#[test]
+fn quantized_positions_are_read() {
+    assert_cube(&read_glb(&quantized()), &cube());
+    let mut b = quantized();
+    let bytes: Vec<u8> = CUBE.iter().flatten().flat_map(|&x| ((x * 32767.0) as i16).to_le_bytes()).collect();
+    let position = b.accessor(&bytes, I16, 8, "VEC3");
+    b.json["accessors"][position]["normalized"] = true.into();
+    b.primitive(0)["attributes"]["POSITION"] = position.into();
+    b.json["nodes"][0]["scale"] = json!([1.0, 1.0, 1.0]);
+    assert_cube(&read_glb(&b), &cube());
+}
+
+#[test]
+fn interleaved_attributes_are_read() {
+    let mut b = plain_cube();
+    let rows: Vec<f32> = CUBE.iter().flat_map(|p| [p[0], p[1], p[2], 7.0, 8.0]).collect();
+    let view = b.view(&floats(&rows));
+    b.json["bufferViews"][view]["byteStride"] = 20.into();
+    let accessor =
+        b.push("accessors", json!({ "bufferView": view, "componentType": 5126, "count": 8, "type": "VEC3" }));
+    b.primitive(0)["attributes"]["POSITION"] = accessor.into();
+    assert_cube(&read_glb(&b), &cube());
+    // The same, starting at the second column: positions (y, z, 7).
+    b.json["accessors"][accessor]["byteOffset"] = 4.into();
+    let expected: Vec<Vec3> = CUBE.iter().map(|p| Vec3::new(p[1], p[2], 7.0)).collect();
+    assert_eq!(read_glb(&b).positions, expected);
+}
+
+#[test]
+fn sparse_values_replace_zeros_and_data() {
+    let mut b = plain_cube();
+    let places = b.view(&[2, 7]);
+    let values = b.view(&floats(&[0., 1., 0., 3., 3., 3.]));
+    let sparse = json!({
+        "count": 2,
+        "indices": { "bufferView": places, "componentType": U8 },
+        "values": { "bufferView": values },
+    });
+    b.json["accessors"][0]["sparse"] = sparse.clone();
+    let mut expected = cube();
+    expected[7] = Vec3::splat(3.0);
+    assert_eq!(read_glb(&b).positions, expected);
+    let zeros =
+        b.push("accessors", json!({ "componentType": 5126, "count": 8, "type": "VEC3", "sparse": sparse }));
+    b.primitive(0)["attributes"]["POSITION"] = zeros.into();
+    let model = read_glb(&b);
+    assert_eq!(
+        (model.positions[1], model.positions[2], model.positions[7]),
+        (Vec3::ZERO, Vec3::Y, expected[7])
+    );
+}
+
+#[test]
+fn nested_transforms_are_baked() {
+    let mut b = plain_cube();
+    // Scale by (2, 1, 1), then a quarter turn about z, then a shift: (x, y, z) -> (-y, 2x, z) + (10, 0, 0).
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    b.json["nodes"] = json!([
+        { "translation": [10.0, 0.0, 0.0], "children": [1] },
+        { "rotation": [0.0, 0.0, half, half], "children": [2] },
+        { "mesh": 0, "matrix": [2.0, 0, 0, 0, 0, 1.0, 0, 0, 0, 0, 1.0, 0, 0, 0, 0, 1.0] },
+    ]);
+    let expected: Vec<Vec3> = cube().iter().map(|p| Vec3::new(10.0 - p.y, 2.0 * p.x, p.z)).collect();
+    let model = read_glb(&b);
+    assert_cube(&model, &expected);
+    assert!((volume(&model) - 2.0).abs() < 1e-4);
+}
+
+#[test]
+fn mirrored_node_stays_outward() {
+    let mut b = plain_cube();
+    b.json["nodes"][0]["scale"] = json!([1.0, -2.0, 1.0]);
+    assert!((volume(&read_glb(&b)) - 2.0).abs() < ROUNDING);
+}
+
+#[test]
+fn only_the_default_scene_is_read() {
+    let mut b = instanced();
+    b.json["scenes"] = json!([{ "nodes": [0] }, { "nodes": [1] }, {}]);
+    b.json["scene"] = 1.into();
+    let model = read_glb(&b);
+    assert_eq!(model.positions.len(), 8);
+    assert_eq!(model.positions[1], Vec3::new(4.0, 0.0, 0.0));
+    assert_eq!(model.notices.len(), 1);
+    b.json["scene"] = 2.into();
+    let model = read_glb(&b);
+    assert_eq!(model.positions.len(), 16, "an empty scene shows nothing, so everything is used");
+}
+
+#[test]
+fn vertices_come_by_mesh_then_node_then_primitive() {
+    let mut b = Builder::new();
+    let (first, second) = (b.cube_mesh("a"), b.cube_mesh("b"));
+    // The tree shows the second mesh first, and the first mesh twice.
+    b.json["nodes"] = json!([
+        { "mesh": second, "translation": [30.0, 0.0, 0.0], "children": [2] },
+        { "mesh": first, "translation": [10.0, 0.0, 0.0] },
+        { "mesh": first, "translation": [-10.0, 0.0, 0.0] },
+    ]);
+    b.json["scenes"] = json!([{ "nodes": [0, 1] }]);
+    let x: Vec<f32> = read_glb(&b).positions.iter().step_by(8).map(|p| p.x).collect();
+    assert_eq!(x, [10.0, 20.0, 30.0]);
+}
+
+#[test]
+fn file_without_nodes_shows_its_meshes() {
+    let mut b = plain_cube();
+    for key in ["nodes", "scenes", "scene"] {
+        b.json.as_object_mut().unwrap().remove(key);
+    }
+    assert_cube(&read_glb(&b), &cube());
+}
+
+#[test]
+fn skinned_mesh_stands_in_its_rest_pose() {
+    let model = read_glb(&skinned());
+    let expected: Vec<Vec3> =
+        cube().iter().map(|p| *p + Vec3::Z * if p.z > 0.5 { 2.0 } else { 0.0 }).collect();
+    assert_cube(&model, &expected);
+    assert!(model.notices.iter().any(|n| n.contains("'body' is skinned")), "{:?}", model.notices);
+    assert_eq!((model.counts.skins, model.counts.animations, model.counts.morph_targets), (1, 2, 1));
+}
+
+#[test]
+fn inverse_bind_matrices_undo_the_joints() {
+    let mut b = skinned();
+    let bind = |z: f32| [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., -z, 1.];
+    let matrices = b.accessor(&floats(&[bind(0.0), bind(2.0)].concat()), common::F32, 2, "MAT4");
+    b.json["skins"][0]["inverseBindMatrices"] = matrices.into();
+    assert_cube(&read_glb(&b), &cube());
+}
+
+#[test]
+fn morph_targets_count_at_their_default_weights() {
+    let mut b = plain_cube();
+    let delta = b.vec3(&[[0.0, 2.0, 0.0]; 8]);
+    b.primitive(0)["targets"] = json!([{ "POSITION": delta }]);
+    b.json["meshes"][0]["weights"] = json!([0.5]);
+    let shifted = |y: f32| cube().iter().map(|p| *p + Vec3::Y * y).collect::<Vec<_>>();
+    assert_cube(&read_glb(&b), &shifted(1.0));
+    b.json["nodes"][0]["weights"] = json!([0.25]);
+    assert_cube(&read_glb(&b), &shifted(0.5));
+}
+
+#[test]
+fn unknown_required_extensions_of_materials_are_no_obstacle() {
+    let mut b = plain_cube();
+    b.json["extensionsRequired"] = json!(["KHR_texture_basisu", "VENDOR_paint"]);
+    b.json["materials"] = json!([{ "alphaMode": "UNHEARD_OF" }]);
+    assert_cube(&read_glb(&b), &cube());
+}
+
+#[test]
+fn points_and_lines_are_left_alone() {
+    let mut b = instanced();
+    let lines = b.cube_mesh("lines");
+    b.primitive(lines)["mode"] = 1.into();
+    b.push("nodes", json!({ "mesh": lines }));
+    b.json["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    let model = read_glb(&b);
+    assert_eq!(model.positions.len(), 16);
+    assert!(model.notices[0].contains("points or lines"));
+}
+
+#[test]
+fn trailing_bytes_and_missing_bin_padding_are_tolerated() {
+    let mut bytes = plain_cube().glb();
+    bytes.extend_from_slice(b"trailing");
+    assert_eq!(read("x.glb", &bytes).unwrap().positions, cube());
+    let mut json = plain_cube().json;
+    json["meshes"] = json!([]);
+    json["nodes"] = json!([]);
+    json["scenes"] = json!([{}]);
+    assert!(read("x.glb", &glb(&json, None)).unwrap_err().to_string().contains("no triangles"));
+}
+
+#[test]
+fn pose_of_a_welded_cage_is_found_by_its_vertices() {
+    let mut b = plain_cube();
+    let corners: Vec<[f32; 3]> = CUBE_TRIANGLES.as_flattened().iter().map(|&i| CUBE[i as usize]).collect();
+    let position = b.vec3(&corners);
+    *b.primitive(0) = json!({ "attributes": { "POSITION": position } });
+    let cage = read_glb(&b);
+    let moved: Vec<[f32; 3]> = corners.iter().map(|p| [2.0 * p[0], p[1], p[2]]).collect();
+    let position = b.vec3(&moved);
+    b.primitive(0)["attributes"]["POSITION"] = position.into();
+    let expected: Vec<Vec3> =
+        cage.cage_mesh().positions.iter().map(|p| Vec3::new(2.0 * p.x, p.y, p.z)).collect();
+    assert_eq!(cage.pose_positions(&read_glb(&b)).unwrap(), expected);
+}

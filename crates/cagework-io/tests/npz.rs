@@ -1,0 +1,110 @@
+//! Weights to NPZ and back.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
+
+use std::io::{Cursor, Read as _, Write as _};
+
+use cagework_core::Weights;
+use cagework_core::bind::OutsideVertex;
+use cagework_io::{read_weights_npz, write_weights_npz};
+use glam::Vec3;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
+
+fn sample() -> (Weights, Vec<OutsideVertex>) {
+    let weights =
+        Weights::new(5, vec![0, 2, 2, 5], vec![0, 4, 1, 2, 3], vec![0.25, 0.75, 0.5, 0.375, 0.125]).unwrap();
+    let outside = OutsideVertex { vertex: 2, corners: [1, 2, 4], offset: Vec3::new(0.5, -1.0, 2.0) };
+    (weights, vec![outside])
+}
+
+/// The file with each array passed through `change`; deflated, as SciPy writes it.
+fn rewritten(change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) -> Vec<u8> {
+    let (weights, outside) = sample();
+    let bytes = write_weights_npz(&weights, &outside);
+    let mut from = ZipArchive::new(Cursor::new(bytes.as_slice())).unwrap();
+    let mut to = ZipWriter::new(Cursor::new(Vec::new()));
+    for i in 0..from.len() {
+        let mut entry = from.by_index(i).unwrap();
+        let (name, mut data) = (entry.name().unwrap().into_owned(), Vec::new());
+        entry.read_to_end(&mut data).unwrap();
+        if let Some(data) = change(&name, data) {
+            to.start_file(name, SimpleFileOptions::default().compression_method(CompressionMethod::Deflated))
+                .unwrap();
+            to.write_all(&data).unwrap();
+        }
+    }
+    to.finish().unwrap().into_inner()
+}
+
+#[test]
+fn weights_survive_and_bytes_repeat() {
+    let (weights, outside) = sample();
+    let bytes = write_weights_npz(&weights, &outside);
+    assert_eq!(bytes, write_weights_npz(&weights, &outside));
+    assert_eq!(read_weights_npz(&bytes).unwrap(), (weights.clone(), outside));
+    let bytes = write_weights_npz(&weights, &[]);
+    assert_eq!(read_weights_npz(&bytes).unwrap(), (weights, vec![]));
+}
+
+#[test]
+fn headers_are_what_numpy_writes() {
+    let (weights, _) = sample();
+    let bytes = write_weights_npz(&weights, &[]);
+    let mut zip = ZipArchive::new(Cursor::new(bytes.as_slice())).unwrap();
+    let mut data = Vec::new();
+    zip.by_name("indptr.npy").unwrap().read_to_end(&mut data).unwrap();
+    // numpy.lib.format, version 1.0: magic, version, header length, a dict padded to 64 bytes with a newline.
+    let header = b"{'descr': '<i4', 'fortran_order': False, 'shape': (4,), }";
+    assert_eq!(&data[..8], b"\x93NUMPY\x01\0");
+    assert_eq!(u16::from_le_bytes([data[8], data[9]]), 118);
+    assert_eq!(&data[10..10 + header.len()], header);
+    assert_eq!((data[127], data.len()), (b'\n', 128 + 4 * 4));
+}
+
+#[test]
+fn deflated_files_with_wide_numbers_are_read() {
+    let wide = rewritten(|name, data| {
+        let word = |b: &[u8]| <[u8; 4]>::try_from(b).unwrap();
+        let wide_int = |b: &[u8]| i64::from(i32::from_le_bytes(word(b))).to_le_bytes();
+        let wide_float = |b: &[u8]| f64::from(f32::from_le_bytes(word(b))).to_le_bytes();
+        let chunks = data[128..].chunks(4);
+        let (from, body): (_, Vec<u8>) = match name {
+            "indptr.npy" | "indices.npy" => (b"<i4", chunks.flat_map(wide_int).collect()),
+            "data.npy" => (b"<f4", chunks.flat_map(wide_float).collect()),
+            _ => return Some(data),
+        };
+        let mut out = data[..128].to_vec();
+        let place = out.windows(3).position(|w| w == from).unwrap();
+        out[place + 2] = b'8';
+        out.extend(body);
+        Some(out)
+    });
+    assert_eq!(read_weights_npz(&wide).unwrap(), sample());
+}
+
+#[test]
+fn faults_are_named() {
+    let message = |bytes: &[u8]| read_weights_npz(bytes).unwrap_err().to_string();
+    assert!(message(b"no zip").contains("not an .npz"));
+    for name in ["format", "shape", "indptr", "indices", "data"] {
+        let file = format!("{name}.npy");
+        let without = rewritten(|n, d| (n != file).then_some(d));
+        assert!(message(&without).contains(&format!("'{name}' is missing")));
+        let garbage =
+            rewritten(|n, d| Some(if n == file { b"\x93NUMPY\x01\0\xff\xff{".to_vec() } else { d }));
+        assert!(message(&garbage).contains(name));
+    }
+    let csc = rewritten(|n, d| Some(if n == "format.npy" { [&d[..128], b"csc"].concat() } else { d }));
+    assert!(message(&csc).contains("tocsr"));
+    let cut = rewritten(|n, d| Some(if n == "data.npy" { d[..d.len() - 2].to_vec() } else { d }));
+    assert!(message(&cut).contains("cut off"));
+    let high = rewritten(|n, d| {
+        Some(if n == "indices.npy" { [&d[..d.len() - 4], &9_i32.to_le_bytes()].concat() } else { d })
+    });
+    assert!(message(&high).contains("column 9"));
+    let negative = rewritten(|n, d| {
+        Some(if n == "indices.npy" { [&d[..d.len() - 4], &(-1_i32).to_le_bytes()].concat() } else { d })
+    });
+    assert!(message(&negative).contains("negative"));
+}

@@ -1,0 +1,179 @@
+//! OBJ in and out.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
+
+mod common;
+
+use cagework_io::{Format, write_cage_obj};
+use common::{CUBE_OBJ, cube, read, twist, volume};
+use glam::Vec3;
+
+/// Message of a failed read.
+fn fault(text: &str) -> String {
+    read("x.obj", text.as_bytes()).unwrap_err().to_string()
+}
+
+#[test]
+fn every_v_line_is_a_vertex_in_file_order() {
+    let model = read("x.obj", b"v 9 9 9\nv 0 0 0\no a\nv 1 0 0\ng b\nv 0 1 0\nf 2 3 4\n").unwrap();
+    assert_eq!(model.format(), Format::Obj);
+    assert_eq!(model.positions, [Vec3::splat(9.0), Vec3::ZERO, Vec3::X, Vec3::Y]);
+    assert_eq!(model.triangles, [[1, 2, 3]]);
+    assert_eq!(model.counts.nodes, 2);
+}
+
+#[test]
+fn all_spellings_of_a_face_mean_the_same() {
+    let head = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
+    for face in [
+        "f 1 2 3",
+        "f 1/1 2/1 3/1",
+        "f 1//1 2//1 3//1",
+        "f 1/1/1 2/1/1 3/1/1",
+        "f -3 -2 -1",
+        "f\t1  2 \\\n 3 # c",
+    ] {
+        let model = read("x.obj", format!("{head}{face}").as_bytes()).unwrap();
+        assert_eq!(model.triangles, [[0, 1, 2]], "{face}");
+        assert!(model.notices.is_empty(), "{face}: {:?}", model.notices);
+    }
+}
+
+#[test]
+fn windows_line_ends_and_latin_1_names_are_read() {
+    let text = CUBE_OBJ.replace('\n', "\r\n").replace("# a box", "# W\u{1}rfel");
+    let bytes: Vec<u8> = text.bytes().map(|b| if b == 1 { 0xfc } else { b }).collect();
+    let model = read("x.obj", &bytes).unwrap();
+    assert_eq!((model.positions.as_slice(), model.n_faces()), (cube().as_slice(), 6));
+    assert!((volume(&model) - 1.0).abs() < 1e-6);
+    let moved: Vec<Vec3> = model.positions.iter().map(|&p| twist(p)).collect();
+    let out = model.write_obj(&moved).unwrap();
+    assert!(!String::from_utf8_lossy(&out).replace("\r\n", "").contains('\n'), "line ends are kept");
+    assert!(out.windows(2).any(|w| w == [b'W', 0xfc]), "bytes that are not UTF-8 are kept");
+}
+
+#[test]
+fn cage_keeps_its_polygons() {
+    let cage = read("x.obj", CUBE_OBJ.as_bytes()).unwrap().cage_mesh();
+    assert_eq!(cage.positions, cube());
+    assert_eq!(cage.faces[0], [0, 2, 3, 1]);
+    assert_eq!(cage.faces.len(), 6);
+    let again = read("y.obj", &write_cage_obj(&cage)).unwrap().cage_mesh();
+    assert_eq!(again, cage);
+}
+
+#[test]
+fn pose_without_faces_is_read_and_is_no_mesh() {
+    let cage = read("cage.obj", CUBE_OBJ.as_bytes()).unwrap();
+    let pose =
+        read("pose.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 2 2 2").unwrap();
+    assert_eq!(cage.pose_positions(&pose).unwrap()[7], Vec3::splat(2.0));
+    let message = pose.require_faces().unwrap_err().to_string();
+    assert!(message.contains("8 vertices but no faces"), "{message}");
+    let short = read("pose.obj", b"v 0 0 0").unwrap();
+    let message = cage.pose_positions(&short).unwrap_err().to_string();
+    assert!(message.contains("has 1 vertices, but cage cage.obj has 8"), "{message}");
+}
+
+#[test]
+fn errors_name_the_line() {
+    let cases = [
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99", "line 4: face names vertex 99, but there are 3"),
+        ("v 0 0 0\nv 1 0 0\nf 1 2 -3\nv 0 1 0", "line 3: face names vertex -3, but there are 2"),
+        ("v 0 0 0\nf 0 1 1", "line 2: face names vertex 0, but there are 1"),
+        ("v 0 0 0\nf 1 1", "line 2: face has 2 corners; it needs at least 3"),
+        ("v 0 0 0\nf 1 x 1", "line 2: face corner 'x' is not an index"),
+        ("v 0 0 0\nf 1/1/1/1 1 1", "line 2: face corner '1/1/1/1'"),
+        ("# c\nv 0 nan 0", "line 2: y coordinate is 'nan'"),
+        ("v 0 0 1e99", "line 1: z coordinate is '1e99'"),
+        ("v 1,5 0 0", "line 1: x coordinate is '1,5'"),
+        ("v 0 0", "line 1: z coordinate is missing"),
+        ("hello", "no vertices"),
+    ];
+    for (text, expected) in cases {
+        let message = fault(text);
+        assert!(message.contains(expected), "{message} should say {expected}");
+    }
+}
+
+#[test]
+fn other_formats_are_named_with_a_way_out() {
+    for (name, bytes, expected) in [
+        ("a.obj", &b""[..], "empty"),
+        ("a.zip", b"PK\x03\x04rest", "zip archive: unpack it"),
+        ("a.stl", b"solid x", "export it as GLB or OBJ"),
+        ("a.glb", b"glXF", "not a GLB"),
+        ("a.ply", b"ply\nformat", "PLY"),
+    ] {
+        let message = read(name, bytes).unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}");
+    }
+}
+
+#[test]
+fn forward_references_and_dangling_attributes_are_tolerated() {
+    let model = read("x.obj", b"f 1/7 2/8//  3\nv 0 0 0".as_slice()).unwrap_err().to_string();
+    assert!(model.contains("line 1"), "{model}");
+    let model = read("x.obj", b"f 1/7 2/8 3/9\nv 0 0 0\nv 1 0 0\nv 0 1 0").unwrap();
+    assert_eq!(model.triangles, [[0, 1, 2]]);
+    assert_eq!(model.notices.len(), 1);
+}
+
+#[test]
+fn concave_polygon_keeps_its_area() {
+    let model = read("x.obj", b"v 0 0 0\nv 2 1 0\nv 0 2 0\nv 1 1 0\nf 1 2 3 4").unwrap();
+    let p = |i: u32| model.positions[i as usize];
+    let area: f32 = model.triangles.iter().map(|&[a, b, c]| (p(b) - p(a)).cross(p(c) - p(a)).z / 2.0).sum();
+    let both_up = model.triangles.iter().all(|&[a, b, c]| (p(b) - p(a)).cross(p(c) - p(a)).z > 0.0);
+    // Shoelace formula of the four corners.
+    assert!(both_up && (area - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn patched_file_at_rest_is_the_same_text() {
+    // Numbers written the way Rust writes them, so that nothing else can differ.
+    let text = "# c\r\nmtllib a.mtl\no x\nv  0.5 0 0 0.1 0.2 0.3 # red\n\tv 1 0 0\nv 0 1 0\nvt 0.25 1\nusemtl m\ns 1\nf 1/1 2/1 3/1\nl 1 2\n";
+    let model = read("x.obj", text.as_bytes()).unwrap();
+    assert_eq!(String::from_utf8(model.write_obj(&model.positions).unwrap()).unwrap(), text);
+}
+
+#[test]
+fn patched_file_moves_vertices_and_keeps_the_rest() {
+    let text = "v 0 0 0 0.1 0.2 0.3\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
+    let model = read("x.obj", text.as_bytes()).unwrap();
+    let moved = [Vec3::new(1.5, -2.0, 0.125), Vec3::X, Vec3::Y];
+    let out = String::from_utf8(model.write_obj(&moved).unwrap()).unwrap();
+    assert_eq!(out, text.replacen("v 0 0 0", "v 1.5 -2 0.125", 1));
+    assert_eq!(read("x.obj", out.as_bytes()).unwrap().positions, moved);
+}
+
+#[test]
+fn patched_normals_turn_with_the_surface() {
+    let model = read("x.obj", CUBE_OBJ.as_bytes()).unwrap();
+    // A quarter turn about z: x becomes y, y becomes -x.
+    let turned: Vec<Vec3> = model.positions.iter().map(|p| Vec3::new(-p.y, p.x, p.z)).collect();
+    let out = String::from_utf8(model.write_obj(&turned).unwrap()).unwrap();
+    let normals: Vec<Vec3> = out
+        .lines()
+        .filter_map(|l| l.strip_prefix("vn "))
+        .map(|l| Vec3::from_slice(&l.split(' ').map(|x| x.parse().unwrap()).collect::<Vec<f32>>()))
+        .collect();
+    // Four corners shared each of the six lines.
+    assert_eq!(normals.len(), 24);
+    let expected = [-Vec3::Z, Vec3::Z, Vec3::X, -Vec3::X, -Vec3::Y, Vec3::Y];
+    for (k, n) in normals.iter().enumerate() {
+        assert!(n.distance(expected[k / 4]) < 1e-6, "normal {k} is {n}");
+    }
+    let again = read("y.obj", out.as_bytes()).unwrap();
+    assert!(again.notices.is_empty());
+    assert_eq!((&again.positions, again.n_faces()), (&turned, 6));
+}
+
+#[test]
+fn wrong_positions_are_refused() {
+    let model = read("x.obj", CUBE_OBJ.as_bytes()).unwrap();
+    let message = model.write_obj(&[Vec3::ZERO]).unwrap_err().to_string();
+    assert!(message.contains("1 positions for a model of 8 vertices"), "{message}");
+    let message = model.write_glb(&[Vec3::NAN; 8]).unwrap_err().to_string();
+    assert!(message.contains("vertex 0 is not a finite number"), "{message}");
+}

@@ -1,0 +1,59 @@
+#!/usr/bin/env bash
+# What must happen before cargo can run: a linker and the pinned Rust toolchain. Then `cargo xtask "$@"` takes over.
+# `npm start`, `npm test`, `npm run build` and `npm run check` all come through here.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+
+# Debian packages, as "command package...": what is missing is installed, what is there is left alone.
+debian_packages=(
+  "cc gcc libc6-dev"
+)
+
+missing=()
+for row in "${debian_packages[@]}"; do
+  read -r command packages <<<"$row"
+  command -v "$command" >/dev/null || missing+=($packages)
+done
+# The tests of the kernels need a Vulkan device: Mesa's software one where there is no other.
+if [ "${1:-}" = test ]; then
+  compgen -G "/usr/lib/*/libvulkan.so.1" >/dev/null || missing+=(libvulkan1)
+  compgen -G "/usr/share/vulkan/icd.d/*.json" >/dev/null || missing+=(mesa-vulkan-drivers)
+fi
+if ((${#missing[@]})); then
+  as_root=()
+  if [ "$(id -u)" != 0 ]; then as_root=(sudo); fi
+  if ! command -v apt-get >/dev/null || { ((${#as_root[@]})) && ! command -v sudo >/dev/null; }; then
+    echo "error: ${missing[*]} is missing and cannot be installed from here: install it, then try again" >&2
+    exit 1
+  fi
+  echo "setup: installing ${missing[*]} (apt-get)"
+  "${as_root[@]}" apt-get update -qq
+  DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}"
+fi
+
+# rustup puts cargo here, but only login shells look there.
+if ! command -v cargo >/dev/null && [ -x "${CARGO_HOME:-$HOME/.cargo}/bin/cargo" ]; then
+  export PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+fi
+if ! command -v cargo >/dev/null; then
+  cat >&2 <<'TXT'
+error: Rust is missing. Install rustup, then try again:
+  curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh -s -- -y --profile minimal
+(on Debian 13 and later also: apt-get install rustup)
+TXT
+  exit 1
+fi
+if command -v rustup >/dev/null; then
+  # rust-toolchain.toml names the version, the wasm32 target, rustfmt and clippy; rustup skips what is installed.
+  channel=$(sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
+  if ! rustup run "$channel" rustc --version >/dev/null 2>&1; then
+    echo "setup: installing Rust $channel (rustup)"
+    rustup toolchain install "$channel" --profile minimal
+  fi
+  if ! rustup target list --toolchain "$channel" --installed | grep -qx wasm32-unknown-unknown; then
+    echo "setup: installing Rust's wasm32-unknown-unknown target (rustup)"
+    rustup target add --toolchain "$channel" wasm32-unknown-unknown
+  fi
+fi
+
+exec cargo xtask "$@"

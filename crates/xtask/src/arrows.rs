@@ -1,0 +1,72 @@
+//! The dependency arrows of ARCHITECTURE.md, checked against `cargo tree`.
+//!
+//! A crate is a wall that a dependency must not pass, so each crate has a row here, and a crate without one is an error.
+
+use std::collections::BTreeSet;
+
+use crate::command::output;
+
+/// What one crate of ours may and must not depend on, directly or through others.
+struct Rule {
+    name: &'static str,
+    /// Crates of ours that it may depend on.
+    may_use: &'static [&'static str],
+    /// Crates of others that must not be behind it.
+    must_not_use: &'static [&'static str],
+}
+
+const RULES: &[Rule] = &[
+    Rule {
+        name: "cagework-core",
+        may_use: &[],
+        must_not_use: &["wgpu", "naga", "gltf", "gltf-json", "wasm-bindgen", "web-sys", "js-sys", "clap"],
+    },
+    Rule {
+        name: "cagework-io",
+        may_use: &["cagework-core"],
+        // Not wasm-bindgen: zip draws it in through getrandom on wasm32, and calls nothing of it here.
+        must_not_use: &["wgpu", "naga", "web-sys", "clap"],
+    },
+    Rule { name: "cagework-cli", may_use: &["cagework-core", "cagework-io"], must_not_use: &[] },
+    Rule { name: "cagework-gpu", may_use: &["cagework-core"], must_not_use: &["gltf", "gltf-json", "clap"] },
+    Rule { name: "cagework-tests", may_use: &["cagework-core", "cagework-gpu"], must_not_use: &[] },
+    Rule {
+        name: "cagework-benches",
+        may_use: &["cagework-core", "cagework-gpu", "cagework-io", "cagework-tests"],
+        must_not_use: &[],
+    },
+    Rule { name: "xtask", may_use: &[], must_not_use: &["wgpu"] },
+];
+
+/// Checks every crate of the workspace with all its features, natively and for the browser.
+///
+/// # Errors
+/// Names the first arrow that should not be there.
+pub(crate) fn check() -> Result<(), String> {
+    let members = tree(&["--workspace", "--depth", "0"])?;
+    if let Some(stranger) = members.iter().find(|m| RULES.iter().all(|r| r.name != **m)) {
+        return Err(format!("crate {stranger} has no rule in crates/xtask/src/arrows.rs: give it one"));
+    }
+    for rule in RULES {
+        // Not `--target all`, which follows combinations of targets and features that no build has.
+        let mut used = tree(&["--package", rule.name, "--all-features"])?;
+        used.extend(tree(&["--package", rule.name, "--all-features", "--target", "wasm32-unknown-unknown"])?);
+        for name in used.iter().filter(|name| **name != rule.name) {
+            if members.contains(name) && !rule.may_use.contains(&name.as_str()) {
+                return Err(format!("{} must not depend on {name} (ARCHITECTURE.md, arrows)", rule.name));
+            }
+            if rule.must_not_use.contains(&name.as_str()) {
+                return Err(format!("{} must not depend on {name} (ARCHITECTURE.md, arrows)", rule.name));
+            }
+        }
+    }
+    println!("arrows: {} crates depend on nothing that they must not", RULES.len());
+    Ok(())
+}
+
+/// Names of the packages in a dependency tree; development dependencies do not count.
+fn tree(args: &[&str]) -> Result<BTreeSet<String>, String> {
+    let fixed = ["tree", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}"];
+    let text = output("cargo", &[&fixed[..], args].concat())?;
+    Ok(text.lines().filter_map(|line| line.split_whitespace().next()).map(str::to_owned).collect())
+}

@@ -1,0 +1,40 @@
+//! The repository's own tasks, called through `npm start`, `npm test`, `npm run build` and `npm run check`.
+//!
+//! `cargo xtask TASK` does the same once Rust is there; `crates/xtask/run.sh` sees to that.
+
+mod arrows;
+mod command;
+mod tasks;
+
+use std::process::ExitCode;
+
+const USAGE: &str = "usage: cargo xtask TASK
+
+  start [ARGS]  build the release `cagework` and run `cagework demo ARGS` on the built-in sample
+  build         build the release `cagework` (target/release/cagework)
+  test          every test there is: Rust, wasm32 builds, glTF validator
+  check         format, lints, documentation, dependency arrows, biome
+  arrows        the dependency arrows of ARCHITECTURE.md only";
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    let outcome = match args.as_slice() {
+        ["start", rest @ ..] => tasks::start(rest),
+        ["build"] => tasks::build(),
+        ["test"] => tasks::test(),
+        ["check"] => tasks::check(),
+        ["arrows"] => arrows::check(),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,30 @@
+// The inner sum of Eq. 2: by how much each cell's weights changed between two fields, over the columns of one batch.
+// One invocation per row; batches add up in `changes`. Twin: cagework_core::stencil::change_norms.
+
+/// `mode`, bits: absolute values instead of squares; this batch is the first, so replace what is there.
+const CHANGE_ABSOLUTE = 1u;
+const CHANGE_FIRST = 2u;
+/// Changes of a weight below this do not count: their squares would be denormal.
+const CHANGE_NEGLIGIBLE = 1e-18f;
+
+@group(0) @binding(0) var<uniform> work: Work;
+@group(0) @binding(1) var<storage, read> u_old: array<vec4f>;
+@group(0) @binding(2) var<storage, read> u_new: array<vec4f>;
+@group(0) @binding(3) var<storage, read_write> changes: array<f32>;
+
+@compute @workgroup_size(64)
+fn change_norms(@builtin(global_invocation_id) id: vec3u) {
+    let number = invocation(id, work.stride);
+    if number >= work.count { return; }
+    let row = work.first + number;
+    var sum = 0.0;
+    if (work.mode & CHANGE_FIRST) == 0u { sum = changes[row]; }
+    for (var quad = 0u; quad < work.n_quads; quad++) {
+        let i = row * work.n_quads + quad;
+        var d = abs(u_new[i] - u_old[i]);
+        d = select(vec4f(0.0), d, d > vec4f(CHANGE_NEGLIGIBLE));
+        if (work.mode & CHANGE_ABSOLUTE) == 0u { d *= d; }
+        sum += (d.x + d.y) + (d.z + d.w);
+    }
+    changes[row] = sum;
+}

@@ -1,0 +1,18 @@
+// Sums in a fixed order, so that they are the same in every run: an invocation adds every 256th value of its
+// workgroup's 4096, then the workgroup adds the invocations' sums as a tree. Twin: cagework_core::stencil::reduce.
+
+const REDUCE_LANES = 256u;
+const REDUCE_VALUES = 4096u;
+
+var<workgroup> sums: array<f32, 256>;
+
+/// Sum over the workgroup, valid in every invocation.
+fn tree_sum(lane: u32, value: f32) -> f32 {
+    sums[lane] = value;
+    workgroupBarrier();
+    for (var n = REDUCE_LANES / 2u; n > 0u; n /= 2u) {
+        if lane < n { sums[lane] += sums[lane + n]; }
+        workgroupBarrier();
+    }
+    return sums[0];
+}

@@ -1,0 +1,28 @@
+// Restriction: the coarse right-hand side from the red residuals around each coarse cell, its own centre and twelve
+// edge neighbours. One invocation per coarse row and quad. Twin: cagework_core::stencil::restrict_residual.
+
+/// Fine rows around a coarse one.
+const N_AROUND = 13u;
+/// Weights of the cell that is the coarse cell's centre, and of the twelve others: 4/8 and 1/8.
+const RESTRICT_CENTRE = 0.5f;
+const RESTRICT_EDGE = 0.125f;
+
+@group(0) @binding(0) var<uniform> work: Work;
+@group(0) @binding(1) var<storage, read> around: array<u32>;
+@group(0) @binding(2) var<storage, read> red_residual: array<vec4f>;
+@group(0) @binding(3) var<storage, read_write> coarse_rhs: array<vec4f>;
+
+@compute @workgroup_size(64)
+fn restrict_residual(@builtin(global_invocation_id) id: vec3u) {
+    let number = invocation(id, work.stride);
+    if number >= work.count { return; }
+    let item = work.first + number;
+    let row = item / work.n_quads;
+    let quad = item % work.n_quads;
+    var edges = vec4f(0.0);
+    for (var k = 1u; k < N_AROUND; k++) {
+        edges += red_residual[around[N_AROUND * row + k] * work.n_quads + quad];
+    }
+    let centre = red_residual[around[N_AROUND * row] * work.n_quads + quad];
+    coarse_rhs[item] = RESTRICT_CENTRE * centre + RESTRICT_EDGE * edges;
+}

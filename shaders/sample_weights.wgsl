@@ -1,0 +1,35 @@
+// Weights of mesh vertices for the columns of one batch, from the solved field and the cage's values.
+// One invocation per vertex and quad. Twin: cagework_core::stencil::sample_weights.
+
+@group(0) @binding(0) var<uniform> work: Work;
+/// Where each vertex's entries start in `nodes` and in `hats`.
+@group(0) @binding(1) var<storage, read> starts: array<vec2u>;
+/// (row of the field, bits of its weight)
+@group(0) @binding(2) var<storage, read> nodes: array<vec2u>;
+/// (control vertex, bits of its weight)
+@group(0) @binding(3) var<storage, read> hats: array<vec2u>;
+@group(0) @binding(4) var<storage, read> field: array<vec4f>;
+@group(0) @binding(5) var<storage, read_write> block: array<vec4f>;
+
+@compute @workgroup_size(64)
+fn sample_weights(@builtin(global_invocation_id) id: vec3u) {
+    let number = invocation(id, work.stride);
+    if number >= work.count { return; }
+    let item = work.first + number;
+    let vertex = work.first_row + item / work.n_quads;
+    let quad = item % work.n_quads;
+    let begin = starts[vertex];
+    let end = starts[vertex + 1u];
+    var sum = vec4f(0.0);
+    for (var i = begin.x; i < end.x; i++) {
+        let node = nodes[i];
+        sum += bitcast<f32>(node.y) * field[node.x * work.n_quads + quad];
+    }
+    let first_column = 4u * (work.first_quad + quad);
+    for (var i = begin.y; i < end.y; i++) {
+        let hat = hats[i];
+        let lane = vec4u(hat.x - first_column);
+        sum += select(vec4f(0.0), vec4f(bitcast<f32>(hat.y)), lane == vec4u(0u, 1u, 2u, 3u));
+    }
+    block[item] = sum;
+}

@@ -1,0 +1,27 @@
+// Area-weighted vertex normals. One invocation per vertex gathers its triangles: no atomics, one order of additions.
+// A vertex without triangles gets zero. Twin: cagework_core::stencil::vertex_normals.
+
+@group(0) @binding(0) var<uniform> work: Work;
+/// Where each vertex's triangles start in `others`.
+@group(0) @binding(1) var<storage, read> starts: array<u32>;
+/// A triangle's next two vertices, counter-clockwise after the one it is listed for.
+@group(0) @binding(2) var<storage, read> others: array<vec2u>;
+@group(0) @binding(3) var<storage, read> positions: array<vec4f>;
+@group(0) @binding(4) var<storage, read_write> normals: array<vec4f>;
+
+@compute @workgroup_size(64)
+fn vertex_normals(@builtin(global_invocation_id) id: vec3u) {
+    let number = invocation(id, work.stride);
+    if number >= work.count { return; }
+    let vertex = work.first + number;
+    let end = starts[vertex + 1u];
+    let p = positions[vertex].xyz;
+    var sum = vec3f(0.0);
+    for (var i = starts[vertex]; i < end; i++) {
+        let other = others[i];
+        sum += cross(positions[other.x].xyz - p, positions[other.y].xyz - p);
+    }
+    let square = dot(sum, sum);
+    if square > 0.0 { sum *= inverseSqrt(square); }
+    normals[vertex] = vec4f(sum, 0.0);
+}

@@ -1,0 +1,133 @@
+//! What every solver of Laplace's equation in a cage must do, run for every back end.
+//!
+//! A property is a function of a [`suite::BackEnd`], written once; [`solver_suite!`] makes a module of tests for one
+//! back end. The classic method, which shows the paper's errors, is spared the properties that it does not have.
+
+// Always true here; it tells clippy that these are tests.
+#[cfg(test)]
+mod suite;
+
+use cagework_core::bind::{BindOptions, Method, Solver};
+use suite::BackEnd;
+
+/// One test per property of one back end.
+macro_rules! properties {
+    ($back_end:expr; $($module:ident::$property:ident,)*) => {
+        $(#[test] fn $property() { crate::suite::$module::$property(&$back_end); })*
+    };
+}
+
+/// A module of tests: `every` for what both methods promise, `embedded` for all promises.
+macro_rules! solver_suite {
+    ($name:ident, every, $back_end:expr) => {
+        mod $name {
+            use super::*;
+            solver_suite!(@every $back_end);
+        }
+    };
+    ($name:ident, embedded, $back_end:expr) => {
+        mod $name {
+            use super::*;
+            solver_suite!(@every $back_end);
+            solver_suite!(@embedded $back_end);
+        }
+    };
+    (@every $back_end:expr) => {
+        properties! { $back_end;
+            exact::tetrahedron_is_barycentric_within_a_cell,
+            principles::weights_are_not_negative,
+            principles::weights_sum_to_one,
+            principles::influence_stays_in_its_arm_of_a_c,
+            principles::renumbering_the_cage_renumbers_the_weights,
+            principles::runs_are_bit_identical,
+            shapes::inside_out_cage_gives_the_same_weights,
+            shapes::unused_cage_vertex_has_no_weight,
+            shapes::components_do_not_feel_each_other,
+            shapes::sizes_of_the_unit_do_not_matter,
+            rows::equal_positions_have_equal_rows,
+            rows::limit_on_iterations_is_reported,
+            rows::history_has_one_entry_per_iteration,
+            rows::dropping_small_weights_keeps_sums_and_rest_pose,
+            outside::vertices_outside_are_listed_and_follow_rigidly,
+            outside::refusal_names_count_and_first_vertex,
+            errors::options_out_of_range_are_named,
+            errors::bad_meshes_are_named,
+            errors::memory_limit_is_kept_and_named,
+            progress::fraction_never_falls_and_ends_at_one,
+            progress::break_cancels_in_every_stage,
+        }
+    };
+    (@embedded $back_end:expr) => {
+        properties! { $back_end;
+            exact::tetrahedron_is_barycentric,
+            exact::box_is_trilinear,
+            exact::error_is_second_order,
+            principles::points_are_reproduced,
+            principles::affine_motion_is_followed,
+            principles::vertex_at_a_cage_vertex_has_weight_one,
+            principles::mirrored_cage_has_mirrored_weights,
+            shapes::polygons_reproduce_points,
+            shapes::quads_that_are_not_planar_reproduce_points,
+            shapes::parts_thinner_than_a_cell_get_weights,
+            shapes::cage_far_from_the_origin_is_bound,
+            rows::sparse_weights_follow_affine_motion,
+            outside::vertices_on_the_cage_are_not_outside,
+        }
+    };
+}
+
+/// A back end on the processor.
+fn cpu(method: Method, solver: Solver, threads: usize) -> BackEnd {
+    BackEnd {
+        bind: cagework_core::bind,
+        options: BindOptions { method, solver, threads, ..BindOptions::default() },
+    }
+}
+
+solver_suite!(embedded_multigrid_one_thread, embedded, cpu(Method::Embedded, Solver::Multigrid, 1));
+solver_suite!(embedded_multigrid_all_threads, embedded, cpu(Method::Embedded, Solver::Multigrid, 0));
+solver_suite!(embedded_jacobi_one_thread, embedded, cpu(Method::Embedded, Solver::Jacobi, 1));
+solver_suite!(embedded_jacobi_all_threads, embedded, cpu(Method::Embedded, Solver::Jacobi, 0));
+solver_suite!(classic_multigrid_one_thread, every, cpu(Method::Classic, Solver::Multigrid, 1));
+solver_suite!(classic_multigrid_all_threads, every, cpu(Method::Classic, Solver::Multigrid, 0));
+solver_suite!(classic_jacobi_one_thread, every, cpu(Method::Classic, Solver::Jacobi, 1));
+solver_suite!(classic_jacobi_all_threads, every, cpu(Method::Classic, Solver::Jacobi, 0));
+
+/// Multigrid only: what a V-cycle promises.
+mod multigrid {
+    use super::*;
+
+    #[test]
+    fn tau_below_round_off_ends() {
+        for method in [Method::Embedded, Method::Classic] {
+            suite::rows::tau_below_round_off_ends(&cpu(method, Solver::Multigrid, 0));
+        }
+    }
+}
+
+/// Two back ends that solve the same equations give the same weights.
+mod agreement {
+    use super::*;
+
+    const METHODS: [Method; 2] = [Method::Embedded, Method::Classic];
+
+    #[test]
+    fn jacobi_and_multigrid_agree() {
+        for method in METHODS {
+            let [jacobi, multigrid] = [Solver::Jacobi, Solver::Multigrid].map(|s| cpu(method, s, 0));
+            suite::agreement::solvers_agree(&jacobi, &multigrid);
+        }
+    }
+
+    #[test]
+    fn one_thread_and_all_agree() {
+        for method in METHODS {
+            for solver in [Solver::Jacobi, Solver::Multigrid] {
+                // Three also where the machine has fewer: shares of columns are then uneven.
+                for threads in [0, 2, 3] {
+                    suite::agreement::threads_agree(&cpu(method, solver, 1), &cpu(method, solver, threads));
+                }
+            }
+        }
+    }
+}

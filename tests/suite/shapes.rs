@@ -1,0 +1,131 @@
+//! Cages as they come: polygons, bent quads, several parts, thin parts, any size, any place.
+
+use cagework_tests::cages::{
+    blocks, c_shape, cage, cuboid, inside_out, l_shape, moved, pentagonal_prism, sphere, thin_bar, together,
+    triangulated,
+};
+use cagework_tests::{Random, assert_close, dense, points};
+use glam::Vec3;
+
+use super::{BackEnd, SOLVED, TAU, assert_combined};
+
+pub(crate) fn inside_out_cage_gives_the_same_weights(back_end: &BackEnd) {
+    let mesh = triangulated(&l_shape());
+    let (outward, inward) = (cage(&mesh), cage(&inside_out(&mesh)));
+    let points = points::inside(&outward, 300, 70);
+    let [a, b] = [outward, inward].map(|cage| back_end.bind(&points, &cage));
+    assert_close(&dense(&a.weights), &dense(&b.weights), SOLVED);
+    assert!(a.report.notices.is_empty() && b.report.notices.len() == 1, "{:?}", b.report.notices);
+}
+
+pub(crate) fn unused_cage_vertex_has_no_weight(back_end: &BackEnd) {
+    let mesh = l_shape();
+    let mut with_one_more = mesh.clone();
+    // First, so that every other column moves up by one; far away, so that it would stretch the grid.
+    with_one_more.positions.insert(0, Vec3::splat(50.0));
+    for i in with_one_more.faces.iter_mut().flatten() {
+        *i += 1;
+    }
+    let (without, with) = (cage(&mesh), cage(&with_one_more));
+    let points = points::inside(&without, 300, 71);
+    let [without, with] = [without, with].map(|cage| back_end.bind(&points, &cage).weights);
+    assert_eq!(with.n_columns(), without.n_columns() + 1);
+    let kept: Vec<f32> = dense(&with).chunks(with.n_columns()).flat_map(|row| row[1..].to_vec()).collect();
+    assert!(dense(&with).iter().step_by(with.n_columns()).all(|&w| w == 0.0));
+    assert_close(&kept, &dense(&without), SOLVED);
+}
+
+pub(crate) fn components_do_not_feel_each_other(back_end: &BackEnd) {
+    // So close that cells of a coarse grid reach from one to the other; in the embedded method nothing leaks.
+    let gap = if back_end.is_embedded() { 0.01 } else { 0.5 };
+    let second = moved(&sphere(1), |p| p + Vec3::new(2.0 + gap, 0.0, 0.0));
+    let both = cage(&together(&sphere(1), &second));
+    let points = points::inside(&both, 500, 72);
+    let binding = back_end.bind(&points, &both);
+    let n_first = sphere(1).positions.len() as u32;
+    for (v, p) in points.iter().enumerate() {
+        let in_first = p.x < 1.0 + 0.5 * gap;
+        let (columns, row) = binding.weights.row(v);
+        for (&i, &w) in columns.iter().zip(row) {
+            // Coarse levels of multigrid reach over the gap; what a cycle leaves of that is below tau.
+            assert!(
+                (i < n_first) == in_first || w < TAU,
+                "vertex {v} at {p} has weight {w} of cage vertex {i}"
+            );
+        }
+    }
+}
+
+/// Object units are the user's: millimetres or kilometres give the same weights.
+pub(crate) fn sizes_of_the_unit_do_not_matter(back_end: &BackEnd) {
+    let mesh = triangulated(&c_shape());
+    let points = points::inside(&cage(&mesh), 300, 73);
+    let bound = |scale: f32| {
+        let points: Vec<Vec3> = points.iter().map(|p| p * scale).collect();
+        dense(&back_end.bind(&points, &cage(&moved(&mesh, |p| p * scale))).weights)
+    };
+    let unit = bound(1.0);
+    // Powers of two scale f32 exactly, so that not even a vertex next to a cell's border changes its cell.
+    for scale in [2f32.powi(-12), 2f32.powi(14)] {
+        assert_close(&bound(scale), &unit, SOLVED);
+    }
+}
+
+pub(crate) fn cage_far_from_the_origin_is_bound(back_end: &BackEnd) {
+    // 1/64 of f32's digits are left for the shape: positions are multiples of 1/8192.
+    let shift = Vec3::new(1000.0, -500.0, 800.0);
+    let mesh = moved(&c_shape(), |p| p + shift);
+    let cage = cage(&mesh);
+    let points = points::inside(&cage, 300, 74);
+    let binding = back_end.bind(&points, &cage);
+    assert_eq!(binding.outside, []);
+    // A sum of f32 weights is 1 to within 2e-7, which the distance to the origin, 1,400, multiplies.
+    assert_combined(&binding.weights, cage.positions(), &points, 3e-4);
+    assert!(binding.report.weights.max_sum_error <= 1e-5);
+}
+
+pub(crate) fn polygons_reproduce_points(back_end: &BackEnd) {
+    let turn = Random::new(75).rotation();
+    for mesh in [pentagonal_prism(), moved(&pentagonal_prism(), |p| turn * p)] {
+        let cage = cage(&mesh);
+        let points = points::inside(&cage, 400, 75);
+        let binding = back_end.bind(&points, &cage);
+        assert_eq!(binding.outside, []);
+        assert_combined(&binding.weights, cage.positions(), &points, 1e-5 * f64::from(cage.diagonal()));
+    }
+}
+
+pub(crate) fn quads_that_are_not_planar_reproduce_points(back_end: &BackEnd) {
+    let mut random = Random::new(76);
+    let shaken: Vec<Vec3> = c_shape()
+        .positions
+        .iter()
+        .map(|&p| p + random.point(Vec3::splat(-0.15), Vec3::splat(0.15)))
+        .collect();
+    let mut mesh = c_shape();
+    mesh.positions = shaken;
+    let cage = cage(&mesh);
+    let points = points::inside(&cage, 600, 76);
+    let binding = back_end.bind(&points, &cage);
+    assert_eq!(binding.outside, []);
+    assert_combined(&binding.weights, cage.positions(), &points, 1e-5 * f64::from(cage.diagonal()));
+    assert!(binding.report.weights.min >= -1e-6);
+}
+
+/// A leg of a horse on a coarse grid: few cell centres inside, or none.
+pub(crate) fn parts_thinner_than_a_cell_get_weights(back_end: &BackEnd) {
+    let leg = moved(&blocks(&[[0, 0, 0], [0, 0, 1]]), |p| p * Vec3::new(0.02, 0.02, 1.0));
+    let with_body = together(&cuboid(Vec3::new(1.0, 0.0, 0.0), Vec3::new(2.0, 1.0, 2.0)), &leg);
+    for mesh in [thin_bar(0.5), thin_bar(0.1), thin_bar(0.01), with_body] {
+        let cage = cage(&mesh);
+        let points = points::inside(&cage, 400, 77);
+        for grid in [8, 16] {
+            let binding = back_end.bind_with(&points, &cage, |o| o.grid = grid);
+            assert_eq!(binding.outside, [], "g = {grid}");
+            assert!(binding.weights.rows().all(|(_, row)| !row.is_empty()));
+            assert!(binding.report.weights.min >= -1e-6 && binding.report.weights.max_sum_error <= 1e-5);
+            let diagonal = f64::from(cage.diagonal());
+            assert_combined(&binding.weights, cage.positions(), &points, 1e-5 * diagonal);
+        }
+    }
+}

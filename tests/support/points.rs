@@ -1,0 +1,23 @@
+//! Points inside cages.
+
+use cagework_core::Cage;
+use cagework_core::geometry::winding_number;
+use glam::Vec3;
+
+use crate::Random;
+
+/// Whether a point lies inside, by its winding number.
+#[must_use]
+pub fn is_inside(cage: &Cage, point: Vec3) -> bool {
+    let triangles = (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
+    winding_number(point.as_dvec3(), triangles) > 0.5
+}
+
+/// `n` random points inside a cage.
+#[must_use]
+pub fn inside(cage: &Cage, n: usize, seed: u64) -> Vec<Vec3> {
+    let mut random = Random::new(seed);
+    let bounds = cage.bounds();
+    let tries = std::iter::repeat_with(|| random.point(bounds.min, bounds.max));
+    tries.filter(|&p| is_inside(cage, p)).take(n).collect()
+}
