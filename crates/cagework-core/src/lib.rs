@@ -16,6 +16,7 @@ pub mod progress;
 pub mod report;
 pub mod sample;
 mod simd;
+pub mod slice;
 pub mod solve;
 pub mod stencil;
 pub mod transfer;
