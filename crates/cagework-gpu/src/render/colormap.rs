@@ -4,7 +4,7 @@
 //! accurate interpretation of scientific data. PLoS ONE 13(7), 2018. Twin: `shaders/colormap.wgsl`.
 
 /// Logarithms to base 10 of the errors, over the cage's diagonal, that the first and the last colour stand for.
-pub const ERROR_RANGE: [f32; 2] = [-8.0, -2.0];
+pub const ERROR_RANGE: [f32; 2] = [-8.0, -1.0];
 
 /// Weights below this are drawn as negative: what rounding leaves is not.
 pub const NEGATIVE: f32 = -1e-5;

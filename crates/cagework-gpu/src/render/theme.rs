@@ -51,7 +51,7 @@ pub(super) const ACTIVE: Color = (0xffc53d, 1.0);
 const DARK: Palette = Palette {
     background_top: (0x3c424c, 1.0),
     background_bottom: (0x1b1d21, 1.0),
-    floor: (0x9aa4b4, 0.34),
+    floor: (0x9aa4b4, 0.24),
     cage: (0x86b4ff, 0.95),
     handle: (0xf3f6fc, 1.0),
     handle_rim: (0x27406e, 1.0),
@@ -71,7 +71,7 @@ const DARK: Palette = Palette {
 const LIGHT: Palette = Palette {
     background_top: (0xfbfcfd, 1.0),
     background_bottom: (0xd4dae1, 1.0),
-    floor: (0x5e6a7a, 0.36),
+    floor: (0x5e6a7a, 0.30),
     cage: (0x1f5fc4, 0.95),
     handle: (0xffffff, 1.0),
     handle_rim: (0x1f5fc4, 1.0),
