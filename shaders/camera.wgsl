@@ -24,8 +24,8 @@ struct Camera {
     floor_radius: f32,
     /// Distance of its lines, object units.
     floor_spacing: f32,
-    /// How much the view direction raises the floor's transparency, 0 to 1.
-    floor_fade: f32,
+    /// How much smaller clip depth is for a point that is nearer by all of its depth.
+    lift: f32,
     /// Size of a pixel of the target in clip space.
     pixel: vec2f,
 }

@@ -44,7 +44,7 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     let distance = length(in.world - camera.floor_center) / camera.floor_radius;
     let fade = 1.0 - smoothstep(0.25, 1.0, distance);
     let steep = clamp(6.0 * abs(dot(to_eye(in.world), vec3f(0.0, 1.0, 0.0))), 0.0, 1.0);
-    alpha *= fade * mix(1.0, steep, camera.floor_fade);
+    alpha *= fade * steep;
     if alpha <= 0.002 { discard; }
     return to_target(color, alpha);
 }

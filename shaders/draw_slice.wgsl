@@ -3,8 +3,8 @@
 struct SliceView {
     /// Outer corner of the first cell, world space.
     corner: vec3f,
-    /// 1: values, 0: kinds.
-    mode: u32,
+    /// Value of the last colour; 0 if kinds of cells are shown.
+    high: f32,
     /// Edge of a cell, object units.
     u: vec3f,
     /// Cells along u.
@@ -17,7 +17,6 @@ struct SliceView {
     line_color: vec4f,
 }
 
-const VALUES = 1u;
 const EXTERIOR = 3u;
 
 @group(1) @binding(0) var<uniform> slice: SliceView;
@@ -47,9 +46,9 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     let cell = min(vec2u(max(in.place, vec2f(0.0))), limit);
     let content = cells[cell.y * slice.n_u + cell.x];
     var color = slice.kinds[content.x & 3u];
-    if slice.mode == VALUES && content.x != EXTERIOR {
+    if slice.high > 0.0 && content.x != EXTERIOR {
         let value = bitcast<f32>(content.y);
-        color = vec4f(cividis(value), 1.0);
+        color = vec4f(cividis(value / slice.high), 1.0);
         if value < NEGATIVE { color = vec4f(NEGATIVE_COLOR, 1.0); }
     }
     let distance = abs(fract(in.place - 0.5) - 0.5) / max(slope, vec2f(1e-6));

@@ -9,7 +9,7 @@ struct Style {
     rim_color: vec4f,
     /// Width of the rim, CSS pixels.
     rim: f32,
-    /// How much nearer than it is it is drawn, as a fraction of its depth.
+    /// How much nearer to the eye than it is it is drawn, as a fraction of its depth.
     lift: f32,
     /// Factor of all alphas.
     opacity: f32,
@@ -45,5 +45,5 @@ fn clip_of(index: u32) -> vec4f {
 
 /// Draws it a little nearer.
 fn lifted(clip: vec4f) -> vec4f {
-    return vec4f(clip.xy, max(0.0, clip.z - style.lift * clip.w), clip.w);
+    return vec4f(clip.xy, max(0.0, clip.z - style.lift * camera.lift), clip.w);
 }

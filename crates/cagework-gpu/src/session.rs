@@ -16,7 +16,7 @@ use crate::bind::bind_gpu;
 use crate::deform::{Deformer, GpuWeights};
 use crate::device::GpuContext;
 use crate::error::GpuError;
-use crate::render::{Camera, DrawModel, MeshStyle, Renderer, SceneOptions, Target};
+use crate::render::{Camera, DrawModel, MeshStyle, Renderer, SceneOptions, Target, colormap};
 
 pub use picture::MAX_PICTURE;
 
@@ -214,10 +214,10 @@ impl Session {
     pub fn set_scene(&mut self, scene: SceneOptions) {
         let other_values = scene.mesh != self.scene.mesh;
         self.scene = scene;
+        self.write_scene();
         if other_values {
             self.write_values();
         }
-        self.write_scene();
     }
 
     /// What is drawn.
@@ -230,22 +230,33 @@ impl Session {
         self.renderer.set_scene(&self.context, self.scene.clone(), self.model.as_deref());
     }
 
-    /// Uploads what the scene's heat map shows; zeros without weights.
-    fn write_values(&self) {
+    /// Uploads what the scene's heat map shows; nothing without weights.
+    fn write_values(&mut self) {
+        let Some(range) = self.value_range() else { return };
         let (Some(model), Some(bound), Some(cage)) = (&self.model, &self.bound, &self.cage) else { return };
-        match self.scene.mesh {
-            MeshStyle::Weights { column } => {
-                let values: Vec<f32> = bound.weights.column(column).collect();
-                self.renderer.set_values(&self.context, &values);
-            }
+        let values: Vec<f32> = match self.scene.mesh {
+            MeshStyle::Weights { column } => bound.weights.column(column).collect(),
             MeshStyle::Errors => {
                 let rebuilt = deform_bound(&bound.weights, &bound.outside, cage.positions());
                 let scale = 1.0 / cage.diagonal();
-                let errors: Vec<f32> =
-                    rebuilt.iter().zip(&model.positions).map(|(a, b)| scale * a.distance(*b)).collect();
-                self.renderer.set_values(&self.context, &errors);
+                rebuilt.iter().zip(&model.positions).map(|(a, b)| scale * a.distance(*b)).collect()
             }
-            MeshStyle::Hidden | MeshStyle::Solid | MeshStyle::Clay => {}
+            MeshStyle::Hidden | MeshStyle::Solid | MeshStyle::Clay => return,
+        };
+        self.renderer.set_values(&self.context, &values, range);
+    }
+
+    /// Values of the first and the last colour of the scene's heat map, for a legend: weights, or logarithms to base 10
+    /// of errors over the cage's diagonal. Nothing without a heat map or weights.
+    #[must_use]
+    pub fn value_range(&self) -> Option<[f32; 2]> {
+        let weights = self.weights()?;
+        match self.scene.mesh {
+            MeshStyle::Weights { column } => {
+                Some([0.0, weights.column(column).fold(colormap::LOWEST_RANGE, f32::max)])
+            }
+            MeshStyle::Errors => Some(colormap::ERROR_RANGE),
+            MeshStyle::Hidden | MeshStyle::Solid | MeshStyle::Clay => None,
         }
     }
 

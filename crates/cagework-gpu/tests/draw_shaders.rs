@@ -112,7 +112,7 @@ fn uniforms_mirror_their_wgsl_structs() {
             floor_center,
             floor_radius,
             floor_spacing,
-            floor_fade,
+            lift,
             pixel
         );
     }
@@ -120,7 +120,7 @@ fn uniforms_mirror_their_wgsl_structs() {
         same!(shader, Style, colors, widths, rim_color, rim, lift, opacity, size);
     }
     same!(&shaders::MESH, Surface, base_color, mode, alpha_cutoff, low, high);
-    same!(&shaders::SLICE, SliceView, corner, mode, u, n_u, v, n_v, kinds, line_color);
+    same!(&shaders::SLICE, SliceView, corner, high, u, n_u, v, n_v, kinds, line_color);
     same!(&shaders::GIZMO, GizmoView, world_from_gizmo);
     assert_eq!(size_of::<DrawVertex>(), 20, "u32, two f32, four u16");
 }

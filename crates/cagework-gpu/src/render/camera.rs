@@ -20,7 +20,7 @@ const DISTANCES: [f32; 2] = [1e-3, 1e3];
 /// How far behind the scene the floor is still drawn, over the scene's radius.
 const FAR_REACH: f32 = 24.0;
 
-/// The near plane is no nearer than this fraction of the distance to the target.
+/// The near plane is at this fraction of the distance to the target: depth is an f32, which has digits enough.
 const NEAR_FRACTION: f32 = 0.02;
 
 /// How depth becomes size.
@@ -197,10 +197,21 @@ impl Camera {
         let far = (depth + FAR_REACH * self.scene_radius).max(2.0 * self.distance);
         match self.projection {
             Projection::Perspective => {
-                let near = (depth - 1.5 * self.scene_radius).max(NEAR_FRACTION * self.distance);
+                let near = NEAR_FRACTION * self.distance;
                 [near, far.max(2.0 * near)]
             }
             Projection::Orthographic => [depth - FAR_REACH * self.scene_radius, far],
+        }
+    }
+
+    /// How much smaller clip depth (not divided by w) is for a point that is nearer to the eye by all of its depth, or
+    /// of the target's in an orthographic picture: what overlays are lifted by, in proportion.
+    #[must_use]
+    pub(crate) fn lift(&self) -> f32 {
+        let [near, far] = self.depths();
+        match self.projection {
+            Projection::Perspective => near * far / (far - near),
+            Projection::Orthographic => self.distance / (far - near),
         }
     }
 

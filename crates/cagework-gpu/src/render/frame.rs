@@ -61,6 +61,8 @@ pub struct Renderer {
     gizmo: GizmoShape,
     scene: SceneOptions,
     floor: Bounds,
+    /// Values of the first and the last colour of a heat map.
+    range: [f32; 2],
 }
 
 impl Renderer {
@@ -91,6 +93,7 @@ impl Renderer {
             marks: None,
             scene: SceneOptions::default(),
             floor: Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE },
+            range: [0.0, 1.0],
         }
     }
 
@@ -135,14 +138,13 @@ impl Renderer {
         }
     }
 
-    /// Weights or errors of all vertices.
-    pub(crate) fn set_values(&self, context: &GpuContext, values: &[f32]) {
-        if let Some(mesh) = &self.mesh
-            && !values.is_empty()
-        {
-            debug_assert_eq!(values.len(), mesh.n_vertices as usize, "one value per vertex");
-            context.queue.write_buffer(&mesh.values, 0, bytemuck::cast_slice(values));
-        }
+    /// Weights or errors of all vertices, and the values of the first and the last colour.
+    pub(crate) fn set_values(&mut self, context: &GpuContext, values: &[f32], range: [f32; 2]) {
+        let Some(mesh) = self.mesh.as_ref().filter(|_| !values.is_empty()) else { return };
+        debug_assert_eq!(values.len(), mesh.n_vertices as usize, "one value per vertex");
+        context.queue.write_buffer(&mesh.values, 0, bytemuck::cast_slice(values));
+        self.range = range;
+        mesh.set_style(context, self.scene.mesh, range);
     }
 
     /// Where model and cage are at rest: the floor lies below.
@@ -170,7 +172,7 @@ impl Renderer {
         }
         if let Some(mesh) = &self.mesh {
             if before.is_none_or(|b| b.mesh != scene.mesh) {
-                mesh.set_style(context, scene.mesh);
+                mesh.set_style(context, scene.mesh, self.range);
             }
             if (scene.base_wireframe || scene.mesh_edges)
                 && self.wires.is_none()
@@ -347,7 +349,7 @@ impl Renderer {
             floor_center: middle.to_array(),
             floor_radius: FLOOR_REACH * radius,
             floor_spacing: 10f32.powf((0.15 * radius).log10().round()),
-            floor_fade: 1.0,
+            lift: camera.lift(),
             pixel: viewport.map(|s| 2.0 / s),
         }
     }

@@ -248,7 +248,8 @@ mod tests {
     use super::*;
 
     fn scene() -> (Camera, Gizmo) {
-        let mut camera = Camera { yaw: 0.5, pitch: 0.4, ..Camera::default() };
+        let mut camera = Camera::default();
+        (camera.yaw, camera.pitch) = (0.75, 0.6);
         camera.set_viewport(Vec2::new(800.0, 600.0));
         let gizmo = Gizmo {
             mode: GizmoMode::Move,

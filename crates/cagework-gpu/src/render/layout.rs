@@ -34,8 +34,8 @@ pub struct Camera {
     pub floor_radius: f32,
     /// Distance of its lines, object units.
     pub floor_spacing: f32,
-    /// How much the view direction raises the floor's transparency, 0 to 1.
-    pub floor_fade: f32,
+    /// How much smaller clip depth is for a point that is nearer by all of its depth.
+    pub lift: f32,
     /// Size of a pixel of the target in clip space.
     pub pixel: [f32; 2],
 }
@@ -82,7 +82,7 @@ pub struct Style {
     pub rim_color: [f32; 4],
     /// Width of the rim, CSS pixels.
     pub rim: f32,
-    /// How much nearer than it is it is drawn, as a fraction of its depth.
+    /// How much nearer to the eye than it is it is drawn, as a fraction of its depth.
     pub lift: f32,
     /// Factor of all alphas.
     pub opacity: f32,
@@ -102,8 +102,8 @@ pub const HIDDEN: u32 = 15;
 pub struct SliceView {
     /// Outer corner of the first cell, world space.
     pub corner: [f32; 3],
-    /// 1: values, 0: kinds.
-    pub mode: u32,
+    /// Value of the last colour; 0 if kinds of cells are shown.
+    pub high: f32,
     /// Edge of a cell along u, object units.
     pub u: [f32; 3],
     /// Cells along u.

@@ -4,7 +4,7 @@ use super::layout::{Surface, surface_mode};
 use super::model::{Alpha, CLAY, DrawGroup, DrawModel, DrawTexture, Wrap};
 use super::pipelines::Layouts;
 use super::scene::MeshStyle;
-use super::{colormap, texture};
+use super::texture;
 use crate::buffers::Allocator;
 use crate::device::GpuContext;
 use crate::error::GpuError;
@@ -101,8 +101,8 @@ impl Mesh {
         self.set_vertices(context, layouts, &rest, &normals);
     }
 
-    /// Writes what colours the surface.
-    pub(super) fn set_style(&self, context: &GpuContext, style: MeshStyle) {
+    /// Writes what colours the surface, and the values of the first and the last colour.
+    pub(super) fn set_style(&self, context: &GpuContext, style: MeshStyle, [low, high]: [f32; 2]) {
         for group in &self.groups {
             let surface = match style {
                 MeshStyle::Hidden | MeshStyle::Solid => group.surface,
@@ -113,12 +113,9 @@ impl Mesh {
                     ..Surface::default()
                 },
                 MeshStyle::Weights { .. } => {
-                    Surface { mode: surface_mode::WEIGHTS, high: 1.0, ..Surface::default() }
+                    Surface { mode: surface_mode::WEIGHTS, low, high, ..Surface::default() }
                 }
-                MeshStyle::Errors => {
-                    let [low, high] = colormap::ERROR_RANGE;
-                    Surface { mode: surface_mode::ERRORS, low, high, ..Surface::default() }
-                }
+                MeshStyle::Errors => Surface { mode: surface_mode::ERRORS, low, high, ..Surface::default() },
             };
             context.queue.write_buffer(&group.uniform, 0, bytemuck::bytes_of(&surface));
         }

@@ -25,7 +25,8 @@ pub enum MeshStyle {
     Solid,
     /// One plain colour, whatever its materials.
     Clay,
-    /// Weights of one cage vertex, 0 to 1, in the colours of [`super::colormap`]; negative ones in a warning colour.
+    /// Weights of one cage vertex, from 0 to the largest of the mesh, in the colours of [`super::colormap`]; negative
+    /// ones in a warning colour. See [`crate::Session::value_range`] for a legend.
     Weights {
         /// The cage vertex.
         column: u32,
@@ -140,7 +141,7 @@ pub struct Gizmo {
 pub struct SliceView {
     /// The slice. Made anew for another place; sharing it makes setting a scene cheap.
     pub slice: Arc<Slice>,
-    /// One coordinate's value, 0 to 1, instead of the kinds of cells: a cage vertex. Needs [`Slice::weights`].
+    /// One coordinate's value, from 0 to its largest, instead of the kinds of cells: a cage vertex. Needs [`Slice::weights`].
     pub column: Option<u32>,
 }
 

@@ -75,9 +75,9 @@ const LIGHT: Palette = Palette {
     cage: (0x1f5fc4, 0.95),
     handle: (0xffffff, 1.0),
     handle_rim: (0x1f5fc4, 1.0),
-    hovered: (0x00a3c7, 1.0),
-    selected: (0xe8590c, 1.0),
-    both: (0xff8a3d, 1.0),
+    hovered: (0x0b7c8c, 1.0),
+    selected: (0xcf4708, 1.0),
+    both: (0xa83800, 1.0),
     unmatched: (0xc2255c, 1.0),
     wire: (0x1b4b8f, 0.5),
     mesh_edges: (0x10151c, 0.38),
@@ -122,7 +122,7 @@ impl Palette {
         Style {
             colors: self.states(self.cage),
             widths: [[1.5, 2.5, 2.75, 3.25], [1.5; 4]],
-            lift: 2e-4,
+            lift: 1e-3,
             opacity: 1.0,
             size: 1.0,
             ..Style::default()
@@ -136,7 +136,7 @@ impl Palette {
             widths: [[8.0, 11.0, 10.5, 12.0], [9.5, 8.0, 8.0, 8.0]],
             rim_color: linear(self.handle_rim),
             rim: 1.4,
-            lift: 1e-3,
+            lift: 4e-3,
             opacity: 1.0,
             size: 1.0,
         }
@@ -157,7 +157,7 @@ impl Palette {
         Style {
             colors: [linear(color); 8],
             widths: [[if base { 0.9 } else { 0.8 }; 4]; 2],
-            lift: 3e-4,
+            lift: 1.5e-3,
             opacity: 1.0,
             size: 1.0,
             ..Style::default()
@@ -171,7 +171,7 @@ impl Palette {
             widths: [[7.0; 4], [3.0; 4]],
             rim_color: [1.0, 1.0, 1.0, 0.9],
             rim: 1.2,
-            lift: 1.5e-3,
+            lift: 6e-3,
             opacity: 1.0,
             size: 1.0,
         }
@@ -202,7 +202,7 @@ mod tests {
             {
                 for background in [palette.background_top, palette.background_bottom] {
                     let contrast = contrast(color, background);
-                    assert!(contrast >= 2.2, "{:06x} on {:06x}: {contrast}", color.0, background.0);
+                    assert!(contrast >= 3.0, "{:06x} on {:06x}: {contrast}", color.0, background.0);
                 }
             }
             let rim = contrast(palette.handle, palette.handle_rim);

@@ -196,5 +196,9 @@ fn depth_is_ordered_and_within_the_clip_volume() {
         };
         let (near, far) = (camera.target + camera.backward(), camera.target - camera.backward());
         assert!(0.0 < z(near) && z(near) < z(far) && z(far) < 1.0);
+        // Lifted by a hundredth of the distance, a point is as deep as one that lies there.
+        let clip = camera.clip_from_world() * camera.target.extend(1.0);
+        let nearer = camera.target + 0.01 * camera.distance * camera.backward();
+        assert!(((clip.z - 0.01 * camera.lift()) / clip.w - z(nearer)).abs() < 2e-5);
     }
 }
