@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use cagework_core::bind::BindError;
 use cagework_core::cage::CageError;
+use cagework_gpu::GpuError;
 use thiserror::Error;
 
 /// Why a command failed.
@@ -35,6 +36,9 @@ pub(crate) enum CliError {
     /// The bind did not come about.
     #[error(transparent)]
     Bind(#[from] BindError),
+    /// The GPU, or a bind on it.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
     /// A plot could not be drawn.
     #[error("a plot cannot be drawn: {message}")]
     Plot {
@@ -79,10 +83,15 @@ impl CliError {
             Self::Cage { source: CageError::Empty, .. } => {
                 Some("a cage is a closed mesh around the model; `--cage box` makes a simple one")
             }
-            Self::Bind(BindError::Outside { .. }) => {
+            Self::Bind(BindError::Outside { .. }) | Self::Gpu(GpuError::Bind(BindError::Outside { .. })) => {
                 Some("`--outside closest-point` binds such vertices to the closest point of the cage")
             }
-            Self::Bind(BindError::Memory { .. }) => Some("the limit is set by --memory-limit, in MiB"),
+            Self::Gpu(GpuError::NoAdapter { .. }) => Some(
+                "a bind does not need one: leave out `--backend gpu`; CAGEWORK_ADAPTER chooses among several",
+            ),
+            Self::Bind(BindError::Memory { .. }) | Self::Gpu(GpuError::Bind(BindError::Memory { .. })) => {
+                Some("the limit is set by --memory-limit, in MiB")
+            }
             _ => None,
         }
     }

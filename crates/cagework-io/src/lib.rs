@@ -10,6 +10,7 @@
 
 mod error;
 mod gltf;
+mod look;
 mod model;
 mod normals;
 mod npz;
@@ -17,6 +18,7 @@ mod obj;
 
 pub use error::{PoseError, ReadError, WriteError};
 pub use gltf::GltfError;
+pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
 pub use model::{Counts, Format, Model};
 pub use npz::{NpzError, read_weights_npz, write_weights_npz};
 pub use obj::{ObjError, write_cage_obj};

@@ -12,6 +12,7 @@ mod build;
 mod container;
 mod export;
 mod geometry;
+mod look;
 mod pack;
 mod patch;
 mod scene;
@@ -27,6 +28,7 @@ use scene::{Instance, Worlds};
 
 pub(crate) use build::build_from_obj;
 pub(crate) use export::write_obj;
+pub(crate) use look::look;
 pub(crate) use patch::{Pose, Rest, patch};
 
 /// Why a glTF file could not be read.

@@ -1,0 +1,180 @@
+//! Materials of a glTF: base colour and its texture.
+
+use ::gltf::json::mesh::Semantic;
+use glam::{Vec2, Vec3};
+use serde_json::Value;
+
+use super::accessor::Source;
+use super::geometry::{attribute, world_normals};
+use super::{GltfDocument, Slot};
+use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap, sniff_image};
+use crate::normals::Shading;
+
+/// Images of a document that materials ask for, each once.
+struct Images<'a> {
+    document: &'a GltfDocument,
+    numbers: Vec<Option<u32>>,
+    found: Vec<LookImage>,
+}
+
+/// How a document looks. `positions`, `triangles`: the model's.
+pub(crate) fn look(document: &GltfDocument, positions: &[Vec3], triangles: &[[u32; 3]]) -> Look {
+    let mut vertices: Vec<LookVertex> = (0..positions.len() as u32).map(LookVertex::plain).collect();
+    let n_images = document.json["images"].as_array().map_or(0, Vec::len);
+    let mut images = Images { document, numbers: vec![None; n_images], found: Vec::new() };
+    let mut normals = vec![Vec3::ZERO; positions.len()];
+    let mut groups = Vec::new();
+    for slot in &document.slots {
+        let range = slot.start as usize..(slot.start + slot.count) as usize;
+        if let Ok(Some(original)) = world_normals(document, slot) {
+            normals[range.clone()].copy_from_slice(&original[..range.len().min(original.len())]);
+        }
+        let material = material_of(document, slot);
+        let own = &mut vertices[range];
+        colours(document, slot, own);
+        let Some(material) = material else { continue };
+        let texture = Texture::of(&document.json, material);
+        coordinates(document, slot, &texture, own);
+        groups.push(LookGroup {
+            triangles: slot.triangles.start as u32..slot.triangles.end as u32,
+            base_color: texture.factor,
+            image: texture.image.and_then(|i| images.number(i)),
+            wrap: texture.wrap,
+            alpha: match material["alphaMode"].as_str() {
+                Some("MASK") => LookAlpha::Mask { cutoff: number(&material["alphaCutoff"], 0.5) },
+                Some("BLEND") => LookAlpha::Blend,
+                _ => LookAlpha::Opaque,
+            },
+            double_sided: material["doubleSided"].as_bool().unwrap_or(false),
+        });
+    }
+    smooth_seams(positions, normals, triangles, &mut vertices);
+    Look { vertices, triangles: triangles.to_vec(), groups, images: images.found }
+}
+
+fn number(value: &Value, default: f32) -> f32 {
+    value.as_f64().map_or(default, |x| x as f32)
+}
+
+fn material_of<'a>(document: &'a GltfDocument, slot: &Slot) -> Option<&'a Value> {
+    let mesh = document.instances[slot.instance as usize].mesh as usize;
+    let primitive = &document.json["meshes"][mesh]["primitives"][slot.primitive as usize];
+    let index = primitive["material"].as_u64()?;
+    document.json["materials"].get(index as usize)
+}
+
+/// Where base colour and its texture stand: in the core's material, or in the older extension.
+struct Texture {
+    factor: [f32; 4],
+    image: Option<usize>,
+    wrap: [LookWrap; 2],
+    set: u32,
+    offset: Vec2,
+    scale: Vec2,
+    rotation: f32,
+}
+
+impl Texture {
+    fn of(json: &Value, material: &Value) -> Self {
+        let glossy = &material["extensions"]["KHR_materials_pbrSpecularGlossiness"];
+        let (factor, info) = if glossy.is_object() && material.get("pbrMetallicRoughness").is_none() {
+            (&glossy["diffuseFactor"], &glossy["diffuseTexture"])
+        } else {
+            let pbr = &material["pbrMetallicRoughness"];
+            (&pbr["baseColorFactor"], &pbr["baseColorTexture"])
+        };
+        let texture = info["index"].as_u64().map_or(&Value::Null, |t| &json["textures"][t as usize]);
+        let webp = &texture["extensions"]["EXT_texture_webp"]["source"];
+        let sampler = texture["sampler"].as_u64().map_or(&Value::Null, |s| &json["samplers"][s as usize]);
+        let transform = &info["extensions"]["KHR_texture_transform"];
+        let pair = |key: &str, default: f32| {
+            Vec2::new(number(&transform[key][0], default), number(&transform[key][1], default))
+        };
+        Self {
+            factor: std::array::from_fn(|k| number(&factor[k], 1.0)),
+            image: texture["source"].as_u64().or(webp.as_u64()).map(|i| i as usize),
+            wrap: ["wrapS", "wrapT"].map(|key| match sampler[key].as_u64() {
+                Some(33_071) => LookWrap::Clamp,
+                Some(33_648) => LookWrap::Mirror,
+                _ => LookWrap::Repeat,
+            }),
+            set: transform["texCoord"].as_u64().or(info["texCoord"].as_u64()).unwrap_or(0) as u32,
+            offset: pair("offset", 0.0),
+            scale: pair("scale", 1.0),
+            rotation: number(&transform["rotation"], 0.0),
+        }
+    }
+
+    /// KHR_texture_transform: scale, then rotate counter-clockwise (v points down), then move.
+    fn transformed(&self, uv: [f32; 2]) -> [f32; 2] {
+        let (sin, cos) = self.rotation.sin_cos();
+        let scaled = self.scale * Vec2::from(uv);
+        let turned = Vec2::new(cos * scaled.x + sin * scaled.y, cos * scaled.y - sin * scaled.x);
+        (turned + self.offset).to_array()
+    }
+}
+
+fn coordinates(document: &GltfDocument, slot: &Slot, texture: &Texture, vertices: &mut [LookVertex]) {
+    let (_, primitive) = document.primitive(slot);
+    let Some(accessor) = attribute(primitive, Semantic::TexCoords(texture.set)) else { return };
+    let Ok(uvs) = document.source().floats::<2>(accessor, "TEXCOORD") else { return };
+    for (vertex, uv) in vertices.iter_mut().zip(uvs) {
+        let uv = texture.transformed(uv);
+        if uv.iter().all(|x| x.is_finite()) {
+            vertex.uv = uv;
+        }
+    }
+}
+
+fn colours(document: &GltfDocument, slot: &Slot, vertices: &mut [LookVertex]) {
+    let (_, primitive) = document.primitive(slot);
+    let Some(accessor) = attribute(primitive, Semantic::Colors(0)) else { return };
+    let source: Source<'_> = document.source();
+    let colors: Vec<[f32; 4]> = match source.floats::<4>(accessor, "COLOR_0") {
+        Ok(colors) => colors,
+        Err(_) => match source.floats::<3>(accessor, "COLOR_0") {
+            Ok(colors) => colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect(),
+            Err(_) => return,
+        },
+    };
+    for (vertex, color) in vertices.iter_mut().zip(colors) {
+        vertex.color = color.map(|c| if c.is_finite() { c.clamp(0.0, 1.0) } else { 1.0 });
+    }
+}
+
+/// Lets vertices that are one surface at one place name one of them.
+fn smooth_seams(positions: &[Vec3], normals: Vec<Vec3>, triangles: &[[u32; 3]], vertices: &mut [LookVertex]) {
+    let all = (0..positions.len() as u32).collect();
+    let shading = Shading::new(positions, all, normals, triangles.to_vec());
+    let mut first: Vec<Option<u32>> = vec![None; positions.len()];
+    for (v, &cluster) in (0u32..).zip(shading.clusters()) {
+        vertices[v as usize].source = *first[cluster as usize].get_or_insert(v);
+    }
+}
+
+impl Images<'_> {
+    /// Number of an image among those found; nothing if its bytes are not there.
+    fn number(&mut self, image: usize) -> Option<u32> {
+        let known = *self.numbers.get(image)?;
+        known.or_else(|| {
+            let found = self.read(image)?;
+            self.found.push(found);
+            let number = self.found.len() as u32 - 1;
+            self.numbers[image] = Some(number);
+            Some(number)
+        })
+    }
+
+    fn read(&self, image: usize) -> Option<LookImage> {
+        if let Some(image) = self.document.images.get(image)?.as_ref() {
+            return Some(LookImage { bytes: image.bytes.clone(), mime: image.mime.clone() });
+        }
+        let json = &self.document.json["images"][image];
+        let view = self.document.root.buffer_views.get(json["bufferView"].as_u64()? as usize)?;
+        let start = view.byte_offset.map_or(0, |o| o.0) as usize;
+        let end = start.checked_add(view.byte_length.0 as usize)?;
+        let bytes = self.document.buffers.get(view.buffer.value())?.get(start..end)?.to_vec();
+        let mime = sniff_image(&bytes).or(json["mimeType"].as_str())?.to_owned();
+        Some(LookImage { bytes, mime })
+    }
+}
