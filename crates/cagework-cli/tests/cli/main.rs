@@ -7,5 +7,6 @@ mod bench_and_demo;
 mod bind;
 mod cage_and_info;
 mod deform;
+mod render;
 mod support;
 mod usage;
