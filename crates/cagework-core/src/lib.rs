@@ -6,6 +6,7 @@
 pub mod bind;
 pub mod cage;
 pub mod cage_gen;
+mod contact;
 pub mod deform;
 pub mod geometry;
 pub mod grid;
@@ -24,7 +25,7 @@ pub mod weights;
 
 pub use bind::{BindError, BindOptions, Binding, bind};
 pub use cage::{Cage, CageError, CageNotice, FaceDefect};
-pub use cage_gen::subdivided_box;
+pub use cage_gen::{CageOptions, GeneratedCage, subdivided_box};
 pub use mean_value::{MeanValueError, mean_value_weights};
 pub use mesh::{Bounds, PolygonMesh, TriMesh};
 pub use progress::{Cancelled, Progress, ProgressEvent, Stage};
