@@ -71,7 +71,8 @@ pub(crate) fn meet(a: &Corners, b: &Corners, gap: f64) -> bool {
 ///
 /// Sweep along x: `n log n` for surfaces whose triangles are small against the whole.
 pub(crate) fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
-    let mut order: Vec<(f64, u32)> = triangles.iter().enumerate().map(|(t, c)| (c.min().x, t as u32)).collect();
+    let mut order: Vec<(f64, u32)> =
+        triangles.iter().enumerate().map(|(t, c)| (c.min().x, t as u32)).collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut active: Vec<u32> = Vec::new();
     let mut pairs = Vec::new();
@@ -166,8 +167,7 @@ mod tests {
         Corners { index, at }
     }
 
-    const FLOOR: [DVec3; 3] =
-        [DVec3::ZERO, DVec3::new(4.0, 0.0, 0.0), DVec3::new(0.0, 4.0, 0.0)];
+    const FLOOR: [DVec3; 3] = [DVec3::ZERO, DVec3::new(4.0, 0.0, 0.0), DVec3::new(0.0, 4.0, 0.0)];
 
     #[test]
     fn strangers_meet_when_they_cross_touch_or_come_too_near() {
@@ -190,7 +190,10 @@ mod tests {
         assert!(!meet(&floor, &fan(v(-1.0, 0.0, 0.0), v(0.0, -1.0, 0.0)), 1.0), "across, in one plane");
         assert!(meet(&floor, &fan(v(1.0, 1.0, 0.0), v(1.0, 2.0, 0.0)), 0.0), "on it");
         assert!(meet(&floor, &fan(v(1.0, 1.0, 1.0), v(1.0, 1.0, -1.0)), 0.0), "through it");
-        assert!(!meet(&floor, &fan(v(-1.0, -1.0, 1.0), v(-1.0, -1.0, -1.0)), 0.0), "through its plane elsewhere");
+        assert!(
+            !meet(&floor, &fan(v(-1.0, -1.0, 1.0), v(-1.0, -1.0, -1.0)), 0.0),
+            "through its plane elsewhere"
+        );
         assert!(!meet(&floor, &fan(v(1.0, 1.0, 1.0), v(1.0, 2.0, 1.0)), 0.0), "above it");
     }
 

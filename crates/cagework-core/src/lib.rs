@@ -16,6 +16,7 @@ pub mod mesh;
 pub mod progress;
 pub mod report;
 pub mod sample;
+pub mod samples;
 mod simd;
 pub mod solve;
 pub mod stencil;

@@ -81,7 +81,8 @@ struct Scratch {
 
 /// Quality of a triangle: 1 if equilateral, 0 if flat.
 pub(super) fn quality(t: &[DVec3; 3]) -> f64 {
-    let edges = (t[1] - t[0]).length_squared() + (t[2] - t[1]).length_squared() + (t[0] - t[2]).length_squared();
+    let edges =
+        (t[1] - t[0]).length_squared() + (t[2] - t[1]).length_squared() + (t[0] - t[2]).length_squared();
     2.0 * 3.0_f64.sqrt() * (t[1] - t[0]).cross(t[2] - t[0]).length() / edges.max(1e-300)
 }
 
@@ -238,9 +239,10 @@ impl<'g, 'a> Collapser<'g, 'a> {
             }
         }
         // Nor may a triangle lie in the plane.
-        surface.around[gone as usize].iter().map(|&t| surface.triangles[t as usize]).all(|t| {
-            t.contains(&kept) || !t.iter().all(|&i| i == gone || on_mirror(i))
-        })
+        surface.around[gone as usize]
+            .iter()
+            .map(|&t| surface.triangles[t as usize])
+            .all(|t| t.contains(&kept) || !t.iter().all(|&i| i == gone || on_mirror(i)))
     }
 
     /// Where the merged vertex may go, and what it costs there.
@@ -273,7 +275,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         let outward = outward.normalize_or_zero();
         let optimum = self.optimum(a, b);
         let [p, q] = [kept, gone].map(|v| self.surface.positions[v as usize]);
-        let middle = if pinned.is_some() && !self.surface.on_mirror[gone as usize] { p } else { 0.5 * (p + q) };
+        let middle =
+            if pinned.is_some() && !self.surface.on_mirror[gone as usize] { p } else { 0.5 * (p + q) };
         let mut candidates = Vec::with_capacity(2 * PUSHES.len() + 2);
         for push in PUSHES {
             candidates.push(optimum + push * outward);

@@ -34,16 +34,13 @@ use guarded::Guarded;
 pub use options::{
     CageGenError, CageOptions, CageReport, GeneratedCage, MAX_TARGET, MIN_TARGET, Mirror, Shape, Symmetry,
 };
+use options::{MAX_VOXELS, MIN_VOXELS};
 use shell::Shell;
 pub use subdivided_box::subdivided_box;
 use verify::verified;
 
 /// Lattices tried until the target is met.
 const TRIES: usize = 4;
-
-/// Coarsest and finest lattice.
-const MIN_VOXELS: usize = 8;
-const MAX_VOXELS: usize = 96;
 
 /// A cage may have this many times the vertices asked for before a coarser lattice is tried.
 const NEAR_TARGET: f64 = 1.1;
@@ -64,7 +61,7 @@ pub fn generate(
     let bounds = options::check(positions, triangles, options)?;
     let began = progress.now_ms();
     let target = options.target as usize;
-    let mut voxels = first_voxels(target);
+    let mut voxels = if options.voxels > 0 { options.voxels as usize } else { first_voxels(target) };
     let mut best: Option<GeneratedCage> = None;
     let mut tried = Vec::new();
     for attempt in 0..TRIES {

@@ -11,6 +11,9 @@ use crate::progress::Cancelled;
 pub const MIN_TARGET: u32 = 12;
 /// Most vertices that can be asked for.
 pub const MAX_TARGET: u32 = 400;
+/// Coarsest and finest lattice.
+pub(super) const MIN_VOXELS: usize = 8;
+pub(super) const MAX_VOXELS: usize = 128;
 /// Largest clearance, as a fraction of the model's diagonal.
 const MAX_CLEARANCE: f32 = 0.25;
 
@@ -75,6 +78,9 @@ pub struct CageOptions {
     /// Distance to keep from the model along each axis, as a fraction of the diagonal of its box, 0 to 0.25; at least
     /// half a voxel in any case. Default 0.
     pub clearance: f32,
+    /// Voxels along the model's longest side, 8 to 128: gaps narrower than three of them are closed, detail thinner than one is
+    /// lost. 0 ties them to the target. Default 0.
+    pub voxels: u32,
 }
 
 impl Default for CageOptions {
@@ -85,6 +91,7 @@ impl Default for CageOptions {
             symmetry: Symmetry::default(),
             per_component: false,
             clearance: 0.0,
+            voxels: 0,
         }
     }
 }
@@ -168,7 +175,9 @@ pub enum CageGenError {
         largest: f64,
     },
     /// Not even the hull passes the check.
-    #[error("no cage passes the check: the model is too small for its distance from the origin; move it there")]
+    #[error(
+        "no cage passes the check: the model is too small for its distance from the origin; move it there"
+    )]
     Unresolved,
     /// Cancelled by the caller.
     #[error(transparent)]
@@ -188,6 +197,10 @@ pub(super) fn check(
     if !(0.0..=MAX_CLEARANCE).contains(&options.clearance) {
         let (value, allowed) = (f64::from(options.clearance), "a fraction of the diagonal from 0 to 0.25");
         return Err(CageGenError::Option { option: "clearance", value, allowed });
+    }
+    if options.voxels != 0 && !(MIN_VOXELS..=MAX_VOXELS).contains(&(options.voxels as usize)) {
+        let (value, allowed) = (f64::from(options.voxels), "0 (automatic) or a whole number from 8 to 128");
+        return Err(CageGenError::Option { option: "voxels", value, allowed });
     }
     if positions.is_empty() {
         return Err(CageGenError::Empty);

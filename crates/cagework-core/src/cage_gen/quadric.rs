@@ -38,12 +38,7 @@ impl Quadric {
 
     /// The sum of two.
     pub(super) fn plus(&self, other: &Self) -> Self {
-        Self {
-            a: self.a + other.a,
-            b: self.b + other.b,
-            c: self.c + other.c,
-            area: self.area + other.area,
-        }
+        Self { a: self.a + other.a, b: self.b + other.b, c: self.c + other.c, area: self.area + other.area }
     }
 
     /// Its value at a point.

@@ -67,11 +67,7 @@ impl Surface {
                     }
                     *slot
                 });
-                surface.triangles.extend(if even {
-                    [[a, b, c], [a, c, d]]
-                } else {
-                    [[b, c, d], [b, d, a]]
-                });
+                surface.triangles.extend(if even { [[a, b, c], [a, c, d]] } else { [[b, c, d], [b, d, a]] });
             }
         });
         surface

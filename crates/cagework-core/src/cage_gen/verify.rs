@@ -27,11 +27,8 @@ pub(super) fn verified(shell: &Shell, surface: &Surface) -> Option<Cage> {
         return None;
     }
     let at: Vec<DVec3> = cage.positions().iter().map(|&p| shell.lattice.centred(p)).collect();
-    let triangles: Vec<Corners> = cage
-        .triangles()
-        .iter()
-        .map(|&index| Corners { index, at: index.map(|i| at[i as usize]) })
-        .collect();
+    let triangles: Vec<Corners> =
+        cage.triangles().iter().map(|&index| Corners { index, at: index.map(|i| at[i as usize]) }).collect();
     let mut obstacle = Obstacle { voxels: shell.obstacle.voxels.clone(), ..shell.obstacle };
     obstacle.clearance *= LEFT;
     if triangles.iter().any(|t| !obstacle.is_clear(t.at)) || !meeting(&triangles).is_empty() {
