@@ -9,6 +9,9 @@ use glam::DVec3;
 /// what f32 coordinates of a cage resolve.
 const IN_PLANE: f64 = 1e-7;
 
+/// Triangles nearer than this fraction of their size touch: rounding of f64, with room.
+const TOUCH: f64 = 1e-10;
+
 /// Cosine of the smallest angle between two faces with a common edge (2 degrees): sharper is folded.
 const FOLDED: f64 = 0.9994;
 
@@ -93,15 +96,16 @@ pub(crate) fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
     pairs
 }
 
-/// Whether some axis separates two triangles by more than `gap`. Exact for a gap of 0; with a gap it may refuse pairs
-/// whose closest points are both corners.
+/// Whether some axis separates two triangles by more than `gap`. Exact for a gap of 0, but that touching counts as
+/// meeting; with a gap it may refuse pairs whose closest points are both corners.
 fn are_apart(a: &[DVec3; 3], b: &[DVec3; 3], gap: f64) -> bool {
+    // Near the origin nothing is lost when triangles are small against their distance from it.
+    let origin = a[0];
+    let (a, b) = (&a.map(|p| p - origin), &b.map(|p| p - origin));
+    let size = a.iter().chain(b).fold(0.0, |m: f64, p| m.max(p.abs().max_element()));
+    let gap = gap + TOUCH * size;
     let separates = |axis: DVec3| {
-        let length_squared = axis.length_squared();
-        if length_squared < 1e-24 {
-            return false;
-        }
-        let margin = gap * length_squared.sqrt();
+        let margin = gap * axis.length();
         let (p, q) = (a.map(|x| axis.dot(x)), b.map(|x| axis.dot(x)));
         let (p_min, p_max) = (p[0].min(p[1]).min(p[2]), p[0].max(p[1]).max(p[2]));
         let (q_min, q_max) = (q[0].min(q[1]).min(q[2]), q[0].max(q[1]).max(q[2]));

@@ -65,6 +65,7 @@ impl Buckets {
             for y in ys[0]..=ys[1] {
                 for x in xs[0]..=xs[1] {
                     let slot = (z * dims[1] + y) * dims[0] + x;
+                    let bucket = bucket_bounds(origin, dims, [x, y, z]);
                     let mut list = std::mem::take(&mut self.lists[slot]);
                     self.lists_read += 1;
                     let read = self.lists_read;
@@ -79,10 +80,7 @@ impl Buckets {
                             met.1 = searches;
                             found.push(t);
                         }
-                        let [ax, ay, az] = range(origin, dims, low, high);
-                        (ax[0]..=ax[1]).contains(&x)
-                            && (ay[0]..=ay[1]).contains(&y)
-                            && (az[0]..=az[1]).contains(&z)
+                        low.cmple(bucket[1]).all() && high.cmpge(bucket[0]).all()
                     });
                     self.lists[slot] = list;
                 }
@@ -97,4 +95,18 @@ fn range(origin: DVec3, dims: [usize; 3], min: DVec3, max: DVec3) -> [[usize; 2]
         let at = |p: DVec3| (((p[k] - origin[k]) / SIZE).max(0.0) as usize).min(dims[k] - 1);
         [at(min), at(max)]
     })
+}
+
+/// The box of a bucket; the outermost ones have no end.
+fn bucket_bounds(origin: DVec3, dims: [usize; 3], at: [usize; 3]) -> [DVec3; 2] {
+    let [mut min, mut max] = [DVec3::NEG_INFINITY, DVec3::INFINITY];
+    for k in 0..3 {
+        if at[k] > 0 {
+            min[k] = origin[k] + SIZE * at[k] as f64;
+        }
+        if at[k] + 1 < dims[k] {
+            max[k] = origin[k] + SIZE * (at[k] + 1) as f64;
+        }
+    }
+    [min, max]
 }

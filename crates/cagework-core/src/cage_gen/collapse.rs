@@ -60,7 +60,7 @@ impl Ord for Waiting {
 /// A surface with the quadric of every vertex.
 #[derive(Debug)]
 pub(super) struct Collapser<'g, 'a> {
-    surface: &'g mut Guarded<'a>,
+    pub(super) surface: &'g mut Guarded<'a>,
     pub(super) quadrics: Vec<Quadric>,
     version: Vec<u32>,
     heap: BinaryHeap<Waiting>,
@@ -101,16 +101,14 @@ impl<'g, 'a> Collapser<'g, 'a> {
         }
         let on_mirror = surface.on_mirror.iter().filter(|&&on| on).count();
         let count = if surface.mirror.is_some() { 2 * n - on_mirror } else { n };
-        let mut collapser = Self {
+        Self {
             surface,
             quadrics,
             version: vec![0; n],
             heap: BinaryHeap::new(),
             count,
             scratch: Scratch::default(),
-        };
-        collapser.wait_for_all();
-        collapser
+        }
     }
 
     /// Enters every edge.
@@ -133,14 +131,17 @@ impl<'g, 'a> Collapser<'g, 'a> {
         target: usize,
         go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
     ) -> Result<usize, Cancelled> {
+        self.heap.clear();
+        self.wait_for_all();
         let before = self.count;
         let (mut steps, mut count_then) = (0, before);
         while self.count > target {
             let Some(waiting) = self.heap.pop() else {
-                if self.count == count_then {
+                if self.count == count_then || self.surface.has_band() {
                     break;
                 }
-                // Edges that had no place may have one now that their surroundings have changed.
+                // Edges that had no place may have one now that their surroundings have changed. (With a band
+                // they get their chance in the next, wider one.)
                 count_then = self.count;
                 self.wait_for_all();
                 continue;
@@ -194,7 +195,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
     /// Enters an edge with the cost that it has if nothing is in the way.
     fn wait(&mut self, edge: [u32; 2]) {
         let [a, b] = edge;
-        let cost = self.merged_quadric(a, b).at(self.optimum(a, b));
+        let cost = self.merged_quadric(a, b).cost(self.optimum(a, b));
         let version = edge.map(|v| self.version[v as usize]);
         self.heap.push(Waiting { cost, edge, version });
     }
@@ -286,7 +287,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         if pinned.is_none() || self.surface.on_mirror[gone as usize] {
             candidates.push(q);
         }
-        let mut priced: Vec<(f64, DVec3)> = candidates.into_iter().map(|c| (quadric.at(c), c)).collect();
+        let mut priced: Vec<(f64, DVec3)> = candidates.into_iter().map(|c| (quadric.cost(c), c)).collect();
         priced.sort_by(|x, y| x.0.total_cmp(&y.0));
         priced.into_iter().find(|&(_, c)| self.is_place(kept, c)).map(|(cost, c)| (c, cost))
     }

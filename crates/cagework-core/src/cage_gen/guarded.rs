@@ -3,8 +3,9 @@
 use glam::DVec3;
 
 use super::buckets::Buckets;
+use super::footprint::any_run;
 use super::surface::Surface;
-use super::voxels::{Footprint, Voxels};
+use super::voxels::Voxels;
 use crate::contact::{Corners, meet};
 
 /// Parts of the cage that are not neighbours stay this far apart, in voxels.
@@ -23,11 +24,17 @@ pub(super) struct Obstacle {
 }
 
 impl Obstacle {
-    /// Whether a triangle (centred coordinates) keeps its distance.
-    pub(super) fn is_clear(&self, triangle: [DVec3; 3]) -> bool {
-        let half = DVec3::from_array(self.voxels.dims.map(|n| 0.5 * n as f64));
-        let footprint = Footprint::new(triangle.map(|p| p + half), self.clearance);
-        !footprint.any_run(self.voxels.dims, |y, z, first, last| self.voxels.has_run(y, z, first, last))
+    /// Whether a triangle (centred coordinates) keeps its distance and, if there is a band, stays in it.
+    pub(super) fn is_clear(&self, triangle: [DVec3; 3], band: Option<&Voxels>) -> bool {
+        let dims = self.voxels.dims;
+        let half = DVec3::from_array(dims.map(|n| 0.5 * n as f64));
+        if band.is_some() && triangle.iter().any(|p| p.abs().cmpge(half).any()) {
+            return false;
+        }
+        !any_run(triangle.map(|p| p + half), self.clearance, dims, |y, z, first, last| {
+            self.voxels.has_run(y, z, first, last)
+                || band.is_some_and(|band| !band.covers_run(y, z, first, last))
+        })
     }
 }
 
@@ -41,6 +48,8 @@ pub(super) struct Guarded<'a> {
     pub(super) on_mirror: Vec<bool>,
     pub(super) mirror: Option<usize>,
     obstacle: &'a Obstacle,
+    /// Where triangles may be at all: keeps them from spanning gaps that the model leaves open.
+    band: Option<Voxels>,
     buckets: Buckets,
     bounds: Vec<Option<(DVec3, DVec3)>>,
     near: Vec<u32>,
@@ -58,6 +67,7 @@ impl<'a> Guarded<'a> {
             on_mirror: surface.on_mirror,
             mirror: surface.mirror,
             obstacle,
+            band: None,
             buckets: Buckets::new(half, n),
             bounds: vec![None; n],
             near: Vec::new(),
@@ -69,6 +79,16 @@ impl<'a> Guarded<'a> {
             guarded.note(t as u32);
         }
         guarded
+    }
+
+    /// Sets the band within which triangles may change from now on; none: anywhere.
+    pub(super) fn set_band(&mut self, band: Option<Voxels>) {
+        self.band = band;
+    }
+
+    /// Whether there is a band.
+    pub(super) fn has_band(&self) -> bool {
+        self.band.is_some()
     }
 
     /// The surface as it is now, without gaps.
@@ -113,7 +133,7 @@ impl<'a> Guarded<'a> {
                 return false;
             }
         }
-        if new.iter().any(|t| !self.obstacle.is_clear(t.at)) {
+        if new.iter().any(|t| !self.obstacle.is_clear(t.at, self.band.as_ref())) {
             return false;
         }
         if new.iter().enumerate().any(|(k, a)| new[..k].iter().any(|b| meet(a, b, GAP))) {

@@ -3,7 +3,8 @@
 
 use glam::{DVec3, Vec3};
 
-use super::voxels::{Footprint, Voxels};
+use super::footprint::Footprint;
+use super::voxels::Voxels;
 use crate::progress::Cancelled;
 
 /// Voxels are this much larger than the model's length divided by their number: its ends lie inside voxels, not
@@ -84,10 +85,8 @@ impl Lattice {
             if voxel == voxel_of(corners[1]) && voxel == voxel_of(corners[2]) {
                 continue;
             }
-            Footprint::new(corners, 0.0).any_run(self.dims, |y, z, first, last| {
-                voxels.add_run(y, z, first, last);
-                false
-            });
+            Footprint::new(corners, 0.0)
+                .for_each_run(self.dims, |y, z, first, last| voxels.add_run(y, z, first, last));
         }
         Ok(voxels)
     }

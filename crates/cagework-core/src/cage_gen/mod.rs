@@ -12,6 +12,7 @@
 
 mod buckets;
 mod collapse;
+mod footprint;
 mod guarded;
 mod lattice;
 mod options;
@@ -44,6 +45,10 @@ const TRIES: usize = 4;
 
 /// A cage may have this many times the vertices asked for before a coarser lattice is tried.
 const NEAR_TARGET: f64 = 1.1;
+
+/// Layers of voxels around the hull in which the cage must stay, tried one after the other until the target is met:
+/// as far as possible it spans no gap. At last anywhere.
+const BANDS: [Option<usize>; 5] = [Some(1), Some(2), Some(3), Some(5), None];
 
 /// Makes a cage that encloses a model strictly.
 ///
@@ -127,7 +132,15 @@ fn simplified(
     while aim < n_hull {
         let mut guarded = Guarded::new(shell.hull.clone(), &shell.obstacle);
         let mut collapser = Collapser::new(&mut guarded);
-        let left = collapser.run(aim, &|share| go_on(0.7 * share))?;
+        let mut left = n_hull;
+        for (k, layers) in BANDS.iter().enumerate() {
+            collapser.surface.set_band(layers.map(|layers| shell.band(layers)));
+            let from = 0.7 * k as f32 / BANDS.len() as f32;
+            left = collapser.run(aim, &|share| go_on(from + 0.7 * share / BANDS.len() as f32))?;
+            if left <= aim {
+                break;
+            }
+        }
         let quadrics = collapser.quadrics;
         if let Some(cage) = relaxed(shell, guarded, &quadrics, go_on)? {
             return Ok((cage, false));

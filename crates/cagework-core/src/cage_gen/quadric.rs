@@ -46,6 +46,12 @@ impl Quadric {
         (p.dot(self.a * p) - 2.0 * self.b.dot(p) + self.c).max(0.0)
     }
 
+    /// What a vertex there costs: area times the fourth power of the distance. The square alone lets a thin limb's few
+    /// planes be far off because its area is small, and webs grow between limbs.
+    pub(super) fn cost(&self, p: DVec3) -> f64 {
+        self.at(p).powi(2) / self.area.max(1e-12)
+    }
+
     /// Where it is smallest, among the points with `p[axis] = 0` if an axis is given.
     pub(super) fn minimum(&self, on_mirror: Option<usize>) -> Option<DVec3> {
         let (mut a, mut b) = (self.a, self.b);

@@ -19,7 +19,7 @@ use crate::progress::Cancelled;
 const ALIKE: f64 = 0.985;
 
 /// Room between the solid's box and the lattice's, apart from dilation: the outermost layer stays empty.
-const PAD: usize = 2;
+const PAD: usize = 6;
 
 /// Clearance in voxels unless the caller asks for more.
 const CLEARANCE: f64 = 0.5;
@@ -33,6 +33,8 @@ pub(super) struct Shell {
     pub(super) lattice: Lattice,
     /// What the cage must not meet.
     pub(super) obstacle: Obstacle,
+    /// The hull as voxels.
+    filled: Voxels,
     /// The smoothed hull: clear of the obstacle and of itself.
     pub(super) hull: Surface,
     /// The hull with its stairs: right by construction.
@@ -80,6 +82,7 @@ impl Shell {
         }
         go_on(0.8)?;
         let stairs = Surface::of(&hull, mirror);
+        let filled = hull;
         let clearance = (asked / lattice.cell).max(CLEARANCE);
         // Whole voxels of it by dilation, the rest as distance.
         let whole = clearance.floor();
@@ -90,7 +93,14 @@ impl Shell {
         let obstacle = Obstacle { voxels: keep_out, clearance: clearance - whole };
         let hull = smoothed(&stairs, &obstacle);
         let parts = solid.parts();
-        Ok(Self { clearance: clearance * lattice.cell, lattice, obstacle, hull, stairs, parts })
+        Ok(Self { clearance: clearance * lattice.cell, lattice, obstacle, filled, hull, stairs, parts })
+    }
+}
+
+impl Shell {
+    /// The hull and layers of voxels around it.
+    pub(super) fn band(&self, layers: usize) -> Voxels {
+        (0..layers).fold(self.filled.clone(), |band, _| band.dilated())
     }
 }
 

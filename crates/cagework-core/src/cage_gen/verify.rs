@@ -31,7 +31,7 @@ pub(super) fn verified(shell: &Shell, surface: &Surface) -> Option<Cage> {
         cage.triangles().iter().map(|&index| Corners { index, at: index.map(|i| at[i as usize]) }).collect();
     let mut obstacle = Obstacle { voxels: shell.obstacle.voxels.clone(), ..shell.obstacle };
     obstacle.clearance *= LEFT;
-    if triangles.iter().any(|t| !obstacle.is_clear(t.at)) || !meeting(&triangles).is_empty() {
+    if triangles.iter().any(|t| !obstacle.is_clear(t.at, None)) || !meeting(&triangles).is_empty() {
         return None;
     }
     let half = shell.lattice.half();

@@ -1,7 +1,5 @@
 //! A set of voxels as bits, one row of words along x after the other, and what is done to such sets.
 
-use glam::DVec3;
-
 /// Bits of a word.
 const WORD: usize = u64::BITS as usize;
 
@@ -49,6 +47,12 @@ impl Voxels {
     pub(super) fn has_run(&self, y: usize, z: usize, first: usize, last: usize) -> bool {
         let row = self.row(y, z);
         (first / WORD..=last / WORD).any(|w| row[w] & run_mask(w, first, last) != 0)
+    }
+
+    /// Whether all of the voxels `first..=last` of a row are in the set.
+    pub(super) fn covers_run(&self, y: usize, z: usize, first: usize, last: usize) -> bool {
+        let row = self.row(y, z);
+        (first / WORD..=last / WORD).all(|w| !row[w] & run_mask(w, first, last) == 0)
     }
 
     /// Voxels in the set.
@@ -299,96 +303,4 @@ fn is_critical(block: usize) -> bool {
         block == pair || block == 255 ^ pair
     });
     edge || corner
-}
-
-/// The voxels that a triangle overlaps, row by row.
-///
-/// Source: Akenine-Moeller 2001 (separating axes). For one row all axes but x are constants, so that each axis bounds
-/// x on both sides and the row's voxels come out as one run, without testing any of them.
-#[derive(Debug)]
-pub(super) struct Footprint {
-    slabs: [Slab; 10],
-    min: DVec3,
-    max: DVec3,
-}
-
-/// A voxel centre `c` overlaps only if `low <= axis . c <= high`.
-#[derive(Clone, Copy, Debug, Default)]
-struct Slab {
-    axis: DVec3,
-    low: f64,
-    high: f64,
-}
-
-/// Widening of voxels that keeps rounding on the safe side.
-const SLACK: f64 = 1e-6;
-
-impl Footprint {
-    /// The footprint of a triangle in voxel units, for voxels grown by `grow` on all sides.
-    pub(super) fn new(triangle: [DVec3; 3], grow: f64) -> Self {
-        let half = 0.5 + grow + SLACK;
-        let slab = |axis: DVec3| {
-            let p = triangle.map(|v| axis.dot(v));
-            let reach = half * (axis.x.abs() + axis.y.abs() + axis.z.abs());
-            Slab { axis, low: p[0].min(p[1]).min(p[2]) - reach, high: p[0].max(p[1]).max(p[2]) + reach }
-        };
-        let edges = [triangle[1] - triangle[0], triangle[2] - triangle[1], triangle[0] - triangle[2]];
-        let mut slabs = [slab(edges[0].cross(edges[1])); 10];
-        for (k, e) in edges.iter().enumerate() {
-            slabs[3 * k + 1] = slab(DVec3::new(0.0, -e.z, e.y));
-            slabs[3 * k + 2] = slab(DVec3::new(e.z, 0.0, -e.x));
-            slabs[3 * k + 3] = slab(DVec3::new(-e.y, e.x, 0.0));
-        }
-        let [a, b, c] = triangle;
-        Self { slabs, min: a.min(b).min(c) - half, max: a.max(b).max(c) + half }
-    }
-
-    /// Calls `each(y, z, first, last)` for the run of every row; ends early, with true, when it returns true.
-    pub(super) fn any_run(
-        &self,
-        dims: [usize; 3],
-        mut each: impl FnMut(usize, usize, usize, usize) -> bool,
-    ) -> bool {
-        let range = |axis: usize| {
-            let first = (self.min[axis] - 0.5).ceil().max(0.0);
-            let last = (self.max[axis] - 0.5).floor().min(dims[axis] as f64 - 1.0);
-            (first, last)
-        };
-        let ((y0, y1), (z0, z1)) = (range(1), range(2));
-        let mut z = z0;
-        while z <= z1 {
-            let mut y = y0;
-            while y <= y1 {
-                if let Some((first, last)) = self.run(y + 0.5, z + 0.5, dims[0])
-                    && each(y as usize, z as usize, first, last)
-                {
-                    return true;
-                }
-                y += 1.0;
-            }
-            z += 1.0;
-        }
-        false
-    }
-
-    fn run(&self, y: f64, z: f64, n: usize) -> Option<(usize, usize)> {
-        let (mut low, mut high) = (self.min.x, self.max.x);
-        for slab in &self.slabs {
-            let rest = slab.axis.y * y + slab.axis.z * z;
-            let (a, b) = (slab.low - rest, slab.high - rest);
-            let x = slab.axis.x;
-            if x > 1e-12 {
-                low = low.max(a / x);
-                high = high.min(b / x);
-            } else if x < -1e-12 {
-                low = low.max(b / x);
-                high = high.min(a / x);
-            } else if a > 0.0 || b < 0.0 {
-                return None;
-            }
-        }
-        let first = (low - 0.5 - SLACK).ceil().max(0.0);
-        let last = (high - 0.5 + SLACK).floor().min(n as f64 - 1.0);
-        (first <= last).then_some((first as usize, last as usize))
-    }
 }
