@@ -5,9 +5,11 @@
 
 pub mod bind;
 pub mod cage;
+pub mod cage_check;
 pub mod cage_gen;
 mod contact;
 pub mod deform;
+pub mod enclosure;
 pub mod geometry;
 pub mod grid;
 pub mod levels;
