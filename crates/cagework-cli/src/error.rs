@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use cagework_core::bind::BindError;
 use cagework_core::cage::CageError;
+use cagework_core::cage_check::RepairError;
+use cagework_core::cage_gen::CageGenError;
 use cagework_gpu::GpuError;
 use thiserror::Error;
 
@@ -39,6 +41,12 @@ pub(crate) enum CliError {
     /// The GPU, or a bind on it.
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    /// No cage was generated.
+    #[error(transparent)]
+    CageGen(#[from] CageGenError),
+    /// The cage could not be mended.
+    #[error(transparent)]
+    Repair(#[from] RepairError),
     /// A plot could not be drawn.
     #[error("a plot cannot be drawn: {message}")]
     Plot {
@@ -81,7 +89,7 @@ impl CliError {
         match self {
             Self::Mismatch { hint, .. } => Some(hint),
             Self::Cage { source: CageError::Empty, .. } => {
-                Some("a cage is a closed mesh around the model; `--cage box` makes a simple one")
+                Some("a cage is a closed mesh around the model; `--cage auto` makes one")
             }
             Self::Bind(BindError::Outside { .. }) | Self::Gpu(GpuError::Bind(BindError::Outside { .. })) => {
                 Some("`--outside closest-point` binds such vertices to the closest point of the cage")
@@ -92,6 +100,7 @@ impl CliError {
             Self::Bind(BindError::Memory { .. }) | Self::Gpu(GpuError::Bind(BindError::Memory { .. })) => {
                 Some("the limit is set by --memory-limit, in MiB")
             }
+            Self::Repair(RepairError::NoModel) => Some("`--mesh` names it"),
             _ => None,
         }
     }

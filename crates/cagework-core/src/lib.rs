@@ -5,8 +5,11 @@
 
 pub mod bind;
 pub mod cage;
+pub mod cage_check;
 pub mod cage_gen;
+mod contact;
 pub mod deform;
+pub mod enclosure;
 pub mod geometry;
 pub mod grid;
 pub mod levels;
@@ -15,6 +18,7 @@ pub mod mesh;
 pub mod progress;
 pub mod report;
 pub mod sample;
+pub mod samples;
 mod simd;
 pub mod slice;
 pub mod solve;
@@ -25,7 +29,7 @@ pub mod weights;
 
 pub use bind::{BindError, BindOptions, Binding, bind};
 pub use cage::{Cage, CageError, CageNotice, FaceDefect};
-pub use cage_gen::subdivided_box;
+pub use cage_gen::{CageOptions, GeneratedCage, subdivided_box};
 pub use mean_value::{MeanValueError, mean_value_weights};
 pub use mesh::{Bounds, PolygonMesh, TriMesh};
 pub use progress::{Cancelled, Progress, ProgressEvent, Stage};
