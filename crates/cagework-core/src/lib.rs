@@ -17,6 +17,7 @@ pub mod mean_value;
 pub mod mesh;
 pub mod progress;
 pub mod report;
+pub mod rest_edit;
 pub mod sample;
 pub mod samples;
 mod simd;
