@@ -7,6 +7,7 @@ pub mod bind;
 pub mod cage;
 pub mod cage_gen;
 pub mod deform;
+pub mod edit;
 pub mod geometry;
 pub mod grid;
 pub mod levels;
