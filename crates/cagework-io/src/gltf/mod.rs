@@ -12,6 +12,7 @@ mod build;
 mod container;
 mod export;
 mod geometry;
+mod look;
 mod pack;
 mod patch;
 mod scene;
@@ -26,8 +27,11 @@ use crate::model::Counts;
 use scene::{Instance, Worlds};
 
 pub(crate) use build::build_from_obj;
+pub(crate) use container::{glb_of, glb_parts};
 pub(crate) use export::write_obj;
-pub(crate) use patch::{Pose, Rest, patch};
+pub(crate) use look::look;
+pub(crate) use pack::{Pack, push};
+pub(crate) use patch::{Pose, Rest, embed_images, patch};
 
 /// Why a glTF file could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
