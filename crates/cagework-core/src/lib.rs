@@ -17,6 +17,7 @@ pub mod progress;
 pub mod report;
 pub mod sample;
 mod simd;
+pub mod slice;
 pub mod solve;
 pub mod stencil;
 pub mod transfer;

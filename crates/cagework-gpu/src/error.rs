@@ -60,6 +60,18 @@ pub enum GpuError {
         /// How long was waited.
         seconds: u64,
     },
+    /// What was handed over does not belong together.
+    #[error("cannot be drawn: {reason}")]
+    Model {
+        /// What does not.
+        reason: String,
+    },
+    /// Something has to come first.
+    #[error("there is no {missing} yet: load one first")]
+    NotReady {
+        /// What.
+        missing: &'static str,
+    },
     /// The bind does not fit.
     #[error(transparent)]
     Plan(#[from] PlanError),

@@ -2,6 +2,7 @@
 //!
 //! [`GpuContext`] holds the device and one pipeline per [`kernels`] row; [`bind_gpu`] solves batch after batch on it and
 //! reads back only the weights sampled at the mesh's vertices; [`Deformer`] keeps them on the GPU and moves the mesh.
+//! [`Session`] is all of it for one model, with pictures by the [`render`]er.
 //! Everything is async and nothing blocks the web's event loop: work goes out in short slices ([`stream`]), awaited.
 
 pub mod bind;
@@ -16,7 +17,9 @@ pub mod levels;
 pub mod multigrid;
 pub mod pipelines;
 pub mod plan;
+pub mod render;
 pub mod sample;
+pub mod session;
 pub mod stream;
 
 pub use bind::bind_gpu;
@@ -24,3 +27,4 @@ pub use deform::{Deformer, GpuWeights};
 pub use device::{ContextOptions, GpuContext};
 pub use error::GpuError;
 pub use plan::{Plan, PlanError};
+pub use session::Session;

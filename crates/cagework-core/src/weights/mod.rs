@@ -148,6 +148,12 @@ impl Weights {
         (&self.indices[range.clone()], &self.data[range])
     }
 
+    /// Weights of one column, zeros included. `[n_rows]`
+    pub fn column(&self, column: u32) -> impl Iterator<Item = f32> {
+        self.rows()
+            .map(move |(columns, data)| columns.iter().position(|&c| c == column).map_or(0.0, |k| data[k]))
+    }
+
     /// All rows in order.
     pub fn rows(&self) -> impl Iterator<Item = (&[u32], &[f32])> {
         (0..self.n_rows()).map(|row| self.row(row))

@@ -1,0 +1,213 @@
+//! A slice through the grid, to look at: the kinds of its cells, and the harmonic coordinates at their centres.
+//!
+//! Values are those that a mesh vertex at each cell's centre would get, from the bind itself ([`crate::bind()`] with
+//! [`Slice::centers`] as its mesh), so that there is no second solver that could disagree.
+
+use glam::{DVec3, Vec3};
+use thiserror::Error;
+
+use crate::bind::{BindOptions, Method};
+use crate::cage::Cage;
+use crate::grid::Grid;
+use crate::levels::Boundary as _;
+use crate::voxelize::CellKind;
+use crate::voxelize::classic::{place_grid, voxelize_classic};
+use crate::voxelize::embedded::{EmbeddedCells, classify, shoot_lines};
+use crate::weights::Weights;
+
+/// One layer of cells across an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slice {
+    /// The axis it lies across: 0, 1, 2.
+    pub axis: usize,
+    /// The layer, counted from the grid's first.
+    pub layer: u32,
+    /// Cells along [`Self::u`] and [`Self::v`].
+    pub dims: [u32; 2],
+    /// Outer corner of its first cell, in the plane of the centres, object units.
+    pub corner: Vec3,
+    /// Edge of a cell along the next axis (y for x, z for y, x for z), object units.
+    pub u: Vec3,
+    /// Edge of a cell along the one after it.
+    pub v: Vec3,
+    /// u fastest; none is untyped. `[dims[1], dims[0]]`
+    pub kinds: Vec<CellKind>,
+    /// Cells that are not exterior, ascending: what [`Self::weights`] has rows for.
+    pub cells: Vec<u32>,
+    /// Harmonic coordinates at the centres of [`Self::cells`], once they are known. `[n_cells, n_cage]`
+    pub weights: Option<Weights>,
+}
+
+/// Why weights do not belong to a slice.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("the slice has {cells} cells inside the cage, but there are {rows} rows of weights")]
+pub struct SliceError {
+    /// Cells.
+    pub cells: usize,
+    /// Rows.
+    pub rows: usize,
+}
+
+impl Slice {
+    /// The layer of the grid of a bind with `options` at `fraction` (0 to 1) of its length along `axis`.
+    ///
+    /// # Panics
+    /// If there is no such axis.
+    #[must_use]
+    pub fn new(cage: &Cage, options: &BindOptions, axis: usize, fraction: f32) -> Self {
+        match options.method {
+            Method::Embedded => {
+                let grid = Grid::cubic(cage.bounds(), options.grid);
+                let lines = shoot_lines(cage, &grid);
+                let (inside, _) = classify(&lines, &grid);
+                let cells = EmbeddedCells::finest(cage, &lines, grid, inside);
+                Self::of(&grid, axis, fraction, |cell| match cells.is_unknown(cell) {
+                    false => CellKind::Exterior,
+                    true if cells.cut_arms(cell) != 0 => CellKind::Boundary,
+                    true => CellKind::Interior,
+                })
+            }
+            Method::Classic => {
+                let (dims, origin, cell) = place_grid(cage, options.grid, options.cell_shape);
+                let grid = Grid { dims: dims.to_array(), origin, cell };
+                let cells = voxelize_classic(cage, options.grid, options.cell_shape);
+                Self::of(&grid, axis, fraction, |cell| cells.kinds[grid.index(cell)])
+            }
+        }
+    }
+
+    fn of(grid: &Grid, axis: usize, fraction: f32, kind: impl Fn([u32; 3]) -> CellKind) -> Self {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let last = grid.dims[axis] - 1;
+        let layer = (fraction.clamp(0.0, 1.0) * grid.dims[axis] as f32).min(last as f32) as u32;
+        let dims = [grid.dims[u], grid.dims[v]];
+        let at = |i: u32, j: u32| {
+            let mut cell = [layer; 3];
+            (cell[u], cell[v]) = (i, j);
+            cell
+        };
+        let kinds: Vec<CellKind> = (0..dims[1])
+            .flat_map(|j| (0..dims[0]).map(move |i| (i, j)))
+            .map(|(i, j)| kind(at(i, j)))
+            .collect();
+        let edge = |axis: usize| {
+            DVec3::from_array(std::array::from_fn(|a| f64::from(u8::from(a == axis)))) * grid.cell
+        };
+        let cells = (0..kinds.len() as u32).filter(|&c| kinds[c as usize] != CellKind::Exterior).collect();
+        Self {
+            axis,
+            layer,
+            dims,
+            corner: (grid.center(at(0, 0)) - 0.5 * (edge(u) + edge(v))).as_vec3(),
+            u: edge(u).as_vec3(),
+            v: edge(v).as_vec3(),
+            kinds,
+            cells,
+            weights: None,
+        }
+    }
+
+    /// Centres of [`Self::cells`]: the mesh whose weights are the slice's values. Object units.
+    #[must_use]
+    pub fn centers(&self) -> Vec<Vec3> {
+        let n = self.dims[0];
+        let center =
+            |&c: &u32| self.corner + ((c % n) as f32 + 0.5) * self.u + ((c / n) as f32 + 0.5) * self.v;
+        self.cells.iter().map(center).collect()
+    }
+
+    /// Takes the weights of a bind of [`Self::centers`].
+    ///
+    /// # Errors
+    /// [`SliceError`] when there is not one row for each.
+    pub fn set_weights(&mut self, weights: Weights) -> Result<(), SliceError> {
+        if weights.n_rows() != self.cells.len() {
+            return Err(SliceError { cells: self.cells.len(), rows: weights.n_rows() });
+        }
+        self.weights = Some(weights);
+        Ok(())
+    }
+
+    /// Values of one coordinate, 0 in exterior cells; nothing without weights. `[dims[1], dims[0]]`
+    #[must_use]
+    pub fn values(&self, column: u32) -> Option<Vec<f32>> {
+        let weights = self.weights.as_ref()?;
+        let mut values = vec![0.0; self.kinds.len()];
+        for (&cell, value) in self.cells.iter().zip(weights.column(column)) {
+            values[cell as usize] = value;
+        }
+        Some(values)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cage_gen::subdivided_box;
+    use crate::mesh::Bounds;
+    use crate::progress::Silent;
+
+    fn box_cage() -> Cage {
+        let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(1.0, 2.0, 4.0) };
+        Cage::new(&subdivided_box(bounds, 0.0, [1, 1, 1])).unwrap()
+    }
+
+    fn options(method: Method) -> BindOptions {
+        BindOptions { grid: 16, method, ..BindOptions::default() }
+    }
+
+    #[test]
+    fn middle_of_a_box_is_interior_within_one_ring_of_boundary() {
+        let slice = Slice::new(&box_cage(), &options(Method::Embedded), 0, 0.5);
+        // g = 16 along z: cells of 1/4; 8 x 16 of them inside across x, less the ring next to the cage.
+        let count = |kind| slice.kinds.iter().filter(|&&k| k == kind).count();
+        assert_eq!((count(CellKind::Interior), count(CellKind::Boundary)), (6 * 14, 8 * 16 - 6 * 14));
+        assert_eq!((slice.cells.len(), slice.u, slice.v), (8 * 16, 0.25 * Vec3::Y, 0.25 * Vec3::Z));
+    }
+
+    #[test]
+    fn centres_lie_in_the_plane_of_the_layer_and_inside() {
+        for method in [Method::Embedded, Method::Classic] {
+            for axis in 0..3 {
+                let slice = Slice::new(&box_cage(), &options(method), axis, 0.3);
+                let centers = slice.centers();
+                assert!(!centers.is_empty());
+                let size = Vec3::new(1.0, 2.0, 4.0);
+                assert!(centers.iter().all(|p| p[axis] == slice.corner[axis]));
+                assert!(centers.iter().all(|p| p.min_element() > -0.02 && (size - *p).min_element() > -0.02));
+            }
+        }
+    }
+
+    #[test]
+    fn ends_are_the_first_and_the_last_layer() {
+        let at = |fraction| Slice::new(&box_cage(), &options(Method::Embedded), 2, fraction).layer;
+        assert_eq!((at(-1.0), at(0.0)), (0, 0));
+        assert!(at(1.0) == at(2.0) && at(1.0) >= 16);
+    }
+
+    /// Harmonic coordinates of a box are trilinear: at the centre of a cell they are a product of three fractions.
+    #[test]
+    fn values_are_the_harmonic_coordinates() {
+        let cage = box_cage();
+        let options = options(Method::Embedded);
+        let mut slice = Slice::new(&cage, &options, 1, 0.4);
+        assert_eq!(slice.values(0), None);
+        let centers = slice.centers();
+        let weights = crate::bind(&centers, &cage, &options, &Silent).unwrap().weights;
+        assert!(slice.set_weights(weights.with_rows(&[0])).is_err());
+        slice.set_weights(weights).unwrap();
+        for column in [0, 5] {
+            let corner = cage.positions()[column as usize] / Vec3::new(1.0, 2.0, 4.0);
+            let values = slice.values(column).unwrap();
+            for (&cell, p) in slice.cells.iter().zip(&centers) {
+                let t = *p / Vec3::new(1.0, 2.0, 4.0);
+                let expected = (Vec3::ONE - (t - corner).abs()).to_array().iter().product::<f32>();
+                // What tau = 1e-5 leaves.
+                assert!((values[cell as usize] - expected).abs() < 1e-4);
+            }
+            let outside = (0..slice.kinds.len()).filter(|&c| slice.kinds[c] == CellKind::Exterior);
+            assert!(outside.map(|c| values[c]).all(|v| v == 0.0));
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! The cage in the picture: lines, handles, chosen faces.
+
+use std::collections::HashMap;
+
+use cagework_core::Cage;
+use glam::Vec3;
+
+use super::overlay::{Item, NOTHING, Overlay, item, unique_edges};
+use super::pipelines::Layouts;
+use super::scene::{Selection, Theme};
+use super::theme::state;
+use crate::buffers::Allocator;
+use crate::device::GpuContext;
+use crate::error::GpuError;
+
+/// The cage as it is drawn.
+#[derive(Debug)]
+pub(super) struct CageView {
+    pub(super) positions: wgpu::Buffer,
+    pub(super) n_vertices: usize,
+    edges: Vec<[u32; 2]>,
+    edge_numbers: HashMap<[u32; 2], usize>,
+    triangles: Vec<[u32; 3]>,
+    face_of_triangle: Vec<u32>,
+    pub(super) lines: Overlay,
+    pub(super) handles: Overlay,
+    pub(super) faces: Overlay,
+}
+
+impl CageView {
+    pub(super) async fn new(context: &GpuContext, layouts: &Layouts, cage: &Cage) -> Result<Self, GpuError> {
+        let n_vertices = cage.n_vertices();
+        let positions = Allocator::new(context).storage("cage vertices", 16 * n_vertices as u64).await?;
+        let edges = unique_edges(cage.faces().iter().map(Vec::as_slice));
+        let edge_numbers = edges.iter().enumerate().map(|(k, &e)| (e, k)).collect();
+        let overlay = |items: &[Item]| Overlay::new(context, layouts, &positions, items);
+        let view = Self {
+            lines: overlay(&edges.iter().map(|&[a, b]| item(state::NORMAL, a, b)).collect::<Vec<_>>()),
+            handles: overlay(&(0..n_vertices as u32).map(|i| item(state::NORMAL, i, 0)).collect::<Vec<_>>()),
+            faces: overlay(&vec![NOTHING; 2 * cage.triangles().len()]),
+            positions,
+            n_vertices,
+            edges,
+            edge_numbers,
+            triangles: cage.triangles().to_vec(),
+            face_of_triangle: cage.face_of_triangle().to_vec(),
+        };
+        view.pose(context, cage.positions());
+        Ok(view)
+    }
+
+    /// Uploads where the cage is.
+    pub(super) fn pose(&self, context: &GpuContext, cage_positions: &[Vec3]) {
+        let padded: Vec<[f32; 4]> = cage_positions.iter().map(|p| p.extend(1.0).to_array()).collect();
+        context.queue.write_buffer(&self.positions, 0, bytemuck::cast_slice(&padded));
+    }
+
+    /// Writes what is chosen and pointed at.
+    pub(super) fn select(&mut self, context: &GpuContext, layouts: &Layouts, selection: &Selection) {
+        self.handles.set_items(context, layouts, &self.handle_items(selection));
+        self.lines.set_items(context, layouts, &self.line_items(selection));
+        self.faces.set_items(context, layouts, &self.face_items(selection));
+    }
+
+    pub(super) fn set_theme(&self, context: &GpuContext, theme: Theme) {
+        let palette = theme.palette();
+        self.lines.set_style(context, palette.cage_lines());
+        self.handles.set_style(context, palette.handles());
+        self.faces.set_style(context, palette.faces());
+    }
+
+    fn handle_items(&self, selection: &Selection) -> Vec<Item> {
+        let mut states = vec![state::NORMAL; self.n_vertices];
+        mark(&mut states, &selection.unmatched, state::UNMATCHED);
+        mark(&mut states, &selection.vertices, state::SELECTED);
+        hover(&mut states, selection.hovered_vertex.map(|v| v as usize));
+        (0u32..).zip(states).map(|(i, state)| item(state, i, 0)).collect()
+    }
+
+    fn line_items(&self, selection: &Selection) -> Vec<Item> {
+        let number = |[a, b]: [u32; 2]| self.edge_numbers.get(&[a.min(b), a.max(b)]).copied();
+        let mut states = vec![state::NORMAL; self.edges.len()];
+        for edge in selection.edges.iter().filter_map(|&e| number(e)) {
+            states[edge] = state::SELECTED;
+        }
+        hover(&mut states, selection.hovered_edge.and_then(number));
+        self.edges.iter().zip(states).map(|(&[a, b], state)| item(state, a, b)).collect()
+    }
+
+    fn face_items(&self, selection: &Selection) -> Vec<Item> {
+        let n_faces = self.face_of_triangle.iter().max().map_or(0, |&f| f as usize + 1);
+        let mut states = vec![state::NORMAL; n_faces];
+        mark(&mut states, &selection.faces, state::SELECTED);
+        hover(&mut states, selection.hovered_face.map(|f| f as usize));
+        self.triangles
+            .iter()
+            .zip(&self.face_of_triangle)
+            .flat_map(|(&[a, b, c], &face)| match states[face as usize] {
+                state::NORMAL => [NOTHING, NOTHING],
+                state => [item(state, a, b), [c, 0]],
+            })
+            .collect()
+    }
+}
+
+fn mark(states: &mut [u32], chosen: &[u32], state: u32) {
+    for &k in chosen {
+        if let Some(s) = states.get_mut(k as usize) {
+            *s = state;
+        }
+    }
+}
+
+fn hover(states: &mut [u32], hovered: Option<usize>) {
+    if let Some(s) = hovered.and_then(|k| states.get_mut(k)) {
+        *s = if *s == state::SELECTED { state::BOTH } else { state::HOVERED };
+    }
+}

@@ -1,0 +1,204 @@
+use super::*;
+
+/// Rounding of f32 products of numbers of size 10, in pixels of a picture 800 wide.
+const PIXELS: f32 = 0.02;
+
+/// The same in object units.
+const UNITS: f32 = 2e-5;
+
+fn camera(projection: Projection) -> Camera {
+    let mut camera = Camera {
+        target: Vec3::new(0.5, -0.25, 1.0),
+        yaw: 0.7,
+        pitch: -0.4,
+        distance: 5.0,
+        projection,
+        ..Camera::default()
+    };
+    camera.set_viewport(Vec2::new(800.0, 600.0));
+    camera.set_scene(Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.5) });
+    camera
+}
+
+fn both() -> [Camera; 2] {
+    [camera(Projection::Perspective), camera(Projection::Orthographic)]
+}
+
+#[test]
+fn axes_are_orthonormal_and_right_handed() {
+    for pitch in [-FRAC_PI_2, -0.4, 0.0, 1.2, FRAC_PI_2] {
+        let camera = Camera { pitch, ..camera(Projection::Perspective) };
+        let (x, y, z) = (camera.right(), camera.up(), camera.backward());
+        assert!(x.cross(y).abs_diff_eq(z, 1e-6), "{x} {y} {z}");
+        assert!(x.dot(z).abs() < 1e-6 && (y.length() - 1.0).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn target_is_in_the_middle() {
+    for camera in both() {
+        let projected = camera.project(camera.target).expect("it is in front");
+        assert!(projected.position.abs_diff_eq(Vec2::new(400.0, 300.0), PIXELS));
+        assert!((projected.depth - camera.distance).abs() < UNITS);
+    }
+}
+
+#[test]
+fn front_view_has_x_to_the_right_and_y_up() {
+    for mut camera in both() {
+        camera.look_along(AxisView::Front);
+        let at = |p: Vec3| camera.project(camera.target + p).expect("it is in front").position;
+        let middle = at(Vec3::ZERO);
+        assert!(at(Vec3::X).x > middle.x + 10.0 && (at(Vec3::X).y - middle.y).abs() < PIXELS);
+        assert!(at(Vec3::Y).y < middle.y - 10.0 && (at(Vec3::Y).x - middle.x).abs() < PIXELS);
+    }
+}
+
+#[test]
+fn every_axis_view_looks_along_its_axis() {
+    for (view, backward) in [
+        (AxisView::Front, Vec3::Z),
+        (AxisView::Back, -Vec3::Z),
+        (AxisView::Right, Vec3::X),
+        (AxisView::Left, -Vec3::X),
+        (AxisView::Top, Vec3::Y),
+        (AxisView::Bottom, -Vec3::Y),
+    ] {
+        let mut camera = Camera::default();
+        camera.look_along(view);
+        assert!(camera.backward().abs_diff_eq(backward, 1e-6), "{view:?}");
+    }
+}
+
+/// Field of view 2 atan(1/2): at distance d, half the height is d/2.
+#[test]
+fn perspective_divides_by_depth() {
+    let mut camera =
+        Camera { fov_y: 2.0 * 0.5f32.atan(), yaw: 0.0, pitch: 0.0, distance: 4.0, ..Camera::default() };
+    camera.set_viewport(Vec2::new(200.0, 100.0));
+    // Depth 4: half the height, 50 pixels, is 2 units. Depth 2: 1 unit.
+    let at = |p: Vec3| camera.project(p).expect("it is in front").position;
+    assert!(at(Vec3::new(1.0, 1.0, 0.0)).abs_diff_eq(Vec2::new(125.0, 25.0), PIXELS));
+    assert!(at(Vec3::new(1.0, 0.5, 2.0)).abs_diff_eq(Vec2::new(150.0, 25.0), PIXELS));
+    assert!((camera.units_per_pixel(Vec3::ZERO) - 2.0 / 50.0).abs() < 1e-6);
+}
+
+#[test]
+fn ray_goes_through_what_is_drawn_there() {
+    for camera in both() {
+        for point in [Vec3::ZERO, Vec3::new(1.0, 0.5, -0.7), Vec3::new(-0.3, 1.2, 1.4)] {
+            let projected = camera.project(point).expect("it is in front");
+            let ray = camera.ray(projected.position);
+            let along = (point - ray.origin).dot(ray.direction);
+            assert!(along > 0.0, "the point lies ahead");
+            assert!((ray.origin + along * ray.direction).abs_diff_eq(point, UNITS), "{camera:?}");
+        }
+    }
+}
+
+#[test]
+fn points_behind_the_eye_are_not_drawn() {
+    let camera = camera(Projection::Perspective);
+    assert_eq!(camera.project(camera.eye() + camera.backward()), None);
+}
+
+#[test]
+fn zoom_keeps_the_point_under_the_cursor() {
+    for mut camera in both() {
+        let cursor = Vec2::new(650.0, 120.0);
+        let fixed = camera.on_target_plane(cursor);
+        let direction = camera.backward();
+        for factor in [0.5, 1.7, 0.8] {
+            let before = camera.distance;
+            camera.zoom_at(factor, cursor);
+            assert!((camera.distance / before - factor).abs() < 1e-5);
+            let now = camera.project(fixed).expect("it is in front").position;
+            assert!(now.abs_diff_eq(cursor, PIXELS), "{now} instead of {cursor}");
+            assert_eq!(camera.backward(), direction);
+        }
+    }
+}
+
+#[test]
+fn zoom_stays_within_reason() {
+    let mut camera = camera(Projection::Perspective);
+    for _ in 0..100 {
+        camera.zoom_at(0.5, Vec2::ZERO);
+    }
+    assert!(camera.distance > 0.0 && camera.clip_from_world().is_finite());
+    for _ in 0..100 {
+        camera.zoom_at(2.0, Vec2::ZERO);
+    }
+    assert!(camera.distance.is_finite() && camera.clip_from_world().is_finite());
+}
+
+#[test]
+fn pan_moves_what_is_at_the_target_with_the_pointer() {
+    for mut camera in both() {
+        let grabbed = camera.on_target_plane(Vec2::new(300.0, 200.0));
+        camera.pan(Vec2::new(55.0, -20.0));
+        let now = camera.project(grabbed).expect("it is in front").position;
+        assert!(now.abs_diff_eq(Vec2::new(355.0, 180.0), PIXELS));
+    }
+}
+
+#[test]
+fn orbit_stops_at_the_poles_and_keeps_the_distance() {
+    let mut camera = camera(Projection::Perspective);
+    camera.orbit(Vec2::new(1.0, 10.0));
+    assert_eq!(camera.pitch, FRAC_PI_2);
+    assert!((camera.eye().distance(camera.target) - 5.0).abs() < UNITS);
+    // The hand moves right: what is in front moves right, the eye goes left around it.
+    let mut camera = Camera { yaw: 0.0, pitch: 0.0, ..camera };
+    camera.orbit(Vec2::new(0.2, 0.0));
+    let front = camera.target + 0.5 * Vec3::Z;
+    assert!(camera.project(front).expect("it is in front").position.x > 400.0);
+}
+
+#[test]
+fn framed_box_fills_the_picture_and_no_more() {
+    let bounds = Bounds { min: Vec3::new(-3.0, 0.0, 1.0), max: Vec3::new(1.0, 1.0, 2.0) };
+    for mut camera in both() {
+        for size in [Vec2::new(800.0, 600.0), Vec2::new(300.0, 900.0)] {
+            camera.set_viewport(size);
+            camera.set_scene(bounds);
+            camera.frame(bounds);
+            let fill = (0..8)
+                .map(|k| {
+                    let corner = Vec3::new(
+                        if k & 1 == 0 { bounds.min.x } else { bounds.max.x },
+                        if k & 2 == 0 { bounds.min.y } else { bounds.max.y },
+                        if k & 4 == 0 { bounds.min.z } else { bounds.max.z },
+                    );
+                    let ndc = camera.project(corner).expect("it is in front").position / size * 2.0 - 1.0;
+                    ndc.abs().max_element()
+                })
+                .fold(0.0, f32::max);
+            assert!((0.8..1.0).contains(&fill), "{size}: {fill}");
+        }
+    }
+}
+
+#[test]
+fn switching_the_projection_keeps_the_size_at_the_target() {
+    let [perspective, orthographic] = both();
+    let point = perspective.target + 0.7 * perspective.right() + 0.2 * perspective.up();
+    let [a, b] = [perspective, orthographic].map(|c| c.project(point).expect("it is in front").position);
+    assert!(a.abs_diff_eq(b, PIXELS), "{a} {b}");
+}
+
+#[test]
+fn depth_is_ordered_and_within_the_clip_volume() {
+    for camera in both() {
+        let z = |p: Vec3| {
+            let clip = camera.clip_from_world() * p.extend(1.0);
+            clip.z / clip.w
+        };
+        let (near, far) = (camera.target + camera.backward(), camera.target - camera.backward());
+        assert!(0.0 < z(near) && z(near) < z(far) && z(far) < 1.0);
+        // Lifted by a hundredth of the distance, a point is as deep as one that lies there.
+        let clip = camera.clip_from_world() * camera.target.extend(1.0);
+        let nearer = camera.target + 0.01 * camera.distance * camera.backward();
+        assert!(((clip.z - 0.01 * camera.lift()) / clip.w - z(nearer)).abs() < 2e-5);
+    }
+}

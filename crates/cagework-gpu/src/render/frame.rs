@@ -1,0 +1,380 @@
+//! One frame: what is drawn, in which order.
+
+use cagework_core::{Bounds, Cage as CoreCage};
+use glam::Vec3;
+
+use super::cage::CageView;
+use super::camera::{Camera, Projection};
+use super::gizmo::GizmoShape;
+use super::layout::Camera as Uniform;
+use super::marks::{MarksView, Wires};
+use super::mesh::Mesh;
+use super::model::DrawModel;
+use super::pipelines::{DEPTH_FORMAT, Layouts, Pipelines, SAMPLES};
+use super::scene::{MeshStyle, SceneOptions};
+use super::slice::SlicePlane;
+use super::theme::linear;
+use crate::device::GpuContext;
+use crate::error::GpuError;
+
+/// How far the floor reaches, over the scene's radius.
+const FLOOR_REACH: f32 = 5.0;
+
+/// Depths of the gizmo: before everything else, yet its own parts hide each other.
+const GIZMO_DEPTHS: [f32; 2] = [0.0, 1e-3];
+
+/// What a frame is drawn into in the end.
+#[derive(Clone, Copy, Debug)]
+pub struct Target<'a> {
+    /// The view.
+    pub view: &'a wgpu::TextureView,
+    /// The view's format.
+    pub format: wgpu::TextureFormat,
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Its pixels per CSS pixel.
+    pub scale: f32,
+}
+
+/// Textures that a frame is drawn into before its samples are averaged.
+#[derive(Debug)]
+struct Targets {
+    format: wgpu::TextureFormat,
+    size: [u32; 2],
+    color: wgpu::TextureView,
+    depth: wgpu::TextureView,
+}
+
+/// Draws the scene.
+#[derive(Debug)]
+pub struct Renderer {
+    layouts: Layouts,
+    pipelines: Vec<(wgpu::TextureFormat, Pipelines)>,
+    camera: wgpu::Buffer,
+    camera_group: wgpu::BindGroup,
+    targets: Option<Targets>,
+    mesh: Option<Mesh>,
+    wires: Option<Wires>,
+    cage: Option<CageView>,
+    slice: Option<SlicePlane>,
+    marks: Option<MarksView>,
+    gizmo: GizmoShape,
+    scene: SceneOptions,
+    floor: Bounds,
+    /// Values of the first and the last colour of a heat map.
+    range: [f32; 2],
+}
+
+impl Renderer {
+    pub(crate) fn new(context: &GpuContext) -> Self {
+        let layouts = Layouts::new(&context.device);
+        let camera = context.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("camera"),
+            size: size_of::<Uniform>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let camera_group = context.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("camera"),
+            layout: &layouts.camera,
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: camera.as_entire_binding() }],
+        });
+        Self {
+            gizmo: GizmoShape::new(context, &layouts),
+            layouts,
+            pipelines: Vec::new(),
+            camera,
+            camera_group,
+            targets: None,
+            mesh: None,
+            wires: None,
+            cage: None,
+            slice: None,
+            marks: None,
+            scene: SceneOptions::default(),
+            floor: Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE },
+            range: [0.0, 1.0],
+        }
+    }
+
+    /// Another model, at rest; `normals` for its vertices.
+    pub(crate) async fn set_model(
+        &mut self,
+        context: &GpuContext,
+        model: &DrawModel,
+        normals: &[Vec3],
+    ) -> Result<(), GpuError> {
+        let padded: Vec<[f32; 4]> = normals.iter().map(|n| n.extend(0.0).to_array()).collect();
+        self.wires = None;
+        self.mesh = Some(Mesh::new(context, &self.layouts, model, &padded).await?);
+        self.apply(context, Some(model), None);
+        Ok(())
+    }
+
+    /// Another cage, at rest.
+    pub(crate) async fn set_cage(&mut self, context: &GpuContext, cage: &CoreCage) -> Result<(), GpuError> {
+        self.cage = Some(CageView::new(context, &self.layouts, cage).await?);
+        self.apply(context, None, None);
+        Ok(())
+    }
+
+    /// Draws vertices where these buffers have them; at rest without.
+    pub(crate) fn set_vertices(&mut self, context: &GpuContext, buffers: Option<[&wgpu::Buffer; 2]>) {
+        let Some(mesh) = &mut self.mesh else { return };
+        match buffers {
+            Some([positions, normals]) => mesh.set_vertices(context, &self.layouts, positions, normals),
+            None => mesh.set_rest(context, &self.layouts),
+        }
+        if let Some(wires) = &mut self.wires {
+            wires.edges.set_positions(context, &self.layouts, &mesh.positions);
+        }
+        self.make_marks(context);
+    }
+
+    /// Where the cage is. Nothing happens without a cage.
+    pub(crate) fn pose(&self, context: &GpuContext, cage_positions: &[Vec3]) {
+        if let Some(cage) = &self.cage {
+            cage.pose(context, cage_positions);
+        }
+    }
+
+    /// Weights or errors of all vertices, and the values of the first and the last colour.
+    pub(crate) fn set_values(&mut self, context: &GpuContext, values: &[f32], range: [f32; 2]) {
+        let Some(mesh) = self.mesh.as_ref().filter(|_| !values.is_empty()) else { return };
+        debug_assert_eq!(values.len(), mesh.n_vertices as usize, "one value per vertex");
+        context.queue.write_buffer(&mesh.values, 0, bytemuck::cast_slice(values));
+        self.range = range;
+        mesh.set_style(context, self.scene.mesh, range);
+    }
+
+    /// Where model and cage are at rest: the floor lies below.
+    pub(crate) fn set_bounds(&mut self, bounds: Bounds) {
+        self.floor = bounds;
+    }
+
+    /// Another scene.
+    pub(crate) fn set_scene(&mut self, context: &GpuContext, scene: SceneOptions, model: Option<&DrawModel>) {
+        let before = std::mem::replace(&mut self.scene, scene);
+        self.apply(context, model, Some(&before));
+    }
+
+    /// Writes what differs from `before`, or all of it.
+    fn apply(&mut self, context: &GpuContext, model: Option<&DrawModel>, before: Option<&SceneOptions>) {
+        let scene = &self.scene;
+        let theme_changed = before.is_none_or(|b| b.theme != scene.theme);
+        if let Some(cage) = &mut self.cage {
+            if theme_changed {
+                cage.set_theme(context, scene.theme);
+            }
+            if before.is_none_or(|b| b.selection != scene.selection) {
+                cage.select(context, &self.layouts, &scene.selection);
+            }
+        }
+        if let Some(mesh) = &self.mesh {
+            if before.is_none_or(|b| b.mesh != scene.mesh) {
+                mesh.set_style(context, scene.mesh, self.range);
+            }
+            if (scene.base_wireframe || scene.mesh_edges)
+                && self.wires.is_none()
+                && let Some(model) = model
+            {
+                let wires = Wires::new(context, &self.layouts, mesh, model);
+                wires.set_theme(context, scene.theme);
+                self.wires = Some(wires);
+            }
+        }
+        if let Some(wires) = self.wires.as_ref().filter(|_| theme_changed) {
+            wires.set_theme(context, scene.theme);
+        }
+        if theme_changed || before.is_none_or(|b| b.slice != scene.slice) {
+            self.slice =
+                scene.slice.as_ref().map(|s| SlicePlane::new(context, &self.layouts, s, scene.theme));
+        }
+        if theme_changed || before.is_none_or(|b| b.marks != scene.marks) {
+            self.make_marks(context);
+        }
+    }
+
+    fn make_marks(&mut self, context: &GpuContext) {
+        let mesh = self.mesh.as_ref().map(|m| &m.positions);
+        let cage = self.cage.as_ref().map(|c| &c.positions);
+        let marks = MarksView::new(context, &self.layouts, &self.scene.marks, mesh, cage);
+        marks.set_theme(context, self.scene.theme);
+        self.marks = Some(marks);
+    }
+
+    /// Records a picture.
+    pub(crate) fn draw(
+        &mut self,
+        context: &GpuContext,
+        encoder: &mut wgpu::CommandEncoder,
+        target: Target<'_>,
+        camera: &Camera,
+    ) {
+        let Target { view, format, size, .. } = target;
+        let uniform = self.uniform(target, camera);
+        context.queue.write_buffer(&self.camera, 0, bytemuck::bytes_of(&uniform));
+        if let Some(gizmo) = &self.scene.gizmo {
+            self.gizmo.update(context, gizmo, camera);
+        }
+        if self.pipelines.iter().all(|(f, _)| *f != format) {
+            self.pipelines.push((format, Pipelines::new(&context.device, &self.layouts, format)));
+        }
+        if self.targets.as_ref().is_none_or(|t| (t.format, t.size) != (format, size)) {
+            self.targets = Some(Targets::new(context, format, size));
+        }
+        let (Some(targets), Some((_, pipelines))) =
+            (&self.targets, self.pipelines.iter().find(|(f, _)| *f == format))
+        else {
+            return;
+        };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("picture"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &targets.color,
+                depth_slice: None,
+                resolve_target: Some(view),
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    // Only the average of the samples is wanted.
+                    store: wgpu::StoreOp::Discard,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &targets.depth,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(1.0),
+                    store: wgpu::StoreOp::Discard,
+                }),
+                stencil_ops: None,
+            }),
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        pass.set_bind_group(0, &self.camera_group, &[]);
+        self.draw_model(&mut pass, pipelines);
+        self.draw_over(&mut pass, pipelines);
+        if self.scene.gizmo.is_some() {
+            let [near, far] = GIZMO_DEPTHS;
+            pass.set_viewport(0.0, 0.0, size[0] as f32, size[1] as f32, near, far);
+            pass.set_pipeline(&pipelines.gizmo);
+            self.gizmo.draw(&mut pass);
+        }
+    }
+
+    fn draw_model(&self, pass: &mut wgpu::RenderPass<'_>, pipelines: &Pipelines) {
+        let scene = &self.scene;
+        pass.set_pipeline(&pipelines.background);
+        pass.draw(0..3, 0..1);
+        let mesh = self.mesh.as_ref().filter(|_| scene.mesh != MeshStyle::Hidden);
+        if let Some(mesh) = mesh {
+            pass.set_pipeline(&pipelines.mesh);
+            mesh.draw(pass, scene.mesh, false);
+        }
+        if let Some(slice) = &self.slice {
+            pass.set_pipeline(&pipelines.slice);
+            slice.draw(pass);
+        }
+        if let Some(mesh) = mesh {
+            pass.set_pipeline(&pipelines.mesh_blended);
+            mesh.draw(pass, scene.mesh, true);
+        }
+        if scene.floor {
+            pass.set_pipeline(&pipelines.floor);
+            pass.draw(0..6, 0..1);
+        }
+        if let Some(wires) = &self.wires {
+            pass.set_pipeline(&pipelines.lines);
+            if scene.mesh_edges && mesh.is_some() {
+                wires.edges.draw(pass, false);
+            }
+            if scene.base_wireframe {
+                wires.base.draw(pass, false);
+            }
+        }
+    }
+
+    fn draw_over(&self, pass: &mut wgpu::RenderPass<'_>, pipelines: &Pipelines) {
+        if let Some(cage) = &self.cage {
+            if self.scene.cage_lines {
+                pass.set_pipeline(&pipelines.faces);
+                cage.faces.draw_faces(pass);
+                pass.set_pipeline(&pipelines.lines_behind);
+                cage.lines.draw(pass, true);
+                pass.set_pipeline(&pipelines.lines);
+                cage.lines.draw(pass, false);
+            }
+            if self.scene.handles {
+                pass.set_pipeline(&pipelines.points_behind);
+                cage.handles.draw(pass, true);
+                pass.set_pipeline(&pipelines.points);
+                cage.handles.draw(pass, false);
+            }
+        }
+        if let Some(marks) = &self.marks {
+            for (behind, [lines, points]) in [
+                (true, [&pipelines.lines_behind, &pipelines.points_behind]),
+                (false, [&pipelines.lines, &pipelines.points]),
+            ] {
+                if let Some(segments) = &marks.segments {
+                    pass.set_pipeline(lines);
+                    segments.draw(pass, behind);
+                }
+                for overlay in &marks.points {
+                    pass.set_pipeline(points);
+                    overlay.draw(pass, behind);
+                }
+            }
+        }
+    }
+
+    fn uniform(&self, target: Target<'_>, camera: &Camera) -> Uniform {
+        let Target { format, size, scale, .. } = target;
+        let palette = self.scene.theme.palette();
+        let clip_from_world = camera.clip_from_world();
+        let viewport = size.map(|s| s as f32);
+        let radius = (0.5 * self.floor.diagonal()).max(f32::MIN_POSITIVE);
+        let middle = self.floor.center().with_y(self.floor.min.y);
+        Uniform {
+            clip_from_world: clip_from_world.to_cols_array_2d(),
+            world_from_clip: clip_from_world.inverse().to_cols_array_2d(),
+            view_from_world: camera.view_from_world().to_cols_array_2d(),
+            eye: camera.eye().to_array(),
+            perspective: f32::from(u8::from(camera.projection == Projection::Perspective)),
+            viewport,
+            scale,
+            encode: u32::from(!format.is_srgb()),
+            background_top: linear(palette.background_top),
+            background_bottom: linear(palette.background_bottom),
+            floor_color: linear(palette.floor),
+            floor_center: middle.to_array(),
+            floor_radius: FLOOR_REACH * radius,
+            floor_spacing: 10f32.powf((0.15 * radius).log10().round()),
+            lift: camera.lift(),
+            pixel: viewport.map(|s| 2.0 / s),
+        }
+    }
+}
+
+impl Targets {
+    fn new(context: &GpuContext, format: wgpu::TextureFormat, [width, height]: [u32; 2]) -> Self {
+        let view = |label, format| {
+            let texture = context.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: SAMPLES,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+                view_formats: &[],
+            });
+            texture.create_view(&wgpu::TextureViewDescriptor::default())
+        };
+        Self {
+            format,
+            size: [width, height],
+            color: view("samples", format),
+            depth: view("depth", DEPTH_FORMAT),
+        }
+    }
+}

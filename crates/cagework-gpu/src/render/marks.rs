@@ -1,0 +1,96 @@
+//! Places with a problem, and wireframes: overlays that come and go.
+
+use glam::Vec3;
+
+use super::mesh::Mesh;
+use super::model::DrawModel;
+use super::overlay::{Item, Overlay, item, unique_edges};
+use super::pipelines::Layouts;
+use super::scene::{Marks, Theme};
+use crate::device::GpuContext;
+
+/// The state whose width is that of a line rather than a point.
+const SEGMENT: u32 = 4;
+
+/// Marks as they are drawn.
+#[derive(Debug)]
+pub(super) struct MarksView {
+    pub(super) segments: Option<Overlay>,
+    pub(super) points: Vec<Overlay>,
+}
+
+impl MarksView {
+    pub(super) fn new(
+        context: &GpuContext,
+        layouts: &Layouts,
+        marks: &Marks,
+        mesh: Option<&wgpu::Buffer>,
+        cage: Option<&wgpu::Buffer>,
+    ) -> Self {
+        let points = |indices: &[u32], positions: &wgpu::Buffer| {
+            let limit = (positions.size() / 16) as u32;
+            let items: Vec<Item> = indices.iter().filter(|&&i| i < limit).map(|&i| item(0, i, 0)).collect();
+            Overlay::new(context, layouts, positions, &items)
+        };
+        let mut view = Self { segments: None, points: Vec::new() };
+        if !marks.segments.is_empty() {
+            let ends: Vec<Vec3> = marks.segments.iter().flatten().copied().collect();
+            let items: Vec<Item> =
+                (0..marks.segments.len() as u32).map(|k| item(SEGMENT, 2 * k, 2 * k + 1)).collect();
+            let positions = upload(context, &ends);
+            view.segments = Some(Overlay::new(context, layouts, &positions, &items));
+        }
+        if !marks.points.is_empty() {
+            let all: Vec<u32> = (0..marks.points.len() as u32).collect();
+            view.points.push(points(&all, &upload(context, &marks.points)));
+        }
+        for (indices, positions) in [(&marks.mesh_vertices, mesh), (&marks.cage_vertices, cage)] {
+            if let Some(positions) = positions.filter(|_| !indices.is_empty()) {
+                view.points.push(points(indices, positions));
+            }
+        }
+        view
+    }
+
+    pub(super) fn set_theme(&self, context: &GpuContext, theme: Theme) {
+        for overlay in self.segments.iter().chain(&self.points) {
+            overlay.set_style(context, theme.palette().marks());
+        }
+    }
+}
+
+fn upload(context: &GpuContext, points: &[Vec3]) -> wgpu::Buffer {
+    let padded: Vec<[f32; 4]> = points.iter().map(|p| p.extend(1.0).to_array()).collect();
+    let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("marks"),
+        size: 16 * padded.len() as u64,
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    context.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(&padded));
+    buffer
+}
+
+/// The mesh's edges, at rest and where it is; made when first asked for.
+#[derive(Debug)]
+pub(super) struct Wires {
+    pub(super) base: Overlay,
+    pub(super) edges: Overlay,
+}
+
+impl Wires {
+    pub(super) fn new(context: &GpuContext, layouts: &Layouts, mesh: &Mesh, model: &DrawModel) -> Self {
+        let triangles = model.shading_triangles();
+        let edges = unique_edges(triangles.iter().map(<[u32; 3]>::as_slice));
+        let items: Vec<Item> = edges.into_iter().map(|[a, b]| item(0, a, b)).collect();
+        Self {
+            base: Overlay::new(context, layouts, &mesh.rest, &items),
+            edges: Overlay::new(context, layouts, &mesh.positions, &items),
+        }
+    }
+
+    pub(super) fn set_theme(&self, context: &GpuContext, theme: Theme) {
+        self.base.set_style(context, theme.palette().wire(true));
+        self.edges.set_style(context, theme.palette().wire(false));
+    }
+}

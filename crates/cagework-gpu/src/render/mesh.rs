@@ -1,0 +1,245 @@
+//! The model on the GPU: corners, indices, materials, textures.
+
+use super::layout::{Surface, surface_mode};
+use super::model::{Alpha, CLAY, DrawGroup, DrawModel, DrawTexture, Wrap};
+use super::pipelines::Layouts;
+use super::scene::MeshStyle;
+use super::texture;
+use crate::buffers::Allocator;
+use crate::device::GpuContext;
+use crate::error::GpuError;
+
+/// The model as it is drawn.
+#[derive(Debug)]
+pub(super) struct Mesh {
+    corners: wgpu::Buffer,
+    indices: wgpu::Buffer,
+    groups: Vec<Group>,
+    /// Positions at rest.
+    pub(super) rest: wgpu::Buffer,
+    /// Normals at rest.
+    pub(super) rest_normals: wgpu::Buffer,
+    /// A weight or an error of each vertex.
+    pub(super) values: wgpu::Buffer,
+    /// Where the vertices are now; the bind group that the mesh is drawn with.
+    vertices: wgpu::BindGroup,
+    /// Positions that are drawn: at rest, or deformed.
+    pub(super) positions: wgpu::Buffer,
+    pub(super) n_vertices: u32,
+}
+
+#[derive(Debug)]
+struct Group {
+    indices: std::ops::Range<u32>,
+    surface: Surface,
+    uniform: wgpu::Buffer,
+    bind_group: wgpu::BindGroup,
+    blended: bool,
+}
+
+impl Mesh {
+    pub(super) async fn new(
+        context: &GpuContext,
+        layouts: &Layouts,
+        model: &DrawModel,
+        normals: &[[f32; 4]],
+    ) -> Result<Self, GpuError> {
+        let mut allocator = Allocator::new(context);
+        let usage = wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST;
+        let corner_bytes: &[u8] = bytemuck::cast_slice(&model.vertices);
+        let corners = allocator.zeros("corners", corner_bytes.len() as u64, usage).await?;
+        let usage = wgpu::BufferUsages::INDEX | wgpu::BufferUsages::COPY_DST;
+        let index_bytes: &[u8] = bytemuck::cast_slice(&model.triangles);
+        let indices = allocator.zeros("triangles", index_bytes.len() as u64, usage).await?;
+        for (buffer, bytes) in [(&corners, corner_bytes), (&indices, index_bytes)] {
+            if !bytes.is_empty() {
+                context.queue.write_buffer(buffer, 0, bytes);
+            }
+        }
+        let padded: Vec<[f32; 4]> = model.positions.iter().map(|p| p.extend(1.0).to_array()).collect();
+        let rest = allocator.table("rest positions", &padded).await?;
+        let rest_normals = allocator.table("rest normals", normals).await?;
+        let values = allocator.storage("values of vertices", 4 * model.positions.len() as u64).await?;
+        let white = texture::upload(
+            context,
+            &DrawTexture { width: 1, height: 1, rgba: vec![255; 4], ..DrawTexture::default() },
+        )
+        .await?;
+        let mut textures = Vec::new();
+        for texture in &model.textures {
+            textures.push(texture::upload(context, texture).await?);
+        }
+        let mut groups = Vec::new();
+        for group in whole(model) {
+            let (view, wrap) = match group.texture {
+                Some(t) => (&textures[t as usize], model.textures[t as usize].wrap),
+                None => (&white, [Wrap::Repeat; 2]),
+            };
+            groups.push(Group::new(context, layouts, &mut allocator, &group, view, wrap).await?);
+        }
+        let vertices = bind_vertices(context, layouts, [&rest, &rest_normals, &values]);
+        let n_vertices = model.positions.len() as u32;
+        let positions = rest.clone();
+        Ok(Self { corners, indices, groups, rest, rest_normals, values, vertices, positions, n_vertices })
+    }
+
+    /// Draws vertices from other buffers from now on: where they are deformed to.
+    pub(super) fn set_vertices(
+        &mut self,
+        context: &GpuContext,
+        layouts: &Layouts,
+        positions: &wgpu::Buffer,
+        normals: &wgpu::Buffer,
+    ) {
+        self.vertices = bind_vertices(context, layouts, [positions, normals, &self.values]);
+        self.positions = positions.clone();
+    }
+
+    /// Draws vertices where they are at rest from now on.
+    pub(super) fn set_rest(&mut self, context: &GpuContext, layouts: &Layouts) {
+        let (rest, normals) = (self.rest.clone(), self.rest_normals.clone());
+        self.set_vertices(context, layouts, &rest, &normals);
+    }
+
+    /// Writes what colours the surface, and the values of the first and the last colour.
+    pub(super) fn set_style(&self, context: &GpuContext, style: MeshStyle, [low, high]: [f32; 2]) {
+        for group in &self.groups {
+            let surface = match style {
+                MeshStyle::Hidden | MeshStyle::Solid => group.surface,
+                MeshStyle::Clay => Surface {
+                    mode: surface_mode::CLAY,
+                    base_color: CLAY,
+                    alpha_cutoff: 0.0,
+                    ..Surface::default()
+                },
+                MeshStyle::Weights { .. } => {
+                    Surface { mode: surface_mode::WEIGHTS, low, high, ..Surface::default() }
+                }
+                MeshStyle::Errors => Surface { mode: surface_mode::ERRORS, low, high, ..Surface::default() },
+            };
+            context.queue.write_buffer(&group.uniform, 0, bytemuck::bytes_of(&surface));
+        }
+    }
+
+    /// Draws the groups that are `blended` or not. Colours that mean a value cover everything.
+    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, style: MeshStyle, blended: bool) {
+        pass.set_bind_group(1, &self.vertices, &[]);
+        pass.set_vertex_buffer(0, self.corners.slice(..));
+        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
+        for group in &self.groups {
+            if (group.blended && style == MeshStyle::Solid) == blended {
+                pass.set_bind_group(2, &group.bind_group, &[]);
+                pass.draw_indexed(group.indices.clone(), 0, 0..1);
+            }
+        }
+    }
+}
+
+fn bind_vertices(
+    context: &GpuContext,
+    layouts: &Layouts,
+    [positions, normals, values]: [&wgpu::Buffer; 3],
+) -> wgpu::BindGroup {
+    context.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("vertices"),
+        layout: &layouts.vertices,
+        entries: &[
+            wgpu::BindGroupEntry { binding: 0, resource: positions.as_entire_binding() },
+            wgpu::BindGroupEntry { binding: 1, resource: normals.as_entire_binding() },
+            wgpu::BindGroupEntry { binding: 2, resource: values.as_entire_binding() },
+        ],
+    })
+}
+
+/// The groups of a model, and clay for the triangles of none.
+fn whole(model: &DrawModel) -> Vec<DrawGroup> {
+    let mut groups = model.groups.clone();
+    groups.sort_by_key(|g| g.triangles.start);
+    let mut gaps = Vec::new();
+    let mut covered = 0;
+    for group in &groups {
+        if group.triangles.start > covered {
+            gaps.push(DrawGroup { triangles: covered..group.triangles.start, ..DrawGroup::default() });
+        }
+        covered = covered.max(group.triangles.end);
+    }
+    let n = model.triangles.len() as u32;
+    if covered < n {
+        gaps.push(DrawGroup { triangles: covered..n, ..DrawGroup::default() });
+    }
+    groups.extend(gaps);
+    groups
+}
+
+impl Group {
+    async fn new(
+        context: &GpuContext,
+        layouts: &Layouts,
+        allocator: &mut Allocator<'_>,
+        group: &DrawGroup,
+        view: &wgpu::TextureView,
+        wrap: [Wrap; 2],
+    ) -> Result<Self, GpuError> {
+        let surface = Surface {
+            base_color: group.base_color,
+            mode: if group.alpha == Alpha::Blend { surface_mode::BLENDED } else { surface_mode::MATERIAL },
+            alpha_cutoff: match group.alpha {
+                Alpha::Mask { cutoff } => cutoff,
+                Alpha::Opaque | Alpha::Blend => 0.0,
+            },
+            low: 0.0,
+            high: 1.0,
+        };
+        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let uniform = allocator.zeros("material", size_of::<Surface>() as u64, usage).await?;
+        context.queue.write_buffer(&uniform, 0, bytemuck::bytes_of(&surface));
+        let [u, v] = wrap.map(|wrap| match wrap {
+            Wrap::Repeat => wgpu::AddressMode::Repeat,
+            Wrap::Mirror => wgpu::AddressMode::MirrorRepeat,
+            Wrap::Clamp => wgpu::AddressMode::ClampToEdge,
+        });
+        let sampler = context.device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("base colour"),
+            address_mode_u: u,
+            address_mode_v: v,
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            mipmap_filter: wgpu::MipmapFilterMode::Linear,
+            anisotropy_clamp: 4,
+            ..wgpu::SamplerDescriptor::default()
+        });
+        let bind_group = context.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("material"),
+            layout: &layouts.material,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::TextureView(view) },
+                wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::Sampler(&sampler) },
+            ],
+        });
+        Ok(Self {
+            indices: 3 * group.triangles.start..3 * group.triangles.end,
+            surface,
+            uniform,
+            bind_group,
+            blended: group.alpha == Alpha::Blend,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn triangles_of_no_group_are_clay() {
+        let mut model = DrawModel::plain(vec![Vec3::ZERO; 3], vec![[0, 1, 2]; 10]);
+        let group = |range| DrawGroup { triangles: range, base_color: [1.0; 4], ..DrawGroup::default() };
+        model.groups = vec![group(6..8), group(1..4)];
+        let mut all = whole(&model);
+        all.sort_by_key(|g| g.triangles.start);
+        let ranges: Vec<_> = all.iter().map(|g| (g.triangles.clone(), g.base_color == CLAY)).collect();
+        assert_eq!(ranges, [(0..1, true), (1..4, false), (4..6, true), (6..8, false), (8..10, true)]);
+    }
+}

@@ -1,0 +1,36 @@
+//! The renderer: a picture of the scene, into a page's canvas or a texture of its own.
+//!
+//! It reads the vertex buffers that `deform_vertices` and `vertex_normals` wrote; nothing is copied, and a frame
+//! uploads a few hundred bytes. Colours are computed in linear light and blended premultiplied, with four samples per
+//! pixel and a depth buffer. What changes rarely (chosen vertices, styles, a heat map) is written when it changes.
+//!
+//! Order: background, opaque mesh, slice, translucent mesh, floor, edges, cage (first what is behind the mesh, fainter),
+//! handles, marks, gizmo.
+//!
+//! **Format of the target.** sRGB formats (`rgba8unorm-srgb`) are written in linear light and encoded by the GPU. A
+//! canvas has none: configure it with its preferred format and the sRGB one among `view_formats`, and draw into a view
+//! of the latter. Where that is not possible, any 8-bit format does: shaders then encode, and only blending differs a
+//! little.
+
+mod cage;
+pub mod camera;
+pub mod colormap;
+mod frame;
+mod gizmo;
+pub mod layout;
+mod marks;
+mod mesh;
+pub mod model;
+mod overlay;
+mod pipelines;
+pub mod scene;
+pub mod shaders;
+mod slice;
+mod texture;
+mod theme;
+
+pub use camera::{AxisView, Camera, Projected, Projection, Ray};
+pub use frame::{Renderer, Target};
+pub use gizmo::{GIZMO_PX, pick_gizmo};
+pub use model::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
+pub use scene::{Gizmo, GizmoMode, GizmoPart, Marks, MeshStyle, SceneOptions, Selection, SliceView, Theme};

@@ -1,0 +1,175 @@
+//! Lines, points and faces over the model: items that index positions, each with a state.
+
+use super::layout::{HIDDEN, STATE_SHIFT, Style};
+use super::pipelines::Layouts;
+use crate::device::GpuContext;
+
+/// How much of the opacity is left where something nearer is.
+pub(super) const BEHIND_OPACITY: f32 = 0.22;
+
+/// An item: state and first index, second index.
+pub(super) type Item = [u32; 2];
+
+/// An item with a state.
+pub(super) fn item(state: u32, a: u32, b: u32) -> Item {
+    [state << STATE_SHIFT | a, b]
+}
+
+/// An item that is not drawn.
+pub(super) const NOTHING: Item = [HIDDEN << STATE_SHIFT, 0];
+
+/// Items of one kind over one buffer of positions.
+#[derive(Debug)]
+pub(super) struct Overlay {
+    positions: wgpu::Buffer,
+    items: wgpu::Buffer,
+    count: u32,
+    /// In front, and behind something.
+    styles: [wgpu::Buffer; 2],
+    bind_groups: [wgpu::BindGroup; 2],
+}
+
+fn buffer(context: &GpuContext, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    context.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: bytes.max(16).next_multiple_of(16),
+        usage: usage | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+impl Overlay {
+    pub(super) fn new(
+        context: &GpuContext,
+        layouts: &Layouts,
+        positions: &wgpu::Buffer,
+        items: &[Item],
+    ) -> Self {
+        let bytes = size_of_val(items) as u64;
+        let item_buffer = buffer(context, "items", bytes, wgpu::BufferUsages::STORAGE);
+        let styles = [(); 2]
+            .map(|()| buffer(context, "style", size_of::<Style>() as u64, wgpu::BufferUsages::UNIFORM));
+        let bind_groups = bind(context, layouts, positions, &item_buffer, &styles);
+        let overlay = Self {
+            positions: positions.clone(),
+            items: item_buffer,
+            count: items.len() as u32,
+            styles,
+            bind_groups,
+        };
+        overlay.write(context, items);
+        overlay
+    }
+
+    fn write(&self, context: &GpuContext, items: &[Item]) {
+        if !items.is_empty() {
+            context.queue.write_buffer(&self.items, 0, bytemuck::cast_slice(items));
+        }
+    }
+
+    /// Other items; only a longer list takes a new buffer.
+    pub(super) fn set_items(&mut self, context: &GpuContext, layouts: &Layouts, items: &[Item]) {
+        let bytes = size_of_val(items) as u64;
+        if bytes > self.items.size() {
+            self.items = buffer(context, "items", bytes, wgpu::BufferUsages::STORAGE);
+            self.bind_groups = bind(context, layouts, &self.positions, &self.items, &self.styles);
+        }
+        self.count = items.len() as u32;
+        self.write(context, items);
+    }
+
+    /// Other positions; nothing happens when they are the same.
+    pub(super) fn set_positions(
+        &mut self,
+        context: &GpuContext,
+        layouts: &Layouts,
+        positions: &wgpu::Buffer,
+    ) {
+        if self.positions != *positions {
+            self.positions = positions.clone();
+            self.bind_groups = bind(context, layouts, &self.positions, &self.items, &self.styles);
+        }
+    }
+
+    /// What it looks like.
+    pub(super) fn set_style(&self, context: &GpuContext, style: Style) {
+        let behind = Style { opacity: BEHIND_OPACITY * style.opacity, ..style };
+        for (buffer, style) in self.styles.iter().zip([style, behind]) {
+            context.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&style));
+        }
+    }
+
+    /// Draws all items with the pipeline that is set: lines and points.
+    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, behind: bool) {
+        self.draw_instances(pass, behind, 6, self.count);
+    }
+
+    /// Draws all items with the pipeline that is set: faces, two items each.
+    pub(super) fn draw_faces(&self, pass: &mut wgpu::RenderPass<'_>) {
+        self.draw_instances(pass, false, 3, self.count / 2);
+    }
+
+    fn draw_instances(&self, pass: &mut wgpu::RenderPass<'_>, behind: bool, vertices: u32, count: u32) {
+        if count > 0 {
+            pass.set_bind_group(1, &self.bind_groups[usize::from(behind)], &[]);
+            pass.draw(0..vertices, 0..count);
+        }
+    }
+}
+
+fn bind(
+    context: &GpuContext,
+    layouts: &Layouts,
+    positions: &wgpu::Buffer,
+    items: &wgpu::Buffer,
+    styles: &[wgpu::Buffer; 2],
+) -> [wgpu::BindGroup; 2] {
+    styles.each_ref().map(|style| {
+        context.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("overlay"),
+            layout: &layouts.overlay,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: style.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: positions.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 2, resource: items.as_entire_binding() },
+            ],
+        })
+    })
+}
+
+/// Every edge of polygons once, smaller vertex first, in order of first occurrence.
+pub(super) fn unique_edges<'a>(polygons: impl Iterator<Item = &'a [u32]>) -> Vec<[u32; 2]> {
+    let mut edges: Vec<(u64, u32)> = Vec::new();
+    let mut count = 0;
+    for polygon in polygons {
+        for (k, &a) in polygon.iter().enumerate() {
+            let b = polygon[(k + 1) % polygon.len()];
+            edges.push((u64::from(a.min(b)) << 32 | u64::from(a.max(b)), count));
+            count += 1;
+        }
+    }
+    edges.sort_unstable();
+    edges.dedup_by_key(|e| e.0);
+    edges.sort_unstable_by_key(|e| e.1);
+    edges.into_iter().map(|(key, _)| [(key >> 32) as u32, key as u32]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_of_a_box_are_twelve() {
+        let faces: [&[u32]; 6] =
+            [&[0, 2, 3, 1], &[4, 5, 7, 6], &[0, 1, 5, 4], &[2, 6, 7, 3], &[0, 4, 6, 2], &[1, 3, 7, 5]];
+        let edges = unique_edges(faces.into_iter());
+        assert_eq!(edges.len(), 12);
+        assert_eq!(&edges[..4], [[0, 2], [2, 3], [1, 3], [0, 1]]);
+    }
+
+    #[test]
+    fn items_keep_state_and_indices_apart() {
+        assert_eq!(item(4, 0x0fff_ffff, 7), [0x4fff_ffff, 7]);
+        assert_eq!(NOTHING[0] >> STATE_SHIFT, HIDDEN);
+    }
+}

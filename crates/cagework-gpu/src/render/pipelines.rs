@@ -1,0 +1,197 @@
+//! Render pipelines: one of each per format of the target, made when a picture of that format is first asked for.
+
+use wgpu::{BlendState, CompareFunction, PrimitiveTopology};
+
+use super::model::DrawVertex;
+use super::shaders::{self, DrawBinding, DrawShader};
+
+/// Samples per pixel.
+pub(super) const SAMPLES: u32 = 4;
+
+/// Depth of 32 bits: handles far away stay before the cage they belong to.
+pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// Bind group layouts, which do not depend on the target.
+#[derive(Debug)]
+pub(super) struct Layouts {
+    pub(super) camera: wgpu::BindGroupLayout,
+    pub(super) vertices: wgpu::BindGroupLayout,
+    pub(super) material: wgpu::BindGroupLayout,
+    pub(super) overlay: wgpu::BindGroupLayout,
+    pub(super) slice: wgpu::BindGroupLayout,
+    pub(super) gizmo: wgpu::BindGroupLayout,
+}
+
+/// Pipelines for one format.
+#[derive(Debug)]
+pub(super) struct Pipelines {
+    pub(super) background: wgpu::RenderPipeline,
+    pub(super) mesh: wgpu::RenderPipeline,
+    pub(super) mesh_blended: wgpu::RenderPipeline,
+    pub(super) lines: wgpu::RenderPipeline,
+    pub(super) lines_behind: wgpu::RenderPipeline,
+    pub(super) points: wgpu::RenderPipeline,
+    pub(super) points_behind: wgpu::RenderPipeline,
+    pub(super) faces: wgpu::RenderPipeline,
+    pub(super) floor: wgpu::RenderPipeline,
+    pub(super) slice: wgpu::RenderPipeline,
+    pub(super) gizmo: wgpu::RenderPipeline,
+}
+
+/// A vertex of the gizmo: position, normal, colour.
+pub(super) const GIZMO_STRIDE: u64 = 40;
+
+const GIZMO_ATTRIBUTES: [wgpu::VertexAttribute; 3] =
+    wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4];
+
+const MESH_ATTRIBUTES: [wgpu::VertexAttribute; 3] =
+    wgpu::vertex_attr_array![0 => Uint32, 1 => Float32x2, 2 => Unorm16x4];
+
+/// How depth is treated.
+#[derive(Clone, Copy)]
+struct Depth {
+    compare: CompareFunction,
+    write: bool,
+}
+
+/// What is nearer covers what is behind.
+const SOLID: Depth = Depth { compare: CompareFunction::Less, write: true };
+/// Shows where nothing nearer is, and covers nothing.
+const OVER: Depth = Depth { compare: CompareFunction::LessEqual, write: false };
+/// Shows where something nearer is.
+const BEHIND: Depth = Depth { compare: CompareFunction::Greater, write: false };
+/// Knows no depth.
+const NO_DEPTH: Depth = Depth { compare: CompareFunction::Always, write: false };
+
+fn layout_of(device: &wgpu::Device, name: &str, bindings: &[DrawBinding]) -> wgpu::BindGroupLayout {
+    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let entries: Vec<_> = (0u32..)
+        .zip(bindings)
+        .map(|(binding, kind)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+            ty: match kind {
+                DrawBinding::Uniform => buffer(wgpu::BufferBindingType::Uniform),
+                DrawBinding::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
+                DrawBinding::Texture => wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Float { filterable: true },
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                    multisampled: false,
+                },
+                DrawBinding::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+            },
+            count: None,
+        })
+        .collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(name), entries: &entries })
+}
+
+impl Layouts {
+    pub(super) fn new(device: &wgpu::Device) -> Self {
+        Self {
+            camera: layout_of(device, "camera", &[DrawBinding::Uniform]),
+            vertices: layout_of(device, "vertices", shaders::MESH.groups[0]),
+            material: layout_of(device, "material", shaders::MESH.groups[1]),
+            overlay: layout_of(device, "overlay", shaders::LINES.groups[0]),
+            slice: layout_of(device, "slice", shaders::SLICE.groups[0]),
+            gizmo: layout_of(device, "gizmo", shaders::GIZMO.groups[0]),
+        }
+    }
+
+    /// Groups of a shader after the camera's.
+    fn of(&self, shader: &DrawShader) -> Vec<&wgpu::BindGroupLayout> {
+        match shader.name {
+            "draw_mesh" => vec![&self.vertices, &self.material],
+            "draw_slice" => vec![&self.slice],
+            "draw_gizmo" => vec![&self.gizmo],
+            "draw_lines" | "draw_points" | "draw_faces" => vec![&self.overlay],
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// Makes pipelines for one format.
+struct Maker<'a> {
+    device: &'a wgpu::Device,
+    layouts: &'a Layouts,
+    format: wgpu::TextureFormat,
+}
+
+impl Maker<'_> {
+    fn make(&self, shader: &DrawShader, depth: Depth, blend: bool) -> wgpu::RenderPipeline {
+        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(shader.name),
+            source: wgpu::ShaderSource::Wgsl(shader.wgsl.into()),
+        });
+        let groups: Vec<_> =
+            std::iter::once(&self.layouts.camera).chain(self.layouts.of(shader)).map(Some).collect();
+        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(shader.name),
+            bind_group_layouts: &groups,
+            immediate_size: 0,
+        });
+        let vertices = |array_stride, attributes| {
+            let step_mode = wgpu::VertexStepMode::Vertex;
+            [Some(wgpu::VertexBufferLayout { array_stride, step_mode, attributes })]
+        };
+        let mesh_vertices = vertices(size_of::<DrawVertex>() as u64, &MESH_ATTRIBUTES);
+        let gizmo_vertices = vertices(GIZMO_STRIDE, &GIZMO_ATTRIBUTES);
+        self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(shader.name),
+            layout: Some(&layout),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("vertex"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                buffers: match shader.name {
+                    "draw_mesh" => &mesh_vertices,
+                    "draw_gizmo" => &gizmo_vertices,
+                    _ => &[],
+                },
+            },
+            primitive: wgpu::PrimitiveState {
+                topology: PrimitiveTopology::TriangleList,
+                ..wgpu::PrimitiveState::default()
+            },
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH_FORMAT,
+                depth_write_enabled: Some(depth.write),
+                depth_compare: Some(depth.compare),
+                stencil: wgpu::StencilState::default(),
+                bias: wgpu::DepthBiasState::default(),
+            }),
+            multisample: wgpu::MultisampleState { count: SAMPLES, ..wgpu::MultisampleState::default() },
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("fragment"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                targets: &[Some(wgpu::ColorTargetState {
+                    format: self.format,
+                    blend: blend.then_some(BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+                    write_mask: wgpu::ColorWrites::ALL,
+                })],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+}
+
+impl Pipelines {
+    pub(super) fn new(device: &wgpu::Device, layouts: &Layouts, format: wgpu::TextureFormat) -> Self {
+        let maker = Maker { device, layouts, format };
+        Self {
+            background: maker.make(&shaders::BACKGROUND, NO_DEPTH, false),
+            mesh: maker.make(&shaders::MESH, SOLID, false),
+            mesh_blended: maker.make(&shaders::MESH, OVER, true),
+            lines: maker.make(&shaders::LINES, OVER, true),
+            lines_behind: maker.make(&shaders::LINES, BEHIND, true),
+            points: maker.make(&shaders::POINTS, OVER, true),
+            points_behind: maker.make(&shaders::POINTS, BEHIND, true),
+            faces: maker.make(&shaders::FACES, OVER, true),
+            floor: maker.make(&shaders::FLOOR, OVER, true),
+            slice: maker.make(&shaders::SLICE, SOLID, true),
+            gizmo: maker.make(&shaders::GIZMO, SOLID, true),
+        }
+    }
+}

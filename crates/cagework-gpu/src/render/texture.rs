@@ -1,0 +1,144 @@
+//! Textures: uploaded with smaller versions of themselves, averaged in linear light.
+
+use super::model::DrawTexture;
+use crate::device::GpuContext;
+use crate::error::GpuError;
+
+/// Largest side, the baseline's limit.
+const MAX_SIDE: u32 = 8192;
+
+/// Steps of the table that leads from linear light back to bytes: finer than sRGB's steepest place needs.
+const ENCODE_STEPS: usize = 8192;
+
+/// sRGB bytes to linear light and back.
+struct Tables {
+    linear: Vec<f32>,
+    encoded: Vec<u8>,
+}
+
+impl Tables {
+    fn new() -> Self {
+        let linear = (0..256u32)
+            .map(|c| {
+                let c = c as f32 / 255.0;
+                if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+            })
+            .collect();
+        let encoded = (0..=ENCODE_STEPS)
+            .map(|k| {
+                let x = k as f32 / ENCODE_STEPS as f32;
+                let c = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
+                (255.0 * c).round() as u8
+            })
+            .collect();
+        Self { linear, encoded }
+    }
+
+    /// The image at half its size, rounded down, each pixel the mean of four.
+    fn halved(&self, image: &DrawTexture) -> DrawTexture {
+        let (width, height) = ((image.width / 2).max(1), (image.height / 2).max(1));
+        let mut rgba = Vec::with_capacity(4 * (width * height) as usize);
+        let pixel = |x: u32, y: u32| {
+            let at = 4
+                * (y.min(image.height - 1) as usize * image.width as usize + x.min(image.width - 1) as usize);
+            [image.rgba[at], image.rgba[at + 1], image.rgba[at + 2], image.rgba[at + 3]]
+        };
+        for y in 0..height {
+            for x in 0..width {
+                let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| pixel(2 * x + dx, 2 * y + dy));
+                for k in 0..3 {
+                    let sum: f32 = four.iter().map(|p| self.linear[p[k] as usize]).sum();
+                    rgba.push(self.encoded[(0.25 * sum * ENCODE_STEPS as f32) as usize]);
+                }
+                let alpha: u32 = four.iter().map(|p| u32::from(p[3])).sum();
+                rgba.push(((alpha + 2) / 4) as u8);
+            }
+        }
+        DrawTexture { width, height, rgba, wrap: image.wrap }
+    }
+}
+
+/// The image and all its halves, largest first; none larger than the baseline allows.
+fn levels(image: &DrawTexture) -> Vec<DrawTexture> {
+    let tables = Tables::new();
+    let mut levels = vec![image.clone()];
+    while let Some(last) = levels.last().filter(|l| l.width.max(l.height) > 1) {
+        let half = tables.halved(last);
+        levels.push(half);
+    }
+    levels.retain(|l| l.width.max(l.height) <= MAX_SIDE);
+    levels
+}
+
+/// Uploads an image, sRGB with straight alpha.
+pub(super) async fn upload(context: &GpuContext, image: &DrawTexture) -> Result<wgpu::TextureView, GpuError> {
+    let levels = levels(image);
+    let bytes = levels.iter().map(|l| l.rgba.len() as u64).sum();
+    let size =
+        |l: &DrawTexture| wgpu::Extent3d { width: l.width, height: l.height, depth_or_array_layers: 1 };
+    let device = &context.device;
+    let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("base colour"),
+        size: size(&levels[0]),
+        mip_level_count: levels.len() as u32,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba8UnormSrgb,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let no_memory = memory.pop().await;
+    context.check()?;
+    if no_memory.is_some() {
+        return Err(GpuError::OutOfMemory { what: "a texture".to_owned(), bytes });
+    }
+    for (mip_level, level) in (0u32..).zip(&levels) {
+        let target = wgpu::TexelCopyTextureInfo {
+            texture: &texture,
+            mip_level,
+            origin: wgpu::Origin3d::ZERO,
+            aspect: wgpu::TextureAspect::All,
+        };
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(4 * level.width),
+            rows_per_image: None,
+        };
+        context.queue.write_texture(target, &level.rgba, layout, size(level));
+    }
+    Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(width: u32, height: u32, pixel: impl Fn(u32, u32) -> [u8; 4]) -> DrawTexture {
+        let rgba = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| pixel(x, y));
+        DrawTexture { width, height, rgba: rgba.collect(), ..DrawTexture::default() }
+    }
+
+    /// Half black, half white is linear 0.5, and that is sRGB 188 (IEC 61966-2-1).
+    #[test]
+    fn halves_are_averaged_in_linear_light() {
+        let checkers = image(4, 4, |x, y| if (x + y) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] });
+        let levels = levels(&checkers);
+        assert_eq!(levels.iter().map(|l| l.width).collect::<Vec<_>>(), [4, 2, 1]);
+        assert!(levels[1].rgba.chunks(4).all(|p| p == [188, 188, 188, 255]), "{:?}", levels[1].rgba);
+    }
+
+    #[test]
+    fn one_colour_stays_what_it_is() {
+        let plain = image(7, 3, |_, _| [10, 100, 200, 128]);
+        for level in levels(&plain) {
+            assert!(level.rgba.chunks(4).all(|p| p == [10, 100, 200, 128]), "{} wide", level.width);
+        }
+    }
+
+    #[test]
+    fn larger_images_than_the_baseline_allows_are_halved() {
+        let wide = image(16_384, 1, |_, _| [1; 4]);
+        assert_eq!(levels(&wide)[0].width, 8192);
+    }
+}

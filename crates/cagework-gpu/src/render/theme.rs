@@ -1,0 +1,218 @@
+//! Colours: one table per theme, in sRGB as designers write them.
+
+use super::layout::Style;
+use super::scene::Theme;
+
+/// States of handles, edges and faces; numbers of [`Style::colors`].
+pub(super) mod state {
+    /// Neither chosen nor pointed at.
+    pub(in crate::render) const NORMAL: u32 = 0;
+    /// Under the pointer.
+    pub(in crate::render) const HOVERED: u32 = 1;
+    /// Chosen.
+    pub(in crate::render) const SELECTED: u32 = 2;
+    /// Chosen and under the pointer.
+    pub(in crate::render) const BOTH: u32 = 3;
+    /// Without a partner, where symmetry is asked for.
+    pub(in crate::render) const UNMATCHED: u32 = 4;
+}
+
+/// Colours of a theme: sRGB bytes and alpha.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Palette {
+    pub(super) background_top: Color,
+    pub(super) background_bottom: Color,
+    pub(super) floor: Color,
+    pub(super) cage: Color,
+    pub(super) handle: Color,
+    pub(super) handle_rim: Color,
+    pub(super) hovered: Color,
+    pub(super) selected: Color,
+    pub(super) both: Color,
+    pub(super) unmatched: Color,
+    pub(super) wire: Color,
+    pub(super) mesh_edges: Color,
+    pub(super) warning: Color,
+    pub(super) boundary: Color,
+    pub(super) interior: Color,
+    pub(super) exterior: Color,
+    pub(super) cell_lines: Color,
+}
+
+/// `0xRRGGBB` and alpha.
+pub(super) type Color = (u32, f32);
+
+/// Colours of the axes x, y, z, and of what belongs to none.
+pub(super) const AXES: [Color; 4] = [(0xe5484d, 1.0), (0x46a758, 1.0), (0x3e82f1, 1.0), (0xd5dae3, 1.0)];
+
+/// The active part of a gizmo.
+pub(super) const ACTIVE: Color = (0xffc53d, 1.0);
+
+const DARK: Palette = Palette {
+    background_top: (0x3c424c, 1.0),
+    background_bottom: (0x1b1d21, 1.0),
+    floor: (0x9aa4b4, 0.24),
+    cage: (0x86b4ff, 0.95),
+    handle: (0xf3f6fc, 1.0),
+    handle_rim: (0x27406e, 1.0),
+    hovered: (0x5ee0ff, 1.0),
+    selected: (0xffa629, 1.0),
+    both: (0xffd27a, 1.0),
+    unmatched: (0xff5c9a, 1.0),
+    wire: (0x7fe3c4, 0.55),
+    mesh_edges: (0x0b0d10, 0.42),
+    warning: (0xff4d4f, 1.0),
+    boundary: (0xe0913a, 1.0),
+    interior: (0x2f7f86, 1.0),
+    exterior: (0x8a94a3, 0.10),
+    cell_lines: (0x15181d, 0.55),
+};
+
+const LIGHT: Palette = Palette {
+    background_top: (0xfbfcfd, 1.0),
+    background_bottom: (0xd4dae1, 1.0),
+    floor: (0x5e6a7a, 0.30),
+    cage: (0x1f5fc4, 0.95),
+    handle: (0xffffff, 1.0),
+    handle_rim: (0x1f5fc4, 1.0),
+    hovered: (0x0b7c8c, 1.0),
+    selected: (0xcf4708, 1.0),
+    both: (0xa83800, 1.0),
+    unmatched: (0xc2255c, 1.0),
+    wire: (0x1b4b8f, 0.5),
+    mesh_edges: (0x10151c, 0.38),
+    warning: (0xd6293e, 1.0),
+    boundary: (0xe8a14a, 1.0),
+    interior: (0x6db5b9, 1.0),
+    exterior: (0x5e6a7a, 0.08),
+    cell_lines: (0x2b333d, 0.5),
+};
+
+impl Theme {
+    pub(super) fn palette(self) -> &'static Palette {
+        match self {
+            Self::Dark => &DARK,
+            Self::Light => &LIGHT,
+        }
+    }
+}
+
+/// Linear from sRGB (IEC 61966-2-1), with alpha.
+pub(super) fn linear((rgb, alpha): Color) -> [f32; 4] {
+    let channel = |shift: u32| {
+        let c = f32::from((rgb >> shift & 0xff) as u8) / 255.0;
+        if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+    };
+    [channel(16), channel(8), channel(0), alpha]
+}
+
+impl Palette {
+    /// Colours of all states, `normal` given.
+    fn states(&self, normal: Color) -> [[f32; 4]; 8] {
+        let mut colors = [linear(normal); 8];
+        colors[state::HOVERED as usize] = linear(self.hovered);
+        colors[state::SELECTED as usize] = linear(self.selected);
+        colors[state::BOTH as usize] = linear(self.both);
+        colors[state::UNMATCHED as usize] = linear(self.unmatched);
+        colors
+    }
+
+    /// Edges of the cage.
+    pub(super) fn cage_lines(&self) -> Style {
+        Style {
+            colors: self.states(self.cage),
+            widths: [[1.5, 2.5, 2.75, 3.25], [1.5; 4]],
+            lift: 1e-3,
+            opacity: 1.0,
+            size: 1.0,
+            ..Style::default()
+        }
+    }
+
+    /// Vertices of the cage.
+    pub(super) fn handles(&self) -> Style {
+        Style {
+            colors: self.states(self.handle),
+            widths: [[8.0, 11.0, 10.5, 12.0], [9.5, 8.0, 8.0, 8.0]],
+            rim_color: linear(self.handle_rim),
+            rim: 1.4,
+            lift: 4e-3,
+            opacity: 1.0,
+            size: 1.0,
+        }
+    }
+
+    /// Faces of the cage.
+    pub(super) fn faces(&self) -> Style {
+        let mut colors = self.states(self.cage);
+        for (color, alpha) in colors.iter_mut().zip([0.0, 0.16, 0.30, 0.38, 0.2]) {
+            color[3] = alpha;
+        }
+        Style { colors, opacity: 1.0, size: 1.0, ..Style::default() }
+    }
+
+    /// The mesh at rest, or its edges where it is.
+    pub(super) fn wire(&self, base: bool) -> Style {
+        let color = if base { self.wire } else { self.mesh_edges };
+        Style {
+            colors: [linear(color); 8],
+            widths: [[if base { 0.9 } else { 0.8 }; 4]; 2],
+            lift: 1.5e-3,
+            opacity: 1.0,
+            size: 1.0,
+            ..Style::default()
+        }
+    }
+
+    /// Places with a problem.
+    pub(super) fn marks(&self) -> Style {
+        Style {
+            colors: [linear(self.warning); 8],
+            widths: [[7.0; 4], [3.0; 4]],
+            rim_color: [1.0, 1.0, 1.0, 0.9],
+            rim: 1.2,
+            lift: 6e-3,
+            opacity: 1.0,
+            size: 1.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Relative luminance (IEC 61966-2-1).
+    fn luminance(color: Color) -> f32 {
+        let [r, g, b, _] = linear(color);
+        0.2126 * r + 0.7152 * g + 0.0722 * b
+    }
+
+    /// Contrast as WCAG 2 defines it.
+    fn contrast(a: Color, b: Color) -> f32 {
+        let (a, b) = (luminance(a), luminance(b));
+        (a.max(b) + 0.05) / (a.min(b) + 0.05)
+    }
+
+    /// WCAG 2.2, 1.4.11: graphics need 3 : 1 against what is next to them.
+    #[test]
+    fn cage_and_marks_stand_out_from_the_background() {
+        for palette in [&DARK, &LIGHT] {
+            for color in [palette.cage, palette.selected, palette.warning, palette.unmatched, palette.hovered]
+            {
+                for background in [palette.background_top, palette.background_bottom] {
+                    let contrast = contrast(color, background);
+                    assert!(contrast >= 3.0, "{:06x} on {:06x}: {contrast}", color.0, background.0);
+                }
+            }
+            let rim = contrast(palette.handle, palette.handle_rim);
+            assert!(rim >= 3.0, "a handle's rim: {rim}");
+        }
+    }
+
+    #[test]
+    fn white_is_one_and_black_is_zero() {
+        assert_eq!(linear((0xff_ffff, 0.5)), [1.0, 1.0, 1.0, 0.5]);
+        assert_eq!(linear((0, 1.0)), [0.0, 0.0, 0.0, 1.0]);
+    }
+}

@@ -1,0 +1,377 @@
+//! One model, one cage, one GPU: load, cage, bind, pose, frame, read back.
+//!
+//! The same type serves tests, the command and the page. A page has two: one draws and deforms on its main thread, one
+//! binds in a worker and hands over weights ([`Session::bind`] there, [`Session::adopt`] here).
+
+mod picture;
+
+use std::sync::Arc;
+
+use cagework_core::bind::{BindOptions, OutsideVertex};
+use cagework_core::deform::{deform_bound, vertex_normals};
+use cagework_core::{BindReport, Bounds, Cage, Progress, Weights};
+use glam::{Vec2, Vec3};
+
+use crate::bind::bind_gpu;
+use crate::deform::{Deformer, GpuWeights};
+use crate::device::GpuContext;
+use crate::error::GpuError;
+use crate::render::{Camera, DrawModel, MeshStyle, Renderer, SceneOptions, Target, colormap};
+
+pub use picture::MAX_PICTURE;
+
+/// Everything about one model on one GPU.
+#[derive(Debug)]
+pub struct Session {
+    context: GpuContext,
+    renderer: Renderer,
+    camera: Camera,
+    scene: SceneOptions,
+    model: Option<Arc<DrawModel>>,
+    cage: Option<Cage>,
+    pose: Vec<Vec3>,
+    bound: Option<Bound>,
+    /// Whether the cage moved since the mesh was deformed last.
+    moved: bool,
+}
+
+/// A bind, here and on the GPU.
+#[derive(Debug)]
+struct Bound {
+    weights: Weights,
+    outside: Vec<OutsideVertex>,
+    deformer: Deformer,
+}
+
+impl Session {
+    /// A session without a model.
+    #[must_use]
+    pub fn new(context: GpuContext) -> Self {
+        Self {
+            renderer: Renderer::new(&context),
+            context,
+            camera: Camera::default(),
+            scene: SceneOptions::default(),
+            model: None,
+            cage: None,
+            pose: Vec::new(),
+            bound: None,
+            moved: false,
+        }
+    }
+
+    /// The GPU.
+    #[must_use]
+    pub fn context(&self) -> &GpuContext {
+        &self.context
+    }
+
+    /// Another model; weights of the one before are dropped. The camera stays where it is: see
+    /// [`Self::frame_all`].
+    ///
+    /// # Errors
+    /// [`GpuError::Model`] if its lists do not belong together; otherwise as [`crate::buffers::Allocator::zeros`].
+    pub async fn set_model(&mut self, model: DrawModel) -> Result<(), GpuError> {
+        self.set_shared_model(Arc::new(model)).await
+    }
+
+    async fn set_shared_model(&mut self, model: Arc<DrawModel>) -> Result<(), GpuError> {
+        if let Some(reason) = model.fault() {
+            return Err(GpuError::Model { reason });
+        }
+        self.drop_weights();
+        let normals = vertex_normals(&model.positions, &model.shading_triangles());
+        self.renderer.set_model(&self.context, &model, &normals).await?;
+        self.model = Some(model);
+        self.update_bounds();
+        // A wireframe may have been asked for before there was a model.
+        self.write_scene();
+        Ok(())
+    }
+
+    /// Another cage, at rest; weights for the one before are dropped.
+    ///
+    /// # Errors
+    /// As [`crate::buffers::Allocator::zeros`].
+    pub async fn set_cage(&mut self, cage: &Cage) -> Result<(), GpuError> {
+        self.drop_weights();
+        self.renderer.set_cage(&self.context, cage).await?;
+        self.pose = cage.positions().to_vec();
+        self.cage = Some(cage.clone());
+        self.update_bounds();
+        Ok(())
+    }
+
+    /// The cage at rest.
+    #[must_use]
+    pub fn cage(&self) -> Option<&Cage> {
+        self.cage.as_ref()
+    }
+
+    /// Binds the model to the cage on this GPU.
+    ///
+    /// # Errors
+    /// [`GpuError::NotReady`] without model or cage; otherwise as [`bind_gpu`].
+    pub async fn bind(
+        &mut self,
+        options: &BindOptions,
+        progress: &dyn Progress,
+    ) -> Result<BindReport, GpuError> {
+        let (model, cage) = self.parts()?;
+        let (binding, weights) = bind_gpu(&model.positions, cage, options, progress, &self.context).await?;
+        self.bound(binding.weights, binding.outside, &weights).await?;
+        Ok(binding.report)
+    }
+
+    /// Takes weights that were bound elsewhere.
+    ///
+    /// # Errors
+    /// [`GpuError::NotReady`] without model or cage, [`GpuError::Model`] if the weights belong to others; otherwise as
+    /// [`crate::buffers::Allocator::zeros`].
+    pub async fn adopt(&mut self, weights: Weights, outside: Vec<OutsideVertex>) -> Result<(), GpuError> {
+        let (model, cage) = self.parts()?;
+        let (rows, columns) = (model.positions.len(), cage.n_vertices());
+        if (weights.n_rows(), weights.n_columns()) != (rows, columns) {
+            let reason = format!(
+                "weights are of {} vertices and {} cage vertices, but there are {rows} and {columns}",
+                weights.n_rows(),
+                weights.n_columns()
+            );
+            return Err(GpuError::Model { reason });
+        }
+        let astray =
+            |o: &OutsideVertex| o.vertex as usize >= rows || o.corners.iter().any(|&c| c as usize >= columns);
+        if outside.iter().any(astray) {
+            let reason = "a vertex outside the cage, or its triangle, does not exist".to_owned();
+            return Err(GpuError::Model { reason });
+        }
+        let on_gpu = GpuWeights::new(&self.context, &weights, &outside).await?;
+        self.bound(weights, outside, &on_gpu).await
+    }
+
+    fn parts(&self) -> Result<(&DrawModel, &Cage), GpuError> {
+        match (&self.model, &self.cage) {
+            (Some(model), Some(cage)) => Ok((model, cage)),
+            (None, _) => Err(GpuError::NotReady { missing: "model" }),
+            (_, None) => Err(GpuError::NotReady { missing: "cage" }),
+        }
+    }
+
+    async fn bound(
+        &mut self,
+        weights: Weights,
+        outside: Vec<OutsideVertex>,
+        on_gpu: &GpuWeights,
+    ) -> Result<(), GpuError> {
+        let (model, _) = self.parts()?;
+        let deformer = Deformer::new(&self.context, on_gpu, &model.shading_triangles()).await?;
+        deformer.pose(&self.context, &self.pose);
+        self.renderer.set_vertices(&self.context, Some([deformer.positions(), deformer.normals()]));
+        self.bound = Some(Bound { weights, outside, deformer });
+        self.moved = true;
+        self.write_values();
+        Ok(())
+    }
+
+    fn drop_weights(&mut self) {
+        self.bound = None;
+        self.renderer.set_vertices(&self.context, None);
+    }
+
+    /// The weights, once there are some.
+    #[must_use]
+    pub fn weights(&self) -> Option<&Weights> {
+        self.bound.as_ref().map(|b| &b.weights)
+    }
+
+    /// Vertices outside the cage, once there are weights.
+    #[must_use]
+    pub fn outside(&self) -> &[OutsideVertex] {
+        self.bound.as_ref().map_or(&[], |b| &b.outside)
+    }
+
+    /// Moves the cage; the next frame shows it and the mesh that follows. Uploads the cage and nothing else.
+    ///
+    /// # Panics
+    /// If there is not one position per cage vertex.
+    pub fn pose(&mut self, cage_positions: &[Vec3]) {
+        assert_eq!(cage_positions.len(), self.pose.len(), "one position per cage vertex");
+        self.pose.copy_from_slice(cage_positions);
+        self.renderer.pose(&self.context, cage_positions);
+        if let Some(bound) = &self.bound {
+            bound.deformer.pose(&self.context, cage_positions);
+            self.moved = true;
+        }
+    }
+
+    /// Where the cage is. `[n_cage]`, object units.
+    #[must_use]
+    pub fn cage_positions(&self) -> &[Vec3] {
+        &self.pose
+    }
+
+    /// What is drawn from now on.
+    pub fn set_scene(&mut self, scene: SceneOptions) {
+        let other_values = scene.mesh != self.scene.mesh;
+        self.scene = scene;
+        self.write_scene();
+        if other_values {
+            self.write_values();
+        }
+    }
+
+    /// What is drawn.
+    #[must_use]
+    pub fn scene(&self) -> &SceneOptions {
+        &self.scene
+    }
+
+    fn write_scene(&mut self) {
+        self.renderer.set_scene(&self.context, self.scene.clone(), self.model.as_deref());
+    }
+
+    /// Uploads what the scene's heat map shows; nothing without weights.
+    fn write_values(&mut self) {
+        let Some(range) = self.value_range() else { return };
+        let (Some(model), Some(bound), Some(cage)) = (&self.model, &self.bound, &self.cage) else { return };
+        let values: Vec<f32> = match self.scene.mesh {
+            MeshStyle::Weights { column } => bound.weights.column(column).collect(),
+            MeshStyle::Errors => {
+                let rebuilt = deform_bound(&bound.weights, &bound.outside, cage.positions());
+                let scale = 1.0 / cage.diagonal();
+                rebuilt.iter().zip(&model.positions).map(|(a, b)| scale * a.distance(*b)).collect()
+            }
+            MeshStyle::Hidden | MeshStyle::Solid | MeshStyle::Clay => return,
+        };
+        self.renderer.set_values(&self.context, &values, range);
+    }
+
+    /// Values of the first and the last colour of the scene's heat map, for a legend: weights, or logarithms to base 10
+    /// of errors over the cage's diagonal. Nothing without a heat map or weights.
+    #[must_use]
+    pub fn value_range(&self) -> Option<[f32; 2]> {
+        let weights = self.weights()?;
+        match self.scene.mesh {
+            MeshStyle::Weights { column } => {
+                Some([0.0, weights.column(column).fold(colormap::LOWEST_RANGE, f32::max)])
+            }
+            MeshStyle::Errors => Some(colormap::ERROR_RANGE),
+            MeshStyle::Hidden | MeshStyle::Solid | MeshStyle::Clay => None,
+        }
+    }
+
+    /// The camera. Its pixels are CSS pixels of the frame drawn last.
+    #[must_use]
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The camera, to be moved.
+    pub fn camera_mut(&mut self) -> &mut Camera {
+        &mut self.camera
+    }
+
+    /// Bounds of model and cage at rest; nothing before there is either.
+    #[must_use]
+    pub fn bounds(&self) -> Option<Bounds> {
+        let model = self.model.as_ref().and_then(|m| Bounds::of(&m.positions));
+        let cage = self.cage.as_ref().map(Cage::bounds);
+        match (model, cage) {
+            (Some(a), Some(b)) => Some(Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }),
+            (one, other) => one.or(other),
+        }
+    }
+
+    /// Turns the camera's attention to model and cage, as large as fits.
+    pub fn frame_all(&mut self) {
+        if let Some(bounds) = self.bounds() {
+            self.camera.frame(bounds);
+        }
+    }
+
+    fn update_bounds(&mut self) {
+        if let Some(bounds) = self.bounds() {
+            self.camera.set_scene(bounds);
+            // The model stands on the floor, not its cage.
+            let model = self.model.as_ref().and_then(|m| Bounds::of(&m.positions));
+            self.renderer.set_bounds(model.unwrap_or(bounds));
+        }
+    }
+
+    /// Draws a frame into `target`, a view of `format` and `size` (pixels), with `scale` of its pixels per CSS pixel:
+    /// deforms the mesh if the cage moved, draws, submits, and does not wait. About formats see [`crate::render`].
+    ///
+    /// # Errors
+    /// [`GpuError::DeviceLost`], [`GpuError::Refused`]: what went wrong since the last look.
+    pub fn frame(
+        &mut self,
+        target: &wgpu::TextureView,
+        format: wgpu::TextureFormat,
+        size: [u32; 2],
+        scale: f32,
+    ) -> Result<(), GpuError> {
+        self.context.check()?;
+        self.camera.set_viewport(Vec2::from(size.map(|s| s as f32)) / scale);
+        let camera = self.camera;
+        let mut encoder = self.encoder();
+        self.encode(&mut encoder, Target { view: target, format, size, scale }, &camera);
+        self.context.queue.submit([encoder.finish()]);
+        Ok(())
+    }
+
+    fn encoder(&self) -> wgpu::CommandEncoder {
+        self.context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") })
+    }
+
+    fn encode(&mut self, encoder: &mut wgpu::CommandEncoder, target: Target<'_>, camera: &Camera) {
+        self.encode_deformation(encoder);
+        self.renderer.draw(&self.context, encoder, target, camera);
+    }
+
+    fn encode_deformation(&mut self, encoder: &mut wgpu::CommandEncoder) {
+        if let Some(bound) = self.bound.as_ref().filter(|_| self.moved) {
+            bound.deformer.encode(encoder);
+            self.moved = false;
+        }
+    }
+
+    /// Where the mesh is, `[n_vertices]`, object units: deformed once there are weights, else at rest.
+    ///
+    /// # Errors
+    /// [`GpuError::NotReady`] without a model; [`GpuError::OutOfMemory`], [`GpuError::DeviceLost`],
+    /// [`GpuError::Refused`].
+    pub async fn read_positions(&self) -> Result<Vec<Vec3>, GpuError> {
+        let Some(model) = &self.model else { return Err(GpuError::NotReady { missing: "model" }) };
+        match &self.bound {
+            // Again even if nothing moved: it costs a millisecond, and a frame may not have been drawn yet.
+            Some(bound) => {
+                bound.deformer.run(&self.context).await?;
+                bound.deformer.read_positions(&self.context).await
+            }
+            None => Ok(model.positions.clone()),
+        }
+    }
+
+    /// Everything again on another device, after this one was lost: model, cage, weights, pose, scene, camera.
+    ///
+    /// # Errors
+    /// As the calls that set them.
+    pub async fn recover(self, context: GpuContext) -> Result<Self, GpuError> {
+        let mut session = Self::new(context);
+        session.camera = self.camera;
+        if let Some(model) = self.model {
+            session.set_shared_model(model).await?;
+        }
+        if let Some(cage) = &self.cage {
+            session.set_cage(cage).await?;
+        }
+        if let Some(bound) = self.bound {
+            session.adopt(bound.weights, bound.outside).await?;
+        }
+        if !self.pose.is_empty() {
+            session.pose(&self.pose);
+        }
+        session.set_scene(self.scene);
+        Ok(session)
+    }
+}

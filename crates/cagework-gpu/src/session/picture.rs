@@ -1,0 +1,77 @@
+//! Pictures that are read back.
+
+use glam::Vec2;
+
+use super::Session;
+use crate::buffers::Allocator;
+use crate::error::GpuError;
+use crate::render::Target;
+
+/// Format of pictures that are read back.
+const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
+
+/// Largest side of a picture, the baseline's limit, pixels.
+pub const MAX_PICTURE: u32 = 8192;
+
+impl Session {
+    /// A picture of `size` pixels, `scale` of them per CSS pixel, from where the camera is. RGBA, sRGB, opaque, rows
+    /// from the top: `[height, width, 4]`.
+    ///
+    /// # Errors
+    /// [`GpuError::Model`] for a size of 0 or above [`MAX_PICTURE`]; [`GpuError::OutOfMemory`],
+    /// [`GpuError::DeviceLost`], [`GpuError::Refused`].
+    pub async fn picture(&mut self, size: [u32; 2], scale: f32) -> Result<Vec<u8>, GpuError> {
+        let [width, height] = size;
+        if size.iter().any(|s| !(1..=MAX_PICTURE).contains(s)) {
+            let reason = format!("a picture of {width} x {height} pixels: sides are 1 to {MAX_PICTURE}");
+            return Err(GpuError::Model { reason });
+        }
+        self.context.check()?;
+        let device = &self.context.device;
+        let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("picture"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: PICTURE_FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let row_bytes = 4 * width;
+        let stride = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let bytes = u64::from(stride) * u64::from(height);
+        if memory.pop().await.is_some() {
+            return Err(GpuError::OutOfMemory { what: "the picture".to_owned(), bytes });
+        }
+        let readback = Allocator::new(&self.context).readback("picture, read back", bytes).await?;
+        let mut camera = self.camera;
+        camera.set_viewport(Vec2::from(size.map(|s| s as f32)) / scale);
+        let mut encoder = self.encoder();
+        self.encode(&mut encoder, Target { view: &view, format: PICTURE_FORMAT, size, scale }, &camera);
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &readback.buffer,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(stride),
+                    rows_per_image: None,
+                },
+            },
+            texture.size(),
+        );
+        let submission = self.context.queue.submit([encoder.finish()]);
+        readback
+            .read(&self.context, &submission, bytes, |bytes| {
+                bytes
+                    .chunks_exact(stride as usize)
+                    .flat_map(|row| &row[..row_bytes as usize])
+                    .copied()
+                    .collect()
+            })
+            .await
+    }
+}

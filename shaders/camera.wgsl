@@ -1,0 +1,62 @@
+// What every picture is drawn with. Mirror: cagework_gpu::render::layout::Camera.
+
+struct Camera {
+    clip_from_world: mat4x4f,
+    world_from_clip: mat4x4f,
+    view_from_world: mat4x4f,
+    /// Where the eye is, world space, object units.
+    eye: vec3f,
+    /// 1 in perspective, 0 in an orthographic picture.
+    perspective: f32,
+    /// Width and height of the picture, pixels of the target.
+    viewport: vec2f,
+    /// The target's pixels per CSS pixel.
+    scale: f32,
+    /// 1 if the target does not turn linear colours into sRGB itself.
+    encode: u32,
+    /// Background above and below, linear.
+    background_top: vec4f,
+    background_bottom: vec4f,
+    /// Lines of the floor, linear, straight alpha.
+    floor_color: vec4f,
+    /// Middle of the floor, world space, and where it ends, object units.
+    floor_center: vec3f,
+    floor_radius: f32,
+    /// Distance of its lines, object units.
+    floor_spacing: f32,
+    /// How much smaller clip depth is for a point that is nearer by all of its depth.
+    lift: f32,
+    /// Size of a pixel of the target in clip space.
+    pixel: vec2f,
+}
+
+@group(0) @binding(0) var<uniform> camera: Camera;
+
+/// Marks what is not drawn: a place outside the clip volume.
+const NOWHERE = vec4f(0.0, 0.0, 2.0, 1.0);
+
+/// sRGB from linear (IEC 61966-2-1).
+fn srgb_from_linear(linear: vec3f) -> vec3f {
+    let low = 12.92 * linear;
+    let high = 1.055 * pow(max(linear, vec3f(1e-5)), vec3f(1.0 / 2.4)) - 0.055;
+    return select(high, low, linear <= vec3f(0.0031308));
+}
+
+/// Linear from sRGB.
+fn linear_from_srgb(srgb: vec3f) -> vec3f {
+    let high = pow((srgb + 0.055) / 1.055, vec3f(2.4));
+    return select(high, srgb / 12.92, srgb <= vec3f(0.04045));
+}
+
+/// A colour as the target takes it: premultiplied with its alpha.
+fn to_target(linear: vec3f, alpha: f32) -> vec4f {
+    var color = clamp(linear, vec3f(0.0), vec3f(1.0));
+    if camera.encode == 1u { color = srgb_from_linear(color); }
+    return vec4f(color * alpha, alpha);
+}
+
+/// Unit vector from a point to the eye, world space.
+fn to_eye(point: vec3f) -> vec3f {
+    let backward = vec3f(camera.view_from_world[0].z, camera.view_from_world[1].z, camera.view_from_world[2].z);
+    return normalize(select(backward, camera.eye - point, camera.perspective == 1.0));
+}

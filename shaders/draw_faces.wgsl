@@ -1,0 +1,23 @@
+// Chosen faces of the cage, translucent. An item is half a triangle: (state and first corner, second), (third, -).
+// One instance per triangle, three vertices each.
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(flat) color: vec4f,
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
+    let first = items[2u * instance];
+    let state = first.x >> STATE_SHIFT;
+    if state == HIDDEN { return Varying(NOWHERE, vec4f(0.0)); }
+    var corner = first.x;
+    if index == 1u { corner = first.y; }
+    if index == 2u { corner = items[2u * instance + 1u].x; }
+    return Varying(lifted(clip_of(corner & INDEX_MASK)), state_color(state));
+}
+
+@fragment
+fn fragment(in: Varying) -> @location(0) vec4f {
+    return to_target(in.color.rgb, in.color.a);
+}

@@ -1,0 +1,50 @@
+// A grid on the floor that fades out; every tenth line is stronger, the lines of x and z have their colours.
+// One quad as large as the floor.
+
+/// Colours of the x and z axes, linear.
+const X_COLOR = vec3f(0.55, 0.07, 0.09);
+const Z_COLOR = vec3f(0.06, 0.20, 0.62);
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) world: vec3f,
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> Varying {
+    let corner = vec2f(
+        select(-1.0, 1.0, index == 1u || index == 3u || index == 5u),
+        select(-1.0, 1.0, index == 2u || index == 3u || index == 4u),
+    ) * camera.floor_radius;
+    let world = camera.floor_center + vec3f(corner.x, 0.0, corner.y);
+    return Varying(camera.clip_from_world * vec4f(world, 1.0), world);
+}
+
+/// How much of a pixel the lines through whole numbers cover. `width` in pixels.
+fn lines(at: vec2f, slope: vec2f, width: f32) -> vec2f {
+    let distance = abs(fract(at - 0.5) - 0.5) / max(slope, vec2f(1e-6));
+    let cover = clamp(vec2f(0.5 * width + 0.5) - distance, vec2f(0.0), vec2f(1.0));
+    // Lines closer than a few pixels are no lines any more.
+    return cover * clamp(1.4 - 4.0 * slope, vec2f(0.0), vec2f(1.0));
+}
+
+@fragment
+fn fragment(in: Varying) -> @location(0) vec4f {
+    let at = in.world.xz / camera.floor_spacing;
+    let slope = fwidth(at);
+    let width = camera.scale;
+    let fine = lines(at, slope, width);
+    let coarse = lines(0.1 * at, 0.1 * slope, width);
+    var alpha = max(0.45 * max(fine.x, fine.y), max(coarse.x, coarse.y)) * camera.floor_color.a;
+    var color = camera.floor_color.rgb;
+    // Where x = 0 the line runs along z, and the other way round.
+    let axes = clamp(vec2f(width) - abs(at) / max(slope, vec2f(1e-6)), vec2f(0.0), vec2f(1.0));
+    if axes.x > 0.0 { color = mix(color, Z_COLOR, axes.x); alpha = max(alpha, 0.75 * axes.x); }
+    if axes.y > 0.0 { color = mix(color, X_COLOR, axes.y); alpha = max(alpha, 0.75 * axes.y); }
+    let distance = length(in.world - camera.floor_center) / camera.floor_radius;
+    let fade = 1.0 - smoothstep(0.25, 1.0, distance);
+    let steep = clamp(6.0 * abs(dot(to_eye(in.world), vec3f(0.0, 1.0, 0.0))), 0.0, 1.0);
+    alpha *= fade * steep;
+    if alpha <= 0.002 { discard; }
+    return to_target(color, alpha);
+}

@@ -1,0 +1,30 @@
+// Arrows, rings or boxes around the selection, of constant size in the picture, in flat light.
+
+struct GizmoView {
+    /// World from the gizmo's own space, where its axes are 1 long.
+    world_from_gizmo: mat4x4f,
+}
+
+@group(1) @binding(0) var<uniform> gizmo: GizmoView;
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) normal: vec3f,
+    @location(1) color: vec4f,
+}
+
+@vertex
+fn vertex(@location(0) position: vec3f, @location(1) normal: vec3f, @location(2) color: vec4f) -> Varying {
+    let world = gizmo.world_from_gizmo * vec4f(position, 1.0);
+    let clip = camera.clip_from_world * world;
+    let turned = camera.view_from_world * gizmo.world_from_gizmo * vec4f(normal, 0.0);
+    return Varying(clip, turned.xyz, color);
+}
+
+@fragment
+fn fragment(in: Varying) -> @location(0) vec4f {
+    let square = dot(in.normal, in.normal);
+    var light = 1.0;
+    if square > 0.0 { light = 0.78 + 0.22 * abs(in.normal.z) * inverseSqrt(square); }
+    return to_target(in.color.rgb * light, in.color.a);
+}

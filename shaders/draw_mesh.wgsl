@@ -1,0 +1,75 @@
+// The mesh: its material, or weights or errors as colours, in studio light. Positions and normals are read where
+// deform_vertices and vertex_normals wrote them.
+
+struct Surface {
+    /// Factor of the base colour, linear RGBA.
+    base_color: vec4f,
+    /// What colours it: MATERIAL, WEIGHTS, ERRORS, CLAY or BLENDED.
+    mode: u32,
+    /// Below this alpha nothing is drawn.
+    alpha_cutoff: f32,
+    /// Values of the first and the last colour.
+    low: f32,
+    high: f32,
+}
+
+const MATERIAL = 0u;
+const WEIGHTS = 1u;
+const ERRORS = 2u;
+const CLAY = 3u;
+const BLENDED = 4u;
+
+@group(1) @binding(0) var<storage, read> positions: array<vec4f>;
+@group(1) @binding(1) var<storage, read> normals: array<vec4f>;
+/// A weight or an error of each vertex.
+@group(1) @binding(2) var<storage, read> values: array<f32>;
+@group(2) @binding(0) var<uniform> surface: Surface;
+@group(2) @binding(1) var base_texture: texture_2d<f32>;
+@group(2) @binding(2) var base_sampler: sampler;
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) world: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) uv: vec2f,
+    @location(3) color: vec4f,
+    @location(4) value: f32,
+}
+
+@vertex
+fn vertex(@location(0) source: u32, @location(1) uv: vec2f, @location(2) color: vec4f) -> Varying {
+    let world = positions[source].xyz;
+    let clip = camera.clip_from_world * vec4f(world, 1.0);
+    return Varying(clip, world, normals[source].xyz, uv, color, values[source]);
+}
+
+/// Base colour of a value.
+fn value_color(value: f32) -> vec3f {
+    if surface.mode == ERRORS {
+        let digits = log(max(value, 1e-20)) / log(10.0);
+        return cividis((digits - surface.low) / (surface.high - surface.low));
+    }
+    if value < NEGATIVE { return NEGATIVE_COLOR; }
+    return cividis((value - surface.low) / (surface.high - surface.low));
+}
+
+@fragment
+fn fragment(in: Varying) -> @location(0) vec4f {
+    // Before any branch: derivatives need whole quads of pixels.
+    let texel = textureSample(base_texture, base_sampler, in.uv);
+    let flat_normal = cross(dpdx(in.world), dpdy(in.world));
+    var base = surface.base_color * in.color * texel;
+    if base.a < surface.alpha_cutoff { discard; }
+    let is_value = surface.mode == WEIGHTS || surface.mode == ERRORS;
+    if is_value { base = vec4f(value_color(in.value), 1.0); }
+    if surface.mode == CLAY { base = surface.base_color; }
+    if surface.mode == MATERIAL { base.a = 1.0; }
+    var normal = in.normal;
+    // A vertex whose triangles have no area has no normal; the picture's own slope then does.
+    if dot(normal, normal) < 1e-6 { normal = flat_normal; }
+    if dot(normal, normal) < 1e-30 { normal = to_eye(in.world); }
+    var lit = studio_light(base.rgb, in.world, normalize(normal));
+    // Colours that mean a value keep most of their own.
+    if is_value { lit = mix(lit, base.rgb, 0.35); }
+    return to_target(lit, base.a);
+}

@@ -1,0 +1,61 @@
+// A layer of the grid: kinds of cells, or one coordinate's value, with thin lines between cells. One quad.
+
+struct SliceView {
+    /// Outer corner of the first cell, world space.
+    corner: vec3f,
+    /// Value of the last colour; 0 if kinds of cells are shown.
+    high: f32,
+    /// Edge of a cell, object units.
+    u: vec3f,
+    /// Cells along u.
+    n_u: u32,
+    v: vec3f,
+    n_v: u32,
+    /// Colour of each kind (untyped, boundary, interior, exterior), linear, straight alpha.
+    kinds: array<vec4f, 4>,
+    /// Lines between cells, linear, straight alpha.
+    line_color: vec4f,
+}
+
+const EXTERIOR = 3u;
+
+@group(1) @binding(0) var<uniform> slice: SliceView;
+/// (kind, bits of the value) of each cell, u fastest.
+@group(1) @binding(1) var<storage, read> cells: array<vec2u>;
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    @location(0) place: vec2f,
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> Varying {
+    let corner = vec2f(
+        select(0.0, 1.0, index == 1u || index == 3u || index == 5u),
+        select(0.0, 1.0, index == 2u || index == 3u || index == 4u),
+    );
+    let place = corner * vec2f(f32(slice.n_u), f32(slice.n_v));
+    let world = slice.corner + place.x * slice.u + place.y * slice.v;
+    return Varying(camera.clip_from_world * vec4f(world, 1.0), place);
+}
+
+@fragment
+fn fragment(in: Varying) -> @location(0) vec4f {
+    let slope = fwidth(in.place);
+    let limit = vec2u(slice.n_u, slice.n_v) - 1u;
+    let cell = min(vec2u(max(in.place, vec2f(0.0))), limit);
+    let content = cells[cell.y * slice.n_u + cell.x];
+    var color = slice.kinds[content.x & 3u];
+    if slice.high > 0.0 && content.x != EXTERIOR {
+        let value = bitcast<f32>(content.y);
+        color = vec4f(cividis(value / slice.high), 1.0);
+        if value < NEGATIVE { color = vec4f(NEGATIVE_COLOR, 1.0); }
+    }
+    let distance = abs(fract(in.place - 0.5) - 0.5) / max(slope, vec2f(1e-6));
+    let covers = clamp(vec2f(0.5 * camera.scale + 0.5) - distance, vec2f(0.0), vec2f(1.0));
+    // Where cells are a few pixels wide, lines would hide them.
+    let visible = clamp(1.5 - 6.0 * max(slope.x, slope.y), 0.0, 1.0);
+    let line = max(covers.x, covers.y) * visible * slice.line_color.a;
+    if color.a <= 0.0 { discard; }
+    return to_target(mix(color.rgb, slice.line_color.rgb, line), color.a);
+}

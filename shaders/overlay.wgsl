@@ -1,0 +1,49 @@
+// Lines, points and faces over the model share one group of bindings: a style, positions, and what is drawn of them.
+
+struct Style {
+    /// Colour of each state, linear, straight alpha.
+    colors: array<vec4f, 8>,
+    /// Width of lines or diameter of points for states 0 to 3 and 4 to 7, CSS pixels.
+    widths: array<vec4f, 2>,
+    /// Rim of points, linear, straight alpha.
+    rim_color: vec4f,
+    /// Width of the rim, CSS pixels.
+    rim: f32,
+    /// How much nearer to the eye than it is it is drawn, as a fraction of its depth.
+    lift: f32,
+    /// Factor of all alphas.
+    opacity: f32,
+    /// Factor of all widths.
+    size: f32,
+}
+
+/// The upper four bits of an item are its state.
+const STATE_SHIFT = 28u;
+const INDEX_MASK = 0x0fffffffu;
+/// The state of what is not drawn.
+const HIDDEN = 15u;
+
+@group(1) @binding(0) var<uniform> style: Style;
+@group(1) @binding(1) var<storage, read> positions: array<vec4f>;
+@group(1) @binding(2) var<storage, read> items: array<vec2u>;
+
+/// Colour of a state, with the style's opacity.
+fn state_color(state: u32) -> vec4f {
+    let color = style.colors[state & 7u];
+    return vec4f(color.rgb, color.a * style.opacity);
+}
+
+/// Width of a state, the target's pixels.
+fn state_width(state: u32) -> f32 {
+    return style.widths[(state >> 2u) & 1u][state & 3u] * style.size * camera.scale;
+}
+
+/// Clip coordinates of a vertex.
+fn clip_of(index: u32) -> vec4f {
+    return camera.clip_from_world * vec4f(positions[index].xyz, 1.0);
+}
+
+/// Draws it a little nearer.
+fn lifted(clip: vec4f) -> vec4f {
+    return vec4f(clip.xy, max(0.0, clip.z - style.lift * camera.lift), clip.w);
+}

@@ -1,0 +1,214 @@
+//! Pictures of everything that can be drawn, compared with golden ones.
+
+// Always true here; it tells clippy that these are tests.
+#[cfg(test)]
+mod golden;
+#[cfg(test)]
+mod scenes;
+
+use std::sync::Arc;
+
+use cagework_core::bind::{BindOptions, Method};
+use cagework_core::progress::Silent;
+use cagework_core::slice::Slice;
+use cagework_gpu::Session;
+use cagework_gpu::render::{
+    AxisView, Camera, Gizmo, GizmoMode, GizmoPart, Marks, MeshStyle, Projection, SceneOptions, Selection,
+    SliceView, Theme,
+};
+use glam::{Quat, Vec2, Vec3};
+use golden::{SIZE, assert_picture};
+use scenes::{bind, bow, classic, creature, embedded, textured};
+
+#[test]
+fn solid_in_its_cage() {
+    for (theme, name) in [(Theme::Dark, "solid-dark"), (Theme::Light, "solid-light")] {
+        let mut session = creature();
+        session.set_scene(SceneOptions { theme, ..SceneOptions::default() });
+        assert_picture(&mut session, name);
+    }
+}
+
+#[test]
+fn posed_with_selection() {
+    let mut session = creature();
+    bind(&mut session, &embedded());
+    bow(&mut session);
+    let faces = session.cage().expect("there is one").faces().to_vec();
+    let selection = Selection {
+        vertices: faces[3].clone(),
+        faces: vec![3],
+        edges: vec![[faces[3][0], faces[3][1]], [faces[3][2], faces[3][1]]],
+        hovered_vertex: Some(faces[10][0]),
+        hovered_face: Some(20),
+        hovered_edge: Some([faces[30][0], faces[30][1]]),
+        unmatched: vec![faces[40][0], faces[40][1]],
+    };
+    session.set_scene(SceneOptions { selection, ..SceneOptions::default() });
+    assert_picture(&mut session, "posed-selection");
+}
+
+/// The cage vertex above the neck, which moves much of head and body.
+fn near_the_head(session: &Session) -> u32 {
+    let positions = session.cage().expect("there is one").positions();
+    let distance = |p: &Vec3| p.distance(Vec3::new(5.0, 4.0, -1.0));
+    let nearest =
+        (0..positions.len()).min_by(|&a, &b| distance(&positions[a]).total_cmp(&distance(&positions[b])));
+    nearest.expect("a cage has vertices") as u32
+}
+
+/// The paper's figure 4: what the classic weights make of the rest pose, and the mesh as it was.
+#[test]
+fn base_wireframe_over_the_reconstruction() {
+    let mut session = creature();
+    bind(&mut session, &classic(16));
+    session.set_scene(SceneOptions {
+        theme: Theme::Light,
+        mesh: MeshStyle::Clay,
+        base_wireframe: true,
+        cage_lines: false,
+        handles: false,
+        floor: false,
+        ..SceneOptions::default()
+    });
+    assert_picture(&mut session, "base-wireframe");
+}
+
+#[test]
+fn mesh_edges() {
+    let mut session = creature();
+    let bare =
+        SceneOptions { mesh_edges: true, cage_lines: false, handles: false, ..SceneOptions::default() };
+    session.set_scene(bare);
+    assert_picture(&mut session, "mesh-edges");
+}
+
+#[test]
+fn heat_map_of_weights() {
+    let mut session = creature();
+    bind(&mut session, &embedded());
+    let column = near_the_head(&session);
+    let selection = Selection { vertices: vec![column], ..Selection::default() };
+    session.set_scene(SceneOptions {
+        mesh: MeshStyle::Weights { column },
+        selection,
+        ..SceneOptions::default()
+    });
+    assert_picture(&mut session, "weights");
+}
+
+#[test]
+fn heat_map_of_errors() {
+    let mut session = creature();
+    bind(&mut session, &classic(24));
+    session.set_scene(SceneOptions {
+        mesh: MeshStyle::Errors,
+        cage_lines: false,
+        handles: false,
+        ..SceneOptions::default()
+    });
+    assert_picture(&mut session, "errors");
+}
+
+fn sliced(method: Method, with_values: bool, theme: Theme, name: &str) {
+    let mut session = creature();
+    let column = with_values.then(|| near_the_head(&session));
+    let cage = session.cage().expect("there is one").clone();
+    let options = BindOptions { grid: 24, method, ..BindOptions::default() };
+    let mut slice = Slice::new(&cage, &options, 2, 0.5);
+    if column.is_some() {
+        let weights =
+            cagework_core::bind(&slice.centers(), &cage, &options, &Silent).expect("it binds").weights;
+        slice.set_weights(weights).expect("a row for each cell");
+    }
+    session.camera_mut().look_along(AxisView::Front);
+    session.camera_mut().orbit(Vec2::new(0.5, 0.3));
+    session.set_scene(SceneOptions {
+        theme,
+        mesh: MeshStyle::Hidden,
+        handles: false,
+        slice: Some(SliceView { slice: Arc::new(slice), column }),
+        ..SceneOptions::default()
+    });
+    assert_picture(&mut session, name);
+}
+
+#[test]
+fn slice_with_kinds_of_cells() {
+    sliced(Method::Classic, false, Theme::Dark, "slice-kinds");
+    sliced(Method::Embedded, false, Theme::Light, "slice-kinds-light");
+}
+
+#[test]
+fn slice_with_values() {
+    sliced(Method::Embedded, true, Theme::Dark, "slice-values");
+}
+
+#[test]
+fn textures_colours_and_transparency() {
+    let mut session = textured();
+    assert_picture(&mut session, "materials");
+}
+
+#[test]
+fn gizmos() {
+    let mut session = creature();
+    for (mode, active, name) in [
+        (GizmoMode::Move, Some(GizmoPart::Axis(1)), "gizmo-move"),
+        (GizmoMode::Rotate, None, "gizmo-rotate"),
+        (GizmoMode::Scale, Some(GizmoPart::View), "gizmo-scale"),
+    ] {
+        let center = session.bounds().expect("there is a model").center();
+        let gizmo = Gizmo { mode, center, rotation: Quat::IDENTITY, active };
+        session.set_scene(SceneOptions { gizmo: Some(gizmo), ..SceneOptions::default() });
+        assert_picture(&mut session, name);
+    }
+}
+
+#[test]
+fn problems_are_marked() {
+    let mut session = creature();
+    let corners = session.cage().expect("there is one").positions().to_vec();
+    let marks = Marks {
+        points: vec![corners[0] + 0.4 * Vec3::Y],
+        segments: vec![[corners[0], corners[1]], [corners[1], corners[2]]],
+        mesh_vertices: (0..40).collect(),
+        cage_vertices: vec![5, 60],
+    };
+    session.set_scene(SceneOptions { marks, theme: Theme::Light, ..SceneOptions::default() });
+    assert_picture(&mut session, "marks");
+}
+
+#[test]
+fn orthographic_from_above() {
+    let mut session = creature();
+    session.camera_mut().projection = Projection::Orthographic;
+    session.camera_mut().look_along(AxisView::Top);
+    session.frame_all();
+    assert_picture(&mut session, "orthographic-top");
+}
+
+/// Drawn into a format without sRGB, as a browser's canvas may have, the colours are the same.
+#[test]
+fn formats_without_srgb_look_the_same() {
+    let mut session = creature();
+    // Nothing translucent: that is blended in sRGB there.
+    let bare = SceneOptions { floor: false, cage_lines: false, handles: false, ..SceneOptions::default() };
+    session.set_scene(bare);
+    let expected = pollster::block_on(session.picture(SIZE, 1.0)).expect("the picture is drawn");
+    let actual = scenes::picture_as(&mut session, wgpu::TextureFormat::Rgba8Unorm, SIZE);
+    let n = expected.len();
+    let sum: f64 = expected.iter().zip(&actual).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
+    // Samples are averaged in sRGB there, too: edges are a little darker.
+    assert!(sum / (n as f64) < 1.0, "{}", sum / n as f64);
+}
+
+#[test]
+fn empty_session_is_a_background() {
+    let mut session = scenes::empty();
+    *session.camera_mut() = Camera::default();
+    let rgba = pollster::block_on(session.picture([64, 48], 1.0)).expect("the picture is drawn");
+    assert!(rgba.chunks(4).all(|p| p[3] == 255));
+    // Above lighter than below, in the dark theme.
+    assert!(rgba[0] > rgba[4 * 64 * 47]);
+}
