@@ -4,23 +4,12 @@ export const PRODUCT = "Cagework";
 
 export const PRIVACY = "Your files never leave this computer: everything is computed in this page.";
 
-/** One sentence a sample: what to try. Unknown samples have none. */
+/** What to try with each sample, and an icon until its picture is there. Unknown samples have none. */
 export const SAMPLES: Record<string, { sentence: string; icon: "spark" | "pose" | "bind" | "model" }> = {
-  rat: {
-    sentence: "The paper's rat. Drag the tail, or lift the head: the body follows smoothly.",
-    icon: "spark",
-  },
-  figure: { sentence: "Legs close together. Move one knee: the other leg stays where it is.", icon: "pose" },
-  humanoid: {
-    sentence: "Legs close together. Move one knee: the other leg stays where it is.",
-    icon: "pose",
-  },
-  clamp: {
-    sentence: "Open the jaws. Then compare with mean value coordinates, which leak across the gap.",
-    icon: "bind",
-  },
-  spider: { sentence: "Thin legs, one cage. Bend one and see how sharply the weights end.", icon: "model" },
-  creature: { sentence: "Thin legs, one cage. Bend one and see how sharply the weights end.", icon: "model" },
+  rat: { sentence: "The paper's rat. Drag its tail, or turn its head: the feet stay.", icon: "spark" },
+  humanoid: { sentence: "Lift one knee: the other leg, a hand's breadth away, stays.", icon: "pose" },
+  clamp: { sentence: "Open the jaw, then compare with mean value coordinates.", icon: "bind" },
+  strider: { sentence: "Legs as thin as a grid cell. Bend one, the others keep still.", icon: "model" },
 };
 
 export const STAGES = {

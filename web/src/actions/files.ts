@@ -46,7 +46,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       poses: opened.project?.poses ?? [],
       shares: opened.project?.poses.map(() => 0) ?? [],
       editingRest: false,
-      cageSource: opened.cage ? "file" : "auto",
+      cageSource: "auto",
       playing: false,
       gesture: null,
       busy: null,

@@ -8,30 +8,43 @@ interface Entry {
   readonly label: string;
   readonly group: Group;
   readonly scope?: Scope;
+  /** Keys as the sheet shows them, where one row stands for several commands. */
+  readonly shown?: readonly string[];
 }
 
-export const GROUPS = ["Move", "Select", "Look", "Cage", "Poses", "File"] as const;
+export const GROUPS = ["Move", "While moving", "Select", "Look", "Cage", "Poses", "File"] as const;
 export type Group = (typeof GROUPS)[number];
 
 /** Keys are written as `keyOf` says them; `mod` is Ctrl, or Cmd on a Mac. */
 const TABLE = {
   grab: { keys: ["g"], label: "Move the selection", group: "Move" },
-  rotate: { keys: ["r"], label: "Rotate (with the gizmo shown: the scale gizmo)", group: "Move" },
+  rotate: { keys: ["r"], label: "Rotate; after W or E, gizmo to scale", group: "Move" },
   scale: { keys: ["s"], label: "Scale", group: "Move" },
-  axisX: { keys: ["x"], label: "Only along X; with Shift, all but X", group: "Move", scope: "gesture" },
-  axisY: { keys: ["y"], label: "Only along Y; with Shift, all but Y", group: "Move", scope: "gesture" },
-  axisZ: { keys: ["z"], label: "Only along Z; with Shift, all but Z", group: "Move", scope: "gesture" },
-  planeX: { keys: ["shift+x"], label: "", group: "Move", scope: "gesture" },
-  planeY: { keys: ["shift+y"], label: "", group: "Move", scope: "gesture" },
-  planeZ: { keys: ["shift+z"], label: "", group: "Move", scope: "gesture" },
-  keep: { keys: ["enter"], label: "Keep what was moved", group: "Move", scope: "gesture" },
-  cancel: { keys: ["escape"], label: "Put it back; close; select nothing", group: "Move" },
+  axisX: {
+    keys: ["x"],
+    label: "Only along this axis; with Shift, all but it",
+    group: "While moving",
+    scope: "gesture",
+    shown: ["x", "y", "z"],
+  },
+  axisY: { keys: ["y"], label: "", group: "While moving", scope: "gesture" },
+  axisZ: { keys: ["z"], label: "", group: "While moving", scope: "gesture" },
+  planeX: { keys: ["shift+x"], label: "", group: "While moving", scope: "gesture" },
+  planeY: { keys: ["shift+y"], label: "", group: "While moving", scope: "gesture" },
+  planeZ: { keys: ["shift+z"], label: "", group: "While moving", scope: "gesture" },
+  keep: { keys: ["enter"], label: "Keep it; a click does too", group: "While moving", scope: "gesture" },
+  cancel: { keys: ["escape"], label: "Put it back; otherwise: select nothing", group: "While moving" },
   gizmoMove: { keys: ["w"], label: "Gizmo to move", group: "Move" },
   gizmoRotate: { keys: ["e"], label: "Gizmo to rotate", group: "Move" },
   toolSelect: { keys: ["q"], label: "No gizmo: select and drag", group: "Move" },
   symmetry: { keys: ["m"], label: "Mirror across X", group: "Move" },
-  proportional: { keys: ["o"], label: "Take neighbours along (wheel: how far)", group: "Move" },
-  nudgeLeft: { keys: ["arrowleft"], label: "Nudge; with Shift ten times as far", group: "Move" },
+  proportional: { keys: ["o"], label: "Take neighbours along; wheel: how far", group: "Move" },
+  nudgeLeft: {
+    keys: ["arrowleft"],
+    label: "Nudge; with Shift ten times as far",
+    group: "Move",
+    shown: ["arrowleft", "arrowup", "arrowdown", "arrowright"],
+  },
   nudgeRight: { keys: ["arrowright"], label: "", group: "Move" },
   nudgeUp: { keys: ["arrowup"], label: "", group: "Move" },
   nudgeDown: { keys: ["arrowdown"], label: "", group: "Move" },
@@ -53,26 +66,26 @@ const TABLE = {
 
   frameSelection: { keys: ["f"], label: "Frame the selection", group: "Look" },
   frameAll: { keys: ["home", "shift+f"], label: "Frame everything", group: "Look" },
-  viewFront: { keys: ["1"], label: "From the front; with Ctrl, from behind", group: "Look" },
-  viewRight: { keys: ["3"], label: "From the right; with Ctrl, from the left", group: "Look" },
-  viewTop: { keys: ["7"], label: "From above; with Ctrl, from below", group: "Look" },
+  viewFront: { keys: ["1"], label: "Front; with Ctrl, back", group: "Look" },
+  viewRight: { keys: ["3"], label: "Right; with Ctrl, left", group: "Look" },
+  viewTop: { keys: ["7"], label: "Top; with Ctrl, bottom", group: "Look" },
   viewBack: { keys: ["mod+1"], label: "", group: "Look" },
   viewLeft: { keys: ["mod+3"], label: "", group: "Look" },
   viewBottom: { keys: ["mod+7"], label: "", group: "Look" },
   ortho: { keys: ["5"], label: "Perspective or parallel", group: "Look" },
   original: { keys: [" "], label: "Hold: show the original", group: "Look" },
   toggleCage: { keys: ["h"], label: "Hide or show the cage", group: "Look" },
-  toggleWire: { keys: ["z"], label: "Wireframe of the model", group: "Look" },
+  toggleWire: { keys: ["z"], label: "The model at rest, as wires", group: "Look" },
   heatMap: { keys: ["k"], label: "Weights of the selected vertex", group: "Look" },
   see: { keys: ["n"], label: "The See panel", group: "Look" },
 
-  restMode: { keys: ["tab"], label: "Edit the rest cage, or pose", group: "Cage" },
-  split: { keys: ["shift+s"], label: "Split the selected edge", group: "Cage", scope: "rest" },
-  collapse: { keys: ["shift+c"], label: "Collapse the selected edge", group: "Cage", scope: "rest" },
-  extrude: { keys: ["shift+e"], label: "Extrude the selected face", group: "Cage", scope: "rest" },
+  restMode: { keys: ["tab"], label: "Rest cage or pose", group: "Cage" },
+  split: { keys: ["shift+s"], label: "Split an edge", group: "Cage", scope: "rest" },
+  collapse: { keys: ["shift+c"], label: "Collapse an edge", group: "Cage", scope: "rest" },
+  extrude: { keys: ["shift+e"], label: "Extrude a face", group: "Cage", scope: "rest" },
   remove: {
     keys: ["delete", "backspace"],
-    label: "Delete the selection and close the gap",
+    label: "Delete, and fill the gap",
     group: "Cage",
     scope: "rest",
   },

@@ -35,8 +35,8 @@ export function createModelPanel(app: App): HTMLElement {
         button("Open a folder", () => app.chooseFolder(), { icon: "open", kind: "small" }),
       ),
     ),
-    card,
     section("Samples", gallery),
+    card,
     h("p", { class: "privacy" }, icon("lock"), h("span", { text: PRIVACY })),
   );
 

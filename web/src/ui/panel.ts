@@ -9,6 +9,8 @@ import type { IconName } from "./icons";
 interface Action {
   label: string;
   icon?: IconName;
+  /** Not what the user came for: no accent. */
+  plain?: true;
   run: () => void;
 }
 
@@ -27,7 +29,8 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
     case "cage":
       return cageActions(state, app);
     case "bind":
-      if (state.bindRun) return { primary: { label: "Cancel", icon: "stop", run: () => app.bind.cancel() } };
+      if (state.bindRun)
+        return { primary: { label: "Cancel", icon: "stop", plain: true, run: () => app.bind.cancel() } };
       if (!state.bound) return { primary: { label: "Bind", icon: "bind", run: () => app.run("bind") } };
       return {
         primary: { label: "Pose it", icon: "pose", run: () => app.go("pose") },
@@ -52,7 +55,7 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
 
 function cageActions(state: AppState, app: App): { primary: Action; second?: Action } {
   if (state.cageProgress !== null) {
-    return { primary: { label: "Cancel", icon: "stop", run: () => app.cage.cancel() } };
+    return { primary: { label: "Cancel", icon: "stop", plain: true, run: () => app.cage.cancel() } };
   }
   if (!state.cage) {
     return { primary: { label: "Make a cage", icon: "cage", run: () => void app.cage.make() } };
@@ -98,13 +101,17 @@ export function createPanel(element: HTMLElement, app: App, bodies: Record<StepN
     if (key === footKey) return;
     footKey = key;
     const make = (action: Action, kind: string) =>
-      button(action.label, () => nextActionsRun(app, kind === "primary"), {
+      button(action.label, () => nextActionsRun(app, kind.includes("main")), {
         kind,
         ...(action.icon ? { icon: action.icon } : {}),
       });
     const hadFocus = foot.contains(document.activeElement);
-    fill(foot, second ? make(second, "secondary") : null, make(primary, "primary"));
-    if (hadFocus) foot.querySelector<HTMLButtonElement>(".primary")?.focus();
+    fill(
+      foot,
+      second ? make(second, "secondary") : null,
+      make(primary, primary.plain ? "main" : "primary main"),
+    );
+    if (hadFocus) foot.querySelector<HTMLButtonElement>(".main")?.focus();
   });
 }
 

@@ -66,11 +66,11 @@ export function createSheet(mac: boolean): { element: HTMLDialogElement; show: (
 
 function row(shortcut: Shortcut, mac: boolean): HTMLElement[] {
   const keys = h("dt");
-  shortcut.keys.forEach((combination, i) => {
-    if (i > 0) keys.append(h("span", { class: "or", text: "or" }));
-    for (const cap of caps(combination, mac)) keys.append(h("kbd", { text: cap }));
+  (shortcut.shown ?? shortcut.keys).forEach((combination, i) => {
+    if (i > 0 && !shortcut.shown) keys.append(h("span", { class: "or", text: "or" }));
+    keys.append(
+      h("span", { class: "caps" }, ...caps(combination, mac).map((cap) => h("kbd", { text: cap }))),
+    );
   });
-  const when =
-    shortcut.scope === "gesture" ? " (while moving)" : shortcut.scope === "rest" ? " (rest cage)" : "";
-  return [keys, h("dd", { text: shortcut.label + when })];
+  return [keys, h("dd", { text: shortcut.label })];
 }
