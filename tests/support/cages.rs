@@ -141,6 +141,19 @@ pub fn c_shape() -> PolygonMesh {
     blocks(&arms.chain((0..3).map(|y| [0, y, 0])).collect::<Vec<_>>())
 }
 
+/// A C whose two caps are one concave polygon each: arms `[1, 4] x [0, 1]` and `[1, 4] x [2, 3]` on a back `[0, 1] x [0, 3]`,
+/// from z = 0 to 1; 16 vertices.
+#[must_use]
+pub fn c_prism() -> PolygonMesh {
+    const OUTLINE: [[f32; 2]; 8] =
+        [[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [1.0, 1.0], [1.0, 2.0], [4.0, 2.0], [4.0, 3.0], [0.0, 3.0]];
+    let n = OUTLINE.len() as u32;
+    let level = |z: f32| OUTLINE.iter().map(move |&[x, y]| Vec3::new(x, y, z));
+    let mut faces = vec![(0..n).rev().collect(), (n..2 * n).collect::<Vec<u32>>()];
+    faces.extend((0..n).map(|k| vec![k, (k + 1) % n, (k + 1) % n + n, k + n]));
+    PolygonMesh { positions: level(0.0).chain(level(1.0)).collect(), faces }
+}
+
 /// A bar of length 4 and the given thickness along a direction that is no axis: like a horse's leg, thinner than the
 /// cells of a coarse grid.
 #[must_use]

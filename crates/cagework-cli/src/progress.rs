@@ -75,5 +75,6 @@ fn stage_name(stage: Stage) -> &'static str {
         Stage::Voxelize => "voxelizing",
         Stage::Solve => "solving",
         Stage::Sample => "sampling",
+        Stage::Simplify => "simplifying",
     }
 }

@@ -11,6 +11,7 @@
 mod defects;
 mod hats;
 mod orient;
+mod pieces;
 mod polygon;
 #[cfg(test)]
 pub(crate) mod shapes;
@@ -26,7 +27,7 @@ use glam::{DVec2, DVec3, Vec3};
 use crate::mesh::{Bounds, PolygonMesh};
 
 pub use defects::{CageError, CageNotice, FaceDefect};
-use polygon::{Hats, Polygon};
+use polygon::{Hats, Piece, Polygon};
 
 /// Smallest diagonal of a cage, object units: squares and cubes of lengths stay far from the end of f32 and f64.
 pub const MIN_DIAGONAL: f64 = 1e-12;
@@ -45,6 +46,8 @@ pub struct Cage {
     face_of_triangle: Vec<u32>,
     /// Corners of each triangle as corners of its face.
     local: Vec<[u32; 3]>,
+    /// Rank of each triangle among those of its face.
+    local_rank: Vec<u32>,
     polygons: Vec<Polygon>,
     bounds: Bounds,
     notices: Vec<CageNotice>,
@@ -72,16 +75,18 @@ impl Cage {
             triangles: Vec::new(),
             face_of_triangle: Vec::new(),
             local: Vec::new(),
+            local_rank: Vec::new(),
             faces,
             polygons,
             bounds,
             notices,
         };
         for (f, (face, polygon)) in cage.faces.iter().zip(&cage.polygons).enumerate() {
-            for &local in &polygon.triangles {
+            for (rank, &local) in polygon.triangles.iter().enumerate() {
                 cage.triangles.push(local.map(|k| face[k as usize]));
                 cage.face_of_triangle.push(f as u32);
                 cage.local.push(local);
+                cage.local_rank.push(rank as u32);
             }
         }
         Ok(cage)
@@ -151,45 +156,54 @@ impl Cage {
     /// [`Self::triangles`] and barycentric coordinates in it. Calls `each(cage vertex, value)` for every vertex whose
     /// value is not zero; the values sum to 1 and reproduce the point.
     ///
-    /// Linear on triangles; Meyer et al. 2002 on convex planar polygons (bilinear on a rectangle); mean value
-    /// coordinates (Hormann & Floater 2006) on other planar ones, where they may be slightly negative next to a
-    /// re-entrant corner. A polygon that is not planar is split into triangles and linear on each, because a curved
+    /// Linear on triangles; Meyer et al. 2002 on convex planar polygons (bilinear on a rectangle). Other planar polygons
+    /// are cut into convex pieces, each with the coordinates of its own corners, because mean value coordinates of the
+    /// whole are negative next to a re-entrant corner and reach across the gap of a C; they serve for pieces with
+    /// straight corners. A polygon that is not planar is split into triangles and linear on each, because a curved
     /// patch would reproduce points that are not on the triangles that rays meet. All are linear along edges, so
-    /// neighbouring faces agree.
+    /// neighbouring faces agree; none is negative.
     ///
     /// # Panics
     /// If there is no such triangle.
     pub fn hats_at(&self, triangle: u32, barycentric: [f64; 3], each: &mut dyn FnMut(u32, f64)) {
         let t = triangle as usize;
-        let f = self.face_of_triangle[t] as usize;
-        let (face, polygon) = (&self.faces[f], &self.polygons[f]);
-        if polygon.hats == Hats::Linear {
+        let Some(piece) = self.piece_of(t) else {
             for (&i, b) in self.triangles[t].iter().zip(barycentric) {
                 if b != 0.0 {
                     each(i, b);
                 }
             }
             return;
-        }
-        let corners = self.local[t].map(|k| polygon.outline[k as usize]);
+        };
+        let f = self.face_of_triangle[t] as usize;
+        let (face, outline) = (&self.faces[f], &self.polygons[f].outline);
+        let corners = self.local[t].map(|k| outline[k as usize]);
         let point = corners.iter().zip(barycentric).fold(DVec2::ZERO, |p, (&q, b)| p + b * q);
+        let n = piece.corners.len();
         let (mut stack, mut heap);
-        let values: &mut [f64] = if face.len() <= STACK_CORNERS {
+        let values: &mut [f64] = if n <= STACK_CORNERS {
             stack = [0.0; STACK_CORNERS];
-            &mut stack[..face.len()]
+            &mut stack[..n]
         } else {
-            heap = vec![0.0; face.len()];
+            heap = vec![0.0; n];
             &mut heap
         };
-        match polygon.hats {
-            Hats::Convex => hats::wachspress(&polygon.outline, point, values),
-            Hats::Linear | Hats::MeanValue => hats::mean_value(&polygon.outline, point, values),
+        match piece.hats {
+            Hats::Convex => hats::wachspress(&piece.outline, point, values),
+            Hats::Linear | Hats::MeanValue => hats::mean_value(&piece.outline, point, values),
         }
-        for (&i, &value) in face.iter().zip(values.iter()) {
+        for (&k, &value) in piece.corners.iter().zip(values.iter()) {
             if value != 0.0 {
-                each(i, value);
+                each(face[k as usize], value);
             }
         }
+    }
+
+    /// The piece of a face that a triangle lies in; none if hats are linear on the triangle.
+    fn piece_of(&self, triangle: usize) -> Option<&Piece> {
+        let polygon = &self.polygons[self.face_of_triangle[triangle] as usize];
+        let piece = *polygon.piece_of_triangle.get(self.local_rank[triangle] as usize)?;
+        Some(&polygon.pieces[piece as usize]).filter(|piece| piece.hats != Hats::Linear)
     }
 }
 

@@ -7,6 +7,10 @@
 use glam::DVec3;
 
 use crate::grid::{Grid, NO_CELL};
+use crate::voxelize::map_indices;
+
+/// Planes that a thread takes at a time: cells next to the cage, which cost most, are not spread evenly.
+const SLAB: u32 = 8;
 
 /// The cage as a level sees it: which cells are unknowns, and where their arms end on the cage.
 pub trait Boundary {
@@ -163,7 +167,7 @@ impl Level {
 
     /// Builds the stencils of all unknowns.
     #[must_use]
-    pub fn new(boundary: &impl Boundary) -> Self {
+    pub fn new(boundary: &(impl Boundary + Sync)) -> Self {
         let grid = boundary.grid();
         let (row_of, n_cells, isolated) = number_cells(boundary, &grid);
         let mut level = Self {
@@ -173,31 +177,48 @@ impl Level {
             row_of,
             isolated,
         };
-        let mut terms = [Vec::new(), Vec::new()];
-        for z in 0..grid.dims[2] {
-            level.mark_plane();
-            for y in 0..grid.dims[1] {
-                level.add_line(boundary, y, z, &mut terms);
+        let nz = grid.dims[2];
+        let slabs = map_indices(nz.div_ceil(SLAB) as usize, |k| {
+            let first = k as u32 * SLAB;
+            let mut slab = Slab::default();
+            for z in first..nz.min(first + SLAB) {
+                slab.mark_plane();
+                for y in 0..grid.dims[1] {
+                    level.add_line(boundary, y, z, &mut slab);
+                }
             }
-        }
-        level.mark_plane();
-        let red_cut = level.colours[0].cut.len() as u32;
-        let [red, black] = terms;
-        level.boundary = red;
-        level
-            .boundary
-            .extend(black.into_iter().map(|t| BoundaryTerm { cut_cell: t.cut_cell + red_cut, ..t }));
+            slab
+        });
+        level.join(slabs);
         level
     }
 
-    fn mark_plane(&mut self) {
+    /// Takes over the planes' stencils, in order.
+    fn join(&mut self, slabs: Vec<Slab>) {
+        let mut terms = [Vec::new(), Vec::new()];
+        for slab in slabs {
+            let parts = self.colours.iter_mut().zip(slab.colours).zip(terms.iter_mut().zip(slab.terms));
+            for ((colour, part), (terms, part_terms)) in parts {
+                let [runs, cut] = [colour.runs.len() as u32, colour.cut.len() as u32];
+                colour.planes.extend(part.planes.iter().map(|&[r, c]| [r + runs, c + cut]));
+                terms
+                    .extend(part_terms.into_iter().map(|t| BoundaryTerm { cut_cell: t.cut_cell + cut, ..t }));
+                colour.runs.extend(part.runs);
+                colour.cut.extend(part.cut);
+            }
+        }
         for colour in &mut self.colours {
             colour.planes.push([colour.runs.len() as u32, colour.cut.len() as u32]);
         }
+        let red_cut = self.colours[0].cut.len() as u32;
+        let [red, black] = terms;
+        self.boundary = red;
+        let renumbered = black.into_iter().map(|t| BoundaryTerm { cut_cell: t.cut_cell + red_cut, ..t });
+        self.boundary.extend(renumbered);
     }
 
     /// Adds the runs and cut cells of the line (y, z).
-    fn add_line(&mut self, boundary: &impl Boundary, y: u32, z: u32, terms: &mut [Vec<BoundaryTerm>; 2]) {
+    fn add_line(&self, boundary: &impl Boundary, y: u32, z: u32, slab: &mut Slab) {
         let first_rows = [self.first_row(0) as u32, self.first_row(1) as u32];
         let mut open = [None::<Run>; 2];
         let [nx, ny, nz] = self.grid.dims;
@@ -232,18 +253,34 @@ impl Level {
                 let slot = &mut open[colour];
                 match slot {
                     Some(r) if r.continues_with(&run) => r.len += 1,
-                    _ => self.colours[colour].runs.extend(slot.replace(run)),
+                    _ => slab.colours[colour].runs.extend(slot.replace(run)),
                 }
             } else {
                 let whole = neighbours.iter().filter(|&&n| n != zero).count();
-                let number = self.colours[colour].cut.len() as u32;
-                let weight = add_terms(boundary, cell, cut, number, &mut terms[colour]);
+                let number = slab.colours[colour].cut.len() as u32;
+                let weight = add_terms(boundary, cell, cut, number, &mut slab.terms[colour]);
                 let diagonal = (whole as f64 + weight) as f32;
-                self.colours[colour].cut.push(CutCell { cell: own, neighbours, diagonal });
+                slab.colours[colour].cut.push(CutCell { cell: own, neighbours, diagonal });
             }
         }
-        for (colour, run) in self.colours.iter_mut().zip(open) {
+        for (colour, run) in slab.colours.iter_mut().zip(open) {
             colour.runs.extend(run);
+        }
+    }
+}
+
+/// Stencils of some planes, numbered from 0: what one thread makes.
+#[derive(Default)]
+struct Slab {
+    /// `n_cells` is not known here.
+    colours: [Colour; 2],
+    terms: [Vec<BoundaryTerm>; 2],
+}
+
+impl Slab {
+    fn mark_plane(&mut self) {
+        for colour in &mut self.colours {
+            colour.planes.push([colour.runs.len() as u32, colour.cut.len() as u32]);
         }
     }
 }

@@ -6,6 +6,7 @@
 pub mod bind;
 pub mod cage;
 pub mod cage_gen;
+mod contact;
 pub mod deform;
 pub mod edit;
 pub mod geometry;
@@ -16,6 +17,7 @@ pub mod mesh;
 pub mod progress;
 pub mod report;
 pub mod sample;
+pub mod samples;
 mod simd;
 pub mod slice;
 pub mod solve;
@@ -26,7 +28,7 @@ pub mod weights;
 
 pub use bind::{BindError, BindOptions, Binding, bind};
 pub use cage::{Cage, CageError, CageNotice, FaceDefect};
-pub use cage_gen::subdivided_box;
+pub use cage_gen::{CageOptions, GeneratedCage, subdivided_box};
 pub use mean_value::{MeanValueError, mean_value_weights};
 pub use mesh::{Bounds, PolygonMesh, TriMesh};
 pub use progress::{Cancelled, Progress, ProgressEvent, Stage};

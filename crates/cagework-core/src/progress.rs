@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// The stages of a bind, in order.
+/// The stages of a bind, in order, and those of making a cage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
@@ -15,6 +15,8 @@ pub enum Stage {
     Solve,
     /// Weights are taken at the mesh's vertices.
     Sample,
+    /// A generated cage is brought to few vertices.
+    Simplify,
 }
 
 /// One step of progress.
@@ -22,7 +24,7 @@ pub enum Stage {
 pub struct ProgressEvent {
     /// The stage under way.
     pub stage: Stage,
-    /// How much of the whole bind is done, 0 to 1.
+    /// How much of the whole work is done, 0 to 1.
     pub fraction: f32,
     /// Sweeps or V-cycles done so far in this stage.
     pub iteration: u32,

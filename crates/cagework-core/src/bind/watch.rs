@@ -11,6 +11,8 @@ fn span(stage: Stage) -> [f32; 2] {
         Stage::Voxelize => [0.0, 0.1],
         Stage::Solve => [0.1, 0.9],
         Stage::Sample => [0.9, 1.0],
+        // No part of a bind.
+        Stage::Simplify => [0.0, 0.0],
     }
 }
 

@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::defects::FaceDefect;
+use super::pieces::{Pieces, convex_pieces};
 use super::triangulate::{cross, ear_clip};
 
 /// A face lower than this fraction of the cage's diagonal has no area: it is lost in the rounding of f32 coordinates
@@ -14,7 +15,7 @@ pub(super) const FLAT_HEIGHT: f64 = 1e-7;
 pub(super) const PLANAR: f64 = 2e-6;
 
 /// Smallest sine of a convex corner's turn for Meyer's formula: at a straight corner its hat vanishes, which would
-/// not fit the neighbouring faces; mean value coordinates have no trouble there.
+/// not fit the neighbouring faces; mean value coordinates have no trouble there, and are not negative either.
 const MIN_TURN: f64 = 1e-3;
 
 /// Most corners for Meyer's formula, a product of one factor an edge: more could underflow.
@@ -27,18 +28,43 @@ pub(super) enum Hats {
     Linear,
     /// Meyer et al. 2002.
     Convex,
-    /// Hormann & Floater 2006.
+    /// Hormann & Floater 2006: pieces with straight corners or very many.
     MeanValue,
 }
 
 /// A face in its plane.
 #[derive(Clone, Debug)]
 pub(super) struct Polygon {
-    pub(super) hats: Hats,
-    /// Corners in the plane, counter-clockwise seen from outside; empty if hats are linear.
+    /// Corners in the plane, counter-clockwise seen from outside; empty if hats are linear everywhere.
     pub(super) outline: Vec<DVec2>,
+    /// What carries hats of its own; empty if hats are linear everywhere.
+    pub(super) pieces: Vec<Piece>,
     /// Triangles that cover the face, as corners of it, turned like it.
     pub(super) triangles: Vec<[u32; 3]>,
+    /// The piece that each triangle lies in; empty if hats are linear everywhere.
+    pub(super) piece_of_triangle: Vec<u32>,
+}
+
+/// A convex part of a face.
+#[derive(Clone, Debug)]
+pub(super) struct Piece {
+    pub(super) hats: Hats,
+    /// Corners of the face, counter-clockwise.
+    pub(super) corners: Vec<u32>,
+    /// The same in the plane.
+    pub(super) outline: Vec<DVec2>,
+}
+
+impl Piece {
+    fn new(outline: &[DVec2], corners: Vec<u32>) -> Self {
+        let outline: Vec<DVec2> = corners.iter().map(|&k| outline[k as usize]).collect();
+        let hats = match corners.len() {
+            3 => Hats::Linear,
+            4..=MAX_CONVEX_CORNERS if is_convex(&outline) => Hats::Convex,
+            _ => Hats::MeanValue,
+        };
+        Self { hats, corners, outline }
+    }
 }
 
 impl Polygon {
@@ -54,25 +80,31 @@ impl Polygon {
             return Err(FaceDefect::NoArea);
         }
         if n == 3 {
-            return Ok(Self { hats: Hats::Linear, outline: Vec::new(), triangles: vec![[0, 1, 2]] });
+            return Ok(Self::linear(vec![[0, 1, 2]]));
         }
         let normal = normal.normalize();
         let outline = project(&arms, normal);
         let height = arms.iter().map(|p| p.dot(normal).abs()).fold(0.0, f64::max);
         if height > PLANAR * diagonal {
-            let triangles = if n == 4 { split_quad(&arms, normal) } else { ear_clip(&outline)? };
-            return Ok(Self { hats: Hats::Linear, outline: Vec::new(), triangles });
+            return Ok(Self::linear(if n == 4 { split_quad(&arms, normal) } else { ear_clip(&outline)? }));
         }
-        if is_convex(&outline) {
-            let hats = if n <= MAX_CONVEX_CORNERS { Hats::Convex } else { Hats::MeanValue };
-            let triangles = (2..n as u32).map(|k| [0, k - 1, k]).collect();
-            return Ok(Self { hats, outline, triangles });
-        }
-        if crosses_itself(&outline) {
+        let Pieces { corners, triangles, piece_of_triangle } = if is_convex(&outline) {
+            Pieces {
+                corners: vec![(0..n as u32).collect()],
+                triangles: (2..n as u32).map(|k| [0, k - 1, k]).collect(),
+                piece_of_triangle: vec![0; n - 2],
+            }
+        } else if crosses_itself(&outline) {
             return Err(FaceDefect::CrossesItself);
-        }
-        let triangles = ear_clip(&outline)?;
-        Ok(Self { hats: Hats::MeanValue, outline, triangles })
+        } else {
+            convex_pieces(&outline)?
+        };
+        let pieces = corners.into_iter().map(|corners| Piece::new(&outline, corners)).collect();
+        Ok(Self { outline, pieces, triangles, piece_of_triangle })
+    }
+
+    fn linear(triangles: Vec<[u32; 3]>) -> Self {
+        Self { outline: Vec::new(), pieces: Vec::new(), triangles, piece_of_triangle: Vec::new() }
     }
 }
 
@@ -93,14 +125,18 @@ fn is_convex(outline: &[DVec2]) -> bool {
     let n = outline.len();
     let mut total = 0.0;
     for k in 0..n {
-        let before = (outline[k] - outline[(k + n - 1) % n]).normalize_or_zero();
-        let after = (outline[(k + 1) % n] - outline[k]).normalize_or_zero();
-        if before.perp_dot(after) < MIN_TURN {
+        let (before, after) = (outline[(k + n - 1) % n], outline[(k + 1) % n]);
+        if turn(before, outline[k], after) < MIN_TURN {
             return false;
         }
-        total += before.angle_to(after);
+        total += (outline[k] - before).angle_to(after - outline[k]);
     }
     total < 3.0 * std::f64::consts::PI
+}
+
+/// Sine of the turn at `b` on the way from `a` to `c`; positive to the left.
+pub(super) fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
+    (b - a).normalize_or_zero().perp_dot((c - b).normalize_or_zero())
 }
 
 /// Whether two sides cross in a point inside both.

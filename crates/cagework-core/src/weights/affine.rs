@@ -58,17 +58,19 @@ impl Columns {
     #[must_use]
     pub fn sums(&self, row: &[Row], target: DVec3) -> (f64, f64) {
         let [x, y, z] = &self.exact;
-        let mut sums = [[0.0f64; LANES]; 4];
+        // Sums in variables of their own, not in an array: they stay in registers.
+        let (mut s, mut sx, mut sy, mut sz) =
+            ([0.0f64; LANES], [0.0f64; LANES], [0.0f64; LANES], [0.0f64; LANES]);
         for (((w, x), y), z) in row.iter().zip(x).zip(y).zip(z) {
+            let w = w.map(f64::from);
             for k in 0..LANES {
-                let w = f64::from(w[k]);
-                sums[0][k] += w;
-                sums[1][k] += w * x[k];
-                sums[2][k] += w * y[k];
-                sums[3][k] += w * z[k];
+                s[k] += w[k];
+                sx[k] += w[k] * x[k];
+                sy[k] += w[k] * y[k];
+                sz[k] += w[k] * z[k];
             }
         }
-        let [sum, x, y, z] = sums.map(|lanes| lanes.iter().sum::<f64>());
+        let [sum, x, y, z] = [s, sx, sy, sz].map(|lanes| lanes.iter().sum::<f64>());
         (sum, (DVec3::new(x, y, z) - target).length())
     }
 
@@ -91,27 +93,27 @@ impl Columns {
     pub fn restore_affine(&self, row: &mut [Row], target: DVec3) {
         let t = target.as_vec3();
         let [x, y, z] = &self.scaled;
-        // 1; x, y, z; xx, xy, xz, yy, yz, zz, each weighted and summed.
-        let mut moments = [ZERO; 10];
+        // 1; x, y, z; xx, xy, xz, yy, yz, zz, each weighted and summed. In variables of their own, not in an array:
+        // they stay in registers.
+        let (mut s, mut sx, mut sy, mut sz) = (ZERO, ZERO, ZERO, ZERO);
+        let (mut sxx, mut sxy, mut sxz, mut syy, mut syz, mut szz) = (ZERO, ZERO, ZERO, ZERO, ZERO, ZERO);
         for (((w, x), y), z) in row.iter().zip(x).zip(y).zip(z) {
-            let (mut dx, mut dy, mut dz, mut wx, mut wy, mut wz) = (ZERO, ZERO, ZERO, ZERO, ZERO, ZERO);
             for k in 0..LANES {
-                (dx[k], dy[k], dz[k]) = (x[k] - t.x, y[k] - t.y, z[k] - t.z);
-                (wx[k], wy[k], wz[k]) = (w[k] * dx[k], w[k] * dy[k], w[k] * dz[k]);
-            }
-            for k in 0..LANES {
-                moments[0][k] += w[k];
-                moments[1][k] += wx[k];
-                moments[2][k] += wy[k];
-                moments[3][k] += wz[k];
-                moments[4][k] += wx[k] * dx[k];
-                moments[5][k] += wx[k] * dy[k];
-                moments[6][k] += wx[k] * dz[k];
-                moments[7][k] += wy[k] * dy[k];
-                moments[8][k] += wy[k] * dz[k];
-                moments[9][k] += wz[k] * dz[k];
+                let (dx, dy, dz) = (x[k] - t.x, y[k] - t.y, z[k] - t.z);
+                let (wx, wy, wz) = (w[k] * dx, w[k] * dy, w[k] * dz);
+                s[k] += w[k];
+                sx[k] += wx;
+                sy[k] += wy;
+                sz[k] += wz;
+                sxx[k] += wx * dx;
+                sxy[k] += wx * dy;
+                sxz[k] += wx * dz;
+                syy[k] += wy * dy;
+                syz[k] += wy * dz;
+                szz[k] += wz * dz;
             }
         }
+        let moments = [s, sx, sy, sz, sxx, sxy, sxz, syy, syz, szz];
         let m = moments.map(|lanes| lanes.iter().map(|&s| f64::from(s)).sum::<f64>());
         let sums = DVec4::new(m[0], m[1], m[2], m[3]);
         let matrix = DMat4::from_cols(
@@ -127,8 +129,12 @@ impl Columns {
         }
         let l = lambda.as_vec4();
         for (((w, x), y), z) in row.iter_mut().zip(x).zip(y).zip(z) {
+            let mut factor = ZERO;
             for k in 0..LANES {
-                w[k] *= 1.0 + (l.x + l.y * (x[k] - t.x) + l.z * (y[k] - t.y) + l.w * (z[k] - t.z));
+                factor[k] = 1.0 + (l.x + l.y * (x[k] - t.x) + l.z * (y[k] - t.y) + l.w * (z[k] - t.z));
+            }
+            for k in 0..LANES {
+                w[k] *= factor[k];
             }
         }
     }

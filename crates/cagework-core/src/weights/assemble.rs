@@ -59,6 +59,8 @@ struct Run<'a> {
     /// The run's part of the result.
     indices: &'a mut [u32],
     data: &'a mut [f32],
+    /// Entries of it that have been written.
+    stored: usize,
 }
 
 /// Makes the matrix of weights. `blocks[batch][vertex]`: sampled values (used up as scratch space); `points`: rest
@@ -73,10 +75,19 @@ pub fn assemble(
 ) -> (Weights, Statistics) {
     let columns = Columns::new(cage);
     let mut runs = runs_of(blocks, points);
+    // Without a threshold it is known beforehand which weights are stored: rows are corrected on their way into the
+    // result. With one, it depends on the correction.
+    let corrected_first = options.threshold > 0.0;
     team.each_mut(&mut runs, |run| {
         dispatch(
             #[inline(always)]
-            || run.correct(&columns, options, &is_outside),
+            || {
+                if corrected_first {
+                    run.correct(&columns, options, &is_outside, Run::keep);
+                } else {
+                    run.count();
+                }
+            },
         );
     });
 
@@ -94,7 +105,18 @@ pub fn assemble(
         run.indices = indices_left.split_off_mut(..n).expect("the lengths' sum was allocated");
         run.data = data_left.split_off_mut(..n).expect("the lengths' sum was allocated");
     }
-    team.each_mut(&mut runs, Run::store);
+    team.each_mut(&mut runs, |run| {
+        dispatch(
+            #[inline(always)]
+            || {
+                if corrected_first {
+                    run.store_kept();
+                } else {
+                    run.correct(&columns, options, &is_outside, |run, v, row| run.store(v, row, |w| w > 0.0));
+                }
+            },
+        );
+    });
     let statistics = statistics(&runs, end, f64::from(cage.diagonal()));
     drop(runs);
     (Weights::from_parts(cage.n_vertices() as u32, indptr, indices, data), statistics)
@@ -114,6 +136,7 @@ fn runs_of<'a>(blocks: &'a mut [Vec<Row>], points: &'a [Vec3]) -> Vec<Run<'a>> {
             max_sum_error: 0.0,
             indices: &mut [],
             data: &mut [],
+            stored: 0,
         })
         .collect();
     for block in blocks {
@@ -137,9 +160,29 @@ impl Run<'_> {
         }
     }
 
-    /// Drops small weights, restores the rows' sums, and measures them.
+    /// Lengths of the rows if every positive weight is stored.
     #[inline(always)]
-    fn correct(&mut self, columns: &Columns, options: RowOptions, is_outside: &impl Fn(usize) -> bool) {
+    fn count(&mut self) {
+        for v in 0..self.points.len() {
+            let mut positive = [0u32; LANES];
+            for block in &self.blocks {
+                for k in 0..LANES {
+                    positive[k] += u32::from(block[v][k] > 0.0);
+                }
+            }
+            self.lengths.push(positive.iter().sum());
+        }
+    }
+
+    /// Drops small weights, restores the rows' sums, measures them, and hands them on: `take(run, vertex, row)`.
+    #[inline(always)]
+    fn correct(
+        &mut self,
+        columns: &Columns,
+        options: RowOptions,
+        is_outside: &impl Fn(usize) -> bool,
+        take: impl Fn(&mut Self, usize, &[Row]),
+    ) {
         let mut row = vec![ZERO; self.blocks.len()];
         for (v, point) in self.points.iter().enumerate() {
             let target = columns.scale(point.as_dvec3());
@@ -159,10 +202,55 @@ impl Run<'_> {
                 _ => columns.sums(&row, target),
             };
             self.measure(&row, sum, (!outside).then_some(miss));
-            for (row, block) in row.iter().zip(&mut self.blocks) {
-                block[v] = *row;
+            take(self, v, &row);
+        }
+    }
+
+    /// Keeps a row in the blocks until all lengths are known.
+    #[inline(always)]
+    fn keep(&mut self, v: usize, row: &[Row]) {
+        self.lengths.push(row.iter().flatten().map(|&w| u32::from(w != 0.0)).sum());
+        for (row, block) in row.iter().zip(&mut self.blocks) {
+            block[v] = *row;
+        }
+    }
+
+    /// Writes the kept rows into the result.
+    #[inline(always)]
+    fn store_kept(&mut self) {
+        for v in 0..self.points.len() {
+            let row: Vec<Row> = self.blocks.iter().map(|block| block[v]).collect();
+            self.store(v, &row, |w| w != 0.0);
+        }
+    }
+
+    /// Writes the row's weights into the result, those that `is_stored` says of what the blocks hold.
+    #[inline(always)]
+    fn store(&mut self, v: usize, row: &[Row], is_stored: impl Fn(f32) -> bool) {
+        let begin = self.stored;
+        let end = begin + self.lengths[v] as usize;
+        let (indices, data) = (&mut self.indices[begin..end], &mut self.data[begin..end]);
+        let mut slot = 0;
+        for ((first, row), block) in (0u32..).step_by(LANES).zip(row).zip(&self.blocks) {
+            let sampled = &block[v];
+            if let (Some(indices), Some(data)) =
+                (indices.get_mut(slot..slot + LANES), data.get_mut(slot..slot + LANES))
+                && sampled.iter().all(|&w| is_stored(w))
+            {
+                for k in 0..LANES {
+                    (indices[k], data[k]) = (first + k as u32, row[k]);
+                }
+                slot += LANES;
+                continue;
+            }
+            for k in 0..LANES {
+                if is_stored(sampled[k]) {
+                    (indices[slot], data[slot]) = (first + k as u32, row[k]);
+                    slot += 1;
+                }
             }
         }
+        self.stored = end;
     }
 
     /// Drops what is below the threshold and restores the row, or keeps all if that cannot be had. `row` holds the
@@ -190,36 +278,16 @@ impl Run<'_> {
     #[inline(always)]
     fn measure(&mut self, row: &[Row], sum: f64, miss: Option<f64>) {
         let (mut low, mut high) = ([f32::INFINITY; LANES], ZERO);
-        let mut stored = [0u32; LANES];
         for row in row {
             for k in 0..LANES {
-                let is_stored = row[k] != 0.0;
-                stored[k] += u32::from(is_stored);
-                low[k] = low[k].min(if is_stored { row[k] } else { f32::INFINITY });
+                low[k] = low[k].min(if row[k] != 0.0 { row[k] } else { f32::INFINITY });
                 high[k] = high[k].max(row[k]);
             }
         }
-        self.lengths.push(stored.iter().sum());
         self.range =
             [low.into_iter().fold(self.range[0], f32::min), high.into_iter().fold(self.range[1], f32::max)];
         self.max_sum_error = self.max_sum_error.max((sum - 1.0).abs());
         self.errors.extend(miss.map(|miss| miss as f32));
-    }
-
-    /// Writes the stored weights into the result.
-    fn store(&mut self) {
-        let mut slots = self.indices.iter_mut().zip(self.data.iter_mut());
-        for v in 0..self.points.len() {
-            for (batch, block) in self.blocks.iter().enumerate() {
-                for (k, &weight) in block[v].iter().enumerate() {
-                    if weight != 0.0
-                        && let Some((index, value)) = slots.next()
-                    {
-                        (*index, *value) = ((batch * LANES + k) as u32, weight);
-                    }
-                }
-            }
-        }
     }
 }
 

@@ -1,0 +1,146 @@
+//! The voxels that a triangle overlaps, row by row.
+//!
+//! Source: Akenine-Moeller 2001, "Fast 3D triangle-box overlap testing" (separating axes). For one row all axes but x
+//! are constants, so that each axis bounds x on both sides and the row's voxels come out as one run, without testing
+//! any of them.
+
+use glam::DVec3;
+
+/// Widening of voxels that keeps rounding on the safe side.
+const SLACK: f64 = 1e-6;
+
+/// An axis whose x component is below this says nothing about x.
+const ACROSS: f64 = 1e-12;
+
+/// A triangle among voxels.
+#[derive(Debug)]
+pub(super) struct Footprint {
+    /// Bounds on a voxel centre's x that depend on y and z; the first `n_slanted` count.
+    slanted: [Slanted; 10],
+    n_slanted: usize,
+    /// Bounds on y and z alone; the first `n_across` count.
+    across: [Slanted; 10],
+    n_across: usize,
+    min: DVec3,
+    max: DVec3,
+}
+
+/// `low <= x + y_share y + z_share z <= high` (slanted), or the same without x.
+#[derive(Clone, Copy, Debug, Default)]
+struct Slanted {
+    y: f64,
+    z: f64,
+    low: f64,
+    high: f64,
+}
+
+impl Footprint {
+    /// The footprint of a triangle in voxel units, for voxels grown by `grow` on all sides.
+    pub(super) fn new(triangle: [DVec3; 3], grow: f64) -> Self {
+        let half = 0.5 + grow + SLACK;
+        let [a, b, c] = triangle;
+        let mut footprint = Self {
+            slanted: [Slanted::default(); 10],
+            n_slanted: 0,
+            across: [Slanted::default(); 10],
+            n_across: 0,
+            min: a.min(b).min(c) - half,
+            max: a.max(b).max(c) + half,
+        };
+        let edges = [b - a, c - b, a - c];
+        footprint.bound(edges[0].cross(edges[1]), triangle, half);
+        for e in edges {
+            footprint.bound(DVec3::new(0.0, -e.z, e.y), triangle, half);
+            footprint.bound(DVec3::new(e.z, 0.0, -e.x), triangle, half);
+            footprint.bound(DVec3::new(-e.y, e.x, 0.0), triangle, half);
+        }
+        footprint
+    }
+
+    /// Adds a separating axis: a voxel overlaps only if its centre is near the triangle along it.
+    fn bound(&mut self, axis: DVec3, triangle: [DVec3; 3], half: f64) {
+        let [p, q, r] = triangle.map(|v| axis.dot(v));
+        let reach = half * (axis.x.abs() + axis.y.abs() + axis.z.abs());
+        let (low, high) = (p.min(q).min(r) - reach, p.max(q).max(r) + reach);
+        if axis.x.abs() > ACROSS {
+            let scale = 1.0 / axis.x;
+            let (one, other) = (low * scale, high * scale);
+            self.slanted[self.n_slanted] =
+                Slanted { y: axis.y * scale, z: axis.z * scale, low: one.min(other), high: one.max(other) };
+            self.n_slanted += 1;
+        } else {
+            self.across[self.n_across] = Slanted { y: axis.y, z: axis.z, low, high };
+            self.n_across += 1;
+        }
+    }
+
+    /// Calls `each(y, z, first, last)` for the run of every row.
+    pub(super) fn for_each_run(&self, dims: [usize; 3], mut each: impl FnMut(usize, usize, usize, usize)) {
+        let [_, ys, zs] = rows(self.min, self.max, dims);
+        for z in zs[0]..zs[1] {
+            for y in ys[0]..ys[1] {
+                if let Some((first, last)) = self.run(y, z, dims[0]) {
+                    each(y, z, first, last);
+                }
+            }
+        }
+    }
+
+    fn run(&self, y: usize, z: usize, n: usize) -> Option<(usize, usize)> {
+        let (y, z) = (y as f64 + 0.5, z as f64 + 0.5);
+        for a in &self.across[..self.n_across] {
+            let at = a.y * y + a.z * z;
+            if at < a.low || at > a.high {
+                return None;
+            }
+        }
+        let (mut low, mut high) = (self.min.x, self.max.x);
+        for s in &self.slanted[..self.n_slanted] {
+            let at = s.y * y + s.z * z;
+            low = low.max(s.low - at);
+            high = high.min(s.high - at);
+        }
+        let (first, end) = (ceil(low - 0.5 - SLACK), ceil(high - 0.5 + SLACK).min(n));
+        (first < end).then(|| (first, end - 1))
+    }
+}
+
+/// Whether `each(y, z, first, last)` is true of the voxels of any row that a triangle overlaps, for voxels grown by
+/// `grow`. `each` is asked about a row's part of the bounding box first and, only if that is true, about the voxels that
+/// really overlap: most triangles are told apart from most rows without any geometry.
+pub(super) fn any_run(
+    triangle: [DVec3; 3],
+    grow: f64,
+    dims: [usize; 3],
+    each: impl Fn(usize, usize, usize, usize) -> bool,
+) -> bool {
+    let half = 0.5 + grow + SLACK;
+    let [a, b, c] = triangle;
+    let [xs, ys, zs] = rows(a.min(b).min(c) - half, a.max(b).max(c) + half, dims);
+    if xs[0] >= xs[1] {
+        return false;
+    }
+    let mut footprint = None;
+    for z in zs[0]..zs[1] {
+        for y in ys[0]..ys[1] {
+            if each(y, z, xs[0], xs[1] - 1) {
+                let footprint = footprint.get_or_insert_with(|| Footprint::new(triangle, grow));
+                if footprint.run(y, z, dims[0]).is_some_and(|(first, last)| each(y, z, first, last)) {
+                    return true;
+                }
+            }
+        }
+    }
+    false
+}
+
+/// First voxel and the one after the last whose centre is in a box, along each axis.
+fn rows(min: DVec3, max: DVec3, dims: [usize; 3]) -> [[usize; 2]; 3] {
+    [0, 1, 2].map(|k| [ceil(min[k] - 0.5).min(dims[k]), ceil(max[k] - 0.5 + SLACK).min(dims[k])])
+}
+
+/// The next whole number, at least 0. Not `f64::ceil`, which is a call on plain x86-64.
+fn ceil(x: f64) -> usize {
+    let whole = x as usize;
+    whole + usize::from(x > whole as f64)
+}

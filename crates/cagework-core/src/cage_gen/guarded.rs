@@ -1,0 +1,233 @@
+//! A surface that changes only in ways that keep it apart from the solid and from itself.
+
+use glam::DVec3;
+
+use super::buckets::Buckets;
+use super::footprint::any_run;
+use super::surface::Surface;
+use super::voxels::Voxels;
+use crate::contact::{Corners, meet};
+
+/// Parts of the cage that are not neighbours stay this far apart, in voxels.
+const GAP: f64 = 0.05;
+
+/// Vertices beside the mirror plane stay this far from it, in voxels.
+const OFF_MIRROR: f64 = 0.1;
+
+/// What the surface must keep away from.
+#[derive(Debug)]
+pub(super) struct Obstacle {
+    /// The solid.
+    pub(super) voxels: Voxels,
+    /// Distance along each axis to keep from its voxels, in voxels.
+    pub(super) clearance: f64,
+}
+
+impl Obstacle {
+    /// Whether a triangle (centred coordinates) keeps its distance and, if there is a band, stays in it.
+    pub(super) fn is_clear(&self, triangle: [DVec3; 3], band: Option<&Voxels>) -> bool {
+        let dims = self.voxels.dims;
+        let half = DVec3::from_array(dims.map(|n| 0.5 * n as f64));
+        if band.is_some() && triangle.iter().any(|p| p.abs().cmpge(half).any()) {
+            return false;
+        }
+        !any_run(triangle.map(|p| p + half), self.clearance, dims, |y, z, first, last| {
+            self.voxels.has_run(y, z, first, last)
+                || band.is_some_and(|band| !band.covers_run(y, z, first, last))
+        })
+    }
+}
+
+/// A surface under change. Triangles and vertices that go away leave gaps in the numbering.
+#[derive(Debug)]
+pub(super) struct Guarded<'a> {
+    pub(super) positions: Vec<DVec3>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Triangles around each vertex; none once it is gone.
+    pub(super) around: Vec<Vec<u32>>,
+    pub(super) on_mirror: Vec<bool>,
+    pub(super) mirror: Option<usize>,
+    obstacle: &'a Obstacle,
+    /// Where triangles may be at all: keeps them from spanning gaps that the model leaves open.
+    band: Option<Voxels>,
+    buckets: Buckets,
+    bounds: Vec<Option<(DVec3, DVec3)>>,
+    near: Vec<u32>,
+}
+
+impl<'a> Guarded<'a> {
+    /// Takes over a surface that is clear of the obstacle and of itself.
+    pub(super) fn new(surface: Surface, obstacle: &'a Obstacle) -> Self {
+        let half = DVec3::from_array(obstacle.voxels.dims.map(|n| 0.5 * n as f64));
+        let n = surface.triangles.len();
+        let mut guarded = Self {
+            around: vec![Vec::new(); surface.positions.len()],
+            positions: surface.positions,
+            triangles: surface.triangles,
+            on_mirror: surface.on_mirror,
+            mirror: surface.mirror,
+            obstacle,
+            band: None,
+            buckets: Buckets::new(half, n),
+            bounds: vec![None; n],
+            near: Vec::new(),
+        };
+        for t in 0..n {
+            for i in guarded.triangles[t] {
+                guarded.around[i as usize].push(t as u32);
+            }
+            guarded.note(t as u32);
+        }
+        guarded
+    }
+
+    /// Sets the band within which triangles may change from now on; none: anywhere.
+    pub(super) fn set_band(&mut self, band: Option<Voxels>) {
+        self.band = band;
+    }
+
+    /// Whether there is a band.
+    pub(super) fn has_band(&self) -> bool {
+        self.band.is_some()
+    }
+
+    /// The surface as it is now, without gaps.
+    pub(super) fn surface(&self) -> Surface {
+        let mut number = vec![u32::MAX; self.positions.len()];
+        let mut surface = Surface { mirror: self.mirror, ..Surface::default() };
+        for (v, _) in self.around.iter().enumerate().filter(|(_, around)| !around.is_empty()) {
+            number[v] = surface.positions.len() as u32;
+            surface.positions.push(self.positions[v]);
+            surface.on_mirror.push(self.on_mirror[v]);
+        }
+        let alive = self.triangles.iter().zip(&self.bounds).filter(|(_, bounds)| bounds.is_some());
+        surface.triangles = alive.map(|(t, _)| t.map(|i| number[i as usize])).collect();
+        surface
+    }
+
+    /// Whether a triangle is still part of the surface.
+    pub(super) fn is_alive(&self, triangle: u32) -> bool {
+        self.bounds[triangle as usize].is_some()
+    }
+
+    /// A triangle's corners.
+    pub(super) fn corners(&self, triangle: u32) -> Corners {
+        let index = self.triangles[triangle as usize];
+        Corners { index, at: index.map(|i| self.positions[i as usize]) }
+    }
+
+    /// Enters a triangle's place.
+    fn note(&mut self, triangle: u32) {
+        let corners = self.corners(triangle);
+        let (min, max) = (corners.min(), corners.max());
+        self.bounds[triangle as usize] = Some((min, max));
+        self.buckets.add(triangle, min, max);
+    }
+
+    /// Whether `new` triangles may stand where those numbered `gone` were: clear of the obstacle, of the rest of the
+    /// surface and of each other.
+    pub(super) fn may_stand(&mut self, new: &[Corners], gone: &[u32]) -> bool {
+        if let Some(axis) = self.mirror {
+            let beside = |i: u32, p: DVec3| self.on_mirror[i as usize] || p[axis] >= OFF_MIRROR;
+            if new.iter().any(|t| t.index.iter().zip(t.at).any(|(&i, p)| !beside(i, p))) {
+                return false;
+            }
+        }
+        if new.iter().any(|t| !self.obstacle.is_clear(t.at, self.band.as_ref())) {
+            return false;
+        }
+        if new.iter().enumerate().any(|(k, a)| new[..k].iter().any(|b| meet(a, b, GAP))) {
+            return false;
+        }
+        let min = new.iter().fold(DVec3::INFINITY, |m, t| m.min(t.min())) - GAP;
+        let max = new.iter().fold(DVec3::NEG_INFINITY, |m, t| m.max(t.max())) + GAP;
+        let mut near = std::mem::take(&mut self.near);
+        let bounds = &self.bounds;
+        self.buckets.near(min, max, |t| bounds[t as usize], &mut near);
+        let clear = near.iter().filter(|t| !gone.contains(t)).all(|&t| {
+            let other = self.corners(t);
+            let (low, high) = (other.min() - GAP, other.max() + GAP);
+            new.iter().all(|corners| {
+                let apart = corners.min().cmpgt(high).any() || corners.max().cmplt(low).any();
+                apart || !meet(corners, &other, GAP)
+            })
+        });
+        self.near = near;
+        clear
+    }
+
+    /// Pairs of triangles that meet where they should not, as vertices of both.
+    pub(super) fn offenders(&mut self) -> Vec<u32> {
+        let mut offenders = Vec::new();
+        for t in 0..self.triangles.len() as u32 {
+            let corners = self.corners(t);
+            let mut near = std::mem::take(&mut self.near);
+            let bounds = &self.bounds;
+            self.buckets.near(corners.min(), corners.max(), |t| bounds[t as usize], &mut near);
+            for &other in near.iter().filter(|&&other| other > t) {
+                let other = self.corners(other);
+                if meet(&corners, &other, GAP) {
+                    offenders.extend(corners.index);
+                    offenders.extend(other.index);
+                }
+            }
+            self.near = near;
+        }
+        offenders.sort_unstable();
+        offenders.dedup();
+        offenders
+    }
+
+    /// Puts a vertex elsewhere.
+    pub(super) fn place(&mut self, vertex: u32, at: DVec3) {
+        self.positions[vertex as usize] = at;
+        for k in 0..self.around[vertex as usize].len() {
+            self.note(self.around[vertex as usize][k]);
+        }
+    }
+
+    /// Merges `gone` into `kept`, which moves to `at`.
+    pub(super) fn merge(&mut self, kept: u32, gone: u32, at: DVec3) {
+        for t in std::mem::take(&mut self.around[gone as usize]) {
+            let corners = &mut self.triangles[t as usize];
+            if corners.contains(&kept) {
+                for i in *corners {
+                    self.around[i as usize].retain(|&other| other != t);
+                }
+                self.bounds[t as usize] = None;
+            } else {
+                for i in corners.iter_mut().filter(|i| **i == gone) {
+                    *i = kept;
+                }
+                self.around[kept as usize].push(t);
+            }
+        }
+        self.place(kept, at);
+    }
+
+    /// Replaces the two triangles of the edge `a`-`b` by two of the edge between their tips.
+    pub(super) fn swap(&mut self, pair: [u32; 2], new: [[u32; 3]; 2]) {
+        for t in pair {
+            for i in self.triangles[t as usize] {
+                self.around[i as usize].retain(|&other| other != t);
+            }
+        }
+        for (t, corners) in pair.into_iter().zip(new) {
+            self.triangles[t as usize] = corners;
+            for i in corners {
+                self.around[i as usize].push(t);
+            }
+            self.note(t);
+        }
+    }
+
+    /// Vertices that share an edge with one, each once.
+    pub(super) fn neighbours(&self, vertex: u32, out: &mut Vec<u32>) {
+        out.clear();
+        for &t in &self.around[vertex as usize] {
+            out.extend(self.triangles[t as usize].iter().filter(|&&i| i != vertex));
+        }
+        out.sort_unstable();
+        out.dedup();
+    }
+}

@@ -1,0 +1,223 @@
+//! What can be asked of [`super::generate`], and what it answers.
+
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::cage::{Cage, MAX_DIAGONAL};
+use crate::progress::Cancelled;
+
+/// Fewest vertices that can be asked for.
+pub const MIN_TARGET: u32 = 12;
+/// Most vertices that can be asked for.
+pub const MAX_TARGET: u32 = 400;
+/// Coarsest and finest lattice.
+pub(super) const MIN_VOXELS: usize = 8;
+pub(super) const MAX_VOXELS: usize = 128;
+/// Largest clearance, as a fraction of the model's diagonal.
+const MAX_CLEARANCE: f32 = 0.25;
+
+/// What the cage follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// The model, limb by limb.
+    #[default]
+    Follow,
+    /// The model's convex hull, roughly (26 planes): the simplest cage that is not a box.
+    Hull,
+}
+
+/// Whether the cage is its own image in a mirror through the middle of the model's box.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Symmetry {
+    /// If the model is, to within a voxel.
+    #[default]
+    Auto,
+    /// No.
+    None,
+    /// Yes, x is turned round.
+    X,
+    /// Yes, y is turned round.
+    Y,
+    /// Yes, z is turned round.
+    Z,
+}
+
+/// The axis that a mirror turns round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mirror {
+    /// Left and right, if y is up.
+    X,
+    /// Up and down, if y is up.
+    Y,
+    /// Front and back, if y is up.
+    Z,
+}
+
+impl Mirror {
+    pub(super) fn of_axis(axis: usize) -> Self {
+        [Self::X, Self::Y, Self::Z][axis]
+    }
+}
+
+/// Options of [`super::generate`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CageOptions {
+    /// Vertices that the cage should have, 12 to 400. Default 80.
+    pub target: u32,
+    /// Default follow.
+    pub shape: Shape,
+    /// Default auto.
+    pub symmetry: Symmetry,
+    /// One closed part for each separate part of the model (parts nearer than a few voxels count as one); otherwise
+    /// thin bridges join them to one cage. Default false.
+    pub per_component: bool,
+    /// Distance to keep from the model along each axis, as a fraction of the diagonal of its box, 0 to 0.25; at least
+    /// half a voxel in any case. Default 0.
+    pub clearance: f32,
+    /// Voxels along the model's longest side, 8 to 128: gaps narrower than three of them are closed, detail thinner than one is
+    /// lost. 0 ties them to the target. Default 0.
+    pub voxels: u32,
+}
+
+impl Default for CageOptions {
+    fn default() -> Self {
+        Self {
+            target: 80,
+            shape: Shape::default(),
+            symmetry: Symmetry::default(),
+            per_component: false,
+            clearance: 0.0,
+            voxels: 0,
+        }
+    }
+}
+
+/// A cage and how it came about.
+#[derive(Clone, Debug)]
+pub struct GeneratedCage {
+    /// The verified cage; its faces are triangles.
+    pub cage: Cage,
+    /// What was done.
+    pub report: CageReport,
+}
+
+/// How a cage was made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CageReport {
+    /// Vertices asked for.
+    pub target: u32,
+    /// Vertices it has.
+    pub vertices: u32,
+    /// Triangles it has.
+    pub faces: u32,
+    /// Whether it has at most a tenth more vertices than asked for; if not, the model's holes and gaps need them.
+    pub target_met: bool,
+    /// Voxels along the model's longest side.
+    pub voxels: u32,
+    /// Edge of a voxel, object units: smaller gaps are closed.
+    pub voxel_size: f32,
+    /// Distance that the cage keeps from the model along at least one axis, object units.
+    pub clearance: f32,
+    /// The mirror that maps the cage onto itself.
+    pub mirror: Option<Mirror>,
+    /// Closed parts.
+    pub parts: u32,
+    /// Vertices of the hull before it was simplified.
+    pub hull_vertices: u32,
+    /// Whether nothing was simplified: the cage is the hull that is right by construction.
+    pub hull: bool,
+    /// Lattices tried.
+    pub attempts: u32,
+    /// Wall-clock time.
+    pub elapsed_ms: f64,
+}
+
+/// Why there is no cage.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum CageGenError {
+    /// An option is out of range.
+    #[error("{option} is {value}; it must be {allowed}")]
+    Option {
+        /// Name of the option.
+        option: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// The model has no vertices.
+    #[error("model has no vertices: there is nothing to make a cage for")]
+    Empty,
+    /// A vertex is not a finite number.
+    #[error("model vertex {vertex} is not a finite number")]
+    NotFinite {
+        /// The vertex.
+        vertex: u32,
+    },
+    /// A triangle names a vertex that does not exist.
+    #[error("model triangle {triangle} names vertex {vertex}, but there are only {n}")]
+    Index {
+        /// The triangle.
+        triangle: u32,
+        /// The vertex it names.
+        vertex: u32,
+        /// Vertices there are.
+        n: usize,
+    },
+    /// The model is too large to compute with.
+    #[error("model has coordinates up to {largest:e}; they must be below {:e}: scale it", 0.1 * MAX_DIAGONAL)]
+    Size {
+        /// Largest coordinate, object units.
+        largest: f64,
+    },
+    /// Not even the hull passes the check.
+    #[error(
+        "no cage passes the check: the model is too small for its distance from the origin; move it there"
+    )]
+    Unresolved,
+    /// Cancelled by the caller.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// Checks input and options; returns the corners of the model's box.
+pub(super) fn check(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    options: &CageOptions,
+) -> Result<[DVec3; 2], CageGenError> {
+    if !(MIN_TARGET..=MAX_TARGET).contains(&options.target) {
+        let (value, allowed) = (f64::from(options.target), "a whole number from 12 to 400");
+        return Err(CageGenError::Option { option: "target", value, allowed });
+    }
+    if !(0.0..=MAX_CLEARANCE).contains(&options.clearance) {
+        let (value, allowed) = (f64::from(options.clearance), "a fraction of the diagonal from 0 to 0.25");
+        return Err(CageGenError::Option { option: "clearance", value, allowed });
+    }
+    if options.voxels != 0 && !(MIN_VOXELS..=MAX_VOXELS).contains(&(options.voxels as usize)) {
+        let (value, allowed) = (f64::from(options.voxels), "0 (automatic) or a whole number from 8 to 128");
+        return Err(CageGenError::Option { option: "voxels", value, allowed });
+    }
+    if positions.is_empty() {
+        return Err(CageGenError::Empty);
+    }
+    if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
+        return Err(CageGenError::NotFinite { vertex: vertex as u32 });
+    }
+    let n = positions.len();
+    for (t, corners) in triangles.iter().enumerate() {
+        if let Some(&vertex) = corners.iter().find(|&&i| i as usize >= n) {
+            return Err(CageGenError::Index { triangle: t as u32, vertex, n });
+        }
+    }
+    let [min, max] = super::bounds_of(positions);
+    let largest = min.abs().max(max.abs()).max_element();
+    if largest > 0.1 * MAX_DIAGONAL {
+        return Err(CageGenError::Size { largest });
+    }
+    Ok([min, max])
+}

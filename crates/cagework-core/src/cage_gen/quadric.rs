@@ -1,0 +1,69 @@
+//! Quadric error: the sum of squared distances to planes as a function of a point.
+//!
+//! Source: Garland, Heckbert 1997, "Surface simplification using quadric error metrics".
+
+use glam::{DMat3, DVec3};
+
+/// A small pull towards where a vertex came from, relative to the planes: keeps triangles of flat parts of even size.
+const PULL: f64 = 0.004;
+
+/// `p . a p - 2 b . p + c`: squared distances weighted by area, voxel units.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Quadric {
+    a: DMat3,
+    b: DVec3,
+    c: f64,
+    /// Total weight: area.
+    pub(super) area: f64,
+}
+
+impl Quadric {
+    /// Squared distance to a triangle's plane, and a little to its corner, weighted by a third of its area.
+    pub(super) fn of_corner(corner: DVec3, normal: DVec3) -> Self {
+        let length = normal.length();
+        if length < 1e-30 {
+            return Self::default();
+        }
+        let n = normal / length;
+        let area = length / 6.0;
+        let d = n.dot(corner);
+        let plane = DMat3::from_cols(n * n.x, n * n.y, n * n.z);
+        Self {
+            a: area * (plane + PULL * DMat3::IDENTITY),
+            b: area * (d * n + PULL * corner),
+            c: area * (d * d + PULL * corner.length_squared()),
+            area,
+        }
+    }
+
+    /// The sum of two.
+    pub(super) fn plus(&self, other: &Self) -> Self {
+        Self { a: self.a + other.a, b: self.b + other.b, c: self.c + other.c, area: self.area + other.area }
+    }
+
+    /// Its value at a point.
+    pub(super) fn at(&self, p: DVec3) -> f64 {
+        (p.dot(self.a * p) - 2.0 * self.b.dot(p) + self.c).max(0.0)
+    }
+
+    /// What a vertex there costs: area times the fourth power of the distance. The square alone lets a thin limb's few
+    /// planes be far off because its area is small, and webs grow between limbs.
+    pub(super) fn cost(&self, p: DVec3) -> f64 {
+        self.at(p).powi(2) / self.area.max(1e-12)
+    }
+
+    /// Where it is smallest, among the points with `p[axis] = 0` if an axis is given.
+    pub(super) fn minimum(&self, on_mirror: Option<usize>) -> Option<DVec3> {
+        let (mut a, mut b) = (self.a, self.b);
+        if let Some(axis) = on_mirror {
+            for k in 0..3 {
+                a.col_mut(axis)[k] = 0.0;
+                a.col_mut(k)[axis] = 0.0;
+            }
+            a.col_mut(axis)[axis] = self.area;
+            b[axis] = 0.0;
+        }
+        let p = a.inverse() * b;
+        p.is_finite().then_some(p)
+    }
+}

@@ -1,0 +1,279 @@
+//! From a triangle soup to the solid it stands for and a hull around it: the part that works for any input.
+//!
+//! Source: Xian, Lin, Gao 2009, "Automatic generation of coarse bounding cages from dense meshes", for voxels,
+//! flood fill and hull. Changes: the hull is dilated for clearance, its boundary is made a 2-manifold by filling
+//! voxels, and separate parts are bridged if one cage is asked for.
+
+use std::collections::VecDeque;
+
+use glam::{DVec3, Vec3};
+
+use super::guarded::{Guarded, Obstacle};
+use super::lattice::Lattice;
+use super::surface::{SMOOTHING_REACH, Surface};
+use super::voxels::Voxels;
+use super::{CageOptions, Shape, Symmetry};
+use crate::progress::Cancelled;
+
+/// A mirror is taken if this share of the solid's voxels has an image within one voxel.
+const ALIKE: f64 = 0.985;
+
+/// Room between the solid's box and the lattice's, apart from dilation: the outermost layer stays empty.
+const PAD: usize = 6;
+
+/// Clearance in voxels unless the caller asks for more.
+const CLEARANCE: f64 = 0.5;
+
+/// What smoothing leaves of a voxel's width, less rounding: the clearance that a hull one voxel off has.
+const KEPT: f64 = 1.0 - SMOOTHING_REACH - 1e-3;
+
+/// A solid in a lattice and the hull around it.
+#[derive(Debug)]
+pub(super) struct Shell {
+    pub(super) lattice: Lattice,
+    /// What the cage must not meet.
+    pub(super) obstacle: Obstacle,
+    /// The hull as voxels.
+    filled: Voxels,
+    /// The smoothed hull: clear of the obstacle and of itself.
+    pub(super) hull: Surface,
+    /// The hull with its stairs: right by construction.
+    pub(super) stairs: Surface,
+    /// One voxel of every part of the solid.
+    pub(super) parts: Vec<[usize; 3]>,
+    /// Distance that the hull keeps from the model along each axis, object units.
+    pub(super) clearance: f64,
+}
+
+impl Shell {
+    /// The hull of a model on a lattice of `n` voxels. `diagonal` of the model's box; `go_on` may end it.
+    pub(super) fn new(
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        [min, max]: [DVec3; 2],
+        n: usize,
+        options: &CageOptions,
+        go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
+    ) -> Result<Self, Cancelled> {
+        let asked = f64::from(options.clearance) * max.distance(min);
+        // Layers of voxels between solid and hull: enough for the clearance that was asked for.
+        let layers_for = |cell: f64| ((asked / cell).max(CLEARANCE) + 1.0 - KEPT).ceil() as usize;
+        let rough = Lattice::around(min, max, n, PAD);
+        let layers = layers_for(rough.cell);
+        let lattice = Lattice::around(min, max, n, PAD + layers);
+        let touched = match options.shape {
+            Shape::Follow => lattice.touched(positions, triangles, &|f| go_on(0.5 * f))?,
+            Shape::Hull => slab_hull(&lattice, positions),
+        };
+        let mut solid = touched.filled();
+        let mirror = find_mirror(&solid, options.symmetry);
+        if let Some(axis) = mirror {
+            let image = solid.mirrored(axis);
+            solid.unite(&image);
+            solid = solid.filled();
+        }
+        go_on(0.6)?;
+        let mut hull = grown(&solid, layers, mirror);
+        if !options.per_component {
+            while bridge(&mut solid, &hull, layers, mirror) {
+                go_on(0.7)?;
+                hull = grown(&solid, layers, mirror);
+            }
+        }
+        go_on(0.8)?;
+        let stairs = Surface::of(&hull, mirror);
+        let filled = hull;
+        let clearance = (asked / lattice.cell).max(CLEARANCE);
+        // Whole voxels of it by dilation, the rest as distance.
+        let whole = clearance.floor();
+        let mut keep_out = solid.clone();
+        for _ in 0..whole as usize {
+            keep_out = keep_out.dilated();
+        }
+        let obstacle = Obstacle { voxels: keep_out, clearance: clearance - whole };
+        let hull = smoothed(&stairs, &obstacle);
+        let parts = solid.parts();
+        Ok(Self { clearance: clearance * lattice.cell, lattice, obstacle, filled, hull, stairs, parts })
+    }
+}
+
+impl Shell {
+    /// The hull and layers of voxels around it.
+    pub(super) fn band(&self, layers: usize) -> Voxels {
+        (0..layers).fold(self.filled.clone(), |band, _| band.dilated())
+    }
+}
+
+/// The solid with layers of voxels around it, cavities filled, its boundary a 2-manifold.
+fn grown(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
+    let mut hull = solid.clone();
+    for _ in 0..layers {
+        hull = hull.dilated();
+    }
+    hull = hull.filled();
+    loop {
+        hull.compose(mirror);
+        // The repair may have closed a cavity off.
+        let filled = hull.filled();
+        if filled == hull {
+            return hull;
+        }
+        hull = filled;
+    }
+}
+
+/// The stairs smoothed; vertices whose triangles then meet others go back until none do.
+fn smoothed(stairs: &Surface, obstacle: &Obstacle) -> Surface {
+    let mut smooth = stairs.clone();
+    smooth.smooth();
+    loop {
+        let offenders = Guarded::new(smooth.clone(), obstacle).offenders();
+        let mut moved = false;
+        for v in offenders {
+            let (now, before) = (&mut smooth.positions[v as usize], stairs.positions[v as usize]);
+            moved |= *now != before;
+            *now = before;
+        }
+        if !moved {
+            return smooth;
+        }
+    }
+}
+
+/// The axis of the mirror to use: the one asked for, or the first (x, z, y) in which the solid is its own image.
+fn find_mirror(solid: &Voxels, symmetry: Symmetry) -> Option<usize> {
+    match symmetry {
+        Symmetry::None => None,
+        Symmetry::X => Some(0),
+        Symmetry::Y => Some(1),
+        Symmetry::Z => Some(2),
+        Symmetry::Auto => [0, 2, 1].into_iter().find(|&axis| {
+            let image = solid.mirrored(axis).dilated();
+            solid.overlap(&image) as f64 >= ALIKE * solid.count() as f64
+        }),
+    }
+}
+
+/// Joins the parts of the hull by paths of voxels in the solid, each grown from what is joined already to the nearest
+/// part that is not; false if there is only one part. `layers` of voxels will come around the paths.
+fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirror: Option<usize>) -> bool {
+    let parts = hull.parts();
+    if parts.len() < 2 {
+        return false;
+    }
+    let mut joined = Joined { hull, from: vec![[usize::MAX; 3]; hull.dims.iter().product()] };
+    let mut queue = VecDeque::new();
+    joined.add_part(parts[0], &mut queue);
+    while let Some(voxel) = queue.pop_front() {
+        for next in hull.neighbours(voxel) {
+            // The outermost layer stays empty.
+            let edge = (0..3).any(|k| next[k] <= layers || next[k] + layers + 1 >= hull.dims[k]);
+            if edge || joined.has(next) {
+                continue;
+            }
+            let index = joined.index(next);
+            joined.from[index] = voxel;
+            if !hull.has(next) {
+                queue.push_back(next);
+                continue;
+            }
+            let mut path = voxel;
+            while joined.from[joined.index(path)] != path {
+                solid.add(path);
+                let before = joined.from[joined.index(path)];
+                let index = joined.index(path);
+                joined.from[index] = path;
+                queue.push_back(path);
+                path = before;
+            }
+            solid.add(path);
+            solid.add(next);
+            let index = joined.index(next);
+            joined.from[index] = [usize::MAX; 3];
+            joined.add_part(next, &mut queue);
+        }
+    }
+    if let Some(axis) = mirror {
+        let image = solid.mirrored(axis);
+        solid.unite(&image);
+    }
+    true
+}
+
+/// Voxels that are joined or have been reached from there.
+struct Joined<'a> {
+    hull: &'a Voxels,
+    /// Where each voxel was reached from; what is joined was reached from itself.
+    from: Vec<[usize; 3]>,
+}
+
+impl Joined<'_> {
+    fn index(&self, v: [usize; 3]) -> usize {
+        (v[2] * self.hull.dims[1] + v[1]) * self.hull.dims[0] + v[0]
+    }
+
+    fn has(&self, voxel: [usize; 3]) -> bool {
+        self.from[self.index(voxel)][0] != usize::MAX
+    }
+
+    /// Takes in a part of the hull.
+    fn add_part(&mut self, seed: [usize; 3], queue: &mut VecDeque<[usize; 3]>) {
+        let mut stack = vec![seed];
+        let index = self.index(seed);
+        self.from[index] = seed;
+        while let Some(voxel) = stack.pop() {
+            queue.push_back(voxel);
+            for next in self.hull.neighbours(voxel) {
+                if self.hull.has(next) && !self.has(next) {
+                    let index = self.index(next);
+                    self.from[index] = next;
+                    stack.push(next);
+                }
+            }
+        }
+    }
+}
+
+/// Voxels that overlap the model's hull of 26 planes (faces, edges and corners of a cube).
+///
+/// Source: Klosowski et al. 1998, k-DOPs.
+fn slab_hull(lattice: &Lattice, positions: &[Vec3]) -> Voxels {
+    let mut axes = Vec::new();
+    for x in -1..=1 {
+        for y in -1..=1 {
+            for z in 0..=1 {
+                let axis = [x, y, z];
+                // One of each pair of opposite directions.
+                if axis.iter().rev().find(|&&k| k != 0) == Some(&1) {
+                    axes.push(DVec3::from_array(axis.map(f64::from)));
+                }
+            }
+        }
+    }
+    let mut slabs: Vec<(DVec3, f64, f64)> =
+        axes.into_iter().map(|axis| (axis, f64::INFINITY, f64::NEG_INFINITY)).collect();
+    for &p in positions {
+        let p = lattice.lattice(p);
+        for (axis, low, high) in &mut slabs {
+            let at = axis.dot(p);
+            *low = low.min(at);
+            *high = high.max(at);
+        }
+    }
+    let mut voxels = Voxels::new(lattice.dims);
+    for z in 0..lattice.dims[2] {
+        for y in 0..lattice.dims[1] {
+            for x in 0..lattice.dims[0] {
+                let center = DVec3::new(x as f64, y as f64, z as f64) + 0.5;
+                let inside = slabs.iter().all(|&(axis, low, high)| {
+                    let reach = 0.5 * (axis.x.abs() + axis.y.abs() + axis.z.abs());
+                    (low - reach..=high + reach).contains(&axis.dot(center))
+                });
+                if inside {
+                    voxels.add([x, y, z]);
+                }
+            }
+        }
+    }
+    voxels
+}

@@ -1,0 +1,260 @@
+use std::ops::ControlFlow;
+
+use glam::{Vec3, vec3};
+use proptest::prelude::*;
+
+use super::{CageGenError, CageOptions, GeneratedCage, Mirror, Shape, Symmetry, generate};
+use crate::cage::Cage;
+use crate::contact::{Corners, meeting};
+use crate::geometry::winding_number;
+use crate::progress::{ProgressEvent, Silent};
+
+/// Positions of the order of 1, rounded to f32 and mirrored.
+const ROUNDING: f32 = 1e-6;
+
+type Soup = (Vec<Vec3>, Vec<[u32; 3]>);
+
+/// Winding numbers of closed surfaces are whole, apart from rounding of angles.
+const WHOLE: f64 = 1e-6;
+
+fn winding(cage: &Cage, p: Vec3) -> f64 {
+    winding_number(p.as_dvec3(), (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t)))
+}
+
+/// The promise, checked by means of its own: no voxels.
+fn assert_promise((positions, _): &Soup, made: &GeneratedCage) {
+    let cage = &made.cage;
+    let again = Cage::new(&cage.to_polygon_mesh()).unwrap();
+    assert_eq!(again.notices(), [], "closed, oriented, manifold, no vertex unused");
+    let triangles: Vec<Corners> = (0..cage.triangles().len())
+        .map(|t| Corners { index: cage.triangles()[t], at: cage.triangle_corners(t as u32) })
+        .collect();
+    assert_eq!(meeting(&triangles), Vec::<[u32; 2]>::new(), "it meets itself");
+    let step = (positions.len() / 200).max(1);
+    for &p in positions.iter().step_by(step) {
+        let w = winding(cage, p);
+        assert!((w - 1.0).abs() < WHOLE, "{p} has winding number {w}");
+    }
+    assert_eq!(made.report.vertices as usize, cage.n_vertices());
+    assert_eq!(
+        made.report.target_met,
+        f64::from(made.report.vertices) <= 1.1 * f64::from(made.report.target)
+    );
+}
+
+fn make(soup: &Soup, options: &CageOptions) -> GeneratedCage {
+    let made = generate(&soup.0, &soup.1, options, &Silent).unwrap();
+    assert_promise(soup, &made);
+    made
+}
+
+fn options(target: u32) -> CageOptions {
+    CageOptions { target, ..CageOptions::default() }
+}
+
+/// A tube of quads cut in two, along a line of points with one radius; `closed` joins its ends. No caps: open ends.
+fn tube(line: &[Vec3], radius: f32, closed: bool) -> Soup {
+    const SIDES: u32 = 12;
+    let n = line.len();
+    let mut soup: Soup = (Vec::new(), Vec::new());
+    for k in 0..n {
+        let (before, after) = if closed {
+            (line[(k + n - 1) % n], line[(k + 1) % n])
+        } else {
+            (line[k.saturating_sub(1)], line[(k + 1).min(n - 1)])
+        };
+        let along = (after - before).normalize();
+        let u = along.cross(vec3(0.31, 0.17, 0.94)).normalize();
+        let v = along.cross(u);
+        for s in 0..SIDES {
+            let (sin, cos) = (std::f32::consts::TAU * s as f32 / SIDES as f32).sin_cos();
+            soup.0.push(line[k] + radius * (u * cos + v * sin));
+        }
+    }
+    let rings = if closed { n } else { n - 1 } as u32;
+    for k in 0..rings {
+        for s in 0..SIDES {
+            let at = |k: u32, s: u32| k % n as u32 * SIDES + s % SIDES;
+            soup.1.push([at(k, s), at(k, s + 1), at(k + 1, s)]);
+            soup.1.push([at(k + 1, s), at(k, s + 1), at(k + 1, s + 1)]);
+        }
+    }
+    soup
+}
+
+fn join(soups: impl IntoIterator<Item = Soup>) -> Soup {
+    soups.into_iter().fold((Vec::new(), Vec::new()), |mut all: Soup, (positions, triangles)| {
+        let first = all.0.len() as u32;
+        all.0.extend(positions);
+        all.1.extend(triangles.into_iter().map(|t| t.map(|i| i + first)));
+        all
+    })
+}
+
+fn segment(a: Vec3, b: Vec3) -> Vec<Vec3> {
+    (0..=8).map(|k| a.lerp(b, k as f32 / 8.0)).collect()
+}
+
+/// Two legs below a bar, overlapping open tubes: symmetric about x = 0.
+fn trousers() -> Soup {
+    join([
+        tube(&segment(vec3(-0.3, 1.0, 0.0), vec3(0.3, 1.0, 0.0)), 0.2, false),
+        tube(&segment(vec3(-0.3, 1.0, 0.0), vec3(-0.3, -1.0, 0.0)), 0.12, false),
+        tube(&segment(vec3(0.3, 1.0, 0.0), vec3(0.3, -1.0, 0.0)), 0.12, false),
+    ])
+}
+
+fn ring() -> Soup {
+    let circle = |k: usize| {
+        let (sin, cos) = (std::f32::consts::TAU * k as f32 / 48.0).sin_cos();
+        vec3(cos, 0.0, sin)
+    };
+    tube(&(0..48).map(circle).collect::<Vec<_>>(), 0.15, true)
+}
+
+#[test]
+fn cage_goes_into_the_gap_between_legs() {
+    for target in [40, 80, 200] {
+        let made = make(&trousers(), &options(target));
+        assert!(made.report.target_met, "{:?}", made.report);
+        let between = winding(&made.cage, vec3(0.0, -0.6, 0.0));
+        assert!(between.abs() < WHOLE, "with {target} vertices the legs are webbed: {between}");
+    }
+}
+
+#[test]
+fn cage_of_a_ring_keeps_its_hole() {
+    let made = make(&ring(), &options(80));
+    assert!(winding(&made.cage, Vec3::ZERO).abs() < WHOLE);
+    // Euler characteristic of a torus: V - E + F = 0 with 2 E = 3 F.
+    assert_eq!(2 * made.cage.n_vertices(), made.cage.triangles().len());
+}
+
+#[test]
+fn symmetric_model_gets_a_symmetric_cage() {
+    let made = make(&trousers(), &options(80));
+    assert_eq!(made.report.mirror, Some(Mirror::X));
+    let (points, center) = (made.cage.positions(), made.cage.bounds().center());
+    for p in points {
+        let image = vec3(2.0 * center.x - p.x, p.y, p.z);
+        let off = points.iter().map(|q| q.distance(image)).fold(f32::MAX, f32::min);
+        assert!(off < ROUNDING, "{p} has no image: the next is {off} away");
+    }
+    let without = CageOptions { symmetry: Symmetry::None, ..options(80) };
+    assert_eq!(make(&trousers(), &without).report.mirror, None);
+}
+
+#[test]
+fn lopsided_model_gets_no_mirror_unless_asked_for() {
+    let soup = tube(&segment(vec3(-1.0, 0.0, 0.3), vec3(1.0, 0.7, -0.4)), 0.1, false);
+    assert_eq!(make(&soup, &options(40)).report.mirror, None);
+    let asked = CageOptions { symmetry: Symmetry::Y, ..options(40) };
+    assert_eq!(make(&soup, &asked).report.mirror, Some(Mirror::Y));
+}
+
+#[test]
+fn scattered_parts_get_one_cage_or_one_each() {
+    let places = [vec3(0.0, 0.0, 0.0), vec3(3.0, 0.5, 0.0), vec3(1.0, 2.5, 1.0)];
+    let soup = join(places.map(|p| tube(&segment(p, p + vec3(0.3, 0.0, 0.4)), 0.3, false)));
+    assert_eq!(make(&soup, &options(80)).report.parts, 1);
+    let each = CageOptions { per_component: true, ..options(80) };
+    assert_eq!(make(&soup, &each).report.parts, 3);
+}
+
+#[test]
+fn hull_is_coarse_and_convex_in_the_large() {
+    let hull = CageOptions { shape: Shape::Hull, ..options(16) };
+    let made = make(&trousers(), &hull);
+    assert!(made.report.target_met);
+    assert!((winding(&made.cage, vec3(0.0, -0.6, 0.0)) - 1.0).abs() < WHOLE, "no gap between the legs");
+}
+
+#[test]
+fn clearance_is_kept() {
+    let soup = trousers();
+    for clearance in [0.0, 0.02, 0.1] {
+        let made = make(&soup, &CageOptions { clearance, ..options(60) });
+        assert!(made.report.clearance >= clearance * 2.0, "the diagonal is longer than 2");
+        // Every cage triangle keeps it along some axis, so cage vertices are at least that far from mesh vertices.
+        for c in made.cage.positions() {
+            let nearest = soup.0.iter().map(|p| p.distance(*c)).fold(f32::MAX, f32::min);
+            assert!(nearest >= 0.97 * made.report.clearance, "{nearest} < {}", made.report.clearance);
+        }
+    }
+}
+
+#[test]
+fn flat_straight_and_single_point_models_are_enclosed() {
+    let square = vec![Vec3::ZERO, Vec3::X, vec3(1.0, 1.0, 0.0), Vec3::Y];
+    make(&(square, vec![[0, 1, 2], [0, 2, 3]]), &options(24));
+    make(&(vec![Vec3::ZERO, Vec3::ONE, 0.3 * Vec3::ONE], vec![[0, 1, 2]]), &options(24));
+    make(&(vec![vec3(5.0, -3.0, 2.0)], vec![]), &options(12));
+    make(&(vec![Vec3::ZERO], vec![]), &options(12));
+}
+
+#[test]
+fn far_from_the_origin_the_cage_is_coarser_but_right() {
+    let far = trousers().0.iter().map(|&p| p + vec3(3e4, -1e4, 0.0)).collect();
+    make(&(far, trousers().1), &options(60));
+}
+
+#[test]
+fn bad_input_is_refused_in_words() {
+    let (positions, triangles) = trousers();
+    let refused = |p: &[Vec3], t: &[[u32; 3]], o: &CageOptions| generate(p, t, o, &Silent).unwrap_err();
+    assert_eq!(refused(&[], &[], &options(80)), CageGenError::Empty);
+    let mut broken = positions.clone();
+    broken[7].y = f32::NAN;
+    assert_eq!(refused(&broken, &triangles, &options(80)), CageGenError::NotFinite { vertex: 7 });
+    let error = refused(&positions, &[[0, 1, 9999]], &options(80));
+    assert!(matches!(error, CageGenError::Index { triangle: 0, vertex: 9999, .. }));
+    assert!(matches!(
+        refused(&positions, &triangles, &options(5)),
+        CageGenError::Option { option: "target", .. }
+    ));
+    let wide = CageOptions { clearance: 0.5, ..options(80) };
+    assert!(matches!(
+        refused(&positions, &triangles, &wide),
+        CageGenError::Option { option: "clearance", .. }
+    ));
+    let huge: Vec<Vec3> = positions.iter().map(|&p| p * 1e30).collect();
+    assert!(matches!(refused(&huge, &triangles, &options(80)), CageGenError::Size { .. }));
+}
+
+#[test]
+fn cancelling_ends_the_work() {
+    let (positions, triangles) = trousers();
+    let cancel = |_: ProgressEvent| ControlFlow::Break(());
+    let error = generate(&positions, &triangles, &options(80), &cancel).unwrap_err();
+    assert!(matches!(error, CageGenError::Cancelled(_)));
+}
+
+#[test]
+fn runs_are_alike() {
+    let soup = trousers();
+    let once = make(&soup, &options(60)).cage;
+    let twice = make(&soup, &options(60)).cage;
+    assert_eq!((once.positions(), once.faces()), (twice.positions(), twice.faces()));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn any_soup_gets_a_verified_cage(
+        points in prop::collection::vec(prop::array::uniform3(-1.0_f32..1.0), 1..40),
+        picks in prop::collection::vec(prop::array::uniform3(0_usize..1000), 0..60),
+        stretch in prop::array::uniform3(prop_oneof![Just(0.0_f32), Just(1.0), 0.01_f32..3.0]),
+        scale in prop_oneof![Just(1.0_f32), Just(1e-6), Just(1e6)],
+        target in 12_u32..150,
+        symmetry in prop_oneof![Just(Symmetry::Auto), Just(Symmetry::None), Just(Symmetry::Z)],
+        per_component in any::<bool>(),
+    ) {
+        let positions: Vec<Vec3> =
+            points.iter().map(|&p| Vec3::from_array(p) * Vec3::from_array(stretch) * scale).collect();
+        let triangles: Vec<[u32; 3]> =
+            picks.iter().map(|t| t.map(|i| (i % positions.len()) as u32)).collect();
+        let soup = (positions, triangles);
+        make(&soup, &CageOptions { target, symmetry, per_component, ..CageOptions::default() });
+    }
+}

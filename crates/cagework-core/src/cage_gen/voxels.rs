@@ -1,0 +1,306 @@
+//! A set of voxels as bits, one row of words along x after the other, and what is done to such sets.
+
+/// Bits of a word.
+const WORD: usize = u64::BITS as usize;
+
+/// A box of voxels, each in the set or not. Voxel `[x, y, z]` is the unit cube from that corner on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Voxels {
+    /// Voxels along x, y, z.
+    pub(super) dims: [usize; 3],
+    /// Words of a row.
+    words: usize,
+    bits: Vec<u64>,
+}
+
+impl Voxels {
+    /// The empty set.
+    pub(super) fn new(dims: [usize; 3]) -> Self {
+        let words = dims[0].div_ceil(WORD);
+        Self { dims, words, bits: vec![0; words * dims[1] * dims[2]] }
+    }
+
+    fn row(&self, y: usize, z: usize) -> &[u64] {
+        let start = (z * self.dims[1] + y) * self.words;
+        &self.bits[start..start + self.words]
+    }
+
+    /// Whether a voxel is in the set.
+    pub(super) fn has(&self, [x, y, z]: [usize; 3]) -> bool {
+        self.row(y, z)[x / WORD] >> (x % WORD) & 1 == 1
+    }
+
+    /// Adds a voxel.
+    pub(super) fn add(&mut self, [x, y, z]: [usize; 3]) {
+        self.bits[(z * self.dims[1] + y) * self.words + x / WORD] |= 1 << (x % WORD);
+    }
+
+    /// Adds voxels `first..=last` of a row.
+    pub(super) fn add_run(&mut self, y: usize, z: usize, first: usize, last: usize) {
+        let start = (z * self.dims[1] + y) * self.words;
+        for w in first / WORD..=last / WORD {
+            self.bits[start + w] |= run_mask(w, first, last);
+        }
+    }
+
+    /// Whether any of the voxels `first..=last` of a row is in the set.
+    pub(super) fn has_run(&self, y: usize, z: usize, first: usize, last: usize) -> bool {
+        let row = self.row(y, z);
+        (first / WORD..=last / WORD).any(|w| row[w] & run_mask(w, first, last) != 0)
+    }
+
+    /// Whether all of the voxels `first..=last` of a row are in the set.
+    pub(super) fn covers_run(&self, y: usize, z: usize, first: usize, last: usize) -> bool {
+        let row = self.row(y, z);
+        (first / WORD..=last / WORD).all(|w| !row[w] & run_mask(w, first, last) == 0)
+    }
+
+    /// Voxels in the set.
+    pub(super) fn count(&self) -> usize {
+        self.bits.iter().map(|w| w.count_ones() as usize).sum()
+    }
+
+    /// Calls `each` for every voxel of the set, x fastest.
+    pub(super) fn for_each(&self, mut each: impl FnMut([usize; 3])) {
+        for (k, &word) in self.bits.iter().enumerate() {
+            let row = k / self.words;
+            let (y, z) = (row % self.dims[1], row / self.dims[1]);
+            let mut left = word;
+            while left != 0 {
+                each([k % self.words * WORD + left.trailing_zeros() as usize, y, z]);
+                left &= left - 1;
+            }
+        }
+    }
+
+    /// Adds all voxels of another set in the same box.
+    pub(super) fn unite(&mut self, other: &Self) {
+        for (a, b) in self.bits.iter_mut().zip(&other.bits) {
+            *a |= b;
+        }
+    }
+
+    /// How many voxels two sets have in common.
+    pub(super) fn overlap(&self, other: &Self) -> usize {
+        self.bits.iter().zip(&other.bits).map(|(a, b)| (a & b).count_ones() as usize).sum()
+    }
+
+    /// The set seen in a mirror halfway along `axis`.
+    pub(super) fn mirrored(&self, axis: usize) -> Self {
+        let mut mirrored = Self::new(self.dims);
+        self.for_each(|mut voxel| {
+            voxel[axis] = self.dims[axis] - 1 - voxel[axis];
+            mirrored.add(voxel);
+        });
+        mirrored
+    }
+
+    /// The set and all voxels that share a face, an edge or a corner with it. The outermost layer must be empty.
+    pub(super) fn dilated(&self) -> Self {
+        let mut along_x = self.bits.clone();
+        for (k, wide) in along_x.iter_mut().enumerate() {
+            let (first, last) = (k % self.words == 0, k % self.words == self.words - 1);
+            let below = if first { 0 } else { self.bits[k - 1] >> (WORD - 1) };
+            let above = if last { 0 } else { self.bits[k + 1] << (WORD - 1) };
+            let word = self.bits[k];
+            *wide |= word << 1 | below | word >> 1 | above;
+        }
+        let mut wide = Self { dims: self.dims, words: self.words, bits: along_x };
+        for stride in [self.words, self.words * self.dims[1]] {
+            let narrow = wide.bits.clone();
+            for (k, bits) in wide.bits.iter_mut().enumerate() {
+                let below = if k >= stride { narrow[k - stride] } else { 0 };
+                *bits |= below | narrow.get(k + stride).copied().unwrap_or(0);
+            }
+        }
+        wide
+    }
+
+    /// The set with everything that cannot be reached from the box's corner through faces: cavities filled.
+    pub(super) fn filled(&self) -> Self {
+        let mut reached = Self::new(self.dims);
+        reached.add([0, 0, 0]);
+        let rows = self.dims[1] * self.dims[2];
+        let mut waiting = vec![false; rows];
+        let mut queue = vec![0];
+        waiting[0] = true;
+        while let Some(row) = queue.pop() {
+            waiting[row] = false;
+            self.spread_along_row(&mut reached, row);
+            let (y, z) = (row % self.dims[1], row / self.dims[1]);
+            let neighbours = [
+                (y > 0).then(|| row - 1),
+                (y + 1 < self.dims[1]).then(|| row + 1),
+                (z > 0).then(|| row - self.dims[1]),
+                (z + 1 < self.dims[2]).then(|| row + self.dims[1]),
+            ];
+            for next in neighbours.into_iter().flatten() {
+                let mut grew = false;
+                for w in 0..self.words {
+                    let free = reached.bits[row * self.words + w] & !self.bits[next * self.words + w];
+                    let there = &mut reached.bits[next * self.words + w];
+                    grew |= free & !*there != 0;
+                    *there |= free;
+                }
+                if grew && !waiting[next] {
+                    waiting[next] = true;
+                    queue.push(next);
+                }
+            }
+        }
+        let mut filled = Self::new(self.dims);
+        for z in 0..self.dims[2] {
+            for y in 0..self.dims[1] {
+                filled.add_run(y, z, 0, self.dims[0] - 1);
+            }
+        }
+        for (solid, free) in filled.bits.iter_mut().zip(&reached.bits) {
+            *solid &= !free;
+        }
+        filled
+    }
+
+    /// Spreads what was reached of a row to all free voxels beside it in the row.
+    fn spread_along_row(&self, reached: &mut Self, row: usize) {
+        let range = row * self.words..(row + 1) * self.words;
+        let (solid, reached) = (&self.bits[range.clone()], &mut reached.bits[range]);
+        let mut carry = 0;
+        for (r, s) in reached.iter_mut().zip(solid) {
+            let free = !s;
+            *r |= carry & free;
+            let mut step = *r;
+            while step != 0 {
+                step = step << 1 & free & !*r;
+                *r |= step;
+            }
+            carry = *r >> (WORD - 1);
+        }
+        carry = 0;
+        for (r, s) in reached.iter_mut().zip(solid).rev() {
+            let free = !s;
+            *r |= carry & free;
+            let mut step = *r;
+            while step != 0 {
+                step = step >> 1 & free & !*r;
+                *r |= step;
+            }
+            carry = (*r & 1) << (WORD - 1);
+        }
+    }
+
+    /// Adds voxels until the set's boundary is a 2-manifold: where two voxels meet in an edge or a corner only, their
+    /// common box is filled. It ends because voxels are only added, and never beyond the set's bounding box.
+    ///
+    /// Source: Latecki 1997, "3D well-composed pictures"; the repair is ours.
+    pub(super) fn compose(&mut self, mirror: Option<usize>) {
+        let critical: Vec<bool> = (0..256).map(is_critical).collect();
+        loop {
+            let mut changed = false;
+            for z in 0..self.dims[2] - 1 {
+                for y in 0..self.dims[1] - 1 {
+                    changed |= self.compose_row(y, z, &critical);
+                }
+            }
+            if let (true, Some(axis)) = (changed, mirror) {
+                // Blocks are visited in one order: without this, the repair would not be symmetric.
+                let other = self.mirrored(axis);
+                self.unite(&other);
+            }
+            if !changed {
+                return;
+            }
+        }
+    }
+
+    fn compose_row(&mut self, y: usize, z: usize, critical: &[bool]) -> bool {
+        let mut changed = false;
+        let rows = [(y, z), (y + 1, z), (y, z + 1), (y + 1, z + 1)];
+        let mut x = 0;
+        while x + 1 < self.dims[0] {
+            let word = x / WORD;
+            if x % WORD == 0
+                && rows.iter().all(|&(y, z)| self.row(y, z)[word..].iter().take(2).all(|&w| w == 0))
+            {
+                x += WORD;
+                continue;
+            }
+            let from = x;
+            let corner = |i: usize| [from + (i & 1), y + (i >> 1 & 1), z + (i >> 2 & 1)];
+            let block = rows.iter().rev().fold(0, |m, &(y, z)| m << 2 | self.pair(from, y, z));
+            x += 1;
+            if !critical[block] {
+                continue;
+            }
+            changed = true;
+            let members = || (0..8_usize).filter(|i| block >> i & 1 == 1);
+            let (all, any) = (members().fold(7, |m, i| m & i), members().fold(0, |m, i| m | i));
+            for i in (0..8).filter(|i| i & all == all && i & !any == 0) {
+                self.add(corner(i));
+            }
+        }
+        changed
+    }
+
+    /// Voxels x and x + 1 of a row as two bits.
+    fn pair(&self, x: usize, y: usize, z: usize) -> usize {
+        let row = self.row(y, z);
+        let (word, bit) = (x / WORD, x % WORD);
+        let above = if bit + 1 == WORD { row[word + 1] << 1 } else { 0 };
+        ((row[word] >> bit | above) & 3) as usize
+    }
+
+    /// One voxel of every part that hangs together through faces.
+    pub(super) fn parts(&self) -> Vec<[usize; 3]> {
+        let mut seen = Self::new(self.dims);
+        let mut parts = Vec::new();
+        let mut stack = Vec::new();
+        self.for_each(|seed| {
+            if seen.has(seed) {
+                return;
+            }
+            parts.push(seed);
+            seen.add(seed);
+            stack.push(seed);
+            while let Some(voxel) = stack.pop() {
+                for next in self.neighbours(voxel) {
+                    if self.has(next) && !seen.has(next) {
+                        seen.add(next);
+                        stack.push(next);
+                    }
+                }
+            }
+        });
+        parts
+    }
+
+    /// The up to six voxels that share a face with one.
+    pub(super) fn neighbours(&self, voxel: [usize; 3]) -> impl Iterator<Item = [usize; 3]> + use<> {
+        let dims = self.dims;
+        (0..6).filter_map(move |side| {
+            let (axis, up) = (side / 2, side % 2 == 1);
+            let mut next = voxel;
+            next[axis] = if up { voxel[axis] + 1 } else { voxel[axis].checked_sub(1)? };
+            (next[axis] < dims[axis]).then_some(next)
+        })
+    }
+}
+
+/// The bits of word `w` of a row that belong to voxels `first..=last`.
+fn run_mask(w: usize, first: usize, last: usize) -> u64 {
+    let low = first.saturating_sub(w * WORD).min(WORD - 1);
+    let high = (last - w * WORD).min(WORD - 1);
+    (u64::MAX << low) & (u64::MAX >> (WORD - 1 - high))
+}
+
+/// Whether a block of 2 x 2 x 2 voxels (bit 0: x, 1: y, 2: z) has voxels, or gaps, that meet in an edge or corner only.
+fn is_critical(block: usize) -> bool {
+    let has = |i: usize| block >> i & 1 == 1;
+    let edge = [(0, 3, 1, 2), (4, 7, 5, 6), (0, 5, 1, 4), (2, 7, 3, 6), (0, 6, 2, 4), (1, 7, 3, 5)]
+        .iter()
+        .any(|&(a, b, p, q)| has(a) == has(b) && has(p) == has(q) && has(a) != has(p));
+    let corner = (0..4).any(|i| {
+        let pair = 1 << i | 1 << (7 - i);
+        block == pair || block == 255 ^ pair
+    });
+    edge || corner
+}

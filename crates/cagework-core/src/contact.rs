@@ -1,0 +1,212 @@
+//! Whether two triangles of one surface meet where they should not.
+//!
+//! What counts depends on what they share. Nothing: they must keep a gap (separating axes). One vertex: apart from it
+//! they must not meet. An edge: they must not be folded onto each other.
+
+use glam::DVec3;
+
+/// Sine of the angle below which a direction counts as lying in a plane: far above the rounding of f64, far below
+/// what f32 coordinates of a cage resolve.
+const IN_PLANE: f64 = 1e-7;
+
+/// Triangles nearer than this fraction of their size touch: rounding of f64, with room.
+const TOUCH: f64 = 1e-10;
+
+/// Cosine of the smallest angle between two faces with a common edge (2 degrees): sharper is folded.
+const FOLDED: f64 = 0.9994;
+
+/// A triangle with its corners' vertex numbers, which say what it shares with others.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Corners {
+    /// Vertex numbers.
+    pub(crate) index: [u32; 3],
+    /// Their positions.
+    pub(crate) at: [DVec3; 3],
+}
+
+impl Corners {
+    /// Smallest corner of the bounding box.
+    pub(crate) fn min(&self) -> DVec3 {
+        self.at[0].min(self.at[1]).min(self.at[2])
+    }
+
+    /// Largest corner of the bounding box.
+    pub(crate) fn max(&self) -> DVec3 {
+        self.at[0].max(self.at[1]).max(self.at[2])
+    }
+
+    /// Normal, not normalised: twice the area long.
+    pub(crate) fn normal(&self) -> DVec3 {
+        (self.at[1] - self.at[0]).cross(self.at[2] - self.at[0])
+    }
+
+    /// The triangle rotated so that corner `k` comes first.
+    fn from_corner(&self, k: usize) -> [DVec3; 3] {
+        [self.at[k], self.at[(k + 1) % 3], self.at[(k + 2) % 3]]
+    }
+}
+
+/// Whether two triangles of a surface meet anywhere but in the vertices and edges that they share. Triangles that
+/// share nothing must be more than `gap` apart.
+pub(crate) fn meet(a: &Corners, b: &Corners, gap: f64) -> bool {
+    let mut shared = [(0, 0); 3];
+    let mut n = 0;
+    for (i, va) in a.index.iter().enumerate() {
+        if let Some(j) = b.index.iter().position(|vb| vb == va) {
+            shared[n] = (i, j);
+            n += 1;
+        }
+    }
+    match n {
+        0 => !are_apart(&a.at, &b.at, gap),
+        1 => cones_meet(a.from_corner(shared[0].0), b.from_corner(shared[0].1)),
+        2 => {
+            let tip = |c: &Corners, i: usize, j: usize| c.at[3 - i - j];
+            let (edge_a, edge_b) = (a.at[shared[0].0], a.at[shared[1].0]);
+            let tips = [tip(a, shared[0].0, shared[1].0), tip(b, shared[0].1, shared[1].1)];
+            is_folded(edge_a, edge_b, tips)
+        }
+        _ => true,
+    }
+}
+
+/// Pairs of triangles of one surface that meet where they should not, each once, in order. `[n_triangles]` given.
+///
+/// Sweep along x: `n log n` for surfaces whose triangles are small against the whole.
+pub(crate) fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
+    let mut order: Vec<(f64, u32)> =
+        triangles.iter().enumerate().map(|(t, c)| (c.min().x, t as u32)).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut active: Vec<u32> = Vec::new();
+    let mut pairs = Vec::new();
+    for &(from, t) in &order {
+        active.retain(|&other| triangles[other as usize].max().x >= from);
+        let corners = &triangles[t as usize];
+        let (min, max) = (corners.min(), corners.max());
+        for &other in &active {
+            let rival = &triangles[other as usize];
+            let apart = rival.min().cmpgt(max).any() || rival.max().cmplt(min).any();
+            if !apart && meet(corners, rival, 0.0) {
+                pairs.push([t.min(other), t.max(other)]);
+            }
+        }
+        active.push(t);
+    }
+    pairs.sort_unstable();
+    pairs
+}
+
+/// Whether some axis separates two triangles by more than `gap`. Exact for a gap of 0, but that touching counts as
+/// meeting; with a gap it may refuse pairs whose closest points are both corners.
+fn are_apart(a: &[DVec3; 3], b: &[DVec3; 3], gap: f64) -> bool {
+    // Near the origin nothing is lost when triangles are small against their distance from it.
+    let origin = a[0];
+    let (a, b) = (&a.map(|p| p - origin), &b.map(|p| p - origin));
+    let size = a.iter().chain(b).fold(0.0, |m: f64, p| m.max(p.abs().max_element()));
+    let gap = gap + TOUCH * size;
+    let separates = |axis: DVec3| {
+        let margin = gap * axis.length();
+        let (p, q) = (a.map(|x| axis.dot(x)), b.map(|x| axis.dot(x)));
+        let (p_min, p_max) = (p[0].min(p[1]).min(p[2]), p[0].max(p[1]).max(p[2]));
+        let (q_min, q_max) = (q[0].min(q[1]).min(q[2]), q[0].max(q[1]).max(q[2]));
+        p_min - q_max > margin || q_min - p_max > margin
+    };
+    let edges = |t: &[DVec3; 3]| [t[1] - t[0], t[2] - t[1], t[0] - t[2]];
+    let (ea, eb) = (edges(a), edges(b));
+    let (na, nb) = (ea[0].cross(ea[1]), eb[0].cross(eb[1]));
+    separates(na)
+        || separates(nb)
+        || ea.iter().any(|&u| eb.iter().any(|&w| separates(u.cross(w))))
+        || ea.iter().any(|&u| separates(na.cross(u)))
+        || eb.iter().any(|&w| separates(nb.cross(w)))
+}
+
+/// Whether two triangles with the same first corner meet elsewhere, too.
+fn cones_meet(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
+    let (a, b) = ([a[1] - a[0], a[2] - a[0]], [b[1] - b[0], b[2] - b[0]]);
+    let (na, nb) = (a[0].cross(a[1]), b[0].cross(b[1]));
+    enters(a, b, nb) || enters(b, a, na)
+}
+
+/// Whether a direction of the cone spanned by `a` that lies in the plane of `b` (normal `nb`) lies in its cone.
+fn enters(a: [DVec3; 2], b: [DVec3; 2], nb: DVec3) -> bool {
+    let limit = |d: DVec3| IN_PLANE * d.length() * nb.length();
+    let height = a.map(|d| nb.dot(d));
+    let flat = [0, 1].map(|k| height[k].abs() <= limit(a[k]));
+    if (0..2).any(|k| flat[k] && is_in_cone(a[k], b, nb)) {
+        return true;
+    }
+    if flat[0] || flat[1] || (height[0] > 0.0) == (height[1] > 0.0) {
+        return false;
+    }
+    let crossing = a[0] + (a[1] - a[0]) * (height[0] / (height[0] - height[1]));
+    is_in_cone(crossing, b, nb)
+}
+
+/// Whether a direction in the plane of the cone lies in it or on its rim.
+fn is_in_cone(d: DVec3, b: [DVec3; 2], nb: DVec3) -> bool {
+    let limit = -IN_PLANE * d.length() * nb.length();
+    nb.dot(b[0].cross(d)) >= limit * b[0].length() && nb.dot(d.cross(b[1])) >= limit * b[1].length()
+}
+
+/// Whether two faces with the common edge `p`-`q` lie on each other.
+fn is_folded(p: DVec3, q: DVec3, tips: [DVec3; 2]) -> bool {
+    let along = (q - p).normalize_or_zero();
+    let [u, w] = tips.map(|tip| {
+        let d = tip - p;
+        (d - along * along.dot(d)).normalize_or_zero()
+    });
+    u.dot(w) > FOLDED
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn v(x: f64, y: f64, z: f64) -> DVec3 {
+        DVec3::new(x, y, z)
+    }
+
+    fn t(index: [u32; 3], at: [DVec3; 3]) -> Corners {
+        Corners { index, at }
+    }
+
+    const FLOOR: [DVec3; 3] = [DVec3::ZERO, DVec3::new(4.0, 0.0, 0.0), DVec3::new(0.0, 4.0, 0.0)];
+
+    #[test]
+    fn strangers_meet_when_they_cross_touch_or_come_too_near() {
+        let floor = t([0, 1, 2], FLOOR);
+        let above = |z: f64| t([3, 4, 5], [v(1.0, 1.0, z), v(2.0, 1.0, z), v(1.0, 2.0, z + 1.0)]);
+        assert!(meet(&floor, &above(-0.5), 0.0), "crosses");
+        assert!(meet(&floor, &above(0.0), 0.0), "touches");
+        assert!(!meet(&floor, &above(0.1), 0.0));
+        assert!(meet(&floor, &above(0.1), 0.2), "nearer than the gap");
+        let beside = t([3, 4, 5], [v(3.0, 3.0, 0.0), v(5.0, 3.0, 0.0), v(3.0, 5.0, 0.0)]);
+        assert!(!meet(&floor, &beside, 0.0), "in one plane, side by side");
+        let inside = t([3, 4, 5], [v(1.0, 1.0, 0.0), v(1.5, 1.0, 0.0), v(1.0, 1.5, 0.0)]);
+        assert!(meet(&floor, &inside, 0.0), "in one plane, on each other");
+    }
+
+    #[test]
+    fn triangles_with_a_common_vertex_meet_only_when_their_cones_do() {
+        let floor = t([0, 1, 2], FLOOR);
+        let fan = |p: DVec3, q: DVec3| t([0, 3, 4], [DVec3::ZERO, p, q]);
+        assert!(!meet(&floor, &fan(v(-1.0, 0.0, 0.0), v(0.0, -1.0, 0.0)), 1.0), "across, in one plane");
+        assert!(meet(&floor, &fan(v(1.0, 1.0, 0.0), v(1.0, 2.0, 0.0)), 0.0), "on it");
+        assert!(meet(&floor, &fan(v(1.0, 1.0, 1.0), v(1.0, 1.0, -1.0)), 0.0), "through it");
+        assert!(
+            !meet(&floor, &fan(v(-1.0, -1.0, 1.0), v(-1.0, -1.0, -1.0)), 0.0),
+            "through its plane elsewhere"
+        );
+        assert!(!meet(&floor, &fan(v(1.0, 1.0, 1.0), v(1.0, 2.0, 1.0)), 0.0), "above it");
+    }
+
+    #[test]
+    fn faces_with_a_common_edge_meet_when_folded() {
+        let floor = t([0, 1, 2], FLOOR);
+        let wing = |tip: DVec3| t([1, 0, 3], [FLOOR[1], FLOOR[0], tip]);
+        assert!(!meet(&floor, &wing(v(1.0, -2.0, 0.0)), 1.0), "flat");
+        assert!(!meet(&floor, &wing(v(1.0, 1.0, 1.0)), 1.0), "45 degrees");
+        assert!(meet(&floor, &wing(v(3.0, 1.0, 0.001)), 1.0), "folded");
+    }
+}

@@ -1,0 +1,69 @@
+use super::{all, build};
+use crate::bind::{BindOptions, bind};
+use crate::cage::Cage;
+use crate::geometry::winding_number;
+use crate::progress::Silent;
+
+/// Mean distance between rest pose and reconstruction over the diagonal: f32 round-off of the corrected rows.
+const REST_ERROR: f64 = 2e-6;
+
+#[test]
+fn every_sample_is_enclosed_by_its_cage_and_bound_exactly() {
+    for info in all() {
+        let sample = build(info.id).unwrap();
+        let n = sample.mesh.positions.len();
+        assert!((10_000..=40_000).contains(&n), "{}: {n} vertices", info.id);
+        assert_eq!(sample.colours.len(), n);
+        assert!(sample.cage.faces.len() < 500);
+        let cage = Cage::new(&sample.cage).unwrap();
+        assert_eq!(cage.notices(), [], "{}", info.id);
+        for p in sample.mesh.positions.iter().step_by(29) {
+            let triangles = (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
+            let winding = winding_number(p.as_dvec3(), triangles);
+            assert!((winding - 1.0).abs() < 1e-6, "{}: {p} has winding number {winding}", info.id);
+        }
+        let binding = bind(&sample.mesh.positions, &cage, &BindOptions::default(), &Silent).unwrap();
+        assert_eq!(binding.outside.len(), 0, "{}", info.id);
+        let error = binding.report.rest_error.mean_rel;
+        assert!(error <= REST_ERROR, "{}: {error:e}", info.id);
+    }
+}
+
+#[test]
+fn poses_move_some_of_the_cage_and_keep_its_vertices() {
+    for info in all() {
+        let sample = build(info.id).unwrap();
+        assert!(!sample.poses.is_empty());
+        for (name, pose) in &sample.poses {
+            assert_eq!(pose.len(), sample.cage.positions.len());
+            let farthest =
+                pose.iter().zip(&sample.cage.positions).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+            assert!(pose.iter().all(|p| p.is_finite()) && farthest > 0.1, "{}: {name}", info.id);
+        }
+    }
+}
+
+#[test]
+fn samples_are_closed_surfaces_that_face_outward() {
+    for info in all() {
+        let mesh = build(info.id).unwrap().mesh;
+        let mut sides: Vec<[u32; 2]> =
+            mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+        sides.sort_unstable();
+        for &[a, b] in &sides {
+            assert!(sides.binary_search(&[b, a]).is_ok(), "{}: edge {a}-{b} is open", info.id);
+        }
+        let volume: f32 = mesh
+            .triangles
+            .iter()
+            .map(|t| t.map(|i| mesh.positions[i as usize]))
+            .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+            .sum();
+        assert!(volume > 0.0, "{}", info.id);
+    }
+}
+
+#[test]
+fn unknown_samples_are_none() {
+    assert!(build("unicorn").is_none());
+}
