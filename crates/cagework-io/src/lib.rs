@@ -19,7 +19,7 @@ mod pose_code;
 mod project;
 
 pub use error::{PoseError, ReadError, WriteError};
-pub use gltf::GltfError;
+pub use gltf::{GltfError, write_mesh_glb};
 pub use look::{Look, LookAlpha, LookCorner, LookGroup, LookTexture, LookWrap};
 pub use model::{Counts, Format, Model};
 pub use npz::{NpzError, read_weights_npz, write_weights_npz};

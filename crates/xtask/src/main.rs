@@ -5,6 +5,7 @@
 mod arrows;
 mod command;
 mod tasks;
+mod wasm;
 
 use std::process::ExitCode;
 
@@ -25,6 +26,8 @@ fn main() -> ExitCode {
         ["test"] => tasks::test(),
         ["check"] => tasks::check(),
         ["arrows"] => arrows::check(),
+        ["wasm"] => wasm::build(wasm::Profile::Web),
+        ["wasm", "--dev"] => wasm::build(wasm::Profile::Dev),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);

@@ -27,6 +27,7 @@ use crate::model::Counts;
 use scene::{Instance, Worlds};
 
 pub(crate) use build::build_from_obj;
+pub use build::write_mesh_glb;
 pub(crate) use container::{glb_of, glb_parts};
 pub(crate) use export::write_obj;
 pub(crate) use look::look;
