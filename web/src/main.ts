@@ -34,9 +34,10 @@ import { createPanel } from "./ui/panel";
 import { createPosePanel } from "./ui/pose";
 import { createSeePanel } from "./ui/see";
 import { createSheet } from "./ui/sheet";
-import { createOverlays, createStage } from "./ui/stage";
+import { createOverlays } from "./ui/stage";
 import { createToasts } from "./ui/toasts";
 import { createUnsupported, type Lack } from "./ui/unsupported";
+import { createStage } from "./ui/viewport";
 
 function byId(id: string): HTMLElement {
   const element = document.getElementById(id);

@@ -4,7 +4,6 @@ import type {
   BindOptions,
   BindReport,
   Element as CageElement,
-  CageOptions,
   CageState,
   Legend,
   ModelInfo,
@@ -12,7 +11,7 @@ import type {
   Sample,
   SceneOptions,
 } from "./contract";
-import { BIND_DEFAULTS, CAGE_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
+import { BIND_DEFAULTS, CAGE_DEFAULTS, type CageWish, SCENE_DEFAULTS } from "./defaults";
 import type { Theme } from "./store";
 
 export const STEPS = ["model", "cage", "bind", "pose", "export"] as const;
@@ -57,7 +56,7 @@ export interface AppState {
   sample: string | null;
   cage: CageState | null;
   cageSource: CageSource;
-  cageOptions: CageOptions;
+  cageOptions: CageWish;
   boxDivisions: number;
   /** Share of the cage generation done; null when none runs. */
   cageProgress: number | null;
