@@ -2,6 +2,7 @@
 
 import type { NamedFile, Opened } from "../contract";
 import { planDrop } from "../drop";
+import { stem } from "../format";
 import type { StepName } from "../state";
 import { sentence } from "../strings";
 import { attempt, type Context } from "./context";
@@ -41,7 +42,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     const settings = opened.project ? readSettings(opened.project.settings) : {};
     ctx.history.clear();
     store.set({
-      model: opened.model,
+      model: opened.project ? { ...opened.model, name: stem(opened.model.name) } : opened.model,
       sample,
       poses: opened.project?.poses ?? [],
       shares: opened.project?.poses.map(() => 0) ?? [],

@@ -42,7 +42,7 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
       }
       return {
         primary: { label: "Export", icon: "export", run: () => app.go("export") },
-        second: { label: "Save this pose", icon: "plus", run: () => app.run("savePose") },
+        second: { label: "Save pose", icon: "plus", run: () => app.run("savePose") },
       };
     case "export":
       return {
