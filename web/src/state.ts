@@ -56,6 +56,8 @@ export interface AppState {
   sample: string | null;
   cage: CageState | null;
   cageSource: CageSource;
+  /** The cage is the one that the sample came with, so that a link can refer to it. */
+  sampleCage: boolean;
   cageOptions: CageWish;
   boxDivisions: number;
   /** Share of the cage generation done; null when none runs. */
@@ -109,6 +111,7 @@ export const INITIAL: AppState = {
   sample: null,
   cage: null,
   cageSource: "auto",
+  sampleCage: false,
   cageOptions: CAGE_DEFAULTS,
   boxDivisions: 2,
   cageProgress: null,

@@ -26,6 +26,7 @@ export function createCage(ctx: Context, after: () => void): CageActions {
   const adopt = (state: CageState | null) => {
     ctx.store.set({
       cage: state,
+      sampleCage: false,
       bound: false,
       report: null,
       earlier: [],

@@ -23,9 +23,8 @@ export interface Follow {
   bind(): Promise<boolean>;
   /** Takes a project's settings, before the bind. */
   applySettings(settings: Settings): void;
-  /** And its pose, after it. */
+  /** And its pose. */
   applyPose(settings: Settings): void;
-  sync(): void;
 }
 
 /** Largest file read without asking, bytes: beyond it the browser's memory for the page is at risk. */
@@ -54,9 +53,11 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     });
     follow.applySettings(settings);
     follow.adoptCage(opened);
-    follow.sync();
+    const ofSample = settings.sample ?? sample;
+    store.set({ sample: ofSample, sampleCage: ofSample !== null && opened.cage !== null });
+    follow.applyPose(settings);
     for (const notice of opened.model.notices) ctx.tell.say(sentence(notice));
-    void prepare(mine, settings, cageFiles, sample !== null || opened.project !== null);
+    void prepare(mine, cageFiles, sample !== null || opened.project !== null);
   };
 
   const goTo = (from: readonly StepName[], step: StepName) => {
@@ -64,12 +65,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
   };
 
   /** Cage, bind, pose: as far as it goes without the user. */
-  const prepare = async (
-    mine: number,
-    settings: Settings,
-    cageFiles: readonly NamedFile[] | undefined,
-    familiar: boolean,
-  ) => {
+  const prepare = async (mine: number, cageFiles: readonly NamedFile[] | undefined, familiar: boolean) => {
     const current = () => mine === turn;
     if (cageFiles) {
       if (!(await follow.loadCage(cageFiles)) || !current()) return;
@@ -82,11 +78,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       return;
     }
     if (!familiar) goTo(["model", "cage"], "bind");
-    const bound = follow.bind();
-    if ((await bound) && current()) {
-      follow.applyPose(settings);
-      goTo(["bind"], "pose");
-    }
+    if ((await follow.bind()) && current()) goTo(["bind"], "pose");
   };
 
   const busy = async (what: string, title: string, work: () => Promise<void>): Promise<boolean> => {

@@ -47,7 +47,7 @@ export function createProject(ctx: Context): Project {
       bind: state.bindOptions,
       cage: state.cageOptions,
       symmetry: state.symmetry,
-      ...(state.sample ? { sample: state.sample } : {}),
+      ...(state.sample && state.sampleCage ? { sample: state.sample } : {}),
       ...(pose ? { pose } : {}),
     };
     return JSON.stringify(all);
@@ -100,8 +100,8 @@ export function createProject(ctx: Context): Project {
     write,
     fileName,
     async link() {
-      const { sample, posed } = store.get();
-      if (!sample) return undefined;
+      const { sample, sampleCage, posed } = store.get();
+      if (!sample || !sampleCage) return undefined;
       const pose = posed ? ctx.session().engine.encodePose() : undefined;
       const fragment = await encodeShare(pose ? { sample, pose } : { sample });
       return `${location.origin}${location.pathname}${fragment}`;

@@ -1,12 +1,12 @@
 /** What lies on the view: tools, legend, status line. */
 
 import type { App } from "../app";
-import type { Element as CageElement, SceneOptions } from "../contract";
+import type { Element as CageElement, CageState, SceneOptions } from "../contract";
 import type { AppState } from "../state";
-import { hintFor } from "../strings";
+import { hintFor, sentence } from "../strings";
 import { iconButton, press, segments } from "./controls";
-import { h, setText } from "./dom";
-import type { IconName } from "./icons";
+import { fill, h, setText } from "./dom";
+import { type IconName, icon } from "./icons";
 import { createLegend } from "./legend";
 import { statusOf } from "./status";
 
@@ -25,7 +25,10 @@ export function createOverlays(
       { value: "pose", label: "Pose" },
       { value: "rest", label: "Rest cage" },
     ],
-    (value) => app.edit.setEditingRest(value === "rest"),
+    (value) => {
+      app.edit.setEditingRest(value === "rest");
+      app.go(value === "rest" ? "cage" : "pose");
+    },
     { hideLabel: true },
   );
   mode.element.classList.add("floating", "mode");
@@ -124,7 +127,13 @@ export function createOverlays(
   const busyText = h("p");
   const busy = h("div", { class: "busy" }, h("span", { class: "spinner" }), busyText);
 
-  element.append(mode.element, tools, looks, legend, compare, bottom, see, busy);
+  const encloses = h("span", { class: "floating badge encloses", attrs: { role: "status" } });
+  store.watch(["editingRest", "cage"], ({ editingRest, cage }) => {
+    encloses.hidden = !editingRest || cage === null;
+    if (cage) showEnclosure(encloses, cage);
+  });
+
+  element.append(mode.element, encloses, tools, looks, legend, compare, bottom, see, busy);
 
   store.watch(["busy"], (state) => {
     busy.hidden = state.busy === null;
@@ -191,4 +200,13 @@ export function createOverlays(
     speak,
   );
   touch.addEventListener("change", () => speak(store.get()));
+}
+
+/** The live check while the cage is shaped. */
+function showEnclosure(badge: HTMLElement, cage: CageState): void {
+  const fault = cage.problems.find((problem) => problem.severity !== "note");
+  badge.classList.toggle("good", cage.usable && !fault);
+  badge.classList.toggle("warn", cage.usable && fault !== undefined);
+  badge.classList.toggle("bad", !cage.usable);
+  fill(badge, icon(fault ? "warning" : "check"), fault ? sentence(fault.message) : "Encloses the model");
 }
