@@ -19,7 +19,20 @@ export const BIND_DEFAULTS: BindOptions = {
 /** What the paper did. */
 export const PAPER_DEFAULTS: BindOptions = { ...BIND_DEFAULTS, method: "classic", solver: "jacobi" };
 
-export const CAGE_DEFAULTS: CageOptions = { vertices: 80, margin: 0.03, symmetry: "auto" };
+/** What the cage is asked for; `shape` and `per_component` go beyond the contract's least. */
+export interface CageWish extends CageOptions {
+  readonly shape: "follow" | "hull";
+  /** A cage for each separate part of the model, instead of one for all. */
+  readonly per_component: boolean;
+}
+
+export const CAGE_DEFAULTS: CageWish = {
+  vertices: 80,
+  margin: 0,
+  symmetry: "auto",
+  shape: "follow",
+  per_component: false,
+};
 
 export const SCENE_DEFAULTS: SceneOptions = {
   theme: "dark",

@@ -61,9 +61,9 @@ export function coordinate(value: number): string {
   return String(rounded === 0 ? 0 : rounded);
 }
 
-/** A file's name without its extension. */
+/** A file's name without its extension, or both of a project's. */
 export function stem(name: string): string {
-  const base = name.split(/[\\/]/).at(-1) ?? name;
+  const base = (name.split(/[\\/]/).at(-1) ?? name).replace(/\.cagework(\.glb)?$/i, "");
   const dot = base.lastIndexOf(".");
   return dot > 0 ? base.slice(0, dot) : base;
 }

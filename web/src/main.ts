@@ -22,7 +22,7 @@ import { decodeShare } from "./share";
 import { startUp } from "./start";
 import { createStore, INITIAL } from "./state";
 import { loadTheme } from "./store";
-import { type Explained, FIX_LABELS, PRODUCT } from "./strings";
+import { type Explained, explain, FIX_LABELS, PRODUCT } from "./strings";
 import { createBar } from "./ui/bar";
 import { createBindPanel } from "./ui/bind";
 import { createCagePanel } from "./ui/cage";
@@ -34,9 +34,10 @@ import { createPanel } from "./ui/panel";
 import { createPosePanel } from "./ui/pose";
 import { createSeePanel } from "./ui/see";
 import { createSheet } from "./ui/sheet";
-import { createOverlays, createStage } from "./ui/stage";
+import { createOverlays } from "./ui/stage";
 import { createToasts } from "./ui/toasts";
 import { createUnsupported, type Lack } from "./ui/unsupported";
+import { createStage } from "./ui/viewport";
 
 function byId(id: string): HTMLElement {
   const element = document.getElementById(id);
@@ -70,23 +71,22 @@ async function main(): Promise<void> {
   const bind = createBind(ctx);
   const project = createProject(ctx);
   let rebind: ReturnType<typeof setTimeout> | undefined;
-  /** A changed rest cage is bound again once the hand rests, ms. */
+  /** A changed cage is bound again once the hand rests, ms; a fine grid waits for the user's word. */
   const bindSoon = (pause: number) => {
     clearTimeout(rebind);
     rebind = setTimeout(() => {
-      if (store.get().cage?.usable && !store.get().bound && !edit.active()) void bind.start();
+      const { cage: now, bindOptions } = store.get();
+      if (now?.usable && !bind.covers() && !edit.active() && bindOptions.grid <= 128) void bind.start();
     }, pause);
   };
   const edit = createEdit(ctx, {
-    changed(state) {
-      cage.adopt(state);
-      bindSoon(700);
-    },
+    changed: (state) => cage.adopt(state),
     left: () => bindSoon(0),
   });
   const cage = createCage(ctx, () => {
     edit.sync();
     view.refresh();
+    bindSoon(600);
   });
   const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"));
   const poses = createPoses(ctx, edit);
@@ -101,7 +101,6 @@ async function main(): Promise<void> {
         ...(settings.bind ? { bindOptions: settings.bind } : {}),
         ...(settings.cage ? { cageOptions: settings.cage } : {}),
       });
-      if (settings.sample) store.set({ sample: settings.sample });
       view.symmetry(settings.symmetry ?? store.get().symmetry);
     },
     applyPose(settings) {
@@ -109,7 +108,6 @@ async function main(): Promise<void> {
       if (pose) current().engine.decodePose(pose);
       edit.sync();
     },
-    sync: () => edit.sync(),
   });
 
   const choose = (accept: string, folder: boolean, then: (files: NamedFile[]) => void) => {
@@ -139,7 +137,10 @@ async function main(): Promise<void> {
     exports,
     mac,
     run: (command) => commands[command](),
-    go: (step) => store.set({ step }),
+    go(step) {
+      if (step === "pose" || step === "export") edit.setEditingRest(false);
+      store.set({ step });
+    },
     chooseModel: () => choose(MODELS, false, (list) => void files.openFiles(list)),
     chooseFolder: () => choose("", true, (list) => void files.openFiles(list)),
     chooseCage: () => choose(".obj,.glb,.gltf,.bin", false, (list) => void cage.load(list)),
@@ -167,7 +168,7 @@ async function main(): Promise<void> {
     const link = await project.link();
     if (!link) {
       tell.say(
-        "A link can hold samples and their poses, but no files of yours. Save a project file to pass this on.",
+        "A link can hold a sample in its own cage and pose, but no files of yours. Save a project file to pass this on.",
         {
           label: "Save the project",
           run: () => void exports.save("project"),
@@ -199,7 +200,11 @@ async function main(): Promise<void> {
     session = await openSession(stage.canvas());
   } catch (error) {
     const name = error instanceof Error ? error.name : "";
-    if (name !== "NoWebGPU" && name !== "NoAdapter" && name !== "NoDevice") throw error;
+    if (name !== "NoWebGPU" && name !== "NoAdapter" && name !== "NoDevice") {
+      store.set({ busy: null });
+      tell.problem(explain(error, "Cagework did not start"), fixFor("reload"));
+      return;
+    }
     document.body.replaceChildren(
       createUnsupported(name satisfies Lack, navigator.userAgent, isSecureContext),
     );

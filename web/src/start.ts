@@ -5,7 +5,7 @@ import type { App } from "./app";
 import { percent } from "./format";
 import type { Shared } from "./share";
 import type { Theme } from "./store";
-import type { Stage } from "./ui/stage";
+import type { Stage } from "./ui/viewport";
 
 /** Sharper than this nobody sees, and it costs four times the pixels. */
 const MOST_SHARP = 2;

@@ -4,7 +4,6 @@ import type {
   BindOptions,
   BindReport,
   Element as CageElement,
-  CageOptions,
   CageState,
   Legend,
   ModelInfo,
@@ -12,7 +11,7 @@ import type {
   Sample,
   SceneOptions,
 } from "./contract";
-import { BIND_DEFAULTS, CAGE_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
+import { BIND_DEFAULTS, CAGE_DEFAULTS, type CageWish, SCENE_DEFAULTS } from "./defaults";
 import type { Theme } from "./store";
 
 export const STEPS = ["model", "cage", "bind", "pose", "export"] as const;
@@ -57,7 +56,9 @@ export interface AppState {
   sample: string | null;
   cage: CageState | null;
   cageSource: CageSource;
-  cageOptions: CageOptions;
+  /** The cage is the one that the sample came with, so that a link can refer to it. */
+  sampleCage: boolean;
+  cageOptions: CageWish;
   boxDivisions: number;
   /** Share of the cage generation done; null when none runs. */
   cageProgress: number | null;
@@ -110,6 +111,7 @@ export const INITIAL: AppState = {
   sample: null,
   cage: null,
   cageSource: "auto",
+  sampleCage: false,
   cageOptions: CAGE_DEFAULTS,
   boxDivisions: 2,
   cageProgress: null,

@@ -18,6 +18,16 @@ export const STAGES = {
   sample: "Reading weights",
 } as const;
 
+export const GESTURES = { grab: "Move", rotate: "Rotate", scale: "Scale" } as const;
+
+export const REST_EDITS = {
+  split_edge: "Split edge",
+  collapse_edge: "Collapse edge",
+  extrude_face: "Extrude face",
+  delete_vertex: "Delete vertices",
+  delete_face: "Delete faces",
+} as const;
+
 export const AXES = ["X", "Y", "Z"] as const;
 
 /** What the status line suggests when nothing else is going on. */

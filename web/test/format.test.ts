@@ -52,5 +52,6 @@ describe("formats", () => {
   it("take folder and extension from a name", () => {
     expect(stem("models/horse.v2.glb")).toBe("horse.v2");
     expect(stem(".hidden")).toBe(".hidden");
+    expect(stem("horse.cagework.glb")).toBe("horse");
   });
 });

@@ -1,6 +1,6 @@
 /** Binding: starts, follows and cancels it, and knows what it will need. */
 
-import type { BindEvent, BindOptions, BindReport, Job } from "../contract";
+import type { BindEvent, BindOptions, BindReport, CageState, Job } from "../contract";
 import { createEta, type Eta } from "../eta";
 import { type BindRun, cageBroken } from "../state";
 import { sentence } from "../strings";
@@ -10,6 +10,8 @@ export interface BindActions {
   /** True when it ended with weights. */
   start(): Promise<boolean>;
   cancel(): void;
+  /** Whether the cage that is open is bound or about to be. */
+  covers(): boolean;
   setOptions(patch: Partial<BindOptions>): void;
   /** Mean value coordinates, once per cage; true when they are there. */
   prepareCompare(): Promise<boolean>;
@@ -22,6 +24,7 @@ export function createBind(ctx: Context): BindActions {
   let job: Job<BindReport> | undefined;
   /** Counts binds: what an older one still says is not heard. */
   let turn = 0;
+  let runningFor: CageState | null = null;
   let compare: Promise<boolean> | undefined;
   const { store } = ctx;
 
@@ -57,6 +60,7 @@ export function createBind(ctx: Context): BindActions {
       let eta: Eta = createEta(performance.now());
       let run: BindRun = start("coarse");
       store.set({ bindRun: run });
+      runningFor = store.get().cage;
       const hear = (event: BindEvent) => {
         if (mine !== turn) return;
         switch (event.kind) {
@@ -102,6 +106,7 @@ export function createBind(ctx: Context): BindActions {
       });
       if (mine === turn) {
         job = undefined;
+        runningFor = null;
         store.set({ bindRun: null });
       }
       return ok && store.get().bound;
@@ -109,6 +114,7 @@ export function createBind(ctx: Context): BindActions {
     cancel() {
       job?.cancel();
     },
+    covers: () => store.get().bound || (runningFor !== null && runningFor === store.get().cage),
     setOptions(patch) {
       store.set({ bindOptions: { ...store.get().bindOptions, ...patch } });
     },

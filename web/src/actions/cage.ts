@@ -1,6 +1,7 @@
 /** Getting a cage: made for the model, a box, or a file; and repairing it. */
 
-import type { CageOptions, CageState, Job, NamedFile, RepairKind } from "../contract";
+import type { CageState, Job, NamedFile, RepairKind } from "../contract";
+import type { CageWish } from "../defaults";
 import type { CageSource } from "../state";
 import { attempt, type Context, report } from "./context";
 
@@ -14,8 +15,8 @@ export interface CageActions {
   adopt(state: CageState | null): void;
 }
 
-/** Preset for a rough hull: few vertices and more room, what a convex body needs. */
-const HULL: CageOptions = { vertices: 24, margin: 0.06, symmetry: "auto" };
+/** A hull needs few vertices: it has no limbs to follow. */
+const HULL_VERTICES = 24;
 
 export function createCage(ctx: Context, after: () => void): CageActions {
   let job: Job<CageState> | undefined;
@@ -25,6 +26,7 @@ export function createCage(ctx: Context, after: () => void): CageActions {
   const adopt = (state: CageState | null) => {
     ctx.store.set({
       cage: state,
+      sampleCage: false,
       bound: false,
       report: null,
       earlier: [],
@@ -50,7 +52,8 @@ export function createCage(ctx: Context, after: () => void): CageActions {
 
   const generate = async (source: CageSource) => {
     const { cageOptions } = ctx.store.get();
-    const options = source === "hull" ? HULL : cageOptions;
+    const options: CageWish =
+      source === "hull" ? { ...cageOptions, shape: "hull", vertices: HULL_VERTICES } : cageOptions;
     turn += 1;
     const mine = turn;
     ctx.store.set({ cageProgress: 0 });

@@ -3,6 +3,7 @@
 import { nextAmount } from "../amount";
 import type { CageState, Gesture, GizmoHandle, RestEdit } from "../contract";
 import { plural } from "../format";
+import { GESTURES, REST_EDITS } from "../strings";
 import { type Context, report } from "./context";
 
 export interface Edit {
@@ -42,14 +43,6 @@ interface Rest {
 }
 
 const NUDGE_PAUSE_MS = 600;
-const EDIT_LABELS: Record<RestEdit, string> = {
-  split_edge: "Split edge",
-  collapse_edge: "Collapse edge",
-  extrude_face: "Extrude face",
-  delete_vertex: "Delete vertices",
-  delete_face: "Delete faces",
-};
-
 export function createEdit(ctx: Context, rest: RestListener): Edit {
   const engine = () => ctx.session().engine;
   let before: Float32Array | undefined;
@@ -154,8 +147,6 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
 
   const showLabel = () => ctx.store.set({ gesture: engine().transformLabel() });
 
-  const names: Record<Gesture, string> = { grab: "Move", rotate: "Rotate", scale: "Scale" };
-
   return {
     begin(gesture, x, y) {
       if (before || ctx.store.get().playing) return false;
@@ -164,7 +155,7 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
         before = undefined;
         return false;
       }
-      verb = names[gesture];
+      verb = GESTURES[gesture];
       showLabel();
       return true;
     },
@@ -239,9 +230,9 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
       settle();
       const from = restNow();
       try {
-        pushRest(EDIT_LABELS[edit], from, engine().editRest(edit));
+        pushRest(REST_EDITS[edit], from, engine().editRest(edit));
       } catch (error) {
-        report(ctx, `${EDIT_LABELS[edit]}: not possible here`, error);
+        report(ctx, `${REST_EDITS[edit]}: not possible here`, error);
       }
     },
     sync,

@@ -2,6 +2,7 @@
 
 import type { NamedFile, Opened } from "../contract";
 import { planDrop } from "../drop";
+import { stem } from "../format";
 import type { StepName } from "../state";
 import { sentence } from "../strings";
 import { attempt, type Context } from "./context";
@@ -22,9 +23,8 @@ export interface Follow {
   bind(): Promise<boolean>;
   /** Takes a project's settings, before the bind. */
   applySettings(settings: Settings): void;
-  /** And its pose, after it. */
+  /** And its pose. */
   applyPose(settings: Settings): void;
-  sync(): void;
 }
 
 /** Largest file read without asking, bytes: beyond it the browser's memory for the page is at risk. */
@@ -41,7 +41,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     const settings = opened.project ? readSettings(opened.project.settings) : {};
     ctx.history.clear();
     store.set({
-      model: opened.model,
+      model: opened.project ? { ...opened.model, name: stem(opened.model.name) } : opened.model,
       sample,
       poses: opened.project?.poses ?? [],
       shares: opened.project?.poses.map(() => 0) ?? [],
@@ -53,9 +53,11 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     });
     follow.applySettings(settings);
     follow.adoptCage(opened);
-    follow.sync();
+    const ofSample = settings.sample ?? sample;
+    store.set({ sample: ofSample, sampleCage: ofSample !== null && opened.cage !== null });
+    follow.applyPose(settings);
     for (const notice of opened.model.notices) ctx.tell.say(sentence(notice));
-    void prepare(mine, settings, cageFiles, sample !== null || opened.project !== null);
+    void prepare(mine, cageFiles, sample !== null || opened.project !== null);
   };
 
   const goTo = (from: readonly StepName[], step: StepName) => {
@@ -63,12 +65,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
   };
 
   /** Cage, bind, pose: as far as it goes without the user. */
-  const prepare = async (
-    mine: number,
-    settings: Settings,
-    cageFiles: readonly NamedFile[] | undefined,
-    familiar: boolean,
-  ) => {
+  const prepare = async (mine: number, cageFiles: readonly NamedFile[] | undefined, familiar: boolean) => {
     const current = () => mine === turn;
     if (cageFiles) {
       if (!(await follow.loadCage(cageFiles)) || !current()) return;
@@ -81,11 +78,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       return;
     }
     if (!familiar) goTo(["model", "cage"], "bind");
-    const bound = follow.bind();
-    if ((await bound) && current()) {
-      follow.applyPose(settings);
-      goTo(["bind"], "pose");
-    }
+    if ((await follow.bind()) && current()) goTo(["bind"], "pose");
   };
 
   const busy = async (what: string, title: string, work: () => Promise<void>): Promise<boolean> => {

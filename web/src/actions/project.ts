@@ -1,6 +1,7 @@
 /** Keeping work: autosave in the browser, the project file, the share link, and coming back from each. */
 
-import type { BindOptions, CageOptions, NamedFile } from "../contract";
+import type { BindOptions, NamedFile } from "../contract";
+import type { CageWish } from "../defaults";
 import { stem } from "../format";
 import { encodeShare, fromBase64Url, toBase64Url } from "../share";
 import { forgetLocally, loadLocally, saveLocally } from "../store";
@@ -9,7 +10,7 @@ import { attempt, type Context } from "./context";
 /** The page's own part of a project file. */
 export interface Settings {
   bind?: BindOptions;
-  cage?: CageOptions;
+  cage?: CageWish;
   sample?: string;
   symmetry?: boolean;
   /** `Engine.encodePose`, base 64. */
@@ -46,7 +47,7 @@ export function createProject(ctx: Context): Project {
       bind: state.bindOptions,
       cage: state.cageOptions,
       symmetry: state.symmetry,
-      ...(state.sample ? { sample: state.sample } : {}),
+      ...(state.sample && state.sampleCage ? { sample: state.sample } : {}),
       ...(pose ? { pose } : {}),
     };
     return JSON.stringify(all);
@@ -99,8 +100,8 @@ export function createProject(ctx: Context): Project {
     write,
     fileName,
     async link() {
-      const { sample, posed } = store.get();
-      if (!sample) return undefined;
+      const { sample, sampleCage, posed } = store.get();
+      if (!sample || !sampleCage) return undefined;
       const pose = posed ? ctx.session().engine.encodePose() : undefined;
       const fragment = await encodeShare(pose ? { sample, pose } : { sample });
       return `${location.origin}${location.pathname}${fragment}`;
@@ -173,12 +174,14 @@ function isBind(value: unknown): value is BindOptions {
   );
 }
 
-function isCage(value: unknown): value is CageOptions {
+function isCage(value: unknown): value is CageWish {
   if (typeof value !== "object" || value === null) return false;
-  const v = value as Partial<CageOptions>;
+  const v = value as Partial<CageWish>;
   return (
     typeof v.vertices === "number" &&
     typeof v.margin === "number" &&
+    (v.shape === "follow" || v.shape === "hull") &&
+    typeof v.per_component === "boolean" &&
     (v.symmetry === "auto" || v.symmetry === "on" || v.symmetry === "off")
   );
 }

@@ -2,7 +2,7 @@
 
 import type { App } from "../app";
 import type { SelectMode } from "../contract";
-import type { Stage } from "../ui/stage";
+import type { Stage } from "../ui/viewport";
 import { createTouch } from "./touch";
 
 /** Pixels that tell a drag from a click. */

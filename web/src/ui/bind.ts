@@ -66,6 +66,7 @@ export function createBindPanel(app: App): HTMLElement {
   );
   const about = h("p", { class: "hint" });
   const memory = h("p", { class: "memory" });
+  const adapter = h("p", { class: "hint" });
 
   const tau = slider(
     "Stop when the change is below",
@@ -149,6 +150,10 @@ export function createBindPanel(app: App): HTMLElement {
     classicOnly.hidden = o.method !== "classic";
     setText(about, describe(o));
   });
+  store.watch(["adapter", "bindOptions"], (state) => {
+    adapter.hidden = state.adapter === "" || state.bindOptions.backend === "cpu";
+    setText(adapter, `Graphics card: ${state.adapter}`);
+  });
   store.watch(["memory", "cage", "bindOptions"], (state) => {
     const wrong = typeof state.memory === "string";
     memory.classList.toggle("bad", wrong);
@@ -206,6 +211,7 @@ export function createBindPanel(app: App): HTMLElement {
       solver.element,
       about,
       backend.element,
+      adapter,
       memory,
       advanced,
     ),

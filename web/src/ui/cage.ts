@@ -2,6 +2,7 @@
 
 import type { App } from "../app";
 import type { CageOptions, CageState, Problem, RestEdit } from "../contract";
+import type { CageWish } from "../defaults";
 import { count, percent, plural } from "../format";
 import type { CageSource } from "../state";
 import { sentence } from "../strings";
@@ -18,7 +19,7 @@ const SOURCES: Record<CageSource, string> = {
 
 export function createCagePanel(app: App): HTMLElement {
   const { store } = app;
-  const setOptions = (patch: Partial<CageOptions>) =>
+  const setOptions = (patch: Partial<CageWish>) =>
     store.set({ cageOptions: { ...store.get().cageOptions, ...patch } });
 
   const source = segments<CageSource>(
@@ -38,7 +39,12 @@ export function createCagePanel(app: App): HTMLElement {
   );
   const margin = slider(
     "Room around the model",
-    { min: 0.01, max: 0.2, step: 0.005, format: (v) => `${(v * 100).toFixed(1)} % of its size` },
+    {
+      min: 0,
+      max: 0.15,
+      step: 0.005,
+      format: (v) => (v === 0 ? "as tight as it can be" : `${(v * 100).toFixed(1)} % of its size`),
+    },
     (value) => setOptions({ margin: value }),
   );
   const symmetry = segments<CageOptions["symmetry"]>(
@@ -50,10 +56,15 @@ export function createCagePanel(app: App): HTMLElement {
     ],
     (value) => setOptions({ symmetry: value }),
   );
+  const parts = toggle(
+    "A cage for each part",
+    "For models of separate parts. Off: one cage around all.",
+    (on) => setOptions({ per_component: on }),
+  );
   const divisions = slider("Squares along each side", { min: 1, max: 8, step: 1 }, (boxDivisions) =>
     store.set({ boxDivisions }),
   );
-  const auto = h("div", { class: "stack" }, target.element, margin.element, symmetry.element);
+  const auto = h("div", { class: "stack" }, target.element, symmetry.element, margin.element, parts.element);
   const box = h("div", { class: "stack" }, divisions.element);
   const make = button("Make this cage", () => void app.cage.make(), { icon: "cage", kind: "block" });
   const load = button("Open a cage file", () => app.chooseCage(), { icon: "file", kind: "block" });
@@ -96,6 +107,7 @@ export function createCagePanel(app: App): HTMLElement {
     target.set(cageOptions.vertices);
     margin.set(cageOptions.margin);
     symmetry.set(cageOptions.symmetry);
+    parts.set(cageOptions.per_component);
     divisions.set(boxDivisions);
   });
   store.watch(["cageProgress", "model"], ({ cageProgress, model }) => {

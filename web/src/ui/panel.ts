@@ -42,7 +42,7 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
       }
       return {
         primary: { label: "Export", icon: "export", run: () => app.go("export") },
-        second: { label: "Save this pose", icon: "plus", run: () => app.run("savePose") },
+        second: { label: "Save pose", icon: "plus", run: () => app.run("savePose") },
       };
     case "export":
       return {
@@ -131,7 +131,7 @@ function createSheet(panel: HTMLElement, handle: HTMLElement): void {
   const settle = (share: number) => {
     const distances = RESTS.map((value) => Math.abs(value - share));
     rest = distances.indexOf(Math.min(...distances));
-    panel.style.setProperty("--sheet", `${(RESTS[rest] ?? 0.42) * 100}dvh`);
+    document.documentElement.style.setProperty("--sheet", `${(RESTS[rest] ?? 0.42) * 100}dvh`);
   };
   handle.addEventListener("pointerdown", (event) => {
     start = { y: event.clientY, height: panel.offsetHeight };
@@ -143,7 +143,7 @@ function createSheet(panel: HTMLElement, handle: HTMLElement): void {
     if (!start) return;
     const height = start.height + start.y - event.clientY;
     moved ||= Math.abs(start.y - event.clientY) > 4;
-    panel.style.setProperty("--sheet", `${Math.max(60, height)}px`);
+    document.documentElement.style.setProperty("--sheet", `${Math.max(60, height)}px`);
   });
   const end = () => {
     if (!start) return;

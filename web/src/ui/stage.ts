@@ -1,71 +1,14 @@
-/** The view: canvas, tools on it, legend, status line. */
+/** What lies on the view: tools, legend, status line. */
 
 import type { App } from "../app";
-import type { Element as CageElement, SceneOptions } from "../contract";
+import type { Element as CageElement, CageState, SceneOptions } from "../contract";
 import type { AppState } from "../state";
-import { hintFor } from "../strings";
+import { hintFor, sentence } from "../strings";
 import { iconButton, press, segments } from "./controls";
-import { h, setText } from "./dom";
-import type { IconName } from "./icons";
+import { fill, h, setText } from "./dom";
+import { type IconName, icon } from "./icons";
 import { createLegend } from "./legend";
 import { statusOf } from "./status";
-
-export interface Stage {
-  /** What takes the pointer and the keys; holds the canvas. */
-  readonly viewport: HTMLElement;
-  readonly canvas: () => HTMLCanvasElement;
-  /** A canvas in place of one whose device was lost. */
-  freshCanvas(): HTMLCanvasElement;
-  /** The rubber band of a box selection; null hides it. */
-  band(box: { x: number; y: number; width: number; height: number } | null): void;
-}
-
-/** The view's element and canvas: made first, because the session opens on the canvas. */
-export function createStage(element: HTMLElement): Stage {
-  const make = () => h("canvas", { attrs: { "aria-hidden": "true" } });
-  let canvas = make();
-  const rubber = h("div", { class: "band", hidden: true });
-  const viewport = h(
-    "div",
-    {
-      class: "viewport",
-      id: "viewport",
-      attrs: {
-        tabindex: "0",
-        role: "application",
-        "aria-label": "3-D view",
-        "aria-describedby": "view-help",
-      },
-    },
-    canvas,
-    rubber,
-  );
-  element.append(
-    viewport,
-    h("p", {
-      id: "view-help",
-      class: "visually-hidden",
-      text: "Square brackets go from one cage vertex to the next, arrow keys move it, question mark lists all keys. Tab leaves the view.",
-    }),
-  );
-  return {
-    viewport,
-    canvas: () => canvas,
-    freshCanvas() {
-      const next = make();
-      canvas.replaceWith(next);
-      canvas = next;
-      return next;
-    },
-    band(box) {
-      rubber.hidden = box === null;
-      if (!box) return;
-      rubber.style.translate = `${box.x}px ${box.y}px`;
-      rubber.style.width = `${box.width}px`;
-      rubber.style.height = `${box.height}px`;
-    },
-  };
-}
 
 /** Everything that lies on the view. */
 export function createOverlays(
@@ -82,7 +25,10 @@ export function createOverlays(
       { value: "pose", label: "Pose" },
       { value: "rest", label: "Rest cage" },
     ],
-    (value) => app.edit.setEditingRest(value === "rest"),
+    (value) => {
+      app.edit.setEditingRest(value === "rest");
+      app.go(value === "rest" ? "cage" : "pose");
+    },
     { hideLabel: true },
   );
   mode.element.classList.add("floating", "mode");
@@ -120,6 +66,7 @@ export function createOverlays(
     () => store.set({ additive: !store.get().additive }),
     {
       shortcut: "Shift+click",
+      kind: "touch-only",
       pressed: false,
     },
   );
@@ -180,7 +127,13 @@ export function createOverlays(
   const busyText = h("p");
   const busy = h("div", { class: "busy" }, h("span", { class: "spinner" }), busyText);
 
-  element.append(mode.element, tools, looks, legend, compare, bottom, see, busy);
+  const encloses = h("span", { class: "floating badge encloses", attrs: { role: "status" } });
+  store.watch(["editingRest", "cage"], ({ editingRest, cage }) => {
+    encloses.hidden = !editingRest || cage === null;
+    if (cage) showEnclosure(encloses, cage);
+  });
+
+  element.append(mode.element, encloses, tools, looks, legend, compare, bottom, see, busy);
 
   store.watch(["busy"], (state) => {
     busy.hidden = state.busy === null;
@@ -247,4 +200,13 @@ export function createOverlays(
     speak,
   );
   touch.addEventListener("change", () => speak(store.get()));
+}
+
+/** The live check while the cage is shaped. */
+function showEnclosure(badge: HTMLElement, cage: CageState): void {
+  const fault = cage.problems.find((problem) => problem.severity !== "note");
+  badge.classList.toggle("good", cage.usable && !fault);
+  badge.classList.toggle("warn", cage.usable && fault !== undefined);
+  badge.classList.toggle("bad", !cage.usable);
+  fill(badge, icon(fault ? "warning" : "check"), fault ? sentence(fault.message) : "Encloses the model");
 }
