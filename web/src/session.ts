@@ -22,13 +22,18 @@ import { load, readFiles } from "./session/files";
 import { createFrames } from "./session/frames";
 import { chain } from "./session/jobs";
 
+declare global {
+  /** For the browser's console, and for tests. */
+  var cagework: Session | undefined;
+}
+
 /**
  * Opens a GPU, the module and the worker. Fails with the name NoWebGPU, NoAdapter or NoDevice where the page cannot run.
  */
 export async function openSession(canvas: HTMLCanvasElement): Promise<Session> {
   const adapter = await findAdapter();
   const module = await compile(wasmUrl);
-  await init({ module_or_path: module });
+  const { memory } = await init({ module_or_path: module });
   const frames = createFrames();
   const raw = await Engine.create(canvas, frames.ask);
   const engine = raw as unknown as PageEngine;
@@ -60,7 +65,7 @@ export async function openSession(canvas: HTMLCanvasElement): Promise<Session> {
     return { model, cage: stateOf(), project };
   }
 
-  return {
+  const session: Session = {
     engine,
     adapter,
     samples: samples(),
@@ -121,12 +126,15 @@ export async function openSession(canvas: HTMLCanvasElement): Promise<Session> {
       void watch();
     },
     loseDevice: () => raw.lose(),
+    memory: () => memory.buffer.byteLength,
     close() {
       frames.stop();
       client.close();
       raw.free();
     },
   };
+  globalThis.cagework = session;
+  return session;
 }
 
 function samples(): readonly Sample[] {

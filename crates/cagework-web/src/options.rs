@@ -2,7 +2,7 @@
 
 use cagework_core::BindOptions;
 use cagework_core::bind::{CellShape, DeltaNorm, Method, OutsidePolicy, Solver};
-use cagework_core::cage_gen::{CageOptions, Symmetry};
+use cagework_core::cage_gen::{CageOptions, Shape, Symmetry};
 use cagework_core::edit::{Element, GestureKind, SelectMode};
 use cagework_gpu::render::Theme;
 use serde::Deserialize;
@@ -67,6 +67,10 @@ pub(crate) struct CageAsked {
     vertices: u32,
     margin: f32,
     symmetry: SymmetryAsked,
+    #[serde(default)]
+    shape: Shape,
+    #[serde(default)]
+    per_component: bool,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -87,6 +91,8 @@ impl From<CageAsked> for CageOptions {
                 SymmetryAsked::On => Symmetry::X,
                 SymmetryAsked::Off => Symmetry::None,
             },
+            shape: asked.shape,
+            per_component: asked.per_component,
             ..Self::default()
         }
     }

@@ -38,11 +38,11 @@ pub(crate) fn build(profile: Profile) -> Result<(), String> {
         Profile::Web => "web",
     };
     let wasm = target_folder()?.join("wasm32-unknown-unknown").join(folder).join("cagework_web.wasm");
-    bindgen(&wasm)
+    bindgen(&wasm, profile)
 }
 
 /// Makes the JavaScript package.
-fn bindgen(wasm: &Path) -> Result<(), String> {
+fn bindgen(wasm: &Path, profile: Profile) -> Result<(), String> {
     let fault = |what: &str| {
         let what = what.to_owned();
         move |error: anyhow::Error| format!("{what}: {error:#}")
@@ -53,6 +53,9 @@ fn bindgen(wasm: &Path) -> Result<(), String> {
         .web(true)
         .map_err(fault("cannot target the web"))?
         .typescript(true)
+        // Names of functions are for debugging; they are a fifth of the file.
+        .remove_name_section(profile == Profile::Web)
+        .remove_producers_section(profile == Profile::Web)
         .out_name("cagework");
     bindgen.generate(root().join(PACKAGE)).map_err(fault("cannot make JavaScript of the wasm"))
 }

@@ -57,6 +57,8 @@ export interface Session {
   recover(canvas: HTMLCanvasElement): Promise<void>;
   /** For tests: destroys the device, as a driver reset would. */
   loseDevice(): void;
+  /** Bytes of the module's memory on this thread. */
+  memory(): number;
   close(): void;
 }
 
