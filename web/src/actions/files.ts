@@ -79,7 +79,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       return;
     }
     if (!familiar) goTo(["model", "cage"], "bind");
-    if ((await follow.bind()) && current()) goTo(["bind"], "pose");
+    if ((await follow.bind()) && current() && !familiar) goTo(["bind"], "pose");
   };
 
   const busy = async (what: string, title: string, work: () => Promise<void>): Promise<boolean> => {
