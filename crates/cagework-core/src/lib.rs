@@ -5,10 +5,15 @@
 
 pub mod bind;
 pub mod cage;
+pub mod cage_check;
 pub mod cage_gen;
 mod contact;
 pub mod deform;
+<<<<<<< HEAD
 pub mod edit;
+=======
+pub mod enclosure;
+>>>>>>> cages
 pub mod geometry;
 pub mod grid;
 pub mod levels;
@@ -16,6 +21,7 @@ pub mod mean_value;
 pub mod mesh;
 pub mod progress;
 pub mod report;
+pub mod rest_edit;
 pub mod sample;
 pub mod samples;
 mod simd;
