@@ -2,8 +2,9 @@
 
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
+import { test } from "@playwright/test";
 import { SCENE_DEFAULTS } from "../src/defaults";
-import { open, test } from "./support";
+import { open } from "./support";
 
 const FOLDER = join(import.meta.dirname, "../public/samples");
 

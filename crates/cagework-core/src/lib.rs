@@ -9,11 +9,8 @@ pub mod cage_check;
 pub mod cage_gen;
 mod contact;
 pub mod deform;
-<<<<<<< HEAD
 pub mod edit;
-=======
 pub mod enclosure;
->>>>>>> cages
 pub mod geometry;
 pub mod grid;
 pub mod levels;
