@@ -22,6 +22,7 @@ export function startUp({ app, stage, theme, shared, product }: Start): void {
   const { store } = app;
   const session = app.ctx.session();
   store.set({ adapter: session.adapter, samples: session.samples, busy: null });
+  if (isSoftware(session.adapter)) app.bind.setOptions({ backend: "cpu" });
 
   const resize = () => {
     const { clientWidth, clientHeight } = stage.viewport;
@@ -97,4 +98,9 @@ export function ago(ms: number): string {
   if (hours < 24) return `${hours} hour${hours === 1 ? "" : "s"} ago`;
   const days = Math.round(hours / 24);
   return `${days} day${days === 1 ? "" : "s"} ago`;
+}
+
+/** Whether a GPU is made of processor cores: then the processor itself binds faster, and drawing does not wait for it. */
+export function isSoftware(adapter: string): boolean {
+  return /swiftshader|llvmpipe|lavapipe|software|basic render/i.test(adapter);
 }

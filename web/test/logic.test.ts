@@ -6,7 +6,7 @@ import { nextAmount } from "../src/amount";
 import { BIND_DEFAULTS } from "../src/defaults";
 import { rectangle } from "../src/input/pointer";
 import { pinch } from "../src/input/touch";
-import { ago } from "../src/start";
+import { ago, isSoftware } from "../src/start";
 import { explain, isCancelled, sentence } from "../src/strings";
 import { historyPoints, scaleOf } from "../src/ui/plot";
 import { recognise } from "../src/ui/unsupported";
@@ -125,6 +125,12 @@ describe("words", () => {
     expect(ago(7_200_000)).toBe("2 hours ago");
     expect(ago(3 * 86_400_000)).toBe("3 days ago");
   });
+});
+
+it("tells software GPUs from real ones", () => {
+  expect(isSoftware("ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (LLVM 10.0.0)))")).toBe(true);
+  expect(isSoftware("llvmpipe (LLVM 15.0.6, 256 bits)")).toBe(true);
+  expect(isSoftware("NVIDIA GeForce RTX 4070")).toBe(false);
 });
 
 describe("browsers", () => {

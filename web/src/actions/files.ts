@@ -1,6 +1,6 @@
 /** Opening: samples, files and projects. What is opened gets a cage and is bound without further questions. */
 
-import type { NamedFile, Opened } from "../contract";
+import type { NamedFile, Opened, Sample } from "../contract";
 import { planDrop } from "../drop";
 import { stem } from "../format";
 import type { StepName } from "../state";
@@ -39,12 +39,13 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     turn += 1;
     const mine = turn;
     const settings = opened.project ? readSettings(opened.project.settings) : {};
+    const poses = opened.project?.poses ?? opened.poses ?? [];
     ctx.history.clear();
     store.set({
-      model: opened.project ? { ...opened.model, name: stem(opened.model.name) } : opened.model,
+      model: { ...opened.model, name: shownName(opened, sample, store.get().samples) },
       sample,
-      poses: opened.project?.poses ?? [],
-      shares: opened.project?.poses.map(() => 0) ?? [],
+      poses,
+      shares: poses.map(() => 0),
       editingRest: false,
       cageSource: "auto",
       playing: false,
@@ -129,4 +130,11 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       });
     },
   };
+}
+
+/** A sample is called by its label, a project by its model. */
+function shownName(opened: Opened, sample: string | null, samples: readonly Sample[]): string {
+  const { name } = opened.model;
+  const label = samples.find(({ id }) => id === sample)?.label;
+  return label ?? (opened.project ? stem(name) : name);
 }

@@ -148,7 +148,7 @@ export function createBindPanel(app: App): HTMLElement {
     delta.set(o.delta_norm);
     outside.set(o.outside === "closest_point");
     classicOnly.hidden = o.method !== "classic";
-    setText(about, describe(o));
+    setText(about, sayOptions(o));
   });
   store.watch(["adapter", "bindOptions"], (state) => {
     adapter.hidden = state.adapter === "" || state.bindOptions.backend === "cpu";
@@ -235,7 +235,7 @@ function curvesOf(
 }
 
 /** What the chosen combination is, as a sentence. */
-export function describe(options: BindOptions): string {
+export function sayOptions(options: BindOptions): string {
   const { method, solver } = options;
   if (method === "embedded") {
     return solver === "multigrid"

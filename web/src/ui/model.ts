@@ -40,8 +40,9 @@ export function createModelPanel(app: App): HTMLElement {
     h("p", { class: "privacy" }, icon("lock"), h("span", { text: PRIVACY })),
   );
 
-  app.store.watch(["model", "sample"], ({ model }) => {
-    fill(card, model ? modelCard(model) : null);
+  app.store.watch(["model", "sample", "samples"], ({ model, sample, samples }) => {
+    const sentenceOf = samples.find(({ id }) => id === sample)?.sentence;
+    fill(card, model ? modelCard(model, sentenceOf) : null);
   });
 
   const showSamples = keyed(gallery, () =>
@@ -84,7 +85,7 @@ export function createModelPanel(app: App): HTMLElement {
   return element;
 }
 
-function modelCard(model: ModelInfo): HTMLElement {
+function modelCard(model: ModelInfo, about: string | undefined): HTMLElement {
   const { min, max } = model.bounds;
   const size = max.map((value, i) => scientific(value - (min[i] ?? 0))).join(" × ");
   const rows: [string, string][] = [
@@ -106,6 +107,7 @@ function modelCard(model: ModelInfo): HTMLElement {
       h("strong", { class: "grow clip", text: model.name }),
       h("span", { class: "badge good" }, icon("check"), "Open"),
     ),
+    about ? h("p", { class: "hint", text: about }) : null,
     facts(rows),
     ...model.notices.map((notice) => h("p", { class: "hint", text: sentence(notice) })),
   );

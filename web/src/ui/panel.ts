@@ -22,7 +22,7 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
         ? {
             primary: state.bound
               ? { label: "Pose it", icon: "pose", run: () => app.go("pose") }
-              : { label: "Continue to the cage", run: () => app.go("cage") },
+              : { label: "Next: the cage", run: () => app.go("cage") },
             second: { label: "Open a file", icon: "open", run: () => app.chooseModel() },
           }
         : { primary: { label: "Open a file", icon: "open", run: () => app.chooseModel() } };
