@@ -22,6 +22,7 @@ const CHROMIUM_ARGS = [
 
 export default defineConfig({
   testDir: "e2e",
+  testMatch: process.env["PICTURES"] ? "pictures.ts" : "*.spec.ts",
   outputDir: "../target/e2e",
   // One GPU made of processor cores: two pages at a time would only wait for each other.
   workers: 1,

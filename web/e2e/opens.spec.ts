@@ -69,8 +69,9 @@ test("a link carries the pose", async ({ page, context }) => {
   await drag(page, -50, -30);
   const posed = await cagePositions(page);
   await page.getByRole("button", { name: /link/i }).first().click();
-  const link = await page.evaluate(() => navigator.clipboard.readText());
-  expect(link).toContain("#");
+  const copied = () => page.evaluate(() => navigator.clipboard.readText());
+  await expect.poll(copied).toContain("#");
+  const link = await copied();
   const other = await context.newPage();
   await open(other, link);
   expect(largestMove(posed, await cagePositions(other))).toBeLessThan(1e-3);

@@ -21,6 +21,9 @@ export const test = base.extend<{ complaints: string[] }>({
         if (message.type() === "error" || message.type() === "warning") complaints.push(message.text());
       });
       page.on("pageerror", (error) => complaints.push(`${error.name}: ${error.message}`));
+      page.on("response", (response) => {
+        if (response.status() >= 400) complaints.push(`${response.status()} ${response.url()}`);
+      });
       await use(complaints);
       expect(complaints, "the console is clean").toEqual([]);
     },

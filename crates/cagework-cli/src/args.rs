@@ -1,8 +1,10 @@
 //! The command line: what can be said, and what is refused before any work starts (exit code 2).
 
-use std::path::PathBuf;
-use std::str::FromStr;
+mod cages;
 
+use std::path::PathBuf;
+
+pub(crate) use cages::{CageArgs, CageSource, CheckArgs, DEFAULT_DIVISIONS, DEFAULT_MARGIN, KindArg};
 use cagework_core::bind::{BindOptions, CellShape, DeltaNorm, Method, OutsidePolicy, Solver};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
@@ -36,8 +38,10 @@ pub(crate) enum Command {
     Bind(BindArgs),
     /// Move the cage, and the mesh with it.
     Deform(DeformArgs),
-    /// Make a cage for a model: a subdivided box.
+    /// Make a cage for a model: one that follows it, its convex hull, or a subdivided box.
     Cage(CageArgs),
+    /// Say everything that is wrong with a cage, and mend what can be mended.
+    Check(CheckArgs),
     /// Time the paper's way against the default, on one thread and on all.
     Bench(BenchArgs),
     /// Run the paper's evaluation anew: times, errors and reconstructions, as CSV, SVG, GLB and words.
@@ -59,12 +63,13 @@ pub(crate) struct InfoArgs {
 #[command(after_help = "Examples:\n  \
     cagework bind horse.glb --cage cage.obj --weights horse.npz\n  \
     cagework bind horse.glb --cage cage.obj -g 128 --sparsify 1e-5 --report horse.json\n  \
-    cagework bind horse.obj --cage box:3 --save-cage box.obj -o rest.glb\n  \
+    cagework bind horse.obj --cage auto:80 --save-cage cage.obj -o rest.glb\n  \
     cagework bind horse.obj --cage cage.obj --method classic --threads 1   (the paper's way)")]
 pub(crate) struct BindArgs {
     /// Mesh to bind (.obj, .gltf, .glb).
     pub(crate) mesh: PathBuf,
-    /// Cage: a file, or box or box:DIVISIONS for a subdivided box around the mesh (box means box:2).
+    /// Cage: a file; auto or auto:VERTICES for one that follows the mesh; hull or hull:VERTICES; box or
+    /// box:DIVISIONS for a subdivided box.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
     /// Cells along the longest side of the cage, 8 to 512.
@@ -174,7 +179,7 @@ impl SolveArgs {
 pub(crate) struct DeformArgs {
     /// The mesh that was bound (.obj, .gltf, .glb).
     pub(crate) mesh: PathBuf,
-    /// The cage that it was bound to: a file, or the same box or box:DIVISIONS.
+    /// The cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
     /// The weights that `cagework bind --weights` wrote.
@@ -188,23 +193,6 @@ pub(crate) struct DeformArgs {
     pub(crate) output: PathBuf,
 }
 
-/// `cagework cage`
-#[derive(Args, Debug)]
-#[command(after_help = "Example:\n  cagework cage horse.glb -o cage.obj --divisions 3")]
-pub(crate) struct CageArgs {
-    /// Model to make a cage for (.obj, .gltf, .glb).
-    pub(crate) model: PathBuf,
-    /// File to write (.obj).
-    #[arg(short, long, value_name = "FILE", value_parser = obj_output)]
-    pub(crate) output: PathBuf,
-    /// Quads along each edge of the box.
-    #[arg(long, default_value_t = DEFAULT_DIVISIONS, value_name = "N", value_parser = divisions)]
-    pub(crate) divisions: u32,
-    /// Room around the model, as a fraction of its bounding box's diagonal.
-    #[arg(long, default_value_t = DEFAULT_MARGIN, value_name = "FRACTION", value_parser = positive)]
-    pub(crate) margin: f32,
-}
-
 /// `cagework bench`
 #[derive(Args, Debug)]
 #[command(after_help = "Without a mesh, the built-in sample is timed.\n\n\
@@ -213,7 +201,7 @@ pub(crate) struct BenchArgs {
     /// Mesh to bind (.obj, .gltf, .glb).
     #[arg(requires = "cage")]
     pub(crate) mesh: Option<PathBuf>,
-    /// Cage: a file, box or box:DIVISIONS.
+    /// Cage: a file, auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE", requires = "mesh")]
     pub(crate) cage: Option<CageSource>,
     /// Cells along the longest side of the cage; several, separated by commas.
@@ -233,7 +221,7 @@ pub(crate) struct EvaluateArgs {
     /// Mesh to bind (.obj, .gltf, .glb); the built-in sample unless given.
     #[arg(long, requires = "cage")]
     pub(crate) mesh: Option<PathBuf>,
-    /// Cage: a file, box or box:DIVISIONS.
+    /// Cage: a file, auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: Option<CageSource>,
     /// Folder to write to; it is made if it is missing.
@@ -251,37 +239,6 @@ pub(crate) struct DemoArgs {
     /// Folder to write to; it is made if it is missing.
     #[arg(short, long, value_name = "FOLDER", default_value = "out")]
     pub(crate) output: PathBuf,
-}
-
-/// Quads along each edge of a box cage unless said otherwise.
-pub(crate) const DEFAULT_DIVISIONS: u32 = 2;
-/// Room around the model in a box cage, as a fraction of its bounding box's diagonal.
-pub(crate) const DEFAULT_MARGIN: f32 = 0.05;
-/// 16 divisions make 1,538 cage vertices: more than anyone moves by hand, and still solved in minutes.
-const MAX_DIVISIONS: u32 = 16;
-
-/// Where a cage comes from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum CageSource {
-    /// A file.
-    File(PathBuf),
-    /// A subdivided box around the mesh.
-    Box {
-        /// Quads along each edge.
-        divisions: u32,
-    },
-}
-
-impl FromStr for CageSource {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.split_once(':') {
-            None if text == "box" => Ok(Self::Box { divisions: DEFAULT_DIVISIONS }),
-            Some(("box", number)) => Ok(Self::Box { divisions: divisions(number)? }),
-            _ => Ok(Self::File(PathBuf::from(text))),
-        }
-    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -330,13 +287,6 @@ fn fraction(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
         _ => Err("not a number from 0 to below 1".into()),
-    }
-}
-
-fn divisions(text: &str) -> Result<u32, String> {
-    match text.parse() {
-        Ok(n) if (1..=MAX_DIVISIONS).contains(&n) => Ok(n),
-        _ => Err(format!("divisions of a box cage are a whole number from 1 to {MAX_DIVISIONS}")),
     }
 }
 

@@ -1,43 +1,119 @@
 //! `cagework cage`: a cage for a model.
 
-use cagework_io::write_cage_obj;
+use cagework_core::cage_gen::{CageGenError, CageReport, generate};
+use cagework_core::{CageOptions, PolygonMesh};
+use cagework_io::{Model, write_cage_obj};
 use serde::Serialize;
 
-use crate::args::CageArgs;
+use crate::args::{CageArgs, DEFAULT_DIVISIONS, KindArg};
+use crate::bind::{export, is_obj};
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, write};
-use crate::load::{box_mesh, load_model};
+use crate::load::{box_mesh, generated_model, load_model};
+use crate::progress::Bar;
 
 /// What was made; its JSON is the output of `--json`.
 #[derive(Debug, Serialize)]
 struct Made {
     output: String,
     kind: &'static str,
-    divisions: u32,
-    margin: f32,
     vertices: usize,
     faces: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    divisions: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    margin: Option<f32>,
+    /// How a generated cage came about.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    report: Option<CageReport>,
 }
 
 /// Runs `cagework cage`.
 ///
 /// # Errors
-/// When the model cannot be read or the cage cannot be written.
+/// When the model cannot be read or the cage cannot be made or written.
 pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
     check_outputs(&[&args.output], &[&args.model])?;
     let model = load_model(&args.model)?;
-    let cage = box_mesh(&model.positions, args.divisions, args.margin)?;
-    write(&args.output, &write_cage_obj(&cage))?;
-    let made = Made {
+    let mut made = Made {
         output: args.output.display().to_string(),
         kind: "box",
-        divisions: args.divisions,
-        margin: args.margin,
-        vertices: cage.positions.len(),
-        faces: cage.faces.len(),
+        vertices: 0,
+        faces: 0,
+        divisions: None,
+        margin: None,
+        report: None,
     };
+    let cage = match args.kind() {
+        KindArg::Box => {
+            let divisions = args.divisions.unwrap_or(DEFAULT_DIVISIONS);
+            (made.divisions, made.margin) = (Some(divisions), Some(args.margin));
+            box_mesh(&model.positions, divisions, args.margin)?
+        }
+        kind => {
+            made.kind = if kind == KindArg::Hull { "hull" } else { "auto" };
+            let (cage, report) = generate_for(&model, &args.options())?;
+            made.report = Some(report);
+            cage
+        }
+    };
+    (made.vertices, made.faces) = (cage.positions.len(), cage.faces.len());
+    write_cage(args.output.as_path(), &cage)?;
     if as_json {
         return print(&json(&made));
     }
-    print(&format!("wrote {}: a box of {} vertices and {} faces", made.output, made.vertices, made.faces))
+    print(&text(&made))
+}
+
+/// A generated cage around a model, with progress on the terminal.
+///
+/// # Errors
+/// Those of [`generate`].
+pub(crate) fn generate_for(
+    model: &Model,
+    options: &CageOptions,
+) -> Result<(PolygonMesh, CageReport), CageGenError> {
+    let bar = Bar::start();
+    let made = generate(&model.positions, &model.triangles, options, &bar)?;
+    Ok((made.cage.to_polygon_mesh(), made.report))
+}
+
+/// Writes a cage in the format that the name asks for.
+///
+/// # Errors
+/// When it cannot be written.
+pub(crate) fn write_cage(path: &std::path::Path, cage: &PolygonMesh) -> Result<(), CliError> {
+    let bytes = if is_obj(path) {
+        write_cage_obj(cage)
+    } else {
+        export(&generated_model("cage.obj", cage)?, &cage.positions, path)?
+    };
+    write(path, &bytes)
+}
+
+fn text(made: &Made) -> String {
+    let Some(report) = &made.report else {
+        return format!(
+            "wrote {}: a box of {} vertices and {} faces",
+            made.output, made.vertices, made.faces
+        );
+    };
+    let mut text = format!(
+        "wrote {}: {} vertices and {} triangles in {:.0} ms; it keeps {:.3} from the model",
+        made.output, made.vertices, made.faces, report.elapsed_ms, report.clearance
+    );
+    if let Some(mirror) = report.mirror {
+        text.push_str(&format!(", is symmetric in {}", format!("{mirror:?}").to_lowercase()));
+    }
+    if report.parts > 1 {
+        text.push_str(&format!(", has {} closed parts", report.parts));
+    }
+    if !report.target_met {
+        text.push_str(&format!(
+            ".\nnote: the model's holes and gaps need more than the {} vertices asked for; --voxels with a smaller \
+             number than {} closes more of them",
+            report.target, report.voxels
+        ));
+    }
+    text
 }

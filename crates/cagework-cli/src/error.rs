@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use cagework_core::bind::BindError;
 use cagework_core::cage::CageError;
+use cagework_core::cage_check::RepairError;
+use cagework_core::cage_gen::CageGenError;
 use thiserror::Error;
 
 /// Why a command failed.
@@ -35,6 +37,12 @@ pub(crate) enum CliError {
     /// The bind did not come about.
     #[error(transparent)]
     Bind(#[from] BindError),
+    /// No cage was generated.
+    #[error(transparent)]
+    CageGen(#[from] CageGenError),
+    /// The cage could not be mended.
+    #[error(transparent)]
+    Repair(#[from] RepairError),
     /// A plot could not be drawn.
     #[error("a plot cannot be drawn: {message}")]
     Plot {
@@ -77,11 +85,12 @@ impl CliError {
         match self {
             Self::Mismatch { hint, .. } => Some(hint),
             Self::Cage { source: CageError::Empty, .. } => {
-                Some("a cage is a closed mesh around the model; `--cage box` makes a simple one")
+                Some("a cage is a closed mesh around the model; `--cage auto` makes one")
             }
             Self::Bind(BindError::Outside { .. }) => {
                 Some("`--outside closest-point` binds such vertices to the closest point of the cage")
             }
+            Self::Repair(RepairError::NoModel) => Some("`--mesh` names it"),
             Self::Bind(BindError::Memory { .. }) => Some("the limit is set by --memory-limit, in MiB"),
             _ => None,
         }

@@ -7,6 +7,7 @@ use cagework_io::{Model, write_cage_obj};
 use glam::Vec3;
 
 use crate::args::{CageSource, DEFAULT_MARGIN};
+use crate::cage::generate_for;
 use crate::error::CliError;
 use crate::files::{read, read_beside};
 
@@ -52,6 +53,7 @@ pub(crate) fn load_cage(source: &CageSource, around: &Model) -> Result<LoadedCag
         CageSource::Box { divisions } => {
             generated_model("box cage", &box_mesh(&around.positions, *divisions, DEFAULT_MARGIN)?)?
         }
+        CageSource::Auto(options) => generated_model("generated cage", &generate_for(around, options)?.0)?,
     };
     let cage = Cage::new(&model.cage_mesh())
         .map_err(|source| CliError::Cage { name: model.name.clone(), source })?;

@@ -7,6 +7,7 @@ mod bench;
 mod bind;
 mod cage;
 mod card;
+mod check;
 mod deform;
 mod demo;
 mod error;
@@ -35,6 +36,7 @@ fn main() -> ExitCode {
         Command::Bind(args) => bind::run(args, cli.json),
         Command::Deform(args) => deform::run(args, cli.json),
         Command::Cage(args) => cage::run(args, cli.json),
+        Command::Check(args) => check::run(args, cli.json),
         Command::Bench(args) => bench::run(args, cli.json),
         Command::Evaluate(args) => evaluate::run(args, cli.json),
         Command::Demo(args) => demo::run(args, cli.json),

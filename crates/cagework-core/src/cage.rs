@@ -207,6 +207,11 @@ impl Cage {
     }
 }
 
+/// Triangles that cover a face, as corners of it; `diagonal` of the cage.
+pub(crate) fn face_triangles(corners: &[DVec3], diagonal: f64) -> Result<Vec<[u32; 3]>, FaceDefect> {
+    Polygon::new(corners, diagonal).map(|polygon| polygon.triangles)
+}
+
 /// What can be told without looking at edges; returns the bounds of the vertices that faces use.
 fn check_numbers(mesh: &PolygonMesh) -> Result<Bounds, CageError> {
     let n = mesh.positions.len();

@@ -41,7 +41,7 @@ impl Corners {
     }
 
     /// The triangle rotated so that corner `k` comes first.
-    fn from_corner(&self, k: usize) -> [DVec3; 3] {
+    fn turned_to(&self, k: usize) -> [DVec3; 3] {
         [self.at[k], self.at[(k + 1) % 3], self.at[(k + 2) % 3]]
     }
 }
@@ -59,7 +59,7 @@ pub(crate) fn meet(a: &Corners, b: &Corners, gap: f64) -> bool {
     }
     match n {
         0 => !are_apart(&a.at, &b.at, gap),
-        1 => cones_meet(a.from_corner(shared[0].0), b.from_corner(shared[0].1)),
+        1 => cones_meet(a.turned_to(shared[0].0), b.turned_to(shared[0].1)),
         2 => {
             let tip = |c: &Corners, i: usize, j: usize| c.at[3 - i - j];
             let (edge_a, edge_b) = (a.at[shared[0].0], a.at[shared[1].0]);

@@ -5,10 +5,12 @@
 
 pub mod bind;
 pub mod cage;
+pub mod cage_check;
 pub mod cage_gen;
 mod contact;
 pub mod deform;
 pub mod edit;
+pub mod enclosure;
 pub mod geometry;
 pub mod grid;
 pub mod levels;
@@ -16,6 +18,7 @@ pub mod mean_value;
 pub mod mesh;
 pub mod progress;
 pub mod report;
+pub mod rest_edit;
 pub mod sample;
 pub mod samples;
 mod simd;

@@ -3,7 +3,9 @@
 //! Per cycle two numbers come back, the squares of the coarse correction (the stop rule's delta) and of the residual.
 
 use cagework_core::solve::hierarchy::Hierarchy;
-use cagework_core::solve::multigrid::{BatchReport, COARSEST_SWEEPS, Convergence, OMEGA, Stop};
+use cagework_core::solve::multigrid::{
+    BatchReport, COARSEST_OMEGA, COARSEST_SWEEPS, Convergence, OMEGA, Stop,
+};
 use cagework_core::stencil::REDUCE_VALUES;
 
 use crate::buffers::{Allocator, Readback};
@@ -217,8 +219,8 @@ impl Multigrid {
             stream.copy(field, before, bytes);
         }
         for _ in 0..COARSEST_SWEEPS {
-            self.relax(stream, coarsest, 0, 1.0).await?;
-            self.relax(stream, coarsest, 1, 1.0).await?;
+            self.relax(stream, coarsest, 0, COARSEST_OMEGA).await?;
+            self.relax(stream, coarsest, 1, COARSEST_OMEGA).await?;
         }
         if let Some((_, changes, sum)) = measured {
             let work = Work { n_quads: self.n_quads, mode: mode::CHANGE_FIRST, ..Work::default() };

@@ -3,8 +3,10 @@
 use std::fmt::{Debug, Display};
 
 use cagework_core::cage::CageError;
+use cagework_core::cage_check::RepairError;
 use cagework_core::cage_gen::CageGenError;
 use cagework_core::edit::PoseError;
+use cagework_core::rest_edit::RestEditError;
 use cagework_core::slice::SliceError;
 use cagework_core::weights::WeightsError;
 use cagework_core::{BindError, MeanValueError};
@@ -72,6 +74,8 @@ plain!(
     NpzError,
     PoseCodeError,
     PoseError,
+    RepairError,
+    RestEditError,
     SliceError,
     WeightsError,
     WriteError

@@ -12,6 +12,7 @@ mod error;
 mod gpu;
 pub mod loaded;
 mod options;
+mod problems;
 mod state;
 mod surface;
 mod views;

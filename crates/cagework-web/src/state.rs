@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cagework_core::cage::CageError;
+use cagework_core::cage_check::CageCheck;
 use cagework_core::edit::{Element, Gesture, Pull, Selection, SharedPull, Symmetry, Topology};
 use cagework_core::slice::Slice;
 use cagework_core::{Bounds, Cage, PolygonMesh};
@@ -13,7 +13,8 @@ use glam::{Vec2, Vec3};
 
 use crate::error::Fault;
 use crate::options::SceneAsked;
-use crate::views::{CageInfo, CageState, Problem};
+use crate::problems;
+use crate::views::{CageInfo, CageState};
 
 /// Model, cage, selection, gesture and camera of a page.
 #[derive(Default)]
@@ -25,7 +26,8 @@ pub(crate) struct State {
     pub(crate) rest: PolygonMesh,
     pub(crate) topology: Topology,
     pub(crate) symmetry: Symmetry,
-    pub(crate) problems: Vec<Problem>,
+    /// What is wrong with the cage.
+    pub(crate) check: Option<CageCheck>,
     /// Where the cage is. `[n_cage]`
     pub(crate) positions: Vec<Vec3>,
     pub(crate) editing_rest: bool,
@@ -67,18 +69,10 @@ impl State {
 
     /// Another cage, or a draft of one.
     pub(crate) fn set_cage(&mut self, mesh: PolygonMesh) {
-        let made = if mesh.faces.is_empty() { None } else { Some(Cage::new(&mesh)) };
-        self.problems.clear();
-        self.cage = None;
-        self.rest = mesh;
-        match made {
-            Some(Ok(cage)) => {
-                self.rest = cage.to_polygon_mesh();
-                self.cage = Some(cage);
-            }
-            Some(Err(error)) => self.problems = vec![draft_problem(&error)],
-            None => {}
-        }
+        self.check = (!mesh.faces.is_empty()).then(|| problems::find(&mesh, self.model_positions()));
+        self.cage = Cage::new(&mesh).ok();
+        // Turned outward, seams closed.
+        self.rest = self.cage.as_ref().map_or(mesh, Cage::to_polygon_mesh);
         self.topology = Topology::new(&self.rest.faces);
         self.symmetry = Symmetry::new(&self.rest.positions);
         self.positions.clone_from(&self.rest.positions);
@@ -92,6 +86,10 @@ impl State {
         self.is_moved = true;
         self.is_changed = true;
         self.fit_camera();
+    }
+
+    pub(crate) fn model_positions(&self) -> Option<&[Vec3]> {
+        self.model.as_ref().map(|m| &m.positions[..])
     }
 
     /// Tells the camera where everything is.
@@ -134,7 +132,7 @@ impl State {
         (!self.rest.faces.is_empty()).then(|| CageState {
             usable: self.cage.is_some(),
             info: CageInfo::of(&self.rest, self.cage.as_ref()),
-            problems: self.problems.clone(),
+            problems: self.check.iter().flat_map(|c| &c.problems).map(problems::view).collect(),
         })
     }
 
@@ -180,26 +178,4 @@ impl State {
         self.is_moved &= !self.is_on_gpu() && self.cage.is_some();
         self.is_changed = false;
     }
-}
-
-/// The reason why a mesh is no cage yet.
-fn draft_problem(error: &CageError) -> Problem {
-    let debug = format!("{error:?}");
-    let end = debug.find(|c: char| !c.is_alphanumeric()).unwrap_or(debug.len());
-    let count = if let CageError::Open { count, .. } = error { *count } else { 1 };
-    Problem {
-        kind: debug[..end].to_owned(),
-        severity: "error",
-        message: sentence(&error.to_string()),
-        count,
-        fix: None,
-    }
-}
-
-/// A message as a sentence: it begins with a capital and ends with a full stop.
-pub(crate) fn sentence(message: &str) -> String {
-    let mut chars = message.chars();
-    let first = chars.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
-    let end = if message.ends_with(['.', '!', '?']) { "" } else { "." };
-    format!("{first}{}{end}", chars.as_str())
 }

@@ -21,6 +21,7 @@ const USAGE: &str = "usage: cargo xtask TASK
   wasm [--dev]   crates/cagework-web as a JavaScript package, web/src/pkg
   page           build the page only
   page-test [ARGS]  build the page and test it in a browser (ARGS for Playwright)
+  pictures       make the pictures of the samples that the page shows
   demo [ARGS]    build the release `cagework` and run `cagework demo ARGS` on the built-in sample";
 
 fn main() -> ExitCode {
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
         ["start", rest @ ..] => site::start(rest),
         ["page"] => site::build(),
         ["page-test", rest @ ..] => site::test_page(rest),
+        ["pictures"] => site::pictures(),
         ["demo", rest @ ..] => tasks::demo(rest),
         ["build"] => tasks::build(),
         ["test"] => tasks::test(),

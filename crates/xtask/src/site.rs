@@ -1,6 +1,6 @@
 //! The page: built into `dist/`, served, tested in a browser.
 
-use crate::command::root;
+use crate::command::{root, run};
 use crate::npm::{self, exec};
 use crate::wasm::{self, Profile};
 
@@ -50,6 +50,16 @@ pub(crate) fn test_scripts() -> Result<(), String> {
 pub(crate) fn test_page(args: &[&str]) -> Result<(), String> {
     build()?;
     exec(&[&["playwright", "test", "--config", "web/playwright.config.ts"], args].concat())
+}
+
+/// Makes the pictures of the samples that the page shows, `web/public/samples`.
+///
+/// # Errors
+/// When a step fails.
+pub(crate) fn pictures() -> Result<(), String> {
+    build()?;
+    let playwright = ["--no-install", "playwright", "test", "--config", "web/playwright.config.ts"];
+    run("npx", &playwright, &[("PICTURES", "1")])
 }
 
 /// Types of the TypeScript, which the build does not look at.

@@ -6,6 +6,7 @@ mod bad_input;
 mod bench_and_demo;
 mod bind;
 mod cage_and_info;
+mod cages;
 mod deform;
 mod support;
 mod usage;

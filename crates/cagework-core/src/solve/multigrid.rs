@@ -22,8 +22,12 @@ use crate::transfer::Transfer;
 /// Over-relaxation of the first black half sweep: 1.1 to 1.3 all lower the error 1.5 to 2 times per cycle (Armadillo).
 pub const OMEGA: f32 = 1.2;
 
-/// Sweeps on the coarsest level, which has at most a few hundred unknowns.
-pub const COARSEST_SWEEPS: usize = 24;
+/// Sweeps on the coarsest level, which has at most a few hundred unknowns, six or so across.
+pub const COARSEST_SWEEPS: usize = 8;
+
+/// Their over-relaxation. Six cells across, Jacobi leaves 0.90 of the error, for which 1.4 is Young's optimum: 0.4 are
+/// left after a sweep, where 0.8 are without.
+pub const COARSEST_OMEGA: f32 = 1.4;
 
 /// What a cycle leaves of the error, at worst: 0.03 to 0.10 measured, on the Armadillo and on boxes.
 const CONTRACTION: f64 = 0.12;
@@ -209,7 +213,7 @@ impl Workspace {
     /// cost is measured.
     pub fn sweep(&mut self, hierarchy: &Hierarchy) {
         let (level, u, f) = (&hierarchy.levels[0], &mut self.u[0], Rhs::Cut(&self.f[0]));
-        relax(level, u, f, 1);
+        relax(level, u, f);
     }
 
     /// One V(2,1) cycle on the finest level, after [`Self::solve`] has set up a batch: for measuring.
@@ -310,16 +314,14 @@ fn post_smooth(level: &Level, transfer: &Transfer, coarse: &[Row], u: &mut [Row]
     );
 }
 
-/// Plain red-black sweeps.
-fn relax(level: &Level, u: &mut [Row], f: Rhs<'_>, sweeps: usize) {
+/// A plain red-black sweep.
+fn relax(level: &Level, u: &mut [Row], f: Rhs<'_>) {
     dispatch(
         #[inline(always)]
         || {
-            for _ in 0..sweeps {
-                for colour in 0..2 {
-                    for plane in 0..level.grid.dims[2] as usize {
-                        relax_plane(level, colour, plane, u, f);
-                    }
+            for colour in 0..2 {
+                for plane in 0..level.grid.dims[2] as usize {
+                    relax_plane(level, colour, plane, u, f);
                 }
             }
         },
@@ -329,7 +331,18 @@ fn relax(level: &Level, u: &mut [Row], f: Rhs<'_>, sweeps: usize) {
 /// Sweeps on the coarsest level. Returns (squared norm of the change per unknown, 0).
 fn relax_coarsest(level: &Level, u: &mut [Row], f: Rhs<'_>) -> (f64, f64) {
     let before = u.to_vec();
-    relax(level, u, f, COARSEST_SWEEPS);
+    dispatch(
+        #[inline(always)]
+        || {
+            for _ in 0..COARSEST_SWEEPS {
+                for colour in 0..2 {
+                    for plane in 0..level.grid.dims[2] as usize {
+                        over_relax_plane(level, colour, plane, COARSEST_OMEGA, u, f);
+                    }
+                }
+            }
+        },
+    );
     let change: f64 = before
         .iter()
         .zip(u.iter())

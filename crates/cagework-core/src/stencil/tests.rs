@@ -5,7 +5,7 @@ use crate::cage_gen::subdivided_box;
 use crate::mesh::Bounds;
 use crate::progress::Silent;
 use crate::solve::jacobi::{self, StopRule};
-use crate::solve::multigrid::{OMEGA, Stop, Workspace};
+use crate::solve::multigrid::{COARSEST_OMEGA, COARSEST_SWEEPS, OMEGA, Stop, Workspace};
 use crate::solve::rows::{LANES, Row};
 use crate::solve::team::Team;
 use crate::{Cage, deform};
@@ -106,9 +106,9 @@ fn multigrid_of_twins_equals_the_fast_one() {
                 restrict_residual(LANES, &transfers[fine].around, &red, &mut f[fine + 1]);
                 u[fine + 1].fill(0.0);
             }
-            for _ in 0..crate::solve::multigrid::COARSEST_SWEEPS {
-                relax(n - 1, 0, 1.0, &mut u[n - 1], &f[n - 1]);
-                relax(n - 1, 1, 1.0, &mut u[n - 1], &f[n - 1]);
+            for _ in 0..COARSEST_SWEEPS {
+                relax(n - 1, 0, COARSEST_OMEGA, &mut u[n - 1], &f[n - 1]);
+                relax(n - 1, 1, COARSEST_OMEGA, &mut u[n - 1], &f[n - 1]);
             }
             for fine in (k..n - 1).rev() {
                 prolong(fine, Prolong::Correct, &mut u);

@@ -5,13 +5,14 @@ use std::sync::Arc;
 use cagework_core::edit::Element;
 use cagework_gpu::render::colormap::ERROR_RANGE;
 use cagework_gpu::render::{Gizmo, GizmoMode, Marks, MeshStyle, SceneOptions, Selection, SliceView};
-use glam::{Quat, Vec3};
+use glam::Quat;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::error::Fault;
 use crate::options::{Colour, GizmoAsked, SceneAsked, SliceShown};
+use crate::problems;
 use crate::state::State;
 use crate::views::{Legend, object};
 
@@ -133,14 +134,9 @@ impl State {
 
     /// Places with a problem; all of a draft is one.
     fn marks(&self) -> Marks {
-        if self.cage.is_some() || !self.view.problems {
-            return Marks::default();
-        }
-        let at = |i: u32| self.positions.get(i as usize).copied().unwrap_or(Vec3::ZERO);
-        Marks {
-            segments: self.topology.edges.iter().map(|e| e.map(at)).collect(),
-            points: self.positions.clone(),
-            ..Marks::default()
+        match self.check.as_ref().filter(|_| self.view.problems) {
+            Some(check) => problems::marks(check, &self.rest, &self.positions, self.cage.is_none()),
+            None => Marks::default(),
         }
     }
 }

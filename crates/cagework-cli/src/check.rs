@@ -1,0 +1,123 @@
+//! `cagework check`: everything that is wrong with a cage, and what can be mended.
+
+use std::fmt::Write as _;
+
+use cagework_core::cage_check::{CageCheck, Fix, Repair, Severity, check, repair};
+use serde::Serialize;
+
+use crate::args::CheckArgs;
+use crate::cage::write_cage;
+use crate::error::CliError;
+use crate::files::{check_outputs, json, print};
+use crate::load::load_model;
+
+/// What `check` says; its JSON is the output of `--json`.
+#[derive(Debug, Serialize)]
+struct Checked {
+    file: String,
+    /// What was mended, a sentence each.
+    repaired: Vec<String>,
+    /// The mended cage's file.
+    output: Option<String>,
+    /// The state after the repairs.
+    #[serde(flatten)]
+    check: CageCheck,
+}
+
+/// Runs `cagework check`.
+///
+/// # Errors
+/// When a file cannot be read or written, or the mesh cannot be used as a cage.
+pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
+    let inputs: Vec<_> =
+        std::iter::once(&args.cage).chain(&args.mesh).map(std::path::PathBuf::as_path).collect();
+    let outputs: Vec<_> = args.output.iter().map(std::path::PathBuf::as_path).collect();
+    check_outputs(&outputs, &inputs)?;
+    let mut cage = load_model(&args.cage)?.cage_mesh();
+    let model = args.mesh.as_deref().map(load_model).transpose()?;
+    let inside = model.as_ref().map(|m| m.positions.as_slice());
+    let mut checked = Checked {
+        file: args.cage.display().to_string(),
+        repaired: Vec::new(),
+        output: None,
+        check: check(&cage, inside, Some(args.grid)),
+    };
+    if let Some(path) = &args.output {
+        let repairs: Vec<Repair> = args.repair.iter().map(|&r| r.into()).collect();
+        let mended = repair(&cage, &repairs, inside)?;
+        cage = mended.mesh;
+        write_cage(path, &cage)?;
+        checked.repaired = mended.done;
+        checked.output = Some(path.display().to_string());
+        checked.check = check(&cage, inside, Some(args.grid));
+    }
+    print(&if as_json { json(&checked) } else { text(&checked) })?;
+    if checked.check.valid {
+        return Ok(());
+    }
+    let errors = checked.check.problems.iter().filter(|p| p.severity == Severity::Error).count();
+    Err(CliError::Mismatch {
+        message: format!(
+            "{} cannot be used as a cage: {errors} {}",
+            args.cage.display(),
+            if errors == 1 { "kind of fault" } else { "kinds of faults" }
+        ),
+        hint: "`cagework check CAGE --repair weld,drop-degenerate,fill-holes,flip -o FILE` mends what it can",
+    })
+}
+
+fn text(checked: &Checked) -> String {
+    let check = &checked.check;
+    let mut out = format!(
+        "{}: {} vertices, {} faces, {} {}\n",
+        checked.file,
+        check.vertices,
+        check.faces,
+        check.components,
+        if check.components == 1 { "component" } else { "components" }
+    );
+    for done in &checked.repaired {
+        let _ = writeln!(out, "mended: {done}");
+    }
+    for p in &check.problems {
+        let name = match p.severity {
+            Severity::Error => "fault",
+            Severity::Warning => "warning",
+            Severity::Note => "note",
+        };
+        let _ = write!(out, "{name}: {}", p.message);
+        if let Some(place) = place(p) {
+            let _ = write!(out, " First: {place}.");
+        }
+        if let Some(Fix::Repair { repair }) = p.fixes.first() {
+            let name = json(repair).replace(['"', '\n'], "").replace('_', "-");
+            let _ = write!(out, " (--repair {name})");
+        }
+        out.push('\n');
+    }
+    if check.valid {
+        out.push_str("valid as a cage");
+        match check.encloses {
+            Some(true) => out.push_str(", and the whole model is inside"),
+            Some(false) => out.push_str(", but not all of the model is inside"),
+            None => {}
+        }
+        out.push('\n');
+    }
+    if let Some(output) = &checked.output {
+        let _ = writeln!(out, "wrote {output}");
+    }
+    out
+}
+
+/// The first place of a problem in words.
+fn place(p: &cagework_core::cage_check::Problem) -> Option<String> {
+    let places = &p.places;
+    if let Some([a, b]) = places.edges.first() {
+        return Some(format!("edge {a}-{b}"));
+    }
+    if let Some(f) = places.faces.first() {
+        return Some(format!("face {f}"));
+    }
+    places.vertices.first().map(|v| format!("vertex {v}"))
+}

@@ -1,0 +1,81 @@
+use predicates::str::contains;
+
+use crate::support::{CORNERS, Sandbox, box_obj, glb_json};
+
+#[test]
+fn generated_cage_encloses_the_model_and_is_bound_without_outsiders() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    let made = sandbox.json("cage mesh.obj -o auto.obj --vertices 40 --json");
+    assert_eq!(made["kind"], "auto");
+    assert!((12..=44).contains(&made["vertices"].as_u64().unwrap()));
+    assert_eq!(made["report"]["target_met"], true);
+    let check = sandbox.json("check auto.obj --mesh mesh.obj -g 32 --json");
+    assert_eq!(check["valid"], true);
+    assert_eq!(check["encloses"], true);
+    let bound = sandbox.json("bind mesh.obj --cage auto.obj -g 16 --json");
+    assert_eq!(bound["outside_vertices"], 0);
+    assert_eq!(bound["cage_vertices"], made["vertices"]);
+}
+
+#[test]
+fn kinds_of_cages_can_be_named_wherever_a_cage_is() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    for (name, at_most) in [("auto:24", 27), ("hull:16", 18), ("auto", 88), ("box:1", 8)] {
+        let bound = sandbox.json(&format!("bind mesh.obj --cage {name} -g 16 --save-cage c.obj --json"));
+        assert!(bound["cage_vertices"].as_u64().unwrap() <= at_most, "{name}: {}", bound["cage_vertices"]);
+        assert_eq!(bound["outside_vertices"], 0, "{name}");
+        sandbox.run("check c.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
+    }
+    for (name, word) in [("auto:5", "from 12 to 400"), ("hull:x", "whole number"), ("box:99", "from 1 to 16")]
+    {
+        sandbox.run(&format!("bind mesh.obj --cage {name}")).code(2).stderr(contains(word));
+    }
+}
+
+#[test]
+fn cage_is_written_as_glb_too() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    sandbox.run("cage mesh.obj -o cage.glb --kind hull").success().stdout(contains("wrote cage.glb"));
+    assert_eq!(glb_json(&sandbox.read("cage.glb"))["asset"]["version"], "2.0");
+    assert_eq!(sandbox.json("info cage.glb --json")["cage"]["valid"], true);
+}
+
+#[test]
+fn symmetric_model_gets_a_mirror_and_may_be_refused_one() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    let made = sandbox.json("cage mesh.obj -o a.obj --vertices 30 --json");
+    assert_eq!(made["report"]["mirror"], "x");
+    let made = sandbox.json("cage mesh.obj -o b.obj --vertices 30 --symmetry none --json");
+    assert!(made["report"]["mirror"].is_null());
+}
+
+#[test]
+fn check_names_the_fault_and_repair_mends_it() {
+    let sandbox = Sandbox::new();
+    sandbox.write("open.obj", box_obj(&CORNERS).replace("f 5 6 8 7\n", "").replace("f 1 2 6 5", "f 5 6 2 1"));
+    let assert = sandbox.run("check open.obj --json").code(1).stderr(contains("cannot be used as a cage"));
+    let check: serde_json::Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
+    assert_eq!(check["valid"], false);
+    let problem = &check["problems"][0];
+    assert_eq!((problem["code"].as_str(), problem["count"].as_u64()), (Some("open_edge"), Some(4)));
+    assert_eq!(problem["places"]["edges"].as_array().unwrap().len(), 4);
+    assert_eq!(problem["fixes"][0]["repair"], "fill_holes");
+    sandbox.run("check open.obj").code(1).stdout(contains("--repair fill-holes"));
+
+    let mended = sandbox.json("check open.obj --repair fill-holes,flip -o mended.obj --json");
+    assert_eq!(mended["valid"], true);
+    assert_eq!(mended["repaired"].as_array().unwrap().len(), 2);
+    assert_eq!(sandbox.json("info mended.obj --json")["cage"]["notices"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn small_cage_grows_around_the_model() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    let half = CORNERS.map(|c| c.map(|x| 0.6 * x));
+    sandbox.write("small.obj", box_obj(&half));
+    let before = sandbox.json("check small.obj --mesh mesh.obj --json");
+    assert_eq!(before["encloses"], false);
+    let after = sandbox.json("check small.obj --mesh mesh.obj --repair grow -o grown.obj --json");
+    assert_eq!(after["encloses"], true);
+    sandbox.run("check small.obj --repair grow -o other.obj").code(1).stderr(contains("--mesh"));
+}

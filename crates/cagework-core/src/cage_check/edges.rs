@@ -1,0 +1,227 @@
+//! Faults of the connectivity: open and crowded edges, vertices that are not joined, not used or pinched.
+
+use std::collections::HashMap;
+
+use super::{Code, Fix, Places, Problem, Repair, Severity, counted, diagonal, problem};
+use crate::mesh::PolygonMesh;
+
+/// Vertices nearer than this fraction of the diagonal are at one place: the rounding of six decimals in a file.
+pub(super) const SAME_PLACE: f64 = 2e-6;
+
+/// A side of a face, run through from `lo` to `hi` if `forward`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Side {
+    pub(super) lo: u32,
+    pub(super) hi: u32,
+    pub(super) face: u32,
+    pub(super) forward: bool,
+}
+
+/// All sides of sound faces, sorted by edge.
+#[derive(Debug)]
+pub(super) struct Edges {
+    sides: Vec<Side>,
+}
+
+impl Edges {
+    pub(super) fn of(mesh: &PolygonMesh, sound: &[u32]) -> Self {
+        let mut sides = Vec::new();
+        for &f in sound {
+            let face = &mesh.faces[f as usize];
+            for (k, &a) in face.iter().enumerate() {
+                let b = face[(k + 1) % face.len()];
+                sides.push(Side { lo: a.min(b), hi: a.max(b), face: f, forward: a < b });
+            }
+        }
+        sides.sort_unstable();
+        Self { sides }
+    }
+
+    /// The sides of every edge.
+    pub(super) fn groups(&self) -> impl Iterator<Item = &[Side]> {
+        self.sides.chunk_by(|a, b| (a.lo, a.hi) == (b.lo, b.hi))
+    }
+
+    /// Edges of exactly one face, run through as the missing neighbour would have to.
+    pub(super) fn open(&self) -> Vec<[u32; 2]> {
+        self.groups()
+            .filter(|g| g.len() == 1)
+            .map(|g| if g[0].forward { [g[0].hi, g[0].lo] } else { [g[0].lo, g[0].hi] })
+            .collect()
+    }
+
+    /// Reports edges that do not belong to two faces.
+    pub(super) fn report(&self, mesh: &PolygonMesh, found: &mut Vec<Problem>) {
+        let open = self.open();
+        if !open.is_empty() {
+            // Vertices that were split at a seam leave open edges, too: welding is tried first.
+            let (_, joined) = same_places(mesh);
+            let fixes = [Repair::Weld, Repair::FillHoles].into_iter();
+            let fixes = fixes.filter(|&r| r != Repair::Weld || joined > 0);
+            found.push(Problem {
+                places: Places {
+                    edges: open.iter().map(|&[a, b]| [a.min(b), a.max(b)]).collect(),
+                    ..Places::default()
+                },
+                fixes: fixes.map(|repair| Fix::Repair { repair }).collect(),
+                ..problem(
+                    Code::OpenEdge,
+                    Severity::Error,
+                    open.len(),
+                    format!(
+                        "The cage is not closed: {} to one face only.",
+                        counted(open.len(), "edge belongs", "edges belong")
+                    ),
+                )
+            });
+        }
+        let crowded: Vec<&[Side]> = self.groups().filter(|g| g.len() > 2).collect();
+        if !crowded.is_empty() {
+            let mut faces: Vec<u32> = crowded.iter().flat_map(|g| g.iter().map(|s| s.face)).collect();
+            faces.sort_unstable();
+            faces.dedup();
+            found.push(Problem {
+                places: Places {
+                    edges: crowded.iter().map(|g| [g[0].lo, g[0].hi]).collect(),
+                    faces,
+                    ..Places::default()
+                },
+                ..problem(
+                    Code::NonManifoldEdge,
+                    Severity::Error,
+                    crowded.len(),
+                    format!(
+                        "{} to more than two faces: remove inner faces there.",
+                        counted(crowded.len(), "edge belongs", "edges belong")
+                    ),
+                )
+            });
+        }
+    }
+}
+
+/// For each vertex the first one at the same place, and how many have an earlier one.
+pub(super) fn same_places(mesh: &PolygonMesh) -> (Vec<u32>, usize) {
+    let reach = SAME_PLACE * diagonal(mesh);
+    let size = (2.0 * reach).max(f64::MIN_POSITIVE);
+    let mut at_place: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    let mut first: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+    let mut joined = 0;
+    for (v, p) in mesh.positions.iter().enumerate() {
+        if !p.is_finite() {
+            continue;
+        }
+        let p = p.as_dvec3();
+        let cell = (p / size).floor().to_array().map(|x| x as i64);
+        let mut found = None;
+        for k in 0..27 {
+            // Coordinates of a mesh without extent saturate: they may wrap, equal places still meet.
+            let key = [0, 1, 2].map(|a| cell[a].wrapping_add(k / [1, 3, 9][a] % 3 - 1));
+            let near = at_place.get(&key).into_iter().flatten();
+            for &w in near {
+                if mesh.positions[w as usize].as_dvec3().distance(p) <= reach && found.is_none_or(|f| w < f) {
+                    found = Some(w);
+                }
+            }
+        }
+        match found {
+            Some(w) => {
+                first[v] = w;
+                joined += 1;
+            }
+            None => at_place.entry(cell).or_default().push(v as u32),
+        }
+    }
+    (first, joined)
+}
+
+/// Reports vertices that are not joined, not used, or pinch the surface.
+pub(super) fn report_vertices(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec<Problem>) {
+    let (first, joined) = same_places(mesh);
+    if joined > 0 {
+        let vertices = first.iter().enumerate().filter(|(v, f)| *v as u32 != **f).map(|(v, _)| v as u32);
+        found.push(Problem {
+            places: Places { vertices: vertices.collect(), ..Places::default() },
+            fixes: vec![Fix::Repair { repair: Repair::Weld }],
+            ..problem(
+                Code::DuplicateVertex,
+                Severity::Note,
+                joined,
+                format!(
+                    "{} where another one is: on open edges they count as one, elsewhere as two handles.",
+                    counted(joined, "vertex is", "vertices are")
+                ),
+            )
+        });
+    }
+    let mut used = vec![false; mesh.positions.len()];
+    for &i in mesh.faces.iter().flatten() {
+        if let Some(used) = used.get_mut(i as usize) {
+            *used = true;
+        }
+    }
+    let unused: Vec<u32> = (0..used.len() as u32).filter(|&v| !used[v as usize]).collect();
+    if !unused.is_empty() {
+        let count = unused.len();
+        found.push(Problem {
+            places: Places { vertices: unused, ..Places::default() },
+            fixes: vec![Fix::Repair { repair: Repair::DropDegenerate }],
+            ..problem(
+                Code::UnusedVertex,
+                Severity::Note,
+                count,
+                format!(
+                    "{} to no face: moving it does nothing.",
+                    counted(count, "vertex belongs", "vertices belong")
+                ),
+            )
+        });
+    }
+    let pinched = pinched(mesh, sound);
+    if !pinched.is_empty() {
+        let count = pinched.len();
+        found.push(Problem {
+            places: Places { vertices: pinched, ..Places::default() },
+            ..problem(
+                Code::NonManifoldVertex,
+                Severity::Note,
+                count,
+                format!(
+                    "Parts of the cage meet only in {}; this does no harm.",
+                    counted(count, "vertex", "vertices")
+                ),
+            )
+        });
+    }
+}
+
+/// Vertices around which the faces form more than one fan.
+fn pinched(mesh: &PolygonMesh, sound: &[u32]) -> Vec<u32> {
+    // Corners by vertex, with the neighbours in their face.
+    let mut corners: Vec<[u32; 3]> = Vec::new();
+    for &f in sound {
+        let face = &mesh.faces[f as usize];
+        let n = face.len();
+        corners.extend((0..n).map(|k| [face[k], face[(k + n - 1) % n], face[(k + 1) % n]]));
+    }
+    corners.sort_unstable();
+    let mut pinched = Vec::new();
+    for around in corners.chunk_by(|a, b| a[0] == b[0]) {
+        // Corners hang together if they share a neighbour.
+        let mut reached = vec![false; around.len()];
+        let mut stack = vec![0];
+        reached[0] = true;
+        while let Some(k) = stack.pop() {
+            for (j, other) in around.iter().enumerate() {
+                if !reached[j] && around[k][1..].iter().any(|n| other[1..].contains(n)) {
+                    reached[j] = true;
+                    stack.push(j);
+                }
+            }
+        }
+        if reached.contains(&false) {
+            pinched.push(around[0][0]);
+        }
+    }
+    pinched
+}

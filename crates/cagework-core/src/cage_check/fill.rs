@@ -1,0 +1,84 @@
+//! Holes: their outlines, and triangles that close them.
+
+use std::collections::{BTreeMap, HashSet};
+
+use glam::DVec3;
+
+/// Most edges of a hole that is filled: the best triangulation takes the cube of it, and larger ones are no accident.
+const MAX_EDGES: usize = 64;
+
+/// Closed outlines made of edges, each run through as most of its edges are; edges that lead nowhere are left out.
+pub(crate) fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
+    // Both ways: a face next to the hole may be turned the wrong way.
+    let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for &[from, to] in edges {
+        next.entry(from).or_default().push(to);
+        next.entry(to).or_default().push(from);
+    }
+    let mut found = Vec::new();
+    while let Some((&start, _)) = next.iter().find(|(_, to)| !to.is_empty()) {
+        let mut path = vec![start];
+        while let Some(from) = path.last().copied()
+            && let Some(to) = next.get_mut(&from).and_then(Vec::pop)
+        {
+            if let Some(back) = next.get_mut(&to)
+                && let Some(k) = back.iter().position(|&v| v == from)
+            {
+                back.swap_remove(k);
+            }
+            if let Some(k) = path.iter().position(|&v| v == to) {
+                // Where holes touch in a vertex, the path closes early: cut the loop off and go on.
+                found.push(path.split_off(k));
+            }
+            path.push(to);
+        }
+    }
+    found.retain(|outline| outline.len() >= 3);
+    let directed: HashSet<[u32; 2]> = edges.iter().copied().collect();
+    for outline in &mut found {
+        let n = outline.len();
+        let ahead = (0..n).filter(|&k| directed.contains(&[outline[k], outline[(k + 1) % n]])).count();
+        if 2 * ahead < n {
+            outline.reverse();
+        }
+    }
+    found
+}
+
+/// Triangles of the smallest total area between the corners of an outline, turned like it. `None` if it has too many.
+///
+/// Source: Barequet, Sharir 1995, "Filling gaps in the boundary of a polyhedron" (dynamic programming).
+pub(crate) fn triangulate(outline: &[u32], at: &[DVec3]) -> Option<Vec<[u32; 3]>> {
+    let n = outline.len();
+    if !(3..=MAX_EDGES).contains(&n) {
+        return None;
+    }
+    let p = |k: usize| at[outline[k] as usize];
+    let mut cost = vec![vec![0.0_f64; n]; n];
+    let mut split = vec![vec![0; n]; n];
+    for length in 2..n {
+        for i in 0..n - length {
+            let k = i + length;
+            cost[i][k] = f64::INFINITY;
+            for m in i + 1..k {
+                let area = (p(m) - p(i)).cross(p(k) - p(i)).length();
+                let total = cost[i][m] + cost[m][k] + area;
+                if total < cost[i][k] {
+                    cost[i][k] = total;
+                    split[i][k] = m;
+                }
+            }
+        }
+    }
+    let mut triangles = Vec::with_capacity(n - 2);
+    let mut spans = vec![(0, n - 1)];
+    while let Some((i, k)) = spans.pop() {
+        if k - i < 2 {
+            continue;
+        }
+        let m = split[i][k];
+        triangles.push([outline[i], outline[m], outline[k]]);
+        spans.extend([(i, m), (m, k)]);
+    }
+    Some(triangles)
+}

@@ -1,0 +1,230 @@
+//! What is wrong with a cage, all of it at once and as data, and what can be done about it.
+//!
+//! [`Cage::new`] stops at the first fault; [`check`] goes on, also on meshes that are no cage at all, so that a page can
+//! mark every place and a command can list them. [`repair`] does what can be done without asking.
+
+mod edges;
+mod fill;
+mod grow;
+mod orient;
+mod repair;
+mod shape;
+#[cfg(test)]
+mod tests;
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::cage::Cage;
+use crate::enclosure::Enclosure;
+use crate::mesh::{Bounds, PolygonMesh};
+
+pub(crate) use fill::{loops, triangulate};
+pub use repair::{Repair, RepairError, Repaired, repair};
+
+/// Most places that a problem lists of each kind; `count` is the full number.
+pub const MAX_PLACES: usize = 2000;
+
+/// What is wrong. The names are stable: programs may rely on them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Code {
+    /// There are no faces.
+    Empty,
+    /// A coordinate is infinite or not a number.
+    NotFinite,
+    /// A face names a vertex that does not exist.
+    BadIndex,
+    /// A face has too few corners, one of them twice, or no area, or its outline crosses itself.
+    DegenerateFace,
+    /// Two faces have the same corners.
+    DuplicateFace,
+    /// Vertices at one place that are not joined.
+    DuplicateVertex,
+    /// An edge belongs to one face only.
+    OpenEdge,
+    /// An edge belongs to three faces or more.
+    NonManifoldEdge,
+    /// Parts of the surface meet in a vertex only.
+    NonManifoldVertex,
+    /// Faces point inwards. One problem for each component.
+    Flipped,
+    /// Faces cannot be turned consistently.
+    OneSided,
+    /// Faces go through each other.
+    SelfIntersection,
+    /// A vertex of no face.
+    UnusedVertex,
+    /// Vertices of the model are not inside.
+    ModelOutside,
+    /// Parts of the cage are thinner than a cell of the grid.
+    ThinPart,
+    /// Something else keeps it from being a cage.
+    NotACage,
+}
+
+/// How bad it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// It cannot be bound, or not rightly.
+    Error,
+    /// It can be bound, but something will not be as expected.
+    Warning,
+    /// Mended by itself, or harmless.
+    Note,
+}
+
+/// Where a problem is: indices into the mesh that was checked (`points`: object units).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Places {
+    /// Cage vertices; for [`Code::ModelOutside`] vertices of the model.
+    pub vertices: Vec<u32>,
+    /// Pairs of cage vertices.
+    pub edges: Vec<[u32; 2]>,
+    /// Cage faces.
+    pub faces: Vec<u32>,
+    /// Points in space.
+    pub points: Vec<[f32; 3]>,
+}
+
+/// What helps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Fix {
+    /// One of the repairs.
+    Repair {
+        /// Which one.
+        repair: Repair,
+    },
+    /// Bind with this many cells along the longest side.
+    Grid {
+        /// Cells.
+        cells: u32,
+    },
+}
+
+/// One kind of fault and all its places.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Problem {
+    /// What.
+    pub code: Code,
+    /// How bad.
+    pub severity: Severity,
+    /// How many.
+    pub count: usize,
+    /// Where; up to [`MAX_PLACES`] of each kind.
+    pub places: Places,
+    /// A sentence.
+    pub message: String,
+    /// What helps, best first; empty if a person has to look.
+    pub fixes: Vec<Fix>,
+}
+
+/// All that is known about a cage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CageCheck {
+    /// Whether it can be used: [`Cage::new`] takes it and it does not go through itself.
+    pub valid: bool,
+    /// Whether all of the model is inside, if a model was given and that can be told.
+    pub encloses: Option<bool>,
+    /// Vertices.
+    pub vertices: usize,
+    /// Faces.
+    pub faces: usize,
+    /// Parts that hang together through edges.
+    pub components: usize,
+    /// Smallest thickness found, object units, if it has an inside.
+    pub thickness: Option<f32>,
+    /// What is wrong, worst first.
+    pub problems: Vec<Problem>,
+}
+
+impl CageCheck {
+    /// The problem of a kind, if there is one.
+    #[must_use]
+    pub fn problem(&self, code: Code) -> Option<&Problem> {
+        self.problems.iter().find(|p| p.code == code)
+    }
+}
+
+/// Looks for everything that may be wrong with a polygon mesh as a cage.
+///
+/// `model`: positions that should be inside, if any. `grid`: cells along the longest side that will be used to bind, to
+/// look for parts thinner than a cell.
+#[must_use]
+pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> CageCheck {
+    let mut found = Vec::new();
+    let sound = shape::sound_faces(mesh, &mut found);
+    let edges = edges::Edges::of(mesh, &sound);
+    edges.report(mesh, &mut found);
+    edges::report_vertices(mesh, &sound, &mut found);
+    let components = orient::report(mesh, &sound, &edges, &mut found);
+    let crossing = shape::report_crossings(mesh, &sound, &mut found);
+    let cage = Cage::new(mesh);
+    if let Err(error) = &cage
+        && !found.iter().any(|p| p.severity == Severity::Error)
+    {
+        found.push(problem(Code::NotACage, Severity::Error, 1, error.to_string()));
+    }
+    let (mut encloses, mut thickness) = (None, None);
+    if let Ok(cage) = &cage {
+        thickness = shape::report_thickness(cage, grid, &mut found);
+        encloses = model.map(|model| report_outside(cage, model, &mut found));
+    }
+    for p in &mut found {
+        p.places.vertices.truncate(MAX_PLACES);
+        p.places.edges.truncate(MAX_PLACES);
+        p.places.faces.truncate(MAX_PLACES);
+        p.places.points.truncate(MAX_PLACES);
+    }
+    found.sort_by_key(|p| (p.severity, p.code));
+    CageCheck {
+        valid: cage.is_ok() && !crossing,
+        encloses,
+        vertices: mesh.positions.len(),
+        faces: mesh.faces.len(),
+        components,
+        thickness,
+        problems: found,
+    }
+}
+
+/// Vertices of the model that the cage does not enclose; whether there are none.
+fn report_outside(cage: &Cage, model: &[Vec3], found: &mut Vec<Problem>) -> bool {
+    let outside = Enclosure::new(cage, model).outside();
+    if outside.is_empty() {
+        return true;
+    }
+    let n = outside.len();
+    let message = format!(
+        "{} of {} {} outside the cage: {} would follow its closest point rigidly.",
+        n,
+        counted(model.len(), "model vertex", "model vertices"),
+        if n == 1 { "is" } else { "are" },
+        if n == 1 { "it" } else { "they" },
+    );
+    let points = outside.iter().take(MAX_PLACES).map(|&v| model[v as usize].to_array()).collect();
+    found.push(Problem {
+        places: Places { vertices: outside, points, ..Places::default() },
+        fixes: vec![Fix::Repair { repair: Repair::Grow }],
+        ..problem(Code::ModelOutside, Severity::Warning, n, message)
+    });
+    false
+}
+
+/// A problem without places and fixes.
+fn problem(code: Code, severity: Severity, count: usize, message: String) -> Problem {
+    Problem { code, severity, count, places: Places::default(), message, fixes: Vec::new() }
+}
+
+/// `1 edge`, `2 edges`.
+fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
+/// Diagonal of the box of all finite vertices, object units.
+fn diagonal(mesh: &PolygonMesh) -> f64 {
+    let finite: Vec<Vec3> = mesh.positions.iter().copied().filter(|p| p.is_finite()).collect();
+    Bounds::of(&finite).map_or(0.0, |b| b.max.as_dvec3().distance(b.min.as_dvec3()))
+}

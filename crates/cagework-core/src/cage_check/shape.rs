@@ -1,0 +1,214 @@
+//! Faults of faces and of the shape: faces without area, faces through each other, thin parts.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use super::{Code, Fix, MAX_PLACES, Places, Problem, Repair, Severity, counted, diagonal, problem};
+use crate::cage::{Cage, face_triangles};
+use crate::contact::{Corners, meeting};
+use crate::grid::MAX_GRID;
+use crate::mesh::PolygonMesh;
+
+/// Triangles up to which the thickness is looked at everywhere; of more, every n-th is a place to measure from.
+const MEASURED: usize = 1500;
+
+/// A part this many cells thick is thick enough: one cell has no unknown of its own in the worst case.
+const ENOUGH_CELLS: f64 = 1.0;
+
+/// Faces that name existing, finite vertices, none twice, and have an area. The others are reported.
+pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u32> {
+    let n = mesh.positions.len();
+    if mesh.faces.is_empty() || n == 0 {
+        found.push(problem(Code::Empty, Severity::Error, 1, "The cage has no faces.".into()));
+    }
+    let broken: Vec<u32> = (0..n as u32).filter(|&v| !mesh.positions[v as usize].is_finite()).collect();
+    if !broken.is_empty() {
+        let count = broken.len();
+        let message = format!("{} no finite position.", counted(count, "vertex has", "vertices have"));
+        found.push(Problem {
+            places: Places { vertices: broken, ..Places::default() },
+            ..problem(Code::NotFinite, Severity::Error, count, message)
+        });
+    }
+    let diagonal = diagonal(mesh);
+    let (mut sound, mut bad, mut degenerate, mut twice) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut outlines: HashMap<Vec<u32>, u32> = HashMap::new();
+    for (f, face) in mesh.faces.iter().enumerate() {
+        let f = f as u32;
+        if face.iter().any(|&i| i as usize >= n) {
+            bad.push(f);
+            continue;
+        }
+        let corners: Vec<DVec3> = face.iter().map(|&i| mesh.positions[i as usize].as_dvec3()).collect();
+        if corners.iter().any(|p| !p.is_finite()) {
+            continue;
+        }
+        let mut sorted = face.clone();
+        sorted.sort_unstable();
+        sorted.dedup();
+        if sorted.len() < face.len() || face.len() < 3 || face_triangles(&corners, diagonal).is_err() {
+            degenerate.push(f);
+            continue;
+        }
+        if outlines.insert(sorted, f).is_some() {
+            twice.push(f);
+            continue;
+        }
+        sound.push(f);
+    }
+    let mut report = |code, faces: Vec<u32>, one: &str, many: &str, fixes: Vec<Fix>| {
+        if !faces.is_empty() {
+            let count = faces.len();
+            let message = format!("{}.", counted(count, one, many));
+            let places = Places { faces, ..Places::default() };
+            found.push(Problem { places, fixes, ..problem(code, Severity::Error, count, message) });
+        }
+    };
+    let drop = || vec![Fix::Repair { repair: Repair::DropDegenerate }];
+    report(
+        Code::BadIndex,
+        bad,
+        "face names a vertex that does not exist",
+        "faces name vertices that do not exist",
+        drop(),
+    );
+    report(
+        Code::DegenerateFace,
+        degenerate,
+        "face has no area, a corner twice, or an outline that crosses itself",
+        "faces have no area, a corner twice, or an outline that crosses itself",
+        drop(),
+    );
+    report(
+        Code::DuplicateFace,
+        twice,
+        "face has the same corners as another one",
+        "faces have the same corners as others",
+        drop(),
+    );
+    sound
+}
+
+/// Sound faces as triangles with the face that each was cut from.
+fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
+    let diagonal = diagonal(mesh);
+    // Vertices at one place count as one, so that neighbours across a seam do not seem to meet.
+    let (first, _) = super::edges::same_places(mesh);
+    let (mut triangles, mut face_of) = (Vec::new(), Vec::new());
+    for &f in sound {
+        let face = &mesh.faces[f as usize];
+        let corners: Vec<DVec3> = face.iter().map(|&i| mesh.positions[i as usize].as_dvec3()).collect();
+        for t in face_triangles(&corners, diagonal).unwrap_or_default() {
+            let index = t.map(|k| first[face[k as usize] as usize]);
+            triangles.push(Corners { index, at: t.map(|k| corners[k as usize]) });
+            face_of.push(f);
+        }
+    }
+    (triangles, face_of)
+}
+
+/// Reports faces that go through each other; whether there are any.
+pub(super) fn report_crossings(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec<Problem>) -> bool {
+    let (triangles, face_of) = triangles(mesh, sound);
+    let mut faces = Vec::new();
+    let mut points = Vec::new();
+    let mut count = 0;
+    for [a, b] in meeting(&triangles) {
+        let (f, g) = (face_of[a as usize], face_of[b as usize]);
+        if f == g {
+            continue;
+        }
+        count += 1;
+        faces.extend([f, g]);
+        if points.len() < MAX_PLACES {
+            points.push(between(&triangles[a as usize], &triangles[b as usize]).as_vec3().to_array());
+        }
+    }
+    if count == 0 {
+        return false;
+    }
+    faces.sort_unstable();
+    faces.dedup();
+    found.push(Problem {
+        places: Places { faces, points, ..Places::default() },
+        ..problem(
+            Code::SelfIntersection,
+            Severity::Error,
+            count,
+            format!(
+                "The cage goes through itself: {} meet. Move their vertices apart.",
+                counted(count, "pair of triangles", "pairs of triangles")
+            ),
+        )
+    });
+    true
+}
+
+/// A point near where two triangles meet: the middle of where their boxes overlap.
+fn between(a: &Corners, b: &Corners) -> DVec3 {
+    0.5 * (a.min().max(b.min()) + a.max().min(b.max()))
+}
+
+/// Measures from the middle of faces straight inwards; reports where that is less than a cell of the grid.
+pub(super) fn report_thickness(cage: &Cage, grid: Option<u32>, found: &mut Vec<Problem>) -> Option<f32> {
+    let n = cage.triangles().len();
+    let triangles: Vec<[DVec3; 3]> = (0..n as u32).map(|t| cage.triangle_corners(t)).collect();
+    let cell = grid.map(|g| f64::from(cage.bounds().extent().max_element()) / f64::from(g.max(1)));
+    let mut thinnest = f64::INFINITY;
+    let (mut faces, mut points) = (Vec::new(), Vec::new());
+    for t in (0..n).step_by(n.div_ceil(MEASURED).max(1)) {
+        let [a, b, c] = triangles[t];
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let middle = (a + b + c) / 3.0;
+        let hits = triangles.iter().enumerate().filter(|(other, _)| *other != t);
+        let way = hits
+            .filter_map(|(_, other)| distance_along(middle, -normal, other))
+            .fold(f64::INFINITY, f64::min);
+        thinnest = thinnest.min(way);
+        if cell.is_some_and(|cell| way < ENOUGH_CELLS * cell) {
+            faces.push(cage.face_of_triangle()[t]);
+            points.push((middle - 0.5 * way * normal).as_vec3().to_array());
+        }
+    }
+    faces.dedup();
+    if let (Some(cell), Some(grid), false) = (cell, grid, points.is_empty()) {
+        let cells = (f64::from(grid) * cell / thinnest.max(1e-30)).ceil() * ENOUGH_CELLS;
+        let fits = cells <= f64::from(MAX_GRID);
+        let advice =
+            if fits { format!("use a grid of {cells} cells") } else { "make the cage thicker".into() };
+        let count = points.len();
+        found.push(Problem {
+            places: Places { faces, points, ..Places::default() },
+            fixes: if fits { vec![Fix::Grid { cells: cells as u32 }] } else { Vec::new() },
+            ..problem(
+                Code::ThinPart,
+                Severity::Warning,
+                count,
+                format!(
+                    "The cage is thinner than a cell of the grid in {}: {advice}.",
+                    counted(count, "place", "places")
+                ),
+            )
+        });
+    }
+    thinnest.is_finite().then_some(thinnest as f32)
+}
+
+/// Distance from a point along a unit direction to a triangle, if the ray meets it.
+///
+/// Source: Moeller, Trumbore 1997.
+fn distance_along(from: DVec3, direction: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<f64> {
+    let (ab, ac) = (*b - *a, *c - *a);
+    let p = direction.cross(ac);
+    let determinant = ab.dot(p);
+    if determinant.abs() < 1e-12 * ab.length() * ac.length() {
+        return None;
+    }
+    let s = (from - *a) / determinant;
+    let u = s.dot(p);
+    let q = s.cross(ab);
+    let v = direction.dot(q);
+    let distance = ac.dot(q);
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some(distance)
+}

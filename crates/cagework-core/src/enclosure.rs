@@ -1,0 +1,159 @@
+//! Which points a cage encloses, kept up to date while the cage is dragged.
+//!
+//! The winding number of a point is a sum over the cage's triangles, so when a few vertices move, only the terms of
+//! their triangles change; and a point that lies outside the box of where those triangles were and are keeps its sum.
+
+use glam::{DVec3, Vec3};
+
+use crate::cage::Cage;
+use crate::mesh::Bounds;
+
+/// A point with a winding number above this is inside. Whole numbers are expected; on the surface it is in between.
+const INSIDE: f64 = 0.5;
+
+/// Points and a cage, with the winding number of every point.
+#[derive(Clone, Debug)]
+pub struct Enclosure {
+    points: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    rest: Vec<Vec3>,
+    winding: Vec<f64>,
+}
+
+impl Enclosure {
+    /// Finds the winding numbers of all points. About 20 ns for each point and triangle.
+    #[must_use]
+    pub fn new(cage: &Cage, points: &[Vec3]) -> Self {
+        let triangles = cage.triangles().to_vec();
+        let rest = cage.positions().to_vec();
+        let corners: Vec<[DVec3; 3]> =
+            (0..triangles.len() as u32).map(|t| cage.triangle_corners(t)).collect();
+        let winding = points.iter().map(|p| winding_number(p.as_dvec3(), &corners)).collect();
+        Self { points: points.to_vec(), triangles, rest, winding }
+    }
+
+    /// Points that are not inside the cage as it was given, ascending.
+    #[must_use]
+    pub fn outside(&self) -> Vec<u32> {
+        let outside = self.winding.iter().enumerate().filter(|(_, w)| **w <= INSIDE);
+        outside.map(|(v, _)| v as u32).collect()
+    }
+
+    /// Points that are not inside the cage with its vertices moved to `positions` (`[n_cage]`, object units),
+    /// ascending. The fewer vertices have moved, the faster.
+    ///
+    /// # Panics
+    /// If there are fewer positions than cage vertices.
+    #[must_use]
+    pub fn outside_of(&self, positions: &[Vec3]) -> Vec<u32> {
+        let at = |of: &[Vec3], t: &[u32; 3]| t.map(|i| of[i as usize].as_dvec3());
+        let moved = |t: &&[u32; 3]| t.iter().any(|&i| self.rest[i as usize] != positions[i as usize]);
+        let changed: Vec<&[u32; 3]> = self.triangles.iter().filter(moved).collect();
+        let before: Vec<[DVec3; 3]> = changed.iter().map(|t| at(&self.rest, t)).collect();
+        let after: Vec<[DVec3; 3]> = changed.iter().map(|t| at(positions, t)).collect();
+        let corners: Vec<Vec3> = before.iter().chain(&after).flatten().map(|p| p.as_vec3()).collect();
+        let swept = Bounds::of(&corners);
+        let mut outside = Vec::new();
+        for (v, (p, &rest)) in self.points.iter().zip(&self.winding).enumerate() {
+            let reached = swept.is_some_and(|b| p.cmpge(b.min).all() && p.cmple(b.max).all());
+            let winding = if reached {
+                let p = p.as_dvec3();
+                rest - winding_number(p, &before) + winding_number(p, &after)
+            } else {
+                rest
+            };
+            if winding <= INSIDE {
+                outside.push(v as u32);
+            }
+        }
+        outside
+    }
+}
+
+/// The sum of [`crate::geometry::winding_number`] with one arc tangent in all: half solid angles are angles of complex
+/// numbers, whose product has the angle of their sum; full turns are counted on the way.
+#[must_use]
+pub fn winding_number(point: DVec3, triangles: &[[DVec3; 3]]) -> f64 {
+    let (mut re, mut im) = (1.0_f64, 0.0_f64);
+    let mut turns = 0_i32;
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|p| p - point);
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let x = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        let y = a.dot(b.cross(c));
+        let size = x.abs() + y.abs();
+        if size == 0.0 {
+            continue;
+        }
+        let (x, y) = (x / size, y / size);
+        let product = (re * x - im * y, re * y + im * x);
+        // Two angles of one sign may add up to more than half a turn; the product's sign then differs.
+        if im >= 0.0 && y >= 0.0 && product.1 < 0.0 {
+            turns += 1;
+        } else if im < 0.0 && y < 0.0 && product.1 >= 0.0 {
+            turns -= 1;
+        }
+        let size = product.0.abs() + product.1.abs();
+        (re, im) = (product.0 / size, product.1 / size);
+    }
+    let angle = im.atan2(re) + f64::from(turns) * std::f64::consts::TAU;
+    angle / std::f64::consts::TAU
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cage_gen::subdivided_box;
+    use crate::geometry;
+
+    /// Sums of a few hundred angles in f64.
+    const ROUNDING: f64 = 1e-9;
+
+    fn box_cage() -> Cage {
+        let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE };
+        Cage::new(&subdivided_box(bounds, 0.0, [3, 3, 3])).unwrap()
+    }
+
+    /// Points in and around the box, on no face of it.
+    fn points() -> Vec<Vec3> {
+        let steps = || (-7..=7).map(|k| 0.19 * k as f32 + 0.013);
+        steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| Vec3::new(x, y, z)))).collect()
+    }
+
+    #[test]
+    fn product_of_angles_is_the_sum_of_angles() {
+        let cage = box_cage();
+        let triangles: Vec<_> =
+            (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t)).collect();
+        for p in points() {
+            let p = p.as_dvec3();
+            let expected = geometry::winding_number(p, triangles.iter().copied());
+            let actual = winding_number(p, &triangles);
+            assert!((actual - expected).abs() < ROUNDING, "{p}: {actual} instead of {expected}");
+            // An open part of it, whose winding number is no whole number.
+            let expected = geometry::winding_number(p, triangles[..20].iter().copied());
+            let actual = winding_number(p, &triangles[..20]);
+            assert!((actual - expected).abs() < ROUNDING, "{p}: {actual} instead of {expected}");
+        }
+    }
+
+    #[test]
+    fn dragging_finds_the_same_points_as_starting_anew() {
+        let cage = box_cage();
+        let enclosure = Enclosure::new(&cage, &points());
+        let inside = |p: &Vec3| p.abs().max_element() < 1.0;
+        let expected: Vec<u32> = (0..).zip(points()).filter(|(_, p)| !inside(p)).map(|(v, _)| v).collect();
+        assert_eq!(enclosure.outside(), expected);
+        let mut posed = cage.positions().to_vec();
+        posed[0] += Vec3::splat(0.7);
+        posed[5] *= 1.4;
+        let moved =
+            Cage::new(&crate::mesh::PolygonMesh { positions: posed.clone(), ..cage.to_polygon_mesh() });
+        // The same triangles: a moved quad might be cut along its other diagonal.
+        let moved = moved.unwrap();
+        if moved.triangles() == cage.triangles() {
+            assert_eq!(enclosure.outside_of(&posed), Enclosure::new(&moved, &points()).outside());
+        }
+        assert_eq!(enclosure.outside_of(cage.positions()), expected);
+    }
+}
