@@ -9,6 +9,7 @@ pub mod cage_check;
 pub mod cage_gen;
 mod contact;
 pub mod deform;
+pub mod edit;
 pub mod enclosure;
 pub mod geometry;
 pub mod grid;
