@@ -14,6 +14,10 @@ for row in "${debian_packages[@]}"; do
   read -r command packages <<<"$row"
   command -v "$command" >/dev/null || missing+=($packages)
 done
+# The page is tested in a browser; Debian's will do.
+if [ "${1:-}" = test ] || [ "${1:-}" = page-test ]; then
+  command -v chromium >/dev/null || missing+=(chromium)
+fi
 # The tests of the kernels need a Vulkan device: Mesa's software one where there is no other.
 if [ "${1:-}" = test ]; then
   compgen -G "/usr/lib/*/libvulkan.so.1" >/dev/null || missing+=(libvulkan1)

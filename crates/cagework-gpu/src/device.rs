@@ -1,6 +1,6 @@
 //! The GPU: which one, its limits, and what became of it.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use futures_channel::oneshot;
 
@@ -22,8 +22,8 @@ pub struct ContextOptions {
     pub max_binding_bytes: Option<u64>,
 }
 
-/// A device, its queue, and the pipelines of all kernels.
-#[derive(Debug)]
+/// A device, its queue, and the pipelines of all kernels. A clone is another handle to the same device.
+#[derive(Clone, Debug)]
 pub struct GpuContext {
     /// For what is not done here: surfaces.
     pub instance: wgpu::Instance,
@@ -44,6 +44,21 @@ pub struct GpuContext {
 struct Fault {
     lost: OnceLock<String>,
     refused: OnceLock<String>,
+    /// Who wants to hear of a loss when it happens.
+    waiting: Mutex<Vec<oneshot::Sender<String>>>,
+}
+
+impl Fault {
+    /// Only the first report is kept: later ones follow from it.
+    fn lose(&self, message: &str) {
+        let _ = self.lost.set(message.to_owned());
+        if let Ok(mut waiting) = self.waiting.lock() {
+            for waiting in waiting.drain(..) {
+                // Whoever no longer waits needs no answer.
+                let _ = waiting.send(message.to_owned());
+            }
+        }
+    }
 }
 
 impl GpuContext {
@@ -99,10 +114,7 @@ impl GpuContext {
             adapter.request_device(&descriptor).await.map_err(|error| no_device(error.to_string()))?;
         let fault = Arc::new(Fault::default());
         let seen = Arc::clone(&fault);
-        device.set_device_lost_callback(move |_, message| {
-            // Only the first report is kept: later ones follow from it.
-            let _ = seen.lost.set(message);
-        });
+        device.set_device_lost_callback(move |_, message| seen.lose(&message));
         let seen = Arc::clone(&fault);
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             let _ = seen.refused.set(error.to_string());
@@ -131,6 +143,19 @@ impl GpuContext {
     #[must_use]
     pub fn adapter_name(&self) -> String {
         self.adapter.get_info().name
+    }
+
+    /// Resolves with the platform's reason when the device is lost, and never if it is not.
+    #[must_use]
+    pub fn lost(&self) -> oneshot::Receiver<String> {
+        let (sender, receiver) = oneshot::channel();
+        if let Ok(mut waiting) = self.fault.waiting.lock() {
+            waiting.push(sender);
+        }
+        if let Some(reason) = self.fault.lost.get() {
+            self.fault.lose(reason);
+        }
+        receiver
     }
 
     /// Whether all is well so far.

@@ -6,10 +6,10 @@ use crate::kernels::{ALL, Binding, Kernel};
 use crate::layout::Work;
 
 /// Pipelines of all kernels, in the table's order.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Pipelines(Vec<Pipeline>);
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Pipeline {
     compute: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,

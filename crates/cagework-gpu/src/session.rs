@@ -204,6 +204,15 @@ impl Session {
         }
     }
 
+    /// Draws the cage somewhere else; the mesh stays where it is. For editing the cage itself.
+    ///
+    /// # Panics
+    /// If there is not one position per cage vertex.
+    pub fn show_cage(&mut self, cage_positions: &[Vec3]) {
+        assert_eq!(cage_positions.len(), self.pose.len(), "one position per cage vertex");
+        self.renderer.pose(&self.context, cage_positions);
+    }
+
     /// Where the cage is. `[n_cage]`, object units.
     #[must_use]
     pub fn cage_positions(&self) -> &[Vec3] {
@@ -354,6 +363,22 @@ impl Session {
             }
             None => Ok(model.positions.clone()),
         }
+    }
+
+    /// Another session on the same GPU with the same model, cage and pose, for other weights to compare with.
+    ///
+    /// # Errors
+    /// [`GpuError::NotReady`] without model or cage; otherwise as the calls that set them.
+    pub async fn twin(&self) -> Result<Self, GpuError> {
+        let (_, cage) = self.parts()?;
+        let mut twin = Self::new(self.context.clone());
+        if let Some(model) = &self.model {
+            twin.set_shared_model(Arc::clone(model)).await?;
+        }
+        twin.set_cage(cage).await?;
+        twin.pose(&self.pose);
+        twin.set_scene(self.scene.clone());
+        Ok(twin)
     }
 
     /// Everything again on another device, after this one was lost: model, cage, weights, pose, scene, camera.

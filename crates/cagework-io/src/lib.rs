@@ -1,4 +1,4 @@
-//! Bytes to scene and back: OBJ, glTF/GLB, NPZ.
+//! Bytes to scene and back: OBJ, glTF/GLB, NPZ, project files.
 //!
 //! No mathematics beyond transforms and normals, no file system, no clock; everything compiles for
 //! `wasm32-unknown-unknown`. A [`Model`] keeps the document it was read from, so that an export is the user's own file
@@ -15,10 +15,14 @@ mod model;
 mod normals;
 mod npz;
 mod obj;
+mod pose_code;
+mod project;
 
 pub use error::{PoseError, ReadError, WriteError};
-pub use gltf::GltfError;
+pub use gltf::{GltfError, write_mesh_glb};
 pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
 pub use model::{Counts, Format, Model};
 pub use npz::{NpzError, read_weights_npz, write_weights_npz};
 pub use obj::{ObjError, write_cage_obj};
+pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
+pub use project::{EXTENSION, Project, ProjectError, read_project, write_project};

@@ -54,11 +54,11 @@ pub struct Model {
     pub counts: Counts,
     /// What the user should know: each a sentence.
     pub notices: Vec<String>,
-    document: Document,
+    pub(crate) document: Document,
 }
 
 #[derive(Clone, Debug)]
-enum Document {
+pub(crate) enum Document {
     Obj(Box<ObjDocument>),
     Gltf(Box<GltfDocument>),
 }

@@ -33,6 +33,11 @@ const RULES: &[Rule] = &[
         must_not_use: &[],
     },
     Rule { name: "cagework-gpu", may_use: &["cagework-core"], must_not_use: &["gltf", "gltf-json", "clap"] },
+    Rule {
+        name: "cagework-web",
+        may_use: &["cagework-core", "cagework-gpu", "cagework-io"],
+        must_not_use: &["clap", "rayon"],
+    },
     Rule { name: "cagework-tests", may_use: &["cagework-core", "cagework-gpu"], must_not_use: &[] },
     Rule {
         name: "cagework-benches",

@@ -4,27 +4,41 @@
 
 mod arrows;
 mod command;
+mod npm;
+mod site;
 mod tasks;
+mod wasm;
 
 use std::process::ExitCode;
 
 const USAGE: &str = "usage: cargo xtask TASK
 
-  start [ARGS]  build the release `cagework` and run `cagework demo ARGS` on the built-in sample
-  build         build the release `cagework` (target/release/cagework)
-  test          every test there is: Rust, wasm32 builds, glTF validator
-  check         format, lints, documentation, dependency arrows, biome
-  arrows        the dependency arrows of ARCHITECTURE.md only";
+  start [ARGS]   build the page and serve it on this machine (ARGS for `vite preview`: --port 8080, --open)
+  build          build the page into dist/, and the release `cagework` (target/release/cagework)
+  test           every test there is: Rust, wasm32 builds, glTF validator, TypeScript, the page in a browser
+  check          format, lints, documentation, dependency arrows, types, biome
+  arrows         the dependency arrows of ARCHITECTURE.md only
+  wasm [--dev]   crates/cagework-web as a JavaScript package, web/src/pkg
+  page           build the page only
+  page-test [ARGS]  build the page and test it in a browser (ARGS for Playwright)
+  pictures       make the pictures of the samples that the page shows
+  demo [ARGS]    build the release `cagework` and run `cagework demo ARGS` on the built-in sample";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let args: Vec<&str> = args.iter().map(String::as_str).collect();
     let outcome = match args.as_slice() {
-        ["start", rest @ ..] => tasks::start(rest),
+        ["start", rest @ ..] => site::start(rest),
+        ["page"] => site::build(),
+        ["page-test", rest @ ..] => site::test_page(rest),
+        ["pictures"] => site::pictures(),
+        ["demo", rest @ ..] => tasks::demo(rest),
         ["build"] => tasks::build(),
         ["test"] => tasks::test(),
         ["check"] => tasks::check(),
         ["arrows"] => arrows::check(),
+        ["wasm"] => wasm::build(wasm::Profile::Web),
+        ["wasm", "--dev"] => wasm::build(wasm::Profile::Dev),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);

@@ -19,6 +19,7 @@ use crate::cage::Cage;
 use crate::enclosure::Enclosure;
 use crate::mesh::{Bounds, PolygonMesh};
 
+pub(crate) use fill::{loops, triangulate};
 pub use repair::{Repair, RepairError, Repaired, repair};
 
 /// Most places that a problem lists of each kind; `count` is the full number.

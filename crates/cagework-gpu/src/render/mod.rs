@@ -15,6 +15,7 @@
 mod cage;
 pub mod camera;
 pub mod colormap;
+mod eye;
 mod frame;
 mod gizmo;
 pub mod layout;

@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use cagework_core::TriMesh;
+use cagework_core::deform::vertex_normals;
 use glam::Vec3;
 use serde_json::{Value, json};
 
@@ -61,6 +63,47 @@ pub(crate) fn build_from_obj(
         sources.extend(part.vertices.iter().map(|&(pair, _)| pairs.shading.vertex[pair as usize]));
     }
     Ok((pack.finish(json)?, sources))
+}
+
+/// A GLB of one mesh with colours: sRGB and opacity for each vertex, 0 to 255, or none at all.
+///
+/// # Errors
+/// [`WriteError::NoFaces`] without triangles, [`WriteError::TooLarge`].
+pub fn write_mesh_glb(name: &str, mesh: &TriMesh, colours: &[[u8; 4]]) -> Result<Vec<u8>, WriteError> {
+    if mesh.triangles.is_empty() {
+        return Err(WriteError::NoFaces);
+    }
+    let mut json = json!({
+        "asset": { "version": "2.0", "generator": "Cagework" },
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "name": name, "mesh": 0 }],
+        "materials": [plain(name)],
+    });
+    let mut pack = Pack::empty();
+    let normals = vertex_normals(&mesh.positions, &mesh.triangles);
+    let mut attributes = json!({
+        "POSITION": pack.push_vec3(&mut json, &mesh.positions, true),
+        "NORMAL": pack.push_vec3(&mut json, &normals, false),
+    });
+    if colours.len() == mesh.positions.len() {
+        // glTF's colours are linear.
+        let linear: Vec<f32> = colours
+            .iter()
+            .flat_map(|&[r, g, b, a]| [to_linear(r), to_linear(g), to_linear(b), f32::from(a) / 255.0])
+            .collect();
+        attributes["COLOR_0"] = pack.push_floats(&mut json, &linear, 4, true, false).into();
+    }
+    let indices = pack.push_indices(&mut json, mesh.triangles.as_flattened().iter().copied());
+    let primitive = json!({ "attributes": attributes, "indices": indices, "material": 0 });
+    json["meshes"] = json!([{ "name": name, "primitives": [primitive] }]);
+    pack.finish(json)
+}
+
+/// Linear light of an sRGB value (IEC 61966-2-1).
+fn to_linear(value: u8) -> f32 {
+    let value = f32::from(value) / 255.0;
+    if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
 /// glTF's default is a rough mirror, which no OBJ means.

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use ::gltf::binary::Glb;
+use ::gltf::binary::{Glb, Header};
 use ::gltf::json::Root;
 use data_url::DataUrl;
 use percent_encoding::percent_decode_str;
@@ -76,6 +76,22 @@ fn split(bytes: &[u8]) -> Result<Chunks<'_>, GltfError> {
     }
     let glb = Glb::from_slice(&bytes[..length]).map_err(|e| fault(e.to_string()))?;
     Ok((glb.json, glb.bin))
+}
+
+/// JSON and binary chunk of a GLB, nothing resolved.
+pub(crate) fn glb_parts(bytes: &[u8]) -> Result<(Value, Vec<u8>), GltfError> {
+    let (json, bin) = split(bytes)?;
+    let json: Value = serde_json::from_slice(&json).map_err(|e| GltfError::Json(e.to_string()))?;
+    check_version(&json)?;
+    Ok((json, bin.map(Cow::into_owned).unwrap_or_default()))
+}
+
+/// A GLB of what [`glb_parts`] took apart.
+pub(crate) fn glb_of(json: &Value, bin: &[u8]) -> Result<Vec<u8>, GltfError> {
+    let json = serde_json::to_vec(json).map_err(|e| GltfError::Json(e.to_string()))?;
+    let header = Header { magic: *b"glTF", version: 2, length: 0 };
+    let glb = Glb { header, json: json.into(), bin: (!bin.is_empty()).then(|| bin.into()) };
+    glb.to_vec().map_err(|e| GltfError::Container(e.to_string()))
 }
 
 fn check_version(json: &Value) -> Result<(), GltfError> {

@@ -27,9 +27,12 @@ use crate::model::Counts;
 use scene::{Instance, Worlds};
 
 pub(crate) use build::build_from_obj;
+pub use build::write_mesh_glb;
+pub(crate) use container::{glb_of, glb_parts};
 pub(crate) use export::write_obj;
 pub(crate) use look::look;
-pub(crate) use patch::{Pose, Rest, patch};
+pub(crate) use pack::{Pack, push};
+pub(crate) use patch::{Pose, Rest, embed_images, patch};
 
 /// Why a glTF file could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]

@@ -20,7 +20,7 @@ const ALIGN: usize = 4;
 
 /// Extensions that refer to accessors nowhere but in the places [`each_accessor`] visits. With any other extension
 /// nothing is thrown away: an index nobody here knows of must not move.
-const KNOWN_EXTENSIONS: [&str; 8] = [
+const KNOWN_EXTENSIONS: [&str; 9] = [
     "KHR_materials_",
     "KHR_texture_",
     "EXT_texture_",
@@ -29,6 +29,7 @@ const KNOWN_EXTENSIONS: [&str; 8] = [
     "KHR_animation_pointer",
     "KHR_xmp",
     "EXT_mesh_gpu_instancing",
+    crate::project::EXTENSION,
 ];
 
 /// Bytes of all buffer views of a document under way.
@@ -93,6 +94,11 @@ impl<'a> Pack<'a> {
     pub(crate) fn push_vec3(&mut self, json: &mut Value, values: &[Vec3], bounds: bool) -> usize {
         let flat: Vec<f32> = values.iter().flat_map(Vec3::to_array).collect();
         self.push_floats(json, &flat, 3, true, bounds)
+    }
+
+    /// A new accessor of the ends of lines.
+    pub(crate) fn push_lines(&mut self, json: &mut Value, lines: &[[u32; 2]]) -> usize {
+        self.push_indices(json, lines.iter().flatten().copied())
     }
 
     /// A new accessor of triangle corners; 16 bits where they suffice (0xffff is a strip's restart value).

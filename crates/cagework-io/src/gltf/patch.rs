@@ -293,7 +293,7 @@ fn patch_primitive(
 }
 
 /// Moves images that came by URI into the file: a GLB travels alone.
-fn embed_images(document: &GltfDocument, json: &mut Value, pack: &mut Pack<'_>) {
+pub(crate) fn embed_images(document: &GltfDocument, json: &mut Value, pack: &mut Pack<'_>) {
     for (number, image) in document.images.iter().enumerate() {
         let Some(image) = image else { continue };
         let view = pack.push_view(json, image.bytes.clone(), None);

@@ -1,0 +1,260 @@
+//! Grab, rotate and scale: from the pointer, or a typed number, to new cage positions.
+
+use glam::{Quat, Vec2, Vec3};
+
+use super::pull::Pull;
+use super::view::View;
+
+/// A plane seen at less than this (sine of the angle) is dragged in the view plane instead: a pixel would be a leap.
+const GRAZING: f32 = 0.05;
+
+/// Nearer to the middle than this many pixels, a scale gesture does not start: a pixel would be a large factor.
+const NEAREST_SCALE: f32 = 8.0;
+
+/// What a gesture does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GestureKind {
+    /// Moves.
+    Grab,
+    /// Turns around the middle of the selection.
+    Rotate,
+    /// Stretches about the middle of the selection.
+    Scale,
+}
+
+/// Which directions a gesture is limited to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Constraint {
+    /// The view plane (grab), the view axis (rotate), all axes alike (scale).
+    #[default]
+    Free,
+    /// One axis, 0 to 2.
+    Axis(usize),
+    /// The plane across an axis, 0 to 2; for a rotation the same as the axis.
+    Plane(usize),
+}
+
+/// A gesture under way. Its result is always computed from where it began.
+#[derive(Clone, Debug)]
+pub struct Gesture {
+    kind: GestureKind,
+    constraint: Constraint,
+    start: Vec<Vec3>,
+    pull: Pull,
+    pivot: Vec3,
+    pointer_start: Vec2,
+    pointer: Vec2,
+    typed: Option<f32>,
+}
+
+impl Gesture {
+    /// Begins at `pointer`. `start`: positions of the moment, `[n_cage]`; `pivot`: middle of the selection.
+    #[must_use]
+    pub fn new(kind: GestureKind, start: Vec<Vec3>, pull: Pull, pivot: Vec3, pointer: Vec2) -> Self {
+        let constraint = Constraint::Free;
+        Self { kind, constraint, start, pull, pivot, pointer_start: pointer, pointer, typed: None }
+    }
+
+    /// What it does.
+    #[must_use]
+    pub fn kind(&self) -> GestureKind {
+        self.kind
+    }
+
+    /// Positions when it began. `[n_cage]`
+    #[must_use]
+    pub fn start(&self) -> &[Vec3] {
+        &self.start
+    }
+
+    /// Where it began to turn and stretch about.
+    #[must_use]
+    pub fn pivot(&self) -> Vec3 {
+        self.pivot
+    }
+
+    /// Limits it.
+    pub fn constrain(&mut self, constraint: Constraint) {
+        self.constraint = constraint;
+    }
+
+    /// Its limit.
+    #[must_use]
+    pub fn constraint(&self) -> Constraint {
+        self.constraint
+    }
+
+    /// Takes another pull: the radius of proportional editing has changed.
+    pub fn set_pull(&mut self, pull: Pull) {
+        self.pull = pull;
+    }
+
+    /// Follows the pointer.
+    pub fn drag(&mut self, pointer: Vec2) {
+        self.pointer = pointer;
+    }
+
+    /// Takes an amount instead of the pointer (object units, degrees, a factor); `None` goes back to the pointer.
+    pub fn type_amount(&mut self, amount: Option<f32>) {
+        self.typed = amount.filter(|a| a.is_finite());
+    }
+
+    /// Cage positions now. `[n_cage]`
+    #[must_use]
+    pub fn positions(&self, view: &dyn View) -> Vec<Vec3> {
+        match self.kind {
+            GestureKind::Grab => {
+                let movement = self.movement(view);
+                self.pull.apply(&self.start, &|p, share| p + share * movement)
+            }
+            GestureKind::Rotate => {
+                let (axis, angle) = self.turn(view);
+                self.pull.apply(&self.start, &|p, share| {
+                    self.pivot + Quat::from_axis_angle(axis, share * angle) * (p - self.pivot)
+                })
+            }
+            GestureKind::Scale => {
+                let factors = self.factors(view);
+                self.pull.apply(&self.start, &|p, share| {
+                    self.pivot + Vec3::ONE.lerp(factors, share) * (p - self.pivot)
+                })
+            }
+        }
+    }
+
+    /// What it does now, for a status line: `Move 0.25 along X`.
+    #[must_use]
+    pub fn label(&self, view: &dyn View) -> String {
+        const NAMES: [&str; 3] = ["X", "Y", "Z"];
+        let along = match self.constraint {
+            Constraint::Free => String::new(),
+            Constraint::Axis(axis) if self.kind == GestureKind::Rotate => format!(" around {}", NAMES[axis]),
+            Constraint::Axis(axis) => format!(" along {}", NAMES[axis]),
+            Constraint::Plane(axis) if self.kind == GestureKind::Rotate => format!(" around {}", NAMES[axis]),
+            Constraint::Plane(axis) => format!(" in {}{}", NAMES[(axis + 1) % 3], NAMES[(axis + 2) % 3]),
+        };
+        match self.kind {
+            GestureKind::Grab => {
+                let movement = self.movement(view);
+                match self.constraint {
+                    Constraint::Axis(axis) => format!("Move {}{along}", shown(movement[axis])),
+                    _ => format!("Move ({}){along}", movement.to_array().map(shown).join(", ")),
+                }
+            }
+            GestureKind::Rotate => format!("Rotate {}°{along}", shown(self.turn(view).1.to_degrees())),
+            GestureKind::Scale => format!("Scale × {}{along}", shown(self.factor(view))),
+        }
+    }
+
+    fn movement(&self, view: &dyn View) -> Vec3 {
+        if let Some(amount) = self.typed {
+            return match self.constraint {
+                Constraint::Axis(axis) => amount * Vec3::AXES[axis],
+                // Along the first axis of the plane, as typed numbers go to x first.
+                Constraint::Plane(axis) => amount * Vec3::AXES[if axis == 0 { 1 } else { 0 }],
+                Constraint::Free => amount * view.right(),
+            };
+        }
+        let free = view.in_view_plane(self.pivot, self.pointer - self.pointer_start);
+        match self.constraint {
+            Constraint::Free => free,
+            Constraint::Axis(axis) => {
+                let axis = Vec3::AXES[axis];
+                let from = along_axis(view, self.pointer_start, self.pivot, axis);
+                match from.zip(along_axis(view, self.pointer, self.pivot, axis)) {
+                    Some((from, to)) => (to - from) * axis,
+                    // The axis points at the eye: up the picture moves away.
+                    None => -free.dot(view.up()) * axis.dot(view.backward()).signum() * axis,
+                }
+            }
+            Constraint::Plane(axis) => {
+                let normal = Vec3::AXES[axis];
+                let from = in_plane(view, self.pointer_start, self.pivot, normal);
+                match from.zip(in_plane(view, self.pointer, self.pivot, normal)) {
+                    Some((from, to)) => to - from,
+                    None => free - free.dot(normal) * normal,
+                }
+            }
+        }
+    }
+
+    /// Axis towards the eye's side and angle, radians.
+    fn turn(&self, view: &dyn View) -> (Vec3, f32) {
+        let backward = view.backward();
+        let axis = match self.constraint {
+            Constraint::Free => backward,
+            Constraint::Axis(axis) | Constraint::Plane(axis) => Vec3::AXES[axis],
+        };
+        if let Some(degrees) = self.typed {
+            return (axis, degrees.to_radians());
+        }
+        let center = view.project(self.pivot).map_or(self.pointer_start, |(pixel, _)| pixel);
+        let (from, to) = (self.pointer_start - center, self.pointer - center);
+        if from == Vec2::ZERO || to == Vec2::ZERO {
+            return (axis, 0.0);
+        }
+        // Pixels run down: what looks counter-clockwise has a negative angle there.
+        let seen = -from.angle_to(to);
+        // An axis that points away turns the other way round.
+        (axis, if axis.dot(backward) < 0.0 { -seen } else { seen })
+    }
+
+    fn factor(&self, view: &dyn View) -> f32 {
+        if let Some(factor) = self.typed {
+            return factor;
+        }
+        let Some((center, _)) = view.project(self.pivot) else { return 1.0 };
+        let from = self.pointer_start - center;
+        // The part along the first direction, so that crossing the middle mirrors.
+        let reach = from.length().max(NEAREST_SCALE);
+        let direction = if from == Vec2::ZERO { Vec2::X } else { from.normalize() };
+        1.0 + (self.pointer - self.pointer_start).dot(direction) / reach
+    }
+
+    fn factors(&self, view: &dyn View) -> Vec3 {
+        let factor = self.factor(view);
+        match self.constraint {
+            Constraint::Free => Vec3::splat(factor),
+            Constraint::Axis(axis) => {
+                Vec3::from_array(std::array::from_fn(|k| if k == axis { factor } else { 1.0 }))
+            }
+            Constraint::Plane(axis) => {
+                Vec3::from_array(std::array::from_fn(|k| if k == axis { 1.0 } else { factor }))
+            }
+        }
+    }
+}
+
+/// Three digits after the point, none of them for nothing.
+fn shown(value: f32) -> String {
+    let text = format!("{value:.3}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// Where on the axis through `through` the pointer's ray passes nearest; nothing if both are parallel.
+fn along_axis(view: &dyn View, pointer: Vec2, through: Vec3, axis: Vec3) -> Option<f32> {
+    let (origin, direction) = view.ray(pointer);
+    let between = through - origin;
+    let cosine = direction.dot(axis);
+    let sine_squared = 1.0 - cosine * cosine;
+    if sine_squared < GRAZING * GRAZING {
+        return None;
+    }
+    Some((cosine * direction.dot(between) - axis.dot(between)) / sine_squared)
+}
+
+/// Where the pointer's ray meets the plane; nothing if it grazes it or meets it behind the eye.
+fn in_plane(view: &dyn View, pointer: Vec2, through: Vec3, normal: Vec3) -> Option<Vec3> {
+    let (origin, direction) = view.ray(pointer);
+    let towards = direction.dot(normal);
+    if towards.abs() < GRAZING {
+        return None;
+    }
+    let along = (through - origin).dot(normal) / towards;
+    (along > 0.0).then(|| origin + along * direction)
+}
+
+#[cfg(test)]
+#[path = "gesture_tests.rs"]
+mod tests;

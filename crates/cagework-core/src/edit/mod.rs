@@ -1,0 +1,22 @@
+//! Editing a cage by hand: what is picked, selected and moved. Plain mathematics; who draws and who listens is elsewhere.
+//!
+//! All of it works on cage positions `[n_cage]` in object units and on the faces of a [`crate::Cage`]. Pixels are those
+//! of the [`View`], from the top left corner, x right and y down.
+
+mod gesture;
+mod pick;
+mod playback;
+mod pull;
+mod selection;
+mod symmetry;
+mod view;
+
+pub use gesture::{Constraint, Gesture, GestureKind};
+pub use pick::{Element, Topology, pick_edge, pick_face, pick_vertex, vertices_in_box};
+pub use playback::{PoseError, blend, moment};
+pub use pull::{Pull, SharedPull};
+pub use selection::{SelectMode, Selection};
+pub use symmetry::Symmetry;
+pub use view::View;
+#[cfg(test)]
+pub(crate) use view::tests::Flat;

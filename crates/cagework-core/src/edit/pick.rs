@@ -1,0 +1,182 @@
+//! What lies under the pointer.
+
+use glam::{Vec2, Vec3};
+
+use super::view::View;
+
+/// What a click selects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Element {
+    /// A vertex.
+    #[default]
+    Vertex,
+    /// An edge: both its ends.
+    Edge,
+    /// A face: all its corners.
+    Face,
+}
+
+/// Edges and faces of a cage, as editing needs them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Topology {
+    /// Corners of each face in order around it. `[n_faces]`
+    pub faces: Vec<Vec<u32>>,
+    /// Each edge once, lower vertex first, ascending. `[n_edges]`
+    pub edges: Vec<[u32; 2]>,
+}
+
+impl Topology {
+    /// Edges of faces; open ones, as a draft of a cage has, are edges too.
+    #[must_use]
+    pub fn new(faces: &[Vec<u32>]) -> Self {
+        let mut edges: Vec<[u32; 2]> = Vec::new();
+        for face in faces {
+            for (k, &a) in face.iter().enumerate() {
+                let b = face[(k + 1) % face.len()];
+                edges.push([a.min(b), a.max(b)]);
+            }
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        Self { faces: faces.to_vec(), edges }
+    }
+}
+
+/// The vertex within `radius` pixels of the pointer; of several, those in front hide those behind, and among those at
+/// one depth (up to the size of the radius) the nearest to the pointer counts.
+#[must_use]
+pub fn pick_vertex(positions: &[Vec3], view: &dyn View, pointer: Vec2, radius: f32) -> Option<u32> {
+    let near = positions.iter().enumerate().filter_map(|(i, &p)| {
+        let (pixel, depth) = view.project(p)?;
+        let distance = pixel.distance(pointer);
+        (distance <= radius).then(|| (i as u32, depth, distance, radius * view.units_per_pixel(p)))
+    });
+    let near: Vec<_> = near.collect();
+    let front = near.iter().map(|n| n.1).fold(f32::INFINITY, f32::min);
+    near.iter()
+        .filter(|(_, depth, _, size)| *depth <= front + 2.0 * size)
+        .min_by(|a, b| a.2.total_cmp(&b.2))
+        .map(|n| n.0)
+}
+
+/// The edge within `radius` pixels of the pointer, an index into [`Topology::edges`]; of several the one whose nearest
+/// point is in front, unless the pointer is much nearer to another.
+#[must_use]
+pub fn pick_edge(
+    positions: &[Vec3],
+    topology: &Topology,
+    view: &dyn View,
+    pointer: Vec2,
+    radius: f32,
+) -> Option<u32> {
+    let near = topology.edges.iter().enumerate().filter_map(|(e, edge)| {
+        let [(a, depth_a), (b, depth_b)] =
+            [view.project(positions[edge[0] as usize])?, view.project(positions[edge[1] as usize])?];
+        let along =
+            ((pointer - a).dot(b - a) / (b - a).length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let distance = pointer.distance(a.lerp(b, along));
+        let depth = depth_a + along * (depth_b - depth_a);
+        let middle = positions[edge[0] as usize].lerp(positions[edge[1] as usize], along);
+        (distance <= radius).then(|| (e as u32, depth, distance, radius * view.units_per_pixel(middle)))
+    });
+    let near: Vec<_> = near.collect();
+    let front = near.iter().map(|n| n.1).fold(f32::INFINITY, f32::min);
+    near.iter()
+        .filter(|(_, depth, _, size)| *depth <= front + 2.0 * size)
+        .min_by(|a, b| a.2.total_cmp(&b.2))
+        .map(|n| n.0)
+}
+
+/// The face under the pointer that is nearest to the eye, by its corners' fan around their mean.
+#[must_use]
+pub fn pick_face(positions: &[Vec3], topology: &Topology, view: &dyn View, pointer: Vec2) -> Option<u32> {
+    let (origin, direction) = view.ray(pointer);
+    let mut best: Option<(f32, u32)> = None;
+    for (f, face) in topology.faces.iter().enumerate() {
+        let corners: Vec<Vec3> = face.iter().map(|&i| positions[i as usize]).collect();
+        let middle = corners.iter().sum::<Vec3>() / corners.len().max(1) as f32;
+        for (k, &a) in corners.iter().enumerate() {
+            let b = corners[(k + 1) % corners.len()];
+            let Some(along) = ray_meets_triangle(origin, direction, [middle, a, b]) else { continue };
+            if best.is_none_or(|(nearest, _)| along < nearest) {
+                best = Some((along, f as u32));
+            }
+        }
+    }
+    best.map(|(_, f)| f)
+}
+
+/// Vertices whose pixels lie in the rectangle between two corners, ascending; hidden ones too.
+#[must_use]
+pub fn vertices_in_box(positions: &[Vec3], view: &dyn View, corners: [Vec2; 2]) -> Vec<u32> {
+    let (low, high) = (corners[0].min(corners[1]), corners[0].max(corners[1]));
+    let inside =
+        |p: Vec3| view.project(p).is_some_and(|(pixel, _)| pixel.cmpge(low).all() && pixel.cmple(high).all());
+    (0..positions.len() as u32).filter(|&i| inside(positions[i as usize])).collect()
+}
+
+/// Distance along a ray to a triangle, either side (Möller and Trumbore 1997).
+fn ray_meets_triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f32> {
+    let (ab, ac) = (b - a, c - a);
+    let p = direction.cross(ac);
+    let det = ab.dot(p);
+    if det == 0.0 {
+        return None;
+    }
+    let s = origin - a;
+    let u = s.dot(p) / det;
+    let q = s.cross(ab);
+    let v = direction.dot(q) / det;
+    let along = ac.dot(q) / det;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && along >= 0.0).then_some(along)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cage::shapes::cube;
+    use crate::edit::Flat;
+
+    fn pixel(x: f32, y: f32) -> Vec2 {
+        Vec2::new(200.0 + 100.0 * x, 100.0 - 100.0 * y)
+    }
+
+    #[test]
+    fn vertex_in_front_hides_the_one_behind_it() {
+        // Cube: vertex x + 2 y + 4 z; 7 is in front of 3.
+        let cube = cube();
+        let at = pixel(1.0, 1.0) + Vec2::new(3.0, 4.0);
+        assert_eq!(pick_vertex(&cube.positions, &Flat, at, 5.0), Some(7));
+        assert_eq!(pick_vertex(&cube.positions, &Flat, at, 4.9), None);
+        // Of two at one depth the nearer to the pointer counts.
+        let two = [Vec3::ZERO, Vec3::new(0.1, 0.0, 0.0)];
+        assert_eq!(pick_vertex(&two, &Flat, pixel(0.06, 0.0), 20.0), Some(1));
+    }
+
+    #[test]
+    fn edge_in_front_is_picked_between_its_ends_only() {
+        let cube = cube();
+        let topology = Topology::new(&cube.faces);
+        assert_eq!(topology.edges.len(), 12);
+        let edge = pick_edge(&cube.positions, &topology, &Flat, pixel(0.5, 1.03), 5.0);
+        assert_eq!(edge.map(|e| topology.edges[e as usize]), Some([6, 7]));
+        assert_eq!(pick_edge(&cube.positions, &topology, &Flat, pixel(1.1, 1.1), 5.0), None);
+    }
+
+    #[test]
+    fn nearest_face_under_the_pointer_is_picked() {
+        let cube = cube();
+        let topology = Topology::new(&cube.faces);
+        let face = pick_face(&cube.positions, &topology, &Flat, pixel(0.25, 0.75));
+        assert_eq!(face.map(|f| topology.faces[f as usize].clone()), Some(vec![4, 5, 7, 6]), "z = 1");
+        assert_eq!(pick_face(&cube.positions, &topology, &Flat, pixel(1.25, 0.75)), None);
+    }
+
+    #[test]
+    fn box_takes_vertices_whichever_way_it_is_drawn() {
+        let cube = cube();
+        let corners = [pixel(0.5, 1.5), pixel(1.5, -0.5)];
+        assert_eq!(vertices_in_box(&cube.positions, &Flat, corners), [1, 3, 5, 7]);
+        assert_eq!(vertices_in_box(&cube.positions, &Flat, [corners[1], corners[0]]), [1, 3, 5, 7]);
+    }
+}

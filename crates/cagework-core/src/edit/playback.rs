@@ -1,0 +1,88 @@
+//! Poses: mixed by their shares, and one after the other as an animation.
+
+use glam::Vec3;
+use thiserror::Error;
+
+/// A pose of another cage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("the pose has {given} vertices, but the cage has {expected}: it belongs to another cage")]
+pub struct PoseError {
+    /// Vertices of the pose.
+    pub given: usize,
+    /// Vertices of the cage.
+    pub expected: usize,
+}
+
+/// `rest + sum_k share_k (pose_k - rest)`: exact, because deformation is linear in the cage. A pose without a share
+/// counts as 0.
+///
+/// # Errors
+/// [`PoseError`] when a pose has not as many vertices as the cage.
+pub fn blend(rest: &[Vec3], poses: &[Vec<Vec3>], shares: &[f32]) -> Result<Vec<Vec3>, PoseError> {
+    let mut mixed = rest.to_vec();
+    for (k, pose) in poses.iter().enumerate() {
+        if pose.len() != rest.len() {
+            return Err(PoseError { given: pose.len(), expected: rest.len() });
+        }
+        let share = shares.get(k).copied().unwrap_or(0.0);
+        for ((mixed, &pose), &rest) in mixed.iter_mut().zip(pose).zip(rest) {
+            *mixed += share * (pose - rest);
+        }
+    }
+    Ok(mixed)
+}
+
+/// A moment of the animation from rest through all poses back to rest, a second each, over and over: the same as an
+/// export plays. `[n_cage]`
+///
+/// # Errors
+/// [`PoseError`] when a pose has not as many vertices as the cage.
+pub fn moment(rest: &[Vec3], poses: &[Vec<Vec3>], seconds: f32) -> Result<Vec<Vec3>, PoseError> {
+    let stops = poses.len() + 1;
+    let time = seconds.rem_euclid(stops as f32);
+    let (from, part) = ((time as usize).min(stops - 1), time.fract());
+    let mut shares = vec![0.0; poses.len()];
+    // Stop 0 is rest, stop k is pose k - 1.
+    if from > 0 {
+        shares[from - 1] = 1.0 - part;
+    }
+    if from < poses.len() {
+        shares[from] = part;
+    }
+    blend(rest, poses, &shares)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_add_up_from_rest() {
+        let rest = [Vec3::ONE];
+        let poses = [vec![Vec3::new(3.0, 1.0, 1.0)], vec![Vec3::new(1.0, 5.0, 1.0)]];
+        let mixed = blend(&rest, &poses, &[0.5, 1.0]);
+        assert_eq!(mixed, Ok(vec![Vec3::new(2.0, 5.0, 1.0)]));
+        assert_eq!(blend(&rest, &poses, &[]), Ok(rest.to_vec()));
+        assert_eq!(blend(&rest, &[vec![Vec3::ZERO; 2]], &[1.0]), Err(PoseError { given: 2, expected: 1 }));
+    }
+
+    #[test]
+    fn animation_passes_every_pose_and_returns_to_rest() {
+        let rest = [Vec3::ZERO];
+        let poses = [vec![Vec3::X], vec![Vec3::Y]];
+        let at = |seconds| moment(&rest, &poses, seconds).unwrap()[0];
+        for (seconds, expected) in [
+            (0.0, Vec3::ZERO),
+            (0.25, 0.25 * Vec3::X),
+            (1.0, Vec3::X),
+            (1.5, 0.5 * Vec3::X + 0.5 * Vec3::Y),
+            (2.0, Vec3::Y),
+            (2.75, 0.25 * Vec3::Y),
+            (3.0, Vec3::ZERO),
+            (7.0, Vec3::X),
+        ] {
+            assert!(at(seconds).abs_diff_eq(expected, 1e-6), "at {seconds} s");
+        }
+        assert_eq!(moment(&rest, &[], 0.7), Ok(rest.to_vec()));
+    }
+}

@@ -1,0 +1,176 @@
+//! Which cage vertices are selected.
+
+use glam::Vec3;
+
+use super::pick::Topology;
+
+/// How new vertices join those that are selected.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SelectMode {
+    /// Only the new ones.
+    #[default]
+    Replace,
+    /// Both.
+    Add,
+    /// The old ones without the new ones.
+    Remove,
+    /// If all new ones are selected they are removed, else added.
+    Toggle,
+}
+
+/// Selected vertices and the one selected last.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Selection {
+    selected: Vec<bool>,
+    last: Option<u32>,
+}
+
+impl Selection {
+    /// Nothing of a cage of `n_cage` vertices.
+    #[must_use]
+    pub fn new(n_cage: usize) -> Self {
+        Self { selected: vec![false; n_cage], last: None }
+    }
+
+    /// Selected vertices, ascending.
+    #[must_use]
+    pub fn vertices(&self) -> Vec<u32> {
+        (0..self.selected.len() as u32).filter(|&i| self.selected[i as usize]).collect()
+    }
+
+    /// Whether a vertex is selected.
+    #[must_use]
+    pub fn contains(&self, vertex: u32) -> bool {
+        self.selected.get(vertex as usize).copied().unwrap_or(false)
+    }
+
+    /// Whether nothing is selected.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        !self.selected.contains(&true)
+    }
+
+    /// The vertex that was selected last and still is.
+    #[must_use]
+    pub fn last(&self) -> Option<u32> {
+        self.last.filter(|&v| self.contains(v))
+    }
+
+    /// Changes the selection; vertices that the cage does not have are ignored.
+    pub fn change(&mut self, vertices: &[u32], mode: SelectMode) {
+        let known = |i: &&u32| (**i as usize) < self.selected.len();
+        let vertices: Vec<u32> = vertices.iter().filter(known).copied().collect();
+        let add = match mode {
+            SelectMode::Replace => {
+                self.selected.fill(false);
+                true
+            }
+            SelectMode::Add => true,
+            SelectMode::Remove => false,
+            SelectMode::Toggle => !vertices.iter().all(|&i| self.contains(i)),
+        };
+        for &i in &vertices {
+            self.selected[i as usize] = add;
+        }
+        if add {
+            self.last = vertices.last().copied().or(self.last);
+        }
+        if self.last().is_none() {
+            self.last = self.vertices().last().copied();
+        }
+    }
+
+    /// Selects everything.
+    pub fn all(&mut self) {
+        self.selected.fill(true);
+        if self.last.is_none() {
+            self.last = self.selected.len().checked_sub(1).map(|i| i as u32);
+        }
+    }
+
+    /// Extends the selection to the whole connected parts it touches.
+    pub fn linked(&mut self, topology: &Topology) {
+        // Passes over all edges until nothing changes: a cage has a few hundred.
+        loop {
+            let mut changed = false;
+            for [a, b] in topology.edges.iter().map(|e| e.map(|i| i as usize)) {
+                if self.selected[a] != self.selected[b] {
+                    (self.selected[a], self.selected[b]) = (true, true);
+                    changed = true;
+                }
+            }
+            if !changed {
+                return;
+            }
+        }
+    }
+
+    /// Edges with both ends selected.
+    #[must_use]
+    pub fn edges(&self, topology: &Topology) -> Vec<[u32; 2]> {
+        topology.edges.iter().filter(|e| e.iter().all(|&i| self.contains(i))).copied().collect()
+    }
+
+    /// Faces with all corners selected.
+    #[must_use]
+    pub fn faces(&self, topology: &Topology) -> Vec<u32> {
+        let whole = |f: &u32| topology.faces[*f as usize].iter().all(|&i| self.contains(i));
+        (0..topology.faces.len() as u32).filter(whole).collect()
+    }
+
+    /// Mean of the selected positions.
+    #[must_use]
+    pub fn center(&self, positions: &[Vec3]) -> Option<Vec3> {
+        let vertices = self.vertices();
+        let sum: Vec3 = vertices.iter().map(|&i| positions[i as usize]).sum();
+        (!vertices.is_empty()).then(|| sum / vertices.len() as f32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cage::shapes::cube;
+
+    #[test]
+    fn modes_are_set_operations() {
+        let mut selection = Selection::new(5);
+        selection.change(&[1, 2], SelectMode::Replace);
+        selection.change(&[4], SelectMode::Add);
+        assert_eq!((selection.vertices(), selection.last()), (vec![1, 2, 4], Some(4)));
+        selection.change(&[4, 0], SelectMode::Toggle);
+        assert_eq!(selection.vertices(), [0, 1, 2, 4], "not all were selected: added");
+        selection.change(&[4, 0], SelectMode::Toggle);
+        assert_eq!(selection.vertices(), [1, 2], "all were selected: removed");
+        selection.change(&[1, 99], SelectMode::Remove);
+        assert_eq!((selection.vertices(), selection.last()), (vec![2], Some(2)));
+        selection.change(&[], SelectMode::Replace);
+        assert!(selection.is_empty() && selection.last().is_none());
+    }
+
+    #[test]
+    fn linked_takes_the_whole_part_and_no_other() {
+        let mut two = cube();
+        two.positions.extend(cube().positions);
+        two.faces.extend(cube().faces.iter().map(|f| f.iter().map(|i| i + 8).collect()));
+        let topology = Topology::new(&two.faces);
+        let mut selection = Selection::new(16);
+        selection.change(&[9], SelectMode::Replace);
+        selection.linked(&topology);
+        assert_eq!(selection.vertices(), (8..16).collect::<Vec<_>>());
+        assert_eq!((selection.edges(&topology).len(), selection.faces(&topology).len()), (12, 6));
+    }
+
+    #[test]
+    fn edges_and_faces_need_all_their_corners() {
+        let cube = cube();
+        let topology = Topology::new(&cube.faces);
+        let mut selection = Selection::new(8);
+        selection.change(&[4, 5, 7], SelectMode::Replace);
+        assert_eq!(selection.edges(&topology), [[4, 5], [5, 7]]);
+        assert!(selection.faces(&topology).is_empty());
+        selection.change(&[6], SelectMode::Add);
+        assert_eq!(selection.faces(&topology), [1]);
+        assert_eq!(selection.center(&cube.positions), Some(Vec3::new(0.5, 0.5, 1.0)));
+    }
+}

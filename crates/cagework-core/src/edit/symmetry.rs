@@ -1,0 +1,111 @@
+//! Mirror images across the plane x = const.
+
+use glam::Vec3;
+
+use crate::mesh::Bounds;
+
+/// A vertex's mirror image may be off by this fraction of the diagonal: modellers snap to a grid, exporters round.
+const TOLERANCE: f32 = 2e-3;
+
+/// Which vertices of a cage are mirror images of each other in the rest pose.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Symmetry {
+    plane: f32,
+    partner: Vec<Option<u32>>,
+}
+
+impl Symmetry {
+    /// Pairs the vertices of a rest cage. The plane is x = 0 or the middle of the bounds, whichever pairs more.
+    #[must_use]
+    pub fn new(rest: &[Vec3]) -> Self {
+        let Some(bounds) = Bounds::of(rest) else { return Self::default() };
+        let tolerance = TOLERANCE * bounds.diagonal();
+        let [origin, middle] = [0.0, bounds.center().x].map(|plane| Self::about(rest, plane, tolerance));
+        let pairs = |s: &Self| s.partner.iter().flatten().count();
+        if pairs(&middle) > pairs(&origin) { middle } else { origin }
+    }
+
+    fn about(rest: &[Vec3], plane: f32, tolerance: f32) -> Self {
+        let nearest = |i: usize| {
+            let image = reflect_point(rest[i], plane);
+            let (j, distance) =
+                rest.iter().map(|p| p.distance(image)).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
+            (distance <= tolerance).then_some(j)
+        };
+        let nearest: Vec<Option<usize>> = (0..rest.len()).map(nearest).collect();
+        // Two that choose each other are a pair.
+        let partner = (0..rest.len())
+            .map(|i| nearest[i].filter(|&j| nearest[j] == Some(i)).map(|j| j as u32))
+            .collect();
+        Self { plane, partner }
+    }
+
+    /// The plane's x, object units.
+    #[must_use]
+    pub fn plane(&self) -> f32 {
+        self.plane
+    }
+
+    /// A vertex's mirror image: itself on the plane, nothing if it has none.
+    #[must_use]
+    pub fn partner(&self, vertex: u32) -> Option<u32> {
+        self.partner.get(vertex as usize).copied().flatten()
+    }
+
+    /// Vertices without a mirror image, ascending.
+    #[must_use]
+    pub fn unmatched(&self) -> Vec<u32> {
+        (0..self.partner.len() as u32).filter(|&i| self.partner[i as usize].is_none()).collect()
+    }
+
+    /// Whether every vertex has a mirror image.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.partner.iter().all(Option::is_some)
+    }
+}
+
+/// Mirror image of a point.
+fn reflect_point(p: Vec3, plane: f32) -> Vec3 {
+    Vec3::new(2.0 * plane - p.x, p.y, p.z)
+}
+
+/// Mirror image of a movement.
+pub(crate) fn reflect(d: Vec3) -> Vec3 {
+    Vec3::new(-d.x, d.y, d.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cage::shapes::{cube, cuboid};
+
+    #[test]
+    fn pairs_are_found_about_the_origin_and_about_the_middle() {
+        for min_x in [-1.0, 3.0] {
+            let rest = cuboid(Vec3::new(min_x, 0.0, 0.0), Vec3::new(min_x + 2.0, 1.0, 1.0)).positions;
+            let symmetry = Symmetry::new(&rest);
+            assert!(symmetry.is_complete() && (symmetry.plane() - (min_x + 1.0)).abs() < 1e-6);
+            // Vertex x + 2 y + 4 z: its mirror image differs in the lowest bit.
+            assert!((0..8).all(|i| symmetry.partner(i) == Some(i ^ 1)));
+        }
+    }
+
+    #[test]
+    fn vertex_on_the_plane_is_its_own_image_and_a_lone_one_has_none() {
+        let rest = [Vec3::NEG_X, Vec3::X, Vec3::Y, Vec3::new(0.4, 0.0, 1.0)];
+        let symmetry = Symmetry::new(&rest);
+        assert_eq!(symmetry.partner(2), Some(2));
+        assert_eq!(symmetry.unmatched(), [3]);
+        assert!(!symmetry.is_complete());
+    }
+
+    #[test]
+    fn image_may_be_a_little_off() {
+        let mut rest = cube().positions;
+        rest[1].y += 1e-3;
+        assert!(Symmetry::new(&rest).is_complete());
+        rest[1].y += 0.1;
+        assert_eq!(Symmetry::new(&rest).unmatched(), [0, 1]);
+    }
+}

@@ -1,0 +1,211 @@
+//! The operations.
+
+use glam::{DVec3, Vec3};
+
+use super::{Edited, RestEditError, finish};
+use crate::cage_check::{loops, triangulate};
+use crate::mesh::PolygonMesh;
+
+/// Puts vertices elsewhere: (vertex, new position in object units).
+///
+/// # Errors
+/// [`RestEditError`]: no such vertex, not finite, or the cage would break.
+pub fn move_vertices(mesh: &PolygonMesh, moves: &[(u32, Vec3)]) -> Result<Edited, RestEditError> {
+    let mut edited = unchanged(mesh);
+    for &(v, p) in moves {
+        if !p.is_finite() {
+            return Err(RestEditError::NotFinite { what: "the new position" });
+        }
+        let slot = edited.mesh.positions.get_mut(v as usize);
+        *slot.ok_or_else(|| missing("vertex", &[v]))? = p;
+        edited.touched.push(v);
+    }
+    finish("moving", mesh, edited)
+}
+
+/// Puts a new vertex on an edge, `share` of the way from its first end to its second (kept within 0.05 to 0.95). Triangles
+/// beside it are cut in two, larger faces get a corner more. The new vertex is the last one.
+///
+/// # Errors
+/// [`RestEditError`]: no such edge, not finite, or the cage would break.
+pub fn split_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<Edited, RestEditError> {
+    let [p, q] = ends(mesh, edge)?;
+    if !share.is_finite() {
+        return Err(RestEditError::NotFinite { what: "the place on the edge" });
+    }
+    let mut edited = unchanged(mesh);
+    let new = mesh.positions.len() as u32;
+    edited.mesh.positions.push(p.lerp(q, share.clamp(0.05, 0.95)));
+    edited.touched.push(new);
+    edited.mesh.faces.clear();
+    for face in &mesh.faces {
+        let Some(k) = side(face, edge) else {
+            edited.mesh.faces.push(face.clone());
+            continue;
+        };
+        let (a, b) = (face[k], face[(k + 1) % face.len()]);
+        if let &[_, _, _] = face.as_slice() {
+            let tip = face[(k + 2) % 3];
+            edited.mesh.faces.push(vec![a, new, tip]);
+            edited.mesh.faces.push(vec![new, b, tip]);
+        } else {
+            let mut longer = face.clone();
+            longer.insert(k + 1, new);
+            edited.mesh.faces.push(longer);
+        }
+    }
+    finish("splitting", mesh, edited)
+}
+
+/// Merges the two ends of an edge into the first one, `share` of the way to the second. Faces that are left with two corners go.
+///
+/// # Errors
+/// [`RestEditError`]: no such edge, not finite, or the cage would break.
+pub fn collapse_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<Edited, RestEditError> {
+    let [p, q] = ends(mesh, edge)?;
+    if !share.is_finite() {
+        return Err(RestEditError::NotFinite { what: "the place on the edge" });
+    }
+    let [kept, gone] = edge;
+    let mut edited = unchanged(mesh);
+    edited.mesh.positions[kept as usize] = p.lerp(q, share.clamp(0.0, 1.0));
+    for face in &mut edited.mesh.faces {
+        for i in face.iter_mut().filter(|i| **i == gone) {
+            *i = kept;
+        }
+        face.dedup();
+        if face.len() > 1 && face.first() == face.last() {
+            face.pop();
+        }
+    }
+    edited.mesh.faces.retain(|face| face.len() > 2);
+    edited.vertex_of[gone as usize] = Some(kept);
+    edited.touched.push(kept);
+    drop_unused(mesh, &mut edited);
+    finish("collapsing", mesh, edited)
+}
+
+/// Moves a face along its normal by `distance` (object units, negative: into the cage) and joins it to where it was by
+/// quads. The corners of the moved face are new vertices, the last ones; the face keeps its number.
+///
+/// # Errors
+/// [`RestEditError`]: no such face, not finite, or the cage would break.
+pub fn extrude_face(mesh: &PolygonMesh, face: u32, distance: f32) -> Result<Edited, RestEditError> {
+    let corners = mesh.faces.get(face as usize).ok_or_else(|| missing("face", &[face]))?.clone();
+    if !distance.is_finite() {
+        return Err(RestEditError::NotFinite { what: "the distance" });
+    }
+    let at: Vec<DVec3> = corners.iter().map(|&i| mesh.positions[i as usize].as_dvec3()).collect();
+    let n = at.len();
+    let center = at.iter().sum::<DVec3>() / n as f64;
+    // Newell's normal: right also for faces that are not planar or not convex.
+    let normal: DVec3 = (0..n).map(|k| (at[k] - center).cross(at[(k + 1) % n] - center)).sum();
+    let offset = (normal.normalize_or_zero() * f64::from(distance)).as_vec3();
+    let mut edited = unchanged(mesh);
+    let first = mesh.positions.len() as u32;
+    for (k, &i) in corners.iter().enumerate() {
+        edited.mesh.positions.push(mesh.positions[i as usize] + offset);
+        edited.touched.push(first + k as u32);
+    }
+    edited.mesh.faces[face as usize] = edited.touched.clone();
+    for k in 0..n {
+        let next = (k + 1) % n;
+        edited.mesh.faces.push(vec![corners[k], corners[next], first + next as u32, first + k as u32]);
+    }
+    finish("extruding", mesh, edited)
+}
+
+/// Deletes faces, closes the holes with triangles of the smallest area, and drops vertices of no face.
+///
+/// # Errors
+/// [`RestEditError`]: no such face, a hole of more than 64 edges, or the cage would break.
+pub fn delete_faces(mesh: &PolygonMesh, faces: &[u32]) -> Result<Edited, RestEditError> {
+    let mut keep = vec![true; mesh.faces.len()];
+    for &f in faces {
+        *keep.get_mut(f as usize).ok_or_else(|| missing("face", &[f]))? = false;
+    }
+    let mut edited = unchanged(mesh);
+    let mut kept = keep.iter();
+    edited.mesh.faces.retain(|_| kept.next().is_some_and(|k| *k));
+    if edited.mesh.faces.is_empty() {
+        return Err(RestEditError::NothingLeft);
+    }
+    // The rim: sides of deleted faces whose other face stays; the filling runs as the deleted faces did.
+    let sides = |f: usize| {
+        let face = &mesh.faces[f];
+        (0..face.len()).map(move |k| [face[k], face[(k + 1) % face.len()]])
+    };
+    let deleted: Vec<usize> = (0..keep.len()).filter(|&f| !keep[f]).collect();
+    let inner: std::collections::HashSet<[u32; 2]> = deleted.iter().flat_map(|&f| sides(f)).collect();
+    let rim: Vec<[u32; 2]> =
+        deleted.iter().flat_map(|&f| sides(f)).filter(|&[a, b]| !inner.contains(&[b, a])).collect();
+    let at: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
+    for outline in loops(&rim) {
+        let triangles =
+            triangulate(&outline, &at).ok_or(RestEditError::LargeHole { edges: outline.len() })?;
+        edited.touched.extend(&outline);
+        edited.mesh.faces.extend(triangles.into_iter().map(|t| t.to_vec()));
+    }
+    edited.touched.sort_unstable();
+    edited.touched.dedup();
+    drop_unused(mesh, &mut edited);
+    finish("deleting", mesh, edited)
+}
+
+fn unchanged(mesh: &PolygonMesh) -> Edited {
+    Edited {
+        mesh: mesh.clone(),
+        vertex_of: (0..mesh.positions.len() as u32).map(Some).collect(),
+        touched: Vec::new(),
+    }
+}
+
+/// Drops vertices that belonged to a face before and belong to none now; the others move up.
+fn drop_unused(before: &PolygonMesh, edited: &mut Edited) {
+    let n = edited.mesh.positions.len();
+    let used = |faces: &[Vec<u32>]| {
+        let mut used = vec![false; n];
+        for &i in faces.iter().flatten() {
+            used[i as usize] = true;
+        }
+        used
+    };
+    let (was, is) = (used(&before.faces), used(&edited.mesh.faces));
+    let mut number = vec![None; n];
+    let mut positions = Vec::with_capacity(n);
+    for v in 0..n {
+        if is[v] || !was[v] {
+            number[v] = Some(positions.len() as u32);
+            positions.push(edited.mesh.positions[v]);
+        }
+    }
+    edited.mesh.positions = positions;
+    for i in edited.mesh.faces.iter_mut().flatten() {
+        *i = number[*i as usize].unwrap_or(*i);
+    }
+    for v in &mut edited.vertex_of {
+        *v = v.and_then(|v| number[v as usize]);
+    }
+    edited.touched = edited.touched.iter().filter_map(|&v| number[v as usize]).collect();
+}
+
+/// Positions of the ends of an edge that some face has.
+fn ends(mesh: &PolygonMesh, edge: [u32; 2]) -> Result<[Vec3; 2], RestEditError> {
+    if !mesh.faces.iter().any(|face| side(face, edge).is_some()) {
+        return Err(missing("edge", &edge));
+    }
+    Ok(edge.map(|i| mesh.positions[i as usize]))
+}
+
+/// The corner of a face at which it runs along an edge, either way.
+fn side(face: &[u32], [a, b]: [u32; 2]) -> Option<usize> {
+    (0..face.len()).find(|&k| {
+        let (p, q) = (face[k], face[(k + 1) % face.len()]);
+        (p, q) == (a, b) || (p, q) == (b, a)
+    })
+}
+
+fn missing(kind: &str, indices: &[u32]) -> RestEditError {
+    let numbers: Vec<String> = indices.iter().map(u32::to_string).collect();
+    RestEditError::Missing { what: format!("{kind} {}", numbers.join("-")) }
+}

@@ -1,0 +1,265 @@
+//! A project in one file: model, cage, poses and settings as a GLB that any viewer opens.
+//!
+//! The visible part is the model at rest, its document unchanged, and the cage as lines. What only we read is in the
+//! extension [`EXTENSION`] of the document: buffer views with the cage's positions, its faces (for each the number of
+//! corners, then the corners) and the poses, all little endian. An OBJ travels as it is in a buffer view; what viewers
+//! see is made from it. Weights are not kept: they are made again from the same settings.
+
+use cagework_core::PolygonMesh;
+use glam::Vec3;
+use serde_json::{Value, json};
+use thiserror::Error;
+
+use crate::error::{ReadError, WriteError};
+use crate::gltf::{self, Pack, push};
+use crate::model::{Document, Model};
+
+/// Name of the extension of the document.
+pub const EXTENSION: &str = "CAGEWORK_project";
+
+/// Version that is written, and the only one that is read.
+const VERSION: u64 = 1;
+
+/// What a project holds.
+#[derive(Clone, Debug)]
+pub struct Project {
+    /// The model.
+    pub model: Model,
+    /// The cage, as it was: it may not be closed yet.
+    pub cage: PolygonMesh,
+    /// Names and cage positions of the poses. `[n_cage]` each
+    pub poses: Vec<(String, Vec<Vec3>)>,
+    /// What the program that wrote it wants to remember.
+    pub settings: String,
+}
+
+/// Why a project could not be read.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum ProjectError {
+    /// The model in it.
+    #[error(transparent)]
+    Model(#[from] ReadError),
+    /// From another version of this program.
+    #[error("{name} is a project of version {found}, but this program reads version {VERSION}: update it")]
+    Version {
+        /// Name the caller gave.
+        name: String,
+        /// Its version.
+        found: u64,
+    },
+    /// A part of it is not what it should be.
+    #[error("{name} is a damaged project: {what}")]
+    Damaged {
+        /// Name the caller gave.
+        name: String,
+        /// What is wrong.
+        what: &'static str,
+    },
+}
+
+/// Everything as one GLB. `poses`: cage positions, `[n_cage]` each.
+///
+/// # Errors
+/// [`WriteError`] when the model's document cannot be written or the file would be too large.
+pub fn write_project(
+    model: &Model,
+    cage: &PolygonMesh,
+    poses: &[(String, Vec<Vec3>)],
+    settings: &str,
+) -> Result<Vec<u8>, WriteError> {
+    let built;
+    // What viewers see of an OBJ.
+    let (document, source) = match &model.document {
+        Document::Gltf(document) => (&**document, None),
+        Document::Obj(document) => {
+            let (glb, _) = gltf::build_from_obj(&model.name, document, &model.positions)?;
+            built = gltf::read(&model.name, &glb, &mut |_| None)?.document;
+            (&built, Some(&document.bytes))
+        }
+    };
+    let mut json = document.json.clone();
+    let mut pack = Pack::of(document);
+    gltf::embed_images(document, &mut json, &mut pack);
+    let node = add_cage(&mut json, &mut pack, cage);
+    let mut view =
+        |json: &mut Value, bytes: Vec<u8>| json!({ "bufferView": pack.push_view(json, bytes, None) });
+    let mut project = json!({ "version": VERSION, "name": model.name, "node": node, "settings": settings });
+    if let Some(source) = source {
+        project["source"] = view(&mut json, source.clone());
+    }
+    project["cage"] = json!({
+        "positions": view(&mut json, position_bytes(&cage.positions)),
+        "faces": view(&mut json, face_bytes(&cage.faces)),
+    });
+    project["poses"] = json!([]);
+    for (name, positions) in poses {
+        let mut pose = view(&mut json, position_bytes(positions));
+        pose["name"] = name.as_str().into();
+        push(&mut project, "poses", pose);
+    }
+    // An object of extensions may be there already, or anything else.
+    if !json["extensions"].is_object() {
+        json["extensions"] = json!({});
+    }
+    json["extensions"][EXTENSION] = project;
+    push(&mut json, "extensionsUsed", EXTENSION.into());
+    pack.finish(json)
+}
+
+/// Reads a project; `None` when the file is no project.
+///
+/// # Errors
+/// [`ProjectError`] when it is one that cannot be read.
+pub fn read_project(name: &str, bytes: &[u8]) -> Result<Option<Project>, ProjectError> {
+    // A search is cheaper than a parse of every GLB that is opened.
+    if !bytes.starts_with(b"glTF") || !bytes.windows(EXTENSION.len()).any(|w| w == EXTENSION.as_bytes()) {
+        return Ok(None);
+    }
+    let damaged = |what| ProjectError::Damaged { name: name.into(), what };
+    let (mut json, bin) =
+        gltf::glb_parts(bytes).map_err(|source| ReadError::Gltf { name: name.into(), source })?;
+    let Some(project) = take_project(&mut json) else { return Ok(None) };
+    let found = project["version"].as_u64().unwrap_or(0);
+    if found != VERSION {
+        return Err(ProjectError::Version { name: name.into(), found });
+    }
+    let view = |part: &Value| {
+        let view = &json["bufferViews"][part["bufferView"].as_u64()? as usize];
+        let start = view["byteOffset"].as_u64().unwrap_or(0);
+        bin.get(start as usize..start.checked_add(view["byteLength"].as_u64()?)? as usize)
+    };
+    let model_name = project["name"].as_str().unwrap_or(name);
+    let cage = &project["cage"];
+    let positions = view(&cage["positions"]).and_then(positions_of).ok_or(damaged("its cage is cut off"))?;
+    let faces =
+        view(&cage["faces"]).and_then(faces_of).ok_or(damaged("the faces of its cage are cut off"))?;
+    let mut poses = Vec::new();
+    for pose in project["poses"].as_array().into_iter().flatten() {
+        let positions = view(pose).and_then(positions_of).ok_or(damaged("a pose is cut off"))?;
+        poses.push((pose["name"].as_str().unwrap_or_default().to_owned(), positions));
+    }
+    let settings = project["settings"].as_str().unwrap_or_default().to_owned();
+    let model = if project["source"].is_object() {
+        let source = view(&project["source"]).ok_or(damaged("its model is cut off"))?;
+        Model::read(model_name, source, &mut |_| None)?
+    } else {
+        drop_cage(&mut json, project["node"].as_u64());
+        let plain = gltf::glb_of(&json, &bin).map_err(|_| damaged("it cannot be put together again"))?;
+        Model::read(model_name, &plain, &mut |_| None)?
+    };
+    Ok(Some(Project { model, cage: PolygonMesh { positions, faces }, poses, settings }))
+}
+
+/// Takes the extension out of the document.
+fn take_project(json: &mut Value) -> Option<Value> {
+    let extensions = json.get_mut("extensions")?.as_object_mut()?;
+    let project = extensions.shift_remove(EXTENSION)?;
+    if extensions.is_empty() {
+        json.as_object_mut()?.shift_remove("extensions");
+    }
+    if let Some(used) = json.get_mut("extensionsUsed").and_then(Value::as_array_mut) {
+        used.retain(|e| e != EXTENSION);
+        if used.is_empty() {
+            json.as_object_mut()?.shift_remove("extensionsUsed");
+        }
+    }
+    Some(project)
+}
+
+/// The cage as lines at a node of its own; the node.
+fn add_cage(json: &mut Value, pack: &mut Pack<'_>, cage: &PolygonMesh) -> Option<usize> {
+    /// Mode of a primitive: lines.
+    const LINES: u32 = 1;
+    let mut edges: Vec<[u32; 2]> = Vec::new();
+    for face in &cage.faces {
+        edges.extend((0..face.len()).map(|k| {
+            let (a, b) = (face[k], face[(k + 1) % face.len()]);
+            [a.min(b), a.max(b)]
+        }));
+    }
+    edges.sort_unstable();
+    edges.dedup();
+    // A document without nodes shows all its meshes; a node for the cage would hide them.
+    if edges.is_empty() || json["nodes"].as_array().is_none_or(Vec::is_empty) {
+        return None;
+    }
+    let primitive = json!({
+        "attributes": { "POSITION": pack.push_vec3(json, &cage.positions, true) },
+        "indices": pack.push_lines(json, &edges),
+        "mode": LINES,
+    });
+    let mesh = push(json, "meshes", json!({ "name": "cage", "primitives": [primitive] }));
+    let node = push(json, "nodes", json!({ "name": "cage", "mesh": mesh }));
+    if json["scenes"].as_array().is_none_or(Vec::is_empty) {
+        return Some(node);
+    }
+    let scene = json["scene"].as_u64().unwrap_or(0) as usize;
+    if json["scenes"][scene].is_object() {
+        push(&mut json["scenes"][scene], "nodes", node.into());
+    }
+    Some(node)
+}
+
+/// Removes the node that [`add_cage`] added, if the file still has it at the end of its list.
+fn drop_cage(json: &mut Value, node: Option<u64>) {
+    let Some(node) = node else { return };
+    let is_cage = |list: &Value, index: u64| {
+        list.as_array().is_some_and(|l| l.len() as u64 == index + 1) && list[index as usize]["name"] == "cage"
+    };
+    if !is_cage(&json["nodes"], node) {
+        return;
+    }
+    let mesh = json["nodes"][node as usize]["mesh"].as_u64();
+    let mut pop = |key: &str| {
+        if let Some(list) = json[key].as_array_mut() {
+            list.pop();
+            if list.is_empty()
+                && let Some(object) = json.as_object_mut()
+            {
+                object.shift_remove(key);
+            }
+        }
+    };
+    pop("nodes");
+    if let Some(mesh) = mesh
+        && is_cage(&json["meshes"], mesh)
+    {
+        json["meshes"].as_array_mut().map(Vec::pop);
+    }
+    for scene in json["scenes"].as_array_mut().into_iter().flatten() {
+        if let Some(nodes) = scene["nodes"].as_array_mut() {
+            nodes.retain(|n| n.as_u64() != Some(node));
+        }
+    }
+}
+
+fn position_bytes(positions: &[Vec3]) -> Vec<u8> {
+    positions.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes).collect()
+}
+
+fn positions_of(bytes: &[u8]) -> Option<Vec<Vec3>> {
+    let numbers = |b: &[u8]| b.try_into().map(f32::from_le_bytes).unwrap_or(f32::NAN);
+    let vector = |b: &[u8]| Vec3::new(numbers(&b[..4]), numbers(&b[4..8]), numbers(&b[8..]));
+    let positions: Vec<Vec3> = bytes.chunks_exact(12).map(vector).collect();
+    (bytes.len() % 12 == 0 && positions.iter().all(|p| p.is_finite())).then_some(positions)
+}
+
+fn face_bytes(faces: &[Vec<u32>]) -> Vec<u8> {
+    let words = faces.iter().flat_map(|f| std::iter::once(f.len() as u32).chain(f.iter().copied()));
+    words.flat_map(u32::to_le_bytes).collect()
+}
+
+fn faces_of(bytes: &[u8]) -> Option<Vec<Vec<u32>>> {
+    let mut words = bytes.chunks_exact(4).map(|b| b.try_into().map(u32::from_le_bytes).unwrap_or(u32::MAX));
+    let mut left = bytes.len() / 4;
+    let mut faces = Vec::new();
+    while let Some(corners) = words.next() {
+        left -= 1;
+        if corners as usize > left {
+            return None;
+        }
+        faces.push(words.by_ref().take(corners as usize).collect());
+        left -= corners as usize;
+    }
+    Some(faces)
+}

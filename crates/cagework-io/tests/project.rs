@@ -1,0 +1,104 @@
+//! Project files: what goes in comes out, and the file is a plain GLB to everybody else.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
+
+mod common;
+
+use cagework_core::{PolygonMesh, subdivided_box};
+use cagework_io::{Model, Project, ProjectError, read_project, write_project};
+use common::{CUBE_OBJ, PNG, glb, instanced, json_of, plain_cube, quantized, read, skinned, textured_square};
+use glam::Vec3;
+use serde_json::json;
+
+const SETTINGS: &str = r#"{"grid":128,"name":"Überpose"}"#;
+
+fn models() -> Vec<Model> {
+    let square = textured_square().glb();
+    let square = Model::read("square.glb", &square, &mut |uri| (uri == "red dot.png").then(|| PNG.to_vec()));
+    let mut models = vec![square.unwrap()];
+    models.extend(
+        [plain_cube(), instanced(), skinned(), quantized()].map(|b| read("x.glb", &b.glb()).unwrap()),
+    );
+    models.push(read("box.obj", CUBE_OBJ.as_bytes()).unwrap());
+    models
+}
+
+fn cage(model: &Model) -> PolygonMesh {
+    subdivided_box(cagework_core::Bounds::of(&model.positions).unwrap(), 0.1, [2, 1, 1])
+}
+
+fn poses(cage: &PolygonMesh) -> Vec<(String, Vec<Vec3>)> {
+    let moved = |by: Vec3| cage.positions.iter().map(|&p| p + by).collect();
+    vec![("raised".to_owned(), moved(Vec3::Y)), ("ä \"quoted\"".to_owned(), moved(Vec3::splat(0.1)))]
+}
+
+fn written(model: &Model) -> Vec<u8> {
+    let cage = cage(model);
+    write_project(model, &cage, &poses(&cage), SETTINGS).unwrap()
+}
+
+fn reopened(bytes: &[u8]) -> Project {
+    read_project("saved.glb", bytes).unwrap().unwrap()
+}
+
+#[test]
+fn everything_comes_back_as_it_was() {
+    for model in models() {
+        let project = reopened(&written(&model));
+        assert_eq!(project.model.name, model.name);
+        assert_eq!(project.model.format(), model.format(), "{}", model.name);
+        assert_eq!(project.model.positions, model.positions, "{}", model.name);
+        assert_eq!(project.model.triangles, model.triangles);
+        assert_eq!(project.model.counts, model.counts, "{}", model.name);
+        assert_eq!(project.model.notices, model.notices);
+        assert_eq!(project.model.look(), model.look(), "{}", model.name);
+        let cage = cage(&model);
+        assert_eq!((&project.cage, &project.poses), (&cage, &poses(&cage)));
+        assert_eq!(project.settings, SETTINGS);
+    }
+}
+
+#[test]
+fn saving_again_and_again_does_not_grow_the_file() {
+    for model in models() {
+        let once = written(&model);
+        let twice = written(&reopened(&once).model);
+        let thrice = written(&reopened(&twice).model);
+        assert_eq!(twice.len(), thrice.len(), "{}", model.name);
+        assert!(twice.len() <= once.len() + 64, "{}: {} then {}", model.name, once.len(), twice.len());
+    }
+}
+
+#[test]
+fn others_see_the_model_and_the_cage_as_lines() {
+    let model = models().remove(0);
+    let bytes = written(&model);
+    let seen = read("seen.glb", &bytes).unwrap();
+    assert_eq!(seen.positions, model.positions);
+    let json = json_of(&bytes);
+    let node = json["nodes"].as_array().unwrap().last().unwrap();
+    let mesh = &json["meshes"][node["mesh"].as_u64().unwrap() as usize];
+    assert_eq!((&node["name"], &mesh["primitives"][0]["mode"]), (&json!("cage"), &json!(1)));
+}
+
+#[test]
+fn other_files_are_no_projects() {
+    for bytes in [plain_cube().glb(), CUBE_OBJ.as_bytes().to_vec(), Vec::new(), b"glTF".to_vec()] {
+        assert!(read_project("x.glb", &bytes).unwrap().is_none());
+    }
+}
+
+#[test]
+fn damage_and_other_versions_are_named() {
+    let bytes = written(&models()[1]);
+    let mut json = json_of(&bytes);
+    let bin = &bytes[bytes.len() - json["buffers"][0]["byteLength"].as_u64().unwrap() as usize..];
+    json["extensions"]["CAGEWORK_project"]["version"] = json!(7);
+    let newer = read_project("x.glb", &glb(&json, Some(bin)));
+    assert!(matches!(newer, Err(ProjectError::Version { found: 7, .. })));
+    json["extensions"]["CAGEWORK_project"]["version"] = json!(1);
+    json["extensions"]["CAGEWORK_project"]["cage"]["faces"]["bufferView"] = json!(1_000_000);
+    let damaged = read_project("x.glb", &glb(&json, Some(bin)));
+    assert!(matches!(damaged, Err(ProjectError::Damaged { .. })), "{damaged:?}");
+    assert!(read_project("x.glb", &bytes[..bytes.len() - 9]).is_err());
+}

@@ -1,0 +1,52 @@
+//! Flat arrays of JavaScript to points and faces, and back.
+
+use cagework_core::PolygonMesh;
+use glam::Vec3;
+
+use crate::error::{Answer, Fault};
+
+/// `[n, 3]` flattened to points.
+pub(crate) fn points(flat: &[f32]) -> Vec<Vec3> {
+    flat.chunks_exact(3).map(Vec3::from_slice).collect()
+}
+
+/// Points to `[n, 3]` flattened.
+pub(crate) fn flat(points: &[Vec3]) -> Vec<f32> {
+    points.iter().flat_map(Vec3::to_array).collect()
+}
+
+/// A polygon mesh from positions and, for each face, the number of its corners and then them.
+///
+/// # Errors
+/// When the last face is cut off.
+pub(crate) fn polygon_mesh(positions: &[f32], corners: &[u32]) -> Answer<PolygonMesh> {
+    let mut faces = Vec::new();
+    let mut rest = corners;
+    while let [count, tail @ ..] = rest {
+        let Some((face, tail)) = tail.split_at_checked(*count as usize) else {
+            return Err(Fault::new("Argument", "the last face of the cage is cut off"));
+        };
+        faces.push(face.to_vec());
+        rest = tail;
+    }
+    Ok(PolygonMesh { positions: points(positions), faces })
+}
+
+/// For each face the number of its corners, then them.
+pub(crate) fn corners(faces: &[Vec<u32>]) -> Vec<u32> {
+    faces.iter().flat_map(|f| std::iter::once(f.len() as u32).chain(f.iter().copied())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faces_come_back_and_cut_off_ones_are_refused() {
+        let faces = vec![vec![0, 1, 2], vec![0, 2, 3, 1]];
+        let flat = corners(&faces);
+        assert_eq!(flat, [3, 0, 1, 2, 4, 0, 2, 3, 1]);
+        assert_eq!(polygon_mesh(&[], &flat).unwrap().faces, faces);
+        assert!(polygon_mesh(&[], &flat[..7]).is_err());
+    }
+}

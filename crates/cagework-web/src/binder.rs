@@ -1,0 +1,313 @@
+//! The worker's half: what takes longer than a frame.
+//!
+//! It has its own GPU device and reads nothing but arrays. Results are taken apart by the page's `Engine`.
+
+use cagework_core::bind::OutsideVertex;
+use cagework_core::cage_gen::{CageOptions, generate};
+use cagework_core::slice::Slice;
+use cagework_core::{BindOptions, Binding, Cage, PolygonMesh, Weights, mean_value_weights, samples};
+use cagework_gpu::{ContextOptions, GpuContext, bind_gpu};
+use glam::Vec3;
+use js_sys::Function;
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use crate::arrays::{corners, flat, points, polygon_mesh};
+use crate::clock::Listener;
+use crate::error::{Answer, Fault};
+use crate::options::{Backend, BindAsked, CageAsked};
+use crate::state::State;
+use crate::views::object;
+
+/// Binds, makes cages, cuts slices and builds samples.
+#[wasm_bindgen]
+pub struct Binder {
+    gpu: Option<GpuContext>,
+}
+
+/// Weights on their way to the page: compressed sparse rows, and the vertices outside the cage.
+#[wasm_bindgen]
+pub struct Bound {
+    weights: Weights,
+    outside: Vec<OutsideVertex>,
+    report: JsValue,
+}
+
+/// A mesh of polygons on its way to the page.
+#[wasm_bindgen]
+pub struct Polygons {
+    mesh: PolygonMesh,
+}
+
+/// A built sample.
+#[wasm_bindgen]
+pub struct BuiltSample {
+    glb: Vec<u8>,
+    cage: PolygonMesh,
+    poses: Vec<(String, Vec<Vec3>)>,
+}
+
+/// Model and cage as arrays.
+struct Parts {
+    positions: Vec<Vec3>,
+    cage: Cage,
+}
+
+impl Parts {
+    fn new(positions: &[f32], cage: &[f32], corners: &[u32]) -> Answer<Self> {
+        Ok(Self { positions: points(positions), cage: Cage::new(&polygon_mesh(cage, corners)?)? })
+    }
+}
+
+#[wasm_bindgen]
+impl Binder {
+    /// Without a GPU yet.
+    #[wasm_bindgen(constructor)]
+    #[must_use]
+    #[allow(clippy::new_without_default, reason = "only JavaScript makes one")]
+    pub fn new() -> Self {
+        Self { gpu: None }
+    }
+
+    /// Opens a GPU for the binds to come, unless there is one.
+    ///
+    /// # Errors
+    /// `NoAdapter`, `NoDevice`.
+    #[wasm_bindgen(js_name = openGpu)]
+    pub async fn open_gpu(&mut self) -> Result<(), JsValue> {
+        if self.gpu.as_ref().is_none_or(|gpu| gpu.check().is_err()) {
+            self.gpu = Some(GpuContext::new(&ContextOptions::default()).await.map_err(Fault::from)?);
+        }
+        Ok(())
+    }
+
+    /// Harmonic coordinates. `positions` `[n_vertices, 3]`, `cage` `[n_cage, 3]`; `corners`: for each face their number,
+    /// then them. `progress` is called with every step and stops the bind by returning false.
+    ///
+    /// # Errors
+    /// Those of a bind; when the arrays are no cage; `Missing` when the GPU is asked for and not open.
+    pub async fn bind(
+        &self,
+        positions: Vec<f32>,
+        cage: Vec<f32>,
+        corners: Vec<u32>,
+        options: JsValue,
+        progress: Function,
+    ) -> Result<Bound, JsValue> {
+        let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
+        let parts = Parts::new(&positions, &cage, &corners)?;
+        drop(positions);
+        let binding = self.run(&parts.positions, &parts.cage, asked, progress).await?;
+        let report = object(&binding.report)?;
+        Ok(Bound { weights: binding.weights, outside: binding.outside, report })
+    }
+
+    /// Mean value coordinates, by formula; the arrays are those of `bind`.
+    ///
+    /// # Errors
+    /// When they are not defined somewhere, or the arrays are no cage.
+    #[wasm_bindgen(js_name = bindMeanValue)]
+    pub fn bind_mean_value(
+        &self,
+        positions: &[f32],
+        cage: &[f32],
+        corners: &[u32],
+    ) -> Result<Bound, JsValue> {
+        let parts = Parts::new(positions, cage, corners)?;
+        let weights = mean_value_weights(&parts.positions, &parts.cage).map_err(Fault::from)?;
+        Ok(Bound { weights, outside: Vec::new(), report: JsValue::UNDEFINED })
+    }
+
+    /// Coordinates at the centres of a slice's cells: rows for `Engine.takeSlice`. Takes the cage's arrays, the axis,
+    /// where along it (0 to 1), and the options of a bind.
+    ///
+    /// # Errors
+    /// Those of a bind.
+    #[allow(clippy::too_many_arguments, reason = "arrays cross the border one by one")]
+    #[wasm_bindgen(js_name = bindSlice)]
+    pub async fn bind_slice(
+        &self,
+        cage: Vec<f32>,
+        corners: Vec<u32>,
+        axis: usize,
+        fraction: f32,
+        options: JsValue,
+        progress: Function,
+    ) -> Result<Option<Bound>, JsValue> {
+        let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
+        let parts = Parts::new(&[], &cage, &corners)?;
+        let centers = Slice::new(&parts.cage, &asked.into(), axis.min(2), fraction).centers();
+        if centers.is_empty() {
+            return Ok(None);
+        }
+        let binding = self.run(&centers, &parts.cage, asked, progress).await?;
+        Ok(Some(Bound { weights: binding.weights, outside: Vec::new(), report: JsValue::UNDEFINED }))
+    }
+
+    /// A cage for a model: `CageOptions` of contract.ts. `progress` as for `bind`.
+    ///
+    /// # Errors
+    /// When there is nothing to enclose or an option is out of range.
+    #[wasm_bindgen(js_name = generateCage)]
+    pub fn generate_cage(
+        &self,
+        positions: &[f32],
+        triangles: &[u32],
+        options: JsValue,
+        progress: Function,
+    ) -> Result<Polygons, JsValue> {
+        let asked: CageAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
+        let triangles: Vec<[u32; 3]> = triangles.as_chunks().0.to_vec();
+        let listener = Listener::new(progress);
+        let made = generate(&points(positions), &triangles, &CageOptions::from(asked), &listener);
+        Ok(Polygons { mesh: made.map_err(Fault::from)?.cage.to_polygon_mesh() })
+    }
+
+    /// Identifier, label and what there is to see of each sample, in turn.
+    #[must_use]
+    pub fn samples() -> Vec<String> {
+        samples::all().iter().flat_map(|s| [s.id, s.label, s.sentence]).map(str::to_owned).collect()
+    }
+
+    /// Builds a sample.
+    ///
+    /// # Errors
+    /// When there is none of that name.
+    #[wasm_bindgen(js_name = buildSample)]
+    pub fn build_sample(id: &str) -> Result<BuiltSample, JsValue> {
+        let sample = samples::build(id).ok_or_else(|| crate::options::unknown("sample", id))?;
+        let glb =
+            cagework_io::write_mesh_glb(&sample.name, &sample.mesh, &sample.colours).map_err(Fault::from)?;
+        Ok(BuiltSample { glb, cage: sample.cage, poses: sample.poses })
+    }
+}
+
+impl Binder {
+    async fn run(
+        &self,
+        positions: &[Vec3],
+        cage: &Cage,
+        asked: BindAsked,
+        progress: Function,
+    ) -> Answer<Binding> {
+        let options = BindOptions::from(asked);
+        let listener = Listener::new(progress);
+        if asked.backend == Backend::Cpu {
+            return Ok(cagework_core::bind(positions, cage, &options, &listener)?);
+        }
+        let gpu = self.gpu.as_ref().ok_or_else(|| Fault::missing("GPU", "open one first"))?;
+        Ok(bind_gpu(positions, cage, &options, &listener, gpu).await?.0)
+    }
+}
+
+#[wasm_bindgen]
+impl Bound {
+    /// Row pointers. `[n_vertices + 1]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn indptr(&self) -> Vec<u32> {
+        self.weights.indptr().to_vec()
+    }
+
+    /// Columns: cage vertices. `[n_nonzeros]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn indices(&self) -> Vec<u32> {
+        self.weights.indices().to_vec()
+    }
+
+    /// Weights. `[n_nonzeros]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn data(&self) -> Vec<f32> {
+        self.weights.data().to_vec()
+    }
+
+    /// For each vertex outside the cage: the vertex and the three corners of its frame. `[n_outside, 4]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn outside(&self) -> Vec<u32> {
+        self.outside.iter().flat_map(|o| [o.vertex, o.corners[0], o.corners[1], o.corners[2]]).collect()
+    }
+
+    /// Offsets of the vertices outside the cage in their frames. `[n_outside, 3]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn offsets(&self) -> Vec<f32> {
+        self.outside.iter().flat_map(|o| o.offset.to_array()).collect()
+    }
+
+    /// The bind report; undefined for mean value coordinates and slices.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn report(&self) -> JsValue {
+        self.report.clone()
+    }
+}
+
+#[wasm_bindgen]
+impl Polygons {
+    /// Vertices. `[n, 3]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn positions(&self) -> Vec<f32> {
+        flat(&self.mesh.positions)
+    }
+
+    /// For each face the number of its corners, then them.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn corners(&self) -> Vec<u32> {
+        corners(&self.mesh.faces)
+    }
+}
+
+#[wasm_bindgen]
+impl BuiltSample {
+    /// The model as GLB.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn glb(&self) -> Vec<u8> {
+        self.glb.clone()
+    }
+
+    /// Its cage.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn cage(&self) -> Polygons {
+        Polygons { mesh: self.cage.clone() }
+    }
+
+    /// Names of the prepared poses.
+    #[wasm_bindgen(getter, js_name = poseNames)]
+    #[must_use]
+    pub fn pose_names(&self) -> Vec<String> {
+        self.poses.iter().map(|(name, _)| name.clone()).collect()
+    }
+
+    /// Cage positions of one of them. `[n_cage, 3]`
+    #[wasm_bindgen(js_name = posePositions)]
+    #[must_use]
+    pub fn pose_positions(&self, index: usize) -> Vec<f32> {
+        self.poses.get(index).map(|(_, positions)| flat(positions)).unwrap_or_default()
+    }
+}
+
+/// Arrays of a [`Bound`] to weights and outside vertices that fit the cage.
+pub(crate) fn unpack(
+    state: &State,
+    indptr: Vec<u32>,
+    indices: Vec<u32>,
+    data: Vec<f32>,
+    outside: &[u32],
+    offsets: &[f32],
+) -> Answer<(Weights, Vec<OutsideVertex>)> {
+    let weights = Weights::new(state.rest.positions.len() as u32, indptr, indices, data)?;
+    let (frames, offsets) = (outside.as_chunks::<4>().0, points(offsets));
+    let outside = frames.iter().zip(offsets).map(|(&[vertex, a, b, c], offset)| OutsideVertex {
+        vertex,
+        corners: [a, b, c],
+        offset,
+    });
+    Ok((weights, outside.collect()))
+}

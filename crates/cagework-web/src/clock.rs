@@ -1,0 +1,67 @@
+//! The browser's clock, and progress on its way to JavaScript.
+
+use std::cell::RefCell;
+use std::ops::ControlFlow;
+
+use cagework_core::{Progress, ProgressEvent};
+use js_sys::Function;
+use serde::Serialize;
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+#[wasm_bindgen]
+extern "C" {
+    /// Milliseconds since the page or worker began.
+    #[wasm_bindgen(js_namespace = performance, js_name = now)]
+    pub(crate) fn now_ms() -> f64;
+}
+
+thread_local! {
+    /// Who listens. A [`Progress`] may be shared between threads, which functions of JavaScript cannot; here is one
+    /// thread, and one job at a time.
+    static LISTENER: RefCell<Option<Function>> = const { RefCell::new(None) };
+}
+
+/// Reports to the function it was given; stops the work when that returns false.
+pub(crate) struct Listener(());
+
+impl Listener {
+    pub(crate) fn new(function: Function) -> Self {
+        LISTENER.set(Some(function));
+        Self(())
+    }
+}
+
+impl Drop for Listener {
+    fn drop(&mut self) {
+        LISTENER.set(None);
+    }
+}
+
+/// `ProgressEvent` of contract.ts.
+#[derive(Serialize)]
+struct Event {
+    stage: cagework_core::Stage,
+    fraction: f32,
+    iteration: u32,
+    delta: Option<f32>,
+}
+
+impl Progress for Listener {
+    fn report(&self, event: ProgressEvent) -> ControlFlow<()> {
+        let ProgressEvent { stage, fraction, iteration, delta } = event;
+        let Some(listener) = LISTENER.with_borrow(Clone::clone) else { return ControlFlow::Continue(()) };
+        let event = Event { stage, fraction, iteration, delta };
+        let Ok(event) = serde_wasm_bindgen::to_value(&event) else { return ControlFlow::Continue(()) };
+        match listener.call1(&JsValue::NULL, &event) {
+            Ok(answer) if answer == JsValue::FALSE => ControlFlow::Break(()),
+            Ok(_) => ControlFlow::Continue(()),
+            // Nobody can hear any more: no reason to go on.
+            Err(_) => ControlFlow::Break(()),
+        }
+    }
+
+    fn now_ms(&self) -> f64 {
+        now_ms()
+    }
+}

@@ -1,0 +1,173 @@
+//! The cage: made, read, edited at rest, posed.
+
+use cagework_core::{BindOptions, Cage, PolygonMesh, subdivided_box};
+use cagework_io::{Model, decode_pose, encode_pose};
+use js_sys::{Function, Uint8Array};
+use wasm_bindgen::prelude::wasm_bindgen;
+use wasm_bindgen::{JsCast as _, JsValue};
+
+use super::Engine;
+use crate::arrays::{corners, flat, points, polygon_mesh};
+use crate::error::{Answer, Fault};
+use crate::options::BindAsked;
+use crate::views::object;
+
+/// Room between the model and a box around it, in diagonals of the model.
+const BOX_MARGIN: f32 = 0.04;
+
+#[wasm_bindgen]
+impl Engine {
+    /// Puts a box around the model, its longest side cut into `divisions`, the others to match.
+    ///
+    /// # Errors
+    /// When no model is open.
+    #[wasm_bindgen(js_name = boxCage)]
+    pub fn box_cage(&self, divisions: u32) -> Result<JsValue, JsValue> {
+        let mesh = self.read(|state| {
+            let bounds = state
+                .model
+                .as_ref()
+                .and_then(|m| cagework_core::Bounds::of(&m.positions))
+                .ok_or_else(|| Fault::missing("model", "open one first"))?;
+            let longest = bounds.extent().max_element().max(f32::MIN_POSITIVE);
+            let cut = |side: f32| (side / longest * divisions as f32).round().max(1.0) as u32;
+            Answer::Ok(subdivided_box(bounds, BOX_MARGIN, bounds.extent().to_array().map(cut)))
+        })?;
+        Ok(self.put_cage(mesh)?)
+    }
+
+    /// Reads a cage from a file; a mesh that is no cage yet becomes a draft.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    #[wasm_bindgen(js_name = loadCage)]
+    pub fn load_cage(&self, name: &str, bytes: &[u8], sibling: &Function) -> Result<JsValue, JsValue> {
+        let mut resolve = |path: &str| {
+            let found = sibling.call1(&JsValue::NULL, &path.into()).ok()?;
+            Some(found.dyn_into::<Uint8Array>().ok()?.to_vec())
+        };
+        let model = Model::read(name, bytes, &mut resolve).map_err(Fault::from)?;
+        model.require_faces().map_err(Fault::from)?;
+        Ok(self.put_cage(model.cage_mesh())?)
+    }
+
+    /// Takes a cage given as arrays; `corners`: for each face their number, then them.
+    ///
+    /// # Errors
+    /// When the arrays are no mesh.
+    #[wasm_bindgen(js_name = setCage)]
+    pub fn set_cage(&self, positions: &[f32], corners: &[u32]) -> Result<JsValue, JsValue> {
+        Ok(self.put_cage(polygon_mesh(positions, corners)?)?)
+    }
+
+    /// The cage, or undefined without one.
+    ///
+    /// # Errors
+    /// Never.
+    #[wasm_bindgen(js_name = cageState)]
+    pub fn cage_state(&self) -> Result<JsValue, JsValue> {
+        Ok(self.state_object()?)
+    }
+
+    /// For each face of the cage the number of its corners, then them.
+    #[wasm_bindgen(js_name = cageCorners)]
+    #[must_use]
+    pub fn cage_corners(&self) -> Vec<u32> {
+        self.read(|state| corners(&state.rest.faces))
+    }
+
+    /// Cage vertices at rest. `[n_cage, 3]`
+    #[wasm_bindgen(js_name = restPositions)]
+    #[must_use]
+    pub fn rest_positions(&self) -> Vec<f32> {
+        self.read(|state| flat(&state.rest.positions))
+    }
+
+    /// Cage vertices of the moment. `[n_cage, 3]`
+    #[wasm_bindgen(js_name = cagePositions)]
+    #[must_use]
+    pub fn cage_positions(&self) -> Vec<f32> {
+        self.read(|state| flat(&state.positions))
+    }
+
+    /// Moves the cage; the model follows. Positions of another cage change nothing.
+    #[wasm_bindgen(js_name = setCagePositions)]
+    pub fn set_cage_positions(&self, positions: &[f32]) {
+        self.change(|state| state.move_to(points(positions)));
+    }
+
+    /// Whether gestures change the rest cage. The cage goes back to rest when this begins or ends.
+    #[wasm_bindgen(js_name = setEditingRest)]
+    pub fn set_editing_rest(&self, editing: bool) {
+        self.change(|state| {
+            if state.editing_rest != editing {
+                state.editing_rest = editing;
+                state.gesture = None;
+                state.positions.clone_from(&state.rest.positions);
+                (state.is_moved, state.is_changed) = (true, true);
+            }
+        });
+    }
+
+    /// The moved rest cage becomes the cage; it has to be bound again.
+    ///
+    /// # Errors
+    /// When the positions are no cage; nothing changes then.
+    #[wasm_bindgen(js_name = commitRest)]
+    pub fn commit_rest(&self) -> Result<JsValue, JsValue> {
+        let (mesh, selection, last) = self.read(|state| {
+            let mesh = PolygonMesh { positions: state.positions.clone(), faces: state.rest.faces.clone() };
+            (mesh, state.selection.clone(), state.cage.is_some())
+        });
+        if last {
+            Cage::new(&mesh).map_err(Fault::from)?;
+        }
+        let shown = self.put_cage(mesh)?;
+        self.change(|state| state.selection = selection);
+        Ok(shown)
+    }
+
+    /// Bytes that a bind would need.
+    ///
+    /// # Errors
+    /// When there is no cage or an option is out of range.
+    #[wasm_bindgen(js_name = estimateMemory)]
+    pub fn estimate_memory(&self, options: JsValue) -> Result<f64, JsValue> {
+        let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
+        let bytes = self.read(|state| {
+            let (model, cage) = state.parts()?;
+            Answer::Ok(BindOptions::from(asked).estimate_memory(cage, model.positions.len())?)
+        })?;
+        Ok(bytes as f64)
+    }
+
+    /// The pose of the moment in few bytes.
+    #[wasm_bindgen(js_name = encodePose)]
+    #[must_use]
+    pub fn encode_pose(&self) -> Vec<u8> {
+        self.read(|state| encode_pose(&state.rest.positions, &state.positions))
+    }
+
+    /// Takes a pose from `encodePose`.
+    ///
+    /// # Errors
+    /// When it is damaged or belongs to another cage.
+    #[wasm_bindgen(js_name = decodePose)]
+    pub fn decode_pose(&self, bytes: &[u8]) -> Result<(), JsValue> {
+        let pose = self.read(|state| decode_pose(&state.rest.positions, bytes)).map_err(Fault::from)?;
+        self.change(|state| state.move_to(pose));
+        Ok(())
+    }
+}
+
+impl Engine {
+    /// Another cage or draft, and what the page is told about it.
+    pub(super) fn put_cage(&self, mesh: PolygonMesh) -> Answer<JsValue> {
+        self.take_cage(mesh);
+        self.state_object()
+    }
+
+    fn state_object(&self) -> Answer<JsValue> {
+        self.read(|state| state.cage_state().map_or(Ok(JsValue::UNDEFINED), |shown| object(&shown)))
+    }
+}

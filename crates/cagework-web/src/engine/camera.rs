@@ -1,0 +1,89 @@
+//! Looking around.
+
+use std::f32::consts::TAU;
+
+use cagework_core::Bounds;
+use cagework_gpu::render::{AxisView, Projection};
+use glam::{Vec2, Vec3};
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use super::Engine;
+
+/// Pixels of a whole turn: half a turn across half a screen.
+const PIXELS_PER_TURN: f32 = 900.0;
+
+#[wasm_bindgen]
+impl Engine {
+    /// Turns the camera, CSS pixels.
+    pub fn orbit(&self, dx: f32, dy: f32) {
+        self.change(|state| state.camera.orbit(Vec2::new(dx, dy) * (TAU / PIXELS_PER_TURN)));
+    }
+
+    /// Moves the camera, CSS pixels.
+    pub fn pan(&self, dx: f32, dy: f32) {
+        self.change(|state| state.camera.pan(Vec2::new(dx, dy)));
+    }
+
+    /// Magnifies by `factor` around a point.
+    #[wasm_bindgen(js_name = zoomAt)]
+    pub fn zoom_at(&self, x: f32, y: f32, factor: f32) {
+        if factor.is_finite() && factor > 0.0 {
+            self.change(|state| {
+                let at = state.pointer(x, y);
+                state.camera.zoom_at(factor.recip(), at);
+            });
+        }
+    }
+
+    /// Shows model and cage as large as fits.
+    #[wasm_bindgen(js_name = frameAll)]
+    pub fn frame_all(&self) {
+        self.change(super::super::state::State::frame_all);
+    }
+
+    /// Shows the selection as large as fits; everything if nothing is selected.
+    #[wasm_bindgen(js_name = frameSelection)]
+    pub fn frame_selection(&self) {
+        self.change(|state| {
+            let selected: Vec<Vec3> =
+                state.selection.vertices().iter().map(|&i| state.positions[i as usize]).collect();
+            match Bounds::of(&selected) {
+                Some(bounds) => state.camera.frame(bounds),
+                None => state.frame_all(),
+            }
+        });
+    }
+
+    /// Looks along an axis, 0 to 2, from its positive or negative end.
+    #[wasm_bindgen(js_name = axisView)]
+    pub fn axis_view(&self, axis: u32, negative: bool) {
+        let view = match (axis, negative) {
+            (0, false) => AxisView::Right,
+            (0, true) => AxisView::Left,
+            (1, false) => AxisView::Top,
+            (1, true) => AxisView::Bottom,
+            (_, false) => AxisView::Front,
+            (_, true) => AxisView::Back,
+        };
+        self.change(|state| state.camera.look_along(view));
+    }
+
+    /// Toggles between perspective and parallel projection; true for parallel.
+    #[wasm_bindgen(js_name = toggleOrtho)]
+    #[must_use]
+    pub fn toggle_ortho(&self) -> bool {
+        self.change(|state| {
+            let parallel = state.camera.projection == Projection::Perspective;
+            state.camera.projection =
+                if parallel { Projection::Orthographic } else { Projection::Perspective };
+            parallel
+        })
+    }
+
+    /// Where a point is in the picture: x, y in CSS pixels, and 1, or 0 if it lies behind the camera.
+    #[must_use]
+    pub fn project(&self, x: f32, y: f32, z: f32) -> Vec<f32> {
+        let projected = self.read(|state| state.camera.project(Vec3::new(x, y, z)));
+        projected.map_or_else(|| vec![0.0; 3], |p| vec![p.position.x, p.position.y, 1.0])
+    }
+}

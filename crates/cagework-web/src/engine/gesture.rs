@@ -1,0 +1,234 @@
+//! Moving the cage: gestures, exact numbers, poses.
+
+use cagework_core::edit::{Constraint, Gesture, GestureKind, View as _, blend, moment};
+use cagework_gpu::render::{GizmoPart, pick_gizmo};
+use glam::{Vec2, Vec3};
+use js_sys::{Array, Float32Array};
+use wasm_bindgen::prelude::wasm_bindgen;
+use wasm_bindgen::{JsCast as _, JsValue};
+
+use super::Engine;
+use crate::arrays::points;
+use crate::error::Fault;
+use crate::options::{GizmoAsked, gesture, unknown};
+use crate::state::State;
+
+/// Movements below this fraction of a pixel are none.
+const STILL: f32 = 1e-3;
+
+#[wasm_bindgen]
+impl Engine {
+    /// Begins a gesture, grab, rotate or scale; false when nothing is selected.
+    ///
+    /// # Errors
+    /// When the gesture is another.
+    #[wasm_bindgen(js_name = beginTransform)]
+    pub fn begin_transform(&self, kind: &str, x: f32, y: f32) -> Result<bool, JsValue> {
+        let kind = gesture(kind)?;
+        Ok(self.change(|state| state.begin(kind, x, y)))
+    }
+
+    /// The gizmo's handle under the pointer; undefined for none.
+    #[wasm_bindgen(js_name = gizmoAt)]
+    #[must_use]
+    pub fn gizmo_at(&self, x: f32, y: f32, _radius: f32) -> Option<String> {
+        let part = self.read(|state| {
+            let gizmo = state.gizmo()?;
+            pick_gizmo(&state.camera, &gizmo, state.pointer(x, y))
+        });
+        if self.read(|state| state.gesture.is_none() && state.active_part != part) {
+            self.change(|state| {
+                state.active_part = part;
+                state.is_changed = true;
+            });
+        }
+        part.map(|part| {
+            match part {
+                GizmoPart::Axis(0) => "x",
+                GizmoPart::Axis(1) => "y",
+                GizmoPart::Axis(_) => "z",
+                GizmoPart::Plane(0) => "plane_x",
+                GizmoPart::Plane(1) => "plane_y",
+                GizmoPart::Plane(_) => "plane_z",
+                GizmoPart::View => "all",
+            }
+            .to_owned()
+        })
+    }
+
+    /// Begins the gesture of one of the gizmo's handles.
+    ///
+    /// # Errors
+    /// When there is no such handle.
+    #[wasm_bindgen(js_name = beginGizmo)]
+    pub fn begin_gizmo(&self, handle: &str, x: f32, y: f32) -> Result<bool, JsValue> {
+        let (part, constraint) = match handle {
+            "x" => (GizmoPart::Axis(0), Constraint::Axis(0)),
+            "y" => (GizmoPart::Axis(1), Constraint::Axis(1)),
+            "z" => (GizmoPart::Axis(2), Constraint::Axis(2)),
+            "plane_x" => (GizmoPart::Plane(0), Constraint::Plane(0)),
+            "plane_y" => (GizmoPart::Plane(1), Constraint::Plane(1)),
+            "plane_z" => (GizmoPart::Plane(2), Constraint::Plane(2)),
+            "all" => (GizmoPart::View, Constraint::Free),
+            other => return Err(unknown("handle", other).into()),
+        };
+        Ok(self.change(|state| {
+            let kind = match state.view.gizmo {
+                GizmoAsked::None | GizmoAsked::Move => GestureKind::Grab,
+                GizmoAsked::Rotate => GestureKind::Rotate,
+                GizmoAsked::Scale => GestureKind::Scale,
+            };
+            let began = state.begin(kind, x, y);
+            if let Some(gesture) = state.gesture.as_mut().filter(|_| began) {
+                gesture.constrain(constraint);
+                state.active_part = Some(part);
+            }
+            began
+        }))
+    }
+
+    /// Follows the pointer.
+    #[wasm_bindgen(js_name = dragTransform)]
+    pub fn drag_transform(&self, x: f32, y: f32) {
+        self.with_gesture(|gesture, pointer| gesture.drag(pointer(x, y)));
+    }
+
+    /// Limits the gesture to an axis, 0 to 2, or to the plane across it; any other number frees it.
+    pub fn constrain(&self, axis: i32, plane: bool) {
+        self.with_gesture(|gesture, _| {
+            gesture.constrain(match (axis, plane) {
+                (0..=2, false) => Constraint::Axis(axis as usize),
+                (0..=2, true) => Constraint::Plane(axis as usize),
+                _ => Constraint::Free,
+            });
+        });
+    }
+
+    /// Takes an amount instead of the pointer; undefined goes back to the pointer.
+    #[wasm_bindgen(js_name = typeTransform)]
+    pub fn type_transform(&self, amount: Option<f32>) {
+        self.with_gesture(|gesture, _| gesture.type_amount(amount));
+    }
+
+    /// How far gestures draw others along, in diagonals of the cage; 0 for not at all.
+    #[wasm_bindgen(js_name = setProportional)]
+    pub fn set_proportional(&self, radius: f32) {
+        self.change(|state| {
+            state.radius = radius.max(0.0);
+            if let Some(mut gesture) = state.gesture.take() {
+                gesture.set_pull(state.pull(gesture.start()));
+                let positions = gesture.positions(&state.camera);
+                state.gesture = Some(gesture);
+                state.move_to(positions);
+            }
+        });
+    }
+
+    /// What the gesture does now.
+    #[wasm_bindgen(js_name = transformLabel)]
+    #[must_use]
+    pub fn transform_label(&self) -> String {
+        self.read(|state| state.gesture.as_ref().map(|g| g.label(&state.camera)).unwrap_or_default())
+    }
+
+    /// Ends the gesture; true when it moved something and is kept.
+    #[wasm_bindgen(js_name = endTransform)]
+    #[must_use]
+    pub fn end_transform(&self, keep: bool) -> bool {
+        self.change(|state| {
+            let Some(gesture) = state.gesture.take() else { return false };
+            state.active_part = None;
+            state.is_changed = true;
+            let moved = gesture.start() != state.positions;
+            if !keep {
+                state.move_to(gesture.start().to_vec());
+            }
+            keep && moved
+        })
+    }
+
+    /// Moves the selection's middle to a point.
+    #[wasm_bindgen(js_name = moveSelectionTo)]
+    #[must_use]
+    pub fn move_selection_to(&self, x: f32, y: f32, z: f32) -> bool {
+        self.change(|state| {
+            let Some(center) = state.selection.center(&state.positions) else { return false };
+            state.shift(Vec3::new(x, y, z) - center)
+        })
+    }
+
+    /// Moves the selection in the view plane, CSS pixels.
+    #[must_use]
+    pub fn nudge(&self, right: f32, up: f32) -> bool {
+        self.change(|state| {
+            let Some(center) = state.selection.center(&state.positions) else { return false };
+            let by = state.camera.in_view_plane(center, Vec2::new(right, -up));
+            state.shift(by)
+        })
+    }
+
+    /// Mixes poses by their shares.
+    ///
+    /// # Errors
+    /// When a pose belongs to another cage.
+    pub fn blend(&self, poses: &Array, shares: &[f32]) -> Result<(), JsValue> {
+        let poses = pose_list(poses);
+        let mixed = self.read(|state| blend(&state.rest.positions, &poses, shares)).map_err(Fault::from)?;
+        self.change(|state| state.move_to(mixed));
+        Ok(())
+    }
+
+    /// A moment of the animation through the poses.
+    ///
+    /// # Errors
+    /// When a pose belongs to another cage.
+    #[wasm_bindgen(js_name = playAt)]
+    pub fn play_at(&self, poses: &Array, seconds: f32) -> Result<(), JsValue> {
+        let poses = pose_list(poses);
+        let now = self.read(|state| moment(&state.rest.positions, &poses, seconds)).map_err(Fault::from)?;
+        self.change(|state| state.move_to(now));
+        Ok(())
+    }
+}
+
+impl Engine {
+    /// Changes the gesture under way, and the cage with it.
+    fn with_gesture(&self, change: impl FnOnce(&mut Gesture, &dyn Fn(f32, f32) -> Vec2)) {
+        self.change(|state| {
+            let Some(mut gesture) = state.gesture.take() else { return };
+            change(&mut gesture, &|x, y| state.pointer(x, y));
+            let positions = gesture.positions(&state.camera);
+            state.gesture = Some(gesture);
+            state.move_to(positions);
+        });
+    }
+}
+
+impl State {
+    fn begin(&mut self, kind: GestureKind, x: f32, y: f32) -> bool {
+        let Some(pivot) = self.selection.center(&self.positions) else { return false };
+        let pull = self.pull(&self.positions);
+        let at = self.pointer(x, y);
+        self.gesture = Some(Gesture::new(kind, self.positions.clone(), pull, pivot, at));
+        true
+    }
+
+    /// Moves the selection, and what goes along with it.
+    fn shift(&mut self, by: Vec3) -> bool {
+        let smallest = STILL * self.camera.units_per_pixel(self.camera.target);
+        if !by.is_finite() || by.length() < smallest {
+            return false;
+        }
+        let moved = self.pull(&self.positions).apply(&self.positions, &|p, share| p + share * by);
+        self.move_to(moved);
+        true
+    }
+}
+
+/// Poses as arrays of JavaScript to points.
+pub(super) fn pose_list(poses: &Array) -> Vec<Vec<Vec3>> {
+    poses
+        .iter()
+        .map(|pose| pose.dyn_into::<Float32Array>().map(|p| points(&p.to_vec())).unwrap_or_default())
+        .collect()
+}

@@ -1,0 +1,216 @@
+//! The engine: everything that the page's main thread asks Rust for.
+//!
+//! Each file adds the methods of one kind. None of them waits, but those that return promises; a change asks the page
+//! for a frame and is drawn with it.
+
+mod cage;
+mod camera;
+mod export;
+mod gesture;
+mod picture;
+mod rest;
+mod scene;
+mod select;
+mod slice;
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use async_lock::Mutex;
+use cagework_gpu::Session;
+use js_sys::Function;
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+use wasm_bindgen_futures::spawn_local;
+use web_sys::HtmlCanvasElement;
+
+use crate::error::{Answer, Fault};
+use crate::gpu::{Gpu, SharedGpu};
+use crate::loaded::Loaded;
+use crate::state::State;
+use crate::surface::Surface;
+use crate::views::{ModelInfo, object};
+
+/// Model, cage, camera and picture of one page.
+#[wasm_bindgen]
+pub struct Engine {
+    state: Rc<RefCell<State>>,
+    gpu: SharedGpu,
+    /// Asks the page for a frame.
+    invalidate: Function,
+}
+
+#[wasm_bindgen]
+impl Engine {
+    /// An engine that draws into a canvas; `invalidate` is called when a frame is needed.
+    ///
+    /// # Errors
+    /// `NoAdapter`, `NoDevice`.
+    pub async fn create(canvas: HtmlCanvasElement, invalidate: Function) -> Result<Engine, JsValue> {
+        let (surface, context) = Surface::open(canvas).await?;
+        let gpu = Gpu { main: Session::new(context), other: None, surface };
+        Ok(Self { state: Rc::default(), gpu: Rc::new(Mutex::new(Some(gpu))), invalidate })
+    }
+
+    /// Shows a file that was read: its model, and its cage if it has one. The file's handle is used up.
+    ///
+    /// # Errors
+    /// When the GPU has no room for it; what was open stays open.
+    pub async fn open(&self, mut loaded: Loaded) -> Result<JsValue, JsValue> {
+        let draw = loaded.draw_model();
+        {
+            let mut gpu = self.gpu.lock().await;
+            let gpu = gpu.as_mut().ok_or_else(lost)?;
+            gpu.main.set_model(draw).await.map_err(Fault::from)?;
+            gpu.other = None;
+        }
+        let info = ModelInfo::of(&loaded.model);
+        let cage = loaded.cage.take();
+        self.change(|state| state.set_model(loaded.model));
+        if let Some(cage) = cage {
+            self.take_cage(cage);
+        }
+        Ok(object(&info)?)
+    }
+
+    /// Takes what the worker has bound: rows, columns and weights; for each vertex outside the cage the vertex and the
+    /// corners of its frame, `[n_outside, 4]`, and its offset, `[n_outside, 3]`.
+    ///
+    /// # Errors
+    /// When the arrays do not fit model and cage, or the GPU has no room for them.
+    pub async fn adopt(
+        &self,
+        indptr: Vec<u32>,
+        indices: Vec<u32>,
+        data: Vec<f32>,
+        outside: Vec<u32>,
+        offsets: Vec<f32>,
+    ) -> Result<(), JsValue> {
+        let bound =
+            self.read(|state| crate::binder::unpack(state, indptr, indices, data, &outside, &offsets))?;
+        let mut gpu = self.gpu.lock().await;
+        let gpu = gpu.as_mut().ok_or_else(lost)?;
+        gpu.main.adopt(bound.0, bound.1).await.map_err(Fault::from)?;
+        self.change(|state| {
+            state.is_bound = true;
+            (state.is_moved, state.is_changed) = (true, true);
+        });
+        Ok(())
+    }
+
+    /// Takes mean value coordinates for the right half of the split view; the arrays are those of `adopt`.
+    ///
+    /// # Errors
+    /// As `adopt`.
+    #[wasm_bindgen(js_name = adoptOther)]
+    pub async fn adopt_other(
+        &self,
+        indptr: Vec<u32>,
+        indices: Vec<u32>,
+        data: Vec<f32>,
+    ) -> Result<(), JsValue> {
+        let bound = self.read(|state| crate::binder::unpack(state, indptr, indices, data, &[], &[]))?;
+        let mut gpu = self.gpu.lock().await;
+        let gpu = gpu.as_mut().ok_or_else(lost)?;
+        let mut other = gpu.main.twin().await.map_err(Fault::from)?;
+        other.adopt(bound.0, bound.1).await.map_err(Fault::from)?;
+        gpu.other = Some(other);
+        self.change(|state| (state.is_moved, state.is_changed) = (true, true));
+        Ok(())
+    }
+
+    /// Whether the model follows the cage.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn bound(&self) -> bool {
+        self.read(|state| state.is_bound)
+    }
+
+    /// Resolves with the reason when the GPU is lost.
+    ///
+    /// # Errors
+    /// Never while the engine is alive.
+    pub async fn lost(&self) -> Result<String, JsValue> {
+        let receiver = {
+            let gpu = self.gpu.lock().await;
+            gpu.as_ref().ok_or_else(lost)?.main.context().lost()
+        };
+        Ok(receiver.await.map_err(|_| Fault::new("DeviceLost", "the GPU is gone"))?)
+    }
+
+    /// Destroys the device, as a reset of the driver would.
+    pub fn lose(&self) {
+        if let Some(gpu) = self.gpu.try_lock().as_ref().and_then(|gpu| gpu.as_ref()) {
+            gpu.main.context().device.destroy();
+        }
+    }
+
+    /// Everything again on a new device.
+    ///
+    /// # Errors
+    /// `NoAdapter`, `NoDevice`: try again later; or the GPU has no room for the model.
+    pub async fn recover(&self, canvas: HtmlCanvasElement) -> Result<(), JsValue> {
+        let (surface, context) = Surface::open(canvas).await?;
+        {
+            let mut shared = self.gpu.lock().await;
+            let Gpu { main, .. } = shared.take().ok_or_else(lost)?;
+            let main = main.recover(context).await.map_err(Fault::from)?;
+            *shared = Some(Gpu { main, other: None, surface });
+        }
+        self.change(|state| (state.is_moved, state.is_changed) = (true, true));
+        Ok(())
+    }
+}
+
+impl Engine {
+    fn read<T>(&self, read: impl FnOnce(&State) -> T) -> T {
+        read(&self.state.borrow())
+    }
+
+    /// Changes something, and asks for a frame.
+    fn change<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
+        let changed = change(&mut self.state.borrow_mut());
+        // The page only notes that it has something to draw: there is nothing that could fail.
+        let _ = self.invalidate.call0(&JsValue::NULL);
+        changed
+    }
+
+    /// Another cage, here at once and on the GPU when it has answered.
+    fn take_cage(&self, mesh: cagework_core::PolygonMesh) {
+        self.change(|state| state.set_cage(mesh));
+        let (state, gpu, invalidate) =
+            (Rc::clone(&self.state), Rc::clone(&self.gpu), self.invalidate.clone());
+        let (generation, cage) = self.read(|state| (state.generation, state.cage.clone()));
+        let Some(cage) = cage else { return };
+        spawn_local(async move {
+            let mut gpu = gpu.lock().await;
+            let Some(gpu) = gpu.as_mut() else { return };
+            if state.borrow().generation != generation {
+                return;
+            }
+            gpu.other = None;
+            let outcome = gpu.main.set_cage(&cage).await;
+            let mut state = state.borrow_mut();
+            match outcome {
+                Ok(()) => state.on_gpu = Some(generation),
+                Err(error) => state.fault = Some(error.into()),
+            }
+            (state.is_moved, state.is_changed) = (true, true);
+            drop(state);
+            let _ = invalidate.call0(&JsValue::NULL);
+        });
+    }
+
+    /// Reads what is on the GPU, unless it is waiting for an answer.
+    fn with_session<T>(&self, read: impl FnOnce(&Session) -> Answer<T>) -> Answer<T> {
+        let gpu = self
+            .gpu
+            .try_lock()
+            .ok_or_else(|| Fault::new("Busy", "the GPU is busy: try again in a moment"))?;
+        read(&gpu.as_ref().ok_or_else(lost)?.main)
+    }
+}
+
+fn lost() -> Fault {
+    Fault::new("DeviceLost", "the GPU is gone: reload the page")
+}

@@ -1,0 +1,78 @@
+//! Frames, pictures, and what was computed on the GPU.
+
+use glam::Vec2;
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use super::{Engine, lost};
+use crate::arrays::flat;
+use crate::error::{Answer, Fault};
+
+#[wasm_bindgen]
+impl Engine {
+    /// The viewport's size, CSS pixels, and how many pixels one of them is.
+    pub fn resize(&self, width: f32, height: f32, scale: f32) {
+        self.change(|state| {
+            state.size = Vec2::new(width, height).max(Vec2::ONE);
+            state.scale = scale.max(0.1);
+            state.place_viewport();
+        });
+    }
+
+    /// Draws what there is now. False if the GPU is busy; it asks again.
+    ///
+    /// # Errors
+    /// `DeviceLost`, `Refused`, `OutOfMemory`.
+    #[wasm_bindgen(js_name = drawFrame)]
+    pub fn draw_frame(&self) -> Result<bool, JsValue> {
+        Ok(self.try_frame()?)
+    }
+
+    /// A picture, red, green, blue, alpha, rows from the top. `[height, width, 4]`
+    ///
+    /// # Errors
+    /// When it is too large.
+    pub async fn picture(&self, width: u32, height: u32) -> Result<Vec<u8>, JsValue> {
+        let mut gpu = self.gpu.lock().await;
+        let gpu = gpu.as_mut().ok_or_else(lost)?;
+        let scale = {
+            let mut state = self.state.borrow_mut();
+            state.write(&mut gpu.main, gpu.other.as_mut());
+            height as f32 / state.size.y
+        };
+        let picture = gpu.main.picture([width, height], scale).await.map_err(Fault::from)?;
+        self.change(|_| ());
+        Ok(picture)
+    }
+
+    /// The model's vertices as the GPU has them. `[n_vertices, 3]`
+    ///
+    /// # Errors
+    /// When there is no model.
+    #[wasm_bindgen(js_name = readPositions)]
+    pub async fn read_positions(&self) -> Result<Vec<f32>, JsValue> {
+        let mut gpu = self.gpu.lock().await;
+        let gpu = gpu.as_mut().ok_or_else(lost)?;
+        self.state.borrow_mut().write(&mut gpu.main, gpu.other.as_mut());
+        let positions = gpu.main.read_positions().await.map_err(Fault::from)?;
+        self.change(|_| ());
+        Ok(flat(&positions))
+    }
+}
+
+impl Engine {
+    fn try_frame(&self) -> Answer<bool> {
+        let Some(mut gpu) = self.gpu.try_lock() else { return Ok(false) };
+        let Some(gpu) = gpu.as_mut() else { return Ok(false) };
+        let mut state = self.state.borrow_mut();
+        if let Some(fault) = state.fault.take() {
+            return Err(fault);
+        }
+        let pixels = (state.size * state.scale).round();
+        let context = gpu.main.context().clone();
+        gpu.surface.resize(&context, [pixels.x as u32, pixels.y as u32]);
+        state.write(&mut gpu.main, gpu.other.as_mut());
+        let other = gpu.other.as_mut().filter(|_| state.view.compare);
+        gpu.surface.draw(&mut gpu.main, other, state.scale)
+    }
+}

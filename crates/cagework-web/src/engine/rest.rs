@@ -1,0 +1,118 @@
+//! Editing the cage itself: faults, repairs, and its edges and faces.
+
+use cagework_core::PolygonMesh;
+use cagework_core::cage_check::repair;
+use cagework_core::edit::SelectMode;
+use cagework_core::rest_edit::{Edited, collapse_edge, delete_faces, extrude_face, split_edge};
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use super::Engine;
+use crate::error::{Answer, Fault};
+use crate::options::unknown;
+use crate::problems;
+use crate::state::State;
+use crate::views::object;
+
+/// How far a face is pulled out, in diagonals of the cage.
+const EXTRUSION: f32 = 0.08;
+
+#[wasm_bindgen]
+impl Engine {
+    /// What is wrong with the cage as it is now: `Problem[]` of contract.ts.
+    ///
+    /// # Errors
+    /// Never.
+    #[wasm_bindgen(js_name = checkCage)]
+    pub fn check_cage(&self) -> Result<JsValue, JsValue> {
+        let found = self.read(|state| problems::find(&state.shown_mesh(), state.model_positions()));
+        let shown: Vec<_> = found.problems.iter().map(problems::view).collect();
+        self.change(|state| {
+            state.check = Some(found);
+            state.is_changed = true;
+        });
+        Ok(object(&shown)?)
+    }
+
+    /// Repairs the cage.
+    ///
+    /// # Errors
+    /// When there is no such repair, or growing did not help.
+    pub fn repair(&self, kind: &str) -> Result<JsValue, JsValue> {
+        let asked = problems::repair_named(kind).ok_or_else(|| unknown("repair", kind))?;
+        let repaired =
+            self.read(|state| repair(&state.rest, &[asked], state.model_positions())).map_err(Fault::from)?;
+        Ok(self.put_cage(repaired.mesh)?)
+    }
+
+    /// Edits the rest cage where it is selected: split_edge, collapse_edge, extrude_face, delete_vertex, delete_face.
+    /// What was made is selected afterwards.
+    ///
+    /// # Errors
+    /// When nothing fitting is selected, or the cage would break; nothing changes then.
+    #[wasm_bindgen(js_name = editRest)]
+    pub fn edit_rest(&self, edit: &str) -> Result<JsValue, JsValue> {
+        let edited = self.read(|state| state.edited(edit))?;
+        let shown = self.put_cage(edited.mesh)?;
+        self.change(|state| {
+            state.selection.change(&edited.touched, SelectMode::Replace);
+            state.is_changed = true;
+        });
+        Ok(shown)
+    }
+}
+
+impl State {
+    /// The cage as it is shown.
+    fn shown_mesh(&self) -> PolygonMesh {
+        let positions = if self.editing_rest { &self.positions } else { &self.rest.positions };
+        PolygonMesh { positions: positions.clone(), faces: self.rest.faces.clone() }
+    }
+
+    fn edited(&self, edit: &str) -> Answer<Edited> {
+        let mesh = self.shown_mesh();
+        let (edges, faces) = (self.selection.edges(&self.topology), self.selection.faces(&self.topology));
+        let nothing = |what: &str| Fault::new("Selection", format!("select {what} first"));
+        Ok(match edit {
+            "split_edge" => each(mesh, &edges, |mesh, &edge| split_edge(mesh, edge, 0.5))?
+                .ok_or_else(|| nothing("an edge, or both its ends,"))?,
+            // Merging moves vertices together: one edge at a time.
+            "collapse_edge" => match edges.first() {
+                Some(&edge) => collapse_edge(&mesh, edge, 0.5)?,
+                None => return Err(nothing("an edge, or both its ends,")),
+            },
+            "extrude_face" => {
+                let distance = EXTRUSION * self.bounds().map_or(1.0, |b| b.diagonal());
+                each(mesh, &faces, |mesh, &face| extrude_face(mesh, face, distance))?
+                    .ok_or_else(|| nothing("a face, or all its corners,"))?
+            }
+            "delete_face" if faces.is_empty() => return Err(nothing("a face, or all its corners,")),
+            "delete_face" => delete_faces(&mesh, &faces)?,
+            "delete_vertex" if self.selection.is_empty() => return Err(nothing("a vertex")),
+            "delete_vertex" => {
+                let around =
+                    |f: &u32| self.topology.faces[*f as usize].iter().any(|&i| self.selection.contains(i));
+                let faces: Vec<u32> = (0..self.topology.faces.len() as u32).filter(around).collect();
+                delete_faces(&mesh, &faces)?
+            }
+            other => return Err(unknown("edit", other)),
+        })
+    }
+}
+
+/// One edit after the other; numbers of those to come stay as they are. Nothing for nothing.
+fn each<T, E>(
+    mesh: PolygonMesh,
+    items: &[T],
+    edit: impl Fn(&PolygonMesh, &T) -> Result<Edited, E>,
+) -> Result<Option<Edited>, E> {
+    let mut all: Option<Edited> = None;
+    for item in items {
+        let mut next = edit(all.as_ref().map_or(&mesh, |e| &e.mesh), item)?;
+        if let Some(before) = all {
+            next.touched.splice(0..0, before.touched);
+        }
+        all = Some(next);
+    }
+    Ok(all)
+}

@@ -1,0 +1,134 @@
+//! Pointing at the cage and selecting.
+
+use cagework_core::edit::{Element, pick_edge, pick_face, pick_vertex, vertices_in_box};
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use super::Engine;
+use crate::arrays::flat;
+use crate::options::{element, select_mode};
+use crate::state::State;
+
+#[wasm_bindgen]
+impl Engine {
+    /// What clicks select: vertex, edge or face.
+    ///
+    /// # Errors
+    /// When it is something else.
+    #[wasm_bindgen(js_name = setElement)]
+    pub fn set_element(&self, name: &str) -> Result<(), JsValue> {
+        let element = element(name)?;
+        self.change(|state| {
+            state.element = element;
+            state.hovered.clear();
+            state.is_changed = true;
+        });
+        Ok(())
+    }
+
+    /// Vertices of the element under the pointer; empty for none.
+    #[must_use]
+    pub fn pick(&self, x: f32, y: f32, radius: f32) -> Vec<u32> {
+        self.read(|state| {
+            let (at, positions, topology, view) =
+                (state.pointer(x, y), &state.positions, &state.topology, &state.camera);
+            match state.element {
+                Element::Vertex => pick_vertex(positions, view, at, radius).into_iter().collect(),
+                Element::Edge => pick_edge(positions, topology, view, at, radius)
+                    .map(|e| topology.edges[e as usize].to_vec())
+                    .unwrap_or_default(),
+                Element::Face => pick_face(positions, topology, view, at)
+                    .map(|f| topology.faces[f as usize].clone())
+                    .unwrap_or_default(),
+            }
+        })
+    }
+
+    /// Marks the element of these vertices.
+    pub fn hover(&self, vertices: Vec<u32>) {
+        if self.read(|state| state.hovered != vertices) {
+            self.change(|state| {
+                state.hovered = vertices;
+                state.is_changed = true;
+            });
+        }
+    }
+
+    /// Selects vertices; `mode` is replace, add, remove or toggle.
+    ///
+    /// # Errors
+    /// When the mode is another.
+    pub fn select(&self, vertices: &[u32], mode: &str) -> Result<(), JsValue> {
+        let mode = select_mode(mode)?;
+        self.change_selection(|state| state.selection.change(vertices, mode));
+        Ok(())
+    }
+
+    /// Selects the vertices in a rectangle.
+    ///
+    /// # Errors
+    /// When the mode is another.
+    #[wasm_bindgen(js_name = selectBox)]
+    pub fn select_box(&self, x0: f32, y0: f32, x1: f32, y1: f32, mode: &str) -> Result<(), JsValue> {
+        let mode = select_mode(mode)?;
+        self.change_selection(|state| {
+            let corners = [state.pointer(x0, y0), state.pointer(x1, y1)];
+            let vertices = vertices_in_box(&state.positions, &state.camera, corners);
+            state.selection.change(&vertices, mode);
+        });
+        Ok(())
+    }
+
+    /// Selects everything.
+    #[wasm_bindgen(js_name = selectAll)]
+    pub fn select_all(&self) {
+        self.change_selection(|state| state.selection.all());
+    }
+
+    /// Extends the selection to whole parts.
+    #[wasm_bindgen(js_name = selectLinked)]
+    pub fn select_linked(&self) {
+        self.change_selection(|state| state.selection.linked(&state.topology));
+    }
+
+    /// Selected vertices, ascending.
+    #[must_use]
+    pub fn selection(&self) -> Vec<u32> {
+        self.read(|state| state.selection.vertices())
+    }
+
+    /// The vertex selected last, or -1.
+    #[must_use]
+    pub fn last(&self) -> i32 {
+        self.read(|state| state.selection.last().map_or(-1, |v| v as i32))
+    }
+
+    /// Middle of the selection; empty without one.
+    #[wasm_bindgen(js_name = selectionCenter)]
+    #[must_use]
+    pub fn selection_center(&self) -> Vec<f32> {
+        self.read(|state| state.selection.center(&state.positions).map(|c| flat(&[c])).unwrap_or_default())
+    }
+
+    /// Whether mirror images move along.
+    #[wasm_bindgen(js_name = setSymmetry)]
+    pub fn set_symmetry(&self, on: bool) {
+        self.change(|state| {
+            state.is_mirrored = on;
+            state.is_changed = true;
+        });
+    }
+
+    /// Vertices without a mirror image.
+    #[must_use]
+    pub fn unmatched(&self) -> Vec<u32> {
+        self.read(|state| state.symmetry.unmatched())
+    }
+
+    fn change_selection(&self, change: impl FnOnce(&mut State)) {
+        self.change(|state| {
+            change(state);
+            state.is_changed = true;
+        });
+    }
+}

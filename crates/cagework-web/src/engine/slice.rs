@@ -1,0 +1,47 @@
+//! A slice through the grid.
+
+use std::sync::Arc;
+
+use cagework_core::BindOptions;
+use cagework_core::slice::Slice;
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use super::Engine;
+use crate::binder::unpack;
+use crate::error::{Answer, Fault};
+use crate::options::BindAsked;
+
+#[wasm_bindgen]
+impl Engine {
+    /// Takes a slice: its axis, where along it (0 to 1), the options of its bind, and the worker's rows of weights, which
+    /// may be missing where no cell is inside.
+    ///
+    /// # Errors
+    /// When there is no cage or the rows belong to another slice.
+    #[wasm_bindgen(js_name = takeSlice)]
+    pub fn take_slice(
+        &self,
+        axis: usize,
+        fraction: f32,
+        options: JsValue,
+        indptr: Vec<u32>,
+        indices: Vec<u32>,
+        data: Vec<f32>,
+    ) -> Result<(), JsValue> {
+        let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
+        let slice = self.read(|state| {
+            let (_, cage) = state.parts()?;
+            let mut slice = Slice::new(cage, &BindOptions::from(asked), axis.min(2), fraction);
+            if !data.is_empty() {
+                slice.set_weights(unpack(state, indptr, indices, data, &[], &[])?.0)?;
+            }
+            Answer::Ok(slice)
+        })?;
+        self.change(|state| {
+            state.slice = Some(Arc::new(slice));
+            state.is_changed = true;
+        });
+        Ok(())
+    }
+}

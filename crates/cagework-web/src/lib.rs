@@ -1,0 +1,26 @@
+//! The page's half of Cagework: JavaScript classes over core, io and gpu. No mathematics.
+//!
+//! One wasm module, two instances: on the main thread [`engine::Engine`] draws, picks and deforms; in a worker
+//! [`binder::Binder`] binds. Arrays go across as typed arrays, everything else as plain objects. What fails throws an
+//! `Error` whose name is the variant and whose message is the sentence.
+
+mod arrays;
+pub mod binder;
+mod clock;
+pub mod engine;
+mod error;
+mod gpu;
+pub mod loaded;
+mod options;
+mod problems;
+mod state;
+mod surface;
+mod views;
+
+use wasm_bindgen::prelude::wasm_bindgen;
+
+/// Called once by the glue: panics become messages in the console.
+#[wasm_bindgen(start)]
+pub fn start() {
+    console_error_panic_hook::set_once();
+}

@@ -1,0 +1,159 @@
+//! A file that was read, before it is shown: its textures are decoded by the browser in between.
+
+use cagework_core::PolygonMesh;
+use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
+use cagework_io::{Look, LookAlpha, LookWrap, Model, read_project};
+use glam::Vec3;
+use js_sys::{Function, Uint8Array};
+use wasm_bindgen::prelude::wasm_bindgen;
+use wasm_bindgen::{JsCast as _, JsValue};
+
+use crate::arrays::flat;
+use crate::error::Answer;
+
+/// A model with its looks, and what else was in its file.
+#[wasm_bindgen]
+pub struct Loaded {
+    pub(crate) model: Model,
+    pub(crate) cage: Option<PolygonMesh>,
+    look: Look,
+    textures: Vec<DrawTexture>,
+    poses: Vec<(String, Vec<Vec3>)>,
+    settings: Option<String>,
+}
+
+#[wasm_bindgen]
+impl Loaded {
+    /// Reads an OBJ, glTF, GLB or project file. `sibling` is called with the path of each file that it refers to and
+    /// returns a Uint8Array or undefined.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn read(name: &str, bytes: &[u8], sibling: &Function) -> Result<Loaded, JsValue> {
+        Ok(Self::from_bytes(name, bytes, sibling)?)
+    }
+
+    /// Textures to decode.
+    #[wasm_bindgen(getter, js_name = textureCount)]
+    #[must_use]
+    pub fn texture_count(&self) -> usize {
+        self.look.images.len()
+    }
+
+    /// File of one texture.
+    #[wasm_bindgen(js_name = textureBytes)]
+    #[must_use]
+    pub fn texture_bytes(&self, index: usize) -> Vec<u8> {
+        self.look.images.get(index).map(|t| t.bytes.clone()).unwrap_or_default()
+    }
+
+    /// Its media type, empty if unknown.
+    #[wasm_bindgen(js_name = textureType)]
+    #[must_use]
+    pub fn texture_type(&self, index: usize) -> String {
+        self.look.images.get(index).map(|t| t.mime.clone()).unwrap_or_default()
+    }
+
+    /// Takes a decoded texture: red, green, blue, alpha; rows from the top.
+    #[wasm_bindgen(js_name = setTexture)]
+    pub fn set_texture(&mut self, index: usize, width: u32, height: u32, rgba: Vec<u8>) {
+        let fits = rgba.len() as u64 == 4 * u64::from(width) * u64::from(height);
+        if let Some(texture) = self.textures.get_mut(index).filter(|_| fits) {
+            *texture = DrawTexture { width, height, rgba, wrap: texture.wrap };
+        }
+    }
+
+    /// Names of the poses in a project.
+    #[wasm_bindgen(js_name = poseNames)]
+    #[must_use]
+    pub fn pose_names(&self) -> Vec<String> {
+        self.poses.iter().map(|(name, _)| name.clone()).collect()
+    }
+
+    /// Cage positions of one of them. `[n_cage, 3]`
+    #[wasm_bindgen(js_name = posePositions)]
+    #[must_use]
+    pub fn pose_positions(&self, index: usize) -> Vec<f32> {
+        self.poses.get(index).map(|(_, positions)| flat(positions)).unwrap_or_default()
+    }
+
+    /// What the page remembered in a project; undefined in any other file.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn settings(&self) -> Option<String> {
+        self.settings.clone()
+    }
+}
+
+impl Loaded {
+    fn from_bytes(name: &str, bytes: &[u8], sibling: &Function) -> Answer<Self> {
+        if let Some(project) = read_project(name, bytes)? {
+            let mut loaded = Self::new(project.model);
+            loaded.cage = Some(project.cage);
+            loaded.poses = project.poses;
+            loaded.settings = Some(project.settings);
+            return Ok(loaded);
+        }
+        let mut resolve = |path: &str| {
+            let found = sibling.call1(&JsValue::NULL, &path.into()).ok()?;
+            Some(found.dyn_into::<Uint8Array>().ok()?.to_vec())
+        };
+        let model = Model::read(name, bytes, &mut resolve)?;
+        model.require_faces()?;
+        Ok(Self::new(model))
+    }
+
+    fn new(model: Model) -> Self {
+        let look = model.look();
+        let wrap = |wrap: LookWrap| match wrap {
+            LookWrap::Repeat => Wrap::Repeat,
+            LookWrap::Mirror => Wrap::Mirror,
+            LookWrap::Clamp => Wrap::Clamp,
+        };
+        let mut textures = vec![DrawTexture::default(); look.images.len()];
+        for group in &look.groups {
+            if let Some(image) = group.image {
+                textures[image as usize].wrap = group.wrap.map(wrap);
+            }
+        }
+        Self { model, cage: None, look, textures, poses: Vec::new(), settings: None }
+    }
+
+    /// What the renderer takes; a texture that was not decoded is left out.
+    pub(crate) fn draw_model(&mut self) -> DrawModel {
+        let look = std::mem::take(&mut self.look);
+        let textures = std::mem::take(&mut self.textures);
+        let decoded: Vec<bool> = textures.iter().map(|t| !t.rgba.is_empty()).collect();
+        let mut number = 0;
+        let numbers: Vec<Option<u32>> = decoded
+            .iter()
+            .map(|&decoded| {
+                number += u32::from(decoded);
+                decoded.then(|| number - 1)
+            })
+            .collect();
+        let groups = look.groups.into_iter().map(|group| {
+            let texture = group.image.and_then(|t| numbers[t as usize]);
+            DrawGroup {
+                triangles: group.triangles,
+                base_color: group.base_color,
+                texture,
+                alpha: match group.alpha {
+                    LookAlpha::Opaque => Alpha::Opaque,
+                    LookAlpha::Mask { cutoff } => Alpha::Mask { cutoff },
+                    LookAlpha::Blend => Alpha::Blend,
+                },
+            }
+        });
+        let unit = |x: f32| (x.clamp(0.0, 1.0) * f32::from(u16::MAX)).round() as u16;
+        let vertex =
+            |c: &cagework_io::LookVertex| DrawVertex { source: c.source, uv: c.uv, color: c.color.map(unit) };
+        DrawModel {
+            positions: self.model.positions.clone(),
+            vertices: look.vertices.iter().map(vertex).collect(),
+            groups: groups.collect(),
+            triangles: look.triangles,
+            textures: textures.into_iter().filter(|t| !t.rgba.is_empty()).collect(),
+        }
+    }
+}

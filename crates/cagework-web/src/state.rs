@@ -1,0 +1,181 @@
+//! What the page works on, on the CPU: always complete and at once; the GPU follows with the next frame.
+
+use std::sync::Arc;
+
+use cagework_core::cage_check::CageCheck;
+use cagework_core::edit::{Element, Gesture, Pull, Selection, SharedPull, Symmetry, Topology};
+use cagework_core::slice::Slice;
+use cagework_core::{Bounds, Cage, PolygonMesh};
+use cagework_gpu::Session;
+use cagework_gpu::render::{Camera, GizmoPart};
+use cagework_io::Model;
+use glam::{Vec2, Vec3};
+
+use crate::error::Fault;
+use crate::options::SceneAsked;
+use crate::problems;
+use crate::views::{CageInfo, CageState};
+
+/// Model, cage, selection, gesture and camera of a page.
+#[derive(Default)]
+pub(crate) struct State {
+    pub(crate) model: Option<Model>,
+    /// The cage at rest; none while there is only a draft of one.
+    pub(crate) cage: Option<Cage>,
+    /// The cage's positions at rest and faces, or the draft's.
+    pub(crate) rest: PolygonMesh,
+    pub(crate) topology: Topology,
+    pub(crate) symmetry: Symmetry,
+    /// What is wrong with the cage.
+    pub(crate) check: Option<CageCheck>,
+    /// Where the cage is. `[n_cage]`
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) editing_rest: bool,
+    pub(crate) is_bound: bool,
+    pub(crate) element: Element,
+    pub(crate) selection: Selection,
+    pub(crate) hovered: Vec<u32>,
+    pub(crate) is_mirrored: bool,
+    /// Of proportional editing, fraction of the cage's diagonal.
+    pub(crate) radius: f32,
+    pub(crate) gesture: Option<Gesture>,
+    pub(crate) active_part: Option<GizmoPart>,
+    pub(crate) slice: Option<Arc<Slice>>,
+    pub(crate) view: SceneAsked,
+    pub(crate) camera: Camera,
+    /// The viewport, CSS pixels.
+    pub(crate) size: Vec2,
+    /// Pixels of a CSS pixel.
+    pub(crate) scale: f32,
+    /// Counts the cages: work for one before is out of date.
+    pub(crate) generation: u32,
+    /// The generation of the cage that the GPU has.
+    pub(crate) on_gpu: Option<u32>,
+    pub(crate) is_moved: bool,
+    pub(crate) is_changed: bool,
+    /// What went wrong on the way to the GPU, for the next frame to tell.
+    pub(crate) fault: Option<Fault>,
+}
+
+impl State {
+    /// Another model, without a cage.
+    pub(crate) fn set_model(&mut self, model: Model) {
+        self.model = Some(model);
+        self.set_cage(PolygonMesh::default());
+        self.camera = Camera::default();
+        self.fit_camera();
+        self.frame_all();
+    }
+
+    /// Another cage, or a draft of one.
+    pub(crate) fn set_cage(&mut self, mesh: PolygonMesh) {
+        self.check = (!mesh.faces.is_empty()).then(|| problems::find(&mesh, self.model_positions()));
+        self.cage = Cage::new(&mesh).ok();
+        // Turned outward, seams closed.
+        self.rest = self.cage.as_ref().map_or(mesh, Cage::to_polygon_mesh);
+        self.topology = Topology::new(&self.rest.faces);
+        self.symmetry = Symmetry::new(&self.rest.positions);
+        self.positions.clone_from(&self.rest.positions);
+        self.selection = Selection::new(self.positions.len());
+        self.hovered.clear();
+        self.gesture = None;
+        self.active_part = None;
+        self.slice = None;
+        self.is_bound = false;
+        self.generation += 1;
+        self.is_moved = true;
+        self.is_changed = true;
+        self.fit_camera();
+    }
+
+    pub(crate) fn model_positions(&self) -> Option<&[Vec3]> {
+        self.model.as_ref().map(|m| &m.positions[..])
+    }
+
+    /// Tells the camera where everything is.
+    fn fit_camera(&mut self) {
+        self.place_viewport();
+        if let Some(bounds) = self.bounds() {
+            self.camera.set_scene(bounds);
+        }
+    }
+
+    /// Tells the camera how large the picture is: half of it when two are compared.
+    pub(crate) fn place_viewport(&mut self) {
+        let width = if self.view.compare { 0.5 * self.size.x } else { self.size.x };
+        self.camera.set_viewport(Vec2::new(width, self.size.y));
+    }
+
+    /// A pointer's place in the picture it is over.
+    pub(crate) fn pointer(&self, x: f32, y: f32) -> Vec2 {
+        let half = 0.5 * self.size.x;
+        Vec2::new(if self.view.compare && x >= half { x - half } else { x }, y)
+    }
+
+    /// Where model and cage are at rest.
+    pub(crate) fn bounds(&self) -> Option<Bounds> {
+        let model = self.model.as_ref().and_then(|m| Bounds::of(&m.positions));
+        match (model, Bounds::of(&self.rest.positions)) {
+            (Some(a), Some(b)) => Some(Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }),
+            (one, other) => one.or(other),
+        }
+    }
+
+    pub(crate) fn frame_all(&mut self) {
+        if let Some(bounds) = self.bounds() {
+            self.camera.frame(bounds);
+        }
+    }
+
+    /// What JavaScript is told about the cage; nothing without one.
+    pub(crate) fn cage_state(&self) -> Option<CageState> {
+        (!self.rest.faces.is_empty()).then(|| CageState {
+            usable: self.cage.is_some(),
+            info: CageInfo::of(&self.rest, self.cage.as_ref()),
+            problems: self.check.iter().flat_map(|c| &c.problems).map(problems::view).collect(),
+        })
+    }
+
+    /// How the selection of the moment pulls the others along.
+    pub(crate) fn pull(&self, positions: &[Vec3]) -> Pull {
+        let diagonal = Bounds::of(&self.rest.positions).map_or(0.0, |b| b.diagonal());
+        let symmetry = self.is_mirrored.then_some(&self.symmetry);
+        let shared = SharedPull { radius: self.radius * diagonal, symmetry };
+        Pull::new(&self.selection, positions, &self.rest.positions, shared)
+    }
+
+    /// Moves the cage.
+    pub(crate) fn move_to(&mut self, positions: Vec<Vec3>) {
+        if positions.len() == self.positions.len() && positions.iter().all(|p| p.is_finite()) {
+            self.positions = positions;
+            self.is_moved = true;
+            // The gizmo sits in the middle of the selection.
+            self.is_changed = true;
+        }
+    }
+
+    /// Whether the GPU has this cage.
+    pub(crate) fn is_on_gpu(&self) -> bool {
+        self.cage.is_some() && self.on_gpu == Some(self.generation)
+    }
+
+    /// Brings what changed to the GPU.
+    pub(crate) fn write(&mut self, main: &mut Session, other: Option<&mut Session>) {
+        let scene = (self.is_changed).then(|| self.scene());
+        for session in [Some(main), other].into_iter().flatten() {
+            *session.camera_mut() = self.camera;
+            if self.is_moved && self.is_on_gpu() {
+                let at_rest = self.view.original || self.editing_rest;
+                session.pose(if at_rest { &self.rest.positions } else { &self.positions });
+                if self.editing_rest && !self.view.original {
+                    session.show_cage(&self.positions);
+                }
+            }
+            if let Some(scene) = &scene {
+                session.set_scene(scene.clone());
+            }
+        }
+        self.is_moved &= !self.is_on_gpu() && self.cage.is_some();
+        self.is_changed = false;
+    }
+}

@@ -1,0 +1,132 @@
+//! What JavaScript is told about things, as plain objects: the types of contract.ts.
+
+use cagework_core::cage::CageNotice;
+use cagework_core::edit::Topology;
+use cagework_core::{Bounds, Cage, PolygonMesh};
+use cagework_io::{Format, Model};
+use serde::Serialize;
+use wasm_bindgen::JsValue;
+
+use crate::error::Answer;
+
+/// Corners of a box.
+#[derive(Clone, Copy, Serialize)]
+pub(crate) struct BoundsView {
+    min: [f32; 3],
+    max: [f32; 3],
+}
+
+impl BoundsView {
+    /// Of points that may be none.
+    pub(crate) fn of(bounds: Option<Bounds>) -> Self {
+        let zero = [0.0; 3];
+        bounds
+            .map_or(Self { min: zero, max: zero }, |b| Self { min: b.min.to_array(), max: b.max.to_array() })
+    }
+}
+
+/// `ModelInfo`.
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct ModelInfo {
+    name: String,
+    format: &'static str,
+    vertices: usize,
+    triangles: usize,
+    faces: usize,
+    materials: usize,
+    textures: usize,
+    skins: usize,
+    animations: usize,
+    morph_targets: usize,
+    bounds: BoundsView,
+    notices: Vec<String>,
+}
+
+impl ModelInfo {
+    pub(crate) fn of(model: &Model) -> Self {
+        let counts = model.counts;
+        Self {
+            name: model.name.clone(),
+            format: match model.format() {
+                Format::Obj => "obj",
+                Format::Gltf => "gltf",
+            },
+            vertices: model.positions.len(),
+            triangles: model.triangles.len(),
+            faces: model.n_faces(),
+            materials: counts.materials,
+            textures: counts.textures,
+            skins: counts.skins,
+            animations: counts.animations,
+            morph_targets: counts.morph_targets,
+            bounds: BoundsView::of(Bounds::of(&model.positions)),
+            notices: model.notices.clone(),
+        }
+    }
+}
+
+/// `CageInfo`.
+#[derive(Serialize)]
+pub(crate) struct CageInfo {
+    vertices: usize,
+    edges: usize,
+    faces: usize,
+    triangles: usize,
+    bounds: BoundsView,
+    notices: Vec<String>,
+}
+
+impl CageInfo {
+    pub(crate) fn of(mesh: &PolygonMesh, cage: Option<&Cage>) -> Self {
+        let fan: usize = mesh.faces.iter().map(|f| f.len().saturating_sub(2)).sum();
+        Self {
+            vertices: mesh.positions.len(),
+            edges: Topology::new(&mesh.faces).edges.len(),
+            faces: mesh.faces.len(),
+            triangles: cage.map_or(fan, |c| c.triangles().len()),
+            bounds: BoundsView::of(Bounds::of(&mesh.positions)),
+            notices: cage.map_or_else(Vec::new, |c| c.notices().iter().map(CageNotice::to_string).collect()),
+        }
+    }
+}
+
+/// `CageState`.
+#[derive(Serialize)]
+pub(crate) struct CageState {
+    pub(crate) usable: bool,
+    pub(crate) info: CageInfo,
+    pub(crate) problems: Vec<Problem>,
+}
+
+/// `Problem`.
+#[derive(Clone, Serialize)]
+pub(crate) struct Problem {
+    pub(crate) kind: String,
+    pub(crate) severity: &'static str,
+    pub(crate) message: String,
+    pub(crate) count: usize,
+    pub(crate) fix: Option<Fix>,
+}
+
+/// A repair and what its button says.
+#[derive(Clone, Serialize)]
+pub(crate) struct Fix {
+    pub(crate) kind: &'static str,
+    pub(crate) label: String,
+}
+
+/// `Legend`.
+#[derive(Serialize)]
+pub(crate) struct Legend {
+    pub(crate) low: f32,
+    pub(crate) high: f32,
+    pub(crate) logarithmic: bool,
+    pub(crate) map: &'static str,
+}
+
+/// A plain object of JavaScript; what is not there is null.
+pub(crate) fn object(value: &impl Serialize) -> Answer<JsValue> {
+    let serializer = serde_wasm_bindgen::Serializer::json_compatible();
+    Ok(value.serialize(&serializer)?)
+}

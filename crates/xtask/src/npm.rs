@@ -1,0 +1,29 @@
+//! Programs of npm: installed from the lock file, run from node_modules.
+
+use crate::command::{root, run};
+
+/// Installs the dependencies that package-lock.json names, unless that has been done.
+///
+/// # Errors
+/// When npm fails.
+pub(crate) fn install() -> Result<(), String> {
+    let root = root();
+    let modified = |path: &str| root.join(path).metadata().and_then(|m| m.modified()).ok();
+    // npm writes this file last; an older one belongs to another lock file.
+    let installed = modified("node_modules/.package-lock.json");
+    if installed.is_some() && installed >= modified("package-lock.json") {
+        return Ok(());
+    }
+    println!("setup: installing npm dependencies");
+    // Not `npm ci`, which fails where the registry lacks the optional packages of other platforms; --no-save leaves
+    // the lock file alone, and what it names is what is installed.
+    run("npm", &["install", "--no-save", "--no-audit", "--no-fund"], &[])
+}
+
+/// Runs an installed program.
+///
+/// # Errors
+/// When it fails.
+pub(crate) fn exec(args: &[&str]) -> Result<(), String> {
+    run("npx", &[&["--no-install"], args].concat(), &[])
+}

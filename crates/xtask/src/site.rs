@@ -1,0 +1,103 @@
+//! The page: built into `dist/`, served, tested in a browser.
+
+use crate::command::{root, run};
+use crate::npm::{self, exec};
+use crate::wasm::{self, Profile};
+
+/// Largest wasm file, gzip-compressed: what a visitor waits for.
+const MAX_WASM_BYTES: usize = 700_000;
+/// Largest script that a visitor waits for, gzip-compressed.
+const MAX_SCRIPT_BYTES: usize = 80_000;
+
+/// Where the built page goes.
+const FOLDER: &str = "dist";
+
+/// Builds the page into `dist/`: files that work below any path of any web server.
+///
+/// # Errors
+/// When a step fails or the result is too large to download.
+pub(crate) fn build() -> Result<(), String> {
+    npm::install()?;
+    wasm::build(Profile::Web)?;
+    exec(&["vite", "build", "web", "--config", "web/vite.config.ts", "--logLevel", "warn"])?;
+    check_sizes()?;
+    println!("the page is in {FOLDER}/: any web server can serve it, from any path");
+    Ok(())
+}
+
+/// Builds the page and serves it on this machine.
+///
+/// # Errors
+/// When a step fails.
+pub(crate) fn start(args: &[&str]) -> Result<(), String> {
+    build()?;
+    exec(&[&["vite", "preview", "web", "--config", "web/vite.config.ts"], args].concat())
+}
+
+/// Tests of the TypeScript's own logic, without a browser.
+///
+/// # Errors
+/// When one fails.
+pub(crate) fn test_scripts() -> Result<(), String> {
+    npm::install()?;
+    exec(&["vitest", "run", "--root", "web"])
+}
+
+/// Builds the page and tests it in a browser; `args` go to Playwright.
+///
+/// # Errors
+/// When one fails.
+pub(crate) fn test_page(args: &[&str]) -> Result<(), String> {
+    build()?;
+    exec(&[&["playwright", "test", "--config", "web/playwright.config.ts"], args].concat())
+}
+
+/// Makes the pictures of the samples that the page shows, `web/public/samples`.
+///
+/// # Errors
+/// When a step fails.
+pub(crate) fn pictures() -> Result<(), String> {
+    build()?;
+    let playwright = ["--no-install", "playwright", "test", "--config", "web/playwright.config.ts"];
+    run("npx", &playwright, &[("PICTURES", "1")])
+}
+
+/// Types of the TypeScript, which the build does not look at.
+///
+/// # Errors
+/// When one is wrong.
+pub(crate) fn check_types() -> Result<(), String> {
+    if !root().join("web/src/pkg/cagework.d.ts").exists() {
+        wasm::build(Profile::Dev)?;
+    }
+    exec(&["tsc", "--project", "web"])
+}
+
+/// What a visitor waits for must stay small.
+fn check_sizes() -> Result<(), String> {
+    let folder = root().join(FOLDER).join("assets");
+    let entries = std::fs::read_dir(&folder).map_err(|e| format!("cannot read {}: {e}", folder.display()))?;
+    for entry in entries.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let limit = match name.as_str() {
+            n if n.starts_with("cagework_bg") => MAX_WASM_BYTES,
+            n if n.starts_with("index") && n.to_ascii_lowercase().ends_with(".js") => MAX_SCRIPT_BYTES,
+            _ => continue,
+        };
+        let bytes = std::fs::read(entry.path()).map_err(|e| format!("cannot read {name}: {e}"))?;
+        let size = compressed(&bytes)?;
+        println!("{name}: {} kB, {} kB compressed", bytes.len() / 1000, size / 1000);
+        if size > limit {
+            return Err(format!("{name} has {size} bytes compressed; it may have {limit}"));
+        }
+    }
+    Ok(())
+}
+
+/// Bytes after gzip, as servers send them.
+fn compressed(bytes: &[u8]) -> Result<usize, String> {
+    use std::io::Write as _;
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    let packed = encoder.write_all(bytes).and_then(|()| encoder.finish());
+    packed.map(|p| p.len()).map_err(|e| format!("cannot compress: {e}"))
+}

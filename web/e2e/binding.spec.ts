@@ -1,0 +1,74 @@
+/** A bind never stands in the way. */
+
+import { bound, expect, open, shoot, test } from "./support";
+
+/** Longest the main thread may be busy with one thing during a bind, ms, apart from the GPU's own time. */
+const LONGEST_TASK = 50;
+
+test("a bind at g = 64 blocks no frame", async ({ page }) => {
+  await open(page);
+  const { tasks, frames } = await page.evaluate(async () => {
+    const session = globalThis.cagework;
+    if (!session) throw new Error("no session");
+    const tasks: number[] = [];
+    const frames: number[] = [];
+    const observer = new PerformanceObserver((list) => {
+      for (const { duration } of list.getEntries()) tasks.push(duration);
+    });
+    observer.observe({ entryTypes: ["longtask"] });
+    const stop = session.onFrame((ms) => frames.push(ms));
+    const { BIND } = { BIND: { grid: 64, method: "embedded", solver: "multigrid", backend: "gpu", cell_shape: "box", delta_norm: "euclidean", tau: 1e-5, max_iterations: 20000, sparsify: 0, outside: "closest_point", memory_limit: 2 ** 31 } as const };
+    const job = session.bind(BIND, () => undefined);
+    let running = true;
+    const turn = () => {
+      session.engine.orbit(2, 0);
+      if (running) requestAnimationFrame(turn);
+    };
+    requestAnimationFrame(turn);
+    await job.done;
+    running = false;
+    await new Promise((done) => setTimeout(done, 200));
+    observer.disconnect();
+    stop();
+    return { tasks, frames };
+  });
+  const longest = Math.max(0, ...tasks, ...frames);
+  test.info().annotations.push({ type: "longest main-thread task, ms", description: longest.toFixed(1) });
+  expect(frames.length, "frames were drawn meanwhile").toBeGreaterThan(5);
+  expect(longest).toBeLessThan(LONGEST_TASK);
+});
+
+for (const backend of ["gpu", "cpu"] as const) {
+  test(`a bind on the ${backend} shows its progress and can be cancelled`, async ({ page }) => {
+    await open(page);
+    const answer = await page.evaluate(async (backend) => {
+      const session = globalThis.cagework;
+      if (!session) throw new Error("no session");
+      const options = { grid: 192, method: "embedded", solver: "multigrid", backend, cell_shape: "box", delta_norm: "euclidean", tau: 1e-7, max_iterations: 20000, sparsify: 0, outside: "closest_point", memory_limit: 2 ** 32 } as const;
+      let steps = 0;
+      const job = session.bind(options, (event) => {
+        if (event.kind !== "progress") return;
+        steps += 1;
+        if (event.fraction > 0) job.cancel();
+      });
+      const name = await job.done.then(
+        () => "done",
+        (error: Error) => error.name,
+      );
+      // The worker is there for the next one, and the weights before are still in use.
+      const report = await session.bind({ ...options, grid: 16, tau: 1e-5 }, () => undefined).done;
+      return { name, steps, grid: report.grid, backend: report.backend, bound: session.engine.bound };
+    }, backend);
+    expect(answer).toMatchObject({ name: "Cancelled", grid: 16, backend, bound: true });
+    expect(answer.steps).toBeGreaterThan(0);
+  });
+}
+
+test("the bind panel compares the paper's method with ours", async ({ page }) => {
+  await open(page);
+  await page.getByRole("button", { name: /bind/i }).first().click();
+  await page.getByRole("button", { name: "The paper's" }).click();
+  await page.keyboard.press("Control+Enter");
+  await bound(page);
+  await shoot(page, "bind-panel");
+});

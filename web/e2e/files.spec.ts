@@ -1,0 +1,74 @@
+/** Files that people drop: good ones open, bad ones say what is wrong and leave the model on screen. */
+
+import { dracoGlb, glb, gltfFiles, meshoptGlb, obj } from "./models";
+import { bound, cagePositions, drag, drop, expect, open, shoot, test } from "./support";
+
+test.describe("good files", () => {
+  for (const [name, files] of [
+    ["a GLB", async () => [{ name: "worm.glb", bytes: await glb() }]],
+    ["a glTF with its files", gltfFiles],
+    ["a Draco compressed GLB", async () => [{ name: "draco.glb", bytes: await dracoGlb() }]],
+    ["a meshopt compressed GLB", async () => [{ name: "meshopt.glb", bytes: await meshoptGlb() }]],
+    ["an OBJ with its cage", async () => [
+      { name: "tetra.obj", bytes: obj(1) },
+      { name: "tetra-cage.obj", bytes: obj(1.5) },
+    ]],
+  ] as const) {
+    test(`${name} gets a cage, is bound and can be dragged`, async ({ page }) => {
+      await open(page);
+      const list = await files();
+      await drop(page, list);
+      const stem = list[0]?.name.split(".")[0] ?? "";
+      await expect(page).toHaveTitle(new RegExp(stem));
+      await bound(page);
+      if (stem === "tetra") expect((await cagePositions(page)).length).toBe(3 * 4);
+      await drag(page, 30, 20);
+      await shoot(page, `dropped-${stem}`);
+    });
+  }
+});
+
+test("bad files say what is wrong, and the model stays", async ({ page, complaints }) => {
+  await open(page);
+  const before = await cagePositions(page);
+  const good = await glb();
+  const alert = page.locator("#toasts [role=alert]");
+  const cases: [string, Uint8Array, RegExp][] = [
+    ["empty.glb", new Uint8Array(), /empty|no content/i],
+    ["broken.glb", good.slice(0, good.length - 1000), /cut off|damaged/i],
+    ["noise.glb", new Uint8Array(5000).map((_, k) => (k * 7919) % 251), /not a GLB|damaged/i],
+    ["picture.blend", new TextEncoder().encode("BLENDER-v401"), /opens|Blender/i],
+    ["numbers.obj", new TextEncoder().encode("v 1 2\nf 1 2 3\n"), /line 1/i],
+  ];
+  for (const [name, bytes, message] of cases) {
+    await drop(page, [{ name, bytes }]);
+    await expect(alert.getByText(message).first(), name).toBeVisible();
+    await alert.getByRole("button", { name: /close/i }).first().click();
+  }
+  await shoot(page, "bad-files");
+  expect(await cagePositions(page)).toEqual(before);
+  expect(complaints).toEqual([]);
+});
+
+test("a file too large for a browser is refused before it is read", async ({ page }) => {
+  await open(page);
+  await page.evaluate(() => {
+    const file = new File(["glTF"], "huge.glb");
+    Object.defineProperty(file, "size", { value: 5 * 2 ** 30 });
+    const session = globalThis.cagework;
+    return session?.openFiles([{ name: file.name, path: file.name, file }]).catch((error) => {
+      document.body.dataset["refused"] = `${error.name}: ${error.message}`;
+    });
+  });
+  await expect(page.locator("body")).toHaveAttribute("data-refused", /TooLarge: huge.glb has 5.0 GiB/);
+});
+
+test("an open cage is drawn with its faults and can be repaired", async ({ page }) => {
+  await open(page);
+  await drop(page, [
+    { name: "tetra.obj", bytes: obj(1) },
+    { name: "tetra-cage.obj", bytes: obj(1.5, true) },
+  ]);
+  await expect(page.locator("#panel").getByText(/not closed|open edge/i).first()).toBeVisible();
+  await shoot(page, "open-cage");
+});

@@ -1,0 +1,120 @@
+/** Models made by formula, as the files that people drop. */
+
+import { Document, type Node, NodeIO } from "@gltf-transform/core";
+import {
+  EXTMeshoptCompression,
+  KHRDracoMeshCompression,
+  KHRMeshQuantization,
+} from "@gltf-transform/extensions";
+import { quantize, reorder } from "@gltf-transform/functions";
+import draco3d from "draco3dgltf";
+import { MeshoptDecoder, MeshoptEncoder } from "meshoptimizer";
+import validator from "gltf-validator";
+
+/** A 2 x 2 PNG: red, green, blue, white. */
+const PNG = Buffer.from(
+  "iVBORw0KGgoAAAANSUhEUgAAAAIAAAACCAIAAAD91JpzAAAAFklEQVQI12P4z8DAAMIM/xkYGP7/Z2AAAB/wBP3cGd4eAAAAAElFTkSuQmCC",
+  "base64",
+);
+
+/** A bent tube along y, radius 0.4, 2 high, with texture coordinates. */
+function tube(rings = 40, around = 32): { positions: Float32Array; uvs: Float32Array; indices: Uint32Array } {
+  const positions: number[] = [];
+  const uvs: number[] = [];
+  const indices: number[] = [];
+  for (let j = 0; j <= rings; j++) {
+    const v = j / rings;
+    // Ends are closed by rings that shrink to a point.
+    const radius = 0.4 * Math.sqrt(Math.max(0, Math.sin(Math.PI * v))) ** 0.5;
+    for (let i = 0; i <= around; i++) {
+      const angle = (2 * Math.PI * i) / around;
+      positions.push(0.3 * Math.sin(3 * v) + radius * Math.cos(angle), 2 * v, radius * Math.sin(angle));
+      uvs.push(i / around, 1 - v);
+    }
+  }
+  const row = around + 1;
+  for (let j = 0; j < rings; j++) {
+    for (let i = 0; i < around; i++) {
+      const a = j * row + i;
+      indices.push(a, a + row, a + 1, a + 1, a + row, a + row + 1);
+    }
+  }
+  return {
+    positions: new Float32Array(positions),
+    uvs: new Float32Array(uvs),
+    indices: new Uint32Array(indices),
+  };
+}
+
+function document(): { document: Document; node: Node } {
+  const document = new Document();
+  const buffer = document.createBuffer();
+  const { positions, uvs, indices } = tube();
+  const image = document.createTexture("colours").setImage(new Uint8Array(PNG)).setMimeType("image/png");
+  const primitive = document
+    .createPrimitive()
+    .setAttribute("POSITION", document.createAccessor().setType("VEC3").setArray(positions).setBuffer(buffer))
+    .setAttribute("TEXCOORD_0", document.createAccessor().setType("VEC2").setArray(uvs).setBuffer(buffer))
+    .setIndices(document.createAccessor().setType("SCALAR").setArray(indices).setBuffer(buffer))
+    .setMaterial(document.createMaterial("skin").setBaseColorTexture(image).setDoubleSided(true));
+  const node = document.createNode("worm").setMesh(document.createMesh("worm").addPrimitive(primitive));
+  document.createScene("garden").addChild(node);
+  return { document, node };
+}
+
+/** A textured GLB. */
+export async function glb(): Promise<Uint8Array> {
+  return new NodeIO().writeBinary(document().document);
+}
+
+/** The same as a .gltf with its .bin and texture. */
+export async function gltfFiles(): Promise<{ name: string; bytes: Uint8Array }[]> {
+  const { json, resources } = await new NodeIO().writeJSON(document().document, { basename: "worm" });
+  const files = Object.entries(resources).map(([name, bytes]) => ({ name, bytes }));
+  return [{ name: "worm.gltf", bytes: new TextEncoder().encode(JSON.stringify(json)) }, ...files];
+}
+
+export async function dracoGlb(): Promise<Uint8Array> {
+  const { document: made } = document();
+  made.createExtension(KHRDracoMeshCompression).setRequired(true);
+  const io = new NodeIO()
+    .registerExtensions([KHRDracoMeshCompression])
+    .registerDependencies({ "draco3d.encoder": await draco3d.createEncoderModule() });
+  return io.writeBinary(made);
+}
+
+export async function meshoptGlb(): Promise<Uint8Array> {
+  await Promise.all([MeshoptEncoder.ready, MeshoptDecoder.ready]);
+  const { document: made } = document();
+  await made.transform(reorder({ encoder: MeshoptEncoder }), quantize());
+  made
+    .createExtension(EXTMeshoptCompression)
+    .setRequired(true)
+    .setEncoderOptions({ method: EXTMeshoptCompression.EncoderMethod.FILTER });
+  const io = new NodeIO()
+    .registerExtensions([EXTMeshoptCompression, KHRMeshQuantization])
+    .registerDependencies({ "meshopt.encoder": MeshoptEncoder });
+  return io.writeBinary(made);
+}
+
+/** A tetrahedron and a cage for it, as OBJ; with a face less it is open. */
+export function obj(scale: number, open = false): Uint8Array {
+  const corners = [
+    [1, 1, 1],
+    [-1, -1, 1],
+    [-1, 1, -1],
+    [1, -1, -1],
+  ];
+  const faces = ["f 1 2 4", "f 1 3 2", "f 1 4 3", "f 2 3 4"].slice(open ? 1 : 0);
+  const lines = corners.map((p) => `v ${p.map((x) => x * scale).join(" ")}`);
+  return new TextEncoder().encode([...lines, ...faces, ""].join("\n"));
+}
+
+/** Errors that the Khronos validator finds. */
+export async function validationErrors(bytes: Uint8Array): Promise<string[]> {
+  const report = await validator.validateBytes(new Uint8Array(bytes));
+  const ERROR = 0;
+  return report.issues.messages
+    .filter(({ severity }) => severity === ERROR)
+    .map(({ code, pointer, message }) => `${code} at ${pointer}: ${message}`);
+}

@@ -1,0 +1,78 @@
+/** The page opens with a model that can be dragged at once. */
+
+import { cagePositions, drag, expect, largestMove, modelPositions, open, shoot, test } from "./support";
+
+test("opens with a sample that is bound, and dragging deforms it", async ({ page }) => {
+  await open(page);
+  await shoot(page, "opens");
+  const before = { cage: await cagePositions(page), model: await modelPositions(page) };
+  const picture = await page.locator("canvas").first().screenshot();
+
+  const vertex = await drag(page, 60, -50);
+  const after = { cage: await cagePositions(page), model: await modelPositions(page) };
+  const moved = largestMove(before.cage, after.cage);
+  expect(moved, `cage vertex ${vertex} follows the pointer`).toBeGreaterThan(0);
+  // Weights are at most 1: no vertex moves farther than the handle.
+  const follows = largestMove(before.model, after.model);
+  expect(follows).toBeGreaterThan(0.02 * moved);
+  expect(follows).toBeLessThanOrEqual(1.001 * moved);
+  expect(picture.equals(await page.locator("canvas").first().screenshot()), "pixels change").toBe(false);
+  await shoot(page, "posed");
+
+  await page.keyboard.press("Control+z");
+  expect(largestMove(before.cage, await cagePositions(page)), "undo restores the cage").toBeLessThan(1e-6);
+  expect(largestMove(before.model, await modelPositions(page)), "and the model").toBeLessThan(1e-6);
+  await page.keyboard.press("Control+y");
+  expect(largestMove(after.cage, await cagePositions(page)), "redo brings it back").toBeLessThan(1e-6);
+});
+
+test("works below any path, from its own files alone", async ({ page }) => {
+  const strangers: string[] = [];
+  page.on("request", (request) => {
+    const { hostname, protocol } = new URL(request.url());
+    if (protocol.startsWith("http") && hostname !== "127.0.0.1") strangers.push(request.url());
+  });
+  await open(page, "~student/some%20where/cagework/");
+  await drag(page, 40, 10);
+  expect(strangers).toEqual([]);
+});
+
+test("an idle page draws nothing", async ({ page }) => {
+  await open(page);
+  const frames = await page.evaluate(async () => {
+    let frames = 0;
+    const stop = globalThis.cagework?.onFrame(() => {
+      frames += 1;
+    });
+    await new Promise((done) => setTimeout(done, 1500));
+    stop?.();
+    return frames;
+  });
+  expect(frames).toBeLessThanOrEqual(1);
+});
+
+test("keeps the work of the last visit", async ({ page }) => {
+  await open(page);
+  await drag(page, 50, 30);
+  const posed = await cagePositions(page);
+  await page.waitForFunction(() => indexedDB.databases().then((list) => list.length > 0));
+  // Saved a moment after the last change.
+  await page.waitForTimeout(2500);
+  await page.reload();
+  await open(page);
+  expect(largestMove(posed, await cagePositions(page)), "the pose is back").toBeLessThan(1e-3);
+});
+
+test("a link carries the pose", async ({ page, context }) => {
+  await context.grantPermissions(["clipboard-read", "clipboard-write"]);
+  await open(page);
+  await drag(page, -50, -30);
+  const posed = await cagePositions(page);
+  await page.getByRole("button", { name: /link/i }).first().click();
+  const copied = () => page.evaluate(() => navigator.clipboard.readText());
+  await expect.poll(copied).toContain("#");
+  const link = await copied();
+  const other = await context.newPage();
+  await open(other, link);
+  expect(largestMove(posed, await cagePositions(other))).toBeLessThan(1e-3);
+});

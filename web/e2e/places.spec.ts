@@ -1,0 +1,76 @@
+/** Other browsers, other screens, other people. */
+
+import AxeBuilder from "@axe-core/playwright";
+import { expect, largestMove, modelPositions, open, shoot, test, drag, bound } from "./support";
+
+test("nothing for axe to complain about, light and dark", async ({ page }) => {
+  for (const scheme of ["light", "dark"] as const) {
+    await page.emulateMedia({ colorScheme: scheme });
+    await open(page);
+    for (const step of ["Model", "Cage", "Bind", "Pose", "Export"]) {
+      await page.getByRole("button", { name: step, exact: false }).first().click();
+      await page.waitForTimeout(250);
+      const { violations } = await new AxeBuilder({ page }).analyze();
+      const told = violations.map(({ id, nodes }) => `${id}: ${nodes.map((n) => n.target).join(", ")}`);
+      expect(told, `${scheme}, ${step}`).toEqual([]);
+      await shoot(page, `${scheme}-${step.toLowerCase()}`);
+    }
+  }
+});
+
+test.describe("on a phone", () => {
+  test.use({ viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true, deviceScaleFactor: 2 });
+  test("everything fits", async ({ page }) => {
+    await open(page);
+    await shoot(page, "phone");
+    const width = await page.evaluate(() => document.documentElement.scrollWidth);
+    expect(width).toBeLessThanOrEqual(390);
+    await page.touchscreen.tap(200, 200);
+  });
+});
+
+test("a lost device comes back with model and pose", async ({ page }) => {
+  await open(page);
+  await drag(page, 40, 40);
+  const before = await modelPositions(page);
+  await page.evaluate(() => globalThis.cagework?.loseDevice());
+  await page.waitForTimeout(500);
+  await page.waitForFunction(
+    () => globalThis.cagework?.readPositions().then((p) => p.length > 0, () => false),
+    undefined,
+    { timeout: 30_000 },
+  );
+  expect(largestMove(before, await modelPositions(page))).toBeLessThan(1e-5);
+  await bound(page);
+  await drag(page, -20, 10);
+  await shoot(page, "recovered");
+});
+
+test("without WebGPU the page says what to do", async ({ page }) => {
+  await page.addInitScript(() => {
+    Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined });
+  });
+  await page.goto("./");
+  await expect(page.getByRole("heading").first()).toBeVisible();
+  await expect(page.getByText(/WebGPU/).first()).toBeVisible();
+  await expect(page.getByText(/Firefox/).first()).toBeVisible();
+  await shoot(page, "no-webgpu");
+  const { violations } = await new AxeBuilder({ page }).analyze();
+  expect(violations.map(({ id }) => id)).toEqual([]);
+});
+
+test("ten models in turn leave no memory behind", async ({ page }) => {
+  await open(page);
+  const bytes = await page.evaluate(async () => {
+    const session = globalThis.cagework;
+    if (!session) throw new Error("no session");
+    const sizes: number[] = [];
+    for (let k = 0; k < 10; k++) {
+      await session.openSample(k % 2 === 0 ? "clamp" : "rat");
+      sizes.push(session.memory());
+    }
+    return sizes;
+  });
+  // The module's memory never shrinks, but it must stop growing once the largest model has been there.
+  expect(bytes.at(-1)).toBe(bytes[3]);
+});

@@ -1,0 +1,33 @@
+// Serves dist/ as the plainest of web servers would: at the root and below a path, without special headers.
+
+import { readFile } from "node:fs/promises";
+import { createServer } from "node:http";
+import { extname, join, normalize } from "node:path";
+
+const PORT = 4179;
+const FOLDER = join(import.meta.dirname, "../../dist");
+const BELOW = "/~student/some%20where/cagework";
+
+const TYPES = {
+  ".html": "text/html",
+  ".js": "text/javascript",
+  ".css": "text/css",
+  ".wasm": "application/wasm",
+  ".svg": "image/svg+xml",
+  ".webp": "image/webp",
+  ".json": "application/json",
+};
+
+createServer(async (request, response) => {
+  const { pathname } = new URL(request.url ?? "/", "http://localhost");
+  const inner = pathname.startsWith(`${BELOW}/`) ? pathname.slice(BELOW.length) : pathname;
+  const path = normalize(decodeURIComponent(inner.endsWith("/") ? `${inner}index.html` : inner));
+  try {
+    const bytes = await readFile(join(FOLDER, path));
+    response.setHeader("Content-Type", TYPES[extname(path)] ?? "application/octet-stream");
+    response.end(bytes);
+  } catch {
+    response.statusCode = 404;
+    response.end("not found");
+  }
+}).listen(PORT, "127.0.0.1");

@@ -1,0 +1,143 @@
+/** What all tests of the page share: opening it, looking at its engine, dropping files on it. */
+
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
+import { test as base, expect, type Page } from "@playwright/test";
+import type { Session } from "../src/contract";
+
+declare global {
+  var cagework: Session | undefined;
+}
+
+/** Pictures of each state, to be looked at. */
+export const SCREENS = join(import.meta.dirname, "../../target/screens");
+
+/** A page whose console must stay empty. */
+export const test = base.extend<{ complaints: string[] }>({
+  complaints: [
+    async ({ page }, use) => {
+      const complaints: string[] = [];
+      page.on("console", (message) => {
+        if (message.type() === "error" || message.type() === "warning") complaints.push(message.text());
+      });
+      page.on("pageerror", (error) => complaints.push(`${error.name}: ${error.message}`));
+      page.on("response", (response) => {
+        if (response.status() >= 400) complaints.push(`${response.status()} ${response.url()}`);
+      });
+      await use(complaints);
+      expect(complaints, "the console is clean").toEqual([]);
+    },
+    { auto: true },
+  ],
+});
+
+export { expect };
+
+/** Opens the page and waits until its model follows its cage. */
+export async function open(page: Page, address = "./"): Promise<void> {
+  await page.goto(address);
+  await bound(page);
+}
+
+/** Waits until a model is bound as asked, and nothing is under way any more. */
+export async function bound(page: Page): Promise<void> {
+  await page.waitForFunction(() => globalThis.cagework?.engine.bound === true, undefined, { timeout: 60_000 });
+  await expect(page.locator("#status")).toHaveText(/^(Ready|.*selected)$/, { timeout: 60_000 });
+}
+
+/** Where a cage vertex is in the window. */
+export async function handle(page: Page, vertex: number): Promise<{ x: number; y: number }> {
+  const box = await page.locator("canvas").first().boundingBox();
+  if (!box) throw new Error("no canvas");
+  const [x = 0, y = 0] = await page.evaluate((vertex) => {
+    const engine = globalThis.cagework?.engine;
+    const [x = 0, y = 0, z = 0] = engine?.cagePositions().slice(3 * vertex, 3 * vertex + 3) ?? [];
+    return Array.from(engine?.project(x, y, z) ?? []);
+  }, vertex);
+  return { x: box.x + x, y: box.y + y };
+}
+
+/** A cage vertex that the pointer reaches: in front, and not beneath the tools. */
+export async function reachable(page: Page): Promise<number> {
+  return page.evaluate(() => {
+    const engine = globalThis.cagework?.engine;
+    const canvas = document.querySelector("canvas");
+    if (!engine || !canvas) return -1;
+    const { left, top } = canvas.getBoundingClientRect();
+    const positions = engine.cagePositions();
+    for (let vertex = 0; vertex < positions.length / 3; vertex++) {
+      const [x = 0, y = 0] = engine.project(...(positions.slice(3 * vertex, 3 * vertex + 3) as unknown as [number, number, number]));
+      const isFirst = engine.pick(x, y, 4)[0] === vertex;
+      const element = document.elementFromPoint(left + x, top + y);
+      if (isFirst && element && (element === canvas || element.contains(canvas))) return vertex;
+    }
+    return -1;
+  });
+}
+
+/** Drags a cage vertex by pixels; returns the vertex. */
+export async function drag(page: Page, dx: number, dy: number): Promise<number> {
+  const vertex = await reachable(page);
+  const { x, y } = await handle(page, vertex);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.mouse.move(x + dx / 2, y + dy / 2, { steps: 3 });
+  await page.mouse.move(x + dx, y + dy, { steps: 3 });
+  await page.mouse.up();
+  return vertex;
+}
+
+export function cagePositions(page: Page): Promise<number[]> {
+  return page.evaluate(() => Array.from(globalThis.cagework?.engine.cagePositions() ?? []));
+}
+
+/** Positions of the model's vertices, as the GPU has them. */
+export function modelPositions(page: Page): Promise<number[]> {
+  return page.evaluate(async () => Array.from((await globalThis.cagework?.readPositions()) ?? []));
+}
+
+/** Largest distance between two lists of points. */
+export function largestMove(a: readonly number[], b: readonly number[]): number {
+  let largest = 0;
+  for (let k = 0; k + 2 < a.length; k += 3) {
+    const d = [0, 1, 2].map((c) => (a[k + c] ?? 0) - (b[k + c] ?? 0));
+    largest = Math.max(largest, Math.hypot(...d));
+  }
+  return largest;
+}
+
+export interface Dropped {
+  readonly name: string;
+  readonly bytes: Uint8Array;
+}
+
+/** Drops files on the window, as a hand would. */
+export async function drop(page: Page, files: readonly Dropped[]): Promise<void> {
+  const packed = files.map(({ name, bytes }) => ({ name, base64: Buffer.from(bytes).toString("base64") }));
+  const data = await page.evaluateHandle((packed) => {
+    const transfer = new DataTransfer();
+    for (const { name, base64 } of packed) {
+      const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+      transfer.items.add(new File([bytes], name));
+    }
+    return transfer;
+  }, packed);
+  for (const type of ["dragenter", "dragover", "drop"]) {
+    await page.locator("#stage").dispatchEvent(type, { dataTransfer: data });
+  }
+}
+
+/** Saves a picture of the page. */
+export async function shoot(page: Page, name: string): Promise<void> {
+  await page.screenshot({ path: join(SCREENS, `${name}.png`) });
+}
+
+/** Clicks a button of the export step and returns the file. */
+export async function download(page: Page, kind: string): Promise<Dropped> {
+  await page.getByRole("button", { name: "Export", exact: false }).first().click();
+  const [file] = await Promise.all([
+    page.waitForEvent("download"),
+    page.locator(`button[data-kind="${kind}"]`).click(),
+  ]);
+  return { name: file.suggestedFilename(), bytes: readFileSync(await file.path()) };
+}

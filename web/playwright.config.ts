@@ -1,0 +1,51 @@
+import { defineConfig } from "@playwright/test";
+
+/** Where e2e/server.mjs serves the built page. */
+const BASE = "http://127.0.0.1:4179/";
+
+/** Debian's Chromium with a real WebGPU device: SwiftShader, which needs no graphics card. */
+const CHROMIUM_ARGS = [
+  "--enable-unsafe-webgpu",
+  "--enable-features=Vulkan",
+  "--use-vulkan=swiftshader",
+  "--use-angle=swiftshader",
+  "--use-webgpu-adapter=swiftshader",
+  "--ignore-gpu-blocklist",
+  "--headless=new",
+  "--no-sandbox",
+  "--disable-quic",
+  "--no-first-run",
+  "--disable-background-networking",
+  "--disable-component-update",
+  "--disable-sync",
+];
+
+export default defineConfig({
+  testDir: "e2e",
+  testMatch: process.env["PICTURES"] ? "pictures.ts" : "*.spec.ts",
+  outputDir: "../target/e2e",
+  // One GPU made of processor cores: two pages at a time would only wait for each other.
+  workers: 1,
+  fullyParallel: false,
+  forbidOnly: true,
+  // A machine under load takes several times as long as one of its own.
+  timeout: 90_000,
+  expect: { timeout: 20_000 },
+  reporter: [["list"]],
+  use: {
+    baseURL: BASE,
+    viewport: { width: 1280, height: 800 },
+    acceptDownloads: true,
+    launchOptions: {
+      executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
+      args: CHROMIUM_ARGS,
+    },
+  },
+  webServer: {
+    command: "node e2e/server.mjs",
+    cwd: import.meta.dirname,
+    url: BASE,
+    reuseExistingServer: false,
+    stdout: "ignore",
+  },
+});

@@ -1,0 +1,152 @@
+/** Binding: starts, follows and cancels it, and knows what it will need. */
+
+import type { BindEvent, BindOptions, BindReport, CageState, Job } from "../contract";
+import { createEta, type Eta } from "../eta";
+import { type BindRun, cageBroken } from "../state";
+import { sentence } from "../strings";
+import { attempt, type Context } from "./context";
+
+export interface BindActions {
+  /** True when it ended with weights. */
+  start(): Promise<boolean>;
+  cancel(): void;
+  /** Whether the cage that is open is bound or about to be. */
+  covers(): boolean;
+  setOptions(patch: Partial<BindOptions>): void;
+  /** Mean value coordinates, once per cage; true when they are there. */
+  prepareCompare(): Promise<boolean>;
+}
+
+/** Reports kept to compare methods with. */
+const EARLIER = 4;
+
+export function createBind(ctx: Context): BindActions {
+  let job: Job<BindReport> | undefined;
+  /** Counts binds: what an older one still says is not heard. */
+  let turn = 0;
+  let runningFor: CageState | null = null;
+  let compare: Promise<boolean> | undefined;
+  const { store } = ctx;
+
+  const estimate = () => {
+    const { model, cage, bindOptions } = store.get();
+    if (!model || !cage?.usable) return;
+    try {
+      store.set({ memory: ctx.session().estimateMemory(bindOptions) });
+    } catch (error) {
+      store.set({ memory: sentence(error instanceof Error ? error.message : String(error)) });
+    }
+  };
+  store.watch(["model", "cage", "bindOptions"], estimate);
+
+  const adopted = (report: BindReport) => {
+    const { report: last, earlier } = store.get();
+    const same = last && sameWay(last, report);
+    store.set({
+      bound: true,
+      report,
+      earlier:
+        last && !same ? [last, ...earlier.filter((e) => !sameWay(e, report))].slice(0, EARLIER) : earlier,
+    });
+    if (store.get().scene.colour !== "material") store.set({ legend: ctx.session().engine.legend() ?? null });
+  };
+
+  return {
+    async start() {
+      if (!store.get().cage || cageBroken(store.get())) return false;
+      ctx.tell.clear();
+      turn += 1;
+      const mine = turn;
+      let eta: Eta = createEta(performance.now());
+      let run: BindRun = start("coarse");
+      store.set({ bindRun: run });
+      runningFor = store.get().cage;
+      const hear = (event: BindEvent) => {
+        if (mine !== turn) return;
+        switch (event.kind) {
+          case "progress": {
+            if (event.pass !== run.pass) {
+              run = start(event.pass);
+              eta = createEta(performance.now());
+            }
+            const own = eta.update(event.fraction, performance.now());
+            run = {
+              pass: event.pass,
+              stage: event.stage,
+              fraction: event.fraction,
+              etaMs: event.etaMs ?? own ?? null,
+              iteration: event.iteration,
+              delta: event.delta,
+              curve: grown(run.curve, event.iteration, event.delta),
+            };
+            store.set({ bindRun: run });
+            break;
+          }
+          case "adopted":
+            adopted(event.report);
+            break;
+          case "fallback":
+            ctx.tell.say(sentence(event.reason));
+            break;
+          default:
+            event satisfies never;
+        }
+      };
+      const running = ctx.session().bind(store.get().bindOptions, hear);
+      job = running;
+      const ok = await attempt(ctx, "The bind did not finish", async () => {
+        const report = await running.done;
+        if (mine !== turn) return;
+        adopted(report);
+        if (!report.converged) {
+          ctx.tell.say(
+            "The solver stopped at its iteration limit, before the change fell below the threshold.",
+          );
+        }
+      });
+      if (mine === turn) {
+        job = undefined;
+        runningFor = null;
+        store.set({ bindRun: null });
+      }
+      return ok && store.get().bound;
+    },
+    cancel() {
+      job?.cancel();
+    },
+    covers: () => store.get().bound || (runningFor !== null && runningFor === store.get().cage),
+    setOptions(patch) {
+      store.set({ bindOptions: { ...store.get().bindOptions, ...patch } });
+    },
+    prepareCompare() {
+      if (store.get().meanValueReady) return Promise.resolve(true);
+      compare ??= attempt(ctx, "Mean value coordinates could not be computed", async () => {
+        const cage = store.get().cage;
+        await ctx.session().bindMeanValue().done;
+        if (store.get().cage === cage) store.set({ meanValueReady: true });
+      }).finally(() => {
+        compare = undefined;
+      });
+      return compare;
+    },
+  };
+}
+
+function start(pass: BindRun["pass"]): BindRun {
+  return { pass, stage: "voxelize", fraction: 0, etaMs: null, iteration: 0, delta: null, curve: [] };
+}
+
+/** Whether two binds were done the same way, so that one report takes the other's place. */
+export function sameWay(a: BindReport, b: BindReport): boolean {
+  return a.method === b.method && a.solver === b.solver && a.grid === b.grid && a.backend === b.backend;
+}
+
+/** Longest curve kept; beyond it every second point goes, which a plot of 300 pixels does not miss. */
+const LONGEST = 600;
+
+/** The curve with a new point, if it is one. */
+export function grown(curve: BindRun["curve"], iteration: number, delta: number | null): BindRun["curve"] {
+  if (delta === null || !(delta > 0) || curve.at(-1)?.[0] === iteration) return curve;
+  const next = [...curve, [iteration, delta] as const];
+  return next.length > LONGEST ? next.filter((_, i) => i % 2 === 0 || i === next.length - 1) : next;
+}

@@ -1,0 +1,244 @@
+/** Moving the cage: gestures, fields, arrows, each one step of the history, in the pose or in the rest cage. */
+
+import { nextAmount } from "../amount";
+import type { CageState, Gesture, GizmoHandle, RestEdit } from "../contract";
+import { plural } from "../format";
+import { GESTURES, REST_EDITS } from "../strings";
+import { type Context, report } from "./context";
+
+export interface Edit {
+  /** Begins a gesture at a point; false when nothing is selected. */
+  begin(gesture: Gesture, x: number, y: number): boolean;
+  beginGizmo(handle: GizmoHandle, x: number, y: number): boolean;
+  drag(x: number, y: number): void;
+  constrain(axis: 0 | 1 | 2, plane: boolean): void;
+  /** A key typed as part of an amount; false when it is not one. */
+  type(key: string): boolean;
+  end(keep: boolean): void;
+  active(): boolean;
+  nudge(right: number, up: number): void;
+  /** Writes a nudge that is still open as a step. */
+  settle(): void;
+  moveTo(x: number, y: number, z: number): void;
+  /** Takes positions as one step. */
+  pose(label: string, positions: Float32Array): void;
+  /** Remembers positions before something that ends with `posedSince`. */
+  positions(): Float32Array;
+  posedSince(label: string, before: Float32Array): void;
+  restEdit(edit: RestEdit): void;
+  /** Refreshes what the page knows about selection and pose. */
+  sync(): void;
+  setEditingRest(on: boolean): void;
+}
+
+/** What the rest of the page does when the cage at rest changed. */
+export interface RestListener {
+  changed(state: CageState): void;
+  left(): void;
+}
+
+interface Rest {
+  positions: Float32Array;
+  corners: Uint32Array;
+}
+
+const NUDGE_PAUSE_MS = 600;
+export function createEdit(ctx: Context, rest: RestListener): Edit {
+  const engine = () => ctx.session().engine;
+  let before: Float32Array | undefined;
+  let beforeRest: Rest | undefined;
+  let verb = "Move";
+  let typed = "";
+  let nudging: { before: Float32Array; beforeRest: Rest; timer: ReturnType<typeof setTimeout> } | undefined;
+
+  const restNow = (): Rest => ({ positions: engine().restPositions(), corners: engine().cageCorners() });
+
+  const sync = () => {
+    const e = engine();
+    const hasCage = ctx.store.get().cage !== null;
+    const selection = hasCage ? e.selection() : new Uint32Array();
+    const center = selection.length > 0 ? e.selectionCenter() : new Float32Array();
+    const [x, y, z] = center;
+    const rested = hasCage ? e.restPositions() : new Float32Array();
+    const moved = hasCage ? e.cagePositions() : new Float32Array();
+    ctx.store.set({
+      selected: {
+        count: selection.length,
+        last: hasCage ? e.last() : -1,
+        center: x === undefined || y === undefined || z === undefined ? null : [x, y, z],
+      },
+      posed: !ctx.store.get().editingRest && moved.some((value, i) => value !== rested[i]),
+      legend: e.legend() ?? null,
+    });
+  };
+
+  const setEditingRest = (on: boolean) => {
+    if (ctx.store.get().editingRest === on) return;
+    engine().setEditingRest(on);
+    ctx.store.set({ editingRest: on });
+    sync();
+    if (!on) rest.left();
+  };
+
+  const setPose = (positions: Float32Array) => {
+    setEditingRest(false);
+    engine().setCagePositions(positions);
+    forgetShares();
+    sync();
+  };
+
+  const forgetShares = () => {
+    const { shares } = ctx.store.get();
+    if (shares.some((share) => share !== 0)) ctx.store.set({ shares: shares.map(() => 0) });
+  };
+
+  const pushPose = (label: string, from: Float32Array) => {
+    const to = engine().cagePositions();
+    ctx.history.push({ label, undo: () => setPose(from), redo: () => setPose(to) });
+    sync();
+  };
+
+  const setRest = (shape: Rest) => {
+    rest.changed(engine().setCage(shape.positions, shape.corners));
+    sync();
+  };
+
+  const pushRest = (label: string, from: Rest, state: CageState) => {
+    const to = restNow();
+    ctx.history.push({ label, undo: () => setRest(from), redo: () => setRest(to) });
+    rest.changed(state);
+    sync();
+  };
+
+  /** What moved since `from` becomes a step. */
+  const keep = (label: string, from: Float32Array, fromRest: Rest) => {
+    if (!ctx.store.get().editingRest) {
+      forgetShares();
+      pushPose(label, from);
+      return;
+    }
+    try {
+      pushRest(`${label} of the cage`, fromRest, engine().commitRest());
+    } catch (error) {
+      engine().setCagePositions(from);
+      report(ctx, "The cage cannot have this shape", error);
+      sync();
+    }
+  };
+
+  const settle = () => {
+    if (!nudging) return;
+    clearTimeout(nudging.timer);
+    const open = nudging;
+    nudging = undefined;
+    keep(
+      `Nudge ${plural(ctx.store.get().selected.count, "vertex", "vertices")}`,
+      open.before,
+      open.beforeRest,
+    );
+  };
+
+  const remember = () => {
+    settle();
+    before = engine().cagePositions();
+    beforeRest = restNow();
+    typed = "";
+  };
+
+  const showLabel = () => ctx.store.set({ gesture: engine().transformLabel() });
+
+  return {
+    begin(gesture, x, y) {
+      if (before || ctx.store.get().playing) return false;
+      remember();
+      if (!engine().beginTransform(gesture, x, y)) {
+        before = undefined;
+        return false;
+      }
+      verb = GESTURES[gesture];
+      showLabel();
+      return true;
+    },
+    beginGizmo(handle, x, y) {
+      if (before) return false;
+      remember();
+      if (!engine().beginGizmo(handle, x, y)) {
+        before = undefined;
+        return false;
+      }
+      const { gizmo } = ctx.store.get().scene;
+      verb = gizmo === "rotate" ? "Rotate" : gizmo === "scale" ? "Scale" : "Move";
+      showLabel();
+      return true;
+    },
+    drag(x, y) {
+      engine().dragTransform(x, y);
+      showLabel();
+    },
+    constrain(axis, plane) {
+      engine().constrain(axis, plane);
+      showLabel();
+    },
+    type(key) {
+      const next = nextAmount(typed, key);
+      if (next === undefined) return false;
+      typed = next;
+      const amount = Number(typed);
+      engine().typeTransform(typed === "" || Number.isNaN(amount) ? undefined : amount);
+      ctx.store.set({
+        gesture: typed === "" ? engine().transformLabel() : `${engine().transformLabel()}  [${typed}]`,
+      });
+      return true;
+    },
+    end(keepIt) {
+      if (!before || !beforeRest) return;
+      const from = before;
+      const fromRest = beforeRest;
+      before = undefined;
+      beforeRest = undefined;
+      const count = engine().selection().length;
+      const moved = engine().endTransform(keepIt);
+      ctx.store.set({ gesture: null });
+      if (moved) keep(`${verb} ${plural(count, "vertex", "vertices")}`, from, fromRest);
+      else sync();
+    },
+    active: () => before !== undefined,
+    nudge(right, up) {
+      const open = nudging ?? { before: engine().cagePositions(), beforeRest: restNow() };
+      if (!engine().nudge(right, up)) return;
+      if (nudging) clearTimeout(nudging.timer);
+      nudging = { ...open, timer: setTimeout(settle, NUDGE_PAUSE_MS) };
+      sync();
+    },
+    settle,
+    moveTo(x, y, z) {
+      remember();
+      const from = before;
+      const fromRest = beforeRest;
+      before = undefined;
+      if (from && fromRest && engine().moveSelectionTo(x, y, z)) keep("Type a position", from, fromRest);
+    },
+    pose(label, positions) {
+      settle();
+      const from = engine().cagePositions();
+      setPose(positions);
+      pushPose(label, from);
+    },
+    positions: () => engine().cagePositions(),
+    posedSince: (label, from) => pushPose(label, from),
+    restEdit(edit) {
+      settle();
+      const from = restNow();
+      try {
+        pushRest(REST_EDITS[edit], from, engine().editRest(edit));
+      } catch (error) {
+        report(ctx, `${REST_EDITS[edit]}: not possible here`, error);
+      }
+    },
+    sync,
+    setEditingRest(on) {
+      settle();
+      setEditingRest(on);
+    },
+  };
+}

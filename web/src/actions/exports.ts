@@ -1,0 +1,89 @@
+/** Files out of the page. */
+
+import type { NamedFile } from "../contract";
+import { bytes as size, stem } from "../format";
+import { fittingPoses } from "../state";
+import { attempt, type Context } from "./context";
+import type { Project } from "./project";
+
+export type ExportKind = "glb" | "poses" | "cage" | "weights" | "picture" | "project";
+
+export interface Exports {
+  save(kind: ExportKind): Promise<void>;
+  pictureSize(scale: number): void;
+}
+
+/** Largest side of a picture, pixels. */
+const LONGEST_SIDE = 8192;
+
+export function createExports(ctx: Context, project: Project, viewport: () => DOMRect): Exports {
+  let scale = 2;
+
+  const bytesOf = (kind: Exclude<ExportKind, "picture">): Uint8Array => {
+    const { engine } = ctx.session();
+    switch (kind) {
+      case "glb":
+        return engine.exportGlb();
+      case "poses": {
+        const poses = fittingPoses(ctx.store.get());
+        return engine.exportPoses(
+          poses.map((pose) => pose.name),
+          poses.map((pose) => pose.positions),
+        );
+      }
+      case "cage":
+        return engine.exportCage();
+      case "weights":
+        return engine.exportWeights();
+      case "project":
+        return project.write();
+      default:
+        return kind satisfies never;
+    }
+  };
+
+  const picture = () => {
+    const { width, height } = viewport();
+    const fit = Math.min(scale, LONGEST_SIDE / Math.max(width, height, 1));
+    return ctx.session().picture(Math.round(width * fit), Math.round(height * fit));
+  };
+
+  return {
+    async save(kind) {
+      const name = stem(ctx.store.get().model?.name ?? "model");
+      await attempt(ctx, "The file could not be written", async () => {
+        const blob = kind === "picture" ? await picture() : new Blob([new Uint8Array(bytesOf(kind))]);
+        const file = kind === "project" ? project.fileName() : `${name}${SUFFIX[kind]}`;
+        download(blob, file);
+        ctx.tell.say(`${file} is in your downloads (${size(blob.size)}).`);
+      });
+    },
+    pictureSize(value) {
+      scale = value;
+    },
+  };
+}
+
+const SUFFIX: Record<Exclude<ExportKind, "project">, string> = {
+  glb: "-posed.glb",
+  poses: "-poses.glb",
+  cage: "-cage.obj",
+  weights: "-weights.npz",
+  picture: ".png",
+};
+
+/** Hands a file to the browser's downloads. */
+function download(blob: Blob, name: string): void {
+  const url = URL.createObjectURL(blob);
+  const link = document.createElement("a");
+  link.href = url;
+  link.download = name;
+  link.click();
+  // The download has its own hold on the data once the click has been handled.
+  setTimeout(() => URL.revokeObjectURL(url), 10_000);
+}
+
+/** Files of a file button. */
+export function named(files: Iterable<File>): NamedFile[] {
+  return Array.from(files, (file) => ({ name: file.name, path: file.webkitRelativePath || file.name, file }));
+}

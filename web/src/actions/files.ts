@@ -1,0 +1,140 @@
+/** Opening: samples, files and projects. What is opened gets a cage and is bound without further questions. */
+
+import type { NamedFile, Opened, Sample } from "../contract";
+import { planDrop } from "../drop";
+import { stem } from "../format";
+import type { StepName } from "../state";
+import { sentence } from "../strings";
+import { attempt, type Context } from "./context";
+import type { Settings } from "./project";
+import { readSettings } from "./project";
+
+export interface Files {
+  openSample(id: string): Promise<boolean>;
+  /** Files of a drop or a file button; names and kinds decide. */
+  openFiles(files: readonly NamedFile[]): Promise<boolean>;
+}
+
+export interface Follow {
+  /** The page's side of a cage that came along. */
+  adoptCage(opened: Opened): void;
+  makeCage(): Promise<boolean>;
+  loadCage(files: readonly NamedFile[]): Promise<boolean>;
+  bind(): Promise<boolean>;
+  /** Takes a project's settings, before the bind. */
+  applySettings(settings: Settings): void;
+  /** And its pose. */
+  applyPose(settings: Settings): void;
+}
+
+/** Largest file read without asking, bytes: beyond it the browser's memory for the page is at risk. */
+const LARGEST = 2 * 1024 ** 3;
+
+export function createFiles(ctx: Context, follow: Follow): Files {
+  const { store } = ctx;
+  /** Each opening has a number: a later one makes an earlier one's end meaningless. */
+  let turn = 0;
+
+  const take = async (opened: Opened, sample: string | null, cageFiles?: readonly NamedFile[]) => {
+    turn += 1;
+    const mine = turn;
+    const settings = opened.project ? readSettings(opened.project.settings) : {};
+    const poses = opened.project?.poses ?? opened.poses ?? [];
+    ctx.history.clear();
+    store.set({
+      model: { ...opened.model, name: shownName(opened, sample, store.get().samples) },
+      sample,
+      poses,
+      shares: poses.map(() => 0),
+      editingRest: false,
+      cageSource: "auto",
+      playing: false,
+      gesture: null,
+      busy: null,
+    });
+    follow.applySettings(settings);
+    follow.adoptCage(opened);
+    const ofSample = settings.sample ?? sample;
+    store.set({ sample: ofSample, sampleCage: ofSample !== null && opened.cage !== null });
+    follow.applyPose(settings);
+    for (const notice of opened.model.notices) ctx.tell.say(sentence(notice));
+    void prepare(mine, cageFiles, sample !== null || opened.project !== null);
+  };
+
+  const goTo = (from: readonly StepName[], step: StepName) => {
+    if (from.includes(store.get().step)) store.set({ step });
+  };
+
+  /** Cage, bind, pose: as far as it goes without the user. */
+  const prepare = async (mine: number, cageFiles: readonly NamedFile[] | undefined, familiar: boolean) => {
+    const current = () => mine === turn;
+    if (cageFiles) {
+      if (!(await follow.loadCage(cageFiles)) || !current()) return;
+    } else if (!store.get().cage) {
+      if (!familiar) goTo(["model", "bind", "pose", "export"], "cage");
+      if (!(await follow.makeCage()) || !current()) return;
+    }
+    if (!store.get().cage?.usable) {
+      goTo(["model", "bind", "pose", "export"], "cage");
+      return;
+    }
+    if (!familiar) goTo(["model", "cage"], "bind");
+    if ((await follow.bind()) && current() && !familiar) goTo(["bind"], "pose");
+  };
+
+  const busy = async (what: string, title: string, work: () => Promise<void>): Promise<boolean> => {
+    store.set({ busy: what });
+    ctx.tell.clear();
+    const ok = await attempt(ctx, title, work);
+    store.set({ busy: null });
+    return ok;
+  };
+
+  return {
+    openSample(id) {
+      const label = store.get().samples.find((sample) => sample.id === id)?.label ?? id;
+      return busy(`Opening ${label}`, "The sample could not be opened", async () => {
+        await take(await ctx.session().openSample(id), id);
+      });
+    },
+    openFiles(files) {
+      const plan = planDrop(files.map((file) => file.path || file.name));
+      const main = plan.main === undefined ? undefined : files[plan.main];
+      if (!main) {
+        ctx.tell.problem({ title: "Nothing to open", message: plan.sentence }, ctx.fixFor("file"));
+        return Promise.resolve(false);
+      }
+      const second = plan.second === undefined ? undefined : files[plan.second];
+      const tooLarge = files.find((file) => file.file.size > LARGEST);
+      if (tooLarge) {
+        ctx.tell.problem({
+          title: "This file is too large",
+          message: `${tooLarge.name} has more than 2 GB. Make it smaller in a modelling program, by fewer triangles or smaller textures.`,
+        });
+        return Promise.resolve(false);
+      }
+      if (main.file.size === 0) {
+        ctx.tell.problem(
+          {
+            title: "This file is empty",
+            message: `${main.name} has no content. Export it again, or choose another file.`,
+          },
+          ctx.fixFor("file"),
+        );
+        return Promise.resolve(false);
+      }
+      return busy(`Opening ${main.name}`, `${main.name} could not be opened`, async () => {
+        const own = files.filter((file) => file !== second);
+        const opened = await ctx.session().openFiles([main, ...own.filter((file) => file !== main)]);
+        await take(opened, null, second ? [second] : undefined);
+      });
+    },
+  };
+}
+
+/** A sample is called by its label, a project by its model. */
+function shownName(opened: Opened, sample: string | null, samples: readonly Sample[]): string {
+  const { name } = opened.model;
+  const label = samples.find(({ id }) => id === sample)?.label;
+  return label ?? (opened.project ? stem(name) : name);
+}

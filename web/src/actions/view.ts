@@ -1,0 +1,127 @@
+/** What is drawn and from where. */
+
+import type { Element as CageElement, Job, SceneOptions } from "../contract";
+import type { Slice } from "../state";
+import { saveTheme, type Theme } from "../store";
+import { attempt, type Context } from "./context";
+
+export interface View {
+  scene(patch: Partial<SceneOptions>): void;
+  theme(theme: Theme): void;
+  slice(patch: Partial<Omit<Slice, "busy">>, kind?: SceneOptions["slice"]): void;
+  compare(on: boolean): Promise<void>;
+  frameAll(): void;
+  frameSelection(): void;
+  axis(axis: 0 | 1 | 2, negative: boolean): void;
+  ortho(): void;
+  symmetry(on: boolean): void;
+  proportional(on: boolean, radius?: number): void;
+  element(element: CageElement): void;
+  gizmo(gizmo: SceneOptions["gizmo"]): void;
+  /** Space is held, or let go. */
+  original(on: boolean): void;
+  /** The cage changed: what is shown of it follows. */
+  refresh(): void;
+  /** Tells the session the view's size; set once it is known. */
+  resized: () => void;
+}
+
+/** Pause before a moved slice is computed, ms: a slider sends many positions. */
+const SLICE_PAUSE_MS = 90;
+/** Half the width holds the model when it is this much smaller. */
+const HALF_ZOOM = 0.6;
+
+export function createView(
+  ctx: Context,
+  prepareCompare: () => Promise<boolean>,
+  dark: MediaQueryList,
+  viewport: () => DOMRect,
+): View {
+  const { store } = ctx;
+  const engine = () => ctx.session().engine;
+  let sliceJob: Job<void> | undefined;
+  let sliceTimer: ReturnType<typeof setTimeout> | undefined;
+
+  const scene = (patch: Partial<SceneOptions>) => {
+    const next = { ...store.get().scene, ...patch };
+    store.set({ scene: next });
+    engine().setScene(next);
+    store.set({ legend: engine().legend() ?? null });
+  };
+
+  const shown = (theme: Theme): "light" | "dark" =>
+    theme === "auto" ? (dark.matches ? "dark" : "light") : theme;
+
+  const theme = (choice: Theme) => {
+    if (choice === "auto") delete document.documentElement.dataset.theme;
+    else document.documentElement.dataset.theme = choice;
+    saveTheme(choice);
+    store.set({ theme: choice });
+    scene({ theme: shown(choice) });
+  };
+  dark.addEventListener("change", () => {
+    if (store.get().theme === "auto") scene({ theme: shown("auto") });
+  });
+
+  const loadSlice = async () => {
+    const { slice, scene: now, bindOptions } = store.get();
+    if (now.slice === "off" || !store.get().cage?.usable) return;
+    sliceJob?.cancel();
+    const job = ctx.session().loadSlice(slice.axis, slice.position, bindOptions.grid);
+    sliceJob = job;
+    store.set({ slice: { ...slice, busy: true } });
+    await attempt(ctx, "The slice could not be computed", () => job.done);
+    if (sliceJob !== job) return;
+    sliceJob = undefined;
+    store.set({ slice: { ...store.get().slice, busy: false } });
+    scene({});
+  };
+
+  return {
+    scene,
+    theme,
+    slice(patch, kind) {
+      store.set({ slice: { ...store.get().slice, ...patch } });
+      if (kind !== undefined) scene({ slice: kind });
+      clearTimeout(sliceTimer);
+      sliceTimer = setTimeout(() => void loadSlice(), SLICE_PAUSE_MS);
+    },
+    async compare(on) {
+      if (on && !(await prepareCompare())) {
+        scene({ compare: false });
+        return;
+      }
+      if (store.get().scene.compare === on) return;
+      scene({ compare: on });
+      const { width, height } = viewport();
+      engine().zoomAt(width / 2, height / 2, on ? HALF_ZOOM : 1 / HALF_ZOOM);
+    },
+    frameAll: () => engine().frameAll(),
+    frameSelection: () => engine().frameSelection(),
+    axis: (axis, negative) => engine().axisView(axis, negative),
+    ortho: () => store.set({ ortho: engine().toggleOrtho() }),
+    symmetry(on) {
+      engine().setSymmetry(on);
+      store.set({ symmetry: on, unmatched: on && store.get().cage ? engine().unmatched().length : 0 });
+    },
+    proportional(on, radius) {
+      const next = Math.min(1, Math.max(0.02, radius ?? store.get().proportional));
+      engine().setProportional(on ? next : 0);
+      store.set({ proportionalOn: on, proportional: next });
+    },
+    element(element) {
+      engine().setElement(element);
+      store.set({ element });
+    },
+    gizmo: (gizmo) => scene({ gizmo }),
+    original(on) {
+      if (store.get().scene.original !== on) scene({ original: on });
+    },
+    refresh() {
+      scene({});
+      const { symmetry, cage } = store.get();
+      store.set({ unmatched: symmetry && cage ? engine().unmatched().length : 0 });
+    },
+    resized: () => undefined,
+  };
+}

@@ -1,0 +1,40 @@
+/** The cage and what may be wrong with it. */
+
+import type { Bounds } from "./session";
+
+export interface CageInfo {
+  readonly vertices: number;
+  readonly edges: number;
+  readonly faces: number;
+  readonly triangles: number;
+  readonly bounds: Bounds;
+  /** Whole sentences about what was mended. */
+  readonly notices: readonly string[];
+}
+
+/** `usable` false: a draft that is drawn with its faults marked, but cannot be bound. */
+export interface CageState { readonly usable: boolean; readonly info: CageInfo; readonly problems: readonly Problem[] }
+
+export interface Problem {
+  /** Variant: "OpenEdges", "FlippedFaces", "SelfIntersection", "Outside", "Thin", "NonManifold", "Degenerate", ... */
+  readonly kind: string;
+  readonly severity: "error" | "warning" | "note";
+  /** A whole sentence with numbers. */
+  readonly message: string;
+  readonly count: number;
+  /** A repair that helps: pass `kind` to `engine.repair`, show `label` on the button ("Fill 2 holes"). */
+  readonly fix: { readonly kind: RepairKind; readonly label: string } | null;
+}
+export type RepairKind = "fill_holes" | "turn_faces" | "grow" | "drop_parts" | "weld" | "regenerate";
+
+export interface CageOptions {
+  /** Vertices wanted, 8 to 400. */
+  readonly vertices: number;
+  /** Distance from the model, fraction of its diagonal, 0.01 to 0.2. */
+  readonly margin: number;
+  /** Mirror-symmetric in x, if the model is (found out by itself with "auto"). */
+  readonly symmetry: "auto" | "on" | "off";
+}
+
+/** Edits of the rest cage's topology, on the selection. */
+export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";

@@ -1,0 +1,98 @@
+/** What `session.ts` offers: files, jobs in the worker, frames. */
+
+import type { BindEvent, BindOptions, BindReport } from "./bind";
+import type { CageOptions, CageState } from "./cage";
+import type { Engine } from "./engine";
+import type { Pose } from "./scene";
+
+
+export type Point = readonly [x: number, y: number, z: number];
+export interface Bounds { readonly min: Point; readonly max: Point }
+
+export interface Session {
+  /** Synchronous side: state, picking, gestures, exports. Never keep anything else of the wasm module. */
+  readonly engine: Engine;
+  /** Name of the GPU, as the report card shows it. */
+  readonly adapter: string;
+  /** Identifier and label of each built-in sample; the first one is opened at start. */
+  readonly samples: readonly Sample[];
+
+  /**
+   * Opens what was dropped or chosen: one .glb/.gltf/.obj (with siblings of a .gltf; paths of a folder drop through
+   * `path`), or a project GLB. Draco and meshopt are decoded (their decoders load only then), textures decoded.
+   * A project's cage and poses are open afterwards too.
+   */
+  openFiles(files: readonly NamedFile[]): Promise<Opened>;
+  openSample(id: string): Promise<Opened>;
+  /** A cage from a file (.obj, .glb, .gltf). A mesh that is no cage yet is kept as a draft: `usable` is false. */
+  openCage(files: readonly NamedFile[]): Promise<CageState>;
+  /** Makes a cage for the model, in the worker. */
+  generateCage(options: CageOptions, onProgress: (fraction: number) => void): Job<CageState>;
+
+  /**
+   * Binds in the worker: coarse (g = 32) first if that is less than asked, then as asked; each result is adopted as
+   * soon as it is there, the pose stays. Only one bind at a time: a second one cancels the first.
+   * `done` rejects with name "Cancelled" after `cancel()`, what was adopted before stays.
+   */
+  bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport>;
+  /** Bytes that this bind would need, or the Error that it would end in. Cheap: call on every change. */
+  estimateMemory(options: BindOptions): number;
+  /** Mean value coordinates for the split view; needed once per cage before `compare`. Runs in the worker. */
+  bindMeanValue(): Job<void>;
+  /** Cells and coordinates of one plane of the grid, in the worker; shown with `scene.slice` afterwards. */
+  loadSlice(axis: 0 | 1 | 2, position: number, grid: number): Job<void>;
+
+  /** Asks for a frame; many calls make one. Every change through `engine` asks by itself. */
+  draw(): void;
+  /** Called after each drawn frame with the milliseconds the main thread spent on it. Returns "stop listening". */
+  onFrame(listener: (ms: number) => void): () => void;
+  /** PNG of the scene (without canvas borders), any size up to 8192. */
+  picture(width: number, height: number): Promise<Blob>;
+  /** Posed positions as the GPU has them (tests, numbers panel). */
+  readPositions(): Promise<Float32Array>;
+
+  /** The device was lost (or `loseDevice()` was called): the page says so and calls `recover()`. */
+  onLost(listener: (reason: string) => void): () => void;
+  /** Everything again on a new device and canvas (a lost context's canvas cannot be used again: give a fresh one). */
+  recover(canvas: HTMLCanvasElement): Promise<void>;
+  /** For tests: destroys the device, as a driver reset would. */
+  loseDevice(): void;
+  /** Bytes of the module's memory on this thread. */
+  memory(): number;
+  close(): void;
+}
+
+export interface Job<T> { readonly done: Promise<T>; cancel(): void }
+export interface NamedFile { readonly name: string; readonly path: string; readonly file: Blob }
+export interface Sample {
+  readonly id: string;
+  readonly label: string;
+  /** What there is to see. */
+  readonly sentence?: string;
+}
+
+export interface Opened {
+  readonly model: ModelInfo;
+  /** The cage that came along (sample, project); null when there is none yet. */
+  readonly cage: CageState | null;
+  /** Set when a project was opened. `settings` is what `writeProject` was given. */
+  readonly project: { readonly poses: readonly Pose[]; readonly settings: string } | null;
+  /** Prepared poses of a sample. */
+  readonly poses?: readonly Pose[];
+}
+
+export interface ModelInfo {
+  readonly name: string;
+  readonly format: "obj" | "gltf";
+  readonly vertices: number;
+  readonly triangles: number;
+  readonly faces: number;
+  readonly materials: number;
+  readonly textures: number;
+  readonly skins: number;
+  readonly animations: number;
+  readonly morphTargets: number;
+  readonly bounds: Bounds;
+  /** Whole sentences. */
+  readonly notices: readonly string[];
+}

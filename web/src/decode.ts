@@ -1,0 +1,84 @@
+/** Draco and meshopt: compressed GLBs to plain ones. Loaded only when such a file is opened. */
+
+import { type Document, WebIO } from "@gltf-transform/core";
+import { ALL_EXTENSIONS, EXTMeshoptCompression, KHRDracoMeshCompression } from "@gltf-transform/extensions";
+import { dequantize } from "@gltf-transform/functions";
+import createDecoder from "draco3dgltf/draco_decoder_gltf_nodejs.js";
+import dracoWasm from "draco3dgltf/draco_decoder_gltf.wasm?url";
+import { MeshoptDecoder } from "meshoptimizer/decoder";
+import { named } from "./session/client";
+
+const GLB = 0x46546c67;
+const JSON_CHUNK = 0x4e4f534a;
+
+/** A plain GLB of a compressed GLB or glTF. */
+export async function decompress(
+  name: string,
+  bytes: Uint8Array,
+  sibling: (path: string) => Uint8Array | undefined,
+): Promise<Uint8Array> {
+  await MeshoptDecoder.ready;
+  const io = new WebIO().registerExtensions(ALL_EXTENSIONS).registerDependencies({
+    "meshopt.decoder": MeshoptDecoder,
+    ...(mentions(bytes, "KHR_draco_mesh_compression") ? { "draco3d.decoder": await openDraco() } : {}),
+  });
+  try {
+    const document = await readDocument(io, renamed(bytes), sibling);
+    await document.transform(dequantize());
+    for (const extension of document.getRoot().listExtensionsUsed()) {
+      const { extensionName } = extension;
+      if ([KHRDracoMeshCompression, EXTMeshoptCompression].some((e) => e.EXTENSION_NAME === extensionName)) {
+        extension.dispose();
+      }
+    }
+    return await io.writeBinary(document);
+  } catch (error) {
+    const reason = error instanceof Error ? error.message : String(error);
+    throw named("Damaged", `${name} is compressed, and its geometry could not be decoded: ${reason}`);
+  }
+}
+
+async function openDraco(): Promise<unknown> {
+  const wasmBinary = await (await fetch(dracoWasm)).arrayBuffer();
+  return createDecoder({ wasmBinary });
+}
+
+async function readDocument(
+  io: WebIO,
+  bytes: Uint8Array,
+  sibling: (path: string) => Uint8Array | undefined,
+): Promise<Document> {
+  if (new DataView(bytes.buffer, bytes.byteOffset).getUint32(0, true) === GLB) return io.readBinary(bytes);
+  const json = JSON.parse(new TextDecoder().decode(bytes));
+  const resources: Record<string, Uint8Array<ArrayBuffer>> = {};
+  for (const { uri } of [...(json.buffers ?? []), ...(json.images ?? [])]) {
+    const found = typeof uri === "string" ? sibling(decodeURIComponent(uri)) : undefined;
+    if (found) resources[uri] = new Uint8Array(found);
+  }
+  return io.readJSON({ json, resources });
+}
+
+function mentions(bytes: Uint8Array, word: string): boolean {
+  const head = jsonRange(bytes);
+  return new TextDecoder().decode(bytes.subarray(...head)).includes(word);
+}
+
+/** Where the JSON is. */
+function jsonRange(bytes: Uint8Array): [number, number] {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const isGlb = bytes.length > 20 && view.getUint32(0, true) === GLB && view.getUint32(16, true) === JSON_CHUNK;
+  return isGlb ? [20, 20 + view.getUint32(12, true)] : [0, bytes.length];
+}
+
+/** The ratified name of meshopt's extension is newer than the library; the streams are the same, and so is its length. */
+function renamed(bytes: Uint8Array): Uint8Array<ArrayBuffer> {
+  const copy = new Uint8Array(bytes);
+  const [from, to] = jsonRange(copy);
+  const text = new TextDecoder("latin1").decode(copy.subarray(from, to));
+  const old = new TextEncoder().encode("EXT_meshopt_compression");
+  for (let at = text.indexOf("KHR_meshopt_compression"); at >= 0; ) {
+    copy.set(old, from + at);
+    at = text.indexOf("KHR_meshopt_compression", at + 1);
+  }
+  return copy;
+}

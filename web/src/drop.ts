@@ -1,0 +1,72 @@
+/** What dropped files are, by their names: a model, a cage, a project, or what the page cannot open. */
+
+export type DropKind = "model" | "project" | "textures" | "nothing" | "unknown";
+
+export interface DropPlan {
+  kind: DropKind;
+  /** Index of the file to open. */
+  main?: number;
+  /** Other files that could be models: the second one may be the cage. */
+  second?: number;
+  /** What will happen, as a sentence. */
+  sentence: string;
+}
+
+const MODELS = ["glb", "gltf", "obj"] as const;
+const COMPANIONS = ["bin", "png", "jpg", "jpeg", "webp", "avif", "ktx2", "mtl"] as const;
+const CAGE_NAME = /(^|[^a-z])cage([^a-z]|$)/i;
+const PROJECT_NAME = /\.cagework\.glb$/i;
+
+/** Lower-case extension without the dot, or "". */
+export function extension(name: string): string {
+  const base = name.split("/").at(-1) ?? name;
+  const dot = base.lastIndexOf(".");
+  return dot < 0 ? "" : base.slice(dot + 1).toLowerCase();
+}
+
+function isModel(name: string): boolean {
+  return (MODELS as readonly string[]).includes(extension(name));
+}
+
+/** Says what opening these files means. Files named "...cage..." are cages when another model is among them. */
+export function planDrop(names: readonly string[]): DropPlan {
+  if (names.length === 0) return { kind: "nothing", sentence: "Nothing was dropped." };
+  const project = names.findIndex((name) => PROJECT_NAME.test(name));
+  if (project >= 0) {
+    return { kind: "project", main: project, sentence: `Opens the project ${base(names[project])}.` };
+  }
+  const models = names.map((name, index) => ({ name, index })).filter(({ name }) => isModel(name));
+  const model = models.find(({ name }) => !CAGE_NAME.test(base(name))) ?? models[0];
+  if (!model) {
+    const companions = names.every((name) => (COMPANIONS as readonly string[]).includes(extension(name)));
+    return companions
+      ? {
+          kind: "textures",
+          sentence: "These files belong to a .gltf or .obj file: drop that one together with them.",
+        }
+      : { kind: "unknown", sentence: "Cagework opens .glb, .gltf and .obj files." };
+  }
+  const second = models.find((other) => other !== model && CAGE_NAME.test(base(other.name)));
+  const companions = names.length - models.length;
+  const files = companions > 0 ? ` with ${companions} ${companions === 1 ? "file" : "files"}` : "";
+  const sentence = second
+    ? `Opens ${base(model.name)}${files} with ${base(second.name)} as its cage.`
+    : `Opens ${base(model.name)}${files} and makes a cage for it.`;
+  return { kind: "model", main: model.index, sentence, ...(second ? { second: second.index } : {}) };
+}
+
+/** What the page can say while files hover over it: browsers tell how many there are, and types of some. */
+export function hoverSentence(files: number, hasModel: boolean, onCagePanel: boolean): string {
+  if (files > 1) {
+    return "A model with its textures, or a model and its cage: drop them together.";
+  }
+  if (hasModel && onCagePanel)
+    return "It becomes the model; to use it as the cage, drop it on the Cage panel.";
+  return hasModel
+    ? "It takes the place of the model that is open."
+    : "It gets a cage and can be posed at once.";
+}
+
+function base(name: string | undefined): string {
+  return name?.split("/").at(-1) ?? "";
+}

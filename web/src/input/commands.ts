@@ -1,0 +1,147 @@
+/** What each command of the table of shortcuts does. */
+
+import { report } from "../actions/context";
+import type { App } from "../app";
+import type { Element as CageElement, Gesture } from "../contract";
+import type { Command } from "./shortcuts";
+
+/** CSS pixels of an arrow key, and with Shift. */
+const NUDGE = 2;
+const NUDGE_FAR = 20;
+const NEXT_ELEMENT: Record<CageElement, CageElement> = { vertex: "edge", edge: "face", face: "vertex" };
+
+export function createCommands(app: App, showSheet: () => void): Record<Command, () => void> {
+  const { store, edit, view, poses, cage, bind, exports } = app;
+  const engine = () => app.ctx.session().engine;
+  const hasCage = () => store.get().cage !== null;
+
+  const gesture = (kind: Gesture) => () => {
+    if (!hasCage()) return;
+    if (edit.active()) edit.end(false);
+    poses.stop();
+    const { x, y } = app.pointer();
+    if (!edit.begin(kind, x, y))
+      app.ctx.tell.say("Select a handle of the cage first: click one, or press A for all.");
+  };
+  const select = (work: () => void) => () => {
+    if (!hasCage()) return;
+    work();
+    edit.sync();
+  };
+  const axis = (index: 0 | 1 | 2, plane: boolean) => () => edit.constrain(index, plane);
+  const nudge = (right: number, up: number) => () => {
+    if (hasCage()) edit.nudge(right, up);
+  };
+  const turn = (way: "undo" | "redo") => () => {
+    if (edit.active()) {
+      edit.end(false);
+      return;
+    }
+    edit.settle();
+    poses.stop();
+    app.ctx.history[way]().catch((error: unknown) =>
+      report(app.ctx, `${way === "undo" ? "Undo" : "Redo"} did not work`, error),
+    );
+  };
+  const neighbour = (step: 1 | -1) =>
+    select(() => {
+      const n = store.get().cage?.info.vertices ?? 0;
+      if (n === 0) return;
+      const last = engine().last();
+      const next = last < 0 ? (step === 1 ? 0 : n - 1) : (last + step + n) % n;
+      engine().select(Uint32Array.of(next), "replace");
+    });
+
+  return {
+    grab: gesture("grab"),
+    rotate: () => {
+      if (store.get().scene.gizmo !== "none" && !edit.active()) view.gizmo("scale");
+      else gesture("rotate")();
+    },
+    scale: gesture("scale"),
+    axisX: axis(0, false),
+    axisY: axis(1, false),
+    axisZ: axis(2, false),
+    planeX: axis(0, true),
+    planeY: axis(1, true),
+    planeZ: axis(2, true),
+    keep: () => edit.end(true),
+    cancel: () => {
+      if (edit.active()) edit.end(false);
+      else if (store.get().boxArmed) store.set({ boxArmed: false });
+      else if (store.get().playing) poses.stop();
+      else if (store.get().seeOpen) store.set({ seeOpen: false });
+      else select(() => engine().select(new Uint32Array(), "replace"))();
+    },
+    gizmoMove: () => view.gizmo("move"),
+    gizmoRotate: () => view.gizmo("rotate"),
+    toolSelect: () => view.gizmo("none"),
+    symmetry: () => view.symmetry(!store.get().symmetry),
+    proportional: () => {
+      view.proportional(!store.get().proportionalOn);
+      if (edit.active()) edit.drag(app.pointer().x, app.pointer().y);
+    },
+    nudgeLeft: nudge(-NUDGE, 0),
+    nudgeRight: nudge(NUDGE, 0),
+    nudgeUp: nudge(0, NUDGE),
+    nudgeDown: nudge(0, -NUDGE),
+    nudgeLeftFar: nudge(-NUDGE_FAR, 0),
+    nudgeRightFar: nudge(NUDGE_FAR, 0),
+    nudgeUpFar: nudge(0, NUDGE_FAR),
+    nudgeDownFar: nudge(0, -NUDGE_FAR),
+    undo: turn("undo"),
+    redo: turn("redo"),
+
+    selectAll: select(() => engine().selectAll()),
+    selectNone: select(() => engine().select(new Uint32Array(), "replace")),
+    selectLinked: select(() => engine().selectLinked()),
+    selectInvert: select(() => {
+      const all = Uint32Array.from({ length: store.get().cage?.info.vertices ?? 0 }, (_, i) => i);
+      engine().select(all, "toggle");
+    }),
+    boxSelect: () => {
+      if (hasCage()) store.set({ boxArmed: !store.get().boxArmed });
+    },
+    elementMode: () => view.element(NEXT_ELEMENT[store.get().element]),
+    previousVertex: neighbour(-1),
+    nextVertex: neighbour(1),
+
+    frameSelection: () => view.frameSelection(),
+    frameAll: () => view.frameAll(),
+    viewFront: () => view.axis(2, false),
+    viewRight: () => view.axis(0, false),
+    viewTop: () => view.axis(1, false),
+    viewBack: () => view.axis(2, true),
+    viewLeft: () => view.axis(0, true),
+    viewBottom: () => view.axis(1, true),
+    ortho: () => view.ortho(),
+    // Held, not pressed: the keyboard calls `original` itself.
+    original: () => undefined,
+    toggleCage: () => view.scene({ cage: !store.get().scene.cage }),
+    toggleWire: () => view.scene({ base_wireframe: !store.get().scene.base_wireframe }),
+    heatMap: () => view.scene({ colour: store.get().scene.colour === "weight" ? "material" : "weight" }),
+    see: () => store.set({ seeOpen: !store.get().seeOpen }),
+
+    restMode: () => {
+      if (hasCage()) edit.setEditingRest(!store.get().editingRest);
+    },
+    split: () => edit.restEdit("split_edge"),
+    collapse: () => edit.restEdit("collapse_edge"),
+    extrude: () => edit.restEdit("extrude_face"),
+    remove: () => edit.restEdit(store.get().element === "face" ? "delete_face" : "delete_vertex"),
+
+    savePose: () => poses.save(),
+    play: () => poses.togglePlay(),
+    resetPose: () => poses.reset(),
+
+    open: () => app.chooseModel(),
+    saveProject: () => {
+      if (hasCage()) void exports.save("project");
+    },
+    bind: () => {
+      if (!hasCage()) void cage.make().then((made) => made && bind.start());
+      else void bind.start();
+    },
+    sheet: showSheet,
+  };
+}

@@ -1,0 +1,100 @@
+/** Files dropped on the window: several at once, or a folder; while they hover, the page says what will happen. */
+
+import type { App } from "../app";
+import type { NamedFile } from "../contract";
+import { hoverSentence } from "../drop";
+import { h, setText } from "../ui/dom";
+import { icon } from "../ui/icons";
+
+/** Files of a folder that are read at most: a drop of a whole disk must end. */
+const MOST_FILES = 2000;
+
+export function attachDrop(root: HTMLElement, panel: HTMLElement, app: App): void {
+  const title = h("strong");
+  const sentence = h("p");
+  const overlay = h(
+    "div",
+    { class: "drop-overlay", hidden: true, attrs: { "aria-hidden": "true" } },
+    h("div", { class: "drop-card" }, icon("upload"), title, sentence),
+  );
+  root.append(overlay);
+
+  const onCagePanel = (event: DragEvent) =>
+    app.store.get().step === "cage" &&
+    app.store.get().model !== null &&
+    event.target instanceof Node &&
+    panel.contains(event.target);
+  const hide = () => {
+    overlay.hidden = true;
+  };
+
+  window.addEventListener("dragover", (event) => {
+    if (!event.dataTransfer?.types.includes("Files")) return;
+    event.preventDefault();
+    event.dataTransfer.dropEffect = "copy";
+    const asCage = onCagePanel(event);
+    const files = [...event.dataTransfer.items].filter((item) => item.kind === "file").length;
+    setText(title, asCage ? "Drop to use it as the cage" : "Drop to open");
+    const cageStep = app.store.get().step === "cage";
+    setText(
+      sentence,
+      asCage
+        ? "A closed mesh around the model."
+        : hoverSentence(files, app.store.get().model !== null, cageStep),
+    );
+    overlay.toggleAttribute("data-panel", asCage);
+    overlay.hidden = false;
+  });
+  window.addEventListener("dragleave", (event) => {
+    if (event.relatedTarget === null) hide();
+  });
+  window.addEventListener("drop", (event) => {
+    if (!event.dataTransfer?.types.includes("Files")) return;
+    event.preventDefault();
+    hide();
+    const asCage = onCagePanel(event);
+    void collect(event.dataTransfer).then((files) =>
+      asCage ? app.cage.load(files) : app.files.openFiles(files),
+    );
+  });
+}
+
+/** All files of a drop, folders opened. Entries must be taken before the first await: the list is emptied then. */
+async function collect(data: DataTransfer): Promise<NamedFile[]> {
+  const entries = [...data.items]
+    .filter((item) => item.kind === "file")
+    .map((item) => ({ entry: item.webkitGetAsEntry(), file: item.getAsFile() }));
+  const files: NamedFile[] = [];
+  for (const { entry, file } of entries) {
+    if (entry) await walk(entry, "", files);
+    else if (file) files.push({ name: file.name, path: file.name, file });
+  }
+  return files;
+}
+
+async function walk(entry: FileSystemEntry, folder: string, into: NamedFile[]): Promise<void> {
+  if (into.length >= MOST_FILES || entry.name.startsWith(".")) return;
+  const path = folder === "" ? entry.name : `${folder}/${entry.name}`;
+  if (isFile(entry)) {
+    const file = await new Promise<File>((resolve, reject) => entry.file(resolve, reject));
+    into.push({ name: entry.name, path, file });
+  } else if (isFolder(entry)) {
+    const reader = entry.createReader();
+    for (;;) {
+      // A reader hands out its entries in portions; an empty one is the last.
+      const portion = await new Promise<FileSystemEntry[]>((resolve, reject) =>
+        reader.readEntries(resolve, reject),
+      );
+      if (portion.length === 0) return;
+      for (const child of portion) await walk(child, path, into);
+    }
+  }
+}
+
+function isFile(entry: FileSystemEntry): entry is FileSystemFileEntry {
+  return entry.isFile;
+}
+
+function isFolder(entry: FileSystemEntry): entry is FileSystemDirectoryEntry {
+  return entry.isDirectory;
+}

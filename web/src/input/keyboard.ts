@@ -1,0 +1,64 @@
+/** Keys: looks them up in the table of shortcuts and runs what they stand for. */
+
+import type { App } from "../app";
+import { type Command, commandOf } from "./shortcuts";
+
+/** Elements that want their keys themselves. */
+function isTyping(target: EventTarget | null): boolean {
+  if (!(target instanceof HTMLElement)) return false;
+  if (target instanceof HTMLInputElement) return !["checkbox", "radio", "range"].includes(target.type);
+  return (
+    target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement || target.isContentEditable
+  );
+}
+
+/** Keys that controls use: arrows on sliders and radio buttons, space and enter on buttons. */
+function isControlKey(target: EventTarget | null, key: string): boolean {
+  if (!(target instanceof HTMLElement)) return false;
+  if (target.closest("dialog")) return true;
+  const input = target instanceof HTMLInputElement;
+  if (input && /^(Arrow|Home|End|Page| )/.test(key)) return true;
+  const pressable = target.closest("button, summary, a, label") !== null;
+  return pressable && (key === " " || key === "Enter");
+}
+
+export interface KeyboardOptions {
+  viewport: HTMLElement;
+  app: App;
+  run: (command: Command) => void;
+  /** Space is held or let go. */
+  original: (on: boolean) => void;
+}
+
+export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions): void {
+  document.addEventListener("keydown", (event) => {
+    if (event.defaultPrevented || event.isComposing || isTyping(event.target)) return;
+    if (isControlKey(event.target, event.key)) return;
+    const gesture = app.edit.active();
+    const { editingRest, busy, model } = app.store.get();
+    if (gesture && !event.ctrlKey && !event.metaKey && app.edit.type(event.key)) {
+      event.preventDefault();
+      return;
+    }
+    const command = commandOf(event, { gesture, rest: editingRest });
+    if (!command) return;
+    // Tab moves between modes only after a click into the view; who arrived by Tab leaves by it.
+    if (command === "restMode") {
+      const clicked = document.activeElement === viewport && !viewport.matches(":focus-visible");
+      if (!clicked || event.shiftKey) return;
+    }
+    if (command === "original") {
+      if (!event.repeat) original(true);
+      event.preventDefault();
+      return;
+    }
+    const always = command === "sheet" || command === "open";
+    if (!always && (busy !== null || model === null)) return;
+    event.preventDefault();
+    run(command);
+  });
+  document.addEventListener("keyup", (event) => {
+    if (event.key === " ") original(false);
+  });
+  window.addEventListener("blur", () => original(false));
+}

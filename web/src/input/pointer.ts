@@ -1,0 +1,227 @@
+/** Mouse and pen on the view, and which touches they share with: what a press means is decided here. */
+
+import type { App } from "../app";
+import type { SelectMode } from "../contract";
+import type { Stage } from "../ui/viewport";
+import { createTouch } from "./touch";
+
+/** Pixels that tell a drag from a click. */
+const SLOP = 4;
+const MOUSE_RADIUS = 10;
+const TOUCH_RADIUS = 24;
+/** A wheel notch is about 100 units; this makes it a seventh nearer. */
+const WHEEL_RATE = 0.0015;
+/** Trackpads send pinches as wheel events with Ctrl, in much smaller units. */
+const PINCH_RATE = 0.01;
+
+type Drag =
+  | { kind: "orbit" | "pan" | "zoom" }
+  | { kind: "handle"; started: boolean; vertices: Uint32Array; mode: SelectMode; was: boolean }
+  | { kind: "gizmo" }
+  | { kind: "box"; mode: SelectMode };
+
+export function attachPointer(stage: Stage, app: App): void {
+  const { viewport } = stage;
+  const { store, edit } = app;
+  const engine = () => app.ctx.session().engine;
+  const ready = () => store.get().busy === null && store.get().model !== null;
+  let drag: Drag | undefined;
+  let start = { x: 0, y: 0 };
+  let last = { x: 0, y: 0 };
+  let moved = false;
+  let pointer: { x: number; y: number } = { x: 0, y: 0 };
+  let hoverFrame = 0;
+
+  const place = (event: { clientX: number; clientY: number }) => {
+    const box = viewport.getBoundingClientRect();
+    return { x: event.clientX - box.left, y: event.clientY - box.top };
+  };
+  const radiusOf = (event: PointerEvent) => (event.pointerType === "touch" ? TOUCH_RADIUS : MOUSE_RADIUS);
+
+  const press = (event: PointerEvent, at: { x: number; y: number }): Drag => {
+    const mod = event.ctrlKey || event.metaKey;
+    if (event.altKey) return { kind: event.button === 0 ? "orbit" : event.button === 1 ? "pan" : "zoom" };
+    if (event.button !== 0) return { kind: "pan" };
+    if (store.get().boxArmed)
+      return {
+        kind: "box",
+        mode: event.shiftKey || store.get().additive ? "add" : mod ? "remove" : "replace",
+      };
+    if (store.get().cage && store.get().scene.cage) {
+      const handle = engine().gizmoAt(at.x, at.y, radiusOf(event));
+      if (handle !== undefined && edit.beginGizmo(handle, at.x, at.y)) return { kind: "gizmo" };
+      const vertices = engine().pick(at.x, at.y, radiusOf(event));
+      if (vertices.length > 0) {
+        const selected = new Set(engine().selection());
+        const was = vertices.every((vertex) => selected.has(vertex));
+        const mode: SelectMode =
+          event.shiftKey || store.get().additive ? "toggle" : mod ? "remove" : "replace";
+        return { kind: "handle", started: false, vertices, mode, was };
+      }
+    }
+    if (mod) return { kind: "box", mode: event.shiftKey ? "add" : "replace" };
+    return { kind: event.shiftKey ? "pan" : "orbit" };
+  };
+
+  const move = (at: { x: number; y: number }) => {
+    const dx = at.x - last.x;
+    const dy = at.y - last.y;
+    last = at;
+    if (!drag) return;
+    switch (drag.kind) {
+      case "orbit":
+        engine().orbit(dx, dy);
+        break;
+      case "pan":
+        engine().pan(dx, dy);
+        break;
+      case "zoom":
+        engine().zoomAt(start.x, start.y, Math.exp((dx - dy) * 0.008));
+        break;
+      case "box":
+        stage.band(rectangle(start, at));
+        break;
+      case "gizmo":
+        edit.drag(at.x, at.y);
+        break;
+      case "handle":
+        if (!drag.started && moved) {
+          if (!drag.was || drag.mode === "replace") {
+            if (!drag.was) engine().select(drag.vertices, drag.mode === "toggle" ? "add" : "replace");
+          }
+          drag.started = edit.begin("grab", start.x, start.y);
+        }
+        if (drag.started) edit.drag(at.x, at.y);
+        break;
+      default:
+        drag satisfies never;
+    }
+  };
+
+  const release = (at: { x: number; y: number }, keep: boolean) => {
+    const ended = drag;
+    drag = undefined;
+    if (!ended) return;
+    switch (ended.kind) {
+      case "gizmo":
+        edit.end(keep);
+        break;
+      case "handle":
+        if (ended.started) edit.end(keep);
+        else if (keep) {
+          engine().select(ended.vertices, ended.mode);
+          edit.sync();
+        }
+        break;
+      case "box": {
+        stage.band(null);
+        store.set({ boxArmed: false });
+        if (!keep || !moved) break;
+        const box = rectangle(start, at);
+        engine().selectBox(box.x, box.y, box.x + box.width, box.y + box.height, ended.mode);
+        edit.sync();
+        break;
+      }
+      case "orbit":
+        // A click beside everything selects nothing.
+        if (keep && !moved && store.get().cage) {
+          engine().select(new Uint32Array(), "replace");
+          edit.sync();
+        }
+        break;
+      case "pan":
+      case "zoom":
+        break;
+      default:
+        ended satisfies never;
+    }
+  };
+
+  const touch = createTouch({
+    engine,
+    interrupt() {
+      release(last, false);
+    },
+  });
+
+  viewport.addEventListener("pointerdown", (event) => {
+    if (!ready()) return;
+    viewport.focus({ preventScroll: true, focusVisible: false } as FocusOptions);
+    const at = place(event);
+    pointer = at;
+    // G, R and S follow the pointer without a button: a click keeps, the right one puts back.
+    if (edit.active() && !drag) {
+      edit.end(event.button !== 2);
+      return;
+    }
+    app.poses.stop();
+    viewport.setPointerCapture(event.pointerId);
+    if (event.pointerType === "touch" && touch.down(event.pointerId, at)) return;
+    if (drag) return;
+    start = at;
+    last = at;
+    moved = false;
+    drag = press(event, at);
+  });
+
+  viewport.addEventListener("pointermove", (event) => {
+    if (!ready()) return;
+    const at = place(event);
+    pointer = at;
+    if (event.pointerType === "touch" && touch.move(event.pointerId, at)) return;
+    if (drag) {
+      moved ||= Math.hypot(at.x - start.x, at.y - start.y) > SLOP;
+      if (moved) move(at);
+    } else if (edit.active()) {
+      edit.drag(at.x, at.y);
+    } else if (event.pointerType !== "touch" && hoverFrame === 0 && store.get().cage) {
+      hoverFrame = requestAnimationFrame(() => {
+        hoverFrame = 0;
+        if (!drag && ready() && store.get().cage) {
+          const under = engine().pick(pointer.x, pointer.y, MOUSE_RADIUS);
+          engine().hover(under);
+          viewport.toggleAttribute("data-over", under.length > 0);
+        }
+      });
+    }
+  });
+
+  const up = (event: PointerEvent, keep: boolean) => {
+    if (event.pointerType === "touch" && touch.up(event.pointerId)) return;
+    release(place(event), keep);
+  };
+  viewport.addEventListener("pointerup", (event) => up(event, true));
+  viewport.addEventListener("pointercancel", (event) => up(event, false));
+  viewport.addEventListener("pointerleave", () => {
+    if (!drag && store.get().cage) engine().hover(new Uint32Array());
+  });
+  viewport.addEventListener("contextmenu", (event) => event.preventDefault());
+  viewport.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      if (!ready()) return;
+      const step = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? event.deltaY * 33 : event.deltaY;
+      if (edit.active() && store.get().proportionalOn) {
+        app.view.proportional(true, store.get().proportional * Math.exp(-step * WHEEL_RATE));
+        edit.drag(pointer.x, pointer.y);
+        return;
+      }
+      const at = place(event);
+      engine().zoomAt(at.x, at.y, Math.exp(-step * (event.ctrlKey ? PINCH_RATE : WHEEL_RATE)));
+    },
+    { passive: false },
+  );
+
+  app.pointer = () => pointer;
+}
+
+/** The rectangle between two points. */
+export function rectangle(a: { x: number; y: number }, b: { x: number; y: number }) {
+  return {
+    x: Math.min(a.x, b.x),
+    y: Math.min(a.y, b.y),
+    width: Math.abs(a.x - b.x),
+    height: Math.abs(a.y - b.y),
+  };
+}

@@ -1,0 +1,71 @@
+/** Fingers: one is a pointer like any other; two move and zoom the view. */
+
+import type { Engine } from "../contract";
+
+interface Spot {
+  x: number;
+  y: number;
+}
+
+export interface Touch {
+  /** True when the touch belongs to a two-finger gesture, which the pointer must leave alone. */
+  down(id: number, at: Spot): boolean;
+  move(id: number, at: Spot): boolean;
+  up(id: number): boolean;
+}
+
+export function createTouch(options: { engine: () => Engine; interrupt: () => void }): Touch {
+  const fingers = new Map<number, Spot>();
+  /** From the second finger on until all are lifted: a finger that stays must not grab a handle. */
+  let navigating = false;
+
+  return {
+    down(id, at) {
+      fingers.set(id, at);
+      if (fingers.size < 2) return navigating;
+      if (!navigating) options.interrupt();
+      navigating = true;
+      return true;
+    },
+    move(id, at) {
+      const before = [...fingers.values()];
+      if (!fingers.has(id)) return navigating;
+      fingers.set(id, at);
+      if (!navigating) return false;
+      const after = [...fingers.values()];
+      const change = pinch(before, after);
+      if (change) {
+        options.engine().pan(change.dx, change.dy);
+        options.engine().zoomAt(change.x, change.y, change.factor);
+      }
+      return true;
+    },
+    up(id) {
+      fingers.delete(id);
+      const was = navigating;
+      if (fingers.size === 0) navigating = false;
+      return was;
+    },
+  };
+}
+
+/** What two fingers did between two moments: movement of their middle, and how much they spread. */
+export function pinch(
+  before: readonly Spot[],
+  after: readonly Spot[],
+): { dx: number; dy: number; x: number; y: number; factor: number } | undefined {
+  const [a0, b0] = before;
+  const [a1, b1] = after;
+  if (!a0 || !b0 || !a1 || !b1) return undefined;
+  const x = (a1.x + b1.x) / 2;
+  const y = (a1.y + b1.y) / 2;
+  const spread = Math.hypot(a0.x - b0.x, a0.y - b0.y);
+  const now = Math.hypot(a1.x - b1.x, a1.y - b1.y);
+  return {
+    dx: x - (a0.x + b0.x) / 2,
+    dy: y - (a0.y + b0.y) / 2,
+    x,
+    y,
+    factor: spread > 1 && now > 1 ? now / spread : 1,
+  };
+}

@@ -1,0 +1,227 @@
+/** Puts the page together: the only room that knows all others. */
+
+import { createBind } from "./actions/bind";
+import { createCage } from "./actions/cage";
+import type { Context, Fix } from "./actions/context";
+import { createEdit } from "./actions/edit";
+import { createExports, named } from "./actions/exports";
+import { createFiles } from "./actions/files";
+import { createPoses } from "./actions/poses";
+import { createProject, poseOf } from "./actions/project";
+import { createView } from "./actions/view";
+import type { App } from "./app";
+import type { NamedFile, Session } from "./contract";
+import { createHistory } from "./history";
+import { createCommands } from "./input/commands";
+import { attachDrop } from "./input/drop";
+import { attachKeyboard } from "./input/keyboard";
+import { attachPointer } from "./input/pointer";
+import { isMac, shortcutText } from "./input/shortcuts";
+import { openSession } from "./session";
+import { decodeShare } from "./share";
+import { startUp } from "./start";
+import { createStore, INITIAL } from "./state";
+import { loadTheme } from "./store";
+import { type Explained, explain, FIX_LABELS, PRODUCT } from "./strings";
+import { createBar } from "./ui/bar";
+import { createBindPanel } from "./ui/bind";
+import { createCagePanel } from "./ui/cage";
+import { h } from "./ui/dom";
+import { createExportPanel } from "./ui/export";
+import { attachLost } from "./ui/lost";
+import { createModelPanel } from "./ui/model";
+import { createPanel } from "./ui/panel";
+import { createPosePanel } from "./ui/pose";
+import { createSeePanel } from "./ui/see";
+import { createSheet } from "./ui/sheet";
+import { createOverlays } from "./ui/stage";
+import { createToasts } from "./ui/toasts";
+import { createUnsupported, type Lack } from "./ui/unsupported";
+import { createStage } from "./ui/viewport";
+
+function byId(id: string): HTMLElement {
+  const element = document.getElementById(id);
+  if (!element) throw new Error(`the page lacks #${id}`);
+  return element;
+}
+
+async function main(): Promise<void> {
+  const root = byId("app");
+  const stageElement = byId("stage");
+  const panelElement = byId("panel");
+  const stage = createStage(stageElement);
+  const store = createStore(INITIAL);
+  const { element: toasts, tell } = createToasts();
+  root.append(toasts);
+
+  let session: Session | undefined;
+  const current = (): Session => {
+    if (!session) throw new Error("The page is still starting.");
+    return session;
+  };
+  const history = createHistory(() => {
+    store.set({ undoLabel: history.undoLabel ?? null, redoLabel: history.redoLabel ?? null });
+  });
+  const fixFor = (fix: NonNullable<Explained["fix"]>): Fix => ({
+    label: FIX_LABELS[fix],
+    run: () => fixes[fix](),
+  });
+  const ctx: Context = { session: current, store, history, tell, fixFor };
+
+  const bind = createBind(ctx);
+  const project = createProject(ctx);
+  let rebind: ReturnType<typeof setTimeout> | undefined;
+  /** A changed cage is bound again once the hand rests, ms; a fine grid waits for the user's word. */
+  const bindSoon = (pause: number) => {
+    clearTimeout(rebind);
+    rebind = setTimeout(() => {
+      const { cage: now, bindOptions } = store.get();
+      if (now?.usable && !bind.covers() && !edit.active() && bindOptions.grid <= 128) void bind.start();
+    }, pause);
+  };
+  const edit = createEdit(ctx, {
+    changed: (state) => cage.adopt(state),
+    left: () => bindSoon(0),
+  });
+  const cage = createCage(ctx, () => {
+    edit.sync();
+    view.refresh();
+    bindSoon(600);
+  });
+  const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"), () =>
+    stage.viewport.getBoundingClientRect(),
+  );
+  const poses = createPoses(ctx, edit);
+  const exports = createExports(ctx, project, () => stage.viewport.getBoundingClientRect());
+  const files = createFiles(ctx, {
+    adoptCage: ({ cage: state }) => cage.adopt(state),
+    makeCage: () => cage.make(),
+    loadCage: (list) => cage.load(list),
+    bind: () => bind.start(),
+    applySettings(settings) {
+      store.set({
+        ...(settings.bind ? { bindOptions: settings.bind } : {}),
+        ...(settings.cage ? { cageOptions: settings.cage } : {}),
+      });
+      view.symmetry(settings.symmetry ?? store.get().symmetry);
+    },
+    applyPose(settings) {
+      const pose = poseOf(settings);
+      if (pose) current().engine.decodePose(pose);
+      edit.sync();
+    },
+  });
+
+  const choose = (accept: string, folder: boolean, then: (files: NamedFile[]) => void) => {
+    const input = h("input", { attrs: { type: "file", multiple: "", accept } });
+    if (folder) input.webkitdirectory = true;
+    input.addEventListener("change", () => {
+      const list = named(input.files ?? []);
+      if (list.length > 0) then(list);
+    });
+    input.click();
+  };
+  const MODELS = ".glb,.gltf,.obj,.bin,.png,.jpg,.jpeg,.webp,.ktx2,.mtl,model/gltf-binary,model/gltf+json";
+
+  const mac = isMac(navigator.platform);
+  const sheet = createSheet(mac);
+  root.append(sheet.element);
+  const app: App = {
+    ctx,
+    store,
+    edit,
+    cage,
+    bind,
+    poses,
+    view,
+    files,
+    project,
+    exports,
+    mac,
+    run: (command) => commands[command](),
+    go(step) {
+      if (step === "pose" || step === "export") edit.setEditingRest(false);
+      store.set({ step });
+    },
+    chooseModel: () => choose(MODELS, false, (list) => void files.openFiles(list)),
+    chooseFolder: () => choose("", true, (list) => void files.openFiles(list)),
+    chooseCage: () => choose(".obj,.glb,.gltf,.bin", false, (list) => void cage.load(list)),
+    share: () => void share(),
+    startFresh: () => void project.forget().then(() => files.openSample(store.get().samples[0]?.id ?? "")),
+    pointer: () => ({ x: 0, y: 0 }),
+    key: (command) => shortcutText(command, mac),
+  };
+  const commands = createCommands(app, sheet.show);
+  const fixes: Record<NonNullable<Explained["fix"]>, () => void> = {
+    coarser() {
+      bind.setOptions({ grid: Math.max(16, store.get().bindOptions.grid / 2) });
+      void bind.start();
+    },
+    cpu() {
+      bind.setOptions({ backend: "cpu" });
+      void bind.start();
+    },
+    file: () => app.chooseModel(),
+    regenerate: () => cage.repair("regenerate"),
+    reload: () => location.reload(),
+  };
+
+  const share = async () => {
+    const link = await project.link();
+    if (!link) {
+      tell.say(
+        "A link can hold a sample in its own cage and pose, but no files of yours. Save a project file to pass this on.",
+        {
+          label: "Save the project",
+          run: () => void exports.save("project"),
+        },
+      );
+      return;
+    }
+    try {
+      await navigator.clipboard.writeText(link);
+      tell.say("Link copied. Whoever opens it sees this sample in this pose.");
+    } catch {
+      // No access to the clipboard: the address bar can be copied by hand.
+      window.history.replaceState(null, "", link);
+      tell.say("The link is in the address bar; copy it from there.");
+    }
+  };
+
+  createBar(byId("bar"), app, sheet.show);
+  createPanel(panelElement, app, {
+    model: createModelPanel(app),
+    cage: createCagePanel(app),
+    bind: createBindPanel(app),
+    pose: createPosePanel(app),
+    export: createExportPanel(app),
+  });
+  createOverlays(stageElement, app, createSeePanel(app), matchMedia("(pointer: coarse)"));
+
+  try {
+    session = await openSession(stage.canvas());
+  } catch (error) {
+    const name = error instanceof Error ? error.name : "";
+    if (name !== "NoWebGPU" && name !== "NoAdapter" && name !== "NoDevice") {
+      store.set({ busy: null });
+      tell.problem(explain(error, "Cagework did not start"), fixFor("reload"));
+      return;
+    }
+    document.body.replaceChildren(
+      createUnsupported(name satisfies Lack, navigator.userAgent, isSecureContext),
+    );
+    return;
+  }
+  attachPointer(stage, app);
+  attachKeyboard({ viewport: stage.viewport, app, run: app.run, original: (on) => view.original(on) });
+  attachDrop(root, panelElement, app);
+  attachLost({
+    stage: stageElement,
+    session,
+    freshCanvas: stage.freshCanvas,
+    recovered: () => view.resized(),
+  });
+  startUp({ app, stage, theme: loadTheme(), shared: () => decodeShare(location.hash), product: PRODUCT });
+}
+
+void main();

@@ -1,0 +1,24 @@
+// Packages without types of their own: what is used of them.
+
+declare module "draco3dgltf/draco_decoder_gltf_nodejs.js" {
+  /** Opens the decoder with its wasm file. */
+  export default function createDecoder(options: { wasmBinary: ArrayBuffer }): Promise<unknown>;
+}
+
+declare module "draco3dgltf" {
+  const draco: { createEncoderModule(): Promise<unknown> };
+  export default draco;
+}
+
+declare module "gltf-validator" {
+  interface Message {
+    readonly severity: number;
+    readonly code: string;
+    readonly pointer: string;
+    readonly message: string;
+  }
+  const validator: {
+    validateBytes(bytes: Uint8Array): Promise<{ readonly issues: { readonly messages: readonly Message[] } }>;
+  };
+  export default validator;
+}

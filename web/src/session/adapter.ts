@@ -1,0 +1,19 @@
+/** The GPU, before anything is downloaded for it. */
+
+import { named } from "./client";
+
+/** Name of the GPU that the browser would use. */
+export async function findAdapter(): Promise<string> {
+  const { gpu } = navigator;
+  if (!gpu) throw named("NoWebGPU", "this browser has no WebGPU");
+  const adapter = await gpu.requestAdapter({ powerPreference: "high-performance" });
+  if (!adapter) throw named("NoAdapter", "this browser found no GPU that it may use");
+  const { description, vendor, architecture, device } = adapter.info;
+  const words = description || [vendor, architecture || device].filter(Boolean).join(" ");
+  return words ? tidy(words) : "this GPU";
+}
+
+/** Names as people write them: browsers report them in lower case. */
+function tidy(words: string): string {
+  return words.replace(/\b[a-z]/g, (letter) => letter.toUpperCase());
+}

@@ -1,0 +1,101 @@
+/** A bind: coarse first so that the model can be dragged at once, then as asked. */
+
+import type { BindEvent, BindOptions, BindReport, Engine, Job } from "../contract";
+import { createEta } from "../eta";
+import type { Engine as RawEngine } from "../pkg/cagework";
+import { type Client, named } from "./client";
+import type { BoundArrays, CageArrays, Step } from "./messages";
+
+/** Cells of the first pass. */
+const COARSE = 32;
+
+/** Errors that mean the GPU cannot, though the CPU may. */
+const GPU_ERRORS = [
+  "NoAdapter",
+  "NoDevice",
+  "DeviceLost",
+  "OutOfMemory",
+  "Refused",
+  "Timeout",
+  "Plan",
+  "Missing",
+];
+
+export interface BindStart {
+  readonly client: Client;
+  readonly engine: Engine;
+  readonly raw: RawEngine;
+  readonly adapter: string;
+  readonly options: BindOptions;
+  readonly listener: (event: BindEvent) => void;
+  readonly cage: CageArrays;
+}
+
+type Pass = "coarse" | "fine";
+
+export function startBind(start: BindStart): Job<BindReport> {
+  const { client, engine, raw, adapter, listener, cage } = start;
+  let options = start.options;
+  let job: Job<BoundArrays> | undefined;
+  let isCancelled = false;
+  const positions = raw.modelPositions();
+
+  const step = (pass: Pass) => {
+    const eta = createEta(performance.now());
+    return ({ stage, fraction, iteration, delta }: Step) => {
+      if (isCancelled || stage === "simplify") return;
+      const etaMs = eta.update(fraction, performance.now()) ?? null;
+      listener({ kind: "progress", pass, stage, fraction, etaMs, iteration, delta });
+    };
+  };
+
+  async function once(pass: Pass, asked: BindOptions): Promise<BindReport> {
+    job = client.run("bind", { positions, cage, options: asked }, step(pass));
+    const { indptr, indices, data, outside, offsets, report } = await job.done;
+    const isCurrent = same(cage.positions, engine.restPositions()) && same(cage.corners, engine.cageCorners());
+    if (isCancelled || !isCurrent || !report) throw named("Cancelled", "cancelled");
+    await raw.adopt(indptr, indices, data, outside, offsets);
+    const whole = report.backend === "gpu" ? { ...report, adapter } : report;
+    listener({ kind: "adopted", pass, report: whole });
+    return whole;
+  }
+
+  /** One pass; on the CPU if the GPU cannot. */
+  async function run(pass: Pass): Promise<BindReport> {
+    const asked = () => (pass === "fine" ? options : coarse(options));
+    try {
+      return await once(pass, asked());
+    } catch (error) {
+      const isGpus = error instanceof Error && GPU_ERRORS.includes(error.name) && options.backend === "gpu";
+      if (!isGpus || isCancelled) throw error;
+      listener({ kind: "fallback", reason: error.message });
+      options = { ...options, backend: "cpu" };
+      return once(pass, asked());
+    }
+  }
+
+  async function all(): Promise<BindReport> {
+    if (!engine.bound && options.grid > COARSE) await run("coarse");
+    if (isCancelled) throw named("Cancelled", "cancelled");
+    return run("fine");
+  }
+
+  return {
+    done: all(),
+    cancel() {
+      isCancelled = true;
+      job?.cancel();
+    },
+  };
+}
+
+/** Quick, whatever was asked for. */
+function coarse(options: BindOptions): BindOptions {
+  return { ...options, grid: COARSE, solver: "multigrid" };
+}
+
+function same(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
+  if (a.length !== b.length) return false;
+  for (let k = 0; k < a.length; k++) if (a[k] !== b[k]) return false;
+  return true;
+}

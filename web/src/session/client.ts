@@ -1,0 +1,92 @@
+/** The worker as promises. */
+
+import type { Job } from "../contract";
+import type { FromWorker, JobKind, Jobs, Step, ToWorker } from "./messages";
+
+/** A cancelled job has this long to stop by itself, ms: on the CPU it hears nothing until it is done. */
+const PATIENCE = 400;
+
+interface Waiting {
+  readonly done: (output: never) => void;
+  readonly failed: (error: Error) => void;
+  readonly step: ((step: Step) => void) | undefined;
+}
+
+export interface Client {
+  run<K extends JobKind>(job: K, input: Jobs[K]["input"], step?: (step: Step) => void): Job<Jobs[K]["output"]>;
+  close(): void;
+}
+
+/** An error with the name that callers look at. */
+export function named(name: string, message: string): Error {
+  const error = new Error(message);
+  error.name = name;
+  return error;
+}
+
+/** Starts a worker with the compiled module; a worker that does not listen is replaced. */
+export function createClient(module: WebAssembly.Module, open: () => Worker): Client {
+  const waiting = new Map<number, Waiting>();
+  let next = 0;
+  let worker = start();
+
+  function start(): Worker {
+    const started = open();
+    started.addEventListener("message", ({ data }: MessageEvent<FromWorker>) => hear(data));
+    started.addEventListener("error", (event) => {
+      event.preventDefault();
+      restart(named("Worker", event.message || "the worker stopped"));
+    });
+    say(started, { kind: "start", module });
+    return started;
+  }
+
+  function say(to: Worker, message: ToWorker): void {
+    to.postMessage(message);
+  }
+
+  function hear(message: FromWorker): void {
+    const job = waiting.get(message.id);
+    if (!job) return;
+    if (message.kind === "step") {
+      job.step?.(message.step);
+      return;
+    }
+    waiting.delete(message.id);
+    if (message.kind === "done") job.done(message.output as never);
+    else job.failed(named(message.name, message.message));
+  }
+
+  function restart(error: Error): void {
+    worker.terminate();
+    const lost = [...waiting.values()];
+    waiting.clear();
+    worker = start();
+    for (const job of lost) job.failed(error);
+  }
+
+  return {
+    run(job, input, step) {
+      const id = next++;
+      const done = new Promise<never>((resolve, reject) => {
+        waiting.set(id, { done: resolve, failed: reject, step });
+      });
+      say(worker, { kind: "job", id, job, input });
+      return {
+        done,
+        cancel() {
+          if (!waiting.has(id)) return;
+          say(worker, { kind: "cancel", id });
+          setTimeout(() => {
+            if (waiting.has(id)) restart(named("Cancelled", "cancelled"));
+          }, PATIENCE);
+        },
+      };
+    },
+    close() {
+      worker.terminate();
+      for (const job of waiting.values()) job.failed(named("Cancelled", "the page is closing"));
+      waiting.clear();
+    },
+  };
+}

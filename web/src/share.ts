@@ -1,0 +1,65 @@
+/** Share links: what is open and how it is posed, in the part of the address that no server ever sees. */
+
+export interface Shared {
+  /** Identifier of the sample; links hold no files, so only samples can be shared with their pose. */
+  sample: string;
+  /** How the cage was made, as the page's settings say it. */
+  cage?: string;
+  /** The pose, as `Engine.encodePose` packs it. */
+  pose?: Uint8Array;
+}
+
+/** Longest fragment read; a pose of 400 cage vertices takes about 3 kB. */
+const LONGEST = 16_384;
+
+/** The fragment of a link, with its #. */
+export async function encodeShare(shared: Shared): Promise<string> {
+  const fields = new URLSearchParams({ sample: shared.sample });
+  if (shared.cage !== undefined) fields.set("cage", shared.cage);
+  if (shared.pose && shared.pose.length > 0) fields.set("pose", toBase64Url(await pack(shared.pose)));
+  return `#${fields}`;
+}
+
+/** What a fragment says; undefined when it is no share link. A pose that cannot be read is an error. */
+export async function decodeShare(fragment: string): Promise<Shared | undefined> {
+  if (fragment.length < 2 || fragment.length > LONGEST) return undefined;
+  const fields = new URLSearchParams(fragment.slice(1));
+  const sample = fields.get("sample");
+  if (!sample) return undefined;
+  const cage = fields.get("cage");
+  const pose = fields.get("pose");
+  return {
+    sample,
+    ...(cage === null ? {} : { cage }),
+    ...(pose === null ? {} : { pose: await unpack(fromBase64Url(pose)) }),
+  };
+}
+
+async function through(
+  data: Uint8Array,
+  stream: CompressionStream | DecompressionStream,
+): Promise<Uint8Array> {
+  const body = new Blob([new Uint8Array(data)]).stream().pipeThrough(stream);
+  return new Uint8Array(await new Response(body).arrayBuffer());
+}
+
+function pack(data: Uint8Array): Promise<Uint8Array> {
+  return through(data, new CompressionStream("deflate-raw"));
+}
+
+function unpack(data: Uint8Array): Promise<Uint8Array> {
+  return through(data, new DecompressionStream("deflate-raw"));
+}
+
+/** Base 64 with the letters that addresses allow, without padding. */
+export function toBase64Url(data: Uint8Array): string {
+  let binary = "";
+  for (const byte of data) binary += String.fromCharCode(byte);
+  return btoa(binary).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
+}
+
+/** The bytes; throws when the text is not of that alphabet. */
+export function fromBase64Url(text: string): Uint8Array {
+  const binary = atob(text.replaceAll("-", "+").replaceAll("_", "/"));
+  return Uint8Array.from(binary, (letter) => letter.charCodeAt(0));
+}

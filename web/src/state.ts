@@ -1,0 +1,202 @@
+/** Everything the page shows, in one place; panels watch the keys they draw. */
+
+import type {
+  BindOptions,
+  BindReport,
+  Element as CageElement,
+  CageState,
+  Legend,
+  ModelInfo,
+  Pose,
+  Sample,
+  SceneOptions,
+} from "./contract";
+import { BIND_DEFAULTS, CAGE_DEFAULTS, type CageWish, SCENE_DEFAULTS } from "./defaults";
+import type { Theme } from "./store";
+
+export const STEPS = ["model", "cage", "bind", "pose", "export"] as const;
+export type StepName = (typeof STEPS)[number];
+
+export interface BindRun {
+  pass: "coarse" | "fine";
+  stage: "voxelize" | "solve" | "sample";
+  /** Of the pass, 0 to 1. */
+  fraction: number;
+  etaMs: number | null;
+  iteration: number;
+  delta: number | null;
+  /** Iteration and delta of this pass, in turn. */
+  curve: readonly (readonly [iteration: number, delta: number])[];
+}
+
+export interface Selected {
+  count: number;
+  /** The vertex selected last, -1 for none. */
+  last: number;
+  center: readonly [number, number, number] | null;
+}
+
+export interface Slice {
+  axis: 0 | 1 | 2;
+  /** Along the cage's box, 0 to 1. */
+  position: number;
+  busy: boolean;
+}
+
+export type CageSource = "auto" | "hull" | "box" | "file";
+
+export interface AppState {
+  step: StepName;
+  adapter: string;
+  samples: readonly Sample[];
+  /** What keeps the whole page waiting, as a sentence; null when nothing does. */
+  busy: string | null;
+  model: ModelInfo | null;
+  /** The sample that is open, null for a file of the user's. */
+  sample: string | null;
+  cage: CageState | null;
+  cageSource: CageSource;
+  /** The cage is the one that the sample came with, so that a link can refer to it. */
+  sampleCage: boolean;
+  cageOptions: CageWish;
+  boxDivisions: number;
+  /** Share of the cage generation done; null when none runs. */
+  cageProgress: number | null;
+  bindOptions: BindOptions;
+  bindRun: BindRun | null;
+  report: BindReport | null;
+  /** Reports of earlier binds of this cage, latest first: to compare methods. */
+  earlier: readonly BindReport[];
+  /** Weights are there and belong to the cage as it is. */
+  bound: boolean;
+  /** Bytes the next bind needs, or why it cannot run. */
+  memory: number | string;
+  scene: SceneOptions;
+  seeOpen: boolean;
+  legend: Legend | null;
+  slice: Slice;
+  meanValueReady: boolean;
+  editingRest: boolean;
+  element: CageElement;
+  selected: Selected;
+  symmetry: boolean;
+  unmatched: number;
+  /** Radius as a share of the cage's diagonal; kept while `proportionalOn` is false. */
+  proportional: number;
+  proportionalOn: boolean;
+  /** Clicks and taps add to the selection. */
+  additive: boolean;
+  boxArmed: boolean;
+  ortho: boolean;
+  /** What the gesture under way does, null without one. */
+  gesture: string | null;
+  posed: boolean;
+  poses: readonly Pose[];
+  /** Shares of `poses` in the blend. */
+  shares: readonly number[];
+  playing: boolean;
+  undoLabel: string | null;
+  redoLabel: string | null;
+  theme: Theme;
+  /** When the project was kept in the browser last, ms since 1970. */
+  savedAt: number | null;
+}
+
+export const INITIAL: AppState = {
+  step: "model",
+  adapter: "",
+  samples: [],
+  busy: "Starting",
+  model: null,
+  sample: null,
+  cage: null,
+  cageSource: "auto",
+  sampleCage: false,
+  cageOptions: CAGE_DEFAULTS,
+  boxDivisions: 2,
+  cageProgress: null,
+  bindOptions: BIND_DEFAULTS,
+  bindRun: null,
+  report: null,
+  earlier: [],
+  bound: false,
+  memory: 0,
+  scene: SCENE_DEFAULTS,
+  seeOpen: false,
+  legend: null,
+  slice: { axis: 2, position: 0.5, busy: false },
+  meanValueReady: false,
+  editingRest: false,
+  element: "vertex",
+  selected: { count: 0, last: -1, center: null },
+  symmetry: false,
+  unmatched: 0,
+  proportional: 0.2,
+  proportionalOn: false,
+  additive: false,
+  boxArmed: false,
+  ortho: false,
+  gesture: null,
+  posed: false,
+  poses: [],
+  shares: [],
+  playing: false,
+  undoLabel: null,
+  redoLabel: null,
+  theme: "auto",
+  savedAt: null,
+};
+
+export interface Store {
+  get(): AppState;
+  set(patch: Partial<AppState>): void;
+  /** Calls `listener` now, and after each change of one of the keys; all changes of a turn make one call. */
+  watch(keys: readonly (keyof AppState)[], listener: (state: AppState) => void): void;
+}
+
+/** A store; `schedule` decides when listeners hear of changes. */
+export function createStore(initial: AppState, schedule: (work: () => void) => void = queueMicrotask): Store {
+  let state = initial;
+  const changed = new Set<keyof AppState>();
+  const watchers: { keys: readonly (keyof AppState)[]; listener: (state: AppState) => void }[] = [];
+  let waiting = false;
+
+  const tell = () => {
+    waiting = false;
+    const keys = new Set(changed);
+    changed.clear();
+    for (const watcher of watchers) {
+      if (watcher.keys.some((key) => keys.has(key))) watcher.listener(state);
+    }
+  };
+
+  return {
+    get: () => state,
+    set(patch) {
+      for (const key of Object.keys(patch) as (keyof AppState)[]) {
+        if (!Object.is(state[key], patch[key])) changed.add(key);
+      }
+      if (changed.size === 0) return;
+      state = { ...state, ...patch };
+      if (!waiting) {
+        waiting = true;
+        schedule(tell);
+      }
+    },
+    watch(keys, listener) {
+      watchers.push({ keys, listener });
+      listener(state);
+    },
+  };
+}
+
+/** Whether the cage's faults forbid a bind. */
+export function cageBroken(state: AppState): boolean {
+  return state.cage !== null && !state.cage.usable;
+}
+
+/** Poses of the cage that is open; others wait for theirs to come back by undo. */
+export function fittingPoses(state: AppState): readonly Pose[] {
+  const n = (state.cage?.info.vertices ?? 0) * 3;
+  return state.poses.filter((pose) => pose.positions.length === n);
+}

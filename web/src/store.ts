@@ -1,0 +1,86 @@
+/** What the browser keeps between visits: the project of the moment, in IndexedDB, and the theme. Nothing leaves it. */
+
+const DATABASE = "cagework";
+const TABLE = "projects";
+const KEY = "autosave";
+const THEME = "cagework.theme";
+
+export interface Saved {
+  /** The project file, a GLB. */
+  bytes: Uint8Array;
+  name: string;
+  /** Milliseconds since 1970. */
+  when: number;
+}
+
+function open(): Promise<IDBDatabase> {
+  return new Promise((resolve, reject) => {
+    const request = indexedDB.open(DATABASE, 1);
+    request.onupgradeneeded = () => request.result.createObjectStore(TABLE);
+    request.onsuccess = () => resolve(request.result);
+    request.onerror = () => reject(request.error);
+  });
+}
+
+async function run<T>(mode: IDBTransactionMode, work: (table: IDBObjectStore) => IDBRequest<T>): Promise<T> {
+  const database = await open();
+  try {
+    return await new Promise<T>((resolve, reject) => {
+      const transaction = database.transaction(TABLE, mode);
+      const request = work(transaction.objectStore(TABLE));
+      transaction.oncomplete = () => resolve(request.result);
+      transaction.onabort = () => reject(transaction.error);
+      transaction.onerror = () => reject(transaction.error);
+    });
+  } finally {
+    database.close();
+  }
+}
+
+/** Keeps a project, in place of the one before. */
+export async function saveLocally(saved: Saved): Promise<void> {
+  await run("readwrite", (table) => table.put(saved, KEY));
+}
+
+/** The project kept, if any. */
+export async function loadLocally(): Promise<Saved | undefined> {
+  const found: unknown = await run("readonly", (table) => table.get(KEY));
+  return isSaved(found) ? found : undefined;
+}
+
+/** Forgets it. */
+export async function forgetLocally(): Promise<void> {
+  await run("readwrite", (table) => table.delete(KEY));
+}
+
+function isSaved(value: unknown): value is Saved {
+  if (typeof value !== "object" || value === null) return false;
+  const saved = value as Partial<Saved>;
+  return (
+    saved.bytes instanceof Uint8Array && typeof saved.name === "string" && typeof saved.when === "number"
+  );
+}
+
+export type Theme = "auto" | "light" | "dark";
+
+/** The theme chosen last. */
+export function loadTheme(): Theme {
+  const theme = readItem(THEME);
+  return theme === "light" || theme === "dark" ? theme : "auto";
+}
+
+export function saveTheme(theme: Theme): void {
+  try {
+    localStorage.setItem(THEME, theme);
+  } catch {
+    // Storage is forbidden or full: the theme holds until the page is closed.
+  }
+}
+
+function readItem(key: string): string | null {
+  try {
+    return localStorage.getItem(key);
+  } catch {
+    return null;
+  }
+}

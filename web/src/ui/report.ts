@@ -1,0 +1,119 @@
+/** The result card: what a bind did and how exact it is, in words first. */
+
+import type { BindReport } from "../contract";
+import { bytes, count, duration, percent, plural, scientific } from "../format";
+import { sentence } from "../strings";
+import { facts } from "./controls";
+import { h } from "./dom";
+import { icon } from "./icons";
+
+export const METHODS = { embedded: "Embedded (ours)", classic: "Classic (the paper)" } as const;
+const SOLVERS = { multigrid: "multigrid", jacobi: "Jacobi" } as const;
+
+/** A largest rest error below this share of the cage's diagonal cannot be seen: a tenth of a pixel of 4K. */
+const INVISIBLE = 2.5e-5;
+
+/** The verdict as one sentence. */
+export function verdict(report: BindReport): string {
+  if (!report.converged) return "Stopped before it was done; raise the iteration limit for exact weights.";
+  if (report.rest_error.max_rel < INVISIBLE)
+    return "Exact: at rest the model is where it was, to less than can be seen.";
+  return `At rest the model is off by up to ${scientific(report.rest_error.max_rel * 100)} % of the cage's size.`;
+}
+
+export function reportCard(report: BindReport): HTMLElement {
+  const good = report.converged && report.outside_vertices === 0;
+  const where = report.backend === "gpu" ? `GPU${report.adapter ? ` (${report.adapter})` : ""}` : "processor";
+  return h(
+    "section",
+    { class: "card stack", attrs: { "aria-label": "Result of the bind" } },
+    h(
+      "div",
+      { class: "row" },
+      h("strong", { class: "grow", text: `Bound in ${duration(report.timings_ms.total)}` }),
+      h(
+        "span",
+        { class: `badge ${good ? "good" : "warn"}` },
+        icon(good ? "check" : "warning"),
+        report.converged ? "Converged" : "Not converged",
+      ),
+    ),
+    h("p", { class: "hint", text: verdict(report) }),
+    facts([
+      ["Method", `${METHODS[report.method]}, ${SOLVERS[report.solver]}`],
+      ["Grid", `${report.dims.join(" × ")} cells`],
+      ["Computed on", where],
+      ["Rest error, mean", scientific(report.rest_error.mean_rel)],
+      ["Rest error, largest", scientific(report.rest_error.max_rel)],
+      ["Weights", `${scientific(report.weights.min)} to ${scientific(report.weights.max)}`],
+    ]),
+    h(
+      "details",
+      { class: "fold" },
+      h("summary", { text: "All numbers" }),
+      h(
+        "div",
+        { class: "stack" },
+        facts([
+          ["Iterations", count(report.iterations)],
+          ["Threshold", scientific(report.tau)],
+          ["Cells inside", count(report.cells.interior)],
+          ["Cells on the cage", count(report.cells.boundary)],
+          ["Cells outside", count(report.cells.exterior)],
+          ["Voxelize", duration(report.timings_ms.voxelize)],
+          ["Solve", duration(report.timings_ms.solve)],
+          ["Sample", duration(report.timings_ms.sample)],
+          ["Memory, estimated", bytes(report.memory_bytes.estimated)],
+          ["Memory, most used", bytes(report.memory_bytes.peak)],
+          ["Sum of a row off by", scientific(report.weights.max_sum_error)],
+          ["Weights stored", `${count(report.weights.nonzeros)} (${percent(density(report))})`],
+          ["Outside the cage", plural(report.outside_vertices, "vertex", "vertices")],
+          ["Ambiguous cells", count(report.ambiguous_cells)],
+        ]),
+      ),
+    ),
+    ...report.notices.map((notice) => h("p", { class: "hint", text: sentence(notice) })),
+  );
+}
+
+/** Share of the weights that is stored. */
+export function density(report: BindReport): number {
+  const all = report.vertices * report.cage_vertices;
+  return all === 0 ? 0 : report.weights.nonzeros / all;
+}
+
+/** Binds of this cage side by side. */
+export function compareTable(reports: readonly BindReport[]): HTMLElement {
+  const body = h("tbody");
+  for (const report of reports) {
+    body.append(
+      h(
+        "tr",
+        {},
+        h("th", {
+          attrs: { scope: "row" },
+          text: `${report.method === "classic" ? "Classic" : "Embedded"}, ${SOLVERS[report.solver]}, ${report.grid}, ${report.backend.toUpperCase()}`,
+        }),
+        h("td", { text: duration(report.timings_ms.total) }),
+        h("td", { text: scientific(report.rest_error.mean_rel) }),
+      ),
+    );
+  }
+  return h(
+    "table",
+    { class: "compare" },
+    h("caption", { class: "visually-hidden", text: "Binds of this cage" }),
+    h(
+      "thead",
+      {},
+      h(
+        "tr",
+        {},
+        h("th", { attrs: { scope: "col" }, text: "Bind" }),
+        h("th", { attrs: { scope: "col" }, text: "Time" }),
+        h("th", { attrs: { scope: "col" }, text: "Rest error" }),
+      ),
+    ),
+    body,
+  );
+}

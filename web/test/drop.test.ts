@@ -1,0 +1,58 @@
+import { describe, expect, it } from "vitest";
+import { extension, hoverSentence, planDrop } from "../src/drop";
+
+describe("dropped files", () => {
+  it("open a model and promise a cage", () => {
+    expect(planDrop(["horse.glb"])).toEqual({
+      kind: "model",
+      main: 0,
+      sentence: "Opens horse.glb and makes a cage for it.",
+    });
+  });
+
+  it("take the file with cage in its name as the cage, in any order", () => {
+    const plan = planDrop(["horse_cage.obj", "horse.obj"]);
+    expect([plan.main, plan.second]).toEqual([1, 0]);
+    expect(planDrop(["a/horse.glb", "a/Cage.glb"]).second).toBe(1);
+  });
+
+  it("do not take a word that only contains cage for one", () => {
+    expect(planDrop(["birdcages.glb"]).second).toBeUndefined();
+    expect(planDrop(["horse.glb", "cagework.glb"]).second).toBeUndefined();
+  });
+
+  it("open a lone cage as a model", () => expect(planDrop(["cage.obj"]).main).toBe(0));
+
+  it("find a .gltf among its files", () => {
+    const plan = planDrop(["scene/scene.bin", "scene/textures/a.png", "scene/scene.gltf"]);
+    expect(plan.main).toBe(2);
+    expect(plan.sentence).toBe("Opens scene.gltf with 2 files and makes a cage for it.");
+  });
+
+  it("know a project by its name", () => {
+    expect(planDrop(["horse.cagework.glb"])).toMatchObject({ kind: "project", main: 0 });
+  });
+
+  it("say what is missing when only companions came", () => {
+    expect(planDrop(["scene.bin", "a.png"]).kind).toBe("textures");
+  });
+
+  it("say what can be opened when nothing fits", () => {
+    expect(planDrop(["notes.txt"])).toEqual({
+      kind: "unknown",
+      sentence: "Cagework opens .glb, .gltf and .obj files.",
+    });
+    expect(planDrop([]).kind).toBe("nothing");
+  });
+
+  it("have extensions in lower case", () => {
+    expect(extension("A/B.GLB")).toBe("glb");
+    expect(extension("folder.x/file")).toBe("");
+  });
+
+  it("announce what will happen while they hover", () => {
+    expect(hoverSentence(1, false, false)).toContain("gets a cage");
+    expect(hoverSentence(1, true, true)).toContain("Cage panel");
+    expect(hoverSentence(3, true, false)).toContain("together");
+  });
+});

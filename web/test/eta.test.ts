@@ -1,0 +1,36 @@
+import { describe, expect, it } from "vitest";
+import { createEta } from "../src/eta";
+
+describe("time left", () => {
+  it("is unknown at first", () => {
+    const eta = createEta(0);
+    expect(eta.update(0.01, 100)).toBeUndefined();
+  });
+
+  it("is exact at constant speed: a tenth a second leaves five seconds at one half", () => {
+    const eta = createEta(0);
+    let left: number | undefined;
+    for (let i = 1; i <= 5; i += 1) left = eta.update(i / 10, i * 1000);
+    expect(left).toBeCloseTo(5000, 6);
+  });
+
+  it("counts down while no step comes", () => {
+    const eta = createEta(0);
+    eta.update(0.5, 1000);
+    expect(eta.update(0.5, 1400)).toBeCloseTo(600, 6);
+  });
+
+  it("follows a change of speed", () => {
+    const eta = createEta(0);
+    eta.update(0.1, 1000);
+    const fast = eta.update(0.5, 1100) ?? Number.POSITIVE_INFINITY;
+    // At the first speed, 0.1 a second, it would be 5 s.
+    expect(fast).toBeLessThan(1000);
+  });
+
+  it("is never negative", () => {
+    const eta = createEta(0);
+    eta.update(0.9, 1000);
+    expect(eta.update(0.9, 9000)).toBe(0);
+  });
+});

@@ -1,0 +1,94 @@
+import { describe, expect, it } from "vitest";
+import { createHistory, type Step } from "../src/history";
+
+function numbers() {
+  const state = { value: 0 };
+  const add = (amount: number): Step => ({
+    label: `Add ${amount}`,
+    undo: () => {
+      state.value -= amount;
+    },
+    redo: () => {
+      state.value += amount;
+    },
+  });
+  return { state, add };
+}
+
+describe("history", () => {
+  it("undoes and redoes in turn", async () => {
+    const { state, add } = numbers();
+    const history = createHistory(() => undefined);
+    for (const amount of [1, 10]) {
+      state.value += amount;
+      history.push(add(amount));
+    }
+    await history.undo();
+    expect(state.value).toBe(1);
+    expect(history.undoLabel).toBe("Add 1");
+    expect(history.redoLabel).toBe("Add 10");
+    await history.redo();
+    expect(state.value).toBe(11);
+  });
+
+  it("forgets what was undone when something new is done", async () => {
+    const { add } = numbers();
+    const history = createHistory(() => undefined);
+    history.push(add(1));
+    await history.undo();
+    history.push(add(2));
+    expect(history.redoLabel).toBeUndefined();
+    expect(await history.redo()).toBeUndefined();
+  });
+
+  it("does steps that take time one after the other, in the order asked for", async () => {
+    const order: string[] = [];
+    const history = createHistory(() => undefined);
+    const slow = (name: string, ms: number): Step => ({
+      label: name,
+      undo: async () => {
+        await new Promise((resolve) => setTimeout(resolve, ms));
+        order.push(name);
+      },
+      redo: () => undefined,
+    });
+    history.push(slow("first", 0));
+    history.push(slow("second", 15));
+    await Promise.all([history.undo(), history.undo()]);
+    expect(order).toEqual(["second", "first"]);
+  });
+
+  it("keeps a step whose undo failed", async () => {
+    const history = createHistory(() => undefined);
+    history.push({
+      label: "Broken",
+      undo: () => {
+        throw new Error("no");
+      },
+      redo: () => undefined,
+    });
+    await expect(history.undo()).rejects.toThrow("no");
+    expect(history.undoLabel).toBe("Broken");
+  });
+
+  it("drops the oldest steps beyond its limit", async () => {
+    const { add } = numbers();
+    const history = createHistory(() => undefined, 2);
+    for (const amount of [1, 2, 3]) history.push(add(amount));
+    await history.undo();
+    await history.undo();
+    expect(await history.undo()).toBeUndefined();
+  });
+
+  it("tells of each change", async () => {
+    let calls = 0;
+    const { add } = numbers();
+    const history = createHistory(() => {
+      calls += 1;
+    });
+    history.push(add(1));
+    await history.undo();
+    history.clear();
+    expect(calls).toBe(3);
+  });
+});

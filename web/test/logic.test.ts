@@ -1,0 +1,153 @@
+import { describe, expect, it } from "vitest";
+import { grown } from "../src/actions/bind";
+import { freshName } from "../src/actions/poses";
+import { poseOf, readSettings } from "../src/actions/project";
+import { nextAmount } from "../src/amount";
+import { BIND_DEFAULTS } from "../src/defaults";
+import { rectangle } from "../src/input/pointer";
+import { pinch } from "../src/input/touch";
+import { ago, isSoftware } from "../src/start";
+import { explain, isCancelled, sentence } from "../src/strings";
+import { historyPoints, scaleOf } from "../src/ui/plot";
+import { recognise } from "../src/ui/unsupported";
+
+describe("typed amounts", () => {
+  const type = (keys: string) => [...keys].reduce((typed, key) => nextAmount(typed, key) ?? typed, "");
+  it("are numbers as typed", () => expect(type("12.5")).toBe("12.5"));
+  it("have one point", () => expect(type("1.2.5")).toBe("1.25"));
+  it("turn their sign with any minus", () => {
+    expect(type("5-")).toBe("-5");
+    expect(type("5--")).toBe("5");
+  });
+  it("are shortened by backspace, also to nothing", () => {
+    expect(nextAmount("-", "Backspace")).toBe("");
+    expect(nextAmount("", "x")).toBeUndefined();
+  });
+});
+
+describe("two fingers", () => {
+  it("move by their middle and zoom by their spread", () => {
+    const before = [
+      { x: 0, y: 0 },
+      { x: 100, y: 0 },
+    ];
+    const after = [
+      { x: -40, y: 10 },
+      { x: 160, y: 10 },
+    ];
+    expect(pinch(before, after)).toEqual({ dx: 10, dy: 10, x: 60, y: 10, factor: 2 });
+  });
+  it("do nothing when one is missing", () => expect(pinch([{ x: 0, y: 0 }], [])).toBeUndefined());
+  it("do not zoom when they lie on each other", () => {
+    const same = [
+      { x: 5, y: 5 },
+      { x: 5, y: 5 },
+    ];
+    expect(pinch(same, same)?.factor).toBe(1);
+  });
+});
+
+describe("settings of a project", () => {
+  it("come back as they were", () => {
+    const text = JSON.stringify({ bind: BIND_DEFAULTS, symmetry: true, pose: "AAEC" });
+    const settings = readSettings(text);
+    expect(settings).toEqual({ bind: BIND_DEFAULTS, symmetry: true, pose: "AAEC" });
+    expect(poseOf(settings)).toEqual(Uint8Array.of(0, 1, 2));
+  });
+  it("are dropped part by part when they are not what they should be", () => {
+    expect(readSettings("not json")).toEqual({});
+    expect(readSettings("[1]")).toEqual({});
+    expect(readSettings(JSON.stringify({ bind: { grid: 100_000 }, pose: 7 }))).toEqual({});
+    expect(poseOf({ pose: "***" })).toBeUndefined();
+  });
+});
+
+describe("the plot", () => {
+  it("spans whole powers of ten and holds the threshold", () => {
+    const scale = scaleOf(
+      [
+        {
+          name: "a",
+          kind: "now",
+          points: [
+            [1, 0.03],
+            [9, 2e-4],
+          ],
+        },
+      ],
+      1e-5,
+    );
+    expect(scale).toEqual({ lowest: -5, highest: -1, last: 9 });
+  });
+  it("places a history by its interval and skips zeros", () => {
+    expect(historyPoints([0.1, 0, 0.01], 10)).toEqual([
+      [10, 0.1],
+      [30, 0.01],
+    ]);
+  });
+  it("grows by new iterations only, and stays short", () => {
+    let curve = grown([], 1, 0.5);
+    curve = grown(curve, 1, 0.4);
+    curve = grown(curve, 2, null);
+    expect(curve).toEqual([[1, 0.5]]);
+    for (let i = 2; i < 5000; i += 1) curve = grown(curve, i, 1 / i);
+    expect(curve.length).toBeLessThanOrEqual(601);
+    expect(curve.at(-1)?.[0]).toBe(4999);
+  });
+});
+
+describe("words", () => {
+  it("make sentences of Rust's messages", () => {
+    expect(sentence("cage is not closed: edge 12-40 has one triangle")).toBe(
+      "Cage is not closed: edge 12-40 has one triangle.",
+    );
+    expect(sentence("  ")).toBe("Something went wrong.");
+  });
+  it("offer the fix of an error by its name", () => {
+    const error = new Error("needs 3 GB");
+    error.name = "Memory";
+    expect(explain(error, "No bind").fix).toBe("coarser");
+    expect(explain("plain", "No bind")).toEqual({ title: "No bind", message: "Plain." });
+  });
+  it("know a cancellation", () => {
+    const error = new Error("cancelled");
+    error.name = "Cancelled";
+    expect(isCancelled(error)).toBe(true);
+  });
+  it("find a free name for a pose", () => {
+    const poses = ["Pose 2", "Jump"].map((name) => ({ name, positions: new Float32Array() }));
+    expect(freshName(poses)).toBe("Pose 3");
+    expect(freshName(poses.slice(0, 1))).toBe("Pose 3");
+  });
+  it("say how long ago", () => {
+    expect(ago(10_000)).toBe("a moment ago");
+    expect(ago(60_000)).toBe("1 minute ago");
+    expect(ago(7_200_000)).toBe("2 hours ago");
+    expect(ago(3 * 86_400_000)).toBe("3 days ago");
+  });
+});
+
+it("tells software GPUs from real ones", () => {
+  expect(isSoftware("ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (LLVM 10.0.0)))")).toBe(true);
+  expect(isSoftware("llvmpipe (LLVM 15.0.6, 256 bits)")).toBe(true);
+  expect(isSoftware("NVIDIA GeForce RTX 4070")).toBe(false);
+});
+
+describe("browsers", () => {
+  it("are told apart by their user agents", () => {
+    const edge =
+      "Mozilla/5.0 (Windows NT 10.0; Win64; x64) AppleWebKit/537.36 Chrome/140.0 Safari/537.36 Edg/140.0";
+    const safari =
+      "Mozilla/5.0 (Macintosh; Intel Mac OS X 10_15_7) AppleWebKit/605.1.15 Version/17.6 Safari/605.1.15";
+    const chrome = "Mozilla/5.0 (X11; Linux x86_64) AppleWebKit/537.36 Chrome/144.0.0.0 Safari/537.36";
+    const firefox = "Mozilla/5.0 (Android 14; Mobile; rv:140.0) Gecko/140.0 Firefox/140.0";
+    expect(recognise(edge)).toEqual({ browser: "edge", system: "windows" });
+    expect(recognise(safari)).toEqual({ browser: "safari", system: "mac" });
+    expect(recognise(chrome)).toEqual({ browser: "chrome", system: "linux" });
+    expect(recognise(firefox)).toEqual({ browser: "firefox", system: "android" });
+  });
+});
+
+it("a rubber band has its corner at the top left", () => {
+  expect(rectangle({ x: 10, y: 5 }, { x: 4, y: 8 })).toEqual({ x: 4, y: 5, width: 6, height: 3 });
+});

@@ -1,0 +1,7 @@
+import { defineConfig } from "vitest/config";
+
+/** Logic of the TypeScript alone; what needs a browser is in e2e/. */
+export default defineConfig({
+  root: import.meta.dirname,
+  test: { include: ["test/**/*.test.ts"] },
+});
