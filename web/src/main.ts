@@ -88,7 +88,9 @@ async function main(): Promise<void> {
     view.refresh();
     bindSoon(600);
   });
-  const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"));
+  const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"), () =>
+    stage.viewport.getBoundingClientRect(),
+  );
   const poses = createPoses(ctx, edit);
   const exports = createExports(ctx, project, () => stage.viewport.getBoundingClientRect());
   const files = createFiles(ctx, {

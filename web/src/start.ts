@@ -40,9 +40,14 @@ export function startUp({ app, stage, theme, shared, product }: Start): void {
     const name = model ? `${model.name} - ${product}` : product;
     document.title = share === null || share === undefined ? name : `${percent(share)} - ${name}`;
   });
-  store.watch(["cage", "poses", "posed", "selected", "bindOptions", "symmetry", "bound"], ({ bound }) => {
-    if (bound) app.project.touch();
-  });
+  store.watch(
+    ["cage", "poses", "posed", "selected", "bindOptions", "symmetry", "bound", "undoLabel"],
+    ({ bound, sampleCage, undoLabel }) => {
+      // A sample that nobody has touched is no work to come back to.
+      const untouched = sampleCage && undoLabel === null;
+      if (bound && !untouched) app.project.touch();
+    },
+  );
 
   void open(app, shared);
   window.addEventListener("hashchange", () => void openShared(app, shared));

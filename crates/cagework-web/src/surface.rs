@@ -11,8 +11,11 @@ pub(crate) struct Surface {
     config: wgpu::SurfaceConfiguration,
     /// Format that is drawn in: the canvas's, with sRGB encoding.
     format: wgpu::TextureFormat,
-    /// Two halves of the picture, drawn apart.
-    halves: Option<[wgpu::Texture; 2]>,
+    /// What is drawn into and then copied to the canvas: the whole picture, or two halves.
+    ///
+    /// Not the canvas itself seen as sRGB: SwiftShader forgets to encode where multisampling resolves into such a view
+    /// (a clear of 0.2 arrives as 51, not 124).
+    parts: Vec<wgpu::Texture>,
 }
 
 impl Surface {
@@ -41,11 +44,10 @@ impl Surface {
             .get_default_config(&context.adapter, size[0], size[1])
             .ok_or_else(|| Fault::new("Canvas", "this GPU cannot draw into a canvas"))?;
         let format = config.format.add_srgb_suffix();
-        config.view_formats = vec![format];
         config.usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_DST;
         config.alpha_mode = wgpu::CompositeAlphaMode::Opaque;
         surface.configure(&context.device, &config);
-        Ok((Self { surface, config, format, halves: None }, context))
+        Ok((Self { surface, config, format, parts: Vec::new() }, context))
     }
 
     /// Gives the canvas another size, pixels.
@@ -56,7 +58,7 @@ impl Surface {
             return;
         }
         [self.config.width, self.config.height] = size;
-        self.halves = None;
+        self.parts.clear();
         self.surface.configure(&context.device, &self.config);
     }
 
@@ -84,48 +86,39 @@ impl Surface {
             | wgpu::CurrentSurfaceTexture::Occluded
             | wgpu::CurrentSurfaceTexture::Validation => return Ok(false),
         };
-        let view = |texture: &wgpu::Texture| {
-            texture.create_view(&wgpu::TextureViewDescriptor {
-                format: Some(self.format),
-                ..wgpu::TextureViewDescriptor::default()
-            })
-        };
-        let size = [self.config.width, self.config.height];
-        let Some(other) = other.filter(|_| size[0] > 1) else {
-            self.halves = None;
-            session.frame(&view(&frame.texture), self.format, size, scale)?;
-            context.queue.present(frame);
-            return Ok(true);
-        };
-        let half = [size[0] / 2, size[1]];
-        let halves = self.halves.take().unwrap_or_else(|| self.make_halves(&context, half));
-        session.frame(&view(&halves[0]), self.format, half, scale)?;
-        other.frame(&view(&halves[1]), self.format, half, scale)?;
+        let [width, height] = [self.config.width, self.config.height];
+        let other = other.filter(|_| width > 1);
+        let size = if other.is_some() { [width / 2, height] } else { [width, height] };
+        let n_parts = 1 + usize::from(other.is_some());
+        if self.parts.len() != n_parts {
+            self.parts = (0..n_parts).map(|_| self.make_part(&context, size)).collect();
+        }
         let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        for (k, texture) in halves.iter().enumerate() {
+        for (k, (texture, session)) in
+            self.parts.iter().zip([Some(session), other].into_iter().flatten()).enumerate()
+        {
+            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+            session.frame(&view, self.format, size, scale)?;
             let mut place = frame.texture.as_image_copy();
             // An odd column between the halves stays clear: the divider.
-            place.origin.x = k as u32 * (size[0] - half[0]);
+            place.origin.x = k as u32 * (width - size[0]);
             encoder.copy_texture_to_texture(texture.as_image_copy(), place, texture.size());
         }
         context.queue.submit([encoder.finish()]);
-        self.halves = Some(halves);
         context.queue.present(frame);
         Ok(true)
     }
 
-    fn make_halves(&self, context: &GpuContext, [width, height]: [u32; 2]) -> [wgpu::Texture; 2] {
-        std::array::from_fn(|_| {
-            context.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("half of the picture"),
-                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: self.config.format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[self.format],
-            })
+    fn make_part(&self, context: &GpuContext, [width, height]: [u32; 2]) -> wgpu::Texture {
+        context.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("picture"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: self.format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
         })
     }
 }

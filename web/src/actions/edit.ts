@@ -196,7 +196,7 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
       const fromRest = beforeRest;
       before = undefined;
       beforeRest = undefined;
-      const { count } = ctx.store.get().selected;
+      const count = engine().selection().length;
       const moved = engine().endTransform(keepIt);
       ctx.store.set({ gesture: null });
       if (moved) keep(`${verb} ${plural(count, "vertex", "vertices")}`, from, fromRest);

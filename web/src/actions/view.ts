@@ -28,8 +28,15 @@ export interface View {
 
 /** Pause before a moved slice is computed, ms: a slider sends many positions. */
 const SLICE_PAUSE_MS = 90;
+/** Half the width holds the model when it is this much smaller. */
+const HALF_ZOOM = 0.6;
 
-export function createView(ctx: Context, prepareCompare: () => Promise<boolean>, dark: MediaQueryList): View {
+export function createView(
+  ctx: Context,
+  prepareCompare: () => Promise<boolean>,
+  dark: MediaQueryList,
+  viewport: () => DOMRect,
+): View {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
   let sliceJob: Job<void> | undefined;
@@ -80,8 +87,14 @@ export function createView(ctx: Context, prepareCompare: () => Promise<boolean>,
       sliceTimer = setTimeout(() => void loadSlice(), SLICE_PAUSE_MS);
     },
     async compare(on) {
-      if (on && !(await prepareCompare())) return;
+      if (on && !(await prepareCompare())) {
+        scene({ compare: false });
+        return;
+      }
+      if (store.get().scene.compare === on) return;
       scene({ compare: on });
+      const { width, height } = viewport();
+      engine().zoomAt(width / 2, height / 2, on ? HALF_ZOOM : 1 / HALF_ZOOM);
     },
     frameAll: () => engine().frameAll(),
     frameSelection: () => engine().frameSelection(),

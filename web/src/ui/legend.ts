@@ -8,6 +8,7 @@ import { h, setText } from "./dom";
 export function createLegend(app: App): HTMLElement {
   const title = h("strong");
   const low = h("span");
+  const middle = h("span", { class: "grow" });
   const high = h("span");
   const ramp = h("div", { class: "ramp" });
   const element = h(
@@ -15,7 +16,7 @@ export function createLegend(app: App): HTMLElement {
     { class: "floating legend" },
     h("figcaption", {}, title),
     ramp,
-    h("div", { class: "row ends" }, low, h("span", { class: "grow" }), high),
+    h("div", { class: "row ends" }, low, middle, high),
   );
   app.store.watch(["legend", "scene", "selected"], ({ legend, scene, selected }) => {
     element.hidden = legend === null;
@@ -23,6 +24,7 @@ export function createLegend(app: App): HTMLElement {
     ramp.dataset.map = legend.map;
     setText(title, legendTitle(scene, selected.last));
     setText(low, legend.map === "kinds" ? "inside" : scientific(legend.low));
+    setText(middle, legend.map === "kinds" ? "on the cage" : "");
     setText(high, legend.map === "kinds" ? "outside" : scientific(legend.high));
     element.setAttribute("aria-label", `${title.textContent}: ${low.textContent} to ${high.textContent}`);
   });
