@@ -35,14 +35,14 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     let width = camera.scale;
     let fine = lines(at, slope, width);
     let coarse = lines(0.1 * at, 0.1 * slope, width);
-    var alpha = max(0.45 * max(fine.x, fine.y), max(coarse.x, coarse.y)) * camera.floor_color.a;
+    var alpha = max(0.36 * max(fine.x, fine.y), max(coarse.x, coarse.y)) * camera.floor_color.a;
     var color = camera.floor_color.rgb;
     // Where x = 0 the line runs along z, and the other way round.
     let axes = clamp(vec2f(width) - abs(at) / max(slope, vec2f(1e-6)), vec2f(0.0), vec2f(1.0));
     if axes.x > 0.0 { color = mix(color, Z_COLOR, axes.x); alpha = max(alpha, 0.75 * axes.x); }
     if axes.y > 0.0 { color = mix(color, X_COLOR, axes.y); alpha = max(alpha, 0.75 * axes.y); }
     let distance = length(in.world - camera.floor_center) / camera.floor_radius;
-    let fade = 1.0 - smoothstep(0.25, 1.0, distance);
+    let fade = 1.0 - smoothstep(0.15, 1.0, distance);
     let steep = clamp(6.0 * abs(dot(to_eye(in.world), vec3f(0.0, 1.0, 0.0))), 0.0, 1.0);
     alpha *= fade * steep;
     if alpha <= 0.002 { discard; }

@@ -29,8 +29,9 @@ const BLENDED = 4u;
 
 struct Varying {
     @builtin(position) clip: vec4f,
-    @location(0) world: vec3f,
-    @location(1) normal: vec3f,
+    // At the samples that are covered: beyond an outline, normals would turn away from the eye.
+    @location(0) @interpolate(perspective, centroid) world: vec3f,
+    @location(1) @interpolate(perspective, centroid) normal: vec3f,
     @location(2) uv: vec2f,
     @location(3) color: vec4f,
     @location(4) value: f32,
@@ -54,7 +55,7 @@ fn value_color(value: f32) -> vec3f {
 }
 
 @fragment
-fn fragment(in: Varying) -> @location(0) vec4f {
+fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
     // Before any branch: derivatives need whole quads of pixels.
     let texel = textureSample(base_texture, base_sampler, in.uv);
     let flat_normal = cross(dpdx(in.world), dpdy(in.world));
@@ -66,7 +67,9 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     if surface.mode == MATERIAL { base.a = 1.0; }
     var normal = in.normal;
     // A vertex whose triangles have no area has no normal; the picture's own slope then does.
-    if dot(normal, normal) < 1e-6 { normal = flat_normal; }
+    // Either side of the surface is lit.
+    if !is_front { normal = -normal; }
+    if dot(normal, normal) < 1e-6 { normal = faceForward(flat_normal, -to_eye(in.world), flat_normal); }
     if dot(normal, normal) < 1e-30 { normal = to_eye(in.world); }
     var lit = studio_light(base.rgb, in.world, normalize(normal));
     // Colours that mean a value keep most of their own.

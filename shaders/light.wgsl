@@ -2,20 +2,18 @@
 
 const KEY_DIRECTION = vec3f(-0.43, 0.56, 0.71);
 const FILL_DIRECTION = vec3f(0.81, 0.05, 0.58);
-const KEY_COLOR = vec3f(0.80, 0.78, 0.74);
+const KEY_COLOR = vec3f(0.90, 0.88, 0.84);
 const FILL_COLOR = vec3f(0.14, 0.16, 0.20);
-const SKY_COLOR = vec3f(0.30, 0.32, 0.36);
-const GROUND_COLOR = vec3f(0.13, 0.12, 0.12);
+const SKY_COLOR = vec3f(0.26, 0.28, 0.32);
+const GROUND_COLOR = vec3f(0.10, 0.095, 0.09);
 /// Blinn-Phong highlight and rim.
 const GLOSS = 28.0;
 const HIGHLIGHT = 0.07;
 const RIM = 0.10;
 
-/// Light that a surface of `color` sends to the eye. `normal`: unit, world space; either side of the surface is lit.
-fn studio_light(color: vec3f, point: vec3f, world_normal: vec3f) -> vec3f {
+/// Light that a surface of `color` sends to the eye. `normal`: unit, world space, towards the eye's side.
+fn studio_light(color: vec3f, point: vec3f, normal: vec3f) -> vec3f {
     let view = to_eye(point);
-    let facing = dot(world_normal, view);
-    let normal = select(world_normal, -world_normal, facing < 0.0);
     let in_view = (camera.view_from_world * vec4f(normal, 0.0)).xyz;
     let view_in_view = (camera.view_from_world * vec4f(view, 0.0)).xyz;
     // Half Lambert on the key light: the terminator is soft, as of a large lamp.
@@ -24,7 +22,7 @@ fn studio_light(color: vec3f, point: vec3f, world_normal: vec3f) -> vec3f {
     let sky = mix(GROUND_COLOR, SKY_COLOR, 0.5 + 0.5 * normal.y);
     let half_way = normalize(KEY_DIRECTION + view_in_view);
     let highlight = HIGHLIGHT * pow(max(0.0, dot(in_view, half_way)), GLOSS);
-    let edge = 1.0 - abs(facing);
+    let edge = 1.0 - clamp(dot(normal, view), 0.0, 1.0);
     let rim = RIM * edge * edge * edge * (0.5 + 0.5 * normal.y);
     return color * (key * key * KEY_COLOR + fill * FILL_COLOR + sky) + highlight + rim;
 }

@@ -7,7 +7,13 @@
 #[cfg(test)]
 mod suite;
 
+use std::sync::OnceLock;
+
 use cagework_core::bind::{BindOptions, Method, Solver};
+use cagework_core::{BindError, Binding, Cage, Progress};
+use cagework_gpu::{ContextOptions, GpuContext, GpuError, PlanError, bind_gpu};
+use glam::Vec3;
+use pollster::block_on;
 use suite::BackEnd;
 
 /// One test per property of one back end.
@@ -84,6 +90,36 @@ fn cpu(method: Method, solver: Solver, threads: usize) -> BackEnd {
     }
 }
 
+/// A back end on the GPU; one device serves all tests.
+fn gpu(method: Method, solver: Solver) -> BackEnd {
+    fn bind(
+        positions: &[Vec3],
+        cage: &Cage,
+        options: &BindOptions,
+        progress: &dyn Progress,
+    ) -> Result<Binding, BindError> {
+        static CONTEXT: OnceLock<GpuContext> = OnceLock::new();
+        let context = CONTEXT.get_or_init(|| match block_on(GpuContext::new(&ContextOptions::default())) {
+            Ok(context) => context,
+            Err(error) => panic!("these tests need a Vulkan adapter: {error}"),
+        });
+        match block_on(bind_gpu(positions, cage, options, progress, context)) {
+            Ok((binding, _)) => Ok(binding),
+            Err(GpuError::Bind(error)) => Err(error),
+            // The suite asks for the memory of the whole, wherever it is.
+            Err(GpuError::Plan(PlanError::Memory { needed, limit })) => {
+                Err(BindError::Memory { needed, limit })
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+    BackEnd { bind, options: BindOptions { method, solver, ..BindOptions::default() } }
+}
+
+solver_suite!(embedded_multigrid_gpu, embedded, gpu(Method::Embedded, Solver::Multigrid));
+solver_suite!(embedded_jacobi_gpu, embedded, gpu(Method::Embedded, Solver::Jacobi));
+solver_suite!(classic_multigrid_gpu, every, gpu(Method::Classic, Solver::Multigrid));
+solver_suite!(classic_jacobi_gpu, every, gpu(Method::Classic, Solver::Jacobi));
 solver_suite!(embedded_multigrid_one_thread, embedded, cpu(Method::Embedded, Solver::Multigrid, 1));
 solver_suite!(embedded_multigrid_all_threads, embedded, cpu(Method::Embedded, Solver::Multigrid, 0));
 solver_suite!(embedded_jacobi_one_thread, embedded, cpu(Method::Embedded, Solver::Jacobi, 1));
@@ -116,6 +152,15 @@ mod agreement {
         for method in METHODS {
             let [jacobi, multigrid] = [Solver::Jacobi, Solver::Multigrid].map(|s| cpu(method, s, 0));
             suite::agreement::solvers_agree(&jacobi, &multigrid);
+        }
+    }
+
+    #[test]
+    fn gpu_and_processor_agree() {
+        for method in METHODS {
+            for solver in [Solver::Jacobi, Solver::Multigrid] {
+                suite::agreement::solvers_agree(&cpu(method, solver, 0), &gpu(method, solver));
+            }
         }
     }
 

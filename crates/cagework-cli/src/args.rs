@@ -1,12 +1,15 @@
 //! The command line: what can be said, and what is refused before any work starts (exit code 2).
 
 mod cages;
+mod render;
 
 use std::path::PathBuf;
 
 pub(crate) use cages::{CageArgs, CageSource, CheckArgs, DEFAULT_DIVISIONS, DEFAULT_MARGIN, KindArg};
 use cagework_core::bind::{BindOptions, CellShape, DeltaNorm, Method, OutsidePolicy, Solver};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+
+pub(crate) use render::{RenderArgs, Show};
 
 /// Bind a 3-D model to a cage by harmonic coordinates, then deform it by moving the cage.
 #[derive(Debug, Parser)]
@@ -38,6 +41,8 @@ pub(crate) enum Command {
     Bind(BindArgs),
     /// Move the cage, and the mesh with it.
     Deform(DeformArgs),
+    /// Draw a picture of a model in its cage (needs a GPU, or the software one of mesa-vulkan-drivers).
+    Render(RenderArgs),
     /// Make a cage for a model: one that follows it, its convex hull, or a subdivided box.
     Cage(CageArgs),
     /// Say everything that is wrong with a cage, and mend what can be mended.
@@ -124,16 +129,19 @@ pub(crate) struct SolveArgs {
     /// Refuse to start above this much working memory, in MiB.
     #[arg(long, default_value_t = 4096, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
     memory_limit: u64,
-    /// Where to compute.
+    /// Where to compute; CAGEWORK_ADAPTER chooses among several GPUs by part of a name.
     #[arg(long, value_enum, default_value_t = BackendArg::Cpu)]
     backend: BackendArg,
 }
 
 impl SolveArgs {
+    /// Whether the GPU is to solve.
+    pub(crate) fn on_gpu(&self) -> bool {
+        matches!(self.backend, BackendArg::Gpu)
+    }
+
     /// The options of a bind on `grid` cells.
     pub(crate) fn options(&self, grid: u32) -> BindOptions {
-        // One back end so far: naming it is allowed, so that scripts can already say what they mean.
-        let BackendArg::Cpu = self.backend;
         let method = match self.method {
             MethodArg::Classic => Method::Classic,
             MethodArg::Embedded => Method::Embedded,
@@ -274,6 +282,7 @@ enum OutsideArg {
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum BackendArg {
     Cpu,
+    Gpu,
 }
 
 fn positive(text: &str) -> Result<f32, String> {

@@ -5,13 +5,15 @@ use std::path::{Path, PathBuf};
 use cagework_core::bind::{BindOptions, Binding};
 use cagework_core::deform::deform_bound;
 use cagework_core::{Cage, bind};
+use cagework_gpu::{GpuContext, bind_gpu};
 use cagework_io::{Model, write_cage_obj, write_weights_npz};
 use glam::Vec3;
 
-use crate::args::{BindArgs, CageSource};
+use crate::args::{BindArgs, CageSource, SolveArgs};
 use crate::card;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, write};
+use crate::gpu;
 use crate::load::{load_cage, load_model};
 use crate::progress::Bar;
 
@@ -35,7 +37,7 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
 
     let model = load_model(&args.mesh)?;
     let cage = load_cage(&args.cage, &model)?.cage;
-    let binding = bind_model(&model, &cage, &args.solve.options(args.grid))?;
+    let binding = bind_positions(&model.positions, &cage, &args.solve, args.grid)?;
 
     if let Some(path) = &args.weights {
         write(path, &write_weights_npz(&binding.weights, &binding.outside))?;
@@ -64,6 +66,40 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
 pub(crate) fn bind_model(model: &Model, cage: &Cage, options: &BindOptions) -> Result<Binding, CliError> {
     let bar = Bar::start();
     Ok(bind(&model.positions, cage, options, &bar)?)
+}
+
+/// Binds positions where the arguments say, with progress on the terminal.
+///
+/// # Errors
+/// When the bind fails or is cancelled, or there is no GPU.
+pub(crate) fn bind_positions(
+    positions: &[Vec3],
+    cage: &Cage,
+    solve: &SolveArgs,
+    grid: u32,
+) -> Result<Binding, CliError> {
+    let options = solve.options(grid);
+    if solve.on_gpu() {
+        let context = gpu::open()?;
+        return bind_on(&context, positions, cage, &options);
+    }
+    let bar = Bar::start();
+    Ok(bind(positions, cage, &options, &bar)?)
+}
+
+/// Binds positions on a GPU, with progress on the terminal.
+///
+/// # Errors
+/// When the bind fails or is cancelled.
+pub(crate) fn bind_on(
+    context: &GpuContext,
+    positions: &[Vec3],
+    cage: &Cage,
+    options: &BindOptions,
+) -> Result<Binding, CliError> {
+    let bar = Bar::start();
+    let (binding, _) = pollster::block_on(bind_gpu(positions, cage, options, &bar, context))?;
+    Ok(binding)
 }
 
 /// Where the bound vertices go for a posed cage. `[n_vertices]`, object units.

@@ -13,7 +13,8 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
         let _ = writeln!(out, "  {name:<12}{value}");
     };
     let threads = if report.threads == 1 { "1 thread".into() } else { format!("{} threads", report.threads) };
-    row("method", format!("{}, {}, {} ({threads})", method(report), solver(report.solver), report.backend));
+    let place = report.adapter.clone().unwrap_or(threads);
+    row("method", format!("{}, {}, {} ({place})", method(report), solver(report.solver), report.backend));
     let [x, y, z] = report.dims;
     row("grid", format!("{} ({x} x {y} x {z} cells)", report.grid));
     let cells = report.cells;

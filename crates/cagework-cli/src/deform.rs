@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
+use cagework_core::Weights;
 use cagework_core::deform::deform_bound;
 use cagework_io::read_weights_npz;
 use glam::Vec3;
@@ -55,18 +56,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         read_weights_npz(&read(&args.weights)?).map_err(|e| CliError::file(&args.weights, e))?;
     let n_vertices = model.positions.len();
     let n_cage = cage.cage.positions().len();
-    if (weights.n_rows(), weights.n_columns()) != (n_vertices, n_cage) {
-        return Err(CliError::Mismatch {
-            message: format!(
-                "{}: holds weights of {} mesh vertices for {} cage vertices, but the mesh has {n_vertices} \
-                 vertices and the cage {n_cage}",
-                args.weights.display(),
-                weights.n_rows(),
-                weights.n_columns(),
-            ),
-            hint: "use the mesh and the cage that were bound, or bind these two",
-        });
-    }
+    check_weights(&args.weights, &weights, n_vertices, n_cage)?;
     let poses = args.pose.iter().map(|path| cage.load_pose(path)).collect::<Result<Vec<_>, _>>()?;
 
     let started = Instant::now();
@@ -92,6 +82,31 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         notices: model.notices,
     };
     print(&if as_json { json(&done) } else { text(&done) })
+}
+
+/// Checks that weights belong to a mesh and a cage.
+///
+/// # Errors
+/// With both numbers.
+pub(crate) fn check_weights(
+    path: &Path,
+    weights: &Weights,
+    n_vertices: usize,
+    n_cage: usize,
+) -> Result<(), CliError> {
+    if (weights.n_rows(), weights.n_columns()) == (n_vertices, n_cage) {
+        return Ok(());
+    }
+    Err(CliError::Mismatch {
+        message: format!(
+            "{}: holds weights of {} mesh vertices for {} cage vertices, but the mesh has {n_vertices} vertices and \
+             the cage {n_cage}",
+            path.display(),
+            weights.n_rows(),
+            weights.n_columns(),
+        ),
+        hint: "use the mesh and the cage that were bound, or bind these two",
+    })
 }
 
 /// A pose is called as its file is, without folder and ending.

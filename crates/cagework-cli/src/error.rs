@@ -7,6 +7,7 @@ use cagework_core::bind::BindError;
 use cagework_core::cage::CageError;
 use cagework_core::cage_check::RepairError;
 use cagework_core::cage_gen::CageGenError;
+use cagework_gpu::GpuError;
 use thiserror::Error;
 
 /// Why a command failed.
@@ -37,6 +38,9 @@ pub(crate) enum CliError {
     /// The bind did not come about.
     #[error(transparent)]
     Bind(#[from] BindError),
+    /// The GPU, or a bind on it.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
     /// No cage was generated.
     #[error(transparent)]
     CageGen(#[from] CageGenError),
@@ -87,11 +91,16 @@ impl CliError {
             Self::Cage { source: CageError::Empty, .. } => {
                 Some("a cage is a closed mesh around the model; `--cage auto` makes one")
             }
-            Self::Bind(BindError::Outside { .. }) => {
+            Self::Bind(BindError::Outside { .. }) | Self::Gpu(GpuError::Bind(BindError::Outside { .. })) => {
                 Some("`--outside closest-point` binds such vertices to the closest point of the cage")
             }
+            Self::Gpu(GpuError::NoAdapter { .. }) => Some(
+                "a bind does not need one: leave out `--backend gpu`; CAGEWORK_ADAPTER chooses among several",
+            ),
+            Self::Bind(BindError::Memory { .. }) | Self::Gpu(GpuError::Bind(BindError::Memory { .. })) => {
+                Some("the limit is set by --memory-limit, in MiB")
+            }
             Self::Repair(RepairError::NoModel) => Some("`--mesh` names it"),
-            Self::Bind(BindError::Memory { .. }) => Some("the limit is set by --memory-limit, in MiB"),
             _ => None,
         }
     }

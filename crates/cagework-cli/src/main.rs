@@ -13,9 +13,11 @@ mod demo;
 mod error;
 mod evaluate;
 mod files;
+mod gpu;
 mod info;
 mod load;
 mod progress;
+mod render;
 mod sample;
 
 use std::io::Write as _;
@@ -35,6 +37,7 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(args, cli.json),
         Command::Bind(args) => bind::run(args, cli.json),
         Command::Deform(args) => deform::run(args, cli.json),
+        Command::Render(args) => render::run(args, cli.json),
         Command::Cage(args) => cage::run(args, cli.json),
         Command::Check(args) => check::run(args, cli.json),
         Command::Bench(args) => bench::run(args, cli.json),

@@ -88,6 +88,7 @@ async fn solve_and_sample(
         delta_interval: outcome.delta_interval,
         residual_history: outcome.residual_history,
         field_bytes: allocator.allocated() as usize,
+        planned_bytes: plan.bytes(),
         solve_share: if all_ms > 0.0 { outcome.solve_ms / all_ms } else { 1.0 },
         adapter: Some(context.adapter_name()),
     })

@@ -20,7 +20,7 @@ mod project;
 
 pub use error::{PoseError, ReadError, WriteError};
 pub use gltf::{GltfError, write_mesh_glb};
-pub use look::{Look, LookAlpha, LookCorner, LookGroup, LookTexture, LookWrap};
+pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
 pub use model::{Counts, Format, Model};
 pub use npz::{NpzError, read_weights_npz, write_weights_npz};
 pub use obj::{ObjError, write_cage_obj};

@@ -1,33 +1,63 @@
-//! How a model looks: corners with texture coordinates and colours, materials, encoded textures.
+//! How a model looks: texture coordinates, colours, materials and the bytes of their textures.
 //!
-//! Only what a preview shows: base colour, its texture and transparency. Everything else a document says about its
-//! materials stays in the document. Damage here never refuses a model: the shape matters more.
+//! Decoration, so nothing here is an error: what cannot be read is left out. Images stay undecoded: a browser does that
+//! itself, and a command has a library for it.
 
-use std::collections::HashMap;
 use std::ops::Range;
 
-use crate::model::{Document, Model};
-use crate::obj::NONE;
+/// A model's triangles for drawing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Look {
+    /// Corners of triangles. `[n_corners]`
+    pub vertices: Vec<LookVertex>,
+    /// Indices into `vertices`; the model's triangles, those of one material in a row. `[n_triangles]`
+    pub triangles: Vec<[u32; 3]>,
+    /// Materials of ranges of triangles; those of none have no material.
+    pub groups: Vec<LookGroup>,
+    /// Images that materials name.
+    pub images: Vec<LookImage>,
+}
 
 /// A corner of triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LookCorner {
-    /// The model's vertex that it moves with and shares its normal with.
+pub struct LookVertex {
+    /// The model's vertex that it moves with. Corners that are one surface at a seam of a glTF name one vertex, so that
+    /// normals of the moved mesh show no seam; where the file has a hard edge, they name different ones.
     pub source: u32,
-    /// Texture coordinates, v downwards as in glTF.
+    /// Texture coordinates, v downwards, transformed by the material.
     pub uv: [f32; 2],
-    /// Factor of the base colour, linear RGBA, 0 to 1.
+    /// Factor of the base colour, linear RGBA.
     pub color: [f32; 4],
 }
 
-/// What alpha means.
+/// Triangles of one material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LookGroup {
+    /// Range of [`Look::triangles`].
+    pub triangles: Range<u32>,
+    /// Base colour factor, linear RGBA.
+    pub base_color: [f32; 4],
+    /// Base colour texture, an index into [`Look::images`].
+    pub image: Option<u32>,
+    /// What the texture is outside its image, along u and v.
+    pub wrap: [LookWrap; 2],
+    /// What alpha means.
+    pub alpha: LookAlpha,
+    /// Whether the file asks for both sides to be drawn.
+    pub double_sided: bool,
+}
+
+/// What alpha means (glTF 2.0, section 3.9.4).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum LookAlpha {
     /// Nothing.
     #[default]
     Opaque,
-    /// Below this nothing is drawn.
-    Mask(f32),
+    /// Below the cutoff nothing is drawn.
+    Mask {
+        /// The cutoff.
+        cutoff: f32,
+    },
     /// How much covers what is behind.
     Blend,
 }
@@ -44,75 +74,48 @@ pub enum LookWrap {
     Clamp,
 }
 
-/// Triangles of one material.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LookGroup {
-    /// Range of [`Look::triangles`].
-    pub triangles: Range<u32>,
-    /// Base colour factor, linear RGBA; nothing without a material.
-    pub base_color: Option<[f32; 4]>,
-    /// Base colour texture, an index into [`Look::textures`].
-    pub texture: Option<u32>,
-    /// What alpha means.
-    pub alpha: LookAlpha,
-}
-
-/// A texture as it lies in the file.
+/// An encoded image.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LookTexture {
-    /// PNG, JPEG or WebP file.
+pub struct LookImage {
+    /// PNG, JPEG or whatever the file has.
     pub bytes: Vec<u8>,
-    /// Its media type, empty if unknown.
+    /// Media type, by content where that is known.
     pub mime: String,
-    /// Along u and v.
-    pub wrap: [LookWrap; 2],
 }
 
-/// A model as it is drawn. Corners and the model's vertices are two lists: an OBJ's vertex may have several texture
-/// coordinates, and a glTF's vertices that were split at a seam must not show in the shading.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Look {
-    /// Corners of triangles. `[n_corners]`
-    pub corners: Vec<LookCorner>,
-    /// Indices into `corners`, in the order of the model's triangles but for OBJ files, where they are by material.
-    pub triangles: Vec<[u32; 3]>,
-    /// Materials of ranges of triangles, ascending, without gaps.
-    pub groups: Vec<LookGroup>,
-    /// Base colour textures in use.
-    pub textures: Vec<LookTexture>,
-}
-
-impl Model {
-    /// How the model looks.
-    #[must_use]
-    pub fn look(&self) -> Look {
-        match &self.document {
-            Document::Gltf(document) => crate::gltf::look(document, &self.positions, &self.triangles),
-            Document::Obj(document) => obj_look(document),
+impl Default for LookGroup {
+    fn default() -> Self {
+        Self {
+            triangles: 0..0,
+            base_color: [1.0; 4],
+            image: None,
+            wrap: [LookWrap::Repeat; 2],
+            alpha: LookAlpha::Opaque,
+            double_sided: false,
         }
     }
 }
 
-/// One corner for each distinct (vertex, texture coordinate); materials have no colours, because `.mtl` files are not
-/// read.
-fn obj_look(document: &crate::obj::ObjDocument) -> Look {
-    let mut look = Look::default();
-    let mut numbers = HashMap::new();
-    for triangle in &document.triangles {
-        look.triangles.push(triangle.map(|corner| {
-            let corner = document.corners[corner as usize];
-            *numbers.entry((corner.v, corner.vt)).or_insert_with(|| {
-                let uv = match corner.vt {
-                    NONE => [0.0; 2],
-                    vt => document.texcoords.get(vt as usize).map_or([0.0; 2], |&[u, v]| [u, 1.0 - v]),
-                };
-                look.corners.push(LookCorner { source: corner.v, uv, color: [1.0; 4] });
-                look.corners.len() as u32 - 1
-            })
-        }));
+impl LookVertex {
+    /// A corner without texture and colour.
+    #[must_use]
+    pub fn plain(source: u32) -> Self {
+        Self { source, uv: [0.0; 2], color: [1.0; 4] }
     }
-    let all = 0..look.triangles.len() as u32;
-    look.groups =
-        vec![LookGroup { triangles: all, base_color: None, texture: None, alpha: LookAlpha::Opaque }];
-    look
+}
+
+/// Media type by content: a wrong `mimeType` makes viewers refuse the texture.
+pub(crate) fn sniff_image(bytes: &[u8]) -> Option<&'static str> {
+    match bytes {
+        [0x89, b'P', b'N', b'G', ..] => Some("image/png"),
+        [0xff, 0xd8, 0xff, ..] => Some("image/jpeg"),
+        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some("image/webp"),
+        [0xab, b'K', b'T', b'X', b' ', b'2', b'0', ..] => Some("image/ktx2"),
+        _ => None,
+    }
+}
+
+/// Linear from sRGB (IEC 61966-2-1): colours of OBJ files are written as they look.
+pub(crate) fn linear_from_srgb(c: f32) -> f32 {
+    if c <= 0.040_45 { c.max(0.0) / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }

@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use crate::error::{PoseError, ReadError, WriteError};
 use crate::gltf::{self, GltfDocument, Pose, Rest};
+use crate::look::Look;
 use crate::obj::{self, ObjDocument};
 
 /// Format of a model's document.
@@ -65,7 +66,8 @@ pub(crate) enum Document {
 impl Model {
     /// Reads an OBJ, glTF or GLB file; the content decides which, `name` helps with the error if it is none of them.
     ///
-    /// `resolve` is asked for sibling files (buffers and textures of a `.gltf`) by relative path, percent-decoded;
+    /// `resolve` is asked for sibling files (buffers and textures of a `.gltf`, materials and textures of an OBJ) by
+    /// relative path, percent-decoded;
     /// `data:` URIs are decoded here. A file of vertices without faces is read: it may be a pose.
     ///
     /// # Errors
@@ -89,8 +91,8 @@ impl Model {
                 })
             }
             Format::Obj => {
-                let model =
-                    obj::read(bytes).map_err(|source| ReadError::Obj { name: name.into(), source })?;
+                let model = obj::read(bytes, resolve)
+                    .map_err(|source| ReadError::Obj { name: name.into(), source })?;
                 let corner = |c: u32| model.document.corners[c as usize].v;
                 Ok(Self {
                     name: name.into(),
@@ -107,6 +109,15 @@ impl Model {
                     document: Document::Obj(Box::new(model.document)),
                 })
             }
+        }
+    }
+
+    /// How the model looks: texture coordinates, colours, materials, undecoded images.
+    #[must_use]
+    pub fn look(&self) -> Look {
+        match &self.document {
+            Document::Obj(document) => obj::look(document),
+            Document::Gltf(document) => gltf::look(document, &self.positions, &self.triangles),
         }
     }
 

@@ -26,6 +26,11 @@ pub(crate) struct Shading {
 }
 
 impl Shading {
+    /// For each shading vertex the surface it belongs to, counted from 0.
+    pub(crate) fn clusters(&self) -> &[u32] {
+        &self.cluster
+    }
+
     /// `vertex`: model vertex of each shading vertex; `normal`: its original unit normal, zero where it has none;
     /// `triangles`: of shading vertices; `positions`: of model vertices, at rest.
     pub(crate) fn new(

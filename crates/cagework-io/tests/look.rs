@@ -1,67 +1,170 @@
-//! What a preview shows of a document.
+//! How models look: texture coordinates, colours, materials.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
 
 mod common;
 
-use cagework_io::{LookAlpha, LookWrap, Model};
-use common::{CUBE_OBJ, PNG, plain_cube, read, textured_square};
+use cagework_io::{Look, LookAlpha, LookWrap, Model};
+use common::{Builder, F32, PNG, U8, floats, plain_cube, read, textured_square};
 use serde_json::json;
 
-fn square(change: impl FnOnce(&mut serde_json::Value)) -> Model {
-    let mut builder = textured_square();
-    change(&mut builder.json);
-    Model::read("square.glb", &builder.glb(), &mut |uri| (uri == "red dot.png").then(|| PNG.to_vec()))
-        .unwrap()
+/// Numbers that went through sRGB and back.
+const COLOUR_TOLERANCE: f32 = 1e-4;
+
+fn look(builder: &Builder) -> Look {
+    read("x.glb", &builder.glb()).unwrap().look()
+}
+
+fn obj(text: &str, files: &[(&str, &[u8])]) -> Look {
+    let mut resolve = |name: &str| files.iter().find(|(n, _)| *n == name).map(|(_, bytes)| bytes.to_vec());
+    Model::read("x.obj", text.as_bytes(), &mut resolve).unwrap().look()
 }
 
 #[test]
-fn texture_and_material_of_the_document_are_shown() {
-    let look = square(|json| {
-        json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([1.0, 0.5, 0.25, 0.5]);
-        json["materials"][0]["alphaMode"] = json!("MASK");
-        json["samplers"] = json!([{ "wrapS": 33071, "wrapT": 33648 }]);
-        json["textures"][0]["sampler"] = json!(0);
-    })
-    .look();
-    let group = &look.groups[0];
-    assert_eq!((group.base_color, group.alpha), (Some([1.0, 0.5, 0.25, 0.5]), LookAlpha::Mask(0.5)));
-    let texture = &look.textures[group.texture.unwrap() as usize];
-    assert_eq!((&texture.bytes[..], texture.mime.as_str()), (&PNG[..], "image/png"));
-    assert_eq!(texture.wrap, [LookWrap::Clamp, LookWrap::Mirror]);
-}
-
-#[test]
-fn texture_transform_moves_coordinates() {
-    let plain = square(|_| {}).look();
-    let moved = square(|json| {
-        json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] =
-            json!({ "KHR_texture_transform": { "offset": [0.5, 0.25], "scale": [2.0, 3.0] } });
-    })
-    .look();
-    for (a, b) in plain.corners.iter().zip(&moved.corners) {
-        assert_eq!(b.uv, [2.0 * a.uv[0] + 0.5, 3.0 * a.uv[1] + 0.25]);
-    }
-}
-
-#[test]
-fn missing_or_damaged_looks_do_not_refuse_the_model() {
-    let look = square(|json| {
-        json["textures"][0]["source"] = json!(99);
-        json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!("red");
-    })
-    .look();
-    assert_eq!((look.groups[0].texture, look.groups[0].base_color), (None, Some([1.0; 4])));
-    let bare = read("cube.glb", &plain_cube().glb()).unwrap().look();
-    assert_eq!((bare.groups[0].base_color, bare.textures.len()), (None, 0));
-}
-
-#[test]
-fn corners_of_an_obj_are_its_distinct_texture_coordinates() {
-    let model = read("box.obj", CUBE_OBJ.as_bytes()).unwrap();
+fn texture_is_found_beside_the_file() {
+    let mut b = textured_square();
+    b.json["samplers"] = json!([{ "wrapS": 33_071, "wrapT": 33_648 }]);
+    b.json["textures"][0]["sampler"] = json!(0);
+    let bytes = b.glb();
+    let model =
+        Model::read("x.glb", &bytes, &mut |name| (name == "red dot.png").then(|| PNG.to_vec())).unwrap();
     let look = model.look();
-    assert_eq!(look.triangles.len(), model.triangles.len());
-    for (drawn, bound) in look.triangles.iter().zip(&model.triangles) {
-        assert_eq!(drawn.map(|c| look.corners[c as usize].source), *bound);
+    assert_eq!((look.images.len(), look.images[0].mime.as_str()), (1, "image/png"));
+    assert_eq!(look.images[0].bytes, PNG);
+    let group = &look.groups[0];
+    assert_eq!((group.triangles.clone(), group.image, group.base_color), (0..2, Some(0), [1.0; 4]));
+    assert_eq!(group.wrap, [LookWrap::Clamp, LookWrap::Mirror]);
+    let uvs: Vec<_> = look.vertices.iter().map(|v| v.uv).collect();
+    assert_eq!(uvs, [[0.0, 0.0], [0.5, 0.0], [0.5, 1.0], [0.0, 0.0], [0.5, 1.0], [0.0, 1.0]]);
+}
+
+#[test]
+fn missing_texture_leaves_the_colour() {
+    let mut b = textured_square();
+    b.json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([0.25, 0.5, 1.0, 0.75]);
+    let look = look(&b);
+    assert_eq!((look.images.len(), look.groups[0].image), (0, None));
+    assert_eq!(look.groups[0].base_color, [0.25, 0.5, 1.0, 0.75]);
+}
+
+#[test]
+fn image_in_a_buffer_view_is_cut_out() {
+    let mut b = textured_square();
+    let view = b.view(&PNG);
+    b.json["images"] = json!([{ "bufferView": view, "mimeType": "image/jpeg" }]);
+    let look = look(&b);
+    // The content says what it is.
+    assert_eq!((look.images[0].bytes.as_slice(), look.images[0].mime.as_str()), (&PNG[..], "image/png"));
+}
+
+#[test]
+fn seams_share_a_vertex_and_hard_edges_do_not() {
+    // Vertices 0 and 3, 2 and 4 of the square are split at the seam; normals agree.
+    let sources = |look: &Look| look.vertices.iter().map(|v| v.source).collect::<Vec<_>>();
+    assert_eq!(sources(&look(&textured_square())), [0, 1, 2, 0, 2, 5]);
+    let mut b = textured_square();
+    let half = [[0., 0., 1.], [0., 0., 1.], [0., 0., 1.], [1., 0., 0.], [1., 0., 0.], [1., 0., 0.]];
+    let normals = b.vec3(&half);
+    b.primitive(0)["attributes"]["NORMAL"] = json!(normals);
+    assert_eq!(sources(&look(&b)), [0, 1, 2, 3, 4, 5]);
+}
+
+/// KHR_texture_transform's example matrix: offset * rotation * scale.
+#[test]
+fn texture_transform_is_applied() {
+    let mut b = textured_square();
+    b.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = json!({
+        "KHR_texture_transform": { "offset": [0.1, 0.2], "rotation": std::f32::consts::FRAC_PI_2, "scale": [2.0, 4.0] }
+    });
+    let look = look(&b);
+    // (0.5, 1) scaled is (1, 4); turned by 90 degrees (4, -1); moved (4.1, -0.8).
+    let [u, v] = look.vertices[2].uv;
+    assert!((u - 4.1).abs() < 1e-5 && (v + 0.8).abs() < 1e-5, "{u} {v}");
+}
+
+#[test]
+fn colours_of_vertices_are_read_in_every_encoding() {
+    let mut b = plain_cube();
+    let bytes: Vec<u8> = (0..8).flat_map(|v| [255, 0, 17 * v, 128]).collect();
+    let colors = b.accessor(&bytes, U8, 8, "VEC4");
+    b.json["accessors"][colors]["normalized"] = json!(true);
+    b.primitive(0)["attributes"]["COLOR_0"] = json!(colors);
+    let [r, g, blue, a] = look(&b).vertices[3].color;
+    assert_eq!((r, g, blue), (1.0, 0.0, 51.0 / 255.0));
+    assert!((a - 128.0 / 255.0).abs() < 1e-6);
+    let mut b = plain_cube();
+    let colors = b.accessor(&floats(&[0.25, 0.5, 2.0].repeat(8)), F32, 8, "VEC3");
+    b.primitive(0)["attributes"]["COLOR_0"] = json!(colors);
+    assert_eq!(look(&b).vertices[0].color, [0.25, 0.5, 1.0, 1.0]);
+}
+
+#[test]
+fn alpha_and_sides_are_kept_and_no_material_is_no_group() {
+    assert!(look(&plain_cube()).groups.is_empty());
+    for (material, alpha) in [
+        (json!({ "alphaMode": "MASK" }), LookAlpha::Mask { cutoff: 0.5 }),
+        (json!({ "alphaMode": "MASK", "alphaCutoff": 0.25 }), LookAlpha::Mask { cutoff: 0.25 }),
+        (json!({ "alphaMode": "BLEND" }), LookAlpha::Blend),
+        (json!({ "alphaMode": "nonsense" }), LookAlpha::Opaque),
+    ] {
+        let mut b = plain_cube();
+        b.json["materials"] = json!([material]);
+        b.json["materials"][0]["doubleSided"] = json!(true);
+        b.primitive(0)["material"] = json!(0);
+        let group = &look(&b).groups[0];
+        assert_eq!((group.alpha, group.double_sided), (alpha, true));
     }
+}
+
+/// Nothing about looks may refuse a file.
+#[test]
+fn damaged_looks_are_left_out() {
+    let mut b = textured_square();
+    b.primitive(0)["attributes"]["COLOR_0"] = json!(9_999);
+    b.primitive(0)["material"] = json!(7);
+    assert!(look(&b).groups.is_empty());
+    let mut b = textured_square();
+    b.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = json!(50);
+    assert_eq!(look(&b).groups[0].image, None);
+    let mut b = textured_square();
+    b.json["images"] = json!([{ "bufferView": 500, "mimeType": "image/png" }]);
+    assert_eq!(look(&b).groups[0].image, None);
+}
+
+const SQUARE: &str = "mtllib paint box.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+    usemtl blue\nf 1/1 2/2 3/3\nusemtl plain\nf 1/2 3/3 4/4\nusemtl blue\nf 4/4 1/1 3/3\n";
+
+#[test]
+fn obj_gets_the_colours_of_its_materials() {
+    let mtl = b"# by hand\nnewmtl blue\nKd 0.5 0 1\nd 0.5\nnewmtl unused\nKd 1 1 1\n";
+    let look = obj(SQUARE, &[("paint box.mtl", mtl)]);
+    // Triangles of one material come together; those without one have no group.
+    assert_eq!((look.triangles.len(), look.groups.len()), (3, 1));
+    let group = &look.groups[0];
+    assert_eq!((group.triangles.clone(), group.alpha), (0..2, LookAlpha::Blend));
+    // sRGB 0.5 is linear 0.2140 (IEC 61966-2-1).
+    let expected = [0.2140, 0.0, 1.0, 0.5];
+    assert!(group.base_color.iter().zip(expected).all(|(a, b)| (a - b).abs() < COLOUR_TOLERANCE));
+    // v 1 is drawn with two texture coordinates; v points down.
+    let first: Vec<_> = look.vertices.iter().filter(|v| v.source == 0).map(|v| v.uv).collect();
+    assert_eq!(first, [[0.0, 1.0], [1.0, 1.0]]);
+}
+
+#[test]
+fn obj_texture_is_found_and_replaces_the_colour() {
+    let mtl = b"newmtl blue\nKd 0 0 0\nmap_Kd maps\\dot.png\n";
+    let look = obj(SQUARE, &[("paint box.mtl", mtl), ("maps/dot.png", &PNG)]);
+    assert_eq!((look.groups[0].image, look.groups[0].base_color), (Some(0), [1.0; 4]));
+    assert_eq!(look.images[0].bytes, PNG);
+    assert!(obj(SQUARE, &[]).groups.is_empty(), "no file, no materials");
+}
+
+#[test]
+fn obj_colours_after_coordinates_are_the_vertices() {
+    let look = obj("v 0 0 0 1 0 0.5\nv 1 0 0 1 1 1\nv 0 1 0 0 0 0\nf 1 2 3\n", &[]);
+    let color = look.vertices[0].color;
+    assert!(color.iter().zip([1.0, 0.0, 0.2140, 1.0]).all(|(a, b)| (a - b).abs() < COLOUR_TOLERANCE));
+    assert_eq!(look.groups.len(), 1);
+    // A fourth number alone is a weight.
+    assert!(obj("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n", &[]).groups.is_empty());
 }

@@ -110,11 +110,12 @@ impl Loaded {
             LookWrap::Mirror => Wrap::Mirror,
             LookWrap::Clamp => Wrap::Clamp,
         };
-        let textures = look
-            .textures
-            .iter()
-            .map(|t| DrawTexture { wrap: t.wrap.map(wrap), ..DrawTexture::default() })
-            .collect();
+        let mut textures = vec![DrawTexture::default(); look.images.len()];
+        for group in &look.groups {
+            if let Some(image) = group.image {
+                textures[image as usize].wrap = group.wrap.map(wrap);
+            }
+        }
         Self { model, cage: None, look, textures, poses: Vec::new(), settings: None }
     }
 
@@ -132,25 +133,24 @@ impl Loaded {
             })
             .collect();
         let groups = look.groups.into_iter().map(|group| {
-            let texture = group.texture.and_then(|t| numbers[t as usize]);
-            let plain = DrawGroup::default();
+            let texture = group.image.and_then(|t| numbers[t as usize]);
             DrawGroup {
                 triangles: group.triangles,
-                base_color: group.base_color.unwrap_or(plain.base_color),
+                base_color: group.base_color,
                 texture,
                 alpha: match group.alpha {
                     LookAlpha::Opaque => Alpha::Opaque,
-                    LookAlpha::Mask(cutoff) => Alpha::Mask { cutoff },
+                    LookAlpha::Mask { cutoff } => Alpha::Mask { cutoff },
                     LookAlpha::Blend => Alpha::Blend,
                 },
             }
         });
-        let unit = |x: f32| (x * f32::from(u16::MAX)).round() as u16;
+        let unit = |x: f32| (x.clamp(0.0, 1.0) * f32::from(u16::MAX)).round() as u16;
         let vertex =
-            |c: &cagework_io::LookCorner| DrawVertex { source: c.source, uv: c.uv, color: c.color.map(unit) };
+            |c: &cagework_io::LookVertex| DrawVertex { source: c.source, uv: c.uv, color: c.color.map(unit) };
         DrawModel {
             positions: self.model.positions.clone(),
-            vertices: look.corners.iter().map(vertex).collect(),
+            vertices: look.vertices.iter().map(vertex).collect(),
             groups: groups.collect(),
             triangles: look.triangles,
             textures: textures.into_iter().filter(|t| !t.rgba.is_empty()).collect(),

@@ -27,7 +27,11 @@ const RULES: &[Rule] = &[
         // Not wasm-bindgen: zip draws it in through getrandom on wasm32, and calls nothing of it here.
         must_not_use: &["wgpu", "naga", "web-sys", "clap"],
     },
-    Rule { name: "cagework-cli", may_use: &["cagework-core", "cagework-io"], must_not_use: &[] },
+    Rule {
+        name: "cagework-cli",
+        may_use: &["cagework-core", "cagework-gpu", "cagework-io"],
+        must_not_use: &[],
+    },
     Rule { name: "cagework-gpu", may_use: &["cagework-core"], must_not_use: &["gltf", "gltf-json", "clap"] },
     Rule {
         name: "cagework-web",

@@ -1,12 +1,13 @@
 //! What is run: the paper's cases, and ours beside them.
 
-use cagework_core::bind::{BindOptions, Binding, Method, Solver};
+use cagework_core::bind::{BindOptions, Binding, Method, OutsideVertex, Solver};
 use cagework_core::{BindReport, Cage, Weights};
+use cagework_gpu::{GpuContext, GpuError};
 use cagework_io::Model;
 use serde::Serialize;
 
 use crate::args::EvaluateArgs;
-use crate::bind::bind_model;
+use crate::bind::{bind_model, bind_on};
 use crate::error::CliError;
 
 /// A way to the weights.
@@ -17,24 +18,36 @@ pub(super) enum Way {
     PaperOneThread,
     /// The same on all threads.
     PaperThreads,
+    /// The same on the GPU.
+    PaperGpu,
     /// Embedded multigrid on one thread.
     MultigridOneThread,
     /// Embedded multigrid on all threads.
     MultigridThreads,
+    /// The same on the GPU.
+    MultigridGpu,
 }
 
 impl Way {
     /// In the order of the plots.
-    pub(super) const ALL: [Self; 4] =
-        [Self::PaperOneThread, Self::PaperThreads, Self::MultigridOneThread, Self::MultigridThreads];
+    pub(super) const ALL: [Self; 6] = [
+        Self::PaperOneThread,
+        Self::PaperThreads,
+        Self::PaperGpu,
+        Self::MultigridOneThread,
+        Self::MultigridThreads,
+        Self::MultigridGpu,
+    ];
 
     /// Name in tables and plots.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::PaperOneThread => "paper, one thread",
             Self::PaperThreads => "paper, all threads",
+            Self::PaperGpu => "paper, GPU",
             Self::MultigridOneThread => "multigrid, one thread",
             Self::MultigridThreads => "multigrid, all threads",
+            Self::MultigridGpu => "multigrid, GPU",
         }
     }
 
@@ -43,20 +56,27 @@ impl Way {
         match self {
             Self::PaperOneThread => "paper-one-thread",
             Self::PaperThreads => "paper-threads",
+            Self::PaperGpu => "paper-gpu",
             Self::MultigridOneThread => "multigrid-one-thread",
             Self::MultigridThreads => "multigrid-threads",
+            Self::MultigridGpu => "multigrid-gpu",
         }
     }
 
     /// Whether it is the paper's method.
     pub(super) fn is_paper(self) -> bool {
-        matches!(self, Self::PaperOneThread | Self::PaperThreads)
+        matches!(self, Self::PaperOneThread | Self::PaperThreads | Self::PaperGpu)
+    }
+
+    /// Whether the GPU solves.
+    pub(super) fn is_gpu(self) -> bool {
+        matches!(self, Self::PaperGpu | Self::MultigridGpu)
     }
 
     fn options(self, grid: u32, tau: f32) -> BindOptions {
         let threads = match self {
             Self::PaperOneThread | Self::MultigridOneThread => 1,
-            Self::PaperThreads | Self::MultigridThreads => 0,
+            _ => 0,
         };
         let (method, solver) = if self.is_paper() {
             (Method::Classic, Solver::Jacobi)
@@ -78,7 +98,9 @@ impl Run {
     /// (milliseconds of solving, delta) after each iteration. Iterations of one solve cost the same.
     pub(super) fn delta_over_time(&self) -> impl Iterator<Item = (f64, f32)> + '_ {
         let each = self.report.timings_ms.solve / f64::from(self.report.iterations.max(1));
-        self.report.delta_history.iter().enumerate().map(move |(k, &delta)| (each * (k + 1) as f64, delta))
+        let every = f64::from(self.report.delta_interval);
+        let deltas = self.report.delta_history.iter().enumerate();
+        deltas.map(move |(k, &delta)| (each * every * (k + 1) as f64, delta))
     }
 }
 
@@ -91,6 +113,7 @@ pub(super) struct Reconstruction {
     pub(super) caption: &'static str,
     pub(super) report: BindReport,
     pub(super) weights: Weights,
+    pub(super) outside: Vec<OutsideVertex>,
 }
 
 /// Everything that was run.
@@ -101,6 +124,8 @@ pub(super) struct Evaluation {
     pub(super) n_cage: usize,
     pub(super) threads: usize,
     pub(super) runs: u32,
+    /// Name of the GPU, or why there is none.
+    pub(super) adapter: Result<String, String>,
     /// Figures 8 to 11: every way at every g and tau; medians of the total time.
     pub(super) timed: Vec<Run>,
     /// Figure 12.
@@ -115,6 +140,7 @@ pub(super) struct Summary<'a> {
     vertices: usize,
     cage_vertices: usize,
     threads: usize,
+    adapter: Option<&'a str>,
     runs: u32,
     timed: &'a [Run],
     errors: &'a [Run],
@@ -131,15 +157,25 @@ pub(super) const ERROR_TAUS: [f32; 3] = [1e-3, 1e-4, 1e-5];
 
 impl Evaluation {
     /// Runs all cases.
-    pub(super) fn run(name: &str, model: &Model, cage: &Cage, args: &EvaluateArgs) -> Result<Self, CliError> {
+    pub(super) fn run(
+        name: &str,
+        model: &Model,
+        cage: &Cage,
+        args: &EvaluateArgs,
+        gpu: Result<&GpuContext, &GpuError>,
+    ) -> Result<Self, CliError> {
         let bind = |way: Way, grid, tau| -> Result<Binding, CliError> {
             eprintln!("{}, g = {grid}, tau = {tau:e}", way.name());
-            bind_model(model, cage, &way.options(grid, tau))
+            let options = way.options(grid, tau);
+            match gpu {
+                Ok(context) if way.is_gpu() => bind_on(context, &model.positions, cage, &options),
+                _ => bind_model(model, cage, &options),
+            }
         };
         let (mut timed, mut errors) = (Vec::new(), Vec::new());
         for grid in TIMED_GRIDS {
             for tau in TIMED_TAUS {
-                for way in Way::ALL {
+                for way in Way::ALL.into_iter().filter(|way| gpu.is_ok() || !way.is_gpu()) {
                     let mut reports = (0..args.runs)
                         .map(|_| bind(way, grid, tau).map(|b| b.report))
                         .collect::<Result<Vec<_>, _>>()?;
@@ -166,8 +202,8 @@ impl Evaluation {
         let reconstructions = figures
             .into_iter()
             .map(|(figure, caption, way, grid, tau)| {
-                let Binding { weights, report, .. } = bind(way, grid, tau)?;
-                Ok(Reconstruction { figure, caption, report, weights })
+                let Binding { weights, outside, report } = bind(way, grid, tau)?;
+                Ok(Reconstruction { figure, caption, report, weights, outside })
             })
             .collect::<Result<_, CliError>>()?;
         Ok(Self {
@@ -176,6 +212,7 @@ impl Evaluation {
             n_cage: cage.n_vertices(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             runs: args.runs,
+            adapter: gpu.map(GpuContext::adapter_name).map_err(ToString::to_string),
             timed,
             errors,
             reconstructions,
@@ -207,6 +244,7 @@ impl Evaluation {
             vertices: self.n_vertices,
             cage_vertices: self.n_cage,
             threads: self.threads,
+            adapter: self.adapter.as_deref().ok(),
             runs: self.runs,
             timed: &self.timed,
             errors: &self.errors,

@@ -1,8 +1,9 @@
 //! `cagework evaluate`: the paper's evaluation run anew, with our method beside it.
 //!
-//! Figures are numbered as in the paper: 2-5 reconstructions, 7 delta over time, 8-11 time to completion, 12 error.
+//! Figures are numbered as in the paper: 2-5 reconstructions, 6 a deformation, 7 delta over time, 8-11 time to completion, 12 error.
 
 mod cases;
+mod pictures;
 mod plots;
 mod words;
 
@@ -16,6 +17,7 @@ use crate::args::{CageSource, DEFAULT_DIVISIONS, EvaluateArgs};
 use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{json, make_folder, print, write};
+use crate::gpu;
 use crate::load::{generated_model, load_cage, load_model};
 use crate::sample;
 
@@ -28,9 +30,15 @@ use cases::{Evaluation, Way};
 pub(crate) fn run(args: &EvaluateArgs, as_json: bool) -> Result<(), CliError> {
     let (name, model, cage) = input(args)?;
     make_folder(&args.output)?;
-    let evaluation = Evaluation::run(&name, &model, &cage, args)?;
+    let gpu = gpu::open();
+    let evaluation = Evaluation::run(&name, &model, &cage, args, gpu.as_ref())?;
     let directory = args.output.as_path();
     reconstructions(&model, &cage, &evaluation, directory)?;
+    if let Ok(context) = gpu {
+        for (file, picture) in pictures::all(context, &model, &cage, &evaluation)? {
+            write(&directory.join(file), &picture)?;
+        }
+    }
     write(&directory.join("time.csv"), time_csv(&evaluation).as_bytes())?;
     write(&directory.join("error.csv"), error_csv(&evaluation).as_bytes())?;
     write(&directory.join("delta.csv"), delta_csv(&evaluation).as_bytes())?;
@@ -112,10 +120,11 @@ fn error_csv(evaluation: &Evaluation) -> String {
 
 fn delta_csv(evaluation: &Evaluation) -> String {
     let mut csv = String::from("way,iteration,time_ms,delta\n");
-    for way in [Way::PaperOneThread, Way::MultigridThreads] {
+    for way in [Way::PaperOneThread, Way::PaperGpu, Way::MultigridThreads] {
         if let Some(run) = evaluation.delta_run(way) {
-            for (iteration, (time, delta)) in run.delta_over_time().enumerate() {
-                let _ = writeln!(csv, "{},{},{time:.4},{delta:e}", way.id(), iteration + 1);
+            for (k, (time, delta)) in run.delta_over_time().enumerate() {
+                let iteration = (k as u32 + 1) * run.report.delta_interval;
+                let _ = writeln!(csv, "{},{iteration},{time:.4},{delta:e}", way.id());
             }
         }
     }

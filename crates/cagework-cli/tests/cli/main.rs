@@ -8,5 +8,6 @@ mod bind;
 mod cage_and_info;
 mod cages;
 mod deform;
+mod render;
 mod support;
 mod usage;

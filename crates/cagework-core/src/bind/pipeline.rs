@@ -64,6 +64,8 @@ pub struct Solved {
     pub residual_history: Vec<f32>,
     /// Bytes of fields alive at once.
     pub field_bytes: usize,
+    /// Bytes planned for them on a device, which the estimate made here leaves out; 0 in this process.
+    pub planned_bytes: u64,
     /// Share of the stage's time that went into solving; the rest is sampling.
     pub solve_share: f64,
     /// Name of the GPU; none for the CPU.
@@ -188,7 +190,7 @@ impl<'a> Prepared<'a> {
                 sample: (ended - voxelized) - solve_ms,
                 total: ended - began,
             },
-            memory_bytes: MemoryBytes { estimated: self.estimated, peak: peak as u64 },
+            memory_bytes: MemoryBytes { estimated: self.estimated + solved.planned_bytes, peak: peak as u64 },
             rest_error: statistics.rest_error,
             weights: WeightStats { nonzeros: weights.data().len() as u64, ..statistics.weights },
             vertices: positions.len() as u64,

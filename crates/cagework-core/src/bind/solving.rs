@@ -96,6 +96,7 @@ fn multigrid_columns(
         residual_history,
         delta_history,
         delta_interval: 1,
+        planned_bytes: 0,
         adapter: None,
         field_bytes: Workspace::bytes(hierarchy) * team.n_threads().min(n_batches),
         solve_share: spent.solve_share(),
@@ -128,6 +129,7 @@ fn jacobi_columns(
         converged: report.converged,
         delta_history: report.delta_history,
         delta_interval: 1,
+        planned_bytes: 0,
         adapter: None,
         residual_history: Vec::new(),
         field_bytes: jacobi::field_bytes(

@@ -1,5 +1,7 @@
 //! One frame: what is drawn, in which order.
 
+use std::sync::Arc;
+
 use cagework_core::{Bounds, Cage as CoreCage};
 use glam::Vec3;
 
@@ -10,7 +12,7 @@ use super::layout::Camera as Uniform;
 use super::marks::{MarksView, Wires};
 use super::mesh::Mesh;
 use super::model::DrawModel;
-use super::pipelines::{DEPTH_FORMAT, Layouts, Pipelines, SAMPLES};
+use super::pipelines::{DEPTH_FORMAT, Kind, Layouts, Pipelines, SAMPLES};
 use super::scene::{MeshStyle, SceneOptions};
 use super::slice::SlicePlane;
 use super::theme::linear;
@@ -48,8 +50,8 @@ struct Targets {
 /// Draws the scene.
 #[derive(Debug)]
 pub struct Renderer {
-    layouts: Layouts,
-    pipelines: Vec<(wgpu::TextureFormat, Pipelines)>,
+    layouts: Arc<Layouts>,
+    pipelines: Vec<Pipelines>,
     camera: wgpu::Buffer,
     camera_group: wgpu::BindGroup,
     targets: Option<Targets>,
@@ -67,7 +69,7 @@ pub struct Renderer {
 
 impl Renderer {
     pub(crate) fn new(context: &GpuContext) -> Self {
-        let layouts = Layouts::new(&context.device);
+        let layouts = Arc::new(Layouts::new(&context.device));
         let camera = context.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("camera"),
             size: size_of::<Uniform>() as u64,
@@ -217,14 +219,14 @@ impl Renderer {
         if let Some(gizmo) = &self.scene.gizmo {
             self.gizmo.update(context, gizmo, camera);
         }
-        if self.pipelines.iter().all(|(f, _)| *f != format) {
-            self.pipelines.push((format, Pipelines::new(&context.device, &self.layouts, format)));
+        if self.pipelines.iter().all(|p| p.format != format) {
+            self.pipelines.push(Pipelines::new(&context.device, &self.layouts, format));
         }
         if self.targets.as_ref().is_none_or(|t| (t.format, t.size) != (format, size)) {
             self.targets = Some(Targets::new(context, format, size));
         }
-        let (Some(targets), Some((_, pipelines))) =
-            (&self.targets, self.pipelines.iter().find(|(f, _)| *f == format))
+        let (Some(targets), Some(pipelines)) =
+            (&self.targets, self.pipelines.iter().find(|p| p.format == format))
         else {
             return;
         };
@@ -256,34 +258,34 @@ impl Renderer {
         if self.scene.gizmo.is_some() {
             let [near, far] = GIZMO_DEPTHS;
             pass.set_viewport(0.0, 0.0, size[0] as f32, size[1] as f32, near, far);
-            pass.set_pipeline(&pipelines.gizmo);
+            pass.set_pipeline(pipelines.get(Kind::Gizmo));
             self.gizmo.draw(&mut pass);
         }
     }
 
     fn draw_model(&self, pass: &mut wgpu::RenderPass<'_>, pipelines: &Pipelines) {
         let scene = &self.scene;
-        pass.set_pipeline(&pipelines.background);
+        pass.set_pipeline(pipelines.get(Kind::Background));
         pass.draw(0..3, 0..1);
         let mesh = self.mesh.as_ref().filter(|_| scene.mesh != MeshStyle::Hidden);
         if let Some(mesh) = mesh {
-            pass.set_pipeline(&pipelines.mesh);
+            pass.set_pipeline(pipelines.get(Kind::Mesh));
             mesh.draw(pass, scene.mesh, false);
         }
         if let Some(slice) = &self.slice {
-            pass.set_pipeline(&pipelines.slice);
+            pass.set_pipeline(pipelines.get(Kind::Slice));
             slice.draw(pass);
         }
         if let Some(mesh) = mesh {
-            pass.set_pipeline(&pipelines.mesh_blended);
+            pass.set_pipeline(pipelines.get(Kind::MeshBlended));
             mesh.draw(pass, scene.mesh, true);
         }
         if scene.floor {
-            pass.set_pipeline(&pipelines.floor);
+            pass.set_pipeline(pipelines.get(Kind::Floor));
             pass.draw(0..6, 0..1);
         }
         if let Some(wires) = &self.wires {
-            pass.set_pipeline(&pipelines.lines);
+            pass.set_pipeline(pipelines.get(Kind::Lines));
             if scene.mesh_edges && mesh.is_some() {
                 wires.edges.draw(pass, false);
             }
@@ -296,31 +298,30 @@ impl Renderer {
     fn draw_over(&self, pass: &mut wgpu::RenderPass<'_>, pipelines: &Pipelines) {
         if let Some(cage) = &self.cage {
             if self.scene.cage_lines {
-                pass.set_pipeline(&pipelines.faces);
+                pass.set_pipeline(pipelines.get(Kind::Faces));
                 cage.faces.draw_faces(pass);
-                pass.set_pipeline(&pipelines.lines_behind);
+                pass.set_pipeline(pipelines.get(Kind::LinesBehind));
                 cage.lines.draw(pass, true);
-                pass.set_pipeline(&pipelines.lines);
+                pass.set_pipeline(pipelines.get(Kind::Lines));
                 cage.lines.draw(pass, false);
             }
             if self.scene.handles {
-                pass.set_pipeline(&pipelines.points_behind);
+                pass.set_pipeline(pipelines.get(Kind::PointsBehind));
                 cage.handles.draw(pass, true);
-                pass.set_pipeline(&pipelines.points);
+                pass.set_pipeline(pipelines.get(Kind::Points));
                 cage.handles.draw(pass, false);
             }
         }
         if let Some(marks) = &self.marks {
-            for (behind, [lines, points]) in [
-                (true, [&pipelines.lines_behind, &pipelines.points_behind]),
-                (false, [&pipelines.lines, &pipelines.points]),
-            ] {
+            for (behind, [lines, points]) in
+                [(true, [Kind::LinesBehind, Kind::PointsBehind]), (false, [Kind::Lines, Kind::Points])]
+            {
                 if let Some(segments) = &marks.segments {
-                    pass.set_pipeline(lines);
+                    pass.set_pipeline(pipelines.get(lines));
                     segments.draw(pass, behind);
                 }
                 for overlay in &marks.points {
-                    pass.set_pipeline(points);
+                    pass.set_pipeline(pipelines.get(points));
                     overlay.draw(pass, behind);
                 }
             }

@@ -310,7 +310,7 @@ mod tests {
     fn shapes_fit_their_buffer() {
         for mode in [GizmoMode::Move, GizmoMode::Rotate, GizmoMode::Scale] {
             let n = shape(mode, None).len() as u64;
-            assert!(n > 0 && n % 3 == 0 && n <= MAX_VERTICES, "{mode:?}: {n}");
+            assert!(n > 0 && n.is_multiple_of(3) && n <= MAX_VERTICES, "{mode:?}: {n}");
         }
         assert_eq!(size_of::<Vertex>() as u64, GIZMO_STRIDE);
     }

@@ -1,4 +1,6 @@
-//! Render pipelines: one of each per format of the target, made when a picture of that format is first asked for.
+//! Render pipelines, for each format of a target.
+
+use std::sync::{Arc, OnceLock};
 
 use wgpu::{BlendState, CompareFunction, PrimitiveTopology};
 
@@ -22,20 +24,48 @@ pub(super) struct Layouts {
     pub(super) gizmo: wgpu::BindGroupLayout,
 }
 
-/// Pipelines for one format.
+/// What is drawn with a pipeline of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Background,
+    Mesh,
+    MeshBlended,
+    Lines,
+    LinesBehind,
+    Points,
+    PointsBehind,
+    Faces,
+    Floor,
+    Slice,
+    Gizmo,
+}
+
+impl Kind {
+    /// Shader, depth, and whether it is blended.
+    fn recipe(self) -> (&'static DrawShader, Depth, bool) {
+        match self {
+            Self::Background => (&shaders::BACKGROUND, NO_DEPTH, false),
+            Self::Mesh => (&shaders::MESH, SOLID, false),
+            Self::MeshBlended => (&shaders::MESH, OVER, true),
+            Self::Lines => (&shaders::LINES, OVER, true),
+            Self::LinesBehind => (&shaders::LINES, BEHIND, true),
+            Self::Points => (&shaders::POINTS, OVER, true),
+            Self::PointsBehind => (&shaders::POINTS, BEHIND, true),
+            Self::Faces => (&shaders::FACES, OVER, true),
+            Self::Floor => (&shaders::FLOOR, OVER, true),
+            Self::Slice => (&shaders::SLICE, SOLID, true),
+            Self::Gizmo => (&shaders::GIZMO, SOLID, true),
+        }
+    }
+}
+
+/// Pipelines for one format, each made when it is first drawn with: the first frame need not wait for all.
 #[derive(Debug)]
 pub(super) struct Pipelines {
-    pub(super) background: wgpu::RenderPipeline,
-    pub(super) mesh: wgpu::RenderPipeline,
-    pub(super) mesh_blended: wgpu::RenderPipeline,
-    pub(super) lines: wgpu::RenderPipeline,
-    pub(super) lines_behind: wgpu::RenderPipeline,
-    pub(super) points: wgpu::RenderPipeline,
-    pub(super) points_behind: wgpu::RenderPipeline,
-    pub(super) faces: wgpu::RenderPipeline,
-    pub(super) floor: wgpu::RenderPipeline,
-    pub(super) slice: wgpu::RenderPipeline,
-    pub(super) gizmo: wgpu::RenderPipeline,
+    device: wgpu::Device,
+    layouts: Arc<Layouts>,
+    pub(super) format: wgpu::TextureFormat,
+    made: [OnceLock<wgpu::RenderPipeline>; 11],
 }
 
 /// A vertex of the gizmo: position, normal, colour.
@@ -110,14 +140,18 @@ impl Layouts {
     }
 }
 
-/// Makes pipelines for one format.
-struct Maker<'a> {
-    device: &'a wgpu::Device,
-    layouts: &'a Layouts,
-    format: wgpu::TextureFormat,
-}
+impl Pipelines {
+    pub(super) fn new(device: &wgpu::Device, layouts: &Arc<Layouts>, format: wgpu::TextureFormat) -> Self {
+        Self { device: device.clone(), layouts: Arc::clone(layouts), format, made: Default::default() }
+    }
 
-impl Maker<'_> {
+    pub(super) fn get(&self, kind: Kind) -> &wgpu::RenderPipeline {
+        self.made[kind as usize].get_or_init(|| {
+            let (shader, depth, blend) = kind.recipe();
+            self.make(shader, depth, blend)
+        })
+    }
+
     fn make(&self, shader: &DrawShader, depth: Depth, blend: bool) -> wgpu::RenderPipeline {
         let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(shader.name),
@@ -174,24 +208,5 @@ impl Maker<'_> {
             multiview_mask: None,
             cache: None,
         })
-    }
-}
-
-impl Pipelines {
-    pub(super) fn new(device: &wgpu::Device, layouts: &Layouts, format: wgpu::TextureFormat) -> Self {
-        let maker = Maker { device, layouts, format };
-        Self {
-            background: maker.make(&shaders::BACKGROUND, NO_DEPTH, false),
-            mesh: maker.make(&shaders::MESH, SOLID, false),
-            mesh_blended: maker.make(&shaders::MESH, OVER, true),
-            lines: maker.make(&shaders::LINES, OVER, true),
-            lines_behind: maker.make(&shaders::LINES, BEHIND, true),
-            points: maker.make(&shaders::POINTS, OVER, true),
-            points_behind: maker.make(&shaders::POINTS, BEHIND, true),
-            faces: maker.make(&shaders::FACES, OVER, true),
-            floor: maker.make(&shaders::FLOOR, OVER, true),
-            slice: maker.make(&shaders::SLICE, SOLID, true),
-            gizmo: maker.make(&shaders::GIZMO, SOLID, true),
-        }
     }
 }

@@ -31,7 +31,7 @@ pub(crate) fn build_from_obj(
     });
     let mut pack = Pack::empty();
     let mut sources = Vec::new();
-    for (material, triangles) in by_material(document) {
+    for (material, triangles) in document.by_material() {
         let mut part = Part::default();
         for corner in triangles.into_iter().flatten() {
             let (pair, vt) = (pairs.of_corner[corner as usize], document.corners[corner as usize].vt);
@@ -109,26 +109,6 @@ fn to_linear(value: u8) -> f32 {
 /// glTF's default is a rough mirror, which no OBJ means.
 fn plain(name: &str) -> Value {
     json!({ "name": name, "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.9 } })
-}
-
-/// Triangles (of corners) of each material, in order of first use.
-fn by_material(document: &ObjDocument) -> Vec<(u32, Vec<[u32; 3]>)> {
-    let mut groups: Vec<(u32, Vec<[u32; 3]>)> = Vec::new();
-    let mut group_of = HashMap::new();
-    let mut face = 0;
-    for t in &document.triangles {
-        // Triangles come in the order of their faces, whose corners come one after another.
-        while document.face_starts[face + 1] <= t[0] {
-            face += 1;
-        }
-        let material = document.face_materials[face];
-        let group = *group_of.entry(material).or_insert_with(|| {
-            groups.push((material, Vec::new()));
-            groups.len() - 1
-        });
-        groups[group].1.push(*t);
-    }
-    groups
 }
 
 /// Vertices of one primitive: (pair, texture coordinate), and triangle corners.

@@ -9,6 +9,7 @@ use percent_encoding::percent_decode_str;
 use serde_json::{Value, json};
 
 use super::{GltfError, Image};
+use crate::look::sniff_image;
 
 /// Extensions that hide geometry from a reader without their decoder.
 const COMPRESSED: [&str; 3] =
@@ -200,15 +201,4 @@ fn shown_uri(uri: &str) -> String {
     /// As long as a long path.
     const MAX_CHARS: usize = 120;
     percent_decode_str(uri).decode_utf8_lossy().chars().take(MAX_CHARS).collect()
-}
-
-/// Media type by content: a wrong `mimeType` makes viewers refuse the texture.
-fn sniff_image(bytes: &[u8]) -> Option<&'static str> {
-    match bytes {
-        [0x89, b'P', b'N', b'G', ..] => Some("image/png"),
-        [0xff, 0xd8, 0xff, ..] => Some("image/jpeg"),
-        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some("image/webp"),
-        [0xab, b'K', b'T', b'X', b' ', b'2', b'0', ..] => Some("image/ktx2"),
-        _ => None,
-    }
 }

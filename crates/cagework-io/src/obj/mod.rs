@@ -5,10 +5,12 @@
 //! their polygons, errors name a line, and an export is the user's file with other numbers in it.
 
 mod lex;
+mod look;
 mod read;
 mod triangulate;
 mod write;
 
+pub(crate) use look::look;
 pub use read::ObjError;
 pub(crate) use read::{NONE, ObjDocument, read};
 pub use write::write_cage_obj;

@@ -7,6 +7,7 @@ use glam::Vec3;
 use thiserror::Error;
 
 use super::lex::{Line, lines, shown, tokens};
+use super::look::{Material, read_materials, rest_of};
 use super::triangulate::Triangulator;
 
 /// Why an OBJ file could not be read.
@@ -91,6 +92,32 @@ pub(crate) struct ObjDocument {
     pub(crate) materials: Vec<String>,
     /// Triangles as indices into `corners`.
     pub(crate) triangles: Vec<[u32; 3]>,
+    /// Materials of the `.mtl` files that were found, by name.
+    pub(crate) looks: HashMap<String, Material>,
+    /// Colours after the coordinates of `v` lines, as written.
+    pub(crate) colors: HashMap<u32, [f32; 3]>,
+}
+
+impl ObjDocument {
+    /// Triangles (of corners) of each material, in order of first use.
+    pub(crate) fn by_material(&self) -> Vec<(u32, Vec<[u32; 3]>)> {
+        let mut groups: Vec<(u32, Vec<[u32; 3]>)> = Vec::new();
+        let mut group_of = HashMap::new();
+        let mut face = 0;
+        for t in &self.triangles {
+            // Triangles come in the order of their faces, whose corners come one after another.
+            while self.face_starts[face + 1] <= t[0] {
+                face += 1;
+            }
+            let material = self.face_materials[face];
+            let group = *group_of.entry(material).or_insert_with(|| {
+                groups.push((material, Vec::new()));
+                groups.len() - 1
+            });
+            groups[group].1.push(*t);
+        }
+        groups
+    }
 }
 
 /// A file that was read.
@@ -115,8 +142,11 @@ struct Reader<'a> {
     ignored: usize,
 }
 
-/// Reads an OBJ file.
-pub(crate) fn read(bytes: &[u8]) -> Result<ObjModel, ObjError> {
+/// Reads an OBJ file; `resolve` fetches its materials and their textures by relative path.
+pub(crate) fn read(
+    bytes: &[u8],
+    resolve: &mut dyn FnMut(&str) -> Option<Vec<u8>>,
+) -> Result<ObjModel, ObjError> {
     let mut reader = Reader {
         bytes,
         positions: Vec::new(),
@@ -129,13 +159,17 @@ pub(crate) fn read(bytes: &[u8]) -> Result<ObjModel, ObjError> {
         ignored: 0,
     };
     for line in lines(bytes) {
-        reader.line(&line)?;
+        reader.line(&line, resolve)?;
     }
     reader.finish()
 }
 
 impl<'a> Reader<'a> {
-    fn line(&mut self, line: &Line) -> Result<(), ObjError> {
+    fn line(
+        &mut self,
+        line: &Line,
+        resolve: &mut dyn FnMut(&str) -> Option<Vec<u8>>,
+    ) -> Result<(), ObjError> {
         let bytes = self.bytes;
         let mut words = tokens(bytes, line.range.clone());
         let Some(keyword) = words.next() else { return Ok(()) };
@@ -148,6 +182,11 @@ impl<'a> Reader<'a> {
                         let found = token.map_or("missing".into(), |t| format!("'{}'", shown(&bytes[t])));
                         ObjError::Coordinate { line: line.number, axis, found }
                     })?;
+                }
+                let after: Vec<f32> = words.map_while(|t| number(&bytes[t])).collect();
+                // Four numbers are a weight, six a colour.
+                if let [r, g, b] = after[..] {
+                    self.document.colors.insert(self.positions.len() as u32, [r, g, b]);
                 }
                 self.positions.push(Vec3::from_array(p));
                 check_count(self.positions.len(), line.number)?;
@@ -168,6 +207,12 @@ impl<'a> Reader<'a> {
             b"f" | b"fo" => self.face(line.number, words)?,
             b"o" | b"g" => self.groups += 1,
             b"usemtl" => self.use_material(line),
+            b"mtllib" => {
+                let name = rest_of(&bytes[line.range.clone()], b"mtllib");
+                if let Some(file) = resolve(&name.replace('\\', "/")) {
+                    read_materials(&file, resolve, &mut self.document.looks);
+                }
+            }
             b"l" | b"p" | b"curv" | b"curv2" | b"surf" => self.ignored += 1,
             _ => {}
         }

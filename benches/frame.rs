@@ -1,0 +1,90 @@
+//! A frame: the cage moves, the mesh and its normals follow, and it is drawn. On whatever adapter there is; the
+//! environment's `CAGEWORK_ADAPTER` names another.
+//!
+//! `deform` waits until positions and normals are there, `frame` until the picture is.
+
+use std::time::Instant;
+
+use cagework_core::bind::BindOptions;
+use cagework_core::progress::Silent;
+use cagework_core::{Cage, bind};
+use cagework_gpu::render::DrawModel;
+use cagework_gpu::{ContextOptions, Deformer, GpuContext, GpuWeights, Session};
+use cagework_tests::creature::{creature, creature_cage};
+use glam::{Quat, Vec3};
+use pollster::block_on;
+
+/// Frames that are timed.
+const FRAMES: usize = 100;
+
+/// Size of the picture, pixels.
+const SIZE: [u32; 2] = [1280, 800];
+
+/// The animal four times, each smaller than the one before: 59,200 vertices.
+fn mesh() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let animal = creature();
+    let center = animal.positions.iter().sum::<Vec3>() / animal.positions.len() as f32;
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    for k in 0..4 {
+        let (first, size) = (positions.len() as u32, 1.0 - 0.02 * k as f32);
+        positions.extend(animal.positions.iter().map(|p| center + size * (*p - center)));
+        triangles.extend(animal.triangles.iter().map(|t| t.map(|v| first + v)));
+    }
+    (positions, triangles)
+}
+
+fn posed(cage: &Cage, frame: usize) -> Vec<Vec3> {
+    let turn = |p: &Vec3| Quat::from_rotation_z(0.001 * frame as f32 * p.x) * *p;
+    cage.positions().iter().map(turn).collect()
+}
+
+/// Median of many, milliseconds.
+fn median(mut times: Vec<f64>) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
+
+fn main() {
+    // `cargo test --benches` runs this too, and wants to know only that it compiles.
+    if !std::env::args().any(|argument| argument == "--bench") {
+        return;
+    }
+    let context = || block_on(GpuContext::new(&ContextOptions::default())).expect("there is an adapter");
+    let (positions, triangles) = mesh();
+    let cage = Cage::new(&creature_cage()).expect("it is a cage");
+    let options = BindOptions { grid: 32, ..BindOptions::default() };
+    let binding = bind(&positions, &cage, &options, &Silent).expect("it binds");
+    let gpu = context();
+    println!(
+        "{}: {} vertices, {} triangles, {} cage vertices, {} weights",
+        gpu.adapter_name(),
+        positions.len(),
+        triangles.len(),
+        cage.n_vertices(),
+        binding.weights.data().len()
+    );
+    let weights = block_on(GpuWeights::new(&gpu, &binding.weights, &binding.outside)).expect("they fit");
+    let deformer = block_on(Deformer::new(&gpu, &weights, &triangles)).expect("it fits");
+    let deform = (0..FRAMES).map(|frame| {
+        let pose = posed(&cage, frame);
+        let began = Instant::now();
+        deformer.pose(&gpu, &pose);
+        block_on(deformer.run(&gpu)).expect("it runs");
+        began.elapsed().as_secs_f64() * 1e3
+    });
+    println!("deform: {:.2} ms", median(deform.collect()));
+
+    let mut session = Session::new(context());
+    block_on(session.set_model(DrawModel::plain(positions, triangles))).expect("it fits");
+    block_on(session.set_cage(&cage)).expect("it fits");
+    block_on(session.adopt(binding.weights, binding.outside)).expect("they belong to it");
+    session.frame_all();
+    let frame = (0..FRAMES / 4).map(|frame| {
+        let pose = posed(&cage, frame);
+        let began = Instant::now();
+        session.pose(&pose);
+        block_on(session.picture(SIZE, 1.0)).expect("it is drawn");
+        began.elapsed().as_secs_f64() * 1e3
+    });
+    println!("frame of {} x {}, read back: {:.1} ms", SIZE[0], SIZE[1], median(frame.collect()));
+}

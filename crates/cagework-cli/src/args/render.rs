@@ -1,0 +1,183 @@
+//! The arguments of `cagework render`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use cagework_gpu::render::{AxisView, Camera, Theme};
+use cagework_gpu::session::MAX_PICTURE;
+use clap::{Args, ValueEnum};
+
+use super::{CageSource, SolveArgs, output};
+
+/// `cagework render`
+#[derive(Args, Debug)]
+#[command(after_help = "What needs weights binds the model first, unless --weights brings them.\n\n\
+    Examples:\n  \
+    cagework render horse.glb -o horse.png\n  \
+    cagework render horse.glb --cage cage.obj --pose gallop.obj -o gallop.png\n  \
+    cagework render horse.glb --cage cage.obj --show weights --column 17 -o weights.png\n  \
+    cagework render horse.glb --cage cage.obj --show wireframe --method classic -g 16 --no-cage -o figure-4.png\n  \
+    cagework render horse.glb --cage cage.obj --show cells --axis x --at 0.5 --theme light -o cells.png")]
+pub(crate) struct RenderArgs {
+    /// Model to draw (.obj, .gltf, .glb).
+    pub(crate) model: PathBuf,
+    /// Cage: a file, or box or box:DIVISIONS for a subdivided box around the model.
+    #[arg(long, value_name = "CAGE", required_if_eq_any = [
+        ("show", "wireframe"), ("show", "weights"), ("show", "error"), ("show", "cells"), ("show", "slice"),
+    ])]
+    pub(crate) cage: Option<CageSource>,
+    /// The cage, moved: the model follows.
+    #[arg(long, value_name = "FILE", requires = "cage")]
+    pub(crate) pose: Option<PathBuf>,
+    /// Weights that `cagework bind --weights` wrote, instead of binding here.
+    #[arg(long, value_name = "FILE", requires = "cage")]
+    pub(crate) weights: Option<PathBuf>,
+    /// What to draw.
+    #[arg(long, value_enum, default_value_t = Show::Solid)]
+    pub(crate) show: Show,
+    /// Cage vertex whose weights are drawn, counted from 0.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub(crate) column: u32,
+    /// Axis that a slice lies across.
+    #[arg(long, value_enum, default_value_t = AxisArg::Z)]
+    pub(crate) axis: AxisArg,
+    /// Where along the axis, 0 to 1.
+    #[arg(long, default_value_t = 0.5, value_name = "FRACTION")]
+    pub(crate) at: f32,
+    /// Width and height in pixels.
+    #[arg(long, default_value = "1280x960", value_name = "WxH")]
+    pub(crate) size: Size,
+    /// Pixels per unit of line widths and handle sizes: 2 for pictures that are shown at half their size.
+    #[arg(long, default_value_t = 1.0, value_parser = super::positive)]
+    pub(crate) scale: f32,
+    /// Colours of the surroundings.
+    #[arg(long, value_enum, default_value_t = ThemeArg::Dark)]
+    pub(crate) theme: ThemeArg,
+    /// From where: default, front, back, left, right, top, bottom, or YAW,PITCH in degrees (0,0 is front; pitch looks down).
+    #[arg(long, default_value = "default", allow_hyphen_values = true)]
+    pub(crate) view: View,
+    /// Draw without perspective.
+    #[arg(long)]
+    pub(crate) orthographic: bool,
+    /// Draw no cage.
+    #[arg(long)]
+    pub(crate) no_cage: bool,
+    /// Draw the cage without its vertices.
+    #[arg(long)]
+    pub(crate) no_handles: bool,
+    /// Draw no floor.
+    #[arg(long)]
+    pub(crate) no_floor: bool,
+    /// Picture to write (.png).
+    #[arg(short, long, value_name = "FILE", value_parser = png_output)]
+    pub(crate) output: PathBuf,
+    /// Cells along the longest side of the cage, 8 to 512.
+    #[arg(short, long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(8..=512))]
+    pub(crate) grid: u32,
+    #[command(flatten)]
+    pub(crate) solve: SolveArgs,
+}
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Show {
+    /// The model with its materials.
+    Solid,
+    /// The model in one plain colour.
+    Clay,
+    /// The model with its edges.
+    Edges,
+    /// The rest pose as the weights reconstruct it, under a wireframe of the model: the paper's figures 2 to 5.
+    Wireframe,
+    /// Weights of one cage vertex as colours.
+    Weights,
+    /// How far the weights miss the rest pose, as colours, logarithmic.
+    Error,
+    /// A slice of the grid: kinds of cells.
+    Cells,
+    /// A slice of the grid: values of one cage vertex.
+    Slice,
+}
+
+/// An axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum AxisArg {
+    X,
+    Y,
+    Z,
+}
+
+/// Colours of the surroundings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ThemeArg {
+    Dark,
+    Light,
+}
+
+impl From<ThemeArg> for Theme {
+    fn from(theme: ThemeArg) -> Self {
+        match theme {
+            ThemeArg::Dark => Self::Dark,
+            ThemeArg::Light => Self::Light,
+        }
+    }
+}
+
+/// Width and height of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Size(pub(crate) [u32; 2]);
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let side = |text: &str| text.parse().ok().filter(|s| (1..=MAX_PICTURE).contains(s));
+        text.split_once('x').and_then(|(width, height)| Some(Self([side(width)?, side(height)?]))).ok_or_else(
+            || format!("a size is WIDTHxHEIGHT, such as 800x600, with sides of 1 to {MAX_PICTURE}"),
+        )
+    }
+}
+
+/// From where a picture is taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct View {
+    yaw: f32,
+    pitch: f32,
+}
+
+impl View {
+    /// Yaw and pitch, radians.
+    pub(crate) fn angles(self) -> (f32, f32) {
+        (self.yaw, self.pitch)
+    }
+}
+
+impl FromStr for View {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut camera = Camera::default();
+        match text {
+            "default" => {}
+            "front" => camera.look_along(AxisView::Front),
+            "back" => camera.look_along(AxisView::Back),
+            "left" => camera.look_along(AxisView::Left),
+            "right" => camera.look_along(AxisView::Right),
+            "top" => camera.look_along(AxisView::Top),
+            "bottom" => camera.look_along(AxisView::Bottom),
+            _ => {
+                let angle = |text: &str| text.trim().parse::<f32>().ok().filter(|a| a.is_finite());
+                let angles = text.split_once(',').and_then(|(y, p)| Some((angle(y)?, angle(p)?)));
+                let (yaw, pitch) = angles.filter(|(_, pitch)| pitch.abs() <= 90.0).ok_or(
+                    "a view is default, front, back, left, right, top, bottom or YAW,PITCH in degrees",
+                )?;
+                return Ok(Self { yaw: yaw.to_radians(), pitch: pitch.to_radians() });
+            }
+        }
+        Ok(Self { yaw: camera.yaw, pitch: camera.pitch })
+    }
+}
+
+fn png_output(text: &str) -> Result<PathBuf, String> {
+    output(text, &["png"])
+}

@@ -1,0 +1,74 @@
+//! Figures 2 to 6 as pictures.
+
+use cagework_core::Cage;
+use cagework_gpu::render::{MeshStyle, SceneOptions, Theme};
+use cagework_gpu::{GpuContext, Session};
+use cagework_io::Model;
+use glam::{Quat, Vec3};
+use pollster::block_on;
+
+use crate::error::CliError;
+use crate::gpu::{draw_model, png};
+
+use super::cases::Evaluation;
+
+/// Width and height of a picture.
+const SIZE: [u32; 2] = [720, 540];
+
+/// How far the cage of figure 6 is bent from end to end, radians.
+const BEND: f32 = 0.9;
+
+/// All pictures as (file name, PNG).
+///
+/// # Errors
+/// When the GPU fails.
+pub(super) fn all(
+    context: GpuContext,
+    model: &Model,
+    cage: &Cage,
+    evaluation: &Evaluation,
+) -> Result<Vec<(String, Vec<u8>)>, CliError> {
+    let mut session = Session::new(context);
+    block_on(session.set_model(draw_model(model).0))?;
+    let bare = SceneOptions {
+        theme: Theme::Light,
+        cage_lines: false,
+        handles: false,
+        floor: false,
+        ..SceneOptions::default()
+    };
+    session.camera_mut().set_viewport(glam::Vec2::from(SIZE.map(|s| s as f32)));
+    // Before there is a cage, which figures 2 to 5 do not show.
+    session.frame_all();
+    block_on(session.set_cage(cage))?;
+    let mut pictures = Vec::new();
+    session.set_scene(SceneOptions { mesh: MeshStyle::Clay, base_wireframe: true, ..bare.clone() });
+    for r in &evaluation.reconstructions {
+        block_on(session.adopt(r.weights.clone(), r.outside.clone()))?;
+        let rgba = block_on(session.picture(SIZE, 1.0))?;
+        pictures.push((format!("{}.png", r.figure), png(rgba, SIZE)?));
+    }
+    // The last reconstruction is ours; its weights move the mesh.
+    session.set_scene(SceneOptions { cage_lines: true, handles: true, ..bare });
+    session.pose(&bent(cage));
+    session.frame_all();
+    let rgba = block_on(session.picture(SIZE, 1.0))?;
+    pictures.push(("figure-6.png".to_owned(), png(rgba, SIZE)?));
+    Ok(pictures)
+}
+
+/// The cage bent along its longest horizontal axis, upwards at both ends.
+fn bent(cage: &Cage) -> Vec<Vec3> {
+    let bounds = cage.bounds();
+    let (center, extent) = (bounds.center(), bounds.extent());
+    let along_x = extent.x > extent.z;
+    let length = extent.x.max(extent.z);
+    let turn = |p: Vec3| {
+        if along_x {
+            Quat::from_rotation_z(BEND * p.x / length)
+        } else {
+            Quat::from_rotation_x(-BEND * p.z / length)
+        }
+    };
+    cage.positions().iter().map(|&p| center + turn(p - center) * (p - center)).collect()
+}

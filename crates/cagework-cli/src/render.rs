@@ -1,0 +1,169 @@
+//! `cagework render`: a picture of the model in its cage, drawn by the GPU.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use cagework_core::bind::Binding;
+use cagework_core::slice::Slice;
+use cagework_core::{Cage, Weights};
+use cagework_gpu::Session;
+use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView};
+use cagework_io::{Model, read_weights_npz};
+use serde::Serialize;
+
+use crate::args::{CageSource, RenderArgs, Show};
+use crate::bind::bind_positions;
+use crate::deform::check_weights;
+use crate::error::CliError;
+use crate::files::{check_outputs, json, print, read, write};
+use crate::gpu;
+use crate::load::{LoadedCage, load_cage, load_model};
+
+/// What was done; its JSON is the output of `--json`.
+#[derive(Debug, Serialize)]
+struct Rendered {
+    output: String,
+    size: [u32; 2],
+    adapter: String,
+    /// Drawing and reading back, without files and binding.
+    render_ms: f64,
+    notices: Vec<String>,
+}
+
+/// Runs `cagework render`.
+///
+/// # Errors
+/// When a file cannot be read or written, files do not belong together, there is no GPU, or the bind fails.
+pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
+    let mut inputs = vec![args.model.as_path()];
+    inputs.extend(args.pose.as_deref());
+    inputs.extend(args.weights.as_deref());
+    if let Some(CageSource::File(path)) = &args.cage {
+        inputs.push(path);
+    }
+    check_outputs(&[&args.output], &inputs)?;
+    let model = load_model(&args.model)?;
+    let cage = args.cage.as_ref().map(|source| load_cage(source, &model)).transpose()?;
+    let (drawn, mut notices) = gpu::draw_model(&model);
+    notices.splice(0..0, model.notices.iter().cloned());
+    let mut session = Session::new(gpu::open()?);
+    pollster::block_on(session.set_model(drawn))?;
+    let mut scene = scene_of(args);
+    if let Some(cage) = &cage {
+        pollster::block_on(session.set_cage(&cage.cage))?;
+        prepare(args, &model, cage, &mut session, &mut scene)?;
+    }
+    session.set_scene(scene);
+    let camera = session.camera_mut();
+    (camera.yaw, camera.pitch) = args.view.angles();
+    if args.orthographic {
+        camera.projection = Projection::Orthographic;
+    }
+    let size = args.size.0;
+    camera.set_viewport(glam::Vec2::from(size.map(|s| s as f32)));
+    session.frame_all();
+
+    let started = Instant::now();
+    let rgba = pollster::block_on(session.picture(size, args.scale))?;
+    let render_ms = started.elapsed().as_secs_f64() * 1e3;
+    write(&args.output, &gpu::png(rgba, size)?)?;
+    let done = Rendered {
+        output: args.output.display().to_string(),
+        size,
+        adapter: session.context().adapter_name(),
+        render_ms,
+        notices,
+    };
+    print(&if as_json { json(&done) } else { text(&done) })
+}
+
+/// What is drawn, as far as the arguments alone say.
+fn scene_of(args: &RenderArgs) -> SceneOptions {
+    let column = args.column;
+    let mesh = match args.show {
+        Show::Solid | Show::Edges => MeshStyle::Solid,
+        Show::Clay | Show::Wireframe => MeshStyle::Clay,
+        Show::Weights => MeshStyle::Weights { column },
+        Show::Error => MeshStyle::Errors,
+        Show::Cells | Show::Slice => MeshStyle::Hidden,
+    };
+    let chosen = if matches!(args.show, Show::Weights | Show::Slice) { vec![column] } else { Vec::new() };
+    SceneOptions {
+        theme: args.theme.into(),
+        mesh,
+        mesh_edges: args.show == Show::Edges,
+        base_wireframe: args.show == Show::Wireframe,
+        cage_lines: !args.no_cage,
+        handles: !args.no_cage && !args.no_handles,
+        floor: !args.no_floor,
+        selection: Selection { vertices: chosen, ..Selection::default() },
+        ..SceneOptions::default()
+    }
+}
+
+/// Weights, pose and slice, as far as the picture needs them.
+fn prepare(
+    args: &RenderArgs,
+    model: &Model,
+    cage: &LoadedCage,
+    session: &mut Session,
+    scene: &mut SceneOptions,
+) -> Result<(), CliError> {
+    let n_cage = cage.cage.n_vertices();
+    if matches!(args.show, Show::Weights | Show::Slice) && args.column as usize >= n_cage {
+        return Err(CliError::Mismatch {
+            message: format!("--column is {}, but the cage has {n_cage} vertices", args.column),
+            hint: "cage vertices are counted from 0",
+        });
+    }
+    let needs_weights =
+        args.pose.is_some() || matches!(args.show, Show::Wireframe | Show::Weights | Show::Error);
+    if needs_weights {
+        let (weights, outside) = match &args.weights {
+            Some(path) => {
+                let (weights, outside) =
+                    read_weights_npz(&read(path)?).map_err(|e| CliError::file(path, e))?;
+                check_weights(path, &weights, model.positions.len(), n_cage)?;
+                (weights, outside)
+            }
+            None => {
+                let Binding { weights, outside, .. } =
+                    bind_positions(&model.positions, &cage.cage, &args.solve, args.grid)?;
+                (weights, outside)
+            }
+        };
+        pollster::block_on(session.adopt(weights, outside))?;
+    }
+    if let Some(path) = &args.pose {
+        session.pose(&cage.load_pose(path)?);
+    }
+    if matches!(args.show, Show::Cells | Show::Slice) {
+        scene.slice = Some(slice(args, &cage.cage)?);
+    }
+    Ok(())
+}
+
+fn slice(args: &RenderArgs, cage: &Cage) -> Result<SliceView, CliError> {
+    let options = args.solve.options(args.grid);
+    let mut slice = Slice::new(cage, &options, args.axis as usize, args.at);
+    let mut column = None;
+    if args.show == Show::Slice && !slice.cells.is_empty() {
+        let weights: Weights = bind_positions(&slice.centers(), cage, &args.solve, args.grid)?.weights;
+        slice.set_weights(weights).map_err(|e| CliError::file(Path::new("slice"), e))?;
+        column = Some(args.column);
+    }
+    Ok(SliceView { slice: Arc::new(slice), column })
+}
+
+fn text(done: &Rendered) -> String {
+    let [width, height] = done.size;
+    let mut out = format!(
+        "drew {width} x {height} pixels on {} in {:.0} ms\nwrote {}\n",
+        done.adapter, done.render_ms, done.output
+    );
+    for notice in &done.notices {
+        out += &format!("note: {notice}\n");
+    }
+    out
+}

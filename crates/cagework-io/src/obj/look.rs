@@ -1,0 +1,111 @@
+//! Materials of an OBJ: its `.mtl` files, as far as colours go.
+
+use std::collections::HashMap;
+
+use super::lex::{lines, tokens};
+use super::{NONE, ObjDocument};
+use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, linear_from_srgb, sniff_image};
+
+/// One material of a `.mtl` file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Material {
+    /// `Kd` with `d` as its alpha, as written.
+    pub(crate) color: [f32; 4],
+    /// `map_Kd`, as bytes.
+    pub(crate) image: Option<Vec<u8>>,
+}
+
+/// Reads the materials of a `.mtl` file by name; `resolve` fetches textures.
+pub(crate) fn read_materials(
+    bytes: &[u8],
+    resolve: &mut dyn FnMut(&str) -> Option<Vec<u8>>,
+    into: &mut HashMap<String, Material>,
+) {
+    let mut name: Option<String> = None;
+    for line in lines(bytes) {
+        let mut words = tokens(bytes, line.range.clone());
+        let Some(keyword) = words.next() else { continue };
+        let rest = rest_of(&bytes[line.range.clone()], &bytes[keyword.clone()]);
+        let mut number =
+            || words.next().and_then(|w| std::str::from_utf8(&bytes[w]).ok()?.parse::<f32>().ok());
+        if &bytes[keyword.clone()] == b"newmtl" {
+            into.insert(rest.clone(), Material { color: [1.0; 4], image: None });
+            name = Some(rest);
+            continue;
+        }
+        let Some(material) = name.as_ref().and_then(|n| into.get_mut(n)) else { continue };
+        match &bytes[keyword] {
+            b"Kd" => {
+                if let (Some(r), Some(g), Some(b)) = (number(), number(), number()) {
+                    material.color[..3].copy_from_slice(&[r, g, b]);
+                }
+            }
+            b"d" => material.color[3] = number().unwrap_or(1.0),
+            b"Tr" => material.color[3] = 1.0 - number().unwrap_or(0.0),
+            // Options such as -s 1 1 1 stand before the name, which may itself have blanks; only plain names are read.
+            b"map_Kd" if !rest.starts_with('-') => {
+                material.image = resolve(&rest.replace('\\', "/"));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// What stands after the keyword: names may have blanks.
+pub(crate) fn rest_of(line: &[u8], keyword: &[u8]) -> String {
+    let rest = line.trim_ascii().strip_prefix(keyword).unwrap_or_default().trim_ascii();
+    String::from_utf8_lossy(rest).into_owned()
+}
+
+/// How a document looks: a corner for each different vertex and texture coordinate.
+pub(crate) fn look(document: &ObjDocument) -> Look {
+    let mut look = Look::default();
+    let mut numbers: HashMap<(u32, u32), u32> = HashMap::new();
+    let mut corner = |c: u32, look: &mut Look| {
+        let corner = document.corners[c as usize];
+        *numbers.entry((corner.v, corner.vt)).or_insert_with(|| {
+            let uv = document.texcoords.get(corner.vt as usize).map_or([0.0; 2], |&[u, v]| [u, 1.0 - v]);
+            let color = document.colors.get(&corner.v).map_or([1.0; 4], |&[r, g, b]| {
+                [linear_from_srgb(r), linear_from_srgb(g), linear_from_srgb(b), 1.0]
+            });
+            look.vertices.push(LookVertex { uv, color, ..LookVertex::plain(corner.v) });
+            look.vertices.len() as u32 - 1
+        })
+    };
+    let mut images: HashMap<u32, Option<u32>> = HashMap::new();
+    for (material, triangles) in document.by_material() {
+        let start = look.triangles.len() as u32;
+        for t in triangles {
+            let drawn = t.map(|c| corner(c, &mut look));
+            look.triangles.push(drawn);
+        }
+        let range = start..look.triangles.len() as u32;
+        let name = document.materials.get(material as usize);
+        match name.and_then(|name| document.looks.get(name)) {
+            Some(found) => {
+                let image = *images.entry(material).or_insert_with(|| {
+                    let bytes = found.image.clone()?;
+                    let mime = sniff_image(&bytes)?.to_owned();
+                    look.images.push(LookImage { bytes, mime });
+                    Some(look.images.len() as u32 - 1)
+                });
+                let [r, g, b, alpha] = found.color;
+                // A texture replaces the colour, as programs that write black beside a texture mean it.
+                let base = if image.is_some() { [1.0; 3] } else { [r, g, b].map(linear_from_srgb) };
+                look.groups.push(LookGroup {
+                    triangles: range,
+                    base_color: [base[0], base[1], base[2], alpha.clamp(0.0, 1.0)],
+                    image,
+                    alpha: if alpha < 1.0 { LookAlpha::Blend } else { LookAlpha::Opaque },
+                    double_sided: true,
+                    ..LookGroup::default()
+                });
+            }
+            None if !document.colors.is_empty() => {
+                look.groups.push(LookGroup { triangles: range, double_sided: true, ..LookGroup::default() });
+            }
+            None => debug_assert!(material == NONE || name.is_some()),
+        }
+    }
+    look
+}

@@ -1,0 +1,207 @@
+//! The session on the GPU: equal to the CPU, cancelled, out of memory, lost and recovered.
+
+use std::ops::ControlFlow;
+
+use cagework_core::bind::{BindError, BindOptions, Method, Solver};
+use cagework_core::deform::deform_bound;
+use cagework_core::progress::{ProgressEvent, Silent};
+use cagework_core::{Binding, Cage, Weights};
+use cagework_gpu::render::{DrawModel, DrawVertex, MeshStyle, SceneOptions};
+use cagework_gpu::{ContextOptions, GpuContext, GpuError, PlanError, Session};
+use cagework_tests::cages::cage;
+use cagework_tests::creature::{creature, creature_cage};
+use cagework_tests::{assert_close, dense};
+use glam::{Quat, Vec3};
+use pollster::block_on;
+
+/// The bar for weights, GPU against CPU.
+const WEIGHT_TOLERANCE: f32 = 1e-4;
+
+/// The bar for positions, over the cage's diagonal.
+const POSITION_TOLERANCE: f32 = 1e-4;
+
+/// No GPU fails the test: the software adapter of mesa-vulkan-drivers will do.
+fn context(options: &ContextOptions) -> GpuContext {
+    match block_on(GpuContext::new(options)) {
+        Ok(context) => context,
+        Err(error) => panic!("these tests need a Vulkan adapter: {error}"),
+    }
+}
+
+/// Every third vertex of the animal, so that tests are quick, and its cage.
+fn input() -> (Vec<Vec3>, Cage) {
+    (creature().positions.into_iter().step_by(3).collect(), cage(&creature_cage()))
+}
+
+fn session_with(options: &ContextOptions) -> Session {
+    let (positions, cage) = input();
+    let mut session = Session::new(context(options));
+    let n = positions.len() as u32;
+    let triangles = (0..n / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+    block_on(session.set_model(DrawModel::plain(positions, triangles))).expect("the model is good");
+    block_on(session.set_cage(&cage)).expect("the cage is good");
+    session
+}
+
+fn session() -> Session {
+    session_with(&ContextOptions::default())
+}
+
+fn options(method: Method, solver: Solver) -> BindOptions {
+    BindOptions { grid: 24, tau: 1e-6, method, solver, ..BindOptions::default() }
+}
+
+fn on_cpu(options: &BindOptions) -> Binding {
+    let (positions, cage) = input();
+    cagework_core::bind(&positions, &cage, options, &Silent).expect("it binds")
+}
+
+fn posed(cage: &[Vec3]) -> Vec<Vec3> {
+    cage.iter().map(|&p| Quat::from_rotation_z(0.1 * p.x) * p + 0.2 * Vec3::Y).collect()
+}
+
+fn flat(points: &[Vec3]) -> Vec<f32> {
+    points.iter().flat_map(Vec3::to_array).collect()
+}
+
+fn weights(session: &Session) -> &Weights {
+    session.weights().expect("it is bound")
+}
+
+#[test]
+fn session_equals_the_cpu() {
+    let mut session = session();
+    let (_, cage) = input();
+    let pose = posed(cage.positions());
+    for method in [Method::Embedded, Method::Classic] {
+        for solver in [Solver::Multigrid, Solver::Jacobi] {
+            let options = options(method, solver);
+            let cpu = on_cpu(&options);
+            let report = block_on(session.bind(&options, &Silent)).expect("it binds");
+            assert!(report.converged && report.adapter.is_some());
+            assert_close(&dense(weights(&session)), &dense(&cpu.weights), WEIGHT_TOLERANCE);
+            session.pose(&pose);
+            let positions = block_on(session.read_positions()).expect("they come back");
+            let expected = deform_bound(&cpu.weights, &cpu.outside, &pose);
+            assert_close(&flat(&positions), &flat(&expected), POSITION_TOLERANCE * cage.diagonal());
+        }
+    }
+}
+
+#[test]
+fn adopted_weights_move_the_mesh_as_on_the_cpu() {
+    let mut session = session();
+    let (_, cage) = input();
+    let cpu = on_cpu(&options(Method::Embedded, Solver::Multigrid));
+    block_on(session.adopt(cpu.weights.clone(), cpu.outside.clone())).expect("they belong to it");
+    let pose = posed(cage.positions());
+    session.pose(&pose);
+    let positions = block_on(session.read_positions()).expect("they come back");
+    let expected = deform_bound(&cpu.weights, &cpu.outside, &pose);
+    // The same weights on both sides: f32 sums of dozens of products of size 10 are all that differs.
+    assert_close(&flat(&positions), &flat(&expected), 2e-5);
+}
+
+#[test]
+fn several_batches_give_the_same_weights() {
+    // So fine that a field, not the table of samples, is what does not fit into one binding.
+    let options = BindOptions { grid: 48, ..options(Method::Embedded, Solver::Multigrid) };
+    let mut whole = session();
+    let report = block_on(whole.bind(&options, &Silent)).expect("it binds");
+    // 16 columns of the finest level at a time, of 112.
+    let limit = (report.levels[0] + 2) * 4 * 16 + 100;
+    let limited = ContextOptions { max_binding_bytes: Some(limit), ..ContextOptions::default() };
+    let mut split = session_with(&limited);
+    block_on(split.bind(&options, &Silent)).expect("it binds");
+    assert_close(&dense(weights(&split)), &dense(weights(&whole)), WEIGHT_TOLERANCE);
+}
+
+#[test]
+fn what_does_not_fit_is_an_error_and_the_session_goes_on() {
+    let mut session = session();
+    let small = BindOptions { memory_limit: 6 << 20, ..options(Method::Embedded, Solver::Jacobi) };
+    let error = block_on(session.bind(&small, &Silent)).unwrap_err();
+    let is_memory =
+        matches!(error, GpuError::Plan(PlanError::Memory { .. }) | GpuError::Bind(BindError::Memory { .. }));
+    assert!(is_memory, "{error}");
+    block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &Silent)).expect("it binds");
+}
+
+#[test]
+fn cancel_between_slices_keeps_the_old_weights() {
+    let mut session = session();
+    block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &Silent)).expect("it binds");
+    let before = weights(&session).clone();
+    let cancel = |event: ProgressEvent| {
+        if event.delta.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let endless = BindOptions { tau: 1e-12, ..options(Method::Embedded, Solver::Jacobi) };
+    let error = block_on(session.bind(&endless, &cancel)).unwrap_err();
+    assert!(matches!(error, GpuError::Bind(BindError::Cancelled(_))), "{error}");
+    assert_eq!(weights(&session), &before);
+}
+
+#[test]
+fn lost_device_is_an_error_and_everything_comes_back_on_another() {
+    let mut session = session();
+    block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &Silent)).expect("it binds");
+    let pose = posed(session.cage_positions());
+    session.pose(&pose);
+    session.set_scene(SceneOptions { mesh: MeshStyle::Weights { column: 3 }, ..SceneOptions::default() });
+    session.frame_all();
+    let size = [160, 120];
+    let before = block_on(session.picture(size, 1.0)).expect("it is drawn");
+    let positions = block_on(session.read_positions()).expect("they come back");
+
+    session.context().device.destroy();
+    for error in [
+        block_on(session.picture(size, 1.0)).map(drop).unwrap_err(),
+        block_on(session.read_positions()).map(drop).unwrap_err(),
+        block_on(session.bind(&BindOptions::default(), &Silent)).map(drop).unwrap_err(),
+    ] {
+        assert!(matches!(error, GpuError::DeviceLost { .. }), "{error}");
+    }
+
+    let mut session = block_on(session.recover(context(&ContextOptions::default()))).expect("it recovers");
+    assert_eq!(session.cage_positions(), pose);
+    assert_eq!(block_on(session.picture(size, 1.0)).expect("it is drawn"), before);
+    assert_eq!(block_on(session.read_positions()).expect("they come back"), positions);
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let mut session = Session::new(context(&ContextOptions::default()));
+    let bind = |session: &mut Session| {
+        block_on(session.bind(&BindOptions::default(), &Silent)).map(drop).unwrap_err().to_string()
+    };
+    assert!(bind(&mut session).contains("no model"));
+    block_on(session.set_model(DrawModel::plain(vec![Vec3::ZERO], Vec::new()))).expect("a point is a model");
+    assert!(bind(&mut session).contains("no cage"));
+    assert_eq!(block_on(session.read_positions()).expect("at rest"), [Vec3::ZERO]);
+}
+
+#[test]
+fn what_does_not_belong_together_is_named() {
+    let mut session = session();
+    let few = Weights::new(2, vec![0, 1], vec![0], vec![1.0]).expect("one row");
+    let error = block_on(session.adopt(few, Vec::new())).unwrap_err().to_string();
+    assert!(error.contains("1 vertices and 2 cage vertices"), "{error}");
+    let mut model = DrawModel::plain(vec![Vec3::ZERO], Vec::new());
+    model.vertices.push(DrawVertex::plain(9));
+    let error = block_on(session.set_model(model)).unwrap_err().to_string();
+    assert!(error.contains("vertex 9"), "{error}");
+    for size in [[0, 10], [10, 9000]] {
+        let error = block_on(session.picture(size, 1.0)).unwrap_err().to_string();
+        assert!(error.contains("8192"), "{error}");
+    }
+}
+
+#[test]
+fn another_cage_drops_the_weights() {
+    let mut session = session();
+    block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &Silent)).expect("it binds");
+    let (positions, cage) = input();
+    block_on(session.set_cage(&cage)).expect("the cage is good");
+    assert!(session.weights().is_none() && session.outside().is_empty());
+    assert_eq!(block_on(session.read_positions()).expect("at rest"), positions);
+}
