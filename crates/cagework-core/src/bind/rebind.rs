@@ -7,6 +7,7 @@
 //! [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid, the faces or half of the cage change.
 
 mod local;
+mod steps;
 #[cfg(test)]
 mod tests;
 
@@ -17,21 +18,21 @@ use glam::{DVec3, Vec3};
 use crate::cage::Cage;
 use crate::grid::NO_CELL;
 use crate::mesh::{Weld, weld};
-use crate::progress::{Cancelled, Progress, Stage};
+use crate::progress::{Progress, Stage};
 use crate::sample::Stencils;
-use crate::simd::dispatch;
-use crate::solve::multigrid::{BatchReport, Stop, Workspace, histories};
-use crate::solve::rows::{LANES, Row, ZERO};
+use crate::solve::multigrid::histories;
+use crate::solve::rows::Row;
 use crate::solve::team::Team;
 
-use self::local::{Fields, OldCells, Region, Residual, UNFELT, Update, add_scaled};
+use self::local::{Fields, OldCells, Region, Residual, Update};
+use self::steps::{add_corrections, resample, solve_all, solve_for};
 use super::pipeline::{FieldsOn, Prepared, Solved, refuse_outside, sampling_stencils};
 use super::voxels::Voxels;
 use super::watch::Watch;
 use super::{BindError, BindOptions, Binding, Method, Solver, bind};
 
 /// Edits after which everything is bound anew.
-pub const MAX_UPDATES: usize = 8;
+const MAX_UPDATES: usize = 8;
 
 /// V-cycles for a correction: each makes its error about 15 times smaller.
 const CYCLES: u32 = 5;
@@ -44,9 +45,6 @@ const RESAMPLED: f64 = 1.5;
 
 /// Cells around them in which the old fields are needed: those stencils' centres.
 const NEEDED: f64 = 3.0;
-
-/// Vertices that a thread takes at a time.
-const VERTEX_RUN: usize = 512;
 
 /// How a bind was brought up to date.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,7 +111,6 @@ impl Rebinder {
     ) -> Result<(Binding, RebindReport), BindError> {
         let same = cage.n_vertices() == self.cage.n_vertices()
             && cage.faces() == self.cage.faces()
-            && cage.triangles() == self.cage.triangles()
             && Voxels::grid(cage, &self.options) == Voxels::grid(&self.cage, &self.options);
         if same && let Some(kept) = self.kept.take_if(|k| k.fields.updates.len() < MAX_UPDATES) {
             let watch = Watch::new(progress);
@@ -179,7 +176,8 @@ impl Rebinder {
         let voxelized = watch.now_ms();
 
         let resampled = Region::around(&moved, RESAMPLED, &grid);
-        let near = |v: usize| resampled.holds(to_grid(self.points[v]));
+        // What is outside follows the closest point of the cage, which may be another one from anywhere.
+        let near = |v: usize| resampled.holds(to_grid(self.points[v])) || old_stencils.is_outside(v);
         let moved_to = renumbering(&old_voxels.hierarchy.levels[0].row_of, &level.row_of, &old_voxels);
         let mut failed = None;
         let (stencils, changed) = old_stencils.renewed(
@@ -250,169 +248,17 @@ impl Rebinder {
     }
 }
 
-/// Solves all batches and keeps their fields.
-fn solve_all(
-    prepared: &Prepared<'_>,
-    options: &BindOptions,
-    watch: &Watch<'_>,
-) -> Result<(Solved, Vec<Vec<Row>>), Cancelled> {
-    let hierarchy = prepared.hierarchy();
-    let n_batches = hierarchy.n_batches();
-    let tolerance = f64::from(options.tau) / (n_batches as f64).sqrt();
-    let stop = Stop { tolerance, max_cycles: options.max_iterations };
-    let pieces: Vec<Option<Correction>> = prepared.team.share(
-        n_batches,
-        || Workspace::new(hierarchy),
-        |workspace, batch| {
-            let report = workspace.solve(hierarchy, batch, stop, |cycle, delta| {
-                let fraction = watch.done() as f32 / n_batches as f32;
-                watch.report(Stage::Solve, fraction, cycle, Some(delta as f32)).is_ok()
-            })?;
-            let mut samples = Vec::with_capacity(prepared.stencils.len());
-            prepared.stencils.sample_weights(batch, workspace.field(), &mut samples);
-            watch.piece_done(Stage::Solve, n_batches).ok()?;
-            Some(Correction { report, samples, field: workspace.field().to_vec() })
-        },
-    );
-    let pieces: Vec<Correction> = pieces.into_iter().collect::<Option<_>>().ok_or(Cancelled)?;
-    let [delta_history, residual_history] = histories(&pieces.iter().map(|p| &p.report).collect::<Vec<_>>());
-    let mut solved = Solved {
-        iterations: delta_history.len() as u32,
-        converged: pieces.iter().all(|p| p.report.converged),
-        delta_history,
-        residual_history,
-        delta_interval: 1,
-        field_bytes: pieces.iter().map(|p| size_of_val(p.field.as_slice())).sum(),
-        solve_share: 1.0,
-        ..Solved::default()
-    };
-    let mut fields = Vec::with_capacity(n_batches);
-    for piece in pieces {
-        solved.blocks.push(piece.samples);
-        fields.push(piece.field);
-    }
-    Ok((solved, fields))
-}
-
-/// A solved batch.
-struct Correction {
-    report: BatchReport,
-    /// At the mesh's vertices. `[n_points]`
-    samples: Vec<Row>,
-    field: Vec<Row>,
-}
-
-/// Solves for right-hand sides of cells, in batches, and samples the solutions.
-fn solve_for(
-    voxels: &Voxels,
-    stencils: &Stencils,
-    right: Vec<Vec<Row>>,
-    team: &Team,
-    watch: &Watch<'_>,
-) -> Result<Vec<Correction>, Cancelled> {
-    let hierarchy = &voxels.hierarchy;
-    let n = right.len();
-    let solved: Vec<Option<Correction>> = team.share(
-        n,
-        || Workspace::new(hierarchy),
-        |workspace, batch| {
-            let report = workspace.solve_for(hierarchy, &right[batch], CYCLES, |cycle, delta| {
-                let fraction = watch.done() as f32 / n as f32;
-                watch.report(Stage::Solve, fraction, cycle, Some(delta as f32)).is_ok()
-            })?;
-            let mut samples = Vec::with_capacity(stencils.len());
-            // No column has this number: only the field is sampled, not the cage's values.
-            stencils.sample_weights(usize::MAX / (2 * LANES), workspace.field(), &mut samples);
-            watch.piece_done(Stage::Solve, n).ok()?;
-            Some(Correction { report, samples, field: workspace.field().to_vec() })
-        },
-    );
-    solved.into_iter().collect::<Option<_>>().ok_or(Cancelled)
-}
-
-/// Samples the old fields by stencils that are new.
-fn resample(
-    stencils: &Stencils,
-    changed: &[u32],
-    level: &crate::levels::Level,
-    old: &OldCells<'_>,
-    region: &Region,
-    blocks: &mut [Vec<Row>],
-) {
-    let mut cell_of = std::collections::HashMap::new();
-    for cell in region.cells.iter().map(|&cell| cell as usize) {
-        if level.row_of[cell] != NO_CELL {
-            cell_of.insert(level.row_of[cell], cell);
-        }
-    }
-    let mut sum = vec![ZERO; blocks.len()];
-    let mut next = changed.iter().peekable();
-    for (v, (nodes, hats)) in stencils.iter().enumerate() {
-        if next.next_if_eq(&&(v as u32)).is_none() {
-            continue;
-        }
-        sum.fill(ZERO);
-        for (row, weight) in nodes {
-            if let Some(&cell) = cell_of.get(row) {
-                add_scaled(&mut sum, old.at(cell), *weight);
-            }
-        }
-        for &(column, weight) in hats {
-            sum[column as usize / LANES][column as usize % LANES] += weight;
-        }
-        for (block, row) in blocks.iter_mut().zip(&sum) {
-            block[v] = *row;
-        }
-    }
-}
-
-/// Adds to every vertex's weights its share of the corrections.
-fn add_corrections(blocks: &mut [Vec<Row>], samples: &[&[Row]], shares: &[Vec<Row>], team: &Team) {
-    let mut runs: Vec<(usize, Vec<&mut [Row]>)> = Vec::new();
-    for block in blocks.iter_mut() {
-        for (k, rows) in block.chunks_mut(VERTEX_RUN).enumerate() {
-            if k == runs.len() {
-                runs.push((k * VERTEX_RUN, Vec::new()));
-            }
-            runs[k].1.push(rows);
-        }
-    }
-    team.each_mut(&mut runs, |(first, blocks)| {
-        dispatch(
-            #[inline(always)]
-            || {
-                let n = blocks.first().map_or(0, |rows| rows.len());
-                let mut sum = vec![ZERO; blocks.len()];
-                for v in 0..n {
-                    sum.fill(ZERO);
-                    for (k, share) in shares.iter().enumerate() {
-                        let value = samples[k / LANES][*first + v][k % LANES];
-                        if value.abs() > UNFELT {
-                            add_scaled(&mut sum, share, value);
-                        }
-                    }
-                    for (rows, sum) in blocks.iter_mut().zip(&sum) {
-                        for lane in 0..LANES {
-                            rows[v][lane] += sum[lane];
-                        }
-                    }
-                }
-            },
-        );
-    });
-}
-
 /// Triangles with a moved vertex, in grid coordinates: where they were, are, and in steps of a cell on the way.
 fn moved_triangles(before: &Cage, after: &Cage, to_grid: impl Fn(Vec3) -> DVec3) -> Vec<[DVec3; 3]> {
     let mut moved = Vec::new();
-    let faces = before.face_of_triangle();
     let has_moved = |&i: &u32| before.positions()[i as usize] != after.positions()[i as usize];
-    for (t, corners) in after.triangles().iter().enumerate() {
+    // A polygon may be cut into triangles in another way than before.
+    for (cage, t) in [before, after].into_iter().flat_map(|c| (0..c.triangles().len()).map(move |t| (c, t))) {
         // Boundary values of a polygon depend on all its corners.
-        if !after.faces()[faces[t] as usize].iter().any(has_moved) {
+        if !after.faces()[cage.face_of_triangle()[t] as usize].iter().any(has_moved) {
             continue;
         }
-        let at = |cage: &Cage| corners.map(|i| to_grid(cage.positions()[i as usize]));
+        let at = |of: &Cage| cage.triangles()[t].map(|i| to_grid(of.positions()[i as usize]));
         let (from, to) = (at(before), at(after));
         let way = from.iter().zip(&to).map(|(a, b)| (*b - *a).abs().max_element()).fold(0.0, f64::max);
         let steps = way.ceil().clamp(1.0, 512.0);
