@@ -4,16 +4,26 @@
 //! [`binder::Binder`] binds. Arrays go across as typed arrays, everything else as plain objects. What fails throws an
 //! `Error` whose name is the variant and whose message is the sentence.
 
+// Canvases are the browser's. What does without compiles everywhere, so that tests and lints see it.
+#![cfg_attr(
+    not(target_family = "wasm"),
+    allow(dead_code, unused_imports, reason = "used by what only the browser has")
+)]
+
 mod arrays;
 pub mod binder;
 mod clock;
+#[cfg(target_family = "wasm")]
 pub mod engine;
 mod error;
+#[cfg(target_family = "wasm")]
 mod gpu;
 pub mod loaded;
 mod options;
 mod problems;
+mod scene;
 mod state;
+#[cfg(target_family = "wasm")]
 mod surface;
 mod views;
 

@@ -34,6 +34,8 @@ pub(crate) fn check() -> Result<(), String> {
     npm::install()?;
     run("cargo", &["fmt", "--all", "--check"], &[])?;
     run("cargo", &["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"], &[])?;
+    let web = ["clippy", "--package", "cagework-web", "--target", "wasm32-unknown-unknown", "--locked"];
+    run("cargo", &[&web[..], &["--", "-D", "warnings"]].concat(), &[])?;
     run("cargo", &["doc", "--workspace", "--no-deps", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")])?;
     arrows::check()?;
     site::check_types()?;

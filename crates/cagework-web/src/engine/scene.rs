@@ -1,19 +1,13 @@
 //! What is shown, and what its colours mean.
 
-use std::sync::Arc;
-
-use cagework_core::edit::Element;
-use cagework_gpu::render::colormap::ERROR_RANGE;
-use cagework_gpu::render::{Gizmo, GizmoMode, Marks, MeshStyle, SceneOptions, Selection, SliceView};
-use glam::Quat;
+use cagework_gpu::render::MeshStyle;
+use cagework_gpu::render::colormap::{ERROR_RANGE, LOWEST_RANGE};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::error::Fault;
-use crate::options::{Colour, GizmoAsked, SceneAsked, SliceShown};
-use crate::problems;
-use crate::state::State;
+use crate::options::{SceneAsked, SliceShown};
 use crate::views::{Legend, object};
 
 #[wasm_bindgen]
@@ -39,104 +33,34 @@ impl Engine {
     /// # Errors
     /// Never.
     pub fn legend(&self) -> Result<JsValue, JsValue> {
-        let legend = self.read(|state| {
-            let coordinate = || Legend { low: 0.0, high: 1.0, logarithmic: false, map: "viridis" };
-            match (state.slice.as_ref().map(|_| state.view.slice), state.mesh_style()) {
-                (_, MeshStyle::Weights { .. }) | (Some(SliceShown::Value), _) => Some(coordinate()),
-                (_, MeshStyle::Errors) => {
-                    let [low, high] = ERROR_RANGE.map(|e| 10.0_f32.powf(e));
-                    Some(Legend { low, high, logarithmic: true, map: "error" })
-                }
-                (Some(SliceShown::Kinds), _) => {
-                    Some(Legend { low: 0.0, high: 2.0, logarithmic: false, map: "kinds" })
-                }
-                _ => None,
+        let (slice, style) =
+            self.read(|state| (state.slice.as_ref().map(|_| state.view.slice), state.mesh_style()));
+        let coordinate = |high| Legend { low: 0.0, high, logarithmic: false, map: "viridis" };
+        let legend = match (slice, style) {
+            (Some(SliceShown::Kinds), _) => {
+                Some(Legend { low: 0.0, high: 2.0, logarithmic: false, map: "kinds" })
             }
-        });
+            (Some(SliceShown::Value), _) => Some(coordinate(1.0)),
+            (_, MeshStyle::Weights { column }) => Some(coordinate(self.largest_weight(column))),
+            (_, MeshStyle::Errors) => {
+                let [low, high] = ERROR_RANGE.map(|e| 10.0_f32.powf(e));
+                Some(Legend { low, high, logarithmic: true, map: "error" })
+            }
+            _ => None,
+        };
         Ok(legend.map_or(Ok(JsValue::UNDEFINED), |legend| object(&legend))?)
     }
 }
 
-impl State {
-    /// How the mesh is drawn: colours need weights, and a heat map a vertex.
-    pub(crate) fn mesh_style(&self) -> MeshStyle {
-        match self.view.colour {
-            _ if !self.view.model => MeshStyle::Hidden,
-            Colour::Material => MeshStyle::Solid,
-            Colour::Clay => MeshStyle::Clay,
-            Colour::Error if self.is_bound => MeshStyle::Errors,
-            Colour::Weight | Colour::Negative if self.is_bound => match self.selection.last() {
-                Some(column) => MeshStyle::Weights { column },
-                None => MeshStyle::Clay,
-            },
-            Colour::Weight | Colour::Negative | Colour::Error => MeshStyle::Clay,
-        }
-    }
-
-    /// What the renderer draws.
-    pub(crate) fn scene(&self) -> SceneOptions {
-        let cage = self.view.cage && self.is_on_gpu();
-        SceneOptions {
-            theme: self.view.theme(),
-            mesh: self.mesh_style(),
-            mesh_edges: false,
-            base_wireframe: self.view.base_wireframe,
-            cage_lines: cage,
-            handles: cage,
-            floor: self.view.floor,
-            selection: self.shown_selection(),
-            gizmo: self.gizmo().filter(|_| cage),
-            slice: self.shown_slice(),
-            marks: self.marks(),
-        }
-    }
-
-    fn shown_selection(&self) -> Selection {
-        let mut shown = Selection { vertices: self.selection.vertices(), ..Selection::default() };
-        match self.element {
-            Element::Vertex => shown.hovered_vertex = self.hovered.first().copied(),
-            Element::Edge => {
-                shown.edges = self.selection.edges(&self.topology);
-                shown.hovered_edge = match self.hovered[..] {
-                    [a, b] => Some([a, b]),
-                    _ => None,
-                };
-            }
-            Element::Face => {
-                shown.faces = self.selection.faces(&self.topology);
-                let hovered = |f: &Vec<u32>| !self.hovered.is_empty() && *f == self.hovered;
-                shown.hovered_face = self.topology.faces.iter().position(hovered).map(|f| f as u32);
-            }
-        }
-        if self.is_mirrored {
-            shown.unmatched = self.symmetry.unmatched();
-        }
-        shown
-    }
-
-    /// The gizmo in the middle of the selection.
-    pub(crate) fn gizmo(&self) -> Option<Gizmo> {
-        let mode = match self.view.gizmo {
-            GizmoAsked::None => return None,
-            GizmoAsked::Move => GizmoMode::Move,
-            GizmoAsked::Rotate => GizmoMode::Rotate,
-            GizmoAsked::Scale => GizmoMode::Scale,
-        };
-        let center = self.selection.center(&self.positions)?;
-        Some(Gizmo { mode, center, rotation: Quat::IDENTITY, active: self.active_part })
-    }
-
-    fn shown_slice(&self) -> Option<SliceView> {
-        let slice = self.slice.as_ref().filter(|_| self.view.slice != SliceShown::Off)?;
-        let column = self.selection.last().filter(|_| self.view.slice == SliceShown::Value);
-        Some(SliceView { slice: Arc::clone(slice), column })
-    }
-
-    /// Places with a problem; all of a draft is one.
-    fn marks(&self) -> Marks {
-        match self.check.as_ref().filter(|_| self.view.problems) {
-            Some(check) => problems::marks(check, &self.rest, &self.positions, self.cage.is_none()),
-            None => Marks::default(),
-        }
+impl Engine {
+    /// The value that the last colour of a heat map of weights stands for.
+    fn largest_weight(&self, column: u32) -> f32 {
+        let largest = self.with_session(|session| {
+            let weights =
+                session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
+            Ok(weights.column(column).fold(LOWEST_RANGE, f32::max))
+        });
+        // The GPU is busy with other weights: the page asks again when they are in.
+        largest.unwrap_or(1.0)
     }
 }

@@ -1,0 +1,95 @@
+//! The state as the renderer draws it.
+
+use std::sync::Arc;
+
+use cagework_core::edit::Element;
+use cagework_gpu::render::{Gizmo, GizmoMode, Marks, MeshStyle, SceneOptions, Selection, SliceView};
+use glam::Quat;
+
+use crate::options::{Colour, GizmoAsked, SliceShown};
+use crate::problems;
+use crate::state::State;
+
+impl State {
+    /// How the mesh is drawn: colours need weights, and a heat map a vertex.
+    pub(crate) fn mesh_style(&self) -> MeshStyle {
+        match self.view.colour {
+            _ if !self.view.model => MeshStyle::Hidden,
+            Colour::Material => MeshStyle::Solid,
+            Colour::Clay => MeshStyle::Clay,
+            Colour::Error if self.is_bound => MeshStyle::Errors,
+            Colour::Weight | Colour::Negative if self.is_bound => match self.selection.last() {
+                Some(column) => MeshStyle::Weights { column },
+                None => MeshStyle::Clay,
+            },
+            Colour::Weight | Colour::Negative | Colour::Error => MeshStyle::Clay,
+        }
+    }
+
+    /// What the renderer draws.
+    pub(crate) fn scene(&self) -> SceneOptions {
+        let cage = self.view.cage && self.is_on_gpu();
+        SceneOptions {
+            theme: self.view.theme(),
+            mesh: self.mesh_style(),
+            mesh_edges: false,
+            base_wireframe: self.view.base_wireframe,
+            cage_lines: cage,
+            handles: cage,
+            floor: self.view.floor,
+            selection: self.shown_selection(),
+            gizmo: self.gizmo().filter(|_| cage),
+            slice: self.shown_slice(),
+            marks: self.marks(),
+        }
+    }
+
+    fn shown_selection(&self) -> Selection {
+        let mut shown = Selection { vertices: self.selection.vertices(), ..Selection::default() };
+        match self.element {
+            Element::Vertex => shown.hovered_vertex = self.hovered.first().copied(),
+            Element::Edge => {
+                shown.edges = self.selection.edges(&self.topology);
+                shown.hovered_edge = match self.hovered[..] {
+                    [a, b] => Some([a, b]),
+                    _ => None,
+                };
+            }
+            Element::Face => {
+                shown.faces = self.selection.faces(&self.topology);
+                let hovered = |f: &Vec<u32>| !self.hovered.is_empty() && *f == self.hovered;
+                shown.hovered_face = self.topology.faces.iter().position(hovered).map(|f| f as u32);
+            }
+        }
+        if self.is_mirrored {
+            shown.unmatched = self.symmetry.unmatched();
+        }
+        shown
+    }
+
+    /// The gizmo in the middle of the selection.
+    pub(crate) fn gizmo(&self) -> Option<Gizmo> {
+        let mode = match self.view.gizmo {
+            GizmoAsked::None => return None,
+            GizmoAsked::Move => GizmoMode::Move,
+            GizmoAsked::Rotate => GizmoMode::Rotate,
+            GizmoAsked::Scale => GizmoMode::Scale,
+        };
+        let center = self.selection.center(&self.positions)?;
+        Some(Gizmo { mode, center, rotation: Quat::IDENTITY, active: self.active_part })
+    }
+
+    fn shown_slice(&self) -> Option<SliceView> {
+        let slice = self.slice.as_ref().filter(|_| self.view.slice != SliceShown::Off)?;
+        let column = self.selection.last().filter(|_| self.view.slice == SliceShown::Value);
+        Some(SliceView { slice: Arc::clone(slice), column })
+    }
+
+    /// Places with a problem; all of a draft is one.
+    fn marks(&self) -> Marks {
+        match self.check.as_ref().filter(|_| self.view.problems) {
+            Some(check) => problems::marks(check, &self.rest, &self.positions, self.cage.is_none()),
+            None => Marks::default(),
+        }
+    }
+}
