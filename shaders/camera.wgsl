@@ -2,7 +2,6 @@
 
 struct Camera {
     clip_from_world: mat4x4f,
-    world_from_clip: mat4x4f,
     view_from_world: mat4x4f,
     /// Where the eye is, world space, object units.
     eye: vec3f,

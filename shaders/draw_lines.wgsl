@@ -33,7 +33,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let up = select(-reach, reach, index == 2u || index == 3u || index == 4u);
     let beyond = select(-reach, reach, is_b);
     let own = select(a, b, is_b);
-    let offset = (along * beyond + across * up) / pixels;
+    let offset = (along * beyond + across * up) * camera.pixel;
     let clip = lifted(vec4f(own.xy + offset * own.w, own.zw));
     return Varying(clip, vec2f(select(0.0, length, is_b) + beyond, up), length, half_width, state_color(state));
 }

@@ -22,7 +22,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
         select(-1.0, 1.0, index == 2u || index == 3u || index == 4u),
     );
     let place = corner * (radius + 0.5);
-    let moved = vec4f(clip.xy + place / (0.5 * camera.viewport) * clip.w, clip.zw);
+    let moved = vec4f(clip.xy + place * camera.pixel * clip.w, clip.zw);
     return Varying(lifted(moved), place, radius, state_color(state));
 }
 

@@ -56,6 +56,7 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     // Where cells are a few pixels wide, lines would hide them.
     let visible = clamp(1.5 - 6.0 * max(slope.x, slope.y), 0.0, 1.0);
     let line = max(covers.x, covers.y) * visible * slice.line_color.a;
-    if color.a <= 0.0 { discard; }
+    // Outside the cage there is nothing to see, and nothing that would hide what is behind.
+    if content.x == EXTERIOR { discard; }
     return to_target(mix(color.rgb, slice.line_color.rgb, line), color.a);
 }

@@ -53,7 +53,9 @@ export function hintFor(options: {
 export function sentence(text: string): string {
   const trimmed = text.trim();
   if (trimmed === "") return "Something went wrong.";
-  const first = trimmed.charAt(0).toUpperCase() + trimmed.slice(1);
+  // Names of files keep their letters.
+  const isName = /^\S*\.\w/.test(trimmed);
+  const first = isName ? trimmed : trimmed.charAt(0).toUpperCase() + trimmed.slice(1);
   return /[.!?:]$/.test(first) ? first : `${first}.`;
 }
 

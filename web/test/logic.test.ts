@@ -102,6 +102,7 @@ describe("words", () => {
       "Cage is not closed: edge 12-40 has one triangle.",
     );
     expect(sentence("  ")).toBe("Something went wrong.");
+    expect(sentence("horse.glb: cut off")).toBe("horse.glb: cut off.");
   });
   it("offer the fix of an error by its name", () => {
     const error = new Error("needs 3 GB");

@@ -320,6 +320,10 @@ impl Session {
         scale: f32,
     ) -> Result<(), GpuError> {
         self.context.check()?;
+        // A canvas that is folded away has no area, and nothing to show.
+        if size.contains(&0) {
+            return Ok(());
+        }
         self.camera.set_viewport(Vec2::from(size.map(|s| s as f32)) / scale);
         let camera = self.camera;
         let mut encoder = self.encoder();

@@ -99,7 +99,6 @@ fn uniforms_mirror_their_wgsl_structs() {
             shader,
             Camera,
             clip_from_world,
-            world_from_clip,
             view_from_world,
             eye,
             perspective,

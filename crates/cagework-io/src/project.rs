@@ -238,10 +238,10 @@ fn position_bytes(positions: &[Vec3]) -> Vec<u8> {
 }
 
 fn positions_of(bytes: &[u8]) -> Option<Vec<Vec3>> {
-    let numbers = |b: &[u8]| b.try_into().map(f32::from_le_bytes).unwrap_or(f32::NAN);
+    let numbers = |b: &[u8]| b.try_into().map_or(f32::NAN, f32::from_le_bytes);
     let vector = |b: &[u8]| Vec3::new(numbers(&b[..4]), numbers(&b[4..8]), numbers(&b[8..]));
     let positions: Vec<Vec3> = bytes.chunks_exact(12).map(vector).collect();
-    (bytes.len() % 12 == 0 && positions.iter().all(|p| p.is_finite())).then_some(positions)
+    (bytes.len().is_multiple_of(12) && positions.iter().all(|p| p.is_finite())).then_some(positions)
 }
 
 fn face_bytes(faces: &[Vec<u32>]) -> Vec<u8> {
@@ -250,7 +250,7 @@ fn face_bytes(faces: &[Vec<u32>]) -> Vec<u8> {
 }
 
 fn faces_of(bytes: &[u8]) -> Option<Vec<Vec<u32>>> {
-    let mut words = bytes.chunks_exact(4).map(|b| b.try_into().map(u32::from_le_bytes).unwrap_or(u32::MAX));
+    let mut words = bytes.chunks_exact(4).map(|b| b.try_into().map_or(u32::MAX, u32::from_le_bytes));
     let mut left = bytes.len() / 4;
     let mut faces = Vec::new();
     while let Some(corners) = words.next() {

@@ -48,7 +48,12 @@ export function createBind(ctx: Context): BindActions {
       earlier:
         last && !same ? [last, ...earlier.filter((e) => !sameWay(e, report))].slice(0, EARLIER) : earlier,
     });
-    if (store.get().scene.colour !== "material") store.set({ legend: ctx.session().engine.legend() ?? null });
+    const { scene } = store.get();
+    if (scene.colour === "material" || scene.colour === "clay") return;
+    // Colours were asked for before there were weights to show.
+    const { engine } = ctx.session();
+    engine.setScene(scene);
+    store.set({ legend: engine.legend() ?? null });
   };
 
   return {

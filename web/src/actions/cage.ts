@@ -18,6 +18,9 @@ export interface CageActions {
 /** A hull needs few vertices: it has no limbs to follow. */
 const HULL_VERTICES = 24;
 
+/** Name of the step that takes a cage from a file. */
+const LOAD = "Load a cage";
+
 export function createCage(ctx: Context, after: () => void): CageActions {
   let job: Job<CageState> | undefined;
   /** Counts generations: what an older one still says is not heard. */
@@ -44,6 +47,8 @@ export function createCage(ctx: Context, after: () => void): CageActions {
   /** Takes a new cage as a step of the history; the first cage of a model is none. */
   const take = (label: string, before: ReturnType<typeof now> | undefined, state: CageState) => {
     adopt(state);
+    // A cage from elsewhere may reach beyond the view.
+    if (!before || label === LOAD) ctx.session().engine.frameAll();
     if (!before) return;
     const next = now();
     const set = (shape: typeof next) => adopt(ctx.session().engine.setCage(shape.positions, shape.corners));
@@ -90,7 +95,7 @@ export function createCage(ctx: Context, after: () => void): CageActions {
       return attempt(ctx, "This cage cannot be used", async () => {
         const state = await ctx.session().openCage(files);
         ctx.store.set({ cageSource: "file" });
-        take("Load a cage", before, state);
+        take(LOAD, before, state);
       });
     },
     repair(kind) {

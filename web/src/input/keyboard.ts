@@ -33,8 +33,9 @@ export interface KeyboardOptions {
 export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions): void {
   document.addEventListener("keydown", (event) => {
     if (event.defaultPrevented || event.isComposing || isTyping(event.target)) return;
-    if (isControlKey(event.target, event.key)) return;
     const gesture = app.edit.active();
+    // While something moves, Enter keeps it, whichever button was pressed last.
+    if (!gesture && isControlKey(event.target, event.key)) return;
     const { editingRest, busy, model } = app.store.get();
     if (gesture && !event.ctrlKey && !event.metaKey && app.edit.type(event.key)) {
       event.preventDefault();

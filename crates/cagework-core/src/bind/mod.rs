@@ -2,10 +2,12 @@
 
 mod memory;
 pub mod pipeline;
+mod rebind;
 mod solving;
 mod voxels;
 mod watch;
 
+pub use rebind::{RebindReport, Rebinder};
 pub use watch::Watch;
 
 use glam::Vec3;

@@ -34,17 +34,17 @@ pub enum FieldsOn {
 
 /// A bind up to the solve: the geometry of grid and mesh.
 pub struct Prepared<'a> {
-    positions: &'a [Vec3],
-    cage: &'a Cage,
-    options: &'a BindOptions,
-    welded: Weld,
-    points: Vec<Vec3>,
-    team: Team,
-    voxels: Voxels,
-    stencils: Stencils,
-    estimated: u64,
+    pub(super) positions: &'a [Vec3],
+    pub(super) cage: &'a Cage,
+    pub(super) options: &'a BindOptions,
+    pub(super) welded: Weld,
+    pub(super) points: Vec<Vec3>,
+    pub(super) team: Team,
+    pub(super) voxels: Voxels,
+    pub(super) stencils: Stencils,
+    pub(super) estimated: u64,
     /// On the watcher's clock: the beginning, voxels made, stencils made.
-    times_ms: [f64; 3],
+    pub(super) times_ms: [f64; 3],
 }
 
 /// The sampled columns and how the solve went.
@@ -144,22 +144,27 @@ impl<'a> Prepared<'a> {
     ///
     /// # Errors
     /// Cancelled.
-    pub fn finish(self, solved: Solved, watch: &Watch<'_>) -> Result<Binding, BindError> {
+    pub fn finish(self, mut solved: Solved, watch: &Watch<'_>) -> Result<Binding, BindError> {
+        self.finished(&mut solved, watch)
+    }
+
+    /// As [`Self::finish`], for those who go on with the geometry and the samples (which sparsification changes).
+    pub(super) fn finished(&self, solved: &mut Solved, watch: &Watch<'_>) -> Result<Binding, BindError> {
         let Self { positions, cage, options, welded, points, team, voxels, stencils, .. } = self;
         let [began, voxelized, stencils_made] = self.times_ms;
         let sampled = watch.now_ms();
         watch.report(Stage::Sample, 0.5, solved.iterations, None)?;
-        let mut blocks = solved.blocks;
+        let blocks = &mut solved.blocks;
         let row_options =
             RowOptions { threshold: options.sparsify, preserve_affine: options.method == Method::Embedded };
         let (unique, statistics) =
-            assemble(cage, &mut blocks, &points, row_options, |vertex| stencils.is_outside(vertex), &team);
+            assemble(cage, blocks, points, row_options, |vertex| stencils.is_outside(vertex), team);
         let blocks_bytes: usize = blocks.iter().map(|b| size_of_val(b.as_slice())).sum();
         let held = voxels.bytes + stencils.bytes() + blocks_bytes;
         let peak = held + solved.field_bytes.max(unique.bytes());
         let all_differ = points.len() == positions.len();
         let weights = if all_differ { unique } else { unique.with_rows(&welded.unique_of) };
-        let outside = outside_vertices(cage, &stencils.outside, positions, &welded);
+        let outside = outside_vertices(cage, &stencils.outside, positions, welded);
         watch.report(Stage::Sample, 1.0, solved.iterations, None)?;
         let ended = watch.now_ms();
 
@@ -169,7 +174,7 @@ impl<'a> Prepared<'a> {
             method: options.method,
             solver: options.solver,
             backend: if solved.adapter.is_some() { "gpu" } else { "cpu" }.to_owned(),
-            adapter: solved.adapter,
+            adapter: solved.adapter.take(),
             threads: team.n_threads(),
             grid: options.grid,
             dims: level.grid.dims,
@@ -181,9 +186,9 @@ impl<'a> Prepared<'a> {
             levels: voxels.hierarchy.levels.iter().map(|l| l.n_unknowns() as u64).collect(),
             iterations: solved.iterations,
             converged: solved.converged,
-            delta_history: solved.delta_history,
+            delta_history: std::mem::take(&mut solved.delta_history),
             delta_interval: solved.delta_interval,
-            residual_history: solved.residual_history,
+            residual_history: std::mem::take(&mut solved.residual_history),
             timings_ms: Timings {
                 voxelize: voxelized - began,
                 solve: solve_ms,
@@ -204,7 +209,7 @@ impl<'a> Prepared<'a> {
 }
 
 /// Stencils of all points, in runs shared among threads.
-fn sampling_stencils(
+pub(super) fn sampling_stencils(
     cage: &Cage,
     voxels: &Voxels,
     points: &[Vec3],
@@ -230,7 +235,11 @@ fn sampling_stencils(
     Ok(stencils)
 }
 
-fn refuse_outside(stencils: &Stencils, options: &BindOptions, welded: &Weld) -> Result<(), BindError> {
+pub(super) fn refuse_outside(
+    stencils: &Stencils,
+    options: &BindOptions,
+    welded: &Weld,
+) -> Result<(), BindError> {
     match (options.outside, stencils.outside.first()) {
         (OutsidePolicy::Refuse, Some(first)) => Err(BindError::Outside {
             count: stencils.outside.len() as u32,

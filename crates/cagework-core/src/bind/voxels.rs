@@ -17,6 +17,7 @@ use crate::voxelize::{CellKind, voxelize_classic};
 use super::{BindOptions, Method, Solver};
 
 /// What voxelisation leaves.
+#[derive(Debug)]
 pub(super) struct Voxels {
     pub(super) hierarchy: Hierarchy,
     pub(super) counts: CellCounts,

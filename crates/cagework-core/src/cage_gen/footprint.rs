@@ -14,7 +14,7 @@ const ACROSS: f64 = 1e-12;
 
 /// A triangle among voxels.
 #[derive(Debug)]
-pub(super) struct Footprint {
+pub(crate) struct Footprint {
     /// Bounds on a voxel centre's x that depend on y and z; the first `n_slanted` count.
     slanted: [Slanted; 10],
     n_slanted: usize,
@@ -36,7 +36,7 @@ struct Slanted {
 
 impl Footprint {
     /// The footprint of a triangle in voxel units, for voxels grown by `grow` on all sides.
-    pub(super) fn new(triangle: [DVec3; 3], grow: f64) -> Self {
+    pub(crate) fn new(triangle: [DVec3; 3], grow: f64) -> Self {
         let half = 0.5 + grow + SLACK;
         let [a, b, c] = triangle;
         let mut footprint = Self {
@@ -75,7 +75,7 @@ impl Footprint {
     }
 
     /// Calls `each(y, z, first, last)` for the run of every row.
-    pub(super) fn for_each_run(&self, dims: [usize; 3], mut each: impl FnMut(usize, usize, usize, usize)) {
+    pub(crate) fn for_each_run(&self, dims: [usize; 3], mut each: impl FnMut(usize, usize, usize, usize)) {
         let [_, ys, zs] = rows(self.min, self.max, dims);
         for z in zs[0]..zs[1] {
             for y in ys[0]..ys[1] {

@@ -12,7 +12,7 @@
 
 mod buckets;
 mod collapse;
-mod footprint;
+pub(crate) mod footprint;
 mod guarded;
 mod lattice;
 mod options;

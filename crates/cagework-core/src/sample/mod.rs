@@ -11,6 +11,7 @@ use glam::DVec3;
 
 use crate::cage::Cage;
 use crate::geometry::closest_point_on_triangle;
+use crate::grid::NO_CELL;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 
@@ -138,6 +139,42 @@ impl Stencils {
         self.node_start.extend(other.node_start[1..].iter().map(|s| s + n));
         self.hat_start.extend(other.hat_start[1..].iter().map(|s| s + h));
         self.outside.extend(other.outside.iter().map(|o| Outside { vertex: o.vertex + v, ..*o }));
+    }
+
+    /// The stencils of other rows of the field: `row_of[row]` is where a row went, if it still is somewhere. Vertices
+    /// for which `keep` fails or a row is gone get the next of `fresh(those vertices)`.
+    #[must_use]
+    pub fn renewed(
+        &self,
+        row_of: &[u32],
+        keep: impl Fn(usize) -> bool,
+        fresh: impl FnOnce(&[u32]) -> Self,
+    ) -> (Self, Vec<u32>) {
+        let stale = |(v, (nodes, _)): &(usize, (Entries<'_>, Entries<'_>))| {
+            !keep(*v) || nodes.iter().any(|&(row, _)| row_of[row as usize] == NO_CELL)
+        };
+        let changed: Vec<u32> = self.iter().enumerate().filter(stale).map(|(v, _)| v as u32).collect();
+        let fresh = fresh(&changed);
+        let mut renewed = Self::new();
+        renewed.nodes.reserve(self.nodes.len());
+        renewed.hats.reserve(self.hats.len());
+        let (mut new, mut next) = (fresh.iter(), changed.iter().peekable());
+        for (v, kept) in self.iter().enumerate() {
+            let is_new = next.next_if_eq(&&(v as u32)).is_some();
+            let (nodes, hats) = if is_new { new.next().unwrap_or_default() } else { kept };
+            let moved = |&(row, w): &(u32, f32)| (if is_new { row } else { row_of[row as usize] }, w);
+            renewed.nodes.extend(nodes.iter().map(moved));
+            renewed.hats.extend_from_slice(hats);
+            renewed.node_start.push(renewed.nodes.len() as u32);
+            renewed.hat_start.push(renewed.hats.len() as u32);
+        }
+        let still = self.outside.iter().filter(|o| changed.binary_search(&o.vertex).is_err()).copied();
+        renewed.outside.extend(still);
+        renewed
+            .outside
+            .extend(fresh.outside.iter().map(|o| Outside { vertex: changed[o.vertex as usize], ..*o }));
+        renewed.outside.sort_by_key(|o| o.vertex);
+        (renewed, changed)
     }
 
     /// Weights of all vertices for the columns of one batch.

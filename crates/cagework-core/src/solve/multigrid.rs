@@ -10,6 +10,8 @@
 //! A smoothing pass is one stream through memory: half sweeps follow each other one z-plane apart, and the residual
 //! of the red cells (black ones have none after a black half sweep) trails them.
 
+mod other;
+
 use super::hierarchy::Hierarchy;
 use super::rows::{
     LANES, Prolong, Rhs, Row, ZERO, over_relax_plane, prolong_plane, relax_plane, residual_plane,
@@ -51,6 +53,8 @@ pub struct Workspace {
     f: Vec<Vec<Row>>,
     /// Residual of the red cells of the level under way, and a zero row.
     residual: Vec<Row>,
+    /// Whether `f[0]` has one row per cell, as on the other levels.
+    dense: bool,
 }
 
 /// How one batch converged.
@@ -147,7 +151,7 @@ impl Workspace {
             .enumerate()
             .map(|(k, l)| vec![ZERO; if k == 0 { l.n_cut() } else { l.n_rows() }])
             .collect();
-        Self { u, f, residual: vec![ZERO; hierarchy.levels[0].first_row(1)] }
+        Self { u, f, residual: vec![ZERO; hierarchy.levels[0].first_row(1)], dense: false }
     }
 
     /// Bytes of a workspace for `hierarchy`.
@@ -171,7 +175,7 @@ impl Workspace {
         hierarchy: &Hierarchy,
         batch: usize,
         stop: Stop,
-        mut cycle_done: impl FnMut(u32, f64) -> bool,
+        cycle_done: impl FnMut(u32, f64) -> bool,
     ) -> Option<BatchReport> {
         let coarsest = hierarchy.levels.len() - 1;
         hierarchy.fill_cut_rhs(batch, &mut self.f[0]);
@@ -189,6 +193,16 @@ impl Workspace {
                 self.cycle(hierarchy, k);
             }
         }
+        self.cycles(hierarchy, stop, cycle_done)
+    }
+
+    /// V-cycles until the stop rule holds.
+    fn cycles(
+        &mut self,
+        hierarchy: &Hierarchy,
+        stop: Stop,
+        mut cycle_done: impl FnMut(u32, f64) -> bool,
+    ) -> Option<BatchReport> {
         let mut convergence = Convergence::new(stop);
         loop {
             let (delta_square, residual_square) = self.cycle(hierarchy, 0);
@@ -225,7 +239,7 @@ impl Workspace {
     fn cycle(&mut self, hierarchy: &Hierarchy, k: usize) -> (f64, f64) {
         let level = &hierarchy.levels[k];
         let (f, coarse_f) = self.f.split_at_mut(k + 1);
-        let rhs = if k == 0 { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) };
+        let rhs = if k == 0 && !self.dense { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) };
         if k + 1 == hierarchy.levels.len() {
             return relax_coarsest(level, &mut self.u[k], rhs);
         }
@@ -239,7 +253,7 @@ impl Workspace {
         self.u[k + 1].fill(ZERO);
         self.cycle(hierarchy, k + 1);
         let (f, _) = self.f.split_at(k + 1);
-        let rhs = if k == 0 { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) };
+        let rhs = if k == 0 && !self.dense { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) };
         let (fine_u, coarse_u) = self.u.split_at_mut(k + 1);
         let delta = if k == 0 { sum_squares(&coarse_u[0]) / coarse.n_unknowns().max(1) as f64 } else { 0.0 };
         post_smooth(level, transfer, &coarse_u[0], &mut fine_u[k], rhs);

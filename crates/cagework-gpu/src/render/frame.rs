@@ -331,13 +331,11 @@ impl Renderer {
     fn uniform(&self, target: Target<'_>, camera: &Camera) -> Uniform {
         let Target { format, size, scale, .. } = target;
         let palette = self.scene.theme.palette();
-        let clip_from_world = camera.clip_from_world();
         let viewport = size.map(|s| s as f32);
         let radius = (0.5 * self.floor.diagonal()).max(f32::MIN_POSITIVE);
         let middle = self.floor.center().with_y(self.floor.min.y);
         Uniform {
-            clip_from_world: clip_from_world.to_cols_array_2d(),
-            world_from_clip: clip_from_world.inverse().to_cols_array_2d(),
+            clip_from_world: camera.clip_from_world().to_cols_array_2d(),
             view_from_world: camera.view_from_world().to_cols_array_2d(),
             eye: camera.eye().to_array(),
             perspective: f32::from(u8::from(camera.projection == Projection::Perspective)),

@@ -8,8 +8,6 @@ use bytemuck::{Pod, Zeroable};
 pub struct Camera {
     /// Clip from world, columns.
     pub clip_from_world: [[f32; 4]; 4],
-    /// Its inverse.
-    pub world_from_clip: [[f32; 4]; 4],
     /// View from world, columns.
     pub view_from_world: [[f32; 4]; 4],
     /// Where the eye is, world space, object units.

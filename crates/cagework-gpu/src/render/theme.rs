@@ -64,7 +64,7 @@ const DARK: Palette = Palette {
     warning: (0xff4d4f, 1.0),
     boundary: (0xe0913a, 1.0),
     interior: (0x2f7f86, 1.0),
-    exterior: (0x8a94a3, 0.10),
+    exterior: (0x8a94a3, 0.55),
     cell_lines: (0x15181d, 0.55),
 };
 
@@ -84,7 +84,7 @@ const LIGHT: Palette = Palette {
     warning: (0xd6293e, 1.0),
     boundary: (0xe8a14a, 1.0),
     interior: (0x6db5b9, 1.0),
-    exterior: (0x5e6a7a, 0.08),
+    exterior: (0x5e6a7a, 0.55),
     cell_lines: (0x2b333d, 0.5),
 };
 

@@ -1,0 +1,282 @@
+//! Binding again after a small edit of the rest cage, from what the bind before left behind.
+//!
+//! When a few vertices of the cage move, the discrete equations change only in cells at the moved faces. The old fields leave
+//! a residual there and nowhere else, and the residuals of all columns are combinations of a few: columns that do not
+//! belong to the moved faces vanish on them, so they look alike a few cells away. Those few are solved for, and every
+//! column, also at the mesh's vertices, takes its share of them. What is neglected (1e-6 of a weight an edit) adds up, so after
+//! [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid, the faces or half of the cage change.
+
+mod local;
+mod steps;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use crate::cage::Cage;
+use crate::grid::NO_CELL;
+use crate::mesh::{Weld, weld};
+use crate::progress::{Progress, Stage};
+use crate::sample::Stencils;
+use crate::solve::multigrid::histories;
+use crate::solve::rows::Row;
+use crate::solve::team::Team;
+
+use self::local::{Fields, OldCells, Region, Residual, Update};
+use self::steps::{add_corrections, resample, solve_all, solve_for};
+use super::pipeline::{FieldsOn, Prepared, Solved, refuse_outside, sampling_stencils};
+use super::voxels::Voxels;
+use super::watch::Watch;
+use super::{BindError, BindOptions, Binding, Method, Solver, bind};
+
+/// Edits after which everything is bound anew.
+const MAX_UPDATES: usize = 8;
+
+/// V-cycles for a correction: each makes its error about 15 times smaller.
+const CYCLES: u32 = 5;
+
+/// Cells around the moved faces whose equations may have changed.
+const CHANGED: f64 = 1.5;
+
+/// Cells around them in which stencils are made anew: a stencil sees the triangles in its cube of centres.
+const RESAMPLED: f64 = 1.5;
+
+/// Cells around them in which the old fields are needed: those stencils' centres.
+const NEEDED: f64 = 3.0;
+
+/// How a bind was brought up to date.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RebindReport {
+    /// Right-hand sides that were solved for; a whole bind has one for each column.
+    pub solved: u32,
+    /// Columns.
+    pub columns: u32,
+    /// Different mesh positions whose sampling stencil was made anew.
+    pub stencils_made: u32,
+    /// Whether all was bound anew.
+    pub anew: bool,
+}
+
+/// A bound mesh that remembers the fields of the bind.
+#[derive(Debug)]
+pub struct Rebinder {
+    positions: Vec<Vec3>,
+    options: BindOptions,
+    welded: Weld,
+    points: Vec<Vec3>,
+    cage: Cage,
+    /// What is kept between binds; none for methods that are always bound anew.
+    kept: Option<Kept>,
+}
+
+#[derive(Debug)]
+struct Kept {
+    voxels: Voxels,
+    stencils: Stencils,
+    fields: Fields,
+    /// Samples. `[n_batches][n_points]`
+    blocks: Vec<Vec<Row>>,
+}
+
+impl Rebinder {
+    /// Binds as [`bind`] does, and keeps what the next bind can start from: the fields (4 bytes for each cell inside and
+    /// cage vertex) and the samples (as much for each mesh vertex).
+    ///
+    /// # Errors
+    /// Those of [`bind`].
+    pub fn new(
+        positions: &[Vec3],
+        cage: &Cage,
+        options: &BindOptions,
+        progress: &dyn Progress,
+    ) -> Result<(Self, Binding), BindError> {
+        let welded = weld(positions);
+        let points = welded.first.iter().map(|&v| positions[v as usize]).collect();
+        let (positions, options) = (positions.to_vec(), *options);
+        let mut rebinder = Self { positions, options, welded, points, cage: cage.clone(), kept: None };
+        let binding = rebinder.anew(cage, progress)?;
+        Ok((rebinder, binding))
+    }
+
+    /// Binds the mesh to an edited cage.
+    ///
+    /// # Errors
+    /// Those of [`bind`]; what was kept stays as it was, or is given up, and the next bind is a whole one.
+    pub fn rebind(
+        &mut self,
+        cage: &Cage,
+        progress: &dyn Progress,
+    ) -> Result<(Binding, RebindReport), BindError> {
+        let same = cage.n_vertices() == self.cage.n_vertices()
+            && cage.faces() == self.cage.faces()
+            && Voxels::grid(cage, &self.options) == Voxels::grid(&self.cage, &self.options);
+        if same && let Some(kept) = self.kept.take_if(|k| k.fields.updates.len() < MAX_UPDATES) {
+            let watch = Watch::new(progress);
+            if let Some(done) = self.updated(cage, kept, &watch)? {
+                return Ok(done);
+            }
+        }
+        let columns = cage.n_vertices() as u32;
+        let stencils_made = self.points.len() as u32;
+        let report = RebindReport { solved: columns, columns, stencils_made, anew: true };
+        Ok((self.anew(cage, progress)?, report))
+    }
+
+    /// Everything from the beginning.
+    fn anew(&mut self, cage: &Cage, progress: &dyn Progress) -> Result<Binding, BindError> {
+        if self.options.method != Method::Embedded || self.options.solver != Solver::Multigrid {
+            let binding = bind(&self.positions, cage, &self.options, progress)?;
+            self.cage = cage.clone();
+            return Ok(binding);
+        }
+        let watch = Watch::new(progress);
+        let prepared = Prepared::new(&self.positions, cage, &self.options, FieldsOn::Host, &watch)?;
+        let level = &prepared.hierarchy().levels[0];
+        let n_batches = prepared.hierarchy().n_batches();
+        let needed = prepared.estimated + (level.n_rows() * size_of::<Row>() * n_batches) as u64;
+        if needed > self.options.memory_limit {
+            return Err(BindError::Memory { needed, limit: self.options.memory_limit });
+        }
+        let row_of = Arc::new(level.row_of.clone());
+        let (mut solved, base) = solve_all(&prepared, &self.options, &watch)?;
+        let blocks = if self.options.sparsify > 0.0 { Some(solved.blocks.clone()) } else { None };
+        let binding = prepared.finished(&mut solved, &watch)?;
+        let Prepared { voxels, stencils, .. } = prepared;
+        // Without sparsification the samples are only read.
+        let blocks = blocks.unwrap_or(solved.blocks);
+        let fields = Fields { base, row_of, updates: Vec::new() };
+        self.kept = Some(Kept { voxels, stencils, fields, blocks });
+        self.cage = cage.clone();
+        Ok(binding)
+    }
+
+    /// Only what the moved faces change; `None` if that is too much.
+    fn updated(
+        &mut self,
+        cage: &Cage,
+        kept: Kept,
+        watch: &Watch<'_>,
+    ) -> Result<Option<(Binding, RebindReport)>, BindError> {
+        let Kept { voxels: old_voxels, stencils: old_stencils, mut fields, mut blocks } = kept;
+        let began = watch.now_ms();
+        let team = Team::new(self.options.threads);
+        watch.report(Stage::Voxelize, 0.0, 0, None)?;
+        let grid = Voxels::grid(cage, &self.options);
+        let to_grid = |p: Vec3| grid.to_grid(p.as_dvec3());
+        let moved = moved_triangles(&self.cage, cage, to_grid);
+        let n_batches = blocks.len();
+        let needed = Region::around(&moved, NEEDED, &grid);
+        if 4 * needed.cells.len() > grid.n_cells() {
+            return Ok(None);
+        }
+        let voxels = team.install(|| Voxels::new(cage, grid, &self.options));
+        let level = &voxels.hierarchy.levels[0];
+        let voxelized = watch.now_ms();
+
+        let resampled = Region::around(&moved, RESAMPLED, &grid);
+        // What is outside follows the closest point of the cage, which may be another one from anywhere.
+        let near = |v: usize| resampled.holds(to_grid(self.points[v])) || old_stencils.is_outside(v);
+        let moved_to = renumbering(&old_voxels.hierarchy.levels[0].row_of, &level.row_of, &old_voxels);
+        let mut failed = None;
+        let (stencils, changed) = old_stencils.renewed(
+            &moved_to,
+            |v| !near(v),
+            |changed| {
+                let points: Vec<Vec3> = changed.iter().map(|&v| self.points[v as usize]).collect();
+                sampling_stencils(cage, &voxels, &points, &team, watch).unwrap_or_else(|error| {
+                    failed = Some(error);
+                    Stencils::new()
+                })
+            },
+        );
+        if let Some(error) = failed {
+            return Err(error);
+        }
+        refuse_outside(&stencils, &self.options, &self.welded)?;
+        let stencils_made = watch.now_ms();
+
+        let mut solved = Solved { converged: true, delta_interval: 1, solve_share: 1.0, ..Solved::default() };
+        let mut rank = 0;
+        if !moved.is_empty() {
+            let old = OldCells::new(&fields, &needed, n_batches);
+            let region = Region::around(&moved, CHANGED, &grid);
+            let residual = Residual::new(level, &region, n_batches, &old);
+            let Some((right, shares)) = residual.split(level.n_rows(), cage.n_vertices()) else {
+                return Ok(None);
+            };
+            resample(&stencils, &changed, level, &old, &needed, &mut blocks);
+            rank = shares.len();
+            let corrections = solve_for(&voxels, &stencils, right, &team, watch)?;
+            solved.iterations = CYCLES;
+            solved.residual_history =
+                histories(&corrections.iter().map(|c| &c.report).collect::<Vec<_>>())[1].clone();
+            let samples: Vec<&[Row]> = corrections.iter().map(|c| c.samples.as_slice()).collect();
+            add_corrections(&mut blocks, &samples, &shares, &team);
+            let row_of = Arc::new(level.row_of.clone());
+            let new_fields = corrections.into_iter().map(|c| c.field).collect();
+            fields.updates.push(Update { fields: new_fields, row_of, shares });
+        }
+        let keep_samples = (self.options.sparsify > 0.0).then(|| blocks.clone());
+        solved.blocks = blocks;
+        let prepared = Prepared {
+            positions: &self.positions,
+            cage,
+            options: &self.options,
+            welded: self.welded.clone(),
+            points: std::mem::take(&mut self.points),
+            team,
+            voxels,
+            stencils,
+            estimated: 0,
+            times_ms: [began, voxelized, stencils_made],
+        };
+        let finished = prepared.finished(&mut solved, watch);
+        let Prepared { voxels, stencils, points, .. } = prepared;
+        self.points = points;
+        self.cage = cage.clone();
+        let blocks = keep_samples.unwrap_or(solved.blocks);
+        self.kept = Some(Kept { voxels, stencils, fields, blocks });
+        let report = RebindReport {
+            solved: rank as u32,
+            columns: cage.n_vertices() as u32,
+            stencils_made: changed.len() as u32,
+            anew: false,
+        };
+        Ok(Some((finished?, report)))
+    }
+}
+
+/// Triangles with a moved vertex, in grid coordinates: where they were, are, and in steps of a cell on the way.
+fn moved_triangles(before: &Cage, after: &Cage, to_grid: impl Fn(Vec3) -> DVec3) -> Vec<[DVec3; 3]> {
+    let mut moved = Vec::new();
+    let has_moved = |&i: &u32| before.positions()[i as usize] != after.positions()[i as usize];
+    // A polygon may be cut into triangles in another way than before.
+    for (cage, t) in [before, after].into_iter().flat_map(|c| (0..c.triangles().len()).map(move |t| (c, t))) {
+        // Boundary values of a polygon depend on all its corners.
+        if !after.faces()[cage.face_of_triangle()[t] as usize].iter().any(has_moved) {
+            continue;
+        }
+        let at = |of: &Cage| cage.triangles()[t].map(|i| to_grid(of.positions()[i as usize]));
+        let (from, to) = (at(before), at(after));
+        let way = from.iter().zip(&to).map(|(a, b)| (*b - *a).abs().max_element()).fold(0.0, f64::max);
+        let steps = way.ceil().clamp(1.0, 512.0);
+        for k in 0..=steps as u32 {
+            let share = f64::from(k) / steps;
+            moved.push([0, 1, 2].map(|c| from[c].lerp(to[c], share)));
+        }
+    }
+    moved
+}
+
+/// For every old row the new one of the same cell; [`NO_CELL`] if it is gone. Zero rows are nobody's.
+fn renumbering(old: &[u32], new: &[u32], voxels: &Voxels) -> Vec<u32> {
+    let mut moved_to = vec![NO_CELL; voxels.hierarchy.levels[0].n_rows()];
+    for (&from, &to) in old.iter().zip(new) {
+        if from != NO_CELL {
+            moved_to[from as usize] = to;
+        }
+    }
+    moved_to
+}

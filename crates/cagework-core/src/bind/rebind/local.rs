@@ -1,0 +1,292 @@
+//! What an edit does to the linear system, looked at only where the moved faces are.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::cage_gen::footprint::Footprint;
+use crate::grid::{Grid, NO_CELL};
+use crate::levels::Level;
+use crate::simd::dispatch;
+use crate::solve::rows::{LANES, Row, ZERO};
+
+/// Smallest entry of a residual that counts, as a change of a weight: the solver leaves that much anyway.
+const NEGLIGIBLE: f32 = 1e-6;
+
+/// Values of a correction below this are left out: all of them together stay below [`NEGLIGIBLE`].
+pub(super) const UNFELT: f32 = 1e-8;
+
+/// Independent residuals up to which an update is worth it.
+const MAX_RANK: usize = 96;
+
+/// Cells near moved faces.
+#[derive(Clone, Debug)]
+pub(super) struct Region {
+    /// For each cell of the grid its place in `cells`; [`NO_CELL`] if it is none of them.
+    number: Vec<u32>,
+    /// Indices of the cells in the grid.
+    pub(super) cells: Vec<u32>,
+    dims: [usize; 3],
+}
+
+impl Region {
+    /// All cells whose centre is within `reach` cells, along each axis, of a triangle (grid coordinates).
+    pub(super) fn around(triangles: &[[DVec3; 3]], reach: f64, grid: &Grid) -> Self {
+        let dims = grid.dims.map(|n| n as usize);
+        let mut region = Self { number: vec![NO_CELL; grid.n_cells()], cells: Vec::new(), dims };
+        for triangle in triangles {
+            // A footprint's voxels have their centres half a unit further on, and half a unit of reach.
+            let footprint = Footprint::new(triangle.map(|p| p + 0.5), reach - 0.5);
+            footprint.for_each_run(dims, |y, z, first, last| {
+                let row = (z * dims[1] + y) * dims[0];
+                for cell in row + first..=row + last {
+                    if region.number[cell] == NO_CELL {
+                        region.number[cell] = region.cells.len() as u32;
+                        region.cells.push(cell as u32);
+                    }
+                }
+            });
+        }
+        region
+    }
+
+    /// Whether the cell below a point (grid coordinates) along all axes is one of them.
+    pub(super) fn holds(&self, p: DVec3) -> bool {
+        let cell = p.floor();
+        let [nx, ny, nz] = self.dims;
+        let inside =
+            cell.cmpge(DVec3::ZERO).all() && cell.cmplt(DVec3::new(nx as f64, ny as f64, nz as f64)).all();
+        inside && {
+            let [x, y, z] = cell.to_array().map(|x| x as usize);
+            self.number[(z * ny + y) * nx + x] != NO_CELL
+        }
+    }
+}
+
+/// A correction of all columns: a few fields and how much of each every column takes.
+#[derive(Clone, Debug)]
+pub(super) struct Update {
+    /// `[n_batches of fields][n_rows]`
+    pub(super) fields: Vec<Vec<Row>>,
+    pub(super) row_of: Arc<Vec<u32>>,
+    /// `[n_fields]` rows of all columns.
+    pub(super) shares: Vec<Vec<Row>>,
+}
+
+/// All columns' fields: those of the last whole bind, and the corrections since.
+#[derive(Clone, Debug)]
+pub(super) struct Fields {
+    /// `[n_batches][n_rows]`
+    pub(super) base: Vec<Vec<Row>>,
+    pub(super) row_of: Arc<Vec<u32>>,
+    pub(super) updates: Vec<Update>,
+}
+
+impl Fields {
+    /// Weights of all columns in a cell; zeros where it was outside. `[n_batches]`
+    #[inline(always)]
+    pub(super) fn at(&self, cell: usize, out: &mut [Row]) {
+        out.fill(ZERO);
+        let row = self.row_of[cell];
+        if row != NO_CELL {
+            for (out, batch) in out.iter_mut().zip(&self.base) {
+                *out = batch[row as usize];
+            }
+        }
+        for update in &self.updates {
+            let row = update.row_of[cell];
+            if row == NO_CELL {
+                // Outside at the time: whatever it was before does not count.
+                out.fill(ZERO);
+                continue;
+            }
+            for (k, share) in update.shares.iter().enumerate() {
+                let value = update.fields[k / LANES][row as usize][k % LANES];
+                if value.abs() > UNFELT {
+                    add_scaled(out, share, value);
+                }
+            }
+        }
+    }
+}
+
+/// `out += value * share`
+#[inline(always)]
+pub(super) fn add_scaled(out: &mut [Row], share: &[Row], value: f32) {
+    for (out, share) in out.iter_mut().zip(share) {
+        for lane in 0..LANES {
+            out[lane] += value * share[lane];
+        }
+    }
+}
+
+/// What the old fields leave of the new equations: one row of all columns for each unknown of the region, as the change of
+/// the cell's weights that would meet its own equation.
+pub(super) struct Residual {
+    /// Row of the field of each unknown.
+    rows: Vec<u32>,
+    diagonals: Vec<f32>,
+    /// `[n_unknowns][n_batches]`
+    values: Vec<Vec<Row>>,
+}
+
+impl Residual {
+    /// Residuals of the unknowns in `region`; `old(cell)` must be known one cell beyond it.
+    pub(super) fn new(level: &Level, region: &Region, n_batches: usize, old: &OldCells<'_>) -> Self {
+        let strides = level.grid.strides();
+        let mut number = vec![NO_CELL; level.n_rows()];
+        let mut residual = Self { rows: Vec::new(), diagonals: Vec::new(), values: Vec::new() };
+        let mut cells = Vec::new();
+        for cell in region.cells.iter().map(|&cell| cell as usize) {
+            let row = level.row_of[cell];
+            if row != NO_CELL {
+                number[row as usize] = residual.rows.len() as u32;
+                residual.rows.push(row);
+                residual.diagonals.push(6.0);
+                residual.values.push(vec![ZERO; n_batches]);
+                cells.push(cell);
+            }
+        }
+        // Cut arms: what is no neighbour, and what the cage adds.
+        let mut cut_of = vec![None; residual.rows.len()];
+        for (n, cut) in level.colours.iter().flat_map(|c| &c.cut).enumerate() {
+            let k = number[level.row_of_cut(n)];
+            if k != NO_CELL {
+                cut_of[k as usize] = Some(cut);
+                residual.diagonals[k as usize] = cut.diagonal;
+            }
+        }
+        for term in &level.boundary {
+            let k = number[level.row_of_cut(term.cut_cell as usize)];
+            if k != NO_CELL {
+                let column = term.column as usize;
+                residual.values[k as usize][column / LANES][column % LANES] += term.value;
+            }
+        }
+        for (k, &cell) in cells.iter().enumerate() {
+            let zero = |d: usize| {
+                cut_of[k].is_some_and(|cut| {
+                    // Neighbours of a cut cell belong to the other colour, whose zero row is its last.
+                    let is_red = (residual.rows[k] as usize) < level.first_row(1);
+                    cut.neighbours[d] == level.colours[usize::from(is_red)].n_cells
+                })
+            };
+            let out = &mut residual.values[k];
+            for d in (0..6).filter(|&d| !zero(d)) {
+                let neighbour = if d % 2 == 0 { cell + strides[d / 2] } else { cell - strides[d / 2] };
+                add_scaled(out, old.at(neighbour), 1.0);
+            }
+            add_scaled(out, old.at(cell), -residual.diagonals[k]);
+            let scale = 1.0 / residual.diagonals[k];
+            for w in out.iter_mut().flatten() {
+                *w *= scale;
+            }
+        }
+        residual.drop_negligible();
+        residual
+    }
+
+    /// Leaves only unknowns whose equations have changed.
+    fn drop_negligible(&mut self) {
+        let changed: Vec<bool> =
+            self.values.iter().map(|row| row.iter().flatten().any(|w| w.abs() >= NEGLIGIBLE)).collect();
+        let mut keep = changed.iter();
+        self.values.retain(|_| keep.next() == Some(&true));
+        let mut keep = changed.iter();
+        self.rows.retain(|_| keep.next() == Some(&true));
+        let mut keep = changed.iter();
+        self.diagonals.retain(|_| keep.next() == Some(&true));
+    }
+
+    /// Splits the residuals of all columns into a few independent ones and the columns' shares in them: right-hand sides
+    /// `[n_batches of them][n_rows]`, and `[n_of them]` rows of shares. `None` if there are too many.
+    ///
+    /// Gram-Schmidt, the largest column first: harmonic functions that vanish on the same faces are nearly alike a few
+    /// cells away, so 110 columns have 15 to 40 independent residuals to six digits.
+    pub(super) fn split(self, n_rows: usize, n_columns: usize) -> Option<(Vec<Vec<Row>>, Vec<Vec<Row>>)> {
+        dispatch(
+            #[inline(always)]
+            || self.split_columns(n_rows, n_columns),
+        )
+    }
+
+    #[inline(always)]
+    fn split_columns(mut self, n_rows: usize, n_columns: usize) -> Option<(Vec<Vec<Row>>, Vec<Vec<Row>>)> {
+        let n_batches = n_columns.div_ceil(LANES);
+        let mut right = Vec::new();
+        let mut shares: Vec<Vec<Row>> = Vec::new();
+        loop {
+            let mut largest = vec![ZERO; n_batches];
+            for row in &self.values {
+                for (largest, row) in largest.iter_mut().zip(row) {
+                    for lane in 0..LANES {
+                        largest[lane] = largest[lane].max(row[lane].abs());
+                    }
+                }
+            }
+            let size = |c: usize| largest[c / LANES][c % LANES];
+            let pivot = (0..n_columns).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
+            if size(pivot) < NEGLIGIBLE {
+                return Some((right, shares));
+            }
+            let rank = shares.len();
+            if rank == MAX_RANK {
+                return None;
+            }
+            let column: Vec<f32> = self.values.iter().map(|row| row[pivot / LANES][pivot % LANES]).collect();
+            let norm = column.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt() as f32;
+            let unit: Vec<f32> = column.iter().map(|x| x / norm).collect();
+            let mut share = vec![ZERO; n_batches];
+            for (row, &q) in self.values.iter().zip(&unit) {
+                add_scaled(&mut share, row, q);
+            }
+            for (row, &q) in self.values.iter_mut().zip(&unit) {
+                add_scaled(row, &share, -q);
+            }
+            // Exactly, so that no column is taken twice.
+            for row in &mut self.values {
+                row[pivot / LANES][pivot % LANES] = 0.0;
+            }
+            if rank.is_multiple_of(LANES) {
+                right.push(vec![ZERO; n_rows]);
+            }
+            let batch = &mut right[rank / LANES];
+            for ((&row, &q), &diagonal) in self.rows.iter().zip(&unit).zip(&self.diagonals) {
+                batch[row as usize][rank % LANES] = q * diagonal;
+            }
+            shares.push(share);
+        }
+    }
+}
+
+/// The old fields in a region: all columns of each of its cells.
+pub(super) struct OldCells<'a> {
+    region: &'a Region,
+    /// `[n_cells of the region][n_batches]`
+    values: Vec<Row>,
+    n_batches: usize,
+    nothing: Vec<Row>,
+}
+
+impl<'a> OldCells<'a> {
+    pub(super) fn new(fields: &Fields, region: &'a Region, n_batches: usize) -> Self {
+        let mut values = vec![ZERO; region.cells.len() * n_batches];
+        dispatch(
+            #[inline(always)]
+            || {
+                for (&cell, out) in region.cells.iter().zip(values.chunks_exact_mut(n_batches)) {
+                    fields.at(cell as usize, out);
+                }
+            },
+        );
+        Self { region, values, n_batches, nothing: vec![ZERO; n_batches] }
+    }
+
+    /// All columns of a cell of the grid; zeros outside the region.
+    pub(super) fn at(&self, cell: usize) -> &[Row] {
+        match self.region.number[cell] {
+            NO_CELL => &self.nothing,
+            k => &self.values[k as usize * self.n_batches..(k as usize + 1) * self.n_batches],
+        }
+    }
+}

@@ -1,0 +1,132 @@
+use glam::{Vec3, vec3};
+
+use super::{MAX_UPDATES, RebindReport, Rebinder};
+use crate::bind::{BindError, BindOptions, Binding, Method, bind};
+use crate::cage::Cage;
+use crate::cage_gen::subdivided_box;
+use crate::mesh::{Bounds, PolygonMesh};
+use crate::progress::Silent;
+
+/// What a rebind may differ from a bind by, in any weight: both are solved far more exactly.
+const SAME: f32 = 1e-5;
+
+/// Mean distance of the reconstructed rest pose over the diagonal: f32 round-off of corrected rows.
+const REST_ERROR: f64 = 2e-6;
+
+fn options() -> BindOptions {
+    BindOptions { grid: 32, tau: 1e-7, ..BindOptions::default() }
+}
+
+fn box_mesh() -> PolygonMesh {
+    subdivided_box(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }, 0.0, [3, 3, 4])
+}
+
+fn points() -> Vec<Vec3> {
+    let steps = || (-5..=5).map(|k| 0.17 * k as f32 + 0.01);
+    steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| vec3(x, y, z)))).collect()
+}
+
+/// The vertex of the box nearest to a place, moved by `by`.
+fn pushed(mesh: &PolygonMesh, near: Vec3, by: Vec3) -> Cage {
+    let mut mesh = mesh.clone();
+    let nearest = mesh.positions.iter_mut().min_by(|a, b| a.distance(near).total_cmp(&b.distance(near)));
+    *nearest.unwrap() += by;
+    Cage::new(&mesh).unwrap()
+}
+
+fn dense(binding: &Binding) -> Vec<f32> {
+    let w = &binding.weights;
+    let n = w.n_columns() as usize;
+    let mut dense = vec![0.0; n * (w.indptr().len() - 1)];
+    for (row, range) in w.indptr().windows(2).enumerate() {
+        for k in range[0] as usize..range[1] as usize {
+            dense[row * n + w.indices()[k] as usize] = w.data()[k];
+        }
+    }
+    dense
+}
+
+fn assert_same(rebound: &Binding, cage: &Cage) {
+    let bound = bind(&points(), cage, &options(), &Silent).unwrap();
+    let worst = dense(rebound).iter().zip(dense(&bound)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(worst <= SAME, "a weight differs by {worst:e}");
+    assert_eq!(rebound.outside.len(), bound.outside.len());
+    assert!(rebound.report.rest_error.mean_rel <= REST_ERROR);
+}
+
+#[test]
+fn rebinding_after_edits_gives_the_weights_of_a_bind() {
+    let mesh = box_mesh();
+    let cage = Cage::new(&mesh).unwrap();
+    let (mut rebinder, first) = Rebinder::new(&points(), &cage, &options(), &Silent).unwrap();
+    assert_same(&first, &cage);
+    let mut current = mesh;
+    // In, far in (past mesh vertices, which are outside then), and back; on two sides. The box of the cage stays.
+    let edits = [
+        (vec3(1.0, 0.3, 0.1), vec3(-0.1, 0.03, 0.0)),
+        (vec3(0.3, -1.0, -0.1), vec3(0.0, 0.6, 0.05)),
+        (vec3(0.3, -0.4, -0.1), vec3(0.0, -0.3, 0.0)),
+        (vec3(0.9, 0.3, 0.1), vec3(0.05, -0.03, 0.02)),
+    ];
+    for (near, by) in edits {
+        let cage = pushed(&current, near, by);
+        let (rebound, report) = rebinder.rebind(&cage, &Silent).unwrap();
+        assert!(!report.anew && report.solved > 0 && report.solved < report.columns, "{report:?}");
+        assert_same(&rebound, &cage);
+        current = cage.to_polygon_mesh();
+    }
+}
+
+#[test]
+fn cage_that_did_not_move_needs_nothing() {
+    let cage = Cage::new(&box_mesh()).unwrap();
+    let (mut rebinder, first) = Rebinder::new(&points(), &cage, &options(), &Silent).unwrap();
+    let (again, report) = rebinder.rebind(&cage, &Silent).unwrap();
+    let columns = cage.n_vertices() as u32;
+    assert_eq!(report, RebindReport { solved: 0, columns, stencils_made: 0, anew: false });
+    assert_eq!(dense(&again), dense(&first));
+}
+
+#[test]
+fn whatever_changes_the_grid_or_the_faces_is_bound_anew() {
+    let mesh = box_mesh();
+    let (mut rebinder, _) =
+        Rebinder::new(&points(), &Cage::new(&mesh).unwrap(), &options(), &Silent).unwrap();
+    let longer = pushed(&mesh, Vec3::ONE, vec3(0.5, 0.5, 0.5));
+    let (rebound, report) = rebinder.rebind(&longer, &Silent).unwrap();
+    assert!(report.anew);
+    assert_same(&rebound, &longer);
+    let other = subdivided_box(Bounds { min: Vec3::splat(-1.1), max: Vec3::splat(1.1) }, 0.0, [2; 3]);
+    let other = Cage::new(&other).unwrap();
+    let (rebound, report) = rebinder.rebind(&other, &Silent).unwrap();
+    assert!(report.anew);
+    assert_same(&rebound, &other);
+}
+
+#[test]
+fn after_many_edits_all_is_bound_anew() {
+    let mesh = box_mesh();
+    let (mut rebinder, _) =
+        Rebinder::new(&points(), &Cage::new(&mesh).unwrap(), &options(), &Silent).unwrap();
+    for k in 0..=MAX_UPDATES {
+        let cage = pushed(&mesh, vec3(1.0, 0.3, 0.1), vec3(-0.02 * (k + 1) as f32, 0.0, 0.0));
+        let (rebound, report) = rebinder.rebind(&cage, &Silent).unwrap();
+        assert_eq!(report.anew, k == MAX_UPDATES, "edit {k}");
+        if k + 1 >= MAX_UPDATES {
+            assert_same(&rebound, &cage);
+        }
+    }
+}
+
+#[test]
+fn classic_method_is_bound_anew_and_memory_is_limited() {
+    let cage = Cage::new(&box_mesh()).unwrap();
+    let classic = BindOptions { method: Method::Classic, grid: 16, ..BindOptions::default() };
+    let (mut rebinder, _) = Rebinder::new(&points(), &cage, &classic, &Silent).unwrap();
+    assert!(rebinder.rebind(&cage, &Silent).unwrap().1.anew);
+    let tight = BindOptions { memory_limit: 1 << 20, ..options() };
+    assert!(matches!(
+        Rebinder::new(&points(), &cage, &tight, &Silent).unwrap_err(),
+        BindError::Memory { .. }
+    ));
+}

@@ -1,0 +1,28 @@
+//! Right-hand sides other than the cage's.
+
+use super::{BatchReport, Stop, Workspace};
+use crate::solve::hierarchy::Hierarchy;
+use crate::solve::rows::{Row, ZERO};
+
+impl Workspace {
+    /// Solves for right-hand sides that are not the cage's: `rhs` has one row per row of the finest level. From zero,
+    /// by so many V-cycles.
+    ///
+    /// # Errors
+    /// `None` when cancelled.
+    pub fn solve_for(
+        &mut self,
+        hierarchy: &Hierarchy,
+        rhs: &[Row],
+        cycles: u32,
+        cycle_done: impl FnMut(u32, f64) -> bool,
+    ) -> Option<BatchReport> {
+        self.f[0].clear();
+        self.f[0].extend_from_slice(rhs);
+        self.dense = true;
+        self.u[0].fill(ZERO);
+        let report = self.cycles(hierarchy, Stop { tolerance: 0.0, max_cycles: cycles }, cycle_done);
+        self.dense = false;
+        report
+    }
+}
