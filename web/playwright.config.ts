@@ -22,7 +22,7 @@ const CHROMIUM_ARGS = [
 
 export default defineConfig({
   testDir: "e2e",
-  testMatch: process.env["PICTURES"] ? "pictures.ts" : "*.spec.ts",
+  testMatch: process.env.PICTURES ? "pictures.ts" : "*.spec.ts",
   outputDir: "../target/e2e",
   // One GPU made of processor cores: two pages at a time would only wait for each other.
   workers: 1,
@@ -38,7 +38,7 @@ export default defineConfig({
     viewport: { width: 1024, height: 640 },
     acceptDownloads: true,
     launchOptions: {
-      executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
+      executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
       args: CHROMIUM_ARGS,
     },
   },

@@ -17,7 +17,21 @@ test("a bind at g = 64 blocks no frame", async ({ page }) => {
     });
     observer.observe({ entryTypes: ["longtask"] });
     const stop = session.onFrame((ms) => frames.push(ms));
-    const { BIND } = { BIND: { grid: 64, method: "embedded", solver: "multigrid", backend: "gpu", cell_shape: "box", delta_norm: "euclidean", tau: 1e-5, max_iterations: 20000, sparsify: 0, outside: "closest_point", memory_limit: 2 ** 31 } as const };
+    const { BIND } = {
+      BIND: {
+        grid: 64,
+        method: "embedded",
+        solver: "multigrid",
+        backend: "gpu",
+        cell_shape: "box",
+        delta_norm: "euclidean",
+        tau: 1e-5,
+        max_iterations: 20000,
+        sparsify: 0,
+        outside: "closest_point",
+        memory_limit: 2 ** 31,
+      } as const,
+    };
     const job = session.bind(BIND, () => undefined);
     let running = true;
     const turn = () => {
@@ -44,7 +58,19 @@ for (const backend of ["gpu", "cpu"] as const) {
     const answer = await page.evaluate(async (backend) => {
       const session = globalThis.cagework;
       if (!session) throw new Error("no session");
-      const options = { grid: 192, method: "embedded", solver: "multigrid", backend, cell_shape: "box", delta_norm: "euclidean", tau: 1e-7, max_iterations: 20000, sparsify: 0, outside: "closest_point", memory_limit: 2 ** 32 } as const;
+      const options = {
+        grid: 192,
+        method: "embedded",
+        solver: "multigrid",
+        backend,
+        cell_shape: "box",
+        delta_norm: "euclidean",
+        tau: 1e-7,
+        max_iterations: 20000,
+        sparsify: 0,
+        outside: "closest_point",
+        memory_limit: 2 ** 32,
+      } as const;
       let steps = 0;
       const job = session.bind(options, (event) => {
         if (event.kind !== "progress") return;

@@ -9,10 +9,13 @@ test.describe("good files", () => {
     ["a glTF with its files", gltfFiles],
     ["a Draco compressed GLB", async () => [{ name: "draco.glb", bytes: await dracoGlb() }]],
     ["a meshopt compressed GLB", async () => [{ name: "meshopt.glb", bytes: await meshoptGlb() }]],
-    ["an OBJ with its cage", async () => [
-      { name: "tetra.obj", bytes: obj(1) },
-      { name: "tetra-cage.obj", bytes: obj(1.5) },
-    ]],
+    [
+      "an OBJ with its cage",
+      async () => [
+        { name: "tetra.obj", bytes: obj(1) },
+        { name: "tetra-cage.obj", bytes: obj(1.5) },
+      ],
+    ],
   ] as const) {
     test(`${name} gets a cage, is bound and can be dragged`, async ({ page }) => {
       await open(page);
@@ -57,7 +60,7 @@ test("a file too large for a browser is refused before it is read", async ({ pag
     Object.defineProperty(file, "size", { value: 5 * 2 ** 30 });
     const session = globalThis.cagework;
     return session?.openFiles([{ name: file.name, path: file.name, file }]).catch((error) => {
-      document.body.dataset["refused"] = `${error.name}: ${error.message}`;
+      document.body.dataset.refused = `${error.name}: ${error.message}`;
     });
   });
   await expect(page.locator("body")).toHaveAttribute("data-refused", /TooLarge: huge.glb has 5.0 GiB/);
@@ -69,6 +72,11 @@ test("an open cage is drawn with its faults and can be repaired", async ({ page 
     { name: "tetra.obj", bytes: obj(1) },
     { name: "tetra-cage.obj", bytes: obj(1.5, true) },
   ]);
-  await expect(page.locator("#panel").getByText(/not closed|open edge/i).first()).toBeVisible();
+  await expect(
+    page
+      .locator("#panel")
+      .getByText(/not closed|open edge/i)
+      .first(),
+  ).toBeVisible();
   await shoot(page, "open-cage");
 });

@@ -1,5 +1,6 @@
 /** Models made by formula, as the files that people drop. */
 
+import { crc32, deflateSync } from "node:zlib";
 import { Document, type Node, NodeIO } from "@gltf-transform/core";
 import {
   EXTMeshoptCompression,
@@ -8,14 +9,29 @@ import {
 } from "@gltf-transform/extensions";
 import { quantize, reorder } from "@gltf-transform/functions";
 import draco3d from "draco3dgltf";
-import { MeshoptDecoder, MeshoptEncoder } from "meshoptimizer";
 import validator from "gltf-validator";
+import { MeshoptDecoder, MeshoptEncoder } from "meshoptimizer";
 
-/** A 2 x 2 PNG: red, green, blue, white. */
-const PNG = Buffer.from(
-  "iVBORw0KGgoAAAANSUhEUgAAAAIAAAACCAIAAAD91JpzAAAAFklEQVQI12P4z8DAAMIM/xkYGP7/Z2AAAB/wBP3cGd4eAAAAAElFTkSuQmCC",
-  "base64",
-);
+/** A PNG of 8 x 8 pixels, orange and teal in turn. */
+function png(): Uint8Array {
+  const SIDE = 8;
+  const rows = Array.from({ length: SIDE }, (_, j) => [
+    0,
+    ...Array.from({ length: SIDE }, (_, i) => ((i + j) % 2 === 0 ? [230, 120, 30] : [20, 130, 130])).flat(),
+  ]);
+  const chunk = (type: string, data: Uint8Array) => {
+    const body = Buffer.concat([Buffer.from(type), data]);
+    const frame = Buffer.alloc(8);
+    frame.writeUInt32BE(data.length, 0);
+    frame.writeUInt32BE(crc32(body), 4);
+    return Buffer.concat([frame.subarray(0, 4), body, frame.subarray(4)]);
+  };
+  const header = Buffer.from([0, 0, 0, SIDE, 0, 0, 0, SIDE, 8, 2, 0, 0, 0]);
+  const signature = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
+  const pixels = deflateSync(Uint8Array.from(rows.flat()));
+  const parts = [signature, chunk("IHDR", header), chunk("IDAT", pixels), chunk("IEND", new Uint8Array())];
+  return new Uint8Array(Buffer.concat(parts));
+}
 
 /** A bent tube along y, radius 0.4, 2 high, with texture coordinates. */
 function tube(rings = 40, around = 32): { positions: Float32Array; uvs: Float32Array; indices: Uint32Array } {
@@ -50,7 +66,7 @@ function document(): { document: Document; node: Node } {
   const document = new Document();
   const buffer = document.createBuffer();
   const { positions, uvs, indices } = tube();
-  const image = document.createTexture("colours").setImage(new Uint8Array(PNG)).setMimeType("image/png");
+  const image = document.createTexture("colours").setImage(png()).setMimeType("image/png");
   const primitive = document
     .createPrimitive()
     .setAttribute("POSITION", document.createAccessor().setType("VEC3").setArray(positions).setBuffer(buffer))

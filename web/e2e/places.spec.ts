@@ -1,7 +1,7 @@
 /** Other browsers, other screens, other people. */
 
 import AxeBuilder from "@axe-core/playwright";
-import { expect, largestMove, modelPositions, open, shoot, test, drag, bound } from "./support";
+import { bound, drag, expect, largestMove, modelPositions, open, shoot, test } from "./support";
 
 test("nothing for axe to complain about, light and dark", async ({ page }) => {
   for (const scheme of ["light", "dark"] as const) {
@@ -36,7 +36,11 @@ test("a lost device comes back with model and pose", async ({ page }) => {
   await page.evaluate(() => globalThis.cagework?.loseDevice());
   await page.waitForTimeout(500);
   await page.waitForFunction(
-    () => globalThis.cagework?.readPositions().then((p) => p.length > 0, () => false),
+    () =>
+      globalThis.cagework?.readPositions().then(
+        (p) => p.length > 0,
+        () => false,
+      ),
     undefined,
     { timeout: 30_000 },
   );

@@ -41,7 +41,9 @@ export async function open(page: Page, address = "./"): Promise<void> {
 
 /** Waits until a model is bound as asked, and nothing is under way any more. */
 export async function bound(page: Page): Promise<void> {
-  await page.waitForFunction(() => globalThis.cagework?.engine.bound === true, undefined, { timeout: 60_000 });
+  await page.waitForFunction(() => globalThis.cagework?.engine.bound === true, undefined, {
+    timeout: 60_000,
+  });
   await expect(page.locator("#status")).toHaveText(/^(Ready|.*selected)$/, { timeout: 60_000 });
 }
 
@@ -66,7 +68,9 @@ export async function reachable(page: Page): Promise<number> {
     const { left, top } = canvas.getBoundingClientRect();
     const positions = engine.cagePositions();
     for (let vertex = 0; vertex < positions.length / 3; vertex++) {
-      const [x = 0, y = 0] = engine.project(...(positions.slice(3 * vertex, 3 * vertex + 3) as unknown as [number, number, number]));
+      const [x = 0, y = 0] = engine.project(
+        ...(positions.slice(3 * vertex, 3 * vertex + 3) as unknown as [number, number, number]),
+      );
       const isFirst = engine.pick(x, y, 4)[0] === vertex;
       const element = document.elementFromPoint(left + x, top + y);
       if (isFirst && element && (element === canvas || element.contains(canvas))) return vertex;

@@ -3,8 +3,8 @@
 import { type Document, WebIO } from "@gltf-transform/core";
 import { ALL_EXTENSIONS, EXTMeshoptCompression, KHRDracoMeshCompression } from "@gltf-transform/extensions";
 import { dequantize } from "@gltf-transform/functions";
-import createDecoder from "draco3dgltf/draco_decoder_gltf_nodejs.js";
 import dracoWasm from "draco3dgltf/draco_decoder_gltf.wasm?url";
+import createDecoder from "draco3dgltf/draco_decoder_gltf_nodejs.js";
 import { MeshoptDecoder } from "meshoptimizer/decoder";
 import { named } from "./session/client";
 
@@ -66,7 +66,8 @@ function mentions(bytes: Uint8Array, word: string): boolean {
 /** Where the JSON is. */
 function jsonRange(bytes: Uint8Array): [number, number] {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  const isGlb = bytes.length > 20 && view.getUint32(0, true) === GLB && view.getUint32(16, true) === JSON_CHUNK;
+  const isGlb =
+    bytes.length > 20 && view.getUint32(0, true) === GLB && view.getUint32(16, true) === JSON_CHUNK;
   return isGlb ? [20, 20 + view.getUint32(12, true)] : [0, bytes.length];
 }
 

@@ -5,10 +5,11 @@ import type {
   BindOptions,
   BindReport,
   CageState,
-  Engine as PageEngine,
   Job,
+  ModelInfo,
   NamedFile,
   Opened,
+  Engine as PageEngine,
   Sample,
   Session,
 } from "./contract";
@@ -56,11 +57,12 @@ export async function openSession(canvas: HTMLCanvasElement): Promise<Session> {
   let meanValue: Job<void> | undefined;
 
   async function openBytes(bytes: Parameters<typeof load>[0]): Promise<Opened> {
-    const loaded = await load(bytes);
+    const { loaded, notices } = await load(bytes);
     const { settings } = loaded;
     const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
     bind?.cancel();
-    const model = await raw.open(loaded);
+    const read: ModelInfo = await raw.open(loaded);
+    const model = { ...read, notices: [...read.notices, ...notices] };
     const project = settings === undefined ? null : { poses, settings };
     return { model, cage: stateOf(), project };
   }

@@ -37,21 +37,21 @@ impl Loaded {
     #[wasm_bindgen(getter, js_name = textureCount)]
     #[must_use]
     pub fn texture_count(&self) -> usize {
-        self.look.textures.len()
+        self.look.images.len()
     }
 
     /// File of one texture.
     #[wasm_bindgen(js_name = textureBytes)]
     #[must_use]
     pub fn texture_bytes(&self, index: usize) -> Vec<u8> {
-        self.look.textures.get(index).map(|t| t.bytes.clone()).unwrap_or_default()
+        self.look.images.get(index).map(|t| t.bytes.clone()).unwrap_or_default()
     }
 
     /// Its media type, empty if unknown.
     #[wasm_bindgen(js_name = textureType)]
     #[must_use]
     pub fn texture_type(&self, index: usize) -> String {
-        self.look.textures.get(index).map(|t| t.mime.clone()).unwrap_or_default()
+        self.look.images.get(index).map(|t| t.mime.clone()).unwrap_or_default()
     }
 
     /// Takes a decoded texture: red, green, blue, alpha; rows from the top.

@@ -32,6 +32,8 @@ pub(crate) struct State {
     pub(crate) positions: Vec<Vec3>,
     pub(crate) editing_rest: bool,
     pub(crate) is_bound: bool,
+    /// Whether there are other weights to compare with.
+    pub(crate) has_other: bool,
     pub(crate) element: Element,
     pub(crate) selection: Selection,
     pub(crate) hovered: Vec<u32>,
@@ -81,7 +83,7 @@ impl State {
         self.gesture = None;
         self.active_part = None;
         self.slice = None;
-        self.is_bound = false;
+        (self.is_bound, self.has_other) = (false, false);
         self.generation += 1;
         self.is_moved = true;
         self.is_changed = true;
@@ -102,14 +104,19 @@ impl State {
 
     /// Tells the camera how large the picture is: half of it when two are compared.
     pub(crate) fn place_viewport(&mut self) {
-        let width = if self.view.compare { 0.5 * self.size.x } else { self.size.x };
+        let width = if self.is_split() { 0.5 * self.size.x } else { self.size.x };
         self.camera.set_viewport(Vec2::new(width, self.size.y));
+    }
+
+    /// Whether two pictures are shown side by side.
+    pub(crate) fn is_split(&self) -> bool {
+        self.view.compare && self.has_other
     }
 
     /// A pointer's place in the picture it is over.
     pub(crate) fn pointer(&self, x: f32, y: f32) -> Vec2 {
         let half = 0.5 * self.size.x;
-        Vec2::new(if self.view.compare && x >= half { x - half } else { x }, y)
+        Vec2::new(if self.is_split() && x >= half { x - half } else { x }, y)
     }
 
     /// Where model and cage are at rest.

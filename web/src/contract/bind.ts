@@ -57,11 +57,27 @@ export interface BindReport {
   readonly delta_history: readonly number[];
   readonly delta_interval: number;
   readonly residual_history: readonly number[];
-  readonly timings_ms: { readonly voxelize: number; readonly solve: number; readonly sample: number; readonly total: number };
+  readonly timings_ms: {
+    readonly voxelize: number;
+    readonly solve: number;
+    readonly sample: number;
+    readonly total: number;
+  };
   readonly memory_bytes: { readonly estimated: number; readonly peak: number };
   /** Distances in object units; *_rel over the cage's diagonal. */
-  readonly rest_error: { readonly mean: number; readonly p99: number; readonly max: number; readonly mean_rel: number; readonly max_rel: number };
-  readonly weights: { readonly min: number; readonly max: number; readonly max_sum_error: number; readonly nonzeros: number };
+  readonly rest_error: {
+    readonly mean: number;
+    readonly p99: number;
+    readonly max: number;
+    readonly mean_rel: number;
+    readonly max_rel: number;
+  };
+  readonly weights: {
+    readonly min: number;
+    readonly max: number;
+    readonly max_sum_error: number;
+    readonly nonzeros: number;
+  };
   readonly vertices: number;
   readonly cage_vertices: number;
   readonly outside_vertices: number;

@@ -13,7 +13,11 @@ export interface CageInfo {
 }
 
 /** `usable` false: a draft that is drawn with its faults marked, but cannot be bound. */
-export interface CageState { readonly usable: boolean; readonly info: CageInfo; readonly problems: readonly Problem[] }
+export interface CageState {
+  readonly usable: boolean;
+  readonly info: CageInfo;
+  readonly problems: readonly Problem[];
+}
 
 export interface Problem {
   /** Variant: "OpenEdges", "FlippedFaces", "SelfIntersection", "Outside", "Thin", "NonManifold", "Degenerate", ... */

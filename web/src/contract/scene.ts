@@ -21,9 +21,17 @@ export interface SceneOptions {
 }
 
 /** What colours mean at the moment. */
-export interface Legend { readonly low: number; readonly high: number; readonly logarithmic: boolean; readonly map: "viridis" | "error" | "kinds" }
+export interface Legend {
+  readonly low: number;
+  readonly high: number;
+  readonly logarithmic: boolean;
+  readonly map: "viridis" | "error" | "kinds";
+}
 
-export interface Pose { readonly name: string; readonly positions: Float32Array }
+export interface Pose {
+  readonly name: string;
+  readonly positions: Float32Array;
+}
 export type SelectMode = "replace" | "add" | "remove" | "toggle";
 export type Element = "vertex" | "edge" | "face";
 export type Gesture = "grab" | "rotate" | "scale";

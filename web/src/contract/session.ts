@@ -5,9 +5,11 @@ import type { CageOptions, CageState } from "./cage";
 import type { Engine } from "./engine";
 import type { Pose } from "./scene";
 
-
 export type Point = readonly [x: number, y: number, z: number];
-export interface Bounds { readonly min: Point; readonly max: Point }
+export interface Bounds {
+  readonly min: Point;
+  readonly max: Point;
+}
 
 export interface Session {
   /** Synchronous side: state, picking, gestures, exports. Never keep anything else of the wasm module. */
@@ -62,8 +64,15 @@ export interface Session {
   close(): void;
 }
 
-export interface Job<T> { readonly done: Promise<T>; cancel(): void }
-export interface NamedFile { readonly name: string; readonly path: string; readonly file: Blob }
+export interface Job<T> {
+  readonly done: Promise<T>;
+  cancel(): void;
+}
+export interface NamedFile {
+  readonly name: string;
+  readonly path: string;
+  readonly file: Blob;
+}
 export interface Sample {
   readonly id: string;
   readonly label: string;

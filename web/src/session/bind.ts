@@ -52,7 +52,8 @@ export function startBind(start: BindStart): Job<BindReport> {
   async function once(pass: Pass, asked: BindOptions): Promise<BindReport> {
     job = client.run("bind", { positions, cage, options: asked }, step(pass));
     const { indptr, indices, data, outside, offsets, report } = await job.done;
-    const isCurrent = same(cage.positions, engine.restPositions()) && same(cage.corners, engine.cageCorners());
+    const isCurrent =
+      same(cage.positions, engine.restPositions()) && same(cage.corners, engine.cageCorners());
     if (isCancelled || !isCurrent || !report) throw named("Cancelled", "cancelled");
     await raw.adopt(indptr, indices, data, outside, offsets);
     const whole = report.backend === "gpu" ? { ...report, adapter } : report;

@@ -13,7 +13,11 @@ interface Waiting {
 }
 
 export interface Client {
-  run<K extends JobKind>(job: K, input: Jobs[K]["input"], step?: (step: Step) => void): Job<Jobs[K]["output"]>;
+  run<K extends JobKind>(
+    job: K,
+    input: Jobs[K]["input"],
+    step?: (step: Step) => void,
+  ): Job<Jobs[K]["output"]>;
   close(): void;
 }
 

@@ -41,17 +41,29 @@ export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
 async function read({ name, file }: NamedFile): Promise<Uint8Array> {
   if (file.size > LARGEST) {
     const size = (file.size / LARGEST).toFixed(1);
-    throw named("TooLarge", `${name} has ${size} GiB; files of up to 1 GiB are opened: make it smaller first`);
+    throw named(
+      "TooLarge",
+      `${name} has ${size} GiB; files of up to 1 GiB are opened: make it smaller first`,
+    );
   }
   try {
     return new Uint8Array(await file.arrayBuffer());
   } catch {
-    throw named("Unreadable", `${name} could not be read: it may have been moved, or is too large for this browser`);
+    throw named(
+      "Unreadable",
+      `${name} could not be read: it may have been moved, or is too large for this browser`,
+    );
   }
 }
 
+/** A model that was read, and what the page should say about it. */
+export interface Read {
+  readonly loaded: Loaded;
+  readonly notices: readonly string[];
+}
+
 /** Reads a model, decompressed if need be, its textures decoded. */
-export async function load({ name, bytes, sibling }: Bytes): Promise<Loaded> {
+export async function load({ name, bytes, sibling }: Bytes): Promise<Read> {
   let loaded: Loaded;
   try {
     loaded = Loaded.read(name, bytes, sibling);
@@ -60,6 +72,8 @@ export async function load({ name, bytes, sibling }: Bytes): Promise<Loaded> {
     const { decompress } = await import("../decode");
     loaded = Loaded.read(name, await decompress(name, bytes, sibling), sibling);
   }
-  await decodeTextures(loaded);
-  return loaded;
+  const failed = await decodeTextures(loaded);
+  const many = failed === 1 ? "a texture" : `${failed} textures`;
+  const notice = `this browser cannot decode ${many}: the material's plain colour is shown, exports keep the file`;
+  return { loaded, notices: failed > 0 ? [notice] : [] };
 }

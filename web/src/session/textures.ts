@@ -5,18 +5,23 @@ import type { Loaded } from "../pkg/cagework";
 /** Larger ones are made smaller, pixels: a preview gains nothing from more, and ten of them must fit a phone. */
 const LARGEST = 2048;
 
-/** Decodes all textures of a file that was read; one that cannot be decoded is left out. */
-export async function decodeTextures(loaded: Loaded): Promise<void> {
+/** Decodes all textures of a file that was read; one that cannot be decoded is left out. Returns how many were. */
+export async function decodeTextures(loaded: Loaded): Promise<number> {
+  let failed = 0;
   for (let index = 0; index < loaded.textureCount; index++) {
     const bytes = loaded.textureBytes(index);
     if (bytes.length === 0) continue;
     try {
-      const { width, height, data } = await decode(new Blob([bytes as BlobPart], { type: loaded.textureType(index) }));
+      const { width, height, data } = await decode(
+        new Blob([bytes as BlobPart], { type: loaded.textureType(index) }),
+      );
       loaded.setTexture(index, width, height, new Uint8Array(data.buffer));
     } catch {
       // The shape matters more: the material's plain colour stands in for a damaged image.
+      failed += 1;
     }
   }
+  return failed;
 }
 
 async function decode(file: Blob): Promise<ImageData> {

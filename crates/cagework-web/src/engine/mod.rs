@@ -115,7 +115,11 @@ impl Engine {
         let mut other = gpu.main.twin().await.map_err(Fault::from)?;
         other.adopt(bound.0, bound.1).await.map_err(Fault::from)?;
         gpu.other = Some(other);
-        self.change(|state| (state.is_moved, state.is_changed) = (true, true));
+        self.change(|state| {
+            state.has_other = true;
+            (state.is_moved, state.is_changed) = (true, true);
+            state.place_viewport();
+        });
         Ok(())
     }
 
@@ -157,7 +161,11 @@ impl Engine {
             let main = main.recover(context).await.map_err(Fault::from)?;
             *shared = Some(Gpu { main, other: None, surface });
         }
-        self.change(|state| (state.is_moved, state.is_changed) = (true, true));
+        self.change(|state| {
+            state.has_other = false;
+            (state.is_moved, state.is_changed) = (true, true);
+            state.place_viewport();
+        });
         Ok(())
     }
 }

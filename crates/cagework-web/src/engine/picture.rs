@@ -72,7 +72,7 @@ impl Engine {
         let context = gpu.main.context().clone();
         gpu.surface.resize(&context, [pixels.x as u32, pixels.y as u32]);
         state.write(&mut gpu.main, gpu.other.as_mut());
-        let other = gpu.other.as_mut().filter(|_| state.view.compare);
+        let other = gpu.other.as_mut().filter(|_| state.is_split());
         gpu.surface.draw(&mut gpu.main, other, state.scale)
     }
 }

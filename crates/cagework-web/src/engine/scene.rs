@@ -1,7 +1,7 @@
 //! What is shown, and what its colours mean.
 
 use cagework_gpu::render::MeshStyle;
-use cagework_gpu::render::colormap::ERROR_RANGE;
+use cagework_gpu::render::colormap::{ERROR_RANGE, LOWEST_RANGE};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -33,20 +33,34 @@ impl Engine {
     /// # Errors
     /// Never.
     pub fn legend(&self) -> Result<JsValue, JsValue> {
-        let legend = self.read(|state| {
-            let coordinate = || Legend { low: 0.0, high: 1.0, logarithmic: false, map: "viridis" };
-            match (state.slice.as_ref().map(|_| state.view.slice), state.mesh_style()) {
-                (_, MeshStyle::Weights { .. }) | (Some(SliceShown::Value), _) => Some(coordinate()),
-                (_, MeshStyle::Errors) => {
-                    let [low, high] = ERROR_RANGE.map(|e| 10.0_f32.powf(e));
-                    Some(Legend { low, high, logarithmic: true, map: "error" })
-                }
-                (Some(SliceShown::Kinds), _) => {
-                    Some(Legend { low: 0.0, high: 2.0, logarithmic: false, map: "kinds" })
-                }
-                _ => None,
+        let (slice, style) =
+            self.read(|state| (state.slice.as_ref().map(|_| state.view.slice), state.mesh_style()));
+        let coordinate = |high| Legend { low: 0.0, high, logarithmic: false, map: "viridis" };
+        let legend = match (slice, style) {
+            (Some(SliceShown::Kinds), _) => {
+                Some(Legend { low: 0.0, high: 2.0, logarithmic: false, map: "kinds" })
             }
-        });
+            (Some(SliceShown::Value), _) => Some(coordinate(1.0)),
+            (_, MeshStyle::Weights { column }) => Some(coordinate(self.largest_weight(column))),
+            (_, MeshStyle::Errors) => {
+                let [low, high] = ERROR_RANGE.map(|e| 10.0_f32.powf(e));
+                Some(Legend { low, high, logarithmic: true, map: "error" })
+            }
+            _ => None,
+        };
         Ok(legend.map_or(Ok(JsValue::UNDEFINED), |legend| object(&legend))?)
+    }
+}
+
+impl Engine {
+    /// The value that the last colour of a heat map of weights stands for.
+    fn largest_weight(&self, column: u32) -> f32 {
+        let largest = self.with_session(|session| {
+            let weights =
+                session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
+            Ok(weights.column(column).fold(LOWEST_RANGE, f32::max))
+        });
+        // The GPU is busy with other weights: the page asks again when they are in.
+        largest.unwrap_or(1.0)
     }
 }
