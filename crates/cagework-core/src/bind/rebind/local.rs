@@ -236,7 +236,7 @@ impl Residual {
             }
             let rank = shares.len();
             // More, and solving for the columns themselves is no slower.
-            if 2 * rank >= n_columns {
+            if 4 * rank >= 3 * n_columns {
                 return None;
             }
             let column: Vec<f32> = self.values.iter().map(|row| row[pivot / LANES][pivot % LANES]).collect();
