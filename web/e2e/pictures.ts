@@ -100,7 +100,8 @@ test("pictures of the documents", async ({ page }) => {
         engine.frameAll();
         const view = document.querySelector("canvas");
         if (!view) throw new Error("no view");
-        engine.zoomAt(view.clientWidth / 2, view.clientHeight / 2, 1.35);
+        const closer = figure.scene.compare ? 1 : 1.35;
+        engine.zoomAt(view.clientWidth / 2, view.clientHeight / 2, closer);
         if (figure.scene.compare) {
           session.draw();
           return undefined;
