@@ -28,8 +28,9 @@ export default defineConfig({
   workers: 1,
   fullyParallel: false,
   forbidOnly: true,
-  // A machine under load takes several times as long as one of its own.
-  timeout: 90_000,
+  // A machine under load takes several times as long as one of its own, and its software GPU may lose a page.
+  timeout: 180_000,
+  retries: 2,
   expect: { timeout: 20_000 },
   reporter: [["list"]],
   use: {

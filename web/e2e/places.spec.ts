@@ -33,17 +33,21 @@ test("a lost device comes back with model and pose", async ({ page }) => {
   await open(page);
   await drag(page, 40, 40);
   const before = await modelPositions(page);
-  await page.evaluate(() => globalThis.cagework?.loseDevice());
-  await page.waitForTimeout(500);
-  await page.waitForFunction(
+  await page.evaluate(
     () =>
+      new Promise((done) => {
+        globalThis.cagework?.onLost(done);
+        globalThis.cagework?.loseDevice();
+      }),
+  );
+  const answers = () =>
+    page.evaluate(() =>
       globalThis.cagework?.readPositions().then(
-        (p) => p.length > 0,
+        (positions) => positions.length > 0,
         () => false,
       ),
-    undefined,
-    { timeout: 30_000 },
-  );
+    );
+  await expect.poll(answers, { timeout: 60_000 }).toBe(true);
   expect(largestMove(before, await modelPositions(page))).toBeLessThan(1e-5);
   await bound(page);
   await drag(page, -20, 10);

@@ -146,7 +146,6 @@ impl GpuContext {
     }
 
     /// Resolves with the platform's reason when the device is lost, and never if it is not.
-    #[must_use]
     pub fn lost(&self) -> oneshot::Receiver<String> {
         let (sender, receiver) = oneshot::channel();
         if let Ok(mut waiting) = self.fault.waiting.lock() {

@@ -1,7 +1,7 @@
 //! The page's half of Cagework: JavaScript classes over core, io and gpu. No mathematics.
 //!
-//! One wasm module, two instances: on the main thread [`engine::Engine`] draws, picks and deforms; in a worker
-//! [`binder::Binder`] binds. Arrays go across as typed arrays, everything else as plain objects. What fails throws an
+//! One wasm module, two instances: on the main thread `engine::Engine` draws, picks and deforms; in a worker
+//! `binder::Binder` binds. Arrays go across as typed arrays, everything else as plain objects. What fails throws an
 //! `Error` whose name is the variant and whose message is the sentence.
 
 // Canvases are the browser's. What does without compiles everywhere, so that tests and lints see it.

@@ -1,9 +1,15 @@
 //! The canvas as wgpu sees it.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use cagework_gpu::{ContextOptions, GpuContext, GpuError, Session};
 use web_sys::HtmlCanvasElement;
 
 use crate::error::{Answer, Fault};
+
+/// Frames that the GPU may be behind: with one it would wait for us, with more a slow one shows what was long ago.
+const MOST_IN_FLIGHT: u32 = 2;
 
 /// A canvas that is drawn into.
 pub(crate) struct Surface {
@@ -16,6 +22,8 @@ pub(crate) struct Surface {
     /// Not the canvas itself seen as sRGB: SwiftShader forgets to encode where multisampling resolves into such a view
     /// (a clear of 0.2 arrives as 51, not 124).
     parts: Vec<wgpu::Texture>,
+    /// Frames that were handed to the GPU and are not finished.
+    in_flight: Arc<AtomicU32>,
 }
 
 impl Surface {
@@ -47,7 +55,7 @@ impl Surface {
         config.usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_DST;
         config.alpha_mode = wgpu::CompositeAlphaMode::Opaque;
         surface.configure(&context.device, &config);
-        Ok((Self { surface, config, format, parts: Vec::new() }, context))
+        Ok((Self { surface, config, format, parts: Vec::new(), in_flight: Arc::default() }, context))
     }
 
     /// Gives the canvas another size, pixels.
@@ -74,6 +82,9 @@ impl Surface {
     ) -> Answer<bool> {
         let context = session.context().clone();
         context.check()?;
+        if self.in_flight.load(Ordering::Relaxed) >= MOST_IN_FLIGHT {
+            return Ok(false);
+        }
         let frame = match self.surface.get_current_texture() {
             wgpu::CurrentSurfaceTexture::Success(frame) | wgpu::CurrentSurfaceTexture::Suboptimal(frame) => {
                 frame
@@ -105,6 +116,11 @@ impl Surface {
             encoder.copy_texture_to_texture(texture.as_image_copy(), place, texture.size());
         }
         context.queue.submit([encoder.finish()]);
+        self.in_flight.fetch_add(1, Ordering::Relaxed);
+        let in_flight = Arc::clone(&self.in_flight);
+        context.queue.on_submitted_work_done(move || {
+            in_flight.fetch_sub(1, Ordering::Relaxed);
+        });
         context.queue.present(frame);
         Ok(true)
     }

@@ -92,9 +92,12 @@ export function createView(
         return;
       }
       if (store.get().scene.compare === on) return;
-      scene({ compare: on });
       const { width, height } = viewport();
-      engine().zoomAt(width / 2, height / 2, on ? HALF_ZOOM : 1 / HALF_ZOOM);
+      // Both zooms while there are halves: the pointer's place counts within one of them.
+      const zoom = (factor: number) => engine().zoomAt(width / 4, height / 2, factor);
+      if (!on) zoom(1 / HALF_ZOOM);
+      scene({ compare: on });
+      if (on) zoom(HALF_ZOOM);
     },
     frameAll: () => engine().frameAll(),
     frameSelection: () => engine().frameSelection(),

@@ -35,9 +35,11 @@ export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions
     if (event.defaultPrevented || event.isComposing || isTyping(event.target)) return;
     const gesture = app.edit.active();
     // While something moves, Enter keeps it, whichever button was pressed last.
-    if (!gesture && isControlKey(event.target, event.key)) return;
+    const mod = event.ctrlKey || event.metaKey;
+    if (!gesture && !mod && isControlKey(event.target, event.key)) return;
+    if (mod && event.target instanceof HTMLElement && event.target.closest("dialog")) return;
     const { editingRest, busy, model } = app.store.get();
-    if (gesture && !event.ctrlKey && !event.metaKey && app.edit.type(event.key)) {
+    if (gesture && !mod && app.edit.type(event.key)) {
       event.preventDefault();
       return;
     }

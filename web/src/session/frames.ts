@@ -1,7 +1,7 @@
 /** Frames on demand: many requests make one, and none makes none. */
 
-/** A GPU that is waiting for something is asked again after this pause, ms. */
-const BUSY_PAUSE = 30;
+/** A GPU that is behind, or waiting for something, is asked again after this pause, ms. */
+const BUSY_PAUSE = 12;
 
 export interface Frames {
   ask(): void;

@@ -24,7 +24,7 @@ use crate::solve::multigrid::histories;
 use crate::solve::rows::Row;
 use crate::solve::team::Team;
 
-use self::local::{Fields, OldCells, Region, Residual, Update};
+use self::local::{Fields, OldCells, Region, Residual, Split, Update};
 use self::steps::{add_corrections, resample, solve_all, solve_for};
 use super::pipeline::{FieldsOn, Prepared, Solved, refuse_outside, sampling_stencils};
 use super::voxels::Voxels;
@@ -32,7 +32,7 @@ use super::watch::Watch;
 use super::{BindError, BindOptions, Binding, Method, Solver, bind};
 
 /// Edits after which everything is bound anew.
-const MAX_UPDATES: usize = 8;
+const MAX_UPDATES: usize = 6;
 
 /// V-cycles for a correction: each makes its error about 15 times smaller.
 const CYCLES: u32 = 5;
@@ -203,12 +203,12 @@ impl Rebinder {
             let old = OldCells::new(&fields, &needed, n_batches);
             let region = Region::around(&moved, CHANGED, &grid);
             let residual = Residual::new(level, &region, n_batches, &old);
-            let Some((right, shares)) = residual.split(level.n_rows(), cage.n_vertices()) else {
+            let Some(Split { right, shares }) = residual.split(level.n_rows(), cage.n_vertices()) else {
                 return Ok(None);
             };
             resample(&stencils, &changed, level, &old, &needed, &mut blocks);
             rank = shares.len();
-            let corrections = solve_for(&voxels, &stencils, right, &team, watch)?;
+            let corrections = solve_for(&voxels, &stencils, &right, &team, watch)?;
             solved.iterations = CYCLES;
             solved.residual_history =
                 histories(&corrections.iter().map(|c| &c.report).collect::<Vec<_>>())[1].clone();

@@ -74,7 +74,7 @@ impl State {
         let (edges, faces) = (self.selection.edges(&self.topology), self.selection.faces(&self.topology));
         let nothing = |what: &str| Fault::new("Selection", format!("select {what} first"));
         Ok(match edit {
-            "split_edge" => each(mesh, &edges, |mesh, &edge| split_edge(mesh, edge, 0.5))?
+            "split_edge" => each(&mesh, &edges, |mesh, &edge| split_edge(mesh, edge, 0.5))?
                 .ok_or_else(|| nothing("an edge, or both its ends,"))?,
             // Merging moves vertices together: one edge at a time.
             "collapse_edge" => match edges.first() {
@@ -83,7 +83,7 @@ impl State {
             },
             "extrude_face" => {
                 let distance = EXTRUSION * self.bounds().map_or(1.0, |b| b.diagonal());
-                each(mesh, &faces, |mesh, &face| extrude_face(mesh, face, distance))?
+                each(&mesh, &faces, |mesh, &face| extrude_face(mesh, face, distance))?
                     .ok_or_else(|| nothing("a face, or all its corners,"))?
             }
             "delete_face" if faces.is_empty() => return Err(nothing("a face, or all its corners,")),
@@ -102,13 +102,13 @@ impl State {
 
 /// One edit after the other; numbers of those to come stay as they are. Nothing for nothing.
 fn each<T, E>(
-    mesh: PolygonMesh,
+    mesh: &PolygonMesh,
     items: &[T],
     edit: impl Fn(&PolygonMesh, &T) -> Result<Edited, E>,
 ) -> Result<Option<Edited>, E> {
     let mut all: Option<Edited> = None;
     for item in items {
-        let mut next = edit(all.as_ref().map_or(&mesh, |e| &e.mesh), item)?;
+        let mut next = edit(all.as_ref().map_or(mesh, |e| &e.mesh), item)?;
         if let Some(before) = all {
             next.touched.splice(0..0, before.touched);
         }

@@ -16,9 +16,6 @@ const NEGLIGIBLE: f32 = 1e-6;
 /// Values of a correction below this are left out: all of them together stay below [`NEGLIGIBLE`].
 pub(super) const UNFELT: f32 = 1e-8;
 
-/// Independent residuals up to which an update is worth it.
-const MAX_RANK: usize = 96;
-
 /// Cells near moved faces.
 #[derive(Clone, Debug)]
 pub(super) struct Region {
@@ -130,6 +127,14 @@ pub(super) struct Residual {
     values: Vec<Vec<Row>>,
 }
 
+/// Independent residuals and every column's shares in them.
+pub(super) struct Split {
+    /// Right-hand sides. `[n_batches of them][n_rows]`
+    pub(super) right: Vec<Vec<Row>>,
+    /// For each of them a row of all columns. `[n_of them][n_batches]`
+    pub(super) shares: Vec<Vec<Row>>,
+}
+
 impl Residual {
     /// Residuals of the unknowns in `region`; `old(cell)` must be known one cell beyond it.
     pub(super) fn new(level: &Level, region: &Region, n_batches: usize, old: &OldCells<'_>) -> Self {
@@ -198,12 +203,12 @@ impl Residual {
         self.diagonals.retain(|_| keep.next() == Some(&true));
     }
 
-    /// Splits the residuals of all columns into a few independent ones and the columns' shares in them: right-hand sides
-    /// `[n_batches of them][n_rows]`, and `[n_of them]` rows of shares. `None` if there are too many.
+    /// Splits the residuals of all columns into a few independent ones and the columns' shares in them. `None` if there
+    /// are too many.
     ///
     /// Gram-Schmidt, the largest column first: harmonic functions that vanish on the same faces are nearly alike a few
     /// cells away, so 110 columns have 15 to 40 independent residuals to six digits.
-    pub(super) fn split(self, n_rows: usize, n_columns: usize) -> Option<(Vec<Vec<Row>>, Vec<Vec<Row>>)> {
+    pub(super) fn split(self, n_rows: usize, n_columns: usize) -> Option<Split> {
         dispatch(
             #[inline(always)]
             || self.split_columns(n_rows, n_columns),
@@ -211,7 +216,7 @@ impl Residual {
     }
 
     #[inline(always)]
-    fn split_columns(mut self, n_rows: usize, n_columns: usize) -> Option<(Vec<Vec<Row>>, Vec<Vec<Row>>)> {
+    fn split_columns(mut self, n_rows: usize, n_columns: usize) -> Option<Split> {
         let n_batches = n_columns.div_ceil(LANES);
         let mut right = Vec::new();
         let mut shares: Vec<Vec<Row>> = Vec::new();
@@ -227,10 +232,11 @@ impl Residual {
             let size = |c: usize| largest[c / LANES][c % LANES];
             let pivot = (0..n_columns).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
             if size(pivot) < NEGLIGIBLE {
-                return Some((right, shares));
+                return Some(Split { right, shares });
             }
             let rank = shares.len();
-            if rank == MAX_RANK {
+            // More, and solving for the columns themselves is no slower.
+            if 4 * rank >= 3 * n_columns {
                 return None;
             }
             let column: Vec<f32> = self.values.iter().map(|row| row[pivot / LANES][pivot % LANES]).collect();

@@ -77,7 +77,7 @@ pub(super) struct Correction {
 pub(super) fn solve_for(
     voxels: &Voxels,
     stencils: &Stencils,
-    right: Vec<Vec<Row>>,
+    right: &[Vec<Row>],
     team: &Team,
     watch: &Watch<'_>,
 ) -> Result<Vec<Correction>, Cancelled> {

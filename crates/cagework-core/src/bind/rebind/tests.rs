@@ -36,7 +36,7 @@ fn pushed(mesh: &PolygonMesh, near: Vec3, by: Vec3) -> Cage {
 
 fn dense(binding: &Binding) -> Vec<f32> {
     let w = &binding.weights;
-    let n = w.n_columns() as usize;
+    let n = w.n_columns();
     let mut dense = vec![0.0; n * (w.indptr().len() - 1)];
     for (row, range) in w.indptr().windows(2).enumerate() {
         for k in range[0] as usize..range[1] as usize {
