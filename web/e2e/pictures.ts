@@ -75,6 +75,8 @@ test("pictures of the documents", async ({ page }) => {
   await page.setViewportSize({ width: 1440, height: 900 });
   await open(page);
   await page.getByRole("button", { name: "Pose it" }).click();
+  await page.getByRole("button", { name: "Show", exact: false }).first().click();
+  await page.waitForTimeout(2000);
   await page.screenshot({ path: join(DOCUMENTS, "page.jpg"), quality: 90 });
   for (const figure of FIGURES) {
     const data = await page.evaluate(
@@ -88,7 +90,7 @@ test("pictures of the documents", async ({ page }) => {
         await session.bind(options, () => {}).done;
         if (mean) await session.bindMeanValue().done;
         if (figure.slice !== undefined) await session.loadSlice(figure.slice, 0.5, options.grid / 2).done;
-        const pose = opened.project?.poses[figure.pose ?? -1];
+        const pose = opened.poses?.[figure.pose ?? -1];
         if (pose) engine.setCagePositions(pose.positions);
         const points = engine.restPositions();
         const reach = (i: number) =>
