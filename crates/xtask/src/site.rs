@@ -68,7 +68,7 @@ pub(crate) fn pictures() -> Result<(), String> {
 /// When one is wrong.
 pub(crate) fn check_types() -> Result<(), String> {
     if !root().join("web/src/pkg/cagework.d.ts").exists() {
-        wasm::build(Profile::Dev)?;
+        wasm::build(Profile::Web)?;
     }
     exec(&["tsc", "--project", "web"])
 }
