@@ -51,12 +51,7 @@ pub fn pick_vertex(positions: &[Vec3], view: &dyn View, pointer: Vec2, radius: f
         let distance = pixel.distance(pointer);
         (distance <= radius).then(|| (i as u32, depth, distance, radius * view.units_per_pixel(p)))
     });
-    let near: Vec<_> = near.collect();
-    let front = near.iter().map(|n| n.1).fold(f32::INFINITY, f32::min);
-    near.iter()
-        .filter(|(_, depth, _, size)| *depth <= front + 2.0 * size)
-        .min_by(|a, b| a.2.total_cmp(&b.2))
-        .map(|n| n.0)
+    in_front(near)
 }
 
 /// The edge within `radius` pixels of the pointer, an index into [`Topology::edges`]; of several the one whose nearest
@@ -79,6 +74,12 @@ pub fn pick_edge(
         let middle = positions[edge[0] as usize].lerp(positions[edge[1] as usize], along);
         (distance <= radius).then(|| (e as u32, depth, distance, radius * view.units_per_pixel(middle)))
     });
+    in_front(near)
+}
+
+/// Of (number, depth, distance from the pointer, size of the radius there): what is in front hides what is behind, and
+/// among those at one depth the nearest to the pointer counts.
+fn in_front(near: impl Iterator<Item = (u32, f32, f32, f32)>) -> Option<u32> {
     let near: Vec<_> = near.collect();
     let front = near.iter().map(|n| n.1).fold(f32::INFINITY, f32::min);
     near.iter()
