@@ -85,7 +85,12 @@ impl Input {
     }
 }
 
-fn read(path: &str) -> Model {
+/// Reads a model.
+///
+/// # Panics
+/// If it cannot be read: there is nothing to measure.
+#[must_use]
+pub fn read(path: &str) -> Model {
     let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{path}: {error}"));
     Model::read(path, &bytes, &mut |_| None).unwrap_or_else(|error| panic!("{path}: {error}"))
 }

@@ -1,0 +1,89 @@
+//! Cages made for the samples and for the models that the command line names, at 24, 80 and 200 vertices: what was made,
+//! what the check says, how well it binds. A Markdown table, and an error if one of them is wrong.
+//!
+//! `cargo bench -p cagework-benches --bench cages -- horse.glb cow.obj`
+
+use cagework_benches::read;
+use cagework_core::bind::{BindOptions, bind};
+use cagework_core::cage_check::check;
+use cagework_core::cage_gen::{CageOptions, generate};
+use cagework_core::mesh::TriMesh;
+use cagework_core::progress::Silent;
+use cagework_core::samples;
+
+/// Vertices asked for: few, the default, many.
+const TARGETS: [u32; 3] = [24, 80, 200];
+
+/// Cells along the longest side of the bind.
+const GRID: u32 = 64;
+
+/// What a rest pose may be off, of the cage's diagonal.
+const MAX_REST_ERROR: f64 = 5e-5;
+
+/// How often a cage is made, for the fastest time.
+const TIMES: usize = 5;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    // `cargo test --benches` runs this too, and wants to know only that it compiles.
+    if !arguments.iter().any(|argument| argument == "--bench") {
+        return;
+    }
+    let files = arguments.iter().filter(|argument| !argument.starts_with("--"));
+    let mut models: Vec<(String, TriMesh)> = samples::all()
+        .iter()
+        .filter_map(|info| Some((info.label.to_owned(), samples::build(info.id)?.mesh)))
+        .collect();
+    models.extend(files.map(|file| {
+        let name = std::path::Path::new(file).file_stem().map_or(file.clone(), |s| s.display().to_string());
+        (name, read(file).tri_mesh())
+    }));
+    println!(
+        "| model | triangles | asked | vertices | mirror | clearance / diagonal | sound | model inside | \
+         largest rest error | made in ms |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
+    let mut wrong = 0;
+    for (name, mesh) in &models {
+        for target in TARGETS {
+            wrong += u32::from(!row(name, mesh, target));
+        }
+    }
+    if wrong > 0 {
+        eprintln!("{wrong} of {} cages are wrong", models.len() * TARGETS.len());
+        std::process::exit(1);
+    }
+}
+
+/// Prints a row; whether the cage is right.
+fn row(name: &str, mesh: &TriMesh, target: u32) -> bool {
+    let options = CageOptions { target, ..CageOptions::default() };
+    let make = || generate(&mesh.positions, &mesh.triangles, &options, &Silent);
+    let made = match make() {
+        Ok(made) => made,
+        Err(error) => {
+            println!("| {name} | {} | {target} | {error} |", mesh.triangles.len());
+            return false;
+        }
+    };
+    let fastest = cagework_benches::fastest_ms(TIMES, || drop(make()));
+    let checked = check(&made.cage.to_polygon_mesh(), Some(&mesh.positions), None);
+    let options = BindOptions { grid: GRID, ..BindOptions::default() };
+    let bound = bind(&mesh.positions, &made.cage, &options, &Silent);
+    let (outside, rest) = match &bound {
+        Ok(binding) => (binding.report.outside_vertices, binding.report.rest_error.max_rel),
+        Err(_) => (mesh.positions.len() as u64, f64::INFINITY),
+    };
+    let inside = checked.encloses == Some(true) && outside == 0;
+    println!(
+        "| {name} | {} | {target} | {}{} | {} | {:.3} | {} | {} | {rest:.1e} | {fastest:.0} |",
+        mesh.triangles.len(),
+        made.report.vertices,
+        if made.report.target_met { "" } else { " (more are needed)" },
+        made.report.mirror.map_or("-".to_owned(), |mirror| format!("{mirror:?}").to_lowercase()),
+        f64::from(made.report.clearance) / made.cage.diagonal() as f64,
+        if checked.valid { "yes" } else { "**no**" },
+        if inside { "all" } else { "**not all**" },
+    );
+    checked.valid && inside && rest <= MAX_REST_ERROR
+}
