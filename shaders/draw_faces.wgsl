@@ -8,12 +8,12 @@ struct Varying {
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
-    let first = items[2u * instance];
+    let first = item_at(2u * instance);
     let state = first.x >> STATE_SHIFT;
     if state == HIDDEN { return Varying(NOWHERE, vec4f(0.0)); }
     var corner = first.x;
     if index == 1u { corner = first.y; }
-    if index == 2u { corner = items[2u * instance + 1u].x; }
+    if index == 2u { corner = item_at(2u * instance + 1u).x; }
     return Varying(lifted(clip_of(corner & INDEX_MASK)), state_color(state));
 }
 

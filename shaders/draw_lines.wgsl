@@ -3,7 +3,7 @@
 struct Varying {
     @builtin(position) clip: vec4f,
     /// From the segment's first point along it and across it, pixels.
-    @location(0) @interpolate(linear) place: vec2f,
+    @location(0) place: vec2f,
     @location(1) @interpolate(flat) length: f32,
     @location(2) @interpolate(flat) half_width: f32,
     @location(3) @interpolate(flat) color: vec4f,
@@ -11,7 +11,7 @@ struct Varying {
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
-    let item = items[instance];
+    let item = item_at(instance);
     let state = item.x >> STATE_SHIFT;
     var a = clip_of(item.x & INDEX_MASK);
     var b = clip_of(item.y & INDEX_MASK);
@@ -34,7 +34,8 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let beyond = select(-reach, reach, is_b);
     let own = select(a, b, is_b);
     let offset = (along * beyond + across * up) * camera.pixel;
-    let clip = lifted(vec4f(own.xy + offset * own.w, own.zw));
+    // Divided here, so that what lies between is even in the picture, which WebGL2 cannot be asked for.
+    let clip = vec4f(own.xy / own.w + offset, lifted(own).z / own.w, 1.0);
     return Varying(clip, vec2f(select(0.0, length, is_b) + beyond, up), length, half_width, state_color(state));
 }
 

@@ -1,5 +1,5 @@
-// The mesh: its material, or weights or errors as colours, in studio light. Positions and normals are read where
-// deform_vertices and vertex_normals wrote them.
+// The mesh: its material, or weights or errors as colours, in studio light. Its vertices are in mesh_buffers.wgsl or
+// mesh_textures.wgsl.
 
 struct Surface {
     /// Factor of the base colour, linear RGBA.
@@ -19,10 +19,6 @@ const ERRORS = 2u;
 const CLAY = 3u;
 const BLENDED = 4u;
 
-@group(1) @binding(0) var<storage, read> positions: array<vec4f>;
-@group(1) @binding(1) var<storage, read> normals: array<vec4f>;
-/// A weight or an error of each vertex.
-@group(1) @binding(2) var<storage, read> values: array<f32>;
 @group(2) @binding(0) var<uniform> surface: Surface;
 @group(2) @binding(1) var base_texture: texture_2d<f32>;
 @group(2) @binding(2) var base_sampler: sampler;
@@ -39,9 +35,9 @@ struct Varying {
 
 @vertex
 fn vertex(@location(0) source: u32, @location(1) uv: vec2f, @location(2) color: vec4f) -> Varying {
-    let world = positions[source].xyz;
+    let world = point_at(source);
     let clip = camera.clip_from_world * vec4f(world, 1.0);
-    return Varying(clip, world, normals[source].xyz, uv, color, values[source]);
+    return Varying(clip, world, normal_at(source), uv, color, value_at(source));
 }
 
 /// Base colour of a value.

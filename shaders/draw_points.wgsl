@@ -2,15 +2,15 @@
 
 struct Varying {
     @builtin(position) clip: vec4f,
-    /// From the middle, pixels.
-    @location(0) @interpolate(linear) place: vec2f,
+    /// From the middle, pixels. Even in the picture: all corners are as far away.
+    @location(0) place: vec2f,
     @location(1) @interpolate(flat) radius: f32,
     @location(2) @interpolate(flat) color: vec4f,
 }
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
-    let item = items[instance];
+    let item = item_at(instance);
     let state = item.x >> STATE_SHIFT;
     let clip = clip_of(item.x & INDEX_MASK);
     if state == HIDDEN || clip.z < 0.0 {

@@ -1,4 +1,5 @@
 // A layer of the grid: kinds of cells, or one coordinate's value, with thin lines between cells. One quad.
+// The cells are in slice_buffers.wgsl or slice_textures.wgsl.
 
 struct SliceView {
     /// Outer corner of the first cell, world space.
@@ -20,8 +21,6 @@ struct SliceView {
 const EXTERIOR = 3u;
 
 @group(1) @binding(0) var<uniform> slice: SliceView;
-/// (kind, bits of the value) of each cell, u fastest.
-@group(1) @binding(1) var<storage, read> cells: array<vec2u>;
 
 struct Varying {
     @builtin(position) clip: vec4f,
@@ -44,7 +43,7 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     let slope = fwidth(in.place);
     let limit = vec2u(slice.n_u, slice.n_v) - 1u;
     let cell = min(vec2u(max(in.place, vec2f(0.0))), limit);
-    let content = cells[cell.y * slice.n_u + cell.x];
+    let content = cell_at(cell.y * slice.n_u + cell.x);
     var color = slice.kinds[content.x & 3u];
     if slice.high > 0.0 && content.x != EXTERIOR {
         let value = bitcast<f32>(content.y);

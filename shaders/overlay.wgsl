@@ -1,4 +1,5 @@
 // Lines, points and faces over the model share one group of bindings: a style, positions, and what is drawn of them.
+// Where the latter are: overlay_buffers.wgsl, overlay_textures.wgsl.
 
 struct Style {
     /// Colour of each state, linear, straight alpha.
@@ -24,8 +25,6 @@ const INDEX_MASK = 0x0fffffffu;
 const HIDDEN = 15u;
 
 @group(1) @binding(0) var<uniform> style: Style;
-@group(1) @binding(1) var<storage, read> positions: array<vec4f>;
-@group(1) @binding(2) var<storage, read> items: array<vec2u>;
 
 /// Colour of a state, with the style's opacity.
 fn state_color(state: u32) -> vec4f {
@@ -40,7 +39,7 @@ fn state_width(state: u32) -> f32 {
 
 /// Clip coordinates of a vertex.
 fn clip_of(index: u32) -> vec4f {
-    return camera.clip_from_world * vec4f(positions[index].xyz, 1.0);
+    return camera.clip_from_world * vec4f(point_at(index), 1.0);
 }
 
 /// Draws it a little nearer.

@@ -102,6 +102,33 @@ fn adopted_weights_move_the_mesh_as_on_the_cpu() {
     assert_close(&flat(&positions), &flat(&expected), 2e-5);
 }
 
+/// As in a browser without WebGPU: the processor binds and deforms, and a lost device comes back.
+#[test]
+fn session_that_only_draws_equals_the_cpu() {
+    let only = ContextOptions { draws_only: true, ..ContextOptions::default() };
+    let mut session = session_with(&only);
+    let (_, cage) = input();
+    let options = options(Method::Embedded, Solver::Multigrid);
+    let report = block_on(session.bind(&options, &Silent)).expect("it binds");
+    assert!(report.converged && report.adapter.is_none());
+    let cpu = on_cpu(&options);
+    assert_eq!(weights(&session), &cpu.weights);
+    let pose = posed(cage.positions());
+    session.pose(&pose);
+    let expected = deform_bound(&cpu.weights, &cpu.outside, &pose);
+    assert_eq!(block_on(session.read_positions()).expect("they are here"), expected);
+
+    let computing = block_on(session.recover(context(&ContextOptions::default()))).expect("it recovers");
+    let positions = block_on(computing.read_positions()).expect("they come back");
+    assert_close(&flat(&positions), &flat(&expected), 2e-5);
+    computing.context().device.destroy();
+    let drawing = block_on(computing.recover(context(&only))).expect("it recovers");
+    assert_eq!(block_on(drawing.read_positions()).expect("they are here"), expected);
+    drawing.context().lose("for a test");
+    let error = block_on(drawing.read_positions()).map(drop).unwrap_err();
+    assert!(matches!(error, GpuError::DeviceLost { .. }), "{error}");
+}
+
 #[test]
 fn several_batches_give_the_same_weights() {
     // So fine that a field, not the table of samples, is what does not fit into one binding.

@@ -11,14 +11,14 @@ use std::sync::Arc;
 use cagework_core::bind::{BindOptions, Method};
 use cagework_core::progress::Silent;
 use cagework_core::slice::Slice;
-use cagework_gpu::Session;
 use cagework_gpu::render::{
     AxisView, Camera, Gizmo, GizmoMode, GizmoPart, Marks, MeshStyle, Projection, SceneOptions, Selection,
     SliceView, Theme,
 };
+use cagework_gpu::{ContextOptions, Session};
 use glam::{Quat, Vec2, Vec3};
 use golden::{SIZE, assert_picture};
-use scenes::{bind, bow, classic, creature, embedded, textured};
+use scenes::{bind, bow, classic, creature, creature_on, embedded, everywhere, textured};
 
 #[test]
 fn solid_in_its_cage() {
@@ -31,21 +31,23 @@ fn solid_in_its_cage() {
 
 #[test]
 fn posed_with_selection() {
-    let mut session = creature();
-    bind(&mut session, &embedded());
-    bow(&mut session);
-    let faces = session.cage().expect("there is one").faces().to_vec();
-    let selection = Selection {
-        vertices: faces[3].clone(),
-        faces: vec![3],
-        edges: vec![[faces[3][0], faces[3][1]], [faces[3][2], faces[3][1]]],
-        hovered_vertex: Some(faces[10][0]),
-        hovered_face: Some(20),
-        hovered_edge: Some([faces[30][0], faces[30][1]]),
-        unmatched: vec![faces[40][0], faces[40][1]],
-    };
-    session.set_scene(SceneOptions { selection, ..SceneOptions::default() });
-    assert_picture(&mut session, "posed-selection");
+    for device in everywhere() {
+        let mut session = creature_on(&device);
+        bind(&mut session, &embedded());
+        bow(&mut session);
+        let faces = session.cage().expect("there is one").faces().to_vec();
+        let selection = Selection {
+            vertices: faces[3].clone(),
+            faces: vec![3],
+            edges: vec![[faces[3][0], faces[3][1]], [faces[3][2], faces[3][1]]],
+            hovered_vertex: Some(faces[10][0]),
+            hovered_face: Some(20),
+            hovered_edge: Some([faces[30][0], faces[30][1]]),
+            unmatched: vec![faces[40][0], faces[40][1]],
+        };
+        session.set_scene(SceneOptions { selection, ..SceneOptions::default() });
+        assert_picture(&mut session, "posed-selection");
+    }
 }
 
 /// The cage vertex above the neck, which moves much of head and body.
@@ -76,42 +78,48 @@ fn base_wireframe_over_the_reconstruction() {
 
 #[test]
 fn mesh_edges() {
-    let mut session = creature();
-    let bare =
-        SceneOptions { mesh_edges: true, cage_lines: false, handles: false, ..SceneOptions::default() };
-    session.set_scene(bare);
-    assert_picture(&mut session, "mesh-edges");
+    for device in everywhere() {
+        let mut session = creature_on(&device);
+        let bare =
+            SceneOptions { mesh_edges: true, cage_lines: false, handles: false, ..SceneOptions::default() };
+        session.set_scene(bare);
+        assert_picture(&mut session, "mesh-edges");
+    }
 }
 
 #[test]
 fn heat_map_of_weights() {
-    let mut session = creature();
-    bind(&mut session, &embedded());
-    let column = near_the_head(&session);
-    let selection = Selection { vertices: vec![column], ..Selection::default() };
-    session.set_scene(SceneOptions {
-        mesh: MeshStyle::Weights { column },
-        selection,
-        ..SceneOptions::default()
-    });
-    assert_picture(&mut session, "weights");
+    for device in everywhere() {
+        let mut session = creature_on(&device);
+        bind(&mut session, &embedded());
+        let column = near_the_head(&session);
+        let selection = Selection { vertices: vec![column], ..Selection::default() };
+        session.set_scene(SceneOptions {
+            mesh: MeshStyle::Weights { column },
+            selection,
+            ..SceneOptions::default()
+        });
+        assert_picture(&mut session, "weights");
+    }
 }
 
 #[test]
 fn heat_map_of_errors() {
-    let mut session = creature();
-    bind(&mut session, &classic(24));
-    session.set_scene(SceneOptions {
-        mesh: MeshStyle::Errors,
-        cage_lines: false,
-        handles: false,
-        ..SceneOptions::default()
-    });
-    assert_picture(&mut session, "errors");
+    for device in everywhere() {
+        let mut session = creature_on(&device);
+        bind(&mut session, &classic(24));
+        session.set_scene(SceneOptions {
+            mesh: MeshStyle::Errors,
+            cage_lines: false,
+            handles: false,
+            ..SceneOptions::default()
+        });
+        assert_picture(&mut session, "errors");
+    }
 }
 
-fn sliced(method: Method, with_values: bool, theme: Theme, name: &str) {
-    let mut session = creature();
+fn sliced(device: &ContextOptions, method: Method, with_values: bool, theme: Theme, name: &str) {
+    let mut session = creature_on(device);
     let column = with_values.then(|| near_the_head(&session));
     let cage = session.cage().expect("there is one").clone();
     let options = BindOptions { grid: 24, method, ..BindOptions::default() };
@@ -135,19 +143,25 @@ fn sliced(method: Method, with_values: bool, theme: Theme, name: &str) {
 
 #[test]
 fn slice_with_kinds_of_cells() {
-    sliced(Method::Classic, false, Theme::Dark, "slice-kinds");
-    sliced(Method::Embedded, false, Theme::Light, "slice-kinds-light");
+    for device in everywhere() {
+        sliced(&device, Method::Classic, false, Theme::Dark, "slice-kinds");
+        sliced(&device, Method::Embedded, false, Theme::Light, "slice-kinds-light");
+    }
 }
 
 #[test]
 fn slice_with_values() {
-    sliced(Method::Embedded, true, Theme::Dark, "slice-values");
+    for device in everywhere() {
+        sliced(&device, Method::Embedded, true, Theme::Dark, "slice-values");
+    }
 }
 
 #[test]
 fn textures_colours_and_transparency() {
-    let mut session = textured();
-    assert_picture(&mut session, "materials");
+    for device in everywhere() {
+        let mut session = textured(&device);
+        assert_picture(&mut session, "materials");
+    }
 }
 
 #[test]
@@ -167,16 +181,18 @@ fn gizmos() {
 
 #[test]
 fn problems_are_marked() {
-    let mut session = creature();
-    let corners = session.cage().expect("there is one").positions().to_vec();
-    let marks = Marks {
-        points: vec![corners[0] + 0.4 * Vec3::Y],
-        segments: vec![[corners[0], corners[1]], [corners[1], corners[2]]],
-        mesh_vertices: (0..40).collect(),
-        cage_vertices: vec![5, 60],
-    };
-    session.set_scene(SceneOptions { marks, theme: Theme::Light, ..SceneOptions::default() });
-    assert_picture(&mut session, "marks");
+    for device in everywhere() {
+        let mut session = creature_on(&device);
+        let corners = session.cage().expect("there is one").positions().to_vec();
+        let marks = Marks {
+            points: vec![corners[0] + 0.4 * Vec3::Y],
+            segments: vec![[corners[0], corners[1]], [corners[1], corners[2]]],
+            mesh_vertices: (0..40).collect(),
+            cage_vertices: vec![5, 60],
+        };
+        session.set_scene(SceneOptions { marks, theme: Theme::Light, ..SceneOptions::default() });
+        assert_picture(&mut session, "marks");
+    }
 }
 
 #[test]
@@ -205,7 +221,7 @@ fn formats_without_srgb_look_the_same() {
 
 #[test]
 fn empty_session_is_a_background() {
-    let mut session = scenes::empty();
+    let mut session = scenes::empty(&ContextOptions::default());
     *session.camera_mut() = Camera::default();
     let rgba = pollster::block_on(session.picture([64, 48], 1.0)).expect("the picture is drawn");
     assert!(rgba.chunks(4).all(|p| p[3] == 255));

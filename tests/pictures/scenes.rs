@@ -12,9 +12,14 @@ use cagework_tests::creature;
 use glam::{Quat, Vec2, Vec3};
 use pollster::block_on;
 
+/// Devices that compute and devices that only draw, as in browsers without WebGPU: pictures are the same.
+pub(crate) fn everywhere() -> [ContextOptions; 2] {
+    [false, true].map(|draws_only| ContextOptions { draws_only, ..ContextOptions::default() })
+}
+
 /// A session without anything. No GPU fails the test: the software adapter of mesa-vulkan-drivers will do.
-pub(crate) fn empty() -> Session {
-    match block_on(GpuContext::new(&ContextOptions::default())) {
+pub(crate) fn empty(options: &ContextOptions) -> Session {
+    match block_on(GpuContext::new(options)) {
         Ok(context) => Session::new(context),
         Err(error) => panic!("these tests need a Vulkan adapter: {error}"),
     }
@@ -29,9 +34,14 @@ fn upright(p: Vec3) -> Vec3 {
 
 /// The animal in its cage of 112 vertices.
 pub(crate) fn creature() -> Session {
+    creature_on(&ContextOptions::default())
+}
+
+/// [`creature`] on a device of some kind.
+pub(crate) fn creature_on(options: &ContextOptions) -> Session {
     let mesh = creature::creature();
     let around: Cage = cage(&moved(&creature::creature_cage(), upright));
-    let mut session = empty();
+    let mut session = empty(options);
     let positions = mesh.positions.into_iter().map(upright).collect();
     block_on(session.set_model(DrawModel::plain(positions, mesh.triangles))).expect("the model is drawn");
     block_on(session.set_cage(&around)).expect("the cage is drawn");
@@ -73,7 +83,7 @@ pub(crate) fn bow(session: &mut Session) {
 }
 
 /// A ball with a texture, one with colours of its vertices, one of glass and one that is cut out, side by side.
-pub(crate) fn textured() -> Session {
+pub(crate) fn textured(options: &ContextOptions) -> Session {
     let mut model = DrawModel::default();
     for k in 0..4u32 {
         let first = model.triangles.len() as u32;
@@ -99,7 +109,7 @@ pub(crate) fn textured() -> Session {
     };
     model.textures =
         vec![checks([220, 60, 40, 255], [245, 240, 230, 255]), checks([255; 4], [255, 255, 255, 0])];
-    let mut session = empty();
+    let mut session = empty(options);
     block_on(session.set_model(model)).expect("the model is drawn");
     look(&mut session);
     session.camera_mut().yaw = 0.3;

@@ -54,19 +54,6 @@ test("a lost device comes back with model and pose", async ({ page }) => {
   await shoot(page, "recovered");
 });
 
-test("without WebGPU the page says what to do", async ({ page }) => {
-  await page.addInitScript(() => {
-    Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined });
-  });
-  await page.goto("./");
-  await expect(page.getByRole("heading").first()).toBeVisible();
-  await expect(page.getByText(/WebGPU/).first()).toBeVisible();
-  await expect(page.getByText(/Firefox/).first()).toBeVisible();
-  await shoot(page, "no-webgpu");
-  const { violations } = await new AxeBuilder({ page }).analyze();
-  expect(violations.map(({ id }) => id)).toEqual([]);
-});
-
 test("ten models in turn leave no memory behind", async ({ page }) => {
   await open(page);
   const bytes = await page.evaluate(async () => {

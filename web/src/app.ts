@@ -32,6 +32,8 @@ export interface App {
   chooseFolder(): void;
   chooseCage(): void;
   share(): void;
+  /** How to switch WebGPU on, where it is missing. */
+  showWays(): void;
   /** Forgets what was kept and begins with the first sample. */
   startFresh(): void;
   /** Where the pointer was last, CSS pixels in the view. */

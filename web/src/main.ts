@@ -18,6 +18,7 @@ import { attachKeyboard } from "./input/keyboard";
 import { attachPointer } from "./input/pointer";
 import { isMac, shortcutText } from "./input/shortcuts";
 import { openSession } from "./session";
+import { lackOf } from "./session/adapter";
 import { decodeShare } from "./share";
 import { startUp } from "./start";
 import { createStore, INITIAL } from "./state";
@@ -36,8 +37,9 @@ import { createSeePanel } from "./ui/see";
 import { createSheet } from "./ui/sheet";
 import { createOverlays } from "./ui/stage";
 import { createToasts } from "./ui/toasts";
-import { createUnsupported, type Lack } from "./ui/unsupported";
+import { createUnsupported } from "./ui/unsupported";
 import { createStage } from "./ui/viewport";
+import { createWithout } from "./ui/without";
 
 function byId(id: string): HTMLElement {
   const element = document.getElementById(id);
@@ -125,7 +127,8 @@ async function main(): Promise<void> {
 
   const mac = isMac(navigator.platform);
   const sheet = createSheet(mac);
-  root.append(sheet.element);
+  const without = createWithout(navigator.userAgent, isSecureContext);
+  root.append(sheet.element, without.element);
   const app: App = {
     ctx,
     store,
@@ -147,6 +150,7 @@ async function main(): Promise<void> {
     chooseFolder: () => choose("", true, (list) => void files.openFiles(list)),
     chooseCage: () => choose(".obj,.glb,.gltf,.bin", false, (list) => void cage.load(list)),
     share: () => void share(),
+    showWays: () => without.show(store.get().lack ?? "NoWebGPU"),
     startFresh: () => void project.forget().then(() => files.openSample(store.get().samples[0]?.id ?? "")),
     pointer: () => ({ x: 0, y: 0 }),
     key: (command) => shortcutText(command, mac),
@@ -199,17 +203,15 @@ async function main(): Promise<void> {
   createOverlays(stageElement, app, createSeePanel(app), matchMedia("(pointer: coarse)"));
 
   try {
-    session = await openSession(stage.canvas());
+    session = await openSession(stage);
   } catch (error) {
-    const name = error instanceof Error ? error.name : "";
-    if (name !== "NoWebGPU" && name !== "NoAdapter" && name !== "NoDevice") {
+    const lack = lackOf(error);
+    if (!lack) {
       store.set({ busy: null });
       tell.problem(explain(error, "Cagework did not start"), fixFor("reload"));
       return;
     }
-    document.body.replaceChildren(
-      createUnsupported(name satisfies Lack, navigator.userAgent, isSecureContext),
-    );
+    document.body.replaceChildren(createUnsupported(lack, navigator.userAgent, isSecureContext));
     return;
   }
   attachPointer(stage, app);
@@ -221,6 +223,8 @@ async function main(): Promise<void> {
     freshCanvas: stage.freshCanvas,
     recovered: () => view.resized(),
   });
+  const notice = session.lack && without.notice(session.lack);
+  if (notice) stageElement.before(notice);
   startUp({ app, stage, theme: loadTheme(), shared: () => decodeShare(location.hash), product: PRODUCT });
 }
 

@@ -6,6 +6,7 @@ import type {
   BindReport,
   CageState,
   Job,
+  Lack,
   ModelInfo,
   NamedFile,
   Opened,
@@ -14,35 +15,67 @@ import type {
   Session,
 } from "./contract";
 import { BIND_DEFAULTS } from "./defaults";
-import init, { Binder, Engine } from "./pkg/cagework";
-import wasmUrl from "./pkg/cagework_bg.wasm?url";
-import { findAdapter } from "./session/adapter";
+import { findAdapter, hasWebGl2, lackOf } from "./session/adapter";
+import type { Artifact, Package } from "./session/artifact";
 import { startBind } from "./session/bind";
 import { createClient } from "./session/client";
 import { load, readFiles } from "./session/files";
 import { createFrames } from "./session/frames";
 import { chain } from "./session/jobs";
+import { WEBGPU } from "./session/webgpu";
 
 declare global {
   /** For the browser's console, and for tests. */
   var cagework: Session | undefined;
 }
 
+/** Where the picture goes; a canvas that one interface has used is lost to the other. */
+export interface Canvases {
+  canvas(): HTMLCanvasElement;
+  freshCanvas(): HTMLCanvasElement;
+}
+
 /**
- * Opens a GPU, the module and the worker. Fails with the name NoWebGPU, NoAdapter or NoDevice where the page cannot run.
+ * Opens the page on WebGPU; where that is missing on WebGL2, with the processor to compute. Fails with the name NoWebGPU,
+ * NoAdapter or NoDevice where there is neither.
  */
-export async function openSession(canvas: HTMLCanvasElement): Promise<Session> {
-  const adapter = await findAdapter();
-  const module = await compile(wasmUrl);
-  const { memory } = await init({ module_or_path: module });
+export async function openSession(canvases: Canvases): Promise<Session> {
+  try {
+    return await start(WEBGPU, canvases.canvas(), await findAdapter(), null);
+  } catch (error) {
+    const lack = lackOf(error);
+    if (!lack || !hasWebGl2()) throw error;
+    const { WEBGL } = await import("./session/webgl");
+    try {
+      return await start(WEBGL, canvases.freshCanvas(), "WebGL2", lack);
+    } catch (other) {
+      // A WebGL2 that does not do what it promised is none: what helps is WebGPU.
+      const isNone = lackOf(other) || (other instanceof Error && other.name === "Canvas");
+      throw isNone ? error : other;
+    }
+  }
+}
+
+async function start(
+  { pkg, wasm, openWorker }: Artifact,
+  canvas: HTMLCanvasElement,
+  adapter: string,
+  lack: Lack | null,
+): Promise<Session> {
+  const module = await compile(wasm);
+  const { memory } = await pkg.default({ module_or_path: module });
   const frames = createFrames();
-  const raw = await Engine.create(canvas, frames.ask);
+  const raw = await pkg.Engine.create(canvas, frames.ask);
   const engine = raw as unknown as PageEngine;
   frames.start(() => raw.drawFrame());
-  const client = createClient(
-    module,
-    () => new Worker(new URL("./worker.ts", import.meta.url), { type: "module", name: "cagework" }),
-  );
+  const client = createClient(module, openWorker);
+  /** Where nothing else can, the processor computes, whatever a project was saved with. */
+  const possible = (options: BindOptions): BindOptions => (lack ? { ...options, backend: "cpu" } : options);
+  /** WebGL2 tells the canvas, and nobody else, that it was lost. */
+  const guard = (canvas: HTMLCanvasElement) => {
+    canvas.addEventListener("webglcontextlost", () => raw.lose());
+  };
+  guard(canvas);
   const losses = new Set<(reason: string) => void>();
   const watch = async () => {
     const reason = await raw.lost();
@@ -56,8 +89,8 @@ export async function openSession(canvas: HTMLCanvasElement): Promise<Session> {
   let slice: Job<void> | undefined;
   let meanValue: Job<void> | undefined;
 
-  async function openBytes(bytes: Parameters<typeof load>[0]): Promise<Opened> {
-    const { loaded, notices } = await load(bytes);
+  async function openBytes(bytes: Parameters<typeof load>[1]): Promise<Opened> {
+    const { loaded, notices } = await load(pkg, bytes);
     const { settings } = loaded;
     const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
     bind?.cancel();
@@ -70,11 +103,12 @@ export async function openSession(canvas: HTMLCanvasElement): Promise<Session> {
   const session: Session = {
     engine,
     adapter,
-    samples: samples(),
+    lack,
+    samples: samples(pkg),
     openFiles: async (files) => openBytes(await readFiles(files)),
     async openSample(id) {
       const { glb, cage, poses } = await client.run("sample", { id }).done;
-      const label = samples().find((sample) => sample.id === id)?.label ?? id;
+      const label = samples(pkg).find((sample) => sample.id === id)?.label ?? id;
       const opened = await openBytes({ name: `${label}.glb`, bytes: glb, sibling: () => undefined });
       return { ...opened, cage: engine.setCage(cage.positions, cage.corners), poses };
     },
@@ -89,10 +123,10 @@ export async function openSession(canvas: HTMLCanvasElement): Promise<Session> {
     },
     bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport> {
       bind?.cancel();
-      bind = startBind({ client, engine, raw, adapter, options, listener, cage: cage() });
+      bind = startBind({ client, engine, raw, adapter, options: possible(options), listener, cage: cage() });
       return bind;
     },
-    estimateMemory: (options) => raw.estimateMemory(options),
+    estimateMemory: (options) => raw.estimateMemory(possible(options)),
     bindMeanValue() {
       meanValue?.cancel();
       const job = client.run("meanValue", { positions: raw.modelPositions(), cage: cage() });
@@ -101,7 +135,7 @@ export async function openSession(canvas: HTMLCanvasElement): Promise<Session> {
     },
     loadSlice(axis, fraction, grid) {
       slice?.cancel();
-      const options: BindOptions = { ...BIND_DEFAULTS, grid };
+      const options = possible({ ...BIND_DEFAULTS, grid });
       const job = client.run("slice", { cage: cage(), axis, fraction, options });
       const none = { indptr: new Uint32Array(), indices: new Uint32Array(), data: new Float32Array() };
       slice = chain(job, (rows) => {
@@ -124,6 +158,7 @@ export async function openSession(canvas: HTMLCanvasElement): Promise<Session> {
       return () => losses.delete(listener);
     },
     async recover(fresh) {
+      guard(fresh);
       await raw.recover(fresh);
       void watch();
     },
@@ -139,8 +174,8 @@ export async function openSession(canvas: HTMLCanvasElement): Promise<Session> {
   return session;
 }
 
-function samples(): readonly Sample[] {
-  const words = Binder.samples();
+function samples(pkg: Package): readonly Sample[] {
+  const words = pkg.Binder.samples();
   return Array.from({ length: words.length / 3 }, (_, k) => {
     const [id = "", label = "", sentence = ""] = words.slice(3 * k, 3 * k + 3);
     return { id, label, sentence };

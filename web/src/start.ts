@@ -21,8 +21,8 @@ export interface Start {
 export function startUp({ app, stage, theme, shared, product }: Start): void {
   const { store } = app;
   const session = app.ctx.session();
-  store.set({ adapter: session.adapter, samples: session.samples, busy: null });
-  if (isSoftware(session.adapter)) app.bind.setOptions({ backend: "cpu" });
+  store.set({ adapter: session.adapter, lack: session.lack, samples: session.samples, busy: null });
+  if (session.lack || isSoftware(session.adapter)) app.bind.setOptions({ backend: "cpu" });
 
   const resize = () => {
     const { clientWidth, clientHeight } = stage.viewport;

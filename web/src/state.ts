@@ -5,6 +5,7 @@ import type {
   BindReport,
   Element as CageElement,
   CageState,
+  Lack,
   Legend,
   ModelInfo,
   Pose,
@@ -48,6 +49,8 @@ export type CageSource = "auto" | "hull" | "box" | "file";
 export interface AppState {
   step: StepName;
   adapter: string;
+  /** Why the page draws with WebGL2 and computes on the processor; null with WebGPU. */
+  lack: Lack | null;
   samples: readonly Sample[];
   /** What keeps the whole page waiting, as a sentence; null when nothing does. */
   busy: string | null;
@@ -105,6 +108,7 @@ export interface AppState {
 export const INITIAL: AppState = {
   step: "model",
   adapter: "",
+  lack: null,
   samples: [],
   busy: "Starting",
   model: null,

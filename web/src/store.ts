@@ -1,9 +1,10 @@
-/** What the browser keeps between visits: the project of the moment, in IndexedDB, and the theme. Nothing leaves it. */
+/** What the browser keeps between visits: the project of the moment, in IndexedDB, the theme, and notices that were read. Nothing leaves it. */
 
 const DATABASE = "cagework";
 const TABLE = "projects";
 const KEY = "autosave";
 const THEME = "cagework.theme";
+const SEEN = "cagework.seen.";
 
 export interface Saved {
   /** The project file, a GLB. */
@@ -70,10 +71,23 @@ export function loadTheme(): Theme {
 }
 
 export function saveTheme(theme: Theme): void {
+  writeItem(THEME, theme);
+}
+
+/** Whether a notice has been read and closed. */
+export function hasSeen(notice: string): boolean {
+  return readItem(SEEN + notice) !== null;
+}
+
+export function markSeen(notice: string): void {
+  writeItem(SEEN + notice, "yes");
+}
+
+function writeItem(key: string, value: string): void {
   try {
-    localStorage.setItem(THEME, theme);
+    localStorage.setItem(key, value);
   } catch {
-    // Storage is forbidden or full: the theme holds until the page is closed.
+    // Storage is forbidden or full: it holds until the page is closed.
   }
 }
 

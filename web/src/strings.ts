@@ -2,6 +2,10 @@
 
 export const PRODUCT = "Cagework";
 
+/** What is different without WebGPU. */
+export const WITHOUT_WEBGPU =
+  "The page draws with WebGL2 and computes on the processor instead: everything works, binding takes longer.";
+
 export const PRIVACY = "Your files never leave this computer: everything is computed in this page.";
 
 /** What to try with each sample, and an icon until its picture is there. Unknown samples have none. */

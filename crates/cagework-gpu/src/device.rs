@@ -20,6 +20,8 @@ pub struct ContextOptions {
     pub adapter: Option<String>,
     /// Plan with storage bindings of at most this many bytes instead of the device's limit. For tests.
     pub max_binding_bytes: Option<u64>,
+    /// Draw only, as in a browser without WebGPU, whatever the GPU could do. For tests; needs the feature `webgl`.
+    pub draws_only: bool,
     /// Make pipelines when they are first needed, for who draws and deforms: by default all are there before anything
     /// is measured.
     pub pipelines_later: bool,
@@ -38,6 +40,7 @@ pub struct GpuContext {
     pub queue: wgpu::Queue,
     /// Largest storage binding, bytes.
     pub max_binding_bytes: u64,
+    draws_only: bool,
     pub(crate) pipelines: Pipelines,
     fault: Arc<Fault>,
 }
@@ -70,10 +73,7 @@ impl GpuContext {
     /// # Errors
     /// [`GpuError::NoAdapter`], [`GpuError::UnknownAdapter`], [`GpuError::NoDevice`].
     pub async fn new(options: &ContextOptions) -> Result<Self, GpuError> {
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-        // GLES cannot do what the kernels need, and where it is it offers the same GPU once more.
-        descriptor.backends = wgpu::Backends::PRIMARY;
-        let instance = wgpu::Instance::new(descriptor);
+        let instance = instance();
         let wanted = options.adapter.clone().or_else(|| std::env::var(ADAPTER_VARIABLE).ok());
         let adapter = match wanted.filter(|name| !name.is_empty()) {
             Some(name) => adapter_named(&instance, name).await?,
@@ -100,13 +100,8 @@ impl GpuContext {
         adapter: wgpu::Adapter,
         options: &ContextOptions,
     ) -> Result<Self, GpuError> {
-        let offered = adapter.limits();
-        // The baseline in all but sizes: those are taken as offered, and plans go by what the device then has.
-        let required_limits = wgpu::Limits {
-            max_buffer_size: offered.max_buffer_size,
-            max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
-            ..wgpu::Limits::default()
-        };
+        let draws_only = cfg!(feature = "webgl") && (cfg!(target_family = "wasm") || options.draws_only);
+        let required_limits = limits(&adapter.limits(), draws_only);
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("cagework"),
             required_limits,
@@ -126,7 +121,7 @@ impl GpuContext {
         let max_binding_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let pipelines = Pipelines::default();
-        if !options.pipelines_later {
+        if !draws_only && !options.pipelines_later {
             pipelines.make_all(&device);
         }
         if let Some(error) = scope.pop().await {
@@ -140,9 +135,18 @@ impl GpuContext {
             adapter,
             device,
             queue,
+            draws_only,
             pipelines,
             fault,
         })
+    }
+
+    /// Whether this device draws and no more: what moves then moves on the processor, and shaders find their tables in
+    /// textures. Decided once, when it is opened; false wherever kernels run.
+    #[must_use]
+    pub fn draws_only(&self) -> bool {
+        // The page's two artifacts each need half of what asks here: said so that a compiler leaves out the other.
+        cfg!(feature = "webgl") && (cfg!(target_family = "wasm") || self.draws_only)
     }
 
     /// Name of the GPU as people know it.
@@ -161,6 +165,15 @@ impl GpuContext {
             self.fault.lose(reason);
         }
         receiver
+    }
+
+    /// Gives the device up: as a reset of the driver would, or because whoever watches knows of one.
+    pub fn lose(&self, reason: &str) {
+        self.device.destroy();
+        // WebGPU tells by itself, and better.
+        if self.draws_only() {
+            self.fault.lose(reason);
+        }
     }
 
     /// Whether all is well so far.
@@ -196,6 +209,35 @@ impl GpuContext {
         let answer = answer.await;
         self.check()?;
         answer.map_err(|_| GpuError::DeviceLost { reason: "it dropped its work".to_owned() })
+    }
+}
+
+/// What adapters and surfaces come from.
+#[must_use]
+pub fn instance() -> wgpu::Instance {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    if cfg!(all(feature = "webgl", target_family = "wasm")) {
+        descriptor.backends = wgpu::Backends::GL;
+        // Browsers signal fences between two tasks only, so that waiting for one within a task would never end. What is
+        // read back is waited for by the reading itself.
+        descriptor.backend_options.gl.fence_behavior = wgpu::GlFenceBehavior::AutoFinish;
+    } else {
+        // GLES cannot do what the kernels need, and where it is it offers the same GPU once more.
+        descriptor.backends = wgpu::Backends::PRIMARY;
+    }
+    wgpu::Instance::new(descriptor)
+}
+
+/// The baseline in all but sizes: those are taken as offered, and plans go by what the device then has.
+fn limits(offered: &wgpu::Limits, draws_only: bool) -> wgpu::Limits {
+    if draws_only {
+        let baseline = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(offered.clone());
+        return wgpu::Limits { max_buffer_size: offered.max_buffer_size, ..baseline };
+    }
+    wgpu::Limits {
+        max_buffer_size: offered.max_buffer_size,
+        max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
+        ..wgpu::Limits::default()
     }
 }
 

@@ -21,6 +21,7 @@ pub mod render;
 pub mod sample;
 pub mod session;
 pub mod stream;
+pub mod table;
 
 pub use bind::bind_gpu;
 pub use deform::{Deformer, GpuWeights};

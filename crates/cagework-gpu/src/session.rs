@@ -3,6 +3,8 @@
 //! The same type serves tests, the command and the page. A page has two: one draws and deforms on its main thread, one
 //! binds in a worker and hands over weights ([`Session::bind`] there, [`Session::adopt`] here).
 
+mod again;
+mod mover;
 mod picture;
 
 use std::sync::Arc;
@@ -13,12 +15,14 @@ use cagework_core::{BindReport, Bounds, Cage, Progress, Weights};
 use glam::{Vec2, Vec3};
 
 use crate::bind::bind_gpu;
-use crate::deform::{Deformer, GpuWeights};
+use crate::deform::GpuWeights;
 use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::render::{Camera, DrawModel, MeshStyle, Renderer, SceneOptions, Target, colormap};
 
 pub use picture::MAX_PICTURE;
+
+use mover::Mover;
 
 /// Everything about one model on one GPU.
 #[derive(Debug)]
@@ -40,7 +44,7 @@ pub struct Session {
 struct Bound {
     weights: Weights,
     outside: Vec<OutsideVertex>,
-    deformer: Deformer,
+    mover: Mover,
 }
 
 impl Session {
@@ -108,7 +112,7 @@ impl Session {
         self.cage.as_ref()
     }
 
-    /// Binds the model to the cage on this GPU.
+    /// Binds the model to the cage: on this GPU, or on the processor where it only draws.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] without model or cage; otherwise as [`bind_gpu`].
@@ -118,8 +122,13 @@ impl Session {
         progress: &dyn Progress,
     ) -> Result<BindReport, GpuError> {
         let (model, cage) = self.parts()?;
+        if self.context.draws_only() {
+            let binding = cagework_core::bind(&model.positions, cage, options, progress)?;
+            self.bound(binding.weights, binding.outside, None).await?;
+            return Ok(binding.report);
+        }
         let (binding, weights) = bind_gpu(&model.positions, cage, options, progress, &self.context).await?;
-        self.bound(binding.weights, binding.outside, &weights).await?;
+        self.bound(binding.weights, binding.outside, Some(&weights)).await?;
         Ok(binding.report)
     }
 
@@ -145,8 +154,7 @@ impl Session {
             let reason = "a vertex outside the cage, or its triangle, does not exist".to_owned();
             return Err(GpuError::Model { reason });
         }
-        let on_gpu = GpuWeights::new(&self.context, &weights, &outside).await?;
-        self.bound(weights, outside, &on_gpu).await
+        self.bound(weights, outside, None).await
     }
 
     fn parts(&self) -> Result<(&DrawModel, &Cage), GpuError> {
@@ -161,13 +169,14 @@ impl Session {
         &mut self,
         weights: Weights,
         outside: Vec<OutsideVertex>,
-        on_gpu: &GpuWeights,
+        on_gpu: Option<&GpuWeights>,
     ) -> Result<(), GpuError> {
         let (model, _) = self.parts()?;
-        let deformer = Deformer::new(&self.context, on_gpu, &model.shading_triangles()).await?;
-        deformer.pose(&self.context, &self.pose);
-        self.renderer.set_vertices(&self.context, Some([deformer.positions(), deformer.normals()]));
-        self.bound = Some(Bound { weights, outside, deformer });
+        let triangles = model.shading_triangles();
+        let mover = Mover::new(&self.context, &weights, &outside, on_gpu, triangles).await?;
+        mover.pose(&self.context, &self.pose);
+        self.renderer.set_vertices(&self.context, Some(mover.tables()));
+        self.bound = Some(Bound { weights, outside, mover });
         self.moved = true;
         self.write_values();
         Ok(())
@@ -199,7 +208,7 @@ impl Session {
         self.pose.copy_from_slice(cage_positions);
         self.renderer.pose(&self.context, cage_positions);
         if let Some(bound) = &self.bound {
-            bound.deformer.pose(&self.context, cage_positions);
+            bound.mover.pose(&self.context, cage_positions);
             self.moved = true;
         }
     }
@@ -342,8 +351,8 @@ impl Session {
     }
 
     fn encode_deformation(&mut self, encoder: &mut wgpu::CommandEncoder) {
-        if let Some(bound) = self.bound.as_ref().filter(|_| self.moved) {
-            bound.deformer.encode(encoder);
+        if let Some(Bound { weights, outside, mover }) = self.bound.as_ref().filter(|_| self.moved) {
+            mover.encode(&self.context, encoder, weights, outside, &self.pose);
             self.moved = false;
         }
     }
@@ -356,51 +365,10 @@ impl Session {
     pub async fn read_positions(&self) -> Result<Vec<Vec3>, GpuError> {
         let Some(model) = &self.model else { return Err(GpuError::NotReady { missing: "model" }) };
         match &self.bound {
-            // Again even if nothing moved: it costs a millisecond, and a frame may not have been drawn yet.
-            Some(bound) => {
-                bound.deformer.run(&self.context).await?;
-                bound.deformer.read_positions(&self.context).await
+            Some(Bound { weights, outside, mover }) => {
+                mover.read_positions(&self.context, weights, outside, &self.pose).await
             }
             None => Ok(model.positions.clone()),
         }
-    }
-
-    /// Another session on the same GPU with the same model, cage and pose, for other weights to compare with.
-    ///
-    /// # Errors
-    /// [`GpuError::NotReady`] without model or cage; otherwise as the calls that set them.
-    pub async fn twin(&self) -> Result<Self, GpuError> {
-        let (_, cage) = self.parts()?;
-        let mut twin = Self::new(self.context.clone());
-        if let Some(model) = &self.model {
-            twin.set_shared_model(Arc::clone(model)).await?;
-        }
-        twin.set_cage(cage).await?;
-        twin.pose(&self.pose);
-        twin.set_scene(self.scene.clone());
-        Ok(twin)
-    }
-
-    /// Everything again on another device, after this one was lost: model, cage, weights, pose, scene, camera.
-    ///
-    /// # Errors
-    /// As the calls that set them.
-    pub async fn recover(self, context: GpuContext) -> Result<Self, GpuError> {
-        let mut session = Self::new(context);
-        session.camera = self.camera;
-        if let Some(model) = self.model {
-            session.set_shared_model(model).await?;
-        }
-        if let Some(cage) = &self.cage {
-            session.set_cage(cage).await?;
-        }
-        if let Some(bound) = self.bound {
-            session.adopt(bound.weights, bound.outside).await?;
-        }
-        if !self.pose.is_empty() {
-            session.pose(&self.pose);
-        }
-        session.set_scene(self.scene);
-        Ok(session)
     }
 }

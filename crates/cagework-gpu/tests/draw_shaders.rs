@@ -8,8 +8,9 @@ use cagework_gpu::render::layout::{
 };
 use cagework_gpu::render::model::DrawVertex;
 use cagework_gpu::render::shaders::{self, ALL, DrawBinding, DrawShader};
+use cagework_gpu::table::Entry;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
-use naga::{AddressSpace, ImageClass, Literal, ShaderStage, TypeInner};
+use naga::{AddressSpace, ImageClass, Literal, Scalar, ScalarKind, ShaderStage, TypeInner};
 
 /// Baseline WebGPU's limits per stage.
 const MAX_STORAGE_BUFFERS: usize = 8;
@@ -30,8 +31,22 @@ fn draw_shaders_are_baseline_webgpu() {
         let stages: Vec<_> = module.entry_points.iter().map(|e| (e.name.as_str(), e.stage)).collect();
         let wanted = [("vertex", ShaderStage::Vertex), ("fragment", ShaderStage::Fragment)];
         assert_eq!(stages, wanted, "{}", shader.name);
-        let n_storage = shader.groups.iter().copied().flatten().filter(|b| **b == DrawBinding::Read).count();
+        let n_storage =
+            shader.groups.iter().copied().flatten().filter(|b| matches!(b, DrawBinding::Table(_))).count();
         assert!(n_storage <= MAX_STORAGE_BUFFERS, "{}: {n_storage} storage buffers", shader.name);
+    }
+}
+
+/// What a table's entries are, in a buffer.
+fn entry(inner: &TypeInner) -> Entry {
+    use naga::VectorSize::{Bi, Quad};
+    match inner {
+        TypeInner::Vector { size: Quad, scalar: Scalar { kind: ScalarKind::Float, width: 4 } } => {
+            Entry::Point
+        }
+        TypeInner::Vector { size: Bi, scalar: Scalar { kind: ScalarKind::Uint, width: 4 } } => Entry::Pair,
+        TypeInner::Scalar(Scalar { kind: ScalarKind::Float, width: 4 }) => Entry::Value,
+        other => panic!("a table of {other:?}"),
     }
 }
 
@@ -46,9 +61,9 @@ fn bindings_equal_the_draw_table() {
                 let binding = variable.binding?;
                 let kind = match (variable.space, &module.types[variable.ty].inner) {
                     (AddressSpace::Uniform, _) => DrawBinding::Uniform,
-                    (AddressSpace::Storage { access }, _) => {
+                    (AddressSpace::Storage { access }, TypeInner::Array { base, .. }) => {
                         assert_eq!(access, naga::StorageAccess::LOAD, "{} only reads", shader.name);
-                        DrawBinding::Read
+                        DrawBinding::Table(entry(&module.types[*base].inner))
                     }
                     (_, TypeInner::Image { class: ImageClass::Sampled { .. }, .. }) => DrawBinding::Texture,
                     (_, TypeInner::Sampler { comparison: false }) => DrawBinding::Sampler,
@@ -58,7 +73,10 @@ fn bindings_equal_the_draw_table() {
             })
             .collect();
         found.sort_by_key(|(group, binding, _)| (*group, *binding));
-        let mut wanted = vec![(0, 0, DrawBinding::Uniform)];
+        let mut wanted = Vec::new();
+        if shader.name != shaders::PART.name {
+            wanted.push((0, 0, DrawBinding::Uniform));
+        }
         for (group, bindings) in (1u32..).zip(shader.groups) {
             wanted.extend((0u32..).zip(*bindings).map(|(binding, kind)| (group, binding, *kind)));
         }
@@ -94,7 +112,7 @@ fn uniforms_mirror_their_wgsl_structs() {
             assert!(span <= MAX_UNIFORM_BYTES);
         };
     }
-    for shader in ALL {
+    for shader in ALL.iter().filter(|s| s.name != shaders::PART.name) {
         same!(
             shader,
             Camera,
@@ -163,4 +181,55 @@ fn colour_map_is_the_same_in_wgsl() {
         let stop = format!("vec3f({r}.0,{g}.0,{b}.0)");
         assert!(text.contains(&stop), "{stop} is missing");
     }
+}
+
+/// Without WebGPU the same shaders run on WebGL2: nothing in buffers but uniforms, and GLSL ES 3.00 that naga can write.
+#[cfg(feature = "webgl")]
+#[test]
+fn draw_shaders_are_webgl2() {
+    use naga::back::glsl::{Options, PipelineOptions, Version, Writer};
+    for shader in ALL {
+        let wgsl = shader.wgsl_textures;
+        let module = naga::front::wgsl::parse_str(wgsl)
+            .unwrap_or_else(|e| panic!("{}", e.emit_to_string_with_path(wgsl, shader.name)));
+        let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
+            .validate(&module)
+            .unwrap_or_else(|e| panic!("{}", e.emit_to_string_with_path(wgsl, shader.name)));
+        for (_, variable) in module.global_variables.iter() {
+            assert!(
+                !matches!(variable.space, AddressSpace::Storage { .. }),
+                "{}: {:?} is in a buffer",
+                shader.name,
+                variable.name
+            );
+        }
+        for (entry_point, shader_stage) in
+            [("vertex", ShaderStage::Vertex), ("fragment", ShaderStage::Fragment)]
+        {
+            let options =
+                Options { version: Version::Embedded { version: 300, is_webgl: true }, ..Options::default() };
+            let pipeline =
+                PipelineOptions { shader_stage, entry_point: entry_point.to_owned(), multiview: None };
+            let mut glsl = String::new();
+            Writer::new(
+                &mut glsl,
+                &module,
+                &info,
+                &options,
+                &pipeline,
+                naga::proc::BoundsCheckPolicies::default(),
+            )
+            .and_then(|mut writer| writer.write().map(drop))
+            .unwrap_or_else(|e| panic!("{}, {entry_point}: {e}", shader.name));
+            assert!(glsl.starts_with("#version 300 es"), "{}", shader.name);
+        }
+    }
+}
+
+/// Rows of tables in textures are as wide in the shader as in Rust.
+#[cfg(feature = "webgl")]
+#[test]
+fn rows_of_textures_are_as_wide_in_wgsl() {
+    let shift = cagework_gpu::table::ROW.trailing_zeros();
+    assert!(shaders::MESH.wgsl_textures.contains(&format!("const ROW_SHIFT = {shift}u;")));
 }

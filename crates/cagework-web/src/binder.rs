@@ -69,13 +69,13 @@ impl Binder {
         Self { gpu: None }
     }
 
-    /// Opens a GPU for the binds to come, unless there is one.
+    /// Opens a GPU for the binds to come, unless there is one, or none that could bind.
     ///
     /// # Errors
     /// `NoAdapter`, `NoDevice`.
     #[wasm_bindgen(js_name = openGpu)]
     pub async fn open_gpu(&mut self) -> Result<(), JsValue> {
-        if self.gpu.as_ref().is_none_or(|gpu| gpu.check().is_err()) {
+        if cfg!(feature = "webgpu") && self.gpu.as_ref().is_none_or(|gpu| gpu.check().is_err()) {
             self.gpu = Some(GpuContext::new(&ContextOptions::default()).await.map_err(Fault::from)?);
         }
         Ok(())
@@ -192,7 +192,7 @@ impl Binder {
     ) -> Answer<Binding> {
         let options = BindOptions::from(asked);
         let listener = Listener::new(progress);
-        if asked.backend == Backend::Cpu {
+        if asked.backend == Backend::Cpu || !cfg!(feature = "webgpu") {
             return Ok(cagework_core::bind(positions, cage, &options, &listener)?);
         }
         let gpu = self.gpu.as_ref().ok_or_else(|| Fault::missing("GPU", "open one first"))?;

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use cagework_gpu::{ContextOptions, GpuContext, GpuError, Session};
+use cagework_gpu::render::PartPainter;
+use cagework_gpu::{ContextOptions, GpuContext, GpuError, Session, device};
 use web_sys::HtmlCanvasElement;
 
 use crate::error::{Answer, Fault};
@@ -22,6 +23,8 @@ pub(crate) struct Surface {
     /// Not the canvas itself seen as sRGB: SwiftShader forgets to encode where multisampling resolves into such a view
     /// (a clear of 0.2 arrives as 51, not 124).
     parts: Vec<wgpu::Texture>,
+    /// Draws the halves where they cannot be copied.
+    painter: Option<PartPainter>,
     /// Frames that were handed to the GPU and are not finished.
     in_flight: Arc<AtomicU32>,
 }
@@ -33,9 +36,7 @@ impl Surface {
     /// `NoAdapter`, `NoDevice`, or that the canvas belongs to something else.
     pub(crate) async fn open(canvas: HtmlCanvasElement) -> Answer<(Self, GpuContext)> {
         let size = [canvas.width().max(1), canvas.height().max(1)];
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-        descriptor.backends = wgpu::Backends::BROWSER_WEBGPU;
-        let instance = wgpu::Instance::new(descriptor);
+        let instance = device::instance();
         let surface = instance
             .create_surface(wgpu::SurfaceTarget::Canvas(canvas))
             .map_err(|error| Fault::new("Canvas", error.to_string()))?;
@@ -53,10 +54,17 @@ impl Surface {
             .get_default_config(&context.adapter, size[0], size[1])
             .ok_or_else(|| Fault::new("Canvas", "this GPU cannot draw into a canvas"))?;
         let format = config.format.add_srgb_suffix();
-        config.usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_DST;
         config.alpha_mode = wgpu::CompositeAlphaMode::Opaque;
+        // WebGL2's canvas takes no copies, but encodes as it should.
+        let painter = context.draws_only().then(|| PartPainter::new(&context, format));
+        if painter.is_some() {
+            config.format = format;
+        } else {
+            config.usage |= wgpu::TextureUsages::COPY_DST;
+        }
         surface.configure(&context.device, &config);
-        Ok((Self { surface, config, format, parts: Vec::new(), in_flight: Arc::default() }, context))
+        let in_flight = Arc::default();
+        Ok((Self { surface, config, format, parts: Vec::new(), painter, in_flight }, context))
     }
 
     /// Gives the canvas another size, pixels.
@@ -105,18 +113,11 @@ impl Surface {
         if self.parts.len() != n_parts {
             self.parts = (0..n_parts).map(|_| self.make_part(&context, size)).collect();
         }
-        let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        for (k, (texture, session)) in
-            self.parts.iter().zip([Some(session), other].into_iter().flatten()).enumerate()
-        {
+        for (texture, session) in self.parts.iter().zip([Some(session), other].into_iter().flatten()) {
             let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
             session.frame(&view, self.format, size, scale)?;
-            let mut place = frame.texture.as_image_copy();
-            // An odd column between the halves stays clear: the divider.
-            place.origin.x = k as u32 * (width - size[0]);
-            encoder.copy_texture_to_texture(texture.as_image_copy(), place, texture.size());
         }
-        context.queue.submit([encoder.finish()]);
+        self.put_together(&context, &frame.texture);
         self.in_flight.fetch_add(1, Ordering::Relaxed);
         let in_flight = Arc::clone(&self.in_flight);
         context.queue.on_submitted_work_done(move || {
@@ -124,6 +125,27 @@ impl Surface {
         });
         context.queue.present(frame);
         Ok(true)
+    }
+
+    /// Brings the parts to the canvas. An odd column between the halves stays clear: the divider.
+    fn put_together(&self, context: &GpuContext, canvas: &wgpu::Texture) {
+        let parts: Vec<_> = (0u32..)
+            .zip(&self.parts)
+            .map(|(k, part)| (k * (self.config.width - part.width()), part))
+            .collect();
+        let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        // Asked of the device as well, which a compiler knows the answer of: the other artifact has no use for this.
+        if let Some(painter) = self.painter.as_ref().filter(|_| context.draws_only()) {
+            let view = canvas.create_view(&wgpu::TextureViewDescriptor::default());
+            painter.paint(context, &mut encoder, &view, &parts);
+        } else {
+            for (left, part) in parts {
+                let mut place = canvas.as_image_copy();
+                place.origin.x = left;
+                encoder.copy_texture_to_texture(part.as_image_copy(), place, part.size());
+            }
+        }
+        context.queue.submit([encoder.finish()]);
     }
 
     fn make_part(&self, context: &GpuContext, [width, height]: [u32; 2]) -> wgpu::Texture {
@@ -134,7 +156,12 @@ impl Surface {
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format: self.format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+                | if self.painter.is_some() {
+                    wgpu::TextureUsages::TEXTURE_BINDING
+                } else {
+                    wgpu::TextureUsages::COPY_SRC
+                },
             view_formats: &[],
         })
     }

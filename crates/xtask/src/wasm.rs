@@ -15,34 +15,56 @@ pub(crate) enum Profile {
     Web,
 }
 
-/// Where the JavaScript package goes: beside the page's sources, ignored by git.
-const PACKAGE: &str = "web/src/pkg";
+/// One of the page's two artifacts: the same crate for what a browser may have.
+struct Artifact {
+    /// What of `cagework-web` is built.
+    features: &'static [&'static str],
+    /// Where the JavaScript package goes: beside the page's sources, ignored by git.
+    package: &'static str,
+    /// Its name.
+    name: &'static str,
+}
 
-/// What the web's profile adds to rustc. Vectors of 128 bits are wherever WebGPU is.
+/// The second is downloaded only where WebGPU is missing; the last one built is the one that Cargo keeps, so the one
+/// that changes with every edit comes last.
+const ARTIFACTS: [Artifact; 2] = [
+    Artifact {
+        features: &["--no-default-features", "--features", "webgl"],
+        package: "web/src/pkg-webgl",
+        name: "cagework_webgl",
+    },
+    Artifact { features: &[], package: "web/src/pkg", name: "cagework" },
+];
+
+/// What the web's profile adds to rustc. Vectors of 128 bits are wherever WebGPU or WebGL2 are.
 const RUSTFLAGS: &str = "-C target-feature=+simd128";
 
-/// Builds `crates/cagework-web` for the browser and makes a JavaScript package of it.
+/// Whether the packages have been made.
+pub(crate) fn is_built() -> bool {
+    ARTIFACTS.iter().all(|a| root().join(a.package).join(format!("{}.d.ts", a.name)).exists())
+}
+
+/// Builds `crates/cagework-web` for the browser, once for each of its artifacts, and makes JavaScript packages of them.
 ///
 /// # Errors
 /// When a step fails.
 pub(crate) fn build(profile: Profile) -> Result<(), String> {
-    let name = match profile {
-        Profile::Dev => "dev",
-        Profile::Web => "web",
-    };
-    let target = ["--target", "wasm32-unknown-unknown", "--profile", name];
-    let build = ["build", "--locked", "--package", "cagework-web", "--lib"];
-    run("cargo", &[&build[..], &target].concat(), &[("RUSTFLAGS", RUSTFLAGS)])?;
-    let folder = match profile {
-        Profile::Dev => "debug",
-        Profile::Web => "web",
+    let (name, folder) = match profile {
+        Profile::Dev => ("dev", "debug"),
+        Profile::Web => ("web", "web"),
     };
     let wasm = target_folder()?.join("wasm32-unknown-unknown").join(folder).join("cagework_web.wasm");
-    bindgen(&wasm, profile)
+    for artifact in &ARTIFACTS {
+        let target = ["--target", "wasm32-unknown-unknown", "--profile", name];
+        let build = ["build", "--locked", "--package", "cagework-web", "--lib"];
+        run("cargo", &[&build[..], &target, artifact.features].concat(), &[("RUSTFLAGS", RUSTFLAGS)])?;
+        bindgen(&wasm, artifact, profile)?;
+    }
+    Ok(())
 }
 
 /// Makes the JavaScript package.
-fn bindgen(wasm: &Path, profile: Profile) -> Result<(), String> {
+fn bindgen(wasm: &Path, artifact: &Artifact, profile: Profile) -> Result<(), String> {
     let fault = |what: &str| {
         let what = what.to_owned();
         move |error: anyhow::Error| format!("{what}: {error:#}")
@@ -56,8 +78,8 @@ fn bindgen(wasm: &Path, profile: Profile) -> Result<(), String> {
         // Names of functions are for debugging; they are a fifth of the file.
         .remove_name_section(profile == Profile::Web)
         .remove_producers_section(profile == Profile::Web)
-        .out_name("cagework");
-    bindgen.generate(root().join(PACKAGE)).map_err(fault("cannot make JavaScript of the wasm"))
+        .out_name(artifact.name);
+    bindgen.generate(root().join(artifact.package)).map_err(fault("cannot make JavaScript of the wasm"))
 }
 
 /// Cargo's target folder, wherever the user has put it.

@@ -16,6 +16,8 @@ export interface Session {
   readonly engine: Engine;
   /** Name of the GPU, as the report card shows it. */
   readonly adapter: string;
+  /** Why the page draws with WebGL2 and computes on the processor; null with WebGPU. */
+  readonly lack: Lack | null;
   /** Identifier and label of each built-in sample; the first one is opened at start. */
   readonly samples: readonly Sample[];
 
@@ -50,7 +52,7 @@ export interface Session {
   onFrame(listener: (ms: number) => void): () => void;
   /** PNG of the scene (without canvas borders), any size up to 8192. */
   picture(width: number, height: number): Promise<Blob>;
-  /** Posed positions as the GPU has them (tests, numbers panel). */
+  /** Posed positions as they are drawn (tests, numbers panel). */
   readPositions(): Promise<Float32Array>;
 
   /** The device was lost (or `loseDevice()` was called): the page says so and calls `recover()`. */
@@ -63,6 +65,9 @@ export interface Session {
   memory(): number;
   close(): void;
 }
+
+/** What is missing: the browser has no WebGPU, or has it and found no graphics card for it, or that did not start. */
+export type Lack = "NoWebGPU" | "NoAdapter" | "NoDevice";
 
 export interface Job<T> {
   readonly done: Promise<T>;

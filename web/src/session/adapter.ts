@@ -1,5 +1,6 @@
 /** The GPU, before anything is downloaded for it. */
 
+import type { Lack } from "../contract";
 import { named } from "./client";
 
 /** Name of the GPU that the browser would use. */
@@ -16,4 +17,18 @@ export async function findAdapter(): Promise<string> {
 /** Names as people write them: browsers report them in lower case. */
 function tidy(words: string): string {
   return words.replace(/\b[a-z]/g, (letter) => letter.toUpperCase());
+}
+
+/** What an error says is missing; undefined for errors of another kind. */
+export function lackOf(error: unknown): Lack | undefined {
+  const name = error instanceof Error ? error.name : "";
+  return name === "NoWebGPU" || name === "NoAdapter" || name === "NoDevice" ? name : undefined;
+}
+
+/** Whether this browser can at least draw. */
+export function hasWebGl2(): boolean {
+  const context = document.createElement("canvas").getContext("webgl2");
+  // Browsers allow a few contexts at a time: this one was only a question.
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return context !== null;
 }

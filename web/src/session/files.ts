@@ -2,7 +2,8 @@
 
 import type { NamedFile } from "../contract";
 import { extension } from "../drop";
-import { Loaded } from "../pkg/cagework";
+import type { Loaded } from "../pkg/cagework";
+import type { Package } from "./artifact";
 import { named } from "./client";
 import { decodeTextures } from "./textures";
 
@@ -63,14 +64,14 @@ export interface Read {
 }
 
 /** Reads a model, decompressed if need be, its textures decoded. */
-export async function load({ name, bytes, sibling }: Bytes): Promise<Read> {
+export async function load(pkg: Package, { name, bytes, sibling }: Bytes): Promise<Read> {
   let loaded: Loaded;
   try {
-    loaded = Loaded.read(name, bytes, sibling);
+    loaded = pkg.Loaded.read(name, bytes, sibling);
   } catch (error) {
     if (!(error instanceof Error) || error.name !== "Compressed") throw error;
     const { decompress } = await import("../decode");
-    loaded = Loaded.read(name, await decompress(name, bytes, sibling), sibling);
+    loaded = pkg.Loaded.read(name, await decompress(name, bytes, sibling), sibling);
   }
   const failed = await decodeTextures(loaded);
   const many = failed === 1 ? "a texture" : `${failed} textures`;

@@ -9,6 +9,7 @@ import { STAGES } from "../strings";
 import { button, head, numberField, section, segments, slider, toggle } from "./controls";
 import { fill, h, setText } from "./dom";
 import { icon } from "./icons";
+import { createPlace } from "./place";
 import { type Curve, createPlot, drawPlot, historyPoints } from "./plot";
 import { compareTable, reportCard } from "./report";
 
@@ -56,17 +57,8 @@ export function createBindPanel(app: App): HTMLElement {
     ],
     (value) => set({ solver: value }),
   );
-  const backend = segments<BindOptions["backend"]>(
-    "Computed on",
-    [
-      { value: "gpu", label: "Graphics card" },
-      { value: "cpu", label: "Processor" },
-    ],
-    (value) => set({ backend: value }),
-  );
   const about = h("p", { class: "hint" });
   const memory = h("p", { class: "memory" });
-  const adapter = h("p", { class: "hint" });
 
   const tau = slider(
     "Stop when the change is below",
@@ -140,7 +132,6 @@ export function createBindPanel(app: App): HTMLElement {
     grid.set(String(o.grid) as Grid);
     method.set(o.method);
     solver.set(o.solver);
-    backend.set(o.backend);
     tau.set(Math.round(Math.log10(o.tau)));
     limit.set(o.max_iterations);
     sparsify.set(o.sparsify === 0 ? "0" : o.sparsify < 1e-4 ? "0.00001" : "0.001");
@@ -149,10 +140,6 @@ export function createBindPanel(app: App): HTMLElement {
     outside.set(o.outside === "closest_point");
     classicOnly.hidden = o.method !== "classic";
     setText(about, sayOptions(o));
-  });
-  store.watch(["adapter", "bindOptions"], (state) => {
-    adapter.hidden = state.adapter === "" || state.bindOptions.backend === "cpu";
-    setText(adapter, `Graphics card: ${state.adapter}`);
   });
   store.watch(["memory", "cage", "bindOptions"], (state) => {
     const wrong = typeof state.memory === "string";
@@ -210,8 +197,7 @@ export function createBindPanel(app: App): HTMLElement {
       method.element,
       solver.element,
       about,
-      backend.element,
-      adapter,
+      ...createPlace(app),
       memory,
       advanced,
     ),

@@ -1,5 +1,6 @@
-/** The page for browsers without WebGPU: what is missing, and the exact steps for the browser at hand. */
+/** Browsers without WebGPU: what is missing, and the exact steps for the browser at hand. */
 
+import type { Lack } from "../contract";
 import { PRODUCT } from "../strings";
 import { button } from "./controls";
 import { h } from "./dom";
@@ -95,9 +96,6 @@ const WAYS: readonly Way[] = [
   },
 ];
 
-/** Why it did not start: the browser has no WebGPU, or has it and found no graphics card for it. */
-export type Lack = "NoWebGPU" | "NoAdapter" | "NoDevice";
-
 const REASONS: Record<Lack, string> = {
   NoWebGPU: "This browser does not offer WebGPU, or it is switched off.",
   NoAdapter: "This browser has WebGPU, but found no graphics card that it may use.",
@@ -107,12 +105,36 @@ const REASONS: Record<Lack, string> = {
 /** Whether the address is one at which browsers offer WebGPU at all. */
 const INSECURE = "This page was not opened over https or from localhost; browsers offer WebGPU only there.";
 
-export function createUnsupported(lack: Lack, agent: string, secure: boolean): HTMLElement {
+/** Why there is no WebGPU, as a sentence. */
+export function sayLack(lack: Lack, secure: boolean): string {
+  return lack === "NoWebGPU" && !secure ? INSECURE : REASONS[lack];
+}
+
+/** The steps for the browser at hand, those for others folded. */
+export function ways(agent: string): HTMLElement[] {
   const { browser, system } = recognise(agent);
   const fits = (way: Way) =>
     way.browser === browser && (way.system ?? "") === (system === "linux" ? "linux" : "");
   const mine = WAYS.find(fits) ?? WAYS.find((way) => way.browser === browser);
-  const others = WAYS.filter((way) => way !== mine);
+  const others = WAYS.filter((way) => way !== mine).map((way) =>
+    h(
+      "details",
+      { class: "fold" },
+      h("summary", { text: way.title }),
+      h("div", { class: "stack" }, steps(way)),
+    ),
+  );
+  const rest = h("h2", { class: "way-title others", text: mine ? "Other browsers" : "Browsers that work" });
+  if (!mine) return [rest, ...others];
+  return [
+    h("section", { class: "card stack" }, h("h2", { class: "way-title", text: mine.title }), steps(mine)),
+    rest,
+    ...others,
+  ];
+}
+
+/** The whole page where there is no WebGL2 to draw with either. */
+export function createUnsupported(lack: Lack, agent: string, secure: boolean): HTMLElement {
   return h(
     "main",
     { class: "unsupported" },
@@ -121,17 +143,10 @@ export function createUnsupported(lack: Lack, agent: string, secure: boolean): H
       { class: "unsupported-card" },
       h("div", { class: "row" }, mark(), h("strong", { text: PRODUCT })),
       h("h1", { text: "Cagework needs WebGPU" }),
-      h("p", { text: `${REASONS[lack]} ${secure ? "It takes a minute to put right:" : INSECURE}` }),
-      mine ? h("section", { class: "card stack" }, h("h2", { text: mine.title }), steps(mine)) : null,
-      h("h2", { class: "others", text: mine ? "Other browsers" : "Browsers that work" }),
-      ...others.map((way) =>
-        h(
-          "details",
-          { class: "fold" },
-          h("summary", { text: way.title }),
-          h("div", { class: "stack" }, steps(way)),
-        ),
-      ),
+      h("p", {
+        text: `${sayLack(lack, secure)} WebGL2, which would do instead, is missing as well. It takes a minute to put right:`,
+      }),
+      ...ways(agent),
       h(
         "p",
         { class: "hint" },

@@ -12,11 +12,12 @@ use super::theme::state;
 use crate::buffers::Allocator;
 use crate::device::GpuContext;
 use crate::error::GpuError;
+use crate::table::{Entry, Table};
 
 /// The cage as it is drawn.
 #[derive(Debug)]
 pub(super) struct CageView {
-    pub(super) positions: wgpu::Buffer,
+    pub(super) positions: Table,
     pub(super) n_vertices: usize,
     edges: Vec<[u32; 2]>,
     edge_numbers: HashMap<[u32; 2], usize>,
@@ -31,7 +32,7 @@ impl CageView {
     pub(super) async fn new(context: &GpuContext, layouts: &Layouts, cage: &Cage) -> Result<Self, GpuError> {
         let n_vertices = cage.n_vertices();
         let mut allocator = Allocator::new(context, "the cage");
-        let positions = allocator.storage("cage vertices", 16 * n_vertices as u64)?;
+        let positions = Table::new(context, &mut allocator, "cage vertices", Entry::Point, n_vertices)?;
         let edges = unique_edges(cage.faces().iter().map(Vec::as_slice));
         let edge_numbers = edges.iter().enumerate().map(|(k, &e)| (e, k)).collect();
         let overlay = |items: &[Item]| Overlay::new(context, layouts, &positions, items);
@@ -54,7 +55,7 @@ impl CageView {
     /// Uploads where the cage is.
     pub(super) fn pose(&self, context: &GpuContext, cage_positions: &[Vec3]) {
         let padded: Vec<[f32; 4]> = cage_positions.iter().map(|p| p.extend(1.0).to_array()).collect();
-        context.queue.write_buffer(&self.positions, 0, bytemuck::cast_slice(&padded));
+        self.positions.write(context, bytemuck::cast_slice(&padded));
     }
 
     /// Writes what is chosen and pointed at.

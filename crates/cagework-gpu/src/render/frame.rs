@@ -18,6 +18,7 @@ use super::slice::SlicePlane;
 use super::theme::linear;
 use crate::device::GpuContext;
 use crate::error::GpuError;
+use crate::table::Table;
 
 /// How far the floor reaches, over the scene's radius.
 const FLOOR_REACH: f32 = 5.0;
@@ -69,7 +70,7 @@ pub struct Renderer {
 
 impl Renderer {
     pub(crate) fn new(context: &GpuContext) -> Self {
-        let layouts = Arc::new(Layouts::new(&context.device));
+        let layouts = Arc::new(Layouts::new(context));
         let camera = context.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("camera"),
             size: size_of::<Uniform>() as u64,
@@ -120,10 +121,10 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws vertices where these buffers have them; at rest without.
-    pub(crate) fn set_vertices(&mut self, context: &GpuContext, buffers: Option<[&wgpu::Buffer; 2]>) {
+    /// Draws vertices where these tables have them; at rest without.
+    pub(crate) fn set_vertices(&mut self, context: &GpuContext, tables: Option<[&Table; 2]>) {
         let Some(mesh) = &mut self.mesh else { return };
-        match buffers {
+        match tables {
             Some([positions, normals]) => mesh.set_vertices(context, &self.layouts, positions, normals),
             None => mesh.set_rest(context, &self.layouts),
         }
@@ -144,7 +145,7 @@ impl Renderer {
     pub(crate) fn set_values(&mut self, context: &GpuContext, values: &[f32], range: [f32; 2]) {
         let Some(mesh) = self.mesh.as_ref().filter(|_| !values.is_empty()) else { return };
         debug_assert_eq!(values.len(), mesh.n_vertices as usize, "one value per vertex");
-        context.queue.write_buffer(&mesh.values, 0, bytemuck::cast_slice(values));
+        mesh.values.write(context, bytemuck::cast_slice(values));
         self.range = range;
         mesh.set_style(context, self.scene.mesh, range);
     }
@@ -220,7 +221,7 @@ impl Renderer {
             self.gizmo.update(context, gizmo, camera);
         }
         if self.pipelines.iter().all(|p| p.format != format) {
-            self.pipelines.push(Pipelines::new(&context.device, &self.layouts, format));
+            self.pipelines.push(Pipelines::new(context, &self.layouts, format));
         }
         if self.targets.as_ref().is_none_or(|t| (t.format, t.size) != (format, size)) {
             self.targets = Some(Targets::new(context, format, size));

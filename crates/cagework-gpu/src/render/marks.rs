@@ -8,6 +8,7 @@ use super::overlay::{Item, Overlay, item, unique_edges};
 use super::pipelines::Layouts;
 use super::scene::{Marks, Theme};
 use crate::device::GpuContext;
+use crate::table::{Entry, Table};
 
 /// The state whose width is that of a line rather than a point.
 const SEGMENT: u32 = 4;
@@ -24,11 +25,11 @@ impl MarksView {
         context: &GpuContext,
         layouts: &Layouts,
         marks: &Marks,
-        mesh: Option<&wgpu::Buffer>,
-        cage: Option<&wgpu::Buffer>,
+        mesh: Option<&Table>,
+        cage: Option<&Table>,
     ) -> Self {
-        let points = |indices: &[u32], positions: &wgpu::Buffer| {
-            let limit = (positions.size() / 16) as u32;
+        let points = |indices: &[u32], positions: &Table| {
+            let limit = (positions.bytes() / 16) as u32;
             let items: Vec<Item> = indices.iter().filter(|&&i| i < limit).map(|&i| item(0, i, 0)).collect();
             Overlay::new(context, layouts, positions, &items)
         };
@@ -59,16 +60,11 @@ impl MarksView {
     }
 }
 
-fn upload(context: &GpuContext, points: &[Vec3]) -> wgpu::Buffer {
+fn upload(context: &GpuContext, points: &[Vec3]) -> Table {
     let padded: Vec<[f32; 4]> = points.iter().map(|p| p.extend(1.0).to_array()).collect();
-    let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("marks"),
-        size: 16 * padded.len() as u64,
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    context.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(&padded));
-    buffer
+    let table = Table::unchecked(context, "marks", Entry::Point, padded.len());
+    table.write(context, bytemuck::cast_slice(&padded));
+    table
 }
 
 /// The mesh's edges, at rest and where it is; made when first asked for.

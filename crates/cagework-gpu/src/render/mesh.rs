@@ -8,6 +8,7 @@ use super::texture;
 use crate::buffers::Allocator;
 use crate::device::GpuContext;
 use crate::error::GpuError;
+use crate::table::{Entry, Table};
 
 /// The model as it is drawn.
 #[derive(Debug)]
@@ -16,15 +17,15 @@ pub(super) struct Mesh {
     indices: wgpu::Buffer,
     groups: Vec<Group>,
     /// Positions at rest.
-    pub(super) rest: wgpu::Buffer,
+    pub(super) rest: Table,
     /// Normals at rest.
-    pub(super) rest_normals: wgpu::Buffer,
+    pub(super) rest_normals: Table,
     /// A weight or an error of each vertex.
-    pub(super) values: wgpu::Buffer,
+    pub(super) values: Table,
     /// Where the vertices are now; the bind group that the mesh is drawn with.
     vertices: wgpu::BindGroup,
     /// Positions that are drawn: at rest, or deformed.
-    pub(super) positions: wgpu::Buffer,
+    pub(super) positions: Table,
     pub(super) n_vertices: u32,
 }
 
@@ -57,9 +58,12 @@ impl Mesh {
             }
         }
         let padded: Vec<[f32; 4]> = model.positions.iter().map(|p| p.extend(1.0).to_array()).collect();
-        let rest = allocator.table("rest positions", &padded)?;
-        let rest_normals = allocator.table("rest normals", normals)?;
-        let values = allocator.storage("values of vertices", 4 * model.positions.len() as u64)?;
+        let n = model.positions.len();
+        let rest = Table::new(context, &mut allocator, "rest positions", Entry::Point, n)?;
+        rest.write(context, bytemuck::cast_slice(&padded));
+        let rest_normals = Table::new(context, &mut allocator, "rest normals", Entry::Point, n)?;
+        rest_normals.write(context, bytemuck::cast_slice(normals));
+        let values = Table::new(context, &mut allocator, "values of vertices", Entry::Value, n)?;
         let white = texture::upload(
             context,
             &mut allocator,
@@ -78,19 +82,19 @@ impl Mesh {
             groups.push(Group::new(context, layouts, &mut allocator, &group, view, wrap)?);
         }
         let vertices = bind_vertices(context, layouts, [&rest, &rest_normals, &values]);
-        let n_vertices = model.positions.len() as u32;
+        let n_vertices = n as u32;
         let positions = rest.clone();
         allocator.settle().await?;
         Ok(Self { corners, indices, groups, rest, rest_normals, values, vertices, positions, n_vertices })
     }
 
-    /// Draws vertices from other buffers from now on: where they are deformed to.
+    /// Draws vertices from other tables from now on: where they are deformed to.
     pub(super) fn set_vertices(
         &mut self,
         context: &GpuContext,
         layouts: &Layouts,
-        positions: &wgpu::Buffer,
-        normals: &wgpu::Buffer,
+        positions: &Table,
+        normals: &Table,
     ) {
         self.vertices = bind_vertices(context, layouts, [positions, normals, &self.values]);
         self.positions = positions.clone();
@@ -139,15 +143,15 @@ impl Mesh {
 fn bind_vertices(
     context: &GpuContext,
     layouts: &Layouts,
-    [positions, normals, values]: [&wgpu::Buffer; 3],
+    [positions, normals, values]: [&Table; 3],
 ) -> wgpu::BindGroup {
     context.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("vertices"),
         layout: &layouts.vertices,
         entries: &[
-            wgpu::BindGroupEntry { binding: 0, resource: positions.as_entire_binding() },
-            wgpu::BindGroupEntry { binding: 1, resource: normals.as_entire_binding() },
-            wgpu::BindGroupEntry { binding: 2, resource: values.as_entire_binding() },
+            wgpu::BindGroupEntry { binding: 0, resource: positions.resource() },
+            wgpu::BindGroupEntry { binding: 1, resource: normals.resource() },
+            wgpu::BindGroupEntry { binding: 2, resource: values.resource() },
         ],
     })
 }

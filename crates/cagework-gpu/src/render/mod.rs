@@ -1,7 +1,7 @@
 //! The renderer: a picture of the scene, into a page's canvas or a texture of its own.
 //!
 //! It reads the vertex buffers that `deform_vertices` and `vertex_normals` wrote; nothing is copied, and a frame
-//! uploads a few hundred bytes. Colours are computed in linear light and blended premultiplied, with four samples per
+//! uploads a few hundred bytes. Where the device only draws, the same tables are textures ([`crate::table`]). Colours are computed in linear light and blended premultiplied, with four samples per
 //! pixel and a depth buffer. What changes rarely (chosen vertices, styles, a heat map) is written when it changes.
 //!
 //! Order: background, opaque mesh, slice, translucent mesh, floor, edges, cage (first what is behind the mesh, fainter),
@@ -23,6 +23,7 @@ mod marks;
 mod mesh;
 pub mod model;
 mod overlay;
+mod part;
 mod pipelines;
 pub mod scene;
 pub mod shaders;
@@ -34,4 +35,5 @@ pub use camera::{AxisView, Camera, Projected, Projection, Ray};
 pub use frame::{Renderer, Target};
 pub use gizmo::{GIZMO_PX, pick_gizmo};
 pub use model::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
+pub use part::PartPainter;
 pub use scene::{Gizmo, GizmoMode, GizmoPart, Marks, MeshStyle, SceneOptions, Selection, SliceView, Theme};

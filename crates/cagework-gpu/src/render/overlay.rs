@@ -3,6 +3,7 @@
 use super::layout::{HIDDEN, STATE_SHIFT, Style};
 use super::pipelines::Layouts;
 use crate::device::GpuContext;
+use crate::table::{Entry, Table};
 
 /// How much of the opacity is left where something nearer is.
 pub(super) const BEHIND_OPACITY: f32 = 0.22;
@@ -18,41 +19,34 @@ pub(super) fn item(state: u32, a: u32, b: u32) -> Item {
 /// An item that is not drawn.
 pub(super) const NOTHING: Item = [HIDDEN << STATE_SHIFT, 0];
 
-/// Items of one kind over one buffer of positions.
+/// Items of one kind over one table of positions.
 #[derive(Debug)]
 pub(super) struct Overlay {
-    positions: wgpu::Buffer,
-    items: wgpu::Buffer,
+    positions: Table,
+    items: Table,
     count: u32,
     /// In front, and behind something.
     styles: [wgpu::Buffer; 2],
     bind_groups: [wgpu::BindGroup; 2],
 }
 
-fn buffer(context: &GpuContext, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+fn style_buffer(context: &GpuContext) -> wgpu::Buffer {
     context.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        size: bytes.max(16).next_multiple_of(16),
-        usage: usage | wgpu::BufferUsages::COPY_DST,
+        label: Some("style"),
+        size: size_of::<Style>() as u64,
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     })
 }
 
 impl Overlay {
-    pub(super) fn new(
-        context: &GpuContext,
-        layouts: &Layouts,
-        positions: &wgpu::Buffer,
-        items: &[Item],
-    ) -> Self {
-        let bytes = size_of_val(items) as u64;
-        let item_buffer = buffer(context, "items", bytes, wgpu::BufferUsages::STORAGE);
-        let styles = [(); 2]
-            .map(|()| buffer(context, "style", size_of::<Style>() as u64, wgpu::BufferUsages::UNIFORM));
-        let bind_groups = bind(context, layouts, positions, &item_buffer, &styles);
+    pub(super) fn new(context: &GpuContext, layouts: &Layouts, positions: &Table, items: &[Item]) -> Self {
+        let item_table = Table::unchecked(context, "items", Entry::Pair, items.len());
+        let styles = [(); 2].map(|()| style_buffer(context));
+        let bind_groups = bind(context, layouts, positions, &item_table, &styles);
         let overlay = Self {
             positions: positions.clone(),
-            items: item_buffer,
+            items: item_table,
             count: items.len() as u32,
             styles,
             bind_groups,
@@ -62,16 +56,13 @@ impl Overlay {
     }
 
     fn write(&self, context: &GpuContext, items: &[Item]) {
-        if !items.is_empty() {
-            context.queue.write_buffer(&self.items, 0, bytemuck::cast_slice(items));
-        }
+        self.items.write(context, bytemuck::cast_slice(items));
     }
 
-    /// Other items; only a longer list takes a new buffer.
+    /// Other items; only a longer list takes a new table.
     pub(super) fn set_items(&mut self, context: &GpuContext, layouts: &Layouts, items: &[Item]) {
-        let bytes = size_of_val(items) as u64;
-        if bytes > self.items.size() {
-            self.items = buffer(context, "items", bytes, wgpu::BufferUsages::STORAGE);
+        if size_of_val(items) as u64 > self.items.bytes() {
+            self.items = Table::unchecked(context, "items", Entry::Pair, items.len());
             self.bind_groups = bind(context, layouts, &self.positions, &self.items, &self.styles);
         }
         self.count = items.len() as u32;
@@ -79,12 +70,7 @@ impl Overlay {
     }
 
     /// Other positions; nothing happens when they are the same.
-    pub(super) fn set_positions(
-        &mut self,
-        context: &GpuContext,
-        layouts: &Layouts,
-        positions: &wgpu::Buffer,
-    ) {
+    pub(super) fn set_positions(&mut self, context: &GpuContext, layouts: &Layouts, positions: &Table) {
         if self.positions != *positions {
             self.positions = positions.clone();
             self.bind_groups = bind(context, layouts, &self.positions, &self.items, &self.styles);
@@ -120,8 +106,8 @@ impl Overlay {
 fn bind(
     context: &GpuContext,
     layouts: &Layouts,
-    positions: &wgpu::Buffer,
-    items: &wgpu::Buffer,
+    positions: &Table,
+    items: &Table,
     styles: &[wgpu::Buffer; 2],
 ) -> [wgpu::BindGroup; 2] {
     styles.each_ref().map(|style| {
@@ -130,8 +116,8 @@ fn bind(
             layout: &layouts.overlay,
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: style.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: positions.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 2, resource: items.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: positions.resource() },
+                wgpu::BindGroupEntry { binding: 2, resource: items.resource() },
             ],
         })
     })

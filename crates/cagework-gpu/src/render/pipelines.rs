@@ -6,6 +6,7 @@ use wgpu::{BlendState, CompareFunction, PrimitiveTopology};
 
 use super::model::DrawVertex;
 use super::shaders::{self, DrawBinding, DrawShader};
+use crate::device::GpuContext;
 
 /// Samples per pixel.
 pub(super) const SAMPLES: u32 = 4;
@@ -62,7 +63,7 @@ impl Kind {
 /// Pipelines for one format, each made when it is first drawn with: the first frame need not wait for all.
 #[derive(Debug)]
 pub(super) struct Pipelines {
-    device: wgpu::Device,
+    context: GpuContext,
     layouts: Arc<Layouts>,
     pub(super) format: wgpu::TextureFormat,
     made: [OnceLock<wgpu::RenderPipeline>; 11],
@@ -93,16 +94,19 @@ const BEHIND: Depth = Depth { compare: CompareFunction::Greater, write: false };
 /// Knows no depth.
 const NO_DEPTH: Depth = Depth { compare: CompareFunction::Always, write: false };
 
-fn layout_of(device: &wgpu::Device, name: &str, bindings: &[DrawBinding]) -> wgpu::BindGroupLayout {
-    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+pub(super) fn layout_of(context: &GpuContext, name: &str, bindings: &[DrawBinding]) -> wgpu::BindGroupLayout {
     let entries: Vec<_> = (0u32..)
         .zip(bindings)
         .map(|(binding, kind)| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
             ty: match kind {
-                DrawBinding::Uniform => buffer(wgpu::BufferBindingType::Uniform),
-                DrawBinding::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
+                DrawBinding::Uniform => wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Uniform,
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                DrawBinding::Table(entry) => entry.binding(context),
                 DrawBinding::Texture => wgpu::BindingType::Texture {
                     sample_type: wgpu::TextureSampleType::Float { filterable: true },
                     view_dimension: wgpu::TextureViewDimension::D2,
@@ -113,18 +117,19 @@ fn layout_of(device: &wgpu::Device, name: &str, bindings: &[DrawBinding]) -> wgp
             count: None,
         })
         .collect();
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(name), entries: &entries })
+    let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some(name), entries: &entries };
+    context.device.create_bind_group_layout(&descriptor)
 }
 
 impl Layouts {
-    pub(super) fn new(device: &wgpu::Device) -> Self {
+    pub(super) fn new(context: &GpuContext) -> Self {
         Self {
-            camera: layout_of(device, "camera", &[DrawBinding::Uniform]),
-            vertices: layout_of(device, "vertices", shaders::MESH.groups[0]),
-            material: layout_of(device, "material", shaders::MESH.groups[1]),
-            overlay: layout_of(device, "overlay", shaders::LINES.groups[0]),
-            slice: layout_of(device, "slice", shaders::SLICE.groups[0]),
-            gizmo: layout_of(device, "gizmo", shaders::GIZMO.groups[0]),
+            camera: layout_of(context, "camera", &[DrawBinding::Uniform]),
+            vertices: layout_of(context, "vertices", shaders::MESH.groups[0]),
+            material: layout_of(context, "material", shaders::MESH.groups[1]),
+            overlay: layout_of(context, "overlay", shaders::LINES.groups[0]),
+            slice: layout_of(context, "slice", shaders::SLICE.groups[0]),
+            gizmo: layout_of(context, "gizmo", shaders::GIZMO.groups[0]),
         }
     }
 
@@ -141,8 +146,8 @@ impl Layouts {
 }
 
 impl Pipelines {
-    pub(super) fn new(device: &wgpu::Device, layouts: &Arc<Layouts>, format: wgpu::TextureFormat) -> Self {
-        Self { device: device.clone(), layouts: Arc::clone(layouts), format, made: Default::default() }
+    pub(super) fn new(context: &GpuContext, layouts: &Arc<Layouts>, format: wgpu::TextureFormat) -> Self {
+        Self { context: context.clone(), layouts: Arc::clone(layouts), format, made: Default::default() }
     }
 
     pub(super) fn get(&self, kind: Kind) -> &wgpu::RenderPipeline {
@@ -153,13 +158,14 @@ impl Pipelines {
     }
 
     fn make(&self, shader: &DrawShader, depth: Depth, blend: bool) -> wgpu::RenderPipeline {
-        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        let device = &self.context.device;
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(shader.name),
-            source: wgpu::ShaderSource::Wgsl(shader.wgsl.into()),
+            source: wgpu::ShaderSource::Wgsl(shader.source(&self.context).into()),
         });
         let groups: Vec<_> =
             std::iter::once(&self.layouts.camera).chain(self.layouts.of(shader)).map(Some).collect();
-        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(shader.name),
             bind_group_layouts: &groups,
             immediate_size: 0,
@@ -170,7 +176,7 @@ impl Pipelines {
         };
         let mesh_vertices = vertices(size_of::<DrawVertex>() as u64, &MESH_ATTRIBUTES);
         let gizmo_vertices = vertices(GIZMO_STRIDE, &GIZMO_ATTRIBUTES);
-        self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(shader.name),
             layout: Some(&layout),
             vertex: wgpu::VertexState {

@@ -6,6 +6,7 @@ use super::pipelines::Layouts;
 use super::scene::{SliceView, Theme};
 use super::theme::linear;
 use crate::device::GpuContext;
+use crate::table::{Entry, Table};
 
 /// A slice as it is drawn.
 #[derive(Debug)]
@@ -31,26 +32,21 @@ impl SlicePlane {
         let value = |cell: usize| values.as_ref().map_or(0, |v| v[cell].to_bits());
         let cells: Vec<[u32; 2]> =
             slice.kinds.iter().enumerate().map(|(cell, &kind)| [kind as u32, value(cell)]).collect();
-        let buffer = |label, bytes: &[u8], usage| {
-            let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: (bytes.len() as u64).max(16),
-                usage: usage | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
-            if !bytes.is_empty() {
-                context.queue.write_buffer(&buffer, 0, bytes);
-            }
-            buffer
-        };
-        let uniform = buffer("slice", bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM);
-        let cells = buffer("cells of the slice", bytemuck::cast_slice(&cells), wgpu::BufferUsages::STORAGE);
+        let table = Table::unchecked(context, "cells of the slice", Entry::Pair, cells.len());
+        table.write(context, bytemuck::cast_slice(&cells));
+        let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("slice"),
+            size: size_of::<Uniform>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        context.queue.write_buffer(&buffer, 0, bytemuck::bytes_of(&uniform));
         let bind_group = context.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("slice"),
             layout: &layouts.slice,
             entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 1, resource: cells.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: table.resource() },
             ],
         });
         Self { bind_group }

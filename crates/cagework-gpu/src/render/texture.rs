@@ -4,9 +4,6 @@ use super::model::DrawTexture;
 use crate::buffers::Allocator;
 use crate::device::GpuContext;
 
-/// Largest side, the baseline's limit.
-const MAX_SIDE: u32 = 8192;
-
 /// Steps of the table that leads from linear light back to bytes: finer than sRGB's steepest place needs.
 const ENCODE_STEPS: usize = 8192;
 
@@ -58,15 +55,15 @@ impl Tables {
     }
 }
 
-/// The image and all its halves, largest first; none larger than the baseline allows.
-fn levels(image: &DrawTexture) -> Vec<DrawTexture> {
+/// The image and all its halves, largest first; no side larger than `most`.
+fn levels(image: &DrawTexture, most: u32) -> Vec<DrawTexture> {
     let tables = Tables::new();
     let mut levels = vec![image.clone()];
     while let Some(last) = levels.last().filter(|l| l.width.max(l.height) > 1) {
         let half = tables.halved(last);
         levels.push(half);
     }
-    levels.retain(|l| l.width.max(l.height) <= MAX_SIDE);
+    levels.retain(|l| l.width.max(l.height) <= most);
     levels
 }
 
@@ -76,7 +73,7 @@ pub(super) fn upload(
     allocator: &mut Allocator<'_>,
     image: &DrawTexture,
 ) -> wgpu::TextureView {
-    let levels = levels(image);
+    let levels = levels(image, context.device.limits().max_texture_dimension_2d);
     allocator.count(levels.iter().map(|l| l.rgba.len() as u64).sum());
     let size =
         |l: &DrawTexture| wgpu::Extent3d { width: l.width, height: l.height, depth_or_array_layers: 1 };
@@ -121,7 +118,7 @@ mod tests {
     #[test]
     fn halves_are_averaged_in_linear_light() {
         let checkers = image(4, 4, |x, y| if (x + y) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] });
-        let levels = levels(&checkers);
+        let levels = levels(&checkers, 8192);
         assert_eq!(levels.iter().map(|l| l.width).collect::<Vec<_>>(), [4, 2, 1]);
         assert!(levels[1].rgba.chunks(4).all(|p| p == [188, 188, 188, 255]), "{:?}", levels[1].rgba);
     }
@@ -129,14 +126,15 @@ mod tests {
     #[test]
     fn one_colour_stays_what_it_is() {
         let plain = image(7, 3, |_, _| [10, 100, 200, 128]);
-        for level in levels(&plain) {
+        for level in levels(&plain, 8192) {
             assert!(level.rgba.chunks(4).all(|p| p == [10, 100, 200, 128]), "{} wide", level.width);
         }
     }
 
     #[test]
-    fn larger_images_than_the_baseline_allows_are_halved() {
+    fn larger_images_than_the_device_allows_are_halved() {
         let wide = image(16_384, 1, |_, _| [1; 4]);
-        assert_eq!(levels(&wide)[0].width, 8192);
+        assert_eq!(levels(&wide, 8192)[0].width, 8192);
+        assert_eq!(levels(&wide, 2048)[0].width, 2048);
     }
 }

@@ -10,7 +10,7 @@ use crate::render::Target;
 /// Format of pictures that are read back.
 const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 
-/// Largest side of a picture, the baseline's limit, pixels.
+/// Largest side of a picture, the baseline's limit, pixels; less where the GPU has less.
 pub const MAX_PICTURE: u32 = 8192;
 
 impl Session {
@@ -18,12 +18,13 @@ impl Session {
     /// from the top: `[height, width, 4]`.
     ///
     /// # Errors
-    /// [`GpuError::Model`] for a size of 0 or above [`MAX_PICTURE`]; [`GpuError::OutOfMemory`],
+    /// [`GpuError::Model`] for a size of 0 or above [`MAX_PICTURE`] or what the GPU can draw; [`GpuError::OutOfMemory`],
     /// [`GpuError::DeviceLost`], [`GpuError::Refused`].
     pub async fn picture(&mut self, size: [u32; 2], scale: f32) -> Result<Vec<u8>, GpuError> {
         let [width, height] = size;
-        if size.iter().any(|s| !(1..=MAX_PICTURE).contains(s)) {
-            let reason = format!("a picture of {width} x {height} pixels: sides are 1 to {MAX_PICTURE}");
+        let most = MAX_PICTURE.min(self.context.device.limits().max_texture_dimension_2d);
+        if size.iter().any(|s| !(1..=most).contains(s)) {
+            let reason = format!("a picture of {width} x {height} pixels: sides are 1 to {most}");
             return Err(GpuError::Model { reason });
         }
         self.context.check()?;

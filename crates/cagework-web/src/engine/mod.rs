@@ -142,10 +142,10 @@ impl Engine {
         Ok(receiver.await.map_err(|_| Fault::new("DeviceLost", "the GPU is gone"))?)
     }
 
-    /// Destroys the device, as a reset of the driver would.
+    /// Gives the device up, as a reset of the driver would; called too when the browser says that it took it away.
     pub fn lose(&self) {
         if let Some(gpu) = self.gpu.try_lock().as_ref().and_then(|gpu| gpu.as_ref()) {
-            gpu.main.context().device.destroy();
+            gpu.main.context().lose("the browser took it away");
         }
     }
 

@@ -1,0 +1,111 @@
+//! What moves the mesh when the cage moves: kernels, or the processor where the device only draws.
+//!
+//! Which one is decided when the device is opened ([`GpuContext::draws_only`]); to the session both are the same.
+
+use cagework_core::Weights;
+use cagework_core::bind::OutsideVertex;
+use cagework_core::deform::{deform_bound, vertex_normals};
+use glam::{Vec3, Vec4};
+
+use crate::buffers::Allocator;
+use crate::deform::{Deformer, GpuWeights};
+use crate::device::GpuContext;
+use crate::error::GpuError;
+use crate::table::{Entry, Table};
+
+/// Deforms one mesh, frame after frame; `[positions, normals]` are what is drawn.
+#[derive(Debug)]
+pub(super) enum Mover {
+    /// By kernels: a moved cage is all that is uploaded.
+    Kernels { deformer: Deformer, tables: [Table; 2] },
+    /// By the processor: every vertex is uploaded.
+    Processor { triangles: Vec<[u32; 3]>, tables: [Table; 2] },
+}
+
+impl Mover {
+    /// `on_gpu`: the same weights, if they are there already.
+    pub(super) async fn new(
+        context: &GpuContext,
+        weights: &Weights,
+        outside: &[OutsideVertex],
+        on_gpu: Option<&GpuWeights>,
+        triangles: Vec<[u32; 3]>,
+    ) -> Result<Self, GpuError> {
+        if context.draws_only() {
+            let n = weights.n_rows();
+            let mut allocator = Allocator::new(context, "the deformed mesh");
+            let positions = Table::new(context, &mut allocator, "positions", Entry::Point, n)?;
+            let normals = Table::new(context, &mut allocator, "normals", Entry::Point, n)?;
+            allocator.settle().await?;
+            return Ok(Self::Processor { triangles, tables: [positions, normals] });
+        }
+        let deformer = match on_gpu {
+            Some(on_gpu) => Deformer::new(context, on_gpu, &triangles).await?,
+            None => {
+                let on_gpu = GpuWeights::new(context, weights, outside).await?;
+                Deformer::new(context, &on_gpu, &triangles).await?
+            }
+        };
+        let tables = [deformer.positions(), deformer.normals()].map(|b| Table::Buffer(b.clone()));
+        Ok(Self::Kernels { deformer, tables })
+    }
+
+    pub(super) fn tables(&self) -> [&Table; 2] {
+        let (Self::Kernels { tables, .. } | Self::Processor { tables, .. }) = self;
+        tables.each_ref()
+    }
+
+    /// Takes where the cage is.
+    pub(super) fn pose(&self, context: &GpuContext, cage_positions: &[Vec3]) {
+        match self {
+            Self::Kernels { deformer, .. } => deformer.pose(context, cage_positions),
+            // It looks when it deforms: a pose that no frame shows costs nothing.
+            Self::Processor { .. } => {}
+        }
+    }
+
+    /// Sees to it that what is recorded next finds the mesh where the cage has it.
+    pub(super) fn encode(
+        &self,
+        context: &GpuContext,
+        encoder: &mut wgpu::CommandEncoder,
+        weights: &Weights,
+        outside: &[OutsideVertex],
+        cage_positions: &[Vec3],
+    ) {
+        match self {
+            Self::Kernels { deformer, .. } => deformer.encode(encoder),
+            // There is none elsewhere; the condition leaves this out of the page's main artifact.
+            Self::Processor { triangles, tables: [positions, normals] } if context.draws_only() => {
+                let deformed = deform_bound(weights, outside, cage_positions);
+                let shading = vertex_normals(&deformed, triangles);
+                for (table, points) in [(positions, deformed), (normals, shading)] {
+                    let padded: Vec<Vec4> = points.into_iter().map(|p| p.extend(1.0)).collect();
+                    table.write(context, bytemuck::cast_slice(&padded));
+                }
+            }
+            Self::Processor { .. } => {}
+        }
+    }
+
+    /// Where the mesh is. `[n_vertices]`, object units.
+    pub(super) async fn read_positions(
+        &self,
+        context: &GpuContext,
+        weights: &Weights,
+        outside: &[OutsideVertex],
+        cage_positions: &[Vec3],
+    ) -> Result<Vec<Vec3>, GpuError> {
+        match self {
+            Self::Kernels { deformer, .. } => {
+                // Again even if nothing moved: it costs a millisecond, and a frame may not have been drawn yet.
+                deformer.run(context).await?;
+                deformer.read_positions(context).await
+            }
+            Self::Processor { .. } => {
+                context.check()?;
+                Ok(deform_bound(weights, outside, cage_positions))
+            }
+        }
+    }
+}

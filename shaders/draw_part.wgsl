@@ -1,0 +1,23 @@
+// A picture that was drawn before, at its place in a larger one: for canvases that nothing can be copied to.
+// One triangle; the viewport is the place.
+
+@group(1) @binding(0) var picture: texture_2d<f32>;
+
+struct Varying {
+    @builtin(position) clip: vec4f,
+    /// Across the picture from its upper left corner, 0 to 1.
+    @location(0) place: vec2f,
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> Varying {
+    let corner = vec2f(f32(index & 1u), f32(index >> 1u)) * 2.0;
+    return Varying(vec4f(2.0 * corner.x - 1.0, 1.0 - 2.0 * corner.y, 0.0, 1.0), corner);
+}
+
+@fragment
+fn fragment(in: Varying) -> @location(0) vec4f {
+    let size = textureDimensions(picture);
+    let pixel = min(vec2u(in.place * vec2f(size)), size - 1u);
+    return textureLoad(picture, pixel, 0);
+}

@@ -1,0 +1,10 @@
+// The mesh's vertices in textures, which the processor writes. Twin: mesh_buffers.wgsl.
+
+@group(1) @binding(0) var positions: texture_2d<f32>;
+@group(1) @binding(1) var normals: texture_2d<f32>;
+/// A weight or an error of each vertex.
+@group(1) @binding(2) var values: texture_2d<f32>;
+
+fn point_at(index: u32) -> vec3f { return textureLoad(positions, place_of(index), 0).xyz; }
+fn normal_at(index: u32) -> vec3f { return textureLoad(normals, place_of(index), 0).xyz; }
+fn value_at(index: u32) -> f32 { return textureLoad(values, place_of(index), 0).x; }

@@ -1,0 +1,116 @@
+/** The worker: runs what takes longer than a frame, one job after the other. */
+
+import type { Binder, Bound, Polygons } from "../pkg/cagework";
+import type { Package } from "./artifact";
+import type { BoundArrays, CageArrays, FromWorker, JobKind, Jobs, Step, ToWorker } from "./messages";
+
+/** Steps are told at most this often, ms: a page draws no more of them. */
+const STEP_PAUSE = 33;
+
+type Send = (message: FromWorker, transfer?: Transferable[]) => void;
+const send: Send = (message, transfer = []) => postMessage(message, { transfer });
+
+const cancelled = new Set<number>();
+let queue: Promise<unknown> = Promise.resolve();
+
+/** Answers the page from one build of the module. */
+export function serve(pkg: Package): void {
+  const work = createWork(pkg);
+  addEventListener("message", ({ data }: MessageEvent<ToWorker>) => {
+    switch (data.kind) {
+      case "start":
+        queue = pkg.default({ module_or_path: data.module });
+        break;
+      case "cancel":
+        cancelled.add(data.id);
+        break;
+      case "job":
+        queue = queue.then(() => answer(work, data.id, data.job, data.input));
+        break;
+      default:
+        data satisfies never;
+    }
+  });
+}
+
+async function answer(work: Work, id: number, job: JobKind, input: unknown): Promise<void> {
+  try {
+    const output = await work[job](input as never, steps(id));
+    send({ kind: "done", id, output }, buffers(output));
+  } catch (error) {
+    const { name, message } = error instanceof Error ? error : { name: "Error", message: String(error) };
+    send({ kind: "failed", id, name, message });
+  } finally {
+    cancelled.delete(id);
+  }
+}
+
+/** Tells the page of steps now and then; answers false once the job is cancelled. */
+function steps(id: number): (step: Step) => boolean {
+  let last = Number.NEGATIVE_INFINITY;
+  return (step) => {
+    const now = performance.now();
+    if (now - last >= STEP_PAUSE) {
+      last = now;
+      send({ kind: "step", id, step });
+    }
+    return !cancelled.has(id);
+  };
+}
+
+type Work = {
+  [K in JobKind]: (input: Jobs[K]["input"], step: (step: Step) => boolean) => Promise<Jobs[K]["output"]>;
+};
+
+function createWork(pkg: Package): Work {
+  let shared: Binder | undefined;
+  const binder = async (needsGpu: boolean): Promise<Binder> => {
+    shared ??= new pkg.Binder();
+    if (needsGpu) await shared.openGpu();
+    return shared;
+  };
+  return {
+    async bind({ positions, cage, options }, step) {
+      const by = await binder(options.backend === "gpu");
+      return taken(await by.bind(positions, cage.positions, cage.corners, options, step));
+    },
+    async meanValue({ positions, cage }) {
+      return taken((await binder(false)).bindMeanValue(positions, cage.positions, cage.corners));
+    },
+    async slice({ cage, axis, fraction, options }, step) {
+      const by = await binder(options.backend === "gpu");
+      const bound = await by.bindSlice(cage.positions, cage.corners, axis, fraction, options, step);
+      return bound && taken(bound);
+    },
+    async cage({ positions, triangles, options }, step) {
+      return polygons((await binder(false)).generateCage(positions, triangles, options, step));
+    },
+    async sample({ id }) {
+      const sample = pkg.Binder.buildSample(id);
+      const poses = sample.poseNames.map((name, k) => ({ name, positions: sample.posePositions(k) }));
+      const output = { glb: sample.glb, cage: polygons(sample.cage), poses };
+      sample.free();
+      return output;
+    },
+  };
+}
+
+/** Arrays of what was bound; its memory in the module is given back. */
+function taken(bound: Bound): BoundArrays {
+  const { indptr, indices, data, outside, offsets, report } = bound;
+  bound.free();
+  return { indptr, indices, data, outside, offsets, report };
+}
+
+function polygons(mesh: Polygons): CageArrays {
+  const { positions, corners } = mesh;
+  mesh.free();
+  return { positions, corners };
+}
+
+/** Buffers of all typed arrays in a result: handed over, not copied. */
+function buffers(value: unknown): ArrayBuffer[] {
+  if (ArrayBuffer.isView(value)) return value.buffer instanceof ArrayBuffer ? [value.buffer] : [];
+  if (typeof value === "object" && value !== null) return Object.values(value).flatMap(buffers);
+  return [];
+}
