@@ -22,7 +22,7 @@ import { lackOf } from "./session/adapter";
 import { decodeShare } from "./share";
 import { startUp } from "./start";
 import { createStore, INITIAL } from "./state";
-import { loadTheme } from "./store";
+import { hasLocally, loadTheme } from "./store";
 import { type Explained, explain, FIX_LABELS, PRODUCT } from "./strings";
 import { createBar } from "./ui/bar";
 import { createBindPanel } from "./ui/bind";
@@ -45,6 +45,11 @@ function byId(id: string): HTMLElement {
   const element = document.getElementById(id);
   if (!element) throw new Error(`the page lacks #${id}`);
   return element;
+}
+
+/** Whether this visit begins with the first sample: no link, and nothing to come back to. */
+async function isFresh(): Promise<boolean> {
+  return location.hash.length <= 1 && !(await hasLocally());
 }
 
 async function main(): Promise<void> {
@@ -203,7 +208,7 @@ async function main(): Promise<void> {
   createOverlays(stageElement, app, createSeePanel(app), matchMedia("(pointer: coarse)"));
 
   try {
-    session = await openSession(stage);
+    session = await openSession(stage, isFresh());
   } catch (error) {
     const lack = lackOf(error);
     if (!lack) {

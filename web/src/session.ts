@@ -18,7 +18,7 @@ import { BIND_DEFAULTS } from "./defaults";
 import { findAdapter, hasWebGl2, lackOf } from "./session/adapter";
 import type { Artifact, Package } from "./session/artifact";
 import { startBind } from "./session/bind";
-import { createClient } from "./session/client";
+import { type Client, createClient } from "./session/client";
 import { load, readFiles } from "./session/files";
 import { createFrames } from "./session/frames";
 import { chain } from "./session/jobs";
@@ -37,17 +37,36 @@ export interface Canvases {
 
 /**
  * Opens the page on WebGPU; where that is missing on WebGL2, with the processor to compute. Fails with the name NoWebGPU,
- * NoAdapter or NoDevice where there is neither.
+ * NoAdapter or NoDevice where there is neither. `fresh`: whether the first sample is what will be opened first.
  */
-export async function openSession(canvases: Canvases): Promise<Session> {
+export async function openSession(canvases: Canvases, fresh: Promise<boolean>): Promise<Session> {
   try {
-    return await start(WEBGPU, canvases.canvas(), await findAdapter(), null);
+    const adapter = findAdapter();
+    // Downloaded meanwhile, but not where it is of no use.
+    const module = navigator.gpu ? compile(WEBGPU.wasm) : adapter.then(() => compile(WEBGPU.wasm));
+    const [found, compiled] = await Promise.all([adapter, module]);
+    return await start({
+      artifact: WEBGPU,
+      module: compiled,
+      canvas: canvases.canvas(),
+      adapter: found,
+      lack: null,
+      fresh,
+    });
   } catch (error) {
     const lack = lackOf(error);
     if (!lack || !hasWebGl2()) throw error;
     const { WEBGL } = await import("./session/webgl");
     try {
-      return await start(WEBGL, canvases.freshCanvas(), "WebGL2", lack);
+      const module = await compile(WEBGL.wasm);
+      return await start({
+        artifact: WEBGL,
+        module,
+        canvas: canvases.freshCanvas(),
+        adapter: "WebGL2",
+        lack,
+        fresh,
+      });
     } catch (other) {
       // A WebGL2 that does not do what it promised is none: what helps is WebGPU.
       const isNone = lackOf(other) || (other instanceof Error && other.name === "Canvas");
@@ -56,19 +75,28 @@ export async function openSession(canvases: Canvases): Promise<Session> {
   }
 }
 
-async function start(
-  { pkg, wasm, openWorker }: Artifact,
-  canvas: HTMLCanvasElement,
-  adapter: string,
-  lack: Lack | null,
-): Promise<Session> {
-  const module = await compile(wasm);
+interface Start {
+  readonly artifact: Artifact;
+  readonly module: WebAssembly.Module;
+  readonly canvas: HTMLCanvasElement;
+  readonly adapter: string;
+  readonly lack: Lack | null;
+  /** Whether the first sample is what will be opened first. */
+  readonly fresh: Promise<boolean>;
+}
+
+async function start({ artifact, module, canvas, adapter, lack, fresh }: Start): Promise<Session> {
+  const { pkg, openWorker } = artifact;
   const { memory } = await pkg.default({ module_or_path: module });
+  const client = createClient(module, openWorker);
+  const buildSample = prepareSample(client, samples(pkg)[0]?.id, fresh);
   const frames = createFrames();
-  const raw = await pkg.Engine.create(canvas, frames.ask);
+  const raw = await pkg.Engine.create(canvas, frames.ask).catch((error: unknown) => {
+    client.close();
+    throw error;
+  });
   const engine = raw as unknown as PageEngine;
   frames.start(() => raw.drawFrame());
-  const client = createClient(module, openWorker);
   /** Where nothing else can, the processor computes, whatever a project was saved with. */
   const possible = (options: BindOptions): BindOptions => (lack ? { ...options, backend: "cpu" } : options);
   /** WebGL2 tells the canvas, and nobody else, that it was lost. */
@@ -107,7 +135,7 @@ async function start(
     samples: samples(pkg),
     openFiles: async (files) => openBytes(await readFiles(files)),
     async openSample(id) {
-      const { glb, cage, poses } = await client.run("sample", { id }).done;
+      const { glb, cage, poses } = await buildSample(id);
       const label = samples(pkg).find((sample) => sample.id === id)?.label ?? id;
       const opened = await openBytes({ name: `${label}.glb`, bytes: glb, sibling: () => undefined });
       return { ...opened, cage: engine.setCage(cage.positions, cage.corners), poses };
@@ -172,6 +200,19 @@ async function start(
   };
   globalThis.cagework = session;
   return session;
+}
+
+/** Builds samples; the one that a first visit opens while the GPU is still being opened. */
+function prepareSample(client: Client, first: string | undefined, fresh: Promise<boolean>) {
+  const build = (id: string) => client.run("sample", { id }).done;
+  let early = fresh.then((isFresh) => (isFresh && first ? build(first) : undefined));
+  // Who opens it hears of the error.
+  early.catch(() => undefined);
+  return async (id: string) => {
+    const built = id === first ? await early : undefined;
+    early = Promise.resolve(undefined);
+    return built ?? build(id);
+  };
 }
 
 function samples(pkg: Package): readonly Sample[] {

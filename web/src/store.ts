@@ -49,6 +49,16 @@ export async function loadLocally(): Promise<Saved | undefined> {
   return isSaved(found) ? found : undefined;
 }
 
+/** Whether there is one. */
+export async function hasLocally(): Promise<boolean> {
+  try {
+    return (await run("readonly", (table) => table.count(KEY))) > 0;
+  } catch {
+    // Storage is forbidden: nothing was kept.
+    return false;
+  }
+}
+
 /** Forgets it. */
 export async function forgetLocally(): Promise<void> {
   await run("readwrite", (table) => table.delete(KEY));

@@ -1,16 +1,21 @@
 //! The canvas as wgpu sees it.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cagework_gpu::render::PartPainter;
 use cagework_gpu::{ContextOptions, GpuContext, GpuError, Session, device};
 use web_sys::HtmlCanvasElement;
 
+use crate::clock::now_ms;
 use crate::error::{Answer, Fault};
 
 /// Frames that the GPU may be behind: with one it would wait for us, with more a slow one shows what was long ago.
 const MOST_IN_FLIGHT: u32 = 2;
+
+/// A frame that takes longer comes from a slow GPU, ms: there a second one behind it only keeps everything else waiting
+/// that is asked of the GPU, the weights of a bind first of all.
+const SLOW_MS: f64 = 50.0;
 
 /// A canvas that is drawn into.
 pub(crate) struct Surface {
@@ -27,6 +32,8 @@ pub(crate) struct Surface {
     painter: Option<PartPainter>,
     /// Frames that were handed to the GPU and are not finished.
     in_flight: Arc<AtomicU32>,
+    /// Whether the last one took longer than [`SLOW_MS`].
+    is_slow: Arc<AtomicBool>,
 }
 
 impl Surface {
@@ -63,8 +70,8 @@ impl Surface {
             config.usage |= wgpu::TextureUsages::COPY_DST;
         }
         surface.configure(&context.device, &config);
-        let in_flight = Arc::default();
-        Ok((Self { surface, config, format, parts: Vec::new(), painter, in_flight }, context))
+        let (in_flight, is_slow) = (Arc::default(), Arc::default());
+        Ok((Self { surface, config, format, parts: Vec::new(), painter, in_flight, is_slow }, context))
     }
 
     /// Gives the canvas another size, pixels.
@@ -91,7 +98,8 @@ impl Surface {
     ) -> Answer<bool> {
         let context = session.context().clone();
         context.check()?;
-        if self.in_flight.load(Ordering::Relaxed) >= MOST_IN_FLIGHT {
+        let most = if self.is_slow.load(Ordering::Relaxed) { 1 } else { MOST_IN_FLIGHT };
+        if self.in_flight.load(Ordering::Relaxed) >= most {
             return Ok(false);
         }
         let frame = match self.surface.get_current_texture() {
@@ -119,9 +127,11 @@ impl Surface {
         }
         self.put_together(&context, &frame.texture);
         self.in_flight.fetch_add(1, Ordering::Relaxed);
-        let in_flight = Arc::clone(&self.in_flight);
+        let (in_flight, is_slow) = (Arc::clone(&self.in_flight), Arc::clone(&self.is_slow));
+        let began = now_ms();
         context.queue.on_submitted_work_done(move || {
             in_flight.fetch_sub(1, Ordering::Relaxed);
+            is_slow.store(now_ms() - began > SLOW_MS, Ordering::Relaxed);
         });
         context.queue.present(frame);
         Ok(true)
