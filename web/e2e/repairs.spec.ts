@@ -106,6 +106,11 @@ test("every fault has a button that mends it", async ({ page }) => {
     await expect(card.getByText("Fine enough")).toBeVisible();
     await bound(page);
     await page.getByRole("button", { name: "Bind", exact: false }).first().click();
-    await expect(panel.getByText(/\b128\b/).first()).toBeVisible();
+    await expect(
+      panel
+        .getByText(/\b128\b/)
+        .filter({ visible: true })
+        .first(),
+    ).toBeVisible();
   });
 });

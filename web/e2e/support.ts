@@ -44,7 +44,9 @@ export async function bound(page: Page): Promise<void> {
   await page.waitForFunction(() => globalThis.cagework?.engine.bound === true, undefined, {
     timeout: 60_000,
   });
-  await expect(page.locator("#status")).toHaveText(/^(Ready|Shaping the cage.*|.*selected)$/, { timeout: 60_000 });
+  await expect(page.locator("#status")).toHaveText(/^(Ready|Shaping the cage.*|.*selected)$/, {
+    timeout: 60_000,
+  });
 }
 
 /** Where a cage vertex is in the window. */

@@ -193,7 +193,8 @@ impl GizmoShape {
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_vertex_buffer(0, self.vertices.slice(..));
         let mut first = 0;
-        for (count, place) in self.counts.into_iter().zip(&self.places) {
+        // Browsers warn of draws without vertices.
+        for (count, place) in self.counts.into_iter().zip(&self.places).filter(|(count, _)| *count > 0) {
             pass.set_bind_group(1, &place.bind_group, &[]);
             pass.draw(first..first + count, 0..1);
             first += count;
