@@ -1,17 +1,22 @@
 // Deformation: v' = sum of w_i(v) c_i' (Joshi et al. 2007, Eq. 1), straight into the vertex buffer that is drawn.
-// One invocation per vertex, from `first_row` on. Rows come in slices of 8 vertices, a slice's entries column by column,
-// so that neighbouring invocations read neighbouring entries. Twin: cagework_core::stencil::deform_vertices.
+// One invocation per bundle of 4 vertices, from `first_row` on, so that each control vertex is read once for four.
+// Bundles come in slices of 8, a slice's entries column by column, so that neighbouring invocations read neighbouring
+// entries. Twin: cagework_core::stencil::deform_vertices.
 
-/// Vertices in a slice.
+/// Vertices in a bundle: components of a vec4f.
+const BUNDLE = 4u;
+/// Bundles in a slice.
 const SLICE = 8u;
 
 @group(0) @binding(0) var<uniform> work: Work;
-/// Where each slice starts in `entries`, over 8.
+/// Where each slice starts in `columns` and `weights`, over 8.
 @group(0) @binding(1) var<storage, read> slices: array<u32>;
-/// (control vertex, bits of its weight); short rows end in weights of 0.
-@group(0) @binding(2) var<storage, read> entries: array<vec2u>;
-@group(0) @binding(3) var<storage, read> cage: array<vec4f>;
-@group(0) @binding(4) var<storage, read_write> positions: array<vec4f>;
+/// Control vertices that a bundle follows; short lists end in weights of 0.
+@group(0) @binding(2) var<storage, read> columns: array<u32>;
+/// Their weights for the bundle's four vertices.
+@group(0) @binding(3) var<storage, read> weights: array<vec4f>;
+@group(0) @binding(4) var<storage, read> cage: array<vec4f>;
+@group(0) @binding(5) var<storage, read_write> positions: array<vec4f>;
 
 @compute @workgroup_size(64)
 fn deform_vertices(@builtin(global_invocation_id) id: vec3u) {
@@ -19,11 +24,21 @@ fn deform_vertices(@builtin(global_invocation_id) id: vec3u) {
     if number >= work.count { return; }
     let slice = number / SLICE;
     let lane = number % SLICE;
-    var sum = vec3f(0.0);
-    let end = slices[slice + 1u];
-    for (var k = slices[slice]; k < end; k++) {
-        let entry = entries[k * SLICE + lane];
-        sum += bitcast<f32>(entry.y) * cage[entry.x].xyz;
+    var x = vec4f(0.0);
+    var y = vec4f(0.0);
+    var z = vec4f(0.0);
+    let end = slices[slice + 1u] * SLICE;
+    for (var k = slices[slice] * SLICE + lane; k < end; k += SLICE) {
+        let weight = weights[k];
+        let c = cage[columns[k]].xyz;
+        x += weight * c.x;
+        y += weight * c.y;
+        z += weight * c.z;
     }
-    positions[work.first_row + number] = vec4f(sum, 1.0);
+    let first = work.first_row + number * BUNDLE;
+    let last = min(first + BUNDLE, arrayLength(&positions));
+    for (var v = first; v < last; v++) {
+        let j = v - first;
+        positions[v] = vec4f(x[j], y[j], z[j], 1.0);
+    }
 }

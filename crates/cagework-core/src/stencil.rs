@@ -20,7 +20,7 @@ use crate::deform::triangle_frame;
 use crate::grid::NO_CELL;
 use crate::solve::rows::Prolong;
 use crate::transfer::{RESTRICT_CENTRE, RESTRICT_EDGE};
-use tables::{LevelTable, NormalTable, OutsideTable, SLICE, SamplingTable, SlicedWeights};
+use tables::{BUNDLE, LevelTable, NormalTable, OutsideTable, SLICE, SamplingTable, SlicedWeights};
 
 /// Changes of a weight below this do not count: their squares would be denormal.
 const NEGLIGIBLE: f32 = 1e-18;
@@ -188,14 +188,17 @@ pub fn sample_weights(
 
 /// Deformed positions, `[n_vertices]`, object units, for a posed cage. GPU twin: `shaders/deform_vertices.wgsl`.
 pub fn deform_vertices(weights: &SlicedWeights, cage: &[Vec3], positions: &mut [Vec3]) {
-    for (vertex, position) in positions.iter_mut().enumerate() {
-        let (slice, lane) = (vertex / SLICE, vertex % SLICE);
-        let mut sum = Vec3::ZERO;
+    for (number, bundle) in positions.chunks_mut(BUNDLE).enumerate() {
+        let (slice, lane) = (number / SLICE, number % SLICE);
+        let mut sums = [Vec3::ZERO; BUNDLE];
         for k in weights.slices[slice]..weights.slices[slice + 1] {
-            let [column, weight] = weights.entries[k as usize * SLICE + lane];
-            sum += f32::from_bits(weight) * cage[column as usize];
+            let entry = k as usize * SLICE + lane;
+            let c = cage[weights.columns[entry] as usize];
+            for (sum, &weight) in sums.iter_mut().zip(&weights.weights[entry]) {
+                *sum += weight * c;
+            }
         }
-        *position = sum;
+        bundle.copy_from_slice(&sums[..bundle.len()]);
     }
 }
 

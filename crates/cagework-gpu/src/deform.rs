@@ -4,7 +4,7 @@
 use bytemuck::Pod;
 use cagework_core::Weights;
 use cagework_core::bind::OutsideVertex;
-use cagework_core::stencil::tables::{NormalTable, OutsideTable, SLICE, SlicedWeights};
+use cagework_core::stencil::tables::{BUNDLE, NormalTable, OutsideTable, SLICE, SlicedWeights};
 use futures_channel::oneshot;
 use glam::{Vec3, Vec4};
 
@@ -39,7 +39,8 @@ struct Part {
     first_vertex: u32,
     n_vertices: u32,
     slices: wgpu::Buffer,
-    entries: wgpu::Buffer,
+    columns: wgpu::Buffer,
+    weights: wgpu::Buffer,
 }
 
 impl GpuWeights {
@@ -55,7 +56,7 @@ impl GpuWeights {
         let mut allocator = Allocator::new(context);
         let sliced = SlicedWeights::new(weights);
         let n_vertices = weights.n_rows() as u32;
-        let slice_bytes = (SLICE * size_of::<[u32; 2]>()) as u64;
+        let slice_bytes = (SLICE * size_of::<[f32; BUNDLE]>()) as u64;
         let most = (context.max_binding_bytes / slice_bytes) as u32;
         let n_slices = sliced.slices.len() - 1;
         let mut parts = Vec::new();
@@ -66,11 +67,13 @@ impl GpuWeights {
             let end = begin + more.max(1);
             let starts: Vec<u32> = sliced.slices[begin..=end].iter().map(|s| s - start).collect();
             let entries = start as usize * SLICE..sliced.slices[end] as usize * SLICE;
+            let first_vertex = begin * SLICE * BUNDLE;
             parts.push(Part {
-                first_vertex: (begin * SLICE) as u32,
-                n_vertices: ((end - begin) * SLICE).min(n_vertices as usize - begin * SLICE) as u32,
+                first_vertex: first_vertex as u32,
+                n_vertices: ((end - begin) * SLICE * BUNDLE).min(n_vertices as usize - first_vertex) as u32,
                 slices: allocator.table("slices of weights", &starts).await?,
-                entries: allocator.table("weights", &sliced.entries[entries]).await?,
+                columns: allocator.table("columns of weights", &sliced.columns[entries.clone()]).await?,
+                weights: allocator.table("weights", &sliced.weights[entries]).await?,
             });
             begin = end;
         }
@@ -139,8 +142,10 @@ impl Deformer {
         let mut deformer = Self { cage, positions, normals, steps: Vec::new(), n_vertices, n_columns };
         let (cage, positions) = (deformer.cage.clone(), deformer.positions.clone());
         for part in &weights.parts {
-            let launch = launch(&kernels::DEFORM_VERTICES, &[&part.slices, &part.entries, &cage, &positions]);
-            deformer.add(context, &works, launch, part.first_vertex, part.n_vertices);
+            let buffers = [&part.slices, &part.columns, &part.weights, &cage, &positions];
+            let launch = launch(&kernels::DEFORM_VERTICES, &buffers);
+            let n_bundles = part.n_vertices.div_ceil(BUNDLE as u32);
+            deformer.add(context, &works, launch, part.first_vertex, n_bundles);
         }
         if weights.n_outside > 0 {
             let buffers = [&weights.corners, &weights.offsets, &cage, &positions];

@@ -71,7 +71,7 @@ kernels! {
     /// Weights at the mesh's vertices.
     SAMPLE_WEIGHTS = "sample_weights" + ["work"], 64, 70, &[Uniform, Read, Read, Read, Read, ReadWrite];
     /// Deformed positions.
-    DEFORM_VERTICES = "deform_vertices" + ["work"], 64, 160, &[Uniform, Read, Read, Read, ReadWrite];
+    DEFORM_VERTICES = "deform_vertices" + ["work"], 64, 900, &[Uniform, Read, Read, Read, Read, ReadWrite];
     /// Rigid offsets of vertices outside the cage.
     OFFSET_OUTSIDE = "offset_outside" + ["work"], 64, 24, &[Uniform, Read, Read, Read, ReadWrite];
     /// Normals of the deformed mesh.

@@ -9,7 +9,7 @@ use cagework_core::sample::Stencils;
 use cagework_core::solve::hierarchy::Hierarchy;
 use cagework_core::solve::rows::Prolong;
 use cagework_core::stencil::tables::{
-    LevelTable, NormalTable, OutsideTable, SamplingTable, SlicedWeights, TransferTable,
+    BUNDLE, LevelTable, NormalTable, OutsideTable, SamplingTable, SlicedWeights, TransferTable,
 };
 use cagework_core::{Weights, stencil};
 use cagework_gpu::buffers::Allocator;
@@ -345,12 +345,13 @@ fn deform_vertices_matches_cpu() {
     let mut expected = vec![Vec3::ZERO; 203];
     let inputs = [
         bytes(&sliced.slices).to_vec(),
-        bytes(&sliced.entries).to_vec(),
+        bytes(&sliced.columns).to_vec(),
+        bytes(&sliced.weights).to_vec(),
         bytes(&padded(&posed, 1.0)).to_vec(),
         bytes(&padded(&expected, 0.0)).to_vec(),
     ];
     let inputs: Vec<&[u8]> = inputs.iter().map(Vec::as_slice).collect();
-    let result = run(&kernels::DEFORM_VERTICES, ROWS, 203, &inputs);
+    let result = run(&kernels::DEFORM_VERTICES, ROWS, 203u32.div_ceil(BUNDLE as u32), &inputs);
     stencil::deform_vertices(&sliced, &posed, &mut expected);
     assert_close(&unpadded(&result), &flat(&expected), POINT_TOLERANCE);
     let double = cagework_core::deform::deform_vertices(&weights, &posed);

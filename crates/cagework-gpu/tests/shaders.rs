@@ -115,6 +115,7 @@ fn constants_equal_rusts() {
     same(&kernels::CHANGE_NORMS, "CHANGE_FIRST", f64::from(mode::CHANGE_FIRST));
     same(&kernels::PROLONG_CORRECTION, "PROLONG_REPLACE", f64::from(mode::PROLONG_REPLACE));
     same(&kernels::PROLONG_CORRECTION, "ENTRY_HEAD", stencil::tables::ENTRY_HEAD as f64);
+    same(&kernels::DEFORM_VERTICES, "BUNDLE", stencil::tables::BUNDLE as f64);
     same(&kernels::DEFORM_VERTICES, "SLICE", stencil::tables::SLICE as f64);
     same(&kernels::SUM_SQUARES, "REDUCE_LANES", stencil::REDUCE_LANES as f64);
     same(&kernels::SUM_SQUARES, "REDUCE_VALUES", stencil::REDUCE_VALUES as f64);

@@ -10,12 +10,15 @@
 //! A smoothing pass is one stream through memory: half sweeps follow each other one z-plane apart, and the residual
 //! of the red cells (black ones have none after a black half sweep) trails them.
 
+mod convergence;
 mod other;
+
+pub use convergence::{BatchReport, Convergence, Stop, histories};
 
 use super::hierarchy::Hierarchy;
 use super::rows::{
-    LANES, Prolong, Rhs, Row, ZERO, over_relax_plane, prolong_plane, relax_plane, residual_plane,
-    restrict_residual,
+    LANES, Prolong, Rhs, Row, ZERO, over_relax_plane, over_relax_zeros_plane, prolong_plane, relax_plane,
+    relax_zeros_plane, residual_plane, restrict_residual,
 };
 use crate::levels::Level;
 use crate::simd::dispatch;
@@ -31,19 +34,6 @@ pub const COARSEST_SWEEPS: usize = 8;
 /// left after a sweep, where 0.8 are without.
 pub const COARSEST_OMEGA: f32 = 1.4;
 
-/// What a cycle leaves of the error, at worst: 0.03 to 0.10 measured, on the Armadillo and on boxes.
-const CONTRACTION: f64 = 0.12;
-
-/// Below this correction, cycles that no longer make it [`STALLED`] times smaller move rounding about: f32 has no more digits
-/// to give (3e-8 to 1e-7 on a C at g = 16 to 40), and a tau that asks for them is never met.
-const ROUND_OFF: f64 = 1e-6;
-
-/// See [`ROUND_OFF`].
-const STALLED: f64 = 0.5;
-
-/// See [`ROUND_OFF`]: one such cycle may be chance.
-const MAX_STALLED: u32 = 2;
-
 /// Fields of one batch on every level; allocated once per thread, used for batch after batch.
 #[derive(Debug)]
 pub struct Workspace {
@@ -57,87 +47,13 @@ pub struct Workspace {
     dense: bool,
 }
 
-/// How one batch converged.
-#[derive(Clone, Debug, Default)]
-pub struct BatchReport {
-    /// For each V-cycle on the finest level, the square of the error that it is expected to leave: Eq. 2's norm of the
-    /// coarse correction for this batch's columns, root-mean-squared over coarse cells, times the contraction.
-    pub delta_squares: Vec<f64>,
-    /// For each V-cycle, the sum of squared residuals divided by the number of unknowns.
-    pub residual_squares: Vec<f64>,
-    /// Whether the error is expected to be below the threshold. It never is below f32's round-off, where cycles end.
-    pub converged: bool,
-}
-
-/// When a batch is done.
-#[derive(Clone, Copy, Debug)]
-pub struct Stop {
-    /// Threshold for the batch's share of the error's norm.
-    pub tolerance: f64,
-    /// Largest number of V-cycles on the finest level.
-    pub max_cycles: u32,
-}
-
-/// A batch's way to convergence: the stop rule, the same on every back end.
-#[derive(Clone, Debug)]
-pub struct Convergence {
-    stop: Stop,
-    report: BatchReport,
-    /// Norm of the latest coarse correction.
-    correction: f64,
-    delta: f64,
-    /// Cycles in a row that only moved rounding about.
-    stalled: u32,
-}
-
-impl Convergence {
-    /// Before the first cycle.
-    #[must_use]
-    pub fn new(stop: Stop) -> Self {
-        let report = BatchReport::default();
-        Self { stop, report, correction: f64::INFINITY, delta: f64::INFINITY, stalled: 0 }
-    }
-
-    /// Takes down a cycle by the squared norm of its coarse correction and its mean squared residual; true when it was
-    /// the last: the error that its contraction lets expect is below the threshold, the limit is reached, or f32 has
-    /// no more digits.
-    pub fn cycle_done(&mut self, correction_square: f64, residual_square: f64) -> bool {
-        let correction = correction_square.sqrt();
-        let delta = (correction / self.correction).clamp(CONTRACTION, 1.0) * correction;
-        self.report.delta_squares.push(delta * delta);
-        self.report.residual_squares.push(residual_square);
-        self.report.converged = delta <= self.stop.tolerance;
-        let stalls = correction < ROUND_OFF && correction > STALLED * self.correction;
-        self.stalled = if stalls { self.stalled + 1 } else { 0 };
-        (self.correction, self.delta) = (correction, delta);
-        self.report.converged
-            || self.stalled == MAX_STALLED
-            || self.report.delta_squares.len() >= self.stop.max_cycles as usize
-    }
-
-    /// Number and delta of the latest cycle.
-    #[must_use]
-    pub fn latest(&self) -> (u32, f64) {
-        (self.report.delta_squares.len() as u32, self.delta)
-    }
-
-    /// The report.
-    #[must_use]
-    pub fn into_report(self) -> BatchReport {
-        self.report
-    }
-}
-
-/// Delta and residual of all batches together after each cycle: batches add up in squares.
-#[must_use]
-pub fn histories(reports: &[&BatchReport]) -> [Vec<f32>; 2] {
-    let history = |of: fn(&BatchReport) -> &[f64]| -> Vec<f32> {
-        let longest = reports.iter().map(|r| of(r).len()).max().unwrap_or(0);
-        // A batch that was done earlier keeps what its last cycle left.
-        let at = |r: &&BatchReport, k: usize| of(r).get(k).or(of(r).last()).copied();
-        (0..longest).map(|k| reports.iter().filter_map(|r| at(r, k)).sum::<f64>().sqrt() as f32).collect()
-    };
-    [history(|r| &r.delta_squares), history(|r| &r.residual_squares)]
+/// What a cycle finds on its level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Start {
+    /// A guess, or what the last cycle left.
+    Guess,
+    /// Nothing: the correction starts from zero, and what the rows hold does not count. Coarse levels only.
+    Zero,
 }
 
 impl Workspace {
@@ -190,7 +106,7 @@ impl Workspace {
                 first_guess(&hierarchy.levels[k], &hierarchy.transfers[k], &coarse[0], &mut fine[k]);
             }
             if k > 0 {
-                self.cycle(hierarchy, k);
+                self.cycle(hierarchy, k, Start::Guess);
             }
         }
         self.cycles(hierarchy, stop, cycle_done)
@@ -205,7 +121,7 @@ impl Workspace {
     ) -> Option<BatchReport> {
         let mut convergence = Convergence::new(stop);
         loop {
-            let (delta_square, residual_square) = self.cycle(hierarchy, 0);
+            let (delta_square, residual_square) = self.cycle(hierarchy, 0, Start::Guess);
             let done = convergence.cycle_done(delta_square, residual_square);
             let (cycle, delta) = convergence.latest();
             if !cycle_done(cycle, delta) {
@@ -232,26 +148,28 @@ impl Workspace {
 
     /// One V(2,1) cycle on the finest level, after [`Self::solve`] has set up a batch: for measuring.
     pub fn v_cycle(&mut self, hierarchy: &Hierarchy) {
-        self.cycle(hierarchy, 0);
+        self.cycle(hierarchy, 0, Start::Guess);
     }
 
     /// One V(2,1) cycle from level k down. Returns (squared norm of the coarse correction, mean squared residual).
-    fn cycle(&mut self, hierarchy: &Hierarchy, k: usize) -> (f64, f64) {
+    fn cycle(&mut self, hierarchy: &Hierarchy, k: usize, start: Start) -> (f64, f64) {
         let level = &hierarchy.levels[k];
         let (f, coarse_f) = self.f.split_at_mut(k + 1);
         let rhs = if k == 0 && !self.dense { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) };
         if k + 1 == hierarchy.levels.len() {
+            if start == Start::Zero {
+                self.u[k].fill(ZERO);
+            }
             return relax_coarsest(level, &mut self.u[k], rhs);
         }
         let (coarse, transfer) = (&hierarchy.levels[k + 1], &hierarchy.transfers[k]);
         let residual = &mut self.residual[..level.first_row(1)];
-        let squares = pre_smooth(level, &mut self.u[k], rhs, residual);
+        let squares = pre_smooth(level, &mut self.u[k], rhs, start, residual);
         dispatch(
             #[inline(always)]
             || restrict_residual(coarse, transfer, residual, &mut coarse_f[0]),
         );
-        self.u[k + 1].fill(ZERO);
-        self.cycle(hierarchy, k + 1);
+        self.cycle(hierarchy, k + 1, Start::Zero);
         let (f, _) = self.f.split_at(k + 1);
         let rhs = if k == 0 && !self.dense { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) };
         let (fine_u, coarse_u) = self.u.split_at_mut(k + 1);
@@ -275,18 +193,31 @@ fn first_guess(level: &Level, transfer: &Transfer, coarse: &[Row], u: &mut [Row]
 
 /// Two red-black sweeps, the first one's black half over-relaxed, and the residual of the red cells behind them.
 /// Returns the sum of its squares.
-fn pre_smooth(level: &Level, u: &mut [Row], f: Rhs<'_>, residual: &mut [Row]) -> f64 {
+fn pre_smooth(level: &Level, u: &mut [Row], f: Rhs<'_>, start: Start, residual: &mut [Row]) -> f64 {
     dispatch(
         #[inline(always)]
         || {
+            // The row for neighbours that are no unknowns.
+            if let Some(zero) = residual.last_mut() {
+                *zero = ZERO;
+            }
+            // From zero, the first sweep need not read what it overwrites.
+            let from_zero = if let (Start::Zero, Rhs::Dense(f)) = (start, f) { Some(f) } else { None };
             let n = level.grid.dims[2] as usize;
             let mut squares = ZERO;
             for step in 0..n + 4 {
                 if step < n {
-                    relax_plane(level, 0, step, u, f);
+                    match from_zero {
+                        Some(f) => relax_zeros_plane(level, step, u, f),
+                        None => relax_plane(level, 0, step, u, f),
+                    }
                 }
                 if (1..n + 1).contains(&step) {
-                    over_relax_plane(level, 1, step - 1, OMEGA, u, f);
+                    if from_zero.is_some() {
+                        over_relax_zeros_plane(level, 1, step - 1, OMEGA, u, f);
+                    } else {
+                        over_relax_plane(level, 1, step - 1, OMEGA, u, f);
+                    }
                 }
                 if (2..n + 2).contains(&step) {
                     relax_plane(level, 0, step - 2, u, f);
@@ -297,10 +228,6 @@ fn pre_smooth(level: &Level, u: &mut [Row], f: Rhs<'_>, residual: &mut [Row]) ->
                 if step >= 4 {
                     residual_plane(level, step - 4, u, f, residual, &mut squares);
                 }
-            }
-            // The row for neighbours that are no unknowns.
-            if let Some(zero) = residual.last_mut() {
-                *zero = ZERO;
             }
             squares.iter().map(|&s| f64::from(s)).sum()
         },

@@ -65,17 +65,29 @@ fn add(sum: &mut Row, row: &Row) {
     }
 }
 
-/// Calls `each(row of out, cell, sum of neighbours + right-hand side, diagonal)` for each cell of a colour's plane.
+/// One cell of a plane under way.
+struct Visit {
+    /// The cell, within its colour.
+    cell: usize,
+    /// What it holds, if that was asked for; else zero.
+    old: Row,
+    /// Sum of its neighbours and its right-hand side.
+    sum: Row,
+    diagonal: f32,
+}
+
+/// Calls `each(row of out, visit)` for each cell of a colour's plane; `old`, if `OLD`, is the field that [`Visit::old`]
+/// comes from, else it may be empty.
 ///
-/// `out` is handed over row by row from slices cut once per run, so that whole runs need no check of an index.
+/// Rows are handed over from slices cut once per run, so that whole runs need no check of an index.
 #[inline(always)]
-fn visit_plane(
+fn visit_plane<const OLD: bool>(
     colour: &Colour,
     plane: usize,
-    other: &[Row],
+    [old, other]: [&[Row]; 2],
     rhs: ColourRhs<'_>,
     out: &mut [Row],
-    mut each: impl FnMut(&mut Row, usize, Row, f32),
+    mut each: impl FnMut(&mut Row, Visit),
 ) {
     let ([run, cut], [run_end, cut_end]) = (colour.planes[plane], colour.planes[plane + 1]);
     for run in &colour.runs[run as usize..run_end as usize] {
@@ -84,6 +96,7 @@ fn visit_plane(
         let (low, high) = (part(run.x, n), part(run.x + 1, n));
         let [my, py, mz, pz] = run.yz.map(|first| part(first, n));
         let out = &mut out[start..start + n];
+        let old = if OLD { &old[start..start + n] } else { &[] };
         let f = match rhs {
             ColourRhs::Cut(_) => None,
             ColourRhs::Dense(rows) => Some(&rows[start..start + n]),
@@ -96,55 +109,89 @@ fn visit_plane(
             if let Some(f) = f {
                 add(&mut sum, &f[j]);
             }
-            each(&mut out[j], start + j, sum, 6.0);
+            let old = if OLD { old[j] } else { ZERO };
+            each(&mut out[j], Visit { cell: start + j, old, sum, diagonal: 6.0 });
         }
     }
-    for (number, cell) in (cut as usize..).zip(&colour.cut[cut as usize..cut_end as usize]) {
+    for (number, cut) in (cut as usize..).zip(&colour.cut[cut as usize..cut_end as usize]) {
+        let cell = cut.cell as usize;
         let mut sum = match rhs {
             ColourRhs::Cut(rows) => rows[number],
-            ColourRhs::Dense(rows) => rows[cell.cell as usize],
+            ColourRhs::Dense(rows) => rows[cell],
         };
-        for n in cell.neighbours {
+        for n in cut.neighbours {
             add(&mut sum, &other[n as usize]);
         }
-        each(&mut out[cell.cell as usize], cell.cell as usize, sum, cell.diagonal);
+        let old = if OLD { old[cell] } else { ZERO };
+        each(&mut out[cell], Visit { cell, old, sum, diagonal: cut.diagonal });
     }
 }
 
 /// Gauss-Seidel on one plane of one colour: `u = (sum of neighbours + f) / diagonal`.
 #[inline(always)]
 pub fn relax_plane(level: &Level, colour: usize, plane: usize, u: &mut [Row], rhs: Rhs<'_>) {
+    over_relax_zeros_plane(level, colour, plane, 1.0, u, rhs);
+}
+
+/// [`over_relax_plane`] where this colour is still zero, whatever its rows hold.
+#[inline(always)]
+pub fn over_relax_zeros_plane(
+    level: &Level,
+    colour: usize,
+    plane: usize,
+    omega: f32,
+    u: &mut [Row],
+    rhs: Rhs<'_>,
+) {
     let (own, other) = split(level, u, colour);
-    visit_plane(
+    visit_plane::<false>(
         &level.colours[colour],
         plane,
-        other,
+        [&[], other],
         rhs.of(level, colour),
         own,
         #[inline(always)]
-        |row, _, sum, diagonal| {
-            let inverse = 1.0 / diagonal;
-            *row = sum.map(|s| s * inverse);
+        |row, visit| {
+            let scale = omega / visit.diagonal;
+            *row = visit.sum.map(|s| s * scale);
         },
     );
+}
+
+/// [`relax_plane`] of red cells where both colours are still zero, whatever their rows hold: `u = f / diagonal`, from
+/// a right-hand side with a row per cell.
+#[inline(always)]
+pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: &[Row]) {
+    let red = &level.colours[0];
+    let ([run, cut], [run_end, cut_end]) = (red.planes[plane], red.planes[plane + 1]);
+    for run in &red.runs[run as usize..run_end as usize] {
+        let cells = run.start as usize..(run.start + run.len) as usize;
+        for (row, f) in u[cells.clone()].iter_mut().zip(&rhs[cells]) {
+            *row = f.map(|f| f * (1.0 / 6.0));
+        }
+    }
+    for cut in &red.cut[cut as usize..cut_end as usize] {
+        let inverse = 1.0 / cut.diagonal;
+        u[cut.cell as usize] = rhs[cut.cell as usize].map(|f| f * inverse);
+    }
 }
 
 /// [`relax_plane`] that goes `omega` times as far.
 #[inline(always)]
 pub fn over_relax_plane(level: &Level, colour: usize, plane: usize, omega: f32, u: &mut [Row], rhs: Rhs<'_>) {
     let (own, other) = split(level, u, colour);
-    visit_plane(
+    visit_plane::<false>(
         &level.colours[colour],
         plane,
-        other,
+        [&[], other],
         rhs.of(level, colour),
         own,
         #[inline(always)]
-        |row, _, sum, diagonal| {
-            let scale = omega / diagonal;
+        |row, visit| {
+            let scale = omega / visit.diagonal;
             let old = *row;
             for k in 0..LANES {
-                row[k] = old[k] * (1.0 - omega) + sum[k] * scale;
+                row[k] = old[k] * (1.0 - omega) + visit.sum[k] * scale;
             }
         },
     );
@@ -162,15 +209,14 @@ pub fn residual_plane(
 ) {
     let (own, other) = split(level, u, 0);
     let mut sum_squares = *squares;
-    visit_plane(
+    visit_plane::<true>(
         &level.colours[0],
         plane,
-        other,
+        [own, other],
         rhs.of(level, 0),
         residual,
         #[inline(always)]
-        |out, cell, sum, diagonal| {
-            let old = own[cell];
+        |out, Visit { old, sum, diagonal, .. }| {
             let mut r = ZERO;
             for k in 0..LANES {
                 r[k] = sum[k] - diagonal * old[k];
@@ -198,16 +244,15 @@ pub fn jacobi_plane<const ABSOLUTE: bool>(
 ) {
     let (old, other) = split(level, old, colour);
     let (new, _) = split(level, new, colour);
-    visit_plane(
+    visit_plane::<true>(
         &level.colours[colour],
         plane,
-        other,
+        [old, other],
         rhs.of(level, colour),
         new,
         #[inline(always)]
-        |out, cell, sum, diagonal| {
+        |out, Visit { cell, old, sum, diagonal }| {
             let inverse = 1.0 / diagonal;
-            let old = old[cell];
             let (mut new, mut change) = (ZERO, ZERO);
             for k in 0..LANES {
                 new[k] = sum[k] * inverse;

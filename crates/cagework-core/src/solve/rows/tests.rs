@@ -57,6 +57,25 @@ fn plain_sums(
 }
 
 #[test]
+fn sweeps_from_zero_match_sweeps_of_zeros() {
+    on_two_levels(|_, level, _| {
+        let (_, dense) = rhs(level);
+        let mut expected = vec![ZERO; level.n_rows()];
+        // What rows hold must not count, but for the two that stay zero.
+        let mut u = some_field(level, 1);
+        for plane in 0..level.grid.dims[2] as usize {
+            relax_plane(level, 0, plane, &mut expected, Rhs::Dense(&dense));
+            relax_zeros_plane(level, plane, &mut u, &dense);
+        }
+        for plane in 0..level.grid.dims[2] as usize {
+            over_relax_plane(level, 1, plane, 1.2, &mut expected, Rhs::Dense(&dense));
+            over_relax_zeros_plane(level, 1, plane, 1.2, &mut u, Rhs::Dense(&dense));
+        }
+        assert_rows_close(&u, &expected, REORDERED);
+    });
+}
+
+#[test]
 fn half_sweeps_match_plain_loops() {
     on_two_levels(|_, level, boundary| {
         let (cut, dense) = rhs(level);
