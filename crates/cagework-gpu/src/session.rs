@@ -3,6 +3,7 @@
 //! The same type serves tests, the command and the page. A page has two: one draws and deforms on its main thread, one
 //! binds in a worker and hands over weights ([`Session::bind`] there, [`Session::adopt`] here).
 
+mod again;
 mod picture;
 
 use std::sync::Arc;
@@ -80,7 +81,7 @@ impl Session {
             return Err(GpuError::Model { reason });
         }
         self.drop_weights();
-        let normals = vertex_normals(&model.positions, &model.shading_triangles());
+        let normals = vertex_normals(&model.with_copies(&model.positions), &model.shading_triangles());
         self.renderer.set_model(&self.context, &model, &normals).await?;
         self.model = Some(model);
         self.update_bounds();
@@ -119,7 +120,7 @@ impl Session {
     ) -> Result<BindReport, GpuError> {
         let (model, cage) = self.parts()?;
         let (binding, weights) = bind_gpu(&model.positions, cage, options, progress, &self.context).await?;
-        self.bound(binding.weights, binding.outside, &weights).await?;
+        self.bound(binding.weights, binding.outside, Some(weights)).await?;
         Ok(binding.report)
     }
 
@@ -145,8 +146,7 @@ impl Session {
             let reason = "a vertex outside the cage, or its triangle, does not exist".to_owned();
             return Err(GpuError::Model { reason });
         }
-        let on_gpu = GpuWeights::new(&self.context, &weights, &outside).await?;
-        self.bound(weights, outside, &on_gpu).await
+        self.bound(weights, outside, None).await
     }
 
     fn parts(&self) -> Result<(&DrawModel, &Cage), GpuError> {
@@ -161,10 +161,15 @@ impl Session {
         &mut self,
         weights: Weights,
         outside: Vec<OutsideVertex>,
-        on_gpu: &GpuWeights,
+        on_gpu: Option<GpuWeights>,
     ) -> Result<(), GpuError> {
         let (model, _) = self.parts()?;
-        let deformer = Deformer::new(&self.context, on_gpu, &model.shading_triangles()).await?;
+        let on_gpu = match (model.moved_with_copies(&weights, &outside), on_gpu) {
+            (Some((weights, outside)), _) => GpuWeights::new(&self.context, &weights, &outside).await?,
+            (None, Some(on_gpu)) => on_gpu,
+            (None, None) => GpuWeights::new(&self.context, &weights, &outside).await?,
+        };
+        let deformer = Deformer::new(&self.context, &on_gpu, &model.shading_triangles()).await?;
         deformer.pose(&self.context, &self.pose);
         self.renderer.set_vertices(&self.context, Some([deformer.positions(), deformer.normals()]));
         self.bound = Some(Bound { weights, outside, deformer });
@@ -252,7 +257,7 @@ impl Session {
             }
             MeshStyle::Hidden | MeshStyle::Solid | MeshStyle::Clay => return,
         };
-        self.renderer.set_values(&self.context, &values, range);
+        self.renderer.set_values(&self.context, &model.with_copies(&values), range);
     }
 
     /// Values of the first and the last colour of the scene's heat map, for a legend: weights, or logarithms to base 10
@@ -359,48 +364,12 @@ impl Session {
             // Again even if nothing moved: it costs a millisecond, and a frame may not have been drawn yet.
             Some(bound) => {
                 bound.deformer.run(&self.context).await?;
-                bound.deformer.read_positions(&self.context).await
+                let mut positions = bound.deformer.read_positions(&self.context).await?;
+                // Copies of vertices come last.
+                positions.truncate(model.positions.len());
+                Ok(positions)
             }
             None => Ok(model.positions.clone()),
         }
-    }
-
-    /// Another session on the same GPU with the same model, cage and pose, for other weights to compare with.
-    ///
-    /// # Errors
-    /// [`GpuError::NotReady`] without model or cage; otherwise as the calls that set them.
-    pub async fn twin(&self) -> Result<Self, GpuError> {
-        let (_, cage) = self.parts()?;
-        let mut twin = Self::new(self.context.clone());
-        if let Some(model) = &self.model {
-            twin.set_shared_model(Arc::clone(model)).await?;
-        }
-        twin.set_cage(cage).await?;
-        twin.pose(&self.pose);
-        twin.set_scene(self.scene.clone());
-        Ok(twin)
-    }
-
-    /// Everything again on another device, after this one was lost: model, cage, weights, pose, scene, camera.
-    ///
-    /// # Errors
-    /// As the calls that set them.
-    pub async fn recover(self, context: GpuContext) -> Result<Self, GpuError> {
-        let mut session = Self::new(context);
-        session.camera = self.camera;
-        if let Some(model) = self.model {
-            session.set_shared_model(model).await?;
-        }
-        if let Some(cage) = &self.cage {
-            session.set_cage(cage).await?;
-        }
-        if let Some(bound) = self.bound {
-            session.adopt(bound.weights, bound.outside).await?;
-        }
-        if !self.pose.is_empty() {
-            session.pose(&self.pose);
-        }
-        session.set_scene(self.scene);
-        Ok(session)
     }
 }

@@ -212,7 +212,7 @@ fn color(active: Option<GizmoPart>, part: GizmoPart, own: usize, alpha: f32) -> 
 fn facing_shape(mode: GizmoMode, active: Option<GizmoPart>) -> Vec<Vertex> {
     let mut out = Vec::new();
     if mode == GizmoMode::Rotate {
-        ring(&mut out, 2, [VIEW_RING, TUBE], color(active, GizmoPart::View, 3, 1.0));
+        ring(&mut out, 2, [VIEW_RING, TUBE], color(active, GizmoPart::View, 4, 1.0));
     }
     out
 }

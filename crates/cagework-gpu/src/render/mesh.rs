@@ -56,10 +56,11 @@ impl Mesh {
                 context.queue.write_buffer(buffer, 0, bytes);
             }
         }
-        let padded: Vec<[f32; 4]> = model.positions.iter().map(|p| p.extend(1.0).to_array()).collect();
+        let positions = model.with_copies(&model.positions);
+        let padded: Vec<[f32; 4]> = positions.iter().map(|p| p.extend(1.0).to_array()).collect();
         let rest = allocator.table("rest positions", &padded).await?;
         let rest_normals = allocator.table("rest normals", normals).await?;
-        let values = allocator.storage("values of vertices", 4 * model.positions.len() as u64).await?;
+        let values = allocator.storage("values of vertices", 4 * positions.len() as u64).await?;
         let white = texture::upload(
             context,
             &DrawTexture { width: 1, height: 1, rgba: vec![255; 4], ..DrawTexture::default() },
@@ -78,7 +79,7 @@ impl Mesh {
             groups.push(Group::new(context, layouts, &mut allocator, &group, view, wrap).await?);
         }
         let vertices = bind_vertices(context, layouts, [&rest, &rest_normals, &values]);
-        let n_vertices = model.positions.len() as u32;
+        let n_vertices = positions.len() as u32;
         let positions = rest.clone();
         Ok(Self { corners, indices, groups, rest, rest_normals, values, vertices, positions, n_vertices })
     }

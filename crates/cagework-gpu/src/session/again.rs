@@ -1,0 +1,48 @@
+//! A session made again: beside the first, or on another device.
+
+use std::sync::Arc;
+
+use super::Session;
+use crate::device::GpuContext;
+use crate::error::GpuError;
+
+impl Session {
+    /// Another session on the same GPU with the same model, cage and pose, for other weights to compare with.
+    ///
+    /// # Errors
+    /// [`GpuError::NotReady`] without model or cage; otherwise as the calls that set them.
+    pub async fn twin(&self) -> Result<Self, GpuError> {
+        let (_, cage) = self.parts()?;
+        let mut twin = Self::new(self.context.clone());
+        if let Some(model) = &self.model {
+            twin.set_shared_model(Arc::clone(model)).await?;
+        }
+        twin.set_cage(cage).await?;
+        twin.pose(&self.pose);
+        twin.set_scene(self.scene.clone());
+        Ok(twin)
+    }
+
+    /// Everything again on another device, after this one was lost: model, cage, weights, pose, scene, camera.
+    ///
+    /// # Errors
+    /// As the calls that set them.
+    pub async fn recover(self, context: GpuContext) -> Result<Self, GpuError> {
+        let mut session = Self::new(context);
+        session.camera = self.camera;
+        if let Some(model) = self.model {
+            session.set_shared_model(model).await?;
+        }
+        if let Some(cage) = &self.cage {
+            session.set_cage(cage).await?;
+        }
+        if let Some(bound) = self.bound {
+            session.adopt(bound.weights, bound.outside).await?;
+        }
+        if !self.pose.is_empty() {
+            session.pose(&self.pose);
+        }
+        session.set_scene(self.scene);
+        Ok(session)
+    }
+}
