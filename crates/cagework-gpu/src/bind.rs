@@ -24,6 +24,9 @@ const JACOBI_DECADES: f32 = 4.0;
 /// V-cycles that a batch usually takes: for the progress bar only.
 const USUAL_CYCLES: f32 = 5.0;
 
+/// What a bind makes room for, in error messages.
+const ROOM: &str = "the fields of a bind";
+
 /// What a solve leaves besides its blocks.
 #[derive(Default)]
 struct Outcome {
@@ -33,6 +36,8 @@ struct Outcome {
     delta_interval: u32,
     residual_history: Vec<f32>,
     solve_ms: f64,
+    /// Bytes on the GPU.
+    allocated: u64,
 }
 
 /// [`cagework_core::bind()`] on the GPU: the same grid, stencils and assembly, the same weights to 1e-4. The weights are
@@ -68,16 +73,10 @@ async fn solve_and_sample(
         Plan::new(hierarchy, stencils, options.solver, context.max_binding_bytes, options.memory_limit)?;
     let mut blocks: Vec<Vec<Row>> = vec![vec![ZERO; stencils.len()]; hierarchy.n_columns.div_ceil(LANES)];
     let began = watch.now_ms();
-    let mut allocator = Allocator::new(context);
     let mut stream = Stream::new(context, watch).await?;
-    let sampler = Sampler::new(&mut allocator, stencils, &plan).await?;
     let outcome = match options.solver {
-        Solver::Multigrid => {
-            multigrid(prepared, options, &plan, &mut stream, &mut allocator, &sampler, &mut blocks).await?
-        }
-        Solver::Jacobi => {
-            jacobi(prepared, options, &plan, &mut stream, &mut allocator, &sampler, &mut blocks).await?
-        }
+        Solver::Multigrid => multigrid(prepared, options, &plan, &mut stream, &mut blocks).await?,
+        Solver::Jacobi => jacobi(prepared, options, &plan, &mut stream, &mut blocks).await?,
     };
     let all_ms = watch.now_ms() - began;
     Ok(Solved {
@@ -87,7 +86,7 @@ async fn solve_and_sample(
         delta_history: outcome.delta_history,
         delta_interval: outcome.delta_interval,
         residual_history: outcome.residual_history,
-        field_bytes: allocator.allocated() as usize,
+        field_bytes: outcome.allocated as usize,
         planned_bytes: plan.bytes(),
         solve_share: if all_ms > 0.0 { outcome.solve_ms / all_ms } else { 1.0 },
         adapter: Some(context.adapter_name()),
@@ -99,8 +98,6 @@ async fn multigrid(
     options: &BindOptions,
     plan: &Plan,
     stream: &mut Stream<'_>,
-    allocator: &mut Allocator<'_>,
-    sampler: &Sampler,
     blocks: &mut [Vec<Row>],
 ) -> Result<Outcome, GpuError> {
     let hierarchy = prepared.hierarchy();
@@ -110,7 +107,10 @@ async fn multigrid(
         tolerance: f64::from(options.tau) / f64::from(plan.n_batches).sqrt(),
         max_cycles: options.max_iterations,
     };
-    let mut multigrid = Multigrid::new(stream, allocator, hierarchy, plan).await?;
+    let mut allocator = Allocator::new(stream.context(), ROOM);
+    let sampler = Sampler::new(&mut allocator, prepared.stencils(), plan)?;
+    let mut multigrid = Multigrid::new(stream, &mut allocator, hierarchy, plan)?;
+    let allocated = allocator.settle().await?;
     let mut solve_ms = stream.now_ms() - began;
     let mut reports: Vec<BatchReport> = Vec::new();
     for batch in 0..plan.n_batches {
@@ -135,6 +135,7 @@ async fn multigrid(
         delta_interval: 1,
         residual_history,
         solve_ms,
+        allocated,
     })
 }
 
@@ -143,13 +144,14 @@ async fn jacobi(
     options: &BindOptions,
     plan: &Plan,
     stream: &mut Stream<'_>,
-    allocator: &mut Allocator<'_>,
-    sampler: &Sampler,
     blocks: &mut [Vec<Row>],
 ) -> Result<Outcome, GpuError> {
     let began = stream.now_ms();
     let stop = StopRule { tau: options.tau, max_sweeps: options.max_iterations, norm: options.delta_norm };
-    let jacobi = Jacobi::new(stream, allocator, prepared.hierarchy(), plan).await?;
+    let mut allocator = Allocator::new(stream.context(), ROOM);
+    let sampler = Sampler::new(&mut allocator, prepared.stencils(), plan)?;
+    let jacobi = Jacobi::new(stream, &mut allocator, prepared.hierarchy(), plan)?;
+    let allocated = allocator.settle().await?;
     let (sweeps, report) = jacobi
         .solve(stream, stop, |stream, sweeps, delta| {
             let to_go = (delta / options.tau).max(1.0).log10() / JACOBI_DECADES;
@@ -168,5 +170,6 @@ async fn jacobi(
         delta_interval: INTERVAL,
         residual_history: Vec::new(),
         solve_ms,
+        allocated,
     })
 }

@@ -10,32 +10,60 @@ use crate::plan::PlanError;
 /// Smallest buffer: bindings must not be empty, and no kernel reads more of an empty one.
 const MIN_BYTES: u64 = 16;
 
-/// Makes buffers and notices when there is no memory left.
+/// Makes the buffers and textures of one thing and notices when there is no memory left.
+///
+/// A GPU answers late: behind all frames under way. So everything is made, filled and bound first, which never waits,
+/// and asked about once, by [`Self::settle`]; whatever went wrong until then went wrong here. (Opening a page on a
+/// software GPU, an answer for each buffer took 2 s.)
 #[derive(Debug)]
+#[must_use = "nothing is known to be there before it has settled"]
 pub struct Allocator<'a> {
     context: &'a GpuContext,
+    what: &'static str,
     allocated: u64,
+    // In the order in which they have to be popped.
+    memory: wgpu::ErrorScopeGuard,
+    refused: wgpu::ErrorScopeGuard,
 }
 
 impl<'a> Allocator<'a> {
-    /// An allocator that has made nothing yet.
-    #[must_use]
-    pub fn new(context: &'a GpuContext) -> Self {
-        Self { context, allocated: 0 }
+    /// An allocator for `what`, as error messages call it, that has made nothing yet. Until it settles, nothing may be
+    /// awaited: the device's errors are its own.
+    pub fn new(context: &'a GpuContext, what: &'static str) -> Self {
+        let refused = context.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let memory = context.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        Self { context, what, allocated: 0, memory, refused }
     }
 
-    /// Bytes of all buffers made.
-    #[must_use]
-    pub fn allocated(&self) -> u64 {
-        self.allocated
+    /// Waits for the GPU's answer; bytes of everything made.
+    ///
+    /// # Errors
+    /// [`GpuError::OutOfMemory`], [`GpuError::Refused`], [`GpuError::DeviceLost`].
+    pub async fn settle(self) -> Result<u64, GpuError> {
+        // Popped before anything is awaited: other work may push scopes of its own meanwhile.
+        let (memory, refused) = (self.memory.pop(), self.refused.pop());
+        let (no_memory, refusal) = (memory.await, refused.await);
+        // A lost device refuses everything, and that it is lost is the better message.
+        self.context.check()?;
+        if no_memory.is_some() {
+            return Err(GpuError::OutOfMemory { what: self.what.to_owned(), bytes: self.allocated });
+        }
+        if let Some(error) = refusal {
+            return Err(GpuError::Refused { reason: error.to_string() });
+        }
+        Ok(self.allocated)
+    }
+
+    /// What is made elsewhere, but belongs to it.
+    pub(crate) fn count(&mut self, bytes: u64) {
+        self.allocated += bytes;
     }
 
     /// A buffer of zeros.
     ///
     /// # Errors
-    /// [`PlanError::Binding`] for a storage buffer that is larger than a binding may be, [`GpuError::OutOfMemory`],
-    /// [`GpuError::Refused`], [`GpuError::DeviceLost`].
-    pub async fn zeros(
+    /// [`PlanError::Binding`] for a storage buffer that is larger than a binding may be.
+    pub fn zeros(
         &mut self,
         what: &'static str,
         bytes: u64,
@@ -46,46 +74,31 @@ impl<'a> Allocator<'a> {
         if usage.contains(wgpu::BufferUsages::STORAGE) && bytes > limit {
             return Err(PlanError::Binding { what, needed: bytes, limit }.into());
         }
-        let device = &self.context.device;
-        let refused = device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        self.allocated += bytes;
+        Ok(self.context.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(what),
             size: bytes,
             usage,
             mapped_at_creation: false,
-        });
-        // Popped before anything is awaited: other work may push scopes of its own meanwhile.
-        let (memory, refused) = (memory.pop(), refused.pop());
-        let (no_memory, refusal) = (memory.await, refused.await);
-        // A lost device refuses everything, and that it is lost is the better message.
-        self.context.check()?;
-        if no_memory.is_some() {
-            return Err(GpuError::OutOfMemory { what: what.to_owned(), bytes });
-        }
-        if let Some(error) = refusal {
-            return Err(GpuError::Refused { reason: error.to_string() });
-        }
-        self.allocated += bytes;
-        Ok(buffer)
+        }))
     }
 
     /// A storage buffer of zeros that can be copied from and to.
     ///
     /// # Errors
     /// As [`Self::zeros`].
-    pub async fn storage(&mut self, what: &'static str, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
+    pub fn storage(&mut self, what: &'static str, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
-        self.zeros(what, bytes, usage).await
+        self.zeros(what, bytes, usage)
     }
 
     /// A storage buffer that holds `data`.
     ///
     /// # Errors
     /// As [`Self::zeros`].
-    pub async fn table<T: Pod>(&mut self, what: &'static str, data: &[T]) -> Result<wgpu::Buffer, GpuError> {
+    pub fn table<T: Pod>(&mut self, what: &'static str, data: &[T]) -> Result<wgpu::Buffer, GpuError> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
-        let buffer = self.storage(what, bytes.len() as u64).await?;
+        let buffer = self.storage(what, bytes.len() as u64)?;
         if !bytes.is_empty() {
             self.context.queue.write_buffer(&buffer, 0, bytes);
         }
@@ -96,9 +109,9 @@ impl<'a> Allocator<'a> {
     ///
     /// # Errors
     /// As [`Self::zeros`].
-    pub async fn readback(&mut self, what: &'static str, bytes: u64) -> Result<Readback, GpuError> {
+    pub fn readback(&mut self, what: &'static str, bytes: u64) -> Result<Readback, GpuError> {
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-        Ok(Readback { buffer: self.zeros(what, bytes, usage).await? })
+        Ok(Readback { buffer: self.zeros(what, bytes, usage)? })
     }
 }
 

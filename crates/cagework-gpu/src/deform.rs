@@ -47,13 +47,13 @@ impl GpuWeights {
     /// Uploads weights and outside vertices.
     ///
     /// # Errors
-    /// As [`Allocator::zeros`].
+    /// As [`Allocator::zeros`] and [`Allocator::settle`].
     pub async fn new(
         context: &GpuContext,
         weights: &Weights,
         outside: &[OutsideVertex],
     ) -> Result<Self, GpuError> {
-        let mut allocator = Allocator::new(context);
+        let mut allocator = Allocator::new(context, "the weights");
         let sliced = SlicedWeights::new(weights);
         let n_vertices = weights.n_rows() as u32;
         let slice_bytes = (SLICE * size_of::<[f32; BUNDLE]>()) as u64;
@@ -71,21 +71,23 @@ impl GpuWeights {
             parts.push(Part {
                 first_vertex: first_vertex as u32,
                 n_vertices: ((end - begin) * SLICE * BUNDLE).min(n_vertices as usize - first_vertex) as u32,
-                slices: allocator.table("slices of weights", &starts).await?,
-                columns: allocator.table("columns of weights", &sliced.columns[entries.clone()]).await?,
-                weights: allocator.table("weights", &sliced.weights[entries]).await?,
+                slices: allocator.table("slices of weights", &starts)?,
+                columns: allocator.table("columns of weights", &sliced.columns[entries.clone()])?,
+                weights: allocator.table("weights", &sliced.weights[entries])?,
             });
             begin = end;
         }
         let table = OutsideTable::new(outside);
+        let corners = allocator.table("corners for outside vertices", &table.corners)?;
+        let offsets = allocator.table("offsets of outside vertices", &table.offsets)?;
         Ok(Self {
             parts,
-            corners: allocator.table("corners for outside vertices", &table.corners).await?,
-            offsets: allocator.table("offsets of outside vertices", &table.offsets).await?,
+            corners,
+            offsets,
             n_outside: outside.len() as u32,
             n_vertices,
             n_columns: weights.n_columns() as u32,
-            bytes: allocator.allocated(),
+            bytes: allocator.settle().await?,
         })
     }
 
@@ -112,29 +114,28 @@ impl Deformer {
     /// Makes vertex buffers for `weights` and the normals of `triangles`.
     ///
     /// # Errors
-    /// As [`Allocator::zeros`].
+    /// As [`Allocator::zeros`] and [`Allocator::settle`].
     pub async fn new(
         context: &GpuContext,
         weights: &GpuWeights,
         triangles: &[[u32; 3]],
     ) -> Result<Self, GpuError> {
-        let mut allocator = Allocator::new(context);
+        let mut allocator = Allocator::new(context, "the deformed mesh");
         let (n_vertices, n_columns) = (weights.n_vertices, weights.n_columns);
         let vertex_usage = wgpu::BufferUsages::VERTEX
             | wgpu::BufferUsages::STORAGE
             | wgpu::BufferUsages::COPY_SRC
             | wgpu::BufferUsages::COPY_DST;
         let vertex_bytes = u64::from(n_vertices) * size_of::<Vec4>() as u64;
-        let cage =
-            allocator.storage("cage vertices", u64::from(n_columns) * size_of::<Vec4>() as u64).await?;
-        let positions = allocator.zeros("positions", vertex_bytes, vertex_usage).await?;
-        let normals = allocator.zeros("normals", vertex_bytes, vertex_usage).await?;
+        let cage = allocator.storage("cage vertices", u64::from(n_columns) * size_of::<Vec4>() as u64)?;
+        let positions = allocator.zeros("positions", vertex_bytes, vertex_usage)?;
+        let normals = allocator.zeros("normals", vertex_bytes, vertex_usage)?;
         let table = NormalTable::new(n_vertices as usize, triangles);
-        let starts = allocator.table("starts of triangle lists", &table.starts).await?;
-        let others = allocator.table("triangle lists", &table.others).await?;
+        let starts = allocator.table("starts of triangle lists", &table.starts)?;
+        let others = allocator.table("triangle lists", &table.others)?;
         let n_steps = weights.parts.len() as u64 + 2;
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-        let works = allocator.zeros("work parameters", n_steps * WORK_STRIDE, usage).await?;
+        let works = allocator.zeros("work parameters", n_steps * WORK_STRIDE, usage)?;
 
         let launch = |kernel, buffers: &[&wgpu::Buffer]| {
             context.pipelines.launch(&context.device, kernel, &works, buffers)
@@ -154,6 +155,7 @@ impl Deformer {
         }
         let launch = launch(&kernels::VERTEX_NORMALS, &[&starts, &others, &positions, &deformer.normals]);
         deformer.add(context, &works, launch, 0, n_vertices);
+        allocator.settle().await?;
         Ok(deformer)
     }
 
@@ -260,7 +262,9 @@ pub(crate) async fn read_all<T: Pod>(
     if bytes == 0 {
         return Ok(Vec::new());
     }
-    let readback = Allocator::new(context).readback("results, read back", bytes).await?;
+    let mut allocator = Allocator::new(context, "results, read back");
+    let readback = allocator.readback("results, read back", bytes)?;
+    allocator.settle().await?;
     let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     encoder.copy_buffer_to_buffer(buffer, 0, &readback.buffer, 0, bytes);
     let submission = context.queue.submit([encoder.finish()]);

@@ -20,6 +20,9 @@ pub struct ContextOptions {
     pub adapter: Option<String>,
     /// Plan with storage bindings of at most this many bytes instead of the device's limit. For tests.
     pub max_binding_bytes: Option<u64>,
+    /// Make pipelines when they are first needed, for who draws and deforms: by default all are there before anything
+    /// is measured.
+    pub pipelines_later: bool,
 }
 
 /// A device, its queue, and the pipelines of all kernels. A clone is another handle to the same device.
@@ -122,7 +125,10 @@ impl GpuContext {
         let limits = device.limits();
         let max_binding_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let pipelines = Pipelines::new(&device);
+        let pipelines = Pipelines::default();
+        if !options.pipelines_later {
+            pipelines.make_all(&device);
+        }
         if let Some(error) = scope.pop().await {
             return Err(no_device(error.to_string()));
         }

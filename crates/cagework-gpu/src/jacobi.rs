@@ -46,23 +46,23 @@ impl Jacobi {
     ///
     /// # Errors
     /// As [`Allocator::zeros`].
-    pub async fn new(
+    pub fn new(
         stream: &Stream<'_>,
         allocator: &mut Allocator<'_>,
         hierarchy: &Hierarchy,
         plan: &Plan,
     ) -> Result<Self, GpuError> {
-        let level = GpuLevel::new(allocator, &hierarchy.levels[0], true).await?;
-        let changes = allocator.storage("changes", 4 * u64::from(level.n_rows)).await?;
-        let partials = allocator.storage("partial sums", 4 * u64::from(n_groups(level.n_rows))).await?;
-        let numbers = allocator.storage("numbers", 4).await?;
+        let level = GpuLevel::new(allocator, &hierarchy.levels[0], true)?;
+        let changes = allocator.storage("changes", 4 * u64::from(level.n_rows))?;
+        let partials = allocator.storage("partial sums", 4 * u64::from(n_groups(level.n_rows)))?;
+        let numbers = allocator.storage("numbers", 4)?;
         let (n_quads, n_lanes) = (plan.n_quads(), plan.n_lanes);
         let mut batches = Vec::new();
         let mut scratch = Vec::new();
         for batch in 0..plan.n_batches {
-            let rhs = level.rhs(allocator, n_quads).await?;
+            let rhs = level.rhs(allocator, n_quads)?;
             upload_rhs(stream.context(), hierarchy, 0, batch * n_lanes, n_lanes, &rhs, &mut scratch);
-            let fields = [level.field(allocator, n_quads).await?, level.field(allocator, n_quads).await?];
+            let fields = [level.field(allocator, n_quads)?, level.field(allocator, n_quads)?];
             let sweep = |from, to| {
                 stream.launch(
                     &kernels::JACOBI_CELLS,
@@ -77,7 +77,7 @@ impl Jacobi {
         Ok(Self {
             roots: stream.launch(&kernels::SUM_ROOTS, &[&changes, &partials]),
             sum: stream.launch(&kernels::REDUCE_SUM, &[&partials, &numbers]),
-            readback: allocator.readback("delta, read back", 4).await?,
+            readback: allocator.readback("delta, read back", 4)?,
             level,
             n_quads,
             batches,

@@ -40,13 +40,13 @@ impl GpuLevel {
     ///
     /// # Errors
     /// As [`Allocator::zeros`].
-    pub async fn new(allocator: &mut Allocator<'_>, level: &Level, finest: bool) -> Result<Self, GpuError> {
+    pub fn new(allocator: &mut Allocator<'_>, level: &Level, finest: bool) -> Result<Self, GpuError> {
         let table = LevelTable::new(level, finest);
         let colour = |c: usize| (level.first_row(c) as u32, level.colours[c].n_cells);
         Ok(Self {
-            neighbours: allocator.table("neighbours", &table.neighbours).await?,
-            diagonal: allocator.table("diagonal", &table.diagonal).await?,
-            rhs_of_row: allocator.table("rows of right-hand side", &table.rhs_of_row).await?,
+            neighbours: allocator.table("neighbours", &table.neighbours)?,
+            diagonal: allocator.table("diagonal", &table.diagonal)?,
+            rhs_of_row: allocator.table("rows of right-hand side", &table.rhs_of_row)?,
             n_rows: level.n_rows() as u32,
             colours: [colour(0), colour(1)],
             n_unknowns: level.n_unknowns() as u32,
@@ -55,21 +55,17 @@ impl GpuLevel {
     }
 
     /// A field of zeros on this level.
-    pub(crate) async fn field(
+    pub(crate) fn field(
         &self,
         allocator: &mut Allocator<'_>,
         n_quads: u32,
     ) -> Result<wgpu::Buffer, GpuError> {
-        allocator.storage("field", u64::from(self.n_rows) * u64::from(n_quads) * QUAD_BYTES).await
+        allocator.storage("field", u64::from(self.n_rows) * u64::from(n_quads) * QUAD_BYTES)
     }
 
     /// Room for a right-hand side on this level.
-    pub(crate) async fn rhs(
-        &self,
-        allocator: &mut Allocator<'_>,
-        n_quads: u32,
-    ) -> Result<wgpu::Buffer, GpuError> {
-        allocator.storage("right-hand side", u64::from(self.n_rhs) * u64::from(n_quads) * QUAD_BYTES).await
+    pub(crate) fn rhs(&self, allocator: &mut Allocator<'_>, n_quads: u32) -> Result<wgpu::Buffer, GpuError> {
+        allocator.storage("right-hand side", u64::from(self.n_rhs) * u64::from(n_quads) * QUAD_BYTES)
     }
 }
 
@@ -78,18 +74,14 @@ impl GpuTransfer {
     ///
     /// # Errors
     /// As [`Allocator::zeros`].
-    pub async fn new(
-        allocator: &mut Allocator<'_>,
-        hierarchy: &Hierarchy,
-        k: usize,
-    ) -> Result<Self, GpuError> {
+    pub fn new(allocator: &mut Allocator<'_>, hierarchy: &Hierarchy, k: usize) -> Result<Self, GpuError> {
         let (fine, coarse) = (&hierarchy.levels[k], &hierarchy.levels[k + 1]);
         let transfer = &hierarchy.transfers[k];
         let table = TransferTable::new(fine, coarse, transfer);
         Ok(Self {
-            around: allocator.table("restriction", &table.around).await?,
-            faces: allocator.table("prolongation to faces", &table.faces).await?,
-            corners: allocator.table("prolongation to corners", &table.corners).await?,
+            around: allocator.table("restriction", &table.around)?,
+            faces: allocator.table("prolongation to faces", &table.faces)?,
+            corners: allocator.table("prolongation to corners", &table.corners)?,
             n_faces: transfer.faces.len() as u32,
             n_corners: transfer.corners.len() as u32,
         })

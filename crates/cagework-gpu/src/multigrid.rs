@@ -68,7 +68,7 @@ impl Multigrid {
     ///
     /// # Errors
     /// As [`Allocator::zeros`].
-    pub async fn new(
+    pub fn new(
         stream: &Stream<'_>,
         allocator: &mut Allocator<'_>,
         hierarchy: &Hierarchy,
@@ -77,9 +77,9 @@ impl Multigrid {
         let n_quads = plan.n_quads();
         let mut levels: Vec<LevelWork> = Vec::new();
         for (k, level) in hierarchy.levels.iter().enumerate() {
-            let level = GpuLevel::new(allocator, level, k == 0).await?;
-            let field = level.field(allocator, n_quads).await?;
-            let rhs = level.rhs(allocator, n_quads).await?;
+            let level = GpuLevel::new(allocator, level, k == 0)?;
+            let field = level.field(allocator, n_quads)?;
+            let rhs = level.rhs(allocator, n_quads)?;
             let relax = stream.launch(
                 &kernels::RELAX_CELLS,
                 &[&level.neighbours, &level.diagonal, &level.rhs_of_row, &rhs, &field],
@@ -88,32 +88,32 @@ impl Multigrid {
         }
         // One buffer for all levels: the kernel writes each level's own zero row.
         let red_bytes = u64::from(levels[0].level.colours[0].1 + 1) * u64::from(n_quads) * QUAD_BYTES;
-        let numbers = allocator.storage("numbers", 8).await?;
+        let numbers = allocator.storage("numbers", 8)?;
         let squares = if levels.len() == 1 {
             let finest = &levels[0].level;
-            let before = finest.field(allocator, n_quads).await?;
-            let changes = allocator.storage("changes", 4 * u64::from(finest.n_rows)).await?;
+            let before = finest.field(allocator, n_quads)?;
+            let changes = allocator.storage("changes", 4 * u64::from(finest.n_rows))?;
             Squares::Single {
                 changes: stream.launch(&kernels::CHANGE_NORMS, &[&before, &levels[0].field, &changes]),
                 sum: stream.launch(&kernels::REDUCE_SUM, &[&changes, &numbers]),
                 before,
             }
         } else {
-            let red_residual = allocator.storage("residual", red_bytes).await?;
+            let red_residual = allocator.storage("residual", red_bytes)?;
             for k in 0..hierarchy.transfers.len() {
-                let transfer = GpuTransfer::new(allocator, hierarchy, k).await?;
+                let transfer = GpuTransfer::new(allocator, hierarchy, k)?;
                 let coarser = Coarser::new(stream, &levels[k], &levels[k + 1], &transfer, &red_residual);
                 levels[k].coarser = Some(coarser);
             }
             let most = n_groups(levels[0].level.n_rows * n_quads);
-            let partials = allocator.storage("partial sums", 4 * u64::from(most)).await?;
+            let partials = allocator.storage("partial sums", 4 * u64::from(most))?;
             Squares::Levels {
                 residual: stream.launch(&kernels::SUM_SQUARES, &[&red_residual, &partials]),
                 correction: stream.launch(&kernels::SUM_SQUARES, &[&levels[1].field, &partials]),
                 sum: stream.launch(&kernels::REDUCE_SUM, &[&partials, &numbers]),
             }
         };
-        let readback = allocator.readback("numbers, read back", 8).await?;
+        let readback = allocator.readback("numbers, read back", 8)?;
         Ok(Self { n_quads, levels, squares, numbers, readback, scratch: Vec::new() })
     }
 

@@ -1,13 +1,15 @@
 //! One compute pipeline per row of the kernel table.
 
 use std::num::NonZeroU64;
+use std::sync::{Arc, OnceLock};
 
 use crate::kernels::{ALL, Binding, Kernel};
 use crate::layout::Work;
 
-/// Pipelines of all kernels, in the table's order.
-#[derive(Clone, Debug)]
-pub(crate) struct Pipelines(Vec<Pipeline>);
+/// Pipelines of all kernels, in the table's order, each made when it is first needed: who deforms only need not wait
+/// for the solvers'. A clone is another handle.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Pipelines(Arc<[OnceLock<Pipeline>; ALL.len()]>);
 
 #[derive(Clone, Debug)]
 struct Pipeline {
@@ -25,8 +27,11 @@ pub struct Launch {
 }
 
 impl Pipelines {
-    pub(crate) fn new(device: &wgpu::Device) -> Self {
-        Self(ALL.iter().map(|kernel| Pipeline::new(device, kernel)).collect())
+    /// Makes all of them.
+    pub(crate) fn make_all(&self, device: &wgpu::Device) {
+        for (slot, kernel) in self.0.iter().zip(ALL) {
+            slot.get_or_init(|| Pipeline::new(device, kernel));
+        }
     }
 
     /// A kernel bound to `buffers`, in the table's order after the uniform, which is `works`.
@@ -39,7 +44,7 @@ impl Pipelines {
     ) -> Launch {
         debug_assert_eq!(buffers.len() + 1, kernel.bindings.len(), "{}: one buffer per binding", kernel.name);
         let number = ALL.iter().position(|k| k.name == kernel.name).expect("every kernel is in the table");
-        let pipeline = &self.0[number];
+        let pipeline = self.0[number].get_or_init(|| Pipeline::new(device, kernel));
         let work = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
             buffer: works,
             offset: 0,

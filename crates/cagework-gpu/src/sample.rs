@@ -30,20 +30,16 @@ impl Sampler {
     ///
     /// # Errors
     /// As [`Allocator::zeros`].
-    pub async fn new(
-        allocator: &mut Allocator<'_>,
-        stencils: &Stencils,
-        plan: &Plan,
-    ) -> Result<Self, GpuError> {
+    pub fn new(allocator: &mut Allocator<'_>, stencils: &Stencils, plan: &Plan) -> Result<Self, GpuError> {
         let table = SamplingTable::new(stencils);
         let n_quads = plan.n_quads();
         let bytes = u64::from(plan.vertices_per_block) * u64::from(n_quads) * QUAD_BYTES;
         Ok(Self {
-            starts: allocator.table("starts of sampling stencils", &table.starts).await?,
-            nodes: allocator.table("sampling nodes", &table.nodes).await?,
-            hats: allocator.table("sampling hats", &table.hats).await?,
-            block: allocator.storage("block of weights", bytes).await?,
-            readback: allocator.readback("block of weights, read back", bytes).await?,
+            starts: allocator.table("starts of sampling stencils", &table.starts)?,
+            nodes: allocator.table("sampling nodes", &table.nodes)?,
+            hats: allocator.table("sampling hats", &table.hats)?,
+            block: allocator.storage("block of weights", bytes)?,
+            readback: allocator.readback("block of weights, read back", bytes)?,
             n_vertices: stencils.len() as u32,
             vertices_per_block: plan.vertices_per_block,
             n_quads,

@@ -82,10 +82,12 @@ impl<'a> Stream<'a> {
     /// An empty stream.
     ///
     /// # Errors
-    /// As [`Allocator::zeros`].
+    /// As [`Allocator::zeros`] and [`Allocator::settle`].
     pub async fn new(context: &'a GpuContext, watch: &'a Watch<'a>) -> Result<Self, GpuError> {
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-        let works = Allocator::new(context).zeros("work parameters", MAX_WORKS * WORK_STRIDE, usage).await?;
+        let mut allocator = Allocator::new(context, "the parameters of kernels");
+        let works = allocator.zeros("work parameters", MAX_WORKS * WORK_STRIDE, usage)?;
+        allocator.settle().await?;
         Ok(Self {
             context,
             watch,

@@ -65,12 +65,15 @@ async fn step(
 ) -> Result<Vec<f32>, GpuError> {
     let watch = Watch::new(&Silent);
     let mut stream = Stream::new(context, &watch).await?;
-    let mut allocator = Allocator::new(context);
+    let mut allocator = Allocator::new(context, "one step");
     let mut buffers = Vec::new();
     for input in inputs {
-        buffers.push(allocator.table(kernel.name, input).await?);
+        buffers.push(allocator.table(kernel.name, input)?);
     }
     let launch = stream.launch(kernel, &buffers.iter().collect::<Vec<_>>());
+    let bytes = inputs[inputs.len() - 1].len() as u64;
+    let through = allocator.readback("result", bytes)?;
+    allocator.settle().await?;
     if kernel.workgroup == stencil::REDUCE_LANES as u32 {
         let groups =
             if kernel.name == "reduce_sum" { 1 } else { count.div_ceil(stencil::REDUCE_VALUES as u32) };
@@ -78,8 +81,6 @@ async fn step(
     } else {
         stream.run(&launch, work, count).await?;
     }
-    let bytes = inputs[inputs.len() - 1].len() as u64;
-    let through = allocator.readback("result", bytes).await?;
     stream.read(&buffers[buffers.len() - 1], &through, bytes, bytemuck::pod_collect_to_vec).await
 }
 

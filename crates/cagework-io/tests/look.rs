@@ -173,7 +173,7 @@ fn obj_colours_after_coordinates_are_the_vertices() {
 fn shared_cube(normals: impl Fn(usize, usize) -> usize) -> Look {
     let mut text = String::new();
     for k in 0..8 {
-        let p = [k & 1, k >> 1 & 1, k >> 2].map(|bit| 2 * bit as i32 - 1);
+        let p = [k & 1, k >> 1 & 1, k >> 2].map(|bit| 2 * bit - 1);
         text += &format!("v {} {} {}\nvn {} {} {}\n", p[0], p[1], p[2], p[0], p[1], p[2]);
     }
     // Normals 1 to 8 point to the corners, 9 to 14 out of the faces.

@@ -47,7 +47,8 @@ impl Surface {
             })
             .await
             .map_err(|error| GpuError::NoAdapter { reason: error.to_string() })?;
-        let context = GpuContext::with_adapter(instance, adapter, &ContextOptions::default()).await?;
+        let options = ContextOptions { pipelines_later: true, ..ContextOptions::default() };
+        let context = GpuContext::with_adapter(instance, adapter, &options).await?;
         let mut config = surface
             .get_default_config(&context.adapter, size[0], size[1])
             .ok_or_else(|| Fault::new("Canvas", "this GPU cannot draw into a canvas"))?;

@@ -30,7 +30,8 @@ pub(super) struct CageView {
 impl CageView {
     pub(super) async fn new(context: &GpuContext, layouts: &Layouts, cage: &Cage) -> Result<Self, GpuError> {
         let n_vertices = cage.n_vertices();
-        let positions = Allocator::new(context).storage("cage vertices", 16 * n_vertices as u64).await?;
+        let mut allocator = Allocator::new(context, "the cage");
+        let positions = allocator.storage("cage vertices", 16 * n_vertices as u64)?;
         let edges = unique_edges(cage.faces().iter().map(Vec::as_slice));
         let edge_numbers = edges.iter().enumerate().map(|(k, &e)| (e, k)).collect();
         let overlay = |items: &[Item]| Overlay::new(context, layouts, &positions, items);
@@ -46,6 +47,7 @@ impl CageView {
             face_of_triangle: cage.face_of_triangle().to_vec(),
         };
         view.pose(context, cage.positions());
+        allocator.settle().await?;
         Ok(view)
     }
 

@@ -44,13 +44,13 @@ impl Mesh {
         model: &DrawModel,
         normals: &[[f32; 4]],
     ) -> Result<Self, GpuError> {
-        let mut allocator = Allocator::new(context);
+        let mut allocator = Allocator::new(context, "the model");
         let usage = wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST;
         let corner_bytes: &[u8] = bytemuck::cast_slice(&model.vertices);
-        let corners = allocator.zeros("corners", corner_bytes.len() as u64, usage).await?;
+        let corners = allocator.zeros("corners", corner_bytes.len() as u64, usage)?;
         let usage = wgpu::BufferUsages::INDEX | wgpu::BufferUsages::COPY_DST;
         let index_bytes: &[u8] = bytemuck::cast_slice(&model.triangles);
-        let indices = allocator.zeros("triangles", index_bytes.len() as u64, usage).await?;
+        let indices = allocator.zeros("triangles", index_bytes.len() as u64, usage)?;
         for (buffer, bytes) in [(&corners, corner_bytes), (&indices, index_bytes)] {
             if !bytes.is_empty() {
                 context.queue.write_buffer(buffer, 0, bytes);
@@ -58,17 +58,17 @@ impl Mesh {
         }
         let positions = model.with_copies(&model.positions);
         let padded: Vec<[f32; 4]> = positions.iter().map(|p| p.extend(1.0).to_array()).collect();
-        let rest = allocator.table("rest positions", &padded).await?;
-        let rest_normals = allocator.table("rest normals", normals).await?;
-        let values = allocator.storage("values of vertices", 4 * positions.len() as u64).await?;
+        let rest = allocator.table("rest positions", &padded)?;
+        let rest_normals = allocator.table("rest normals", normals)?;
+        let values = allocator.storage("values of vertices", 4 * positions.len() as u64)?;
         let white = texture::upload(
             context,
+            &mut allocator,
             &DrawTexture { width: 1, height: 1, rgba: vec![255; 4], ..DrawTexture::default() },
-        )
-        .await?;
+        );
         let mut textures = Vec::new();
         for texture in &model.textures {
-            textures.push(texture::upload(context, texture).await?);
+            textures.push(texture::upload(context, &mut allocator, texture));
         }
         let mut groups = Vec::new();
         for group in whole(model) {
@@ -76,11 +76,12 @@ impl Mesh {
                 Some(t) => (&textures[t as usize], model.textures[t as usize].wrap),
                 None => (&white, [Wrap::Repeat; 2]),
             };
-            groups.push(Group::new(context, layouts, &mut allocator, &group, view, wrap).await?);
+            groups.push(Group::new(context, layouts, &mut allocator, &group, view, wrap)?);
         }
         let vertices = bind_vertices(context, layouts, [&rest, &rest_normals, &values]);
         let n_vertices = positions.len() as u32;
         let positions = rest.clone();
+        allocator.settle().await?;
         Ok(Self { corners, indices, groups, rest, rest_normals, values, vertices, positions, n_vertices })
     }
 
@@ -173,7 +174,7 @@ fn whole(model: &DrawModel) -> Vec<DrawGroup> {
 }
 
 impl Group {
-    async fn new(
+    fn new(
         context: &GpuContext,
         layouts: &Layouts,
         allocator: &mut Allocator<'_>,
@@ -192,7 +193,7 @@ impl Group {
             high: 1.0,
         };
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-        let uniform = allocator.zeros("material", size_of::<Surface>() as u64, usage).await?;
+        let uniform = allocator.zeros("material", size_of::<Surface>() as u64, usage)?;
         context.queue.write_buffer(&uniform, 0, bytemuck::bytes_of(&surface));
         let [u, v] = wrap.map(|wrap| match wrap {
             Wrap::Repeat => wgpu::AddressMode::Repeat,

@@ -1,8 +1,8 @@
 //! Textures: uploaded with smaller versions of themselves, averaged in linear light.
 
 use super::model::DrawTexture;
+use crate::buffers::Allocator;
 use crate::device::GpuContext;
-use crate::error::GpuError;
 
 /// Largest side, the baseline's limit.
 const MAX_SIDE: u32 = 8192;
@@ -71,13 +71,16 @@ fn levels(image: &DrawTexture) -> Vec<DrawTexture> {
 }
 
 /// Uploads an image, sRGB with straight alpha.
-pub(super) async fn upload(context: &GpuContext, image: &DrawTexture) -> Result<wgpu::TextureView, GpuError> {
+pub(super) fn upload(
+    context: &GpuContext,
+    allocator: &mut Allocator<'_>,
+    image: &DrawTexture,
+) -> wgpu::TextureView {
     let levels = levels(image);
-    let bytes = levels.iter().map(|l| l.rgba.len() as u64).sum();
+    allocator.count(levels.iter().map(|l| l.rgba.len() as u64).sum());
     let size =
         |l: &DrawTexture| wgpu::Extent3d { width: l.width, height: l.height, depth_or_array_layers: 1 };
     let device = &context.device;
-    let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
     let texture = device.create_texture(&wgpu::TextureDescriptor {
         label: Some("base colour"),
         size: size(&levels[0]),
@@ -88,11 +91,6 @@ pub(super) async fn upload(context: &GpuContext, image: &DrawTexture) -> Result<
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
-    let no_memory = memory.pop().await;
-    context.check()?;
-    if no_memory.is_some() {
-        return Err(GpuError::OutOfMemory { what: "a texture".to_owned(), bytes });
-    }
     for (mip_level, level) in (0u32..).zip(&levels) {
         let target = wgpu::TexelCopyTextureInfo {
             texture: &texture,
@@ -107,7 +105,7 @@ pub(super) async fn upload(context: &GpuContext, image: &DrawTexture) -> Result<
         };
         context.queue.write_texture(target, &level.rgba, layout, size(level));
     }
-    Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
 #[cfg(test)]

@@ -28,7 +28,7 @@ impl Session {
         }
         self.context.check()?;
         let device = &self.context.device;
-        let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let mut allocator = Allocator::new(&self.context, "the picture");
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("picture"),
             size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
@@ -43,10 +43,9 @@ impl Session {
         let row_bytes = 4 * width;
         let stride = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let bytes = u64::from(stride) * u64::from(height);
-        if memory.pop().await.is_some() {
-            return Err(GpuError::OutOfMemory { what: "the picture".to_owned(), bytes });
-        }
-        let readback = Allocator::new(&self.context).readback("picture, read back", bytes).await?;
+        allocator.count(bytes);
+        let readback = allocator.readback("picture, read back", bytes)?;
+        allocator.settle().await?;
         let mut camera = self.camera;
         camera.set_viewport(Vec2::from(size.map(|s| s as f32)) / scale);
         let mut encoder = self.encoder();
