@@ -13,7 +13,8 @@ interface Fault {
   readonly button: RegExp;
   /** Whether it cannot be bound before. */
   readonly broken?: boolean;
-  readonly vertices: number;
+  /** Of the mended cage, where that is known. */
+  readonly vertices?: number;
 }
 
 const cube = boxFaces(1);
@@ -50,6 +51,15 @@ const FAULTS: readonly Fault[] = [
     button: /Drop it/,
     broken: true,
     vertices: 8,
+  },
+  {
+    name: "two boxes through each other, which nothing but another cage mends",
+    cage: {
+      positions: [...cube.positions, ...cube.positions.map((p) => p.map((x) => x + 0.7))],
+      faces: [...cube.faces, ...cube.faces.map((face) => face.map((i) => i + 8))],
+    },
+    says: /through itself/,
+    button: /Make a new cage/,
   },
   {
     name: "a model that sticks out",
@@ -90,7 +100,7 @@ test("every fault has a button that mends it", async ({ page }) => {
       await expect(panel.locator(".problem-card")).toHaveCount(0);
       const state = await page.evaluate(() => globalThis.cagework?.engine.cageState());
       expect(state?.usable).toBe(true);
-      expect(state?.info.vertices).toBe(fault.vertices);
+      if (fault.vertices !== undefined) expect(state?.info.vertices).toBe(fault.vertices);
       await bound(page);
     });
   }
