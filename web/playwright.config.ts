@@ -1,7 +1,7 @@
 import { defineConfig } from "@playwright/test";
 
 /** Where e2e/server.mjs serves the built page. */
-const BASE = "http://127.0.0.1:4179/";
+const BASE = `http://127.0.0.1:${process.env.E2E_PORT ?? 4179}/`;
 
 /** Debian's Chromium with a real WebGPU device: SwiftShader, which needs no graphics card. */
 const CHROMIUM_ARGS = [

@@ -1,5 +1,8 @@
 /** Files that people drop: good ones open, bad ones say what is wrong and leave the model on screen. */
 
+import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { dracoGlb, glb, gltfFiles, meshoptGlb, obj } from "./models";
 import { bound, cagePositions, drag, drop, expect, open, shoot, test } from "./support";
 
@@ -29,6 +32,36 @@ test.describe("good files", () => {
       await shoot(page, `dropped-${stem}`);
     });
   }
+});
+
+test("a dropped folder is opened with all that lies in it", async ({ page }) => {
+  await page.setViewportSize({ width: 820, height: 520 });
+  await open(page);
+  // A real drop, from the disk: what a page makes up has no folders.
+  const folder = mkdtempSync(join(tmpdir(), "cagework-"));
+  const model = join(folder, "garden");
+  mkdirSync(join(model, "parts"), { recursive: true });
+  const files = await gltfFiles();
+  const document = JSON.parse(Buffer.from(files[0]?.bytes ?? []).toString());
+  // The texture and the buffer lie in a folder of their own, and something else beside them.
+  for (const part of [...document.buffers, ...document.images]) part.uri = `parts/${part.uri}`;
+  writeFileSync(join(model, "worm.gltf"), JSON.stringify(document));
+  for (const { name, bytes } of files.slice(1)) writeFileSync(join(model, "parts", name), bytes);
+  writeFileSync(join(model, "notes.txt"), "drawn on a rainy day");
+  writeFileSync(join(model, ".hidden.gltf"), "not a model");
+  const cdp = await page.context().newCDPSession(page);
+  const data = { items: [], files: [model], dragOperationsMask: 1 };
+  for (const type of ["dragEnter", "dragOver", "drop"] as const)
+    await cdp.send("Input.dispatchDragEvent", { type, x: 200, y: 250, data });
+  await expect(page).toHaveTitle(/worm/);
+  await bound(page);
+  const [triangles, textures] = [2 * 40 * 32, 1];
+  await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  const facts = page.locator("#panel").filter({ visible: true });
+  await expect(facts).toContainText(new RegExp(`${triangles.toLocaleString("en")}|${triangles}`));
+  await expect(facts).toContainText(new RegExp(`Textures\\s*${textures}`));
+  await shoot(page, "dropped-folder");
+  rmSync(folder, { recursive: true });
 });
 
 test("bad files say what is wrong, and the model stays", async ({ page, complaints }) => {

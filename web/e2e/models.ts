@@ -126,6 +126,43 @@ export function obj(scale: number, open = false): Uint8Array {
   return new TextEncoder().encode([...lines, ...faces, ""].join("\n"));
 }
 
+/** Corners and faces, counted from 0. */
+export interface Mesh {
+  readonly positions: readonly (readonly number[])[];
+  readonly faces: readonly (readonly number[])[];
+}
+
+/** A box around the origin by half its sides: six quads, seen from outside counter-clockwise. */
+export function boxFaces(half: number | readonly [number, number, number]): Mesh {
+  const sides = typeof half === "number" ? [half, half, half] : half;
+  const signs = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [k & 1, k & 2, k & 4].map((bit) => (bit ? 1 : -1)));
+  return {
+    positions: signs.map((sign) => sign.map((s, axis) => s * (sides[axis] ?? 1))),
+    faces: [
+      [0, 2, 3, 1],
+      [4, 5, 7, 6],
+      [0, 1, 5, 4],
+      [2, 6, 7, 3],
+      [0, 4, 6, 2],
+      [1, 3, 7, 5],
+    ],
+  };
+}
+
+/** A mesh as OBJ. */
+export function objOf({ positions, faces }: Mesh): Uint8Array {
+  const lines = [
+    ...positions.map((p) => `v ${p.join(" ")}`),
+    ...faces.map((face) => `f ${face.map((i) => i + 1).join(" ")}`),
+  ];
+  return new TextEncoder().encode(`${lines.join("\n")}\n`);
+}
+
+/** A box as OBJ. */
+export function box(half: number | readonly [number, number, number]): Uint8Array {
+  return objOf(boxFaces(half));
+}
+
 /** Errors that the Khronos validator finds. */
 export async function validationErrors(bytes: Uint8Array): Promise<string[]> {
   const report = await validator.validateBytes(new Uint8Array(bytes));

@@ -4,7 +4,8 @@ import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
 import { extname, join, normalize } from "node:path";
 
-const PORT = 4179;
+// Two copies of the repository can be tested at once, each on its own port.
+const PORT = Number(process.env.E2E_PORT ?? 4179);
 const FOLDER = join(import.meta.dirname, "../../dist");
 const BELOW = "/~student/some%20where/cagework";
 

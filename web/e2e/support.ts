@@ -44,7 +44,9 @@ export async function bound(page: Page): Promise<void> {
   await page.waitForFunction(() => globalThis.cagework?.engine.bound === true, undefined, {
     timeout: 60_000,
   });
-  await expect(page.locator("#status")).toHaveText(/^(Ready|.*selected)$/, { timeout: 60_000 });
+  await expect(page.locator("#status")).toHaveText(/^(Ready|Shaping the cage.*|.*selected)$/, {
+    timeout: 60_000,
+  });
 }
 
 /** Where a cage vertex is in the window. */
@@ -77,6 +79,42 @@ export async function reachable(page: Page): Promise<number> {
     }
     return -1;
   });
+}
+
+/** The middle of an edge (2 corners) or a face (more) that the pointer reaches, in the window. */
+export async function spot(
+  page: Page,
+  corners: number,
+): Promise<{ x: number; y: number; corners: number[] }> {
+  const found = await page.evaluate((wanted) => {
+    const engine = globalThis.cagework?.engine;
+    const canvas = document.querySelector("canvas");
+    if (!engine || !canvas) return null;
+    const { left, top } = canvas.getBoundingClientRect();
+    const positions = engine.cagePositions();
+    const list = engine.cageCorners();
+    const candidates: number[][] = [];
+    for (let k = 0; k < list.length; k += 1 + (list[k] ?? 0)) {
+      const face = Array.from(list.slice(k + 1, k + 1 + (list[k] ?? 0)));
+      if (wanted > 2) candidates.push(face);
+      else candidates.push(...face.map((a, i) => [a, face[(i + 1) % face.length] ?? a]));
+    }
+    for (const corners of candidates) {
+      if (corners.length !== wanted) continue;
+      const middle = [0, 1, 2].map(
+        (axis) => corners.reduce((sum, i) => sum + (positions[3 * i + axis] ?? 0), 0) / wanted,
+      ) as [number, number, number];
+      const [x = 0, y = 0] = engine.project(...middle);
+      const hit = new Set(engine.pick(x, y, 4));
+      const element = document.elementFromPoint(left + x, top + y);
+      const free = element && (element === canvas || element.contains(canvas));
+      if (free && hit.size === wanted && corners.every((i) => hit.has(i)))
+        return { x: left + x, y: top + y, corners };
+    }
+    return null;
+  }, corners);
+  if (!found) throw new Error(`no element of ${corners} corners is within reach`);
+  return found;
 }
 
 /** Drags a cage vertex by pixels; returns the vertex. */

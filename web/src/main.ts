@@ -83,17 +83,21 @@ async function main(): Promise<void> {
     clearTimeout(rebind);
     rebind = setTimeout(() => {
       const { cage: now, bindOptions } = store.get();
-      if (now?.usable && !bind.covers() && !edit.active() && bindOptions.grid <= 128) void bind.start();
+      if (now?.usable && !bind.covers() && !edit.active() && bindOptions.grid <= 128) void bind.start(true);
     }, pause);
   };
   const edit = createEdit(ctx, {
     changed: (state) => cage.adopt(state),
     left: () => bindSoon(0),
   });
-  const cage = createCage(ctx, () => {
+  const follow = () => {
     edit.sync();
     view.refresh();
     bindSoon(600);
+  };
+  const cage = createCage(ctx, follow, (grid) => {
+    bind.setOptions({ grid });
+    void bind.start();
   });
   const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"), () =>
     stage.viewport.getBoundingClientRect(),

@@ -93,6 +93,8 @@ export interface AppState {
   ortho: boolean;
   /** What the gesture under way does, null without one. */
   gesture: string | null;
+  /** Vertices of the model that the gesture under way leaves outside of the rest cage: of some that are watched. */
+  strays: number;
   posed: boolean;
   poses: readonly Pose[];
   /** Shares of `poses` in the blend. */
@@ -141,6 +143,7 @@ export const INITIAL: AppState = {
   boxArmed: false,
   ortho: false,
   gesture: null,
+  strays: 0,
   posed: false,
   poses: [],
   shares: [],

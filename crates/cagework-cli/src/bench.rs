@@ -8,13 +8,12 @@ use cagework_core::{BindReport, Cage};
 use cagework_io::Model;
 use serde::Serialize;
 
-use crate::args::{BenchArgs, CageSource, DEFAULT_DIVISIONS};
+use crate::args::BenchArgs;
 use crate::bind::bind_model;
 use crate::card::duration;
 use crate::error::CliError;
 use crate::files::{json, print};
-use crate::load::{generated_model, load_cage, load_model};
-use crate::sample;
+use crate::load::{built_in, load_cage, load_model};
 
 /// Results of all grids; its JSON is the output of `--json`.
 #[derive(Debug, Serialize)]
@@ -83,7 +82,10 @@ pub(crate) fn run(args: &BenchArgs, as_json: bool) -> Result<(), CliError> {
             let cage = load_cage(cage, &model)?.cage;
             (mesh.display().to_string(), model, cage)
         }
-        _ => built_in()?,
+        _ => {
+            let sample = built_in()?;
+            (format!("built-in sample, {}", sample.name), sample.model, sample.cage)
+        }
     };
     let grids =
         args.grid.iter().map(|&g| bench_grid(&model, &cage, g, args.runs)).collect::<Result<_, _>>()?;
@@ -96,12 +98,6 @@ pub(crate) fn run(args: &BenchArgs, as_json: bool) -> Result<(), CliError> {
         grids,
     };
     print(&if as_json { json(&bench) } else { text(&bench) })
-}
-
-fn built_in() -> Result<(String, Model, Cage), CliError> {
-    let model = generated_model("creature.obj", &sample::creature())?;
-    let cage = load_cage(&CageSource::Box { divisions: DEFAULT_DIVISIONS }, &model)?.cage;
-    Ok(("built-in sample".into(), model, cage))
 }
 
 fn bench_grid(model: &Model, cage: &Cage, grid: u32, runs: u32) -> Result<GridBench, CliError> {

@@ -9,13 +9,12 @@ use cagework_io::{Model, write_cage_obj, write_weights_npz};
 use glam::Vec3;
 use serde::Serialize;
 
-use crate::args::{CageSource, DEFAULT_DIVISIONS, DemoArgs};
+use crate::args::DemoArgs;
 use crate::bind::{bind_model, deform};
 use crate::card;
 use crate::error::CliError;
 use crate::files::{json, make_folder, print, write};
-use crate::load::{generated_model, load_cage};
-use crate::sample;
+use crate::load::{BuiltIn, built_in};
 
 /// What was done; its JSON is the output of `--json`.
 #[derive(Debug, Serialize)]
@@ -36,24 +35,25 @@ pub(crate) fn run(args: &DemoArgs, as_json: bool) -> Result<(), CliError> {
     make_folder(folder)?;
     let mut files = Files { folder, written: Vec::new() };
 
-    let creature = sample::creature();
-    let model = generated_model("creature.obj", &creature)?;
-    let cage = load_cage(&CageSource::Box { divisions: DEFAULT_DIVISIONS }, &model)?.cage;
+    let BuiltIn { name: sample, mesh, model, cage, poses: cage_poses } = built_in()?;
     let binding = bind_model(&model, &cage, &BindOptions::default())?;
 
-    files.write("creature.obj", &write_cage_obj(&creature))?;
+    files.write(&format!("{sample}.obj"), &write_cage_obj(&mesh))?;
     files.write("cage.obj", &write_cage_obj(&cage.to_polygon_mesh()))?;
     files.write("weights.npz", &write_weights_npz(&binding.weights, &binding.outside))?;
     files.write("report.json", json(&binding.report).as_bytes())?;
     files.write_glb("rest.glb", &model, &deform(&binding, cage.positions()))?;
     let mut poses = Vec::new();
-    for (name, posed) in [("bow", sample::bow(cage.positions())), ("twist", sample::twist(cage.positions()))]
-    {
+    let mut posed_cage = None;
+    for (name, posed) in cage_poses {
         let deformed = deform(&binding, &posed);
-        files.write_glb(&format!("{name}.glb"), &model, &deformed)?;
+        let stem = file_stem(&name);
+        files.write_glb(&format!("{stem}.glb"), &model, &deformed)?;
         let cage = PolygonMesh { positions: posed, ..cage.to_polygon_mesh() };
-        files.write(&format!("{name}-cage.obj"), &write_cage_obj(&cage))?;
-        poses.push((name.to_owned(), deformed));
+        let file = format!("{stem}-cage.obj");
+        files.write(&file, &write_cage_obj(&cage))?;
+        posed_cage.get_or_insert(file);
+        poses.push((name, deformed));
     }
     let animated = model.write_glb_poses(&model.positions, &poses).map_err(|e| CliError::file(folder, e))?;
     files.write("poses.glb", &animated)?;
@@ -64,7 +64,14 @@ pub(crate) fn run(args: &DemoArgs, as_json: bool) -> Result<(), CliError> {
         let folder = folder.display().to_string();
         return print(&json(&Done { folder, files: written, total_ms, report: &binding.report }));
     }
-    print(&text(folder, &binding.report, &files.written, total_ms))
+    let posed_cage = posed_cage.unwrap_or_else(|| "cage.obj".to_owned());
+    print(&text(folder, &sample, &posed_cage, &binding.report, &files.written, total_ms))
+}
+
+/// A pose's name as a file name: lower-case words, joined by hyphens.
+fn file_stem(name: &str) -> String {
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+    words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
 }
 
 /// Files of one folder.
@@ -87,13 +94,20 @@ impl Files<'_> {
     }
 }
 
-fn text(folder: &Path, report: &BindReport, written: &[PathBuf], total_ms: f64) -> String {
+fn text(
+    folder: &Path,
+    sample: &str,
+    posed_cage: &str,
+    report: &BindReport,
+    written: &[PathBuf],
+    total_ms: f64,
+) -> String {
     let at = |name: &str| folder.join(name).display().to_string();
     format!(
-        "Cagework made a creature of {} vertices and a box cage of {} vertices around it, bound one to the other by \
-         harmonic coordinates in {}, and moved the cage twice. All in all {}.\n\n\
+        "Cagework made a {sample} of {} vertices and a cage of {} vertices around it, bound one to the other by \
+         harmonic coordinates in {}, and posed the cage. All in all {}.\n\n\
          {}\n\
-         Look at {} (the creature bows and twists). To go on from here:\n  \
+         Look at {} (an animation of all poses). To go on from here:\n  \
          cagework deform {} --cage {} --weights {} --pose {} -o {}\n\
          where cagework is target/release/cagework, and the pose any edit of the cage that keeps its vertices.",
         report.vertices,
@@ -102,10 +116,10 @@ fn text(folder: &Path, report: &BindReport, written: &[PathBuf], total_ms: f64) 
         card::duration(total_ms),
         card::of(report, &[], written),
         at("poses.glb"),
-        at("creature.obj"),
+        at(&format!("{sample}.obj")),
         at("cage.obj"),
         at("weights.npz"),
-        at("bow-cage.obj"),
+        at(posed_cage),
         at("mine.glb"),
     )
 }

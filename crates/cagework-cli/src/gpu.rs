@@ -69,7 +69,8 @@ pub(crate) fn draw_model(model: &Model) -> (DrawModel, Vec<String>) {
         })
         .collect();
     let positions = model.positions.clone();
-    (DrawModel { positions, vertices, triangles: look.triangles, groups, textures }, notices)
+    let (copies, triangles) = (look.copies, look.triangles);
+    (DrawModel { positions, copies, vertices, triangles, groups, textures }, notices)
 }
 
 fn wrap(wrap: LookWrap) -> Wrap {

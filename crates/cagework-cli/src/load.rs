@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use cagework_core::{Bounds, Cage, CageError, PolygonMesh, subdivided_box};
+use cagework_core::samples::{self, Sample};
+use cagework_core::{Bounds, Cage, CageError, PolygonMesh, TriMesh, subdivided_box};
 use cagework_io::{Model, write_cage_obj};
 use glam::Vec3;
 
@@ -41,6 +42,36 @@ fn load_any(path: &Path) -> Result<Model, CliError> {
 /// When it has no vertices.
 pub(crate) fn generated_model(name: &str, mesh: &PolygonMesh) -> Result<Model, CliError> {
     Ok(Model::read(name, &write_cage_obj(mesh), &mut |_| None)?)
+}
+
+/// The built-in sample: what `demo`, `bench` and `evaluate` work on unless told otherwise.
+#[derive(Debug)]
+pub(crate) struct BuiltIn {
+    /// What people call it.
+    pub(crate) name: String,
+    /// Its mesh, to be written.
+    pub(crate) mesh: PolygonMesh,
+    /// The model that its file would be.
+    pub(crate) model: Model,
+    /// Its own cage.
+    pub(crate) cage: Cage,
+    /// Poses of that cage, by name. `[n_cage]` each
+    pub(crate) poses: Vec<(String, Vec<Vec3>)>,
+}
+
+/// Builds the first sample, the one that the page opens with.
+///
+/// # Errors
+/// None in practice: tests of the core bind every sample.
+pub(crate) fn built_in() -> Result<BuiltIn, CliError> {
+    let missing = || CliError::Cage { name: "built-in sample".into(), source: CageError::Empty };
+    let id = samples::all().first().ok_or_else(missing)?.id;
+    let Sample { mesh, cage, poses, .. } = samples::build(id).ok_or_else(missing)?;
+    let TriMesh { positions, triangles } = mesh;
+    let mesh = PolygonMesh { positions, faces: triangles.iter().map(|t| t.to_vec()).collect() };
+    let model = generated_model(&format!("{id}.obj"), &mesh)?;
+    let cage = Cage::new(&cage).map_err(|source| CliError::Cage { name: id.into(), source })?;
+    Ok(BuiltIn { name: id.to_owned(), mesh, model, cage, poses })
 }
 
 /// The cage that `source` names, for a model.

@@ -18,7 +18,6 @@ mod info;
 mod load;
 mod progress;
 mod render;
-mod sample;
 
 use std::io::Write as _;
 use std::process::ExitCode;

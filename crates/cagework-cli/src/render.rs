@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use cagework_core::bind::Binding;
 use cagework_core::slice::Slice;
-use cagework_core::{Cage, Weights};
+use cagework_core::{Cage, Weights, mean_value_weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView};
 use cagework_io::{Model, read_weights_npz};
@@ -26,6 +26,9 @@ struct Rendered {
     output: String,
     size: [u32; 2],
     adapter: String,
+    /// What is on the left and on the right, with `--compare`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    compared: Option<[&'static str; 2]>,
     /// Drawing and reading back, without files and binding.
     render_ms: f64,
     notices: Vec<String>,
@@ -43,6 +46,7 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
         inputs.push(path);
     }
     check_outputs(&[&args.output], &inputs)?;
+    check_compared(args)?;
     let model = load_model(&args.model)?;
     let cage = args.cage.as_ref().map(|source| load_cage(source, &model)).transpose()?;
     let (drawn, mut notices) = gpu::draw_model(&model);
@@ -50,32 +54,83 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     let mut session = Session::new(gpu::open()?);
     pollster::block_on(session.set_model(drawn))?;
     let mut scene = scene_of(args);
+    let mut other = None;
     if let Some(cage) = &cage {
         pollster::block_on(session.set_cage(&cage.cage))?;
         prepare(args, &model, cage, &mut session, &mut scene)?;
     }
     session.set_scene(scene);
+    if let Some(cage) = cage.as_ref().filter(|_| args.compare) {
+        let mut twin = pollster::block_on(session.twin())?;
+        let weights = mean_value_weights(&model.positions, &cage.cage)?;
+        pollster::block_on(twin.adopt(weights, Vec::new()))?;
+        other = Some(twin);
+    }
+    let size = args.size.0;
+    let part = if other.is_some() { [half(size[0]), size[1]] } else { size };
     let camera = session.camera_mut();
     (camera.yaw, camera.pitch) = args.view.angles();
     if args.orthographic {
         camera.projection = Projection::Orthographic;
     }
-    let size = args.size.0;
-    camera.set_viewport(glam::Vec2::from(size.map(|s| s as f32)));
+    camera.set_viewport(glam::Vec2::from(part.map(|s| s as f32)));
     session.frame_all();
 
     let started = Instant::now();
-    let rgba = pollster::block_on(session.picture(size, args.scale))?;
+    let mut rgba = pollster::block_on(session.picture(part, args.scale))?;
+    let compared = other.is_some().then_some(["harmonic coordinates", "mean value coordinates"]);
+    if let Some(mut other) = other {
+        *other.camera_mut() = *session.camera();
+        let right = pollster::block_on(other.picture(part, args.scale))?;
+        rgba = beside(&rgba, &right, part[0], size[0]);
+    }
     let render_ms = started.elapsed().as_secs_f64() * 1e3;
     write(&args.output, &gpu::png(rgba, size)?)?;
     let done = Rendered {
         output: args.output.display().to_string(),
         size,
         adapter: session.context().adapter_name(),
+        compared,
         render_ms,
         notices,
     };
     print(&if as_json { json(&done) } else { text(&done) })
+}
+
+/// Refuses a comparison of what no weights move.
+fn check_compared(args: &RenderArgs) -> Result<(), CliError> {
+    let hint = "leave out --compare, or --show the model";
+    if args.compare && matches!(args.show, Show::Cells | Show::Slice) {
+        let message = "--compare needs a model that moves, but a slice of the grid is asked for".to_owned();
+        return Err(CliError::Mismatch { message, hint });
+    }
+    if args.compare && args.size.0[0] < NARROWEST_PAIR {
+        let message = format!("--compare needs a picture at least {NARROWEST_PAIR} pixels wide");
+        return Err(CliError::Mismatch { message, hint: "give a larger --size" });
+    }
+    Ok(())
+}
+
+/// Narrowest picture of two, pixels: a column each and the divider.
+const NARROWEST_PAIR: u32 = 2 + DIVIDER;
+
+/// Width of the line between two pictures, pixels.
+const DIVIDER: u32 = 2;
+
+/// Its colour, seen on dark and on light.
+const DIVIDER_COLOR: [u8; 4] = [128, 128, 128, 255];
+
+/// Width of each of two pictures side by side.
+fn half(width: u32) -> u32 {
+    (width - DIVIDER) / 2
+}
+
+/// Two pictures of `part` columns side by side in one of `width`, with a line between them. RGBA
+fn beside(left: &[u8], right: &[u8], part: u32, width: u32) -> Vec<u8> {
+    let row = 4 * part as usize;
+    let line = DIVIDER_COLOR.repeat((width - 2 * part) as usize);
+    let rows = left.chunks_exact(row).zip(right.chunks_exact(row));
+    rows.flat_map(|(left, right)| [left, &line, right].concat()).collect()
 }
 
 /// What is drawn, as far as the arguments alone say.
@@ -117,8 +172,9 @@ fn prepare(
             hint: "cage vertices are counted from 0",
         });
     }
-    let needs_weights =
-        args.pose.is_some() || matches!(args.show, Show::Wireframe | Show::Weights | Show::Error);
+    let needs_weights = args.compare
+        || args.pose.is_some()
+        || matches!(args.show, Show::Wireframe | Show::Weights | Show::Error);
     if needs_weights {
         let (weights, outside) = match &args.weights {
             Some(path) => {
@@ -162,6 +218,9 @@ fn text(done: &Rendered) -> String {
         "drew {width} x {height} pixels on {} in {:.0} ms\nwrote {}\n",
         done.adapter, done.render_ms, done.output
     );
+    if let Some([left, right]) = done.compared {
+        out += &format!("left: {left}; right: {right}\n");
+    }
     for notice in &done.notices {
         out += &format!("note: {notice}\n");
     }

@@ -84,7 +84,7 @@ impl Session {
             return Err(GpuError::Model { reason });
         }
         self.drop_weights();
-        let normals = vertex_normals(&model.positions, &model.shading_triangles());
+        let normals = vertex_normals(&model.with_copies(&model.positions), &model.shading_triangles());
         self.renderer.set_model(&self.context, &model, &normals).await?;
         self.model = Some(model);
         self.update_bounds();
@@ -128,7 +128,7 @@ impl Session {
             return Ok(binding.report);
         }
         let (binding, weights) = bind_gpu(&model.positions, cage, options, progress, &self.context).await?;
-        self.bound(binding.weights, binding.outside, Some(&weights)).await?;
+        self.bound(binding.weights, binding.outside, Some(weights)).await?;
         Ok(binding.report)
     }
 
@@ -157,7 +157,7 @@ impl Session {
         self.bound(weights, outside, None).await
     }
 
-    fn parts(&self) -> Result<(&DrawModel, &Cage), GpuError> {
+    fn parts(&self) -> Result<(&Arc<DrawModel>, &Cage), GpuError> {
         match (&self.model, &self.cage) {
             (Some(model), Some(cage)) => Ok((model, cage)),
             (None, _) => Err(GpuError::NotReady { missing: "model" }),
@@ -169,11 +169,10 @@ impl Session {
         &mut self,
         weights: Weights,
         outside: Vec<OutsideVertex>,
-        on_gpu: Option<&GpuWeights>,
+        on_gpu: Option<GpuWeights>,
     ) -> Result<(), GpuError> {
         let (model, _) = self.parts()?;
-        let triangles = model.shading_triangles();
-        let mover = Mover::new(&self.context, &weights, &outside, on_gpu, triangles).await?;
+        let mover = Mover::new(&self.context, model, &weights, &outside, on_gpu).await?;
         mover.pose(&self.context, &self.pose);
         self.renderer.set_vertices(&self.context, Some(mover.tables()));
         self.bound = Some(Bound { weights, outside, mover });
@@ -261,7 +260,7 @@ impl Session {
             }
             MeshStyle::Hidden | MeshStyle::Solid | MeshStyle::Clay => return,
         };
-        self.renderer.set_values(&self.context, &values, range);
+        self.renderer.set_values(&self.context, &model.with_copies(&values), range);
     }
 
     /// Values of the first and the last colour of the scene's heat map, for a legend: weights, or logarithms to base 10
@@ -366,7 +365,10 @@ impl Session {
         let Some(model) = &self.model else { return Err(GpuError::NotReady { missing: "model" }) };
         match &self.bound {
             Some(Bound { weights, outside, mover }) => {
-                mover.read_positions(&self.context, weights, outside, &self.pose).await
+                let mut positions = mover.read_positions(&self.context, weights, outside, &self.pose).await?;
+                // Copies of vertices come last.
+                positions.truncate(model.positions.len());
+                Ok(positions)
             }
             None => Ok(model.positions.clone()),
         }

@@ -10,6 +10,9 @@ use std::ops::Range;
 pub struct Look {
     /// Corners of triangles. `[n_corners]`
     pub vertices: Vec<LookVertex>,
+    /// Vertices that an OBJ shares between surfaces with a hard edge between them, once more for each further surface:
+    /// the model's vertex that each moves with. They are counted on from the model's own. A glTF has split them itself.
+    pub copies: Vec<u32>,
     /// Indices into `vertices`; the model's triangles, those of one material in a row. `[n_triangles]`
     pub triangles: Vec<[u32; 3]>,
     /// Materials of ranges of triangles; those of none have no material.
@@ -21,8 +24,9 @@ pub struct Look {
 /// A corner of triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LookVertex {
-    /// The model's vertex that it moves with. Corners that are one surface at a seam of a glTF name one vertex, so that
-    /// normals of the moved mesh show no seam; where the file has a hard edge, they name different ones.
+    /// The model's vertex that it moves with, or one of [`Look::copies`]. Corners that are one surface at a seam of a
+    /// glTF name one vertex, so that normals of the moved mesh show no seam; where the file has a hard edge, they name
+    /// different ones.
     pub source: u32,
     /// Texture coordinates, v downwards, transformed by the material.
     pub uv: [f32; 2],

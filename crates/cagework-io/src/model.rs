@@ -116,7 +116,7 @@ impl Model {
     #[must_use]
     pub fn look(&self) -> Look {
         match &self.document {
-            Document::Obj(document) => obj::look(document),
+            Document::Obj(document) => obj::look(document, &self.positions),
             Document::Gltf(document) => gltf::look(document, &self.positions, &self.triangles),
         }
     }

@@ -168,3 +168,69 @@ fn obj_colours_after_coordinates_are_the_vertices() {
     // A fourth number alone is a weight.
     assert!(obj("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n", &[]).groups.is_empty());
 }
+
+/// A cube of eight vertices that its six faces share, with the normals that `normals` gives each corner of a face.
+fn shared_cube(normals: impl Fn(usize, usize) -> usize) -> Look {
+    let mut text = String::new();
+    for k in 0..8 {
+        let p = [k & 1, k >> 1 & 1, k >> 2].map(|bit| 2 * bit - 1);
+        text += &format!("v {} {} {}\nvn {} {} {}\n", p[0], p[1], p[2], p[0], p[1], p[2]);
+    }
+    // Normals 1 to 8 point to the corners, 9 to 14 out of the faces.
+    let faces = [[1, 3, 4, 2], [5, 6, 8, 7], [1, 2, 6, 5], [3, 7, 8, 4], [1, 5, 7, 3], [2, 4, 8, 6]];
+    for normal in ["0 0 -1", "0 0 1", "0 -1 0", "0 1 0", "-1 0 0", "1 0 0"] {
+        text += &format!("vn {normal}\n");
+    }
+    for (f, face) in faces.iter().enumerate() {
+        let corners = face.map(|v| match normals(f, v) {
+            0 => format!(" {v}"),
+            n => format!(" {v}//{n}"),
+        });
+        text += &format!("f{}\n", corners.concat());
+    }
+    obj(&text, &[])
+}
+
+/// Vertices and copies as the sources of a face's two triangles.
+fn sources(look: &Look, face: usize) -> Vec<u32> {
+    look.triangles[2 * face..2 * face + 2]
+        .iter()
+        .flatten()
+        .map(|&c| look.vertices[c as usize].source)
+        .collect()
+}
+
+/// An OBJ's vertices belong to all faces around them; `vn` alone says where an edge is hard. It was drawn smooth.
+#[test]
+fn hard_edges_of_an_obj_split_its_vertices() {
+    let hard = shared_cube(|face, _| 9 + face);
+    // Three faces meet in each of eight vertices: one of them has the vertex, two a copy each.
+    assert_eq!(hard.copies.len(), 16);
+    for v in 0..8 {
+        assert_eq!(hard.copies.iter().filter(|&&c| c == v).count(), 2, "vertex {v}");
+    }
+    let mut seen = std::collections::HashSet::new();
+    for face in 0..6 {
+        let mut own = sources(&hard, face);
+        own.sort_unstable();
+        own.dedup();
+        assert_eq!(own.len(), 4);
+        assert!(own.into_iter().all(|s| s < 24 && seen.insert(s)), "face {face} shares none with another");
+    }
+    for (number, vertex) in hard.vertices.iter().enumerate() {
+        assert!((vertex.source as usize) < 8 + hard.copies.len(), "corner {number}");
+    }
+}
+
+#[test]
+fn smooth_obj_keeps_its_vertices() {
+    let smooth = shared_cube(|_, v| v);
+    let bare = shared_cube(|_, _| 0);
+    assert_eq!((smooth.copies.len(), bare.copies.len()), (0, 0));
+    assert_eq!(smooth, bare);
+    // A lid with an edge around it, everything else smooth: its four vertices are there twice.
+    let lid = shared_cube(|face, v| if face == 3 { 12 } else { v });
+    assert_eq!(lid.copies.len(), 4);
+    let lone = shared_cube(|face, v| if face == 3 { 0 } else { v });
+    assert!(lone.copies.is_empty(), "corners without a normal stay with the vertex");
+}

@@ -150,6 +150,7 @@ impl Loaded {
             |c: &cagework_io::LookVertex| DrawVertex { source: c.source, uv: c.uv, color: c.color.map(unit) };
         DrawModel {
             positions: self.model.positions.clone(),
+            copies: look.copies,
             vertices: look.vertices.iter().map(vertex).collect(),
             groups: groups.collect(),
             triangles: look.triangles,

@@ -32,18 +32,19 @@ pub(crate) fn view(problem: &Problem) -> views::Problem {
     let n = problem.count;
     let many =
         |one: &str, many: &str| if n == 1 { one.to_owned() } else { many.replace('#', &n.to_string()) };
-    let fix = problem.fixes.iter().find_map(|fix| match fix {
-        Fix::Repair { repair } => Some(match repair {
-            Repair::Weld => ("weld", many("Join them", "Join them")),
-            Repair::DropDegenerate => ("drop_parts", many("Drop it", "Drop all #")),
-            Repair::FillHoles => ("fill_holes", "Fill the holes".to_owned()),
-            Repair::Flip => ("turn_faces", "Turn them outward".to_owned()),
-            Repair::Grow => ("grow", "Grow the cage".to_owned()),
-        }),
-        Fix::Grid { .. } => None,
+    // The best one stands first.
+    let fix = problem.fixes.first().map(|fix| match *fix {
+        Fix::Repair { repair } => match repair {
+            Repair::Weld => ("weld", many("Join them", "Join them"), None),
+            Repair::DropDegenerate => ("drop_parts", many("Drop it", "Drop all #"), None),
+            Repair::FillHoles => ("fill_holes", "Fill the holes".to_owned(), None),
+            Repair::Flip => ("turn_faces", "Turn them outward".to_owned(), None),
+            Repair::Grow => ("grow", "Grow the cage".to_owned(), None),
+        },
+        Fix::Grid { cells } => ("refine_grid", format!("Bind with {cells} cells"), Some(cells)),
     });
     let fix = fix.or_else(|| {
-        (problem.severity == Severity::Error).then(|| ("regenerate", "Make a new cage".to_owned()))
+        (problem.severity == Severity::Error).then(|| ("regenerate", "Make a new cage".to_owned(), None))
     });
     views::Problem {
         kind: kind(problem.code),
@@ -54,7 +55,7 @@ pub(crate) fn view(problem: &Problem) -> views::Problem {
         },
         message: problem.message.clone(),
         count: n,
-        fix: fix.map(|(kind, label)| views::Fix { kind, label }),
+        fix: fix.map(|(kind, label, cells)| views::Fix { kind, label, cells }),
     }
 }
 

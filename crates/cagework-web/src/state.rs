@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use cagework_core::cage_check::CageCheck;
 use cagework_core::edit::{Element, Gesture, Pull, Selection, SharedPull, Symmetry, Topology};
+use cagework_core::enclosure::Enclosure;
 use cagework_core::slice::Slice;
 use cagework_core::{Bounds, Cage, PolygonMesh};
 use cagework_gpu::Session;
@@ -28,6 +29,8 @@ pub(crate) struct State {
     pub(crate) symmetry: Symmetry,
     /// What is wrong with the cage.
     pub(crate) check: Option<CageCheck>,
+    /// Some vertices of the model, to be watched while the rest cage is dragged; made when first asked.
+    pub(crate) watched: Option<Enclosure>,
     /// Where the cage is. `[n_cage]`
     pub(crate) positions: Vec<Vec3>,
     pub(crate) editing_rest: bool,
@@ -78,6 +81,7 @@ impl State {
         self.topology = Topology::new(&self.rest.faces);
         self.symmetry = Symmetry::new(&self.rest.positions);
         self.positions.clone_from(&self.rest.positions);
+        self.watched = None;
         self.selection = Selection::new(self.positions.len());
         self.hovered.clear();
         self.gesture = None;

@@ -114,6 +114,8 @@ pub(crate) struct Problem {
 pub(crate) struct Fix {
     pub(crate) kind: &'static str,
     pub(crate) label: String,
+    /// Cells of the grid that the fix asks for.
+    pub(crate) cells: Option<u32>,
 }
 
 /// `Legend`.

@@ -7,8 +7,9 @@ import { sentence } from "../strings";
 import { attempt, type Context } from "./context";
 
 export interface BindActions {
-  /** True when it ended with weights. */
-  start(): Promise<boolean>;
+  /** True when it ended with weights. Problems on screen stay when nobody asked for this bind: they are about
+   * something else. */
+  start(unasked?: boolean): Promise<boolean>;
   cancel(): void;
   /** Whether the cage that is open is bound or about to be. */
   covers(): boolean;
@@ -57,9 +58,9 @@ export function createBind(ctx: Context): BindActions {
   };
 
   return {
-    async start() {
+    async start(unasked = false) {
       if (!store.get().cage || cageBroken(store.get())) return false;
-      ctx.tell.clear();
+      if (!unasked) ctx.tell.clear();
       turn += 1;
       const mine = turn;
       let eta: Eta = createEta(performance.now());

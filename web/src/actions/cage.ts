@@ -1,6 +1,6 @@
 /** Getting a cage: made for the model, a box, or a file; and repairing it. */
 
-import type { CageState, Job, NamedFile, RepairKind } from "../contract";
+import type { CageState, Job, Mend, NamedFile, RepairKind } from "../contract";
 import type { CageWish } from "../defaults";
 import type { CageSource } from "../state";
 import { attempt, type Context, report } from "./context";
@@ -11,6 +11,8 @@ export interface CageActions {
   cancel(): void;
   load(files: readonly NamedFile[]): Promise<boolean>;
   repair(kind: RepairKind): void;
+  /** What the button beside a problem does. */
+  mend(fix: Mend): void;
   /** The page's side of a new or changed cage. */
   adopt(state: CageState | null): void;
 }
@@ -21,7 +23,7 @@ const HULL_VERTICES = 24;
 /** Name of the step that takes a cage from a file. */
 const LOAD = "Load a cage";
 
-export function createCage(ctx: Context, after: () => void): CageActions {
+export function createCage(ctx: Context, after: () => void, refine: (grid: number) => void): CageActions {
   let job: Job<CageState> | undefined;
   /** Counts generations: what an older one still says is not heard. */
   let turn = 0;
@@ -110,6 +112,10 @@ export function createCage(ctx: Context, after: () => void): CageActions {
       } catch (error) {
         report(ctx, "The repair did not work", error);
       }
+    },
+    mend({ kind, cells }) {
+      if (kind !== "refine_grid") this.repair(kind);
+      else if (cells !== null) refine(cells);
     },
     adopt,
   };

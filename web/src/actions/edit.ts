@@ -145,7 +145,15 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
     typed = "";
   };
 
-  const showLabel = () => ctx.store.set({ gesture: engine().transformLabel() });
+  /** What the gesture does, and whether the cage that it shapes still encloses the model. */
+  const showLabel = (typed = "") => {
+    const label = engine().transformLabel();
+    const { editingRest } = ctx.store.get();
+    ctx.store.set({
+      gesture: typed === "" ? label : `${label}  [${typed}]`,
+      strays: editingRest ? engine().strays() : 0,
+    });
+  };
 
   return {
     begin(gesture, x, y) {
@@ -185,9 +193,7 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
       typed = next;
       const amount = Number(typed);
       engine().typeTransform(typed === "" || Number.isNaN(amount) ? undefined : amount);
-      ctx.store.set({
-        gesture: typed === "" ? engine().transformLabel() : `${engine().transformLabel()}  [${typed}]`,
-      });
+      showLabel(typed);
       return true;
     },
     end(keepIt) {
@@ -198,7 +204,7 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
       beforeRest = undefined;
       const count = engine().selection().length;
       const moved = engine().endTransform(keepIt);
-      ctx.store.set({ gesture: null });
+      ctx.store.set({ gesture: null, strays: 0 });
       if (moved) keep(`${verb} ${plural(count, "vertex", "vertices")}`, from, fromRest);
       else sync();
     },

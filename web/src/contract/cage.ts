@@ -27,7 +27,14 @@ export interface Problem {
   readonly message: string;
   readonly count: number;
   /** A repair that helps: pass `kind` to `engine.repair`, show `label` on the button ("Fill 2 holes"). */
-  readonly fix: { readonly kind: RepairKind; readonly label: string } | null;
+  readonly fix: Mend | null;
+}
+
+export interface Mend {
+  readonly kind: RepairKind | "refine_grid";
+  readonly label: string;
+  /** Cells of the grid that "refine_grid" asks for: the cage stays as it is. */
+  readonly cells: number | null;
 }
 export type RepairKind = "fill_holes" | "turn_faces" | "grow" | "drop_parts" | "weld" | "regenerate";
 

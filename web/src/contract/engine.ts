@@ -26,6 +26,8 @@ export interface Engine {
   boxCage(divisions: number): CageState;
   checkCage(): readonly Problem[];
   repair(kind: RepairKind): CageState;
+  /** Of some of the model's vertices, how many are outside of the cage as it is dragged now. For every movement. */
+  strays(): number;
   /** Whether gestures change the rest cage, without the model following. */
   setEditingRest(editing: boolean): void;
   /** Only while editing the rest cage. The selection afterwards is what was made. */

@@ -117,7 +117,7 @@ export function createCagePanel(app: App): HTMLElement {
     make.disabled = cageProgress !== null || !model;
     load.disabled = !model;
   });
-  store.watch(["cage"], ({ cage }) => {
+  store.watch(["cage", "bindOptions"], ({ cage }) => {
     fill(result, cage ? cageCard(cage) : empty());
     for (const problem of cage?.problems ?? []) result.append(problemCard(problem, app));
     restBox.hidden = cage === null;
@@ -197,11 +197,14 @@ function cageCard(cage: CageState): HTMLElement {
 
 function problemCard(problem: Problem, app: App): HTMLElement {
   const { fix } = problem;
+  // Once the grid is as fine as asked for, nothing is left to do.
+  const done = fix?.kind === "refine_grid" && app.store.get().bindOptions.grid >= (fix.cells ?? 0);
   return h(
     "div",
     { class: `problem-card ${problem.severity}` },
     icon(problem.severity === "note" ? "info" : "warning"),
     h("p", { class: "grow", text: sentence(problem.message) }),
-    fix ? button(fix.label, () => app.cage.repair(fix.kind), { kind: "small" }) : null,
+    fix && !done ? button(fix.label, () => app.cage.mend(fix), { kind: "small" }) : null,
+    done ? h("span", { class: "badge good" }, icon("check"), "Fine enough") : null,
   );
 }

@@ -63,7 +63,7 @@ function cageActions(state: AppState, app: App): { primary: Action; second?: Act
   const fix = state.cage.problems.find((problem) => problem.severity === "error" && problem.fix)?.fix;
   if (cageBroken(state)) {
     return fix
-      ? { primary: { label: fix.label, icon: "patch", run: () => app.cage.repair(fix.kind) } }
+      ? { primary: { label: fix.label, icon: "patch", run: () => app.cage.mend(fix) } }
       : { primary: { label: "Make a new cage", icon: "cage", run: () => void app.cage.make() } };
   }
   if (state.bound) return { primary: { label: "Pose it", icon: "pose", run: () => app.go("pose") } };

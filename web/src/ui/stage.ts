@@ -128,9 +128,9 @@ export function createOverlays(
   const busy = h("div", { class: "busy" }, h("span", { class: "spinner" }), busyText);
 
   const encloses = h("span", { class: "floating badge encloses", attrs: { role: "status" } });
-  store.watch(["editingRest", "cage"], ({ editingRest, cage }) => {
+  store.watch(["editingRest", "cage", "strays"], ({ editingRest, cage, strays }) => {
     encloses.hidden = !editingRest || cage === null;
-    if (cage) showEnclosure(encloses, cage);
+    if (cage) showEnclosure(encloses, cage, strays > 0);
   });
 
   element.append(mode.element, encloses, tools, looks, legend, compare, bottom, see, busy);
@@ -203,10 +203,11 @@ export function createOverlays(
 }
 
 /** The live check while the cage is shaped. */
-function showEnclosure(badge: HTMLElement, cage: CageState): void {
+function showEnclosure(badge: HTMLElement, cage: CageState, strays: boolean): void {
   const fault = cage.problems.find((problem) => problem.severity !== "note");
-  badge.classList.toggle("good", cage.usable && !fault);
-  badge.classList.toggle("warn", cage.usable && fault !== undefined);
+  const message = strays ? "Part of the model is outside." : fault ? sentence(fault.message) : null;
+  badge.classList.toggle("good", cage.usable && message === null);
+  badge.classList.toggle("warn", cage.usable && message !== null);
   badge.classList.toggle("bad", !cage.usable);
-  fill(badge, icon(fault ? "warning" : "check"), fault ? sentence(fault.message) : "Encloses the model");
+  fill(badge, icon(message === null ? "check" : "warning"), message ?? "Encloses the model");
 }

@@ -15,6 +15,7 @@ use super::{CageSource, SolveArgs, output};
     Examples:\n  \
     cagework render horse.glb -o horse.png\n  \
     cagework render horse.glb --cage cage.obj --pose gallop.obj -o gallop.png\n  \
+    cagework render horse.glb --cage cage.obj --pose gallop.obj --compare -o beside-mean-value.png\n  \
     cagework render horse.glb --cage cage.obj --show weights --column 17 -o weights.png\n  \
     cagework render horse.glb --cage cage.obj --show wireframe --method classic -g 16 --no-cage -o figure-4.png\n  \
     cagework render horse.glb --cage cage.obj --show cells --axis x --at 0.5 --theme light -o cells.png")]
@@ -32,6 +33,9 @@ pub(crate) struct RenderArgs {
     /// Weights that `cagework bind --weights` wrote, instead of binding here.
     #[arg(long, value_name = "FILE", requires = "cage")]
     pub(crate) weights: Option<PathBuf>,
+    /// Draw two pictures side by side: on the left as always, on the right moved by mean value coordinates.
+    #[arg(long, requires = "cage")]
+    pub(crate) compare: bool,
     /// What to draw.
     #[arg(long, value_enum, default_value_t = Show::Solid)]
     pub(crate) show: Show,

@@ -10,6 +10,8 @@ use crate::args::EvaluateArgs;
 use crate::bind::{bind_model, bind_on};
 use crate::error::CliError;
 
+use super::spread::Spread;
+
 /// A way to the weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -87,14 +89,25 @@ impl Way {
     }
 }
 
-/// One bind of the evaluation.
+/// One case of the evaluation.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Run {
     pub(super) way: Way,
+    /// Of the bind with the median time.
     pub(super) report: BindReport,
+    /// Shortest and longest time of all binds of this case.
+    pub(super) total_ms: Spread,
 }
 
 impl Run {
+    /// The median of several binds of one case, which differ in nothing but their times.
+    fn median(way: Way, mut reports: Vec<BindReport>) -> Option<Self> {
+        let total_ms = Spread::of(reports.iter().map(|r| r.timings_ms.total))?;
+        reports.sort_by(|a, b| a.timings_ms.total.total_cmp(&b.timings_ms.total));
+        let report = reports.swap_remove(reports.len() / 2);
+        Some(Self { way, report, total_ms })
+    }
+
     /// (milliseconds of solving, delta) after each iteration. Iterations of one solve cost the same.
     pub(super) fn delta_over_time(&self) -> impl Iterator<Item = (f64, f32)> + '_ {
         let each = self.report.timings_ms.solve / f64::from(self.report.iterations.max(1));
@@ -110,7 +123,7 @@ pub(super) struct Reconstruction {
     /// File name without its end.
     pub(super) figure: &'static str,
     /// What it shows.
-    pub(super) caption: &'static str,
+    pub(super) caption: String,
     pub(super) report: BindReport,
     pub(super) weights: Weights,
     pub(super) outside: Vec<OutsideVertex>,
@@ -124,6 +137,7 @@ pub(super) struct Evaluation {
     pub(super) n_cage: usize,
     pub(super) threads: usize,
     pub(super) runs: u32,
+    pub(super) grids: Grids,
     /// Name of the GPU, or why there is none.
     pub(super) adapter: Result<String, String>,
     /// Figures 8 to 11: every way at every g and tau; medians of the total time.
@@ -146,14 +160,34 @@ pub(super) struct Summary<'a> {
     errors: &'a [Run],
 }
 
-/// Grids and thresholds of figures 8 to 11.
-pub(super) const TIMED_GRIDS: [u32; 2] = [32, 64];
-/// See [`TIMED_GRIDS`].
+/// Thresholds of figures 8 to 11.
 pub(super) const TIMED_TAUS: [f32; 2] = [1e-4, 1e-5];
-/// Grids and thresholds of figure 12.
-pub(super) const ERROR_GRIDS: [u32; 3] = [16, 32, 64];
-/// See [`ERROR_GRIDS`].
+/// Thresholds of figure 12.
 pub(super) const ERROR_TAUS: [f32; 3] = [1e-3, 1e-4, 1e-5];
+
+/// The grids that are run: 16, 32 and 64 in the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Grids {
+    pub(super) coarse: u32,
+    pub(super) middle: u32,
+    pub(super) fine: u32,
+}
+
+impl Grids {
+    fn up_to(fine: u32) -> Self {
+        Self { coarse: fine / 4, middle: fine / 2, fine }
+    }
+
+    /// Those of figures 8 to 11.
+    pub(super) fn timed(self) -> [u32; 2] {
+        [self.middle, self.fine]
+    }
+
+    /// Those of figure 12.
+    pub(super) fn all(self) -> [u32; 3] {
+        [self.coarse, self.middle, self.fine]
+    }
+}
 
 impl Evaluation {
     /// Runs all cases.
@@ -172,36 +206,38 @@ impl Evaluation {
                 _ => bind_model(model, cage, &options),
             }
         };
+        let grids = Grids::up_to(args.grid);
         let (mut timed, mut errors) = (Vec::new(), Vec::new());
-        for grid in TIMED_GRIDS {
+        for grid in grids.timed() {
             for tau in TIMED_TAUS {
-                for way in Way::ALL.into_iter().filter(|way| gpu.is_ok() || !way.is_gpu()) {
-                    let mut reports = (0..args.runs)
-                        .map(|_| bind(way, grid, tau).map(|b| b.report))
-                        .collect::<Result<Vec<_>, _>>()?;
-                    reports.sort_by(|a, b| a.timings_ms.total.total_cmp(&b.timings_ms.total));
-                    let report = reports.swap_remove(reports.len() / 2);
-                    timed.push(Run { way, report });
+                let ways: Vec<Way> = Way::ALL.into_iter().filter(|w| gpu.is_ok() || !w.is_gpu()).collect();
+                let mut reports = vec![Vec::new(); ways.len()];
+                // Round-robin: a machine that slows down meanwhile slows all ways alike.
+                for _ in 0..args.runs {
+                    for (&way, reports) in ways.iter().zip(&mut reports) {
+                        reports.push(bind(way, grid, tau)?.report);
+                    }
                 }
+                let runs = ways.into_iter().zip(reports);
+                timed.extend(runs.filter_map(|(way, reports)| Run::median(way, reports)));
             }
         }
-        for grid in ERROR_GRIDS {
-            for tau in ERROR_TAUS {
-                let way = Way::PaperThreads;
-                errors.push(Run { way, report: bind(way, grid, tau)?.report });
+        for grid in grids.all() {
+            let paper = ERROR_TAUS.map(|tau| (Way::PaperThreads, tau));
+            for (way, tau) in paper.into_iter().chain([(Way::MultigridThreads, 1e-5)]) {
+                errors.extend(Run::median(way, vec![bind(way, grid, tau)?.report]));
             }
-            let way = Way::MultigridThreads;
-            errors.push(Run { way, report: bind(way, grid, 1e-5)?.report });
         }
         let figures: [(&str, &str, Way, u32, f32); 4] = [
-            ("figure-2", "g = 32, tau = 1e-3: insufficient smoothing", Way::PaperThreads, 32, 1e-3),
-            ("figure-3", "g = 32, tau = 1e-5", Way::PaperThreads, 32, 1e-5),
-            ("figure-4", "g = 16, tau = 1e-5: quantisation", Way::PaperThreads, 16, 1e-5),
-            ("figure-5-ours", "embedded multigrid, g = 16, tau = 1e-5", Way::MultigridThreads, 16, 1e-5),
+            ("figure-2", ": insufficient smoothing", Way::PaperThreads, grids.middle, 1e-3),
+            ("figure-3", "", Way::PaperThreads, grids.middle, 1e-5),
+            ("figure-4", ": quantisation", Way::PaperThreads, grids.coarse, 1e-5),
+            ("figure-5-ours", ": embedded multigrid", Way::MultigridThreads, grids.coarse, 1e-5),
         ];
         let reconstructions = figures
             .into_iter()
-            .map(|(figure, caption, way, grid, tau)| {
+            .map(|(figure, what, way, grid, tau)| {
+                let caption = format!("g = {grid}, tau = {tau:e}{what}");
                 let Binding { weights, outside, report } = bind(way, grid, tau)?;
                 Ok(Reconstruction { figure, caption, report, weights, outside })
             })
@@ -212,6 +248,7 @@ impl Evaluation {
             n_cage: cage.n_vertices(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             runs: args.runs,
+            grids,
             adapter: gpu.map(GpuContext::adapter_name).map_err(ToString::to_string),
             timed,
             errors,
@@ -226,7 +263,7 @@ impl Evaluation {
 
     /// The run of figure 7.
     pub(super) fn delta_run(&self, way: Way) -> Option<&Run> {
-        self.timed(way, 32, 1e-5)
+        self.timed(way, self.grids.middle, 1e-5)
     }
 
     /// Mean error over the cage's diagonal at one g and tau.

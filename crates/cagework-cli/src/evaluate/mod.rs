@@ -5,6 +5,7 @@
 mod cases;
 mod pictures;
 mod plots;
+mod spread;
 mod words;
 
 use std::fmt::Write as _;
@@ -13,13 +14,12 @@ use std::path::Path;
 use cagework_core::Cage;
 use cagework_io::Model;
 
-use crate::args::{CageSource, DEFAULT_DIVISIONS, EvaluateArgs};
+use crate::args::EvaluateArgs;
 use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{json, make_folder, print, write};
 use crate::gpu;
-use crate::load::{generated_model, load_cage, load_model};
-use crate::sample;
+use crate::load::{BuiltIn, built_in, load_cage, load_model};
 
 use cases::{Evaluation, Way};
 
@@ -55,13 +55,17 @@ pub(crate) fn run(args: &EvaluateArgs, as_json: bool) -> Result<(), CliError> {
 }
 
 fn input(args: &EvaluateArgs) -> Result<(String, Model, Cage), CliError> {
-    let (name, model) = match &args.mesh {
-        Some(path) => (path.display().to_string(), load_model(path)?),
-        None => ("built-in sample".to_owned(), generated_model("creature.obj", &sample::creature())?),
+    if let (Some(mesh), Some(cage)) = (&args.mesh, &args.cage) {
+        let model = load_model(mesh)?;
+        let cage = load_cage(cage, &model)?.cage;
+        return Ok((mesh.display().to_string(), model, cage));
+    }
+    let BuiltIn { name, model, cage: own, .. } = built_in()?;
+    let cage = match &args.cage {
+        Some(source) => load_cage(source, &model)?.cage,
+        None => own,
     };
-    let source = args.cage.clone().unwrap_or(CageSource::Box { divisions: DEFAULT_DIVISIONS });
-    let cage = load_cage(&source, &model)?.cage;
-    Ok((name, model, cage))
+    Ok((format!("built-in sample, {name}"), model, cage))
 }
 
 /// Figures 2 to 5: the rest pose as each way's weights reconstruct it.
@@ -80,12 +84,13 @@ fn reconstructions(
 }
 
 fn time_csv(evaluation: &Evaluation) -> String {
-    let mut csv = String::from("way,g,tau,threads,iterations,converged,solve_ms,total_ms\n");
+    let mut csv =
+        String::from("way,g,tau,threads,iterations,converged,solve_ms,total_ms,runs,min_ms,max_ms\n");
     for run in &evaluation.timed {
         let r = &run.report;
         let _ = writeln!(
             csv,
-            "{},{},{:e},{},{},{},{:.3},{:.3}",
+            "{},{},{:e},{},{},{},{:.3},{:.3},{},{:.3},{:.3}",
             run.way.id(),
             r.grid,
             r.tau,
@@ -93,7 +98,10 @@ fn time_csv(evaluation: &Evaluation) -> String {
             r.iterations,
             r.converged,
             r.timings_ms.solve,
-            r.timings_ms.total
+            r.timings_ms.total,
+            run.total_ms.n,
+            run.total_ms.min,
+            run.total_ms.max
         );
     }
     csv

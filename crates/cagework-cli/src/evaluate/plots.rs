@@ -4,7 +4,7 @@ use plotters::prelude::*;
 
 use crate::error::CliError;
 
-use super::cases::{ERROR_GRIDS, ERROR_TAUS, Evaluation, TIMED_GRIDS, TIMED_TAUS, Way};
+use super::cases::{ERROR_TAUS, Evaluation, TIMED_TAUS, Way};
 
 /// Width and height of a plot.
 const SIZE: (u32, u32) = (820, 460);
@@ -34,7 +34,7 @@ pub(super) fn all(evaluation: &Evaluation) -> Result<Vec<(String, String)>, CliE
         ("figure-12.svg".to_owned(), error(evaluation).map_err(failed)?),
     ];
     let mut number = 8;
-    for grid in TIMED_GRIDS {
+    for grid in evaluation.grids.timed() {
         for tau in TIMED_TAUS {
             plots.push((format!("figure-{number}.svg"), times(evaluation, grid, tau).map_err(failed)?));
             number += 1;
@@ -103,7 +103,7 @@ fn delta(evaluation: &Evaluation) -> Plot {
     let (left, right) = decades(series.iter().flat_map(|s| s.1.iter().map(|p| p.0)));
     let (low, high) = decades(series.iter().flat_map(|s| s.1.iter().map(|p| p.1)));
     lines(
-        "Delta over time, g = 32, tau = 1e-5",
+        &format!("Delta over time, g = {}, tau = 1e-5", evaluation.grids.middle),
         ["milliseconds of solving", "delta (Eq. 2)"],
         [left, right],
         [low, high],
@@ -115,14 +115,14 @@ fn delta(evaluation: &Evaluation) -> Plot {
 /// Figure 12: mean error over g and tau.
 fn error(evaluation: &Evaluation) -> Plot {
     let mut series = Vec::new();
-    for grid in ERROR_GRIDS {
+    for grid in evaluation.grids.all() {
         let points: Vec<(f64, f64)> = ERROR_TAUS
             .into_iter()
             .filter_map(|tau| Some((f64::from(tau), evaluation.mean_rel(Way::PaperThreads, grid, tau)?)))
             .collect();
         series.push((format!("paper, g = {grid}"), points));
     }
-    for grid in ERROR_GRIDS {
+    for grid in evaluation.grids.all() {
         if let Some(error) = evaluation.mean_rel(Way::MultigridThreads, grid, 1e-5) {
             // Its tau bounds the solver's error; the plot shows the one run over the whole width.
             let points = ERROR_TAUS.map(|tau| (f64::from(tau), error)).to_vec();

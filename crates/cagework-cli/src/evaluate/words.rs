@@ -2,51 +2,73 @@
 
 use std::fmt::Write as _;
 
-use super::cases::{ERROR_GRIDS, ERROR_TAUS, Evaluation, TIMED_GRIDS, TIMED_TAUS, Way};
+use super::cases::{ERROR_TAUS, Evaluation, Run, TIMED_TAUS, Way};
+use super::spread::{Comparison, Spread};
 
-/// The findings, a line each, from the numbers of this run.
+/// The findings, a line each, from the numbers of this run. A time is called shorter only where the spreads lie apart.
 pub(super) fn verdicts(evaluation: &Evaluation) -> String {
     let mut out = String::new();
-    let time = |way, g, tau| evaluation.timed(way, g, tau).map(|run| run.report.timings_ms.total);
-    for grid in TIMED_GRIDS {
-        if let (Some(one), Some(all)) =
-            (time(Way::PaperOneThread, grid, 1e-5), time(Way::PaperThreads, grid, 1e-5))
-        {
-            let verdict = if all < one { "turns around" } else { "holds" };
+    for grid in evaluation.grids.timed() {
+        let run = |way| evaluation.timed(way, grid, 1e-5);
+        if let (Some(one), Some(all)) = (run(Way::PaperOneThread), run(Way::PaperThreads)) {
             let _ = writeln!(
                 out,
-                "- \"Threaded smoothing is slower than one thread\" {verdict} at g = {grid}: {one:.0} ms on one thread, \
-                 {all:.0} ms on {} ({:.2} times as fast).",
+                "- \"Threaded smoothing is slower than one thread\" {} at g = {grid}: {} on one thread, {} on {}{}.",
+                turned(all, one),
+                times(one),
+                times(all),
                 evaluation.threads,
-                one / all
+                factors(all, one)
             );
         }
-        if let (Some(paper), Some(ours)) =
-            (time(Way::PaperOneThread, grid, 1e-5), time(Way::MultigridThreads, grid, 1e-5))
-        {
+        if let (Some(paper), Some(ours)) = (run(Way::PaperOneThread), run(Way::MultigridThreads)) {
             let _ = writeln!(
                 out,
-                "- Embedded multigrid on all threads takes {ours:.1} ms at g = {grid}: {:.0} times as fast as the \
-                 paper's algorithm on one thread.",
-                paper / ours
+                "- Embedded multigrid on all threads takes {} at g = {grid}, the paper's algorithm on one thread {}{}.",
+                times(ours),
+                times(paper),
+                factors(ours, paper)
             );
         }
     }
     gpu_verdicts(evaluation, &mut out);
-    if let Some(run) = evaluation.delta_run(Way::PaperOneThread) {
-        let h = &run.report.delta_history;
-        if let (Some(first), Some(last)) = (h.get(h.len() / 2), h.last()) {
-            let rate =
-                (f64::from(*last) / f64::from(*first)).powf(1.0 / (h.len() - h.len() / 2).max(1) as f64);
-            let _ = writeln!(
-                out,
-                "- \"Delta appears to decrease logarithmically\": over its second half it falls by the factor {rate:.4} a \
-                 sweep, which is geometric decay: a straight line over the number of sweeps (figure 7).",
-            );
-        }
-    }
+    delta_verdict(evaluation, &mut out);
     error_verdicts(evaluation, &mut out);
     out
+}
+
+/// What becomes of the paper's finding that `new` is slower than `old`.
+fn turned(new: &Run, old: &Run) -> &'static str {
+    match new.total_ms.against(old.total_ms) {
+        Comparison::Faster { .. } => "turns around",
+        Comparison::Slower => "holds here",
+        Comparison::WithinSpread | Comparison::Unknown => "is not decided",
+    }
+}
+
+/// A median with the shortest and the longest time.
+fn times(run: &Run) -> String {
+    let Spread { n, min, max } = run.total_ms;
+    let median = run.report.timings_ms.total;
+    if n < 2 { format!("{median:.1} ms") } else { format!("{median:.1} ms ({min:.1} to {max:.1})") }
+}
+
+/// How many times as fast `new` is, as far as the spreads allow to say.
+fn factors(new: &Run, old: &Run) -> String {
+    match new.total_ms.against(old.total_ms) {
+        Comparison::Faster { least, most } => {
+            let median = old.report.timings_ms.total / new.report.timings_ms.total;
+            format!(": {} times as fast ({} to {})", digits(median), digits(least), digits(most))
+        }
+        Comparison::Slower => ", which is slower".to_owned(),
+        Comparison::WithinSpread => ", which is within the spread of the runs".to_owned(),
+        Comparison::Unknown => ", one measurement each, which may be within the spread".to_owned(),
+    }
+}
+
+/// Two or three digits of a factor.
+fn digits(factor: f64) -> String {
+    if factor < 10.0 { format!("{factor:.2}") } else { format!("{factor:.0}") }
 }
 
 fn gpu_verdicts(evaluation: &Evaluation, out: &mut String) {
@@ -57,42 +79,69 @@ fn gpu_verdicts(evaluation: &Evaluation, out: &mut String) {
             return;
         }
     };
-    let time = |way, g| evaluation.timed(way, g, 1e-5).map(|run| run.report.timings_ms.total);
-    for grid in TIMED_GRIDS {
-        if let (Some(one), Some(gpu), Some(ours)) =
-            (time(Way::PaperOneThread, grid), time(Way::PaperGpu, grid), time(Way::MultigridGpu, grid))
-        {
-            let verdict = if gpu < one { "turns around" } else { "holds here for the paper's own algorithm" };
+    for grid in evaluation.grids.timed() {
+        let run = |way| evaluation.timed(way, grid, 1e-5);
+        let ways = (run(Way::PaperOneThread), run(Way::PaperGpu), run(Way::MultigridGpu));
+        if let (Some(one), Some(gpu), Some(ours)) = ways {
             let _ = writeln!(
                 out,
-                "- \"GPU-based smoothing is slower than one thread\" {verdict} at g = {grid} on {adapter}: {gpu:.0} ms \
-                 against {one:.0} ms ({:.2} times as fast), with the field left on the GPU and one number read back \
-                 every ten sweeps. By multigrid the same GPU takes {ours:.0} ms, {:.0} times as fast as the paper's \
-                 algorithm on one thread.",
-                one / gpu,
-                one / ours
+                "- \"GPU-based smoothing is slower than one thread\" {} at g = {grid} on {adapter}: {} against {}{}, with \
+                 the field left on the GPU and one number read back every ten sweeps. Multigrid on the same GPU takes {}{}.",
+                turned(gpu, one),
+                times(gpu),
+                times(one),
+                factors(gpu, one),
+                times(ours),
+                factors(ours, one).replace("as fast", "as fast as the paper's algorithm on one thread")
             );
         }
     }
 }
 
+/// How much two factors a sweep may differ (in their logarithms) and still be one decay.
+const SAME_DECAY: f64 = 1.25;
+
+fn delta_verdict(evaluation: &Evaluation, out: &mut String) {
+    let Some(run) = evaluation.delta_run(Way::PaperOneThread) else { return };
+    let h = &run.report.delta_history;
+    let rate = |from: usize, to: usize| {
+        let quotient = f64::from(*h.get(to)?) / f64::from(*h.get(from)?);
+        (to > from).then(|| quotient.powf(1.0 / (to - from) as f64))
+    };
+    let last = h.len().saturating_sub(1);
+    if let (Some(third), Some(fourth)) = (rate(last / 2, 3 * last / 4), rate(3 * last / 4, last)) {
+        let bend = third.ln() / fourth.ln();
+        let straight = if bend < SAME_DECAY && bend > 1.0 / SAME_DECAY {
+            "which is geometric decay: a straight line over the number of sweeps"
+        } else {
+            "which is no single geometric decay"
+        };
+        let _ = writeln!(
+            out,
+            "- \"Delta appears to decrease logarithmically\": it falls by the factor {third:.4} a sweep in the third \
+             quarter of the solve and by {fourth:.4} in the last, {straight} (figure 7).",
+        );
+    }
+}
+
+/// Errors do not scatter: two binds with the same options give the same bits.
 fn error_verdicts(evaluation: &Evaluation, out: &mut String) {
-    let paper = |g, tau| evaluation.mean_rel(Way::PaperThreads, g, tau);
-    if let (Some(a), Some(b)) = (paper(64, 1e-4), paper(64, 1e-5)) {
+    let fine = evaluation.grids.fine;
+    let paper = |tau| evaluation.mean_rel(Way::PaperThreads, fine, tau);
+    if let (Some(a), Some(b)) = (paper(1e-4), paper(1e-5)) {
         let verdict = if a > b { "holds" } else { "does not hold here" };
         let _ = writeln!(
             out,
-            "- \"A large mean error for grid size 64 and tau 1e-4\", because a finer grid needs a smaller tau, {verdict}: \
-             {a:.1e} of the diagonal at tau = 1e-4, {b:.1e} at 1e-5.",
+            "- \"A large mean error for grid size 64 and tau 1e-4\", because a finer grid needs a smaller tau, {verdict} at \
+             g = {fine}: {a:.1e} of the diagonal at tau = 1e-4, {b:.1e} at 1e-5.",
         );
     }
-    if let (Some(paper), Some(ours)) = (paper(64, 1e-5), evaluation.mean_rel(Way::MultigridThreads, 64, 1e-5))
-    {
+    if let (Some(paper), Some(ours)) = (paper(1e-5), evaluation.mean_rel(Way::MultigridThreads, fine, 1e-5)) {
+        let verdict = if ours < paper { "belongs to the method, not to the grid" } else { "holds here" };
         let _ = writeln!(
             out,
-            "- \"Low values of g result in excessive quantization error\" belongs to the method, not to the grid: at \
-             g = 64 the paper's weights miss the rest pose by {paper:.1e} of the diagonal on average, the embedded \
-             ones by {ours:.1e}.",
+            "- \"Low values of g result in excessive quantization error\" {verdict}: at g = {fine} the paper's weights \
+             miss the rest pose by {paper:.1e} of the diagonal on average, the embedded ones by {ours:.1e}.",
         );
     }
 }
@@ -101,7 +150,7 @@ fn error_verdicts(evaluation: &Evaluation, out: &mut String) {
 pub(super) fn report(evaluation: &Evaluation) -> String {
     let mut out = format!(
         "# The paper's evaluation, run anew\n\n{}: {} vertices, {} cage vertices. {} threads, {} {}; GPU: {}. Each time is \
-         the median of {} whole binds (voxelize, solve, sample).\nMade by `cagework evaluate`, version {}.\n\n\
+         {} (voxelize, solve, sample).\nMade by `cagework evaluate`, version {}.\n\n\
          ## Findings\n\n{}\n",
         evaluation.mesh,
         evaluation.n_vertices,
@@ -110,7 +159,7 @@ pub(super) fn report(evaluation: &Evaluation) -> String {
         std::env::consts::OS,
         std::env::consts::ARCH,
         evaluation.adapter.as_deref().unwrap_or("none"),
-        evaluation.runs,
+        measured(evaluation.runs),
         env!("CARGO_PKG_VERSION"),
         verdicts(evaluation)
     );
@@ -139,13 +188,21 @@ pub(super) fn report(evaluation: &Evaluation) -> String {
     out
 }
 
+/// What a time in the report is.
+fn measured(runs: u32) -> String {
+    match runs {
+        1 => "one whole bind, whose scatter nobody knows".to_owned(),
+        _ => format!("the median of {runs} whole binds, with the shortest and the longest"),
+    }
+}
+
 fn time_table(evaluation: &Evaluation, out: &mut String) {
     out.push_str("## Time to completion (figures 8 to 11)\n\n| g | tau |");
     for way in Way::ALL {
         let _ = write!(out, " {} |", way.name());
     }
     let _ = writeln!(out, "\n|---|---|{}", "---|".repeat(Way::ALL.len()));
-    for grid in TIMED_GRIDS {
+    for grid in evaluation.grids.timed() {
         for tau in TIMED_TAUS {
             let _ = write!(out, "| {grid} | {tau:e} |");
             for way in Way::ALL {
@@ -153,7 +210,7 @@ fn time_table(evaluation: &Evaluation, out: &mut String) {
                     Some(run) => {
                         let r = &run.report;
                         let unit = if way.is_paper() { "sweeps" } else { "cycles" };
-                        let _ = write!(out, " {:.1} ms, {} {unit} |", r.timings_ms.total, r.iterations);
+                        let _ = write!(out, " {}, {} {unit} |", times(run), r.iterations);
                     }
                     None => out.push_str(" - |"),
                 }
@@ -161,7 +218,7 @@ fn time_table(evaluation: &Evaluation, out: &mut String) {
             out.push('\n');
         }
     }
-    for number in 8..8 + TIMED_GRIDS.len() * TIMED_TAUS.len() {
+    for number in 8..8 + evaluation.grids.timed().len() * TIMED_TAUS.len() {
         let _ = write!(out, "\n![figure {number}](figure-{number}.svg)\n");
     }
     out.push('\n');
@@ -173,7 +230,7 @@ fn error_table(evaluation: &Evaluation, out: &mut String) {
         let _ = write!(out, " paper, tau = {tau:e} |");
     }
     let _ = writeln!(out, " embedded multigrid |\n|---|{}---|", "---|".repeat(ERROR_TAUS.len()));
-    for grid in ERROR_GRIDS {
+    for grid in evaluation.grids.all() {
         let _ = write!(out, "| {grid} |");
         for tau in ERROR_TAUS {
             let error = evaluation.mean_rel(Way::PaperThreads, grid, tau);

@@ -1,7 +1,7 @@
 use predicates::prelude::*;
 use predicates::str::contains;
 
-use crate::support::{Sandbox, glb_json};
+use crate::support::{Sandbox, glb_json, obj_positions};
 
 #[test]
 fn bench_times_both_ways_on_one_thread_and_on_all() {
@@ -36,7 +36,9 @@ fn demo_writes_everything_it_names() {
     let document = glb_json(&sandbox.read("made/here/poses.glb"));
     assert_eq!(document["meshes"][0]["primitives"][0]["targets"].as_array().unwrap().len(), 2);
     let report = &done["report"];
-    assert_eq!(report["vertices"], 10_242);
+    let sample = obj_positions(&sandbox.read("made/here/rat.obj")).len();
+    assert_eq!(report["vertices"], sample);
+    assert_eq!(report["cage_vertices"], obj_positions(&sandbox.read("made/here/cage.obj")).len());
     assert_eq!(report["outside_vertices"], 0);
     assert_eq!(report["converged"], true);
 }

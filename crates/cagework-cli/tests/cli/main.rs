@@ -8,6 +8,7 @@ mod bind;
 mod cage_and_info;
 mod cages;
 mod deform;
+mod evaluate;
 mod render;
 mod support;
 mod usage;

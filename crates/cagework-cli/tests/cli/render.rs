@@ -71,3 +71,75 @@ fn what_cannot_be_drawn_is_refused_before_the_work() {
     let args = "render mesh.obj --cage cage.obj --show weights --column 8 -o p.png";
     sandbox.run(args).code(1).stderr(contains("the cage has 8 vertices"));
 }
+
+/// A C of boxes: two arms along x with a gap between them, from 0 to 1 in y. `v` and quads, counter-clockwise outside.
+fn clamp_obj(room: f64, lift: f64) -> String {
+    // The outline of the C in x and y, and how much of `lift` each corner takes: the tip of the upper arm.
+    const OUTLINE: [([f64; 2], [f64; 2], f64); 8] = [
+        ([0.0, 0.0], [-1.0, -1.0], 0.0),
+        ([3.0, 0.0], [1.0, -1.0], 0.0),
+        ([3.0, 1.0], [1.0, 1.0], 0.0),
+        ([1.0, 1.0], [1.0, 1.0], 0.0),
+        ([1.0, 1.6], [1.0, -1.0], 0.0),
+        ([3.0, 1.6], [1.0, -1.0], 1.0),
+        ([3.0, 2.6], [1.0, 1.0], 1.0),
+        ([0.0, 2.6], [-1.0, 1.0], 0.0),
+    ];
+    let mut text = String::new();
+    for z in [-0.5 - room, 0.5 + room] {
+        for ([x, y], [dx, dy], share) in OUTLINE {
+            text += &format!("v {} {} {z}\n", x + room * dx, y + room * dy + lift * share);
+        }
+    }
+    // Caps in convex parts, then the sides.
+    for [a, b, c, d] in [[1, 2, 3, 4], [1, 4, 5, 8], [5, 6, 7, 8]] {
+        text += &format!("f {d} {c} {b} {a}\nf {} {} {} {}\n", a + 8, b + 8, c + 8, d + 8);
+    }
+    for k in 0..8 {
+        let (a, b) = (k + 1, (k + 1) % 8 + 1);
+        text += &format!("f {a} {b} {} {}\n", b + 8, a + 8);
+    }
+    text
+}
+
+/// Pixels at an edge that two ways to the same positions may fill differently: weights are `f32`, and edges are smoothed.
+const ROUND_OFF: usize = 10;
+
+#[test]
+fn comparison_draws_both_ways_side_by_side() {
+    let sandbox = Sandbox::new();
+    sandbox.write("mesh.obj", clamp_obj(0.0, 0.0));
+    sandbox.write("cage.obj", clamp_obj(0.2, 0.0));
+    sandbox.write("pose.obj", clamp_obj(0.2, 1.5));
+    let args = "render mesh.obj --cage cage.obj -g 24 --no-cage --no-floor --view front --size 202x120";
+    let picture = |more: &str| {
+        let done = sandbox.json(&format!("{args} {more} -o p.png --json"));
+        let picture = image::load_from_memory(&sandbox.read("p.png")).unwrap().into_rgb8();
+        assert_eq!(picture.dimensions(), (202, 120));
+        (picture, done)
+    };
+    // Where the halves differ. Two columns lie between them, so that each has 100.
+    let differing = |picture: &image::RgbImage| {
+        let differs = |x, y| {
+            let pair = [picture.get_pixel(x, y), picture.get_pixel(x + 102, y)].map(|p| p.0);
+            pair[0].iter().zip(pair[1]).any(|(a, b)| a.abs_diff(b) > 8)
+        };
+        (0..100).flat_map(|x| (0..120).map(move |y| (x, y))).filter(|&(x, y)| differs(x, y)).count()
+    };
+    // At rest both ways give the model back.
+    let (rest, done) = picture("--compare");
+    assert_eq!(done["compared"], serde_json::json!(["harmonic coordinates", "mean value coordinates"]));
+    assert!(differing(&rest) <= ROUND_OFF, "{} pixels differ at rest", differing(&rest));
+    // The lower arm stays where it is by harmonic coordinates; mean value coordinates see across the gap.
+    let (posed, _) = picture("--compare --pose pose.obj");
+    assert!(differing(&posed) > 10 * ROUND_OFF, "{} pixels differ", differing(&posed));
+    let (alone, done) = picture("--pose pose.obj");
+    assert!(done.get("compared").is_none());
+    assert_ne!(alone, posed);
+    sandbox.run(&format!("{args} --compare -o p.png")).success().stdout(contains("right: mean value"));
+    sandbox.run("render mesh.obj --compare -o p.png").code(2).stderr(contains("--cage"));
+    for (more, message) in [("--show cells", "slice"), ("--size 3x3", "4 pixels")] {
+        let args = format!("render mesh.obj --cage cage.obj --compare {more} -o p.png");
+        sandbox.run(&args).code(1).stderr(contains(message));
+    }
+}

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
+use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use assert_cmd::cargo::cargo_bin_cmd;
 use serde_json::Value;
@@ -57,10 +58,16 @@ impl Sandbox {
         std::fs::read(self.path(name)).unwrap()
     }
 
+    /// `cagework` in the folder with words separated by blanks, not run yet.
+    pub(crate) fn command(&self, args: &str) -> Command {
+        let mut command = cargo_bin_cmd!("cagework");
+        command.current_dir(self.folder.path()).args(args.split_whitespace());
+        command
+    }
+
     /// Runs `cagework` in the folder with words separated by blanks.
     pub(crate) fn run(&self, args: &str) -> Assert {
-        let mut command = cargo_bin_cmd!("cagework");
-        command.current_dir(self.folder.path()).args(args.split_whitespace()).assert()
+        self.command(args).assert()
     }
 
     /// Runs `cagework`, which must succeed, and returns its stdout as JSON.

@@ -1,6 +1,6 @@
 //! Holes: their outlines, and triangles that close them.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use glam::DVec3;
 
@@ -45,15 +45,29 @@ pub(crate) fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
     found
 }
 
-/// Triangles of the smallest total area between the corners of an outline, turned like it. `None` if it has too many.
+/// A triangle that folds back onto the face behind one of its sides counts as so much more area, for each such side.
+/// Around a missing corner of a cube both ways to cut the hole have the same area, and one lies on the faces that stay.
+const FOLD: f64 = 1.0;
+
+/// Cosine of the angle between two faces above which they lie on each other: 8 degrees.
+const FOLDED: f64 = 0.99;
+
+/// Triangles of the smallest total area between the corners of an outline, turned like it; they keep off `faces`, those
+/// around the hole. `None` if the outline has too many corners.
 ///
 /// Source: Barequet, Sharir 1995, "Filling gaps in the boundary of a polyhedron" (dynamic programming).
-pub(crate) fn triangulate(outline: &[u32], at: &[DVec3]) -> Option<Vec<[u32; 3]>> {
+pub(crate) fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<Vec<[u32; 3]>> {
     let n = outline.len();
     if !(3..=MAX_EDGES).contains(&n) {
         return None;
     }
     let p = |k: usize| at[outline[k] as usize];
+    let behind = behind(outline, at, faces);
+    let folds = |side: usize, opposite: usize| {
+        let (from, to) = (p(side), p((side + 1) % n));
+        let across = (p(opposite) - from).reject_from((to - from).normalize_or(DVec3::X));
+        f64::from(u8::from(across.normalize_or_zero().dot(behind[side]) > FOLDED))
+    };
     let mut cost = vec![vec![0.0_f64; n]; n];
     let mut split = vec![vec![0; n]; n];
     for length in 2..n {
@@ -62,7 +76,15 @@ pub(crate) fn triangulate(outline: &[u32], at: &[DVec3]) -> Option<Vec<[u32; 3]>
             cost[i][k] = f64::INFINITY;
             for m in i + 1..k {
                 let area = (p(m) - p(i)).cross(p(k) - p(i)).length();
-                let total = cost[i][m] + cost[m][k] + area;
+                let mut folded = 0.0;
+                for (is_side, side, opposite) in
+                    [(m == i + 1, i, k), (k == m + 1, m, i), (length == n - 1, n - 1, m)]
+                {
+                    if is_side {
+                        folded += folds(side, opposite);
+                    }
+                }
+                let total = cost[i][m] + cost[m][k] + area * (1.0 + FOLD * folded);
                 if total < cost[i][k] {
                     cost[i][k] = total;
                     split[i][k] = m;
@@ -81,4 +103,26 @@ pub(crate) fn triangulate(outline: &[u32], at: &[DVec3]) -> Option<Vec<[u32; 3]>
         spans.extend([(i, m), (m, k)]);
     }
     Some(triangles)
+}
+
+/// For each side of an outline the direction from it across the face behind it, as far as there is one. Unit or zero.
+fn behind(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Vec<DVec3> {
+    let n = outline.len();
+    let key = |a: u32, b: u32| [a.min(b), a.max(b)];
+    let sides: HashMap<[u32; 2], usize> =
+        (0..n).map(|k| (key(outline[k], outline[(k + 1) % n]), k)).collect();
+    let mut across = vec![DVec3::ZERO; n];
+    for face in faces {
+        for (k, &a) in face.iter().enumerate() {
+            let b = face[(k + 1) % face.len()];
+            let Some(&side) = sides.get(&key(a, b)) else { continue };
+            let point = |i: u32| at.get(i as usize).copied().unwrap_or_default();
+            let corners = face.iter().zip(face.iter().cycle().skip(1));
+            // Newell's normal; whichever way the face is turned, its own sides run around it.
+            let normal: DVec3 =
+                corners.map(|(&c, &d)| (point(c) - point(a)).cross(point(d) - point(a))).sum();
+            across[side] = normal.cross(point(b) - point(a)).normalize_or_zero();
+        }
+    }
+    across
 }

@@ -163,7 +163,7 @@ fn fill_holes(repaired: &mut Repaired) {
     let at: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
     let mut filled = 0;
     for outline in fill::loops(&open) {
-        if let Some(triangles) = fill::triangulate(&outline, &at) {
+        if let Some(triangles) = fill::triangulate(&outline, &at, &mesh.faces) {
             mesh.faces.extend(triangles.into_iter().map(|t| t.to_vec()));
             filled += 1;
         }

@@ -141,8 +141,8 @@ pub fn delete_faces(mesh: &PolygonMesh, faces: &[u32]) -> Result<Edited, RestEdi
         deleted.iter().flat_map(|&f| sides(f)).filter(|&[a, b]| !inner.contains(&[b, a])).collect();
     let at: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
     for outline in loops(&rim) {
-        let triangles =
-            triangulate(&outline, &at).ok_or(RestEditError::LargeHole { edges: outline.len() })?;
+        let triangles = triangulate(&outline, &at, &edited.mesh.faces)
+            .ok_or(RestEditError::LargeHole { edges: outline.len() })?;
         edited.touched.extend(&outline);
         edited.mesh.faces.extend(triangles.into_iter().map(|t| t.to_vec()));
     }

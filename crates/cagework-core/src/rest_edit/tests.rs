@@ -136,6 +136,20 @@ fn deleted_faces_are_closed_over() {
     assert!(matches!(delete_faces(&cube, &[77]).unwrap_err(), RestEditError::Missing { .. }));
 }
 
+/// A corner of a cube leaves a hole of six edges, and two ways to fill it have the same area. One of them lies on the
+/// three faces that stay, and deleting was refused because the cage would have gone through itself.
+#[test]
+fn every_corner_of_a_cube_can_be_deleted() {
+    let cube = cube();
+    for corner in 0..8 {
+        let around: Vec<u32> = (0..6).filter(|&f| cube.faces[f as usize].contains(&corner)).collect();
+        let edited = delete_faces(&cube, &around).unwrap();
+        assert_eq!(edited.mesh.positions.len(), 7);
+        // What is cut off is a corner of three half faces: a sixth of the cube's volume of 8.
+        assert!((volume(&edited.mesh) - 8.0 * 5.0 / 6.0).abs() < 1e-6, "corner {corner}");
+    }
+}
+
 #[test]
 fn cage_that_meets_itself_already_can_still_be_mended() {
     let mut mesh = cube();

@@ -1,9 +1,12 @@
 //! The gizmo: its shape, where it is on the GPU, and which part is under the pointer.
 
+mod solids;
+
 use std::f32::consts::TAU;
 
-use glam::{Mat4, Quat, Vec2, Vec3};
+use glam::{Mat3, Mat4, Quat, Vec2, Vec3};
 
+use self::solids::{cone, cube, ring, vertex};
 use super::camera::Camera;
 use super::layout::GizmoView;
 use super::pipelines::{GIZMO_STRIDE, Layouts};
@@ -23,12 +26,17 @@ const AXIS_START: f32 = 0.16;
 /// The square of a plane, from and to, along both of its axes.
 const PLANE: [f32; 2] = [0.30, 0.50];
 
-/// Segments of a ring, and around cones and rods.
-const RING_SEGMENTS: u32 = 64;
-const AROUND: u32 = 16;
+/// Radius of the ring that faces the eye: outside those around the axes.
+const VIEW_RING: f32 = 1.16;
 
-/// Most vertices of a gizmo: three rings of 64 x 8 quads are the largest.
-const MAX_VERTICES: u64 = 3 * 64 * 8 * 6;
+/// Radius of a ring's tube.
+const TUBE: f32 = 0.014;
+
+/// Segments of a ring.
+const RING_SEGMENTS: u32 = 64;
+
+/// Most vertices of a gizmo: four rings of 64 x 8 quads are the largest.
+const MAX_VERTICES: u64 = 4 * 64 * 8 * 6;
 
 type Vertex = [f32; 10];
 
@@ -41,13 +49,22 @@ pub fn pick_gizmo(camera: &Camera, gizmo: &Gizmo, cursor: Vec2) -> Option<GizmoP
     if gizmo.mode != GizmoMode::Rotate && center.distance(cursor) <= 1.2 * REACH_PX {
         return Some(GizmoPart::View);
     }
+    let to_ring = |axis: u8, at: &dyn Fn(Vec3) -> Option<Vec2>| {
+        ring_points(axis)
+            .zip(ring_points(axis).cycle().skip(1))
+            .filter_map(|(a, b)| Some(to_segment(cursor, at(a)?, at(b)?)))
+            .fold(f32::INFINITY, f32::min)
+    };
     let mut best: Option<(f32, GizmoPart)> = None;
+    if gizmo.mode == GizmoMode::Rotate {
+        let facing = facing(camera);
+        let at = |p: Vec3| camera.project(gizmo.center + size * VIEW_RING * (facing * p)).map(|p| p.position);
+        let distance = to_ring(2, &at);
+        best = (distance <= REACH_PX).then_some((distance, GizmoPart::View));
+    }
     for axis in 0..3u8 {
         let distance = match gizmo.mode {
-            GizmoMode::Rotate => ring_points(axis)
-                .zip(ring_points(axis).cycle().skip(1))
-                .filter_map(|(a, b)| Some(to_segment(cursor, at(a)?, at(b)?)))
-                .fold(f32::INFINITY, f32::min),
+            GizmoMode::Rotate => to_ring(axis, &at),
             GizmoMode::Move | GizmoMode::Scale => {
                 let along = unit(axis);
                 match (at(AXIS_START * along), at(along)) {
@@ -74,6 +91,11 @@ pub fn pick_gizmo(camera: &Camera, gizmo: &Gizmo, cursor: Vec2) -> Option<GizmoP
 
 fn unit(axis: u8) -> Vec3 {
     [Vec3::X, Vec3::Y, Vec3::Z][usize::from(axis % 3)]
+}
+
+/// Turns z towards the eye: the axis that a free rotation turns around.
+fn facing(camera: &Camera) -> Quat {
+    Quat::from_mat3(&Mat3::from_cols(camera.right(), camera.up(), camera.backward()))
 }
 
 fn ring_points(axis: u8) -> impl Iterator<Item = Vec3> + Clone {
@@ -106,10 +128,26 @@ fn is_in_quad(p: Vec2, corners: [Vec2; 4]) -> bool {
 #[derive(Debug)]
 pub(super) struct GizmoShape {
     vertices: wgpu::Buffer,
-    count: u32,
+    /// Vertices along the gizmo's own axes, and of those that face the eye, which come after them.
+    counts: [u32; 2],
+    /// Where either are.
+    places: [Place; 2],
+    shape: Option<(GizmoMode, Option<GizmoPart>)>,
+}
+
+/// Where a part of a gizmo is, on the GPU.
+#[derive(Debug)]
+struct Place {
     uniform: wgpu::Buffer,
     bind_group: wgpu::BindGroup,
-    shape: Option<(GizmoMode, Option<GizmoPart>)>,
+}
+
+impl Place {
+    fn write(&self, context: &GpuContext, size: f32, rotation: Quat, center: Vec3) {
+        let place = Mat4::from_scale_rotation_translation(Vec3::splat(size), rotation, center);
+        let view = GizmoView { world_from_gizmo: place.to_cols_array_2d() };
+        context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&view));
+    }
 }
 
 impl GizmoShape {
@@ -122,49 +160,72 @@ impl GizmoShape {
                 mapped_at_creation: false,
             })
         };
-        let uniform = buffer("gizmo", size_of::<GizmoView>() as u64, wgpu::BufferUsages::UNIFORM);
-        let bind_group = context.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("gizmo"),
-            layout: &layouts.gizmo,
-            entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }],
-        });
+        let place = |label| {
+            let uniform = buffer(label, size_of::<GizmoView>() as u64, wgpu::BufferUsages::UNIFORM);
+            let bind_group = context.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some(label),
+                layout: &layouts.gizmo,
+                entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }],
+            });
+            Place { uniform, bind_group }
+        };
+        let places = [place("gizmo"), place("gizmo's part that faces the eye")];
         let vertices = buffer("gizmo's shape", MAX_VERTICES * GIZMO_STRIDE, wgpu::BufferUsages::VERTEX);
-        Self { vertices, count: 0, uniform, bind_group, shape: None }
+        Self { vertices, counts: [0; 2], places, shape: None }
     }
 
     /// Writes the shape, if it changed, and where it is in this camera.
     pub(super) fn update(&mut self, context: &GpuContext, gizmo: &Gizmo, camera: &Camera) {
         if self.shape != Some((gizmo.mode, gizmo.active)) {
-            let vertices = shape(gizmo.mode, gizmo.active);
+            let mut vertices = shape(gizmo.mode, gizmo.active);
+            let own = vertices.len() as u32;
+            vertices.extend(facing_shape(gizmo.mode, gizmo.active));
             context.queue.write_buffer(&self.vertices, 0, bytemuck::cast_slice(&vertices));
-            self.count = vertices.len() as u32;
+            self.counts = [own, vertices.len() as u32 - own];
             self.shape = Some((gizmo.mode, gizmo.active));
         }
         let size = GIZMO_PX * camera.units_per_pixel(gizmo.center);
-        let place = Mat4::from_scale_rotation_translation(Vec3::splat(size), gizmo.rotation, gizmo.center);
-        let view = GizmoView { world_from_gizmo: place.to_cols_array_2d() };
-        context.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&view));
+        let [own, towards_eye] = &self.places;
+        own.write(context, size, gizmo.rotation, gizmo.center);
+        towards_eye.write(context, size, facing(camera), gizmo.center);
     }
 
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
-        pass.set_bind_group(1, &self.bind_group, &[]);
         pass.set_vertex_buffer(0, self.vertices.slice(..));
-        pass.draw(0..self.count, 0..1);
+        let mut first = 0;
+        // Browsers warn of draws without vertices.
+        for (count, place) in self.counts.into_iter().zip(&self.places).filter(|(count, _)| *count > 0) {
+            pass.set_bind_group(1, &place.bind_group, &[]);
+            pass.draw(first..first + count, 0..1);
+            first += count;
+        }
     }
 }
 
-/// Triangles of a gizmo.
+/// Colour of a part: its own, or that of the part under the pointer.
+fn color(active: Option<GizmoPart>, part: GizmoPart, own: usize, alpha: f32) -> [f32; 4] {
+    let [r, g, b, _] = linear(if active == Some(part) { ACTIVE } else { AXES[own] });
+    [r, g, b, alpha]
+}
+
+/// Triangles of a gizmo that face the eye, towards z: the ring to turn around the view direction.
+fn facing_shape(mode: GizmoMode, active: Option<GizmoPart>) -> Vec<Vertex> {
+    let mut out = Vec::new();
+    if mode == GizmoMode::Rotate {
+        ring(&mut out, 2, [VIEW_RING, TUBE], color(active, GizmoPart::View, 4, 1.0));
+    }
+    out
+}
+
+/// Triangles of a gizmo along its own axes.
 fn shape(mode: GizmoMode, active: Option<GizmoPart>) -> Vec<Vertex> {
     let mut out = Vec::new();
-    let color = |part: GizmoPart, own: usize, alpha: f32| {
-        let [r, g, b, _] = linear(if active == Some(part) { ACTIVE } else { AXES[own] });
-        [r, g, b, alpha]
-    };
+    let color = |part, own, alpha| color(active, part, own, alpha);
     for axis in 0..3u8 {
         let own = color(GizmoPart::Axis(axis), usize::from(axis), 1.0);
         let turn = Quat::from_rotation_arc(Vec3::Z, unit(axis));
         match mode {
-            GizmoMode::Rotate => ring(&mut out, axis, 0.014, own),
+            GizmoMode::Rotate => ring(&mut out, axis, [1.0, TUBE], own),
             GizmoMode::Move => {
                 cone(&mut out, turn, [AXIS_START, 0.80], [0.013, 0.013], own);
                 cone(&mut out, turn, [0.78, 1.0], [0.058, 0.0], own);
@@ -184,63 +245,6 @@ fn shape(mode: GizmoMode, active: Option<GizmoPart>) -> Vec<Vertex> {
         cube(&mut out, Vec3::ZERO, 0.05, color(GizmoPart::View, 3, 1.0));
     }
     out
-}
-
-fn vertex(p: Vec3, n: Vec3, [r, g, b, a]: [f32; 4]) -> Vertex {
-    [p.x, p.y, p.z, n.x, n.y, n.z, r, g, b, a]
-}
-
-fn cube(out: &mut Vec<Vertex>, center: Vec3, half: f32, color: [f32; 4]) {
-    for axis in 0..3u8 {
-        for sign in [-1.0, 1.0] {
-            let n = sign * unit(axis);
-            let (u, v) = (unit(axis + 1), unit(axis + 2));
-            let corner = |a: f32, b: f32| center + half * (n + a * u + b * v);
-            for p in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
-                out.push(vertex(corner(p.0, p.1), n, color));
-            }
-        }
-    }
-}
-
-/// A cone, rod or stump along z from `z[0]` to `z[1]`, turned; its lower end is closed.
-fn cone(out: &mut Vec<Vertex>, turn: Quat, z: [f32; 2], radius: [f32; 2], color: [f32; 4]) {
-    let around = |k: u32| {
-        let (sin, cos) = (TAU * k as f32 / AROUND as f32).sin_cos();
-        Vec3::new(cos, sin, 0.0)
-    };
-    for k in 0..AROUND {
-        let (d, e) = (around(k), around(k + 1));
-        let at = |d: Vec3, end: usize| turn * (radius[end] * d + z[end] * Vec3::Z);
-        for (p, n) in
-            [(at(d, 0), d), (at(e, 0), e), (at(e, 1), e), (at(d, 0), d), (at(e, 1), e), (at(d, 1), d)]
-        {
-            out.push(vertex(p, turn * n, color));
-        }
-        for p in [turn * (z[0] * Vec3::Z), at(e, 0), at(d, 0)] {
-            out.push(vertex(p, turn * -Vec3::Z, color));
-        }
-    }
-}
-
-/// A ring of radius 1 around an axis.
-fn ring(out: &mut Vec<Vertex>, axis: u8, radius: f32, color: [f32; 4]) {
-    const SIDES: u32 = 8;
-    let points: Vec<Vec3> = ring_points(axis).collect();
-    let at = |k: u32, s: u32| {
-        let p = points[(k % RING_SEGMENTS) as usize];
-        let (sin, cos) = (TAU * (s % SIDES) as f32 / SIDES as f32).sin_cos();
-        let n = cos * p + sin * unit(axis);
-        (p + radius * n, n)
-    };
-    for k in 0..RING_SEGMENTS {
-        for s in 0..SIDES {
-            for (p, n) in [at(k, s), at(k + 1, s), at(k + 1, s + 1), at(k, s), at(k + 1, s + 1), at(k, s + 1)]
-            {
-                out.push(vertex(p, n, color));
-            }
-        }
-    }
 }
 
 #[cfg(test)]
@@ -292,6 +296,32 @@ mod tests {
     }
 
     #[test]
+    fn view_ring_is_a_circle_around_the_middle_and_lies_outside_the_others() {
+        let (mut camera, mut gizmo) = scene();
+        gizmo.mode = GizmoMode::Rotate;
+        // In the middle of the picture, where perspective makes no ellipse of a circle that faces the eye.
+        camera.target = gizmo.center;
+        let center = at(&camera, &gizmo, Vec3::ZERO);
+        for k in 0..12 {
+            let away = Vec2::from_angle(TAU * k as f32 / 12.0);
+            for (radius, part) in [(1.0, Some(GizmoPart::View)), (1.0 + 12.0 / GIZMO_PX, None)] {
+                let cursor = center + radius * VIEW_RING * GIZMO_PX * away;
+                assert_eq!(pick_gizmo(&camera, &gizmo, cursor), part, "{k}, {radius}");
+            }
+        }
+        gizmo.mode = GizmoMode::Move;
+        let cursor = center + VIEW_RING * GIZMO_PX * Vec2::NEG_Y;
+        assert_eq!(pick_gizmo(&camera, &gizmo, cursor), None, "arrows have no ring");
+    }
+
+    #[test]
+    fn view_ring_faces_the_eye() {
+        let (camera, _) = scene();
+        assert!((facing(&camera) * Vec3::Z).abs_diff_eq(camera.backward(), 1e-6));
+        assert!((facing(&camera) * Vec3::X).abs_diff_eq(camera.right(), 1e-6));
+    }
+
+    #[test]
     fn size_in_the_picture_does_not_depend_on_the_distance() {
         let (mut camera, gizmo) = scene();
         camera.target = gizmo.center;
@@ -309,7 +339,7 @@ mod tests {
     #[test]
     fn shapes_fit_their_buffer() {
         for mode in [GizmoMode::Move, GizmoMode::Rotate, GizmoMode::Scale] {
-            let n = shape(mode, None).len() as u64;
+            let n = (shape(mode, None).len() + facing_shape(mode, None).len()) as u64;
             assert!(n > 0 && n.is_multiple_of(3) && n <= MAX_VERTICES, "{mode:?}: {n}");
         }
         assert_eq!(size_of::<Vertex>() as u64, GIZMO_STRIDE);

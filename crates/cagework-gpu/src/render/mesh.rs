@@ -57,8 +57,9 @@ impl Mesh {
                 context.queue.write_buffer(buffer, 0, bytes);
             }
         }
-        let padded: Vec<[f32; 4]> = model.positions.iter().map(|p| p.extend(1.0).to_array()).collect();
-        let n = model.positions.len();
+        let rest_positions = model.with_copies(&model.positions);
+        let padded: Vec<[f32; 4]> = rest_positions.iter().map(|p| p.extend(1.0).to_array()).collect();
+        let n = padded.len();
         let rest = Table::new(context, &mut allocator, "rest positions", Entry::Point, n)?;
         rest.write(context, bytemuck::cast_slice(&padded));
         let rest_normals = Table::new(context, &mut allocator, "rest normals", Entry::Point, n)?;

@@ -42,8 +42,10 @@ pub(super) struct Palette {
 /// `0xRRGGBB` and alpha.
 pub(super) type Color = (u32, f32);
 
-/// Colours of the axes x, y, z, and of what belongs to none.
-pub(super) const AXES: [Color; 4] = [(0xe5484d, 1.0), (0x46a758, 1.0), (0x3e82f1, 1.0), (0xd5dae3, 1.0)];
+/// Colours of the axes x, y, z, of what belongs to none, and of the ring around the view: thin, so that it must differ
+/// from dark and light.
+pub(super) const AXES: [Color; 5] =
+    [(0xe5484d, 1.0), (0x46a758, 1.0), (0x3e82f1, 1.0), (0xd5dae3, 1.0), (0x8a94a6, 1.0)];
 
 /// The active part of a gizmo.
 pub(super) const ACTIVE: Color = (0xffc53d, 1.0);

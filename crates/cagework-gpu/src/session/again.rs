@@ -1,4 +1,4 @@
-//! A session once more: beside the first, or on another device.
+//! A session made again: beside the first, or on another device.
 
 use std::sync::Arc;
 

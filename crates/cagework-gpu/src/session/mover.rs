@@ -2,6 +2,8 @@
 //!
 //! Which one is decided when the device is opened ([`GpuContext::draws_only`]); to the session both are the same.
 
+use std::sync::Arc;
+
 use cagework_core::Weights;
 use cagework_core::bind::OutsideVertex;
 use cagework_core::deform::{deform_bound, vertex_normals};
@@ -11,6 +13,7 @@ use crate::buffers::Allocator;
 use crate::deform::{Deformer, GpuWeights};
 use crate::device::GpuContext;
 use crate::error::GpuError;
+use crate::render::DrawModel;
 use crate::table::{Entry, Table};
 
 /// Deforms one mesh, frame after frame; `[positions, normals]` are what is drawn.
@@ -19,33 +22,33 @@ pub(super) enum Mover {
     /// By kernels: a moved cage is all that is uploaded.
     Kernels { deformer: Deformer, tables: [Table; 2] },
     /// By the processor: every vertex is uploaded.
-    Processor { triangles: Vec<[u32; 3]>, tables: [Table; 2] },
+    Processor { model: Arc<DrawModel>, triangles: Vec<[u32; 3]>, tables: [Table; 2] },
 }
 
 impl Mover {
     /// `on_gpu`: the same weights, if they are there already.
     pub(super) async fn new(
         context: &GpuContext,
+        model: &Arc<DrawModel>,
         weights: &Weights,
         outside: &[OutsideVertex],
-        on_gpu: Option<&GpuWeights>,
-        triangles: Vec<[u32; 3]>,
+        on_gpu: Option<GpuWeights>,
     ) -> Result<Self, GpuError> {
+        let triangles = model.shading_triangles();
         if context.draws_only() {
-            let n = weights.n_rows();
+            let n = model.positions.len() + model.copies.len();
             let mut allocator = Allocator::new(context, "the deformed mesh");
             let positions = Table::new(context, &mut allocator, "positions", Entry::Point, n)?;
             let normals = Table::new(context, &mut allocator, "normals", Entry::Point, n)?;
             allocator.settle().await?;
-            return Ok(Self::Processor { triangles, tables: [positions, normals] });
+            return Ok(Self::Processor { model: Arc::clone(model), triangles, tables: [positions, normals] });
         }
-        let deformer = match on_gpu {
-            Some(on_gpu) => Deformer::new(context, on_gpu, &triangles).await?,
-            None => {
-                let on_gpu = GpuWeights::new(context, weights, outside).await?;
-                Deformer::new(context, &on_gpu, &triangles).await?
-            }
+        let on_gpu = match (model.moved_with_copies(weights, outside), on_gpu) {
+            (Some((weights, outside)), _) => GpuWeights::new(context, &weights, &outside).await?,
+            (None, Some(on_gpu)) => on_gpu,
+            (None, None) => GpuWeights::new(context, weights, outside).await?,
         };
+        let deformer = Deformer::new(context, &on_gpu, &triangles).await?;
         let tables = [deformer.positions(), deformer.normals()].map(|b| Table::Buffer(b.clone()));
         Ok(Self::Kernels { deformer, tables })
     }
@@ -76,8 +79,8 @@ impl Mover {
         match self {
             Self::Kernels { deformer, .. } => deformer.encode(encoder),
             // There is none elsewhere; the condition leaves this out of the page's main artifact.
-            Self::Processor { triangles, tables: [positions, normals] } if context.draws_only() => {
-                let deformed = deform_bound(weights, outside, cage_positions);
+            Self::Processor { model, triangles, tables: [positions, normals] } if context.draws_only() => {
+                let deformed = model.with_copies(&deform_bound(weights, outside, cage_positions));
                 let shading = vertex_normals(&deformed, triangles);
                 for (table, points) in [(positions, deformed), (normals, shading)] {
                     let padded: Vec<Vec4> = points.into_iter().map(|p| p.extend(1.0)).collect();
@@ -88,7 +91,7 @@ impl Mover {
         }
     }
 
-    /// Where the mesh is. `[n_vertices]`, object units.
+    /// Where the mesh is, object units: `[n_vertices]`, and copies after them or not.
     pub(super) async fn read_positions(
         &self,
         context: &GpuContext,

@@ -49,7 +49,7 @@ pub(crate) fn look(document: &GltfDocument, positions: &[Vec3], triangles: &[[u3
         });
     }
     smooth_seams(positions, normals, triangles, &mut vertices);
-    Look { vertices, triangles: triangles.to_vec(), groups, images: images.found }
+    Look { vertices, copies: Vec::new(), triangles: triangles.to_vec(), groups, images: images.found }
 }
 
 fn number(value: &Value, default: f32) -> f32 {

@@ -3,8 +3,11 @@
 use std::collections::HashMap;
 
 use super::lex::{lines, tokens};
+use glam::Vec3;
+
 use super::{NONE, ObjDocument};
 use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, linear_from_srgb, sniff_image};
+use crate::normals::Shading;
 
 /// One material of a `.mtl` file.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,18 +60,19 @@ pub(crate) fn rest_of(line: &[u8], keyword: &[u8]) -> String {
     String::from_utf8_lossy(rest).into_owned()
 }
 
-/// How a document looks: a corner for each different vertex and texture coordinate.
-pub(crate) fn look(document: &ObjDocument) -> Look {
+/// How a document looks: a corner for each different vertex, surface and texture coordinate.
+pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
     let mut look = Look::default();
+    let sources = sources(document, positions, &mut look.copies);
     let mut numbers: HashMap<(u32, u32), u32> = HashMap::new();
     let mut corner = |c: u32, look: &mut Look| {
-        let corner = document.corners[c as usize];
-        *numbers.entry((corner.v, corner.vt)).or_insert_with(|| {
+        let (corner, source) = (document.corners[c as usize], sources[c as usize]);
+        *numbers.entry((source, corner.vt)).or_insert_with(|| {
             let uv = document.texcoords.get(corner.vt as usize).map_or([0.0; 2], |&[u, v]| [u, 1.0 - v]);
             let color = document.colors.get(&corner.v).map_or([1.0; 4], |&[r, g, b]| {
                 [linear_from_srgb(r), linear_from_srgb(g), linear_from_srgb(b), 1.0]
             });
-            look.vertices.push(LookVertex { uv, color, ..LookVertex::plain(corner.v) });
+            look.vertices.push(LookVertex { uv, color, ..LookVertex::plain(source) });
             look.vertices.len() as u32 - 1
         })
     };
@@ -108,4 +112,33 @@ pub(crate) fn look(document: &ObjDocument) -> Look {
         }
     }
     look
+}
+
+/// What each corner moves and is shaded with: its vertex, or a copy of it where the file's normals say that another
+/// surface meets it there. Corners without a normal have nothing to say. `[n_corners]`
+fn sources(document: &ObjDocument, positions: &[Vec3], copies: &mut Vec<u32>) -> Vec<u32> {
+    let vertices: Vec<u32> = document.corners.iter().map(|corner| corner.v).collect();
+    let normal = |vn: u32| document.normals.get(vn as usize).copied().unwrap_or(Vec3::ZERO);
+    let normals: Vec<Vec3> = document.corners.iter().map(|corner| normal(corner.vn)).collect();
+    if normals.iter().all(|n| *n == Vec3::ZERO) {
+        return vertices;
+    }
+    let shading = Shading::new(positions, vertices.clone(), normals.clone(), document.triangles.clone());
+    let mut taken = vec![false; positions.len()];
+    let mut source_of = HashMap::new();
+    let corners = vertices.into_iter().zip(normals).zip(shading.clusters());
+    corners
+        .map(|((v, normal), &surface)| {
+            if normal == Vec3::ZERO {
+                return v;
+            }
+            *source_of.entry(surface).or_insert_with(|| {
+                if !std::mem::replace(&mut taken[v as usize], true) {
+                    return v;
+                }
+                copies.push(v);
+                (positions.len() + copies.len() - 1) as u32
+            })
+        })
+        .collect()
 }

@@ -3,6 +3,7 @@
 use cagework_core::PolygonMesh;
 use cagework_core::cage_check::repair;
 use cagework_core::edit::SelectMode;
+use cagework_core::enclosure::Enclosure;
 use cagework_core::rest_edit::{Edited, collapse_edge, delete_faces, extrude_face, split_edge};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -13,6 +14,9 @@ use crate::options::unknown;
 use crate::problems;
 use crate::state::State;
 use crate::views::object;
+
+/// Most pairs of a vertex and a triangle that are looked at while the cage is dragged: a frame has no time for more.
+const WATCHED_PAIRS: usize = 250_000;
 
 /// How far a face is pulled out, in diagonals of the cage.
 const EXTRUSION: f32 = 0.08;
@@ -32,6 +36,23 @@ impl Engine {
             state.is_changed = true;
         });
         Ok(object(&shown)?)
+    }
+
+    /// How many of some vertices of the model, spread evenly over it, lie outside of the cage as it is dragged now.
+    /// Quick enough for every movement of the pointer; what counts is [`Engine::check_cage`] at the end.
+    #[must_use]
+    pub fn strays(&self) -> u32 {
+        // What nobody sees does not change: no frame is asked for.
+        let mut state = self.state.borrow_mut();
+        let state = &mut *state;
+        let (Some(model), Some(cage)) = (&state.model, &state.cage) else { return 0 };
+        let watched = state.watched.get_or_insert_with(|| {
+            let pairs = model.positions.len() * cage.triangles().len();
+            let some: Vec<_> =
+                model.positions.iter().copied().step_by(pairs.div_ceil(WATCHED_PAIRS).max(1)).collect();
+            Enclosure::new(cage, &some)
+        });
+        watched.outside_of(&state.positions).len() as u32
     }
 
     /// Repairs the cage.

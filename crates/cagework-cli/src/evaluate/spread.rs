@@ -1,0 +1,73 @@
+//! Times scatter: what several measurements allow to be said, and what they do not.
+
+use serde::Serialize;
+
+/// Shortest and longest of several measurements of the same thing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(super) struct Spread {
+    pub(super) n: u32,
+    pub(super) min: f64,
+    pub(super) max: f64,
+}
+
+/// What two spreads say about the first thing against the second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Comparison {
+    /// Every measurement of the first is shorter than every one of the second, by these factors at least and at most.
+    Faster { least: f64, most: f64 },
+    /// The other way round.
+    Slower,
+    /// The spreads overlap.
+    WithinSpread,
+    /// One measurement of either says nothing about how much it scatters.
+    Unknown,
+}
+
+impl Spread {
+    /// Of measurements; `None` without any.
+    pub(super) fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+        values.fold(None, |spread, value| {
+            let Self { n, min, max } = spread.unwrap_or(Self { n: 0, min: value, max: value });
+            Some(Self { n: n + 1, min: min.min(value), max: max.max(value) })
+        })
+    }
+
+    /// Compares times.
+    pub(super) fn against(self, other: Self) -> Comparison {
+        if self.n < 2 || other.n < 2 {
+            Comparison::Unknown
+        } else if self.max < other.min {
+            Comparison::Faster { least: other.min / self.max, most: other.max / self.min }
+        } else if self.min > other.max {
+            Comparison::Slower
+        } else {
+            Comparison::WithinSpread
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Comparison, Spread};
+
+    fn spread(values: &[f64]) -> Spread {
+        Spread::of(values.iter().copied()).expect("there are values")
+    }
+
+    #[test]
+    fn only_spreads_that_lie_apart_are_told_apart() {
+        let fast = spread(&[12.0, 10.0, 11.0]);
+        let slow = spread(&[30.0, 24.0]);
+        assert_eq!(fast.against(slow), Comparison::Faster { least: 2.0, most: 3.0 });
+        assert_eq!(slow.against(fast), Comparison::Slower);
+        assert_eq!(fast.against(spread(&[9.0, 10.5])), Comparison::WithinSpread);
+        assert_eq!(fast.against(spread(&[12.0, 13.0])), Comparison::WithinSpread, "they touch");
+    }
+
+    #[test]
+    fn one_measurement_claims_nothing() {
+        assert_eq!(spread(&[1.0]).against(spread(&[1e6, 2e6])), Comparison::Unknown);
+        assert_eq!(spread(&[1e6, 2e6]).against(spread(&[1.0])), Comparison::Unknown);
+        assert_eq!(Spread::of(std::iter::empty()), None);
+    }
+}

@@ -1,0 +1,106 @@
+/** Fingers: two move and magnify the view, one drags a handle. */
+
+import type { CDPSession } from "@playwright/test";
+import { cagePositions, expect, handle, largestMove, open, reachable, shoot, test } from "./support";
+
+type Spot = readonly [x: number, y: number];
+
+test.use({ viewport: { width: 412, height: 760 }, hasTouch: true, isMobile: true });
+
+/** Puts fingers down, moves them in a few steps, and lifts them. */
+async function fingers(cdp: CDPSession, from: readonly Spot[], to: readonly Spot[]): Promise<void> {
+  const at = (share: number) =>
+    from.map(([x, y], id) => ({
+      x: x + share * ((to[id]?.[0] ?? x) - x),
+      y: y + share * ((to[id]?.[1] ?? y) - y),
+      id,
+    }));
+  await cdp.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: at(0) });
+  for (const share of [0.25, 0.5, 0.75, 1])
+    await cdp.send("Input.dispatchTouchEvent", { type: "touchMove", touchPoints: at(share) });
+  await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+}
+
+test("two fingers look around, one finger poses", async ({ page }) => {
+  await open(page);
+  const cdp = await page.context().newCDPSession(page);
+  const rest = await cagePositions(page);
+  // Without perspective everything moves alike.
+  await page.getByRole("button", { name: "Parallel projection" }).tap();
+  /** Two vertices of the cage, far apart in the picture. */
+  const seen = async () => [await handle(page, 0), await handle(page, 40)] as const;
+  const apart = (p: { x: number; y: number }, q: { x: number; y: number }) =>
+    Math.hypot(p.x - q.x, p.y - q.y);
+
+  await test.step("side by side they move the view", async () => {
+    const before = await seen();
+    await fingers(
+      cdp,
+      [
+        [150, 200],
+        [250, 200],
+      ],
+      [
+        [190, 230],
+        [290, 230],
+      ],
+    );
+    const after = await seen();
+    for (const [k, now] of after.entries()) {
+      expect(now.x - (before[k]?.x ?? 0), "right with the fingers").toBeCloseTo(40, 0);
+      expect(now.y - (before[k]?.y ?? 0), "down with the fingers").toBeCloseTo(30, 0);
+    }
+  });
+
+  await test.step("apart they magnify, together they make smaller", async () => {
+    const together = [
+      [170, 220],
+      [250, 220],
+    ] as const;
+    const spread = [
+      [150, 220],
+      [270, 220],
+    ] as const;
+    const before = await seen();
+    await fingers(cdp, together, spread);
+    const larger = await seen();
+    expect(apart(...larger) / apart(...before)).toBeCloseTo(120 / 80, 2);
+    await fingers(cdp, spread, together);
+    const again = await seen();
+    expect(apart(...again) / apart(...before)).toBeCloseTo(1, 2);
+    expect(apart(again[0], before[0]), "around the middle of the fingers").toBeLessThan(2);
+    expect(await cagePositions(page), "the cage stays as it is").toEqual(rest);
+  });
+
+  const vertex = await reachable(page);
+  const { x, y } = await handle(page, vertex);
+  await test.step("a second finger puts back what the first one moved", async () => {
+    const touch = (type: "touchStart" | "touchMove", points: readonly Spot[]) =>
+      cdp.send("Input.dispatchTouchEvent", {
+        type,
+        touchPoints: points.map(([x, y], id) => ({ x, y, id })),
+      });
+    await touch("touchStart", [[x, y]]);
+    await touch("touchMove", [[x + 30, y + 30]]);
+    await expect.poll(async () => largestMove(rest, await cagePositions(page))).toBeGreaterThan(0.01);
+    await touch("touchStart", [
+      [x + 30, y + 30],
+      // Beside everything, and on the view, not on the panel below it.
+      [90, 170],
+    ]);
+    await expect.poll(async () => largestMove(rest, await cagePositions(page))).toBeLessThan(1e-6);
+    await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+  });
+
+  await test.step("one finger on a handle drags it", async () => {
+    const { x, y } = await handle(page, vertex);
+    await fingers(cdp, [[x, y]], [[x + 30, y - 20]]);
+    const moved = await cagePositions(page);
+    expect(largestMove(rest, moved)).toBeGreaterThan(0.02);
+    const others = moved.filter((value, k) => Math.floor(k / 3) !== vertex && value !== rest[k]);
+    expect(others, "only this one").toEqual([]);
+    const now = await handle(page, vertex);
+    expect(apart(now, { x: x + 30, y: y - 20 }), "it is below the finger").toBeLessThan(3);
+    await shoot(page, "touched");
+  });
+});
