@@ -3,7 +3,7 @@
 //! When a few vertices of the cage move, the discrete equations change only in cells at the moved faces. The old fields leave
 //! a residual there and nowhere else, and the residuals of all columns are combinations of a few: columns that do not
 //! belong to the moved faces vanish on them, so they look alike a few cells away. Those few are solved for, and every
-//! column, also at the mesh's vertices, takes its share of them. What is neglected (1e-6 of a weight an edit) adds up, so after
+//! column, also at the mesh's vertices, takes its share of them. What is neglected (a third of tau an edit) adds up, so after
 //! [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid, the faces or half of the cage change.
 
 mod local;
@@ -24,7 +24,7 @@ use crate::solve::multigrid::histories;
 use crate::solve::rows::Row;
 use crate::solve::team::Team;
 
-use self::local::{Fields, OldCells, Region, Residual, Split, Update};
+use self::local::{Fields, Negligible, OldCells, Region, Residual, Split, Update};
 use self::steps::{add_corrections, resample, solve_all, solve_for};
 use super::pipeline::{FieldsOn, Prepared, Solved, refuse_outside, sampling_stencils};
 use super::voxels::Voxels;
@@ -34,8 +34,16 @@ use super::{BindError, BindOptions, Binding, Method, Solver, bind};
 /// Edits after which everything is bound anew.
 const MAX_UPDATES: usize = 6;
 
-/// V-cycles for a correction: each makes its error about 15 times smaller.
-const CYCLES: u32 = 5;
+/// Each V-cycle makes a correction's error about so many times smaller.
+const CONTRACTION: f64 = 15.0;
+
+/// Largest change of a weight by an edit that is small.
+const LARGEST_CHANGE: f64 = 0.1;
+
+/// V-cycles for a correction, from zero to the threshold.
+fn cycles_to(tau: f32) -> u32 {
+    (LARGEST_CHANGE / f64::from(tau)).log(CONTRACTION).ceil().clamp(2.0, 8.0) as u32
+}
 
 /// Cells around the moved faces whose equations may have changed.
 const CHANGED: f64 = 1.5;
@@ -98,6 +106,12 @@ impl Rebinder {
         let mut rebinder = Self { positions, options, welded, points, cage: cage.clone(), kept: None };
         let binding = rebinder.anew(cage, progress)?;
         Ok((rebinder, binding))
+    }
+
+    /// Whether it was made for this mesh and these options: then what it keeps is of use.
+    #[must_use]
+    pub fn fits(&self, positions: &[Vec3], options: &BindOptions) -> bool {
+        self.options == *options && self.positions == positions
     }
 
     /// Binds the mesh to an edited cage.
@@ -200,23 +214,25 @@ impl Rebinder {
         let mut solved = Solved { converged: true, delta_interval: 1, solve_share: 1.0, ..Solved::default() };
         let mut rank = 0;
         if !moved.is_empty() {
+            let negligible = Negligible::at(self.options.tau);
+            let cycles = cycles_to(self.options.tau);
             let old = OldCells::new(&fields, &needed, n_batches);
             let region = Region::around(&moved, CHANGED, &grid);
-            let residual = Residual::new(level, &region, n_batches, &old);
+            let residual = Residual::new(level, &region, n_batches, &old, negligible.residual);
             let Some(Split { right, shares }) = residual.split(level.n_rows(), cage.n_vertices()) else {
                 return Ok(None);
             };
             resample(&stencils, &changed, level, &old, &needed, &mut blocks);
             rank = shares.len();
-            let corrections = solve_for(&voxels, &stencils, &right, &team, watch)?;
-            solved.iterations = CYCLES;
+            let corrections = solve_for(&voxels, &stencils, &right, cycles, &team, watch)?;
+            solved.iterations = cycles;
             solved.residual_history =
                 histories(&corrections.iter().map(|c| &c.report).collect::<Vec<_>>())[1].clone();
             let samples: Vec<&[Row]> = corrections.iter().map(|c| c.samples.as_slice()).collect();
-            add_corrections(&mut blocks, &samples, &shares, &team);
+            add_corrections(&mut blocks, &samples, &shares, negligible.correction, &team);
             let row_of = Arc::new(level.row_of.clone());
             let new_fields = corrections.into_iter().map(|c| c.field).collect();
-            fields.updates.push(Update { fields: new_fields, row_of, shares });
+            fields.updates.push(Update { fields: new_fields, row_of, shares, unfelt: negligible.correction });
         }
         let keep_samples = (self.options.sparsify > 0.0).then(|| blocks.clone());
         solved.blocks = blocks;

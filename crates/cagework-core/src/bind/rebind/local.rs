@@ -10,11 +10,23 @@ use crate::levels::Level;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 
-/// Smallest entry of a residual that counts, as a change of a weight: the solver leaves that much anyway.
-const NEGLIGIBLE: f32 = 1e-6;
+/// What is left out, as changes of a weight.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Negligible {
+    /// Smallest entry of a residual that counts: the solver leaves that much anyway.
+    pub(super) residual: f32,
+    /// Smallest value of a correction that counts: all that are left out stay below the residual's.
+    pub(super) correction: f32,
+}
 
-/// Values of a correction below this are left out: all of them together stay below [`NEGLIGIBLE`].
-pub(super) const UNFELT: f32 = 1e-8;
+impl Negligible {
+    /// A third of the threshold that is solved to, but no less than f32 can tell.
+    pub(super) fn at(tau: f32) -> Self {
+        let residual = (0.3 * tau).max(1e-6);
+        // There are 15 to 40 corrections.
+        Self { residual, correction: residual / 40.0 }
+    }
+}
 
 /// Cells near moved faces.
 #[derive(Clone, Debug)]
@@ -68,6 +80,8 @@ pub(super) struct Update {
     pub(super) row_of: Arc<Vec<u32>>,
     /// `[n_fields]` rows of all columns.
     pub(super) shares: Vec<Vec<Row>>,
+    /// Smallest value that counts.
+    pub(super) unfelt: f32,
 }
 
 /// All columns' fields: those of the last whole bind, and the corrections since.
@@ -99,7 +113,7 @@ impl Fields {
             }
             for (k, share) in update.shares.iter().enumerate() {
                 let value = update.fields[k / LANES][row as usize][k % LANES];
-                if value.abs() > UNFELT {
+                if value.abs() > update.unfelt {
                     add_scaled(out, share, value);
                 }
             }
@@ -125,6 +139,8 @@ pub(super) struct Residual {
     diagonals: Vec<f32>,
     /// `[n_unknowns][n_batches]`
     values: Vec<Vec<Row>>,
+    /// Smallest entry that counts.
+    negligible: f32,
 }
 
 /// Independent residuals and every column's shares in them.
@@ -137,10 +153,16 @@ pub(super) struct Split {
 
 impl Residual {
     /// Residuals of the unknowns in `region`; `old(cell)` must be known one cell beyond it.
-    pub(super) fn new(level: &Level, region: &Region, n_batches: usize, old: &OldCells<'_>) -> Self {
+    pub(super) fn new(
+        level: &Level,
+        region: &Region,
+        n_batches: usize,
+        old: &OldCells<'_>,
+        negligible: f32,
+    ) -> Self {
         let strides = level.grid.strides();
         let mut number = vec![NO_CELL; level.n_rows()];
-        let mut residual = Self { rows: Vec::new(), diagonals: Vec::new(), values: Vec::new() };
+        let mut residual = Self { rows: Vec::new(), diagonals: Vec::new(), values: Vec::new(), negligible };
         let mut cells = Vec::new();
         for cell in region.cells.iter().map(|&cell| cell as usize) {
             let row = level.row_of[cell];
@@ -194,7 +216,7 @@ impl Residual {
     /// Leaves only unknowns whose equations have changed.
     fn drop_negligible(&mut self) {
         let changed: Vec<bool> =
-            self.values.iter().map(|row| row.iter().flatten().any(|w| w.abs() >= NEGLIGIBLE)).collect();
+            self.values.iter().map(|row| row.iter().flatten().any(|w| w.abs() >= self.negligible)).collect();
         let mut keep = changed.iter();
         self.values.retain(|_| keep.next() == Some(&true));
         let mut keep = changed.iter();
@@ -231,7 +253,7 @@ impl Residual {
             }
             let size = |c: usize| largest[c / LANES][c % LANES];
             let pivot = (0..n_columns).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
-            if size(pivot) < NEGLIGIBLE {
+            if size(pivot) < self.negligible {
                 return Some(Split { right, shares });
             }
             let rank = shares.len();

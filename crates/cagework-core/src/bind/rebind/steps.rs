@@ -15,8 +15,7 @@ use crate::solve::multigrid::{BatchReport, Stop, Workspace, histories};
 use crate::solve::rows::{LANES, Row, ZERO};
 use crate::solve::team::Team;
 
-use super::CYCLES;
-use super::local::{OldCells, Region, UNFELT, add_scaled};
+use super::local::{OldCells, Region, add_scaled};
 
 /// Vertices that a thread takes at a time.
 const VERTEX_RUN: usize = 512;
@@ -78,6 +77,7 @@ pub(super) fn solve_for(
     voxels: &Voxels,
     stencils: &Stencils,
     right: &[Vec<Row>],
+    cycles: u32,
     team: &Team,
     watch: &Watch<'_>,
 ) -> Result<Vec<Correction>, Cancelled> {
@@ -87,7 +87,7 @@ pub(super) fn solve_for(
         n,
         || Workspace::new(hierarchy),
         |workspace, batch| {
-            let report = workspace.solve_for(hierarchy, &right[batch], CYCLES, |cycle, delta| {
+            let report = workspace.solve_for(hierarchy, &right[batch], cycles, |cycle, delta| {
                 let fraction = watch.done() as f32 / n as f32;
                 watch.report(Stage::Solve, fraction, cycle, Some(delta as f32)).is_ok()
             })?;
@@ -138,7 +138,13 @@ pub(super) fn resample(
 }
 
 /// Adds to every vertex's weights its share of the corrections.
-pub(super) fn add_corrections(blocks: &mut [Vec<Row>], samples: &[&[Row]], shares: &[Vec<Row>], team: &Team) {
+pub(super) fn add_corrections(
+    blocks: &mut [Vec<Row>],
+    samples: &[&[Row]],
+    shares: &[Vec<Row>],
+    unfelt: f32,
+    team: &Team,
+) {
     let mut runs: Vec<(usize, Vec<&mut [Row]>)> = Vec::new();
     for block in blocks.iter_mut() {
         for (k, rows) in block.chunks_mut(VERTEX_RUN).enumerate() {
@@ -158,7 +164,7 @@ pub(super) fn add_corrections(blocks: &mut [Vec<Row>], samples: &[&[Row]], share
                     sum.fill(ZERO);
                     for (k, share) in shares.iter().enumerate() {
                         let value = samples[k / LANES][*first + v][k % LANES];
-                        if value.abs() > UNFELT {
+                        if value.abs() > unfelt {
                             add_scaled(&mut sum, share, value);
                         }
                     }
