@@ -69,7 +69,7 @@ pub(crate) fn pictures() -> Result<(), String> {
 /// # Errors
 /// When one is wrong.
 pub(crate) fn check_types() -> Result<(), String> {
-    if !wasm::is_built() {
+    if !wasm::is_fresh() {
         wasm::build(Profile::Web)?;
     }
     exec(&["tsc", "--project", "web"])

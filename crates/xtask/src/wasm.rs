@@ -1,6 +1,7 @@
 //! The browser's half: Rust to wasm to JavaScript.
 
 use std::path::Path;
+use std::time::SystemTime;
 
 use wasm_bindgen_cli_support::Bindgen;
 
@@ -39,9 +40,24 @@ const ARTIFACTS: [Artifact; 2] = [
 /// What the web's profile adds to rustc. Vectors of 128 bits are wherever WebGPU or WebGL2 are.
 const RUSTFLAGS: &str = "-C target-feature=+simd128";
 
-/// Whether the packages have been made.
-pub(crate) fn is_built() -> bool {
-    ARTIFACTS.iter().all(|a| root().join(a.package).join(format!("{}.d.ts", a.name)).exists())
+/// What the packages are made of.
+const SOURCES: [&str; 4] = ["crates", "shaders", "Cargo.toml", "Cargo.lock"];
+
+/// Whether the packages have been made, from the sources as they are now.
+pub(crate) fn is_fresh() -> bool {
+    let made = ARTIFACTS.iter().map(|a| modified(&root().join(a.package).join(format!("{}.d.ts", a.name))));
+    let newest = SOURCES.iter().filter_map(|source| newest(&root().join(source))).max();
+    made.into_iter().min().flatten() >= newest
+}
+
+fn modified(path: &Path) -> Option<SystemTime> {
+    path.metadata().and_then(|m| m.modified()).ok()
+}
+
+/// When a file, or the newest file in a folder, was written.
+fn newest(path: &Path) -> Option<SystemTime> {
+    let Ok(entries) = path.read_dir() else { return modified(path) };
+    entries.flatten().filter_map(|entry| newest(&entry.path())).max()
 }
 
 /// Builds `crates/cagework-web` for the browser, once for each of its artifacts, and makes JavaScript packages of them.
