@@ -11,18 +11,17 @@ import type {
   NamedFile,
   Opened,
   Engine as PageEngine,
+  Sample,
   Session,
 } from "./contract";
 import { BIND_DEFAULTS } from "./defaults";
 import { findAdapter, hasWebGl2, lackOf } from "./session/adapter";
-import type { Artifact } from "./session/artifact";
-import { same, startBind } from "./session/bind";
-import { createClient } from "./session/client";
+import type { Artifact, Package } from "./session/artifact";
+import { startBind } from "./session/bind";
+import { type Client, createClient } from "./session/client";
 import { load, readFiles } from "./session/files";
 import { createFrames } from "./session/frames";
 import { chain } from "./session/jobs";
-import type { CageArrays } from "./session/messages";
-import { prepareSample, samples } from "./session/samples";
 import { WEBGPU } from "./session/webgpu";
 
 declare global {
@@ -117,8 +116,6 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   let bind: Job<BindReport> | undefined;
   let slice: Job<void> | undefined;
   let meanValue: Job<void> | undefined;
-  /** The cage that this model was last bound to. */
-  let last: CageArrays | undefined;
 
   async function openBytes(bytes: Parameters<typeof load>[1]): Promise<Opened> {
     const { loaded, notices } = await load(pkg, bytes);
@@ -126,7 +123,6 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
     bind?.cancel();
     const read: ModelInfo = await raw.open(loaded);
-    last = undefined;
     const model = { ...read, notices: [...read.notices, ...notices] };
     const project = settings === undefined ? null : { poses, settings };
     return { model, cage: stateOf(), project };
@@ -155,26 +151,7 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     },
     bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport> {
       bind?.cancel();
-      const now = cage();
-      // The same faces elsewhere. The same cage once more is bound as asked.
-      const edited =
-        last !== undefined && same(last.corners, now.corners) && !same(last.positions, now.positions);
-      bind = startBind({
-        client,
-        engine,
-        raw,
-        adapter,
-        options: possible(options),
-        listener,
-        cage: now,
-        edited,
-      });
-      bind.done.then(
-        () => {
-          last = now;
-        },
-        () => undefined,
-      );
+      bind = startBind({ client, engine, raw, adapter, options: possible(options), listener, cage: cage() });
       return bind;
     },
     estimateMemory: (options) => raw.estimateMemory(possible(options)),
@@ -223,6 +200,28 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   };
   globalThis.cagework = session;
   return session;
+}
+
+/** Builds samples; the one that a first visit opens while the GPU is still being opened. */
+function prepareSample(client: Client, first: string | undefined, fresh: Promise<boolean>) {
+  const build = (id: string) => client.run("sample", { id }).done;
+  let early = fresh.then((isFresh) => (isFresh && first ? build(first) : undefined));
+  // Who opens it hears of the error.
+  early.catch(() => undefined);
+  return async (id: string) => {
+    // Its arrays are given away: a second time it is built anew.
+    const waiting = early;
+    early = Promise.resolve(undefined);
+    return (id === first ? await waiting : undefined) ?? build(id);
+  };
+}
+
+function samples(pkg: Package): readonly Sample[] {
+  const words = pkg.Binder.samples();
+  return Array.from({ length: words.length / 3 }, (_, k) => {
+    const [id = "", label = "", sentence = ""] = words.slice(3 * k, 3 * k + 3);
+    return { id, label, sentence };
+  });
 }
 
 /** Compiles while it downloads, where the server says that it is wasm. */

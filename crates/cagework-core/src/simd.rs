@@ -5,10 +5,17 @@
 //! built for the baseline still fills the registers. Results do not depend on the choice: only additions and
 //! multiplications in a fixed order, never fused.
 
-use pulp::Arch;
-
 /// Runs `op` with the widest instruction set this processor has.
+#[cfg(not(target_family = "wasm"))]
 #[inline(always)]
 pub(crate) fn dispatch<R>(op: impl FnOnce() -> R) -> R {
-    Arch::new().dispatch(op)
+    pulp::Arch::new().dispatch(op)
+}
+
+/// Runs `op`. A wasm file cannot ask: it is built for simd128 or not, and a second copy of each kernel would be
+/// downloaded in vain.
+#[cfg(target_family = "wasm")]
+#[inline(always)]
+pub(crate) fn dispatch<R>(op: impl FnOnce() -> R) -> R {
+    op()
 }

@@ -2,7 +2,7 @@
 //!
 //! It has its own GPU device and reads nothing but arrays. Results are taken apart by the page's `Engine`.
 
-use cagework_core::bind::{BindError, OutsideVertex, Rebinder};
+use cagework_core::bind::OutsideVertex;
 use cagework_core::cage_gen::{CageOptions, generate};
 use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Binding, Cage, PolygonMesh, Weights, mean_value_weights, samples};
@@ -23,8 +23,6 @@ use crate::views::object;
 #[wasm_bindgen]
 pub struct Binder {
     gpu: Option<GpuContext>,
-    /// What the last bind that expected another one left behind.
-    kept: Option<Rebinder>,
 }
 
 /// Weights on their way to the page: compressed sparse rows, and the vertices outside the cage.
@@ -68,7 +66,7 @@ impl Binder {
     #[must_use]
     #[allow(clippy::new_without_default, reason = "only JavaScript makes one")]
     pub fn new() -> Self {
-        Self { gpu: None, kept: None }
+        Self { gpu: None }
     }
 
     /// Opens a GPU for the binds to come, unless there is one, or none that could bind.
@@ -102,48 +100,6 @@ impl Binder {
         let binding = self.run(&parts.positions, &parts.cage, asked, progress).await?;
         let report = object(&binding.report)?;
         Ok(Bound { weights: binding.weights, outside: binding.outside, report })
-    }
-
-    /// As `bind`, on the processor, for a cage at rest that is being edited: keeps its fields (4 bytes for each cell inside
-    /// and cage vertex), so that the next edit of a few vertices solves only for what it changes. What is kept is
-    /// dropped by `forget`.
-    ///
-    /// # Errors
-    /// Those of a bind.
-    pub fn rebind(
-        &mut self,
-        positions: &[f32],
-        cage: &[f32],
-        corners: &[u32],
-        options: JsValue,
-        progress: Function,
-    ) -> Result<Bound, JsValue> {
-        let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
-        let Parts { positions, cage } = Parts::new(positions, cage, corners)?;
-        let (options, listener) = (BindOptions::from(asked), Listener::new(progress));
-        let kept = self.kept.take().filter(|kept| kept.fits(&positions, &options));
-        let (rebinder, bound) = match kept {
-            Some(mut kept) => {
-                let bound = kept.rebind(&cage, &listener).map(|(binding, _)| binding);
-                (Some(kept), bound)
-            }
-            None => match Rebinder::new(&positions, &cage, &options, &listener) {
-                Ok((kept, binding)) => (Some(kept), Ok(binding)),
-                // No room to keep anything is no reason not to bind.
-                Err(BindError::Memory { .. }) => {
-                    (None, cagework_core::bind(&positions, &cage, &options, &listener))
-                }
-                Err(error) => (None, Err(error)),
-            },
-        };
-        let Binding { weights, outside, report } = bound.map_err(Fault::from)?;
-        self.kept = rebinder;
-        Ok(Bound { weights, outside, report: object(&report)? })
-    }
-
-    /// Drops what `rebind` keeps.
-    pub fn forget(&mut self) {
-        self.kept = None;
     }
 
     /// Mean value coordinates, by formula; the arrays are those of `bind`.

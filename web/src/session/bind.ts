@@ -9,9 +9,6 @@ import type { BoundArrays, CageArrays, Step } from "./messages";
 /** Cells of the first pass. */
 const COARSE = 32;
 
-/** Finest grid that the processor binds an edited cage on, keeping its fields: beyond, coarse first is sooner seen. */
-const FINEST_KEPT = 64;
-
 /** Errors that mean the GPU cannot, though the CPU may. */
 const GPU_ERRORS = [
   "NoAdapter",
@@ -32,17 +29,13 @@ export interface BindStart {
   readonly options: BindOptions;
   readonly listener: (event: BindEvent) => void;
   readonly cage: CageArrays;
-  /** Whether the same cage was bound before its vertices were moved. */
-  readonly edited: boolean;
 }
 
 type Pass = "coarse" | "fine";
 
 export function startBind(start: BindStart): Job<BindReport> {
-  const { client, engine, raw, adapter, listener, cage, edited } = start;
+  const { client, engine, raw, adapter, listener, cage } = start;
   let options = start.options;
-  const keep =
-    edited && options.method === "embedded" && options.solver === "multigrid" && options.grid <= FINEST_KEPT;
   let job: Job<BoundArrays> | undefined;
   let isCancelled = false;
   const positions = raw.modelPositions();
@@ -57,7 +50,7 @@ export function startBind(start: BindStart): Job<BindReport> {
   };
 
   async function once(pass: Pass, asked: BindOptions): Promise<BindReport> {
-    job = client.run("bind", { positions, cage, options: asked, keep }, step(pass));
+    job = client.run("bind", { positions, cage, options: asked }, step(pass));
     const { indptr, indices, data, outside, offsets, report } = await job.done;
     const isCurrent =
       same(cage.positions, engine.restPositions()) && same(cage.corners, engine.cageCorners());
@@ -83,7 +76,7 @@ export function startBind(start: BindStart): Job<BindReport> {
   }
 
   async function all(): Promise<BindReport> {
-    if (!engine.bound && !keep && options.grid > COARSE) await run("coarse");
+    if (!engine.bound && options.grid > COARSE) await run("coarse");
     if (isCancelled) throw named("Cancelled", "cancelled");
     return run("fine");
   }
@@ -102,7 +95,7 @@ function coarse(options: BindOptions): BindOptions {
   return { ...options, grid: COARSE, solver: "multigrid" };
 }
 
-export function same(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
+function same(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
   if (a.length !== b.length) return false;
   for (let k = 0; k < a.length; k++) if (a[k] !== b[k]) return false;
   return true;

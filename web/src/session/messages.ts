@@ -26,16 +26,7 @@ export interface SampleArrays {
 
 /** A job's name, what it needs, and what it results in. */
 export interface Jobs {
-  bind: {
-    input: {
-      positions: Float32Array;
-      cage: CageArrays;
-      options: BindOptions;
-      /** Whether the cage is being edited, so that the bind after it can start from this one's fields. */
-      keep: boolean;
-    };
-    output: BoundArrays;
-  };
+  bind: { input: { positions: Float32Array; cage: CageArrays; options: BindOptions }; output: BoundArrays };
   meanValue: { input: { positions: Float32Array; cage: CageArrays }; output: BoundArrays };
   slice: {
     input: { cage: CageArrays; axis: number; fraction: number; options: BindOptions };

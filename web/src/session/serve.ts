@@ -70,10 +70,8 @@ function createWork(pkg: Package): Work {
     return shared;
   };
   return {
-    async bind({ positions, cage, options, keep }, step) {
-      const by = await binder(options.backend === "gpu" && !keep);
-      if (keep) return taken(by.rebind(positions, cage.positions, cage.corners, options, step));
-      by.forget();
+    async bind({ positions, cage, options }, step) {
+      const by = await binder(options.backend === "gpu");
       return taken(await by.bind(positions, cage.positions, cage.corners, options, step));
     },
     async meanValue({ positions, cage }) {
