@@ -11,23 +11,26 @@ import type {
   NamedFile,
   Opened,
   Engine as PageEngine,
-  Sample,
   Session,
 } from "./contract";
 import { BIND_DEFAULTS } from "./defaults";
 import { findAdapter, hasWebGl2, lackOf } from "./session/adapter";
-import type { Artifact, Package } from "./session/artifact";
+import type { Artifact } from "./session/artifact";
 import { startBind } from "./session/bind";
-import { type Client, createClient } from "./session/client";
+import { createClient } from "./session/client";
 import { load, readFiles } from "./session/files";
 import { createFrames } from "./session/frames";
 import { chain } from "./session/jobs";
+import { once, prepareSample, samples } from "./session/opening";
 import { WEBGPU } from "./session/webgpu";
 
 declare global {
   /** For the browser's console, and for tests. */
   var cagework: Session | undefined;
 }
+
+/** The stage shows its background for so long at most if nothing is opened, ms. */
+const LONGEST_EMPTY = 3000;
 
 /** Where the picture goes; a canvas that one interface has used is lost to the other. */
 export interface Canvases {
@@ -96,7 +99,11 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     throw error;
   });
   const engine = raw as unknown as PageEngine;
-  frames.start(() => raw.drawFrame());
+  // What cannot be had now is asked for again by the first frame, which says why.
+  raw.warm().catch(() => undefined);
+  /** Begins to draw: with the first model, because a slow GPU's empty frame is what that would wait for. */
+  const begin = once(() => frames.start(() => raw.drawFrame()));
+  setTimeout(begin, LONGEST_EMPTY);
   /** Where nothing else can, the processor computes, whatever a project was saved with. */
   const possible = (options: BindOptions): BindOptions => (lack ? { ...options, backend: "cpu" } : options);
   /** WebGL2 tells the canvas, and nobody else, that it was lost. */
@@ -133,12 +140,14 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     adapter,
     lack,
     samples: samples(pkg),
-    openFiles: async (files) => openBytes(await readFiles(files)),
+    openFiles: async (files) => openBytes(await readFiles(files)).finally(begin),
     async openSample(id) {
       const { glb, cage, poses } = await buildSample(id);
       const label = samples(pkg).find((sample) => sample.id === id)?.label ?? id;
       const opened = await openBytes({ name: `${label}.glb`, bytes: glb, sibling: () => undefined });
-      return { ...opened, cage: engine.setCage(cage.positions, cage.corners), poses };
+      const state = engine.setCage(cage.positions, cage.corners);
+      begin();
+      return { ...opened, cage: state, poses };
     },
     async openCage(files: readonly NamedFile[]): Promise<CageState> {
       const { name, bytes, sibling } = await readFiles(files);
@@ -200,28 +209,6 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   };
   globalThis.cagework = session;
   return session;
-}
-
-/** Builds samples; the one that a first visit opens while the GPU is still being opened. */
-function prepareSample(client: Client, first: string | undefined, fresh: Promise<boolean>) {
-  const build = (id: string) => client.run("sample", { id }).done;
-  let early = fresh.then((isFresh) => (isFresh && first ? build(first) : undefined));
-  // Who opens it hears of the error.
-  early.catch(() => undefined);
-  return async (id: string) => {
-    // Its arrays are given away: a second time it is built anew.
-    const waiting = early;
-    early = Promise.resolve(undefined);
-    return (id === first ? await waiting : undefined) ?? build(id);
-  };
-}
-
-function samples(pkg: Package): readonly Sample[] {
-  const words = pkg.Binder.samples();
-  return Array.from({ length: words.length / 3 }, (_, k) => {
-    const [id = "", label = "", sentence = ""] = words.slice(3 * k, 3 * k + 3);
-    return { id, label, sentence };
-  });
 }
 
 /** Compiles while it downloads, where the server says that it is wasm. */

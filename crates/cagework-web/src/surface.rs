@@ -17,6 +17,9 @@ const MOST_IN_FLIGHT: u32 = 2;
 /// that is asked of the GPU, the weights of a bind first of all.
 const SLOW_MS: f64 = 50.0;
 
+/// Side of a target that nobody sees, pixels.
+pub(crate) const SMALL: u32 = 16;
+
 /// A canvas that is drawn into.
 pub(crate) struct Surface {
     surface: wgpu::Surface<'static>,
@@ -156,6 +159,11 @@ impl Surface {
             }
         }
         context.queue.submit([encoder.finish()]);
+    }
+
+    /// A target like those that are drawn into, of few pixels, and its format.
+    pub(crate) fn small_target(&self, context: &GpuContext) -> (wgpu::Texture, wgpu::TextureFormat) {
+        (self.make_part(context, [SMALL; 2]), self.format)
     }
 
     fn make_part(&self, context: &GpuContext, [width, height]: [u32; 2]) -> wgpu::Texture {

@@ -1,12 +1,16 @@
 //! Frames, pictures, and what was computed on the GPU.
 
-use glam::Vec2;
+use cagework_core::{Bounds, Cage, Weights, subdivided_box};
+use cagework_gpu::Session;
+use cagework_gpu::render::DrawModel;
+use glam::{Vec2, Vec3};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{Engine, lost};
 use crate::arrays::flat;
 use crate::error::{Answer, Fault};
+use crate::surface::SMALL;
 
 #[wasm_bindgen]
 impl Engine {
@@ -26,6 +30,31 @@ impl Engine {
     #[wasm_bindgen(js_name = drawFrame)]
     pub fn draw_frame(&self) -> Result<bool, JsValue> {
         Ok(self.try_frame()?)
+    }
+
+    /// Draws a box that follows its cage where nobody sees it: GPUs finish a pipeline when it is first used, and before
+    /// the first model is there they have nothing else to do.
+    ///
+    /// # Errors
+    /// `DeviceLost`, `Refused`, `OutOfMemory`.
+    pub async fn warm(&self) -> Result<(), JsValue> {
+        let (context, (target, format)) = {
+            let gpu = self.gpu.lock().await;
+            let gpu = gpu.as_ref().ok_or_else(lost)?;
+            (gpu.main.context().clone(), gpu.surface.small_target(gpu.main.context()))
+        };
+        let cage = subdivided_box(Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE }, 0.0, [1; 3]);
+        let cage = Cage::new(&cage).map_err(Fault::from)?;
+        let n = cage.n_vertices() as u32;
+        let identity = Weights::new(n, (0..=n).collect(), (0..n).collect(), vec![1.0; n as usize]);
+        let mut session = Session::new(context);
+        let model = DrawModel::plain(cage.positions().to_vec(), cage.triangles().to_vec());
+        session.set_model(model).await.map_err(Fault::from)?;
+        session.set_cage(&cage).await.map_err(Fault::from)?;
+        session.adopt(identity.map_err(Fault::from)?, Vec::new()).await.map_err(Fault::from)?;
+        session.frame_all();
+        let view = target.create_view(&wgpu::TextureViewDescriptor::default());
+        Ok(session.frame(&view, format, [SMALL; 2], 1.0).map_err(Fault::from)?)
     }
 
     /// A picture, red, green, blue, alpha, rows from the top. `[height, width, 4]`
