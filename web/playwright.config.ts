@@ -1,24 +1,8 @@
 import { defineConfig } from "@playwright/test";
+import { WITH_WEBGPU } from "./e2e/browser";
 
 /** Where e2e/server.mjs serves the built page. */
 const BASE = `http://127.0.0.1:${process.env.E2E_PORT ?? 4179}/`;
-
-/** Debian's Chromium with a real WebGPU device: SwiftShader, which needs no graphics card. */
-const CHROMIUM_ARGS = [
-  "--enable-unsafe-webgpu",
-  "--enable-features=Vulkan",
-  "--use-vulkan=swiftshader",
-  "--use-angle=swiftshader",
-  "--use-webgpu-adapter=swiftshader",
-  "--ignore-gpu-blocklist",
-  "--headless=new",
-  "--no-sandbox",
-  "--disable-quic",
-  "--no-first-run",
-  "--disable-background-networking",
-  "--disable-component-update",
-  "--disable-sync",
-];
 
 export default defineConfig({
   testDir: "e2e",
@@ -38,10 +22,7 @@ export default defineConfig({
     // Small: every pixel is computed by the processor.
     viewport: { width: 1024, height: 640 },
     acceptDownloads: true,
-    launchOptions: {
-      executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-      args: CHROMIUM_ARGS,
-    },
+    launchOptions: WITH_WEBGPU,
   },
   webServer: {
     command: "node e2e/server.mjs",

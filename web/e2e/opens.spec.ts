@@ -1,29 +1,12 @@
 /** The page opens with a model that can be dragged at once. */
 
-import { cagePositions, drag, expect, largestMove, modelPositions, open, shoot, test } from "./support";
+import { followsAHandle } from "./stories";
+import { cagePositions, drag, expect, largestMove, open, shoot, test } from "./support";
 
 test("opens with a sample that is bound, and dragging deforms it", async ({ page }) => {
   await open(page);
   await shoot(page, "opens");
-  const before = { cage: await cagePositions(page), model: await modelPositions(page) };
-  const picture = await page.locator("canvas").first().screenshot();
-
-  const vertex = await drag(page, 60, -50);
-  const after = { cage: await cagePositions(page), model: await modelPositions(page) };
-  const moved = largestMove(before.cage, after.cage);
-  expect(moved, `cage vertex ${vertex} follows the pointer`).toBeGreaterThan(0);
-  // Weights are at most 1: no vertex moves farther than the handle.
-  const follows = largestMove(before.model, after.model);
-  expect(follows).toBeGreaterThan(0.02 * moved);
-  expect(follows).toBeLessThanOrEqual(1.001 * moved);
-  expect(picture.equals(await page.locator("canvas").first().screenshot()), "pixels change").toBe(false);
-  await shoot(page, "posed");
-
-  await page.keyboard.press("Control+z");
-  expect(largestMove(before.cage, await cagePositions(page)), "undo restores the cage").toBeLessThan(1e-6);
-  expect(largestMove(before.model, await modelPositions(page)), "and the model").toBeLessThan(1e-6);
-  await page.keyboard.press("Control+y");
-  expect(largestMove(after.cage, await cagePositions(page)), "redo brings it back").toBeLessThan(1e-6);
+  await followsAHandle(page, "posed");
 });
 
 test("works below any path, from its own files alone", async ({ page }) => {

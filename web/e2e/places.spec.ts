@@ -1,7 +1,7 @@
 /** Other browsers, other screens, other people. */
 
-import AxeBuilder from "@axe-core/playwright";
-import { bound, drag, expect, largestMove, modelPositions, open, shoot, test } from "./support";
+import { complaintsOfAxe, survives } from "./stories";
+import { expect, open, shoot, test } from "./support";
 
 test("nothing for axe to complain about, light and dark", async ({ page }) => {
   for (const scheme of ["light", "dark"] as const) {
@@ -10,9 +10,7 @@ test("nothing for axe to complain about, light and dark", async ({ page }) => {
     for (const step of ["Model", "Cage", "Bind", "Pose", "Export"]) {
       await page.getByRole("button", { name: step, exact: false }).first().click();
       await page.waitForTimeout(250);
-      const { violations } = await new AxeBuilder({ page }).analyze();
-      const told = violations.map(({ id, nodes }) => `${id}: ${nodes.map((n) => n.target).join(", ")}`);
-      expect(told, `${scheme}, ${step}`).toEqual([]);
+      expect(await complaintsOfAxe(page), `${scheme}, ${step}`).toEqual([]);
       await shoot(page, `${scheme}-${step.toLowerCase()}`);
     }
   }
@@ -31,26 +29,7 @@ test.describe("on a phone", () => {
 
 test("a lost device comes back with model and pose", async ({ page }) => {
   await open(page);
-  await drag(page, 40, 40);
-  const before = await modelPositions(page);
-  await page.evaluate(
-    () =>
-      new Promise((done) => {
-        globalThis.cagework?.onLost(done);
-        globalThis.cagework?.loseDevice();
-      }),
-  );
-  const answers = () =>
-    page.evaluate(() =>
-      globalThis.cagework?.readPositions().then(
-        (positions) => positions.length > 0,
-        () => false,
-      ),
-    );
-  await expect.poll(answers, { timeout: 60_000 }).toBe(true);
-  expect(largestMove(before, await modelPositions(page))).toBeLessThan(1e-5);
-  await bound(page);
-  await drag(page, -20, 10);
+  await survives(page, () => page.evaluate(() => globalThis.cagework?.loseDevice()));
   await shoot(page, "recovered");
 });
 

@@ -7,6 +7,8 @@ import type { Session } from "../src/contract";
 
 declare global {
   var cagework: Session | undefined;
+  /** Resolves when the GPU is lost: a test that loses it waits for that. */
+  var wasLost: Promise<unknown> | undefined;
 }
 
 /** Pictures of each state, to be looked at. */

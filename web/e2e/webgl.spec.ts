@@ -1,53 +1,17 @@
 /** A browser without WebGPU: drawn with WebGL2, computed on the processor. */
 
-import AxeBuilder from "@axe-core/playwright";
 import type { Page } from "@playwright/test";
-import { glb, validationErrors } from "./models";
-import {
-  bound,
-  cagePositions,
-  download,
-  drag,
-  drop,
-  expect,
-  handle,
-  largestMove,
-  modelPositions,
-  open,
-  reachable,
-  shoot,
-  test,
-} from "./support";
+import { WITH_WEBGL } from "./browser";
+import { complaintsOfAxe, exportsAPicture, exportsWhatIsShown, followsAHandle, survives } from "./stories";
+import { bound, expect, handle, open, reachable, shoot, test } from "./support";
 
-test.use({
-  launchOptions: {
-    executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-    // WebGL2 made of processor cores, and nothing that would bring WebGPU.
-    args: [
-      "--use-angle=swiftshader",
-      "--enable-unsafe-swiftshader",
-      "--ignore-gpu-blocklist",
-      "--headless=new",
-      "--no-sandbox",
-      "--disable-quic",
-      "--no-first-run",
-      "--disable-background-networking",
-      "--disable-component-update",
-      "--disable-sync",
-    ],
-  },
-});
+test.use({ launchOptions: WITH_WEBGL });
 
 /** Takes WebGPU away; asked for an adapter, Chromium would complain in the console, which must stay empty. */
 async function withoutWebGpu(page: Page): Promise<void> {
   await page.addInitScript(() => {
     Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined });
   });
-}
-
-async function complaintsOfAxe(page: Page): Promise<string[]> {
-  const { violations } = await new AxeBuilder({ page }).analyze();
-  return violations.map(({ id, nodes }) => `${id}: ${nodes.map((n) => n.target).join(", ")}`);
 }
 
 test.beforeEach(async ({ page }) => withoutWebGpu(page));
@@ -63,23 +27,7 @@ test("opens bound, dragging deforms, undo restores", async ({ page }) => {
     "only the artifact for WebGL2 is downloaded",
   ).toBe(true);
   await shoot(page, "webgl-opens");
-  const before = { cage: await cagePositions(page), model: await modelPositions(page) };
-  const picture = await page.locator("canvas").first().screenshot();
-
-  const vertex = await drag(page, 60, -50);
-  const after = { cage: await cagePositions(page), model: await modelPositions(page) };
-  const moved = largestMove(before.cage, after.cage);
-  expect(moved, `cage vertex ${vertex} follows the pointer`).toBeGreaterThan(0);
-  // Weights are at most 1: no vertex moves farther than the handle.
-  const follows = largestMove(before.model, after.model);
-  expect(follows).toBeGreaterThan(0.02 * moved);
-  expect(follows).toBeLessThanOrEqual(1.001 * moved);
-  expect(picture.equals(await page.locator("canvas").first().screenshot()), "pixels change").toBe(false);
-  await shoot(page, "webgl-posed");
-
-  await page.keyboard.press("Control+z");
-  expect(largestMove(before.cage, await cagePositions(page)), "undo restores the cage").toBeLessThan(1e-6);
-  expect(largestMove(before.model, await modelPositions(page)), "and the model").toBeLessThan(1e-6);
+  await followsAHandle(page, "webgl-posed");
 });
 
 test("says once what is different, and how to get WebGPU", async ({ page }) => {
@@ -112,20 +60,8 @@ test("says once what is different, and how to get WebGPU", async ({ page }) => {
 
 test("a dropped GLB is bound on the processor and exported", async ({ page }) => {
   await open(page);
-  await drop(page, [{ name: "worm.glb", bytes: await glb() }]);
-  await expect(page).toHaveTitle(/worm/);
-  await bound(page);
-  await drag(page, 60, 10);
-  const posed = await modelPositions(page);
-  const file = await download(page, "glb");
-  expect(await validationErrors(file.bytes)).toEqual([]);
-  const picture = await download(page, "picture");
-  expect(Buffer.from(picture.bytes.slice(1, 4)).toString()).toBe("PNG");
-  expect(picture.bytes.length).toBeGreaterThan(20_000);
-  await drop(page, [{ name: "again.glb", bytes: file.bytes }]);
-  await expect(page).toHaveTitle(/again/);
-  const again = await page.evaluate(() => Array.from(globalThis.cagework?.engine.modelPositions() ?? []));
-  expect(largestMove(posed, again)).toBeLessThan(1e-4);
+  await exportsWhatIsShown(page, "webgl-export");
+  await exportsAPicture(page);
 });
 
 test("colours, slice and comparison are shown", async ({ page }) => {
@@ -150,28 +86,13 @@ test("colours, slice and comparison are shown", async ({ page }) => {
 
 test("a lost context comes back with model and pose", async ({ page }) => {
   await open(page);
-  await drag(page, 40, 40);
-  const before = await modelPositions(page);
   // As the browser takes it away: the canvas's own context, not the page's way to give it up.
-  await page.evaluate(
-    () =>
-      new Promise((done) => {
-        globalThis.cagework?.onLost(done);
-        const context = document.querySelector("canvas")?.getContext("webgl2");
-        context?.getExtension("WEBGL_lose_context")?.loseContext();
-      }),
+  await survives(page, () =>
+    page.evaluate(() => {
+      const context = document.querySelector("canvas")?.getContext("webgl2");
+      context?.getExtension("WEBGL_lose_context")?.loseContext();
+    }),
   );
-  const answers = () =>
-    page.evaluate(() =>
-      globalThis.cagework?.readPositions().then(
-        (positions) => positions.length > 0,
-        () => false,
-      ),
-    );
-  await expect.poll(answers, { timeout: 60_000 }).toBe(true);
-  expect(largestMove(before, await modelPositions(page))).toBeLessThan(1e-5);
-  await bound(page);
-  await drag(page, -20, 10);
   await shoot(page, "webgl-recovered");
 });
 

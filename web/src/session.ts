@@ -102,7 +102,12 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   // What cannot be had now is asked for again by the first frame, which says why.
   raw.warm().catch(() => undefined);
   /** Begins to draw: with the first model, because a slow GPU's empty frame is what that would wait for. */
-  const begin = once(() => frames.start(() => raw.drawFrame()));
+  const begin = once(() =>
+    frames.start(
+      (sharp) => raw.drawFrame(sharp),
+      () => !client.isBusy(),
+    ),
+  );
   setTimeout(begin, LONGEST_EMPTY);
   /** Where nothing else can, the processor computes, whatever a project was saved with. */
   const possible = (options: BindOptions): BindOptions => (lack ? { ...options, backend: "cpu" } : options);

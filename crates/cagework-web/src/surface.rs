@@ -17,6 +17,13 @@ const MOST_IN_FLIGHT: u32 = 2;
 /// that is asked of the GPU, the weights of a bind first of all.
 const SLOW_MS: f64 = 50.0;
 
+/// Sides of a rough picture are so many times shorter: a quarter of the pixels.
+const ROUGH: u32 = 2;
+
+/// How much longer a sharp picture may take than a rough one, at least: what is slow stays so until a rough one is this much
+/// faster than [`SLOW_MS`], or a sharp one is fast.
+const SHARP_COSTS: f64 = 2.0;
+
 /// Side of a target that nobody sees, pixels.
 pub(crate) const SMALL: u32 = 16;
 
@@ -35,8 +42,28 @@ pub(crate) struct Surface {
     painter: Option<PartPainter>,
     /// Frames that were handed to the GPU and are not finished.
     in_flight: Arc<AtomicU32>,
-    /// Whether the last one took longer than [`SLOW_MS`].
+    /// Whether a sharp one takes longer than [`SLOW_MS`].
     is_slow: Arc<AtomicBool>,
+}
+
+/// How a picture is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    /// Soon: a slow GPU draws fewer pixels, which the browser enlarges.
+    Soon,
+    /// With all pixels, however long it takes.
+    Sharp,
+}
+
+/// What became of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Drawn {
+    /// The canvas could not be drawn into now.
+    NotNow,
+    /// With fewer pixels than the canvas has.
+    Roughly,
+    /// As it should be.
+    Sharply,
 }
 
 impl Surface {
@@ -73,23 +100,24 @@ impl Surface {
             config.usage |= wgpu::TextureUsages::COPY_DST;
         }
         surface.configure(&context.device, &config);
-        let (in_flight, is_slow) = (Arc::default(), Arc::default());
+        let is_software = context.adapter.get_info().device_type == wgpu::DeviceType::Cpu;
+        let (in_flight, is_slow) = (Arc::default(), Arc::new(AtomicBool::new(is_software)));
         Ok((Self { surface, config, format, parts: Vec::new(), painter, in_flight, is_slow }, context))
     }
 
     /// Gives the canvas another size, pixels.
-    pub(crate) fn resize(&mut self, context: &GpuContext, [width, height]: [u32; 2]) {
+    fn resize(&mut self, context: &GpuContext, [width, height]: [u32; 2]) {
         let most = context.device.limits().max_texture_dimension_2d;
         let size = [width.clamp(1, most), height.clamp(1, most)];
         if [self.config.width, self.config.height] == size {
             return;
         }
         [self.config.width, self.config.height] = size;
-        self.parts.clear();
+        self.drop_parts();
         self.surface.configure(&context.device, &self.config);
     }
 
-    /// Draws a session, or two side by side, and shows the picture. False if the canvas could not be drawn into now.
+    /// Draws a session, or two side by side, into `size` pixels, `scale` for each of CSS, or fewer, and shows the picture.
     ///
     /// # Errors
     /// The GPU was lost or refused something.
@@ -97,31 +125,37 @@ impl Surface {
         &mut self,
         session: &mut Session,
         other: Option<&mut Session>,
-        scale: f32,
-    ) -> Answer<bool> {
+        (size, scale): ([u32; 2], f32),
+        wanted: Wanted,
+    ) -> Answer<Drawn> {
         let context = session.context().clone();
         context.check()?;
-        let most = if self.is_slow.load(Ordering::Relaxed) { 1 } else { MOST_IN_FLIGHT };
-        if self.in_flight.load(Ordering::Relaxed) >= most {
-            return Ok(false);
+        let is_slow = self.is_slow.load(Ordering::Relaxed);
+        if self.in_flight.load(Ordering::Relaxed) >= if is_slow { 1 } else { MOST_IN_FLIGHT } {
+            return Ok(Drawn::NotNow);
         }
+        let is_rough = is_slow && wanted == Wanted::Soon;
+        let (size, scale) =
+            if is_rough { (size.map(|n| n.div_ceil(ROUGH)), scale / ROUGH as f32) } else { (size, scale) };
+        self.resize(&context, size);
         let frame = match self.surface.get_current_texture() {
             wgpu::CurrentSurfaceTexture::Success(frame) | wgpu::CurrentSurfaceTexture::Suboptimal(frame) => {
                 frame
             }
             wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
                 self.surface.configure(&context.device, &self.config);
-                return Ok(false);
+                return Ok(Drawn::NotNow);
             }
             wgpu::CurrentSurfaceTexture::Timeout
             | wgpu::CurrentSurfaceTexture::Occluded
-            | wgpu::CurrentSurfaceTexture::Validation => return Ok(false),
+            | wgpu::CurrentSurfaceTexture::Validation => return Ok(Drawn::NotNow),
         };
         let [width, height] = [self.config.width, self.config.height];
         let other = other.filter(|_| width > 1);
         let size = if other.is_some() { [width / 2, height] } else { [width, height] };
         let n_parts = 1 + usize::from(other.is_some());
         if self.parts.len() != n_parts {
+            self.drop_parts();
             self.parts = (0..n_parts).map(|_| self.make_part(&context, size)).collect();
         }
         for (texture, session) in self.parts.iter().zip([Some(session), other].into_iter().flatten()) {
@@ -134,10 +168,11 @@ impl Surface {
         let began = now_ms();
         context.queue.on_submitted_work_done(move || {
             in_flight.fetch_sub(1, Ordering::Relaxed);
-            is_slow.store(now_ms() - began > SLOW_MS, Ordering::Relaxed);
+            let sharp_ms = (now_ms() - began) * if is_rough { SHARP_COSTS } else { 1.0 };
+            is_slow.store(sharp_ms > SLOW_MS, Ordering::Relaxed);
         });
         context.queue.present(frame);
-        Ok(true)
+        Ok(if is_rough { Drawn::Roughly } else { Drawn::Sharply })
     }
 
     /// Brings the parts to the canvas. An odd column between the halves stays clear: the divider.
@@ -159,6 +194,13 @@ impl Surface {
             }
         }
         context.queue.submit([encoder.finish()]);
+    }
+
+    /// Gives the parts' memory back now, not when JavaScript collects garbage: sizes change with every pause.
+    fn drop_parts(&mut self) {
+        for part in self.parts.drain(..) {
+            part.destroy();
+        }
     }
 
     /// A target like those that are drawn into, of few pixels, and its format.

@@ -18,6 +18,8 @@ export interface Client {
     input: Jobs[K]["input"],
     step?: (step: Step) => void,
   ): Job<Jobs[K]["output"]>;
+  /** Whether a job is under way. */
+  isBusy(): boolean;
   close(): void;
 }
 
@@ -87,6 +89,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
         },
       };
     },
+    isBusy: () => waiting.size > 0,
     close() {
       worker.terminate();
       for (const job of waiting.values()) job.failed(named("Cancelled", "the page is closing"));

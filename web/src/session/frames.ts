@@ -3,49 +3,65 @@
 /** A GPU that is behind, or waiting for something, is asked again after this pause, ms. */
 const BUSY_PAUSE = 12;
 
+/** What a slow GPU drew roughly it draws again once nothing has moved for so long, ms. */
+const QUIET = 250;
+
 export interface Frames {
   ask(): void;
-  /** Begins to draw; false from `draw` means: not now. */
-  start(draw: () => boolean): void;
+  /**
+   * Begins to draw. `draw` with or without all pixels answers whether the picture has them; undefined means: not now.
+   * `calm`: whether there is time for a picture that nobody asked for.
+   */
+  start(draw: (sharp: boolean) => boolean | undefined, calm: () => boolean): void;
   listen(listener: (ms: number) => void): () => void;
   stop(): void;
 }
 
 export function createFrames(): Frames {
   const listeners = new Set<(ms: number) => void>();
-  let draw: (() => boolean) | undefined;
-  let asked = false;
+  let draw: ((sharp: boolean) => boolean | undefined) | undefined;
+  let calm = () => true;
+  let asked: "soon" | "sharp" | undefined;
+  let quiet: ReturnType<typeof setTimeout> | undefined;
   let stopped = false;
 
-  const ask = () => {
-    if (asked || stopped) return;
-    asked = true;
-    requestAnimationFrame(frame);
+  const request = (how: "soon" | "sharp") => {
+    if (stopped) return;
+    clearTimeout(quiet);
+    if (!asked) requestAnimationFrame(frame);
+    // Whoever wants it soon comes first: it is sharpened later.
+    asked = asked === "soon" ? asked : how;
+  };
+  const sharpen = () => {
+    if (calm()) request("sharp");
+    else quiet = setTimeout(sharpen, QUIET);
   };
   const frame = () => {
-    asked = false;
+    const how = asked ?? "soon";
+    asked = undefined;
     if (!draw || stopped) return;
     const began = performance.now();
-    let drawn = true;
+    let isSharp: boolean | undefined;
     try {
-      drawn = draw();
+      isSharp = draw(how === "sharp");
     } catch (error) {
       // A lost device is told by the session; anything else is for the page's handler of errors.
       if (!(error instanceof Error && error.name === "DeviceLost")) reportError(error);
       return;
     }
-    if (!drawn) {
-      setTimeout(ask, BUSY_PAUSE);
+    if (isSharp === undefined) {
+      setTimeout(() => request(how), BUSY_PAUSE);
       return;
     }
+    if (!isSharp) quiet = setTimeout(sharpen, QUIET);
     const ms = performance.now() - began;
     for (const listener of listeners) listener(ms);
   };
   return {
-    ask,
-    start(first) {
-      draw = first;
-      ask();
+    ask: () => request("soon"),
+    start(first, whenCalm) {
+      [draw, calm] = [first, whenCalm];
+      request("soon");
     },
     listen(listener) {
       listeners.add(listener);
@@ -53,6 +69,7 @@ export function createFrames(): Frames {
     },
     stop() {
       stopped = true;
+      clearTimeout(quiet);
       listeners.clear();
     },
   };

@@ -21,7 +21,7 @@ use crate::mesh::{Weld, weld};
 use crate::progress::{Progress, Stage};
 use crate::sample::Stencils;
 use crate::solve::multigrid::histories;
-use crate::solve::rows::Row;
+use crate::solve::rows::{LANES, Row};
 use crate::solve::team::Team;
 
 use self::local::{Fields, Negligible, OldCells, Region, Residual, Split, Update};
@@ -37,12 +37,12 @@ const MAX_UPDATES: usize = 6;
 /// Each V-cycle makes a correction's error about so many times smaller.
 const CONTRACTION: f64 = 15.0;
 
-/// Largest change of a weight by an edit that is small.
-const LARGEST_CHANGE: f64 = 0.1;
+/// How many times as much as a cell's own equation asks for its weight may change, because its neighbours' do.
+const GROWTH: f64 = 4.0;
 
-/// V-cycles for a correction, from zero to the threshold.
-fn cycles_to(tau: f32) -> u32 {
-    (LARGEST_CHANGE / f64::from(tau)).log(CONTRACTION).ceil().clamp(2.0, 8.0) as u32
+/// V-cycles for a correction, from zero to the threshold; `size`: the largest change of a weight that one equation asks for.
+fn cycles_to(tau: f32, size: f32) -> u32 {
+    (GROWTH * f64::from(size) / f64::from(tau)).log(CONTRACTION).ceil().clamp(1.0, 8.0) as u32
 }
 
 /// Cells around the moved faces whose equations may have changed.
@@ -215,17 +215,19 @@ impl Rebinder {
         let mut rank = 0;
         if !moved.is_empty() {
             let negligible = Negligible::at(self.options.tau);
-            let cycles = cycles_to(self.options.tau);
             let old = OldCells::new(&fields, &needed, n_batches);
             let region = Region::around(&moved, CHANGED, &grid);
             let residual = Residual::new(level, &region, n_batches, &old, negligible.residual);
-            let Some(Split { right, shares }) = residual.split(level.n_rows(), cage.n_vertices()) else {
+            let Some(Split { right, shares, sizes }) = residual.split(level.n_rows(), cage.n_vertices()) else {
                 return Ok(None);
             };
             resample(&stencils, &changed, level, &old, &needed, &mut blocks);
             rank = shares.len();
-            let corrections = solve_for(&voxels, &stencils, &right, cycles, &team, watch)?;
-            solved.iterations = cycles;
+            // The largest come first: few of the batches need all cycles.
+            let cycles: Vec<u32> =
+                sizes.chunks(LANES).map(|batch| cycles_to(self.options.tau, batch[0])).collect();
+            let corrections = solve_for(&voxels, &stencils, &right, &cycles, &team, watch)?;
+            solved.iterations = cycles.first().copied().unwrap_or(0);
             solved.residual_history =
                 histories(&corrections.iter().map(|c| &c.report).collect::<Vec<_>>())[1].clone();
             let samples: Vec<&[Row]> = corrections.iter().map(|c| c.samples.as_slice()).collect();

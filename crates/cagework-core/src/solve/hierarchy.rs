@@ -4,6 +4,7 @@ use crate::levels::{Boundary, BoundaryTerm, Level};
 use crate::transfer::Transfer;
 use crate::voxelize::map_indices;
 
+use super::centres::Centres;
 use super::rows::{LANES, Row};
 
 /// Coarsening stops at this many unknowns: there, a few dozen sweeps cost nothing.
@@ -16,6 +17,8 @@ pub struct Hierarchy {
     pub levels: Vec<Level>,
     /// `transfers[k]` lies between levels k and k + 1.
     pub transfers: Vec<Transfer>,
+    /// Centres of the second level's cells in the finest.
+    pub centres: Centres,
     /// Columns: control vertices.
     pub n_columns: usize,
     /// For each level, where each batch's terms start in `Level::boundary`, which is sorted by batch.
@@ -26,8 +29,13 @@ impl Hierarchy {
     /// One level only: for Jacobi.
     #[must_use]
     pub fn single(level: Level, n_columns: usize) -> Self {
-        let mut hierarchy =
-            Self { levels: vec![level], transfers: Vec::new(), n_columns, batches: Vec::new() };
+        let mut hierarchy = Self {
+            levels: vec![level],
+            transfers: Vec::new(),
+            centres: Centres::default(),
+            n_columns,
+            batches: Vec::new(),
+        };
         hierarchy.sort_terms();
         hierarchy
     }
@@ -49,7 +57,8 @@ impl Hierarchy {
         }
         let levels = map_indices(boundaries.len(), |k| Level::new(&boundaries[k]));
         let transfers = map_indices(levels.len() - 1, |k| Transfer::new(&levels[k], &levels[k + 1]));
-        let mut hierarchy = Self { levels, transfers, n_columns, batches: Vec::new() };
+        let centres = transfers.first().map(|t| Centres::new(&levels[0], t)).unwrap_or_default();
+        let mut hierarchy = Self { levels, transfers, centres, n_columns, batches: Vec::new() };
         hierarchy.sort_terms();
         hierarchy
     }
@@ -113,5 +122,6 @@ impl Hierarchy {
     pub fn bytes(&self) -> usize {
         self.levels.iter().map(Level::bytes).sum::<usize>()
             + self.transfers.iter().map(Transfer::bytes).sum::<usize>()
+            + self.centres.bytes()
     }
 }

@@ -4,6 +4,7 @@
 //! (`[red .., 0, black .., 0]`). Every kernel works on one z-plane of one colour, so that callers can let several
 //! half sweeps follow each other a plane apart and a whole smoothing pass reads the field from memory once.
 
+use crate::grid::NO_CELL;
 use crate::levels::{Colour, Level};
 use crate::transfer::{ProlongRow, RESTRICT_CENTRE, RESTRICT_EDGE, RestrictRow, Transfer};
 
@@ -27,6 +28,17 @@ pub enum Rhs<'a> {
     Cut(&'a [Row]),
     /// One row per cell, in field order. A coarse level's.
     Dense(&'a [Row]),
+}
+
+impl Rhs<'_> {
+    /// The right-hand side of a red cell, which is number `cut` of the red cut cells; none for whole cells that need none.
+    #[inline(always)]
+    pub(super) fn of_red(&self, cell: u32, cut: u32) -> Option<&Row> {
+        match self {
+            Self::Cut(rows) => (cut != NO_CELL).then(|| &rows[cut as usize]),
+            Self::Dense(rows) => Some(&rows[cell as usize]),
+        }
+    }
 }
 
 /// One colour's part of a [`Rhs`].
@@ -63,6 +75,16 @@ fn add(sum: &mut Row, row: &Row) {
     for k in 0..LANES {
         sum[k] += row[k];
     }
+}
+
+/// Sum of the rows of `field` that a cell has for neighbours.
+#[inline(always)]
+pub(super) fn sum_around(field: &[Row], neighbours: &[u32; 6]) -> Row {
+    let mut sum = ZERO;
+    for &n in neighbours {
+        add(&mut sum, &field[n as usize]);
+    }
+    sum
 }
 
 /// One cell of a plane under way.
@@ -158,21 +180,30 @@ pub fn over_relax_zeros_plane(
     );
 }
 
-/// [`relax_plane`] of red cells where both colours are still zero, whatever their rows hold: `u = f / diagonal`, from
-/// a right-hand side with a row per cell.
+/// [`relax_plane`] of red cells where both colours are still zero, whatever their rows hold: `u = f / diagonal`.
 #[inline(always)]
-pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: &[Row]) {
+pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: Rhs<'_>) {
     let red = &level.colours[0];
+    let rhs = rhs.of(level, 0);
     let ([run, cut], [run_end, cut_end]) = (red.planes[plane], red.planes[plane + 1]);
     for run in &red.runs[run as usize..run_end as usize] {
         let cells = run.start as usize..(run.start + run.len) as usize;
-        for (row, f) in u[cells.clone()].iter_mut().zip(&rhs[cells]) {
-            *row = f.map(|f| f * (1.0 / 6.0));
+        match rhs {
+            ColourRhs::Cut(_) => u[cells].fill(ZERO),
+            ColourRhs::Dense(rows) => {
+                for (row, f) in u[cells.clone()].iter_mut().zip(&rows[cells]) {
+                    *row = f.map(|f| f * (1.0 / 6.0));
+                }
+            }
         }
     }
-    for cut in &red.cut[cut as usize..cut_end as usize] {
+    for (number, cut) in (cut as usize..).zip(&red.cut[cut as usize..cut_end as usize]) {
+        let f = match rhs {
+            ColourRhs::Cut(rows) => rows[number],
+            ColourRhs::Dense(rows) => rows[cut.cell as usize],
+        };
         let inverse = 1.0 / cut.diagonal;
-        u[cut.cell as usize] = rhs[cut.cell as usize].map(|f| f * inverse);
+        u[cut.cell as usize] = f.map(|f| f * inverse);
     }
 }
 

@@ -44,8 +44,16 @@ pub struct Target<'a> {
 struct Targets {
     format: wgpu::TextureFormat,
     size: [u32; 2],
-    color: wgpu::TextureView,
-    depth: wgpu::TextureView,
+    color: wgpu::Texture,
+    depth: wgpu::Texture,
+}
+
+impl Drop for Targets {
+    /// Now, not when a browser collects garbage: a slow GPU changes sizes with every pause.
+    fn drop(&mut self) {
+        self.color.destroy();
+        self.depth.destroy();
+    }
 }
 
 /// Draws the scene.
@@ -231,10 +239,12 @@ impl Renderer {
         else {
             return;
         };
+        let [color, depth] = [&targets.color, &targets.depth]
+            .map(|texture| texture.create_view(&wgpu::TextureViewDescriptor::default()));
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("picture"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &targets.color,
+                view: &color,
                 depth_slice: None,
                 resolve_target: Some(view),
                 ops: wgpu::Operations {
@@ -244,7 +254,7 @@ impl Renderer {
                 },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &targets.depth,
+                view: &depth,
                 depth_ops: Some(wgpu::Operations {
                     load: wgpu::LoadOp::Clear(1.0),
                     store: wgpu::StoreOp::Discard,
@@ -357,8 +367,8 @@ impl Renderer {
 
 impl Targets {
     fn new(context: &GpuContext, format: wgpu::TextureFormat, [width, height]: [u32; 2]) -> Self {
-        let view = |label, format| {
-            let texture = context.device.create_texture(&wgpu::TextureDescriptor {
+        let texture = |label, format| {
+            context.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
                 size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
                 mip_level_count: 1,
@@ -367,14 +377,13 @@ impl Targets {
                 format,
                 usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
                 view_formats: &[],
-            });
-            texture.create_view(&wgpu::TextureViewDescriptor::default())
+            })
         };
         Self {
             format,
             size: [width, height],
-            color: view("samples", format),
-            depth: view("depth", DEPTH_FORMAT),
+            color: texture("samples", format),
+            depth: texture("depth", DEPTH_FORMAT),
         }
     }
 }

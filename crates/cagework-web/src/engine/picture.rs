@@ -10,7 +10,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::{Engine, lost};
 use crate::arrays::flat;
 use crate::error::{Answer, Fault};
-use crate::surface::SMALL;
+use crate::surface::{Drawn, SMALL, Wanted};
 
 #[wasm_bindgen]
 impl Engine {
@@ -23,13 +23,18 @@ impl Engine {
         });
     }
 
-    /// Draws what there is now. False if the GPU is busy; it asks again.
+    /// Draws what there is now; a slow GPU with fewer pixels than there are, unless it is to be `sharp`. Undefined if the GPU
+    /// is busy; it asks again. Else whether the picture is sharp.
     ///
     /// # Errors
     /// `DeviceLost`, `Refused`, `OutOfMemory`.
     #[wasm_bindgen(js_name = drawFrame)]
-    pub fn draw_frame(&self) -> Result<bool, JsValue> {
-        Ok(self.try_frame()?)
+    pub fn draw_frame(&self, sharp: bool) -> Result<Option<bool>, JsValue> {
+        Ok(match self.try_frame(if sharp { Wanted::Sharp } else { Wanted::Soon })? {
+            Drawn::NotNow => None,
+            Drawn::Roughly => Some(false),
+            Drawn::Sharply => Some(true),
+        })
     }
 
     /// Draws a box that follows its cage where nobody sees it: GPUs finish a pipeline when it is first used, and before
@@ -90,18 +95,17 @@ impl Engine {
 }
 
 impl Engine {
-    fn try_frame(&self) -> Answer<bool> {
-        let Some(mut gpu) = self.gpu.try_lock() else { return Ok(false) };
-        let Some(gpu) = gpu.as_mut() else { return Ok(false) };
+    fn try_frame(&self, wanted: Wanted) -> Answer<Drawn> {
+        let Some(mut gpu) = self.gpu.try_lock() else { return Ok(Drawn::NotNow) };
+        let Some(gpu) = gpu.as_mut() else { return Ok(Drawn::NotNow) };
         let mut state = self.state.borrow_mut();
         if let Some(fault) = state.fault.take() {
             return Err(fault);
         }
-        let pixels = (state.size * state.scale).round();
-        let context = gpu.main.context().clone();
-        gpu.surface.resize(&context, [pixels.x as u32, pixels.y as u32]);
         state.write(&mut gpu.main, gpu.other.as_mut());
+        let pixels = (state.size * state.scale).round();
+        let target = ([pixels.x as u32, pixels.y as u32], state.scale);
         let other = gpu.other.as_mut().filter(|_| state.is_split());
-        gpu.surface.draw(&mut gpu.main, other, state.scale)
+        gpu.surface.draw(&mut gpu.main, other, target, wanted)
     }
 }

@@ -149,6 +149,9 @@ pub(super) struct Split {
     pub(super) right: Vec<Vec<Row>>,
     /// For each of them a row of all columns. `[n_of them][n_batches]`
     pub(super) shares: Vec<Vec<Row>>,
+    /// Largest entry of all columns' residuals when each of them was split off: the size of what it corrects. Falling, but
+    /// for rounding. `[n_of them]`
+    pub(super) sizes: Vec<f32>,
 }
 
 impl Residual {
@@ -241,7 +244,7 @@ impl Residual {
     fn split_columns(mut self, n_rows: usize, n_columns: usize) -> Option<Split> {
         let n_batches = n_columns.div_ceil(LANES);
         let mut right = Vec::new();
-        let mut shares: Vec<Vec<Row>> = Vec::new();
+        let (mut shares, mut sizes) = (Vec::<Vec<Row>>::new(), Vec::new());
         loop {
             let mut largest = vec![ZERO; n_batches];
             for row in &self.values {
@@ -254,7 +257,7 @@ impl Residual {
             let size = |c: usize| largest[c / LANES][c % LANES];
             let pivot = (0..n_columns).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
             if size(pivot) < self.negligible {
-                return Some(Split { right, shares });
+                return Some(Split { right, shares, sizes });
             }
             let rank = shares.len();
             // More, and solving for the columns themselves is no slower.
@@ -283,6 +286,7 @@ impl Residual {
                 batch[row as usize][rank % LANES] = q * diagonal;
             }
             shares.push(share);
+            sizes.push(size(pivot));
         }
     }
 }

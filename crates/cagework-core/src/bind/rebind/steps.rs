@@ -72,12 +72,12 @@ pub(super) struct Correction {
     pub(super) field: Vec<Row>,
 }
 
-/// Solves for right-hand sides of cells, in batches, and samples the solutions.
+/// Solves for right-hand sides of cells, in batches of so many V-cycles each, and samples the solutions.
 pub(super) fn solve_for(
     voxels: &Voxels,
     stencils: &Stencils,
     right: &[Vec<Row>],
-    cycles: u32,
+    cycles: &[u32],
     team: &Team,
     watch: &Watch<'_>,
 ) -> Result<Vec<Correction>, Cancelled> {
@@ -87,7 +87,7 @@ pub(super) fn solve_for(
         n,
         || Workspace::new(hierarchy),
         |workspace, batch| {
-            let report = workspace.solve_for(hierarchy, &right[batch], cycles, |cycle, delta| {
+            let report = workspace.solve_for(hierarchy, &right[batch], cycles[batch], |cycle, delta| {
                 let fraction = watch.done() as f32 / n as f32;
                 watch.report(Stage::Solve, fraction, cycle, Some(delta as f32)).is_ok()
             })?;

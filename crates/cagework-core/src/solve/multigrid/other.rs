@@ -1,8 +1,9 @@
 //! Right-hand sides other than the cage's.
 
+use super::stream::DOWN_FROM_ZERO;
 use super::{BatchReport, Stop, Workspace};
 use crate::solve::hierarchy::Hierarchy;
-use crate::solve::rows::{Row, ZERO};
+use crate::solve::rows::Row;
 
 impl Workspace {
     /// Solves for right-hand sides that are not the cage's: `rhs` has one row per row of the finest level. From zero,
@@ -20,8 +21,8 @@ impl Workspace {
         self.f[0].clear();
         self.f[0].extend_from_slice(rhs);
         self.dense = true;
-        self.u[0].fill(ZERO);
-        let report = self.cycles(hierarchy, Stop { tolerance: 0.0, max_cycles: cycles }, cycle_done);
+        let stop = Stop { tolerance: 0.0, max_cycles: cycles };
+        let report = self.cycles(hierarchy, DOWN_FROM_ZERO, stop, cycle_done);
         self.dense = false;
         report
     }

@@ -1,7 +1,7 @@
 //! Kernels against the plainest loops over the boundary's definition, on grids of odd dimensions.
 
 use super::*;
-use crate::grid::{Grid, NO_CELL};
+use crate::grid::Grid;
 use crate::levels::plain::{cells, hierarchy, on_two_levels, some_field};
 
 /// Sums of six values in [0, 1) in another order, over a diagonal of at least 3.
@@ -65,7 +65,7 @@ fn sweeps_from_zero_match_sweeps_of_zeros() {
         let mut u = some_field(level, 1);
         for plane in 0..level.grid.dims[2] as usize {
             relax_plane(level, 0, plane, &mut expected, Rhs::Dense(&dense));
-            relax_zeros_plane(level, plane, &mut u, &dense);
+            relax_zeros_plane(level, plane, &mut u, Rhs::Dense(&dense));
         }
         for plane in 0..level.grid.dims[2] as usize {
             over_relax_plane(level, 1, plane, 1.2, &mut expected, Rhs::Dense(&dense));

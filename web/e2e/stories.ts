@@ -1,0 +1,95 @@
+/** What the page does on either kind of device. */
+
+import AxeBuilder from "@axe-core/playwright";
+import type { Page } from "@playwright/test";
+import { glb, validationErrors } from "./models";
+import {
+  bound,
+  cagePositions,
+  download,
+  drag,
+  drop,
+  expect,
+  largestMove,
+  modelPositions,
+  shoot,
+} from "./support";
+
+/** What axe finds wrong with the page. */
+export async function complaintsOfAxe(page: Page): Promise<string[]> {
+  const { violations } = await new AxeBuilder({ page }).analyze();
+  return violations.map(({ id, nodes }) => `${id}: ${nodes.map((n) => n.target).join(", ")}`);
+}
+
+/** The model follows a handle, on the screen and in numbers; undo and redo bring both back. */
+export async function followsAHandle(page: Page, picture: string): Promise<void> {
+  const before = { cage: await cagePositions(page), model: await modelPositions(page) };
+  const pixels = await page.locator("canvas").first().screenshot();
+
+  const vertex = await drag(page, 60, -50);
+  const after = { cage: await cagePositions(page), model: await modelPositions(page) };
+  const moved = largestMove(before.cage, after.cage);
+  expect(moved, `cage vertex ${vertex} follows the pointer`).toBeGreaterThan(0);
+  // Weights are at most 1: no vertex moves farther than the handle.
+  const follows = largestMove(before.model, after.model);
+  expect(follows).toBeGreaterThan(0.02 * moved);
+  expect(follows).toBeLessThanOrEqual(1.001 * moved);
+  expect(pixels.equals(await page.locator("canvas").first().screenshot()), "pixels change").toBe(false);
+  await shoot(page, picture);
+
+  await page.keyboard.press("Control+z");
+  expect(largestMove(before.cage, await cagePositions(page)), "undo restores the cage").toBeLessThan(1e-6);
+  expect(largestMove(before.model, await modelPositions(page)), "and the model").toBeLessThan(1e-6);
+  await page.keyboard.press("Control+y");
+  expect(largestMove(after.cage, await cagePositions(page)), "redo brings it back").toBeLessThan(1e-6);
+}
+
+/** Drops a model and poses it. */
+export async function posesAWorm(page: Page, [dx, dy]: readonly [number, number]): Promise<void> {
+  await drop(page, [{ name: "worm.glb", bytes: await glb() }]);
+  await expect(page).toHaveTitle(/worm/);
+  await bound(page);
+  await drag(page, dx, dy);
+}
+
+/** A posed model comes back as it was exported. */
+export async function exportsWhatIsShown(page: Page, picture: string): Promise<void> {
+  await posesAWorm(page, [60, 10]);
+  const posed = await modelPositions(page);
+  const file = await download(page, "glb");
+  await shoot(page, picture);
+  expect(await validationErrors(file.bytes)).toEqual([]);
+  await drop(page, [{ name: "again.glb", bytes: file.bytes }]);
+  await expect(page).toHaveTitle(/again/);
+  const again = await page.evaluate(() => Array.from(globalThis.cagework?.engine.modelPositions() ?? []));
+  expect(largestMove(posed, again)).toBeLessThan(1e-4);
+}
+
+/** The picture that is exported shows something. */
+export async function exportsAPicture(page: Page): Promise<void> {
+  const picture = await download(page, "picture");
+  expect(Buffer.from(picture.bytes.slice(1, 4)).toString()).toBe("PNG");
+  expect(picture.bytes.length).toBeGreaterThan(20_000);
+}
+
+/** Model and pose survive when the GPU is lost, and can be dragged again. */
+export async function survives(page: Page, lose: () => Promise<unknown>): Promise<void> {
+  await drag(page, 40, 40);
+  const before = await modelPositions(page);
+  await page.evaluate(() => {
+    globalThis.wasLost = new Promise((done) => globalThis.cagework?.onLost(done));
+  });
+  await lose();
+  await page.evaluate(() => globalThis.wasLost);
+  const answers = () =>
+    page.evaluate(() =>
+      globalThis.cagework?.readPositions().then(
+        (positions) => positions.length > 0,
+        () => false,
+      ),
+    );
+  await expect.poll(answers, { timeout: 60_000 }).toBe(true);
+  expect(largestMove(before, await modelPositions(page))).toBeLessThan(1e-5);
+  await bound(page);
+  await drag(page, -20, 10);
+}
