@@ -218,7 +218,8 @@ impl Rebinder {
             let old = OldCells::new(&fields, &needed, n_batches);
             let region = Region::around(&moved, CHANGED, &grid);
             let residual = Residual::new(level, &region, n_batches, &old, negligible.residual);
-            let Some(Split { right, shares, sizes }) = residual.split(level.n_rows(), cage.n_vertices()) else {
+            let Some(Split { right, shares, sizes }) = residual.split(level.n_rows(), cage.n_vertices())
+            else {
                 return Ok(None);
             };
             resample(&stencils, &changed, level, &old, &needed, &mut blocks);
