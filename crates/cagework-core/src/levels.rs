@@ -344,13 +344,12 @@ fn add_terms(
         total += weight;
         for &(column, value) in &hats {
             let value = (weight * value) as f32;
-            match terms[first..].iter_mut().find(|t| t.column == column) {
-                Some(term) => term.value += value,
-                None => terms.push(BoundaryTerm { cut_cell, column, value }),
+            match terms[first..].binary_search_by_key(&column, |t| t.column) {
+                Ok(found) => terms[first + found].value += value,
+                Err(place) => terms.insert(first + place, BoundaryTerm { cut_cell, column, value }),
             }
         }
     }
-    terms[first..].sort_by_key(|t| t.column);
     total
 }
 

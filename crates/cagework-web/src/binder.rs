@@ -2,7 +2,7 @@
 //!
 //! It has its own GPU device and reads nothing but arrays. Results are taken apart by the page's `Engine`.
 
-use cagework_core::bind::OutsideVertex;
+use cagework_core::bind::{BindError, OutsideVertex, Rebinder};
 use cagework_core::cage_gen::{CageOptions, generate};
 use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Binding, Cage, PolygonMesh, Weights, mean_value_weights, samples};
@@ -23,6 +23,8 @@ use crate::views::object;
 #[wasm_bindgen]
 pub struct Binder {
     gpu: Option<GpuContext>,
+    /// What the last bind on the processor left behind: after a small edit of the cage the next one starts from it.
+    rebinder: Option<Rebinder>,
 }
 
 /// Weights on their way to the page: compressed sparse rows, and the vertices outside the cage.
@@ -66,7 +68,7 @@ impl Binder {
     #[must_use]
     #[allow(clippy::new_without_default, reason = "only JavaScript makes one")]
     pub fn new() -> Self {
-        Self { gpu: None }
+        Self { gpu: None, rebinder: None }
     }
 
     /// Opens a GPU for the binds to come, unless there is one, or none that could bind.
@@ -87,7 +89,7 @@ impl Binder {
     /// # Errors
     /// Those of a bind; when the arrays are no cage; `Missing` when the GPU is asked for and not open.
     pub async fn bind(
-        &self,
+        &mut self,
         positions: Vec<f32>,
         cage: Vec<f32>,
         corners: Vec<u32>,
@@ -97,7 +99,12 @@ impl Binder {
         let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
         let parts = Parts::new(&positions, &cage, &corners)?;
         drop(positions);
-        let binding = self.run(&parts.positions, &parts.cage, asked, progress).await?;
+        let binding = if is_here(asked) {
+            self.bind_here(&parts, &asked.into(), &Listener::new(progress))?
+        } else {
+            self.rebinder = None;
+            self.run(&parts.positions, &parts.cage, asked, progress).await?
+        };
         let report = object(&binding.report)?;
         Ok(Bound { weights: binding.weights, outside: binding.outside, report })
     }
@@ -182,7 +189,31 @@ impl Binder {
     }
 }
 
+/// Whether the processor computes.
+fn is_here(asked: BindAsked) -> bool {
+    asked.backend == Backend::Cpu || !cfg!(feature = "webgpu")
+}
+
 impl Binder {
+    /// Binds on the processor, from what the last bind left behind if that was of the same model.
+    fn bind_here(&mut self, parts: &Parts, options: &BindOptions, listener: &Listener) -> Answer<Binding> {
+        let Parts { positions, cage } = parts;
+        if let Some(rebinder) = self.rebinder.as_mut().filter(|r| r.fits(positions, options)) {
+            return Ok(rebinder.rebind(cage, listener)?.0);
+        }
+        // Its memory is needed now.
+        self.rebinder = None;
+        match Rebinder::new(positions, cage, options, listener) {
+            Ok((rebinder, binding)) => {
+                self.rebinder = Some(rebinder);
+                Ok(binding)
+            }
+            // Without the fields it may fit.
+            Err(BindError::Memory { .. }) => Ok(cagework_core::bind(positions, cage, options, listener)?),
+            Err(error) => Err(error.into()),
+        }
+    }
+
     async fn run(
         &self,
         positions: &[Vec3],
@@ -192,7 +223,7 @@ impl Binder {
     ) -> Answer<Binding> {
         let options = BindOptions::from(asked);
         let listener = Listener::new(progress);
-        if asked.backend == Backend::Cpu || !cfg!(feature = "webgpu") {
+        if is_here(asked) {
             return Ok(cagework_core::bind(positions, cage, &options, &listener)?);
         }
         let gpu = self.gpu.as_ref().ok_or_else(|| Fault::missing("GPU", "open one first"))?;

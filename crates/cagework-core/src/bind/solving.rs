@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::progress::{Cancelled, Stage};
 use crate::sample::Stencils;
+use crate::solve::hierarchy::Hierarchy;
 use crate::solve::jacobi::{self, StopRule};
 use crate::solve::multigrid::{BatchReport, Stop, Workspace, histories};
 use crate::solve::rows::Row;
@@ -26,11 +27,13 @@ pub(super) fn solve_and_sample(
 ) -> Result<Solved, Cancelled> {
     match options.solver {
         Solver::Jacobi => jacobi_columns(voxels, stencils, options, team, watch),
-        Solver::Multigrid => multigrid_columns(voxels, stencils, options, team, watch),
+        Solver::Multigrid => {
+            Ok(multigrid_columns(voxels, stencils, options, FieldFate::Reused, team, watch)?.0)
+        }
     }
 }
 
-fn sample(stencils: &Stencils, batch: usize, field: &[Row]) -> Vec<Row> {
+pub(super) fn sample(stencils: &Stencils, batch: usize, field: &[Row]) -> Vec<Row> {
     let mut block = Vec::with_capacity(stencils.len());
     stencils.sample_weights(batch, field, &mut block);
     block
@@ -56,13 +59,65 @@ impl Spent {
     }
 }
 
-fn multigrid_columns(
+/// What becomes of a batch's field once it has been sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FieldFate {
+    /// The next batch overwrites it.
+    Reused,
+    /// It is handed out.
+    Kept,
+}
+
+/// A batch of columns that was solved for.
+pub(super) struct SolvedBatch {
+    pub(super) report: BatchReport,
+    /// At the mesh's vertices. `[n_points]`
+    pub(super) samples: Vec<Row>,
+    /// On the finest level, if it is kept. `[n_rows]`
+    pub(super) field: Vec<Row>,
+}
+
+/// Solves batches, shared among threads: `solve(workspace, batch, progress)` solves one, `sample(batch, field)` takes its samples.
+pub(super) fn solve_batches(
+    hierarchy: &Hierarchy,
+    n_batches: usize,
+    fate: FieldFate,
+    team: &Team,
+    watch: &Watch<'_>,
+    solve: &(dyn Fn(&mut Workspace, usize, &mut dyn FnMut(u32, f64) -> bool) -> Option<BatchReport> + Sync),
+    sample: &(dyn Fn(usize, &[Row]) -> Vec<Row> + Sync),
+) -> Result<(Vec<SolvedBatch>, f64), Cancelled> {
+    let spent = Spent::default();
+    let solved: Vec<Option<SolvedBatch>> = team.share(
+        n_batches,
+        || Workspace::new(hierarchy),
+        |workspace, batch| {
+            let begin = watch.now_ms();
+            let report = solve(workspace, batch, &mut |cycle, delta| {
+                let fraction = watch.done() as f32 / n_batches as f32;
+                watch.report(Stage::Solve, fraction, cycle, Some(delta as f32)).is_ok()
+            })?;
+            let solved = watch.now_ms();
+            let samples = sample(batch, workspace.field());
+            let field = if fate == FieldFate::Kept { workspace.field().to_vec() } else { Vec::new() };
+            spent.add([begin, solved, watch.now_ms()]);
+            watch.piece_done(Stage::Solve, n_batches).ok()?;
+            Some(SolvedBatch { report, samples, field })
+        },
+    );
+    let solved = solved.into_iter().collect::<Option<_>>().ok_or(Cancelled)?;
+    Ok((solved, spent.solve_share()))
+}
+
+/// All columns by multigrid, and the batches' fields if they are kept.
+pub(super) fn multigrid_columns(
     voxels: &Voxels,
     stencils: &Stencils,
     options: &BindOptions,
+    fate: FieldFate,
     team: &Team,
     watch: &Watch<'_>,
-) -> Result<Solved, Cancelled> {
+) -> Result<(Solved, Vec<Vec<Row>>), Cancelled> {
     let hierarchy = &voxels.hierarchy;
     let n_batches = hierarchy.n_batches();
     let stop = Stop {
@@ -70,38 +125,35 @@ fn multigrid_columns(
         tolerance: f64::from(options.tau) / (n_batches as f64).sqrt(),
         max_cycles: options.max_iterations,
     };
-    let spent = Spent::default();
-    let done: Vec<Option<(BatchReport, Vec<Row>)>> = team.share(
+    let (batches, solve_share) = solve_batches(
+        hierarchy,
         n_batches,
-        || Workspace::new(hierarchy),
-        |workspace, batch| {
-            let begin = watch.now_ms();
-            let report = workspace.solve(hierarchy, batch, stop, |cycle, delta| {
-                let fraction = watch.done() as f32 / n_batches as f32;
-                watch.report(Stage::Solve, fraction, cycle, Some(delta as f32)).is_ok()
-            })?;
-            let solved = watch.now_ms();
-            let block = sample(stencils, batch, workspace.field());
-            spent.add([begin, solved, watch.now_ms()]);
-            watch.piece_done(Stage::Solve, n_batches).ok()?;
-            Some((report, block))
-        },
-    );
-    let done: Vec<(BatchReport, Vec<Row>)> = done.into_iter().collect::<Option<_>>().ok_or(Cancelled)?;
-    let [delta_history, residual_history] =
-        histories(&done.iter().map(|(report, _)| report).collect::<Vec<_>>());
-    Ok(Solved {
+        fate,
+        team,
+        watch,
+        &|workspace, batch, progress| workspace.solve(hierarchy, batch, stop, progress),
+        &|batch, field| sample(stencils, batch, field),
+    )?;
+    let [delta_history, residual_history] = histories(&batches.iter().map(|b| &b.report).collect::<Vec<_>>());
+    let kept: usize = batches.iter().map(|b| size_of_val(b.field.as_slice())).sum();
+    let mut solved = Solved {
         iterations: delta_history.len() as u32,
-        converged: done.iter().all(|(r, _)| r.converged),
+        converged: batches.iter().all(|b| b.report.converged),
         residual_history,
         delta_history,
         delta_interval: 1,
         planned_bytes: 0,
         adapter: None,
-        field_bytes: Workspace::bytes(hierarchy) * team.n_threads().min(n_batches),
-        solve_share: spent.solve_share(),
-        blocks: done.into_iter().map(|(_, block)| block).collect(),
-    })
+        field_bytes: Workspace::bytes(hierarchy) * team.n_threads().min(n_batches) + kept,
+        solve_share,
+        blocks: Vec::with_capacity(n_batches),
+    };
+    let mut fields = Vec::new();
+    for batch in batches {
+        solved.blocks.push(batch.samples);
+        fields.push(batch.field);
+    }
+    Ok((solved, fields))
 }
 
 fn jacobi_columns(

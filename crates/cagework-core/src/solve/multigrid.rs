@@ -84,7 +84,7 @@ impl Workspace {
         hierarchy: &Hierarchy,
         batch: usize,
         stop: Stop,
-        cycle_done: impl FnMut(u32, f64) -> bool,
+        cycle_done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<BatchReport> {
         let coarsest = hierarchy.levels.len() - 1;
         hierarchy.fill_cut_rhs(batch, &mut self.f[0]);
@@ -102,7 +102,7 @@ impl Workspace {
         hierarchy: &Hierarchy,
         mut start: &[Pass],
         stop: Stop,
-        mut cycle_done: impl FnMut(u32, f64) -> bool,
+        cycle_done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<BatchReport> {
         let mut convergence = Convergence::new(stop);
         loop {

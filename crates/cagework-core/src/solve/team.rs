@@ -93,9 +93,11 @@ impl Team {
                 results.push((piece, work(state.get_or_insert_with(&start), piece)));
             }
         });
-        let mut all: Vec<(usize, T)> = done.into_iter().flatten().collect();
-        all.sort_by_key(|(piece, _)| *piece);
-        all.into_iter().map(|(_, result)| result).collect()
+        let mut all: Vec<Option<T>> = (0..n_pieces).map(|_| None).collect();
+        for (piece, result) in done.into_iter().flatten() {
+            all[piece] = Some(result);
+        }
+        all.into_iter().flatten().collect()
     }
 }
 

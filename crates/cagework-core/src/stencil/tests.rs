@@ -35,7 +35,7 @@ fn jacobi_twin_equals_the_fast_sweeps() {
     prepared(|prepared| {
         let hierarchy = prepared.hierarchy();
         let stop = StopRule { tau: 1e-12, max_sweeps: SWEEPS, norm: DeltaNorm::Euclidean };
-        let (fields, report) = jacobi::solve(hierarchy, &Team::new(1), stop, |_, _| true).unwrap();
+        let (fields, report) = jacobi::solve(hierarchy, &Team::new(1), stop, &mut |_, _| true).unwrap();
         let level = &hierarchy.levels[0];
         let table = LevelTable::new(level, true);
         let mut changes = vec![0.0; level.n_rows()];
@@ -117,7 +117,7 @@ fn multigrid_of_twins_equals_the_fast_one() {
             }
         }
         let mut fast = Workspace::new(hierarchy);
-        fast.solve(hierarchy, 0, Stop { tolerance: 0.0, max_cycles: 1 }, |_, _| true).unwrap();
+        fast.solve(hierarchy, 0, Stop { tolerance: 0.0, max_cycles: 1 }, &mut |_, _| true).unwrap();
         assert_close(&u[0], fast.field());
 
         let table = SamplingTable::new(prepared.stencils());

@@ -44,7 +44,7 @@ impl Lines {
                 found.push((line, Hit { triangle: triangle as u32, ..hit }));
             });
         }
-        // Stable counting sort by line, then each line's few hits by position.
+        // Counting sort by line, each line's few hits inserted by position.
         let mut start = vec![0u32; n_lines + 1];
         for (line, _) in &found {
             start[*line as usize + 1] += 1;
@@ -55,11 +55,11 @@ impl Lines {
         let mut next = start.clone();
         let mut hits = vec![Hit { t: 0.0, triangle: 0, barycentric: [0.0; 2] }; found.len()];
         for (line, hit) in found {
-            hits[next[line as usize] as usize] = hit;
+            let (first, end) = (start[line as usize] as usize, next[line as usize] as usize);
+            let before = hits[first..end].partition_point(|h| h.t.total_cmp(&hit.t).is_le());
+            hits.copy_within(first + before..end, first + before + 1);
+            hits[first + before] = hit;
             next[line as usize] += 1;
-        }
-        for line in start.windows(2) {
-            hits[line[0] as usize..line[1] as usize].sort_by(|a, b| a.t.total_cmp(&b.t));
         }
         Self { axis, n_u: grid.dims[u], start, hits }
     }

@@ -62,12 +62,12 @@ impl Columns {
         let (mut s, mut sx, mut sy, mut sz) =
             ([0.0f64; LANES], [0.0f64; LANES], [0.0f64; LANES], [0.0f64; LANES]);
         for (((w, x), y), z) in row.iter().zip(x).zip(y).zip(z) {
-            let w = w.map(f64::from);
             for k in 0..LANES {
-                s[k] += w[k];
-                sx[k] += w[k] * x[k];
-                sy[k] += w[k] * y[k];
-                sz[k] += w[k] * z[k];
+                let w = f64::from(w[k]);
+                s[k] += w;
+                sx[k] += w * x[k];
+                sy[k] += w * y[k];
+                sz[k] += w * z[k];
             }
         }
         let [sum, x, y, z] = [s, sx, sy, sz].map(|lanes| lanes.iter().sum::<f64>());

@@ -292,7 +292,9 @@ impl Run<'_> {
 }
 
 /// Corrects a row until it sums to 1 and puts its vertex at `goal`; returns its sum and how far it misses the goal.
-#[inline(always)]
+// Part of its callers where they are compiled for several instruction sets; elsewhere four copies would be downloaded.
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
+#[cfg_attr(target_family = "wasm", inline(never))]
 fn restore(columns: &Columns, row: &mut [Row], goal: DVec3) -> (f64, f64) {
     let mut sums = (0.0, f64::INFINITY);
     for _ in 0..MAX_CORRECTIONS {

@@ -15,7 +15,7 @@ use crate::solve::rows::{LANES, Row, ZERO};
 pub(super) struct Negligible {
     /// Smallest entry of a residual that counts: the solver leaves that much anyway.
     pub(super) residual: f32,
-    /// Smallest value of a correction that counts: all that are left out stay below the residual's.
+    /// Smallest change of a weight by one of the corrections that counts: all that are left out stay below the residual's.
     pub(super) correction: f32,
 }
 
@@ -78,10 +78,24 @@ pub(super) struct Update {
     /// `[n_batches of fields][n_rows]`
     pub(super) fields: Vec<Vec<Row>>,
     pub(super) row_of: Arc<Vec<u32>>,
-    /// `[n_fields]` rows of all columns.
-    pub(super) shares: Vec<Vec<Row>>,
-    /// Smallest value that counts.
-    pub(super) unfelt: f32,
+    /// `[n_fields]`
+    pub(super) shares: Vec<Share>,
+}
+
+/// How much every column takes of one field.
+#[derive(Clone, Debug)]
+pub(super) struct Share {
+    /// `[n_batches]`
+    columns: Vec<Row>,
+    /// Value of the field below which no column feels it.
+    unfelt: f32,
+}
+
+impl Share {
+    fn new(columns: Vec<Row>, negligible: Negligible) -> Self {
+        let largest = columns.iter().flatten().fold(f32::MIN_POSITIVE, |m, w| m.max(w.abs()));
+        Self { columns, unfelt: negligible.correction / largest }
+    }
 }
 
 /// All columns' fields: those of the last whole bind, and the corrections since.
@@ -94,31 +108,57 @@ pub(super) struct Fields {
 }
 
 impl Fields {
-    /// Weights of all columns in a cell; zeros where it was outside. `[n_batches]`
+    /// Weights of all columns in a cell; zeros where it was outside. `out`: `[n_batches]`; `felt`: scratch space.
     #[inline(always)]
-    pub(super) fn at(&self, cell: usize, out: &mut [Row]) {
-        out.fill(ZERO);
-        let row = self.row_of[cell];
-        if row != NO_CELL {
-            for (out, batch) in out.iter_mut().zip(&self.base) {
-                *out = batch[row as usize];
-            }
-        }
+    fn at<'a>(&'a self, cell: usize, out: &mut [Row], felt: &mut Felt<'a>) {
+        felt.clear();
+        let mut row = self.row_of[cell];
+        let mut is_known = row != NO_CELL;
         for update in &self.updates {
-            let row = update.row_of[cell];
-            if row == NO_CELL {
+            if update.row_of[cell] == NO_CELL {
                 // Outside at the time: whatever it was before does not count.
-                out.fill(ZERO);
+                felt.clear();
+                is_known = false;
                 continue;
             }
-            for (k, share) in update.shares.iter().enumerate() {
-                let value = update.fields[k / LANES][row as usize][k % LANES];
-                if value.abs() > update.unfelt {
-                    add_scaled(out, share, value);
-                }
-            }
+            felt_in(&update.shares, felt, |k| {
+                update.fields[k / LANES][update.row_of[cell] as usize][k % LANES]
+            });
+        }
+        if !is_known {
+            row = NO_CELL;
+        }
+        for (batch, out) in out.iter_mut().enumerate() {
+            let start = if row == NO_CELL { ZERO } else { self.base[batch][row as usize] };
+            *out = combined(start, batch, felt);
         }
     }
+}
+
+/// Shares of all columns, each with how much of it is taken.
+pub(super) type Felt<'a> = Vec<(&'a [Row], f32)>;
+
+/// Adds to `felt` the shares that are felt; `value(k)`: how much is taken of the k-th.
+#[inline(always)]
+pub(super) fn felt_in<'a>(shares: &'a [Share], felt: &mut Felt<'a>, value: impl Fn(usize) -> f32) {
+    for (k, share) in shares.iter().enumerate() {
+        let value = value(k);
+        if value.abs() > share.unfelt {
+            felt.push((&share.columns, value));
+        }
+    }
+}
+
+/// `start` and what is taken of the shares, for one batch of columns: batch by batch the sum stays in registers.
+#[inline(always)]
+pub(super) fn combined(start: Row, batch: usize, felt: &Felt<'_>) -> Row {
+    let mut sum = start;
+    for (share, value) in felt {
+        for lane in 0..LANES {
+            sum[lane] += value * share[batch][lane];
+        }
+    }
+    sum
 }
 
 /// `out += value * share`
@@ -139,16 +179,15 @@ pub(super) struct Residual {
     diagonals: Vec<f32>,
     /// `[n_unknowns][n_batches]`
     values: Vec<Vec<Row>>,
-    /// Smallest entry that counts.
-    negligible: f32,
+    negligible: Negligible,
 }
 
 /// Independent residuals and every column's shares in them.
 pub(super) struct Split {
     /// Right-hand sides. `[n_batches of them][n_rows]`
     pub(super) right: Vec<Vec<Row>>,
-    /// For each of them a row of all columns. `[n_of them][n_batches]`
-    pub(super) shares: Vec<Vec<Row>>,
+    /// `[n_of them]`
+    pub(super) shares: Vec<Share>,
     /// Largest entry of all columns' residuals when each of them was split off: the size of what it corrects. Falling, but
     /// for rounding. `[n_of them]`
     pub(super) sizes: Vec<f32>,
@@ -161,7 +200,7 @@ impl Residual {
         region: &Region,
         n_batches: usize,
         old: &OldCells<'_>,
-        negligible: f32,
+        negligible: Negligible,
     ) -> Self {
         let strides = level.grid.strides();
         let mut number = vec![NO_CELL; level.n_rows()];
@@ -218,8 +257,11 @@ impl Residual {
 
     /// Leaves only unknowns whose equations have changed.
     fn drop_negligible(&mut self) {
-        let changed: Vec<bool> =
-            self.values.iter().map(|row| row.iter().flatten().any(|w| w.abs() >= self.negligible)).collect();
+        let changed: Vec<bool> = self
+            .values
+            .iter()
+            .map(|row| row.iter().flatten().any(|w| w.abs() >= self.negligible.residual))
+            .collect();
         let mut keep = changed.iter();
         self.values.retain(|_| keep.next() == Some(&true));
         let mut keep = changed.iter();
@@ -244,7 +286,7 @@ impl Residual {
     fn split_columns(mut self, n_rows: usize, n_columns: usize) -> Option<Split> {
         let n_batches = n_columns.div_ceil(LANES);
         let mut right = Vec::new();
-        let (mut shares, mut sizes) = (Vec::<Vec<Row>>::new(), Vec::new());
+        let (mut shares, mut sizes) = (Vec::new(), Vec::new());
         loop {
             let mut largest = vec![ZERO; n_batches];
             for row in &self.values {
@@ -256,7 +298,7 @@ impl Residual {
             }
             let size = |c: usize| largest[c / LANES][c % LANES];
             let pivot = (0..n_columns).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
-            if size(pivot) < self.negligible {
+            if size(pivot) < self.negligible.residual {
                 return Some(Split { right, shares, sizes });
             }
             let rank = shares.len();
@@ -285,7 +327,7 @@ impl Residual {
             for ((&row, &q), &diagonal) in self.rows.iter().zip(&unit).zip(&self.diagonals) {
                 batch[row as usize][rank % LANES] = q * diagonal;
             }
-            shares.push(share);
+            shares.push(Share::new(share, self.negligible));
             sizes.push(size(pivot));
         }
     }
@@ -306,8 +348,9 @@ impl<'a> OldCells<'a> {
         dispatch(
             #[inline(always)]
             || {
+                let mut felt = Felt::new();
                 for (&cell, out) in region.cells.iter().zip(values.chunks_exact_mut(n_batches)) {
-                    fields.at(cell as usize, out);
+                    fields.at(cell as usize, out, &mut felt);
                 }
             },
         );

@@ -16,7 +16,7 @@ impl Workspace {
         hierarchy: &Hierarchy,
         rhs: &[Row],
         cycles: u32,
-        cycle_done: impl FnMut(u32, f64) -> bool,
+        cycle_done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<BatchReport> {
         self.f[0].clear();
         self.f[0].extend_from_slice(rhs);
