@@ -171,8 +171,16 @@ export async function drop(page: Page, files: readonly Dropped[]): Promise<void>
   }
 }
 
-/** Saves a picture of the page. */
+/** A picture waits so long for the canvas to have all its pixels, ms; while something is computed it never has. */
+const SHARPENED = 2000;
+
+/** Saves a picture of the page, as sharp as it gets. */
 export async function shoot(page: Page, name: string): Promise<void> {
+  const isSharp = () => {
+    const canvas = document.querySelector("canvas");
+    return !canvas || canvas.width >= Math.floor(canvas.clientWidth * Math.min(2, devicePixelRatio));
+  };
+  await page.waitForFunction(isSharp, undefined, { timeout: SHARPENED }).catch(() => undefined);
   await page.screenshot({ path: join(SCREENS, `${name}.png`) });
 }
 
