@@ -77,6 +77,15 @@ pub(super) struct SolvedBatch {
     pub(super) field: Vec<Row>,
 }
 
+/// Hears of each cycle and its delta; stops the solve by returning false.
+type CycleDone<'a> = &'a mut dyn FnMut(u32, f64) -> bool;
+
+/// Solves a batch; none if it was stopped.
+type SolveBatch<'a> = &'a (dyn Fn(&mut Workspace, usize, CycleDone<'_>) -> Option<BatchReport> + Sync);
+
+/// Samples a batch from its field, `[n_rows]`.
+type SampleBatch<'a> = &'a (dyn Fn(usize, &[Row]) -> Vec<Row> + Sync);
+
 /// Solves batches, shared among threads: `solve(workspace, batch, progress)` solves one, `sample(batch, field)` takes its samples.
 pub(super) fn solve_batches(
     hierarchy: &Hierarchy,
@@ -84,8 +93,8 @@ pub(super) fn solve_batches(
     fate: FieldFate,
     team: &Team,
     watch: &Watch<'_>,
-    solve: &(dyn Fn(&mut Workspace, usize, &mut dyn FnMut(u32, f64) -> bool) -> Option<BatchReport> + Sync),
-    sample: &(dyn Fn(usize, &[Row]) -> Vec<Row> + Sync),
+    solve: SolveBatch<'_>,
+    sample: SampleBatch<'_>,
 ) -> Result<(Vec<SolvedBatch>, f64), Cancelled> {
     let spent = Spent::default();
     let solved: Vec<Option<SolvedBatch>> = team.share(
