@@ -64,7 +64,8 @@ export function drawPlot(element: SVGSVGElement, curves: readonly Curve[], tau: 
   if (tau > 0) {
     parts.push(
       svg("line", { x1: LEFT, x2: WIDTH - RIGHT, y1: y(tau), y2: y(tau), class: "tau" }),
-      label(WIDTH - RIGHT - 2, y(tau) - 4, "done below this", "end"),
+      // On the left, where curves are still high.
+      label(LEFT + 4, y(tau) - 4, "done below this", "start"),
     );
   }
   for (const curve of curves) {

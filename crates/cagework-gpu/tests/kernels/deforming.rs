@@ -1,0 +1,109 @@
+//! What is done for each frame: vertices follow the cage, those outside it too, and normals follow vertices.
+
+use cagework_core::bind::OutsideVertex;
+use cagework_core::stencil::tables::{BUNDLE, NormalTable, OutsideTable, SlicedWeights};
+use cagework_core::{Weights, stencil};
+use cagework_gpu::kernels;
+use glam::{Vec3, Vec4};
+
+use super::support::{Seeded, assert_close, egg, flat};
+use super::{ROWS, bytes, run};
+
+/// Sums of dozens of products of weights and coordinates near 1.
+const POINT_TOLERANCE: f32 = 2e-6;
+
+/// Unit vectors: `inverseSqrt` is good to 2 ulp.
+const NORMAL_TOLERANCE: f32 = 2e-6;
+
+/// A matrix of weights with rows of different lengths, some empty.
+fn random_weights(seeded: &mut Seeded, n_rows: usize, n_columns: u32) -> Weights {
+    let (mut indptr, mut indices, mut data) = (vec![0], Vec::new(), Vec::new());
+    for _ in 0..n_rows {
+        let stride = 1 + (seeded.bits() % 40) as u32;
+        let first = indices.len();
+        indices.extend((0..n_columns).step_by(stride as usize).skip(1));
+        let row = seeded.values(indices.len() - first);
+        let total: f32 = row.iter().sum();
+        data.extend(row.iter().map(|w| w / total));
+        indptr.push(indices.len() as u32);
+    }
+    Weights::new(n_columns, indptr, indices, data).expect("rows are built in order")
+}
+
+fn padded(points: &[Vec3], w: f32) -> Vec<Vec4> {
+    points.iter().map(|p| p.extend(w)).collect()
+}
+
+fn unpadded(values: &[f32]) -> Vec<f32> {
+    values.chunks(4).flat_map(|v| [v[0], v[1], v[2]]).collect()
+}
+
+#[test]
+fn deform_vertices_matches_cpu() {
+    let mut seeded = Seeded(12);
+    let weights = random_weights(&mut seeded, 203, 31);
+    let sliced = SlicedWeights::new(&weights);
+    let posed: Vec<Vec3> = (0..31).map(|_| seeded.point()).collect();
+    let mut expected = vec![Vec3::ZERO; 203];
+    let inputs = [
+        bytes(&sliced.slices).to_vec(),
+        bytes(&sliced.columns).to_vec(),
+        bytes(&sliced.weights).to_vec(),
+        bytes(&padded(&posed, 1.0)).to_vec(),
+        bytes(&padded(&expected, 0.0)).to_vec(),
+    ];
+    let inputs: Vec<&[u8]> = inputs.iter().map(Vec::as_slice).collect();
+    let result = run(&kernels::DEFORM_VERTICES, ROWS, 203u32.div_ceil(BUNDLE as u32), &inputs);
+    stencil::deform_vertices(&sliced, &posed, &mut expected);
+    assert_close(&unpadded(&result), &flat(&expected), POINT_TOLERANCE);
+    let double = cagework_core::deform::deform_vertices(&weights, &posed);
+    assert_close(&unpadded(&result), &flat(&double), POINT_TOLERANCE);
+}
+
+#[test]
+fn offset_outside_matches_cpu() {
+    let mut seeded = Seeded(13);
+    let posed: Vec<Vec3> = (0..9).map(|_| seeded.point()).collect();
+    let outside: Vec<OutsideVertex> = (0..67u32)
+        .map(|k| OutsideVertex {
+            vertex: 2 * k + 1,
+            // Every seventh triangle has no area.
+            corners: [k % 9, (k + 1) % 9, if k % 7 == 0 { k % 9 } else { (k + 5) % 9 }],
+            offset: seeded.point() - 0.5,
+        })
+        .collect();
+    let table = OutsideTable::new(&outside);
+    let mut expected: Vec<Vec3> = (0..140).map(|_| seeded.point()).collect();
+    let inputs = [
+        bytes(&table.corners).to_vec(),
+        bytes(&table.offsets).to_vec(),
+        bytes(&padded(&posed, 1.0)).to_vec(),
+        bytes(&padded(&expected, 1.0)).to_vec(),
+    ];
+    let inputs: Vec<&[u8]> = inputs.iter().map(Vec::as_slice).collect();
+    let result = run(&kernels::OFFSET_OUTSIDE, ROWS, outside.len() as u32, &inputs);
+    stencil::offset_outside(&table, &posed, &mut expected);
+    assert_close(&unpadded(&result), &flat(&expected), POINT_TOLERANCE);
+}
+
+#[test]
+fn vertex_normals_matches_cpu() {
+    let mut mesh = egg(11, 13);
+    // A vertex of no triangle.
+    mesh.positions.push(Vec3::ONE);
+    let n = mesh.positions.len();
+    let table = NormalTable::new(n, &mesh.triangles);
+    let mut expected = vec![Vec3::ONE; n];
+    let inputs = [
+        bytes(&table.starts).to_vec(),
+        bytes(&table.others).to_vec(),
+        bytes(&padded(&mesh.positions, 1.0)).to_vec(),
+        bytes(&padded(&expected, 1.0)).to_vec(),
+    ];
+    let inputs: Vec<&[u8]> = inputs.iter().map(Vec::as_slice).collect();
+    let result = run(&kernels::VERTEX_NORMALS, ROWS, n as u32, &inputs);
+    stencil::vertex_normals(&table, &mesh.positions, &mut expected);
+    assert_close(&unpadded(&result), &flat(&expected), NORMAL_TOLERANCE);
+    let scattered = cagework_core::deform::vertex_normals(&mesh.positions, &mesh.triangles);
+    assert_close(&unpadded(&result), &flat(&scattered), NORMAL_TOLERANCE);
+}
