@@ -16,7 +16,7 @@ import type {
 import { BIND_DEFAULTS } from "./defaults";
 import { findAdapter, hasWebGl2, lackOf } from "./session/adapter";
 import type { Artifact } from "./session/artifact";
-import { startBind } from "./session/bind";
+import { canGoOn, type KeptBind, startBind } from "./session/bind";
 import { createClient } from "./session/client";
 import { load, readFiles } from "./session/files";
 import { createFrames } from "./session/frames";
@@ -126,6 +126,7 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   const cage = () => ({ positions: engine.restPositions(), corners: engine.cageCorners() });
   const stateOf = () => engine.cageState() ?? null;
   let bind: Job<BindReport> | undefined;
+  let kept: KeptBind | undefined;
   let slice: Job<void> | undefined;
   let meanValue: Job<void> | undefined;
 
@@ -134,6 +135,7 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     const { settings } = loaded;
     const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
     bind?.cancel();
+    kept = undefined;
     const read: ModelInfo = await raw.open(loaded);
     const model = { ...read, notices: [...read.notices, ...notices] };
     const project = settings === undefined ? null : { poses, settings };
@@ -165,7 +167,27 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     },
     bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport> {
       bind?.cancel();
-      bind = startBind({ client, engine, raw, adapter, options: possible(options), listener, cage: cage() });
+      const asked = possible(options);
+      const { positions, corners } = cage();
+      const again = canGoOn(kept, asked, corners);
+      kept = undefined;
+      const started = startBind({
+        client,
+        engine,
+        raw,
+        adapter,
+        options: asked,
+        listener,
+        cage: { positions, corners },
+        again,
+      });
+      started.done.then(
+        ({ backend }) => {
+          if (bind === started && backend === "cpu") kept = { options: asked, corners };
+        },
+        () => undefined,
+      );
+      bind = started;
       return bind;
     },
     estimateMemory: (options) => raw.estimateMemory(possible(options)),

@@ -29,6 +29,24 @@ export interface BindStart {
   readonly options: BindOptions;
   readonly listener: (event: BindEvent) => void;
   readonly cage: CageArrays;
+  /** Whether the worker's last bind left what this one can start from: then it is as quick as a coarse one. */
+  readonly again: boolean;
+}
+
+/** What the worker keeps of the last bind on the processor: it is of use for the same options and the same faces. */
+export interface KeptBind {
+  readonly options: BindOptions;
+  readonly corners: Uint32Array;
+}
+
+/** Whether a bind can start from what is kept; the cage's vertices may have moved. */
+export function canGoOn(kept: KeptBind | undefined, options: BindOptions, corners: Uint32Array): boolean {
+  return (
+    kept !== undefined &&
+    options.backend === "cpu" &&
+    JSON.stringify(kept.options) === JSON.stringify(options) &&
+    same(kept.corners, corners)
+  );
 }
 
 type Pass = "coarse" | "fine";
@@ -76,7 +94,7 @@ export function startBind(start: BindStart): Job<BindReport> {
   }
 
   async function all(): Promise<BindReport> {
-    if (!engine.bound && options.grid > COARSE) await run("coarse");
+    if (!engine.bound && !start.again && options.grid > COARSE) await run("coarse");
     if (isCancelled) throw named("Cancelled", "cancelled");
     return run("fine");
   }
