@@ -171,7 +171,7 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       const { positions, corners } = cage();
       const again = canGoOn(kept, asked, corners);
       kept = undefined;
-      const started = startBind({
+      bind = startBind({
         client,
         engine,
         raw,
@@ -180,14 +180,10 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
         listener,
         cage: { positions, corners },
         again,
-      });
-      started.done.then(
-        ({ backend }) => {
-          if (bind === started && backend === "cpu") kept = { options: asked, corners };
+        keep: (yes) => {
+          kept = yes ? { options: asked, corners } : undefined;
         },
-        () => undefined,
-      );
-      bind = started;
+      });
       return bind;
     },
     estimateMemory: (options) => raw.estimateMemory(possible(options)),

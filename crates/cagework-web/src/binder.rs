@@ -27,12 +27,16 @@ pub struct Binder {
     rebinder: Option<Rebinder>,
 }
 
+/// Most memory, bytes, that a bind may need whose fields are kept: enough for g = 128, and a tenth of what a module can have.
+const MOST_TO_KEEP: u64 = 384 << 20;
+
 /// Weights on their way to the page: compressed sparse rows, and the vertices outside the cage.
 #[wasm_bindgen]
 pub struct Bound {
     weights: Weights,
     outside: Vec<OutsideVertex>,
     report: JsValue,
+    kept: bool,
 }
 
 /// A mesh of polygons on its way to the page.
@@ -106,7 +110,8 @@ impl Binder {
             self.run(&parts.positions, &parts.cage, asked, progress).await?
         };
         let report = object(&binding.report)?;
-        Ok(Bound { weights: binding.weights, outside: binding.outside, report })
+        let kept = self.rebinder.is_some();
+        Ok(Bound { weights: binding.weights, outside: binding.outside, report, kept })
     }
 
     /// Mean value coordinates, by formula; the arrays are those of `bind`.
@@ -122,7 +127,7 @@ impl Binder {
     ) -> Result<Bound, JsValue> {
         let parts = Parts::new(positions, cage, corners)?;
         let weights = mean_value_weights(&parts.positions, &parts.cage).map_err(Fault::from)?;
-        Ok(Bound { weights, outside: Vec::new(), report: JsValue::UNDEFINED })
+        Ok(Bound { weights, outside: Vec::new(), report: JsValue::UNDEFINED, kept: false })
     }
 
     /// Coordinates at the centres of a slice's cells: rows for `Engine.takeSlice`. Takes the cage's arrays, the axis,
@@ -148,7 +153,8 @@ impl Binder {
             return Ok(None);
         }
         let binding = self.run(&centers, &parts.cage, asked, progress).await?;
-        Ok(Some(Bound { weights: binding.weights, outside: Vec::new(), report: JsValue::UNDEFINED }))
+        let (weights, outside) = (binding.weights, Vec::new());
+        Ok(Some(Bound { weights, outside, report: JsValue::UNDEFINED, kept: false }))
     }
 
     /// A cage for a model: `CageOptions` of contract.ts. `progress` as for `bind`.
@@ -198,12 +204,14 @@ impl Binder {
     /// Binds on the processor, from what the last bind left behind if that was of the same model.
     fn bind_here(&mut self, parts: &Parts, options: &BindOptions, listener: &Listener) -> Answer<Binding> {
         let Parts { positions, cage } = parts;
-        if let Some(rebinder) = self.rebinder.as_mut().filter(|r| r.fits(positions, options)) {
-            return Ok(rebinder.rebind(cage, listener)?.0);
-        }
-        // Its memory is needed now.
-        self.rebinder = None;
-        match Rebinder::new(positions, cage, options, listener) {
+        let frugal = BindOptions { memory_limit: options.memory_limit.min(MOST_TO_KEEP), ..*options };
+        // Another model's is dropped here: its memory is needed now.
+        let kept = self.rebinder.take().filter(|r| r.fits(positions, &frugal));
+        let bound = match kept {
+            Some(mut kept) => kept.rebind(cage, listener).map(|(binding, _)| (kept, binding)),
+            None => Rebinder::new(positions, cage, &frugal, listener),
+        };
+        match bound {
             Ok((rebinder, binding)) => {
                 self.rebinder = Some(rebinder);
                 Ok(binding)
@@ -266,6 +274,13 @@ impl Bound {
     #[must_use]
     pub fn offsets(&self) -> Vec<f32> {
         self.outside.iter().flat_map(|o| o.offset.to_array()).collect()
+    }
+
+    /// Whether a bind after a small edit of the cage can start from what this one left behind.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn kept(&self) -> bool {
+        self.kept
     }
 
     /// The bind report; undefined for mean value coordinates and slices.

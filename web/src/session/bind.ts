@@ -31,6 +31,8 @@ export interface BindStart {
   readonly cage: CageArrays;
   /** Whether the worker's last bind left what this one can start from: then it is as quick as a coarse one. */
   readonly again: boolean;
+  /** Hears whether the worker kept what a next bind as fine could start from. */
+  readonly keep: (kept: boolean) => void;
 }
 
 /** What the worker keeps of the last bind on the processor: it is of use for the same options and the same faces. */
@@ -69,7 +71,8 @@ export function startBind(start: BindStart): Job<BindReport> {
 
   async function once(pass: Pass, asked: BindOptions): Promise<BindReport> {
     job = client.run("bind", { positions, cage, options: asked }, step(pass));
-    const { indptr, indices, data, outside, offsets, report } = await job.done;
+    const { indptr, indices, data, outside, offsets, report, kept } = await job.done;
+    if (pass === "fine") start.keep(kept);
     const isCurrent =
       same(cage.positions, engine.restPositions()) && same(cage.corners, engine.cageCorners());
     if (isCancelled || !isCurrent || !report) throw named("Cancelled", "cancelled");
