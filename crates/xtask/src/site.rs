@@ -11,6 +11,12 @@ const MAX_WEBGL_BYTES: usize = 1_400_000;
 /// Largest script that a visitor waits for, gzip-compressed.
 const MAX_SCRIPT_BYTES: usize = 80_000;
 
+/// Fewest `f32x4.add` in a wasm file whose loops are vectors: it has 596, and had 261 (of libraries, and written by
+/// hand) when the core's loops were not.
+const MIN_VECTOR_ADDS: usize = 450;
+/// The instruction `f32x4.add`.
+const VECTOR_ADD: [u8; 3] = [0xfd, 0xe4, 0x01];
+
 /// Where the built page goes.
 const FOLDER: &str = "dist";
 
@@ -75,7 +81,7 @@ pub(crate) fn check_types() -> Result<(), String> {
     exec(&["tsc", "--project", "web"])
 }
 
-/// What a visitor waits for must stay small.
+/// What a visitor waits for must stay small, and compute with vectors.
 fn check_sizes() -> Result<(), String> {
     let folder = root().join(FOLDER).join("assets");
     let entries = std::fs::read_dir(&folder).map_err(|e| format!("cannot read {}: {e}", folder.display()))?;
@@ -92,6 +98,12 @@ fn check_sizes() -> Result<(), String> {
         println!("{name}: {} kB, {} kB compressed", bytes.len() / 1000, size / 1000);
         if size > limit {
             return Err(format!("{name} has {size} bytes compressed; it may have {limit}"));
+        }
+        let adds = bytes.windows(VECTOR_ADD.len()).filter(|w| *w == VECTOR_ADD).count();
+        if limit != MAX_SCRIPT_BYTES && adds < MIN_VECTOR_ADDS {
+            return Err(format!(
+                "{name} adds vectors in {adds} places, not {MIN_VECTOR_ADDS}: its loops are scalar, see RUSTFLAGS in wasm.rs"
+            ));
         }
     }
     Ok(())

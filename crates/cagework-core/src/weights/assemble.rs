@@ -1,5 +1,7 @@
 //! From batches of sampled columns to one sparse row per vertex, with the statistics of what is stored.
 
+mod entries;
+
 use glam::{DVec3, Vec3};
 
 use crate::cage::Cage;
@@ -8,6 +10,7 @@ use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 use crate::solve::team::Team;
 
+use self::entries::Entries;
 use super::Weights;
 use super::affine::Columns;
 
@@ -54,13 +57,10 @@ struct Run<'a> {
     lengths: Vec<u32>,
     /// Distance between `sum w c` and the vertex over the diagonal; none for vertices outside.
     errors: Vec<f32>,
-    range: [f32; 2],
+    /// Smallest stored and largest weight so far, lane by lane.
+    range: [Row; 2],
     max_sum_error: f64,
-    /// The run's part of the result.
-    indices: &'a mut [u32],
-    data: &'a mut [f32],
-    /// Entries of it that have been written.
-    stored: usize,
+    entries: Entries<'a>,
 }
 
 /// Makes the matrix of weights. `blocks[batch][vertex]`: sampled values (used up as scratch space); `points`: rest
@@ -74,7 +74,10 @@ pub fn assemble(
     team: &Team,
 ) -> (Weights, Statistics) {
     let columns = Columns::new(cage);
-    let mut runs = runs_of(blocks, points);
+    if team.n_threads() == 1 {
+        return assemble_alone(cage, &columns, blocks, points, options, &is_outside);
+    }
+    let mut runs = runs_of(blocks, points, VERTEX_RUN);
     // Without a threshold it is known beforehand which weights are stored: rows are corrected on their way into the
     // result. With one, it depends on the correction.
     let corrected_first = options.threshold > 0.0;
@@ -83,7 +86,10 @@ pub fn assemble(
             #[inline(always)]
             || {
                 if corrected_first {
-                    run.correct(&columns, options, &is_outside, Run::keep);
+                    run.correct(&columns, options, &is_outside, |run, v, row| {
+                        run.lengths.push(row.iter().flatten().map(|&w| u32::from(w != 0.0)).sum());
+                        run.keep(v, row);
+                    });
                 } else {
                     run.count();
                 }
@@ -91,19 +97,16 @@ pub fn assemble(
         );
     });
 
-    let mut indptr = Vec::with_capacity(points.len() + 1);
-    let mut end = 0u32;
-    indptr.push(end);
-    for length in runs.iter().flat_map(|run| &run.lengths) {
-        end += length;
-        indptr.push(end);
-    }
-    let (mut indices, mut data) = (vec![0u32; end as usize], vec![0.0f32; end as usize]);
+    let indptr = indptr_of(&runs);
+    let end = indptr[points.len()] as usize;
+    let (mut indices, mut data) = (vec![0u32; end], vec![0.0f32; end]);
     let (mut indices_left, mut data_left) = (indices.as_mut_slice(), data.as_mut_slice());
     for run in &mut runs {
         let n = run.lengths.iter().sum::<u32>() as usize;
-        run.indices = indices_left.split_off_mut(..n).expect("the lengths' sum was allocated");
-        run.data = data_left.split_off_mut(..n).expect("the lengths' sum was allocated");
+        run.entries = Entries::Part {
+            indices: indices_left.split_off_mut(..n).expect("the lengths' sum was allocated"),
+            data: data_left.split_off_mut(..n).expect("the lengths' sum was allocated"),
+        };
     }
     team.each_mut(&mut runs, |run| {
         dispatch(
@@ -112,7 +115,9 @@ pub fn assemble(
                 if corrected_first {
                     run.store_kept();
                 } else {
-                    run.correct(&columns, options, &is_outside, |run, v, row| run.store(v, row, |w| w > 0.0));
+                    run.correct(&columns, options, &is_outside, |run, v, row| {
+                        run.entries.put_row(row, |batch| run.blocks[batch][v].map(|w| w > 0.0));
+                    });
                 }
             },
         );
@@ -122,25 +127,72 @@ pub fn assemble(
     (Weights::from_parts(cage.n_vertices() as u32, indptr, indices, data), statistics)
 }
 
-fn runs_of<'a>(blocks: &'a mut [Vec<Row>], points: &'a [Vec3]) -> Vec<Run<'a>> {
+/// The same on one thread, where rows can be put one after the other without counting them first: a third less memory
+/// is written.
+fn assemble_alone(
+    cage: &Cage,
+    columns: &Columns,
+    blocks: &mut [Vec<Row>],
+    points: &[Vec3],
+    options: RowOptions,
+    is_outside: &impl Fn(usize) -> bool,
+) -> (Weights, Statistics) {
+    let mut runs = runs_of(blocks, points, points.len().max(1));
+    let most = points.len() * cage.n_vertices();
+    // Dense rows are nearly full; of sparse ones nobody knows.
+    let room = if options.threshold > 0.0 { 0 } else { most };
+    for run in &mut runs {
+        run.entries = Entries::All { indices: Vec::with_capacity(room), data: Vec::with_capacity(room) };
+        dispatch(
+            #[inline(always)]
+            || {
+                run.correct(columns, options, is_outside, |run, v, row| {
+                    let length = if options.threshold > 0.0 {
+                        run.entries.put_row(row, |batch| row[batch].map(|w| w != 0.0))
+                    } else {
+                        run.entries.put_row(row, |batch| run.blocks[batch][v].map(|w| w > 0.0))
+                    };
+                    run.lengths.push(length);
+                });
+            },
+        );
+    }
+    let indptr = indptr_of(&runs);
+    let statistics = statistics(&runs, indptr[points.len()] as usize, f64::from(cage.diagonal()));
+    let (indices, data) = match runs.pop().map(|run| run.entries) {
+        Some(Entries::All { indices, data }) => (indices, data),
+        _ => (Vec::new(), Vec::new()),
+    };
+    (Weights::from_parts(cage.n_vertices() as u32, indptr, indices, data), statistics)
+}
+
+/// Where each row starts, and where the last one ends.
+fn indptr_of(runs: &[Run<'_>]) -> Vec<u32> {
+    let mut end = 0u32;
+    let ends = runs.iter().flat_map(|run| &run.lengths).map(|length| {
+        end += length;
+        end
+    });
+    std::iter::once(0).chain(ends).collect()
+}
+
+fn runs_of<'a>(blocks: &'a mut [Vec<Row>], points: &'a [Vec3], length: usize) -> Vec<Run<'a>> {
     let mut runs: Vec<Run<'a>> = points
-        .chunks(VERTEX_RUN)
+        .chunks(length)
         .enumerate()
         .map(|(number, points)| Run {
-            first: number * VERTEX_RUN,
+            first: number * length,
             points,
             blocks: Vec::new(),
             lengths: Vec::with_capacity(points.len()),
             errors: Vec::with_capacity(points.len()),
-            range: [f32::INFINITY, f32::NEG_INFINITY],
+            range: [[f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]],
             max_sum_error: 0.0,
-            indices: &mut [],
-            data: &mut [],
-            stored: 0,
+            entries: Entries::Part { indices: &mut [], data: &mut [] },
         })
         .collect();
     for block in blocks {
-        for (run, rows) in runs.iter_mut().zip(block.chunks_mut(VERTEX_RUN)) {
+        for (run, rows) in runs.iter_mut().zip(block.chunks_mut(length)) {
             run.blocks.push(rows);
         }
     }
@@ -209,7 +261,6 @@ impl Run<'_> {
     /// Keeps a row in the blocks until all lengths are known.
     #[inline(always)]
     fn keep(&mut self, v: usize, row: &[Row]) {
-        self.lengths.push(row.iter().flatten().map(|&w| u32::from(w != 0.0)).sum());
         for (row, block) in row.iter().zip(&mut self.blocks) {
             block[v] = *row;
         }
@@ -220,37 +271,8 @@ impl Run<'_> {
     fn store_kept(&mut self) {
         for v in 0..self.points.len() {
             let row: Vec<Row> = self.blocks.iter().map(|block| block[v]).collect();
-            self.store(v, &row, |w| w != 0.0);
+            self.entries.put_row(&row, |batch| row[batch].map(|w| w != 0.0));
         }
-    }
-
-    /// Writes the row's weights into the result, those that `is_stored` says of what the blocks hold.
-    #[inline(always)]
-    fn store(&mut self, v: usize, row: &[Row], is_stored: impl Fn(f32) -> bool) {
-        let begin = self.stored;
-        let end = begin + self.lengths[v] as usize;
-        let (indices, data) = (&mut self.indices[begin..end], &mut self.data[begin..end]);
-        let mut slot = 0;
-        for ((first, row), block) in (0u32..).step_by(LANES).zip(row).zip(&self.blocks) {
-            let sampled = &block[v];
-            if let (Some(indices), Some(data)) =
-                (indices.get_mut(slot..slot + LANES), data.get_mut(slot..slot + LANES))
-                && sampled.iter().all(|&w| is_stored(w))
-            {
-                for k in 0..LANES {
-                    (indices[k], data[k]) = (first + k as u32, row[k]);
-                }
-                slot += LANES;
-                continue;
-            }
-            for k in 0..LANES {
-                if is_stored(sampled[k]) {
-                    (indices[slot], data[slot]) = (first + k as u32, row[k]);
-                    slot += 1;
-                }
-            }
-        }
-        self.stored = end;
     }
 
     /// Drops what is below the threshold and restores the row, or keeps all if that cannot be had. `row` holds the
@@ -277,15 +299,16 @@ impl Run<'_> {
 
     #[inline(always)]
     fn measure(&mut self, row: &[Row], sum: f64, miss: Option<f64>) {
-        let (mut low, mut high) = ([f32::INFINITY; LANES], ZERO);
+        let [mut low, mut high] = self.range;
         for row in row {
             for k in 0..LANES {
-                low[k] = low[k].min(if row[k] != 0.0 { row[k] } else { f32::INFINITY });
-                high[k] = high[k].max(row[k]);
+                // Comparisons, not `min` and `max`: wasm has no instruction for theirs, which say what becomes of NaN.
+                let stored = if row[k] != 0.0 { row[k] } else { f32::INFINITY };
+                low[k] = if stored < low[k] { stored } else { low[k] };
+                high[k] = if row[k] > high[k] { row[k] } else { high[k] };
             }
         }
-        self.range =
-            [low.into_iter().fold(self.range[0], f32::min), high.into_iter().fold(self.range[1], f32::max)];
+        self.range = [low, high];
         self.max_sum_error = self.max_sum_error.max((sum - 1.0).abs());
         self.errors.extend(miss.map(|miss| miss as f32));
     }
@@ -307,7 +330,7 @@ fn restore(columns: &Columns, row: &mut [Row], goal: DVec3) -> (f64, f64) {
     sums
 }
 
-fn statistics(runs: &[Run<'_>], nonzeros: u32, diagonal: f64) -> Statistics {
+fn statistics(runs: &[Run<'_>], nonzeros: usize, diagonal: f64) -> Statistics {
     let mut errors: Vec<f32> = runs.iter().flat_map(|run| &run.errors).copied().collect();
     let mut rest_error = RestError::default();
     if !errors.is_empty() {
@@ -319,13 +342,14 @@ fn statistics(runs: &[Run<'_>], nonzeros: u32, diagonal: f64) -> Statistics {
         rest_error.max = diagonal * rest_error.max_rel;
     }
     let range = runs.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |range, run| {
-        [range[0].min(run.range[0]), range[1].max(run.range[1])]
+        let [low, high] = run.range;
+        [low.into_iter().fold(range[0], f32::min), high.into_iter().fold(range[1], f32::max)]
     });
     let weights = WeightStats {
         min: if nonzeros == 0 { 0.0 } else { range[0] },
         max: if nonzeros == 0 { 0.0 } else { range[1] },
         max_sum_error: runs.iter().fold(0.0, |m, run| m.max(run.max_sum_error)),
-        nonzeros: u64::from(nonzeros),
+        nonzeros: nonzeros as u64,
     };
     Statistics { rest_error, weights }
 }

@@ -292,7 +292,9 @@ impl Residual {
             for row in &self.values {
                 for (largest, row) in largest.iter_mut().zip(row) {
                     for lane in 0..LANES {
-                        largest[lane] = largest[lane].max(row[lane].abs());
+                        // Wasm has no instruction for `max`.
+                        let size = row[lane].abs();
+                        largest[lane] = if size > largest[lane] { size } else { largest[lane] };
                     }
                 }
             }

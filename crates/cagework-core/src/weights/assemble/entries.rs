@@ -1,0 +1,54 @@
+//! Where the rows of a matrix of weights are written.
+
+use crate::solve::rows::{LANES, Row};
+
+/// Where a run's column indices and weights go.
+pub(super) enum Entries<'a> {
+    /// What is left of the run's part of the result.
+    Part { indices: &'a mut [u32], data: &'a mut [f32] },
+    /// The result itself.
+    All { indices: Vec<u32>, data: Vec<f32> },
+}
+
+impl Entries<'_> {
+    /// Puts some entries behind the others; false if they do not fit into the run's part.
+    #[inline(always)]
+    fn put(&mut self, columns: &[u32], weights: &[f32]) -> bool {
+        match self {
+            Self::All { indices, data } => {
+                indices.extend_from_slice(columns);
+                data.extend_from_slice(weights);
+                true
+            }
+            Self::Part { indices, data } => {
+                let n = columns.len();
+                let (Some(to_indices), Some(to_data)) = (indices.split_off_mut(..n), data.split_off_mut(..n))
+                else {
+                    return false;
+                };
+                to_indices.copy_from_slice(columns);
+                to_data.copy_from_slice(weights);
+                true
+            }
+        }
+    }
+
+    /// Puts the entries of a row that are `chosen(batch)` behind the others; returns how many. `row`: `[n_batches]`.
+    #[inline(always)]
+    pub(super) fn put_row(&mut self, row: &[Row], chosen: impl Fn(usize) -> [bool; LANES]) -> u32 {
+        let mut n = 0;
+        for (batch, row) in row.iter().enumerate() {
+            let columns: [u32; LANES] = std::array::from_fn(|k| (batch * LANES + k) as u32);
+            let chosen = chosen(batch);
+            // All of them at once, without a branch for each.
+            if chosen.iter().fold(true, |all, &one| all & one) && self.put(&columns, row) {
+                n += LANES as u32;
+                continue;
+            }
+            for k in (0..LANES).filter(|&k| chosen[k]) {
+                n += u32::from(self.put(&columns[k..=k], &row[k..=k]));
+            }
+        }
+        n
+    }
+}
