@@ -110,7 +110,7 @@ impl Binder {
             self.run(&parts.positions, &parts.cage, asked, progress).await?
         };
         let report = object(&binding.report)?;
-        let kept = self.rebinder.is_some();
+        let kept = self.rebinder.as_ref().is_some_and(Rebinder::keeps);
         Ok(Bound { weights: binding.weights, outside: binding.outside, report, kept })
     }
 

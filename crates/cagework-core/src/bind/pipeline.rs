@@ -13,7 +13,7 @@ use crate::sample::{Outside, Stencils};
 use crate::solve::hierarchy::Hierarchy;
 use crate::solve::rows::Row;
 use crate::solve::team::Team;
-use crate::weights::assemble::{RowOptions, assemble};
+use crate::weights::assemble::{Assembled, RowOptions, assemble};
 
 use super::solving::solve_and_sample;
 use super::voxels::Voxels;
@@ -145,25 +145,39 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// Cancelled.
     pub fn finish(self, mut solved: Solved, watch: &Watch<'_>) -> Result<Binding, BindError> {
-        self.finished(&mut solved, watch)
+        let solved_at = watch.now_ms();
+        let rows = self.rows(&mut solved, watch)?;
+        self.reported(&rows, &mut solved, solved_at, watch)
     }
 
-    /// As [`Self::finish`], for those who go on with the geometry and the samples (which sparsification changes).
-    pub(super) fn finished(&self, solved: &mut Solved, watch: &Watch<'_>) -> Result<Binding, BindError> {
+    /// The rows of the sampled columns, one per different position; the samples are used up.
+    pub(super) fn rows(&self, solved: &mut Solved, watch: &Watch<'_>) -> Result<Assembled, BindError> {
+        watch.report(Stage::Sample, 0.5, solved.iterations, None)?;
+        let row_options = RowOptions {
+            threshold: self.options.sparsify,
+            preserve_affine: self.options.method == Method::Embedded,
+        };
+        let is_outside = |vertex| self.stencils.is_outside(vertex);
+        Ok(assemble(self.cage, &mut solved.blocks, &self.points, row_options, is_outside, &self.team))
+    }
+
+    /// The weights of all vertices, and the report. `sampled`: when the samples were there, on the watcher's clock.
+    pub(super) fn reported(
+        &self,
+        rows: &Assembled,
+        solved: &mut Solved,
+        sampled: f64,
+        watch: &Watch<'_>,
+    ) -> Result<Binding, BindError> {
         let Self { positions, cage, options, welded, points, team, voxels, stencils, .. } = self;
         let [began, voxelized, stencils_made] = self.times_ms;
-        let sampled = watch.now_ms();
-        watch.report(Stage::Sample, 0.5, solved.iterations, None)?;
-        let blocks = &mut solved.blocks;
-        let row_options =
-            RowOptions { threshold: options.sparsify, preserve_affine: options.method == Method::Embedded };
-        let (unique, statistics) =
-            assemble(cage, blocks, points, row_options, |vertex| stencils.is_outside(vertex), team);
-        let blocks_bytes: usize = blocks.iter().map(|b| size_of_val(b.as_slice())).sum();
+        let unique = &rows.weights;
+        let (rest_error, weight_stats) = rows.statistics(f64::from(cage.diagonal()));
+        let blocks_bytes: usize = solved.blocks.iter().map(|b| size_of_val(b.as_slice())).sum();
         let held = voxels.bytes + stencils.bytes() + blocks_bytes;
         let peak = held + solved.field_bytes.max(unique.bytes());
         let all_differ = points.len() == positions.len();
-        let weights = if all_differ { unique } else { unique.with_rows(&welded.unique_of) };
+        let weights = if all_differ { unique.clone() } else { unique.with_rows(&welded.unique_of) };
         let outside = outside_vertices(cage, &stencils.outside, positions, welded);
         watch.report(Stage::Sample, 1.0, solved.iterations, None)?;
         let ended = watch.now_ms();
@@ -196,8 +210,8 @@ impl<'a> Prepared<'a> {
                 total: ended - began,
             },
             memory_bytes: MemoryBytes { estimated: self.estimated + solved.planned_bytes, peak: peak as u64 },
-            rest_error: statistics.rest_error,
-            weights: WeightStats { nonzeros: weights.data().len() as u64, ..statistics.weights },
+            rest_error,
+            weights: WeightStats { nonzeros: weights.data().len() as u64, ..weight_stats },
             vertices: positions.len() as u64,
             cage_vertices: cage.n_vertices() as u64,
             outside_vertices: outside.len() as u64,

@@ -7,6 +7,7 @@
 //! [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid, the faces or half of the cage change.
 
 mod local;
+mod rows;
 mod steps;
 #[cfg(test)]
 mod tests;
@@ -20,12 +21,13 @@ use crate::grid::NO_CELL;
 use crate::mesh::{Weld, weld};
 use crate::progress::{Progress, Stage};
 use crate::sample::Stencils;
-use crate::solve::multigrid::histories;
 use crate::solve::rows::{LANES, Row};
 use crate::solve::team::Team;
+use crate::weights::assemble::Assembled;
 
 use self::local::{Fields, Negligible, OldCells, Region, Residual, Split, Update};
-use self::steps::{add_corrections, resample, solve_for};
+use self::rows::Edit;
+use self::steps::{resample, solve_for};
 use super::pipeline::{FieldsOn, Prepared, Solved, refuse_outside, sampling_stencils};
 use super::solving::{FieldFate, multigrid_columns};
 use super::voxels::Voxels;
@@ -34,19 +36,6 @@ use super::{BindError, BindOptions, Binding, Method, Solver, bind};
 
 /// Edits after which everything is bound anew.
 const MAX_UPDATES: usize = 6;
-
-/// Each V-cycle makes a correction's error about so many times smaller.
-const CONTRACTION: f64 = 15.0;
-
-/// Share of what one cell's equation asks for that is felt where vertices are: cells whose equations change lie at the cage,
-/// among values that it holds. Chosen on four edits of the Armadillo's cage (two vertices, 1 to 1.3 %), mean error of a
-/// weight 5.6e-8 after a whole bind: 5.6e-8 to 5.7e-8 with 4, 5.7e-8 to 6.4e-8 with 0.3, 5.8e-8 to 8.0e-8 with 0.1.
-const FELT: f64 = 0.3;
-
-/// V-cycles for a correction, from zero to the threshold; `size`: the largest change of a weight that one equation asks for.
-fn cycles_to(tau: f32, size: f32) -> u32 {
-    (FELT * f64::from(size) / f64::from(tau)).log(CONTRACTION).ceil().clamp(1.0, 8.0) as u32
-}
 
 /// Cells around the moved faces whose equations may have changed.
 const CHANGED: f64 = 1.5;
@@ -87,13 +76,14 @@ struct Kept {
     voxels: Voxels,
     stencils: Stencils,
     fields: Fields,
-    /// Samples. `[n_batches][n_points]`
-    blocks: Vec<Vec<Row>>,
+    /// One row of weights for each different position; shared with whoever got them.
+    rows: Assembled,
 }
 
 impl Rebinder {
     /// Binds as [`bind`] does, and keeps what the next bind can start from: the fields (4 bytes for each cell inside and
-    /// cage vertex) and the samples (as much for each mesh vertex).
+    /// cage vertex) and the weights (8 for each mesh vertex and cage vertex). Only embedded multigrid without sparsification
+    /// leaves any: of dropped weights nobody knows how small they were.
     ///
     /// # Errors
     /// Those of [`bind`].
@@ -117,7 +107,14 @@ impl Rebinder {
         self.options == *options && self.positions == positions
     }
 
-    /// Binds the mesh to an edited cage.
+    /// Whether there is anything that the next bind can start from.
+    #[must_use]
+    pub fn keeps(&self) -> bool {
+        self.kept.is_some()
+    }
+
+    /// Binds the mesh to an edited cage. Fastest when the weights of the bind before have been dropped: what stays is then
+    /// not copied.
     ///
     /// # Errors
     /// Those of [`bind`]; what was kept stays as it was, or is given up, and the next bind is a whole one.
@@ -143,7 +140,8 @@ impl Rebinder {
 
     /// Everything from the beginning.
     fn anew(&mut self, cage: &Cage, progress: &dyn Progress) -> Result<Binding, BindError> {
-        if self.options.method != Method::Embedded || self.options.solver != Solver::Multigrid {
+        let BindOptions { method, solver, sparsify, .. } = self.options;
+        if method != Method::Embedded || solver != Solver::Multigrid || sparsify > 0.0 {
             let binding = bind(&self.positions, cage, &self.options, progress)?;
             self.cage = cage.clone();
             return Ok(binding);
@@ -160,13 +158,12 @@ impl Rebinder {
         let Prepared { voxels, stencils, team, .. } = &prepared;
         let (mut solved, base) =
             multigrid_columns(voxels, stencils, &self.options, FieldFate::Kept, team, &watch)?;
-        let blocks = if self.options.sparsify > 0.0 { Some(solved.blocks.clone()) } else { None };
-        let binding = prepared.finished(&mut solved, &watch)?;
+        let sampled = watch.now_ms();
+        let rows = prepared.rows(&mut solved, &watch)?;
+        let binding = prepared.reported(&rows, &mut solved, sampled, &watch)?;
         let Prepared { voxels, stencils, .. } = prepared;
-        // Without sparsification the samples are only read.
-        let blocks = blocks.unwrap_or(solved.blocks);
         let fields = Fields { base, row_of, updates: Vec::new() };
-        self.kept = Some(Kept { voxels, stencils, fields, blocks });
+        self.kept = Some(Kept { voxels, stencils, fields, rows });
         self.cage = cage.clone();
         Ok(binding)
     }
@@ -178,14 +175,14 @@ impl Rebinder {
         kept: Kept,
         watch: &Watch<'_>,
     ) -> Result<Option<(Binding, RebindReport)>, BindError> {
-        let Kept { voxels: old_voxels, stencils: old_stencils, mut fields, mut blocks } = kept;
+        let Kept { voxels: old_voxels, stencils: old_stencils, mut fields, mut rows } = kept;
         let began = watch.now_ms();
         let team = Team::new(self.options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
         let grid = Voxels::grid(cage, &self.options);
         let to_grid = |p: Vec3| grid.to_grid(p.as_dvec3());
         let moved = moved_triangles(&self.cage, cage, to_grid);
-        let n_batches = blocks.len();
+        let n_batches = cage.n_vertices().div_ceil(LANES);
         let needed = Region::around(&moved, NEEDED, &grid);
         if 4 * needed.cells.len() > grid.n_cells() {
             return Ok(None);
@@ -217,33 +214,33 @@ impl Rebinder {
         let stencils_made = watch.now_ms();
 
         let mut solved = Solved { converged: true, delta_interval: 1, solve_share: 1.0, ..Solved::default() };
-        let mut rank = 0;
+        let (mut rank, mut sampled) = (0, stencils_made);
         if !moved.is_empty() {
             let negligible = Negligible::at(self.options.tau);
             let old = OldCells::new(&fields, &needed, n_batches);
             let region = Region::around(&moved, CHANGED, &grid);
             let residual = Residual::new(level, &region, n_batches, &old, negligible);
-            let Some(Split { right, shares, sizes }) = residual.split(level.n_rows(), cage.n_vertices())
-            else {
+            let Some(Split { right, shares }) = residual.split(level.n_rows(), cage.n_vertices()) else {
                 return Ok(None);
             };
-            resample(&stencils, &changed, level, &old, &needed, &mut blocks);
+            let resampled = resample(&stencils, &changed, level, &old, &needed, n_batches);
             rank = shares.len();
-            // The largest come first: few of the batches need all cycles.
-            let cycles: Vec<u32> =
-                sizes.chunks(LANES).map(|batch| cycles_to(self.options.tau, batch[0])).collect();
-            let corrections = solve_for(&voxels.hierarchy, &stencils, &right, &cycles, &team, watch)?;
-            solved.iterations = cycles.first().copied().unwrap_or(0);
-            solved.residual_history =
-                histories(&corrections.iter().map(|c| &c.report).collect::<Vec<_>>())[1].clone();
+            let corrections = solve_for(&voxels.hierarchy, &stencils, &right, &self.options, &team, watch)?;
+            solved.converged_as(&corrections.iter().map(|c| &c.report).collect::<Vec<_>>());
+            sampled = watch.now_ms();
             let samples: Vec<&[Row]> = corrections.iter().map(|c| c.samples.as_slice()).collect();
-            add_corrections(&mut blocks, &samples, &shares, &team);
+            let edit = Edit {
+                cages: [&self.cage, cage],
+                points: &self.points,
+                samples: &samples,
+                shares: &shares,
+                resampled: (&changed, &resampled),
+            };
+            edit.apply(&mut rows, |vertex| stencils.is_outside(vertex), &team);
             let row_of = Arc::new(level.row_of.clone());
             let new_fields = corrections.into_iter().map(|c| c.field).collect();
             fields.updates.push(Update { fields: new_fields, row_of, shares });
         }
-        let keep_samples = (self.options.sparsify > 0.0).then(|| blocks.clone());
-        solved.blocks = blocks;
         let prepared = Prepared {
             positions: &self.positions,
             cage,
@@ -256,19 +253,18 @@ impl Rebinder {
             estimated: 0,
             times_ms: [began, voxelized, stencils_made],
         };
-        let finished = prepared.finished(&mut solved, watch);
+        let binding = prepared.reported(&rows, &mut solved, sampled, watch);
         let Prepared { voxels, stencils, points, .. } = prepared;
         self.points = points;
         self.cage = cage.clone();
-        let blocks = keep_samples.unwrap_or(solved.blocks);
-        self.kept = Some(Kept { voxels, stencils, fields, blocks });
+        self.kept = Some(Kept { voxels, stencils, fields, rows });
         let report = RebindReport {
             solved: rank as u32,
             columns: cage.n_vertices() as u32,
             stencils_made: changed.len() as u32,
             anew: false,
         };
-        Ok(Some((finished?, report)))
+        Ok(Some((binding?, report)))
     }
 }
 

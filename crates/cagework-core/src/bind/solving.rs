@@ -118,6 +118,11 @@ pub(super) fn solve_batches(
     Ok((solved, spent.solve_share()))
 }
 
+/// When each of so many batches is done. They add up in squares: each may keep its share of tau.
+pub(super) fn stop_of_batches(tau: f32, max_cycles: u32, n_batches: usize) -> Stop {
+    Stop { tolerance: f64::from(tau) / (n_batches.max(1) as f64).sqrt(), max_cycles }
+}
+
 /// All columns by multigrid, and the batches' fields if they are kept.
 pub(super) fn multigrid_columns(
     voxels: &Voxels,
@@ -129,11 +134,7 @@ pub(super) fn multigrid_columns(
 ) -> Result<(Solved, Vec<Vec<Row>>), Cancelled> {
     let hierarchy = &voxels.hierarchy;
     let n_batches = hierarchy.n_batches();
-    let stop = Stop {
-        // Batches add up in squares: each may keep its share of tau.
-        tolerance: f64::from(options.tau) / (n_batches as f64).sqrt(),
-        max_cycles: options.max_iterations,
-    };
+    let stop = stop_of_batches(options.tau, options.max_iterations, n_batches);
     let (batches, solve_share) = solve_batches(
         hierarchy,
         n_batches,
@@ -143,26 +144,30 @@ pub(super) fn multigrid_columns(
         &|workspace, batch, progress| workspace.solve(hierarchy, batch, stop, progress),
         &|batch, field| sample(stencils, batch, field),
     )?;
-    let [delta_history, residual_history] = histories(&batches.iter().map(|b| &b.report).collect::<Vec<_>>());
     let kept: usize = batches.iter().map(|b| size_of_val(b.field.as_slice())).sum();
     let mut solved = Solved {
-        iterations: delta_history.len() as u32,
-        converged: batches.iter().all(|b| b.report.converged),
-        residual_history,
-        delta_history,
-        delta_interval: 1,
-        planned_bytes: 0,
-        adapter: None,
         field_bytes: Workspace::bytes(hierarchy) * team.n_threads().min(n_batches) + kept,
         solve_share,
         blocks: Vec::with_capacity(n_batches),
+        ..Solved::default()
     };
+    solved.converged_as(&batches.iter().map(|b| &b.report).collect::<Vec<_>>());
     let mut fields = Vec::new();
     for batch in batches {
         solved.blocks.push(batch.samples);
         fields.push(batch.field);
     }
     Ok((solved, fields))
+}
+
+impl Solved {
+    /// Takes down how the batches converged.
+    pub(super) fn converged_as(&mut self, reports: &[&BatchReport]) {
+        [self.delta_history, self.residual_history] = histories(reports);
+        self.delta_interval = 1;
+        self.iterations = self.delta_history.len() as u32;
+        self.converged = reports.iter().all(|r| r.converged);
+    }
 }
 
 fn jacobi_columns(

@@ -210,9 +210,15 @@ impl Stencils {
 
     /// Each vertex's nodes (row of the field, weight) and hats (control vertex, weight).
     pub fn iter(&self) -> impl Iterator<Item = (Entries<'_>, Entries<'_>)> {
-        self.node_start.windows(2).zip(self.hat_start.windows(2)).map(|(node, hat)| {
-            (&self.nodes[node[0] as usize..node[1] as usize], &self.hats[hat[0] as usize..hat[1] as usize])
-        })
+        (0..self.len()).map(|vertex| self.at(vertex))
+    }
+
+    /// One vertex's nodes and hats.
+    #[must_use]
+    pub fn at(&self, vertex: usize) -> (Entries<'_>, Entries<'_>) {
+        let [nodes, hats] = [&self.node_start, &self.hat_start]
+            .map(|start| start[vertex] as usize..start[vertex + 1] as usize);
+        (&self.nodes[nodes], &self.hats[hats])
     }
 
     /// Nodes and hats of all vertices together.

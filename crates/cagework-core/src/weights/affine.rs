@@ -47,6 +47,12 @@ impl Columns {
         Self { scaled, exact, center, diagonal }
     }
 
+    /// Batches of lanes that a row has.
+    #[must_use]
+    pub fn n_batches(&self) -> usize {
+        self.exact[0].len()
+    }
+
     /// A point in the columns' units.
     #[must_use]
     pub fn scale(&self, point: DVec3) -> DVec3 {

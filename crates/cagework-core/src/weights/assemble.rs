@@ -1,14 +1,16 @@
 //! From batches of sampled columns to one sparse row per vertex, with the statistics of what is stored.
 
 mod entries;
+mod facts;
 
 use glam::{DVec3, Vec3};
 
 use crate::cage::Cage;
-use crate::report::{RestError, WeightStats};
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 use crate::solve::team::Team;
+
+pub use self::facts::RowFacts;
 
 use self::entries::Entries;
 use super::Weights;
@@ -16,7 +18,7 @@ use super::affine::Columns;
 
 /// Rows whose sums miss by less than this (of the cage's diagonal) are good: two units in the last place of an f32
 /// near 1.
-const GOOD_ENOUGH: f64 = 2e-7;
+pub(crate) const GOOD_ENOUGH: f64 = 2e-7;
 
 /// Corrections are repeated until the sums hold, at most this often: once is enough but for rows in which the
 /// threshold dropped a large share of the weight.
@@ -39,13 +41,13 @@ pub struct RowOptions {
     pub preserve_affine: bool,
 }
 
-/// What was stored.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Statistics {
-    /// Reconstruction of the rest pose by vertices inside the cage.
-    pub rest_error: RestError,
-    /// Of the weights.
-    pub weights: WeightStats,
+/// A matrix of weights and what was found out about its rows.
+#[derive(Clone, Debug, Default)]
+pub struct Assembled {
+    /// The matrix.
+    pub weights: Weights,
+    /// `[n_rows]`
+    pub facts: Vec<RowFacts>,
 }
 
 /// The rows of one run of vertices in all batches, and what is found out about them.
@@ -55,11 +57,7 @@ struct Run<'a> {
     /// `[n_batches]` slices of the batches' blocks.
     blocks: Vec<&'a mut [Row]>,
     lengths: Vec<u32>,
-    /// Distance between `sum w c` and the vertex over the diagonal; none for vertices outside.
-    errors: Vec<f32>,
-    /// Smallest stored and largest weight so far, lane by lane.
-    range: [Row; 2],
-    max_sum_error: f64,
+    facts: Vec<RowFacts>,
     entries: Entries<'a>,
 }
 
@@ -72,7 +70,7 @@ pub fn assemble(
     options: RowOptions,
     is_outside: impl Fn(usize) -> bool + Sync,
     team: &Team,
-) -> (Weights, Statistics) {
+) -> Assembled {
     let columns = Columns::new(cage);
     if team.n_threads() == 1 {
         return assemble_alone(cage, &columns, blocks, points, options, &is_outside);
@@ -122,9 +120,8 @@ pub fn assemble(
             },
         );
     });
-    let statistics = statistics(&runs, end, f64::from(cage.diagonal()));
-    drop(runs);
-    (Weights::from_parts(cage.n_vertices() as u32, indptr, indices, data), statistics)
+    let facts = runs.into_iter().flat_map(|run| run.facts).collect();
+    Assembled { weights: Weights::from_parts(cage.n_vertices() as u32, indptr, indices, data), facts }
 }
 
 /// The same on one thread, where rows can be put one after the other without counting them first: a third less memory
@@ -136,7 +133,7 @@ fn assemble_alone(
     points: &[Vec3],
     options: RowOptions,
     is_outside: &impl Fn(usize) -> bool,
-) -> (Weights, Statistics) {
+) -> Assembled {
     let mut runs = runs_of(blocks, points, points.len().max(1));
     let most = points.len() * cage.n_vertices();
     // Dense rows are nearly full; of sparse ones nobody knows.
@@ -158,12 +155,11 @@ fn assemble_alone(
         );
     }
     let indptr = indptr_of(&runs);
-    let statistics = statistics(&runs, indptr[points.len()] as usize, f64::from(cage.diagonal()));
-    let (indices, data) = match runs.pop().map(|run| run.entries) {
-        Some(Entries::All { indices, data }) => (indices, data),
-        _ => (Vec::new(), Vec::new()),
+    let (indices, data, facts) = match runs.pop() {
+        Some(Run { entries: Entries::All { indices, data }, facts, .. }) => (indices, data, facts),
+        _ => Default::default(),
     };
-    (Weights::from_parts(cage.n_vertices() as u32, indptr, indices, data), statistics)
+    Assembled { weights: Weights::from_parts(cage.n_vertices() as u32, indptr, indices, data), facts }
 }
 
 /// Where each row starts, and where the last one ends.
@@ -185,9 +181,7 @@ fn runs_of<'a>(blocks: &'a mut [Vec<Row>], points: &'a [Vec3], length: usize) ->
             points,
             blocks: Vec::new(),
             lengths: Vec::with_capacity(points.len()),
-            errors: Vec::with_capacity(points.len()),
-            range: [[f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]],
-            max_sum_error: 0.0,
+            facts: Vec::with_capacity(points.len()),
             entries: Entries::Part { indices: &mut [], data: &mut [] },
         })
         .collect();
@@ -253,7 +247,7 @@ impl Run<'_> {
                 Some(sums) if goal == Some(target) => sums,
                 _ => columns.sums(&row, target),
             };
-            self.measure(&row, sum, (!outside).then_some(miss));
+            self.facts.push(RowFacts::of(&row, sum, (!outside).then_some(miss)));
             take(self, v, &row);
         }
     }
@@ -296,29 +290,13 @@ impl Run<'_> {
         }
         restore(columns, row, goal)
     }
-
-    #[inline(always)]
-    fn measure(&mut self, row: &[Row], sum: f64, miss: Option<f64>) {
-        let [mut low, mut high] = self.range;
-        for row in row {
-            for k in 0..LANES {
-                // Comparisons, not `min` and `max`: wasm has no instruction for theirs, which say what becomes of NaN.
-                let stored = if row[k] != 0.0 { row[k] } else { f32::INFINITY };
-                low[k] = if stored < low[k] { stored } else { low[k] };
-                high[k] = if row[k] > high[k] { row[k] } else { high[k] };
-            }
-        }
-        self.range = [low, high];
-        self.max_sum_error = self.max_sum_error.max((sum - 1.0).abs());
-        self.errors.extend(miss.map(|miss| miss as f32));
-    }
 }
 
 /// Corrects a row until it sums to 1 and puts its vertex at `goal`; returns its sum and how far it misses the goal.
 // Part of its callers where they are compiled for several instruction sets; elsewhere four copies would be downloaded.
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[cfg_attr(target_family = "wasm", inline(never))]
-fn restore(columns: &Columns, row: &mut [Row], goal: DVec3) -> (f64, f64) {
+pub(crate) fn restore(columns: &Columns, row: &mut [Row], goal: DVec3) -> (f64, f64) {
     let mut sums = (0.0, f64::INFINITY);
     for _ in 0..MAX_CORRECTIONS {
         columns.restore_affine(row, goal);
@@ -328,28 +306,4 @@ fn restore(columns: &Columns, row: &mut [Row], goal: DVec3) -> (f64, f64) {
         }
     }
     sums
-}
-
-fn statistics(runs: &[Run<'_>], nonzeros: usize, diagonal: f64) -> Statistics {
-    let mut errors: Vec<f32> = runs.iter().flat_map(|run| &run.errors).copied().collect();
-    let mut rest_error = RestError::default();
-    if !errors.is_empty() {
-        rest_error.mean_rel = errors.iter().map(|&e| f64::from(e)).sum::<f64>() / errors.len() as f64;
-        rest_error.max_rel = errors.iter().fold(0.0, |m, &e| m.max(f64::from(e)));
-        let rank = ((errors.len() as f64 * 0.99).ceil() as usize).clamp(1, errors.len()) - 1;
-        rest_error.p99 = diagonal * f64::from(*errors.select_nth_unstable_by(rank, f32::total_cmp).1);
-        rest_error.mean = diagonal * rest_error.mean_rel;
-        rest_error.max = diagonal * rest_error.max_rel;
-    }
-    let range = runs.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |range, run| {
-        let [low, high] = run.range;
-        [low.into_iter().fold(range[0], f32::min), high.into_iter().fold(range[1], f32::max)]
-    });
-    let weights = WeightStats {
-        min: if nonzeros == 0 { 0.0 } else { range[0] },
-        max: if nonzeros == 0 { 0.0 } else { range[1] },
-        max_sum_error: runs.iter().fold(0.0, |m, run| m.max(run.max_sum_error)),
-        nonzeros: nonzeros as u64,
-    };
-    Statistics { rest_error, weights }
 }

@@ -3,16 +3,21 @@
 pub mod affine;
 pub mod assemble;
 
+use std::sync::Arc;
+
 use thiserror::Error;
 
-/// A matrix of weights in compressed sparse rows (CSR). Dimensionless; each row sums to 1.
+/// A matrix of weights in compressed sparse rows (CSR). Dimensionless; each row sums to 1. A clone shares the arrays.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Weights {
     n_columns: u32,
-    indptr: Vec<u32>,
-    indices: Vec<u32>,
-    data: Vec<f32>,
+    indptr: Arc<Vec<u32>>,
+    indices: Arc<Vec<u32>>,
+    data: Arc<Vec<f32>>,
 }
+
+/// A row that takes another's place: (vertex, columns, weights).
+pub(crate) type ReplacedRow = (u32, Vec<u32>, Vec<f32>);
 
 /// Why three arrays are not a CSR matrix.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -72,7 +77,7 @@ impl Weights {
         if indices.len() != last || data.len() != last {
             return Err(WeightsError::Length { indices: indices.len(), data: data.len(), last });
         }
-        let weights = Self { n_columns, indptr, indices, data };
+        let weights = Self::from_parts(n_columns, indptr, indices, data);
         for (row, (indices, data)) in weights.rows().enumerate() {
             if let Some(&column) = indices.iter().find(|&&c| c >= n_columns) {
                 return Err(WeightsError::Column { row, column, n_columns });
@@ -86,8 +91,33 @@ impl Weights {
 
     /// A matrix from arrays that are right by construction.
     pub(crate) fn from_parts(n_columns: u32, indptr: Vec<u32>, indices: Vec<u32>, data: Vec<f32>) -> Self {
-        debug_assert!(indices.iter().all(|&c| c < n_columns) && indices.len() == data.len());
+        let (indptr, indices, data) = (Arc::new(indptr), Arc::new(indices), Arc::new(data));
         Self { n_columns, indptr, indices, data }
+    }
+
+    /// Where each row starts, the columns, and the weights to write to: in place, if no clone shares them.
+    pub(crate) fn parts_mut(&mut self) -> (&[u32], &[u32], &mut [f32]) {
+        (&self.indptr, &self.indices, Arc::make_mut(&mut self.data).as_mut_slice())
+    }
+
+    /// The matrix with other rows in some places: `rows` in ascending order of vertices, each (vertex, columns, weights).
+    #[must_use]
+    pub(crate) fn with_replaced(&self, rows: &[ReplacedRow]) -> Self {
+        let mut indptr = Vec::with_capacity(self.indptr.len());
+        indptr.push(0);
+        let more: usize = rows.iter().map(|(_, columns, _)| columns.len()).sum();
+        let (mut indices, mut data) =
+            (Vec::with_capacity(self.indices.len() + more), Vec::with_capacity(self.data.len() + more));
+        let mut next = rows.iter().peekable();
+        for row in 0..self.n_rows() {
+            let replaced = next.next_if(|(vertex, ..)| *vertex as usize == row);
+            let (columns, weights) =
+                replaced.map_or_else(|| self.row(row), |(_, c, w)| (c.as_slice(), w.as_slice()));
+            indices.extend_from_slice(columns);
+            data.extend_from_slice(weights);
+            indptr.push(indices.len() as u32);
+        }
+        Self::from_parts(self.n_columns, indptr, indices, data)
     }
 
     /// The matrix whose row v is this one's row `row_of[v]`.
@@ -95,14 +125,15 @@ impl Weights {
     pub fn with_rows(&self, row_of: &[u32]) -> Self {
         let mut indptr = Vec::with_capacity(row_of.len() + 1);
         indptr.push(0);
-        let (mut indices, mut data) = (Vec::new(), Vec::new());
+        let n: usize = row_of.iter().map(|&row| self.row(row as usize).0.len()).sum();
+        let (mut indices, mut data) = (Vec::with_capacity(n), Vec::with_capacity(n));
         for &row in row_of {
             let (columns, weights) = self.row(row as usize);
             indices.extend_from_slice(columns);
             data.extend_from_slice(weights);
             indptr.push(indices.len() as u32);
         }
-        Self { n_columns: self.n_columns, indptr, indices, data }
+        Self::from_parts(self.n_columns, indptr, indices, data)
     }
 
     /// Bytes held.

@@ -20,10 +20,12 @@ pub(super) struct Negligible {
 }
 
 impl Negligible {
-    /// A third of the threshold that is solved to, but no less than f32 can tell.
+    /// The threshold that is solved to, but no less than f32 can tell. Of 48 edits of the samples' cages, three in a row each,
+    /// a third of it makes the mean error of a weight 0.05e-8 to 1.5e-8 smaller, of 5.5e-8 to 1.6e-7, and takes a quarter more
+    /// corrections.
     pub(super) fn at(tau: f32) -> Self {
-        let residual = (0.3 * tau).max(1e-6);
-        // There are 15 to 40 corrections.
+        let residual = tau.max(1e-6);
+        // There are 8 to 40 corrections.
         Self { residual, correction: residual / 40.0 }
     }
 }
@@ -92,9 +94,17 @@ pub(super) struct Share {
 }
 
 impl Share {
-    fn new(columns: Vec<Row>, negligible: Negligible) -> Self {
-        let largest = columns.iter().flatten().fold(f32::MIN_POSITIVE, |m, w| m.max(w.abs()));
-        Self { columns, unfelt: negligible.correction / largest }
+    /// Shares of a field that is made so much larger that they have a norm of 1, and how much: then the field's norm is what
+    /// it changes all columns by.
+    fn normalized(mut columns: Vec<Row>, negligible: Negligible) -> (Self, f32) {
+        let squares = columns.iter().flatten().map(|&w| f64::from(w).powi(2)).sum::<f64>();
+        let norm = (squares.sqrt() as f32).max(f32::MIN_POSITIVE);
+        let mut largest = f32::MIN_POSITIVE;
+        for w in columns.iter_mut().flatten() {
+            *w /= norm;
+            largest = largest.max(w.abs());
+        }
+        (Self { columns, unfelt: negligible.correction / largest }, norm)
     }
 }
 
@@ -128,10 +138,10 @@ impl Fields {
         if !is_known {
             row = NO_CELL;
         }
-        for (batch, out) in out.iter_mut().enumerate() {
-            let start = if row == NO_CELL { ZERO } else { self.base[batch][row as usize] };
-            *out = combined(start, batch, felt);
+        for (base, out) in self.base.iter().zip(out.iter_mut()) {
+            *out = if row == NO_CELL { ZERO } else { base[row as usize] };
         }
+        add_felt(out, felt);
     }
 }
 
@@ -149,25 +159,36 @@ pub(super) fn felt_in<'a>(shares: &'a [Share], felt: &mut Felt<'a>, value: impl 
     }
 }
 
-/// `start` and what is taken of the shares, for one batch of columns: batch by batch the sum stays in registers.
-#[inline(always)]
-pub(super) fn combined(start: Row, batch: usize, felt: &Felt<'_>) -> Row {
-    let mut sum = start;
-    for (share, value) in felt {
-        for lane in 0..LANES {
-            sum[lane] += value * share[batch][lane];
+/// Adds what is taken of the shares to a row of all columns: four at a time, or most of the work would be loading and
+/// storing sums.
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
+#[cfg_attr(target_family = "wasm", inline(never))]
+pub(super) fn add_felt(out: &mut [Row], felt: &Felt<'_>) {
+    let (fours, rest) = felt.as_chunks::<4>();
+    for [(a, va), (b, vb), (c, vc), (d, vd)] in fours {
+        for ((((out, a), b), c), d) in out.iter_mut().zip(*a).zip(*b).zip(*c).zip(*d) {
+            // In a variable of its own, which no share can be part of: only so are lanes taken together.
+            let mut sum = *out;
+            for lane in 0..LANES {
+                sum[lane] += va * a[lane] + vb * b[lane] + (vc * c[lane] + vd * d[lane]);
+            }
+            *out = sum;
         }
     }
-    sum
+    for (share, value) in rest {
+        add_scaled(out, share, *value);
+    }
 }
 
 /// `out += value * share`
 #[inline(always)]
 pub(super) fn add_scaled(out: &mut [Row], share: &[Row], value: f32) {
     for (out, share) in out.iter_mut().zip(share) {
+        let mut sum = *out;
         for lane in 0..LANES {
-            out[lane] += value * share[lane];
+            sum[lane] += value * share[lane];
         }
+        *out = sum;
     }
 }
 
@@ -188,9 +209,6 @@ pub(super) struct Split {
     pub(super) right: Vec<Vec<Row>>,
     /// `[n_of them]`
     pub(super) shares: Vec<Share>,
-    /// Largest entry of all columns' residuals when each of them was split off: the size of what it corrects. Falling, but
-    /// for rounding. `[n_of them]`
-    pub(super) sizes: Vec<f32>,
 }
 
 impl Residual {
@@ -286,7 +304,7 @@ impl Residual {
     fn split_columns(mut self, n_rows: usize, n_columns: usize) -> Option<Split> {
         let n_batches = n_columns.div_ceil(LANES);
         let mut right = Vec::new();
-        let (mut shares, mut sizes) = (Vec::new(), Vec::new());
+        let mut shares = Vec::new();
         loop {
             let mut largest = vec![ZERO; n_batches];
             for row in &self.values {
@@ -301,7 +319,7 @@ impl Residual {
             let size = |c: usize| largest[c / LANES][c % LANES];
             let pivot = (0..n_columns).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
             if size(pivot) < self.negligible.residual {
-                return Some(Split { right, shares, sizes });
+                return Some(Split { right, shares });
             }
             let rank = shares.len();
             // More, and solving for the columns themselves is no slower.
@@ -325,12 +343,12 @@ impl Residual {
             if rank.is_multiple_of(LANES) {
                 right.push(vec![ZERO; n_rows]);
             }
+            let (share, norm) = Share::normalized(share, self.negligible);
+            shares.push(share);
             let batch = &mut right[rank / LANES];
             for ((&row, &q), &diagonal) in self.rows.iter().zip(&unit).zip(&self.diagonals) {
-                batch[row as usize][rank % LANES] = q * diagonal;
+                batch[row as usize][rank % LANES] = q * diagonal * norm;
             }
-            shares.push(Share::new(share, self.negligible));
-            sizes.push(size(pivot));
         }
     }
 }

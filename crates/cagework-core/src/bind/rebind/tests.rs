@@ -130,3 +130,67 @@ fn classic_method_is_bound_anew_and_memory_is_limited() {
         BindError::Memory { .. }
     ));
 }
+
+/// A small edit of the box whose outline stays.
+fn nudged() -> Cage {
+    pushed(&box_mesh(), vec3(1.0, 0.3, 0.1), vec3(-0.1, 0.03, 0.0))
+}
+
+#[test]
+fn how_corrections_converged_is_measured() {
+    let cage = Cage::new(&box_mesh()).unwrap();
+    let (mut rebinder, _) = Rebinder::new(&points(), &cage, &options(), &Silent).unwrap();
+    let (rebound, report) = rebinder.rebind(&nudged(), &Silent).unwrap();
+    assert!(!report.anew && rebound.report.converged);
+    let history = rebound.report.delta_history;
+    assert_eq!(history.len(), rebound.report.iterations as usize);
+    assert!(*history.last().unwrap() <= options().tau && history[0] > options().tau, "{history:?}");
+    // One cycle does not make corrections of a tenth as exact as 1e-8.
+    let hasty = BindOptions { max_iterations: 1, ..options() };
+    let (mut rebinder, _) = Rebinder::new(&points(), &cage, &hasty, &Silent).unwrap();
+    let (rebound, report) = rebinder.rebind(&nudged(), &Silent).unwrap();
+    assert!(!report.anew && !rebound.report.converged);
+}
+
+#[test]
+fn weights_that_were_handed_out_stay_as_they_were() {
+    let cage = Cage::new(&box_mesh()).unwrap();
+    let (mut rebinder, first) = Rebinder::new(&points(), &cage, &options(), &Silent).unwrap();
+    let before = dense(&first);
+    let (rebound, report) = rebinder.rebind(&nudged(), &Silent).unwrap();
+    assert!(!report.anew);
+    assert_eq!(dense(&first), before);
+    assert_ne!(dense(&rebound), before);
+}
+
+#[test]
+fn rows_far_from_an_edit_are_not_touched() {
+    // A long box: the weights of its one end vanish at the other.
+    let long = Bounds { min: vec3(-8.0, -1.0, -1.0), max: vec3(8.0, 1.0, 1.0) };
+    let mesh = subdivided_box(long, 0.0, [16, 2, 2]);
+    let cage = Cage::new(&mesh).unwrap();
+    let points: Vec<Vec3> = (-75..=75).map(|k| vec3(0.1 * k as f32, 0.2, 0.3)).collect();
+    let options = BindOptions { grid: 64, ..BindOptions::default() };
+    let (mut rebinder, first) = Rebinder::new(&points, &cage, &options, &Silent).unwrap();
+    let edited = pushed(&mesh, vec3(-6.0, 1.0, 0.0), vec3(0.1, -0.1, 0.05));
+    let (rebound, report) = rebinder.rebind(&edited, &Silent).unwrap();
+    assert!(!report.anew && report.solved > 0);
+    let changed: Vec<bool> =
+        (0..points.len()).map(|v| first.weights.row(v) != rebound.weights.row(v)).collect();
+    assert!(changed[..40].iter().all(|&c| c), "within three of the edit all rows change");
+    assert!(changed[90..].iter().all(|&c| !c), "nine widths away none does");
+    assert!(rebound.report.rest_error.max_rel <= REST_ERROR);
+}
+
+#[test]
+fn sparsified_weights_leave_nothing_to_start_from() {
+    let cage = Cage::new(&box_mesh()).unwrap();
+    let sparse = BindOptions { sparsify: 1e-5, ..options() };
+    let (mut rebinder, _) = Rebinder::new(&points(), &cage, &sparse, &Silent).unwrap();
+    assert!(!rebinder.keeps());
+    let (rebound, report) = rebinder.rebind(&nudged(), &Silent).unwrap();
+    assert!(report.anew);
+    assert_eq!(rebound.weights, bind(&points(), &nudged(), &sparse, &Silent).unwrap().weights);
+    let (rebinder, _) = Rebinder::new(&points(), &cage, &options(), &Silent).unwrap();
+    assert!(rebinder.keeps());
+}

@@ -6,8 +6,8 @@ use crate::solve::hierarchy::Hierarchy;
 use crate::solve::rows::Row;
 
 impl Workspace {
-    /// Solves for right-hand sides that are not the cage's: `rhs` has one row per row of the finest level. From zero,
-    /// by so many V-cycles.
+    /// Solves for right-hand sides that are not the cage's: `rhs` has one row per row of the finest level. From zero;
+    /// `cycle_done` as in [`Self::solve`].
     ///
     /// # Errors
     /// `None` when cancelled.
@@ -15,13 +15,12 @@ impl Workspace {
         &mut self,
         hierarchy: &Hierarchy,
         rhs: &[Row],
-        cycles: u32,
+        stop: Stop,
         cycle_done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<BatchReport> {
         self.f[0].clear();
         self.f[0].extend_from_slice(rhs);
         self.dense = true;
-        let stop = Stop { tolerance: 0.0, max_cycles: cycles };
         let report = self.cycles(hierarchy, DOWN_FROM_ZERO, stop, cycle_done);
         self.dense = false;
         report
