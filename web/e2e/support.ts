@@ -63,15 +63,23 @@ export async function handle(page: Page, vertex: number): Promise<{ x: number; y
   return { x: box.x + x, y: box.y + y };
 }
 
-/** A cage vertex that the pointer reaches: in front, and not beneath the tools. */
-export async function reachable(page: Page): Promise<number> {
-  return page.evaluate(() => {
+/** A cage vertex that the pointer reaches: in front, not beneath the tools, and so far (share of its extent) within the
+ * cage's bounding box. */
+export async function reachable(page: Page, within = 0): Promise<number> {
+  return page.evaluate((within) => {
     const engine = globalThis.cagework?.engine;
     const canvas = document.querySelector("canvas");
     if (!engine || !canvas) return -1;
     const { left, top } = canvas.getBoundingClientRect();
     const positions = engine.cagePositions();
+    const along = (axis: number) => Array.from(positions.filter((_, k) => k % 3 === axis));
+    const bounds = [0, 1, 2].map((axis) => [Math.min(...along(axis)), Math.max(...along(axis))]);
     for (let vertex = 0; vertex < positions.length / 3; vertex++) {
+      const isWithin = bounds.every(([low = 0, high = 0], axis) => {
+        const share = ((positions[3 * vertex + axis] ?? 0) - low) / (high - low);
+        return share >= within && share <= 1 - within;
+      });
+      if (!isWithin) continue;
       const [x = 0, y = 0] = engine.project(
         ...(positions.slice(3 * vertex, 3 * vertex + 3) as unknown as [number, number, number]),
       );
@@ -80,7 +88,7 @@ export async function reachable(page: Page): Promise<number> {
       if (isFirst && element && (element === canvas || element.contains(canvas))) return vertex;
     }
     return -1;
-  });
+  }, within);
 }
 
 /** The middle of an edge (2 corners) or a face (more) that the pointer reaches, in the window. */

@@ -34,6 +34,9 @@ pub struct BindReport {
     pub cells: CellCounts,
     /// Cells to be solved for on each level, finest first; one entry for Jacobi.
     pub levels: Vec<u64>,
+    /// Corrections that were solved for in place of the columns, when the bind started from the one before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub corrections: Option<u32>,
     /// Jacobi sweeps, or V-cycles on the finest level (the largest number over the batches).
     pub iterations: u32,
     /// Whether delta fell below tau before the limit on iterations.

@@ -81,6 +81,7 @@ async fn solve_and_sample(
     let all_ms = watch.now_ms() - began;
     Ok(Solved {
         blocks,
+        corrections: None,
         iterations: outcome.iterations,
         converged: outcome.converged,
         delta_history: outcome.delta_history,

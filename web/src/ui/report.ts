@@ -43,6 +43,7 @@ export function reportCard(report: BindReport): HTMLElement {
       ["Method", `${METHODS[report.method]}, ${SOLVERS[report.solver]}`],
       ["Grid", `${report.dims.join(" × ")} cells`],
       ["Computed on", where],
+      ...(report.corrections === undefined ? [] : [["Started from", startedFrom(report)] as const]),
       ["Rest error, mean", scientific(report.rest_error.mean_rel)],
       ["Rest error, largest", scientific(report.rest_error.max_rel)],
       ["Weights", `${scientific(report.weights.min)} to ${scientific(report.weights.max)}`],
@@ -74,6 +75,11 @@ export function reportCard(report: BindReport): HTMLElement {
     ),
     ...report.notices.map((notice) => h("p", { class: "hint", text: sentence(notice) })),
   );
+}
+
+/** What a bind made of the one before. */
+function startedFrom(report: BindReport): string {
+  return `the last bind: ${plural(report.corrections ?? 0, "correction")} for ${plural(report.cage_vertices, "column")}`;
 }
 
 /** Share of the weights that is stored. */

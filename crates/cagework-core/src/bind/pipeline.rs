@@ -52,6 +52,8 @@ pub struct Prepared<'a> {
 pub struct Solved {
     /// `[n_batches][n_points]` rows of lanes.
     pub blocks: Vec<Vec<Row>>,
+    /// Corrections that were solved for in place of the columns; none if all columns were.
+    pub corrections: Option<u32>,
     /// Sweeps or V-cycles.
     pub iterations: u32,
     /// Whether delta fell below tau.
@@ -198,6 +200,7 @@ impl<'a> Prepared<'a> {
             tau: options.tau,
             cells: voxels.counts,
             levels: voxels.hierarchy.levels.iter().map(|l| l.n_unknowns() as u64).collect(),
+            corrections: solved.corrections,
             iterations: solved.iterations,
             converged: solved.converged,
             delta_history: std::mem::take(&mut solved.delta_history),

@@ -76,6 +76,8 @@ struct Kept {
     voxels: Voxels,
     stencils: Stencils,
     fields: Fields,
+    /// Bytes that the whole bind was estimated to need, with what is kept.
+    estimated: u64,
     /// One row of weights for each different position; shared with whoever got them.
     rows: Assembled,
 }
@@ -163,7 +165,7 @@ impl Rebinder {
         let binding = prepared.reported(&rows, &mut solved, sampled, &watch)?;
         let Prepared { voxels, stencils, .. } = prepared;
         let fields = Fields { base, row_of, updates: Vec::new() };
-        self.kept = Some(Kept { voxels, stencils, fields, rows });
+        self.kept = Some(Kept { voxels, stencils, fields, estimated: needed, rows });
         self.cage = cage.clone();
         Ok(binding)
     }
@@ -175,7 +177,7 @@ impl Rebinder {
         kept: Kept,
         watch: &Watch<'_>,
     ) -> Result<Option<(Binding, RebindReport)>, BindError> {
-        let Kept { voxels: old_voxels, stencils: old_stencils, mut fields, mut rows } = kept;
+        let Kept { voxels: old_voxels, stencils: old_stencils, mut fields, estimated, mut rows } = kept;
         let began = watch.now_ms();
         let team = Team::new(self.options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
@@ -250,14 +252,15 @@ impl Rebinder {
             team,
             voxels,
             stencils,
-            estimated: 0,
+            estimated,
             times_ms: [began, voxelized, stencils_made],
         };
+        solved.corrections = Some(rank as u32);
         let binding = prepared.reported(&rows, &mut solved, sampled, watch);
         let Prepared { voxels, stencils, points, .. } = prepared;
         self.points = points;
         self.cage = cage.clone();
-        self.kept = Some(Kept { voxels, stencils, fields, rows });
+        self.kept = Some(Kept { voxels, stencils, fields, estimated, rows });
         let report = RebindReport {
             solved: rank as u32,
             columns: cage.n_vertices() as u32,

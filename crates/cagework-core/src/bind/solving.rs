@@ -195,9 +195,6 @@ fn jacobi_columns(
         converged: report.converged,
         delta_history: report.delta_history,
         delta_interval: 1,
-        planned_bytes: 0,
-        adapter: None,
-        residual_history: Vec::new(),
         field_bytes: jacobi::field_bytes(
             level.n_unknowns() as u64,
             level.n_cut() as u64,
@@ -205,5 +202,6 @@ fn jacobi_columns(
             team.n_threads() as u64,
         ) as usize,
         solve_share: spent.solve_share(),
+        ..Solved::default()
     })
 }
