@@ -79,7 +79,7 @@ export function reportCard(report: BindReport): HTMLElement {
 
 /** What a bind made of the one before. */
 function startedFrom(report: BindReport): string {
-  return `the last bind: ${plural(report.corrections ?? 0, "correction")} for ${plural(report.cage_vertices, "column")}`;
+  return `the last bind, by ${plural(report.corrections ?? 0, "correction")}`;
 }
 
 /** Share of the weights that is stored. */

@@ -30,6 +30,9 @@ impl Negligible {
     }
 }
 
+/// A residual must be so many times what counts to be worth a batch of its own.
+const MANY: f32 = 2.0;
+
 /// Cells near moved faces.
 #[derive(Clone, Debug)]
 pub(super) struct Region {
@@ -318,10 +321,13 @@ impl Residual {
             }
             let size = |c: usize| largest[c / LANES][c % LANES];
             let pivot = (0..n_columns).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
-            if size(pivot) < self.negligible.residual {
+            let rank = shares.len();
+            // Another batch for little more than nothing costs as much as the one before.
+            let needs_batch = rank > 0 && rank.is_multiple_of(LANES);
+            let least = if needs_batch { MANY } else { 1.0 } * self.negligible.residual;
+            if size(pivot) < least {
                 return Some(Split { right, shares });
             }
-            let rank = shares.len();
             // More, and solving for the columns themselves is no slower.
             if 4 * rank >= 3 * n_columns {
                 return None;

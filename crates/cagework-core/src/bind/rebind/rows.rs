@@ -22,6 +22,9 @@ const UNMOVED: f64 = 2e-8;
 /// A weight that was not stored stays so below this: what the solver leaves, with either sign, where the weight is 0.
 const STILL_ZERO: f32 = 1e-7;
 
+/// A row that keeps fewer than one in so many of its entries is stored anew.
+const FAR_FEWER: usize = 8;
+
 /// What an edit does to the rows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edit<'a> {
@@ -137,8 +140,13 @@ impl Run<'_> {
                 (sum, miss) = restore(&shared.columns, &mut row, target);
             }
             self.facts[k] = RowFacts::of(&row, sum, (!outside).then_some(miss));
-            if !store(&row, indices, data) {
-                let entries = (0u32..).zip(row.iter().flatten().copied()).filter(|(_, w)| *w > 0.0);
+            let n_positive = row.iter().flatten().map(|&w| usize::from(w > 0.0)).sum::<usize>();
+            // As outside the cage, where only the closest triangle's corners count.
+            let is_other = FAR_FEWER * n_positive < indices.len();
+            if is_other || !store(&row, n_positive, indices, data) {
+                let is_stored =
+                    |&(c, w): &(u32, f32)| w > 0.0 || !is_other && indices.binary_search(&c).is_ok();
+                let entries = (0u32..).zip(row.iter().flatten().copied()).filter(is_stored);
                 let (columns, weights) = entries.unzip();
                 self.replaced.push((v as u32, columns, weights));
             }
@@ -193,13 +201,10 @@ fn forget_unstored(row: &mut [Row], indices: &[u32]) {
     }
 }
 
-/// Writes a row over the stored one, unless it has more entries than that one, or far fewer, as outside the cage.
+/// Writes a row over the stored one, unless it has more entries than that one. Weights that have become 0 stay entries: the
+/// next edit may bring them back.
 #[inline(always)]
-fn store(row: &[Row], indices: &[u32], data: &mut [f32]) -> bool {
-    let n_positive = row.iter().flatten().map(|&w| usize::from(w > 0.0)).sum::<usize>();
-    if 8 * n_positive < indices.len() {
-        return false;
-    }
+fn store(row: &[Row], n_positive: usize, indices: &[u32], data: &mut [f32]) -> bool {
     if is_full(indices) {
         let (whole, lanes) = (data.len() / LANES, data.len() % LANES);
         if row[whole..].iter().flatten().skip(lanes).any(|&w| w > 0.0) {
