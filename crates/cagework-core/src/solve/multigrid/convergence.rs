@@ -42,6 +42,8 @@ pub struct Convergence {
     /// Norm of the latest coarse correction.
     correction: f64,
     delta: f64,
+    /// Latest correction over the one before.
+    ratio: f64,
     /// Cycles in a row that only moved rounding about.
     stalled: u32,
 }
@@ -51,7 +53,7 @@ impl Convergence {
     #[must_use]
     pub fn new(stop: Stop) -> Self {
         let report = BatchReport::default();
-        Self { stop, report, correction: f64::INFINITY, delta: f64::INFINITY, stalled: 0 }
+        Self { stop, report, correction: f64::INFINITY, delta: f64::INFINITY, ratio: CONTRACTION, stalled: 0 }
     }
 
     /// Takes down a cycle by the squared norm of its coarse correction and its mean squared residual; true when it was
@@ -59,16 +61,25 @@ impl Convergence {
     /// no more digits.
     pub fn cycle_done(&mut self, correction_square: f64, residual_square: f64) -> bool {
         let correction = correction_square.sqrt();
-        let delta = (correction / self.correction).clamp(CONTRACTION, 1.0) * correction;
+        let ratio = correction / self.correction;
+        let delta = ratio.clamp(CONTRACTION, 1.0) * correction;
         self.report.delta_squares.push(delta * delta);
         self.report.residual_squares.push(residual_square);
         self.report.converged = delta <= self.stop.tolerance;
         let stalls = correction < ROUND_OFF && correction > STALLED * self.correction;
         self.stalled = if stalls { self.stalled + 1 } else { 0 };
+        // The first one has none before it.
+        self.ratio = if ratio > 0.0 { ratio } else { self.ratio };
         (self.correction, self.delta) = (correction, delta);
         self.report.converged
             || self.stalled == MAX_STALLED
             || self.report.delta_squares.len() >= self.stop.max_cycles as usize
+    }
+
+    /// Whether the next cycle is expected to be the last, with so much to spare.
+    #[must_use]
+    pub fn is_nearly_done(&self, spare: f64) -> bool {
+        spare * self.ratio * self.delta <= self.stop.tolerance
     }
 
     /// Number and delta of the latest cycle.

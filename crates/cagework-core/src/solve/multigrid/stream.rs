@@ -48,6 +48,10 @@ pub(super) const UP: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, Black];
 pub(super) const UP_AND_DOWN: &[Pass] =
     &[Pass::Prolong(Prolong::Correct), Red, Black, Red, BlackFurther, Red, Black];
 
+/// The same with one sweep less between two coarse corrections, for a last cycle that has little to do.
+pub(super) const UP_AND_HALF_DOWN: &[Pass] =
+    &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black];
+
 /// Runs `passes` over a level's field `u`, `[n_rows]`. `coarse`: the coarser level's field, for [`Pass::Prolong`];
 /// `residual`: `[n red cells + 1]`, for [`Pass::Residual`]. Returns the sum of the residual's squares.
 pub(super) fn stream(
