@@ -134,9 +134,8 @@ impl Fields {
                 is_known = false;
                 continue;
             }
-            felt_in(&update.shares, felt, |k| {
-                update.fields[k / LANES][update.row_of[cell] as usize][k % LANES]
-            });
+            let row = update.row_of[cell] as usize;
+            felt_in(&update.shares, felt, update.fields.iter().map(|field| &field[row]));
         }
         if !is_known {
             row = NO_CELL;
@@ -151,13 +150,18 @@ impl Fields {
 /// Shares of all columns, each with how much of it is taken.
 pub(super) type Felt<'a> = Vec<(&'a [Row], f32)>;
 
-/// Adds to `felt` the shares that are felt; `value(k)`: how much is taken of the k-th.
+/// Adds to `felt` the shares that are felt; `values`: batch by batch, how much is taken of each.
 #[inline(always)]
-pub(super) fn felt_in<'a>(shares: &'a [Share], felt: &mut Felt<'a>, value: impl Fn(usize) -> f32) {
-    for (k, share) in shares.iter().enumerate() {
-        let value = value(k);
-        if value.abs() > share.unfelt {
-            felt.push((&share.columns, value));
+pub(super) fn felt_in<'a, 'b>(
+    shares: &'a [Share],
+    felt: &mut Felt<'a>,
+    values: impl Iterator<Item = &'b Row>,
+) {
+    for (shares, values) in shares.chunks(LANES).zip(values) {
+        for (share, &value) in shares.iter().zip(values) {
+            if value.abs() > share.unfelt {
+                felt.push((&share.columns, value));
+            }
         }
     }
 }

@@ -104,7 +104,7 @@ impl Run<'_> {
         for k in 0..self.facts.len() {
             let v = self.first + k;
             felt.clear();
-            felt_in(shares, &mut felt, |n| samples[n / LANES][v][n % LANES]);
+            felt_in(shares, &mut felt, samples.iter().map(|batch| &batch[v]));
             let range = shared.indptr[v] as usize..shared.indptr[v + 1] as usize;
             let indices = &shared.indices[range.clone()];
             let data = &mut self.data[range.start - self.offset..range.end - self.offset];
@@ -140,7 +140,7 @@ impl Run<'_> {
                 (sum, miss) = restore(&shared.columns, &mut row, target);
             }
             self.facts[k] = RowFacts::of(&row, sum, (!outside).then_some(miss));
-            let n_positive = row.iter().flatten().map(|&w| usize::from(w > 0.0)).sum::<usize>();
+            let n_positive = positive(&row);
             // As outside the cage, where only the closest triangle's corners count.
             let is_other = FAR_FEWER * n_positive < indices.len();
             if is_other || !store(&row, n_positive, indices, data) {
@@ -188,6 +188,18 @@ fn expand(indices: &[u32], data: &[f32], row: &mut [Row]) {
             row[column as usize / LANES][column as usize % LANES] = w;
         }
     }
+}
+
+/// Weights of a row that are not 0.
+#[inline(always)]
+fn positive(row: &[Row]) -> usize {
+    let mut lanes = [0u32; LANES];
+    for row in row {
+        for k in 0..LANES {
+            lanes[k] += u32::from(row[k] > 0.0);
+        }
+    }
+    lanes.iter().sum::<u32>() as usize
 }
 
 /// Sets weights to 0 that are nearly so and were not stored.
