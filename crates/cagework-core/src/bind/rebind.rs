@@ -37,6 +37,9 @@ use super::{BindError, BindOptions, Binding, Method, Solver, bind};
 /// Edits after which everything is bound anew.
 const MAX_UPDATES: usize = 6;
 
+/// A row with a weight below was put in its place by force, as in a cage that meets itself: what it was before cannot be told.
+const FORCED: f32 = -1e-5;
+
 /// Cells around the moved faces whose equations may have changed.
 const CHANGED: f64 = 1.5;
 
@@ -128,7 +131,10 @@ impl Rebinder {
         let same = cage.n_vertices() == self.cage.n_vertices()
             && cage.faces() == self.cage.faces()
             && Voxels::grid(cage, &self.options) == Voxels::grid(&self.cage, &self.options);
-        if same && let Some(kept) = self.kept.take_if(|k| k.fields.updates.len() < MAX_UPDATES) {
+        let is_usable = |k: &mut Kept| {
+            k.fields.updates.len() < MAX_UPDATES && k.rows.facts.iter().all(|f| f.low > FORCED)
+        };
+        if same && let Some(kept) = self.kept.take_if(is_usable) {
             let watch = Watch::new(progress);
             if let Some(done) = self.updated(cage, kept, &watch)? {
                 return Ok(done);

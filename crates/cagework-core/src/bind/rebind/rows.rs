@@ -140,12 +140,12 @@ impl Run<'_> {
                 (sum, miss) = restore(&shared.columns, &mut row, target);
             }
             self.facts[k] = RowFacts::of(&row, sum, (!outside).then_some(miss));
-            let n_positive = positive(&row);
+            let n_nonzero = n_nonzeros(&row);
             // As outside the cage, where only the closest triangle's corners count.
-            let is_other = FAR_FEWER * n_positive < indices.len();
-            if is_other || !store(&row, n_positive, indices, data) {
+            let is_other = FAR_FEWER * n_nonzero < indices.len();
+            if is_other || !store(&row, n_nonzero, indices, data) {
                 let is_stored =
-                    |&(c, w): &(u32, f32)| w > 0.0 || !is_other && indices.binary_search(&c).is_ok();
+                    |&(c, w): &(u32, f32)| w != 0.0 || !is_other && indices.binary_search(&c).is_ok();
                 let entries = (0u32..).zip(row.iter().flatten().copied()).filter(is_stored);
                 let (columns, weights) = entries.unzip();
                 self.replaced.push((v as u32, columns, weights));
@@ -192,11 +192,11 @@ fn expand(indices: &[u32], data: &[f32], row: &mut [Row]) {
 
 /// Weights of a row that are not 0.
 #[inline(always)]
-fn positive(row: &[Row]) -> usize {
+fn n_nonzeros(row: &[Row]) -> usize {
     let mut lanes = [0u32; LANES];
     for row in row {
         for k in 0..LANES {
-            lanes[k] += u32::from(row[k] > 0.0);
+            lanes[k] += u32::from(row[k] != 0.0);
         }
     }
     lanes.iter().sum::<u32>() as usize
@@ -216,10 +216,10 @@ fn forget_unstored(row: &mut [Row], indices: &[u32]) {
 /// Writes a row over the stored one, unless it has more entries than that one. Weights that have become 0 stay entries: the
 /// next edit may bring them back.
 #[inline(always)]
-fn store(row: &[Row], n_positive: usize, indices: &[u32], data: &mut [f32]) -> bool {
+fn store(row: &[Row], n_nonzero: usize, indices: &[u32], data: &mut [f32]) -> bool {
     if is_full(indices) {
         let (whole, lanes) = (data.len() / LANES, data.len() % LANES);
-        if row[whole..].iter().flatten().skip(lanes).any(|&w| w > 0.0) {
+        if row[whole..].iter().flatten().skip(lanes).any(|&w| w != 0.0) {
             return false;
         }
         for (data, row) in data.chunks_mut(LANES).zip(row) {
@@ -231,7 +231,7 @@ fn store(row: &[Row], n_positive: usize, indices: &[u32], data: &mut [f32]) -> b
         return true;
     }
     let of = |&column: &u32| row[column as usize / LANES][column as usize % LANES];
-    if indices.iter().filter(|c| of(c) > 0.0).count() < n_positive {
+    if indices.iter().filter(|c| of(c) != 0.0).count() < n_nonzero {
         return false;
     }
     for (column, w) in indices.iter().zip(data) {

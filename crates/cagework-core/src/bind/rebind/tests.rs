@@ -3,6 +3,7 @@ use glam::{Vec3, vec3};
 use super::{MAX_UPDATES, RebindReport, Rebinder};
 use crate::bind::{BindError, BindOptions, Binding, Method, bind};
 use crate::cage::Cage;
+use crate::cage_check::Code;
 use crate::cage_gen::subdivided_box;
 use crate::mesh::{Bounds, PolygonMesh};
 use crate::progress::Silent;
@@ -193,4 +194,38 @@ fn sparsified_weights_leave_nothing_to_start_from() {
     assert_eq!(rebound.weights, bind(&points(), &nudged(), &sparse, &Silent).unwrap().weights);
     let (rebinder, _) = Rebinder::new(&points(), &cage, &options(), &Silent).unwrap();
     assert!(rebinder.keeps());
+}
+
+#[test]
+fn edits_of_a_sample_one_after_the_other_give_the_weights_of_binds() {
+    let sample = crate::samples::build("humanoid").unwrap();
+    let points: Vec<Vec3> = sample.mesh.positions.iter().step_by(20).copied().collect();
+    let options = BindOptions { grid: 24, tau: 1e-7, ..BindOptions::default() };
+    let cage = Cage::new(&sample.cage).unwrap();
+    let (bounds, n) = (cage.bounds(), cage.n_vertices());
+    let (mut rebinder, _) = Rebinder::new(&points, &cage, &options, &Silent).unwrap();
+    let (mut mesh, mut seed, mut n_incremental) = (sample.cage, 1u32, 0);
+    let mut random = || {
+        // Numerical Recipes' linear congruential generator, its upper bits.
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (seed >> 8) as f32 / (1 << 24) as f32
+    };
+    for edit in 0..12 {
+        let mut edited = mesh.clone();
+        let vertex = (random() * n as f32) as usize;
+        let way = 0.02 * cage.diagonal() * (vec3(random(), random(), random()) - 0.5);
+        // The cage's box stays, and with it the grid.
+        edited.positions[vertex] = (edited.positions[vertex] + way).clamp(bounds.min, bounds.max);
+        if crate::cage_check::check(&edited, None, None).problem(Code::SelfIntersection).is_some() {
+            continue;
+        }
+        let cage = Cage::new(&edited).unwrap();
+        let (rebound, report) = rebinder.rebind(&cage, &Silent).unwrap();
+        let bound = bind(&points, &cage, &options, &Silent).unwrap();
+        let worst = dense(&rebound).iter().zip(dense(&bound)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(worst <= SAME, "edit {edit} {report:?}: a weight differs by {worst:e}");
+        n_incremental += u32::from(!report.anew);
+        mesh = edited;
+    }
+    assert!(n_incremental >= 5, "{n_incremental} edits started from the bind before");
 }
