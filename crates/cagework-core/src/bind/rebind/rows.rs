@@ -113,12 +113,9 @@ impl Run<'_> {
                 row.copy_from_slice(&resampled.1[next * n_batches..(next + 1) * n_batches]);
                 next += 1;
             } else {
-                let off = shared
-                    .moved
-                    .iter()
-                    .map(|&(c, way)| f64::from(weight_of(c, indices, data)) * way)
-                    .sum::<f64>();
-                if felt.is_empty() && off < UNMOVED {
+                let way = |&(column, way): &(usize, f64)| f64::from(weight_of(column, indices, data)) * way;
+                let off = if felt.is_empty() { shared.moved.iter().map(way).sum() } else { f64::INFINITY };
+                if off < UNMOVED {
                     let facts = &mut self.facts[k];
                     facts.error = facts.error.map(|error| error + off as f32);
                     continue;
