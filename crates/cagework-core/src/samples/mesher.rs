@@ -8,7 +8,7 @@ use super::sdf::Body;
 use crate::mesh::TriMesh;
 
 /// Samples along the edge of a block that is skipped if the surface is far.
-const BLOCK: u32 = 8;
+const BLOCK: u32 = 4;
 
 /// Newton steps from the net's vertex to the surface: two leave less than a thousandth of a cell.
 const STEPS: usize = 2;
@@ -20,13 +20,20 @@ pub(super) fn mesh(body: &Body, cell: f32) -> (TriMesh, Vec<[u8; 4]>) {
     let [min, max] = body.bounds();
     let origin = min - 2.0 * cell;
     let n = ((max - min) / cell).ceil().as_uvec3() + 5;
-    let samples = sample(body, origin, cell, n);
+    let blocks = Blocks::new(body, origin, cell, n);
+    let samples = blocks.sample();
     let mut net = SurfaceNetsBuffer::default();
     let shape = RuntimeShape::<u32, 3>::new(n.to_array());
     surface_nets(&samples, &shape, [0; 3], (n - 1).to_array(), &mut net);
 
-    let positions: Vec<Vec3> =
-        net.positions.iter().map(|&p| on_surface(body, origin + cell * Vec3::from_array(p), cell)).collect();
+    let (mut positions, mut colours) = (Vec::new(), Vec::new());
+    for &p in &net.positions {
+        let p = Vec3::from_array(p);
+        let near = blocks.at(p).unwrap_or(body);
+        let position = on_surface(near, origin + cell * p, cell);
+        positions.push(position);
+        colours.push(near.colour(position));
+    }
     let mut triangles: Vec<[u32; 3]> = net.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     let at = |i: u32| positions[i as usize];
     let volume: f32 = triangles.iter().map(|&[a, b, c]| at(a).dot(at(b).cross(at(c)))).sum();
@@ -35,36 +42,67 @@ pub(super) fn mesh(body: &Body, cell: f32) -> (TriMesh, Vec<[u8; 4]>) {
             t.swap(1, 2);
         }
     }
-    let colours = positions.iter().map(|&p| body.colour(p)).collect();
     (TriMesh { positions, triangles }, colours)
 }
 
-/// Distances at the lattice's points, x fastest. Blocks that the surface cannot reach get one distance for all.
-fn sample(body: &Body, origin: Vec3, cell: f32, n: UVec3) -> Vec<f32> {
-    let mut samples = vec![0.0; (n.x * n.y * n.z) as usize];
-    let at = |p: UVec3| origin + cell * p.as_vec3();
-    // From the middle of a block to its farthest sample and the samples beyond.
-    let reach = 1.05 * cell * 3.0_f32.sqrt() * (0.5 * BLOCK as f32 + 1.0);
-    for z in (0..n.z).step_by(BLOCK as usize) {
-        for y in (0..n.y).step_by(BLOCK as usize) {
-            for x in (0..n.x).step_by(BLOCK as usize) {
-                let first = UVec3::new(x, y, z);
-                let last = (first + BLOCK).min(n);
-                let middle = body.distance(at(first) + 0.5 * cell * (BLOCK - 1) as f32);
-                for k in first.z..last.z {
-                    for j in first.y..last.y {
-                        let row = (k * n.y + j) * n.x;
-                        for i in first.x..last.x {
-                            let near = middle.abs() <= reach;
-                            let d = if near { body.distance(at(UVec3::new(i, j, k))) } else { middle };
-                            samples[(row + i) as usize] = d;
-                        }
-                    }
+/// Blocks of the lattice, x fastest: what of the body is near each.
+struct Blocks {
+    origin: Vec3,
+    cell: f32,
+    /// Points of the lattice along each axis, and blocks.
+    n: UVec3,
+    n_blocks: UVec3,
+    /// The distance of a block's middle, and the parts that count in it if the surface can reach it.
+    blocks: Vec<(f32, Option<Body>)>,
+}
+
+impl Blocks {
+    fn new(body: &Body, origin: Vec3, cell: f32, n: UVec3) -> Self {
+        let n_blocks = (n + (BLOCK - 1)) / BLOCK;
+        // From the middle of a block to its farthest sample and the samples beyond.
+        let reach = 1.05 * cell * 3.0_f32.sqrt() * (0.5 * BLOCK as f32 + 1.0);
+        let mut blocks = Vec::with_capacity((n_blocks.x * n_blocks.y * n_blocks.z) as usize);
+        for z in 0..n_blocks.z {
+            for y in 0..n_blocks.y {
+                for x in 0..n_blocks.x {
+                    let first = BLOCK * UVec3::new(x, y, z);
+                    let middle = origin + cell * first.as_vec3() + 0.5 * cell * (BLOCK - 1) as f32;
+                    let distance = body.distance(middle);
+                    // A vertex moves a little over a cell from its place in the net.
+                    let near = || body.near(middle, reach + 2.0 * cell);
+                    blocks.push((distance, (distance.abs() <= reach).then(near)));
                 }
             }
         }
+        Self { origin, cell, n, n_blocks, blocks }
     }
-    samples
+
+    fn number(&self, block: UVec3) -> usize {
+        ((block.z * self.n_blocks.y + block.y) * self.n_blocks.x + block.x) as usize
+    }
+
+    /// What counts near a point, in cells from the lattice's first.
+    fn at(&self, p: Vec3) -> Option<&Body> {
+        let block = (p.as_uvec3() / BLOCK).min(self.n_blocks - 1);
+        self.blocks[self.number(block)].1.as_ref()
+    }
+
+    /// Distances at the lattice's points, x fastest. Blocks that the surface cannot reach get one distance for all.
+    fn sample(&self) -> Vec<f32> {
+        let n = self.n;
+        let mut samples = Vec::with_capacity((n.x * n.y * n.z) as usize);
+        for k in 0..n.z {
+            for j in 0..n.y {
+                for i in 0..n.x {
+                    let p = UVec3::new(i, j, k);
+                    let (distance, near) = &self.blocks[self.number(p / BLOCK)];
+                    let at = || self.origin + self.cell * p.as_vec3();
+                    samples.push(near.as_ref().map_or(*distance, |body| body.distance(at())));
+                }
+            }
+        }
+        samples
+    }
 }
 
 /// The point of the surface that Newton's method finds from a point near it.

@@ -49,6 +49,16 @@ impl Solid {
         }
     }
 
+    /// At most so much the distance changes on a way of length 1.
+    fn steepness(&self) -> f32 {
+        match *self {
+            Self::Cone { a, b, ra, rb } => 1.0 + (rb - ra).abs() / a.distance(b).max(1e-6),
+            // Of a bound, not of a distance; tests compare.
+            Self::Ellipsoid { .. } => 2.0,
+            Self::Block { .. } => 1.0,
+        }
+    }
+
     fn bounds(&self) -> [Vec3; 2] {
         match *self {
             Self::Cone { a, b, ra, rb } => [(a - ra).min(b - rb), (a + ra).max(b + rb)],
@@ -102,6 +112,27 @@ impl Body {
     /// Distance to the surface, negative inside; nowhere larger than the true one, apart from rounding.
     pub(super) fn distance(&self, p: Vec3) -> f32 {
         self.parts.iter().fold(f32::MAX, |d, part| smooth_min(d, part.solid.distance(p), part.blend).0)
+    }
+
+    /// The parts that decide distance and colour within `reach` of a point: of the others neither changes a bit there.
+    pub(super) fn near(&self, p: Vec3, reach: f32) -> Self {
+        let mut parts = Vec::new();
+        let (mut distance, mut steepest) = (f32::MAX, 0.0_f32);
+        for part in &self.parts {
+            let d = part.solid.distance(p);
+            // By so much the two can come closer on the way.
+            let slack = reach * (steepest + part.solid.steepness());
+            steepest = steepest.max(part.solid.steepness());
+            if d - distance >= part.blend + slack {
+                continue;
+            }
+            if distance - d >= part.blend + slack {
+                parts.clear();
+            }
+            parts.push(*part);
+            distance = smooth_min(distance, d, part.blend).0;
+        }
+        Self { parts }
     }
 
     /// Colour at a point of the surface.

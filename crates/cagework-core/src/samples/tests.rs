@@ -1,3 +1,5 @@
+use glam::Vec3;
+
 use super::{all, build};
 use crate::bind::{BindOptions, bind};
 use crate::cage::Cage;
@@ -66,4 +68,28 @@ fn samples_are_closed_surfaces_that_face_outward() {
 #[test]
 fn unknown_samples_are_none() {
     assert!(build("unicorn").is_none());
+}
+
+#[test]
+fn what_is_left_out_of_a_body_changes_no_distance_and_no_colour() {
+    let reach = 0.1;
+    for recipe in
+        [super::rat::recipe(), super::humanoid::recipe(), super::clamp::recipe(), super::strider::recipe()]
+    {
+        let body = recipe.body;
+        let [min, max] = body.bounds();
+        let steps = |n: u32| (0..=n).map(move |k| k as f32 / n as f32);
+        let lattice =
+            steps(9).flat_map(|x| steps(9).flat_map(move |y| steps(9).map(move |z| Vec3::new(x, y, z))));
+        for middle in lattice.map(|share| min + share * (max - min)) {
+            let near = body.near(middle, reach);
+            for corner in 0..8 {
+                let side =
+                    Vec3::from_array([0, 1, 2].map(|axis| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 }));
+                let p = middle + reach / 3.0_f32.sqrt() * side;
+                assert_eq!(near.distance(p), body.distance(p), "at {p}");
+                assert_eq!(near.colour(p), body.colour(p), "at {p}");
+            }
+        }
+    }
 }
