@@ -132,6 +132,6 @@ pub struct WeightStats {
     pub max: f32,
     /// Largest |sum of a row - 1|.
     pub max_sum_error: f64,
-    /// Stored weights.
+    /// Stored weights; after a bind that started from another, some of them may be 0.
     pub nonzeros: u64,
 }

@@ -3,10 +3,12 @@
 //! When a few vertices of the cage move, the discrete equations change only in cells at the moved faces. The old fields leave
 //! a residual there and nowhere else, and the residuals of all columns are combinations of a few: columns that do not
 //! belong to the moved faces vanish on them, so they look alike a few cells away. Those few are solved for, and every
-//! column, also at the mesh's vertices, takes its share of them. What is neglected (a third of tau an edit) adds up, so after
-//! [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid, the faces or half of the cage change.
+//! column, also at the mesh's vertices, takes its share of them. What is neglected (residuals of about tau an edit) adds up, so
+//! after [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid or the faces change, when cells near moved
+//! faces are a quarter of all, or when nearly all columns' residuals are independent.
 
 mod local;
+mod region;
 mod rows;
 mod steps;
 #[cfg(test)]
@@ -21,11 +23,13 @@ use crate::grid::NO_CELL;
 use crate::mesh::{Weld, weld};
 use crate::progress::{Progress, Stage};
 use crate::sample::Stencils;
+use crate::solve::multigrid::Workspace;
 use crate::solve::rows::{LANES, Row};
 use crate::solve::team::Team;
 use crate::weights::assemble::Assembled;
 
-use self::local::{Fields, Negligible, OldCells, Region, Residual, Split, Update};
+use self::local::{Fields, Negligible, OldCells, Residual, Split, Update};
+use self::region::Region;
 use self::rows::Edit;
 use self::steps::{resample, solve_for};
 use super::pipeline::{FieldsOn, Prepared, Solved, refuse_outside, sampling_stencils};
@@ -39,6 +43,9 @@ const MAX_UPDATES: usize = 6;
 
 /// A row with a weight below was put in its place by force, as in a cage that meets itself: what it was before cannot be told.
 const FORCED: f32 = -1e-5;
+
+/// Cells that a face's corners may be off its triangles' planes, when it is cut into others: [`CHANGED`] covers those between.
+const MOST_BENT: f64 = 1.0;
 
 /// Cells around the moved faces whose equations may have changed.
 const CHANGED: f64 = 1.5;
@@ -85,6 +92,13 @@ struct Kept {
     rows: Assembled,
 }
 
+impl Kept {
+    /// Whether a bind can start from it.
+    fn is_usable(&self) -> bool {
+        self.fields.updates.len() < MAX_UPDATES && self.rows.facts.iter().all(|facts| facts.low > FORCED)
+    }
+}
+
 impl Rebinder {
     /// Binds as [`bind`] does, and keeps what the next bind can start from: the fields (4 bytes for each cell inside and
     /// cage vertex) and the weights (8 for each mesh vertex and cage vertex). Only embedded multigrid without sparsification
@@ -115,14 +129,14 @@ impl Rebinder {
     /// Whether there is anything that the next bind can start from.
     #[must_use]
     pub fn keeps(&self) -> bool {
-        self.kept.is_some()
+        self.kept.as_ref().is_some_and(Kept::is_usable)
     }
 
     /// Binds the mesh to an edited cage. Fastest when the weights of the bind before have been dropped: what stays is then
     /// not copied.
     ///
     /// # Errors
-    /// Those of [`bind`]; what was kept stays as it was, or is given up, and the next bind is a whole one.
+    /// Those of [`bind`]; what was kept is given up then, and the next bind is a whole one.
     pub fn rebind(
         &mut self,
         cage: &Cage,
@@ -131,10 +145,8 @@ impl Rebinder {
         let same = cage.n_vertices() == self.cage.n_vertices()
             && cage.faces() == self.cage.faces()
             && Voxels::grid(cage, &self.options) == Voxels::grid(&self.cage, &self.options);
-        let is_usable = |k: &mut Kept| {
-            k.fields.updates.len() < MAX_UPDATES && k.rows.facts.iter().all(|f| f.low > FORCED)
-        };
-        if same && let Some(kept) = self.kept.take_if(is_usable) {
+        // What is of no use is dropped here: a whole bind needs the memory.
+        if let Some(kept) = self.kept.take().filter(|kept| same && kept.is_usable()) {
             let watch = Watch::new(progress);
             if let Some(done) = self.updated(cage, kept, &watch)? {
                 return Ok(done);
@@ -155,14 +167,15 @@ impl Rebinder {
             return Ok(binding);
         }
         let watch = Watch::new(progress);
-        let prepared = Prepared::new(&self.positions, cage, &self.options, FieldsOn::Host, &watch)?;
+        let mut prepared = Prepared::new(&self.positions, cage, &self.options, FieldsOn::Host, &watch)?;
         let level = &prepared.hierarchy().levels[0];
         let n_batches = prepared.hierarchy().n_batches();
-        let needed = prepared.estimated + (level.n_rows() * size_of::<Row>() * n_batches) as u64;
+        let needed = prepared.estimated + level.n_rows() as u64 * (size_of::<Row>() * n_batches) as u64;
         if needed > self.options.memory_limit {
             return Err(BindError::Memory { needed, limit: self.options.memory_limit });
         }
         let row_of = Arc::new(level.row_of.clone());
+        prepared.estimated = needed;
         let Prepared { voxels, stencils, team, .. } = &prepared;
         let (mut solved, base) =
             multigrid_columns(voxels, stencils, &self.options, FieldFate::Kept, team, &watch)?;
@@ -189,7 +202,7 @@ impl Rebinder {
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
         let grid = Voxels::grid(cage, &self.options);
         let to_grid = |p: Vec3| grid.to_grid(p.as_dvec3());
-        let moved = moved_triangles(&self.cage, cage, to_grid);
+        let Some(moved) = moved_triangles(&self.cage, cage, to_grid) else { return Ok(None) };
         let n_batches = cage.n_vertices().div_ceil(LANES);
         let needed = Region::around(&moved, NEEDED, &grid);
         if 4 * needed.cells.len() > grid.n_cells() {
@@ -235,6 +248,8 @@ impl Rebinder {
             rank = shares.len();
             let corrections = solve_for(&voxels.hierarchy, &stencils, &right, &self.options, &team, watch)?;
             solved.converged_as(&corrections.iter().map(|c| &c.report).collect::<Vec<_>>());
+            // They are solved to less than tau; what counts is tau.
+            solved.converged = solved.delta_history.last().is_none_or(|delta| *delta <= self.options.tau);
             sampled = watch.now_ms();
             let samples: Vec<&[Row]> = corrections.iter().map(|c| c.samples.as_slice()).collect();
             let edit = Edit {
@@ -247,6 +262,7 @@ impl Rebinder {
             edit.apply(&mut rows, |vertex| stencils.is_outside(vertex), &team);
             let row_of = Arc::new(level.row_of.clone());
             let new_fields = corrections.into_iter().map(|c| c.field).collect();
+            solved.field_bytes = Workspace::bytes(&voxels.hierarchy) * team.n_threads().min(right.len());
             fields.updates.push(Update { fields: new_fields, row_of, shares });
         }
         let prepared = Prepared {
@@ -262,6 +278,7 @@ impl Rebinder {
             times_ms: [began, voxelized, stencils_made],
         };
         solved.corrections = Some(rank as u32);
+        solved.field_bytes += fields.bytes();
         let binding = prepared.reported(&rows, &mut solved, sampled, watch);
         let Prepared { voxels, stencils, points, .. } = prepared;
         self.points = points;
@@ -277,8 +294,25 @@ impl Rebinder {
     }
 }
 
-/// Triangles with a moved vertex, in grid coordinates: where they were, are, and in steps of a cell on the way.
-fn moved_triangles(before: &Cage, after: &Cage, to_grid: impl Fn(Vec3) -> DVec3) -> Vec<[DVec3; 3]> {
+/// Triangles with a moved vertex, in grid coordinates: where they were, are, and in steps of a cell on the way. `None` if a
+/// face is cut into other triangles than before and is so bent, before and after, that there are cells between them.
+fn moved_triangles(before: &Cage, after: &Cage, to_grid: impl Fn(Vec3) -> DVec3) -> Option<Vec<[DVec3; 3]>> {
+    if before.triangles().len() != after.triangles().len() {
+        return None;
+    }
+    let is_bent = |t: usize, cage: &Cage| {
+        let at = |i: u32| to_grid(cage.positions()[i as usize]);
+        let [a, b, c] = cage.triangles()[t].map(at);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let corners = &cage.faces()[cage.face_of_triangle()[t] as usize];
+        corners.iter().any(|&i| (at(i) - a).dot(normal).abs() > MOST_BENT)
+    };
+    let is_cut_anew = |&t: &usize| before.triangles()[t] != after.triangles()[t];
+    let mut cut_anew = (0..after.triangles().len()).filter(is_cut_anew);
+    // Between a flat face and a bent one all cells lie on the way.
+    if cut_anew.any(|t| is_bent(t, before) && is_bent(t, after)) {
+        return None;
+    }
     let mut moved = Vec::new();
     let has_moved = |&i: &u32| before.positions()[i as usize] != after.positions()[i as usize];
     // A polygon may be cut into triangles in another way than before.
@@ -296,7 +330,7 @@ fn moved_triangles(before: &Cage, after: &Cage, to_grid: impl Fn(Vec3) -> DVec3)
             moved.push([0, 1, 2].map(|c| from[c].lerp(to[c], share)));
         }
     }
-    moved
+    Some(moved)
 }
 
 /// For every old row the new one of the same cell; [`NO_CELL`] if it is gone. Zero rows are nobody's.

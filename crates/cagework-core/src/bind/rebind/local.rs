@@ -2,13 +2,12 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
-use crate::cage_gen::footprint::Footprint;
-use crate::grid::{Grid, NO_CELL};
+use crate::grid::NO_CELL;
 use crate::levels::Level;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
+
+use super::region::Region;
 
 /// What is left out, as changes of a weight.
 #[derive(Clone, Copy, Debug)]
@@ -20,11 +19,12 @@ pub(super) struct Negligible {
 }
 
 impl Negligible {
-    /// The threshold that is solved to, but no less than f32 can tell. Of 48 edits of the samples' cages, three in a row each,
+    /// The threshold that is solved to, but no less than f32 can tell, and no more than the default. Of 48 edits of the samples' cages, three in a row each,
     /// a third of it makes the mean error of a weight, 5.5e-8 to 1.6e-7, smaller by up to 2e-8, and takes a quarter more
     /// corrections.
     pub(super) fn at(tau: f32) -> Self {
-        let residual = tau.max(1e-6);
+        // Whole binds with a coarser tau are far more exact than it, by full multigrid: edits must not be worse.
+        let residual = tau.clamp(1e-6, 1e-5);
         // There are 8 to 40 corrections.
         Self { residual, correction: residual / 40.0 }
     }
@@ -32,50 +32,6 @@ impl Negligible {
 
 /// A residual must be so many times what counts to be worth a batch of its own.
 const MANY: f32 = 2.0;
-
-/// Cells near moved faces.
-#[derive(Clone, Debug)]
-pub(super) struct Region {
-    /// For each cell of the grid its place in `cells`; [`NO_CELL`] if it is none of them.
-    number: Vec<u32>,
-    /// Indices of the cells in the grid.
-    pub(super) cells: Vec<u32>,
-    dims: [usize; 3],
-}
-
-impl Region {
-    /// All cells whose centre is within `reach` cells, along each axis, of a triangle (grid coordinates).
-    pub(super) fn around(triangles: &[[DVec3; 3]], reach: f64, grid: &Grid) -> Self {
-        let dims = grid.dims.map(|n| n as usize);
-        let mut region = Self { number: vec![NO_CELL; grid.n_cells()], cells: Vec::new(), dims };
-        for triangle in triangles {
-            // A footprint's voxels have their centres half a unit further on, and half a unit of reach.
-            let footprint = Footprint::new(triangle.map(|p| p + 0.5), reach - 0.5);
-            footprint.for_each_run(dims, |y, z, first, last| {
-                let row = (z * dims[1] + y) * dims[0];
-                for cell in row + first..=row + last {
-                    if region.number[cell] == NO_CELL {
-                        region.number[cell] = region.cells.len() as u32;
-                        region.cells.push(cell as u32);
-                    }
-                }
-            });
-        }
-        region
-    }
-
-    /// Whether the cell below a point (grid coordinates) along all axes is one of them.
-    pub(super) fn holds(&self, p: DVec3) -> bool {
-        let cell = p.floor();
-        let [nx, ny, nz] = self.dims;
-        let inside =
-            cell.cmpge(DVec3::ZERO).all() && cell.cmplt(DVec3::new(nx as f64, ny as f64, nz as f64)).all();
-        inside && {
-            let [x, y, z] = cell.to_array().map(|x| x as usize);
-            self.number[(z * ny + y) * nx + x] != NO_CELL
-        }
-    }
-}
 
 /// A correction of all columns: a few fields and how much of each every column takes.
 #[derive(Clone, Debug)]
@@ -121,6 +77,12 @@ pub(super) struct Fields {
 }
 
 impl Fields {
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        let updates = self.updates.iter().flat_map(|update| &update.fields);
+        self.base.iter().chain(updates).map(|field| size_of_val(field.as_slice())).sum()
+    }
+
     /// Weights of all columns in a cell; zeros where it was outside. `out`: `[n_batches]`; `felt`: scratch space.
     #[inline(always)]
     fn at<'a>(&'a self, cell: usize, out: &mut [Row], felt: &mut Felt<'a>) {
@@ -299,7 +261,7 @@ impl Residual {
     /// are too many.
     ///
     /// Gram-Schmidt, the largest column first: harmonic functions that vanish on the same faces are nearly alike a few
-    /// cells away, so 110 columns have 15 to 40 independent residuals to six digits.
+    /// cells away, so 44 to 219 columns have 8 to 24 independent residuals to five digits.
     pub(super) fn split(self, n_rows: usize, n_columns: usize) -> Option<Split> {
         dispatch(
             #[inline(always)]

@@ -178,8 +178,8 @@ fn rows_far_from_an_edit_are_not_touched() {
     assert!(!report.anew && report.solved > 0);
     let changed: Vec<bool> =
         (0..points.len()).map(|v| first.weights.row(v) != rebound.weights.row(v)).collect();
-    assert!(changed[..40].iter().all(|&c| c), "within three of the edit all rows change");
-    assert!(changed[90..].iter().all(|&c| !c), "nine widths away none does");
+    assert!(changed[..40].iter().all(|&c| c), "around the edit all rows change");
+    assert!(changed[90..].iter().all(|&c| !c), "three widths away none does");
     assert!(rebound.report.rest_error.max_rel <= REST_ERROR);
 }
 
