@@ -12,16 +12,13 @@ use crate::report::{BindReport, MemoryBytes, Timings, WeightStats};
 use crate::sample::{Outside, Stencils};
 use crate::solve::hierarchy::Hierarchy;
 use crate::solve::rows::Row;
-use crate::solve::team::Team;
+use crate::solve::team::{Team, VERTEX_RUN};
 use crate::weights::assemble::{Assembled, RowOptions, assemble};
 
 use super::solving::solve_and_sample;
 use super::voxels::Voxels;
 use super::watch::Watch;
 use super::{BindError, BindOptions, Binding, Method, OutsidePolicy, OutsideVertex, memory};
-
-/// Vertices that a thread takes at a time: small enough to share out evenly, large enough not to notice.
-const VERTEX_RUN: usize = 512;
 
 /// Where the fields of a solve live: what counts towards the limit on working memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,7 +8,8 @@
 //! its trilinear interpolation with zeros outside: the solution is not zero on the cage (7.5e-2 -> 2.9e-2).
 //!
 //! From the second cycle on, the finest level's residual is injected ([`centres`](super::centres)): 42 cycles for the
-//! Armadillo's 14 batches instead of 43, the later ones cheaper, and 4e-6 of error left at the end instead of 7e-6 (5e-6 with the shorter last cycle, `SPARE`).
+//! Armadillo's 14 batches instead of 43, the later ones cheaper, and 4e-6 of error left at the end instead of 7e-6 (5e-6 with the
+//! shorter last cycle, `SPARE`).
 //!
 //! All passes between two restrictions are one stream through memory (`stream`): the coarse correction, the sweep after it,
 //! the next cycle's two sweeps and the residual of the red cells follow each other one z-plane apart.

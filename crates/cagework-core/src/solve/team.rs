@@ -5,6 +5,9 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+/// Vertices that a thread takes at a time: small enough to share out evenly, large enough not to notice.
+pub const VERTEX_RUN: usize = 512;
+
 /// A fixed number of threads.
 #[derive(Debug)]
 pub struct Team {

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use crate::cage::Cage;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
-use crate::solve::team::Team;
+use crate::solve::team::{Team, VERTEX_RUN};
 
 pub use self::facts::RowFacts;
 
@@ -27,9 +27,6 @@ const MAX_CORRECTIONS: usize = 3;
 /// A row that misses by more (of the cage's diagonal) after small weights were dropped keeps them all: next to a face,
 /// the many small weights of the vertices off the face are what holds the vertex away from it.
 const NOT_RESTORED: f64 = 1e-6;
-
-/// Vertices that a thread takes at a time.
-const VERTEX_RUN: usize = 512;
 
 /// How rows are made from sampled values.
 #[derive(Clone, Copy, Debug)]

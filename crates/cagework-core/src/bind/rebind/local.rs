@@ -19,9 +19,9 @@ pub(super) struct Negligible {
 }
 
 impl Negligible {
-    /// The threshold that is solved to, but no less than f32 can tell, and no more than the default. Of 48 edits of the samples' cages, three in a row each,
-    /// a third of it makes the mean error of a weight, 5.5e-8 to 1.6e-7, smaller by up to 2e-8, and takes a quarter more
-    /// corrections.
+    /// The threshold that is solved to, but no less than f32 can tell, and no more than the default. Of 48 edits of the
+    /// samples' cages, three in a row each, a third of it makes the mean error of a weight, 5.5e-8 to 1.6e-7, smaller by up
+    /// to 2e-8, and takes a quarter more corrections.
     pub(super) fn at(tau: f32) -> Self {
         // Whole binds with a coarser tau are far more exact than it, by full multigrid: edits must not be worse.
         let residual = tau.clamp(1e-6, 1e-5);

@@ -5,15 +5,12 @@ use glam::Vec3;
 use crate::cage::Cage;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
-use crate::solve::team::Team;
+use crate::solve::team::{Team, VERTEX_RUN};
 use crate::weights::ReplacedRow;
 use crate::weights::affine::Columns;
 use crate::weights::assemble::{Assembled, GOOD_ENOUGH, RowFacts, restore};
 
 use super::local::{Felt, Share, add_felt, felt_in};
-
-/// Vertices that a thread takes at a time.
-const VERTEX_RUN: usize = 512;
 
 /// A row that nothing else changes keeps its weights if the cage's move puts its vertex no further off than this, of the
 /// cage's diagonal: a tenth of what a corrected row may miss by.
