@@ -196,7 +196,7 @@ impl Rebinder {
         kept: Kept,
         watch: &Watch<'_>,
     ) -> Result<Option<(Binding, RebindReport)>, BindError> {
-        let Kept { voxels: old_voxels, stencils: old_stencils, mut fields, estimated, mut rows } = kept;
+        let Kept { voxels: old_voxels, mut stencils, mut fields, estimated, mut rows } = kept;
         let began = watch.now_ms();
         let team = Team::new(self.options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
@@ -213,23 +213,16 @@ impl Rebinder {
         let voxelized = watch.now_ms();
 
         let resampled = Region::around(&moved, RESAMPLED, &grid);
-        // What is outside follows the closest point of the cage, which may be another one from anywhere.
-        let near = |v: usize| resampled.holds(to_grid(self.points[v])) || old_stencils.is_outside(v);
         let moved_to = renumbering(&old_voxels.hierarchy.levels[0].row_of, &level.row_of, &old_voxels);
-        let mut failed = None;
-        let (stencils, changed) = old_stencils.renewed(
-            &moved_to,
-            |v| !near(v),
-            |changed| {
-                let points: Vec<Vec3> = changed.iter().map(|&v| self.points[v as usize]).collect();
-                sampling_stencils(cage, &voxels, &points, &team, watch).unwrap_or_else(|error| {
-                    failed = Some(error);
-                    Stencils::new()
-                })
-            },
-        );
-        if let Some(error) = failed {
-            return Err(error);
+        if let Some(moved_to) = moved_to {
+            stencils.renumber(&moved_to);
+        }
+        // What is outside follows the closest point of the cage, which may be another one from anywhere.
+        let near = |v: usize| resampled.holds(to_grid(self.points[v])) || stencils.is_outside(v);
+        let changed = stencils.stale(|v| !near(v));
+        if !changed.is_empty() {
+            let points: Vec<Vec3> = changed.iter().map(|&v| self.points[v as usize]).collect();
+            stencils.replace(&changed, &sampling_stencils(cage, &voxels, &points, &team, watch)?);
         }
         refuse_outside(&stencils, &self.options, &self.welded)?;
         let stencils_made = watch.now_ms();
@@ -333,13 +326,17 @@ fn moved_triangles(before: &Cage, after: &Cage, to_grid: impl Fn(Vec3) -> DVec3)
     Some(moved)
 }
 
-/// For every old row the new one of the same cell; [`NO_CELL`] if it is gone. Zero rows are nobody's.
-fn renumbering(old: &[u32], new: &[u32], voxels: &Voxels) -> Vec<u32> {
+/// For every old row the new one of the same cell; [`NO_CELL`] if it is gone. Zero rows are nobody's. `None` if all are where
+/// they were.
+fn renumbering(old: &[u32], new: &[u32], voxels: &Voxels) -> Option<Vec<u32>> {
+    if old == new {
+        return None;
+    }
     let mut moved_to = vec![NO_CELL; voxels.hierarchy.levels[0].n_rows()];
     for (&from, &to) in old.iter().zip(new) {
         if from != NO_CELL {
             moved_to[from as usize] = to;
         }
     }
-    moved_to
+    Some(moved_to)
 }

@@ -141,40 +141,28 @@ impl Stencils {
         self.outside.extend(other.outside.iter().map(|o| Outside { vertex: o.vertex + v, ..*o }));
     }
 
-    /// The stencils of other rows of the field: `row_of[row]` is where a row went, if it still is somewhere. Vertices
-    /// for which `keep` fails or a row is gone get the next of `fresh(those vertices)`.
-    #[must_use]
-    pub fn renewed(
-        &self,
-        row_of: &[u32],
-        keep: impl Fn(usize) -> bool,
-        fresh: impl FnOnce(&[u32]) -> Self,
-    ) -> (Self, Vec<u32>) {
-        let stale = |(v, (nodes, _)): &(usize, (Entries<'_>, Entries<'_>))| {
-            !keep(*v) || nodes.iter().any(|&(row, _)| row_of[row as usize] == NO_CELL)
-        };
-        let changed: Vec<u32> = self.iter().enumerate().filter(stale).map(|(v, _)| v as u32).collect();
-        let fresh = fresh(&changed);
-        let mut renewed = Self::new();
-        renewed.nodes.reserve(self.nodes.len());
-        renewed.hats.reserve(self.hats.len());
-        let (mut new, mut next) = (fresh.iter(), changed.iter().peekable());
-        for (v, kept) in self.iter().enumerate() {
-            let is_new = next.next_if_eq(&&(v as u32)).is_some();
-            let (nodes, hats) = if is_new { new.next().unwrap_or_default() } else { kept };
-            let moved = |&(row, w): &(u32, f32)| (if is_new { row } else { row_of[row as usize] }, w);
-            renewed.nodes.extend(nodes.iter().map(moved));
-            renewed.hats.extend_from_slice(hats);
-            renewed.node_start.push(renewed.nodes.len() as u32);
-            renewed.hat_start.push(renewed.hats.len() as u32);
+    /// Follows the rows of the field to where they went: `row_of[row]`, [`NO_CELL`] if they are gone.
+    pub fn renumber(&mut self, row_of: &[u32]) {
+        for (row, _) in &mut self.nodes {
+            *row = row_of[*row as usize];
         }
-        let still = self.outside.iter().filter(|o| changed.binary_search(&o.vertex).is_err()).copied();
-        renewed.outside.extend(still);
-        renewed
-            .outside
-            .extend(fresh.outside.iter().map(|o| Outside { vertex: changed[o.vertex as usize], ..*o }));
-        renewed.outside.sort_by_key(|o| o.vertex);
-        (renewed, changed)
+    }
+
+    /// Vertices for which `keep` fails or a row is gone, ascending.
+    #[must_use]
+    pub fn stale(&self, keep: impl Fn(usize) -> bool) -> Vec<u32> {
+        let has_gone = |v: usize| self.at(v).0.iter().any(|&(row, _)| row == NO_CELL);
+        (0..self.len()).filter(|&v| !keep(v) || has_gone(v)).map(|v| v as u32).collect()
+    }
+
+    /// Puts the stencils of `fresh`, one after another, in place of those of `vertices`, which ascend.
+    pub fn replace(&mut self, vertices: &[u32], fresh: &Self) {
+        splice(&mut self.node_start, &mut self.nodes, vertices, (&fresh.node_start, &fresh.nodes));
+        splice(&mut self.hat_start, &mut self.hats, vertices, (&fresh.hat_start, &fresh.hats));
+        self.outside.retain(|o| vertices.binary_search(&o.vertex).is_err());
+        self.outside
+            .extend(fresh.outside.iter().map(|o| Outside { vertex: vertices[o.vertex as usize], ..*o }));
+        self.outside.sort_unstable_by_key(|o| o.vertex);
     }
 
     /// Weights of all vertices for the columns of one batch.
@@ -240,5 +228,72 @@ impl Stencils {
             + size_of_val(self.hats.as_slice())
             + size_of_val(self.node_start.as_slice())
             + size_of_val(self.hat_start.as_slice())
+    }
+}
+
+/// Puts other lists of entries in place of those of `vertices`, which ascend.
+fn splice(
+    start: &mut [u32],
+    entries: &mut Vec<(u32, f32)>,
+    vertices: &[u32],
+    (fresh_start, fresh): (&[u32], Entries<'_>),
+) {
+    let mut spliced = Vec::with_capacity(entries.len() + fresh.len());
+    // Entry and vertex up to which all is done.
+    let (mut entry, mut vertex) = (0, 0);
+    for (&v, fresh_start) in vertices.iter().zip(fresh_start.windows(2)) {
+        let v = v as usize;
+        let [begin, end] = [v, v + 1].map(|v| start[v] as usize);
+        move_by(&mut start[vertex..=v], spliced.len(), entry);
+        spliced.extend_from_slice(&entries[entry..begin]);
+        spliced.extend_from_slice(&fresh[fresh_start[0] as usize..fresh_start[1] as usize]);
+        (entry, vertex) = (end, v + 1);
+    }
+    move_by(&mut start[vertex..], spliced.len(), entry);
+    spliced.extend_from_slice(&entries[entry..]);
+    *entries = spliced;
+}
+
+fn move_by(starts: &mut [u32], to: usize, from: usize) {
+    for start in starts {
+        *start = *start + to as u32 - from as u32;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each vertex has as many nodes as its number says, all of row `number + 10 * generation`.
+    fn stencils(numbers: &[u32], generation: u32) -> Stencils {
+        let mut all = Stencils::new();
+        for &n in numbers {
+            let nodes = (0..n).map(|k| (10 * generation + n, f64::from(k + 1))).collect();
+            all.push(&Stencil { nodes, hats: vec![(n, 1.0)] });
+        }
+        all
+    }
+
+    #[test]
+    fn replaced_stencils_are_those_of_their_vertices() {
+        let mut all = stencils(&[2, 1, 3, 1, 2], 0);
+        all.replace(&[0, 2, 3], &stencils(&[1, 4, 2], 1));
+        let expected = stencils(&[1, 1, 4, 2, 2], 0);
+        for (v, is_new) in [true, false, true, true, false].into_iter().enumerate() {
+            let (nodes, hats) = all.at(v);
+            let (expected, expected_hats) = expected.at(v);
+            let moved: Vec<(u32, f32)> =
+                expected.iter().map(|&(row, w)| (row + if is_new { 10 } else { 0 }, w)).collect();
+            assert_eq!((nodes, hats), (moved.as_slice(), expected_hats), "vertex {v}");
+        }
+        assert_eq!(all.len(), 5);
+    }
+
+    #[test]
+    fn rows_that_are_gone_make_their_vertices_stale() {
+        let mut all = stencils(&[1, 2, 3], 0);
+        all.renumber(&[0, 7, NO_CELL, 5]);
+        assert_eq!(all.stale(|v| v != 2), [1, 2]);
+        assert_eq!(all.at(0).0, [(7, 1.0)]);
     }
 }

@@ -47,9 +47,9 @@ pub(super) struct Update {
 #[derive(Clone, Debug)]
 pub(super) struct Share {
     /// `[n_batches]`
-    columns: Vec<Row>,
+    pub(super) columns: Vec<Row>,
     /// Value of the field below which no column feels it.
-    unfelt: f32,
+    pub(super) unfelt: f32,
 }
 
 impl Share {

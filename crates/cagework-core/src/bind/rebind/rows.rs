@@ -1,6 +1,6 @@
 //! Rows of weights brought up to date: those that an edit reaches are corrected in place, the others stay.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::cage::Cage;
 use crate::simd::dispatch;
@@ -52,8 +52,9 @@ struct Run<'a> {
 struct Shared<'a> {
     edit: Edit<'a>,
     columns: Columns,
-    /// Moved vertices of the cage, and how far over its diagonal.
-    moved: Vec<(usize, f64)>,
+    /// Moved vertices of the cage, and where to, over its diagonal.
+    moved: Vec<(usize, DVec3)>,
+    moments: Moments,
     indptr: &'a [u32],
     indices: &'a [u32],
 }
@@ -65,7 +66,7 @@ impl Edit<'_> {
         let columns = Columns::new(after);
         let n_batches = columns.n_batches();
         let way = |(column, (a, b)): (usize, (&Vec3, &Vec3))| {
-            (a != b).then(|| (column, f64::from(a.distance(*b)) / f64::from(after.diagonal())))
+            (a != b).then(|| (column, (*b - *a).as_dvec3() / f64::from(after.diagonal())))
         };
         let moved = before.positions().iter().zip(after.positions()).enumerate().filter_map(way).collect();
         let (indptr, indices, mut data) = rows.weights.parts_mut();
@@ -77,7 +78,8 @@ impl Edit<'_> {
             let data = data.split_off_mut(..n).expect("the last row pointer is the number of weights");
             runs.push(Run { first, offset, data, facts, replaced: Vec::new() });
         }
-        let shared = Shared { edit: *self, columns, moved, indptr, indices };
+        let moments = Moments::new(self.shares, &columns);
+        let shared = Shared { edit: *self, columns, moved, moments, indptr, indices };
         team.each_mut(&mut runs, |run| {
             dispatch(
                 #[inline(always)]
@@ -88,6 +90,93 @@ impl Edit<'_> {
         if !replaced.is_empty() {
             rows.weights = rows.weights.with_replaced(&replaced);
         }
+    }
+}
+
+impl Shared<'_> {
+    /// Corrects a row that may be off, and says what it is like now.
+    #[inline(always)]
+    fn restored(&self, row: &mut [Row], point: Vec3, is_outside: bool, off: Off) -> RowFacts {
+        if let Off::Little { sum, miss } = off {
+            return RowFacts::of(row, 1.0 + sum, Some(miss));
+        }
+        let target = self.columns.scale(point.as_dvec3());
+        let sums = match off {
+            Off::Much => (f64::INFINITY, f64::INFINITY),
+            _ => self.columns.sums(row, target),
+        };
+        let is_off = sums.1.max((sums.0 - 1.0).abs()) > GOOD_ENOUGH;
+        let (sum, miss) = if is_off && !is_outside { restore(&self.columns, row, target) } else { sums };
+        RowFacts::of(row, sum, (!is_outside).then_some(miss))
+    }
+}
+
+/// How far a row may be from summing to 1 and from its vertex, over the cage's diagonal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Off {
+    /// At most so far, which is good enough.
+    Little { sum: f64, miss: f64 },
+    /// Further than is good enough.
+    Much,
+    /// To be measured.
+    Unknown,
+}
+
+impl RowFacts {
+    /// How far a row is off that changes its sum and its point by so much, and of which weights are cut off at 0.
+    #[inline(always)]
+    fn after(&self, sum: f64, way: DVec3, clipped: f64) -> Off {
+        let (changed, moved) = (sum.abs() + clipped, way.length() + clipped);
+        let (sum, miss) =
+            (f64::from(self.sum_error) + changed, f64::from(self.error.unwrap_or(f32::INFINITY)) + moved);
+        if sum.max(miss) <= GOOD_ENOUGH {
+            Off::Little { sum, miss }
+        } else if changed.max(moved) > GOOD_ENOUGH {
+            Off::Much
+        } else {
+            Off::Unknown
+        }
+    }
+}
+
+/// What a unit of each correction adds to the sum of a row and to its point.
+struct Moments {
+    /// Sum, x, y, z. `[n_batches of corrections]`
+    of_batch: Vec<[Row; 4]>,
+    /// Values below which a correction is not added. `[n_batches of corrections]`
+    unfelt: Vec<Row>,
+}
+
+impl Moments {
+    fn new(shares: &[Share], columns: &Columns) -> Self {
+        let n_batches = shares.len().div_ceil(LANES);
+        let mut moments = Self { of_batch: vec![[ZERO; 4]; n_batches], unfelt: vec![ZERO; n_batches] };
+        for (k, share) in shares.iter().enumerate() {
+            let (batch, lane) = (k / LANES, k % LANES);
+            let (sum, _) = columns.sums(&share.columns, DVec3::ZERO);
+            let point = columns.combined(&share.columns);
+            for (moment, value) in moments.of_batch[batch].iter_mut().zip([sum, point.x, point.y, point.z]) {
+                moment[lane] = value as f32;
+            }
+            moments.unfelt[batch][lane] = share.unfelt;
+        }
+        moments
+    }
+
+    /// Sum, x, y, z of corrections with these values.
+    #[inline(always)]
+    fn of<'a>(&self, values: impl Iterator<Item = &'a Row>) -> [f32; 4] {
+        let (mut s, mut x, mut y, mut z) = (ZERO, ZERO, ZERO, ZERO);
+        for ((values, unfelt), [ms, mx, my, mz]) in values.zip(&self.unfelt).zip(&self.of_batch) {
+            for k in 0..LANES {
+                let value = if values[k].abs() > unfelt[k] { values[k] } else { 0.0 };
+                s[k] += value * ms[k];
+                x[k] += value * mx[k];
+                y[k] += value * my[k];
+                z[k] += value * mz[k];
+            }
+        }
+        [s, x, y, z].map(|lanes| lanes.iter().sum())
     }
 }
 
@@ -106,34 +195,38 @@ impl Run<'_> {
             let indices = &shared.indices[range.clone()];
             let data = &mut self.data[range.start - self.offset..range.end - self.offset];
             let is_resampled = resampled.0.get(next) == Some(&(v as u32));
+            let mut change = None;
             if is_resampled {
                 row.copy_from_slice(&resampled.1[next * n_batches..(next + 1) * n_batches]);
                 next += 1;
             } else {
-                let way = |&(column, way): &(usize, f64)| f64::from(weight_of(column, indices, data)) * way;
-                let off = if felt.is_empty() { shared.moved.iter().map(way).sum() } else { f64::INFINITY };
-                if off < UNMOVED {
+                let way = |&(column, way): &(usize, DVec3)| f64::from(weight_of(column, indices, data)) * way;
+                let way: DVec3 = shared.moved.iter().map(way).sum();
+                if felt.is_empty() && way.length() < UNMOVED {
                     let facts = &mut self.facts[k];
-                    facts.error = facts.error.map(|error| error + off as f32);
+                    facts.error = facts.error.map(|error| error + way.length() as f32);
                     continue;
                 }
                 expand(indices, data, &mut row);
+                if is_full(indices) {
+                    change = Some((way, shared.moments.of(samples.iter().map(|batch| &batch[v]))));
+                }
             }
             add_felt(&mut row, &felt);
-            for w in &mut row {
-                *w = w.map(|w| if w > 0.0 { w } else { 0.0 });
-            }
+            let clipped = clip(&mut row);
             if indices.len() < shared.edit.cages[1].n_vertices() {
                 forget_unstored(&mut row, indices);
             }
-            let target = shared.columns.scale(points[v].as_dvec3());
             let outside = is_outside(v);
-            // Far from the edit the sums still hold: corrections are harmonic, as what they correct is.
-            let (mut sum, mut miss) = shared.columns.sums(&row, target);
-            if !outside && miss.max((sum - 1.0).abs()) > GOOD_ENOUGH {
-                (sum, miss) = restore(&shared.columns, &mut row, target);
-            }
-            self.facts[k] = RowFacts::of(&row, sum, (!outside).then_some(miss));
+            let off = match change {
+                Some((way, [sum, x, y, z])) if !outside => self.facts[k].after(
+                    f64::from(sum),
+                    way + Vec3::new(x, y, z).as_dvec3(),
+                    f64::from(clipped),
+                ),
+                _ => Off::Unknown,
+            };
+            self.facts[k] = shared.restored(&mut row, points[v], outside, off);
             let n_nonzero = n_nonzeros(&row);
             // As outside the cage, where only the closest triangle's corners count.
             let is_other = FAR_FEWER * n_nonzero < indices.len();
@@ -182,6 +275,22 @@ fn expand(indices: &[u32], data: &[f32], row: &mut [Row]) {
             row[column as usize / LANES][column as usize % LANES] = w;
         }
     }
+}
+
+/// Sets negative weights to 0; returns what they sum to, without the sign.
+#[inline(always)]
+fn clip(row: &mut [Row]) -> f32 {
+    let mut clipped = ZERO;
+    for row in row {
+        let mut kept = ZERO;
+        for lane in 0..LANES {
+            let w = row[lane];
+            kept[lane] = if w > 0.0 { w } else { 0.0 };
+            clipped[lane] += kept[lane] - w;
+        }
+        *row = kept;
+    }
+    clipped.iter().sum()
 }
 
 /// Weights of a row that are not 0.
