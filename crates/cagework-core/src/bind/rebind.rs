@@ -10,6 +10,7 @@
 mod local;
 mod region;
 mod rows;
+mod shares;
 mod steps;
 #[cfg(test)]
 mod tests;

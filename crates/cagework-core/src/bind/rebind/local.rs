@@ -8,6 +8,7 @@ use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 
 use super::region::Region;
+use super::shares::{Felt, Shares, add_scaled};
 
 /// What is left out, as changes of a weight.
 #[derive(Clone, Copy, Debug)]
@@ -39,32 +40,7 @@ pub(super) struct Update {
     /// `[n_batches of fields][n_rows]`
     pub(super) fields: Vec<Vec<Row>>,
     pub(super) row_of: Arc<Vec<u32>>,
-    /// `[n_fields]`
-    pub(super) shares: Vec<Share>,
-}
-
-/// How much every column takes of one field.
-#[derive(Clone, Debug)]
-pub(super) struct Share {
-    /// `[n_batches]`
-    pub(super) columns: Vec<Row>,
-    /// Value of the field below which no column feels it.
-    pub(super) unfelt: f32,
-}
-
-impl Share {
-    /// Shares of a field that is made so much larger that they have a norm of 1, and how much: then the field's norm is what
-    /// it changes all columns by.
-    fn normalized(mut columns: Vec<Row>, negligible: Negligible) -> (Self, f32) {
-        let squares = columns.iter().flatten().map(|&w| f64::from(w).powi(2)).sum::<f64>();
-        let norm = (squares.sqrt() as f32).max(f32::MIN_POSITIVE);
-        let mut largest = f32::MIN_POSITIVE;
-        for w in columns.iter_mut().flatten() {
-            *w /= norm;
-            largest = largest.max(w.abs());
-        }
-        (Self { columns, unfelt: negligible.correction / largest }, norm)
-    }
+    pub(super) shares: Shares,
 }
 
 /// All columns' fields: those of the last whole bind, and the corrections since.
@@ -85,79 +61,21 @@ impl Fields {
 
     /// Weights of all columns in a cell; zeros where it was outside. `out`: `[n_batches]`; `felt`: scratch space.
     #[inline(always)]
-    fn at<'a>(&'a self, cell: usize, out: &mut [Row], felt: &mut Felt<'a>) {
-        felt.clear();
-        let mut row = self.row_of[cell];
-        let mut is_known = row != NO_CELL;
-        for update in &self.updates {
-            if update.row_of[cell] == NO_CELL {
-                // Outside at the time: whatever it was before does not count.
-                felt.clear();
-                is_known = false;
-                continue;
-            }
-            let row = update.row_of[cell] as usize;
-            felt_in(&update.shares, felt, update.fields.iter().map(|field| &field[row]));
-        }
-        if !is_known {
-            row = NO_CELL;
-        }
+    fn at(&self, cell: usize, out: &mut [Row], felt: &mut Felt) {
+        let row = self.row_of[cell];
         for (base, out) in self.base.iter().zip(out.iter_mut()) {
             *out = if row == NO_CELL { ZERO } else { base[row as usize] };
         }
-        add_felt(out, felt);
-    }
-}
-
-/// Shares of all columns, each with how much of it is taken.
-pub(super) type Felt<'a> = Vec<(&'a [Row], f32)>;
-
-/// Adds to `felt` the shares that are felt; `values`: batch by batch, how much is taken of each.
-#[inline(always)]
-pub(super) fn felt_in<'a, 'b>(
-    shares: &'a [Share],
-    felt: &mut Felt<'a>,
-    values: impl Iterator<Item = &'b Row>,
-) {
-    for (shares, values) in shares.chunks(LANES).zip(values) {
-        for (share, &value) in shares.iter().zip(values) {
-            if value.abs() > share.unfelt {
-                felt.push((&share.columns, value));
+        for update in &self.updates {
+            let row = update.row_of[cell];
+            if row == NO_CELL {
+                // Outside at the time: whatever it was before does not count.
+                out.fill(ZERO);
+            } else {
+                update.shares.pick(felt, update.fields.iter().map(|field| &field[row as usize]));
+                update.shares.add(felt, out);
             }
         }
-    }
-}
-
-/// Adds what is taken of the shares to a row of all columns: four at a time, or most of the work would be loading and
-/// storing sums.
-#[cfg_attr(not(target_family = "wasm"), inline(always))]
-#[cfg_attr(target_family = "wasm", inline(never))]
-pub(super) fn add_felt(out: &mut [Row], felt: &Felt<'_>) {
-    let (fours, rest) = felt.as_chunks::<4>();
-    for [(a, va), (b, vb), (c, vc), (d, vd)] in fours {
-        for ((((out, a), b), c), d) in out.iter_mut().zip(*a).zip(*b).zip(*c).zip(*d) {
-            // In a variable of its own, which no share can be part of: only so are lanes taken together.
-            let mut sum = *out;
-            for lane in 0..LANES {
-                sum[lane] += va * a[lane] + vb * b[lane] + (vc * c[lane] + vd * d[lane]);
-            }
-            *out = sum;
-        }
-    }
-    for (share, value) in rest {
-        add_scaled(out, share, *value);
-    }
-}
-
-/// `out += value * share`
-#[inline(always)]
-pub(super) fn add_scaled(out: &mut [Row], share: &[Row], value: f32) {
-    for (out, share) in out.iter_mut().zip(share) {
-        let mut sum = *out;
-        for lane in 0..LANES {
-            sum[lane] += value * share[lane];
-        }
-        *out = sum;
     }
 }
 
@@ -176,8 +94,7 @@ pub(super) struct Residual {
 pub(super) struct Split {
     /// Right-hand sides. `[n_batches of them][n_rows]`
     pub(super) right: Vec<Vec<Row>>,
-    /// `[n_of them]`
-    pub(super) shares: Vec<Share>,
+    pub(super) shares: Shares,
 }
 
 impl Residual {
@@ -273,7 +190,7 @@ impl Residual {
     fn split_columns(mut self, n_rows: usize, n_columns: usize) -> Option<Split> {
         let n_batches = n_columns.div_ceil(LANES);
         let mut right = Vec::new();
-        let mut shares = Vec::new();
+        let mut shares = Shares::new(n_batches);
         loop {
             let mut largest = vec![ZERO; n_batches];
             for row in &self.values {
@@ -315,8 +232,7 @@ impl Residual {
             if rank.is_multiple_of(LANES) {
                 right.push(vec![ZERO; n_rows]);
             }
-            let (share, norm) = Share::normalized(share, self.negligible);
-            shares.push(share);
+            let norm = shares.push(share, self.negligible);
             let batch = &mut right[rank / LANES];
             for ((&row, &q), &diagonal) in self.rows.iter().zip(&unit).zip(&self.diagonals) {
                 batch[row as usize][rank % LANES] = q * diagonal * norm;

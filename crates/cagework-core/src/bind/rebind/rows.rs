@@ -10,7 +10,7 @@ use crate::weights::ReplacedRow;
 use crate::weights::affine::Columns;
 use crate::weights::assemble::{Assembled, GOOD_ENOUGH, RowFacts, restore};
 
-use super::local::{Felt, Share, add_felt, felt_in};
+use super::shares::{Felt, Shares};
 
 /// A row that nothing else changes keeps its weights if the cage's move puts its vertex no further off than this, of the
 /// cage's diagonal: a tenth of what a corrected row may miss by.
@@ -31,8 +31,7 @@ pub(super) struct Edit<'a> {
     pub(super) points: &'a [Vec3],
     /// Corrections at them. `[n_batches of corrections][n_points]`
     pub(super) samples: &'a [&'a [Row]],
-    /// `[n_corrections]`
-    pub(super) shares: &'a [Share],
+    pub(super) shares: &'a Shares,
     /// Vertices whose old weights are sampled anew, ascending, and those rows: `[n_resampled][n_batches]`.
     pub(super) resampled: (&'a [u32], &'a [Row]),
 }
@@ -139,44 +138,33 @@ impl RowFacts {
     }
 }
 
-/// What a unit of each correction adds to the sum of a row and to its point.
+/// What a unit of each correction adds to the sum of a row and to its point: sum, x, y, z.
 struct Moments {
-    /// Sum, x, y, z. `[n_batches of corrections]`
-    of_batch: Vec<[Row; 4]>,
-    /// Values below which a correction is not added. `[n_batches of corrections]`
-    unfelt: Vec<Row>,
+    /// `[n_corrections]`
+    of_field: Vec<[f32; 4]>,
 }
 
 impl Moments {
-    fn new(shares: &[Share], columns: &Columns) -> Self {
-        let n_batches = shares.len().div_ceil(LANES);
-        let mut moments = Self { of_batch: vec![[ZERO; 4]; n_batches], unfelt: vec![ZERO; n_batches] };
-        for (k, share) in shares.iter().enumerate() {
-            let (batch, lane) = (k / LANES, k % LANES);
-            let (sum, _) = columns.sums(&share.columns, DVec3::ZERO);
-            let point = columns.combined(&share.columns);
-            for (moment, value) in moments.of_batch[batch].iter_mut().zip([sum, point.x, point.y, point.z]) {
-                moment[lane] = value as f32;
-            }
-            moments.unfelt[batch][lane] = share.unfelt;
-        }
-        moments
+    fn new(shares: &Shares, columns: &Columns) -> Self {
+        let of_share = |share| {
+            let ((sum, _), point) = (columns.sums(share, DVec3::ZERO), columns.combined(share));
+            [sum, point.x, point.y, point.z].map(|x| x as f32)
+        };
+        Self { of_field: shares.iter().map(of_share).collect() }
     }
 
-    /// Sum, x, y, z of corrections with these values.
+    /// Of all that is felt.
     #[inline(always)]
-    fn of<'a>(&self, values: impl Iterator<Item = &'a Row>) -> [f32; 4] {
-        let (mut s, mut x, mut y, mut z) = (ZERO, ZERO, ZERO, ZERO);
-        for ((values, unfelt), [ms, mx, my, mz]) in values.zip(&self.unfelt).zip(&self.of_batch) {
-            for k in 0..LANES {
-                let value = if values[k].abs() > unfelt[k] { values[k] } else { 0.0 };
-                s[k] += value * ms[k];
-                x[k] += value * mx[k];
-                y[k] += value * my[k];
-                z[k] += value * mz[k];
+    fn of(&self, felt: &Felt) -> (f64, DVec3) {
+        let mut moments = [0.0f32; 4];
+        for (field, value) in felt.iter() {
+            let of_field = self.of_field[field];
+            for k in 0..4 {
+                moments[k] += value * of_field[k];
             }
         }
-        [s, x, y, z].map(|lanes| lanes.iter().sum())
+        let [sum, x, y, z] = moments.map(f64::from);
+        (sum, DVec3::new(x, y, z))
     }
 }
 
@@ -185,12 +173,11 @@ impl Run<'_> {
     fn update(&mut self, shared: &Shared<'_>, n_batches: usize, is_outside: &impl Fn(usize) -> bool) {
         let Edit { points, samples, shares, resampled, .. } = shared.edit;
         let mut row = vec![ZERO; n_batches];
-        let mut felt = Felt::with_capacity(shares.len());
+        let mut felt = Felt::new();
         let mut next = resampled.0.partition_point(|&v| (v as usize) < self.first);
         for k in 0..self.facts.len() {
             let v = self.first + k;
-            felt.clear();
-            felt_in(shares, &mut felt, samples.iter().map(|batch| &batch[v]));
+            shares.pick(&mut felt, samples.iter().map(|batch| &batch[v]));
             let range = shared.indptr[v] as usize..shared.indptr[v + 1] as usize;
             let indices = &shared.indices[range.clone()];
             let data = &mut self.data[range.start - self.offset..range.end - self.offset];
@@ -209,25 +196,23 @@ impl Run<'_> {
                 }
                 expand(indices, data, &mut row);
                 if is_full(indices) {
-                    change = Some((way, shared.moments.of(samples.iter().map(|batch| &batch[v]))));
+                    let (sum, moved) = shared.moments.of(&felt);
+                    change = Some((sum, way + moved));
                 }
             }
-            add_felt(&mut row, &felt);
+            shares.add(&felt, &mut row);
             let clipped = clip(&mut row);
             if indices.len() < shared.edit.cages[1].n_vertices() {
                 forget_unstored(&mut row, indices);
             }
             let outside = is_outside(v);
             let off = match change {
-                Some((way, [sum, x, y, z])) if !outside => self.facts[k].after(
-                    f64::from(sum),
-                    way + Vec3::new(x, y, z).as_dvec3(),
-                    f64::from(clipped),
-                ),
+                Some((sum, way)) if !outside => self.facts[k].after(sum, way, f64::from(clipped)),
                 _ => Off::Unknown,
             };
             self.facts[k] = shared.restored(&mut row, points[v], outside, off);
-            let n_nonzero = n_nonzeros(&row);
+            // Rows of all columns stay what they are, but for vertices that are outside now.
+            let n_nonzero = if is_full(indices) && !is_resampled { indices.len() } else { n_nonzeros(&row) };
             // As outside the cage, where only the closest triangle's corners count.
             let is_other = FAR_FEWER * n_nonzero < indices.len();
             if is_other || !store(&row, n_nonzero, indices, data) {
@@ -280,17 +265,17 @@ fn expand(indices: &[u32], data: &[f32], row: &mut [Row]) {
 /// Sets negative weights to 0; returns what they sum to, without the sign.
 #[inline(always)]
 fn clip(row: &mut [Row]) -> f32 {
-    let mut clipped = ZERO;
-    for row in row {
-        let mut kept = ZERO;
+    let mut lows = ZERO;
+    for row in row.iter() {
         for lane in 0..LANES {
-            let w = row[lane];
-            kept[lane] = if w > 0.0 { w } else { 0.0 };
-            clipped[lane] += kept[lane] - w;
+            lows[lane] = if row[lane] < lows[lane] { row[lane] } else { lows[lane] };
         }
-        *row = kept;
     }
-    clipped.iter().sum()
+    if lows == ZERO {
+        return 0.0;
+    }
+    let negative = row.iter_mut().flatten().filter(|w| **w < 0.0);
+    negative.map(|w| -std::mem::take(w)).sum()
 }
 
 /// Weights of a row that are not 0.

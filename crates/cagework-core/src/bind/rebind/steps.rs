@@ -11,8 +11,9 @@ use crate::solve::hierarchy::Hierarchy;
 use crate::solve::rows::{LANES, Row, ZERO};
 use crate::solve::team::Team;
 
-use super::local::{OldCells, add_scaled};
+use super::local::OldCells;
 use super::region::Region;
+use super::shares::add_scaled;
 
 /// Share of the threshold that corrections are solved to. They live in few cells, and the norm is a mean over all: solved to
 /// the threshold itself, a weight near the edit was 3 to 7 times as far off as after a whole bind; so it is as exact.
