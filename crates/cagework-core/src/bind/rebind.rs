@@ -5,8 +5,9 @@
 //! belong to the moved faces vanish on them, so they look alike a few cells away. Those few are solved for, and every
 //! column, also at the mesh's vertices, takes its share of them. What is neglected (residuals of about tau an edit) adds up, so
 //! after [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid or the faces change, when cells near moved
-//! faces are a quarter of all, or when nearly all columns' residuals are independent.
+//! faces are a seventh of all, or when nearly all columns' residuals are independent.
 
+mod equations;
 mod local;
 mod region;
 mod rows;
@@ -29,6 +30,7 @@ use crate::solve::rows::{LANES, Row};
 use crate::solve::team::Team;
 use crate::weights::assemble::Assembled;
 
+use self::equations::{Equations, cells_of_rows};
 use self::local::{Fields, Negligible, OldCells, Residual, Split, Update};
 use self::region::Region;
 use self::rows::Edit;
@@ -48,14 +50,12 @@ const FORCED: f32 = -1e-5;
 /// Cells that a face's corners may be off its triangles' planes, when it is cut into others: [`CHANGED`] covers those between.
 const MOST_BENT: f64 = 1.0;
 
-/// Cells around the moved faces whose equations may have changed.
+/// Everything is bound anew if one in so many cells is at a moved face.
+const MOST: usize = 7;
+
+/// Cells around the moved faces whose equations may have changed, and in which stencils are made anew: a stencil sees the
+/// triangles in its cube of centres.
 const CHANGED: f64 = 1.5;
-
-/// Cells around them in which stencils are made anew: a stencil sees the triangles in its cube of centres.
-const RESAMPLED: f64 = 1.5;
-
-/// Cells around them in which the old fields are needed: those stencils' centres.
-const NEEDED: f64 = 3.0;
 
 /// How a bind was brought up to date.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -205,21 +205,20 @@ impl Rebinder {
         let to_grid = |p: Vec3| grid.to_grid(p.as_dvec3());
         let Some(moved) = moved_triangles(&self.cage, cage, to_grid) else { return Ok(None) };
         let n_batches = cage.n_vertices().div_ceil(LANES);
-        let needed = Region::around(&moved, NEEDED, &grid);
-        if 4 * needed.cells.len() > grid.n_cells() {
+        let region = Region::around(&moved, CHANGED, &grid);
+        if MOST * region.cells.len() > grid.n_cells() {
             return Ok(None);
         }
         let voxels = team.install(|| Voxels::new(cage, grid, &self.options));
         let level = &voxels.hierarchy.levels[0];
         let voxelized = watch.now_ms();
 
-        let resampled = Region::around(&moved, RESAMPLED, &grid);
         let moved_to = renumbering(&old_voxels.hierarchy.levels[0].row_of, &level.row_of, &old_voxels);
         if let Some(moved_to) = moved_to {
             stencils.renumber(&moved_to);
         }
         // What is outside follows the closest point of the cage, which may be another one from anywhere.
-        let near = |v: usize| resampled.holds(to_grid(self.points[v])) || stencils.is_outside(v);
+        let near = |v: usize| region.holds(to_grid(self.points[v])) || stencils.is_outside(v);
         let changed = stencils.stale(|v| !near(v));
         if !changed.is_empty() {
             let points: Vec<Vec3> = changed.iter().map(|&v| self.points[v as usize]).collect();
@@ -232,13 +231,18 @@ impl Rebinder {
         let (mut rank, mut sampled) = (0, stencils_made);
         if !moved.is_empty() {
             let negligible = Negligible::at(self.options.tau);
+            let equations = Equations::changed(level, &old_voxels.hierarchy.levels[0], &region);
+            let mut needed = equations.neighbourhood(level);
+            let cell_of = if changed.is_empty() { Vec::new() } else { cells_of_rows(level) };
+            for (row, _) in changed.iter().flat_map(|&v| stencils.at(v as usize).0) {
+                needed.add(cell_of[*row as usize] as usize);
+            }
             let old = OldCells::new(&fields, &needed, n_batches);
-            let region = Region::around(&moved, CHANGED, &grid);
-            let residual = Residual::new(level, &region, n_batches, &old, negligible);
+            let residual = Residual::new(level, &equations, n_batches, &old, negligible);
             let Some(Split { right, shares }) = residual.split(level.n_rows(), cage.n_vertices()) else {
                 return Ok(None);
             };
-            let resampled = resample(&stencils, &changed, level, &old, &needed, n_batches);
+            let resampled = resample(&stencils, &changed, &cell_of, &old, n_batches);
             rank = shares.len();
             let corrections = solve_for(&voxels.hierarchy, &stencils, &right, &self.options, &team, watch)?;
             solved.converged_as(&corrections.iter().map(|c| &c.report).collect::<Vec<_>>());

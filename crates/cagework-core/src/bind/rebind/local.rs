@@ -7,6 +7,7 @@ use crate::levels::Level;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 
+use super::equations::Equations;
 use super::region::Region;
 use super::shares::{Felt, Shares, add_scaled};
 
@@ -79,7 +80,7 @@ impl Fields {
     }
 }
 
-/// What the old fields leave of the new equations: one row of all columns for each unknown of the region, as the change of
+/// What the old fields leave of equations that may have changed: one row of all columns for each unknown, as the change of
 /// the cell's weights that would meet its own equation.
 pub(super) struct Residual {
     /// Row of the field of each unknown.
@@ -98,28 +99,19 @@ pub(super) struct Split {
 }
 
 impl Residual {
-    /// Residuals of the unknowns in `region`; `old(cell)` must be known one cell beyond it.
+    /// Residuals of equations; `old` must know their cells and those around them.
     pub(super) fn new(
         level: &Level,
-        region: &Region,
+        equations: &Equations,
         n_batches: usize,
         old: &OldCells<'_>,
         negligible: Negligible,
     ) -> Self {
         let strides = level.grid.strides();
-        let mut number = vec![NO_CELL; level.n_rows()];
-        let mut residual = Self { rows: Vec::new(), diagonals: Vec::new(), values: Vec::new(), negligible };
-        let mut cells = Vec::new();
-        for cell in region.cells.iter().map(|&cell| cell as usize) {
-            let row = level.row_of[cell];
-            if row != NO_CELL {
-                number[row as usize] = residual.rows.len() as u32;
-                residual.rows.push(row);
-                residual.diagonals.push(6.0);
-                residual.values.push(vec![ZERO; n_batches]);
-                cells.push(cell);
-            }
-        }
+        let Equations { cells, rows, number } = equations;
+        let (rows, diagonals) = (rows.clone(), vec![6.0; rows.len()]);
+        let values = vec![vec![ZERO; n_batches]; rows.len()];
+        let mut residual = Self { rows, diagonals, values, negligible };
         // Cut arms: what is no neighbour, and what the cage adds.
         let mut cut_of = vec![None; residual.rows.len()];
         for (n, cut) in level.colours.iter().flat_map(|c| &c.cut).enumerate() {
@@ -136,7 +128,7 @@ impl Residual {
                 residual.values[k as usize][column / LANES][column % LANES] += term.value;
             }
         }
-        for (k, &cell) in cells.iter().enumerate() {
+        for (k, cell) in cells.iter().map(|&cell| cell as usize).enumerate() {
             let zero = |d: usize| {
                 cut_of[k].is_some_and(|cut| {
                     // Neighbours of a cut cell belong to the other colour, whose zero row is its last.
@@ -241,10 +233,10 @@ impl Residual {
     }
 }
 
-/// The old fields in a region: all columns of each of its cells.
+/// The old fields in some cells: all columns of each.
 pub(super) struct OldCells<'a> {
     region: &'a Region,
-    /// `[n_cells of the region][n_batches]`
+    /// `[n_cells][n_batches]`
     values: Vec<Row>,
     n_batches: usize,
     nothing: Vec<Row>,
@@ -265,11 +257,11 @@ impl<'a> OldCells<'a> {
         Self { region, values, n_batches, nothing: vec![ZERO; n_batches] }
     }
 
-    /// All columns of a cell of the grid; zeros outside the region.
+    /// All columns of a cell of the grid; zeros for one that is none of them.
     pub(super) fn at(&self, cell: usize) -> &[Row] {
-        match self.region.number[cell] {
-            NO_CELL => &self.nothing,
-            k => &self.values[k as usize * self.n_batches..(k as usize + 1) * self.n_batches],
+        match self.region.number.get(cell) {
+            Some(&k) if k != NO_CELL => &self.values[k as usize * self.n_batches..][..self.n_batches],
+            _ => &self.nothing,
         }
     }
 }

@@ -1,11 +1,11 @@
-//! The cells around an edit.
+//! Cells of the grid: those around an edit.
 
 use glam::DVec3;
 
 use crate::cage_gen::footprint::Footprint;
 use crate::grid::{Grid, NO_CELL};
 
-/// Cells near moved faces.
+/// Some cells, such as those near moved faces.
 #[derive(Clone, Debug)]
 pub(super) struct Region {
     /// For each cell of the grid its place in `cells`; [`NO_CELL`] if it is none of them.
@@ -18,22 +18,31 @@ pub(super) struct Region {
 impl Region {
     /// All cells whose centre is within `reach` cells, along each axis, of a triangle (grid coordinates).
     pub(super) fn around(triangles: &[[DVec3; 3]], reach: f64, grid: &Grid) -> Self {
-        let dims = grid.dims.map(|n| n as usize);
-        let mut region = Self { number: vec![NO_CELL; grid.n_cells()], cells: Vec::new(), dims };
+        let mut region = Self::none(grid);
+        let dims = region.dims;
         for triangle in triangles {
             // A footprint's voxels have their centres half a unit further on, and half a unit of reach.
             let footprint = Footprint::new(triangle.map(|p| p + 0.5), reach - 0.5);
             footprint.for_each_run(dims, |y, z, first, last| {
                 let row = (z * dims[1] + y) * dims[0];
-                for cell in row + first..=row + last {
-                    if region.number[cell] == NO_CELL {
-                        region.number[cell] = region.cells.len() as u32;
-                        region.cells.push(cell as u32);
-                    }
-                }
+                (row + first..=row + last).for_each(|cell| region.add(cell));
             });
         }
         region
+    }
+
+    /// No cells of the grid yet.
+    pub(super) fn none(grid: &Grid) -> Self {
+        let dims = grid.dims.map(|n| n as usize);
+        Self { number: vec![NO_CELL; grid.n_cells()], cells: Vec::new(), dims }
+    }
+
+    /// Adds a cell, if there is one of that index.
+    pub(super) fn add(&mut self, cell: usize) {
+        if self.number.get(cell) == Some(&NO_CELL) {
+            self.number[cell] = self.cells.len() as u32;
+            self.cells.push(cell as u32);
+        }
     }
 
     /// Whether the cell below a point (grid coordinates) along all axes is one of them.

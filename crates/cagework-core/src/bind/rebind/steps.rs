@@ -3,8 +3,6 @@
 use crate::bind::BindOptions;
 use crate::bind::solving::{FieldFate, SolvedBatch, sample, solve_batches, stop_of_batches};
 use crate::bind::watch::Watch;
-use crate::grid::NO_CELL;
-use crate::levels::Level;
 use crate::progress::Cancelled;
 use crate::sample::Stencils;
 use crate::solve::hierarchy::Hierarchy;
@@ -12,7 +10,6 @@ use crate::solve::rows::{LANES, Row, ZERO};
 use crate::solve::team::Team;
 
 use super::local::OldCells;
-use super::region::Region;
 use super::shares::add_scaled;
 
 /// Share of the threshold that corrections are solved to. They live in few cells, and the norm is a mean over all: solved to
@@ -42,30 +39,19 @@ pub(super) fn solve_for(
     Ok(solved)
 }
 
-/// Samples the old fields by stencils that are new. Returns the rows of the vertices `changed`: `[n_changed][n_batches]`.
+/// Samples the old fields by stencils that are new; `cell_of`: the cell of each row they ask for. Returns the rows of the vertices `changed`: `[n_changed][n_batches]`.
 pub(super) fn resample(
     stencils: &Stencils,
     changed: &[u32],
-    level: &Level,
+    cell_of: &[u32],
     old: &OldCells<'_>,
-    region: &Region,
     n_batches: usize,
 ) -> Vec<Row> {
-    let mut cell_of = vec![NO_CELL; level.n_rows()];
-    for &cell in &region.cells {
-        let row = level.row_of[cell as usize];
-        if row != NO_CELL {
-            cell_of[row as usize] = cell;
-        }
-    }
     let mut rows = vec![ZERO; changed.len() * n_batches];
     for (sum, &v) in rows.chunks_exact_mut(n_batches).zip(changed) {
         let (nodes, hats) = stencils.at(v as usize);
         for (row, weight) in nodes {
-            let cell = cell_of[*row as usize];
-            if cell != NO_CELL {
-                add_scaled(sum, old.at(cell as usize), *weight);
-            }
+            add_scaled(sum, old.at(cell_of[*row as usize] as usize), *weight);
         }
         for &(column, weight) in hats {
             sum[column as usize / LANES][column as usize % LANES] += weight;
