@@ -35,7 +35,7 @@ pub const MIN_DIAGONAL: f64 = 1e-12;
 pub const MAX_DIAGONAL: f64 = 1e12;
 
 /// Corners up to which hat values need no heap memory.
-const STACK_CORNERS: usize = 32;
+const STACK_CORNERS: usize = 8;
 
 /// A closed, outward-oriented polygon mesh around the model.
 #[derive(Clone, Debug)]
@@ -181,15 +181,16 @@ impl Cage {
         let point = corners.iter().zip(barycentric).fold(DVec2::ZERO, |p, (&q, b)| p + b * q);
         let n = piece.corners.len();
         let (mut stack, mut heap);
-        let values: &mut [f64] = if n <= STACK_CORNERS {
-            stack = [0.0; STACK_CORNERS];
-            &mut stack[..n]
+        let both: &mut [f64] = if n <= STACK_CORNERS {
+            stack = [0.0; 2 * STACK_CORNERS];
+            &mut stack[..2 * n]
         } else {
-            heap = vec![0.0; n];
+            heap = vec![0.0; 2 * n];
             &mut heap
         };
+        let (values, areas) = both.split_at_mut(n);
         match piece.hats {
-            Hats::Convex => hats::wachspress(&piece.outline, point, values),
+            Hats::Convex => hats::wachspress(&piece.outline, point, values, areas),
             Hats::Linear | Hats::MeanValue => hats::mean_value(&piece.outline, point, values),
         }
         for (&k, &value) in piece.corners.iter().zip(values.iter()) {

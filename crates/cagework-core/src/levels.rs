@@ -120,11 +120,26 @@ impl Level {
     /// Row of the cell at `cell + offset`; the zero row where it is no unknown.
     #[must_use]
     pub fn row_at(&self, cell: [u32; 3], offset: [i32; 3]) -> u32 {
-        self.grid
-            .offset(cell, offset)
-            .map(|c| self.row_of[self.grid.index(c)])
-            .filter(|&row| row != NO_CELL)
-            .unwrap_or(self.zero_row())
+        self.rows_at(cell, &[offset])[0]
+    }
+
+    /// Rows of the cells at `cell + offset`; the zero row where there is no unknown.
+    #[inline]
+    #[must_use]
+    pub fn rows_at<const N: usize>(&self, cell: [u32; 3], offsets: &[[i32; 3]; N]) -> [u32; N] {
+        let [sx, sy, sz] = self.grid.strides().map(|s| s as isize);
+        // One step from the grid's sides, which is nearly everywhere, there is nothing to be checked.
+        let is_within = (0..3).all(|a| cell[a] > 0 && cell[a] + 1 < self.grid.dims[a]);
+        let center = if is_within { self.grid.index(cell) } else { 0 };
+        offsets.map(|offset| {
+            let row = if is_within && offset.iter().all(|d| d.abs() <= 1) {
+                let [dx, dy, dz] = offset.map(|d| d as isize);
+                self.row_of[center.wrapping_add_signed(dx * sx + dy * sy + dz * sz)]
+            } else {
+                self.grid.offset(cell, offset).map_or(NO_CELL, |c| self.row_of[self.grid.index(c)])
+            };
+            if row == NO_CELL { self.zero_row() } else { row }
+        })
     }
 
     /// Number of cut cells of both colours.

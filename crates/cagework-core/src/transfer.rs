@@ -43,8 +43,9 @@ pub struct Transfer {
     pub planes: Vec<[u32; 2]>,
 }
 
-/// The twelve edge neighbours of a cell.
-const EDGES: [[i32; 3]; 12] = [
+/// A cell and its twelve edge neighbours.
+const AROUND: [[i32; 3]; 13] = [
+    [0, 0, 0],
     [1, 1, 0],
     [-1, 1, 0],
     [1, -1, 0],
@@ -59,6 +60,10 @@ const EDGES: [[i32; 3]; 12] = [
     [0, -1, -1],
 ];
 
+/// The corners of a cube.
+const CORNERS: [[i32; 3]; 8] =
+    [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
+
 impl Transfer {
     /// Tables between `fine` and `coarse`, whose grid is `fine.grid.coarsened()`.
     #[must_use]
@@ -66,11 +71,7 @@ impl Transfer {
         let mut restrict_rows = [Vec::new(), Vec::new()];
         for cell in coarse.grid.cells().filter(|&c| coarse.row_of[coarse.grid.index(c)] != NO_CELL) {
             let centre = cell.map(|x| 2 * x);
-            let mut row = [fine.row_at(centre, [0; 3]); 13];
-            for (slot, edge) in row[1..].iter_mut().zip(EDGES) {
-                *slot = fine.row_at(centre, edge);
-            }
-            restrict_rows[Grid::colour(cell)].push(row);
+            restrict_rows[Grid::colour(cell)].push(fine.rows_at(centre, &AROUND));
         }
         let (mut faces, mut corners, mut planes) = (Vec::new(), Vec::new(), Vec::new());
         let first_black = fine.first_row(1) as u32;
@@ -87,11 +88,9 @@ impl Transfer {
                     let low = [x / 2, y / 2, z / 2];
                     let odd = [x, y, z].map(|i| (i % 2) as i32);
                     if odd == [1; 3] {
-                        corners.push(prolong_row(coarse, cell, low, |k| {
-                            [k & 1, k >> 1 & 1, k >> 2 & 1].map(|b| b as i32)
-                        }));
+                        corners.push(prolong_row(coarse, cell, low, &CORNERS));
                     } else {
-                        faces.push(prolong_row(coarse, cell, low, |k| odd.map(|o| o * k as i32)));
+                        faces.push(prolong_row(coarse, cell, low, &[[0; 3], odd]));
                     }
                 }
             }
@@ -114,9 +113,9 @@ fn prolong_row<const N: usize>(
     coarse: &Level,
     cell: u32,
     low: [u32; 3],
-    offset: impl Fn(usize) -> [i32; 3],
+    offsets: &[[i32; 3]; N],
 ) -> ProlongRow<N> {
-    let rows = std::array::from_fn(|k| coarse.row_at(low, offset(k)));
+    let rows = coarse.rows_at(low, offsets);
     let unknowns = rows.iter().filter(|&&row| row != coarse.zero_row()).count();
     let mean = if unknowns == 0 { 0.0 } else { 1.0 / unknowns as f32 };
     ProlongRow { cell, coarse: rows, mean }

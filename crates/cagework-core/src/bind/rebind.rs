@@ -214,12 +214,14 @@ impl Rebinder {
         let voxelized = watch.now_ms();
 
         let moved_to = renumbering(&old_voxels.hierarchy.levels[0].row_of, &level.row_of, &old_voxels);
-        if let Some(moved_to) = moved_to {
-            stencils.renumber(&moved_to);
-        }
+        let is_any_gone = moved_to.is_some_and(|moved_to| stencils.renumber(&moved_to));
         // What is outside follows the closest point of the cage, which may be another one from anywhere.
-        let near = |v: usize| region.holds(to_grid(self.points[v])) || stencils.is_outside(v);
-        let changed = stencils.stale(|v| !near(v));
+        let is_stale = |v: usize| {
+            region.holds(to_grid(self.points[v]))
+                || stencils.is_outside(v)
+                || is_any_gone && stencils.has_lost_a_row(v)
+        };
+        let changed: Vec<u32> = (0..self.points.len()).filter(|&v| is_stale(v)).map(|v| v as u32).collect();
         if !changed.is_empty() {
             let points: Vec<Vec3> = changed.iter().map(|&v| self.points[v as usize]).collect();
             stencils.replace(&changed, &sampling_stencils(cage, &voxels, &points, &team, watch)?);
@@ -239,12 +241,13 @@ impl Rebinder {
             }
             let old = OldCells::new(&fields, &needed, n_batches);
             let residual = Residual::new(level, &equations, n_batches, &old, negligible);
-            let Some(Split { right, shares }) = residual.split(level.n_rows(), cage.n_vertices()) else {
+            let Some(Split { rows: of, right, shares }) = residual.split(cage.n_vertices()) else {
                 return Ok(None);
             };
             let resampled = resample(&stencils, &changed, &cell_of, &old, n_batches);
             rank = shares.len();
-            let corrections = solve_for(&voxels.hierarchy, &stencils, &right, &self.options, &team, watch)?;
+            let corrections =
+                solve_for(&voxels.hierarchy, &stencils, (&of, &right), &self.options, &team, watch)?;
             solved.converged_as(&corrections.iter().map(|c| &c.report).collect::<Vec<_>>());
             // They are solved to less than tau; what counts is tau.
             solved.converged = solved.delta_history.last().is_none_or(|delta| *delta <= self.options.tau);

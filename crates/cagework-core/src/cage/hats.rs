@@ -13,26 +13,33 @@ use super::triangulate::cross;
 /// Distances below this fraction of the polygon are zero: on the corner or side. A few roundings of f64.
 const ON_OUTLINE: f64 = 1e-15;
 
-/// Coordinates of `point` in a strictly convex counter-clockwise polygon. `values`: `[n]`, non-negative, sum 1.
-/// Outside by rounding, a point is treated as if on the side.
-pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64]) {
+/// Coordinates of `point` in a strictly convex counter-clockwise polygon. `values`: `[n]`, non-negative, sum 1; `areas`:
+/// `[n]`, scratch space. Outside by rounding, a point is treated as if on the side.
+pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64], areas: &mut [f64]) {
     let n = outline.len();
     let before = |k: usize| if k == 0 { n - 1 } else { k - 1 };
     let after = |k: usize| if k + 1 == n { 0 } else { k + 1 };
     // Doubled areas of the triangles between the point and each side, relative to the largest, so that their product
-    // neither overflows nor underflows.
-    let largest = (0..n).map(|k| cross(outline[k], outline[after(k)], point)).fold(0.0, f64::max);
-    let scale = 1.0 / largest.max(f64::MIN_POSITIVE);
-    for (k, value) in values.iter_mut().enumerate() {
-        *value = cross(outline[before(k)], outline[k], outline[after(k)]);
+    // neither overflows nor underflows. Comparisons: wasm has no instruction for `max`.
+    let mut largest = f64::MIN_POSITIVE;
+    for (k, area) in areas.iter_mut().enumerate() {
+        *area = cross(outline[k], outline[after(k)], point);
+        largest = if *area > largest { *area } else { largest };
     }
-    for side in 0..n {
-        let area = (cross(outline[side], outline[after(side)], point) * scale).max(0.0);
-        for (k, value) in values.iter_mut().enumerate() {
-            if k != side && k != after(side) {
-                *value *= area;
-            }
+    let scale = 1.0 / largest;
+    for area in areas.iter_mut() {
+        *area = if *area > 0.0 { *area * scale } else { 0.0 };
+    }
+    for (k, value) in values.iter_mut().enumerate() {
+        let (first, next) = (before(k), after(k));
+        // All sides but the two that meet in the corner.
+        let mut product = cross(outline[first], outline[k], outline[next]);
+        let mut side = next;
+        while side != first {
+            product *= areas[side];
+            side = after(side);
         }
+        *value = product;
     }
     normalize(values);
 }

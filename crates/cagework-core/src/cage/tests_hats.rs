@@ -185,7 +185,7 @@ proptest! {
         let toward = outline[(angle * 100.0) as usize % outline.len()];
         let point = center + r * (toward - center);
         let mut values = vec![0.0; outline.len()];
-        hats::wachspress(&outline, point, &mut values);
+        hats::wachspress(&outline, point, &mut values, &mut vec![0.0; outline.len()]);
         assert_coordinates(&outline, point, &values);
         prop_assert!(values.iter().all(|&w| w >= 0.0));
     }

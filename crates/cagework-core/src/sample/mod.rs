@@ -141,18 +141,21 @@ impl Stencils {
         self.outside.extend(other.outside.iter().map(|o| Outside { vertex: o.vertex + v, ..*o }));
     }
 
-    /// Follows the rows of the field to where they went: `row_of[row]`, [`NO_CELL`] if they are gone.
-    pub fn renumber(&mut self, row_of: &[u32]) {
+    /// Follows the rows of the field to where they went: `row_of[row]`, [`NO_CELL`] if they are gone. Returns whether any is.
+    #[must_use]
+    pub fn renumber(&mut self, row_of: &[u32]) -> bool {
+        let mut is_any_gone = false;
         for (row, _) in &mut self.nodes {
             *row = row_of[*row as usize];
+            is_any_gone |= *row == NO_CELL;
         }
+        is_any_gone
     }
 
-    /// Vertices for which `keep` fails or a row is gone, ascending.
+    /// Whether a row of the vertex's stencil is gone.
     #[must_use]
-    pub fn stale(&self, keep: impl Fn(usize) -> bool) -> Vec<u32> {
-        let has_gone = |v: usize| self.at(v).0.iter().any(|&(row, _)| row == NO_CELL);
-        (0..self.len()).filter(|&v| !keep(v) || has_gone(v)).map(|v| v as u32).collect()
+    pub fn has_lost_a_row(&self, vertex: usize) -> bool {
+        self.at(vertex).0.iter().any(|&(row, _)| row == NO_CELL)
     }
 
     /// Puts the stencils of `fresh`, one after another, in place of those of `vertices`, which ascend.
@@ -290,10 +293,10 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_are_gone_make_their_vertices_stale() {
+    fn rows_that_are_gone_are_noticed() {
         let mut all = stencils(&[1, 2, 3], 0);
-        all.renumber(&[0, 7, NO_CELL, 5]);
-        assert_eq!(all.stale(|v| v != 2), [1, 2]);
+        assert!(all.renumber(&[0, 7, NO_CELL, 5]));
+        assert_eq!([0, 1, 2].map(|v| all.has_lost_a_row(v)), [false, true, false]);
         assert_eq!(all.at(0).0, [(7, 1.0)]);
     }
 }

@@ -93,7 +93,9 @@ pub(super) struct Residual {
 
 /// Independent residuals and every column's shares in them.
 pub(super) struct Split {
-    /// Right-hand sides. `[n_batches of them][n_rows]`
+    /// Rows of the finest level that right-hand sides have anything in.
+    pub(super) rows: Vec<u32>,
+    /// Right-hand sides. `[n_batches of them][rows.len()]`
     pub(super) right: Vec<Vec<Row>>,
     pub(super) shares: Shares,
 }
@@ -171,15 +173,15 @@ impl Residual {
     ///
     /// Gram-Schmidt, the largest column first: harmonic functions that vanish on the same faces are nearly alike a few
     /// cells away, so 44 to 219 columns have 8 to 24 independent residuals to five digits.
-    pub(super) fn split(self, n_rows: usize, n_columns: usize) -> Option<Split> {
+    pub(super) fn split(self, n_columns: usize) -> Option<Split> {
         dispatch(
             #[inline(always)]
-            || self.split_columns(n_rows, n_columns),
+            || self.split_columns(n_columns),
         )
     }
 
     #[inline(always)]
-    fn split_columns(mut self, n_rows: usize, n_columns: usize) -> Option<Split> {
+    fn split_columns(mut self, n_columns: usize) -> Option<Split> {
         let n_batches = n_columns.div_ceil(LANES);
         let mut right = Vec::new();
         let mut shares = Shares::new(n_batches);
@@ -201,7 +203,7 @@ impl Residual {
             let needs_batch = rank > 0 && rank.is_multiple_of(LANES);
             let least = if needs_batch { MANY } else { 1.0 } * self.negligible.residual;
             if size(pivot) < least {
-                return Some(Split { right, shares });
+                return Some(Split { rows: self.rows, right, shares });
             }
             // More, and solving for the columns themselves is no slower.
             if 4 * rank >= 3 * n_columns {
@@ -222,12 +224,12 @@ impl Residual {
                 row[pivot / LANES][pivot % LANES] = 0.0;
             }
             if rank.is_multiple_of(LANES) {
-                right.push(vec![ZERO; n_rows]);
+                right.push(vec![ZERO; self.rows.len()]);
             }
             let norm = shares.push(share, self.negligible);
             let batch = &mut right[rank / LANES];
-            for ((&row, &q), &diagonal) in self.rows.iter().zip(&unit).zip(&self.diagonals) {
-                batch[row as usize][rank % LANES] = q * diagonal * norm;
+            for ((values, &q), &diagonal) in batch.iter_mut().zip(&unit).zip(&self.diagonals) {
+                values[rank % LANES] = q * diagonal * norm;
             }
         }
     }

@@ -16,11 +16,11 @@ use super::shares::add_scaled;
 /// the threshold itself, a weight near the edit was 3 to 7 times as far off as after a whole bind; so it is as exact.
 const SHARPER: f32 = 0.1;
 
-/// Solves for right-hand sides of cells, and samples the solutions.
+/// Solves for right-hand sides, `[n_batches]` of what is in `rows` of the finest level, and samples the solutions.
 pub(super) fn solve_for(
     hierarchy: &Hierarchy,
     stencils: &Stencils,
-    right: &[Vec<Row>],
+    (rows, right): (&[u32], &[Vec<Row>]),
     options: &BindOptions,
     team: &Team,
     watch: &Watch<'_>,
@@ -32,7 +32,7 @@ pub(super) fn solve_for(
         FieldFate::Kept,
         team,
         watch,
-        &|workspace, batch, progress| workspace.solve_for(hierarchy, &right[batch], stop, progress),
+        &|workspace, batch, progress| workspace.solve_for(hierarchy, (rows, &right[batch]), stop, progress),
         // No column has this number: only the field is sampled, not the cage's values.
         &|_, field| sample(stencils, usize::MAX / (2 * LANES), field),
     )?;
