@@ -4,8 +4,8 @@
 //! a residual there and nowhere else, and the residuals of all columns are combinations of a few: columns that do not
 //! belong to the moved faces vanish on them, so they look alike a few cells away. Those few are solved for, and every
 //! column, also at the mesh's vertices, takes its share of them. What is neglected (residuals of about tau an edit) adds up, so
-//! after [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid or the faces change, when cells near moved
-//! faces are a seventh of all, or when nearly all columns' residuals are independent.
+//! after [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid or the faces change, or when cells near
+//! moved faces are a quarter of all.
 
 mod equations;
 mod local;
@@ -51,7 +51,7 @@ const FORCED: f32 = -1e-5;
 const MOST_BENT: f64 = 1.0;
 
 /// Everything is bound anew if one in so many cells is at a moved face.
-const MOST: usize = 7;
+const MOST: usize = 4;
 
 /// Cells around the moved faces whose equations may have changed, and in which stencils are made anew: a stencil sees the
 /// triangles in its cube of centres.
@@ -241,9 +241,7 @@ impl Rebinder {
             }
             let old = OldCells::new(&fields, &needed, n_batches);
             let residual = Residual::new(level, &equations, n_batches, &old, negligible);
-            let Some(Split { rows: of, right, shares }) = residual.split(cage.n_vertices()) else {
-                return Ok(None);
-            };
+            let Split { rows: of, right, shares } = residual.split(cage.n_vertices());
             let resampled = resample(&stencils, &changed, &cell_of, &old, n_batches);
             rank = shares.len();
             let corrections =

@@ -168,12 +168,11 @@ impl Residual {
         self.diagonals.retain(|_| keep.next() == Some(&true));
     }
 
-    /// Splits the residuals of all columns into a few independent ones and the columns' shares in them. `None` if there
-    /// are too many.
+    /// Splits the residuals of all columns into a few independent ones and the columns' shares in them.
     ///
     /// Gram-Schmidt, the largest column first: harmonic functions that vanish on the same faces are nearly alike a few
     /// cells away, so 44 to 219 columns have 8 to 24 independent residuals to five digits.
-    pub(super) fn split(self, n_columns: usize) -> Option<Split> {
+    pub(super) fn split(self, n_columns: usize) -> Split {
         dispatch(
             #[inline(always)]
             || self.split_columns(n_columns),
@@ -181,7 +180,7 @@ impl Residual {
     }
 
     #[inline(always)]
-    fn split_columns(mut self, n_columns: usize) -> Option<Split> {
+    fn split_columns(mut self, n_columns: usize) -> Split {
         let n_batches = n_columns.div_ceil(LANES);
         let mut right = Vec::new();
         let mut shares = Shares::new(n_batches);
@@ -197,17 +196,13 @@ impl Residual {
                 }
             }
             let size = |c: usize| largest[c / LANES][c % LANES];
-            let pivot = (0..n_columns).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
+            let pivot = (0..n_columns).max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
             let rank = shares.len();
             // Another batch for little more than nothing costs as much as the one before.
             let needs_batch = rank > 0 && rank.is_multiple_of(LANES);
             let least = if needs_batch { MANY } else { 1.0 } * self.negligible.residual;
             if size(pivot) < least {
-                return Some(Split { rows: self.rows, right, shares });
-            }
-            // More, and solving for the columns themselves is no slower.
-            if 4 * rank >= 3 * n_columns {
-                return None;
+                return Split { rows: self.rows, right, shares };
             }
             let column: Vec<f32> = self.values.iter().map(|row| row[pivot / LANES][pivot % LANES]).collect();
             let norm = column.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt() as f32;
