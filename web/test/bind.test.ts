@@ -11,7 +11,7 @@ describe("what the worker kept of the last bind", () => {
     expect(canGoOn(kept, { ...options }, corners.slice())).toBe(true);
   });
 
-  it("is of none before the first bind, on a GPU, with other options or other faces", () => {
+  it("is of none before the first bind, elsewhere, with other options or other faces", () => {
     expect(canGoOn(undefined, options, corners)).toBe(false);
     expect(canGoOn(kept, { ...options, backend: "gpu" }, corners)).toBe(false);
     expect(canGoOn(kept, { ...options, grid: 2 * options.grid }, corners)).toBe(false);

@@ -1,10 +1,10 @@
 //! The bind on the GPU: geometry and assembly are the CPU's own, what lies between runs as kernels.
 
 use cagework_core::bind::pipeline::{FieldsOn, Prepared, Solved};
-use cagework_core::bind::{BindOptions, Solver, Watch};
+use cagework_core::bind::{BindOptions, Rebinder, Solver, Watch};
 use cagework_core::solve::jacobi::StopRule;
 use cagework_core::solve::multigrid::{BatchReport, Stop, histories};
-use cagework_core::solve::rows::{LANES, Row, ZERO};
+use cagework_core::solve::rows::{Row, ZERO};
 use cagework_core::{Binding, Cage, Progress};
 use glam::Vec3;
 
@@ -14,8 +14,8 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::jacobi::{INTERVAL, Jacobi};
 use crate::multigrid::Multigrid;
-use crate::plan::Plan;
-use crate::sample::Sampler;
+use crate::plan::{Fields, Plan};
+use crate::sample::{Sampler, scatter};
 use crate::stream::Stream;
 
 /// Delta falls roughly by this factor from the first sweep to tau: for the progress bar only.
@@ -54,32 +54,63 @@ pub async fn bind_gpu(
     progress: &dyn Progress,
     context: &GpuContext,
 ) -> Result<(Binding, GpuWeights), GpuError> {
-    let watch = Watch::new(progress);
-    let prepared = Prepared::new(positions, cage, options, FieldsOn::Device, &watch)?;
-    let solved = solve_and_sample(&prepared, options, &watch, context).await?;
-    let binding = prepared.finish(solved, &watch)?;
+    let (binding, _) = bind_gpu_to_edit(positions, cage, options, 0, progress, context).await?;
     let weights = GpuWeights::new(context, &binding.weights, &binding.outside).await?;
     Ok((binding, weights))
 }
 
+/// [`bind_gpu`] for a cage that will be edited: the fields are read back, so that the next bind can start from them, on the
+/// CPU. Without them if there are none to keep ([`Rebinder::can_keep`]) or if they and the CPU's arrays exceed
+/// `most_to_keep`, bytes.
+///
+/// # Errors
+/// As [`bind_gpu`].
+pub async fn bind_gpu_to_edit(
+    positions: &[Vec3],
+    cage: &Cage,
+    options: &BindOptions,
+    most_to_keep: u64,
+    progress: &dyn Progress,
+    context: &GpuContext,
+) -> Result<(Binding, Option<Rebinder>), GpuError> {
+    let watch = Watch::new(progress);
+    let prepared = Prepared::new(positions, cage, options, FieldsOn::Device, &watch)?;
+    let fits = prepared.estimated() + prepared.fields_bytes() <= most_to_keep;
+    let fate = if fits && Rebinder::can_keep(options) { Fields::ReadBack } else { Fields::Dropped };
+    let (solved, fields) = solve_and_sample(&prepared, options, fate, &watch, context).await?;
+    if fate == Fields::Dropped {
+        return Ok((prepared.finish(solved, &watch)?, None));
+    }
+    let (rebinder, binding) = Rebinder::taken_over(prepared, solved, fields, most_to_keep, &watch)?;
+    Ok((binding, Some(rebinder)))
+}
+
+/// Solves all columns. Returns what [`Prepared::finish`] needs, and the fields as the CPU would have kept them, none if they
+/// are dropped: `[n_batches of LANES][n_rows]`.
 async fn solve_and_sample(
     prepared: &Prepared<'_>,
     options: &BindOptions,
+    fate: Fields,
     watch: &Watch<'_>,
     context: &GpuContext,
-) -> Result<Solved, GpuError> {
+) -> Result<(Solved, Vec<Vec<Row>>), GpuError> {
     let (hierarchy, stencils) = (prepared.hierarchy(), prepared.stencils());
-    let plan =
-        Plan::new(hierarchy, stencils, options.solver, context.max_binding_bytes, options.memory_limit)?;
-    let mut blocks: Vec<Vec<Row>> = vec![vec![ZERO; stencils.len()]; hierarchy.n_columns.div_ceil(LANES)];
+    let limit = options.memory_limit;
+    let plan = Plan::new(hierarchy, stencils, options.solver, context.max_binding_bytes, limit, fate)?;
+    let n_batches = hierarchy.n_batches();
+    let mut blocks: Vec<Vec<Row>> = vec![vec![ZERO; stencils.len()]; n_batches];
+    let n_kept = if fate == Fields::ReadBack { n_batches } else { 0 };
+    let mut fields: Vec<Vec<Row>> = vec![vec![ZERO; hierarchy.levels[0].n_rows()]; n_kept];
     let began = watch.now_ms();
     let mut stream = Stream::new(context, watch).await?;
     let outcome = match options.solver {
-        Solver::Multigrid => multigrid(prepared, options, &plan, &mut stream, &mut blocks).await?,
+        Solver::Multigrid => {
+            multigrid(prepared, options, &plan, &mut stream, &mut blocks, &mut fields).await?
+        }
         Solver::Jacobi => jacobi(prepared, options, &plan, &mut stream, &mut blocks).await?,
     };
     let all_ms = watch.now_ms() - began;
-    Ok(Solved {
+    let solved = Solved {
         blocks,
         corrections: None,
         iterations: outcome.iterations,
@@ -91,7 +122,8 @@ async fn solve_and_sample(
         planned_bytes: plan.bytes(),
         solve_share: if all_ms > 0.0 { outcome.solve_ms / all_ms } else { 1.0 },
         adapter: Some(context.adapter_name()),
-    })
+    };
+    Ok((solved, fields))
 }
 
 async fn multigrid(
@@ -100,6 +132,7 @@ async fn multigrid(
     plan: &Plan,
     stream: &mut Stream<'_>,
     blocks: &mut [Vec<Row>],
+    fields: &mut [Vec<Row>],
 ) -> Result<Outcome, GpuError> {
     let hierarchy = prepared.hierarchy();
     let began = stream.now_ms();
@@ -111,6 +144,11 @@ async fn multigrid(
     let mut allocator = Allocator::new(stream.context(), ROOM);
     let sampler = Sampler::new(&mut allocator, prepared.stencils(), plan)?;
     let mut multigrid = Multigrid::new(stream, &mut allocator, hierarchy, plan)?;
+    let bytes = multigrid.field_bytes();
+    let read_back = match fields {
+        [] => None,
+        _ => Some(allocator.readback("field, read back", bytes)?),
+    };
     let allocated = allocator.settle().await?;
     let mut solve_ms = stream.now_ms() - began;
     let mut reports: Vec<BatchReport> = Vec::new();
@@ -127,6 +165,11 @@ async fn multigrid(
         solve_ms += stream.now_ms() - began;
         reports.push(report);
         sampler.sample(stream, multigrid.field(), first_column, blocks).await?;
+        if let Some(read_back) = &read_back {
+            let take =
+                |bytes: &[u8]| scatter(bytes, plan.n_quads() as usize, first_column as usize, 0, fields);
+            stream.read(multigrid.field(), read_back, bytes, take).await?;
+        }
     }
     let [delta_history, residual_history] = histories(&reports.iter().collect::<Vec<_>>());
     Ok(Outcome {

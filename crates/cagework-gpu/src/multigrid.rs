@@ -123,6 +123,12 @@ impl Multigrid {
         &self.levels[0].field
     }
 
+    /// Bytes of it: `[n_rows][n_quads]` of four columns.
+    #[must_use]
+    pub fn field_bytes(&self) -> u64 {
+        u64::from(self.levels[0].level.n_rows) * u64::from(self.n_quads) * QUAD_BYTES
+    }
+
     /// Solves the batch that starts at `first_column`. `cycle_done(stream, cycle, delta)` is told of each cycle.
     ///
     /// # Errors

@@ -66,6 +66,17 @@ struct Sizes {
     /// Bytes that do not depend on the number of columns.
     other_bytes: u64,
     all_batches: bool,
+    /// Rows of a batch that are read back besides the sampled ones.
+    kept_rows: u64,
+}
+
+/// What becomes of the fields once they have been sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fields {
+    /// Batches overwrite each other's.
+    Dropped,
+    /// They are read back, which takes room for one batch more.
+    ReadBack,
 }
 
 impl Plan {
@@ -80,8 +91,9 @@ impl Plan {
         solver: Solver,
         max_binding_bytes: u64,
         memory_limit: u64,
+        fields: Fields,
     ) -> Result<Self, PlanError> {
-        let sizes = Sizes::of(hierarchy, stencils, solver);
+        let sizes = Sizes::of(hierarchy, stencils, solver, fields);
         let bindable = |what, needed| {
             let limit = max_binding_bytes;
             if needed <= limit { Ok(()) } else { Err(PlanError::Binding { what, needed, limit }) }
@@ -108,7 +120,7 @@ impl Plan {
                 n_batches: n_batches as u32,
                 vertices_per_block: vertices_per_block as u32,
                 table_bytes,
-                field_bytes: (fields + block) * QUAD_BYTES,
+                field_bytes: (fields + block + sizes.kept_rows * n_quads) * QUAD_BYTES,
             }
         };
         (1..=most_quads)
@@ -132,7 +144,7 @@ impl Plan {
 }
 
 impl Sizes {
-    fn of(hierarchy: &Hierarchy, stencils: &Stencils, solver: Solver) -> Self {
+    fn of(hierarchy: &Hierarchy, stencils: &Stencils, solver: Solver, fields: Fields) -> Self {
         let finest = &hierarchy.levels[0];
         let (n_rows, n_cut) = (finest.n_rows() as u64, finest.n_cut() as u64);
         let coarse_rows: u64 = hierarchy.levels[1..].iter().map(|l| l.n_rows() as u64).sum();
@@ -163,6 +175,7 @@ impl Sizes {
             largest_rows: n_rows.max(1),
             other_bytes: 12 * n_rows + 32 * coarse_rows + transfers + partials,
             all_batches: solver == Solver::Jacobi,
+            kept_rows: if fields == Fields::ReadBack { n_rows } else { 0 },
         }
     }
 }

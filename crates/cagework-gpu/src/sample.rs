@@ -82,15 +82,21 @@ impl Sampler {
     }
 }
 
-/// Puts a block, `[vertex][lane]`, where the CPU would have put its samples.
-fn scatter(bytes: &[u8], n_quads: usize, first_column: usize, first_vertex: usize, blocks: &mut [Vec<Row>]) {
-    for (v, row) in bytes.chunks_exact(n_quads * QUAD_BYTES as usize).enumerate() {
+/// Puts a block, `[row][lane]`, where the CPU would have put its own: samples of vertices, or rows of fields.
+pub(crate) fn scatter(
+    bytes: &[u8],
+    n_quads: usize,
+    first_column: usize,
+    first_row: usize,
+    blocks: &mut [Vec<Row>],
+) {
+    for (k, row) in bytes.chunks_exact(n_quads * QUAD_BYTES as usize).enumerate() {
         for (quad, values) in row.chunks_exact(QUAD_BYTES as usize).enumerate() {
             let column = first_column + 4 * quad;
             // The last batch's padding may reach beyond the CPU's.
             if let Some(block) = blocks.get_mut(column / LANES) {
                 let values: [f32; 4] = bytemuck::pod_read_unaligned(values);
-                block[first_vertex + v][column % LANES..column % LANES + 4].copy_from_slice(&values);
+                block[first_row + k][column % LANES..column % LANES + 4].copy_from_slice(&values);
             }
         }
     }

@@ -9,7 +9,10 @@ use cagework_core::bind::{BindOptions, CellShape, DeltaNorm, Method, Solver};
 use cagework_core::deform::{deform_bound, vertex_normals};
 use cagework_core::progress::{ProgressEvent, Silent};
 use cagework_core::{BindError, Binding, Cage, Weights, bind};
-use cagework_gpu::{ContextOptions, Deformer, GpuContext, GpuError, GpuWeights, Plan, PlanError, bind_gpu};
+use cagework_gpu::{
+    ContextOptions, Deformer, Fields, GpuContext, GpuError, GpuWeights, Plan, PlanError, bind_gpu,
+    bind_gpu_to_edit,
+};
 use glam::Vec3;
 use pollster::block_on;
 use support::{assert_close, cage, egg, flat, gpu, gpu_with, with_prepared};
@@ -123,7 +126,7 @@ fn what_does_not_fit_is_refused_with_numbers() {
     assert!(matches!(error, GpuError::Plan(PlanError::Binding { limit: 4096, .. })), "{error}");
     with_prepared(&positions, &cage, &options, |prepared| {
         let (hierarchy, stencils) = (prepared.hierarchy(), prepared.stencils());
-        let plan = |limit| Plan::new(hierarchy, stencils, Solver::Multigrid, 1 << 27, limit);
+        let plan = |limit| Plan::new(hierarchy, stencils, Solver::Multigrid, 1 << 27, limit, Fields::Dropped);
         let all = plan(u64::MAX).unwrap();
         assert_eq!((all.n_batches, all.n_lanes as usize), (1, hierarchy.n_columns.next_multiple_of(4)));
         let less = plan(all.bytes() - 1).unwrap();
@@ -132,6 +135,44 @@ fn what_does_not_fit_is_refused_with_numbers() {
         let error = plan(limit).unwrap_err();
         assert!(matches!(error, PlanError::Memory { needed, .. } if needed > limit), "{error}");
     });
+}
+
+#[test]
+fn an_edit_starts_from_the_fields_of_a_bind_on_the_gpu() {
+    let (cage, positions) = (cage([3, 3, 3]), points());
+    // Bindings for two quads of columns at a time: the fields come back in several batches.
+    let options = BindOptions { grid: 40, ..options(Method::Embedded, Solver::Multigrid) };
+    let rows = u64::from(options.grid + 2).pow(3);
+    let limit = Some(2 * 16 * rows);
+    let context = gpu_with(&ContextOptions { max_binding_bytes: limit, ..ContextOptions::default() });
+    let mut mesh = cage.to_polygon_mesh();
+    let bounds = cage.bounds();
+    // The grid is laid into the bounding box, which must stay.
+    let is_free = |p: &&mut Vec3| (0..3).all(|a| p[a] > bounds.min[a] && p[a] < bounds.max[a]);
+    *mesh.positions.iter_mut().find(is_free).expect("a vertex inside the bounding box") *= 0.97;
+    let edited = Cage::new(&mesh).unwrap();
+    let bind_with = |options: &BindOptions, most| {
+        block_on(bind_gpu_to_edit(&positions, &cage, options, most, &Silent, &context)).unwrap()
+    };
+
+    let (binding, rebinder) = bind_with(&options, u64::MAX);
+    let on_cpu = bind(&positions, &cage, &options, &Silent).unwrap();
+    assert_close(&dense(&binding.weights), &dense(&on_cpu.weights), WEIGHT_TOLERANCE);
+    assert_eq!(binding.report.backend, "gpu");
+    let mut rebinder = rebinder.expect("there is room for the fields");
+    assert!(rebinder.is_bound_to(&cage) && !rebinder.is_bound_to(&edited));
+    let (corrected, report) = rebinder.correct(&edited, &Silent).unwrap().expect("a small edit");
+    assert!(!report.anew && report.solved > 0 && report.solved < report.columns, "{report:?}");
+    assert_eq!(
+        (corrected.report.backend.as_str(), corrected.report.corrections),
+        ("cpu", Some(report.solved))
+    );
+    let anew = bind(&positions, &edited, &options, &Silent).unwrap();
+    assert_close(&dense(&corrected.weights), &dense(&anew.weights), WEIGHT_TOLERANCE);
+
+    assert!(bind_with(&options, 1000).1.is_none(), "a kilobyte is not enough");
+    let sparse = BindOptions { sparsify: 1e-5, ..options };
+    assert!(bind_with(&sparse, u64::MAX).1.is_none(), "nobody knows how small the dropped weights were");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use cagework_core::bind::{BindError, OutsideVertex, Rebinder};
 use cagework_core::cage_gen::{CageOptions, generate};
 use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Binding, Cage, PolygonMesh, Weights, mean_value_weights, samples};
-use cagework_gpu::{ContextOptions, GpuContext, bind_gpu};
+use cagework_gpu::{ContextOptions, GpuContext, bind_gpu_to_edit};
 use glam::Vec3;
 use js_sys::Function;
 use wasm_bindgen::JsValue;
@@ -23,8 +23,8 @@ use crate::views::object;
 #[wasm_bindgen]
 pub struct Binder {
     gpu: Option<GpuContext>,
-    /// What the last bind on the processor left behind: after a small edit of the cage the next one starts from it.
-    rebinder: Option<Rebinder>,
+    /// What the last bind left behind, and where it ran: after a small edit of the cage the next one starts from it.
+    kept: Option<(Backend, Rebinder)>,
 }
 
 /// Most memory, bytes, that a bind may need whose fields are kept: enough for g = 128, and a tenth of what a module can have.
@@ -72,7 +72,7 @@ impl Binder {
     #[must_use]
     #[allow(clippy::new_without_default, reason = "only JavaScript makes one")]
     pub fn new() -> Self {
-        Self { gpu: None, rebinder: None }
+        Self { gpu: None, kept: None }
     }
 
     /// Opens a GPU for the binds to come, unless there is one, or none that could bind.
@@ -103,14 +103,15 @@ impl Binder {
         let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
         let parts = Parts::new(&positions, &cage, &corners)?;
         drop(positions);
-        let binding = if is_here(asked) {
-            self.bind_here(&parts, &asked.into(), &Listener::new(progress))?
-        } else {
-            self.rebinder = None;
-            self.run(&parts.positions, &parts.cage, asked, progress).await?
+        let place = if is_here(asked) { Backend::Cpu } else { Backend::Gpu };
+        let listener = Listener::new(progress);
+        let binding = match self.corrected(&parts, asked, place, &listener)? {
+            Some(binding) => binding,
+            None if place == Backend::Cpu => self.bind_here(&parts, &asked.into(), &listener)?,
+            None => self.bind_there(&parts, &asked.into(), &listener).await?,
         };
         let report = object(&binding.report)?;
-        let kept = self.rebinder.as_ref().is_some_and(Rebinder::keeps);
+        let kept = self.kept.as_ref().is_some_and(|(_, rebinder)| rebinder.keeps());
         Ok(Bound { weights: binding.weights, outside: binding.outside, report, kept })
     }
 
@@ -200,26 +201,64 @@ fn is_here(asked: BindAsked) -> bool {
     asked.backend == Backend::Cpu || !cfg!(feature = "webgpu")
 }
 
+/// The options of a bind whose fields are kept.
+fn frugal(options: &BindOptions) -> BindOptions {
+    BindOptions { memory_limit: options.memory_limit.min(MOST_TO_KEEP), ..*options }
+}
+
 impl Binder {
-    /// Binds on the processor, from what the last bind left behind if that was of the same model.
+    /// Binds to an edited cage from what the last bind left behind, on the processor, if that was of the same model and asked
+    /// for in the same way.
+    fn corrected(
+        &mut self,
+        parts: &Parts,
+        asked: BindAsked,
+        place: Backend,
+        listener: &Listener,
+    ) -> Answer<Option<Binding>> {
+        // Another model's is dropped here: its memory is needed now. Whoever binds to the same cage again wants it done again.
+        let kept = self.kept.take().filter(|(bound_by, rebinder)| {
+            *bound_by == place
+                && rebinder.fits(&parts.positions, &frugal(&asked.into()))
+                && !rebinder.is_bound_to(&parts.cage)
+        });
+        let Some((_, mut rebinder)) = kept else { return Ok(None) };
+        let corrected = rebinder.correct(&parts.cage, listener)?;
+        self.kept = corrected.is_some().then_some((place, rebinder));
+        Ok(corrected.map(|(binding, _)| binding))
+    }
+
+    /// Binds on the processor, and keeps what the next bind can start from if there is memory for it.
     fn bind_here(&mut self, parts: &Parts, options: &BindOptions, listener: &Listener) -> Answer<Binding> {
         let Parts { positions, cage } = parts;
-        let frugal = BindOptions { memory_limit: options.memory_limit.min(MOST_TO_KEEP), ..*options };
-        // Another model's is dropped here: its memory is needed now.
-        let kept = self.rebinder.take().filter(|r| r.fits(positions, &frugal));
-        let bound = match kept {
-            Some(mut kept) => kept.rebind(cage, listener).map(|(binding, _)| (kept, binding)),
-            None => Rebinder::new(positions, cage, &frugal, listener),
-        };
-        match bound {
+        match Rebinder::new(positions, cage, &frugal(options), listener) {
             Ok((rebinder, binding)) => {
-                self.rebinder = Some(rebinder);
+                self.kept = Some((Backend::Cpu, rebinder));
                 Ok(binding)
             }
             // Without the fields it may fit.
             Err(BindError::Memory { .. }) => Ok(cagework_core::bind(positions, cage, options, listener)?),
             Err(error) => Err(error.into()),
         }
+    }
+
+    /// The same on the GPU.
+    async fn bind_there(
+        &mut self,
+        parts: &Parts,
+        options: &BindOptions,
+        listener: &Listener,
+    ) -> Answer<Binding> {
+        let Parts { positions, cage } = parts;
+        let most = frugal(options).memory_limit;
+        let (binding, rebinder) =
+            bind_gpu_to_edit(positions, cage, options, most, listener, self.open()?).await?;
+        self.kept = rebinder.map(|rebinder| (Backend::Gpu, rebinder));
+        Ok(binding)
+    }
+
+    fn open(&self) -> Answer<&GpuContext> {
+        self.gpu.as_ref().ok_or_else(|| Fault::missing("GPU", "open one first"))
     }
 
     async fn run(
@@ -234,8 +273,7 @@ impl Binder {
         if is_here(asked) {
             return Ok(cagework_core::bind(positions, cage, &options, &listener)?);
         }
-        let gpu = self.gpu.as_ref().ok_or_else(|| Fault::missing("GPU", "open one first"))?;
-        Ok(bind_gpu(positions, cage, &options, &listener, gpu).await?.0)
+        Ok(bind_gpu_to_edit(positions, cage, &options, 0, &listener, self.open()?).await?.0)
     }
 }
 

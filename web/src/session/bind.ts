@@ -35,7 +35,7 @@ export interface BindStart {
   readonly keep: (kept: boolean) => void;
 }
 
-/** What the worker keeps of the last bind on the processor: it is of use for the same options and the same faces. */
+/** What the worker keeps of the last bind: it is of use for the same options and the same faces. */
 export interface KeptBind {
   readonly options: BindOptions;
   readonly corners: Uint32Array;
@@ -45,7 +45,6 @@ export interface KeptBind {
 export function canGoOn(kept: KeptBind | undefined, options: BindOptions, corners: Uint32Array): boolean {
   return (
     kept !== undefined &&
-    options.backend === "cpu" &&
     JSON.stringify(kept.options) === JSON.stringify(options) &&
     same(kept.corners, corners)
   );

@@ -139,6 +139,19 @@ impl<'a> Prepared<'a> {
         &self.stencils
     }
 
+    /// Bytes that the bind was estimated to need in this process.
+    #[must_use]
+    pub fn estimated(&self) -> u64 {
+        self.estimated
+    }
+
+    /// Bytes of all columns' fields on the finest level, 4 for each unknown and column.
+    #[must_use]
+    pub fn fields_bytes(&self) -> u64 {
+        let hierarchy = self.hierarchy();
+        (hierarchy.levels[0].n_rows() * hierarchy.n_batches() * size_of::<Row>()) as u64
+    }
+
     /// Makes weights and report of the sampled columns.
     ///
     /// # Errors

@@ -9,6 +9,7 @@
 
 mod equations;
 mod local;
+mod moved;
 mod region;
 mod rows;
 mod shares;
@@ -18,10 +19,9 @@ mod tests;
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use crate::cage::Cage;
-use crate::grid::NO_CELL;
 use crate::mesh::{Weld, weld};
 use crate::progress::{Progress, Stage};
 use crate::sample::Stencils;
@@ -32,6 +32,7 @@ use crate::weights::assemble::Assembled;
 
 use self::equations::{Equations, cells_of_rows};
 use self::local::{Fields, Negligible, OldCells, Residual, Split, Update};
+use self::moved::{moved_triangles, renumbering};
 use self::region::Region;
 use self::rows::Edit;
 use self::steps::{resample, solve_for};
@@ -46,9 +47,6 @@ const MAX_UPDATES: usize = 6;
 
 /// A row with a weight below was put in its place by force, as in a cage that meets itself: what it was before cannot be told.
 const FORCED: f32 = -1e-5;
-
-/// Cells that a face's corners may be off its triangles' planes, when it is cut into others: [`CHANGED`] covers those between.
-const MOST_BENT: f64 = 1.0;
 
 /// Everything is bound anew if one in so many cells is at a moved face.
 const MOST: usize = 4;
@@ -94,6 +92,22 @@ struct Kept {
 }
 
 impl Kept {
+    /// Finishes a whole bind, and keeps what the next one can start from.
+    fn finish(
+        prepared: Prepared<'_>,
+        solved: &mut Solved,
+        base: Vec<Vec<Row>>,
+        sampled: f64,
+        watch: &Watch<'_>,
+    ) -> Result<(Self, Binding), BindError> {
+        let rows = prepared.rows(solved, watch)?;
+        let binding = prepared.reported(&rows, solved, sampled, watch)?;
+        let Prepared { voxels, stencils, estimated, .. } = prepared;
+        let row_of = Arc::new(voxels.hierarchy.levels[0].row_of.clone());
+        let fields = Fields { base, row_of, updates: Vec::new() };
+        Ok((Self { voxels, stencils, fields, estimated, rows }, binding))
+    }
+
     /// Whether a bind can start from it.
     fn is_usable(&self) -> bool {
         self.fields.updates.len() < MAX_UPDATES && self.rows.facts.iter().all(|facts| facts.low > FORCED)
@@ -121,6 +135,40 @@ impl Rebinder {
         Ok((rebinder, binding))
     }
 
+    /// Whether binds with these options leave anything that the next can start from: of dropped weights nobody knows how small
+    /// they were, and the classic method's grid moves with its cage.
+    #[must_use]
+    pub fn can_keep(options: &BindOptions) -> bool {
+        options.method == Method::Embedded && options.solver == Solver::Multigrid && options.sparsify == 0.0
+    }
+
+    /// Finishes a bind that was solved elsewhere, with fields (`[n_batches][n_rows]`, as [`Self::can_keep`] allows) that the
+    /// next bind can start from. Binds to come may need `memory_limit`.
+    ///
+    /// # Errors
+    /// Cancelled.
+    pub fn taken_over(
+        mut prepared: Prepared<'_>,
+        mut solved: Solved,
+        fields: Vec<Vec<Row>>,
+        memory_limit: u64,
+        watch: &Watch<'_>,
+    ) -> Result<(Self, Binding), BindError> {
+        prepared.estimated += prepared.fields_bytes();
+        let (positions, cage) = (prepared.positions.to_vec(), prepared.cage.clone());
+        let options = BindOptions { memory_limit, ..*prepared.options };
+        let (welded, points) = (prepared.welded.clone(), prepared.points.clone());
+        let sampled = watch.now_ms();
+        let (kept, binding) = Kept::finish(prepared, &mut solved, fields, sampled, watch)?;
+        Ok((Self { positions, options, welded, points, cage, kept: Some(kept) }, binding))
+    }
+
+    /// Whether this is the cage of the last bind.
+    #[must_use]
+    pub fn is_bound_to(&self, cage: &Cage) -> bool {
+        self.cage.positions() == cage.positions() && self.cage.faces() == cage.faces()
+    }
+
     /// Whether it was made for this mesh and these options: then what it keeps is of use.
     #[must_use]
     pub fn fits(&self, positions: &[Vec3], options: &BindOptions) -> bool {
@@ -143,15 +191,8 @@ impl Rebinder {
         cage: &Cage,
         progress: &dyn Progress,
     ) -> Result<(Binding, RebindReport), BindError> {
-        let same = cage.n_vertices() == self.cage.n_vertices()
-            && cage.faces() == self.cage.faces()
-            && Voxels::grid(cage, &self.options) == Voxels::grid(&self.cage, &self.options);
-        // What is of no use is dropped here: a whole bind needs the memory.
-        if let Some(kept) = self.kept.take().filter(|kept| same && kept.is_usable()) {
-            let watch = Watch::new(progress);
-            if let Some(done) = self.updated(cage, kept, &watch)? {
-                return Ok(done);
-            }
+        if let Some(done) = self.correct(cage, progress)? {
+            return Ok(done);
         }
         let columns = cage.n_vertices() as u32;
         let stencils_made = self.points.len() as u32;
@@ -159,33 +200,46 @@ impl Rebinder {
         Ok((self.anew(cage, progress)?, report))
     }
 
+    /// Binds the mesh to an edited cage by what has changed; `None` if everything must be bound anew. Then, and after an
+    /// error, nothing is kept.
+    ///
+    /// # Errors
+    /// Those of [`bind`].
+    pub fn correct(
+        &mut self,
+        cage: &Cage,
+        progress: &dyn Progress,
+    ) -> Result<Option<(Binding, RebindReport)>, BindError> {
+        let same = cage.n_vertices() == self.cage.n_vertices()
+            && cage.faces() == self.cage.faces()
+            && Voxels::grid(cage, &self.options) == Voxels::grid(&self.cage, &self.options);
+        // What is of no use is dropped here: a whole bind needs the memory.
+        match self.kept.take().filter(|kept| same && kept.is_usable()) {
+            Some(kept) => self.updated(cage, kept, &Watch::new(progress)),
+            None => Ok(None),
+        }
+    }
+
     /// Everything from the beginning.
     fn anew(&mut self, cage: &Cage, progress: &dyn Progress) -> Result<Binding, BindError> {
-        let BindOptions { method, solver, sparsify, .. } = self.options;
-        if method != Method::Embedded || solver != Solver::Multigrid || sparsify > 0.0 {
+        if !Self::can_keep(&self.options) {
             let binding = bind(&self.positions, cage, &self.options, progress)?;
             self.cage = cage.clone();
             return Ok(binding);
         }
         let watch = Watch::new(progress);
         let mut prepared = Prepared::new(&self.positions, cage, &self.options, FieldsOn::Host, &watch)?;
-        let level = &prepared.hierarchy().levels[0];
-        let n_batches = prepared.hierarchy().n_batches();
-        let needed = prepared.estimated + level.n_rows() as u64 * (size_of::<Row>() * n_batches) as u64;
-        if needed > self.options.memory_limit {
-            return Err(BindError::Memory { needed, limit: self.options.memory_limit });
+        prepared.estimated += prepared.fields_bytes();
+        let (needed, limit) = (prepared.estimated, self.options.memory_limit);
+        if needed > limit {
+            return Err(BindError::Memory { needed, limit });
         }
-        let row_of = Arc::new(level.row_of.clone());
-        prepared.estimated = needed;
         let Prepared { voxels, stencils, team, .. } = &prepared;
-        let (mut solved, base) =
+        let (mut solved, fields) =
             multigrid_columns(voxels, stencils, &self.options, FieldFate::Kept, team, &watch)?;
         let sampled = watch.now_ms();
-        let rows = prepared.rows(&mut solved, &watch)?;
-        let binding = prepared.reported(&rows, &mut solved, sampled, &watch)?;
-        let Prepared { voxels, stencils, .. } = prepared;
-        let fields = Fields { base, row_of, updates: Vec::new() };
-        self.kept = Some(Kept { voxels, stencils, fields, estimated: needed, rows });
+        let (kept, binding) = Kept::finish(prepared, &mut solved, fields, sampled, &watch)?;
+        self.kept = Some(kept);
         self.cage = cage.clone();
         Ok(binding)
     }
@@ -291,58 +345,4 @@ impl Rebinder {
         };
         Ok(Some((binding?, report)))
     }
-}
-
-/// Triangles with a moved vertex, in grid coordinates: where they were, are, and in steps of a cell on the way. `None` if a
-/// face is cut into other triangles than before and is so bent, before and after, that there are cells between them.
-fn moved_triangles(before: &Cage, after: &Cage, to_grid: impl Fn(Vec3) -> DVec3) -> Option<Vec<[DVec3; 3]>> {
-    if before.triangles().len() != after.triangles().len() {
-        return None;
-    }
-    let is_bent = |t: usize, cage: &Cage| {
-        let at = |i: u32| to_grid(cage.positions()[i as usize]);
-        let [a, b, c] = cage.triangles()[t].map(at);
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        let corners = &cage.faces()[cage.face_of_triangle()[t] as usize];
-        corners.iter().any(|&i| (at(i) - a).dot(normal).abs() > MOST_BENT)
-    };
-    let is_cut_anew = |&t: &usize| before.triangles()[t] != after.triangles()[t];
-    let mut cut_anew = (0..after.triangles().len()).filter(is_cut_anew);
-    // Between a flat face and a bent one all cells lie on the way.
-    if cut_anew.any(|t| is_bent(t, before) && is_bent(t, after)) {
-        return None;
-    }
-    let mut moved = Vec::new();
-    let has_moved = |&i: &u32| before.positions()[i as usize] != after.positions()[i as usize];
-    // A polygon may be cut into triangles in another way than before.
-    for (cage, t) in [before, after].into_iter().flat_map(|c| (0..c.triangles().len()).map(move |t| (c, t))) {
-        // Boundary values of a polygon depend on all its corners.
-        if !after.faces()[cage.face_of_triangle()[t] as usize].iter().any(has_moved) {
-            continue;
-        }
-        let at = |of: &Cage| cage.triangles()[t].map(|i| to_grid(of.positions()[i as usize]));
-        let (from, to) = (at(before), at(after));
-        let way = from.iter().zip(&to).map(|(a, b)| (*b - *a).abs().max_element()).fold(0.0, f64::max);
-        let steps = way.ceil().clamp(1.0, 512.0);
-        for k in 0..=steps as u32 {
-            let share = f64::from(k) / steps;
-            moved.push([0, 1, 2].map(|c| from[c].lerp(to[c], share)));
-        }
-    }
-    Some(moved)
-}
-
-/// For every old row the new one of the same cell; [`NO_CELL`] if it is gone. Zero rows are nobody's. `None` if all are where
-/// they were.
-fn renumbering(old: &[u32], new: &[u32], voxels: &Voxels) -> Option<Vec<u32>> {
-    if old == new {
-        return None;
-    }
-    let mut moved_to = vec![NO_CELL; voxels.hierarchy.levels[0].n_rows()];
-    for (&from, &to) in old.iter().zip(new) {
-        if from != NO_CELL {
-            moved_to[from as usize] = to;
-        }
-    }
-    Some(moved_to)
 }

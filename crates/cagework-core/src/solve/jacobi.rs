@@ -192,10 +192,7 @@ impl Share {
         for batch in &mut self.batches {
             for changes in &mut self.changes[..round] {
                 let (old, new, f) = (&mut batch.old, &mut batch.new, Rhs::Cut(&batch.f));
-                match norm {
-                    DeltaNorm::Euclidean => sweep::<false>(level, old, new, f, changes),
-                    DeltaNorm::Literal => sweep::<true>(level, old, new, f, changes),
-                }
+                sweep(level, old, new, f, norm, changes);
                 std::mem::swap(&mut batch.old, &mut batch.new);
             }
         }
@@ -203,20 +200,14 @@ impl Share {
 }
 
 /// One sweep of both colours; plane by plane, so that both read a plane while it is near.
-fn sweep<const ABSOLUTE: bool>(
-    level: &Level,
-    old: &mut [Row],
-    new: &mut [Row],
-    f: Rhs<'_>,
-    changes: &mut [f32],
-) {
+fn sweep(level: &Level, old: &mut [Row], new: &mut [Row], f: Rhs<'_>, norm: DeltaNorm, changes: &mut [f32]) {
     dispatch(
         #[inline(always)]
         || {
             for plane in 0..level.grid.dims[2] as usize {
                 for colour in 0..2 {
                     let first = level.first_row(colour);
-                    jacobi_plane::<ABSOLUTE>(level, colour, plane, old, new, f, &mut changes[first..]);
+                    jacobi_plane(level, colour, plane, [old, new], f, norm, &mut changes[first..]);
                 }
             }
         },

@@ -4,6 +4,7 @@
 //! (`[red .., 0, black .., 0]`). Every kernel works on one z-plane of one colour, so that callers can let several
 //! half sweeps follow each other a plane apart and a whole smoothing pass reads the field from memory once.
 
+use crate::bind::DeltaNorm;
 use crate::grid::NO_CELL;
 use crate::levels::{Colour, Level};
 use crate::transfer::{ProlongRow, RESTRICT_CENTRE, RESTRICT_EDGE, RestrictRow, Transfer};
@@ -262,19 +263,20 @@ pub fn residual_plane(
 }
 
 /// Jacobi on one plane of one colour, from `old` to `new`; `changes[cell]` grows by the cell's change, squared and
-/// summed over lanes, or (`ABSOLUTE`) its absolute value, summed.
+/// summed over lanes, or, literally, its absolute value, summed.
 #[inline(always)]
-pub fn jacobi_plane<const ABSOLUTE: bool>(
+pub fn jacobi_plane(
     level: &Level,
     colour: usize,
     plane: usize,
-    old: &mut [Row],
-    new: &mut [Row],
+    [old, new]: [&mut [Row]; 2],
     rhs: Rhs<'_>,
+    norm: DeltaNorm,
     changes: &mut [f32],
 ) {
     let (old, other) = split(level, old, colour);
     let (new, _) = split(level, new, colour);
+    let is_literal = norm == DeltaNorm::Literal;
     visit_plane::<true>(
         &level.colours[colour],
         plane,
@@ -291,7 +293,7 @@ pub fn jacobi_plane<const ABSOLUTE: bool>(
                 // Values spread from the cage by a factor of 6 a cell, and squares below 1e-38 would be denormal:
                 // sweeps measured three times slower for changes that no delta can feel.
                 let d = if d > NEGLIGIBLE { d } else { 0.0 };
-                change[k] = if ABSOLUTE { d } else { d * d };
+                change[k] = d * if is_literal { 1.0 } else { d };
             }
             *out = new;
             changes[cell] += tree_sum(change);

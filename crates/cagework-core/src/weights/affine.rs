@@ -63,6 +63,16 @@ impl Columns {
     #[inline(always)]
     #[must_use]
     pub fn sums(&self, row: &[Row], target: DVec3) -> (f64, f64) {
+        let (sum, point) = self.combined(row);
+        (sum, (point - target).length())
+    }
+
+    /// (sum of a row, where it puts its vertex in the columns' units). `row`: `[n_batches]`.
+    // Part of its callers where they are compiled for several instruction sets; elsewhere copies would be downloaded.
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[must_use]
+    pub fn combined(&self, row: &[Row]) -> (f64, DVec3) {
         let [x, y, z] = &self.exact;
         // Sums in variables of their own, not in an array: they stay in registers.
         let (mut s, mut sx, mut sy, mut sz) =
@@ -77,21 +87,7 @@ impl Columns {
             }
         }
         let [sum, x, y, z] = [s, sx, sy, sz].map(|lanes| lanes.iter().sum::<f64>());
-        (sum, (DVec3::new(x, y, z) - target).length())
-    }
-
-    /// Where a row puts its vertex, in the columns' units. `row`: `[n_batches]`.
-    #[inline(always)]
-    #[must_use]
-    pub fn combined(&self, row: &[Row]) -> DVec3 {
-        let mut point = DVec3::ZERO;
-        for (batch, w) in row.iter().enumerate() {
-            for k in 0..LANES {
-                let at = self.exact.each_ref().map(|axis| axis[batch][k]);
-                point += f64::from(w[k]) * DVec3::from_array(at);
-            }
-        }
-        point
+        (sum, DVec3::new(x, y, z))
     }
 
     /// Corrects a row so that it sums to 1 and reproduces `target` ([`Self::scale`]d).

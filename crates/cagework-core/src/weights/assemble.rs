@@ -235,7 +235,7 @@ impl Run<'_> {
                 Some(target)
             } else if options.threshold > 0.0 {
                 // Errors, and the place of a vertex outside, are not sparsification's to change.
-                Some(columns.combined(&row))
+                Some(columns.combined(&row).1)
             } else {
                 None
             };

@@ -147,7 +147,7 @@ struct Moments {
 impl Moments {
     fn new(shares: &Shares, columns: &Columns) -> Self {
         let of_share = |share| {
-            let ((sum, _), point) = (columns.sums(share, DVec3::ZERO), columns.combined(share));
+            let (sum, point) = columns.combined(share);
             [sum, point.x, point.y, point.z].map(|x| x as f32)
         };
         Self { of_field: shares.iter().map(of_share).collect() }

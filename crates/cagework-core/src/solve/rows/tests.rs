@@ -1,6 +1,7 @@
 //! Kernels against the plainest loops over the boundary's definition, on grids of odd dimensions.
 
 use super::*;
+use crate::bind::DeltaNorm;
 use crate::grid::Grid;
 use crate::levels::plain::{cells, hierarchy, on_two_levels, some_field};
 
@@ -127,8 +128,24 @@ fn jacobi_sweep_matches_plain_loops() {
         for plane in 0..level.grid.dims[2] as usize {
             for colour in 0..2 {
                 let [a, b] = changes.each_mut().map(|c| &mut c[level.first_row(colour)..]);
-                jacobi_plane::<false>(level, colour, plane, &mut old, &mut new, Rhs::Cut(&cut), a);
-                jacobi_plane::<true>(level, colour, plane, &mut old, &mut new, Rhs::Dense(&dense), b);
+                jacobi_plane(
+                    level,
+                    colour,
+                    plane,
+                    [&mut old, &mut new],
+                    Rhs::Cut(&cut),
+                    DeltaNorm::Euclidean,
+                    a,
+                );
+                jacobi_plane(
+                    level,
+                    colour,
+                    plane,
+                    [&mut old, &mut new],
+                    Rhs::Dense(&dense),
+                    DeltaNorm::Literal,
+                    b,
+                );
             }
         }
         assert_eq!(old, before, "old values are only read");

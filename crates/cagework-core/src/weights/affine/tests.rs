@@ -80,5 +80,5 @@ fn combined_is_the_weighted_sum_of_positions() {
     let row = rows_of(&[0.0, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.75]);
     // Vertex 1 is (1, 0, 0), vertex 7 is (1, 1, 1).
     let expected = columns.scale(DVec3::new(1.0, 0.75, 0.75));
-    assert!(columns.combined(&row).distance(expected) <= 1e-12);
+    assert!(columns.combined(&row).1.distance(expected) <= 1e-12);
 }

@@ -20,7 +20,9 @@ pub struct RowFacts {
 
 impl RowFacts {
     /// Facts about a row (`[n_batches]`) with this sum, which misses the vertex by so much.
-    #[inline(always)]
+    // As in `restore`.
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
+    #[cfg_attr(target_family = "wasm", inline(never))]
     #[must_use]
     pub fn of(row: &[Row], sum: f64, miss: Option<f64>) -> Self {
         // Comparisons, not `min` and `max`: wasm has no instruction for theirs, which say what becomes of NaN.
