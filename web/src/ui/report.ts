@@ -2,6 +2,7 @@
 
 import type { BindReport } from "../contract";
 import { bytes, count, duration, percent, plural, scientific } from "../format";
+import { isEdit } from "../state";
 import { sentence } from "../strings";
 import { facts } from "./controls";
 import { h } from "./dom";
@@ -43,7 +44,7 @@ export function reportCard(report: BindReport): HTMLElement {
       ["Method", `${METHODS[report.method]}, ${SOLVERS[report.solver]}`],
       ["Grid", `${report.dims.join(" × ")} cells`],
       ["Computed on", where],
-      ...(report.corrections === undefined ? [] : [["Started from", startedFrom(report)] as const]),
+      ...(isEdit(report) ? [["Started from", startedFrom(report)] as const] : []),
       ["Rest error, mean", scientific(report.rest_error.mean_rel)],
       ["Rest error, largest", scientific(report.rest_error.max_rel)],
       ["Weights", `${scientific(report.weights.min)} to ${scientific(report.weights.max)}`],
@@ -82,6 +83,11 @@ function startedFrom(report: BindReport): string {
   return `the last bind, by ${plural(report.corrections ?? 0, "correction")}`;
 }
 
+/** Method, solver, grid and place of a bind, in short. */
+function wayOf({ method, solver, grid, backend }: BindReport): string {
+  return `${method === "classic" ? "Classic" : "Embedded"}, ${SOLVERS[solver]}, ${grid}, ${backend.toUpperCase()}`;
+}
+
 /** Share of the weights that is stored. */
 export function density(report: BindReport): number {
   const all = report.vertices * report.cage_vertices;
@@ -98,7 +104,7 @@ export function compareTable(reports: readonly BindReport[]): HTMLElement {
         {},
         h("th", {
           attrs: { scope: "row" },
-          text: `${report.method === "classic" ? "Classic" : "Embedded"}, ${SOLVERS[report.solver]}, ${report.grid}, ${report.backend.toUpperCase()}`,
+          text: `${wayOf(report)}${isEdit(report) ? ", after an edit" : ""}`,
         }),
         h("td", { text: duration(report.timings_ms.total) }),
         h("td", { text: scientific(report.rest_error.mean_rel) }),
