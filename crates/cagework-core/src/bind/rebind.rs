@@ -310,6 +310,7 @@ impl Rebinder {
                 points: &self.points,
                 samples: &samples,
                 shares: &shares,
+                still_zero: negligible.weight,
                 resampled: (&changed, &resampled),
             };
             edit.apply(&mut rows, |vertex| stencils.is_outside(vertex), &team);

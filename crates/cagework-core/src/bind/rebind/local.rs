@@ -18,6 +18,8 @@ pub(super) struct Negligible {
     pub(super) residual: f32,
     /// Smallest change of a weight by one of the corrections that counts: all that are left out stay below the residual's.
     pub(super) correction: f32,
+    /// Smallest weight that is stored where none was.
+    pub(super) weight: f32,
 }
 
 impl Negligible {
@@ -28,7 +30,7 @@ impl Negligible {
         // Whole binds with a coarser tau are far more exact than it, by full multigrid: edits must not be worse.
         let residual = tau.clamp(1e-6, 1e-5);
         // There are 8 to 40 corrections.
-        Self { residual, correction: residual / 40.0 }
+        Self { residual, correction: residual / 40.0, weight: residual / 10.0 }
     }
 }
 

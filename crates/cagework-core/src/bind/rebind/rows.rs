@@ -16,9 +16,6 @@ use super::shares::{Felt, Shares};
 /// cage's diagonal: a tenth of what a corrected row may miss by.
 const UNMOVED: f64 = 2e-8;
 
-/// A weight that was not stored stays so below this: what the solver leaves, with either sign, where the weight is 0.
-const STILL_ZERO: f32 = 1e-7;
-
 /// A row that keeps fewer than one in so many of its entries is stored anew.
 const FAR_FEWER: usize = 8;
 
@@ -32,6 +29,9 @@ pub(super) struct Edit<'a> {
     /// Corrections at them. `[n_batches of corrections][n_points]`
     pub(super) samples: &'a [&'a [Row]],
     pub(super) shares: &'a Shares,
+    /// A weight that was not stored stays so below this: what the solver leaves, with either sign, where the weight is 0. One
+    /// entry more, and the whole matrix is copied.
+    pub(super) still_zero: f32,
     /// Vertices whose old weights are sampled anew, ascending, and those rows: `[n_resampled][n_batches]`.
     pub(super) resampled: (&'a [u32], &'a [Row]),
 }
@@ -203,7 +203,7 @@ impl Run<'_> {
             shares.add(&felt, &mut row);
             let clipped = clip(&mut row);
             if indices.len() < shared.edit.cages[1].n_vertices() {
-                forget_unstored(&mut row, indices);
+                forget_unstored(&mut row, indices, shared.edit.still_zero);
             }
             let outside = is_outside(v);
             let off = match change {
@@ -292,10 +292,10 @@ fn n_nonzeros(row: &[Row]) -> usize {
 
 /// Sets weights to 0 that are nearly so and were not stored.
 #[inline(always)]
-fn forget_unstored(row: &mut [Row], indices: &[u32]) {
+fn forget_unstored(row: &mut [Row], indices: &[u32], still_zero: f32) {
     let mut next = indices.iter().peekable();
     for (column, w) in (0u32..).zip(row.iter_mut().flatten()) {
-        if next.next_if_eq(&&column).is_none() && *w < STILL_ZERO {
+        if next.next_if_eq(&&column).is_none() && *w < still_zero {
             *w = 0.0;
         }
     }
