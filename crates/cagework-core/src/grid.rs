@@ -58,6 +58,14 @@ impl Grid {
         (z as usize * self.dims[1] as usize + y as usize) * self.dims[0] as usize + x as usize
     }
 
+    /// The cell of an index.
+    #[inline]
+    #[must_use]
+    pub fn cell(&self, index: usize) -> [u32; 3] {
+        let [nx, ny] = [self.dims[0] as usize, self.dims[1] as usize];
+        [index % nx, index / nx % ny, index / (nx * ny)].map(|x| x as u32)
+    }
+
     /// The cell one step along `direction` (+x, -x, +y, -y, +z, -z), if it is in the grid.
     #[inline]
     #[must_use]
@@ -144,6 +152,14 @@ mod tests {
                 assert!(grid.center([0; 3])[axis] < f64::from(bounds.min[axis]));
                 assert!(grid.center(grid.dims.map(|d| d - 1))[axis] > f64::from(bounds.max[axis]));
             }
+        }
+    }
+
+    #[test]
+    fn cells_come_in_index_order() {
+        let grid = Grid { dims: [5, 3, 4], origin: DVec3::ZERO, cell: DVec3::ONE };
+        for (index, cell) in grid.cells().enumerate() {
+            assert_eq!((grid.index(cell), grid.cell(index)), (index, cell));
         }
     }
 

@@ -28,11 +28,12 @@ use crate::sample::Stencils;
 use crate::solve::multigrid::Workspace;
 use crate::solve::rows::{LANES, Row};
 use crate::solve::team::Team;
+use crate::weights::affine::Columns;
 use crate::weights::assemble::Assembled;
 
 use self::equations::{Equations, cells_of_rows};
 use self::local::{Fields, Negligible, OldCells, Residual, Split, Update};
-use self::moved::{moved_triangles, renumbering};
+use self::moved::{moved_columns, moved_triangles, renumbering};
 use self::region::Region;
 use self::rows::Edit;
 use self::steps::{resample, solve_for};
@@ -287,14 +288,18 @@ impl Rebinder {
         let (mut rank, mut sampled) = (0, stencils_made);
         if !moved.is_empty() {
             let negligible = Negligible::at(self.options.tau);
-            let equations = Equations::changed(level, &old_voxels.hierarchy.levels[0], &region);
+            let before = &old_voxels.hierarchy.levels[0];
+            let equations = Equations::changed(level, before, &region);
             let mut needed = equations.neighbourhood(level);
             let cell_of = if changed.is_empty() { Vec::new() } else { cells_of_rows(level) };
             for (row, _) in changed.iter().flat_map(|&v| stencils.at(v as usize).0) {
                 needed.add(cell_of[*row as usize] as usize);
             }
             let old = OldCells::new(&fields, &needed, n_batches);
-            let residual = Residual::new(level, &equations, n_batches, &old, negligible);
+            let moved = moved_columns(&self.cage, cage);
+            let columns = Columns::new(cage);
+            let residual =
+                Residual::new([level, before], &equations, n_batches, &old, &columns, &moved, negligible);
             let Split { rows: of, right, shares } = residual.split(cage.n_vertices());
             let resampled = resample(&stencils, &changed, &cell_of, &old, n_batches);
             rank = shares.len();
@@ -306,7 +311,8 @@ impl Rebinder {
             sampled = watch.now_ms();
             let samples: Vec<&[Row]> = corrections.iter().map(|c| c.samples.as_slice()).collect();
             let edit = Edit {
-                cages: [&self.cage, cage],
+                cage,
+                moved: &moved,
                 points: &self.points,
                 samples: &samples,
                 shares: &shares,

@@ -63,17 +63,27 @@ impl Hierarchy {
         hierarchy
     }
 
+    /// Sorts the levels' terms by batch; within a batch they keep their order.
     fn sort_terms(&mut self) {
         let n_batches = self.n_batches();
         let batch_of = |t: &BoundaryTerm| t.column as usize / LANES;
-        self.batches = self
-            .levels
-            .iter_mut()
-            .map(|level| {
-                level.boundary.sort_by_key(batch_of);
-                (0..=n_batches).map(|b| level.boundary.partition_point(|t| batch_of(t) < b) as u32).collect()
-            })
-            .collect();
+        for level in &mut self.levels {
+            let mut starts = vec![0u32; n_batches + 1];
+            for term in &level.boundary {
+                starts[batch_of(term) + 1] += 1;
+            }
+            for batch in 0..n_batches {
+                starts[batch + 1] += starts[batch];
+            }
+            let (mut next, mut sorted) = (starts.clone(), level.boundary.clone());
+            for term in &level.boundary {
+                let place = &mut next[batch_of(term)];
+                sorted[*place as usize] = *term;
+                *place += 1;
+            }
+            level.boundary = sorted;
+            self.batches.push(starts);
+        }
     }
 
     /// Batches of [`LANES`] columns.

@@ -22,6 +22,10 @@ pub struct Columns {
     scaled: [Vec<Row>; 3],
     /// The same as f64, to measure with.
     exact: [Vec<[f64; LANES]>; 3],
+    /// 1 for columns, 0 for lanes without one. `[n_batches]`
+    ones: Vec<Row>,
+    /// Inverse of the sum of `(c, 1) (c, 1)^T` over the columns.
+    gram_inverse: DMat4,
     center: DVec3,
     diagonal: f64,
 }
@@ -44,7 +48,16 @@ impl Columns {
                 .collect::<Vec<_>>()
         });
         let scaled = exact.each_ref().map(|e| e.iter().map(|lanes| lanes.map(|x| x as f32)).collect());
-        Self { scaled, exact, center, diagonal }
+        let n = cage.n_vertices();
+        let ones =
+            (0..n).step_by(LANES).map(|first| std::array::from_fn(|k| if first + k < n { 1.0 } else { 0.0 }));
+        let mut gram = DMat4::ZERO;
+        for p in cage.positions() {
+            let p = ((p.as_dvec3() - center) / diagonal).extend(1.0);
+            gram += DMat4::from_cols(p.x * p, p.y * p, p.z * p, p.w * p);
+        }
+        let (ones, gram_inverse) = (ones.collect(), gram.inverse());
+        Self { scaled, exact, ones, gram_inverse, center, diagonal }
     }
 
     /// Batches of lanes that a row has.
@@ -88,6 +101,21 @@ impl Columns {
         }
         let [sum, x, y, z] = [s, sx, sy, sz].map(|lanes| lanes.iter().sum::<f64>());
         (sum, DVec3::new(x, y, z))
+    }
+
+    /// Changes a row of any numbers by as little as possible so that it has this sum and puts its point there.
+    pub fn impose(&self, row: &mut [Row], sum: f64, point: DVec3) {
+        let (old_sum, old_point) = self.combined(row);
+        let off = self.gram_inverse * (point - old_point).extend(sum - old_sum);
+        let off = off.as_vec4();
+        let [x, y, z] = &self.scaled;
+        for ((((row, one), x), y), z) in row.iter_mut().zip(&self.ones).zip(x).zip(y).zip(z) {
+            let mut sums = *row;
+            for k in 0..LANES {
+                sums[k] += off.x * x[k] + off.y * y[k] + (off.z * z[k] + off.w * one[k]);
+            }
+            *row = sums;
+        }
     }
 
     /// Corrects a row so that it sums to 1 and reproduces `target` ([`Self::scale`]d).

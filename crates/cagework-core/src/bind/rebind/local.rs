@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
+use glam::{DVec3, DVec4};
+
 use crate::grid::NO_CELL;
 use crate::levels::Level;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
+use crate::weights::affine::Columns;
 
 use super::equations::Equations;
 use super::region::Region;
@@ -36,6 +39,9 @@ impl Negligible {
 
 /// A residual must be so many times what counts to be worth a batch of its own.
 const MANY: f32 = 2.0;
+
+/// Moments must be met so many times as well as weights: then most rows need not be restored after they were corrected.
+const KEENER: f32 = 30.0;
 
 /// A correction of all columns: a few fields and how much of each every column takes.
 #[derive(Clone, Debug)]
@@ -88,7 +94,8 @@ pub(super) struct Residual {
     /// Row of the field of each unknown.
     rows: Vec<u32>,
     diagonals: Vec<f32>,
-    /// `[n_unknowns][n_batches]`
+    /// The last batch is none of columns, but of moments: [`KEENER`] times what the columns' residuals, each times its cage
+    /// vertex, sum to along x, y, z, over the cage's diagonal. `[n_unknowns][n_batches + 1]`
     values: Vec<Vec<Row>>,
     negligible: Negligible,
 }
@@ -105,16 +112,18 @@ pub(super) struct Split {
 impl Residual {
     /// Residuals of equations; `old` must know their cells and those around them.
     pub(super) fn new(
-        level: &Level,
+        [level, before]: [&Level; 2],
         equations: &Equations,
         n_batches: usize,
         old: &OldCells<'_>,
+        columns: &Columns,
+        moved: &[(usize, DVec3)],
         negligible: Negligible,
     ) -> Self {
         let strides = level.grid.strides();
         let Equations { cells, rows, number } = equations;
         let (rows, diagonals) = (rows.clone(), vec![6.0; rows.len()]);
-        let values = vec![vec![ZERO; n_batches]; rows.len()];
+        let values = vec![vec![ZERO; n_batches + 1]; rows.len()];
         let mut residual = Self { rows, diagonals, values, negligible };
         // Cut arms: what is no neighbour, and what the cage adds.
         let mut cut_of = vec![None; residual.rows.len()];
@@ -140,34 +149,58 @@ impl Residual {
                     cut.neighbours[d] == level.colours[usize::from(is_red)].n_cells
                 })
             };
-            let out = &mut residual.values[k];
+            let (out, moments) = residual.values[k].split_at_mut(n_batches);
+            let of = |row: &[Row], column: usize| row[column / LANES][column % LANES];
+            let given: Vec<f32> = moved.iter().map(|&(column, _)| of(out, column)).collect();
+            let mut ideal = DVec4::ZERO;
+            let mut missing = |cell: usize, weight: f64| {
+                if before.row_of[cell] == NO_CELL {
+                    ideal += weight * columns.scale(level.grid.center(level.grid.cell(cell))).extend(1.0);
+                }
+            };
             for d in (0..6).filter(|&d| !zero(d)) {
                 let neighbour = if d % 2 == 0 { cell + strides[d / 2] } else { cell - strides[d / 2] };
                 add_scaled(out, old.at(neighbour), 1.0);
+                missing(neighbour, -1.0);
             }
             add_scaled(out, old.at(cell), -residual.diagonals[k]);
+            missing(cell, f64::from(residual.diagonals[k]));
             let scale = 1.0 / residual.diagonals[k];
+            // Linear functions meet the new equations with the new cage's values, and old weights reproduce the place of a
+            // cell and, for each moved vertex of the cage, its weight times its way.
+            for (&(column, way), given) in moved.iter().zip(given) {
+                ideal += (way * f64::from(of(out, column) - given)).extend(0.0);
+            }
+            for (moment, ideal) in moments[0].iter_mut().zip((ideal * f64::from(KEENER * scale)).to_array()) {
+                *moment = ideal as f32;
+            }
             for w in out.iter_mut().flatten() {
                 *w *= scale;
             }
         }
         residual.drop_negligible();
+        for row in &mut residual.values {
+            let (row, moments) = row.split_at_mut(n_batches);
+            let [x, y, z, sum, ..] = moments[0].map(|moment| f64::from(moment / KEENER));
+            columns.impose(row, sum, DVec3::new(x, y, z));
+        }
         residual
     }
 
     /// Leaves only unknowns whose equations have changed.
     fn drop_negligible(&mut self) {
-        let changed: Vec<bool> = self
-            .values
-            .iter()
-            .map(|row| row.iter().flatten().any(|w| w.abs() >= self.negligible.residual))
-            .collect();
-        let mut keep = changed.iter();
-        self.values.retain(|_| keep.next() == Some(&true));
-        let mut keep = changed.iter();
-        self.rows.retain(|_| keep.next() == Some(&true));
-        let mut keep = changed.iter();
-        self.diagonals.retain(|_| keep.next() == Some(&true));
+        let mut kept = 0;
+        for k in 0..self.rows.len() {
+            if self.values[k].iter().flatten().any(|w| w.abs() >= self.negligible.residual) {
+                self.values.swap(kept, k);
+                self.rows.swap(kept, k);
+                self.diagonals.swap(kept, k);
+                kept += 1;
+            }
+        }
+        self.values.truncate(kept);
+        self.rows.truncate(kept);
+        self.diagonals.truncate(kept);
     }
 
     /// Splits the residuals of all columns into a few independent ones and the columns' shares in them.
@@ -184,10 +217,12 @@ impl Residual {
     #[inline(always)]
     fn split_columns(mut self, n_columns: usize) -> Split {
         let n_batches = n_columns.div_ceil(LANES);
+        // The last four are moments.
+        let columns = || (0..n_columns).chain((0..4).map(|k| n_batches * LANES + k));
         let mut right = Vec::new();
         let mut shares = Shares::new(n_batches);
         loop {
-            let mut largest = vec![ZERO; n_batches];
+            let mut largest = vec![ZERO; n_batches + 1];
             for row in &self.values {
                 for (largest, row) in largest.iter_mut().zip(row) {
                     for lane in 0..LANES {
@@ -198,7 +233,7 @@ impl Residual {
                 }
             }
             let size = |c: usize| largest[c / LANES][c % LANES];
-            let pivot = (0..n_columns).max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
+            let pivot = columns().max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
             let rank = shares.len();
             // Another batch for little more than nothing costs as much as the one before.
             let needs_batch = rank > 0 && rank.is_multiple_of(LANES);
@@ -209,7 +244,7 @@ impl Residual {
             let column: Vec<f32> = self.values.iter().map(|row| row[pivot / LANES][pivot % LANES]).collect();
             let norm = column.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt() as f32;
             let unit: Vec<f32> = column.iter().map(|x| x / norm).collect();
-            let mut share = vec![ZERO; n_batches];
+            let mut share = vec![ZERO; n_batches + 1];
             for (row, &q) in self.values.iter().zip(&unit) {
                 add_scaled(&mut share, row, q);
             }
@@ -223,6 +258,7 @@ impl Residual {
             if rank.is_multiple_of(LANES) {
                 right.push(vec![ZERO; self.rows.len()]);
             }
+            share.truncate(n_batches);
             let norm = shares.push(share, self.negligible);
             let batch = &mut right[rank / LANES];
             for ((values, &q), &diagonal) in batch.iter_mut().zip(&unit).zip(&self.diagonals) {

@@ -9,6 +9,13 @@ use crate::grid::NO_CELL;
 /// Cells that a face's corners may be off its triangles' planes, when it is cut into others: the cells that count as near cover those between.
 const MOST_BENT: f64 = 1.0;
 
+/// Moved vertices of the cage, and where to, over its diagonal.
+pub(super) fn moved_columns(before: &Cage, after: &Cage) -> Vec<(usize, DVec3)> {
+    let diagonal = f64::from(after.diagonal());
+    let pairs = before.positions().iter().zip(after.positions()).enumerate();
+    pairs.filter(|(_, (a, b))| a != b).map(|(k, (a, b))| (k, (*b - *a).as_dvec3() / diagonal)).collect()
+}
+
 /// Triangles with a moved vertex, in grid coordinates: where they were, are, and in steps of a cell on the way. `None` if a
 /// face is cut into other triangles than before and is so bent, before and after, that there are cells between them.
 pub(super) fn moved_triangles(

@@ -22,8 +22,10 @@ const FAR_FEWER: usize = 8;
 /// What an edit does to the rows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edit<'a> {
-    /// The cage before and after.
-    pub(super) cages: [&'a Cage; 2],
+    /// The cage as it is now.
+    pub(super) cage: &'a Cage,
+    /// Its vertices that have moved, and where to, over its diagonal.
+    pub(super) moved: &'a [(usize, DVec3)],
     /// Rest positions of the rows' vertices.
     pub(super) points: &'a [Vec3],
     /// Corrections at them. `[n_batches of corrections][n_points]`
@@ -51,8 +53,6 @@ struct Run<'a> {
 struct Shared<'a> {
     edit: Edit<'a>,
     columns: Columns,
-    /// Moved vertices of the cage, and where to, over its diagonal.
-    moved: Vec<(usize, DVec3)>,
     moments: Moments,
     indptr: &'a [u32],
     indices: &'a [u32],
@@ -61,13 +61,8 @@ struct Shared<'a> {
 impl Edit<'_> {
     /// Brings all rows up to date.
     pub(super) fn apply(&self, rows: &mut Assembled, is_outside: impl Fn(usize) -> bool + Sync, team: &Team) {
-        let [before, after] = self.cages;
-        let columns = Columns::new(after);
+        let columns = Columns::new(self.cage);
         let n_batches = columns.n_batches();
-        let way = |(column, (a, b)): (usize, (&Vec3, &Vec3))| {
-            (a != b).then(|| (column, (*b - *a).as_dvec3() / f64::from(after.diagonal())))
-        };
-        let moved = before.positions().iter().zip(after.positions()).enumerate().filter_map(way).collect();
         let (indptr, indices, mut data) = rows.weights.parts_mut();
         let mut runs = Vec::new();
         for (number, facts) in rows.facts.chunks_mut(VERTEX_RUN).enumerate() {
@@ -78,7 +73,7 @@ impl Edit<'_> {
             runs.push(Run { first, offset, data, facts, replaced: Vec::new() });
         }
         let moments = Moments::new(self.shares, &columns);
-        let shared = Shared { edit: *self, columns, moved, moments, indptr, indices };
+        let shared = Shared { edit: *self, columns, moments, indptr, indices };
         team.each_mut(&mut runs, |run| {
             dispatch(
                 #[inline(always)]
@@ -188,7 +183,7 @@ impl Run<'_> {
                 next += 1;
             } else {
                 let way = |&(column, way): &(usize, DVec3)| f64::from(weight_of(column, indices, data)) * way;
-                let way: DVec3 = shared.moved.iter().map(way).sum();
+                let way: DVec3 = shared.edit.moved.iter().map(way).sum();
                 if felt.is_empty() && way.length() < UNMOVED {
                     let facts = &mut self.facts[k];
                     facts.error = facts.error.map(|error| error + way.length() as f32);
@@ -202,7 +197,7 @@ impl Run<'_> {
             }
             shares.add(&felt, &mut row);
             let clipped = clip(&mut row);
-            if indices.len() < shared.edit.cages[1].n_vertices() {
+            if indices.len() < shared.edit.cage.n_vertices() {
                 forget_unstored(&mut row, indices, shared.edit.still_zero);
             }
             let outside = is_outside(v);

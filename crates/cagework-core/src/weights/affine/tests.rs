@@ -82,3 +82,21 @@ fn combined_is_the_weighted_sum_of_positions() {
     let expected = columns.scale(DVec3::new(1.0, 0.75, 0.75));
     assert!(columns.combined(&row).1.distance(expected) <= 1e-12);
 }
+
+#[test]
+fn imposed_sum_and_point_are_met_by_the_smallest_change() {
+    let columns = Columns::new(&Cage::new(&shapes::octahedron()).unwrap());
+    let before = rows_of(&[0.3, -0.2, 0.1, 0.0, 0.4, -0.1]);
+    let mut row = before.clone();
+    let point = DVec3::new(0.1, -0.05, 0.02);
+    columns.impose(&mut row, 0.25, point);
+    let (sum, combined) = columns.combined(&row);
+    assert!((sum - 0.25).abs() <= RESTORED && combined.distance(point) <= RESTORED, "{sum}, {combined}");
+    assert!(row[0][6..].iter().all(|w| *w == 0.0), "lanes without a column stay 0");
+    // The smallest change is a linear function of the cage's vertices (normal equations), so that doing it again, from
+    // there to what was, leads back.
+    let (sum, combined) = columns.combined(&before);
+    columns.impose(&mut row, sum, combined);
+    let off = row[0].iter().zip(before[0]).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(f64::from(off) <= RESTORED, "{off:e}");
+}
