@@ -169,7 +169,7 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       bind?.cancel();
       const asked = possible(options);
       const { positions, corners } = cage();
-      const again = canGoOn(kept, asked, corners);
+      const again = canGoOn(kept, asked, { positions, corners });
       kept = undefined;
       bind = startBind({
         client,
@@ -180,8 +180,8 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
         listener,
         cage: { positions, corners },
         again,
-        keep: (yes) => {
-          kept = yes ? { options: asked, corners } : undefined;
+        keep: (bound) => {
+          kept = bound;
         },
       });
       return bind;

@@ -75,9 +75,18 @@ pub async fn bind_gpu_to_edit(
 ) -> Result<(Binding, Option<Rebinder>), GpuError> {
     let watch = Watch::new(progress);
     let prepared = Prepared::new(positions, cage, options, FieldsOn::Device, &watch)?;
-    let fits = prepared.estimated() + prepared.fields_bytes() <= most_to_keep;
-    let fate = if fits && Rebinder::can_keep(options) { Fields::ReadBack } else { Fields::Dropped };
-    let (solved, fields) = solve_and_sample(&prepared, options, fate, &watch, context).await?;
+    let (hierarchy, stencils) = (prepared.hierarchy(), prepared.stencils());
+    let plan = |fields| {
+        let limit = options.memory_limit;
+        Plan::new(hierarchy, stencils, options.solver, context.max_binding_bytes, limit, fields)
+    };
+    let keep = Rebinder::can_keep(options) && Rebinder::bytes_to_keep(&prepared) <= most_to_keep;
+    let (plan, fate) = match keep.then(|| plan(Fields::ReadBack)) {
+        Some(Ok(plan)) => (plan, Fields::ReadBack),
+        // Without them it may fit.
+        _ => (plan(Fields::Dropped)?, Fields::Dropped),
+    };
+    let (solved, fields) = solve_and_sample(&prepared, options, (&plan, fate), &watch, context).await?;
     if fate == Fields::Dropped {
         return Ok((prepared.finish(solved, &watch)?, None));
     }
@@ -90,13 +99,11 @@ pub async fn bind_gpu_to_edit(
 async fn solve_and_sample(
     prepared: &Prepared<'_>,
     options: &BindOptions,
-    fate: Fields,
+    (plan, fate): (&Plan, Fields),
     watch: &Watch<'_>,
     context: &GpuContext,
 ) -> Result<(Solved, Vec<Vec<Row>>), GpuError> {
     let (hierarchy, stencils) = (prepared.hierarchy(), prepared.stencils());
-    let limit = options.memory_limit;
-    let plan = Plan::new(hierarchy, stencils, options.solver, context.max_binding_bytes, limit, fate)?;
     let n_batches = hierarchy.n_batches();
     let mut blocks: Vec<Vec<Row>> = vec![vec![ZERO; stencils.len()]; n_batches];
     let n_kept = if fate == Fields::ReadBack { n_batches } else { 0 };
@@ -105,9 +112,9 @@ async fn solve_and_sample(
     let mut stream = Stream::new(context, watch).await?;
     let outcome = match options.solver {
         Solver::Multigrid => {
-            multigrid(prepared, options, &plan, &mut stream, &mut blocks, &mut fields).await?
+            multigrid(prepared, options, plan, &mut stream, &mut blocks, &mut fields).await?
         }
-        Solver::Jacobi => jacobi(prepared, options, &plan, &mut stream, &mut blocks).await?,
+        Solver::Jacobi => jacobi(prepared, options, plan, &mut stream, &mut blocks).await?,
     };
     let all_ms = watch.now_ms() - began;
     let solved = Solved {

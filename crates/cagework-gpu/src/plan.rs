@@ -23,7 +23,7 @@ pub struct Plan {
     pub vertices_per_block: u32,
     /// Bytes of stencils, transfers and sampling tables.
     pub table_bytes: u64,
-    /// Bytes of fields, right-hand sides and blocks.
+    /// Bytes of fields, right-hand sides, blocks, and the buffer that fields are read back through.
     pub field_bytes: u64,
 }
 

@@ -31,22 +31,23 @@ export interface BindStart {
   readonly cage: CageArrays;
   /** Whether the worker's last bind left what this one can start from: then it is as quick as a coarse one. */
   readonly again: boolean;
-  /** Hears whether the worker kept what a next bind as fine could start from. */
-  readonly keep: (kept: boolean) => void;
+  /** Hears what the worker kept for a next bind as fine to start from. */
+  readonly keep: (kept: KeptBind | undefined) => void;
 }
 
 /** What the worker keeps of the last bind: it is of use for the same options and the same faces. */
-export interface KeptBind {
+export interface KeptBind extends CageArrays {
   readonly options: BindOptions;
-  readonly corners: Uint32Array;
 }
 
-/** Whether a bind can start from what is kept; the cage's vertices may have moved. */
-export function canGoOn(kept: KeptBind | undefined, options: BindOptions, corners: Uint32Array): boolean {
+/** Whether a bind can start from what is kept: some of the cage's vertices have moved. With none moved it is asked for once
+ * more, and done once more. */
+export function canGoOn(kept: KeptBind | undefined, options: BindOptions, cage: CageArrays): boolean {
   return (
     kept !== undefined &&
     JSON.stringify(kept.options) === JSON.stringify(options) &&
-    same(kept.corners, corners)
+    same(kept.corners, cage.corners) &&
+    !same(kept.positions, cage.positions)
   );
 }
 
@@ -71,7 +72,7 @@ export function startBind(start: BindStart): Job<BindReport> {
   async function once(pass: Pass, asked: BindOptions): Promise<BindReport> {
     job = client.run("bind", { positions, cage, options: asked }, step(pass));
     const { indptr, indices, data, outside, offsets, report, kept } = await job.done;
-    if (pass === "fine") start.keep(kept);
+    if (pass === "fine" && !isCancelled) start.keep(kept ? { options: asked, ...cage } : undefined);
     const isCurrent =
       same(cage.positions, engine.restPositions()) && same(cage.corners, engine.cageCorners());
     if (isCancelled || !isCurrent || !report) throw named("Cancelled", "cancelled");

@@ -139,12 +139,6 @@ impl<'a> Prepared<'a> {
         &self.stencils
     }
 
-    /// Bytes that the bind was estimated to need in this process.
-    #[must_use]
-    pub fn estimated(&self) -> u64 {
-        self.estimated
-    }
-
     /// Bytes of all columns' fields on the finest level, 4 for each unknown and column.
     #[must_use]
     pub fn fields_bytes(&self) -> u64 {

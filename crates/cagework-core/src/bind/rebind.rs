@@ -50,7 +50,7 @@ const MAX_UPDATES: usize = 6;
 const FORCED: f32 = -1e-5;
 
 /// Everything is bound anew if one in so many cells is at a moved face.
-const MOST: usize = 4;
+const ONE_IN: usize = 4;
 
 /// Cells around the moved faces whose equations may have changed, and in which stencils are made anew: a stencil sees the
 /// triangles in its cube of centres.
@@ -59,7 +59,7 @@ const CHANGED: f64 = 1.5;
 /// How a bind was brought up to date.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RebindReport {
-    /// Right-hand sides that were solved for; a whole bind has one for each column.
+    /// Right-hand sides that were solved for; a whole bind has one for each column, an edit at most four more.
     pub solved: u32,
     /// Columns.
     pub columns: u32,
@@ -143,8 +143,15 @@ impl Rebinder {
         options.method == Method::Embedded && options.solver == Solver::Multigrid && options.sparsify == 0.0
     }
 
+    /// Bytes that a bind that was solved elsewhere would have needed in this process, with its fields and a thread's workspace
+    /// for the edits to come.
+    #[must_use]
+    pub fn bytes_to_keep(prepared: &Prepared<'_>) -> u64 {
+        prepared.estimated + prepared.fields_bytes() + Workspace::bytes(prepared.hierarchy()) as u64
+    }
+
     /// Finishes a bind that was solved elsewhere, with fields (`[n_batches][n_rows]`, as [`Self::can_keep`] allows) that the
-    /// next bind can start from. Binds to come may need `memory_limit`.
+    /// next bind can start from. Whatever edits need more than `memory_limit` for, with what they leave, is bound anew.
     ///
     /// # Errors
     /// Cancelled.
@@ -155,7 +162,7 @@ impl Rebinder {
         memory_limit: u64,
         watch: &Watch<'_>,
     ) -> Result<(Self, Binding), BindError> {
-        prepared.estimated += prepared.fields_bytes();
+        prepared.estimated = Self::bytes_to_keep(&prepared);
         let (positions, cage) = (prepared.positions.to_vec(), prepared.cage.clone());
         let options = BindOptions { memory_limit, ..*prepared.options };
         let (welded, points) = (prepared.welded.clone(), prepared.points.clone());
@@ -252,16 +259,16 @@ impl Rebinder {
         kept: Kept,
         watch: &Watch<'_>,
     ) -> Result<Option<(Binding, RebindReport)>, BindError> {
-        let Kept { voxels: old_voxels, mut stencils, mut fields, estimated, mut rows } = kept;
+        let Kept { voxels: old_voxels, mut stencils, mut fields, mut estimated, mut rows } = kept;
         let began = watch.now_ms();
         let team = Team::new(self.options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
         let grid = Voxels::grid(cage, &self.options);
         let to_grid = |p: Vec3| grid.to_grid(p.as_dvec3());
-        let Some(moved) = moved_triangles(&self.cage, cage, to_grid) else { return Ok(None) };
+        let Some(swept) = moved_triangles(&self.cage, cage, to_grid) else { return Ok(None) };
         let n_batches = cage.n_vertices().div_ceil(LANES);
-        let region = Region::around(&moved, CHANGED, &grid);
-        if MOST * region.cells.len() > grid.n_cells() {
+        let region = Region::around(&swept, CHANGED, &grid);
+        if ONE_IN * region.cells.len() > grid.n_cells() {
             return Ok(None);
         }
         let voxels = team.install(|| Voxels::new(cage, grid, &self.options));
@@ -286,7 +293,7 @@ impl Rebinder {
 
         let mut solved = Solved { converged: true, delta_interval: 1, solve_share: 1.0, ..Solved::default() };
         let (mut rank, mut sampled) = (0, stencils_made);
-        if !moved.is_empty() {
+        if !swept.is_empty() {
             let negligible = Negligible::at(self.options.tau);
             let before = &old_voxels.hierarchy.levels[0];
             let equations = Equations::changed(level, before, &region);
@@ -297,10 +304,24 @@ impl Rebinder {
             }
             let old = OldCells::new(&fields, &needed, n_batches);
             let moved = moved_columns(&self.cage, cage);
-            let columns = Columns::new(cage);
-            let residual =
-                Residual::new([level, before], &equations, n_batches, &old, &columns, &moved, negligible);
+            // Where the axes disagree equations need not hold for linear functions.
+            let is_exact = voxels.ambiguous == 0 && old_voxels.ambiguous == 0;
+            let columns = is_exact.then(|| Columns::new(cage));
+            let residual = Residual::new(
+                [level, before],
+                &equations,
+                n_batches,
+                &old,
+                columns.as_ref(),
+                &moved,
+                negligible,
+            );
             let Split { rows: of, right, shares } = residual.split(cage.n_vertices());
+            // What each edit leaves is kept until everything is bound anew.
+            estimated += (right.len() * level.n_rows() * size_of::<Row>()) as u64;
+            if estimated > self.options.memory_limit {
+                return Ok(None);
+            }
             let resampled = resample(&stencils, &changed, &cell_of, &old, n_batches);
             rank = shares.len();
             let corrections =
@@ -342,6 +363,7 @@ impl Rebinder {
         let binding = prepared.reported(&rows, &mut solved, sampled, watch);
         let Prepared { voxels, stencils, points, .. } = prepared;
         self.points = points;
+        let binding = binding?;
         self.cage = cage.clone();
         self.kept = Some(Kept { voxels, stencils, fields, estimated, rows });
         let report = RebindReport {
@@ -350,6 +372,6 @@ impl Rebinder {
             stencils_made: changed.len() as u32,
             anew: false,
         };
-        Ok(Some((binding?, report)))
+        Ok(Some((binding, report)))
     }
 }

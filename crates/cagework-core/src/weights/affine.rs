@@ -107,14 +107,18 @@ impl Columns {
     pub fn impose(&self, row: &mut [Row], sum: f64, point: DVec3) {
         let (old_sum, old_point) = self.combined(row);
         let off = self.gram_inverse * (point - old_point).extend(sum - old_sum);
+        // Of a flat cage, inside which nothing is.
+        if !off.is_finite() {
+            return;
+        }
         let off = off.as_vec4();
         let [x, y, z] = &self.scaled;
         for ((((row, one), x), y), z) in row.iter_mut().zip(&self.ones).zip(x).zip(y).zip(z) {
-            let mut sums = *row;
+            let mut changed = *row;
             for k in 0..LANES {
-                sums[k] += off.x * x[k] + off.y * y[k] + (off.z * z[k] + off.w * one[k]);
+                changed[k] += off.x * x[k] + off.y * y[k] + (off.z * z[k] + off.w * one[k]);
             }
-            *row = sums;
+            *row = changed;
         }
     }
 

@@ -46,7 +46,7 @@ impl Equations {
         for &cell in &self.cells {
             region.add(cell as usize);
             for stride in strides {
-                // At the end of a line it is another line's: one too many.
+                // At the end of a line it is another line's: one too many, which nobody asks for.
                 region.add(cell as usize + stride);
                 region.add((cell as usize).wrapping_sub(stride));
             }

@@ -32,7 +32,7 @@ impl Negligible {
     pub(super) fn at(tau: f32) -> Self {
         // Whole binds with a coarser tau are far more exact than it, by full multigrid: edits must not be worse.
         let residual = tau.clamp(1e-6, 1e-5);
-        // There are 8 to 40 corrections.
+        // There are seldom more than 40 corrections.
         Self { residual, correction: residual / 40.0, weight: residual / 10.0 }
     }
 }
@@ -94,8 +94,8 @@ pub(super) struct Residual {
     /// Row of the field of each unknown.
     rows: Vec<u32>,
     diagonals: Vec<f32>,
-    /// The last batch is none of columns, but of moments: [`KEENER`] times what the columns' residuals, each times its cage
-    /// vertex, sum to along x, y, z, over the cage's diagonal. `[n_unknowns][n_batches + 1]`
+    /// The last batch is none of columns, but of moments: [`KEENER`] times what the columns' residuals sum to, each times its
+    /// cage vertex (x, y, z, over the cage's diagonal) and by themselves. `[n_unknowns][n_batches + 1]`
     values: Vec<Vec<Row>>,
     negligible: Negligible,
 }
@@ -110,13 +110,14 @@ pub(super) struct Split {
 }
 
 impl Residual {
-    /// Residuals of equations; `old` must know their cells and those around them.
+    /// Residuals of equations; `old` must know their cells and those around them. Their moments are made what they must be if
+    /// there are `columns`.
     pub(super) fn new(
         [level, before]: [&Level; 2],
         equations: &Equations,
         n_batches: usize,
         old: &OldCells<'_>,
-        columns: &Columns,
+        columns: Option<&Columns>,
         moved: &[(usize, DVec3)],
         negligible: Negligible,
     ) -> Self {
@@ -154,7 +155,7 @@ impl Residual {
             let given: Vec<f32> = moved.iter().map(|&(column, _)| of(out, column)).collect();
             let mut ideal = DVec4::ZERO;
             let mut missing = |cell: usize, weight: f64| {
-                if before.row_of[cell] == NO_CELL {
+                if let (NO_CELL, Some(columns)) = (before.row_of[cell], columns) {
                     ideal += weight * columns.scale(level.grid.center(level.grid.cell(cell))).extend(1.0);
                 }
             };
@@ -171,18 +172,21 @@ impl Residual {
             for (&(column, way), given) in moved.iter().zip(given) {
                 ideal += (way * f64::from(of(out, column) - given)).extend(0.0);
             }
-            for (moment, ideal) in moments[0].iter_mut().zip((ideal * f64::from(KEENER * scale)).to_array()) {
-                *moment = ideal as f32;
+            if columns.is_some() {
+                let ideal = (ideal * f64::from(KEENER * scale)).as_vec4().to_array();
+                moments[0][..4].copy_from_slice(&ideal);
             }
             for w in out.iter_mut().flatten() {
                 *w *= scale;
             }
         }
         residual.drop_negligible();
-        for row in &mut residual.values {
-            let (row, moments) = row.split_at_mut(n_batches);
-            let [x, y, z, sum, ..] = moments[0].map(|moment| f64::from(moment / KEENER));
-            columns.impose(row, sum, DVec3::new(x, y, z));
+        if let Some(columns) = columns {
+            for row in &mut residual.values {
+                let (row, moments) = row.split_at_mut(n_batches);
+                let [x, y, z, sum, ..] = moments[0].map(|moment| f64::from(moment / KEENER));
+                columns.impose(row, sum, DVec3::new(x, y, z));
+            }
         }
         residual
     }

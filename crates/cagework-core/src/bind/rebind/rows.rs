@@ -108,7 +108,7 @@ impl Shared<'_> {
 /// How far a row may be from summing to 1 and from its vertex, over the cage's diagonal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Off {
-    /// At most so far, which is good enough.
+    /// At most so far, but for f32 rounding, which is good enough.
     Little { sum: f64, miss: f64 },
     /// Further than is good enough.
     Much,
@@ -190,7 +190,8 @@ impl Run<'_> {
                     continue;
                 }
                 expand(indices, data, &mut row);
-                if is_full(indices) {
+                // Of other rows small weights are dropped.
+                if indices.len() == shared.edit.cage.n_vertices() {
                     let (sum, moved) = shared.moments.of(&felt);
                     change = Some((sum, way + moved));
                 }

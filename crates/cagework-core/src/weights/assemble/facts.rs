@@ -20,7 +20,7 @@ pub struct RowFacts {
 
 impl RowFacts {
     /// Facts about a row (`[n_batches]`) with this sum, which misses the vertex by so much.
-    // As in `restore`.
+    // One copy for all callers in wasm: each would be downloaded.
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
     #[cfg_attr(target_family = "wasm", inline(never))]
     #[must_use]
