@@ -306,13 +306,13 @@ impl Rebinder {
             let moved = moved_columns(&self.cage, cage);
             // Where the axes disagree equations need not hold for linear functions.
             let is_exact = voxels.ambiguous == 0 && old_voxels.ambiguous == 0;
-            let columns = is_exact.then(|| Columns::new(cage));
+            let columns = Columns::new(cage);
             let residual = Residual::new(
                 [level, before],
                 &equations,
                 n_batches,
                 &old,
-                columns.as_ref(),
+                is_exact.then_some(&columns),
                 &moved,
                 negligible,
             );
@@ -332,7 +332,8 @@ impl Rebinder {
             sampled = watch.now_ms();
             let samples: Vec<&[Row]> = corrections.iter().map(|c| c.samples.as_slice()).collect();
             let edit = Edit {
-                cage,
+                columns: &columns,
+                n_columns: cage.n_vertices(),
                 moved: &moved,
                 points: &self.points,
                 samples: &samples,

@@ -103,7 +103,8 @@ impl Columns {
         (sum, DVec3::new(x, y, z))
     }
 
-    /// Changes a row of any numbers by as little as possible so that it has this sum and puts its point there.
+    /// Changes a row of any numbers (`[n_batches]`) by as little as possible, in squares, so that it has this sum and puts its
+    /// point there (columns' units).
     pub fn impose(&self, row: &mut [Row], sum: f64, point: DVec3) {
         let (old_sum, old_point) = self.combined(row);
         let off = self.gram_inverse * (point - old_point).extend(sum - old_sum);

@@ -6,7 +6,8 @@ use crate::bind::voxels::Voxels;
 use crate::cage::Cage;
 use crate::grid::NO_CELL;
 
-/// Cells that a face's corners may be off its triangles' planes, when it is cut into others: the cells that count as near cover those between.
+/// Cells that a face's corners may be off its triangles' planes, when it is cut into others: the cells that count as near
+/// cover those between.
 const MOST_BENT: f64 = 1.0;
 
 /// Moved vertices of the cage, and where to, over its diagonal.

@@ -2,7 +2,6 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::cage::Cage;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 use crate::solve::team::{Team, VERTEX_RUN};
@@ -22,9 +21,10 @@ const FAR_FEWER: usize = 8;
 /// What an edit does to the rows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edit<'a> {
-    /// The cage as it is now.
-    pub(super) cage: &'a Cage,
-    /// Its vertices that have moved, and where to, over its diagonal.
+    /// The cage's vertices as they are now.
+    pub(super) columns: &'a Columns,
+    pub(super) n_columns: usize,
+    /// Those that have moved, and where to, over the cage's diagonal.
     pub(super) moved: &'a [(usize, DVec3)],
     /// Rest positions of the rows' vertices.
     pub(super) points: &'a [Vec3],
@@ -52,7 +52,6 @@ struct Run<'a> {
 /// What all runs look at.
 struct Shared<'a> {
     edit: Edit<'a>,
-    columns: Columns,
     moments: Moments,
     indptr: &'a [u32],
     indices: &'a [u32],
@@ -61,8 +60,7 @@ struct Shared<'a> {
 impl Edit<'_> {
     /// Brings all rows up to date.
     pub(super) fn apply(&self, rows: &mut Assembled, is_outside: impl Fn(usize) -> bool + Sync, team: &Team) {
-        let columns = Columns::new(self.cage);
-        let n_batches = columns.n_batches();
+        let n_batches = self.columns.n_batches();
         let (indptr, indices, mut data) = rows.weights.parts_mut();
         let mut runs = Vec::new();
         for (number, facts) in rows.facts.chunks_mut(VERTEX_RUN).enumerate() {
@@ -72,8 +70,8 @@ impl Edit<'_> {
             let data = data.split_off_mut(..n).expect("the last row pointer is the number of weights");
             runs.push(Run { first, offset, data, facts, replaced: Vec::new() });
         }
-        let moments = Moments::new(self.shares, &columns);
-        let shared = Shared { edit: *self, columns, moments, indptr, indices };
+        let moments = Moments::new(self.shares, self.columns);
+        let shared = Shared { edit: *self, moments, indptr, indices };
         team.each_mut(&mut runs, |run| {
             dispatch(
                 #[inline(always)]
@@ -94,13 +92,14 @@ impl Shared<'_> {
         if let Off::Little { sum, miss } = off {
             return RowFacts::of(row, 1.0 + sum, Some(miss));
         }
-        let target = self.columns.scale(point.as_dvec3());
+        let columns = self.edit.columns;
+        let target = columns.scale(point.as_dvec3());
         let sums = match off {
             Off::Much => (f64::INFINITY, f64::INFINITY),
-            _ => self.columns.sums(row, target),
+            _ => columns.sums(row, target),
         };
         let is_off = sums.1.max((sums.0 - 1.0).abs()) > GOOD_ENOUGH;
-        let (sum, miss) = if is_off && !is_outside { restore(&self.columns, row, target) } else { sums };
+        let (sum, miss) = if is_off && !is_outside { restore(columns, row, target) } else { sums };
         RowFacts::of(row, sum, (!is_outside).then_some(miss))
     }
 }
@@ -191,14 +190,14 @@ impl Run<'_> {
                 }
                 expand(indices, data, &mut row);
                 // Of other rows small weights are dropped.
-                if indices.len() == shared.edit.cage.n_vertices() {
+                if indices.len() == shared.edit.n_columns {
                     let (sum, moved) = shared.moments.of(&felt);
                     change = Some((sum, way + moved));
                 }
             }
             shares.add(&felt, &mut row);
             let clipped = clip(&mut row);
-            if indices.len() < shared.edit.cage.n_vertices() {
+            if indices.len() < shared.edit.n_columns {
                 forget_unstored(&mut row, indices, shared.edit.still_zero);
             }
             let outside = is_outside(v);

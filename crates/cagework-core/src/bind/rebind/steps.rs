@@ -39,7 +39,8 @@ pub(super) fn solve_for(
     Ok(solved)
 }
 
-/// Samples the old fields by stencils that are new; `cell_of`: the cell of each row they ask for. Returns the rows of the vertices `changed`: `[n_changed][n_batches]`.
+/// Samples the old fields by stencils that are new; `cell_of`: the cell of each row they ask for. Returns the rows of the
+/// vertices `changed`: `[n_changed][n_batches]`.
 pub(super) fn resample(
     stencils: &Stencils,
     changed: &[u32],

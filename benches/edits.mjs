@@ -1,0 +1,114 @@
+/**
+ * Binds after edits of the rest cage, as share of a whole bind, in the page's own module (build it first: cargo xtask page).
+ *
+ *   node benches/edits.mjs                       the samples
+ *   node benches/edits.mjs mesh.obj cage.obj     a model and its cage
+ */
+
+import { readFileSync } from "node:fs";
+
+const EDITS = 5;
+const BINDS = 8;
+const PLACES = [0.1, 0.4, 0.6, 0.9];
+/** Of the model's longest side: the first edit, and how much larger each further one is. */
+const STEP = 0.01;
+const MORE = 0.1;
+/** Vertices nearer to the cage's box than this share of it would move the grid. */
+const RIM = 0.03;
+
+globalThis.self ??= globalThis;
+const pkg = new URL("../web/src/pkg/", import.meta.url);
+const { Binder, default: init } = await import(new URL("cagework.js", pkg));
+await init({ module_or_path: readFileSync(new URL("cagework_bg.wasm", pkg)) });
+
+const options = {
+  backend: "cpu",
+  method: "embedded",
+  solver: "multigrid",
+  grid: 64,
+  tau: 1e-5,
+  max_iterations: 20_000,
+  sparsify: 0,
+  delta_norm: "euclidean",
+  cell_shape: "box",
+  memory_limit: 2 ** 31,
+  outside: "closest_point",
+};
+
+/** Positions of a GLB's first mesh, as samples are built. */
+function glbPositions(glb) {
+  const view = new DataView(glb.buffer, glb.byteOffset, glb.byteLength);
+  const length = view.getUint32(12, true);
+  const json = JSON.parse(new TextDecoder().decode(glb.subarray(20, 20 + length)));
+  const accessor = json.accessors[json.meshes[0].primitives[0].attributes.POSITION];
+  const start = (json.bufferViews[accessor.bufferView].byteOffset ?? 0) + (accessor.byteOffset ?? 0);
+  return new Float32Array(glb.slice(28 + length).buffer, start, 3 * accessor.count).slice();
+}
+
+/** Positions, and for each face the number of its corners, then them. */
+function obj(path) {
+  const [positions, corners] = [[], []];
+  for (const line of readFileSync(path, "utf8").split("\n")) {
+    const [kind, ...words] = line.trim().split(/\s+/);
+    if (kind === "v") positions.push(...words.slice(0, 3).map(Number));
+    else if (kind === "f") corners.push(words.length, ...words.map((word) => Number.parseInt(word, 10) - 1));
+  }
+  return { positions: new Float32Array(positions), corners: new Uint32Array(corners) };
+}
+
+const median = (times) => times.toSorted((a, b) => a - b)[times.length >> 1];
+
+/** Milliseconds of a bind, and its corrections. */
+async function bind(binder, mesh, positions, corners) {
+  const began = performance.now();
+  const bound = await binder.bind(mesh, positions, corners, options, () => true);
+  const ms = performance.now() - began;
+  const { corrections } = bound.report;
+  bound.free();
+  return { ms, corrections };
+}
+
+async function measure(name, mesh, { positions, corners }) {
+  const axes = [0, 1, 2].map((axis) => positions.filter((_, k) => k % 3 === axis));
+  const [low, high] = [axes.map((xs) => Math.min(...xs)), axes.map((xs) => Math.max(...xs))];
+  const size = Math.max(...high.map((h, axis) => h - low[axis]));
+  const isFree = (k) =>
+    axes.every((xs, axis) => xs[k] > low[axis] + RIM * size && xs[k] < high[axis] - RIM * size);
+  const all = [...axes[0].keys()];
+  // The clamp has none; most of its vertices can move along y all the same.
+  const free = all.some(isFree) ? all.filter(isFree) : all;
+  const whole = [];
+  for (let k = 0; k < BINDS; k += 1) {
+    const binder = new Binder();
+    whole.push((await bind(binder, mesh, positions, corners)).ms);
+    binder.free();
+  }
+  const edits = [];
+  for (const place of PLACES) {
+    const vertex = free[Math.floor(place * free.length)];
+    const binder = new Binder();
+    await bind(binder, mesh, positions, corners);
+    const times = [];
+    let last;
+    for (let k = 0; k < EDITS; k += 1) {
+      const edited = positions.slice();
+      edited[3 * vertex + 1] += STEP * size * (1 + MORE * k);
+      last = await bind(binder, mesh, edited, corners);
+      times.push(last.ms);
+    }
+    binder.free();
+    const how = last.corrections === undefined ? "anew" : `${last.corrections} corrections`;
+    edits.push(`vertex ${vertex} ${(median(times) / median(whole)).toFixed(2)} (${how})`);
+  }
+  const of = `${mesh.length / 3} vertices, ${positions.length / 3} columns`;
+  console.log(`${name}: ${of}; whole ${median(whole).toFixed(0)} ms; ${edits.join(", ")}`);
+}
+
+const [mesh, cage] = process.argv.slice(2);
+if (mesh && cage) await measure(mesh, obj(mesh).positions, obj(cage));
+else {
+  for (const id of ["rat", "humanoid", "clamp", "strider"]) {
+    const sample = Binder.buildSample(id);
+    await measure(id, glbPositions(sample.glb), sample.cage);
+  }
+}
