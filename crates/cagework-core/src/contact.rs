@@ -76,7 +76,7 @@ pub(crate) fn meet(a: &Corners, b: &Corners, gap: f64) -> bool {
 pub(crate) fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
     let mut order: Vec<(f64, u32)> =
         triangles.iter().enumerate().map(|(t, c)| (c.min().x, t as u32)).collect();
-    order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut active: Vec<u32> = Vec::new();
     let mut pairs = Vec::new();
     for &(from, t) in &order {

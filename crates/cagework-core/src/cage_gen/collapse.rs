@@ -288,8 +288,14 @@ impl<'g, 'a> Collapser<'g, 'a> {
             candidates.push(q);
         }
         let mut priced: Vec<(f64, DVec3)> = candidates.into_iter().map(|c| (quadric.cost(c), c)).collect();
-        priced.sort_by(|x, y| x.0.total_cmp(&y.0));
-        priced.into_iter().find(|&(_, c)| self.is_place(kept, c)).map(|(cost, c)| (c, cost))
+        // The cheapest place that will do, of equal ones the first; mostly that is the first that is looked at.
+        while let Some(k) = (0..priced.len()).min_by(|&x, &y| priced[x].0.total_cmp(&priced[y].0)) {
+            let (cost, place) = priced.remove(k);
+            if self.is_place(kept, place) {
+                return Some((place, cost));
+            }
+        }
+        None
     }
 
     /// Whether the star found by [`Self::place_of`] may have its vertex `kept` at `p`.

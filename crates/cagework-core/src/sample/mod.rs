@@ -162,10 +162,16 @@ impl Stencils {
     pub fn replace(&mut self, vertices: &[u32], fresh: &Self) {
         splice(&mut self.node_start, &mut self.nodes, vertices, (&fresh.node_start, &fresh.nodes));
         splice(&mut self.hat_start, &mut self.hats, vertices, (&fresh.hat_start, &fresh.hats));
-        self.outside.retain(|o| vertices.binary_search(&o.vertex).is_err());
-        self.outside
-            .extend(fresh.outside.iter().map(|o| Outside { vertex: vertices[o.vertex as usize], ..*o }));
-        self.outside.sort_unstable_by_key(|o| o.vertex);
+        let mut fresh =
+            fresh.outside.iter().map(|o| Outside { vertex: vertices[o.vertex as usize], ..*o }).peekable();
+        let kept = std::mem::take(&mut self.outside);
+        for o in kept.into_iter().filter(|o| vertices.binary_search(&o.vertex).is_err()) {
+            while let Some(first) = fresh.next_if(|first| first.vertex < o.vertex) {
+                self.outside.push(first);
+            }
+            self.outside.push(o);
+        }
+        self.outside.extend(fresh);
     }
 
     /// Weights of all vertices for the columns of one batch.

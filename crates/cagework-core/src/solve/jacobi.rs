@@ -104,10 +104,11 @@ pub fn solve(
         }
         round = next_round(&report.delta_history, stop.tau);
     }
-    let mut fields: Vec<(usize, Vec<Row>)> =
-        shares.into_iter().flat_map(|s| s.batches).map(|b| (b.batch, b.old)).collect();
-    fields.sort_by_key(|(batch, _)| *batch);
-    Ok((fields.into_iter().map(|(_, field)| field).collect(), report))
+    let mut fields = vec![Vec::new(); hierarchy.n_batches()];
+    for batch in shares.into_iter().flat_map(|s| s.batches) {
+        fields[batch.batch] = batch.old;
+    }
+    Ok((fields, report))
 }
 
 /// Sweeps that can be done at once without passing the sweep at which delta, which decays geometrically, meets tau.
