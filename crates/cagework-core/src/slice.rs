@@ -61,9 +61,9 @@ impl Slice {
                 let lines = shoot_lines(cage, &grid);
                 let (inside, _) = classify(&lines, &grid);
                 let cells = EmbeddedCells::finest(cage, &lines, grid, inside);
-                Self::of(&grid, axis, fraction, |cell| match cells.is_unknown(cell) {
+                Self::of(&grid, axis, fraction, |cell| match cells.unknowns()[grid.index(cell)] {
                     false => CellKind::Exterior,
-                    true if cells.cut_arms(cell) != 0 => CellKind::Boundary,
+                    true if cells.cut_arms()[grid.index(cell)] != 0 => CellKind::Boundary,
                     true => CellKind::Interior,
                 })
             }

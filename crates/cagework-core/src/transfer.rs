@@ -7,7 +7,11 @@
 //! red cells only and prolongation writes black cells only.
 
 use crate::grid::{Grid, NO_CELL};
-use crate::levels::Level;
+use crate::levels::{Before, Level};
+
+mod old;
+
+use old::Old;
 
 /// Weights of restriction: of the fine cell that is the coarse cell's own centre, and of the twelve red cells next
 /// to it across an edge.
@@ -31,7 +35,7 @@ pub struct ProlongRow<const N: usize> {
 }
 
 /// How a level and the next coarser one exchange fields.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Transfer {
     /// For each coarse row but the zero rows: red, then black cells, in order.
     pub restrict_rows: [Vec<RestrictRow>; 2],
@@ -68,35 +72,62 @@ impl Transfer {
     /// Tables between `fine` and `coarse`, whose grid is `fine.grid.coarsened()`.
     #[must_use]
     pub fn new(fine: &Level, coarse: &Level) -> Self {
-        let mut restrict_rows = [Vec::new(), Vec::new()];
-        for cell in coarse.grid.cells().filter(|&c| coarse.row_of[coarse.grid.index(c)] != NO_CELL) {
-            let centre = cell.map(|x| 2 * x);
-            restrict_rows[Grid::colour(cell)].push(fine.rows_at(centre, &AROUND));
-        }
-        let (mut faces, mut corners, mut planes) = (Vec::new(), Vec::new(), Vec::new());
-        let first_black = fine.first_row(1) as u32;
+        Self::built([fine, coarse], None)
+    }
+
+    /// The same from what they were before an edit. Both pairs: fine, coarse.
+    #[must_use]
+    pub fn renewed(&self, levels: [&Level; 2], before: [&Before<'_>; 2]) -> Self {
+        Self::built(levels, Some(&Old { tables: self, before, levels }))
+    }
+
+    fn built(levels: [&Level; 2], old: Option<&Old<'_>>) -> Self {
+        let [fine, coarse] = levels;
         let [nx, ny, nz] = fine.grid.dims;
+        let mut tables = Self {
+            restrict_rows: Default::default(),
+            faces: Vec::new(),
+            corners: Vec::new(),
+            planes: Vec::new(),
+        };
         for z in 0..nz {
-            planes.push([faces.len() as u32, corners.len() as u32]);
+            tables.mark_plane();
             for y in 0..ny {
-                for x in (1 - (y + z) % 2..nx).step_by(2) {
-                    let row = fine.row_of[fine.grid.index([x, y, z])];
-                    if row == NO_CELL {
-                        continue;
-                    }
-                    let cell = row - first_black;
+                if let Some(old) = old.filter(|old| old.can_prolong(y, z)) {
+                    old.prolong_line(y, z, &mut tables);
+                    continue;
+                }
+                let rows = &fine.row_of[fine.grid.index([0, y, z])..][..nx as usize];
+                for x in (1 - (y + z) % 2..nx).step_by(2).filter(|&x| rows[x as usize] != NO_CELL) {
+                    let cell = rows[x as usize] - fine.first_row(1) as u32;
                     let low = [x / 2, y / 2, z / 2];
                     let odd = [x, y, z].map(|i| (i % 2) as i32);
                     if odd == [1; 3] {
-                        corners.push(prolong_row(coarse, cell, low, &CORNERS));
+                        tables.corners.push(prolong_row(coarse, cell, low, &CORNERS));
                     } else {
-                        faces.push(prolong_row(coarse, cell, low, &[[0; 3], odd]));
+                        tables.faces.push(prolong_row(coarse, cell, low, &[[0; 3], odd]));
                     }
                 }
             }
         }
-        planes.push([faces.len() as u32, corners.len() as u32]);
-        Self { restrict_rows, faces, corners, planes }
+        tables.mark_plane();
+        let [nx, ny, nz] = coarse.grid.dims;
+        for (y, z) in (0..nz).flat_map(|z| (0..ny).map(move |y| (y, z))) {
+            if let Some(old) = old.filter(|old| old.can_restrict(y, z)) {
+                old.restrict_line(y, z, &mut tables);
+                continue;
+            }
+            let rows = &coarse.row_of[coarse.grid.index([0, y, z])..][..nx as usize];
+            for cell in (0..nx).filter(|&x| rows[x as usize] != NO_CELL).map(|x| [x, y, z]) {
+                let around = fine.rows_at(cell.map(|i| 2 * i), &AROUND);
+                tables.restrict_rows[Grid::colour(cell)].push(around);
+            }
+        }
+        tables
+    }
+
+    fn mark_plane(&mut self) {
+        self.planes.push([self.faces.len() as u32, self.corners.len() as u32]);
     }
 
     /// Bytes held.

@@ -271,7 +271,7 @@ impl Rebinder {
         if ONE_IN * region.cells.len() > grid.n_cells() {
             return Ok(None);
         }
-        let voxels = team.install(|| Voxels::new(cage, grid, &self.options));
+        let voxels = team.install(|| old_voxels.renewed(&self.cage, cage, grid, &self.options));
         let level = &voxels.hierarchy.levels[0];
         let voxelized = watch.now_ms();
 

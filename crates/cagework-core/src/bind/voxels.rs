@@ -10,7 +10,7 @@ use crate::sample::embedded::Sampler;
 use crate::sample::{Stencils, classic};
 use crate::solve::hierarchy::Hierarchy;
 use crate::voxelize::classic::{ClassicCells, place_grid};
-use crate::voxelize::embedded::{EmbeddedCells, classify, shoot_lines};
+use crate::voxelize::embedded::{EmbeddedCells, classify, lines_at_moved_faces, shoot_lines};
 use crate::voxelize::published::PublishedCells;
 use crate::voxelize::{CellKind, voxelize_classic};
 
@@ -49,8 +49,13 @@ impl Voxels {
     pub(super) fn new(cage: &Cage, grid: Grid, options: &BindOptions) -> Self {
         match options.method {
             Method::Classic => Self::classic(cage, options),
-            Method::Embedded => Self::embedded(cage, grid, options),
+            Method::Embedded => Self::embedded(cage, grid, options, None),
         }
+    }
+
+    /// What [`Self::new`] leaves for multigrid on an embedded cage that was edited, made of what was left before: `cage_before`.
+    pub(super) fn renewed(&self, cage_before: &Cage, cage: &Cage, grid: Grid, options: &BindOptions) -> Self {
+        Self::embedded(cage, grid, options, Some((self, cage_before)))
     }
 
     fn classic(cage: &Cage, options: &BindOptions) -> Self {
@@ -73,13 +78,21 @@ impl Voxels {
         Self { hierarchy, counts, ambiguous: 0, bytes, classic: Some(cells) }
     }
 
-    fn embedded(cage: &Cage, grid: Grid, options: &BindOptions) -> Self {
+    fn embedded(cage: &Cage, grid: Grid, options: &BindOptions, before: Option<(&Self, &Cage)>) -> Self {
         let lines = shoot_lines(cage, &grid);
         let (inside, ambiguous) = classify(&lines, &grid);
         let cells = EmbeddedCells::finest(cage, &lines, grid, inside);
-        let hierarchy = match options.solver {
-            Solver::Jacobi => Hierarchy::single(Level::new(&cells), cage.n_vertices()),
-            Solver::Multigrid => Hierarchy::new(cells, cage.n_vertices(), EmbeddedCells::coarsened),
+        let hierarchy = match (options.solver, before) {
+            (Solver::Jacobi, _) => Hierarchy::single(Level::new(&cells), cage.n_vertices()),
+            (Solver::Multigrid, None) => Hierarchy::new(cells, cage.n_vertices(), EmbeddedCells::coarsened),
+            (Solver::Multigrid, Some((before, cage_before))) => {
+                let has_moved =
+                    |&i: &u32| cage_before.positions()[i as usize] != cage.positions()[i as usize];
+                let is_moved: Vec<bool> = cage.faces().iter().map(|f| f.iter().any(has_moved)).collect();
+                before.hierarchy.renewed(cells, EmbeddedCells::coarsened, |n_levels| {
+                    lines_at_moved_faces([cage_before, cage], &grid, n_levels, |f| is_moved[f as usize])
+                })
+            }
         };
         let finest = &hierarchy.levels[0];
         let (cut, unknowns) = (finest.n_cut() as u64, finest.n_unknowns() as u64);

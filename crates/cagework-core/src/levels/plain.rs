@@ -20,7 +20,7 @@ pub(crate) struct PlainCell {
 }
 
 /// All unknowns of a level, in grid order.
-pub(crate) fn cells(level: &Level, boundary: &impl Boundary) -> Vec<PlainCell> {
+pub(crate) fn cells(level: &Level, boundary: &dyn Boundary) -> Vec<PlainCell> {
     let row = |cell| level.row_of[level.grid.index(cell)];
     let unknowns = level.grid.cells().filter(|&cell| row(cell) != NO_CELL);
     unknowns
@@ -28,7 +28,7 @@ pub(crate) fn cells(level: &Level, boundary: &impl Boundary) -> Vec<PlainCell> {
             let mut plain =
                 PlainCell { cell, row: row(cell), neighbours: Vec::new(), hats: Vec::new(), diagonal: 0.0 };
             for d in 0..6 {
-                if boundary.cut_arms(cell) >> d & 1 == 1 {
+                if boundary.cut_arms()[level.grid.index(cell)] >> d & 1 == 1 {
                     let mut hats = Vec::new();
                     let weight = boundary.arm(cell, d, &mut |column, value| hats.push((column, value)));
                     plain.hats.extend(hats.into_iter().map(|(column, value)| (column, weight * value)));

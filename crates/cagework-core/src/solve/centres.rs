@@ -15,7 +15,7 @@ use super::rows::{LANES, Rhs, Row, ZERO, split, sum_around};
 pub const INJECT: f32 = RESTRICT_CENTRE + 12.0 * RESTRICT_EDGE;
 
 /// A red fine cell that is the centre of a coarse cell.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Centre {
     /// Its stencil, also where no arm is cut.
     stencil: CutCell,
@@ -24,7 +24,7 @@ struct Centre {
 }
 
 /// Centres of a coarse level's cells: for each of its rows but the zero rows, red, then black.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Centres {
     stencils: [Vec<Centre>; 2],
 }

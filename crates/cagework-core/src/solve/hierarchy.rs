@@ -1,6 +1,7 @@
 //! All levels of one bind with their transfers and right-hand sides in batches: what every solver reads.
 
-use crate::levels::{Boundary, BoundaryTerm, Level};
+use crate::grid::NO_CELL;
+use crate::levels::{Before, Boundary, BoundaryTerm, Level};
 use crate::transfer::Transfer;
 use crate::voxelize::map_indices;
 
@@ -11,7 +12,7 @@ use super::rows::{LANES, Row};
 const COARSEST_UNKNOWNS: usize = 200;
 
 /// Levels, finest first, and the transfers between neighbours.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Hierarchy {
     /// Levels, finest first; at least one.
     pub levels: Vec<Level>,
@@ -29,61 +30,72 @@ impl Hierarchy {
     /// One level only: for Jacobi.
     #[must_use]
     pub fn single(level: Level, n_columns: usize) -> Self {
-        let mut hierarchy = Self {
-            levels: vec![level],
+        let (boundary, starts) = sorted_by_batch(&level.boundary, n_columns.div_ceil(LANES));
+        Self {
+            levels: vec![Level { boundary, ..level }],
             transfers: Vec::new(),
             centres: Centres::default(),
             n_columns,
-            batches: Vec::new(),
-        };
-        hierarchy.sort_terms();
-        hierarchy
+            batches: vec![starts],
+        }
     }
 
     /// Levels of doubling cell size, until few unknowns remain. `coarsen` makes the next coarser boundary.
     #[must_use]
-    pub fn new<B: Boundary + Sync>(finest: B, n_columns: usize, coarsen: impl Fn(&B) -> B) -> Self {
-        let mut boundaries = vec![finest];
-        loop {
-            let last = &boundaries[boundaries.len() - 1];
-            if last.count_unknowns() <= COARSEST_UNKNOWNS {
-                break;
-            }
-            let coarse = coarsen(last);
-            if coarse.count_unknowns() == 0 {
-                break;
-            }
-            boundaries.push(coarse);
-        }
-        let levels = map_indices(boundaries.len(), |k| Level::new(&boundaries[k]));
-        let transfers = map_indices(levels.len() - 1, |k| Transfer::new(&levels[k], &levels[k + 1]));
-        let centres = transfers.first().map(|t| Centres::new(&levels[0], t)).unwrap_or_default();
-        let mut hierarchy = Self { levels, transfers, centres, n_columns, batches: Vec::new() };
-        hierarchy.sort_terms();
-        hierarchy
+    pub fn new<B: Boundary>(finest: B, n_columns: usize, coarsen: impl Fn(&B) -> B) -> Self {
+        let boundaries = boundaries(finest, coarsen);
+        Self::of(&boundaries.iter().map(|b| b as &dyn Boundary).collect::<Vec<_>>(), n_columns, None)
     }
 
-    /// Sorts the levels' terms by batch; within a batch they keep their order.
-    fn sort_terms(&mut self) {
-        let n_batches = self.n_batches();
-        let batch_of = |t: &BoundaryTerm| t.column as usize / LANES;
-        for level in &mut self.levels {
-            let mut starts = vec![0u32; n_batches + 1];
-            for term in &level.boundary {
-                starts[batch_of(term) + 1] += 1;
+    /// The same from what it was before an edit of the cage that leaves the grid: the outcome is that of [`Self::new`].
+    /// `moved(n_levels)` are, on each level, the lines along x with cells whose arms may end elsewhere now.
+    #[must_use]
+    pub fn renewed<B: Boundary>(
+        &self,
+        finest: B,
+        coarsen: impl Fn(&B) -> B,
+        moved: impl Fn(usize) -> Vec<Vec<bool>>,
+    ) -> Self {
+        let boundaries = boundaries(finest, coarsen);
+        let boundaries: Vec<&dyn Boundary> = boundaries.iter().map(|b| b as &dyn Boundary).collect();
+        let moved = moved(boundaries.len());
+        Self::of(&boundaries, self.n_columns, Some((self, &moved)))
+    }
+
+    fn of(boundaries: &[&dyn Boundary], n_columns: usize, old: Option<(&Self, &[Vec<bool>])>) -> Self {
+        let before: Vec<Option<Before<'_>>> = map_indices(boundaries.len(), |k| {
+            let (old, moved) = old?;
+            old.levels.get(k).map(|level| Before::new(level, boundaries[k], &moved[k]))
+        });
+        let n_batches = n_columns.div_ceil(LANES);
+        let levels = map_indices(boundaries.len(), |k| match (&before[k], old) {
+            (Some(before), Some((old, _))) => {
+                let (mut level, moved_to) = Level::renewed(boundaries[k], before);
+                let anew = sorted_by_batch(&level.boundary, n_batches);
+                let kept = (old.levels[k].boundary.as_slice(), old.batches[k].as_slice());
+                let starts;
+                (level.boundary, starts) = merged(kept, &moved_to, (&anew.0, &anew.1));
+                (level, starts)
             }
-            for batch in 0..n_batches {
-                starts[batch + 1] += starts[batch];
+            _ => {
+                let mut level = Level::new(boundaries[k]);
+                let starts;
+                (level.boundary, starts) = sorted_by_batch(&level.boundary, n_batches);
+                (level, starts)
             }
-            let (mut next, mut sorted) = (starts.clone(), level.boundary.clone());
-            for term in &level.boundary {
-                let place = &mut next[batch_of(term)];
-                sorted[*place as usize] = *term;
-                *place += 1;
+        });
+        let (levels, batches): (Vec<Level>, _) = levels.into_iter().unzip();
+        let transfers = map_indices(levels.len() - 1, |k| {
+            let [fine, coarse] = [&levels[k], &levels[k + 1]];
+            match (&before[k], &before[k + 1], old) {
+                (Some(fine_before), Some(coarse_before), Some((old, _))) => {
+                    old.transfers[k].renewed([fine, coarse], [fine_before, coarse_before])
+                }
+                _ => Transfer::new(fine, coarse),
             }
-            level.boundary = sorted;
-            self.batches.push(starts);
-        }
+        });
+        let centres = transfers.first().map(|t| Centres::new(&levels[0], t)).unwrap_or_default();
+        Self { levels, transfers, centres, n_columns, batches }
     }
 
     /// Batches of [`LANES`] columns.
@@ -133,5 +145,71 @@ impl Hierarchy {
         self.levels.iter().map(Level::bytes).sum::<usize>()
             + self.transfers.iter().map(Transfer::bytes).sum::<usize>()
             + self.centres.bytes()
+    }
+}
+
+/// A level's terms sorted by batch, within which they keep their order, and where each batch starts.
+fn sorted_by_batch(terms: &[BoundaryTerm], n_batches: usize) -> (Vec<BoundaryTerm>, Vec<u32>) {
+    let batch_of = |t: &BoundaryTerm| t.column as usize / LANES;
+    let mut starts = vec![0u32; n_batches + 1];
+    for term in terms {
+        starts[batch_of(term) + 1] += 1;
+    }
+    for batch in 0..n_batches {
+        starts[batch + 1] += starts[batch];
+    }
+    let (mut next, mut sorted) = (starts.clone(), terms.to_vec());
+    for term in terms {
+        let place = &mut next[batch_of(term)];
+        sorted[*place as usize] = *term;
+        *place += 1;
+    }
+    (sorted, starts)
+}
+
+/// Terms of cut cells that were there before, by the number that each has now, and of those made anew. All are sorted by
+/// batch, with where each batch starts.
+fn merged(
+    (kept, kept_starts): (&[BoundaryTerm], &[u32]),
+    moved_to: &[u32],
+    (anew, starts): (&[BoundaryTerm], &[u32]),
+) -> (Vec<BoundaryTerm>, Vec<u32>) {
+    let mut all = Vec::with_capacity(kept.len() + anew.len());
+    let mut all_starts = vec![0];
+    for (old, new) in kept_starts.windows(2).zip(starts.windows(2)) {
+        let mut anew = &anew[new[0] as usize..new[1] as usize];
+        for term in &kept[old[0] as usize..old[1] as usize] {
+            let cut_cell = moved_to[term.cut_cell as usize];
+            if cut_cell == NO_CELL {
+                continue;
+            }
+            while let [first, rest @ ..] = anew
+                && first.cut_cell < cut_cell
+            {
+                all.push(*first);
+                anew = rest;
+            }
+            all.push(BoundaryTerm { cut_cell, ..*term });
+        }
+        all.extend_from_slice(anew);
+        all_starts.push(all.len() as u32);
+    }
+    (all, all_starts)
+}
+
+/// Boundaries of doubling cell size, until few unknowns remain.
+fn boundaries<B: Boundary>(finest: B, coarsen: impl Fn(&B) -> B) -> Vec<B> {
+    let n_unknowns = |boundary: &B| boundary.unknowns().iter().filter(|&&unknown| unknown).count();
+    let mut boundaries = vec![finest];
+    loop {
+        let last = &boundaries[boundaries.len() - 1];
+        if n_unknowns(last) <= COARSEST_UNKNOWNS {
+            return boundaries;
+        }
+        let coarse = coarsen(last);
+        if n_unknowns(&coarse) == 0 {
+            return boundaries;
+        }
+        boundaries.push(coarse);
     }
 }

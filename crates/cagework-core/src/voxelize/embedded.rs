@@ -13,7 +13,7 @@ use crate::cage::Cage;
 use crate::grid::Grid;
 use crate::levels::Boundary;
 
-use super::lines::{Hit, Lines};
+use super::lines::{Hit, Lines, hits};
 
 /// Shortest arm, in cells: a centre this close to the cage has the cage's value to within the solver's accuracy, and
 /// a shorter arm would only cost f32 digits (1e-3 measured on the Armadillo and the horse).
@@ -102,12 +102,6 @@ impl<'a> EmbeddedCells<'a> {
         Self { cage, lines, grid, step, inside, cut }
     }
 
-    /// Whether each centre is inside the cage.
-    #[must_use]
-    pub fn inside(&self) -> &[bool] {
-        &self.inside
-    }
-
     /// The crossing nearest to a cell along a direction, at most one cell away, and its distance in cells.
     fn nearest(&self, cell: [u32; 3], direction: usize) -> Option<(Hit, f64)> {
         let axis = direction / 2;
@@ -123,6 +117,45 @@ impl<'a> EmbeddedCells<'a> {
     }
 }
 
+/// The lines along x with centres next to which a face of the cage has moved, on every level: `[n_levels][nz * ny]`. `cages`:
+/// before and after; `is_moved`: whether a face's corners, or one of them, have moved.
+#[must_use]
+pub fn lines_at_moved_faces(
+    cages: [&Cage; 2],
+    grid: &Grid,
+    n_levels: usize,
+    is_moved: impl Fn(u32) -> bool,
+) -> Vec<Vec<bool>> {
+    let mut grids = vec![*grid];
+    while grids.len() < n_levels {
+        grids.extend(grids.last().map(Grid::coarsened));
+    }
+    let mut marked: Vec<Vec<bool>> =
+        grids.iter().map(|grid| vec![false; (grid.dims[1] * grid.dims[2]) as usize]).collect();
+    for (cage, axis) in cages.into_iter().flat_map(|cage| (0..3).map(move |axis| (cage, axis))) {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let moved = |triangle: u32| is_moved(cage.face_of_triangle()[triangle as usize]);
+        hits(cage, grid, axis, moved, |iu, iv, hit| {
+            for (level, (grid, marked)) in grids.iter().zip(&mut marked).enumerate() {
+                let step = 1 << level;
+                if iu % step != 0 || iv % step != 0 {
+                    break;
+                }
+                let mut cell = [0; 3];
+                (cell[u], cell[v]) = (iu / step, iv / step);
+                let (below, above) = wall_between(hit.t / f64::from(step));
+                for x in [below, above] {
+                    if (0..i64::from(grid.dims[axis])).contains(&x) {
+                        cell[axis] = x as u32;
+                        marked[(cell[2] * grid.dims[1] + cell[1]) as usize] = true;
+                    }
+                }
+            }
+        });
+    }
+    marked
+}
+
 /// The two centres between which a crossing at `t` lies. A crossing exactly on a centre lies below it, as in
 /// [`classify`], where centre s is past the crossing when `t <= s`.
 fn wall_between(t: f64) -> (i64, i64) {
@@ -135,16 +168,12 @@ impl Boundary for EmbeddedCells<'_> {
         self.grid
     }
 
-    fn is_unknown(&self, cell: [u32; 3]) -> bool {
-        self.inside[self.grid.index(cell)]
+    fn unknowns(&self) -> &[bool] {
+        &self.inside
     }
 
-    fn count_unknowns(&self) -> usize {
-        self.inside.iter().filter(|&&inside| inside).count()
-    }
-
-    fn cut_arms(&self, cell: [u32; 3]) -> u8 {
-        self.cut[self.grid.index(cell)]
+    fn cut_arms(&self) -> &[u8] {
+        &self.cut
     }
 
     fn arm(&self, cell: [u32; 3], direction: usize, hats: &mut dyn FnMut(u32, f64)) -> f64 {

@@ -36,14 +36,9 @@ impl Lines {
     #[must_use]
     pub fn shoot(cage: &Cage, grid: &Grid, axis: usize) -> Self {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let points: Vec<DVec3> = cage.positions().iter().map(|p| grid.to_grid(p.as_dvec3())).collect();
         let n_lines = grid.dims[u] as usize * grid.dims[v] as usize;
         let mut found: Vec<(u32, Hit)> = Vec::new();
-        for (triangle, corners) in cage.triangles().iter().enumerate() {
-            cover(&points, *corners, grid, axis, |line, hit| {
-                found.push((line, Hit { triangle: triangle as u32, ..hit }));
-            });
-        }
+        hits(cage, grid, axis, |_| true, |iu, iv, hit| found.push((iu + grid.dims[u] * iv, hit)));
         // Counting sort by line, each line's few hits inserted by position.
         let mut start = vec![0u32; n_lines + 1];
         for (line, _) in &found {
@@ -87,8 +82,28 @@ impl Lines {
     }
 }
 
-/// Calls `found(line, hit)` for every line along `axis` that the triangle covers.
-fn cover(points: &[DVec3], corners: [u32; 3], grid: &Grid, axis: usize, mut found: impl FnMut(u32, Hit)) {
+/// Calls `found(u, v, hit)` for every crossing of a line along `axis` with one of the triangles that are `wanted`.
+pub(super) fn hits(
+    cage: &Cage,
+    grid: &Grid,
+    axis: usize,
+    wanted: impl Fn(u32) -> bool,
+    mut found: impl FnMut(u32, u32, Hit),
+) {
+    let points: Vec<DVec3> = cage.positions().iter().map(|p| grid.to_grid(p.as_dvec3())).collect();
+    for (triangle, corners) in (0u32..).zip(cage.triangles()).filter(|(triangle, _)| wanted(*triangle)) {
+        cover(&points, *corners, grid, axis, |u, v, hit| found(u, v, Hit { triangle, ..hit }));
+    }
+}
+
+/// Calls `found(u, v, hit)` for every line along `axis` that the triangle covers.
+fn cover(
+    points: &[DVec3],
+    corners: [u32; 3],
+    grid: &Grid,
+    axis: usize,
+    mut found: impl FnMut(u32, u32, Hit),
+) {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let p = corners.map(|i| points[i as usize]);
     let range = |a: usize| {
@@ -116,7 +131,7 @@ fn cover(points: &[DVec3], corners: [u32; 3], grid: &Grid, axis: usize, mut foun
             let w = [e0, e1, e2].map(|e| (e / area).clamp(0.0, 1.0));
             let t = w[0] * p[0][axis] + w[1] * p[1][axis] + w[2] * p[2][axis];
             let hit = Hit { t, triangle: 0, barycentric: [w[0], w[1]] };
-            found(iu as u32 + grid.dims[u] * iv as u32, hit);
+            found(iu as u32, iv as u32, hit);
         }
     }
 }

@@ -16,6 +16,8 @@ pub struct PublishedCells<'a> {
     fine: Grid,
     grid: Grid,
     step: u32,
+    unknowns: Vec<bool>,
+    cut: Vec<u8>,
 }
 
 impl<'a> PublishedCells<'a> {
@@ -23,13 +25,25 @@ impl<'a> PublishedCells<'a> {
     #[must_use]
     pub fn finest(cells: &'a ClassicCells) -> Self {
         let grid = Grid { dims: cells.dims, origin: cells.origin, cell: cells.cell_size };
-        Self { cells, fine: grid, grid, step: 1 }
+        Self::on(cells, grid, grid, 1)
     }
 
     /// The next coarser level.
     #[must_use]
     pub fn coarsened(&self) -> Self {
-        Self { grid: self.grid.coarsened(), step: 2 * self.step, ..*self }
+        Self::on(self.cells, self.fine, self.grid.coarsened(), 2 * self.step)
+    }
+
+    fn on(cells: &'a ClassicCells, fine: Grid, grid: Grid, step: u32) -> Self {
+        let mut level = Self { cells, fine, grid, step, unknowns: Vec::new(), cut: Vec::new() };
+        level.unknowns =
+            grid.cells().map(|c| level.kind(c.map(|x| x * step)) == CellKind::Interior).collect();
+        let arms = |(cell, &unknown): ([u32; 3], &bool)| {
+            let ends = |&d: &usize| unknown && level.first_boundary(cell, d).is_some();
+            (0..6).filter(ends).fold(0, |arms, d| arms | 1 << d)
+        };
+        level.cut = grid.cells().zip(&level.unknowns).map(arms).collect();
+        level
     }
 
     fn kind(&self, cell: [u32; 3]) -> CellKind {
@@ -54,14 +68,12 @@ impl Boundary for PublishedCells<'_> {
         self.grid
     }
 
-    fn is_unknown(&self, cell: [u32; 3]) -> bool {
-        self.kind(cell.map(|x| x * self.step)) == CellKind::Interior
+    fn unknowns(&self) -> &[bool] {
+        &self.unknowns
     }
 
-    fn cut_arms(&self, cell: [u32; 3]) -> u8 {
-        (0..6)
-            .filter(|&direction| self.first_boundary(cell, direction).is_some())
-            .fold(0, |arms, direction| arms | 1 << direction)
+    fn cut_arms(&self) -> &[u8] {
+        &self.cut
     }
 
     fn arm(&self, cell: [u32; 3], direction: usize, hats: &mut dyn FnMut(u32, f64)) -> f64 {

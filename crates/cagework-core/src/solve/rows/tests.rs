@@ -40,7 +40,7 @@ fn assert_rows_close(a: &[Row], b: &[Row], tolerance: f32) {
 /// For each cell of a colour: (row, sum of neighbours + f, diagonal).
 fn plain_sums(
     level: &Level,
-    boundary: &impl crate::levels::Boundary,
+    boundary: &dyn crate::levels::Boundary,
     colour: usize,
     u: &[Row],
     f: &[Row],

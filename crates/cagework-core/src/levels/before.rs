@@ -1,0 +1,128 @@
+//! A level before an edit, of which most lines stay what they are.
+
+use crate::grid::NO_CELL;
+
+use super::build::{Slab, add_to_rows};
+use super::{Boundary, CutCell, Level, Run};
+
+/// A level before an edit, and what has become of its lines along x.
+#[derive(Debug)]
+pub struct Before<'a> {
+    pub(super) level: &'a Level,
+    /// Whether there are other unknowns in a line now. `[nz * ny]`
+    changed: Vec<bool>,
+    /// Whether a line's stencils are made anew. `[nz * ny]`
+    is_anew: Vec<bool>,
+}
+
+impl<'a> Before<'a> {
+    /// Compares a level with what its unknowns are now. `moved`: lines with cells whose arms may end elsewhere now, `[nz * ny]`.
+    #[must_use]
+    pub fn new(level: &'a Level, boundary: &dyn Boundary, moved: &[bool]) -> Self {
+        let [nx, ny, _] = level.grid.dims.map(|n| n as usize);
+        let lines = boundary.unknowns().chunks_exact(nx).zip(level.row_of.chunks_exact(nx));
+        let changed: Vec<bool> = lines
+            .map(|(now, rows)| {
+                // Without leaving early: only so cells are compared several at once.
+                now.iter().zip(rows).fold(false, |other, (&now, &row)| other | (now != (row != NO_CELL)))
+            })
+            .collect();
+        let mut is_anew = moved.to_vec();
+        for line in (0..changed.len()).filter(|&line| changed[line]) {
+            // Whoever has neighbours in it.
+            for other in
+                [Some(line), Some(line + 1), line.checked_sub(1), Some(line + ny), line.checked_sub(ny)]
+            {
+                if let Some(is_anew) = other.and_then(|other| is_anew.get_mut(other)) {
+                    *is_anew = true;
+                }
+            }
+        }
+        Self { level, changed, is_anew }
+    }
+
+    /// The level as it was.
+    pub(crate) fn level(&self) -> &Level {
+        self.level
+    }
+
+    /// Whether a line's stencils are what they were, but for their rows.
+    pub(super) fn is_kept(&self, line: usize) -> bool {
+        !self.is_anew[line]
+    }
+
+    /// Whether a line's unknowns are those that they were.
+    pub(crate) fn has_same_cells(&self, line: usize) -> bool {
+        !self.changed[line]
+    }
+
+    /// What a line's cells grew by, within each colour.
+    pub(crate) fn shift(&self, now: &Level, line: usize) -> [u32; 2] {
+        [0, 1].map(|c| now.lines[line][c].wrapping_sub(self.level.lines[line][c]))
+    }
+
+    /// Numbers the cells of a kept line within their colours, of which there are `n_cells` so far.
+    pub(super) fn copy_rows(&self, line: usize, n_cells: &mut [u32; 2], rows: &mut [u32]) {
+        let (start, end) = (self.level.lines[line], self.level.lines[line + 1]);
+        if start == end {
+            return;
+        }
+        let ny = self.level.grid.dims[1] as usize;
+        rows.copy_from_slice(&self.level.row_of[line * rows.len()..][..rows.len()]);
+        let by = [0, 1].map(|c| n_cells[c].wrapping_sub(start[c] + self.level.first_row(c) as u32));
+        let red = (line % ny + line / ny) % 2;
+        add_to_rows(rows, [by[red], by[1 - red]]);
+        for c in 0..2 {
+            n_cells[c] += end[c] - start[c];
+        }
+    }
+
+    /// Copies the runs and cut cells of the line (y, z) to where its rows are `now`.
+    pub(super) fn copy_line(&self, now: &Level, y: u32, z: u32, slab: &mut Slab) {
+        let (ny, z) = (self.level.grid.dims[1] as usize, z as usize);
+        let line = z * ny + y as usize;
+        let (start, end) = (self.level.lines[line], self.level.lines[line + 1]);
+        if start == end {
+            return;
+        }
+        let n_lines = now.lines.len() - 1;
+        for c in 0..2 {
+            let own = self.shift(now, line)[c];
+            // A line that does not exist has nobody's neighbours.
+            let of_line = |line: usize| if line < n_lines { self.shift(now, line)[1 - c] } else { 0 };
+            let x = of_line(line);
+            let yz = [line.wrapping_sub(1), line + 1, line.wrapping_sub(ny), line + ny].map(of_line);
+            let (colour, out) = (&self.level.colours[c], &mut slab.colours[c]);
+            let ([run, cut], [run_end, cut_end]) = (colour.planes[z], colour.planes[z + 1]);
+            let runs = &colour.runs[run as usize..run_end as usize];
+            let first = runs.partition_point(|run| run.start < start[c]);
+            for run in runs[first..].iter().take_while(|run| run.start < end[c]) {
+                out.runs.push(Run {
+                    start: run.start.wrapping_add(own),
+                    len: run.len,
+                    x: run.x.wrapping_add(x),
+                    yz: std::array::from_fn(|d| run.yz[d].wrapping_add(yz[d])),
+                });
+            }
+            let by = [x, x, yz[1], yz[0], yz[3], yz[2]];
+            let [zero, zero_now] = [self.level, now].map(|level| level.colours[1 - c].n_cells);
+            let cells = &colour.cut[cut as usize..cut_end as usize];
+            let first = cells.partition_point(|cut| cut.cell < start[c]);
+            let red_cut = if c == 0 { 0 } else { self.level.colours[0].cut.len() as u32 };
+            for (number, cell) in (red_cut + cut + first as u32..).zip(&cells[first..]) {
+                if cell.cell >= end[c] {
+                    break;
+                }
+                let neighbours = std::array::from_fn(|d| {
+                    let n = cell.neighbours[d];
+                    if n == zero { zero_now } else { n.wrapping_add(by[d]) }
+                });
+                out.cut.push(CutCell { cell: cell.cell.wrapping_add(own), neighbours, ..*cell });
+                slab.from[c].push(number);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
