@@ -84,11 +84,13 @@ impl Transfer {
     fn built(levels: [&Level; 2], old: Option<&Old<'_>>) -> Self {
         let [fine, coarse] = levels;
         let [nx, ny, nz] = fine.grid.dims;
+        // One black cell in four has three odd coordinates, more or less.
+        let n_black = fine.colours[1].n_cells as usize;
         let mut tables = Self {
-            restrict_rows: Default::default(),
-            faces: Vec::new(),
-            corners: Vec::new(),
-            planes: Vec::new(),
+            restrict_rows: [0, 1].map(|c| Vec::with_capacity(coarse.colours[c].n_cells as usize)),
+            faces: Vec::with_capacity(n_black * 13 / 16),
+            corners: Vec::with_capacity(n_black * 5 / 16),
+            planes: Vec::with_capacity(nz as usize + 1),
         };
         for z in 0..nz {
             tables.mark_plane();

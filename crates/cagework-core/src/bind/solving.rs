@@ -108,7 +108,7 @@ pub(super) fn solve_batches(
             })?;
             let solved = watch.now_ms();
             let samples = sample(batch, workspace.field());
-            let field = if fate == FieldFate::Kept { workspace.field().to_vec() } else { Vec::new() };
+            let field = if fate == FieldFate::Kept { workspace.take_field() } else { Vec::new() };
             spent.add([begin, solved, watch.now_ms()]);
             watch.piece_done(Stage::Solve, n_batches).ok()?;
             Some(SolvedBatch { report, samples, field })

@@ -26,6 +26,10 @@ impl Level {
     fn join(&mut self, slabs: Vec<Slab>, before: Option<&Before<'_>>) -> Vec<u32> {
         let mut terms = [Vec::new(), Vec::new()];
         let mut from = [Vec::new(), Vec::new()];
+        for (k, colour) in self.colours.iter_mut().enumerate() {
+            colour.runs.reserve(slabs.iter().map(|slab| slab.colours[k].runs.len()).sum());
+            colour.cut.reserve(slabs.iter().map(|slab| slab.colours[k].cut.len()).sum());
+        }
         for slab in slabs {
             for (k, part) in slab.colours.into_iter().enumerate() {
                 let colour = &mut self.colours[k];

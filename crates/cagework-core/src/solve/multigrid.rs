@@ -91,6 +91,7 @@ impl Workspace {
         cycle_done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<BatchReport> {
         let coarsest = hierarchy.levels.len() - 1;
+        self.u[0].resize(hierarchy.levels[0].n_rows(), ZERO);
         hierarchy.fill_cut_rhs(batch, &mut self.f[0]);
         for k in (1..=coarsest).rev() {
             hierarchy.fill_dense_rhs(k, batch, &mut self.f[k]);
@@ -132,6 +133,11 @@ impl Workspace {
     #[must_use]
     pub fn field(&self) -> &[Row] {
         &self.u[0]
+    }
+
+    /// Hands the finest level's field out; the next solve makes another. `[n_rows]`
+    pub fn take_field(&mut self) -> Vec<Row> {
+        std::mem::take(&mut self.u[0])
     }
 
     /// One full relaxation of the finest level, both colours, as the solver does it: the unit in which a solve's

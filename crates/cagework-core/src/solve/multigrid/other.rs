@@ -18,14 +18,22 @@ impl Workspace {
         stop: Stop,
         cycle_done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<BatchReport> {
-        self.f[0].clear();
-        self.f[0].resize(hierarchy.levels[0].n_rows(), ZERO);
+        let n_rows = hierarchy.levels[0].n_rows();
+        if self.f[0].len() != n_rows {
+            self.f[0].clear();
+            self.f[0].resize(n_rows, ZERO);
+        }
+        self.u[0].resize(n_rows, ZERO);
         for (&row, values) in rhs.0.iter().zip(rhs.1) {
             self.f[0][row as usize] = *values;
         }
         self.dense = true;
         let report = self.cycles(hierarchy, DOWN_FROM_ZERO, stop, cycle_done);
         self.dense = false;
+        // All others are still zero: the next batch need not be told so.
+        for &row in rhs.0 {
+            self.f[0][row as usize] = ZERO;
+        }
         report
     }
 }
