@@ -31,7 +31,7 @@ use crate::solve::team::Team;
 use crate::weights::affine::Columns;
 use crate::weights::assemble::Assembled;
 
-use self::equations::{Equations, cells_of_rows};
+use self::equations::{Equations, cells_of_rows, n_cut_in};
 use self::local::{Fields, Negligible, OldCells, Residual, Split, Update};
 use self::moved::{moved_columns, moved_triangles, renumbering};
 use self::region::Region;
@@ -51,6 +51,10 @@ const FORCED: f32 = -1e-5;
 
 /// Everything is bound anew if one in so many cells is at a moved face.
 const ONE_IN: usize = 4;
+
+/// Batches of corrections for each edit of so many cells next to the cage as there are, more or less: an edit of a fifth of them
+/// takes three, and the bind of a cage of 24 vertices takes no more. Such edits are bound anew.
+const BATCHES_OF_ALL: usize = 15;
 
 /// Cells around the moved faces whose equations may have changed, and in which stencils are made anew: a stencil sees the
 /// triangles in its cube of centres.
@@ -271,6 +275,10 @@ impl Rebinder {
         if ONE_IN * region.cells.len() > grid.n_cells() {
             return Ok(None);
         }
+        let before = &old_voxels.hierarchy.levels[0];
+        if BATCHES_OF_ALL * n_cut_in(before, &region) > n_batches * before.n_cut() {
+            return Ok(None);
+        }
         let voxels = team.install(|| old_voxels.renewed(&self.cage, cage, grid, &self.options));
         let level = &voxels.hierarchy.levels[0];
         let voxelized = watch.now_ms();
@@ -295,7 +303,6 @@ impl Rebinder {
         let (mut rank, mut sampled) = (0, stencils_made);
         if !swept.is_empty() {
             let negligible = Negligible::at(self.options.tau);
-            let before = &old_voxels.hierarchy.levels[0];
             let equations = Equations::changed(level, before, &region);
             let mut needed = equations.neighbourhood(level);
             let cell_of = if changed.is_empty() { Vec::new() } else { cells_of_rows(level) };

@@ -55,6 +55,13 @@ impl Equations {
     }
 }
 
+/// Cells next to the cage that are in a region.
+pub(super) fn n_cut_in(level: &Level, region: &Region) -> usize {
+    let cut = cut_rows(level);
+    let rows = region.cells.iter().map(|&cell| level.row_of[cell as usize]);
+    rows.filter(|&row| row != NO_CELL && cut[row as usize]).count()
+}
+
 /// Whether each row's cell is next to the cage. `[n_rows]`
 #[inline(never)]
 fn cut_rows(level: &Level) -> Vec<bool> {
