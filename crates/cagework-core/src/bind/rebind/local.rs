@@ -225,17 +225,12 @@ impl Residual {
         let columns = || (0..n_columns).chain((0..4).map(|k| n_batches * LANES + k));
         let mut right = Vec::new();
         let mut shares = Shares::new(n_batches);
+        let mut largest = vec![ZERO; n_batches + 1];
+        let nothing = vec![ZERO; n_batches + 1];
+        for row in &mut self.values {
+            add_scaled_and_measure(row, &nothing, 0.0, &mut largest);
+        }
         loop {
-            let mut largest = vec![ZERO; n_batches + 1];
-            for row in &self.values {
-                for (largest, row) in largest.iter_mut().zip(row) {
-                    for lane in 0..LANES {
-                        // Wasm has no instruction for `max`.
-                        let size = row[lane].abs();
-                        largest[lane] = if size > largest[lane] { size } else { largest[lane] };
-                    }
-                }
-            }
             let size = |c: usize| largest[c / LANES][c % LANES];
             let pivot = columns().max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
             let rank = shares.len();
@@ -252,13 +247,13 @@ impl Residual {
             for (row, &q) in self.values.iter().zip(&unit) {
                 add_scaled(&mut share, row, q);
             }
+            largest.fill(ZERO);
             for (row, &q) in self.values.iter_mut().zip(&unit) {
-                add_scaled(row, &share, -q);
-            }
-            // Exactly, so that no column is taken twice.
-            for row in &mut self.values {
+                add_scaled_and_measure(row, &share, -q, &mut largest);
+                // Exactly, so that no column is taken twice.
                 row[pivot / LANES][pivot % LANES] = 0.0;
             }
+            largest[pivot / LANES][pivot % LANES] = 0.0;
             if rank.is_multiple_of(LANES) {
                 right.push(vec![ZERO; self.rows.len()]);
             }
@@ -269,6 +264,21 @@ impl Residual {
                 values[rank % LANES] = q * diagonal * norm;
             }
         }
+    }
+}
+
+/// `out += value * share`; `largest` grows to what is there then, without the sign.
+#[inline(always)]
+fn add_scaled_and_measure(out: &mut [Row], share: &[Row], value: f32, largest: &mut [Row]) {
+    for ((out, share), largest) in out.iter_mut().zip(share).zip(largest) {
+        let (mut sum, mut high) = (*out, *largest);
+        for lane in 0..LANES {
+            sum[lane] += value * share[lane];
+            // Wasm has no instruction for `max`.
+            let size = sum[lane].abs();
+            high[lane] = if size > high[lane] { size } else { high[lane] };
+        }
+        (*out, *largest) = (sum, high);
     }
 }
 
