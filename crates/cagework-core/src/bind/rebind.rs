@@ -13,6 +13,7 @@ mod moved;
 mod region;
 mod rows;
 mod shares;
+mod stencils;
 mod steps;
 #[cfg(test)]
 mod tests;
@@ -309,7 +310,7 @@ impl Rebinder {
             for (row, _) in changed.iter().flat_map(|&v| stencils.at(v as usize).0) {
                 needed.add(cell_of[*row as usize] as usize);
             }
-            let old = OldCells::new(&fields, &needed, n_batches);
+            let mut old = OldCells::new(&fields, &needed, n_batches);
             let moved = moved_columns(&self.cage, cage);
             // Where the axes disagree equations need not hold for linear functions.
             let is_exact = voxels.ambiguous == 0 && old_voxels.ambiguous == 0;
@@ -318,14 +319,15 @@ impl Rebinder {
                 [level, before],
                 &equations,
                 n_batches,
-                &old,
+                &mut old,
                 is_exact.then_some(&columns),
                 &moved,
                 negligible,
             );
             let Split { rows: of, right, shares } = residual.split(cage.n_vertices());
             // What each edit leaves is kept until everything is bound anew.
-            estimated += (right.len() * level.n_rows() * size_of::<Row>()) as u64;
+            let n_rows = right.len() * level.n_rows() + old.n_extended() * n_batches;
+            estimated += (n_rows * size_of::<Row>()) as u64;
             if estimated > self.options.memory_limit {
                 return Ok(None);
             }
@@ -352,7 +354,7 @@ impl Rebinder {
             let row_of = Arc::new(level.row_of.clone());
             let new_fields = corrections.into_iter().map(|c| c.field).collect();
             solved.field_bytes = Workspace::bytes(&voxels.hierarchy) * team.n_threads().min(right.len());
-            fields.updates.push(Update { fields: new_fields, row_of, shares });
+            fields.updates.push(Update { fields: new_fields, row_of, shares, extended: old.into_extended() });
         }
         let prepared = Prepared {
             positions: &self.positions,

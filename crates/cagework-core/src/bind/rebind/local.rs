@@ -1,5 +1,6 @@
 //! What an edit does to the linear system, looked at only where the moved faces are.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{DVec3, DVec4};
@@ -13,6 +14,7 @@ use crate::weights::affine::Columns;
 use super::equations::Equations;
 use super::region::Region;
 use super::shares::{Felt, Shares, add_scaled};
+use super::stencils::FewStencils;
 
 /// What is left out, as changes of a weight.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +52,8 @@ pub(super) struct Update {
     pub(super) fields: Vec<Vec<Row>>,
     pub(super) row_of: Arc<Vec<u32>>,
     pub(super) shares: Shares,
+    /// What is corrected in cells that were outside. `[n_batches]` each
+    pub(super) extended: HashMap<u32, Vec<Row>>,
 }
 
 /// All columns' fields: those of the last whole bind, and the corrections since.
@@ -64,8 +68,9 @@ pub(super) struct Fields {
 impl Fields {
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        let updates = self.updates.iter().flat_map(|update| &update.fields);
-        self.base.iter().chain(updates).map(|field| size_of_val(field.as_slice())).sum()
+        let updates =
+            self.updates.iter().flat_map(|update| update.fields.iter().chain(update.extended.values()));
+        self.base.iter().chain(updates).map(|rows| size_of_val(rows.as_slice())).sum()
     }
 
     /// Weights of all columns in a cell; zeros where it was outside. `out`: `[n_batches]`; `felt`: scratch space.
@@ -75,15 +80,20 @@ impl Fields {
         for (base, out) in self.base.iter().zip(out.iter_mut()) {
             *out = if row == NO_CELL { ZERO } else { base[row as usize] };
         }
+        let mut was_outside = row == NO_CELL;
         for update in &self.updates {
             let row = update.row_of[cell];
             if row == NO_CELL {
                 // Outside at the time: whatever it was before does not count.
                 out.fill(ZERO);
             } else {
+                if was_outside && let Some(extended) = update.extended.get(&(cell as u32)) {
+                    out.copy_from_slice(extended);
+                }
                 update.shares.pick(felt, update.fields.iter().map(|field| &field[row as usize]));
                 update.shares.add(felt, out);
             }
+            was_outside = row == NO_CELL;
         }
     }
 }
@@ -116,51 +126,33 @@ impl Residual {
         [level, before]: [&Level; 2],
         equations: &Equations,
         n_batches: usize,
-        old: &OldCells<'_>,
+        old: &mut OldCells<'_>,
         columns: Option<&Columns>,
         moved: &[(usize, DVec3)],
         negligible: Negligible,
     ) -> Self {
-        let strides = level.grid.strides();
-        let Equations { cells, rows, number } = equations;
-        let (rows, diagonals) = (rows.clone(), vec![6.0; rows.len()]);
-        let values = vec![vec![ZERO; n_batches + 1]; rows.len()];
+        let rows = equations.rows.clone();
+        let stencils = FewStencils::new(level, equations);
+        let mut values = vec![vec![ZERO; n_batches + 1]; rows.len()];
+        stencils.add_boundary(&mut values);
+        stencils.extend(before, &values, old);
+        let diagonals = (0..rows.len()).map(|k| stencils.diagonal(k)).collect();
         let mut residual = Self { rows, diagonals, values, negligible };
-        // Cut arms: what is no neighbour, and what the cage adds.
-        let mut cut_of = vec![None; residual.rows.len()];
-        for (n, cut) in level.colours.iter().flat_map(|c| &c.cut).enumerate() {
-            let k = number[level.row_of_cut(n)];
-            if k != NO_CELL {
-                cut_of[k as usize] = Some(cut);
-                residual.diagonals[k as usize] = cut.diagonal;
-            }
-        }
-        for term in &level.boundary {
-            let k = number[level.row_of_cut(term.cut_cell as usize)];
-            if k != NO_CELL {
-                let column = term.column as usize;
-                residual.values[k as usize][column / LANES][column % LANES] += term.value;
-            }
-        }
-        for (k, cell) in cells.iter().map(|&cell| cell as usize).enumerate() {
-            let zero = |d: usize| {
-                cut_of[k].is_some_and(|cut| {
-                    // Neighbours of a cut cell belong to the other colour, whose zero row is its last.
-                    let is_red = (residual.rows[k] as usize) < level.first_row(1);
-                    cut.neighbours[d] == level.colours[usize::from(is_red)].n_cells
-                })
-            };
+        for (k, cell) in equations.cells.iter().map(|&cell| cell as usize).enumerate() {
             let (out, moments) = residual.values[k].split_at_mut(n_batches);
             let of = |row: &[Row], column: usize| row[column / LANES][column % LANES];
             let given: Vec<f32> = moved.iter().map(|&(column, _)| of(out, column)).collect();
             let mut ideal = DVec4::ZERO;
             let mut missing = |cell: usize, weight: f64| {
                 if let (NO_CELL, Some(columns)) = (before.row_of[cell], columns) {
-                    ideal += weight * columns.scale(level.grid.center(level.grid.cell(cell))).extend(1.0);
+                    let row = old.at(cell);
+                    let (sum, point) = columns.combined(row);
+                    let way: DVec3 = moved.iter().map(|&(c, way)| f64::from(of(row, c)) * way).sum();
+                    let place = columns.scale(level.grid.center(level.grid.cell(cell)));
+                    ideal += weight * (place + way - point).extend(1.0 - sum);
                 }
             };
-            for d in (0..6).filter(|&d| !zero(d)) {
-                let neighbour = if d % 2 == 0 { cell + strides[d / 2] } else { cell - strides[d / 2] };
+            for neighbour in stencils.neighbours(k) {
                 add_scaled(out, old.at(neighbour), 1.0);
                 missing(neighbour, -1.0);
             }
@@ -168,7 +160,8 @@ impl Residual {
             missing(cell, f64::from(residual.diagonals[k]));
             let scale = 1.0 / residual.diagonals[k];
             // Linear functions meet the new equations with the new cage's values, and old weights reproduce the place of a
-            // cell and, for each moved vertex of the cage, its weight times its way.
+            // cell and, for each moved vertex of the cage, its weight times its way. What cells that were outside got
+            // does so but for what is `missing`.
             for (&(column, way), given) in moved.iter().zip(given) {
                 ideal += (way * f64::from(of(out, column) - given)).extend(0.0);
             }
@@ -289,6 +282,7 @@ pub(super) struct OldCells<'a> {
     values: Vec<Row>,
     n_batches: usize,
     nothing: Vec<Row>,
+    extended: HashMap<u32, Vec<Row>>,
 }
 
 impl<'a> OldCells<'a> {
@@ -303,7 +297,7 @@ impl<'a> OldCells<'a> {
                 }
             },
         );
-        Self { region, values, n_batches, nothing: vec![ZERO; n_batches] }
+        Self { region, values, n_batches, nothing: vec![ZERO; n_batches], extended: HashMap::new() }
     }
 
     /// All columns of a cell of the grid; zeros for one that is none of them.
@@ -312,5 +306,31 @@ impl<'a> OldCells<'a> {
             Some(&k) if k != NO_CELL => &self.values[k as usize * self.n_batches..][..self.n_batches],
             _ => &self.nothing,
         }
+    }
+
+    pub(super) fn n_batches(&self) -> usize {
+        self.n_batches
+    }
+
+    /// Puts a row into a cell that was outside, which must be one of them.
+    pub(super) fn set(&mut self, cell: u32, row: Vec<Row>) {
+        let first = self.region.number[cell as usize] as usize * self.n_batches;
+        self.values[first..first + self.n_batches].copy_from_slice(&row);
+        self.extended.insert(cell, row);
+    }
+
+    /// Whether a row was put there.
+    pub(super) fn is_extended(&self, cell: usize) -> bool {
+        self.extended.contains_key(&(cell as u32))
+    }
+
+    /// Cells that a row was put into.
+    pub(super) fn n_extended(&self) -> usize {
+        self.extended.len()
+    }
+
+    /// The rows that were put into cells.
+    pub(super) fn into_extended(self) -> HashMap<u32, Vec<Row>> {
+        self.extended
     }
 }
