@@ -53,9 +53,9 @@ const FORCED: f32 = -1e-5;
 /// Everything is bound anew if one in so many cells is at a moved face.
 const ONE_IN: usize = 4;
 
-/// Batches of corrections for each edit of so many cells next to the cage as there are, more or less: an edit of a fifth of them
-/// takes three, and the bind of a cage of 24 vertices takes no more. Such edits are bound anew.
-const BATCHES_OF_ALL: usize = 15;
+/// Whole batches of columns for each share of the cells next to the cage that an edit may reach: a quarter of them for a cage of 24
+/// vertices, whose three batches cost no more than the corrections and what they take to find. Others are bound anew.
+const REACH: usize = 12;
 
 /// Cells around the moved faces whose equations may have changed, and in which stencils are made anew: a stencil sees the
 /// triangles in its cube of centres.
@@ -277,7 +277,7 @@ impl Rebinder {
             return Ok(None);
         }
         let before = &old_voxels.hierarchy.levels[0];
-        if BATCHES_OF_ALL * n_cut_in(before, &region) > n_batches * before.n_cut() {
+        if REACH * n_cut_in(before, &region) > n_batches * before.n_cut() {
             return Ok(None);
         }
         let voxels = team.install(|| old_voxels.renewed(&self.cage, cage, grid, &self.options));
