@@ -20,6 +20,8 @@ mod tests;
 #[cfg(test)]
 mod tests_hats;
 mod topology;
+
+pub(crate) use topology::{Side, sides_of};
 mod triangulate;
 
 use glam::{DVec2, DVec3, Vec3};

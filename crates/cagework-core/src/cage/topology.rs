@@ -8,12 +8,27 @@ use super::defects::{CageError, CageNotice, FaceDefect};
 use crate::mesh::PolygonMesh;
 
 /// A side of a face: the edge between `lo` and `hi`, run through from `lo` to `hi` if `forward`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
-    lo: u32,
-    hi: u32,
-    face: u32,
-    forward: bool,
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Side {
+    pub(crate) lo: u32,
+    pub(crate) hi: u32,
+    pub(crate) face: u32,
+    pub(crate) forward: bool,
+}
+
+/// The sides of some faces, sorted by edge.
+pub(crate) fn sides_of(faces: &[Vec<u32>], some: impl Iterator<Item = u32>) -> Vec<Side> {
+    // As numbers, three of which are sorted elsewhere too: every other kind of key is 2 kB more to download.
+    let mut keys: Vec<[u32; 3]> = Vec::new();
+    for f in some {
+        let face = &faces[f as usize];
+        for (k, &a) in face.iter().enumerate() {
+            let b = face[(k + 1) % face.len()];
+            keys.push([a.min(b), a.max(b), f << 1 | u32::from(a < b)]);
+        }
+    }
+    keys.sort_unstable();
+    keys.into_iter().map(|[lo, hi, f]| Side { lo, hi, face: f >> 1, forward: f & 1 == 1 }).collect()
 }
 
 /// Closed faces whose orientations agree within each component.
@@ -70,14 +85,7 @@ pub(super) fn close(mesh: &PolygonMesh, notices: &mut Vec<CageNotice>) -> Result
 /// All sides, sorted by edge: on success two of each.
 fn check_edges(faces: &[Vec<u32>]) -> Result<Vec<Side>, CageError> {
     check_duplicates(faces)?;
-    let mut sides: Vec<Side> = Vec::with_capacity(faces.iter().map(Vec::len).sum());
-    for (f, face) in faces.iter().enumerate() {
-        for (k, &a) in face.iter().enumerate() {
-            let b = face[(k + 1) % face.len()];
-            sides.push(Side { lo: a.min(b), hi: a.max(b), face: f as u32, forward: a < b });
-        }
-    }
-    sides.sort_unstable();
+    let sides = sides_of(faces, 0..faces.len() as u32);
     let mut open = None;
     let mut count = 0;
     for edge in sides.chunk_by(|a, b| (a.lo, a.hi) == (b.lo, b.hi)) {

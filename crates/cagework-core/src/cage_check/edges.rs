@@ -3,19 +3,11 @@
 use std::collections::HashMap;
 
 use super::{Code, Fix, Places, Problem, Repair, Severity, counted, diagonal, problem};
+use crate::cage::{Side, sides_of};
 use crate::mesh::PolygonMesh;
 
 /// Vertices nearer than this fraction of the diagonal are at one place: the rounding of six decimals in a file.
 pub(super) const SAME_PLACE: f64 = 2e-6;
-
-/// A side of a face, run through from `lo` to `hi` if `forward`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Side {
-    pub(super) lo: u32,
-    pub(super) hi: u32,
-    pub(super) face: u32,
-    pub(super) forward: bool,
-}
 
 /// All sides of sound faces, sorted by edge.
 #[derive(Debug)]
@@ -25,16 +17,7 @@ pub(super) struct Edges {
 
 impl Edges {
     pub(super) fn of(mesh: &PolygonMesh, sound: &[u32]) -> Self {
-        let mut sides = Vec::new();
-        for &f in sound {
-            let face = &mesh.faces[f as usize];
-            for (k, &a) in face.iter().enumerate() {
-                let b = face[(k + 1) % face.len()];
-                sides.push(Side { lo: a.min(b), hi: a.max(b), face: f, forward: a < b });
-            }
-        }
-        sides.sort_unstable();
-        Self { sides }
+        Self { sides: sides_of(&mesh.faces, sound.iter().copied()) }
     }
 
     /// The sides of every edge.

@@ -1,6 +1,5 @@
 //! What an edit does to the linear system, looked at only where the moved faces are.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{DVec3, DVec4};
@@ -52,8 +51,8 @@ pub(super) struct Update {
     pub(super) fields: Vec<Vec<Row>>,
     pub(super) row_of: Arc<Vec<u32>>,
     pub(super) shares: Shares,
-    /// What is corrected in cells that were outside. `[n_batches]` each
-    pub(super) extended: HashMap<u32, Vec<Row>>,
+    /// What is corrected in cells that were outside: cells, ascending, and `[n_batches]` of each.
+    pub(super) extended: Vec<(u32, Vec<Row>)>,
 }
 
 /// All columns' fields: those of the last whole bind, and the corrections since.
@@ -68,8 +67,10 @@ pub(super) struct Fields {
 impl Fields {
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        let updates =
-            self.updates.iter().flat_map(|update| update.fields.iter().chain(update.extended.values()));
+        let updates = self
+            .updates
+            .iter()
+            .flat_map(|update| update.fields.iter().chain(update.extended.iter().map(|(_, row)| row)));
         self.base.iter().chain(updates).map(|rows| size_of_val(rows.as_slice())).sum()
     }
 
@@ -87,8 +88,8 @@ impl Fields {
                 // Outside at the time: whatever it was before does not count.
                 out.fill(ZERO);
             } else {
-                if was_outside && let Some(extended) = update.extended.get(&(cell as u32)) {
-                    out.copy_from_slice(extended);
+                if was_outside && let Ok(k) = place_of(&update.extended, cell) {
+                    out.copy_from_slice(&update.extended[k].1);
                 }
                 update.shares.pick(felt, update.fields.iter().map(|field| &field[row as usize]));
                 update.shares.add(felt, out);
@@ -282,7 +283,13 @@ pub(super) struct OldCells<'a> {
     values: Vec<Row>,
     n_batches: usize,
     nothing: Vec<Row>,
-    extended: HashMap<u32, Vec<Row>>,
+    /// Cells that a row was put into, ascending.
+    extended: Vec<(u32, Vec<Row>)>,
+}
+
+/// Where a cell is, or would be, among those that a row was put into.
+fn place_of(extended: &[(u32, Vec<Row>)], cell: usize) -> Result<usize, usize> {
+    extended.binary_search_by_key(&cell, |(cell, _)| *cell as usize)
 }
 
 impl<'a> OldCells<'a> {
@@ -297,7 +304,7 @@ impl<'a> OldCells<'a> {
                 }
             },
         );
-        Self { region, values, n_batches, nothing: vec![ZERO; n_batches], extended: HashMap::new() }
+        Self { region, values, n_batches, nothing: vec![ZERO; n_batches], extended: Vec::new() }
     }
 
     /// All columns of a cell of the grid; zeros for one that is none of them.
@@ -316,12 +323,14 @@ impl<'a> OldCells<'a> {
     pub(super) fn set(&mut self, cell: u32, row: Vec<Row>) {
         let first = self.region.number[cell as usize] as usize * self.n_batches;
         self.values[first..first + self.n_batches].copy_from_slice(&row);
-        self.extended.insert(cell, row);
+        if let Err(place) = place_of(&self.extended, cell as usize) {
+            self.extended.insert(place, (cell, row));
+        }
     }
 
     /// Whether a row was put there.
     pub(super) fn is_extended(&self, cell: usize) -> bool {
-        self.extended.contains_key(&(cell as u32))
+        place_of(&self.extended, cell).is_ok()
     }
 
     /// Cells that a row was put into.
@@ -330,7 +339,7 @@ impl<'a> OldCells<'a> {
     }
 
     /// The rows that were put into cells.
-    pub(super) fn into_extended(self) -> HashMap<u32, Vec<Row>> {
+    pub(super) fn into_extended(self) -> Vec<(u32, Vec<Row>)> {
         self.extended
     }
 }
