@@ -181,7 +181,8 @@ mod tests {
 
     #[test]
     fn keys_ascend_as_numbers_do() {
-        let numbers = [f64::NEG_INFINITY, -2.5, -2.0, -1e-300, -0.0, 0.0, 1e-300, 0.1, 7.0, 7.5, f64::INFINITY];
+        let numbers =
+            [f64::NEG_INFINITY, -2.5, -2.0, -1e-300, -0.0, 0.0, 1e-300, 0.1, 7.0, 7.5, f64::INFINITY];
         let keys = numbers.iter().flat_map(|&x| [ascending(x, 3), ascending(x, 4)]);
         assert!(numbers.is_sorted_by(|a, b| a.total_cmp(b).is_lt()) && keys.is_sorted_by(|a, b| a < b));
     }
