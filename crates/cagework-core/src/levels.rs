@@ -4,6 +4,8 @@
 //! stays zero, the neighbour of whoever has none: `[red .., 0, black .., 0]`. A red-black sweep then streams
 //! through contiguous memory, and a *run* of whole stencils needs seven numbers, not seven gathers a cell.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use crate::grid::{Grid, NO_CELL};
@@ -139,6 +141,33 @@ impl Level {
             };
             if row == NO_CELL { self.zero_row() } else { row }
         })
+    }
+
+    /// Cells of a z-plane within their colour.
+    #[must_use]
+    pub fn cells_of_plane(&self, colour: usize, z: usize) -> Range<usize> {
+        let ny = self.grid.dims[1] as usize;
+        self.lines[z * ny][colour] as usize..self.lines[(z + 1) * ny][colour] as usize
+    }
+
+    /// Planes from the first to the last that has one of these rows; none without rows.
+    #[must_use]
+    pub fn planes_of(&self, rows: &[u32]) -> Range<usize> {
+        let first_black = self.first_row(1) as u32;
+        let mut ends = [[u32::MAX, 0]; 2];
+        for &row in rows {
+            let colour = usize::from(row >= first_black);
+            let cell = row - self.first_row(colour) as u32;
+            let [low, high] = ends[colour];
+            ends[colour] = [low.min(cell), high.max(cell)];
+        }
+        let plane = |colour: usize, cell: u32| {
+            let line = self.lines.partition_point(|first| first[colour] <= cell) - 1;
+            line / self.grid.dims[1] as usize
+        };
+        let some = ends.into_iter().enumerate().filter(|(_, [low, high])| low <= high);
+        let planes = some.map(|(c, [low, high])| plane(c, low)..plane(c, high) + 1);
+        planes.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)).unwrap_or(0..0)
     }
 
     /// Number of cut cells of both colours.

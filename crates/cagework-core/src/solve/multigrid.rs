@@ -20,6 +20,8 @@ mod stream;
 
 pub use convergence::{BatchReport, Convergence, Stop, histories};
 
+use std::ops::Range;
+
 use super::hierarchy::Hierarchy;
 use super::rows::{LANES, Rhs, Row, ZERO, over_relax_plane, relax_plane, restrict_residual};
 use crate::levels::Level;
@@ -51,6 +53,8 @@ pub struct Workspace {
     residual: Vec<Row>,
     /// Whether `f[0]` has one row per cell, as on the other levels.
     dense: bool,
+    /// Planes of the finest level outside which there is no right-hand side, if that is known.
+    planes: Option<Range<usize>>,
 }
 
 impl Workspace {
@@ -64,7 +68,7 @@ impl Workspace {
             .enumerate()
             .map(|(k, l)| vec![ZERO; if k == 0 { l.n_cut() } else { l.n_rows() }])
             .collect();
-        Self { u, f, residual: vec![ZERO; hierarchy.levels[0].first_row(1)], dense: false }
+        Self { u, f, residual: vec![ZERO; hierarchy.levels[0].first_row(1)], dense: false, planes: None }
     }
 
     /// Bytes of a workspace for `hierarchy`.
@@ -178,7 +182,8 @@ impl Workspace {
         let (u, coarse_u) = self.u.split_at_mut(k + 1);
         let residual = &mut self.residual[..level.first_row(1)];
         let rhs = Self::rhs(f, k, self.dense);
-        let squares = stream(start, level, (transfer, &coarse_u[0]), &mut u[k], rhs, residual);
+        let planes = self.planes.as_ref().filter(|_| k == 0 && start == DOWN_FROM_ZERO);
+        let squares = stream(start, level, planes, (transfer, &coarse_u[0]), &mut u[k], rhs, residual);
         let mean_square = dispatch(
             #[inline(always)]
             || {
@@ -203,6 +208,7 @@ impl Workspace {
             stream(
                 UP,
                 &hierarchy.levels[k],
+                None,
                 (&hierarchy.transfers[k], &coarse_u[0]),
                 &mut u[k],
                 rhs,

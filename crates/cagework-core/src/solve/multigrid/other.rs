@@ -28,8 +28,9 @@ impl Workspace {
             self.f[0][row as usize] = *values;
         }
         self.dense = true;
+        self.planes = Some(hierarchy.levels[0].planes_of(rhs.0));
         let report = self.cycles(hierarchy, DOWN_FROM_ZERO, stop, cycle_done);
-        self.dense = false;
+        (self.dense, self.planes) = (false, None);
         // All others are still zero: the next batch need not be told so.
         for &row in rhs.0 {
             self.f[0][row as usize] = ZERO;

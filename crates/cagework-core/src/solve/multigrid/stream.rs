@@ -4,11 +4,13 @@
 //! in the two next to it, which the pass before has just left and the pass after has not yet reached. So a field is read
 //! from memory once for a whole list of passes, and results are those of one pass after another.
 
+use std::ops::Range;
+
 use crate::levels::Level;
 use crate::simd::dispatch;
 use crate::solve::rows::{
     Prolong, Rhs, Row, ZERO, over_relax_plane, over_relax_zeros_plane, prolong_plane, relax_plane,
-    relax_zeros_plane, residual_plane,
+    relax_zeros_plane, residual_plane, split,
 };
 use crate::transfer::Transfer;
 
@@ -52,11 +54,13 @@ pub(super) const UP_AND_DOWN: &[Pass] =
 pub(super) const UP_AND_HALF_DOWN: &[Pass] =
     &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black];
 
-/// Runs `passes` over a level's field `u`, `[n_rows]`. `coarse`: the coarser level's field, for [`Pass::Prolong`];
-/// `residual`: `[n red cells + 1]`, for [`Pass::Residual`]. Returns the sum of the residual's squares.
+/// Runs `passes` over a level's field `u`, `[n_rows]`. `planes`: for passes from zero, those outside which there is no
+/// right-hand side; `coarse`: the coarser level's field, for [`Pass::Prolong`]; `residual`: `[n red cells + 1]`, for
+/// [`Pass::Residual`]. Returns the sum of the residual's squares.
 pub(super) fn stream(
     passes: &[Pass],
     level: &Level,
+    planes: Option<&Range<usize>>,
     (transfer, coarse): (&Transfer, &[Row]),
     u: &mut [Row],
     f: Rhs<'_>,
@@ -74,6 +78,19 @@ pub(super) fn stream(
             for step in 0..n + passes.len() - 1 {
                 for (lag, pass) in passes.iter().enumerate() {
                     let Some(plane) = step.checked_sub(lag).filter(|&plane| plane < n) else { continue };
+                    // A pass carries what there is no more than a plane further; beyond, all is zero.
+                    let reach = |p: &Range<usize>| p.start.saturating_sub(lag)..p.end + lag;
+                    if planes.is_some_and(|planes| !reach(planes).contains(&plane)) {
+                        match *pass {
+                            RedFromZero => u[level.cells_of_plane(0, plane)].fill(ZERO),
+                            BlackFurtherFromZero => {
+                                split(level, u, 1).0[level.cells_of_plane(1, plane)].fill(ZERO);
+                            }
+                            Residual => residual[level.cells_of_plane(0, plane)].fill(ZERO),
+                            _ => {}
+                        }
+                        continue;
+                    }
                     match *pass {
                         Pass::Prolong(mode) => prolong_plane(level, transfer, plane, coarse, u, mode),
                         Red => relax_plane(level, 0, plane, u, f),
@@ -88,4 +105,41 @@ pub(super) fn stream(
             squares.iter().map(|&s| f64::from(s)).sum()
         },
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::levels::plain::{hierarchy, some_field};
+    use crate::solve::rows::LANES;
+
+    #[test]
+    fn planes_without_a_right_hand_side_need_not_be_gone_through() {
+        let hierarchy = hierarchy();
+        let (level, transfer) = (&hierarchy.levels[0], &hierarchy.transfers[0]);
+        for z in [1, 6, level.grid.dims[2] as usize - 3] {
+            let mut f = vec![ZERO; level.n_rows()];
+            let some = some_field(level, 1);
+            for colour in 0..2 {
+                let first = level.first_row(colour);
+                for cell in level.cells_of_plane(colour, z).step_by(3) {
+                    f[first + cell] = some[first + cell];
+                }
+            }
+            let rows: Vec<u32> = (0..f.len() as u32).filter(|&row| f[row as usize] != ZERO).collect();
+            let planes = level.planes_of(&rows);
+            assert!(rows.is_empty() || planes == (z..z + 1), "{planes:?} for plane {z}");
+            let run = |planes: Option<&Range<usize>>| {
+                // What fields hold must not count.
+                let (mut u, mut residual) = (some_field(level, 2), vec![[7.0; LANES]; level.first_row(1)]);
+                let coarse = (transfer, &[] as &[Row]);
+                let squares =
+                    stream(DOWN_FROM_ZERO, level, planes, coarse, &mut u, Rhs::Dense(&f), &mut residual);
+                (u, residual, squares)
+            };
+            let (all, few) = (run(None), run(Some(&planes)));
+            assert!(all == few, "plane {z}");
+            assert!(rows.is_empty() || all.2 > 0.0);
+        }
+    }
 }
