@@ -21,7 +21,8 @@ pub trait Boundary: Sync {
     fn grid(&self) -> Grid;
     /// Whether each cell is solved for. `[nz, ny, nx]`
     fn unknowns(&self) -> &[bool];
-    /// Of each unknown the directions (bit d: +x, -x, +y, -y, +z, -z) in which its arm ends on the cage. `[nz, ny, nx]`
+    /// Of each unknown the directions (bit d: +x, -x, +y, -y, +z, -z) in which its arm ends on the cage;
+    /// what is there of other cells does not count. `[nz, ny, nx]`
     fn cut_arms(&self) -> &[u8];
     /// Weight of the arm (1 over its length in cells; 0 if it does not end on the cage after all); calls
     /// `hats(control vertex, value)` for the Dirichlet values at its end.

@@ -4,8 +4,8 @@
 //! a residual there and nowhere else, and the residuals of all columns are combinations of a few: columns that do not
 //! belong to the moved faces vanish on them, so they look alike a few cells away. Those few are solved for, and every
 //! column, also at the mesh's vertices, takes its share of them. What is neglected (residuals of about tau an edit) adds up, so
-//! after [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid or the faces change, or when cells near
-//! moved faces are a quarter of all.
+//! after [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid or the faces change, or when an edit
+//! reaches too many cells ([`ONE_IN`], [`REACH`]).
 
 mod equations;
 mod local;
@@ -53,8 +53,9 @@ const FORCED: f32 = -1e-5;
 /// Everything is bound anew if one in so many cells is at a moved face.
 const ONE_IN: usize = 4;
 
-/// Whole batches of columns for each share of the cells next to the cage that an edit may reach: a quarter of them for a cage of 24
-/// vertices, whose three batches cost no more than the corrections and what they take to find. Others are bound anew.
+/// An edit may reach one in so many of the cells next to the cage for each batch of columns: a quarter of them with 24 vertices,
+/// where corrections and what it takes to find them cost as much as a bind. Beyond, everything is bound anew; from twelve batches
+/// on nothing is refused.
 const REACH: usize = 12;
 
 /// Cells around the moved faces whose equations may have changed, and in which stencils are made anew: a stencil sees the
@@ -277,7 +278,7 @@ impl Rebinder {
             return Ok(None);
         }
         let before = &old_voxels.hierarchy.levels[0];
-        if REACH * n_cut_in(before, &region) > n_batches * before.n_cut() {
+        if n_batches < REACH && REACH * n_cut_in(before, &region) > n_batches * before.n_cut() {
             return Ok(None);
         }
         let voxels = team.install(|| old_voxels.renewed(&self.cage, cage, grid, &self.options));

@@ -10,7 +10,7 @@ use crate::sample::embedded::Sampler;
 use crate::sample::{Stencils, classic};
 use crate::solve::hierarchy::Hierarchy;
 use crate::voxelize::classic::{ClassicCells, place_grid};
-use crate::voxelize::embedded::{EmbeddedCells, classify, lines_at_moved_faces, shoot_lines};
+use crate::voxelize::embedded::{EmbeddedCells, classify, lines_at_faces, shoot_lines};
 use crate::voxelize::published::PublishedCells;
 use crate::voxelize::{CellKind, voxelize_classic};
 
@@ -53,7 +53,7 @@ impl Voxels {
         }
     }
 
-    /// What [`Self::new`] leaves for multigrid on an embedded cage that was edited, made of what was left before: `cage_before`.
+    /// What [`Self::new`] leaves for multigrid on an embedded cage that was edited, made of what it left for `cage_before`.
     pub(super) fn renewed(&self, cage_before: &Cage, cage: &Cage, grid: Grid, options: &BindOptions) -> Self {
         Self::embedded(cage, grid, options, Some((self, cage_before)))
     }
@@ -86,11 +86,9 @@ impl Voxels {
             (Solver::Jacobi, _) => Hierarchy::single(Level::new(&cells), cage.n_vertices()),
             (Solver::Multigrid, None) => Hierarchy::new(cells, cage.n_vertices(), EmbeddedCells::coarsened),
             (Solver::Multigrid, Some((before, cage_before))) => {
-                let has_moved =
-                    |&i: &u32| cage_before.positions()[i as usize] != cage.positions()[i as usize];
-                let is_moved: Vec<bool> = cage.faces().iter().map(|f| f.iter().any(has_moved)).collect();
+                let has_changed = cage.changed_faces(cage_before);
                 before.hierarchy.renewed(cells, EmbeddedCells::coarsened, |n_levels| {
-                    lines_at_moved_faces([cage_before, cage], &grid, n_levels, |f| is_moved[f as usize])
+                    lines_at_faces([cage_before, cage], &grid, n_levels, |f| has_changed[f as usize])
                 })
             }
         };

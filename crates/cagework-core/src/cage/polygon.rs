@@ -33,7 +33,7 @@ pub(super) enum Hats {
 }
 
 /// A face in its plane.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Polygon {
     /// Corners in the plane, counter-clockwise seen from outside; empty if hats are linear everywhere.
     pub(super) outline: Vec<DVec2>,
@@ -46,7 +46,7 @@ pub(super) struct Polygon {
 }
 
 /// A convex part of a face.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Piece {
     pub(super) hats: Hats,
     /// Corners of the face, counter-clockwise.

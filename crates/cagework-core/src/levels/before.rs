@@ -19,6 +19,7 @@ impl<'a> Before<'a> {
     /// Compares a level with what its unknowns are now. `moved`: lines with cells whose arms may end elsewhere now, `[nz * ny]`.
     #[must_use]
     pub fn new(level: &'a Level, boundary: &dyn Boundary, moved: &[bool]) -> Self {
+        debug_assert_eq!(level.grid, boundary.grid(), "an edit leaves the grid");
         let [nx, ny, _] = level.grid.dims.map(|n| n as usize);
         let lines = boundary.unknowns().chunks_exact(nx).zip(level.row_of.chunks_exact(nx));
         let changed: Vec<bool> = lines
@@ -56,7 +57,7 @@ impl<'a> Before<'a> {
         !self.changed[line]
     }
 
-    /// What a line's cells grew by, within each colour.
+    /// What the numbers of a line's cells grew by, within each colour.
     pub(crate) fn shift(&self, now: &Level, line: usize) -> [u32; 2] {
         [0, 1].map(|c| now.lines[line][c].wrapping_sub(self.level.lines[line][c]))
     }

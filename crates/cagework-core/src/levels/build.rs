@@ -15,8 +15,8 @@ impl Level {
         build(boundary, None).0
     }
 
-    /// Builds it from what it was before an edit. `boundary` has no terms but those of lines that are made anew; the second is
-    /// the new number of each old cut cell whose terms are what they were, [`NO_CELL`] for the others.
+    /// Builds it from what it was before an edit. [`Level::boundary`] has only the terms of lines that are made anew; the second
+    /// is the new number of each old cut cell whose terms are what they were, [`NO_CELL`] for the others.
     #[must_use]
     pub fn renewed(boundary: &dyn Boundary, before: &Before<'_>) -> (Self, Vec<u32>) {
         build(boundary, Some(before))

@@ -85,6 +85,10 @@ impl Hierarchy {
             }
         });
         let (levels, batches): (Vec<Level>, _) = levels.into_iter().unzip();
+        if old.is_some() && levels.iter().any(|level| level.isolated > 0) {
+            // A cell that has lost its last neighbour has no row, but its line has the unknowns it had.
+            return Self::of(boundaries, n_columns, None);
+        }
         let transfers = map_indices(levels.len() - 1, |k| {
             let [fine, coarse] = [&levels[k], &levels[k + 1]];
             match (&before[k], &before[k + 1], old) {

@@ -47,7 +47,7 @@ pub const COARSEST_OMEGA: f32 = 1.4;
 pub struct Workspace {
     /// `u[k]`: the solution, on coarse levels the correction. `[n_rows]`
     u: Vec<Vec<Row>>,
-    /// `f[0]`: one row per cut cell; `f[k]`: one row per cell.
+    /// `f[0]`: one row per cut cell, or one per cell, all zero between two calls of `solve_for`; `f[k]`: one row per cell.
     f: Vec<Vec<Row>>,
     /// Residual of the red cells of the level under way, and a zero row.
     residual: Vec<Row>,
@@ -139,7 +139,8 @@ impl Workspace {
         &self.u[0]
     }
 
-    /// Hands the finest level's field out; the next solve makes another. `[n_rows]`
+    /// Hands the finest level's field out, `[n_rows]`. The next solve makes another; until then there is none to look at, to
+    /// sweep or to cycle on.
     pub fn take_field(&mut self) -> Vec<Row> {
         std::mem::take(&mut self.u[0])
     }

@@ -117,14 +117,14 @@ impl<'a> EmbeddedCells<'a> {
     }
 }
 
-/// The lines along x with centres next to which a face of the cage has moved, on every level: `[n_levels][nz * ny]`. `cages`:
-/// before and after; `is_moved`: whether a face's corners, or one of them, have moved.
+/// The lines along x with centres whose arms may end on some faces of one of two cages, on every level:
+/// `[n_levels][nz * ny]`. `is_one`: whether a face is one of them.
 #[must_use]
-pub fn lines_at_moved_faces(
+pub fn lines_at_faces(
     cages: [&Cage; 2],
     grid: &Grid,
     n_levels: usize,
-    is_moved: impl Fn(u32) -> bool,
+    is_one: impl Fn(u32) -> bool,
 ) -> Vec<Vec<bool>> {
     let mut grids = vec![*grid];
     while grids.len() < n_levels {
@@ -134,8 +134,8 @@ pub fn lines_at_moved_faces(
         grids.iter().map(|grid| vec![false; (grid.dims[1] * grid.dims[2]) as usize]).collect();
     for (cage, axis) in cages.into_iter().flat_map(|cage| (0..3).map(move |axis| (cage, axis))) {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let moved = |triangle: u32| is_moved(cage.face_of_triangle()[triangle as usize]);
-        hits(cage, grid, axis, moved, |iu, iv, hit| {
+        let wanted = |triangle: u32| is_one(cage.face_of_triangle()[triangle as usize]);
+        hits(cage, grid, axis, wanted, |iu, iv, hit| {
             for (level, (grid, marked)) in grids.iter().zip(&mut marked).enumerate() {
                 let step = 1 << level;
                 if iu % step != 0 || iv % step != 0 {

@@ -125,19 +125,18 @@ fn bind(
 
 /// Every edge of polygons once, smaller vertex first, in order of first occurrence.
 pub(super) fn unique_edges<'a>(polygons: impl Iterator<Item = &'a [u32]>) -> Vec<[u32; 2]> {
-    let mut edges: Vec<(u64, u32)> = Vec::new();
-    let mut count = 0;
+    let mut edges: Vec<[u32; 3]> = Vec::new();
     for polygon in polygons {
         for (k, &a) in polygon.iter().enumerate() {
             let b = polygon[(k + 1) % polygon.len()];
-            edges.push((u64::from(a.min(b)) << 32 | u64::from(a.max(b)), count));
-            count += 1;
+            edges.push([a.min(b), a.max(b), edges.len() as u32]);
         }
     }
     edges.sort_unstable();
-    edges.dedup_by_key(|e| e.0);
-    edges.sort_unstable_by_key(|e| e.1);
-    edges.into_iter().map(|(key, _)| [(key >> 32) as u32, key as u32]).collect()
+    edges.dedup_by_key(|&mut [a, b, _]| [a, b]);
+    let mut edges: Vec<[u32; 3]> = edges.into_iter().map(|[a, b, place]| [place, a, b]).collect();
+    edges.sort_unstable();
+    edges.into_iter().map(|[_, a, b]| [a, b]).collect()
 }
 
 #[cfg(test)]

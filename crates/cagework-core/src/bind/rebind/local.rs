@@ -88,7 +88,9 @@ impl Fields {
                 // Outside at the time: whatever it was before does not count.
                 out.fill(ZERO);
             } else {
-                if was_outside && let Ok(k) = place_of(&update.extended, cell) {
+                if was_outside
+                    && let Ok(k) = update.extended.binary_search_by_key(&(cell as u32), |(cell, _)| *cell)
+                {
                     out.copy_from_slice(&update.extended[k].1);
                 }
                 update.shares.pick(felt, update.fields.iter().map(|field| &field[row as usize]));
@@ -283,13 +285,10 @@ pub(super) struct OldCells<'a> {
     values: Vec<Row>,
     n_batches: usize,
     nothing: Vec<Row>,
-    /// Cells that a row was put into, ascending.
+    /// Cells that a row was put into.
     extended: Vec<(u32, Vec<Row>)>,
-}
-
-/// Where a cell is, or would be, among those that a row was put into.
-fn place_of(extended: &[(u32, Vec<Row>)], cell: usize) -> Result<usize, usize> {
-    extended.binary_search_by_key(&cell, |(cell, _)| *cell as usize)
+    /// Whether a row was put into each cell of the region.
+    is_extended: Vec<bool>,
 }
 
 impl<'a> OldCells<'a> {
@@ -304,7 +303,8 @@ impl<'a> OldCells<'a> {
                 }
             },
         );
-        Self { region, values, n_batches, nothing: vec![ZERO; n_batches], extended: Vec::new() }
+        let (nothing, is_extended) = (vec![ZERO; n_batches], vec![false; region.cells.len()]);
+        Self { region, values, n_batches, nothing, extended: Vec::new(), is_extended }
     }
 
     /// All columns of a cell of the grid; zeros for one that is none of them.
@@ -321,16 +321,17 @@ impl<'a> OldCells<'a> {
 
     /// Puts a row into a cell that was outside, which must be one of them.
     pub(super) fn set(&mut self, cell: u32, row: Vec<Row>) {
-        let first = self.region.number[cell as usize] as usize * self.n_batches;
+        let number = self.region.number[cell as usize] as usize;
+        let first = number * self.n_batches;
         self.values[first..first + self.n_batches].copy_from_slice(&row);
-        if let Err(place) = place_of(&self.extended, cell as usize) {
-            self.extended.insert(place, (cell, row));
-        }
+        self.is_extended[number] = true;
+        self.extended.push((cell, row));
     }
 
     /// Whether a row was put there.
     pub(super) fn is_extended(&self, cell: usize) -> bool {
-        place_of(&self.extended, cell).is_ok()
+        let number = self.region.number.get(cell);
+        number.and_then(|&k| self.is_extended.get(k as usize)).is_some_and(|&is| is)
     }
 
     /// Cells that a row was put into.
@@ -338,8 +339,12 @@ impl<'a> OldCells<'a> {
         self.extended.len()
     }
 
-    /// The rows that were put into cells.
-    pub(super) fn into_extended(self) -> Vec<(u32, Vec<Row>)> {
-        self.extended
+    /// The rows that were put into cells, by cell.
+    pub(super) fn into_extended(mut self) -> Vec<(u32, Vec<Row>)> {
+        let mut order: Vec<[u32; 2]> =
+            (0u32..).zip(&self.extended).map(|(k, (cell, _))| [*cell, k]).collect();
+        order.sort_unstable();
+        let rows = &mut self.extended;
+        order.into_iter().map(|[cell, k]| (cell, std::mem::take(&mut rows[k as usize].1))).collect()
     }
 }

@@ -17,7 +17,7 @@ pub(super) fn moved_columns(before: &Cage, after: &Cage) -> Vec<(usize, DVec3)> 
     pairs.filter(|(_, (a, b))| a != b).map(|(k, (a, b))| (k, (*b - *a).as_dvec3() / diagonal)).collect()
 }
 
-/// Triangles with a moved vertex, in grid coordinates: where they were, are, and in steps of a cell on the way. `None` if a
+/// Triangles of faces that have changed, in grid coordinates: where they were, are, and in steps of a cell on the way. `None` if a
 /// face is cut into other triangles than before and is so bent, before and after, that there are cells between them.
 pub(super) fn moved_triangles(
     before: &Cage,
@@ -41,11 +41,10 @@ pub(super) fn moved_triangles(
         return None;
     }
     let mut moved = Vec::new();
-    let has_moved = |&i: &u32| before.positions()[i as usize] != after.positions()[i as usize];
+    let has_changed = after.changed_faces(before);
     // A polygon may be cut into triangles in another way than before.
     for (cage, t) in [before, after].into_iter().flat_map(|c| (0..c.triangles().len()).map(move |t| (c, t))) {
-        // Boundary values of a polygon depend on all its corners.
-        if !after.faces()[cage.face_of_triangle()[t] as usize].iter().any(has_moved) {
+        if !has_changed[cage.face_of_triangle()[t] as usize] {
             continue;
         }
         let at = |of: &Cage| cage.triangles()[t].map(|i| to_grid(of.positions()[i as usize]));

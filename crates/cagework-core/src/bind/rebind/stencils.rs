@@ -1,4 +1,4 @@
-//! The stencils of a few equations, and what they suppose to have been where there was nothing.
+//! The stencils of a few equations, and what cells that were outside begin with.
 
 use crate::grid::NO_CELL;
 use crate::levels::{CutCell, Level};
@@ -77,7 +77,7 @@ impl<'a> FewStencils<'a> {
                         add_scaled(&mut row, old.at(cell), 1.0);
                     }
                 }
-                // One arm at least, or rounding of those that are not.
+                // At least one known arm, which is no longer than a cell, or what rounding leaves of none.
                 let is_known = weight > 0.5;
                 if is_known {
                     row.iter_mut().flatten().for_each(|w| *w /= weight);
@@ -111,7 +111,7 @@ mod tests {
     use crate::solve::rows::ZERO;
     use crate::voxelize::embedded::{EmbeddedCells, classify, shoot_lines};
 
-    /// f32 rounding of a row of some dozen weights, divided by weights of arms down to one half.
+    /// f32 rounding of a row of some dozen weights, made of up to six rows with weights up to 1,000.
     const ROUNDED: f32 = 1e-5;
 
     /// Hat values sum to 1, and so do old weights: what is made of both does too, and lies between them. Where cells are several

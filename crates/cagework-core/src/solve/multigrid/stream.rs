@@ -117,7 +117,11 @@ mod tests {
     fn planes_without_a_right_hand_side_need_not_be_gone_through() {
         let hierarchy = hierarchy();
         let (level, transfer) = (&hierarchy.levels[0], &hierarchy.transfers[0]);
-        for z in [1, 6, level.grid.dims[2] as usize - 3] {
+        assert_eq!(level.planes_of(&[]), 0..0);
+        let n = level.grid.dims[2] as usize;
+        let with_cells = |z: &usize| !level.cells_of_plane(0, *z).is_empty();
+        let (first, last) = ((0..n).find(with_cells).unwrap(), (0..n).rev().find(with_cells).unwrap());
+        for z in [first, n / 2, last] {
             let mut f = vec![ZERO; level.n_rows()];
             let some = some_field(level, 1);
             for colour in 0..2 {
@@ -128,7 +132,7 @@ mod tests {
             }
             let rows: Vec<u32> = (0..f.len() as u32).filter(|&row| f[row as usize] != ZERO).collect();
             let planes = level.planes_of(&rows);
-            assert!(rows.is_empty() || planes == (z..z + 1), "{planes:?} for plane {z}");
+            assert!(planes == (z..z + 1), "{planes:?} for plane {z}");
             let run = |planes: Option<&Range<usize>>| {
                 // What fields hold must not count.
                 let (mut u, mut residual) = (some_field(level, 2), vec![[7.0; LANES]; level.first_row(1)]);
@@ -139,7 +143,7 @@ mod tests {
             };
             let (all, few) = (run(None), run(Some(&planes)));
             assert!(all == few, "plane {z}");
-            assert!(rows.is_empty() || all.2 > 0.0);
+            assert!(all.2 > 0.0);
         }
     }
 }
