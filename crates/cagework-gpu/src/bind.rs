@@ -143,11 +143,9 @@ async fn multigrid(
 ) -> Result<Outcome, GpuError> {
     let hierarchy = prepared.hierarchy();
     let began = stream.now_ms();
-    let stop = Stop {
-        // Batches add up in squares: each may keep its share of tau.
-        tolerance: f64::from(options.tau) / f64::from(plan.n_batches).sqrt(),
-        max_cycles: options.max_iterations,
-    };
+    // Batches add up in squares: each may keep its share of tau.
+    let tolerance = f64::from(options.tau) / f64::from(plan.n_batches).sqrt();
+    let stop = Stop::new(tolerance, options.max_iterations);
     let mut allocator = Allocator::new(stream.context(), ROOM);
     let sampler = Sampler::new(&mut allocator, prepared.stencils(), plan)?;
     let mut multigrid = Multigrid::new(stream, &mut allocator, hierarchy, plan)?;

@@ -167,7 +167,7 @@ impl Multigrid {
             let coarse = self.levels.get(1).map_or(&self.levels[0], |l| l).level.n_unknowns;
             let n_unknowns = self.levels[0].level.n_unknowns;
             let residual = if coarsest == 0 { 0.0 } else { residual / f64::from(n_unknowns) };
-            let done = convergence.cycle_done(delta / f64::from(coarse.max(1)), residual);
+            let done = convergence.cycle_done(delta / f64::from(coarse.max(1)), 0.0, residual);
             let (cycle, delta) = convergence.latest();
             cycle_done(stream, cycle, delta);
             if done {

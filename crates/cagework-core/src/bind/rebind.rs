@@ -111,13 +111,13 @@ impl Kept {
         let binding = prepared.reported(&rows, solved, sampled, watch)?;
         let Prepared { voxels, stencils, estimated, .. } = prepared;
         let row_of = Arc::new(voxels.hierarchy.levels[0].row_of.clone());
-        let fields = Fields { base, row_of, updates: Vec::new() };
+        let fields = Fields::new(base, row_of);
         Ok((Self { voxels, stencils, fields, estimated, rows }, binding))
     }
 
     /// Whether a bind can start from it.
     fn is_usable(&self) -> bool {
-        self.fields.updates.len() < MAX_UPDATES && self.rows.facts.iter().all(|facts| facts.low > FORCED)
+        self.fields.n_updates() < MAX_UPDATES && self.rows.facts.iter().all(|facts| facts.low > FORCED)
     }
 }
 
@@ -311,7 +311,7 @@ impl Rebinder {
             for (row, _) in changed.iter().flat_map(|&v| stencils.at(v as usize).0) {
                 needed.add(cell_of[*row as usize] as usize);
             }
-            let mut old = OldCells::new(&fields, &needed, n_batches);
+            let mut old = OldCells::new(&mut fields, &needed, n_batches);
             let moved = moved_columns(&self.cage, cage);
             // Where the axes disagree equations need not hold for linear functions.
             let is_exact = voxels.ambiguous == 0 && old_voxels.ambiguous == 0;
@@ -325,7 +325,7 @@ impl Rebinder {
                 &moved,
                 negligible,
             );
-            let Split { rows: of, right, shares } = residual.split(cage.n_vertices());
+            let Split { cells, right, shares } = residual.split(cage.n_vertices());
             // What each edit leaves is kept until everything is bound anew.
             let n_rows = right.len() * level.n_rows() + old.n_extended() * n_batches;
             estimated += (n_rows * size_of::<Row>()) as u64;
@@ -335,7 +335,7 @@ impl Rebinder {
             let resampled = resample(&stencils, &changed, &cell_of, &old, n_batches);
             rank = shares.len();
             let corrections =
-                solve_for(&voxels.hierarchy, &stencils, (&of, &right), &self.options, &team, watch)?;
+                solve_for(&voxels.hierarchy, &stencils, (&cells, &right), &self.options, &team, watch)?;
             solved.converged_as(&corrections.iter().map(|c| &c.report).collect::<Vec<_>>());
             // They are solved to less than tau; what counts is tau.
             solved.converged = solved.delta_history.last().is_none_or(|delta| *delta <= self.options.tau);
@@ -355,7 +355,7 @@ impl Rebinder {
             let row_of = Arc::new(level.row_of.clone());
             let new_fields = corrections.into_iter().map(|c| c.field).collect();
             solved.field_bytes = Workspace::bytes(&voxels.hierarchy) * team.n_threads().min(right.len());
-            fields.updates.push(Update { fields: new_fields, row_of, shares, extended: old.into_extended() });
+            fields.correct(Update { fields: new_fields, row_of, shares, extended: old.into_extended() });
         }
         let prepared = Prepared {
             positions: &self.positions,

@@ -120,7 +120,7 @@ pub(super) fn solve_batches(
 
 /// When each of so many batches is done. They add up in squares: each may keep its share of tau.
 pub(super) fn stop_of_batches(tau: f32, max_cycles: u32, n_batches: usize) -> Stop {
-    Stop { tolerance: f64::from(tau) / (n_batches.max(1) as f64).sqrt(), max_cycles }
+    Stop::new(f64::from(tau) / (n_batches.max(1) as f64).sqrt(), max_cycles)
 }
 
 /// All columns by multigrid, and the batches' fields if they are kept.

@@ -18,6 +18,7 @@ mod convergence;
 mod other;
 mod stream;
 
+pub use other::Places;
 pub use convergence::{BatchReport, Convergence, Stop, histories};
 
 use std::ops::Range;
@@ -27,7 +28,7 @@ use super::rows::{LANES, Rhs, Row, ZERO, over_relax_plane, relax_plane, restrict
 use crate::levels::Level;
 use crate::simd::dispatch;
 
-use stream::{DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, Pass, UP, UP_AND_DOWN, UP_AND_HALF_DOWN, stream};
+use stream::{DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, Extent, Pass, UP, UP_AND_DOWN, UP_AND_HALF_DOWN, add_whole, stream};
 
 /// Over-relaxation of the first black half sweep: 1.1 to 1.3 all lower the error 1.5 to 2 times per cycle (Armadillo).
 pub const OMEGA: f32 = 1.2;
@@ -47,14 +48,14 @@ pub const COARSEST_OMEGA: f32 = 1.4;
 pub struct Workspace {
     /// `u[k]`: the solution, on coarse levels the correction. `[n_rows]`
     u: Vec<Vec<Row>>,
-    /// `f[0]`: one row per cut cell, or one per cell, all zero between two calls of `solve_for`; `f[k]`: one row per cell.
+    /// `f[0]`: one row per cut cell, then one for each of `whole`; `f[k]`: one row per cell.
     f: Vec<Vec<Row>>,
     /// Residual of the red cells of the level under way, and a zero row.
     residual: Vec<Row>,
-    /// Whether `f[0]` has one row per cell, as on the other levels.
-    dense: bool,
     /// Planes of the finest level outside which there is no right-hand side, if that is known.
     planes: Option<Range<usize>>,
+    /// See [`Extent::whole`]; of the finest level.
+    whole: Vec<u32>,
 }
 
 impl Workspace {
@@ -68,7 +69,7 @@ impl Workspace {
             .enumerate()
             .map(|(k, l)| vec![ZERO; if k == 0 { l.n_cut() } else { l.n_rows() }])
             .collect();
-        Self { u, f, residual: vec![ZERO; hierarchy.levels[0].first_row(1)], dense: false, planes: None }
+        Self { u, f, residual: vec![ZERO; hierarchy.levels[0].first_row(1)], planes: None, whole: Vec::new() }
     }
 
     /// Bytes of a workspace for `hierarchy`.
@@ -116,7 +117,8 @@ impl Workspace {
         let mut convergence = Convergence::new(stop);
         loop {
             let (correction_square, residual_square) = self.down(hierarchy, 0, start);
-            let done = convergence.cycle_done(correction_square, residual_square);
+            let largest = if stop.in_any_cell < f64::INFINITY { self.largest_correction() } else { 0.0 };
+            let done = convergence.cycle_done(correction_square, largest, residual_square);
             let (cycle, delta) = convergence.latest();
             if !cycle_done(cycle, delta) {
                 return None;
@@ -164,8 +166,13 @@ impl Workspace {
     }
 
     /// The right-hand side of level k.
-    fn rhs(f: &[Vec<Row>], k: usize, dense: bool) -> Rhs<'_> {
-        if k == 0 && !dense { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) }
+    fn rhs(f: &[Vec<Row>], k: usize) -> Rhs<'_> {
+        if k == 0 { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) }
+    }
+
+    /// Where level k's right-hand side is.
+    fn extent<'a>(planes: Option<&'a Range<usize>>, whole: &'a [u32], k: usize) -> Extent<'a> {
+        if k == 0 { Extent { planes, whole } } else { Extent::default() }
     }
 
     /// A cycle's way down on level k, by the passes `start`, and all of it on coarser levels. Returns (squared norm of the
@@ -176,15 +183,17 @@ impl Workspace {
             if start == DOWN_FROM_ZERO {
                 self.u[k].fill(ZERO);
             }
-            return relax_coarsest(level, &mut self.u[k], Self::rhs(&self.f, k, self.dense));
+            let whole = Self::extent(None, &self.whole, k).whole;
+            return relax_coarsest(level, &mut self.u[k], Self::rhs(&self.f, k), whole);
         }
         let (coarse, transfer) = (&hierarchy.levels[k + 1], &hierarchy.transfers[k]);
         let (f, coarse_f) = self.f.split_at_mut(k + 1);
         let (u, coarse_u) = self.u.split_at_mut(k + 1);
         let residual = &mut self.residual[..level.first_row(1)];
-        let rhs = Self::rhs(f, k, self.dense);
-        let planes = self.planes.as_ref().filter(|_| k == 0 && start == DOWN_FROM_ZERO);
-        let squares = stream(start, level, planes, (transfer, &coarse_u[0]), &mut u[k], rhs, residual);
+        let rhs = Self::rhs(f, k);
+        let planes = self.planes.as_ref().filter(|_| start == DOWN_FROM_ZERO);
+        let extent = Self::extent(planes, &self.whole, k);
+        let squares = stream(start, level, extent, (transfer, &coarse_u[0]), &mut u[k], rhs, residual);
         let mean_square = dispatch(
             #[inline(always)]
             || {
@@ -205,17 +214,23 @@ impl Workspace {
     fn up(&mut self, hierarchy: &Hierarchy, k: usize) {
         if k + 1 < hierarchy.levels.len() {
             let (u, coarse_u) = self.u.split_at_mut(k + 1);
-            let rhs = Self::rhs(&self.f, k, self.dense);
+            let rhs = Self::rhs(&self.f, k);
             stream(
                 UP,
                 &hierarchy.levels[k],
-                None,
+                Self::extent(None, &self.whole, k),
                 (&hierarchy.transfers[k], &coarse_u[0]),
                 &mut u[k],
                 rhs,
                 &mut [],
             );
         }
+    }
+
+    /// Square of the latest coarse correction of the finest level in the cell where it is largest, summed over lanes.
+    fn largest_correction(&self) -> f64 {
+        let square = |row: &Row| row.iter().map(|w| w * w).sum::<f32>();
+        f64::from(self.u.get(1).into_iter().flatten().map(square).fold(0.0, |a, b| if b > a { b } else { a }))
     }
 }
 
@@ -234,7 +249,7 @@ fn relax(level: &Level, u: &mut [Row], f: Rhs<'_>) {
 }
 
 /// Sweeps on the coarsest level. Returns (squared norm of the change per unknown, 0).
-fn relax_coarsest(level: &Level, u: &mut [Row], f: Rhs<'_>) -> (f64, f64) {
+fn relax_coarsest(level: &Level, u: &mut [Row], f: Rhs<'_>, whole: &[u32]) -> (f64, f64) {
     let before = u.to_vec();
     dispatch(
         #[inline(always)]
@@ -243,6 +258,9 @@ fn relax_coarsest(level: &Level, u: &mut [Row], f: Rhs<'_>) -> (f64, f64) {
                 for colour in 0..2 {
                     for plane in 0..level.grid.dims[2] as usize {
                         over_relax_plane(level, colour, plane, COARSEST_OMEGA, u, f);
+                        if colour == 1 {
+                            add_whole(level, plane, COARSEST_OMEGA, u, whole, f);
+                        }
                     }
                 }
             }

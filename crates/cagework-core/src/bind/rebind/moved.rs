@@ -43,7 +43,9 @@ pub(super) fn moved_triangles(
     let mut moved = Vec::new();
     let has_changed = after.changed_faces(before);
     // A polygon may be cut into triangles in another way than before.
-    for (cage, t) in [before, after].into_iter().flat_map(|c| (0..c.triangles().len()).map(move |t| (c, t))) {
+    let is_cut_as_before = before.triangles() == after.triangles();
+    let cages = [before, after].into_iter().skip(usize::from(is_cut_as_before));
+    for (cage, t) in cages.flat_map(|c| (0..c.triangles().len()).map(move |t| (c, t))) {
         if !has_changed[cage.face_of_triangle()[t] as usize] {
             continue;
         }

@@ -137,9 +137,9 @@ mod tests {
             std::array::from_fn(|k| if batch * LANES + k < n { 1.0 / n as f32 } else { 0.0 })
         };
         let base = (0..n_batches).map(|batch| vec![equal(batch); before.n_rows()]).collect();
-        let fields = Fields { base, row_of: Arc::new(before.row_of.clone()), updates: Vec::new() };
+        let mut fields = Fields::new(base, Arc::new(before.row_of.clone()));
         let needed = equations.neighbourhood(&level);
-        let mut old = OldCells::new(&fields, &needed, n_batches);
+        let mut old = OldCells::new(&mut fields, &needed, n_batches);
         let stencils = FewStencils::new(&level, &equations);
         let mut boundary = vec![vec![ZERO; n_batches]; equations.cells.len()];
         stencils.add_boundary(&mut boundary);

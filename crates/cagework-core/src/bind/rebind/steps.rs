@@ -6,33 +6,37 @@ use crate::bind::watch::Watch;
 use crate::progress::Cancelled;
 use crate::sample::Stencils;
 use crate::solve::hierarchy::Hierarchy;
+use crate::solve::multigrid::{Places, Stop};
 use crate::solve::rows::{LANES, Row, ZERO};
 use crate::solve::team::Team;
 
 use super::local::OldCells;
 use super::shares::add_scaled;
 
-/// Share of the threshold that corrections are solved to. They live in few cells, and the norm is a mean over all: solved to
-/// the threshold itself, a weight near the edit was 3 to 7 times as far off as after a whole bind; so it is as exact.
-const SHARPER: f32 = 0.1;
+/// What corrections may leave in any cell, over the threshold. They may live in few cells, and the norm is a mean over all:
+/// solved to the threshold as a mean, a weight near the edit was 3 to 7 times as far off as after a whole bind; so it is as
+/// exact, with a fifth fewer cycles than a mean over all cells of a tenth of the threshold takes.
+const IN_ANY_CELL: f64 = 1.5;
 
-/// Solves for right-hand sides, `[n_batches]` of what is in `rows` of the finest level, and samples the solutions.
+/// Solves for right-hand sides, `[n_batches]` of what is in `cells`, and samples the solutions.
 pub(super) fn solve_for(
     hierarchy: &Hierarchy,
     stencils: &Stencils,
-    (rows, right): (&[u32], &[Vec<Row>]),
+    (cells, right): (&[u32], &[Vec<Row>]),
     options: &BindOptions,
     team: &Team,
     watch: &Watch<'_>,
 ) -> Result<Vec<SolvedBatch>, Cancelled> {
-    let stop = stop_of_batches(SHARPER * options.tau, options.max_iterations, right.len());
+    let stop = stop_of_batches(options.tau, options.max_iterations, right.len());
+    let stop = Stop { in_any_cell: IN_ANY_CELL * f64::from(options.tau), ..stop };
+    let places = Places::new(&hierarchy.levels[0], cells);
     let (solved, _) = solve_batches(
         hierarchy,
         right.len(),
         FieldFate::Kept,
         team,
         watch,
-        &|workspace, batch, progress| workspace.solve_for(hierarchy, (rows, &right[batch]), stop, progress),
+        &|workspace, batch, progress| workspace.solve_for(hierarchy, (&places, &right[batch]), stop, progress),
         // No column has this number: only the field is sampled, not the cage's values.
         &|_, field| sample(stencils, usize::MAX / (2 * LANES), field),
     )?;

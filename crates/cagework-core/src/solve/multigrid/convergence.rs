@@ -28,10 +28,20 @@ pub struct BatchReport {
 /// When a batch is done.
 #[derive(Clone, Copy, Debug)]
 pub struct Stop {
-    /// Threshold for the batch's share of the error's norm.
+    /// Threshold for the batch's share of the error's norm, a mean over cells.
     pub tolerance: f64,
+    /// The same for the cell with the largest; infinite if only the mean counts.
+    pub in_any_cell: f64,
     /// Largest number of V-cycles on the finest level.
     pub max_cycles: u32,
+}
+
+impl Stop {
+    /// By the mean over cells.
+    #[must_use]
+    pub fn new(tolerance: f64, max_cycles: u32) -> Self {
+        Self { tolerance, in_any_cell: f64::INFINITY, max_cycles }
+    }
 }
 
 /// A batch's way to convergence: the stop rule, the same on every back end.
@@ -42,6 +52,8 @@ pub struct Convergence {
     /// Norm of the latest coarse correction.
     correction: f64,
     delta: f64,
+    /// The same in the cell where it is largest.
+    largest: f64,
     /// Latest correction over the one before.
     ratio: f64,
     /// Cycles in a row that only moved rounding about.
@@ -53,24 +65,25 @@ impl Convergence {
     #[must_use]
     pub fn new(stop: Stop) -> Self {
         let report = BatchReport::default();
-        Self { stop, report, correction: f64::INFINITY, delta: f64::INFINITY, ratio: CONTRACTION, stalled: 0 }
+        Self { stop, report, correction: f64::INFINITY, delta: f64::INFINITY, largest: f64::INFINITY, ratio: CONTRACTION, stalled: 0 }
     }
 
-    /// Takes down a cycle by the squared norm of its coarse correction and its mean squared residual; true when it was
-    /// the last: the error that its contraction lets expect is below the threshold, the limit is reached, or f32 has
+    /// Takes down a cycle by the squared norm of its coarse correction, as a mean over cells and in the cell with the largest (0
+    /// if nobody asks), and its mean squared residual; true when it was the last: the error that its contraction lets expect is below the threshold, the limit is reached, or f32 has
     /// no more digits.
-    pub fn cycle_done(&mut self, correction_square: f64, residual_square: f64) -> bool {
+    pub fn cycle_done(&mut self, correction_square: f64, largest_square: f64, residual_square: f64) -> bool {
         let correction = correction_square.sqrt();
         let ratio = correction / self.correction;
-        let delta = ratio.clamp(CONTRACTION, 1.0) * correction;
+        let contraction = ratio.clamp(CONTRACTION, 1.0);
+        let (delta, largest) = (contraction * correction, contraction * largest_square.sqrt());
         self.report.delta_squares.push(delta * delta);
         self.report.residual_squares.push(residual_square);
-        self.report.converged = delta <= self.stop.tolerance;
+        self.report.converged = delta <= self.stop.tolerance && largest <= self.stop.in_any_cell;
         let stalls = correction < ROUND_OFF && correction > STALLED * self.correction;
         self.stalled = if stalls { self.stalled + 1 } else { 0 };
         // The first one has none before it.
         self.ratio = if ratio > 0.0 { ratio } else { self.ratio };
-        (self.correction, self.delta) = (correction, delta);
+        (self.correction, self.delta, self.largest) = (correction, delta, largest);
         self.report.converged
             || self.stalled == MAX_STALLED
             || self.report.delta_squares.len() >= self.stop.max_cycles as usize
@@ -79,7 +92,8 @@ impl Convergence {
     /// Whether the next cycle is expected to be the last, with so much to spare.
     #[must_use]
     pub fn is_nearly_done(&self, spare: f64) -> bool {
-        spare * self.ratio * self.delta <= self.stop.tolerance
+        let expected = spare * self.ratio;
+        expected * self.delta <= self.stop.tolerance && expected * self.largest <= self.stop.in_any_cell
     }
 
     /// Number and delta of the latest cycle.

@@ -1,39 +1,107 @@
 //! Right-hand sides other than the cage's.
 
+use std::ops::Range;
+
 use super::stream::DOWN_FROM_ZERO;
 use super::{BatchReport, Stop, Workspace};
+use crate::grid::NO_CELL;
+use crate::levels::Level;
 use crate::solve::hierarchy::Hierarchy;
 use crate::solve::rows::{Row, ZERO};
 
+/// What a right-hand side of a whole red cell adds to the cell, and its six neighbours' right-hand sides, if it is handed to them.
+const SIXTH: f32 = 1.0 / 6.0;
+
+/// Where right-hand sides of some cells go.
+///
+/// Cells next to the cage have a row for theirs, as the cage's values ask for, and whole black cells get one. Whole red ones
+/// need none: what is added to them by their own right-hand side is known, and the cells around them, which are black, get
+/// what that adds to theirs. So whole cells need not be asked for a right-hand side one after the other.
+#[derive(Debug, Default)]
+pub struct Places {
+    /// Number of a cell, row of the right-hand side, and how much of the cell's goes there.
+    shares: Vec<(u32, u32, f32)>,
+    /// Whole red cells: their numbers, and their rows in fields.
+    red: Vec<[u32; 2]>,
+    /// Whole black cells, within their colour, ascending.
+    whole: Vec<u32>,
+    /// Planes from the first right-hand side to the last.
+    planes: Range<usize>,
+}
+
+impl Places {
+    /// Of cells, by their index in the grid, that must be unknowns of the level.
+    #[must_use]
+    pub fn new(level: &Level, cells: &[u32]) -> Self {
+        let mut place = vec![NO_CELL; level.n_rows()];
+        for number in 0..level.n_cut() {
+            place[level.row_of_cut(number)] = number as u32;
+        }
+        let first_black = level.first_row(1);
+        let (mut shares, mut red) = (Vec::new(), Vec::new());
+        for (k, &cell) in (0u32..).zip(cells) {
+            let row = level.row_of[cell as usize];
+            if (row as usize) < first_black && place[row as usize] == NO_CELL {
+                red.push([k, row]);
+                for stride in level.grid.strides() {
+                    let around = [cell as usize - stride, cell as usize + stride];
+                    shares.extend(around.map(|neighbour| (k, level.row_of[neighbour], SIXTH)));
+                }
+            } else {
+                shares.push((k, row, 1.0));
+            }
+        }
+        let rows: Vec<u32> = shares.iter().map(|share| share.1).collect();
+        let planes = level.planes_of(&rows);
+        // All that have no place yet are whole and black.
+        let mut whole = Vec::new();
+        for &row in rows.iter().filter(|&&row| place[row as usize] == NO_CELL) {
+            whole.push(row - first_black as u32);
+        }
+        whole.sort_unstable();
+        whole.dedup();
+        for (place_of_whole, &cell) in (level.n_cut() as u32..).zip(&whole) {
+            place[first_black + cell as usize] = place_of_whole;
+        }
+        for (_, row, _) in &mut shares {
+            *row = place[*row as usize];
+        }
+        Self { shares, red, whole, planes }
+    }
+}
+
 impl Workspace {
-    /// Solves for right-hand sides that are not the cage's: `rhs` are rows of the finest level and what is in them; all
-    /// others are zero. From zero; `cycle_done` as in [`Self::solve`].
+    /// Solves for right-hand sides that are not the cage's: the `values` of the cells that there are `places` for; all others
+    /// are zero. From zero; `cycle_done` as in [`Self::solve`].
     ///
     /// # Errors
     /// `None` when cancelled.
     pub fn solve_for(
         &mut self,
         hierarchy: &Hierarchy,
-        rhs: (&[u32], &[Row]),
+        (places, values): (&Places, &[Row]),
         stop: Stop,
         cycle_done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<BatchReport> {
-        let n_rows = hierarchy.levels[0].n_rows();
-        if self.f[0].len() != n_rows {
-            self.f[0].clear();
-            self.f[0].resize(n_rows, ZERO);
+        let level = &hierarchy.levels[0];
+        self.u[0].resize(level.n_rows(), ZERO);
+        self.f[0].clear();
+        self.f[0].resize(level.n_cut() + places.whole.len(), ZERO);
+        for &(number, place, share) in &places.shares {
+            let out = &mut self.f[0][place as usize];
+            for (out, value) in out.iter_mut().zip(&values[number as usize]) {
+                *out += share * value;
+            }
         }
-        self.u[0].resize(n_rows, ZERO);
-        for (&row, values) in rhs.0.iter().zip(rhs.1) {
-            self.f[0][row as usize] = *values;
-        }
-        self.dense = true;
-        self.planes = Some(hierarchy.levels[0].planes_of(rhs.0));
+        self.whole.clone_from(&places.whole);
+        self.planes = Some(places.planes.clone());
         let report = self.cycles(hierarchy, DOWN_FROM_ZERO, stop, cycle_done);
-        (self.dense, self.planes) = (false, None);
-        // All others are still zero: the next batch need not be told so.
-        for &row in rhs.0 {
-            self.f[0][row as usize] = ZERO;
+        self.whole.clear();
+        self.planes = None;
+        for &[number, row] in &places.red {
+            for (out, value) in self.u[0][row as usize].iter_mut().zip(&values[number as usize]) {
+                *out += SIXTH * value;
+            }
         }
         report
     }
@@ -43,33 +111,75 @@ impl Workspace {
 mod tests {
     use super::*;
     use crate::levels::plain::{hierarchy, some_field};
+    use crate::solve::rows::{Rhs, relax_plane};
 
-    const STOP: Stop = Stop { tolerance: 1e-5, max_cycles: 3 };
+    /// f32 rounding of values up to some hundreds, solved for until nothing changes.
+    const ROUNDED: f32 = 1e-4;
+
+    fn stop(max_cycles: u32) -> Stop {
+        Stop::new(1e-5, max_cycles)
+    }
+
+    /// Every `step`-th cell from `first` on, by colour, and some values of each.
+    fn some_cells(hierarchy: &Hierarchy, first: usize, step: usize) -> (Vec<u32>, Vec<Row>) {
+        let level = &hierarchy.levels[0];
+        let values = some_field(level, 1);
+        let cells = (0u32..).zip(&level.row_of).filter(|(_, row)| **row != NO_CELL);
+        let some = cells.skip(first).step_by(step);
+        some.map(|(cell, row)| (cell, values[*row as usize])).unzip()
+    }
+
+    /// Sweeps that know each cell's right-hand side leave the solution as it is: red cells and black ones, whole ones and cut
+    /// ones.
+    #[test]
+    fn the_solution_meets_every_cells_equation() {
+        let hierarchy = hierarchy();
+        let level = &hierarchy.levels[0];
+        let (cells, values) = some_cells(&hierarchy, 5, 11);
+        let places = Places::new(level, &cells);
+        let n_cut = level.n_cut() as u32;
+        assert!(!places.red.is_empty() && !places.whole.is_empty());
+        assert!(places.shares.iter().any(|&(_, place, share)| place < n_cut && share == 1.0));
+        let mut workspace = Workspace::new(&hierarchy);
+        workspace.solve_for(&hierarchy, (&places, &values), Stop::new(0.0, 12), &mut |_, _| true).unwrap();
+        let mut f = vec![ZERO; level.n_rows()];
+        for (cell, values) in cells.iter().zip(values) {
+            f[level.row_of[*cell as usize] as usize] = values;
+        }
+        let u = workspace.field();
+        assert!(u.iter().flatten().any(|w| w.abs() > 0.1));
+        for colour in 0..2 {
+            let mut swept = u.to_vec();
+            for plane in 0..level.grid.dims[2] as usize {
+                relax_plane(level, colour, plane, &mut swept, Rhs::Dense(&f));
+            }
+            let change = |(a, b): (&Row, &Row)| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            let change = u.iter().zip(&swept).map(change).fold(0.0, f32::max);
+            assert!(change < ROUNDED, "colour {colour}: {change}");
+        }
+    }
 
     /// What one call leaves, also if it is cancelled, must not be felt by the next.
     #[test]
     fn a_workspace_serves_one_call_after_another() {
         let hierarchy = hierarchy();
-        let values = some_field(&hierarchy.levels[0], 1);
-        let rows = |first: usize| -> Vec<u32> {
-            let zero = hierarchy.levels[0].zero_row();
-            (first as u32..values.len() as u32 - 1).step_by(29).filter(|&row| row != zero).collect()
-        };
-        let [some, others] = [rows(0), rows(13)];
-        let of = |rows: &[u32]| -> Vec<Row> { rows.iter().map(|&row| values[row as usize]).collect() };
-        let (of_some, of_others) = (of(&some), of(&others));
+        let [some, others] = [0, 13].map(|first| {
+            let (cells, values) = some_cells(&hierarchy, first, 29);
+            (Places::new(&hierarchy.levels[0], &cells), values)
+        });
         let mut used = Workspace::new(&hierarchy);
-        assert!(used.solve_for(&hierarchy, (&some, &of_some), STOP, &mut |_, _| false).is_none());
+        assert!(used.solve_for(&hierarchy, (&some.0, &some.1), stop(3), &mut |_, _| false).is_none());
         for _ in 0..2 {
             let mut fresh = Workspace::new(&hierarchy);
             for workspace in [&mut used, &mut fresh] {
-                workspace.solve_for(&hierarchy, (&others, &of_others), STOP, &mut |_, _| true).unwrap();
+                let others = (&others.0, others.1.as_slice());
+                workspace.solve_for(&hierarchy, others, stop(3), &mut |_, _| true).unwrap();
             }
             assert!(used.field() == fresh.field() && used.field().iter().any(|row| *row != ZERO));
             used.take_field();
             let mut fresh = Workspace::new(&hierarchy);
             for workspace in [&mut used, &mut fresh] {
-                workspace.solve(&hierarchy, 0, STOP, &mut |_, _| true).unwrap();
+                workspace.solve(&hierarchy, 0, stop(3), &mut |_, _| true).unwrap();
             }
             assert!(used.take_field() == fresh.field());
         }

@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::levels::Level;
 use crate::simd::dispatch;
 use crate::solve::rows::{
-    Prolong, Rhs, Row, ZERO, over_relax_plane, over_relax_zeros_plane, prolong_plane, relax_plane,
+    LANES, Prolong, Rhs, Row, ZERO, over_relax_plane, over_relax_zeros_plane, prolong_plane, relax_plane,
     relax_zeros_plane, residual_plane, split,
 };
 use crate::transfer::Transfer;
@@ -54,13 +54,21 @@ pub(super) const UP_AND_DOWN: &[Pass] =
 pub(super) const UP_AND_HALF_DOWN: &[Pass] =
     &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black];
 
-/// Runs `passes` over a level's field `u`, `[n_rows]`. `planes`: for passes from zero, those outside which there is no
-/// right-hand side; `coarse`: the coarser level's field, for [`Pass::Prolong`]; `residual`: `[n red cells + 1]`, for
+/// Where a level's right-hand side is, if it is not the cage's.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Extent<'a> {
+    /// For passes from zero: planes outside which there is none.
+    pub(super) planes: Option<&'a Range<usize>>,
+    /// Black cells with whole stencils that have some, ascending, within their colour: the rows after all cut cells'.
+    pub(super) whole: &'a [u32],
+}
+
+/// Runs `passes` over a level's field `u`, `[n_rows]`. `coarse`: the coarser level's field, for [`Pass::Prolong`]; `residual`: `[n red cells + 1]`, for
 /// [`Pass::Residual`]. Returns the sum of the residual's squares.
 pub(super) fn stream(
     passes: &[Pass],
     level: &Level,
-    planes: Option<&Range<usize>>,
+    extent: Extent<'_>,
     (transfer, coarse): (&Transfer, &[Row]),
     u: &mut [Row],
     f: Rhs<'_>,
@@ -80,7 +88,7 @@ pub(super) fn stream(
                     let Some(plane) = step.checked_sub(lag).filter(|&plane| plane < n) else { continue };
                     // A pass carries what there is no more than a plane further; beyond, all is zero.
                     let reach = |p: &Range<usize>| p.start.saturating_sub(lag)..p.end + lag;
-                    if planes.is_some_and(|planes| !reach(planes).contains(&plane)) {
+                    if extent.planes.is_some_and(|planes| !reach(planes).contains(&plane)) {
                         match *pass {
                             RedFromZero => u[level.cells_of_plane(0, plane)].fill(ZERO),
                             BlackFurtherFromZero => {
@@ -100,6 +108,14 @@ pub(super) fn stream(
                         BlackFurtherFromZero => over_relax_zeros_plane(level, 1, plane, OMEGA, u, f),
                         Residual => residual_plane(level, plane, u, f, residual, &mut squares),
                     }
+                    let omega = match *pass {
+                        Black => 1.0,
+                        BlackFurther | BlackFurtherFromZero => OMEGA,
+                        _ => continue,
+                    };
+                    if !extent.whole.is_empty() {
+                        add_whole(level, plane, omega, u, extent.whole, f);
+                    }
                 }
             }
             squares.iter().map(|&s| f64::from(s)).sum()
@@ -107,11 +123,34 @@ pub(super) fn stream(
     )
 }
 
+/// Adds what right-hand sides of the black cells `whole` ([`Extent::whole`]) add to a half sweep of a plane that goes `omega` times as
+/// far.
+#[inline(always)]
+pub(super) fn add_whole(
+    level: &Level,
+    plane: usize,
+    omega: f32,
+    u: &mut [Row],
+    whole: &[u32],
+    f: Rhs<'_>,
+) {
+    let Rhs::Cut(rows) = f else { return };
+    let rows = &rows[level.n_cut()..];
+    let cells = level.cells_of_plane(1, plane);
+    let [first, end] = [cells.start, cells.end].map(|end| whole.partition_point(|&c| (c as usize) < end));
+    let (black, _) = split(level, u, 1);
+    for (&cell, f) in whole[first..end].iter().zip(&rows[first..end]) {
+        let row = &mut black[cell as usize];
+        for k in 0..LANES {
+            row[k] += omega / 6.0 * f[k];
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::levels::plain::{hierarchy, some_field};
-    use crate::solve::rows::LANES;
 
     #[test]
     fn planes_without_a_right_hand_side_need_not_be_gone_through() {
@@ -137,8 +176,9 @@ mod tests {
                 // What fields hold must not count.
                 let (mut u, mut residual) = (some_field(level, 2), vec![[7.0; LANES]; level.first_row(1)]);
                 let coarse = (transfer, &[] as &[Row]);
+                let extent = Extent { planes, whole: &[] };
                 let squares =
-                    stream(DOWN_FROM_ZERO, level, planes, coarse, &mut u, Rhs::Dense(&f), &mut residual);
+                    stream(DOWN_FROM_ZERO, level, extent, coarse, &mut u, Rhs::Dense(&f), &mut residual);
                 (u, residual, squares)
             };
             let (all, few) = (run(None), run(Some(&planes)));
