@@ -11,6 +11,7 @@ use crate::solve::rows::{LANES, Row, ZERO};
 use crate::weights::affine::Columns;
 
 use super::equations::Equations;
+use super::lenience;
 use super::region::Region;
 use super::shares::{Felt, Shares, add_scaled};
 use super::stencils::FewStencils;
@@ -38,12 +39,8 @@ impl Negligible {
     }
 }
 
-/// How many times as large as what counts a residual must be to be worth a batch of its own: twice, or more where a bind has few
-/// batches, of which one more is a large share. With 24 vertices four times, which leaves the largest error of 48 edits at
-/// a bind's, 2.6e-5; with the samples' 44 to 219 it would go from 4.2e-5 to 5.6e-5.
-fn worth_a_batch(n_batches: usize) -> f32 {
-    (12.0 / n_batches as f32).clamp(2.0, 4.0)
-}
+/// A residual must be so many times what counts to be worth a batch of its own, [`lenience`] aside.
+const MANY: f32 = 2.0;
 
 /// Moments must be met so many times as well as weights: then most rows need not be restored after they were corrected.
 const KEENER: f32 = 30.0;
@@ -249,7 +246,7 @@ impl Residual {
     #[inline(always)]
     fn split_columns(mut self, n_columns: usize) -> Split {
         let n_batches = n_columns.div_ceil(LANES);
-        let many = worth_a_batch(n_batches);
+        let many = MANY * lenience(n_batches);
         // The last four are moments.
         let columns = || (0..n_columns).chain((0..4).map(|k| n_batches * LANES + k));
         let mut right = Vec::new();

@@ -10,13 +10,14 @@ use crate::solve::multigrid::{Places, Stop};
 use crate::solve::rows::{LANES, Row, ZERO};
 use crate::solve::team::Team;
 
+use super::lenience;
 use super::local::OldCells;
 use super::shares::add_scaled;
 
-/// What corrections may leave in any cell, over the threshold. They may live in few cells, and the norm is a mean over all:
+/// What corrections may leave in any cell, over the threshold, [`lenience`] aside. They may live in few cells, and the norm is a mean over all:
 /// solved to the threshold as a mean, a weight near the edit was 3 to 7 times as far off as after a whole bind; so it is as
 /// exact, with a fifth fewer cycles than a mean over all cells of a tenth of the threshold takes.
-const IN_ANY_CELL: f64 = 1.5;
+const IN_ANY_CELL: f32 = 1.35;
 
 /// Solves for right-hand sides, `[n_batches]` of what is in `cells`, and samples the solutions.
 pub(super) fn solve_for(
@@ -28,7 +29,8 @@ pub(super) fn solve_for(
     watch: &Watch<'_>,
 ) -> Result<Vec<SolvedBatch>, Cancelled> {
     let stop = stop_of_batches(options.tau, options.max_iterations, right.len());
-    let stop = Stop { in_any_cell: IN_ANY_CELL * f64::from(options.tau), ..stop };
+    let in_any_cell = f64::from(IN_ANY_CELL * lenience(hierarchy.n_batches()));
+    let stop = Stop { in_any_cell: in_any_cell * f64::from(options.tau), ..stop };
     let places = Places::new(&hierarchy.levels[0], cells);
     let (solved, _) = solve_batches(
         hierarchy,

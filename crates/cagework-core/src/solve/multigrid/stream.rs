@@ -125,7 +125,7 @@ pub(super) fn stream(
 
 /// Adds what right-hand sides of the black cells `whole` ([`Extent::whole`]) add to a half sweep of a plane that goes `omega` times as
 /// far.
-#[inline(always)]
+#[inline(never)]
 pub(super) fn add_whole(
     level: &Level,
     plane: usize,
