@@ -151,26 +151,6 @@ impl Level {
         self.lines[z * ny][colour] as usize..self.lines[(z + 1) * ny][colour] as usize
     }
 
-    /// Planes from the first to the last that has one of these rows; none without rows.
-    #[must_use]
-    pub fn planes_of(&self, rows: &[u32]) -> Range<usize> {
-        let first_black = self.first_row(1) as u32;
-        let mut ends = [[u32::MAX, 0]; 2];
-        for &row in rows {
-            let colour = usize::from(row >= first_black);
-            let cell = row - self.first_row(colour) as u32;
-            let [low, high] = ends[colour];
-            ends[colour] = [low.min(cell), high.max(cell)];
-        }
-        let plane = |colour: usize, cell: u32| {
-            let line = self.lines.partition_point(|first| first[colour] <= cell) - 1;
-            line / self.grid.dims[1] as usize
-        };
-        let some = ends.into_iter().enumerate().filter(|(_, [low, high])| low <= high);
-        let planes = some.map(|(c, [low, high])| plane(c, low)..plane(c, high) + 1);
-        planes.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)).unwrap_or(0..0)
-    }
-
     /// Number of cut cells of both colours.
     #[must_use]
     pub fn n_cut(&self) -> usize {

@@ -12,6 +12,7 @@ use crate::levels::{BoundaryTerm, CutCell, Run};
 use crate::solve::jacobi;
 use crate::solve::rows::{LANES, Row};
 use crate::transfer::{ProlongRow, RestrictRow};
+use crate::voxelize::lines::Hit;
 
 use super::{BindOptions, Method, Solver};
 
@@ -47,6 +48,8 @@ pub(super) fn estimate(
 
     let voxels = n_cells * if options.method == Method::Embedded { 7.0 } else { 5.0 };
     let stencils = n_cut * (size_of::<CutCell>() + size_of::<Run>() + 8 * size_of::<BoundaryTerm>()) as f64;
+    // Lines along three axes cross a surface as often as it cuts cells.
+    let lines = n_cut * size_of::<Hit>() as f64;
     let transfers = n_unknowns
         * (size_of::<RestrictRow>() as f64 / 8.0
             + size_of::<ProlongRow<2>>() as f64 * 3.0 / 8.0
@@ -64,7 +67,7 @@ pub(super) fn estimate(
     let share = if options.sparsify > 0.0 { SPARSE_SHARE } else { 1.0 };
     let points = n_points as f64;
     let weights = points * (n_batches * row + 2.0 * share * n_columns * 8.0 + STENCIL_BYTES);
-    (voxels * (1.0 + COARSER) + stencils * (1.0 + 2.0 * COARSER) + fields + weights) as u64
+    (voxels * (1.0 + COARSER) + lines + stencils * (1.0 + 2.0 * COARSER) + fields + weights) as u64
 }
 
 /// Volume enclosed (divergence theorem) and area of the cage.

@@ -10,7 +10,8 @@ use crate::sample::embedded::Sampler;
 use crate::sample::{Stencils, classic};
 use crate::solve::hierarchy::Hierarchy;
 use crate::voxelize::classic::{ClassicCells, place_grid};
-use crate::voxelize::embedded::{EmbeddedCells, classify, lines_at_faces, shoot_lines};
+use crate::voxelize::embedded::{EmbeddedCells, classify, lines_at, shoot_changed, shoot_lines};
+use crate::voxelize::lines::Lines;
 use crate::voxelize::published::PublishedCells;
 use crate::voxelize::{CellKind, voxelize_classic};
 
@@ -26,6 +27,8 @@ pub(super) struct Voxels {
     /// Bytes held.
     pub(super) bytes: usize,
     classic: Option<ClassicCells>,
+    /// Lines through the cage, for the next edit; of the embedded method.
+    lines: Option<[Lines; 3]>,
 }
 
 /// A sampler of either method.
@@ -75,21 +78,27 @@ impl Voxels {
         let bytes = hierarchy.bytes()
             + size_of_val(cells.kinds.as_slice())
             + 4 * (values.cells.len() + values.indptr.len() + 2 * values.values.len());
-        Self { hierarchy, counts, ambiguous: 0, bytes, classic: Some(cells) }
+        Self { hierarchy, counts, ambiguous: 0, bytes, classic: Some(cells), lines: None }
     }
 
     fn embedded(cage: &Cage, grid: Grid, options: &BindOptions, before: Option<(&Self, &Cage)>) -> Self {
-        let lines = shoot_lines(cage, &grid);
+        let edit = before.and_then(|(before, cage_before)| {
+            Some((before, before.lines.as_ref()?, shoot_changed(cage_before, cage, &grid)))
+        });
+        let lines = match &edit {
+            Some((_, lines, [gone, come])) => {
+                std::array::from_fn(|axis| lines[axis].renewed(&gone[axis], &come[axis]))
+            }
+            None => shoot_lines(cage, &grid),
+        };
         let (inside, ambiguous) = classify(&lines, &grid);
         let cells = EmbeddedCells::finest(cage, &lines, grid, inside);
-        let hierarchy = match (options.solver, before) {
+        let hierarchy = match (options.solver, &edit) {
             (Solver::Jacobi, _) => Hierarchy::single(Level::new(&cells), cage.n_vertices()),
             (Solver::Multigrid, None) => Hierarchy::new(cells, cage.n_vertices(), EmbeddedCells::coarsened),
-            (Solver::Multigrid, Some((before, cage_before))) => {
-                let has_changed = cage.changed_faces(cage_before);
-                before.hierarchy.renewed(cells, EmbeddedCells::coarsened, |n_levels| {
-                    lines_at_faces([cage_before, cage], &grid, n_levels, |f| has_changed[f as usize])
-                })
+            (Solver::Multigrid, Some((before, _, changed))) => {
+                let moved = |n_levels| lines_at(changed, &grid, n_levels);
+                before.hierarchy.renewed(cells, EmbeddedCells::coarsened, moved)
             }
         };
         let finest = &hierarchy.levels[0];
@@ -99,9 +108,9 @@ impl Voxels {
             boundary: cut,
             exterior: grid.n_cells() as u64 - unknowns,
         };
-        let line_bytes: usize = lines.iter().map(crate::voxelize::lines::Lines::bytes).sum();
-        let bytes = hierarchy.bytes().max(line_bytes + 2 * grid.n_cells() + hierarchy.levels[0].bytes());
-        Self { hierarchy, counts, ambiguous, bytes, classic: None }
+        let line_bytes: usize = lines.iter().map(Lines::bytes).sum();
+        let bytes = line_bytes + hierarchy.bytes().max(3 * grid.n_cells() + hierarchy.levels[0].bytes());
+        Self { hierarchy, counts, ambiguous, bytes, classic: None, lines: Some(lines) }
     }
 
     pub(super) fn sampler<'a>(&'a self, cage: &'a Cage) -> AnySampler<'a> {

@@ -18,8 +18,8 @@ mod convergence;
 mod other;
 mod stream;
 
-pub use other::Places;
 pub use convergence::{BatchReport, Convergence, Stop, histories};
+pub use other::Places;
 
 use std::ops::Range;
 
@@ -28,7 +28,10 @@ use super::rows::{LANES, Rhs, Row, ZERO, over_relax_plane, relax_plane, restrict
 use crate::levels::Level;
 use crate::simd::dispatch;
 
-use stream::{DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, Extent, Pass, UP, UP_AND_DOWN, UP_AND_HALF_DOWN, add_whole, stream};
+use stream::{
+    DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, Extent, Pass, UP, UP_AND_DOWN, UP_AND_HALF_DOWN, add_whole,
+    stream,
+};
 
 /// Over-relaxation of the first black half sweep: 1.1 to 1.3 all lower the error 1.5 to 2 times per cycle (Armadillo).
 pub const OMEGA: f32 = 1.2;

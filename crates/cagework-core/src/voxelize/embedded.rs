@@ -13,7 +13,7 @@ use crate::cage::Cage;
 use crate::grid::Grid;
 use crate::levels::Boundary;
 
-use super::lines::{Hit, Lines, hits};
+use super::lines::{Hit, Lines};
 
 /// Shortest arm, in cells: a centre this close to the cage has the cage's value to within the solver's accuracy, and
 /// a shorter arm would only cost f32 digits (1e-3 measured on the Armadillo and the horse).
@@ -34,27 +34,57 @@ pub struct EmbeddedCells<'a> {
 /// Lines along x, y and z.
 #[must_use]
 pub fn shoot_lines(cage: &Cage, grid: &Grid) -> [Lines; 3] {
-    let lines = super::map_indices(3, |axis| Lines::shoot(cage, grid, axis));
+    shoot_some(cage, grid, &|_| true)
+}
+
+/// Lines through the faces that an edit has changed: as they were, and as they are now. What [`Lines::renewed`] asks for.
+#[must_use]
+pub fn shoot_changed(before: &Cage, cage: &Cage, grid: &Grid) -> [[Lines; 3]; 2] {
+    let has_changed = cage.changed_faces(before);
+    [before, cage]
+        .map(|cage| shoot_some(cage, grid, &|t| has_changed[cage.face_of_triangle()[t as usize] as usize]))
+}
+
+fn shoot_some(cage: &Cage, grid: &Grid, wanted: &(dyn Fn(u32) -> bool + Sync)) -> [Lines; 3] {
+    let lines = super::map_indices(3, |axis| Lines::shoot(cage, grid, axis, wanted));
     lines.try_into().expect("three axes")
 }
 
 /// Types every centre of the finest grid. Returns (inside, cells about which the axes disagreed).
 #[must_use]
 pub fn classify(lines: &[Lines; 3], grid: &Grid) -> (Vec<bool>, u64) {
-    let mut votes = vec![0u8; grid.n_cells()];
+    let (mut votes, mut flips) = (vec![0u8; grid.n_cells()], vec![0u8; grid.n_cells()]);
     let strides = grid.strides();
     for (axis, lines) in lines.iter().enumerate() {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let stride = strides[axis];
+        let (stride, n) = (strides[axis], grid.dims[axis] as usize);
         for (iu, iv, hits) in lines.crossing() {
             let first = iu as usize * strides[u] + iv as usize * strides[v];
             for pair in hits.chunks_exact(2) {
                 // Centres s with t0 <= s < t1 lie between an odd and an even crossing.
-                let range =
-                    [pair[0].t, pair[1].t].map(|t| t.ceil().clamp(0.0, f64::from(grid.dims[axis])) as usize);
-                for s in range[0]..range[1] {
-                    votes[first + s * stride] += 1;
+                let [start, end] = [pair[0].t, pair[1].t].map(|t| t.ceil().clamp(0.0, n as f64) as usize);
+                if axis == 0 {
+                    votes[first + start..first + end].iter_mut().for_each(|vote| *vote += 1);
+                    continue;
                 }
+                for s in [start, end].into_iter().filter(|&s| s < n) {
+                    flips[first + s * stride] ^= 1;
+                }
+            }
+        }
+        if axis == 0 {
+            continue;
+        }
+        // Along y and z neighbours are far apart: all of a row or plane go on together.
+        for (flips, votes) in flips.chunks_exact_mut(stride * n).zip(votes.chunks_exact_mut(stride * n)) {
+            for s in 1..n {
+                let (before, now) = flips.split_at_mut(s * stride);
+                for (flip, before) in now[..stride].iter_mut().zip(&before[(s - 1) * stride..]) {
+                    *flip ^= before;
+                }
+            }
+            for (vote, flip) in votes.iter_mut().zip(flips) {
+                *vote += std::mem::take(flip);
             }
         }
     }
@@ -117,25 +147,19 @@ impl<'a> EmbeddedCells<'a> {
     }
 }
 
-/// The lines along x with centres whose arms may end on some faces of one of two cages, on every level:
-/// `[n_levels][nz * ny]`. `is_one`: whether a face is one of them.
+/// The lines along x with centres whose arms may end at some crossings, on every level: `[n_levels][nz * ny]`.
 #[must_use]
-pub fn lines_at_faces(
-    cages: [&Cage; 2],
-    grid: &Grid,
-    n_levels: usize,
-    is_one: impl Fn(u32) -> bool,
-) -> Vec<Vec<bool>> {
+pub fn lines_at(crossings: &[[Lines; 3]; 2], grid: &Grid, n_levels: usize) -> Vec<Vec<bool>> {
     let mut grids = vec![*grid];
     while grids.len() < n_levels {
         grids.extend(grids.last().map(Grid::coarsened));
     }
     let mut marked: Vec<Vec<bool>> =
         grids.iter().map(|grid| vec![false; (grid.dims[1] * grid.dims[2]) as usize]).collect();
-    for (cage, axis) in cages.into_iter().flat_map(|cage| (0..3).map(move |axis| (cage, axis))) {
+    for (axis, lines) in crossings.iter().flat_map(|lines| lines.iter().enumerate()) {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let wanted = |triangle: u32| is_one(cage.face_of_triangle()[triangle as usize]);
-        hits(cage, grid, axis, wanted, |iu, iv, hit| {
+        for (iu, iv, hit) in lines.crossing().flat_map(|(iu, iv, hits)| hits.iter().map(move |h| (iu, iv, h)))
+        {
             for (level, (grid, marked)) in grids.iter().zip(&mut marked).enumerate() {
                 let step = 1 << level;
                 if iu % step != 0 || iv % step != 0 {
@@ -151,7 +175,7 @@ pub fn lines_at_faces(
                     }
                 }
             }
-        });
+        }
     }
     marked
 }

@@ -5,6 +5,8 @@
 //! counts as one a little beside it, the same way for all edges (simulation of simplicity: Edelsbrunner, Muecke 1990),
 //! so that it crosses there exactly once or, at a silhouette, an even number of times.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use crate::cage::Cage;
@@ -23,7 +25,7 @@ pub struct Hit {
 
 /// All grid lines along one axis; the hits of a line ascend. Lines are numbered `u + n_u * v`, where u and v are the
 /// cell's coordinates along the next two axes in cyclic order.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Lines {
     axis: usize,
     n_u: u32,
@@ -32,13 +34,19 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Shoots all lines along `axis` through the cage.
+    /// Shoots all lines along `axis` through those of the cage's triangles that are `wanted`.
     #[must_use]
-    pub fn shoot(cage: &Cage, grid: &Grid, axis: usize) -> Self {
+    pub fn shoot(cage: &Cage, grid: &Grid, axis: usize, wanted: &dyn Fn(u32) -> bool) -> Self {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let n_lines = grid.dims[u] as usize * grid.dims[v] as usize;
+        let n_u = grid.dims[u];
+        let n_lines = n_u as usize * grid.dims[v] as usize;
         let mut found: Vec<(u32, Hit)> = Vec::new();
-        hits(cage, grid, axis, |_| true, |iu, iv, hit| found.push((iu + grid.dims[u] * iv, hit)));
+        let points: Vec<DVec3> = cage.positions().iter().map(|p| grid.to_grid(p.as_dvec3())).collect();
+        for (triangle, corners) in (0u32..).zip(cage.triangles()).filter(|(triangle, _)| wanted(*triangle)) {
+            cover(&points, *corners, grid, axis, |u, v, hit| {
+                found.push((u + n_u * v, Hit { triangle, ..hit }));
+            });
+        }
         // Counting sort by line, each line's few hits inserted by position.
         let mut start = vec![0u32; n_lines + 1];
         for (line, _) in &found {
@@ -56,7 +64,42 @@ impl Lines {
             hits[first + before] = hit;
             next[line as usize] += 1;
         }
-        Self { axis, n_u: grid.dims[u], start, hits }
+        Self { axis, n_u, start, hits }
+    }
+
+    /// Lines through an edited cage: these, without the hits of triangles that have changed, as they were, and with those that
+    /// these have now.
+    #[must_use]
+    pub fn renewed(&self, gone: &Self, come: &Self) -> Self {
+        let mut hits =
+            Vec::with_capacity((self.hits.len() + come.hits.len()).saturating_sub(gone.hits.len()));
+        let mut start = Vec::with_capacity(self.start.len());
+        // Lines with neither are copied many at a time.
+        let mut copied = 0;
+        for line in 0..self.start.len() - 1 {
+            let [old, gone_here, come_here] = [self, gone, come].map(|lines| lines.range(line));
+            start.push((hits.len() + old.start - copied) as u32);
+            if gone_here.is_empty() && come_here.is_empty() {
+                continue;
+            }
+            hits.extend_from_slice(&self.hits[copied..old.start]);
+            copied = old.end;
+            let (first, gone) = (hits.len(), &gone.hits[gone_here]);
+            hits.extend(self.hits[old].iter().filter(|hit| gone.iter().all(|g| g.triangle != hit.triangle)));
+            for hit in &come.hits[come_here] {
+                let is_before = |h: &Hit| h.t.total_cmp(&hit.t).then(h.triangle.cmp(&hit.triangle)).is_lt();
+                let place = first + hits[first..].partition_point(is_before);
+                hits.insert(place, *hit);
+            }
+        }
+        start.push((hits.len() + self.hits.len() - copied) as u32);
+        hits.extend_from_slice(&self.hits[copied..]);
+        Self { start, hits, ..*self }
+    }
+
+    /// Where a line's hits are.
+    fn range(&self, line: usize) -> Range<usize> {
+        self.start[line] as usize..self.start[line + 1] as usize
     }
 
     /// Hits of the line through a cell, ascending.
@@ -64,8 +107,7 @@ impl Lines {
     #[must_use]
     pub fn through(&self, cell: [u32; 3]) -> &[Hit] {
         let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
-        let line = (cell[u] + self.n_u * cell[v]) as usize;
-        &self.hits[self.start[line] as usize..self.start[line + 1] as usize]
+        &self.hits[self.range((cell[u] + self.n_u * cell[v]) as usize)]
     }
 
     /// Each line that crosses the cage, as (u, v, hits).
@@ -79,20 +121,6 @@ impl Lines {
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(self.hits.as_slice()) + size_of_val(self.start.as_slice())
-    }
-}
-
-/// Calls `found(u, v, hit)` for every crossing of a line along `axis` with one of the triangles that are `wanted`.
-pub(super) fn hits(
-    cage: &Cage,
-    grid: &Grid,
-    axis: usize,
-    wanted: impl Fn(u32) -> bool,
-    mut found: impl FnMut(u32, u32, Hit),
-) {
-    let points: Vec<DVec3> = cage.positions().iter().map(|p| grid.to_grid(p.as_dvec3())).collect();
-    for (triangle, corners) in (0u32..).zip(cage.triangles()).filter(|(triangle, _)| wanted(*triangle)) {
-        cover(&points, *corners, grid, axis, |u, v, hit| found(u, v, Hit { triangle, ..hit }));
     }
 }
 

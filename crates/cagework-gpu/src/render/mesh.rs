@@ -159,8 +159,9 @@ fn bind_vertices(
 
 /// The groups of a model, and clay for the triangles of none.
 fn whole(model: &DrawModel) -> Vec<DrawGroup> {
-    let mut groups = model.groups.clone();
-    groups.sort_by_key(|g| g.triangles.start);
+    let mut order: Vec<[u32; 2]> = (0u32..).zip(&model.groups).map(|(k, g)| [g.triangles.start, k]).collect();
+    order.sort_unstable();
+    let mut groups: Vec<DrawGroup> = order.iter().map(|[_, k]| model.groups[*k as usize].clone()).collect();
     let mut gaps = Vec::new();
     let mut covered = 0;
     for group in &groups {

@@ -146,8 +146,10 @@ pub(crate) fn instances(
             elsewhere.len()
         ));
     }
-    shown.sort_by_key(|i| (i.mesh, i.node));
-    Ok(shown)
+    let key = |(k, i): (u32, &Instance)| [i.mesh, i.node.map_or(0, |node| node + 1), k];
+    let mut order: Vec<[u32; 3]> = (0u32..).zip(&shown).map(key).collect();
+    order.sort_unstable();
+    Ok(order.into_iter().map(|[.., k]| shown[k as usize].clone()).collect())
 }
 
 /// What the document has of everything.

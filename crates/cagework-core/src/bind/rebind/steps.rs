@@ -38,7 +38,9 @@ pub(super) fn solve_for(
         FieldFate::Kept,
         team,
         watch,
-        &|workspace, batch, progress| workspace.solve_for(hierarchy, (&places, &right[batch]), stop, progress),
+        &|workspace, batch, progress| {
+            workspace.solve_for(hierarchy, (&places, &right[batch]), stop, progress)
+        },
         // No column has this number: only the field is sampled, not the cage's values.
         &|_, field| sample(stencils, usize::MAX / (2 * LANES), field),
     )?;

@@ -7,7 +7,7 @@ use crate::grid::{Grid, NO_CELL};
 use crate::levels::plain::askew_c;
 use crate::levels::{Before, Boundary, Level};
 use crate::solve::hierarchy::Hierarchy;
-use crate::voxelize::embedded::{EmbeddedCells, classify, lines_at_faces, shoot_lines};
+use crate::voxelize::embedded::{EmbeddedCells, classify, lines_at, shoot_changed, shoot_lines};
 
 fn hierarchy(cage: &Cage, grid: &Grid, before: Option<(&Cage, &Hierarchy)>) -> Hierarchy {
     let lines = shoot_lines(cage, grid);
@@ -15,10 +15,8 @@ fn hierarchy(cage: &Cage, grid: &Grid, before: Option<(&Cage, &Hierarchy)>) -> H
     match before {
         None => Hierarchy::new(cells, cage.n_vertices(), EmbeddedCells::coarsened),
         Some((cage_before, hierarchy)) => {
-            let has_changed = cage.changed_faces(cage_before);
-            hierarchy.renewed(cells, EmbeddedCells::coarsened, |n_levels| {
-                lines_at_faces([cage_before, cage], grid, n_levels, |f| has_changed[f as usize])
-            })
+            let changed = shoot_changed(cage_before, cage, grid);
+            hierarchy.renewed(cells, EmbeddedCells::coarsened, |n| lines_at(&changed, grid, n))
         }
     }
 }
@@ -43,6 +41,11 @@ fn assert_on(mut cage: Cage, grid: Grid, way: f64) {
             *p += ((center - *p).normalize() + 0.5 * aside) * (way * grid.cell.x) as f32;
         }
         let edited = Cage::new(&mesh).unwrap();
+        let [gone, come] = shoot_changed(&cage, &edited, &grid);
+        let [were, are] = [&cage, &edited].map(|cage| shoot_lines(cage, &grid));
+        for (axis, are) in are.iter().enumerate() {
+            assert!(were[axis].renewed(&gone[axis], &come[axis]) == *are, "lines, {way} cells, step {step}");
+        }
         let new = hierarchy(&edited, &grid, None);
         let renewed = hierarchy(&edited, &grid, Some((&cage, &before)));
         // In parts, or a failure would print all of it.
@@ -78,8 +81,7 @@ fn a_small_edit_leaves_lines_as_they_are() {
     let mut mesh = cage.to_polygon_mesh();
     mesh.positions[2] += Vec3::splat(0.1 * grid.cell.x as f32);
     let edited = Cage::new(&mesh).unwrap();
-    let has_changed = edited.changed_faces(&cage);
-    let moved = lines_at_faces([&cage, &edited], &grid, 1, |f| has_changed[f as usize]);
+    let moved = lines_at(&shoot_changed(&cage, &edited, &grid), &grid, 1);
     let lines = shoot_lines(&edited, &grid);
     let cells = EmbeddedCells::finest(&edited, &lines, grid, classify(&lines, &grid).0);
     let before = hierarchy(&cage, &grid, None);

@@ -65,7 +65,15 @@ impl Convergence {
     #[must_use]
     pub fn new(stop: Stop) -> Self {
         let report = BatchReport::default();
-        Self { stop, report, correction: f64::INFINITY, delta: f64::INFINITY, largest: f64::INFINITY, ratio: CONTRACTION, stalled: 0 }
+        Self {
+            stop,
+            report,
+            correction: f64::INFINITY,
+            delta: f64::INFINITY,
+            largest: f64::INFINITY,
+            ratio: CONTRACTION,
+            stalled: 0,
+        }
     }
 
     /// Takes down a cycle by the squared norm of its coarse correction, as a mean over cells and in the cell with the largest (0

@@ -37,26 +37,29 @@ impl Places {
         for number in 0..level.n_cut() {
             place[level.row_of_cut(number)] = number as u32;
         }
-        let first_black = level.first_row(1);
-        let (mut shares, mut red) = (Vec::new(), Vec::new());
-        for (k, &cell) in (0u32..).zip(cells) {
-            let row = level.row_of[cell as usize];
+        let (first_black, strides) = (level.first_row(1), level.grid.strides());
+        let (mut shares, mut red, mut whole) = (Vec::new(), Vec::new(), Vec::new());
+        let mut planes = usize::MAX..0;
+        let mut add = |number: u32, cell: usize, share: f32| {
+            let (row, plane) = (level.row_of[cell], cell / strides[2]);
+            planes = planes.start.min(plane)..planes.end.max(plane + 1);
+            if place[row as usize] == NO_CELL {
+                // Whole and black.
+                whole.push(row - first_black as u32);
+            }
+            shares.push((number, row, share));
+        };
+        for (number, &cell) in (0u32..).zip(cells) {
+            let (cell, row) = (cell as usize, level.row_of[cell as usize]);
             if (row as usize) < first_black && place[row as usize] == NO_CELL {
-                red.push([k, row]);
-                for stride in level.grid.strides() {
-                    let around = [cell as usize - stride, cell as usize + stride];
-                    shares.extend(around.map(|neighbour| (k, level.row_of[neighbour], SIXTH)));
+                red.push([number, row]);
+                for stride in strides {
+                    add(number, cell - stride, SIXTH);
+                    add(number, cell + stride, SIXTH);
                 }
             } else {
-                shares.push((k, row, 1.0));
+                add(number, cell, 1.0);
             }
-        }
-        let rows: Vec<u32> = shares.iter().map(|share| share.1).collect();
-        let planes = level.planes_of(&rows);
-        // All that have no place yet are whole and black.
-        let mut whole = Vec::new();
-        for &row in rows.iter().filter(|&&row| place[row as usize] == NO_CELL) {
-            whole.push(row - first_black as u32);
         }
         whole.sort_unstable();
         whole.dedup();
@@ -153,7 +156,8 @@ mod tests {
             for plane in 0..level.grid.dims[2] as usize {
                 relax_plane(level, colour, plane, &mut swept, Rhs::Dense(&f));
             }
-            let change = |(a, b): (&Row, &Row)| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            let change =
+                |(a, b): (&Row, &Row)| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             let change = u.iter().zip(&swept).map(change).fold(0.0, f32::max);
             assert!(change < ROUNDED, "colour {colour}: {change}");
         }
