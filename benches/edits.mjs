@@ -1,5 +1,6 @@
 /**
- * Binds after edits of the rest cage, as share of a whole bind, in the page's own module (build it first: cargo xtask page).
+ * Binds after edits of the rest cage, as share of a whole bind, in the page's own module (build it first: cargo xtask page): one
+ * vertex by 1 % of the model, and by 0.1 %.
  *
  *   node benches/edits.mjs                       the samples
  *   node benches/edits.mjs mesh.obj cage.obj     a model and its cage
@@ -10,9 +11,8 @@ import { readFileSync } from "node:fs";
 const EDITS = 5;
 const BINDS = 8;
 const PLACES = [0.1, 0.4, 0.6, 0.9];
-/** Of the model's longest side: the first edit, and how much larger each further one is. */
-const STEP = 0.01;
-const MORE = 0.1;
+/** What a vertex moves by in each edit, of the model's longest side: about half a cell, and a twentieth. */
+const STEPS = [0.01, 0.001];
 /** Vertices nearer to the cage's box than this share of it would move the grid. */
 const RIM = 0.03;
 
@@ -87,23 +87,27 @@ async function measure(name, mesh, { positions, corners }) {
   // The first place twice, and once not counted: the code of edits is compiled then.
   for (const [number, place] of [PLACES[0], ...PLACES].entries()) {
     const vertex = free[Math.floor(place * free.length)];
-    const binder = new Binder();
-    await bind(binder, mesh, positions, corners);
-    const times = [];
-    let last;
-    for (let k = 0; k < EDITS; k += 1) {
-      const edited = positions.slice();
-      edited[3 * vertex + 1] += STEP * size * (1 + MORE * k);
-      last = await bind(binder, mesh, edited, corners);
-      times.push(last.ms);
+    const shares = [];
+    for (const step of STEPS) {
+      const binder = new Binder();
+      await bind(binder, mesh, positions, corners);
+      const times = [];
+      let last;
+      for (let k = 1; k <= EDITS; k += 1) {
+        const edited = positions.slice();
+        // There and back again: no further from the cage's shape after many edits than after one.
+        edited[3 * vertex + 1] += (k % 2) * step * size;
+        last = await bind(binder, mesh, edited, corners);
+        times.push(last.ms);
+      }
+      binder.free();
+      const how = last.corrections === undefined ? "anew" : `${last.corrections} corrections`;
+      shares.push(`${(median(times) / median(whole)).toFixed(2)} (${how})`);
     }
-    binder.free();
-    if (number === 0) continue;
-    const how = last.corrections === undefined ? "anew" : `${last.corrections} corrections`;
-    edits.push(`vertex ${vertex} ${(median(times) / median(whole)).toFixed(2)} (${how})`);
+    if (number > 0) edits.push(`vertex ${vertex} ${shares.join(" and ")}`);
   }
   const of = `${mesh.length / 3} vertices, ${positions.length / 3} columns`;
-  console.log(`${name}: ${of}; whole ${median(whole).toFixed(0)} ms; ${edits.join(", ")}`);
+  console.log(`${name}: ${of}; whole ${median(whole).toFixed(0)} ms; ${edits.join("; ")}`);
 }
 
 const [mesh, cage] = process.argv.slice(2);
