@@ -56,7 +56,7 @@ const ONE_IN: usize = 4;
 /// An edit may reach one in so many of the cells next to the cage for each batch of columns: a quarter of them with 24 vertices,
 /// where corrections and what it takes to find them cost as much as a bind. Beyond, everything is bound anew; from twelve batches
 /// on nothing is refused.
-const REACH: usize = 12;
+const REACH: usize = 7;
 
 /// How much more of what a correction would still change may be left where a bind has few batches, of which a cycle more is a large
 /// share: twice as much with 24 vertices, nothing with 44 or more. Of 48 edits each by 0.1, 0.4 and 1 % of the model, four
