@@ -147,8 +147,14 @@ impl Level {
     /// Cells of a z-plane within their colour.
     #[must_use]
     pub fn cells_of_plane(&self, colour: usize, z: usize) -> Range<usize> {
-        let ny = self.grid.dims[1] as usize;
-        self.lines[z * ny][colour] as usize..self.lines[(z + 1) * ny][colour] as usize
+        self.cells_of_lines(colour, z, &(0..self.grid.dims[1] as usize))
+    }
+
+    /// Cells of the lines `ys` of a z-plane within their colour.
+    #[must_use]
+    pub fn cells_of_lines(&self, colour: usize, z: usize, ys: &Range<usize>) -> Range<usize> {
+        let first = z * self.grid.dims[1] as usize;
+        self.lines[first + ys.start][colour] as usize..self.lines[first + ys.end][colour] as usize
     }
 
     /// Number of cut cells of both colours.

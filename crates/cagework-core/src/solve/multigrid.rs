@@ -21,7 +21,7 @@ mod stream;
 pub use convergence::{BatchReport, Convergence, Stop, histories};
 pub use other::Places;
 
-use std::ops::Range;
+use std::sync::Arc;
 
 use super::hierarchy::Hierarchy;
 use super::rows::{LANES, Rhs, Row, ZERO, over_relax_plane, relax_plane, restrict_residual};
@@ -29,8 +29,7 @@ use crate::levels::Level;
 use crate::simd::dispatch;
 
 use stream::{
-    DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, Extent, Pass, UP, UP_AND_DOWN, UP_AND_HALF_DOWN, add_whole,
-    stream,
+    DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, Pass, UP, UP_AND_DOWN, UP_AND_HALF_DOWN, add_whole, stream,
 };
 
 /// Over-relaxation of the first black half sweep: 1.1 to 1.3 all lower the error 1.5 to 2 times per cycle (Armadillo).
@@ -51,14 +50,12 @@ pub const COARSEST_OMEGA: f32 = 1.4;
 pub struct Workspace {
     /// `u[k]`: the solution, on coarse levels the correction. `[n_rows]`
     u: Vec<Vec<Row>>,
-    /// `f[0]`: one row per cut cell, then one for each of `whole`; `f[k]`: one row per cell.
+    /// `f[0]`: one row per cut cell, then those of whole cells (`places`); `f[k]`: one row per cell.
     f: Vec<Vec<Row>>,
     /// Residual of the red cells of the level under way, and a zero row.
     residual: Vec<Row>,
-    /// Planes of the finest level outside which there is no right-hand side, if that is known.
-    planes: Option<Range<usize>>,
-    /// See [`Extent::whole`]; of the finest level.
-    whole: Vec<u32>,
+    /// Where the finest level's right-hand side is, if it is not the cage's.
+    places: Arc<Places>,
 }
 
 impl Workspace {
@@ -72,7 +69,7 @@ impl Workspace {
             .enumerate()
             .map(|(k, l)| vec![ZERO; if k == 0 { l.n_cut() } else { l.n_rows() }])
             .collect();
-        Self { u, f, residual: vec![ZERO; hierarchy.levels[0].first_row(1)], planes: None, whole: Vec::new() }
+        Self { u, f, residual: vec![ZERO; hierarchy.levels[0].first_row(1)], places: Arc::default() }
     }
 
     /// Bytes of a workspace for `hierarchy`.
@@ -173,11 +170,6 @@ impl Workspace {
         if k == 0 { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) }
     }
 
-    /// Where level k's right-hand side is.
-    fn extent<'a>(planes: Option<&'a Range<usize>>, whole: &'a [u32], k: usize) -> Extent<'a> {
-        if k == 0 { Extent { planes, whole } } else { Extent::default() }
-    }
-
     /// A cycle's way down on level k, by the passes `start`, and all of it on coarser levels. Returns (squared norm of the
     /// coarse correction, on level 0; mean squared residual).
     fn down(&mut self, hierarchy: &Hierarchy, k: usize, start: &[Pass]) -> (f64, f64) {
@@ -186,7 +178,7 @@ impl Workspace {
             if start == DOWN_FROM_ZERO {
                 self.u[k].fill(ZERO);
             }
-            let whole = Self::extent(None, &self.whole, k).whole;
+            let whole = self.places.extent(k, start).whole;
             return relax_coarsest(level, &mut self.u[k], Self::rhs(&self.f, k), whole);
         }
         let (coarse, transfer) = (&hierarchy.levels[k + 1], &hierarchy.transfers[k]);
@@ -194,8 +186,7 @@ impl Workspace {
         let (u, coarse_u) = self.u.split_at_mut(k + 1);
         let residual = &mut self.residual[..level.first_row(1)];
         let rhs = Self::rhs(f, k);
-        let planes = self.planes.as_ref().filter(|_| start == DOWN_FROM_ZERO);
-        let extent = Self::extent(planes, &self.whole, k);
+        let extent = self.places.extent(k, start);
         let squares = stream(start, level, extent, (transfer, &coarse_u[0]), &mut u[k], rhs, residual);
         let mean_square = dispatch(
             #[inline(always)]
@@ -221,7 +212,7 @@ impl Workspace {
             stream(
                 UP,
                 &hierarchy.levels[k],
-                Self::extent(None, &self.whole, k),
+                self.places.extent(k, UP),
                 (&hierarchy.transfers[k], &coarse_u[0]),
                 &mut u[k],
                 rhs,

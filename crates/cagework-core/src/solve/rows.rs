@@ -4,6 +4,8 @@
 //! (`[red .., 0, black .., 0]`). Every kernel works on one z-plane of one colour, so that callers can let several
 //! half sweeps follow each other a plane apart and a whole smoothing pass reads the field from memory once.
 
+use std::ops::Range;
+
 use crate::bind::DeltaNorm;
 use crate::grid::NO_CELL;
 use crate::levels::{Colour, Level};
@@ -88,6 +90,43 @@ pub(super) fn sum_around(field: &[Row], neighbours: &[u32; 6]) -> Row {
     sum
 }
 
+/// What a kernel goes through: a z-plane, or some of its lines along x.
+#[derive(Clone, Debug)]
+pub struct Part {
+    plane: usize,
+    /// All if there are none.
+    ys: Option<Range<usize>>,
+}
+
+impl From<usize> for Part {
+    fn from(plane: usize) -> Self {
+        Self { plane, ys: None }
+    }
+}
+
+impl Part {
+    /// The lines `ys` of a plane.
+    #[must_use]
+    pub fn lines(plane: usize, ys: Range<usize>) -> Self {
+        Self { plane, ys: Some(ys) }
+    }
+
+    /// A colour's runs and cut cells.
+    #[inline(always)]
+    fn of(&self, level: &Level, colour: usize) -> [Range<usize>; 2] {
+        let Colour { runs, cut, planes, .. } = &level.colours[colour];
+        let ([run, cell], [run_end, cell_end]) = (planes[self.plane], planes[self.plane + 1]);
+        let [of_runs, of_cut] = [run as usize..run_end as usize, cell as usize..cell_end as usize];
+        let Some(ys) = &self.ys else { return [of_runs, of_cut] };
+        let cells = level.cells_of_lines(colour, self.plane, ys);
+        let run_at =
+            |end: usize| run as usize + runs[of_runs.clone()].partition_point(|r| (r.start as usize) < end);
+        let cut_at =
+            |end: usize| cell as usize + cut[of_cut.clone()].partition_point(|c| (c.cell as usize) < end);
+        [run_at(cells.start)..run_at(cells.end), cut_at(cells.start)..cut_at(cells.end)]
+    }
+}
+
 /// One cell of a plane under way.
 struct Visit {
     /// The cell, within its colour.
@@ -105,15 +144,16 @@ struct Visit {
 /// Rows are handed over from slices cut once per run, so that whole runs need no check of an index.
 #[inline(always)]
 fn visit_plane<const OLD: bool>(
-    colour: &Colour,
-    plane: usize,
+    level: &Level,
+    colour: usize,
+    part: Part,
     [old, other]: [&[Row]; 2],
     rhs: ColourRhs<'_>,
     out: &mut [Row],
     mut each: impl FnMut(&mut Row, Visit),
 ) {
-    let ([run, cut], [run_end, cut_end]) = (colour.planes[plane], colour.planes[plane + 1]);
-    for run in &colour.runs[run as usize..run_end as usize] {
+    let ([runs, cut], colour) = (part.of(level, colour), &level.colours[colour]);
+    for run in &colour.runs[runs] {
         let (start, n) = (run.start as usize, run.len as usize);
         let part = |first: u32, n: usize| &other[first as usize..first as usize + n];
         let (low, high) = (part(run.x, n), part(run.x + 1, n));
@@ -136,7 +176,7 @@ fn visit_plane<const OLD: bool>(
             each(&mut out[j], Visit { cell: start + j, old, sum, diagonal: 6.0 });
         }
     }
-    for (number, cut) in (cut as usize..).zip(&colour.cut[cut as usize..cut_end as usize]) {
+    for (number, cut) in (cut.start..).zip(&colour.cut[cut]) {
         let cell = cut.cell as usize;
         let mut sum = match rhs {
             ColourRhs::Cut(rows) => rows[number],
@@ -152,8 +192,8 @@ fn visit_plane<const OLD: bool>(
 
 /// Gauss-Seidel on one plane of one colour: `u = (sum of neighbours + f) / diagonal`.
 #[inline(always)]
-pub fn relax_plane(level: &Level, colour: usize, plane: usize, u: &mut [Row], rhs: Rhs<'_>) {
-    over_relax_zeros_plane(level, colour, plane, 1.0, u, rhs);
+pub fn relax_plane(level: &Level, colour: usize, part: impl Into<Part>, u: &mut [Row], rhs: Rhs<'_>) {
+    over_relax_zeros_plane(level, colour, part, 1.0, u, rhs);
 }
 
 /// [`over_relax_plane`] where this colour is still zero, whatever its rows hold.
@@ -161,15 +201,16 @@ pub fn relax_plane(level: &Level, colour: usize, plane: usize, u: &mut [Row], rh
 pub fn over_relax_zeros_plane(
     level: &Level,
     colour: usize,
-    plane: usize,
+    part: impl Into<Part>,
     omega: f32,
     u: &mut [Row],
     rhs: Rhs<'_>,
 ) {
     let (own, other) = split(level, u, colour);
     visit_plane::<false>(
-        &level.colours[colour],
-        plane,
+        level,
+        colour,
+        part.into(),
         [&[], other],
         rhs.of(level, colour),
         own,
@@ -183,11 +224,11 @@ pub fn over_relax_zeros_plane(
 
 /// [`relax_plane`] of red cells where both colours are still zero, whatever their rows hold: `u = f / diagonal`.
 #[inline(always)]
-pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: Rhs<'_>) {
+pub fn relax_zeros_plane(level: &Level, part: impl Into<Part>, u: &mut [Row], rhs: Rhs<'_>) {
     let red = &level.colours[0];
     let rhs = rhs.of(level, 0);
-    let ([run, cut], [run_end, cut_end]) = (red.planes[plane], red.planes[plane + 1]);
-    for run in &red.runs[run as usize..run_end as usize] {
+    let [runs, cut] = part.into().of(level, 0);
+    for run in &red.runs[runs] {
         let cells = run.start as usize..(run.start + run.len) as usize;
         match rhs {
             ColourRhs::Cut(_) => u[cells].fill(ZERO),
@@ -198,7 +239,7 @@ pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: Rhs<'_
             }
         }
     }
-    for (number, cut) in (cut as usize..).zip(&red.cut[cut as usize..cut_end as usize]) {
+    for (number, cut) in (cut.start..).zip(&red.cut[cut]) {
         let f = match rhs {
             ColourRhs::Cut(rows) => rows[number],
             ColourRhs::Dense(rows) => rows[cut.cell as usize],
@@ -213,8 +254,9 @@ pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: Rhs<'_
 pub fn over_relax_plane(level: &Level, colour: usize, plane: usize, omega: f32, u: &mut [Row], rhs: Rhs<'_>) {
     let (own, other) = split(level, u, colour);
     visit_plane::<false>(
-        &level.colours[colour],
-        plane,
+        level,
+        colour,
+        plane.into(),
         [&[], other],
         rhs.of(level, colour),
         own,
@@ -233,7 +275,7 @@ pub fn over_relax_plane(level: &Level, colour: usize, plane: usize, omega: f32, 
 #[inline(always)]
 pub fn residual_plane(
     level: &Level,
-    plane: usize,
+    part: impl Into<Part>,
     u: &mut [Row],
     rhs: Rhs<'_>,
     residual: &mut [Row],
@@ -242,8 +284,9 @@ pub fn residual_plane(
     let (own, other) = split(level, u, 0);
     let mut sum_squares = *squares;
     visit_plane::<true>(
-        &level.colours[0],
-        plane,
+        level,
+        0,
+        part.into(),
         [own, other],
         rhs.of(level, 0),
         residual,
@@ -278,8 +321,9 @@ pub fn jacobi_plane(
     let (new, _) = split(level, new, colour);
     let is_literal = norm == DeltaNorm::Literal;
     visit_plane::<true>(
-        &level.colours[colour],
-        plane,
+        level,
+        colour,
+        plane.into(),
         [old, other],
         rhs.of(level, colour),
         new,

@@ -1,5 +1,7 @@
 //! The stages of a rebind that work on whole batches or all vertices.
 
+use std::sync::Arc;
+
 use crate::bind::BindOptions;
 use crate::bind::solving::{FieldFate, SolvedBatch, sample, solve_batches, stop_of_batches};
 use crate::bind::watch::Watch;
@@ -31,7 +33,7 @@ pub(super) fn solve_for(
     let stop = stop_of_batches(options.tau, options.max_iterations, right.len());
     let in_any_cell = f64::from(IN_ANY_CELL * lenience(hierarchy.n_batches()));
     let stop = Stop { in_any_cell: in_any_cell * f64::from(options.tau), ..stop };
-    let places = Places::new(&hierarchy.levels[0], cells);
+    let places = Arc::new(Places::new(&hierarchy.levels[0], cells));
     let (solved, _) = solve_batches(
         hierarchy,
         right.len(),

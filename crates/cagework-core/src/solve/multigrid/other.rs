@@ -1,15 +1,16 @@
 //! Right-hand sides other than the cage's.
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use super::stream::DOWN_FROM_ZERO;
+use super::stream::{DOWN_FROM_ZERO, Extent, Pass};
 use super::{BatchReport, Stop, Workspace};
 use crate::grid::NO_CELL;
 use crate::levels::Level;
 use crate::solve::hierarchy::Hierarchy;
 use crate::solve::rows::{Row, ZERO};
 
-/// What a right-hand side of a whole red cell adds to the cell, and its six neighbours' right-hand sides, if it is handed to them.
+/// What a right-hand side of a whole red cell adds to the cell, and to the six neighbours' right-hand sides.
 const SIXTH: f32 = 1.0 / 6.0;
 
 /// Where right-hand sides of some cells go.
@@ -25,8 +26,8 @@ pub struct Places {
     red: Vec<[u32; 2]>,
     /// Whole black cells, within their colour, ascending.
     whole: Vec<u32>,
-    /// Planes from the first right-hand side to the last.
-    planes: Range<usize>,
+    /// See [`Extent::reach`].
+    reach: Vec<Vec<Range<usize>>>,
 }
 
 impl Places {
@@ -39,10 +40,12 @@ impl Places {
         }
         let (first_black, strides) = (level.first_row(1), level.grid.strides());
         let (mut shares, mut red, mut whole) = (Vec::new(), Vec::new(), Vec::new());
-        let mut planes = usize::MAX..0;
+        let [_, ny, nz] = level.grid.dims.map(|n| n as usize);
+        let mut lines = vec![0..0; nz];
         let mut add = |number: u32, cell: usize, share: f32| {
-            let (row, plane) = (level.row_of[cell], cell / strides[2]);
-            planes = planes.start.min(plane)..planes.end.max(plane + 1);
+            let row = level.row_of[cell];
+            let (y, z) = (cell % strides[2] / strides[1], cell / strides[2]);
+            lines[z] = hull(&lines[z], &(y..y + 1));
             if place[row as usize] == NO_CELL {
                 // Whole and black.
                 whole.push(row - first_black as u32);
@@ -69,7 +72,38 @@ impl Places {
         for (_, row, _) in &mut shares {
             *row = place[*row as usize];
         }
-        Self { shares, red, whole, planes }
+        let mut reach = vec![lines];
+        while reach.len() < DOWN_FROM_ZERO.len() {
+            let before = &reach[reach.len() - 1];
+            // A pass carries what there is no more than a cell further.
+            let further = |z: usize| {
+                let Range { start, end } = before[z];
+                let own = if start < end { start.saturating_sub(1)..ny.min(end + 1) } else { 0..0 };
+                let beside = [z.checked_sub(1), Some(z + 1)].into_iter().flatten();
+                beside.filter_map(|z| before.get(z)).fold(own, |own, other| hull(&own, other))
+            };
+            let further = (0..nz).map(further).collect();
+            reach.push(further);
+        }
+        Self { shares, red, whole, reach }
+    }
+
+    /// Where level k's right-hand side is, for some passes.
+    pub(super) fn extent(&self, k: usize, passes: &[Pass]) -> Extent<'_> {
+        if k > 0 {
+            return Extent::default();
+        }
+        let has_reach = passes == DOWN_FROM_ZERO && !self.reach.is_empty();
+        Extent { reach: has_reach.then_some(&self.reach), whole: &self.whole }
+    }
+}
+
+/// The range of both; empty ones have nothing.
+fn hull(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    match (a.is_empty(), b.is_empty()) {
+        (true, _) => b.clone(),
+        (_, true) => a.clone(),
+        _ => a.start.min(b.start)..a.end.max(b.end),
     }
 }
 
@@ -82,7 +116,7 @@ impl Workspace {
     pub fn solve_for(
         &mut self,
         hierarchy: &Hierarchy,
-        (places, values): (&Places, &[Row]),
+        (places, values): (&Arc<Places>, &[Row]),
         stop: Stop,
         cycle_done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<BatchReport> {
@@ -96,11 +130,9 @@ impl Workspace {
                 *out += share * value;
             }
         }
-        self.whole.clone_from(&places.whole);
-        self.planes = Some(places.planes.clone());
+        self.places = Arc::clone(places);
         let report = self.cycles(hierarchy, DOWN_FROM_ZERO, stop, cycle_done);
-        self.whole.clear();
-        self.planes = None;
+        self.places = Arc::default();
         for &[number, row] in &places.red {
             for (out, value) in self.u[0][row as usize].iter_mut().zip(&values[number as usize]) {
                 *out += SIXTH * value;
@@ -139,7 +171,7 @@ mod tests {
         let hierarchy = hierarchy();
         let level = &hierarchy.levels[0];
         let (cells, values) = some_cells(&hierarchy, 5, 11);
-        let places = Places::new(level, &cells);
+        let places = Arc::new(Places::new(level, &cells));
         let n_cut = level.n_cut() as u32;
         assert!(!places.red.is_empty() && !places.whole.is_empty());
         assert!(places.shares.iter().any(|&(_, place, share)| place < n_cut && share == 1.0));
@@ -169,7 +201,7 @@ mod tests {
         let hierarchy = hierarchy();
         let [some, others] = [0, 13].map(|first| {
             let (cells, values) = some_cells(&hierarchy, first, 29);
-            (Places::new(&hierarchy.levels[0], &cells), values)
+            (Arc::new(Places::new(&hierarchy.levels[0], &cells)), values)
         });
         let mut used = Workspace::new(&hierarchy);
         assert!(used.solve_for(&hierarchy, (&some.0, &some.1), stop(3), &mut |_, _| false).is_none());

@@ -9,8 +9,8 @@ use std::ops::Range;
 use crate::levels::Level;
 use crate::simd::dispatch;
 use crate::solve::rows::{
-    LANES, Prolong, Rhs, Row, ZERO, over_relax_plane, over_relax_zeros_plane, prolong_plane, relax_plane,
-    relax_zeros_plane, residual_plane, split,
+    LANES, Part, Prolong, Rhs, Row, ZERO, over_relax_plane, over_relax_zeros_plane, prolong_plane,
+    relax_plane, relax_zeros_plane, residual_plane, split,
 };
 use crate::transfer::Transfer;
 
@@ -57,8 +57,8 @@ pub(super) const UP_AND_HALF_DOWN: &[Pass] =
 /// Where a level's right-hand side is, if it is not the cage's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Extent<'a> {
-    /// For passes from zero: planes outside which there is none.
-    pub(super) planes: Option<&'a Range<usize>>,
+    /// For passes from zero: the lines along x of each plane outside which each pass leaves zeros. `[n_passes][nz]`
+    pub(super) reach: Option<&'a [Vec<Range<usize>>]>,
     /// Black cells with whole stencils that have some, ascending, within their colour: the rows after all cut cells'.
     pub(super) whole: &'a [u32],
 }
@@ -86,27 +86,33 @@ pub(super) fn stream(
             for step in 0..n + passes.len() - 1 {
                 for (lag, pass) in passes.iter().enumerate() {
                     let Some(plane) = step.checked_sub(lag).filter(|&plane| plane < n) else { continue };
-                    // A pass carries what there is no more than a plane further; beyond, all is zero.
-                    let reach = |p: &Range<usize>| p.start.saturating_sub(lag)..p.end + lag;
-                    if extent.planes.is_some_and(|planes| !reach(planes).contains(&plane)) {
+                    let mut part = Part::from(plane);
+                    if let Some(reach) = extent.reach {
+                        let ys = &reach[lag][plane];
+                        let clear = |colour: usize, rows: &mut [Row]| {
+                            let (all, some) = (
+                                level.cells_of_plane(colour, plane),
+                                level.cells_of_lines(colour, plane, ys),
+                            );
+                            rows[all.start..some.start].fill(ZERO);
+                            rows[some.end..all.end].fill(ZERO);
+                        };
                         match *pass {
-                            RedFromZero => u[level.cells_of_plane(0, plane)].fill(ZERO),
-                            BlackFurtherFromZero => {
-                                split(level, u, 1).0[level.cells_of_plane(1, plane)].fill(ZERO);
-                            }
-                            Residual => residual[level.cells_of_plane(0, plane)].fill(ZERO),
+                            RedFromZero => clear(0, u),
+                            BlackFurtherFromZero => clear(1, split(level, u, 1).0),
+                            Residual => clear(0, residual),
                             _ => {}
                         }
-                        continue;
+                        part = Part::lines(plane, ys.clone());
                     }
                     match *pass {
                         Pass::Prolong(mode) => prolong_plane(level, transfer, plane, coarse, u, mode),
-                        Red => relax_plane(level, 0, plane, u, f),
-                        Black => relax_plane(level, 1, plane, u, f),
+                        Red => relax_plane(level, 0, part, u, f),
+                        Black => relax_plane(level, 1, part, u, f),
                         BlackFurther => over_relax_plane(level, 1, plane, OMEGA, u, f),
-                        RedFromZero => relax_zeros_plane(level, plane, u, f),
-                        BlackFurtherFromZero => over_relax_zeros_plane(level, 1, plane, OMEGA, u, f),
-                        Residual => residual_plane(level, plane, u, f, residual, &mut squares),
+                        RedFromZero => relax_zeros_plane(level, part, u, f),
+                        BlackFurtherFromZero => over_relax_zeros_plane(level, 1, part, OMEGA, u, f),
+                        Residual => residual_plane(level, part, u, f, residual, &mut squares),
                     }
                     let omega = match *pass {
                         Black => 1.0,
@@ -143,37 +149,37 @@ pub(super) fn add_whole(level: &Level, plane: usize, omega: f32, u: &mut [Row], 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::NO_CELL;
     use crate::levels::plain::{hierarchy, some_field};
+    use crate::solve::multigrid::Places;
 
     #[test]
-    fn planes_without_a_right_hand_side_need_not_be_gone_through() {
+    fn lines_that_no_right_hand_side_reaches_need_not_be_gone_through() {
         let hierarchy = hierarchy();
         let (level, transfer) = (&hierarchy.levels[0], &hierarchy.transfers[0]);
-        let n = level.grid.dims[2] as usize;
-        let with_cells = |z: &usize| !level.cells_of_plane(0, *z).is_empty();
-        let (first, last) = ((0..n).find(with_cells).unwrap(), (0..n).rev().find(with_cells).unwrap());
-        for z in [first, n / 2, last] {
-            let mut f = vec![ZERO; level.n_rows()];
-            let some = some_field(level, 1);
-            for colour in 0..2 {
-                let first = level.first_row(colour);
-                for cell in level.cells_of_plane(colour, z).step_by(3) {
-                    f[first + cell] = some[first + cell];
-                }
+        let cells: Vec<u32> =
+            (0u32..).zip(&level.row_of).filter(|(_, row)| **row != NO_CELL).map(|(cell, _)| cell).collect();
+        let (n, some) = (cells.len(), some_field(level, 1));
+        // One at either end, one in the middle, two far apart, and none.
+        for of in [&[0][..], &[n - 1], &[n / 2], &[n / 3, 2 * n / 3], &[]] {
+            let (mut f, of) = (vec![ZERO; level.n_rows()], of.iter().map(|&k| cells[k]).collect::<Vec<_>>());
+            let places = Places::new(level, &of);
+            for cell in &of {
+                let row = level.row_of[*cell as usize] as usize;
+                f[row] = some[row];
             }
-            let planes = z..z + 1;
-            let run = |planes: Option<&Range<usize>>| {
+            let run = |reach| {
                 // What fields hold must not count.
                 let (mut u, mut residual) = (some_field(level, 2), vec![[7.0; LANES]; level.first_row(1)]);
                 let coarse = (transfer, &[] as &[Row]);
-                let extent = Extent { planes, whole: &[] };
+                let extent = Extent { reach, whole: &[] };
                 let squares =
                     stream(DOWN_FROM_ZERO, level, extent, coarse, &mut u, Rhs::Dense(&f), &mut residual);
                 (u, residual, squares)
             };
-            let (all, few) = (run(None), run(Some(&planes)));
-            assert!(all == few, "plane {z}");
-            assert!(all.2 > 0.0);
+            let (all, few) = (run(None), run(places.extent(0, DOWN_FROM_ZERO).reach));
+            assert!(all == few, "{of:?}");
+            assert_eq!(all.2 > 0.0, !of.is_empty());
         }
     }
 }
