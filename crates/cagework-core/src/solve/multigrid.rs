@@ -62,7 +62,9 @@ impl Workspace {
     /// Fields for all levels.
     #[must_use]
     pub fn new(hierarchy: &Hierarchy) -> Self {
-        let u = hierarchy.levels.iter().map(|l| vec![ZERO; l.n_rows()]).collect();
+        // The finest level's is made by whoever solves: it may be handed out.
+        let mut u = vec![Vec::new()];
+        u.extend(hierarchy.levels[1..].iter().map(|l| vec![ZERO; l.n_rows()]));
         let f = hierarchy
             .levels
             .iter()

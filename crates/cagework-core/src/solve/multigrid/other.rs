@@ -121,6 +121,8 @@ impl Workspace {
         cycle_done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<BatchReport> {
         let level = &hierarchy.levels[0];
+        // Zeros: first passes write only where right-hand sides reach.
+        self.u[0].clear();
         self.u[0].resize(level.n_rows(), ZERO);
         self.f[0].clear();
         self.f[0].resize(level.n_cut() + places.whole.len(), ZERO);

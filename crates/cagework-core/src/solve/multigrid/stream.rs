@@ -57,7 +57,8 @@ pub(super) const UP_AND_HALF_DOWN: &[Pass] =
 /// Where a level's right-hand side is, if it is not the cage's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Extent<'a> {
-    /// For passes from zero: the lines along x of each plane outside which each pass leaves zeros. `[n_passes][nz]`
+    /// For passes from zero, if the field's rows hold zeros: the lines along x of each plane outside which each pass leaves them.
+    /// `[n_passes][nz]`
     pub(super) reach: Option<&'a [Vec<Range<usize>>]>,
     /// Black cells with whole stencils that have some, ascending, within their colour: the rows after all cut cells'.
     pub(super) whole: &'a [u32],
@@ -89,19 +90,11 @@ pub(super) fn stream(
                     let mut part = Part::from(plane);
                     if let Some(reach) = extent.reach {
                         let ys = &reach[lag][plane];
-                        let clear = |colour: usize, rows: &mut [Row]| {
-                            let (all, some) = (
-                                level.cells_of_plane(colour, plane),
-                                level.cells_of_lines(colour, plane, ys),
-                            );
-                            rows[all.start..some.start].fill(ZERO);
-                            rows[some.end..all.end].fill(ZERO);
-                        };
-                        match *pass {
-                            RedFromZero => clear(0, u),
-                            BlackFurtherFromZero => clear(1, split(level, u, 1).0),
-                            Residual => clear(0, residual),
-                            _ => {}
+                        if *pass == Residual {
+                            let cells = level.cells_of_plane(0, plane);
+                            let reached = level.cells_of_lines(0, plane, ys);
+                            residual[cells.start..reached.start].fill(ZERO);
+                            residual[reached.end..cells.end].fill(ZERO);
                         }
                         part = Part::lines(plane, ys.clone());
                     }
@@ -168,9 +161,14 @@ mod tests {
                 let row = level.row_of[*cell as usize] as usize;
                 f[row] = some[row];
             }
-            let run = |reach| {
-                // What fields hold must not count.
-                let (mut u, mut residual) = (some_field(level, 2), vec![[7.0; LANES]; level.first_row(1)]);
+            let run = |reach: Option<&[Vec<Range<usize>>]>| {
+                let (mut u, mut residual) =
+                    (vec![ZERO; level.n_rows()], vec![[7.0; LANES]; level.first_row(1)]);
+                if reach.is_none() {
+                    // What it holds must not count then.
+                    u = some_field(level, 2);
+                    u[level.zero_row() as usize] = ZERO;
+                }
                 let coarse = (transfer, &[] as &[Row]);
                 let extent = Extent { reach, whole: &[] };
                 let squares =
