@@ -98,7 +98,9 @@ impl Workspace {
         cycle_done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<BatchReport> {
         let coarsest = hierarchy.levels.len() - 1;
-        self.u[0].resize(hierarchy.levels[0].n_rows(), ZERO);
+        if self.u[0].is_empty() {
+            self.u[0] = vec![ZERO; hierarchy.levels[0].n_rows()];
+        }
         hierarchy.fill_cut_rhs(batch, &mut self.f[0]);
         for k in (1..=coarsest).rev() {
             hierarchy.fill_dense_rhs(k, batch, &mut self.f[k]);

@@ -122,8 +122,7 @@ impl Workspace {
     ) -> Option<BatchReport> {
         let level = &hierarchy.levels[0];
         // Zeros: first passes write only where right-hand sides reach.
-        self.u[0].clear();
-        self.u[0].resize(level.n_rows(), ZERO);
+        self.u[0] = vec![ZERO; level.n_rows()];
         self.f[0].clear();
         self.f[0].resize(level.n_cut() + places.whole.len(), ZERO);
         for &(number, place, share) in &places.shares {
