@@ -8,6 +8,7 @@
 
 import { readFileSync } from "node:fs";
 
+/** As many as start from one whole bind: the next one is bound anew. */
 const EDITS = 6;
 const ROUNDS = 3;
 const BINDS = 15;
@@ -96,7 +97,8 @@ async function measure(name, mesh, { positions, corners }) {
     const shares = [];
     for (const step of STEPS) {
       const times = [];
-      let last;
+      let anew = 0;
+      let corrections;
       for (let round = 0; round < ROUNDS; round += 1) {
         const binder = new Binder();
         await bind(binder, mesh, positions, corners);
@@ -104,13 +106,15 @@ async function measure(name, mesh, { positions, corners }) {
           const edited = positions.slice();
           // There and back again: no further from the cage's shape after many edits than after one.
           edited[3 * vertex + 1] += (k % 2) * step * size;
-          last = await bind(binder, mesh, edited, corners);
-          times.push(last.ms);
+          const { ms, corrections: some } = await bind(binder, mesh, edited, corners);
+          times.push(ms);
+          if (some === undefined) anew += 1;
+          else corrections = some;
         }
         binder.free();
       }
-      const how = last.corrections === undefined ? "anew" : `${last.corrections} corrections`;
-      shares.push(`${(median(times) / median(whole)).toFixed(2)} (${how})`);
+      const how = [corrections && `${corrections} corrections`, anew && `${anew} of ${times.length} anew`];
+      shares.push(`${(median(times) / median(whole)).toFixed(2)} (${how.filter(Boolean).join(", ")})`);
     }
     if (number > 0) edits.push(`vertex ${vertex} ${shares.join(" and ")}`);
   }

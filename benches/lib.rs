@@ -97,7 +97,7 @@ pub fn read(path: &str) -> Model {
 
 /// Solves one batch of columns as a bind does.
 pub fn solve_batch(workspace: &mut Workspace, hierarchy: &Hierarchy, batch: usize) {
-    let stop = Stop { tolerance: TAU / (hierarchy.n_batches() as f64).sqrt(), max_cycles: 20_000 };
+    let stop = Stop::new(TAU / (hierarchy.n_batches() as f64).sqrt(), 20_000);
     let report = workspace.solve(hierarchy, batch, stop, &mut |_, _| true);
     debug_assert!(report.is_some(), "nobody cancels");
 }

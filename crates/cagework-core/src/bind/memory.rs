@@ -49,7 +49,7 @@ pub(super) fn estimate(
     let voxels = n_cells * if options.method == Method::Embedded { 7.0 } else { 5.0 };
     let stencils = n_cut * (size_of::<CutCell>() + size_of::<Run>() + 8 * size_of::<BoundaryTerm>()) as f64;
     // Lines along three axes cross a surface as often as it cuts cells.
-    let lines = n_cut * size_of::<Hit>() as f64;
+    let lines = if options.method == Method::Embedded { n_cut * size_of::<Hit>() as f64 } else { 0.0 };
     let transfers = n_unknowns
         * (size_of::<RestrictRow>() as f64 / 8.0
             + size_of::<ProlongRow<2>>() as f64 * 3.0 / 8.0

@@ -56,10 +56,12 @@ pub struct Workspace {
     residual: Vec<Row>,
     /// Where the finest level's right-hand side is, if it is not the cage's.
     places: Arc<Places>,
+    /// What the coarsest level's last sweeps changed in the cell where that is most, squared and summed over lanes.
+    largest_change: f64,
 }
 
 impl Workspace {
-    /// Fields for all levels.
+    /// Fields for all levels but the finest one's solution, which a solve makes.
     #[must_use]
     pub fn new(hierarchy: &Hierarchy) -> Self {
         // The finest level's is made by whoever solves: it may be handed out.
@@ -71,10 +73,16 @@ impl Workspace {
             .enumerate()
             .map(|(k, l)| vec![ZERO; if k == 0 { l.n_cut() } else { l.n_rows() }])
             .collect();
-        Self { u, f, residual: vec![ZERO; hierarchy.levels[0].first_row(1)], places: Arc::default() }
+        Self {
+            u,
+            f,
+            residual: vec![ZERO; hierarchy.levels[0].first_row(1)],
+            places: Arc::default(),
+            largest_change: 0.0,
+        }
     }
 
-    /// Bytes of a workspace for `hierarchy`.
+    /// Bytes of a workspace for `hierarchy`, but for right-hand sides of whole cells, of which edits have a few.
     #[must_use]
     pub fn bytes(hierarchy: &Hierarchy) -> usize {
         let rows: usize = hierarchy
@@ -139,7 +147,7 @@ impl Workspace {
         }
     }
 
-    /// The finest level's field. `[n_rows]`
+    /// The finest level's field, `[n_rows]`; empty before the first solve and once it was handed out.
     #[must_use]
     pub fn field(&self) -> &[Row] {
         &self.u[0]
@@ -152,7 +160,7 @@ impl Workspace {
     }
 
     /// One full relaxation of the finest level, both colours, as the solver does it: the unit in which a solve's
-    /// cost is measured.
+    /// cost is measured. After a [`Self::solve`].
     pub fn sweep(&mut self, hierarchy: &Hierarchy) {
         let (level, u, f) = (&hierarchy.levels[0], &mut self.u[0], Rhs::Cut(&self.f[0]));
         relax(level, u, f);
@@ -183,7 +191,9 @@ impl Workspace {
                 self.u[k].fill(ZERO);
             }
             let whole = self.places.extent(k, start).whole;
-            return relax_coarsest(level, &mut self.u[k], Self::rhs(&self.f, k), whole);
+            let (change, largest) = relax_coarsest(level, &mut self.u[k], Self::rhs(&self.f, k), whole);
+            self.largest_change = largest;
+            return (change, 0.0);
         }
         let (coarse, transfer) = (&hierarchy.levels[k + 1], &hierarchy.transfers[k]);
         let (f, coarse_f) = self.f.split_at_mut(k + 1);
@@ -225,8 +235,12 @@ impl Workspace {
         }
     }
 
-    /// Square of the latest coarse correction of the finest level in the cell where it is largest, summed over lanes.
+    /// Square of the latest coarse correction of the finest level in the cell where it is largest, summed over lanes; of its
+    /// latest sweeps if there is no other level.
     fn largest_correction(&self) -> f64 {
+        if self.u.len() == 1 {
+            return self.largest_change;
+        }
         let square = |row: &Row| row.iter().map(|w| w * w).sum::<f32>();
         f64::from(self.u.get(1).into_iter().flatten().map(square).fold(0.0, |a, b| if b > a { b } else { a }))
     }
@@ -246,7 +260,7 @@ fn relax(level: &Level, u: &mut [Row], f: Rhs<'_>) {
     );
 }
 
-/// Sweeps on the coarsest level. Returns (squared norm of the change per unknown, 0).
+/// Sweeps on the coarsest level. Returns the squared norm of the change per unknown, and its square in the cell with the most.
 fn relax_coarsest(level: &Level, u: &mut [Row], f: Rhs<'_>, whole: &[u32]) -> (f64, f64) {
     let before = u.to_vec();
     dispatch(
@@ -264,13 +278,13 @@ fn relax_coarsest(level: &Level, u: &mut [Row], f: Rhs<'_>, whole: &[u32]) -> (f
             }
         },
     );
-    let change: f64 = before
-        .iter()
-        .zip(u.iter())
-        .flat_map(|(a, b)| a.iter().zip(b))
-        .map(|(a, b)| f64::from(a - b).powi(2))
-        .sum();
-    (change / level.n_unknowns().max(1) as f64, 0.0)
+    let square = |(a, b): (&Row, &Row)| a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
+    let (mut sum, mut largest) = (0.0, 0.0);
+    for square in before.iter().zip(u.iter()).map(square) {
+        sum += square;
+        largest = f64::max(largest, square);
+    }
+    (sum / level.n_unknowns().max(1) as f64, largest)
 }
 
 /// Sum of squares over all rows and lanes.

@@ -4,12 +4,13 @@
 //! (`[red .., 0, black .., 0]`). Every kernel works on one z-plane of one colour, so that callers can let several
 //! half sweeps follow each other a plane apart and a whole smoothing pass reads the field from memory once.
 
-use std::ops::Range;
-
 use crate::bind::DeltaNorm;
 use crate::grid::NO_CELL;
-use crate::levels::{Colour, Level};
+use crate::levels::Level;
 use crate::transfer::{ProlongRow, RESTRICT_CENTRE, RESTRICT_EDGE, RestrictRow, Transfer};
+
+mod part;
+pub use part::Part;
 
 /// Columns of a batch: one AVX register, two of SSE, NEON or wasm. Measured on the Armadillo: with 16, a solve takes
 /// 25 % less time at g = 64, where a batch fits the second-level cache, and 40 % more at g = 128, where it does not.
@@ -27,7 +28,8 @@ const NEGLIGIBLE: f32 = 1e-18;
 /// Right-hand side of one level.
 #[derive(Clone, Copy, Debug)]
 pub enum Rhs<'a> {
-    /// The cage's values only: one row per cut cell, red ones first. The finest level's.
+    /// One row per cut cell, red ones first: all that the cage's values ask for. The finest level's. Rows after those are of
+    /// whole cells, which kernels leave to whoever has put them there (`multigrid::Places`).
     Cut(&'a [Row]),
     /// One row per cell, in field order. A coarse level's.
     Dense(&'a [Row]),
@@ -90,43 +92,6 @@ pub(super) fn sum_around(field: &[Row], neighbours: &[u32; 6]) -> Row {
     sum
 }
 
-/// What a kernel goes through: a z-plane, or some of its lines along x.
-#[derive(Clone, Debug)]
-pub struct Part {
-    plane: usize,
-    /// All if there are none.
-    ys: Option<Range<usize>>,
-}
-
-impl From<usize> for Part {
-    fn from(plane: usize) -> Self {
-        Self { plane, ys: None }
-    }
-}
-
-impl Part {
-    /// The lines `ys` of a plane.
-    #[must_use]
-    pub fn lines(plane: usize, ys: Range<usize>) -> Self {
-        Self { plane, ys: Some(ys) }
-    }
-
-    /// A colour's runs and cut cells.
-    #[inline(always)]
-    fn of(&self, level: &Level, colour: usize) -> [Range<usize>; 2] {
-        let Colour { runs, cut, planes, .. } = &level.colours[colour];
-        let ([run, cell], [run_end, cell_end]) = (planes[self.plane], planes[self.plane + 1]);
-        let [of_runs, of_cut] = [run as usize..run_end as usize, cell as usize..cell_end as usize];
-        let Some(ys) = &self.ys else { return [of_runs, of_cut] };
-        let cells = level.cells_of_lines(colour, self.plane, ys);
-        let run_at =
-            |end: usize| run as usize + runs[of_runs.clone()].partition_point(|r| (r.start as usize) < end);
-        let cut_at =
-            |end: usize| cell as usize + cut[of_cut.clone()].partition_point(|c| (c.cell as usize) < end);
-        [run_at(cells.start)..run_at(cells.end), cut_at(cells.start)..cut_at(cells.end)]
-    }
-}
-
 /// One cell of a plane under way.
 struct Visit {
     /// The cell, within its colour.
@@ -146,7 +111,7 @@ struct Visit {
 fn visit_plane<const OLD: bool>(
     level: &Level,
     colour: usize,
-    part: Part,
+    part: &Part,
     [old, other]: [&[Row]; 2],
     rhs: ColourRhs<'_>,
     out: &mut [Row],
@@ -210,7 +175,7 @@ pub fn over_relax_zeros_plane(
     visit_plane::<false>(
         level,
         colour,
-        part.into(),
+        &part.into(),
         [&[], other],
         rhs.of(level, colour),
         own,
@@ -256,7 +221,7 @@ pub fn over_relax_plane(level: &Level, colour: usize, plane: usize, omega: f32, 
     visit_plane::<false>(
         level,
         colour,
-        plane.into(),
+        &plane.into(),
         [&[], other],
         rhs.of(level, colour),
         own,
@@ -286,7 +251,7 @@ pub fn residual_plane(
     visit_plane::<true>(
         level,
         0,
-        part.into(),
+        &part.into(),
         [own, other],
         rhs.of(level, 0),
         residual,
@@ -323,7 +288,7 @@ pub fn jacobi_plane(
     visit_plane::<true>(
         level,
         colour,
-        plane.into(),
+        &plane.into(),
         [old, other],
         rhs.of(level, colour),
         new,

@@ -159,6 +159,7 @@ fn bind_vertices(
 
 /// The groups of a model, and clay for the triangles of none.
 fn whole(model: &DrawModel) -> Vec<DrawGroup> {
+    // By numbers, which are sorted elsewhere too: another sort makes the page's module larger.
     let mut order: Vec<[u32; 2]> = (0u32..).zip(&model.groups).map(|(k, g)| [g.triangles.start, k]).collect();
     order.sort_unstable();
     let mut groups: Vec<DrawGroup> = order.iter().map(|[_, k]| model.groups[*k as usize].clone()).collect();

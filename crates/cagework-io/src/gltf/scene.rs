@@ -146,6 +146,7 @@ pub(crate) fn instances(
             elsewhere.len()
         ));
     }
+    // By numbers, which are sorted elsewhere too: another sort makes the page's module larger.
     let key = |(k, i): (u32, &Instance)| [i.mesh, i.node.map_or(0, |node| node + 1), k];
     let mut order: Vec<[u32; 3]> = (0u32..).zip(&shown).map(key).collect();
     order.sort_unstable();

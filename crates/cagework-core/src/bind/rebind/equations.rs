@@ -9,9 +9,7 @@ use super::region::Region;
 pub(super) struct Equations {
     /// Index of each one's cell in the grid.
     pub(super) cells: Vec<u32>,
-    /// Row of each one in the fields.
-    pub(super) rows: Vec<u32>,
-    /// Number of each row among `rows`; [`NO_CELL`] if it is none of them. `[n_rows]`
+    /// Number of each row of the fields among them; [`NO_CELL`] if it is none of them. `[n_rows]`
     pub(super) number: Vec<u32>,
 }
 
@@ -21,8 +19,7 @@ impl Equations {
     #[inline(never)]
     pub(super) fn changed(level: &Level, before: &Level, region: &Region) -> Self {
         let (cut, was_cut) = (cut_rows(level), cut_rows(before));
-        let mut equations =
-            Self { cells: Vec::new(), rows: Vec::new(), number: vec![NO_CELL; level.n_rows()] };
+        let mut equations = Self { cells: Vec::new(), number: vec![NO_CELL; level.n_rows()] };
         for &cell in &region.cells {
             let (row, old_row) = (level.row_of[cell as usize], before.row_of[cell as usize]);
             if row == NO_CELL {
@@ -30,8 +27,7 @@ impl Equations {
             }
             let was_whole = old_row != NO_CELL && !was_cut[old_row as usize];
             if cut[row as usize] || !was_whole {
-                equations.number[row as usize] = equations.rows.len() as u32;
-                equations.rows.push(row);
+                equations.number[row as usize] = equations.cells.len() as u32;
                 equations.cells.push(cell);
             }
         }

@@ -87,7 +87,9 @@ impl Convergence {
         self.report.delta_squares.push(delta * delta);
         self.report.residual_squares.push(residual_square);
         self.report.converged = delta <= self.stop.tolerance && largest <= self.stop.in_any_cell;
-        let stalls = correction < ROUND_OFF && correction > STALLED * self.correction;
+        let stalls = correction < ROUND_OFF
+            && correction > STALLED * self.correction
+            && largest >= STALLED * self.largest;
         self.stalled = if stalls { self.stalled + 1 } else { 0 };
         // The first one has none before it.
         self.ratio = if ratio > 0.0 { ratio } else { self.ratio };
@@ -127,4 +129,38 @@ pub fn histories(reports: &[&BatchReport]) -> [Vec<f32>; 2] {
         (0..longest).map(|k| reports.iter().filter_map(|r| at(r, k)).sum::<f64>().sqrt() as f32).collect()
     };
     [history(|r| &r.delta_squares), history(|r| &r.residual_squares)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A mean below its tolerance is not enough while some cell is above its own.
+    #[test]
+    fn the_cell_with_the_most_counts_too() {
+        let stop = Stop { in_any_cell: 1e-4, ..Stop::new(1e-5, 9) };
+        let mut both = Convergence::new(stop);
+        let mut mean = Convergence::new(Stop::new(1e-5, 9));
+        // Corrections, of which a contraction of 0.12 leaves 1.2e-6 on average and 1.2e-3 in one cell.
+        assert!(mean.cycle_done(1e-5_f64.powi(2), 1e-2_f64.powi(2), 0.0));
+        assert!(!both.cycle_done(1e-5_f64.powi(2), 1e-2_f64.powi(2), 0.0));
+        assert!(!both.is_nearly_done(1.0));
+        assert!(!both.cycle_done(1e-6_f64.powi(2), 1e-3_f64.powi(2), 0.0));
+        assert!(both.is_nearly_done(1.0));
+        assert!(both.cycle_done(1e-7_f64.powi(2), 1e-4_f64.powi(2), 0.0));
+        assert!(both.into_report().converged);
+    }
+
+    /// Rounding ends a solve only where no cell gains anything from another cycle.
+    #[test]
+    fn cycles_that_move_rounding_about_are_the_last() {
+        let stop = Stop { in_any_cell: 0.0, ..Stop::new(0.0, 99) };
+        let n_cycles = |largest: &dyn Fn(i32) -> f64| {
+            let mut convergence = Convergence::new(stop);
+            (1..99).find(|&k| convergence.cycle_done(1e-7_f64.powi(2), largest(k).powi(2), 0.0)).unwrap()
+        };
+        assert_eq!(n_cycles(&|_| 1e-6), 3);
+        let falls_until_the_tenth = |k: i32| if k < 10 { 0.1_f64.powi(k) } else { 1e-10 };
+        assert!(n_cycles(&falls_until_the_tenth) > 10);
+    }
 }

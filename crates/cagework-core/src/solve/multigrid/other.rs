@@ -31,7 +31,10 @@ pub struct Places {
 }
 
 impl Places {
-    /// Of cells, by their index in the grid, that must be unknowns of the level.
+    /// Of cells, by their index in the grid.
+    ///
+    /// # Panics
+    /// If one of them is no unknown of the level.
     #[must_use]
     pub fn new(level: &Level, cells: &[u32]) -> Self {
         let mut place = vec![NO_CELL; level.n_rows()];
@@ -109,10 +112,13 @@ fn hull(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
 
 impl Workspace {
     /// Solves for right-hand sides that are not the cage's: the `values` of the cells that there are `places` for; all others
-    /// are zero. From zero; `cycle_done` as in [`Self::solve`].
+    /// are zero. From zero, in a new field; `cycle_done` as in [`Self::solve`].
     ///
     /// # Errors
     /// `None` when cancelled.
+    ///
+    /// # Panics
+    /// If there are fewer values than cells.
     pub fn solve_for(
         &mut self,
         hierarchy: &Hierarchy,
@@ -166,21 +172,29 @@ mod tests {
     }
 
     /// Sweeps that know each cell's right-hand side leave the solution as it is: red cells and black ones, whole ones and cut
-    /// ones.
+    /// ones; so they do where there is one level only.
     #[test]
     fn the_solution_meets_every_cells_equation() {
         let hierarchy = hierarchy();
+        let single = Hierarchy::single(hierarchy.levels[0].clone(), hierarchy.n_columns);
+        for (hierarchy, n_cycles) in [(hierarchy, 12), (single, 200)] {
+            assert_is_solved(&hierarchy, n_cycles);
+        }
+    }
+
+    fn assert_is_solved(hierarchy: &Hierarchy, n_cycles: u32) {
         let level = &hierarchy.levels[0];
-        let (cells, values) = some_cells(&hierarchy, 5, 11);
+        let (cells, values) = some_cells(hierarchy, 5, 11);
         let places = Arc::new(Places::new(level, &cells));
         let n_cut = level.n_cut() as u32;
         assert!(!places.red.is_empty() && !places.whole.is_empty());
         assert!(places.shares.iter().any(|&(_, place, share)| place < n_cut && share == 1.0));
-        let mut workspace = Workspace::new(&hierarchy);
-        workspace.solve_for(&hierarchy, (&places, &values), Stop::new(0.0, 12), &mut |_, _| true).unwrap();
+        let mut workspace = Workspace::new(hierarchy);
+        let exactly = Stop::new(0.0, n_cycles);
+        workspace.solve_for(hierarchy, (&places, &values), exactly, &mut |_, _| true).unwrap();
         let mut f = vec![ZERO; level.n_rows()];
-        for (cell, values) in cells.iter().zip(values) {
-            f[level.row_of[*cell as usize] as usize] = values;
+        for (cell, values) in cells.iter().zip(&values) {
+            f[level.row_of[*cell as usize] as usize] = *values;
         }
         let u = workspace.field();
         assert!(u.iter().flatten().any(|w| w.abs() > 0.1));
@@ -194,6 +208,10 @@ mod tests {
             let change = u.iter().zip(&swept).map(change).fold(0.0, f32::max);
             assert!(change < ROUNDED, "colour {colour}: {change}");
         }
+        // By the mean one cycle would do.
+        let by_cells = Stop { in_any_cell: 1e-3, ..Stop::new(f64::INFINITY, n_cycles) };
+        let report = workspace.solve_for(hierarchy, (&places, &values), by_cells, &mut |_, _| true).unwrap();
+        assert!(report.converged && report.delta_squares.len() > 1);
     }
 
     /// What one call leaves, also if it is cancelled, must not be felt by the next.
