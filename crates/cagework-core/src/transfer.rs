@@ -94,9 +94,10 @@ impl Transfer {
         };
         for z in 0..nz {
             tables.mark_plane();
+            let mut next = old.map_or([0; 2], |old| old.tables.planes[z as usize]);
             for y in 0..ny {
                 if let Some(old) = old.filter(|old| old.can_prolong(y, z)) {
-                    old.prolong_line(y, z, &mut tables);
+                    old.prolong_line(y, z, &mut next, &mut tables);
                     continue;
                 }
                 let rows = &fine.row_of[fine.grid.index([0, y, z])..][..nx as usize];

@@ -1,5 +1,7 @@
 //! A level before an edit, of which most lines stay what they are.
 
+use std::ops::Range;
+
 use crate::grid::NO_CELL;
 
 use super::build::{Slab, add_to_rows};
@@ -78,21 +80,48 @@ impl<'a> Before<'a> {
         }
     }
 
-    /// Copies the runs and cut cells of the line (y, z) to where its rows are `now`.
-    pub(super) fn copy_line(&self, now: &Level, y: u32, z: u32, slab: &mut Slab) {
+    /// [`Self::shift`] of all lines, `[nz * ny]`.
+    pub(super) fn shifts(&self, now: &Level) -> Vec<[u32; 2]> {
+        (0..self.changed.len()).map(|line| self.shift(now, line)).collect()
+    }
+
+    /// End of the kept lines from (y, z) on in its plane whose rows and neighbours have moved by the same.
+    pub(super) fn end_of_stretch(&self, shifts: &[[u32; 2]], y: u32, z: u32) -> u32 {
+        let ny = self.level.grid.dims[1];
+        let first = (z * ny + y) as usize;
+        let around = self.shifts_around(shifts, first);
+        let is_like_first = |line: usize| self.is_kept(line) && self.shifts_around(shifts, line) == around;
+        let n = (1..(ny - y) as usize).take_while(|k| is_like_first(first + k)).count();
+        y + 1 + n as u32
+    }
+
+    /// Shifts of a line and of those before and after it along y and z. A line that does not exist has nobody's neighbours.
+    fn shifts_around(&self, shifts: &[[u32; 2]], line: usize) -> [[u32; 2]; 5] {
+        let ny = self.level.grid.dims[1] as usize;
+        [line, line.wrapping_sub(1), line + 1, line.wrapping_sub(ny), line + ny]
+            .map(|line| shifts.get(line).copied().unwrap_or_default())
+    }
+
+    /// Copies the runs and cut cells of the lines `ys` of a plane, a stretch, to where their rows are `now`.
+    pub(super) fn copy_lines(
+        &self,
+        now: &Level,
+        shifts: &[[u32; 2]],
+        z: u32,
+        ys: Range<u32>,
+        slab: &mut Slab,
+    ) {
         let (ny, z) = (self.level.grid.dims[1] as usize, z as usize);
-        let line = z * ny + y as usize;
-        let (start, end) = (self.level.lines[line], self.level.lines[line + 1]);
+        let [line, end] = [ys.start, ys.end].map(|y| z * ny + y as usize);
+        let (start, end) = (self.level.lines[line], self.level.lines[end]);
         if start == end {
             return;
         }
-        let n_lines = now.lines.len() - 1;
+        let around = self.shifts_around(shifts, line);
         for c in 0..2 {
-            let own = self.shift(now, line)[c];
-            // A line that does not exist has nobody's neighbours.
-            let of_line = |line: usize| if line < n_lines { self.shift(now, line)[1 - c] } else { 0 };
-            let x = of_line(line);
-            let yz = [line.wrapping_sub(1), line + 1, line.wrapping_sub(ny), line + ny].map(of_line);
+            let own = around[0][c];
+            let [x, y_low, y_high, z_low, z_high] = around.map(|shift| shift[1 - c]);
+            let yz = [y_low, y_high, z_low, z_high];
             let (colour, out) = (&self.level.colours[c], &mut slab.colours[c]);
             let ([run, cut], [run_end, cut_end]) = (colour.planes[z], colour.planes[z + 1]);
             let runs = &colour.runs[run as usize..run_end as usize];

@@ -117,18 +117,23 @@ impl Level {
 fn build(boundary: &dyn Boundary, before: Option<&Before<'_>>) -> (Level, Vec<u32>) {
     let mut level = number_cells(boundary, before);
     let [_, ny, nz] = level.grid.dims;
+    let shifts = before.map_or_else(Vec::new, |before| before.shifts(&level));
     let slabs = map_indices(nz.div_ceil(SLAB) as usize, |k| {
         let first = k as u32 * SLAB;
         let mut slab = Slab::default();
         for z in first..nz.min(first + SLAB) {
             slab.mark_plane();
-            for y in 0..ny {
+            let mut y = 0;
+            while y < ny {
+                let mut next = y + 1;
                 match before {
                     Some(before) if before.is_kept((z * ny + y) as usize) => {
-                        before.copy_line(&level, y, z, &mut slab);
+                        next = before.end_of_stretch(&shifts, y, z);
+                        before.copy_lines(&level, &shifts, z, y..next, &mut slab);
                     }
                     _ => level.add_line(boundary, y, z, &mut slab),
                 }
+                y = next;
                 if before.is_some() {
                     for (from, colour) in slab.from.iter_mut().zip(&slab.colours) {
                         from.resize(colour.cut.len(), NO_CELL);

@@ -56,8 +56,8 @@ impl Old<'_> {
             && self.are_same(1, coarse.into_iter().map(|(dy, dz)| (y / 2 + dy, z / 2 + dz)))
     }
 
-    /// Copies a fine line's black cells.
-    pub(super) fn prolong_line(&self, y: u32, z: u32, tables: &mut Transfer) {
+    /// Copies a fine line's black cells. `next`: where the lines before it in its plane ended in both tables, or began.
+    pub(super) fn prolong_line(&self, y: u32, z: u32, next: &mut [u32; 2], tables: &mut Transfer) {
         let ny = self.levels[0].grid.dims[1];
         let (line, level) = ((z * ny + y) as usize, self.before[0].level());
         let cells = level.lines[line][1]..level.lines[line + 1][1];
@@ -65,19 +65,19 @@ impl Old<'_> {
             return;
         }
         let by = self.before[0].shift(self.levels[0], line)[1];
-        let (low, planes) = ([y / 2, z / 2].map(i64::from), &self.tables.planes);
-        let [[face, corner], [face_end, corner_end]] = [planes[z as usize], planes[z as usize + 1]];
+        let low = [y / 2, z / 2].map(i64::from);
+        let [face_end, corner_end] = self.tables.planes[z as usize + 1];
         // Black cells of a line are all of one kind.
         if y % 2 == 1 && z % 2 == 1 {
-            let moved =
-                CORNERS.map(|[_, dy, dz]| self.moved(1, (low[0] + i64::from(dy), low[1] + i64::from(dz))));
-            let rows = &self.tables.corners[corner as usize..corner_end as usize];
-            copy(rows, cells, by, moved, &mut tables.corners);
+            let lines = [0, 1, 2, 3].map(|k| self.moved(1, (low[0] + k % 2, low[1] + k / 2)));
+            let moved = CORNERS.map(|[_, dy, dz]| lines[(2 * dz + dy) as usize]);
+            let rows = &self.tables.corners[..corner_end as usize];
+            copy(rows, cells, by, moved, &mut next[1], &mut tables.corners);
         } else {
             let high = (low[0] + i64::from(y % 2), low[1] + i64::from(z % 2));
             let moved = [(low[0], low[1]), high].map(|line| self.moved(1, line));
-            let rows = &self.tables.faces[face as usize..face_end as usize];
-            copy(rows, cells, by, moved, &mut tables.faces);
+            let rows = &self.tables.faces[..face_end as usize];
+            copy(rows, cells, by, moved, &mut next[0], &mut tables.faces);
         }
     }
 
@@ -97,7 +97,9 @@ impl Old<'_> {
             return;
         }
         let (y, z) = (2 * i64::from(y), 2 * i64::from(z));
-        let moved = AROUND.map(|[_, dy, dz]| self.moved(0, (y + i64::from(dy), z + i64::from(dz))));
+        let lines: [Moved; 9] =
+            std::array::from_fn(|k| self.moved(0, (y + k as i64 % 3 - 1, z + k as i64 / 3 - 1)));
+        let moved = AROUND.map(|[_, dy, dz]| lines[(3 * dz + dy + 4) as usize]);
         for colour in 0..2 {
             let rows = &self.tables.restrict_rows[colour][start[colour] as usize..end[colour] as usize];
             let moved = rows.iter().map(|rows| std::array::from_fn(|k| moved[k].row(rows[k])));
@@ -106,17 +108,20 @@ impl Old<'_> {
     }
 }
 
-/// Copies what there is in `rows`, ascending, of some cells.
+/// Copies what there is in `rows`, ascending, of some cells; `next`: from where on they may be, and where they end then.
 fn copy<const N: usize>(
     rows: &[ProlongRow<N>],
     cells: std::ops::Range<u32>,
     by: u32,
     moved: [Moved; N],
+    next: &mut u32,
     out: &mut Vec<ProlongRow<N>>,
 ) {
-    let first = rows.partition_point(|row| row.cell < cells.start);
-    let rows = rows[first..].iter().take_while(|row| row.cell < cells.end);
-    out.extend(rows.map(|row| ProlongRow {
+    let n_until =
+        |first: u32, end: u32| rows[first as usize..].iter().take_while(|row| row.cell < end).count();
+    let first = *next + n_until(*next, cells.start) as u32;
+    *next = first + n_until(first, cells.end) as u32;
+    out.extend(rows[first as usize..*next as usize].iter().map(|row| ProlongRow {
         cell: row.cell.wrapping_add(by),
         coarse: std::array::from_fn(|k| moved[k].row(row.coarse[k])),
         mean: row.mean,
