@@ -14,7 +14,7 @@ const ROUNDS = 3;
 const BINDS = 15;
 const WARM_UP_MS = 1000;
 const PLACES = [0.1, 0.4, 0.6, 0.9];
-/** What a vertex moves by in each edit, of the model's longest side: about half a cell, and a twentieth. */
+/** What a vertex moves by in each edit, of the model's longest side: two thirds of a cell, and a fifteenth. */
 const STEPS = [0.01, 0.001];
 /** Vertices nearer to the cage's box than this share of it would move the grid. */
 const RIM = 0.03;

@@ -58,10 +58,10 @@ const ONE_IN: usize = 4;
 /// vertex moved by 8 % of the model). Beyond, everything is bound anew; from seven batches on nothing is refused.
 const REACH: usize = 7;
 
-/// How much more of what a correction would still change may be left where a bind has few batches, of which a cycle more is a large
-/// share: twice as much with 24 vertices, nothing with 44 or more. Of 48 edits each by 0.1, 0.4 and 1 % of the model, four
-/// cages of 24 vertices, a quarter fewer cycles; weights' mean error is 1.7e-7 to 8.7e-7 then (whole binds 1.5e-7 to
-/// 3.9e-7), the largest 3.7e-5 (2.6e-5).
+/// How many times as much as elsewhere corrections may leave where a bind has few batches, of which a cycle more is a large share:
+/// twice with 24 vertices, once with 41 or more. Of 48 edits each by 0.1, 0.4 and 1 % of the model, four cages of 24
+/// vertices: 549 cycles instead of 659; weights' mean error is 1.7e-7 to 8.7e-7 (5.2e-7 at most without it; whole binds
+/// 3.9e-7), the largest 3.7e-5 (2.6e-5 without it and of whole binds).
 fn lenience(n_batches: usize) -> f32 {
     (6.0 / n_batches as f32).clamp(1.0, 2.0)
 }

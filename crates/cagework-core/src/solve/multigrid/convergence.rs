@@ -77,8 +77,8 @@ impl Convergence {
     }
 
     /// Takes down a cycle by the squared norm of its coarse correction, as a mean over cells and in the cell with the largest (0
-    /// if nobody asks), and its mean squared residual; true when it was the last: the error that its contraction lets expect is below the threshold, the limit is reached, or f32 has
-    /// no more digits.
+    /// if nobody asks), and its mean squared residual; true when it was the last: the error that its contraction lets
+    /// expect is below the thresholds, the limit is reached, or f32 has no more digits.
     pub fn cycle_done(&mut self, correction_square: f64, largest_square: f64, residual_square: f64) -> bool {
         let correction = correction_square.sqrt();
         let ratio = correction / self.correction;

@@ -64,7 +64,8 @@ pub(super) struct Extent<'a> {
     pub(super) whole: &'a [u32],
 }
 
-/// Runs `passes` over a level's field `u`, `[n_rows]`. `coarse`: the coarser level's field, for [`Pass::Prolong`]; `residual`: `[n red cells + 1]`, for
+/// Runs `passes` over a level's field `u`, `[n_rows]`. `coarse`: the coarser level's field, for [`Pass::Prolong`];
+/// `residual`: `[n red cells + 1]`, for
 /// [`Pass::Residual`]. Returns the sum of the residual's squares.
 pub(super) fn stream(
     passes: &[Pass],
@@ -122,8 +123,8 @@ pub(super) fn stream(
     )
 }
 
-/// Adds what right-hand sides of the black cells `whole` ([`Extent::whole`]) add to a half sweep of a plane that goes `omega` times as
-/// far.
+/// Adds what right-hand sides of the black cells `whole` ([`Extent::whole`]) add to a half sweep of a plane that goes `omega`
+/// times as far.
 #[inline(never)]
 pub(super) fn add_whole(level: &Level, plane: usize, omega: f32, u: &mut [Row], whole: &[u32], f: Rhs<'_>) {
     let Rhs::Cut(rows) = f else { return };
