@@ -12,7 +12,7 @@ use cagework_core::sample::Stencils;
 use cagework_core::sample::embedded::Sampler;
 use cagework_core::solve::hierarchy::Hierarchy;
 use cagework_core::solve::multigrid::{Stop, Workspace};
-use cagework_core::voxelize::embedded::{EmbeddedCells, classify, shoot_lines};
+use cagework_core::voxelize::embedded::Embedding;
 use cagework_core::{Binding, Cage};
 use cagework_io::Model;
 use cagework_tests::creature::{creature, creature_cage};
@@ -71,10 +71,8 @@ impl Input {
     #[must_use]
     pub fn hierarchy(&self, grid: u32) -> Hierarchy {
         let grid = Grid::cubic(self.cage.bounds(), grid);
-        let lines = shoot_lines(&self.cage, &grid);
-        let (inside, _) = classify(&lines, &grid);
-        let cells = EmbeddedCells::finest(&self.cage, &lines, grid, inside);
-        Hierarchy::new(cells, self.cage.n_vertices(), EmbeddedCells::coarsened)
+        let embedding = Embedding::new(&self.cage, &grid);
+        Hierarchy::new(&embedding.boundaries(&self.cage), self.cage.n_vertices())
     }
 
     /// Sampling stencils of all vertices.

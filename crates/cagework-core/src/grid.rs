@@ -93,6 +93,14 @@ impl Grid {
         [1, nx, nx * ny]
     }
 
+    /// Index of the first cell of a line along `axis`, given the coordinates along the next two axes in cyclic order.
+    #[inline]
+    #[must_use]
+    pub fn line_start(&self, axis: usize, [u, v]: [u32; 2]) -> usize {
+        let strides = self.strides();
+        u as usize * strides[(axis + 1) % 3] + v as usize * strides[(axis + 2) % 3]
+    }
+
     /// All cells in index order.
     pub fn cells(&self) -> impl Iterator<Item = [u32; 3]> + use<> {
         let [nx, ny, nz] = self.dims;

@@ -13,7 +13,10 @@ use crate::grid::{Grid, NO_CELL};
 mod before;
 mod build;
 
-pub use before::Before;
+pub use before::{Before, Touched};
+
+/// Coarsening stops at this many unknowns: there, a few dozen sweeps cost nothing.
+const COARSEST_UNKNOWNS: usize = 200;
 
 /// The cage as a level sees it: which cells are unknowns, and where their arms end on the cage.
 pub trait Boundary: Sync {
@@ -195,6 +198,33 @@ impl Level {
                 })
                 .sum::<usize>()
     }
+}
+
+/// Cells of doubling size, from the finest on until few unknowns remain. `coarsen` makes the next coarser ones.
+pub fn coarsened_until_few<C>(
+    finest: C,
+    unknowns: impl Fn(&C) -> &[bool],
+    coarsen: impl Fn(&C) -> C,
+) -> Vec<C> {
+    let mut levels = vec![finest];
+    loop {
+        let last = &levels[levels.len() - 1];
+        if is_few(unknowns(last)) {
+            return levels;
+        }
+        let coarse = coarsen(last);
+        if !unknowns(&coarse).contains(&true) {
+            return levels;
+        }
+        levels.push(coarse);
+    }
+}
+
+/// Whether a level has so few unknowns that it needs no coarser one. Not inlined, as three places ask.
+#[inline(never)]
+#[must_use]
+pub fn is_few(unknowns: &[bool]) -> bool {
+    unknowns.iter().filter(|&&unknown| unknown).count() <= COARSEST_UNKNOWNS
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use crate::grid::Grid;
 use crate::levels::Boundary as _;
 use crate::voxelize::CellKind;
 use crate::voxelize::classic::{place_grid, voxelize_classic};
-use crate::voxelize::embedded::{EmbeddedCells, classify, shoot_lines};
+use crate::voxelize::embedded::{Cells, shoot_lines, votes};
 use crate::weights::Weights;
 
 /// One layer of cells across an axis.
@@ -58,9 +58,9 @@ impl Slice {
         match options.method {
             Method::Embedded => {
                 let grid = Grid::cubic(cage.bounds(), options.grid);
-                let lines = shoot_lines(cage, &grid);
-                let (inside, _) = classify(&lines, &grid);
-                let cells = EmbeddedCells::finest(cage, &lines, grid, inside);
+                let lines = shoot_lines(cage, &grid, &|_| true);
+                let cells = Cells::finest(&lines, grid, &votes(&lines, &grid));
+                let cells = cells.with(cage, &lines);
                 Self::of(&grid, axis, fraction, |cell| match cells.unknowns()[grid.index(cell)] {
                     false => CellKind::Exterior,
                     true if cells.cut_arms()[grid.index(cell)] != 0 => CellKind::Boundary,

@@ -74,7 +74,7 @@ pub async fn bind_gpu_to_edit(
     context: &GpuContext,
 ) -> Result<(Binding, Option<Rebinder>), GpuError> {
     let watch = Watch::new(progress);
-    let prepared = Prepared::new(positions, cage, options, FieldsOn::Device, &watch)?;
+    let mut prepared = Prepared::new(positions, cage, options, FieldsOn::Device, &watch)?;
     let (hierarchy, stencils) = (prepared.hierarchy(), prepared.stencils());
     let plan = |fields| {
         let limit = options.memory_limit;
@@ -86,6 +86,9 @@ pub async fn bind_gpu_to_edit(
         // Without them it may fit.
         _ => (plan(Fields::Dropped)?, Fields::Dropped),
     };
+    if fate == Fields::Dropped {
+        prepared.forget_edits();
+    }
     let (solved, fields) = solve_and_sample(&prepared, options, (&plan, fate), &watch, context).await?;
     if fate == Fields::Dropped {
         return Ok((prepared.finish(solved, &watch)?, None));

@@ -78,7 +78,8 @@ pub(super) fn run(
     progress: &dyn Progress,
 ) -> Result<Binding, BindError> {
     let watch = Watch::new(progress);
-    let prepared = Prepared::new(positions, cage, options, FieldsOn::Host, &watch)?;
+    let mut prepared = Prepared::new(positions, cage, options, FieldsOn::Host, &watch)?;
+    prepared.forget_edits();
     let solved = solve_and_sample(&prepared.voxels, &prepared.stencils, options, &prepared.team, &watch)?;
     prepared.finish(solved, &watch)
 }
@@ -125,6 +126,11 @@ impl<'a> Prepared<'a> {
         refuse_outside(&stencils, options, &welded)?;
         let times_ms = [began, voxelized, watch.now_ms()];
         Ok(Self { positions, cage, options, welded, points, team, voxels, stencils, estimated, times_ms })
+    }
+
+    /// Drops what only edits need: none will follow.
+    pub fn forget_edits(&mut self) {
+        self.voxels.forget_edits();
     }
 
     /// What is to be solved.

@@ -3,7 +3,7 @@
 //! When a few vertices of the cage move, the discrete equations change only in cells at the moved faces. The old fields leave
 //! a residual there and nowhere else, and the residuals of all columns are combinations of a few: columns that do not
 //! belong to the moved faces vanish on them, so they look alike a few cells away. Those few are solved for, and every
-//! column, also at the mesh's vertices, takes its share of them. What is neglected (residuals of about tau an edit) adds up, so
+//! column, also at the mesh's vertices, takes its share of them. What is neglected (residuals of about tau an edit, more with few columns: [`lenience`]) adds up, so
 //! after [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid or the faces change, or when an edit
 //! reaches too many cells ([`ONE_IN`], [`REACH`]).
 
@@ -34,7 +34,7 @@ use crate::weights::assemble::Assembled;
 
 use self::equations::{Equations, cells_of_rows, n_cut_in};
 use self::local::{Fields, Negligible, OldCells, Residual, Split, Update};
-use self::moved::{moved_columns, moved_triangles, renumbering};
+use self::moved::{moved_columns, renumbering, swept_by};
 use self::region::Region;
 use self::rows::Edit;
 use self::steps::{resample, solve_for};
@@ -58,17 +58,19 @@ const ONE_IN: usize = 4;
 /// vertex moved by 8 % of the model). Beyond, everything is bound anew; from seven batches on nothing is refused.
 const REACH: usize = 7;
 
-/// How many times as much as elsewhere corrections may leave where a bind has few batches, of which a cycle more is a large share:
-/// twice with 24 vertices, once with 41 or more. Of 48 edits each by 0.1, 0.4 and 1 % of the model, four cages of 24
-/// vertices: 549 cycles instead of 659; weights' mean error is 1.7e-7 to 8.7e-7 (5.2e-7 at most without it; whole binds
-/// 3.9e-7), the largest 3.7e-5 (2.6e-5 without it and of whole binds).
+/// How many times as much as elsewhere corrections may leave, and leave out, where a bind has few batches, of which a cycle or
+/// a batch more is a large share: four times with 24 vertices, once with 41 or more. Cycles before the last spare a sweep then,
+/// too. Of 48 edits each by 0.1, 0.4 and 1 % of the model, four cages of 24 vertices: 510 cycles, where it was 659 with
+/// once (and 1.35 tau, see `steps`); weights' mean error is 1.8e-7 to 9.6e-7 (5.2e-7 at most then; whole binds 3.9e-7),
+/// the largest 3.9e-5 (2.6e-5 then and of whole binds).
 fn lenience(n_batches: usize) -> f32 {
-    (6.0 / n_batches as f32).clamp(1.0, 2.0)
+    (7.0 - n_batches as f32).clamp(1.0, 4.0)
 }
 
-/// Cells around the moved faces whose equations may have changed, and in which stencils are made anew: a stencil sees the
-/// triangles in its cube of centres.
-const CHANGED: f64 = 1.5;
+/// Cells around the moved faces' ways, along each axis, in which equations may have changed: arms are no longer than a cell, and
+/// little more for rounding. Where a stencil may have changed, which sees the triangles in its cube of centres, all of the
+/// cube's are among them.
+const CHANGED: f64 = 1.0 + 1e-3;
 
 /// How a bind was brought up to date.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,7 +133,7 @@ impl Kept {
 
 impl Rebinder {
     /// Binds as [`bind`] does, and keeps what the next bind can start from: the fields (4 bytes for each cell inside and
-    /// cage vertex) and the weights (8 for each mesh vertex and cage vertex). Only embedded multigrid without sparsification
+    /// cage vertex), the weights (8 for each mesh vertex and cage vertex), levels and cells (some 60 for each cell inside). Only embedded multigrid without sparsification
     /// leaves any: of dropped weights nobody knows how small they were.
     ///
     /// # Errors
@@ -273,15 +275,15 @@ impl Rebinder {
         kept: Kept,
         watch: &Watch<'_>,
     ) -> Result<Option<(Binding, RebindReport)>, BindError> {
-        let Kept { voxels: old_voxels, mut stencils, mut fields, mut estimated, mut rows } = kept;
+        let Kept { voxels: mut old_voxels, mut stencils, mut fields, mut estimated, mut rows } = kept;
         let began = watch.now_ms();
         let team = Team::new(self.options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
         let grid = Voxels::grid(cage, &self.options);
         let to_grid = |p: Vec3| grid.to_grid(p.as_dvec3());
-        let Some(swept) = moved_triangles(&self.cage, cage, to_grid) else { return Ok(None) };
+        let Some(swept) = swept_by(&self.cage, cage, to_grid) else { return Ok(None) };
         let n_batches = cage.n_vertices().div_ceil(LANES);
-        let region = Region::around(&swept, CHANGED, &grid);
+        let region = Region::around(&swept.triangles, CHANGED + swept.slack, &grid);
         if ONE_IN * region.cells.len() > grid.n_cells() {
             return Ok(None);
         }
@@ -290,14 +292,15 @@ impl Rebinder {
             return Ok(None);
         }
         let voxels = team.install(|| old_voxels.renewed(&self.cage, cage, grid, &self.options));
+        let before = &old_voxels.hierarchy.levels[0];
         let level = &voxels.hierarchy.levels[0];
         let voxelized = watch.now_ms();
 
-        let moved_to = renumbering(&old_voxels.hierarchy.levels[0].row_of, &level.row_of, &old_voxels);
+        let moved_to = renumbering(before, level);
         let is_any_gone = moved_to.is_some_and(|moved_to| stencils.renumber(&moved_to));
         // What is outside follows the closest point of the cage, which may be another one from anywhere.
         let is_stale = |v: usize| {
-            region.holds(to_grid(self.points[v]))
+            region.holds_cube(to_grid(self.points[v]))
                 || stencils.is_outside(v)
                 || is_any_gone && stencils.has_lost_a_row(v)
         };
@@ -311,7 +314,7 @@ impl Rebinder {
 
         let mut solved = Solved { converged: true, delta_interval: 1, solve_share: 1.0, ..Solved::default() };
         let (mut rank, mut sampled) = (0, stencils_made);
-        if !swept.is_empty() {
+        if !swept.triangles.is_empty() {
             let negligible = Negligible::at(self.options.tau);
             let equations = Equations::changed(level, before, &region);
             let mut needed = equations.neighbourhood(level);

@@ -4,14 +4,13 @@ use glam::DVec3;
 
 use crate::cage::Cage;
 use crate::grid::Grid;
-use crate::levels::Level;
+use crate::levels::{Boundary, Level, coarsened_until_few};
 use crate::report::CellCounts;
 use crate::sample::embedded::Sampler;
 use crate::sample::{Stencils, classic};
 use crate::solve::hierarchy::Hierarchy;
 use crate::voxelize::classic::{ClassicCells, place_grid};
-use crate::voxelize::embedded::{EmbeddedCells, classify, lines_at, shoot_changed, shoot_lines};
-use crate::voxelize::lines::Lines;
+use crate::voxelize::embedded::Embedding;
 use crate::voxelize::published::PublishedCells;
 use crate::voxelize::{CellKind, voxelize_classic};
 
@@ -24,11 +23,11 @@ pub(super) struct Voxels {
     pub(super) counts: CellCounts,
     /// Cells about which the axes disagreed.
     pub(super) ambiguous: u64,
-    /// Bytes held.
+    /// Bytes held at most.
     pub(super) bytes: usize,
     classic: Option<ClassicCells>,
-    /// Lines through the cage, for the next edit; of the embedded method.
-    lines: Option<[Lines; 3]>,
+    /// The embedded method's cells, for the next edit.
+    embedding: Option<Embedding>,
 }
 
 /// A sampler of either method.
@@ -56,8 +55,15 @@ impl Voxels {
         }
     }
 
-    /// What [`Self::new`] leaves for multigrid on an embedded cage that was edited, made of what it left for `cage_before`.
-    pub(super) fn renewed(&self, cage_before: &Cage, cage: &Cage, grid: Grid, options: &BindOptions) -> Self {
+    /// What [`Self::new`] leaves for multigrid on an embedded cage that was edited, made of what it left for `cage_before`: only
+    /// the hierarchy stays there.
+    pub(super) fn renewed(
+        &mut self,
+        cage_before: &Cage,
+        cage: &Cage,
+        grid: Grid,
+        options: &BindOptions,
+    ) -> Self {
         Self::embedded(cage, grid, options, Some((self, cage_before)))
     }
 
@@ -72,33 +78,38 @@ impl Voxels {
         };
         let hierarchy = match options.solver {
             Solver::Jacobi => Hierarchy::single(Level::new(&boundary), cage.n_vertices()),
-            Solver::Multigrid => Hierarchy::new(boundary, cage.n_vertices(), PublishedCells::coarsened),
+            Solver::Multigrid => {
+                let boundaries =
+                    coarsened_until_few(boundary, PublishedCells::unknowns, PublishedCells::coarsened);
+                Hierarchy::new(&boundaries, cage.n_vertices())
+            }
         };
         let values = &cells.boundary;
         let bytes = hierarchy.bytes()
             + size_of_val(cells.kinds.as_slice())
             + 4 * (values.cells.len() + values.indptr.len() + 2 * values.values.len());
-        Self { hierarchy, counts, ambiguous: 0, bytes, classic: Some(cells), lines: None }
+        Self { hierarchy, counts, ambiguous: 0, bytes, classic: Some(cells), embedding: None }
     }
 
-    fn embedded(cage: &Cage, grid: Grid, options: &BindOptions, before: Option<(&Self, &Cage)>) -> Self {
-        let edit = before.and_then(|(before, cage_before)| {
-            Some((before, before.lines.as_ref()?, shoot_changed(cage_before, cage, &grid)))
+    fn embedded(cage: &Cage, grid: Grid, options: &BindOptions, old: Option<(&mut Self, &Cage)>) -> Self {
+        let edited = old.and_then(|(old, cage_before)| {
+            let mut embedding = old.embedding.take()?;
+            let touched = embedding.edit(cage_before, cage)?;
+            Some((embedding, &old.hierarchy, touched))
         });
-        let lines = match &edit {
-            Some((_, lines, [gone, come])) => {
-                std::array::from_fn(|axis| lines[axis].renewed(&gone[axis], &come[axis]))
+        let (embedding, hierarchy) = match edited {
+            Some((embedding, before, touched)) => {
+                let hierarchy = before.renewed(&embedding.boundaries(cage), &touched);
+                (embedding, hierarchy)
             }
-            None => shoot_lines(cage, &grid),
-        };
-        let (inside, ambiguous) = classify(&lines, &grid);
-        let cells = EmbeddedCells::finest(cage, &lines, grid, inside);
-        let hierarchy = match (options.solver, &edit) {
-            (Solver::Jacobi, _) => Hierarchy::single(Level::new(&cells), cage.n_vertices()),
-            (Solver::Multigrid, None) => Hierarchy::new(cells, cage.n_vertices(), EmbeddedCells::coarsened),
-            (Solver::Multigrid, Some((before, _, changed))) => {
-                let moved = |n_levels| lines_at(changed, &grid, n_levels);
-                before.hierarchy.renewed(cells, EmbeddedCells::coarsened, moved)
+            None => {
+                let embedding = Embedding::new(cage, &grid);
+                let boundaries = embedding.boundaries(cage);
+                let hierarchy = match options.solver {
+                    Solver::Jacobi => Hierarchy::single(Level::new(&boundaries[0]), cage.n_vertices()),
+                    Solver::Multigrid => Hierarchy::new(&boundaries, cage.n_vertices()),
+                };
+                (embedding, hierarchy)
             }
         };
         let finest = &hierarchy.levels[0];
@@ -108,9 +119,14 @@ impl Voxels {
             boundary: cut,
             exterior: grid.n_cells() as u64 - unknowns,
         };
-        let line_bytes: usize = lines.iter().map(Lines::bytes).sum();
-        let bytes = line_bytes + hierarchy.bytes().max(3 * grid.n_cells() + hierarchy.levels[0].bytes());
-        Self { hierarchy, counts, ambiguous, bytes, classic: None, lines: Some(lines) }
+        let bytes = embedding.bytes() + hierarchy.bytes();
+        let ambiguous = embedding.ambiguous();
+        Self { hierarchy, counts, ambiguous, bytes, classic: None, embedding: Some(embedding) }
+    }
+
+    /// Drops what only edits need. [`Self::bytes`] stays: it was held once.
+    pub(super) fn forget_edits(&mut self) {
+        self.embedding = None;
     }
 
     pub(super) fn sampler<'a>(&'a self, cage: &'a Cage) -> AnySampler<'a> {

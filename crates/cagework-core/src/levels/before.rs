@@ -2,35 +2,46 @@
 
 use std::ops::Range;
 
-use crate::grid::NO_CELL;
+use crate::grid::Grid;
 
-use super::build::{Slab, add_to_rows};
-use super::{Boundary, CutCell, Level, Run};
+use super::build::Slab;
+use super::{CutCell, Level, Run};
+
+/// Lines along x of a level that an edit has touched.
+#[derive(Clone, Debug)]
+pub struct Touched {
+    /// Those with cells whose arms may end elsewhere now. `[nz * ny]`
+    pub moved: Vec<bool>,
+    /// Those that may have other unknowns. `[nz * ny]`
+    pub changed: Vec<bool>,
+}
+
+impl Touched {
+    /// No lines of a grid.
+    pub(crate) fn none(grid: &Grid) -> Self {
+        let none = vec![false; (grid.dims[1] * grid.dims[2]) as usize];
+        Self { moved: none.clone(), changed: none }
+    }
+}
 
 /// A level before an edit, and what has become of its lines along x.
 #[derive(Debug)]
 pub struct Before<'a> {
     pub(super) level: &'a Level,
-    /// Whether there are other unknowns in a line now. `[nz * ny]`
-    changed: Vec<bool>,
+    /// Whether there may be other unknowns in a line now. `[nz * ny]`
+    changed: &'a [bool],
     /// Whether a line's stencils are made anew. `[nz * ny]`
     is_anew: Vec<bool>,
 }
 
 impl<'a> Before<'a> {
-    /// Compares a level with what its unknowns are now. `moved`: lines with cells whose arms may end elsewhere now, `[nz * ny]`.
+    /// A level, and the lines that the edit has touched.
     #[must_use]
-    pub fn new(level: &'a Level, boundary: &dyn Boundary, moved: &[bool]) -> Self {
-        debug_assert_eq!(level.grid, boundary.grid(), "an edit leaves the grid");
-        let [nx, ny, _] = level.grid.dims.map(|n| n as usize);
-        let lines = boundary.unknowns().chunks_exact(nx).zip(level.row_of.chunks_exact(nx));
-        let changed: Vec<bool> = lines
-            .map(|(now, rows)| {
-                // Without leaving early: only so cells are compared several at once.
-                now.iter().zip(rows).fold(false, |other, (&now, &row)| other | (now != (row != NO_CELL)))
-            })
-            .collect();
-        let mut is_anew = moved.to_vec();
+    pub fn new(level: &'a Level, touched: &'a Touched) -> Self {
+        let Touched { moved, changed } = touched;
+        let ny = level.grid.dims[1] as usize;
+        debug_assert_eq!(changed.len() + 1, level.lines.len(), "an edit leaves the grid");
+        let mut is_anew = moved.clone();
         for line in (0..changed.len()).filter(|&line| changed[line]) {
             // Whoever has neighbours in it.
             for other in
@@ -64,20 +75,16 @@ impl<'a> Before<'a> {
         [0, 1].map(|c| now.lines[line][c].wrapping_sub(self.level.lines[line][c]))
     }
 
-    /// Numbers the cells of a kept line within their colours, of which there are `n_cells` so far.
-    pub(super) fn copy_rows(&self, line: usize, n_cells: &mut [u32; 2], rows: &mut [u32]) {
-        let (start, end) = (self.level.lines[line], self.level.lines[line + 1]);
-        if start == end {
-            return;
-        }
-        let ny = self.level.grid.dims[1] as usize;
+    /// Cells of a line of each colour.
+    pub(super) fn n_cells(&self, line: usize) -> [u32; 2] {
+        [0, 1].map(|c| self.level.lines[line + 1][c] - self.level.lines[line][c])
+    }
+
+    /// Copies the rows of a line, whose first ones of each colour are `first` now; returns what is to be added to them.
+    pub(super) fn copy_rows(&self, line: usize, first: [u32; 2], rows: &mut [u32]) -> [u32; 2] {
         rows.copy_from_slice(&self.level.row_of[line * rows.len()..][..rows.len()]);
-        let by = [0, 1].map(|c| n_cells[c].wrapping_sub(start[c] + self.level.first_row(c) as u32));
-        let red = (line % ny + line / ny) % 2;
-        add_to_rows(rows, [by[red], by[1 - red]]);
-        for c in 0..2 {
-            n_cells[c] += end[c] - start[c];
-        }
+        let was = self.level.lines[line];
+        [0, 1].map(|c| first[c].wrapping_sub(was[c] + self.level.first_row(c) as u32))
     }
 
     /// [`Self::shift`] of all lines, `[nz * ny]`.

@@ -189,16 +189,20 @@ fn number_cells(boundary: &dyn Boundary, before: Option<&Before<'_>>) -> Level {
     for (line, rows) in row_of.chunks_exact_mut(nx as usize).enumerate() {
         lines.push(n_cells);
         if let Some(before) = before.filter(|before| before.is_kept(line)) {
-            before.copy_rows(line, &mut n_cells, rows);
+            let kept = before.n_cells(line);
+            n_cells = [0, 1].map(|c| n_cells[c] + kept[c]);
             continue;
         }
         let (y, z) = (line as u32 % ny, line as u32 / ny);
+        let first = line * nx as usize;
+        let unknowns = &unknowns[first..][..nx as usize];
         for (x, row) in (0..nx).zip(rows) {
-            let (cell, index) = ([x, y, z], line * nx as usize + x as usize);
-            if !unknowns[index] {
+            let (cell, x) = ([x, y, z], x as usize);
+            if !unknowns[x] {
                 continue;
             }
-            if is_connected(cell, index) {
+            // Most have one beside them.
+            if unknowns.get(x + 1) == Some(&true) || is_connected(cell, first + x) {
                 let n = &mut n_cells[Grid::colour(cell)];
                 *row = *n;
                 *n += 1;
@@ -208,26 +212,28 @@ fn number_cells(boundary: &dyn Boundary, before: Option<&Before<'_>>) -> Level {
         }
     }
     lines.push(n_cells);
+    let first_rows = [0, n_cells[0] + 1];
     for (line, rows) in row_of.chunks_exact_mut(nx as usize).enumerate() {
+        if lines[line] == lines[line + 1] {
+            continue;
+        }
+        let first = [0, 1].map(|c| first_rows[c] + lines[line][c]);
+        let mut by = first_rows;
+        if let Some(before) = before.filter(|before| before.is_kept(line)) {
+            by = before.copy_rows(line, first, rows);
+        }
         let red = (line as u32 % ny + line as u32 / ny) as usize % 2;
-        let mut first = [n_cells[0] + 1; 2];
-        first[red] = 0;
-        add_to_rows(rows, first);
+        add_to_rows(rows, [by[red], by[1 - red]]);
     }
     let colours = n_cells.map(|n_cells| Colour { n_cells, ..Colour::default() });
     Level { grid, colours, boundary: Vec::new(), row_of, lines, isolated }
 }
 
 /// Adds to a line's rows what is to be added in even places and in odd ones.
-pub(super) fn add_to_rows(rows: &mut [u32], [even, odd]: [u32; 2]) {
-    let add = |row: &mut u32, n: u32| *row = if *row == NO_CELL { NO_CELL } else { row.wrapping_add(n) };
-    let (pairs, last) = rows.as_chunks_mut::<2>();
-    for [a, b] in pairs {
-        add(a, even);
-        add(b, odd);
-    }
-    for row in last {
-        add(row, even);
+fn add_to_rows(rows: &mut [u32], [even, odd]: [u32; 2]) {
+    for (x, row) in rows.iter_mut().enumerate() {
+        let n = if x % 2 == 0 { even } else { odd };
+        *row = if *row == NO_CELL { NO_CELL } else { row.wrapping_add(n) };
     }
 }
 

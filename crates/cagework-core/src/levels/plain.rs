@@ -6,7 +6,7 @@ use super::*;
 use crate::cage::{Cage, shapes};
 use crate::solve::hierarchy::Hierarchy;
 use crate::solve::rows::{LANES, Row};
-use crate::voxelize::embedded::{EmbeddedCells, classify, shoot_lines};
+use crate::voxelize::embedded::{EmbeddedCells, Embedding};
 
 /// One unknown: `diagonal * u = sum of neighbours + sum of hats`.
 pub(crate) struct PlainCell {
@@ -59,10 +59,7 @@ pub(crate) fn askew_c() -> (Cage, Grid) {
 /// Runs `test` on the finest and the next coarser level of [`askew_c`].
 pub(crate) fn on_two_levels(test: impl Fn(&Cage, &Level, &EmbeddedCells<'_>)) {
     let (cage, grid) = askew_c();
-    let lines = shoot_lines(&cage, &grid);
-    let fine = EmbeddedCells::finest(&cage, &lines, grid, classify(&lines, &grid).0);
-    let coarse = fine.coarsened();
-    for boundary in [&fine, &coarse] {
+    for boundary in &Embedding::new(&cage, &grid).boundaries(&cage)[..2] {
         test(&cage, &Level::new(boundary), boundary);
     }
 }
@@ -70,9 +67,7 @@ pub(crate) fn on_two_levels(test: impl Fn(&Cage, &Level, &EmbeddedCells<'_>)) {
 /// All levels of [`askew_c`].
 pub(crate) fn hierarchy() -> Hierarchy {
     let (cage, grid) = askew_c();
-    let lines = shoot_lines(&cage, &grid);
-    let boundary = EmbeddedCells::finest(&cage, &lines, grid, classify(&lines, &grid).0);
-    Hierarchy::new(boundary, cage.n_vertices(), EmbeddedCells::coarsened)
+    Hierarchy::new(&Embedding::new(&cage, &grid).boundaries(&cage), cage.n_vertices())
 }
 
 /// A field of numbers without order in [0, 1), and its zero rows.

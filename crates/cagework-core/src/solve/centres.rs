@@ -38,25 +38,26 @@ impl Centres {
         let stencil = CutCell { cell: red.n_cells, neighbours: [black.n_cells; 6], diagonal: 1.0 };
         let none = Centre { stencil, cut: NO_CELL };
         let mut stencils = transfer.restrict_rows.each_ref().map(|rows| vec![none; rows.len()]);
-        let mut coarse_of = vec![None; red.n_cells as usize + 1];
-        for (colour, rows) in transfer.restrict_rows.iter().enumerate() {
-            for (k, around) in rows.iter().enumerate().filter(|(_, around)| around[0] != red.n_cells) {
-                coarse_of[around[0] as usize] = Some((colour, k));
-            }
-        }
-        for run in &red.runs {
-            for j in 0..run.len {
-                if let Some((colour, k)) = coarse_of[(run.start + j) as usize] {
+        for (rows, stencils) in transfer.restrict_rows.iter().zip(&mut stencils) {
+            // Centres ascend, as runs and cut cells do.
+            let centres =
+                || rows.iter().map(|around| around[0]).zip(0..).filter(|(cell, _)| *cell != red.n_cells);
+            let mut next = centres().peekable();
+            for run in &red.runs {
+                while let Some((cell, k)) = next.next_if(|(cell, _)| *cell < run.start + run.len) {
+                    let Some(j) = cell.checked_sub(run.start) else { continue };
                     let [my, py, mz, pz] = run.yz.map(|first| first + j);
                     let neighbours = [run.x + 1 + j, run.x + j, py, my, pz, mz];
-                    let stencil = CutCell { cell: run.start + j, neighbours, diagonal: 6.0 };
-                    stencils[colour][k] = Centre { stencil, cut: NO_CELL };
+                    stencils[k].stencil = CutCell { cell, neighbours, diagonal: 6.0 };
                 }
             }
-        }
-        for (number, cut) in (0u32..).zip(&red.cut) {
-            if let Some((colour, k)) = coarse_of[cut.cell as usize] {
-                stencils[colour][k] = Centre { stencil: *cut, cut: number };
+            let mut next = centres().peekable();
+            for (number, cut) in (0u32..).zip(&red.cut) {
+                while let Some((cell, k)) = next.next_if(|(cell, _)| *cell <= cut.cell) {
+                    if cell == cut.cell {
+                        stencils[k] = Centre { stencil: *cut, cut: number };
+                    }
+                }
             }
         }
         Self { stencils }

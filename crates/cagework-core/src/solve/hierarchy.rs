@@ -1,15 +1,12 @@
 //! All levels of one bind with their transfers and right-hand sides in batches: what every solver reads.
 
 use crate::grid::NO_CELL;
-use crate::levels::{Before, Boundary, BoundaryTerm, Level};
+use crate::levels::{Before, Boundary, BoundaryTerm, Level, Touched};
 use crate::transfer::Transfer;
 use crate::voxelize::map_indices;
 
 use super::centres::Centres;
 use super::rows::{LANES, Row};
-
-/// Coarsening stops at this many unknowns: there, a few dozen sweeps cost nothing.
-const COARSEST_UNKNOWNS: usize = 200;
 
 /// Levels, finest first, and the transfers between neighbours.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,32 +37,28 @@ impl Hierarchy {
         }
     }
 
-    /// Levels of doubling cell size, until few unknowns remain. `coarsen` makes the next coarser boundary.
+    /// Of what each level's cells see of the cage, finest first ([`coarsened_until_few`](crate::levels::coarsened_until_few)).
     #[must_use]
-    pub fn new<B: Boundary>(finest: B, n_columns: usize, coarsen: impl Fn(&B) -> B) -> Self {
-        let boundaries = boundaries(finest, coarsen);
-        Self::of(&boundaries.iter().map(|b| b as &dyn Boundary).collect::<Vec<_>>(), n_columns, None)
-    }
-
-    /// The same from what it was before an edit of the cage that leaves the grid: the outcome is that of [`Self::new`].
-    /// `moved(n_levels)` are, on each level, the lines along x with cells whose arms may end elsewhere now.
-    #[must_use]
-    pub fn renewed<B: Boundary>(
-        &self,
-        finest: B,
-        coarsen: impl Fn(&B) -> B,
-        moved: impl Fn(usize) -> Vec<Vec<bool>>,
-    ) -> Self {
-        let boundaries = boundaries(finest, coarsen);
+    pub fn new<B: Boundary>(boundaries: &[B], n_columns: usize) -> Self {
         let boundaries: Vec<&dyn Boundary> = boundaries.iter().map(|b| b as &dyn Boundary).collect();
-        let moved = moved(boundaries.len());
-        Self::of(&boundaries, self.n_columns, Some((self, &moved)))
+        Self::of(&boundaries, n_columns, None)
     }
 
-    fn of(boundaries: &[&dyn Boundary], n_columns: usize, old: Option<(&Self, &[Vec<bool>])>) -> Self {
+    /// The same from what it was before an edit of the cage that leaves the grid and the number of levels: the outcome is that
+    /// of [`Self::new`]. `touched`: of each level.
+    #[must_use]
+    pub fn renewed<B: Boundary>(&self, boundaries: &[B], touched: &[Touched]) -> Self {
+        let boundaries: Vec<&dyn Boundary> = boundaries.iter().map(|b| b as &dyn Boundary).collect();
+        debug_assert!(boundaries.len() == self.levels.len() && touched.len() == self.levels.len());
+        // Where cells without neighbours have no row, nobody knows which those were.
+        let old = self.levels.iter().all(|level| level.isolated == 0).then_some((self, touched));
+        Self::of(&boundaries, self.n_columns, old)
+    }
+
+    fn of(boundaries: &[&dyn Boundary], n_columns: usize, old: Option<(&Self, &[Touched])>) -> Self {
         let before: Vec<Option<Before<'_>>> = map_indices(boundaries.len(), |k| {
-            let (old, moved) = old?;
-            old.levels.get(k).map(|level| Before::new(level, boundaries[k], &moved[k]))
+            let (old, touched) = old?;
+            Some(Before::new(&old.levels[k], &touched[k]))
         });
         let n_batches = n_columns.div_ceil(LANES);
         let levels = map_indices(boundaries.len(), |k| match (&before[k], old) {
@@ -199,21 +192,4 @@ fn merged(
         all_starts.push(all.len() as u32);
     }
     (all, all_starts)
-}
-
-/// Boundaries of doubling cell size, until few unknowns remain.
-fn boundaries<B: Boundary>(finest: B, coarsen: impl Fn(&B) -> B) -> Vec<B> {
-    let n_unknowns = |boundary: &B| boundary.unknowns().iter().filter(|&&unknown| unknown).count();
-    let mut boundaries = vec![finest];
-    loop {
-        let last = &boundaries[boundaries.len() - 1];
-        if n_unknowns(last) <= COARSEST_UNKNOWNS {
-            return boundaries;
-        }
-        let coarse = coarsen(last);
-        if n_unknowns(&coarse) == 0 {
-            return boundaries;
-        }
-        boundaries.push(coarse);
-    }
 }

@@ -139,9 +139,10 @@ impl Workspace {
                 self.up(hierarchy, 0);
                 return Some(convergence.into_report());
             }
+            let is_early = stop.spares_sweeps && !convergence.is_nearly_done(1.0);
             start = match hierarchy.levels.len() {
                 1 => DOWN,
-                _ if convergence.is_nearly_done(SPARE) => UP_AND_HALF_DOWN,
+                _ if is_early || convergence.is_nearly_done(SPARE) => UP_AND_HALF_DOWN,
                 _ => UP_AND_DOWN,
             };
         }

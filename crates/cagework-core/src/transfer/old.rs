@@ -11,19 +11,25 @@ pub(super) struct Old<'a> {
     pub(super) levels: [&'a Level; 2],
 }
 
-/// How the rows of a line have moved: those of red cells, the row that stays zero and where that is now, and black cells'.
-#[derive(Clone, Copy, Default)]
-struct Moved {
-    by: [u32; 2],
+/// How the rows of some lines have moved: those of red cells and of black ones of each, and the row that stays zero and where that
+/// is now, the same for all.
+struct Moved<const N: usize> {
+    red: [u32; N],
+    black: [u32; N],
     zero: u32,
     zero_now: u32,
 }
 
-impl Moved {
+impl<const N: usize> Moved<N> {
+    /// Rows, one in each of the lines.
     #[inline(always)]
-    fn row(self, row: u32) -> u32 {
-        let moved = row.wrapping_add(self.by[usize::from(row > self.zero)]);
-        if row == self.zero { self.zero_now } else { moved }
+    fn rows(&self, rows: &[u32; N]) -> [u32; N] {
+        std::array::from_fn(|k| {
+            let row = rows[k];
+            // Without branches, so that several are taken at once.
+            let moved = row.wrapping_add(if row > self.zero { self.black[k] } else { self.red[k] });
+            if row == self.zero { self.zero_now } else { moved }
+        })
     }
 }
 
@@ -39,13 +45,18 @@ impl Old<'_> {
         lines.all(|(y, z)| self.line(level, y, z).is_none_or(|line| self.before[level].has_same_cells(line)))
     }
 
-    /// How a line's rows have moved; of a line that is not in the grid nobody knows a row but zero.
-    fn moved(&self, level: usize, (y, z): (i64, i64)) -> Moved {
+    /// How lines' rows have moved; of a line that is not in the grid nobody knows a row but zero.
+    fn moved<const N: usize>(&self, level: usize, line: impl Fn(usize) -> (i64, i64)) -> Moved<N> {
         let (now, before) = (self.levels[level], self.before[level]);
-        let [red, black] = self.line(level, y, z).map_or([0; 2], |line| before.shift(now, line));
         let [zero, zero_now] = [before.level().zero_row(), now.zero_row()];
-        // Black rows begin after the red ones.
-        Moved { by: [red, black.wrapping_add(zero_now).wrapping_sub(zero)], zero, zero_now }
+        let mut moved = Moved { red: [0; N], black: [0; N], zero, zero_now };
+        for k in 0..N {
+            let (y, z) = line(k);
+            let [red, black] = self.line(level, y, z).map_or([0; 2], |line| before.shift(now, line));
+            // Black rows begin after the red ones.
+            (moved.red[k], moved.black[k]) = (red, black.wrapping_add(zero_now).wrapping_sub(zero));
+        }
+        moved
     }
 
     /// Whether what a fine line is prolonged from has stayed.
@@ -69,15 +80,17 @@ impl Old<'_> {
         let [face_end, corner_end] = self.tables.planes[z as usize + 1];
         // Black cells of a line are all of one kind.
         if y % 2 == 1 && z % 2 == 1 {
-            let lines = [0, 1, 2, 3].map(|k| self.moved(1, (low[0] + k % 2, low[1] + k / 2)));
-            let moved = CORNERS.map(|[_, dy, dz]| lines[(2 * dz + dy) as usize]);
+            let moved = self.moved(1, |k| {
+                let [_, dy, dz] = CORNERS[k].map(i64::from);
+                (low[0] + dy, low[1] + dz)
+            });
             let rows = &self.tables.corners[..corner_end as usize];
-            copy(rows, cells, by, moved, &mut next[1], &mut tables.corners);
+            copy(rows, cells, by, &moved, &mut next[1], &mut tables.corners);
         } else {
             let high = (low[0] + i64::from(y % 2), low[1] + i64::from(z % 2));
-            let moved = [(low[0], low[1]), high].map(|line| self.moved(1, line));
+            let moved = self.moved(1, |k| if k == 0 { (low[0], low[1]) } else { high });
             let rows = &self.tables.faces[..face_end as usize];
-            copy(rows, cells, by, moved, &mut next[0], &mut tables.faces);
+            copy(rows, cells, by, &moved, &mut next[0], &mut tables.faces);
         }
     }
 
@@ -97,13 +110,13 @@ impl Old<'_> {
             return;
         }
         let (y, z) = (2 * i64::from(y), 2 * i64::from(z));
-        let lines: [Moved; 9] =
-            std::array::from_fn(|k| self.moved(0, (y + k as i64 % 3 - 1, z + k as i64 / 3 - 1)));
-        let moved = AROUND.map(|[_, dy, dz]| lines[(3 * dz + dy + 4) as usize]);
+        let moved = self.moved(0, |k| {
+            let [_, dy, dz] = AROUND[k].map(i64::from);
+            (y + dy, z + dz)
+        });
         for colour in 0..2 {
             let rows = &self.tables.restrict_rows[colour][start[colour] as usize..end[colour] as usize];
-            let moved = rows.iter().map(|rows| std::array::from_fn(|k| moved[k].row(rows[k])));
-            tables.restrict_rows[colour].extend(moved);
+            tables.restrict_rows[colour].extend(rows.iter().map(|rows| moved.rows(rows)));
         }
     }
 }
@@ -113,7 +126,7 @@ fn copy<const N: usize>(
     rows: &[ProlongRow<N>],
     cells: std::ops::Range<u32>,
     by: u32,
-    moved: [Moved; N],
+    moved: &Moved<N>,
     next: &mut u32,
     out: &mut Vec<ProlongRow<N>>,
 ) {
@@ -123,7 +136,7 @@ fn copy<const N: usize>(
     *next = first + n_until(first, cells.end) as u32;
     out.extend(rows[first as usize..*next as usize].iter().map(|row| ProlongRow {
         cell: row.cell.wrapping_add(by),
-        coarse: std::array::from_fn(|k| moved[k].row(row.coarse[k])),
+        coarse: moved.rows(&row.coarse),
         mean: row.mean,
     }));
 }

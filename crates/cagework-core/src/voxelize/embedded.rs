@@ -15,15 +15,17 @@ use crate::levels::Boundary;
 
 use super::lines::{Hit, Lines};
 
+mod embedding;
+
+pub use embedding::Embedding;
+
 /// Shortest arm, in cells: a centre this close to the cage has the cage's value to within the solver's accuracy, and
 /// a shorter arm would only cost f32 digits (1e-3 measured on the Armadillo and the horse).
 const MIN_ARM: f64 = 1e-3;
 
-/// The cage in the grid, on one level: level k looks at every 2^k-th centre of the finest grid.
-#[derive(Debug)]
-pub struct EmbeddedCells<'a> {
-    cage: &'a Cage,
-    lines: &'a [Lines; 3],
+/// What the cells of one level are: level k looks at every 2^k-th centre of the finest grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cells {
     grid: Grid,
     /// Distance between this level's centres in cells of the finest grid.
     step: u32,
@@ -31,28 +33,24 @@ pub struct EmbeddedCells<'a> {
     cut: Vec<u8>,
 }
 
-/// Lines along x, y and z.
-#[must_use]
-pub fn shoot_lines(cage: &Cage, grid: &Grid) -> [Lines; 3] {
-    shoot_some(cage, grid, &|_| true)
+/// The cage in the grid, on one level.
+#[derive(Debug)]
+pub struct EmbeddedCells<'a> {
+    cage: &'a Cage,
+    lines: &'a [Lines; 3],
+    cells: &'a Cells,
 }
 
-/// Lines through the faces that an edit has changed: as they were, and as they are now. What [`Lines::renewed`] asks for.
+/// Lines along x, y and z through those of the cage's triangles that are `wanted`.
 #[must_use]
-pub fn shoot_changed(before: &Cage, cage: &Cage, grid: &Grid) -> [[Lines; 3]; 2] {
-    let has_changed = cage.changed_faces(before);
-    [before, cage]
-        .map(|cage| shoot_some(cage, grid, &|t| has_changed[cage.face_of_triangle()[t as usize] as usize]))
-}
-
-fn shoot_some(cage: &Cage, grid: &Grid, wanted: &(dyn Fn(u32) -> bool + Sync)) -> [Lines; 3] {
+pub fn shoot_lines(cage: &Cage, grid: &Grid, wanted: &(dyn Fn(u32) -> bool + Sync)) -> [Lines; 3] {
     let lines = super::map_indices(3, |axis| Lines::shoot(cage, grid, axis, wanted));
     lines.try_into().expect("three axes")
 }
 
-/// Types every centre of the finest grid. Returns (inside, cells about which the axes disagreed).
+/// How many axes say of each centre of the finest grid that it is inside.
 #[must_use]
-pub fn classify(lines: &[Lines; 3], grid: &Grid) -> (Vec<bool>, u64) {
+pub fn votes(lines: &[Lines; 3], grid: &Grid) -> Vec<u8> {
     let (mut votes, mut flips) = (vec![0u8; grid.n_cells()], vec![0u8; grid.n_cells()]);
     let strides = grid.strides();
     for (axis, lines) in lines.iter().enumerate() {
@@ -88,55 +86,83 @@ pub fn classify(lines: &[Lines; 3], grid: &Grid) -> (Vec<bool>, u64) {
             }
         }
     }
-    let ambiguous = votes.iter().filter(|&&v| v == 1 || v == 2).count() as u64;
-    (votes.into_iter().map(|v| v >= 2).collect(), ambiguous)
+    votes
 }
 
-impl<'a> EmbeddedCells<'a> {
-    /// The finest level.
+/// Whether most axes say that a centre is inside.
+fn is_inside(votes: u8) -> bool {
+    votes >= 2
+}
+
+/// Whether the axes disagree about a centre.
+fn is_ambiguous(votes: u8) -> bool {
+    votes == 1 || votes == 2
+}
+
+impl Cells {
+    /// The finest level. Not inlined: it is made in two places, and the page's wasm is small.
+    #[inline(never)]
     #[must_use]
-    pub fn finest(cage: &'a Cage, lines: &'a [Lines; 3], grid: Grid, inside: Vec<bool>) -> Self {
-        Self::with_walls(cage, lines, grid, 1, inside)
+    pub fn finest(lines: &[Lines; 3], grid: Grid, votes: &[u8]) -> Self {
+        Self::with_walls(lines, grid, 1, votes.iter().map(|&votes| is_inside(votes)).collect())
     }
 
     /// The next coarser level.
     #[must_use]
-    pub fn coarsened(&self) -> Self {
+    pub fn coarsened(&self, lines: &[Lines; 3]) -> Self {
         let grid = self.grid.coarsened();
         let inside = grid.cells().map(|cell| self.inside[self.grid.index(cell.map(|x| 2 * x))]).collect();
-        Self::with_walls(self.cage, self.lines, grid, 2 * self.step, inside)
+        Self::with_walls(lines, grid, 2 * self.step, inside)
     }
 
-    fn with_walls(cage: &'a Cage, lines: &'a [Lines; 3], grid: Grid, step: u32, inside: Vec<bool>) -> Self {
-        let mut cut = vec![0u8; grid.n_cells()];
+    fn with_walls(lines: &[Lines; 3], grid: Grid, step: u32, inside: Vec<bool>) -> Self {
+        let (mut cells, mut cut) = (Self { grid, step, inside, cut: Vec::new() }, vec![0; grid.n_cells()]);
         for (axis, lines) in lines.iter().enumerate() {
-            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-            let last = i64::from(grid.dims[axis]) - 1;
             for (iu, iv, hits) in lines.crossing() {
-                if iu % step != 0 || iv % step != 0 {
-                    continue;
-                }
-                let mut cell = [0; 3];
-                (cell[u], cell[v]) = (iu / step, iv / step);
-                for hit in hits {
-                    let (below, above) = wall_between(hit.t / f64::from(step));
-                    for (x, direction) in [(below, 2 * axis), (above, 2 * axis + 1)] {
-                        if (0..=last).contains(&x) {
-                            cell[axis] = x as u32;
-                            cut[grid.index(cell)] |= 1 << direction;
-                        }
+                if cells.has(&[iu, iv]) {
+                    for hit in hits {
+                        cells.at_wall(axis, [iu, iv], hit).for_each(|(cell, arm)| cut[cell] |= arm);
                     }
                 }
             }
         }
-        Self { cage, lines, grid, step, inside, cut }
+        cells.cut = cut;
+        cells
     }
 
+    /// Whether this level has lines or cells with these coordinates in the finest grid.
+    #[inline]
+    fn has(&self, place: &[u32]) -> bool {
+        place.iter().all(|x| x & (self.step - 1) == 0)
+    }
+
+    /// The centres of this level between which a crossing of the line of the finest grid at (u, v) lies: their cells, and the arm of
+    /// each that ends there. Only for lines that this level has.
+    #[inline]
+    fn at_wall(&self, axis: usize, place: [u32; 2], hit: &Hit) -> impl Iterator<Item = (usize, u8)> + use<> {
+        let first = self.grid.line_start(axis, place.map(|x| x / self.step));
+        let (stride, n) = (self.grid.strides()[axis], i64::from(self.grid.dims[axis]));
+        let (below, above) = wall_between(hit.t / f64::from(self.step));
+        [(below, 2 * axis), (above, 2 * axis + 1)]
+            .into_iter()
+            .filter(move |(x, _)| (0..n).contains(x))
+            .map(move |(x, direction)| (first + x as usize * stride, 1 << direction))
+    }
+
+    /// With the cage and the lines of which they were made.
+    #[must_use]
+    pub fn with<'a>(&'a self, cage: &'a Cage, lines: &'a [Lines; 3]) -> EmbeddedCells<'a> {
+        EmbeddedCells { cage, lines, cells: self }
+    }
+}
+
+impl EmbeddedCells<'_> {
     /// The crossing nearest to a cell along a direction, at most one cell away, and its distance in cells.
     fn nearest(&self, cell: [u32; 3], direction: usize) -> Option<(Hit, f64)> {
         let axis = direction / 2;
-        let step = f64::from(self.step);
-        let hits = self.lines[axis].through(cell.map(|x| x * self.step));
+        let step = self.cells.step;
+        let hits = self.lines[axis].through(cell.map(|x| x * step));
+        let step = f64::from(step);
         let s = f64::from(cell[axis]);
         let hit = if direction.is_multiple_of(2) {
             hits.iter().find(|h| h.t / step > s)
@@ -147,41 +173,8 @@ impl<'a> EmbeddedCells<'a> {
     }
 }
 
-/// The lines along x with centres whose arms may end at some crossings, on every level: `[n_levels][nz * ny]`.
-#[must_use]
-pub fn lines_at(crossings: &[[Lines; 3]; 2], grid: &Grid, n_levels: usize) -> Vec<Vec<bool>> {
-    let mut grids = vec![*grid];
-    while grids.len() < n_levels {
-        grids.extend(grids.last().map(Grid::coarsened));
-    }
-    let mut marked: Vec<Vec<bool>> =
-        grids.iter().map(|grid| vec![false; (grid.dims[1] * grid.dims[2]) as usize]).collect();
-    for (axis, lines) in crossings.iter().flat_map(|lines| lines.iter().enumerate()) {
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        for (iu, iv, hit) in lines.crossing().flat_map(|(iu, iv, hits)| hits.iter().map(move |h| (iu, iv, h)))
-        {
-            for (level, (grid, marked)) in grids.iter().zip(&mut marked).enumerate() {
-                let step = 1 << level;
-                if iu % step != 0 || iv % step != 0 {
-                    break;
-                }
-                let mut cell = [0; 3];
-                (cell[u], cell[v]) = (iu / step, iv / step);
-                let (below, above) = wall_between(hit.t / f64::from(step));
-                for x in [below, above] {
-                    if (0..i64::from(grid.dims[axis])).contains(&x) {
-                        cell[axis] = x as u32;
-                        marked[(cell[2] * grid.dims[1] + cell[1]) as usize] = true;
-                    }
-                }
-            }
-        }
-    }
-    marked
-}
-
 /// The two centres between which a crossing at `t` lies. A crossing exactly on a centre lies below it, as in
-/// [`classify`], where centre s is past the crossing when `t <= s`.
+/// [`votes`], where centre s is past the crossing when `t <= s`.
 fn wall_between(t: f64) -> (i64, i64) {
     let above = t.ceil() as i64;
     (above - 1, above)
@@ -189,15 +182,15 @@ fn wall_between(t: f64) -> (i64, i64) {
 
 impl Boundary for EmbeddedCells<'_> {
     fn grid(&self) -> Grid {
-        self.grid
+        self.cells.grid
     }
 
     fn unknowns(&self) -> &[bool] {
-        &self.inside
+        &self.cells.inside
     }
 
     fn cut_arms(&self) -> &[u8] {
-        &self.cut
+        &self.cells.cut
     }
 
     fn arm(&self, cell: [u32; 3], direction: usize, hats: &mut dyn FnMut(u32, f64)) -> f64 {

@@ -97,6 +97,30 @@ impl Lines {
         Self { start, hits, ..*self }
     }
 
+    /// Number of lines.
+    #[must_use]
+    pub fn n_lines(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    /// A line's coordinates along the next two axes in cyclic order.
+    #[must_use]
+    pub fn place(&self, line: usize) -> [u32; 2] {
+        [line as u32 % self.n_u, line as u32 / self.n_u]
+    }
+
+    /// Whether a line crosses the cage.
+    #[must_use]
+    pub fn is_hit(&self, line: usize) -> bool {
+        !self.range(line).is_empty()
+    }
+
+    /// Hits of a line, ascending.
+    #[must_use]
+    pub fn at(&self, line: usize) -> &[Hit] {
+        &self.hits[self.range(line)]
+    }
+
     /// Where a line's hits are.
     fn range(&self, line: usize) -> Range<usize> {
         self.start[line] as usize..self.start[line + 1] as usize

@@ -45,15 +45,15 @@ impl Region {
         }
     }
 
-    /// Whether the cell below a point (grid coordinates) along all axes is one of them.
-    pub(super) fn holds(&self, p: DVec3) -> bool {
+    /// Whether the lowest and the highest cell of the cube of centres around a point (grid coordinates) are among them.
+    pub(super) fn holds_cube(&self, p: DVec3) -> bool {
         let cell = p.floor();
         let [nx, ny, nz] = self.dims;
-        let inside =
-            cell.cmpge(DVec3::ZERO).all() && cell.cmplt(DVec3::new(nx as f64, ny as f64, nz as f64)).all();
-        inside && {
+        let highest = DVec3::new(nx as f64, ny as f64, nz as f64) - 1.0;
+        cell.cmpge(DVec3::ZERO).all() && cell.cmplt(highest).all() && {
             let [x, y, z] = cell.to_array().map(|x| x as usize);
-            self.number[(z * ny + y) * nx + x] != NO_CELL
+            let lowest = (z * ny + y) * nx + x;
+            [lowest, lowest + (ny + 1) * nx + 1].iter().all(|&cell| self.number[cell] != NO_CELL)
         }
     }
 }

@@ -104,12 +104,12 @@ mod tests {
     use super::*;
     use crate::bind::rebind::CHANGED;
     use crate::bind::rebind::local::Fields;
-    use crate::bind::rebind::moved::moved_triangles;
+    use crate::bind::rebind::moved::swept_by;
     use crate::bind::rebind::region::Region;
     use crate::cage::Cage;
     use crate::levels::plain::askew_c;
     use crate::solve::rows::ZERO;
-    use crate::voxelize::embedded::{EmbeddedCells, classify, shoot_lines};
+    use crate::voxelize::embedded::Embedding;
 
     /// f32 rounding of a row of some dozen weights, made of up to six rows with weights up to 1,000.
     const ROUNDED: f32 = 1e-5;
@@ -119,17 +119,15 @@ mod tests {
     #[test]
     fn cells_that_were_outside_get_means_of_what_is_around_them() {
         let (cage, grid) = askew_c();
-        let level_of = |cage: &Cage| {
-            let lines = shoot_lines(cage, &grid);
-            Level::new(&EmbeddedCells::finest(cage, &lines, grid, classify(&lines, &grid).0))
-        };
+        let level_of = |cage: &Cage| Level::new(&Embedding::new(cage, &grid).boundaries(cage)[0]);
         let mut smaller = cage.to_polygon_mesh();
         let pushed = &mut smaller.positions[3];
         *pushed += (cage.bounds().center() - *pushed).normalize() * (3.0 * grid.cell.x) as f32;
         let smaller = Cage::new(&smaller).unwrap();
         let (before, level) = (level_of(&smaller), level_of(&cage));
         let to_grid = |p: Vec3| -> DVec3 { grid.to_grid(p.as_dvec3()) };
-        let region = Region::around(&moved_triangles(&smaller, &cage, to_grid).unwrap(), CHANGED, &grid);
+        let swept = swept_by(&smaller, &cage, to_grid).unwrap();
+        let region = Region::around(&swept.triangles, CHANGED + swept.slack, &grid);
         let equations = Equations::changed(&level, &before, &region);
 
         let (n, n_batches) = (cage.n_vertices(), cage.n_vertices().div_ceil(LANES));

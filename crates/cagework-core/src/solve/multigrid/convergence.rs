@@ -1,4 +1,4 @@
-//! When a batch is done, the same on every back end.
+//! When a batch of columns is done, the same on every back end; corrections, on the CPU, ask for more.
 
 /// What a cycle leaves of the error, at worst: 0.03 to 0.10 measured, on the Armadillo and on boxes.
 const CONTRACTION: f64 = 0.12;
@@ -32,6 +32,8 @@ pub struct Stop {
     pub tolerance: f64,
     /// The same for the cell with the largest; infinite if only the mean counts.
     pub in_any_cell: f64,
+    /// Whether cycles that are not expected to be the last do with a sweep less: worth it where two or three cycles are all there is.
+    pub spares_sweeps: bool,
     /// Largest number of V-cycles on the finest level.
     pub max_cycles: u32,
 }
@@ -40,7 +42,7 @@ impl Stop {
     /// By the mean over cells.
     #[must_use]
     pub fn new(tolerance: f64, max_cycles: u32) -> Self {
-        Self { tolerance, in_any_cell: f64::INFINITY, max_cycles }
+        Self { tolerance, in_any_cell: f64::INFINITY, spares_sweeps: false, max_cycles }
     }
 }
 

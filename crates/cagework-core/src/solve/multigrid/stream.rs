@@ -50,7 +50,8 @@ pub(super) const UP: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, Black];
 pub(super) const UP_AND_DOWN: &[Pass] =
     &[Pass::Prolong(Prolong::Correct), Red, Black, Red, BlackFurther, Red, Black];
 
-/// The same with one sweep less between two coarse corrections, for a last cycle that has little to do.
+/// The same with one sweep less between two coarse corrections: for a last cycle that has little to do, and where sweeps are spared
+/// ([`Stop::spares_sweeps`](super::Stop)).
 pub(super) const UP_AND_HALF_DOWN: &[Pass] =
     &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black];
 
