@@ -3,9 +3,9 @@
 //! When a few vertices of the cage move, the discrete equations change only in cells at the moved faces. The old fields leave
 //! a residual there and nowhere else, and the residuals of all columns are combinations of a few: columns that do not
 //! belong to the moved faces vanish on them, so they look alike a few cells away. Those few are solved for, and every
-//! column, also at the mesh's vertices, takes its share of them. What is neglected (residuals of about tau an edit, more with few columns: [`lenience`]) adds up, so
-//! after [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid or the faces change, or when an edit
-//! reaches too many cells ([`ONE_IN`], [`REACH`]).
+//! column, also at the mesh's vertices, takes its share of them. What is neglected (residuals of about tau an edit, more with
+//! few columns: [`lenience`]) adds up, so after [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid or
+//! the faces change, or when an edit reaches too many cells ([`ONE_IN`], [`REACH`]).
 
 mod equations;
 mod local;
@@ -133,8 +133,8 @@ impl Kept {
 
 impl Rebinder {
     /// Binds as [`bind`] does, and keeps what the next bind can start from: the fields (4 bytes for each cell inside and
-    /// cage vertex), the weights (8 for each mesh vertex and cage vertex), levels and cells (some 60 for each cell inside). Only embedded multigrid without sparsification
-    /// leaves any: of dropped weights nobody knows how small they were.
+    /// cage vertex), the weights (8 for each mesh vertex and cage vertex), levels and cells (some 60 for each cell inside).
+    /// Only embedded multigrid without sparsification leaves any: of dropped weights nobody knows how small they were.
     ///
     /// # Errors
     /// Those of [`bind`].

@@ -52,12 +52,10 @@ pub fn shoot_lines(cage: &Cage, grid: &Grid, wanted: &(dyn Fn(u32) -> bool + Syn
 #[must_use]
 pub fn votes(lines: &[Lines; 3], grid: &Grid) -> Vec<u8> {
     let (mut votes, mut flips) = (vec![0u8; grid.n_cells()], vec![0u8; grid.n_cells()]);
-    let strides = grid.strides();
     for (axis, lines) in lines.iter().enumerate() {
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let (stride, n) = (strides[axis], grid.dims[axis] as usize);
+        let (stride, n) = (grid.strides()[axis], grid.dims[axis] as usize);
         for (iu, iv, hits) in lines.crossing() {
-            let first = iu as usize * strides[u] + iv as usize * strides[v];
+            let first = grid.line_start(axis, [iu, iv]);
             for pair in hits.chunks_exact(2) {
                 // Centres s with t0 <= s < t1 lie between an odd and an even crossing.
                 let [start, end] = [pair[0].t, pair[1].t].map(|t| t.ceil().clamp(0.0, n as f64) as usize);
@@ -136,8 +134,8 @@ impl Cells {
         place.iter().all(|x| x & (self.step - 1) == 0)
     }
 
-    /// The centres of this level between which a crossing of the line of the finest grid at (u, v) lies: their cells, and the arm of
-    /// each that ends there. Only for lines that this level has.
+    /// The centres of this level between which a crossing of the line of the finest grid at (u, v) lies: their cells, and the
+    /// arm of each that ends there. Only for lines that this level has.
     #[inline]
     fn at_wall(&self, axis: usize, place: [u32; 2], hit: &Hit) -> impl Iterator<Item = (usize, u8)> + use<> {
         let first = self.grid.line_start(axis, place.map(|x| x / self.step));

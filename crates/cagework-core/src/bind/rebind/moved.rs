@@ -69,8 +69,8 @@ pub(super) fn swept_by(before: &Cage, after: &Cage, to_grid: impl Fn(Vec3) -> DV
     Some(Swept { triangles, slack })
 }
 
-/// For every row of a level the one that the same cell has now; [`NO_CELL`] if it is gone. Zero rows are nobody's. `None` if all are
-/// where they were.
+/// For every row of a level the one that the same cell has now; [`NO_CELL`] if it is gone. Zero rows are nobody's. `None` if
+/// all are where they were.
 pub(super) fn renumbering(before: &Level, level: &Level) -> Option<Vec<u32>> {
     if before.row_of == level.row_of {
         return None;
@@ -107,7 +107,7 @@ mod tests {
             // As text: the same numbers to the last bit.
             let rest = format!("{:?} {:?}", plain.hats, plain.diagonal);
             let neighbours =
-                (0..6).filter(|d| boundary_free(&level, plain.cell, *d, &plain.neighbours)).collect();
+                (0..6).filter(|d| has_neighbour_in(&level, plain.cell, *d, &plain.neighbours)).collect();
             equations[grid.index(plain.cell)] = Some((neighbours, rest));
         }
         let stencils = Sampler::new(cage, &level).stencils(points.iter().copied());
@@ -120,7 +120,7 @@ mod tests {
     }
 
     /// Whether a cell's neighbour in a direction is one of these rows.
-    fn boundary_free(level: &Level, cell: [u32; 3], direction: usize, rows: &[u32]) -> bool {
+    fn has_neighbour_in(level: &Level, cell: [u32; 3], direction: usize, rows: &[u32]) -> bool {
         let neighbour = level.grid.neighbour(cell, direction);
         neighbour.is_some_and(|c| rows.contains(&level.row_of[level.grid.index(c)]))
     }
@@ -156,8 +156,9 @@ mod tests {
             for (k, point) in points.iter().enumerate().filter(|(k, _)| were.1[*k] != are.1[*k]) {
                 n_changed[1] += 1;
                 let p = grid.to_grid(*point);
-                let is_outside = are.1[k].ends_with("true");
-                assert!(is_outside || region.holds_cube(p), "{way} cells: the stencil at {p}");
+                // What was outside is made anew wherever it is.
+                let was_outside = were.1[k].ends_with("true");
+                assert!(was_outside || region.holds_cube(p), "{way} cells: the stencil at {p}");
             }
             assert!(n_changed.iter().all(|&n| n > 10), "{way} cells: {n_changed:?} change");
         }

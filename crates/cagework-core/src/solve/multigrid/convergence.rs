@@ -32,7 +32,8 @@ pub struct Stop {
     pub tolerance: f64,
     /// The same for the cell with the largest; infinite if only the mean counts.
     pub in_any_cell: f64,
-    /// Whether cycles that are not expected to be the last do with a sweep less: worth it where two or three cycles are all there is.
+    /// Whether cycles that are not expected to be the last do with a sweep less: worth it where two or three cycles are all
+    /// there is.
     pub spares_sweeps: bool,
     /// Largest number of V-cycles on the finest level.
     pub max_cycles: u32,

@@ -66,8 +66,7 @@ pub(super) struct Extent<'a> {
 }
 
 /// Runs `passes` over a level's field `u`, `[n_rows]`. `coarse`: the coarser level's field, for [`Pass::Prolong`];
-/// `residual`: `[n red cells + 1]`, for
-/// [`Pass::Residual`]. Returns the sum of the residual's squares.
+/// `residual`: `[n red cells + 1]`, for [`Pass::Residual`]. Returns the sum of the residual's squares.
 pub(super) fn stream(
     passes: &[Pass],
     level: &Level,
