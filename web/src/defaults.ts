@@ -30,6 +30,7 @@ export const CAGE_DEFAULTS: CageWish = {
   vertices: 80,
   margin: 0,
   symmetry: "auto",
+  voxels: 0,
   shape: "follow",
   per_component: false,
 };

@@ -3,7 +3,7 @@ import { grown } from "../src/actions/bind";
 import { freshName } from "../src/actions/poses";
 import { poseOf, readSettings } from "../src/actions/project";
 import { nextAmount } from "../src/amount";
-import { BIND_DEFAULTS } from "../src/defaults";
+import { BIND_DEFAULTS, CAGE_DEFAULTS } from "../src/defaults";
 import { rectangle } from "../src/input/pointer";
 import { pinch } from "../src/input/touch";
 import { ago, isSoftware } from "../src/start";
@@ -54,9 +54,15 @@ describe("settings of a project", () => {
     expect(settings).toEqual({ bind: BIND_DEFAULTS, symmetry: true, pose: "AAEC" });
     expect(poseOf(settings)).toEqual(Uint8Array.of(0, 1, 2));
   });
+  it("of before there were voxels leave them to the vertices", () => {
+    const { voxels: _, ...before } = { ...CAGE_DEFAULTS, vertices: 120 };
+    expect(readSettings(JSON.stringify({ cage: before }))).toEqual({ cage: { ...before, voxels: 0 } });
+  });
   it("are dropped part by part when they are not what they should be", () => {
     expect(readSettings("not json")).toEqual({});
     expect(readSettings("[1]")).toEqual({});
+    expect(readSettings(JSON.stringify({ cage: "none" }))).toEqual({});
+    expect(readSettings(JSON.stringify({ cage: { vertices: "many" } }))).toEqual({});
     expect(readSettings(JSON.stringify({ bind: { grid: 100_000 }, pose: 7 }))).toEqual({});
     expect(poseOf({ pose: "***" })).toBeUndefined();
   });

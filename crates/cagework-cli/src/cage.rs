@@ -91,6 +91,15 @@ pub(crate) fn write_cage(path: &std::path::Path, cage: &PolygonMesh) -> Result<(
     write(path, &bytes)
 }
 
+/// A length of a model of any size, to three digits.
+fn three_digits(length: f32) -> String {
+    let after_point = 2.0 - length.log10().floor();
+    match after_point {
+        -4.0..=8.0 => format!("{length:.0$}", after_point.max(0.0) as usize),
+        _ => format!("{length:.2e}"),
+    }
+}
+
 fn text(made: &Made) -> String {
     let Some(report) = &made.report else {
         return format!(
@@ -99,8 +108,12 @@ fn text(made: &Made) -> String {
         );
     };
     let mut text = format!(
-        "wrote {}: {} vertices and {} triangles in {:.0} ms; it keeps {:.3} from the model",
-        made.output, made.vertices, made.faces, report.elapsed_ms, report.clearance
+        "wrote {}: {} vertices and {} triangles in {:.0} ms; it keeps {} from the model",
+        made.output,
+        made.vertices,
+        made.faces,
+        report.elapsed_ms,
+        three_digits(report.clearance)
     );
     if let Some(mirror) = report.mirror {
         text.push_str(&format!(", is symmetric in {}", format!("{mirror:?}").to_lowercase()));
@@ -108,12 +121,26 @@ fn text(made: &Made) -> String {
     if report.parts > 1 {
         text.push_str(&format!(", has {} closed parts", report.parts));
     }
-    if !report.target_met {
+    if report.vertices > report.target {
         text.push_str(&format!(
-            ".\nnote: the model's holes and gaps need more than the {} vertices asked for; --voxels with a smaller \
-             number than {} closes more of them",
-            report.target, report.voxels
+            ".\nnote: the model's holes and gaps need {} vertices instead of {}; --voxels with a smaller number than \
+             {} closes more of them",
+            report.vertices, report.target, report.voxels
         ));
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::three_digits;
+
+    #[test]
+    fn lengths_of_small_and_large_models_keep_three_digits() {
+        for (length, text) in
+            [(0.0213, "0.0213"), (3.79, "3.79"), (50_100.0, "50100"), (2.5e-8, "2.50e-8"), (0.0, "0.00e0")]
+        {
+            assert_eq!(three_digits(length), text);
+        }
+    }
 }

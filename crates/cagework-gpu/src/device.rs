@@ -245,11 +245,11 @@ fn limits(offered: &wgpu::Limits, draws_only: bool) -> wgpu::Limits {
 async fn adapter_named(instance: &wgpu::Instance, name: String) -> Result<wgpu::Adapter, GpuError> {
     let adapters = instance.enumerate_adapters(wgpu::Backends::PRIMARY).await;
     let names: Vec<String> = adapters.iter().map(|a| a.get_info().name).collect();
-    let wanted = name.to_lowercase();
+    let wanted = name.to_ascii_lowercase();
     adapters
         .into_iter()
         .zip(&names)
-        .find(|(_, found)| found.to_lowercase().contains(&wanted))
+        .find(|(_, found)| found.to_ascii_lowercase().contains(&wanted))
         .map(|(adapter, _)| adapter)
         .ok_or_else(|| GpuError::UnknownAdapter { wanted: name, found: names.join(", ") })
 }

@@ -67,6 +67,7 @@ pub(crate) struct CageAsked {
     vertices: u32,
     margin: f32,
     symmetry: SymmetryAsked,
+    voxels: u32,
     #[serde(default)]
     shape: Shape,
     #[serde(default)]
@@ -93,7 +94,7 @@ impl From<CageAsked> for CageOptions {
             },
             shape: asked.shape,
             per_component: asked.per_component,
-            ..Self::default()
+            voxels: asked.voxels,
         }
     }
 }

@@ -59,8 +59,8 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
 
   const generate = async (source: CageSource) => {
     const { cageOptions } = ctx.store.get();
-    const options: CageWish =
-      source === "hull" ? { ...cageOptions, shape: "hull", vertices: HULL_VERTICES } : cageOptions;
+    const hull = { shape: "hull", vertices: HULL_VERTICES, voxels: 0 } as const;
+    const options: CageWish = source === "hull" ? { ...cageOptions, ...hull } : cageOptions;
     turn += 1;
     const mine = turn;
     ctx.store.set({ cageProgress: 0 });
@@ -69,7 +69,12 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
     });
     job = running;
     try {
-      return await running.done;
+      const state = await running.done;
+      const { vertices } = state.info;
+      if (vertices > options.vertices) {
+        ctx.tell.say(`The model's holes and gaps need ${vertices} vertices instead of ${options.vertices}.`);
+      }
+      return state;
     } finally {
       if (mine === turn) {
         job = undefined;

@@ -1,7 +1,7 @@
 /** Keeping work: autosave in the browser, the project file, the share link, and coming back from each. */
 
 import type { BindOptions, NamedFile } from "../contract";
-import type { CageWish } from "../defaults";
+import { CAGE_DEFAULTS, type CageWish } from "../defaults";
 import { stem } from "../format";
 import { encodeShare, fromBase64Url, toBase64Url } from "../share";
 import { forgetLocally, loadLocally, saveLocally } from "../store";
@@ -139,7 +139,9 @@ export function readSettings(text: string): Settings {
   const from = value as Record<string, unknown>;
   const settings: Settings = {};
   if (isBind(from.bind)) settings.bind = from.bind;
-  if (isCage(from.cage)) settings.cage = from.cage;
+  // Projects from before `voxels` have none.
+  const cage = typeof from.cage === "object" && from.cage && { ...CAGE_DEFAULTS, ...from.cage };
+  if (isCage(cage)) settings.cage = cage;
   if (typeof from.sample === "string") settings.sample = from.sample;
   if (typeof from.symmetry === "boolean") settings.symmetry = from.symmetry;
   if (typeof from.pose === "string") settings.pose = from.pose;
@@ -180,6 +182,7 @@ function isCage(value: unknown): value is CageWish {
   return (
     typeof v.vertices === "number" &&
     typeof v.margin === "number" &&
+    typeof v.voxels === "number" &&
     (v.shape === "follow" || v.shape === "hull") &&
     typeof v.per_component === "boolean" &&
     (v.symmetry === "auto" || v.symmetry === "on" || v.symmetry === "off")

@@ -45,6 +45,8 @@ export interface CageOptions {
   readonly margin: number;
   /** Mirror-symmetric in x, if the model is (found out by itself with "auto"). */
   readonly symmetry: "auto" | "on" | "off";
+  /** Voxels along the model's longest side, 8 to 128: gaps narrower than three of them are closed. 0: by the vertices. */
+  readonly voxels: number;
 }
 
 /** Edits of the rest cage's topology, on the selection. */

@@ -17,6 +17,11 @@ const SOURCES: Record<CageSource, string> = {
   file: "A closed mesh that you modelled around it: .obj, .glb or .gltf.",
 };
 
+/** Where the slider of voxels starts: it stands for none in particular. */
+const COARSEST = 16;
+/** Gaps narrower than so many voxels are closed. */
+const GAP_VOXELS = 3;
+
 export function createCagePanel(app: App): HTMLElement {
   const { store } = app;
   const setOptions = (patch: Partial<CageWish>) =>
@@ -47,6 +52,19 @@ export function createCagePanel(app: App): HTMLElement {
     },
     (value) => setOptions({ margin: value }),
   );
+  const gaps = slider(
+    "Gaps that stay open",
+    {
+      min: COARSEST,
+      max: 128,
+      step: 8,
+      format: (v) =>
+        v === COARSEST
+          ? "as the vertices allow"
+          : `from ${((GAP_VOXELS / v) * 100).toFixed(1)} % of its size`,
+    },
+    (voxels) => setOptions({ voxels: voxels === COARSEST ? 0 : voxels }),
+  );
   const symmetry = segments<CageOptions["symmetry"]>(
     "Left and right alike",
     [
@@ -64,7 +82,15 @@ export function createCagePanel(app: App): HTMLElement {
   const divisions = slider("Squares along each side", { min: 1, max: 8, step: 1 }, (boxDivisions) =>
     store.set({ boxDivisions }),
   );
-  const auto = h("div", { class: "stack" }, target.element, symmetry.element, margin.element, parts.element);
+  const auto = h(
+    "div",
+    { class: "stack" },
+    target.element,
+    symmetry.element,
+    margin.element,
+    gaps.element,
+    parts.element,
+  );
   const box = h("div", { class: "stack" }, divisions.element);
   const make = button("Make this cage", () => void app.cage.make(), { icon: "cage", kind: "block" });
   const load = button("Open a cage file", () => app.chooseCage(), { icon: "file", kind: "block" });
@@ -106,6 +132,7 @@ export function createCagePanel(app: App): HTMLElement {
   store.watch(["cageOptions", "boxDivisions"], ({ cageOptions, boxDivisions }) => {
     target.set(cageOptions.vertices);
     margin.set(cageOptions.margin);
+    gaps.set(cageOptions.voxels || COARSEST);
     symmetry.set(cageOptions.symmetry);
     parts.set(cageOptions.per_component);
     divisions.set(boxDivisions);

@@ -16,6 +16,10 @@ const MEASURED: usize = 1500;
 /// A part this many cells thick is thick enough: one cell has no unknown of its own in the worst case.
 const ENOUGH_CELLS: f64 = 1.0;
 
+/// Two faces bound a thin part if they lean towards each other by less than some 70 degrees (this is the cosine; a regular
+/// tetrahedron's still count). Steeper ones make a corner: near it they are as close as one likes, however thick the part.
+const OPPOSITE: f64 = 0.3;
+
 /// Faces that name existing, finite vertices, none twice, and have an area. The others are reported.
 pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u32> {
     let n = mesh.positions.len();
@@ -150,21 +154,29 @@ fn between(a: &Corners, b: &Corners) -> DVec3 {
     0.5 * (a.min().max(b.min()) + a.max().min(b.max()))
 }
 
-/// Measures from the middle of faces straight inwards; reports where that is less than a cell of the grid.
+/// Measures from the middle of faces straight inwards, to faces about opposite; reports where that is less than a cell of the
+/// grid.
 pub(super) fn report_thickness(cage: &Cage, grid: Option<u32>, found: &mut Vec<Problem>) -> Option<f32> {
     let n = cage.triangles().len();
     let triangles: Vec<[DVec3; 3]> = (0..n as u32).map(|t| cage.triangle_corners(t)).collect();
     let cell = grid.map(|g| f64::from(cage.bounds().extent().max_element()) / f64::from(g.max(1)));
+    let facing = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize_or_zero();
     let mut thinnest = f64::INFINITY;
     let (mut faces, mut points) = (Vec::new(), Vec::new());
     for t in (0..n).step_by(n.div_ceil(MEASURED).max(1)) {
         let [a, b, c] = triangles[t];
-        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let normal = facing(triangles[t]);
         let middle = (a + b + c) / 3.0;
-        let hits = triangles.iter().enumerate().filter(|(other, _)| *other != t);
-        let way = hits
-            .filter_map(|(_, other)| distance_along(middle, -normal, other))
-            .fold(f64::INFINITY, f64::min);
+        let (mut way, mut nearest) = (f64::INFINITY, t);
+        for (other, corners) in triangles.iter().enumerate().filter(|(other, _)| *other != t) {
+            if let Some(distance) = distance_along(middle, -normal, corners).filter(|d| *d < way) {
+                (way, nearest) = (distance, other);
+            }
+        }
+        if normal.dot(facing(triangles[nearest])) > -OPPOSITE {
+            // Past a corner.
+            continue;
+        }
         thinnest = thinnest.min(way);
         if cell.is_some_and(|cell| way < ENOUGH_CELLS * cell) {
             faces.push(cage.face_of_triangle()[t]);

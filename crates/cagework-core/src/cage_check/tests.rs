@@ -160,6 +160,20 @@ fn thin_part_is_found_and_a_grid_is_named_that_resolves_it() {
     assert!(check(&mesh, None, Some(cells)).problem(Code::ThinPart).is_none());
 }
 
+/// From the middle of a narrow face along a corner the other side of the corner is near.
+#[test]
+fn a_corner_is_no_thin_part() {
+    let outline = [[-1.0, -1.0], [1.0002, -1.0], [1.0, -0.999], [1.0, 1.0], [-1.0, 1.0]];
+    let n = outline.len() as u32;
+    let positions =
+        [-1.0, 1.0].into_iter().flat_map(|z| outline.map(|[x, y]| vec3(x, y, z))).collect::<Vec<_>>();
+    let mut faces = vec![(0..n).rev().collect::<Vec<_>>(), (n..2 * n).collect()];
+    faces.extend((0..n).map(|k| vec![k, (k + 1) % n, n + (k + 1) % n, n + k]));
+    let found = check(&PolygonMesh { positions, faces }, None, Some(64));
+    assert!(found.valid && found.problems.is_empty(), "{:?}", found.problems);
+    assert!((found.thickness.unwrap() - 2.0).abs() < 0.01, "{:?}", found.thickness);
+}
+
 #[test]
 fn check_is_written_as_json_with_stable_names() {
     let mut mesh = box_mesh(1);

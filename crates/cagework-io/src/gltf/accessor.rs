@@ -122,7 +122,7 @@ impl<'a> Source<'a> {
         if found != type_of(N) {
             return Err(fault(
                 accessor,
-                format!("is {found:?}, but {what} needs {:?}", type_of(N)).to_lowercase(),
+                format!("is {found:?}, but {what} needs {:?}", type_of(N)).to_ascii_lowercase(),
             ));
         }
         if a.count.0 > MAX_ELEMENTS {
