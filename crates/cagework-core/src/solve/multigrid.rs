@@ -28,9 +28,7 @@ use super::rows::{LANES, Rhs, Row, ZERO, over_relax_plane, relax_plane, restrict
 use crate::levels::Level;
 use crate::simd::dispatch;
 
-use stream::{
-    DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, Pass, UP, UP_AND_DOWN, UP_AND_HALF_DOWN, add_whole, stream,
-};
+use stream::{DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, OF_COLUMNS, Pass, UP, Ways, add_whole, stream};
 
 /// Over-relaxation of the first black half sweep: 1.1 to 1.3 all lower the error 1.5 to 2 times per cycle (Armadillo).
 pub const OMEGA: f32 = 1.2;
@@ -115,14 +113,14 @@ impl Workspace {
             self.cycle(hierarchy, k, if k == coarsest { DOWN_FROM_ZERO } else { DOWN_FROM_COARSE });
         }
         let start = if coarsest == 0 { DOWN_FROM_ZERO } else { DOWN_FROM_COARSE };
-        self.cycles(hierarchy, start, stop, cycle_done)
+        self.cycles(hierarchy, (start, &OF_COLUMNS), stop, cycle_done)
     }
 
     /// V-cycles on the finest level until the stop rule holds, the first of which begins with `start`.
     fn cycles(
         &mut self,
         hierarchy: &Hierarchy,
-        mut start: &[Pass],
+        (mut start, ways): (&[Pass], &Ways),
         stop: Stop,
         cycle_done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<BatchReport> {
@@ -136,14 +134,13 @@ impl Workspace {
                 return None;
             }
             if done {
-                self.up(hierarchy, 0);
+                self.up(hierarchy, 0, ways.last);
                 return Some(convergence.into_report());
             }
-            let is_early = stop.spares_sweeps && !convergence.is_nearly_done(1.0);
             start = match hierarchy.levels.len() {
                 1 => DOWN,
-                _ if is_early || convergence.is_nearly_done(SPARE) => UP_AND_HALF_DOWN,
-                _ => UP_AND_DOWN,
+                _ if convergence.is_nearly_done(SPARE) => ways.before_little,
+                _ => ways.between,
             };
         }
     }
@@ -175,7 +172,7 @@ impl Workspace {
     /// One V(2,1) cycle from level k down, which begins with `start`.
     fn cycle(&mut self, hierarchy: &Hierarchy, k: usize, start: &[Pass]) {
         self.down(hierarchy, k, start);
-        self.up(hierarchy, k);
+        self.up(hierarchy, k, UP);
     }
 
     /// The right-hand side of level k.
@@ -206,7 +203,8 @@ impl Workspace {
         let mean_square = dispatch(
             #[inline(always)]
             || {
-                if k == 0 && (start == UP_AND_DOWN || start == UP_AND_HALF_DOWN) {
+                // What follows a coarse correction ends without a residual.
+                if start.last() != Some(&Pass::Residual) {
                     return hierarchy.centres.inject(level, coarse, &mut u[0], rhs, &mut coarse_f[0]);
                 }
                 restrict_residual(coarse, transfer, residual, &mut coarse_f[0]);
@@ -219,15 +217,15 @@ impl Workspace {
         (correction, mean_square)
     }
 
-    /// A cycle's way up on level k.
-    fn up(&mut self, hierarchy: &Hierarchy, k: usize) {
+    /// A cycle's way up on level k, by `passes`.
+    fn up(&mut self, hierarchy: &Hierarchy, k: usize, passes: &[Pass]) {
         if k + 1 < hierarchy.levels.len() {
             let (u, coarse_u) = self.u.split_at_mut(k + 1);
             let rhs = Self::rhs(&self.f, k);
             stream(
-                UP,
+                passes,
                 &hierarchy.levels[k],
-                self.places.extent(k, UP),
+                self.places.extent(k, passes),
                 (&hierarchy.transfers[k], &coarse_u[0]),
                 &mut u[k],
                 rhs,

@@ -7,7 +7,7 @@
 use crate::bind::DeltaNorm;
 use crate::grid::NO_CELL;
 use crate::levels::Level;
-use crate::transfer::{ProlongRow, RESTRICT_CENTRE, RESTRICT_EDGE, RestrictRow, Transfer};
+use crate::transfer::{FURTHER, ProlongRow, RESTRICT_CENTRE, RESTRICT_EDGE, RestrictRow, Transfer};
 
 mod part;
 pub use part::Part;
@@ -353,6 +353,8 @@ fn gather_edges(residual: &[Row], around: &RestrictRow) -> Row {
 pub enum Prolong {
     /// Adds the coarse correction, zero outside the cage.
     Correct,
+    /// Adds [`FURTHER`] times as much.
+    Further,
     /// Replaces the value by the mean of the coarse solution where there is one.
     Replace,
 }
@@ -381,18 +383,15 @@ fn prolong_rows<const N: usize>(rows: &[ProlongRow<N>], coarse: &[Row], black: &
             add(&mut sum, &coarse[from as usize]);
         }
         let out = &mut black[row.cell as usize];
-        match mode {
-            Prolong::Correct => {
-                for k in 0..LANES {
-                    out[k] += sum[k] * (1.0 / N as f32);
-                }
-            }
+        let share = match mode {
             Prolong::Replace => {
-                for k in 0..LANES {
-                    out[k] = sum[k] * row.mean;
-                }
+                *out = sum.map(|s| s * row.mean);
+                continue;
             }
-        }
+            Prolong::Correct => 1.0 / N as f32,
+            Prolong::Further => FURTHER / N as f32,
+        };
+        add(out, &sum.map(|s| s * share));
     }
 }
 

@@ -39,7 +39,7 @@ impl Negligible {
     }
 }
 
-/// A residual must be so many times what counts to be worth a batch of its own, twice as many with 24 vertices (the root of
+/// A residual must be so many times what counts to be worth a batch of its own, 2.6 times as many with 24 vertices (the root of
 /// [`lenience`]: with four times weights were 1e-4 off where a bind's are 2e-5, in a box of 18 vertices).
 const MANY: f32 = 2.0;
 

@@ -32,9 +32,8 @@ pub struct Stop {
     pub tolerance: f64,
     /// The same for the cell with the largest; infinite if only the mean counts.
     pub in_any_cell: f64,
-    /// Whether cycles that are not expected to be the last do with a sweep less: worth it where two or three cycles are all
-    /// there is.
-    pub spares_sweeps: bool,
+    /// What a cycle leaves of the error, at worst.
+    pub contraction: f64,
     /// Largest number of V-cycles on the finest level.
     pub max_cycles: u32,
 }
@@ -43,7 +42,7 @@ impl Stop {
     /// By the mean over cells.
     #[must_use]
     pub fn new(tolerance: f64, max_cycles: u32) -> Self {
-        Self { tolerance, in_any_cell: f64::INFINITY, spares_sweeps: false, max_cycles }
+        Self { tolerance, in_any_cell: f64::INFINITY, contraction: CONTRACTION, max_cycles }
     }
 }
 
@@ -74,7 +73,7 @@ impl Convergence {
             correction: f64::INFINITY,
             delta: f64::INFINITY,
             largest: f64::INFINITY,
-            ratio: CONTRACTION,
+            ratio: stop.contraction,
             stalled: 0,
         }
     }
@@ -85,7 +84,7 @@ impl Convergence {
     pub fn cycle_done(&mut self, correction_square: f64, largest_square: f64, residual_square: f64) -> bool {
         let correction = correction_square.sqrt();
         let ratio = correction / self.correction;
-        let contraction = ratio.clamp(CONTRACTION, 1.0);
+        let contraction = ratio.clamp(self.stop.contraction, 1.0);
         let (delta, largest) = (contraction * correction, contraction * largest_square.sqrt());
         self.report.delta_squares.push(delta * delta);
         self.report.residual_squares.push(residual_square);

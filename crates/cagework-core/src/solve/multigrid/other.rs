@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::stream::{DOWN_FROM_ZERO, Extent, Pass};
+use super::stream::{DOWN_FROM_ZERO, Extent, FROM_ZERO, Pass};
 use super::{BatchReport, Stop, Workspace};
 use crate::grid::NO_CELL;
 use crate::levels::Level;
@@ -138,7 +138,7 @@ impl Workspace {
             }
         }
         self.places = Arc::clone(places);
-        let report = self.cycles(hierarchy, DOWN_FROM_ZERO, stop, cycle_done);
+        let report = self.cycles(hierarchy, (DOWN_FROM_ZERO, &FROM_ZERO), stop, cycle_done);
         self.places = Arc::default();
         for &[number, row] in &places.red {
             for (out, value) in self.u[0][row as usize].iter_mut().zip(&values[number as usize]) {

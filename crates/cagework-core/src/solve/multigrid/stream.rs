@@ -46,14 +46,31 @@ pub(super) const DOWN_FROM_COARSE: &[Pass] =
     &[Pass::Prolong(Prolong::Replace), Red, BlackFurther, Red, Black, Residual];
 /// The coarse correction and the sweep after it.
 pub(super) const UP: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, Black];
-/// [`UP`], and [`DOWN`] of the next cycle, whose residual is injected.
-pub(super) const UP_AND_DOWN: &[Pass] =
-    &[Pass::Prolong(Prolong::Correct), Red, Black, Red, BlackFurther, Red, Black];
+/// What a solve does from one coarse correction to the next.
+#[derive(Debug)]
+pub(super) struct Ways {
+    /// The coarse correction and the sweep after it, and [`DOWN`] of the next cycle, whose residual is injected.
+    pub(super) between: &'static [Pass],
+    /// The same before a last cycle that has little to do.
+    pub(super) before_little: &'static [Pass],
+    /// The last coarse correction and what comes after it.
+    pub(super) last: &'static [Pass],
+}
 
-/// The same with one sweep less between two coarse corrections: for a last cycle that has little to do, and where sweeps are spared
-/// ([`Stop::spares_sweeps`](super::Stop)).
-pub(super) const UP_AND_HALF_DOWN: &[Pass] =
-    &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black];
+/// For columns, which start from the coarser level's solution; one sweep less for a last cycle with little to do.
+pub(super) const OF_COLUMNS: Ways = Ways {
+    between: &[Pass::Prolong(Prolong::Correct), Red, Black, Red, BlackFurther, Red, Black],
+    before_little: &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black],
+    last: UP,
+};
+
+/// For right-hand sides that start from zero. At last a half sweep more, which halves the largest error: nothing smooths
+/// again what two or three cycles leave next to the cage.
+pub(super) const FROM_ZERO: Ways = Ways {
+    between: &[Pass::Prolong(Prolong::Further), Red, Black, Red, BlackFurther, Red, Black],
+    before_little: &[Pass::Prolong(Prolong::Further), Red, Black, Red, BlackFurther, Red, Black],
+    last: &[Pass::Prolong(Prolong::Further), Red, BlackFurther, Red],
+};
 
 /// Where a level's right-hand side is, if it is not the cage's.
 #[derive(Clone, Copy, Debug, Default)]

@@ -218,7 +218,7 @@ fn prolongation_matches_plain_loops() {
     for (levels, transfer) in hierarchy.levels.windows(2).zip(&hierarchy.transfers) {
         let [fine, coarse] = levels else { unreachable!("windows of two") };
         let (from, before) = (some_field(coarse, 5), some_field(fine, 6));
-        for mode in [Prolong::Correct, Prolong::Replace] {
+        for mode in [Prolong::Correct, Prolong::Further, Prolong::Replace] {
             let mut expected = before.clone();
             let black = fine.grid.cells().filter(|&c| Grid::colour(c) == 1);
             for cell in black.filter(|&c| fine.row_of[fine.grid.index(c)] != NO_CELL) {
@@ -244,6 +244,7 @@ fn prolongation_matches_plain_loops() {
                 for k in 0..LANES {
                     out[k] = match mode {
                         Prolong::Correct => out[k] + weight * sum[k],
+                        Prolong::Further => out[k] + FURTHER * weight * sum[k],
                         Prolong::Replace => sum[k] / known.max(1.0),
                     };
                 }
