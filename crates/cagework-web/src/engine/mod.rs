@@ -77,7 +77,7 @@ impl Engine {
     /// corners of its frame, `[n_outside, 4]`, and its offset, `[n_outside, 3]`.
     ///
     /// # Errors
-    /// When the arrays do not fit model and cage, or the GPU has no room for them.
+    /// When the arrays do not fit model and cage, or the GPU has no room for them; `Cancelled` when another cage came meanwhile.
     pub async fn adopt(
         &self,
         indptr: Vec<u32>,
@@ -88,9 +88,18 @@ impl Engine {
     ) -> Result<(), JsValue> {
         let bound =
             self.read(|state| crate::binder::unpack(state, indptr, indices, data, &outside, &offsets))?;
+        let generation = self.read(|state| state.generation);
+        let is_current = || self.read(|state| state.generation) == generation;
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
-        gpu.main.adopt(bound.0, bound.1).await.map_err(Fault::from)?;
+        // The cage may still be waiting for its turn, and would take the weights away again.
+        upload_cage(&self.state, gpu).await?;
+        if is_current() {
+            gpu.main.adopt(bound.0, bound.1).await.map_err(Fault::from)?;
+        }
+        if !is_current() {
+            return Err(Fault::new("Cancelled", "there is another cage by now").into());
+        }
         self.change(|state| {
             state.is_bound = true;
             (state.is_moved, state.is_changed) = (true, true);
@@ -188,21 +197,12 @@ impl Engine {
         self.change(|state| state.set_cage(mesh));
         let (state, gpu, invalidate) =
             (Rc::clone(&self.state), Rc::clone(&self.gpu), self.invalidate.clone());
-        let (generation, cage) = self.read(|state| (state.generation, state.cage.clone()));
-        let Some(cage) = cage else { return };
         spawn_local(async move {
             let mut gpu = gpu.lock().await;
             let Some(gpu) = gpu.as_mut() else { return };
-            if state.borrow().generation != generation {
-                return;
-            }
-            gpu.other = None;
-            let outcome = gpu.main.set_cage(&cage).await;
+            let outcome = upload_cage(&state, gpu).await;
             let mut state = state.borrow_mut();
-            match outcome {
-                Ok(()) => state.on_gpu = Some(generation),
-                Err(error) => state.fault = Some(error.into()),
-            }
+            state.fault = outcome.err().or_else(|| state.fault.take());
             (state.is_moved, state.is_changed) = (true, true);
             drop(state);
             let _ = invalidate.call0(&JsValue::NULL);
@@ -217,6 +217,20 @@ impl Engine {
             .ok_or_else(|| Fault::new("Busy", "the GPU is busy: try again in a moment"))?;
         read(&gpu.as_ref().ok_or_else(lost)?.main)
     }
+}
+
+/// Sees to it that the GPU has the cage of the moment; weights for the one before are dropped.
+async fn upload_cage(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> {
+    let (generation, cage) = {
+        let state = state.borrow();
+        let missing = state.cage.as_ref().filter(|_| !state.is_on_gpu());
+        (state.generation, missing.cloned())
+    };
+    let Some(cage) = cage else { return Ok(()) };
+    gpu.other = None;
+    gpu.main.set_cage(&cage).await?;
+    state.borrow_mut().on_gpu = Some(generation);
+    Ok(())
 }
 
 fn lost() -> Fault {
