@@ -61,7 +61,7 @@ const REACH: usize = 7;
 /// How many times as much as elsewhere corrections may leave, and leave out, where a bind has few batches, of which a cycle or
 /// a batch more is a large share: seven times with 24 vertices, once with 41 or more. Of 39 edits each by 0.1, 0.4 and 1 % of the
 /// model, four cages of 24 vertices: 327 cycles, where four times takes 363; weights' mean error is 1.6e-6 at most, the largest
-/// 6.6e-5 (7.4e-7 and 3.8e-5; whole binds 3.9e-7 and 2.6e-5; the grid itself is off by 3e-5 on average and 1e-3 at most, or more).
+/// 6.6e-5 (7.4e-7 and 3.8e-5; whole binds 3.9e-7 and 2.6e-5; the grid itself is off by 3e-5 on average and 1e-3 at worst, or more).
 fn lenience(n_batches: usize) -> f32 {
     match n_batches {
         ..=3 => 7.0,
