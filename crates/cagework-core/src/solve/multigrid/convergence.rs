@@ -21,6 +21,8 @@ pub struct BatchReport {
     pub delta_squares: Vec<f64>,
     /// For each V-cycle, the sum of squared residuals divided by the number of unknowns.
     pub residual_squares: Vec<f64>,
+    /// Error that the last cycle is expected to leave in the cell with the largest; 0 if nobody asked.
+    pub largest: f64,
     /// Whether the error is expected to be below the threshold. It never is below f32's round-off, where cycles end.
     pub converged: bool,
 }
@@ -54,8 +56,6 @@ pub struct Convergence {
     /// Norm of the latest coarse correction.
     correction: f64,
     delta: f64,
-    /// The same in the cell where it is largest.
-    largest: f64,
     /// Latest correction over the one before.
     ratio: f64,
     /// Cycles in a row that only moved rounding about.
@@ -66,13 +66,12 @@ impl Convergence {
     /// Before the first cycle.
     #[must_use]
     pub fn new(stop: Stop) -> Self {
-        let report = BatchReport::default();
+        let report = BatchReport { largest: f64::INFINITY, ..BatchReport::default() };
         Self {
             stop,
             report,
             correction: f64::INFINITY,
             delta: f64::INFINITY,
-            largest: f64::INFINITY,
             ratio: stop.contraction,
             stalled: 0,
         }
@@ -91,11 +90,11 @@ impl Convergence {
         self.report.converged = delta <= self.stop.tolerance && largest <= self.stop.in_any_cell;
         let stalls = correction < ROUND_OFF
             && correction > STALLED * self.correction
-            && largest >= STALLED * self.largest;
+            && largest >= STALLED * self.report.largest;
         self.stalled = if stalls { self.stalled + 1 } else { 0 };
         // The first one has none before it.
         self.ratio = if ratio > 0.0 { ratio } else { self.ratio };
-        (self.correction, self.delta, self.largest) = (correction, delta, largest);
+        (self.correction, self.delta, self.report.largest) = (correction, delta, largest);
         self.report.converged
             || self.stalled == MAX_STALLED
             || self.report.delta_squares.len() >= self.stop.max_cycles as usize
@@ -105,7 +104,8 @@ impl Convergence {
     #[must_use]
     pub fn is_nearly_done(&self, spare: f64) -> bool {
         let expected = spare * self.ratio;
-        expected * self.delta <= self.stop.tolerance && expected * self.largest <= self.stop.in_any_cell
+        expected * self.delta <= self.stop.tolerance
+            && expected * self.report.largest <= self.stop.in_any_cell
     }
 
     /// Number and delta of the latest cycle.

@@ -3,15 +3,20 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::stream::{DOWN_FROM_ZERO, Extent, FROM_ZERO, Pass};
+use super::stream::{AROUND, DOWN_FROM_ZERO, Extent, FROM_ZERO, Pass, stream};
 use super::{BatchReport, Stop, Workspace};
 use crate::grid::NO_CELL;
 use crate::levels::Level;
 use crate::solve::hierarchy::Hierarchy;
-use crate::solve::rows::{Row, ZERO};
+use crate::solve::rows::{Rhs, Row, ZERO};
 
 /// What a right-hand side of a whole red cell adds to the cell, and to the six neighbours' right-hand sides.
 const SIXTH: f32 = 1.0 / 6.0;
+
+/// A solve that is expected to leave more than so much of what it may leave in a cell ends with sweeps around the right-hand
+/// sides, where that cell is. They replace a cycle at a tenth to a quarter of its cost, which is why a cell may be left with more
+/// (edits of cages of 80 and 200 vertices: 963 cycles instead of 1,034, weights as exact).
+const WELL: f64 = 0.45;
 
 /// Where right-hand sides of some cells go.
 ///
@@ -139,6 +144,14 @@ impl Workspace {
         }
         self.places = Arc::clone(places);
         let report = self.cycles(hierarchy, (DOWN_FROM_ZERO, &FROM_ZERO), stop, cycle_done);
+        let is_well = |report: &BatchReport| report.largest <= WELL * stop.in_any_cell;
+        if let Some(transfer) = hierarchy.transfers.first()
+            && !report.as_ref().is_none_or(is_well)
+        {
+            let extent = Extent { reach: Some(&places.reach[..AROUND.len()]), whole: &places.whole };
+            let f = Rhs::Cut(&self.f[0]);
+            stream(AROUND, level, extent, (transfer, &[]), &mut self.u[0], f, &mut []);
+        }
         self.places = Arc::default();
         for &[number, row] in &places.red {
             for (out, value) in self.u[0][row as usize].iter_mut().zip(&values[number as usize]) {
@@ -212,6 +225,27 @@ mod tests {
         let by_cells = Stop { in_any_cell: 1e-3, ..Stop::new(f64::INFINITY, n_cycles) };
         let report = workspace.solve_for(hierarchy, (&places, &values), by_cells, &mut |_, _| true).unwrap();
         assert!(report.converged && report.delta_squares.len() > 1);
+    }
+
+    /// Where a cell is left with more than it may, sweeps follow around the right-hand sides.
+    #[test]
+    fn sweeps_around_right_hand_sides_make_up_for_a_cycle() {
+        let hierarchy = hierarchy();
+        let (cells, values) = some_cells(&hierarchy, 60, usize::MAX);
+        let places = Arc::new(Places::new(&hierarchy.levels[0], &cells));
+        let solved = |n_cycles: u32, in_any_cell: f64| {
+            let mut workspace = Workspace::new(&hierarchy);
+            let stop = Stop { in_any_cell, ..Stop::new(0.0, n_cycles) };
+            workspace.solve_for(&hierarchy, (&places, &values), stop, &mut |_, _| true).unwrap();
+            workspace.take_field()
+        };
+        let exact = solved(12, f64::INFINITY);
+        let error = |u: Vec<Row>| {
+            let apart = u.iter().flatten().zip(exact.iter().flatten()).map(|(a, b)| (a - b).abs());
+            apart.fold(0.0, f32::max)
+        };
+        let [without, with] = [f64::INFINITY, 1e-9].map(|in_any_cell| error(solved(1, in_any_cell)));
+        assert!(with < 0.75 * without, "{with} with sweeps, {without} without");
     }
 
     /// What one call leaves, also if it is cancelled, must not be felt by the next.
