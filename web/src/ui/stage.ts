@@ -8,7 +8,7 @@ import { iconButton, press, segments } from "./controls";
 import { fill, h, setText } from "./dom";
 import { type IconName, icon } from "./icons";
 import { createLegend } from "./legend";
-import { statusOf } from "./status";
+import { statusOf, underWay } from "./status";
 
 /** Everything that lies on the view. */
 export function createOverlays(
@@ -170,7 +170,10 @@ export function createOverlays(
     },
   );
   const speak = (state: AppState) => {
-    setText(status, statusOf(state));
+    const text = statusOf(state);
+    // Another element, so that it stays for a while each time it says something else.
+    if (status.textContent !== text) fill(status, text === "" ? null : h("span", { text }));
+    status.toggleAttribute("data-settled", underWay(state) === null);
     const quiet = state.gesture !== null || state.busy !== null;
     hint.hidden = quiet;
     setText(

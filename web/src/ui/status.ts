@@ -6,6 +6,11 @@ import { STAGES } from "../strings";
 
 /** The status line: what is going on, said once; progress in steps of ten so that it is not read all the time. */
 export function statusOf(state: AppState): string {
+  return underWay(state) ?? settled(state);
+}
+
+/** What is going on, or must not be missed; null if nothing. */
+export function underWay(state: AppState): string | null {
   if (state.busy) return `${state.busy}…`;
   if (state.gesture) return state.gesture;
   if (state.scene.original) return "The original, while Space is held";
@@ -14,6 +19,10 @@ export function statusOf(state: AppState): string {
   if (state.boxArmed) return "Drag a box around what you want to select";
   if (state.playing) return "Playing the poses";
   if (cageBroken(state)) return "The cage has faults; the Cage step says which";
+  return null;
+}
+
+function settled(state: AppState): string {
   const { count, last } = state.selected;
   if (count === 1) return `Cage vertex ${last} selected`;
   if (count > 1) return `${plural(count, "cage vertex", "cage vertices")} selected`;
