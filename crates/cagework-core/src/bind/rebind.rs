@@ -3,11 +3,12 @@
 //! When a few vertices of the cage move, the discrete equations change only in cells at the moved faces. The old fields leave
 //! a residual there and nowhere else, and the residuals of all columns are combinations of a few: columns that do not
 //! belong to the moved faces vanish on them, so they look alike a few cells away. Those few are solved for, and every
-//! column, also at the mesh's vertices, takes its share of them. What is neglected (residuals of about tau an edit, more with
-//! few columns: [`lenience`]) adds up, so after [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid or
-//! the faces change, or when an edit reaches too many cells ([`ONE_IN`], [`REACH`]).
+//! column, also at the mesh's vertices, takes its share of them. What is neglected ([`lenience`]) adds up, so after
+//! [`MAX_UPDATES`] edits everything is bound anew; so it is when the grid or the faces change, or when an edit reaches too many
+//! cells ([`ONE_IN`], [`REACH`]).
 
 mod equations;
+mod fields;
 mod local;
 mod moved;
 mod region;
@@ -33,7 +34,8 @@ use crate::weights::affine::Columns;
 use crate::weights::assemble::Assembled;
 
 use self::equations::{Equations, cells_of_rows, n_cut_in};
-use self::local::{Fields, Negligible, OldCells, Residual, Split, Update};
+use self::fields::{Fields, Update};
+use self::local::{Negligible, OldCells, Residual, Split};
 use self::moved::{moved_columns, renumbering, swept_by};
 use self::region::Region;
 use self::rows::Edit;
@@ -47,20 +49,19 @@ use super::{BindError, BindOptions, Binding, Method, Solver, bind};
 /// Edits after which everything is bound anew.
 const MAX_UPDATES: usize = 6;
 
-/// A row with a weight below was put in its place by force, as in a cage that meets itself: what it was before cannot be told.
+/// A row with a weight below was put in place by force, as in a cage that meets itself: nobody knows what it was.
 const FORCED: f32 = -1e-5;
 
 /// Everything is bound anew if one in so many cells is at a moved face.
 const ONE_IN: usize = 4;
 
-/// An edit may reach one in so many of the cells next to the cage for each batch of columns: three in seven with 24 vertices,
-/// where corrections and what it takes to find them cost nearly as much as a bind (0.96 of it, the Armadillo in such a cage, one
-/// vertex moved by 8 % of the model). Beyond, everything is bound anew; from seven batches on nothing is refused.
+/// An edit may reach one in so many of the cells next to the cage for each batch of columns: three in seven with 24 vertices, where
+/// it takes nearly as long as a bind then (0.96 of it once, with 8 % of the model). Beyond, all is bound anew; never from seven on.
 const REACH: usize = 7;
 
-/// How many times as much as elsewhere corrections may leave, and leave out, where a bind has few batches, of which a cycle or
-/// a batch more is a large share. After 117 edits of four cages of 24 vertices by 0.1 to 1 % of the model weights' mean error is
-/// 1.5e-6 at most, the largest 7.0e-5 (whole binds 3.9e-7 and 2.6e-5; the grid itself is off by at least 3e-5 and 1e-3).
+/// How many times as much as elsewhere corrections may leave, and leave out, where a bind has few batches, of which a cycle or a
+/// batch more is much. After 117 edits of four cages of 24 vertices by 0.1 to 1 % of the model weights' mean error is 1.5e-6 at
+/// most, the largest 7.0e-5 (whole binds 3.9e-7 and 2.6e-5; the grid itself is off by at least 3e-5 and 1e-3).
 fn lenience(n_batches: usize) -> f32 {
     match n_batches {
         ..=3 => 4.7,
@@ -71,8 +72,7 @@ fn lenience(n_batches: usize) -> f32 {
 }
 
 /// Cells around the moved faces' ways, along each axis, in which equations may have changed: arms are no longer than a cell, and
-/// little more for rounding. Where a stencil may have changed, which sees the triangles in its cube of centres, all of the
-/// cube's are among them.
+/// little more for rounding. All of the cube of centres of a stencil that may have changed are among them.
 const CHANGED: f64 = 1.0 + 1e-3;
 
 /// How a bind was brought up to date.

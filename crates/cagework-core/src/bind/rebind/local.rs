@@ -1,7 +1,5 @@
 //! What an edit does to the linear system, looked at only where the moved faces are.
 
-use std::sync::Arc;
-
 use glam::{DVec3, DVec4};
 
 use crate::grid::NO_CELL;
@@ -11,9 +9,10 @@ use crate::solve::rows::{LANES, Row, ZERO};
 use crate::weights::affine::Columns;
 
 use super::equations::Equations;
+use super::fields::Fields;
 use super::lenience;
 use super::region::Region;
-use super::shares::{Felt, Shares, add_scaled};
+use super::shares::{Shares, add_scaled};
 use super::stencils::FewStencils;
 
 /// What is left out, as changes of a weight.
@@ -45,91 +44,6 @@ const MANY: f32 = 2.4;
 
 /// Moments must be met so many times as well as weights: then most rows need not be restored after they were corrected.
 const KEENER: f32 = 30.0;
-
-/// A correction of all columns: a few fields and how much of each every column takes.
-#[derive(Clone, Debug)]
-pub(super) struct Update {
-    /// `[n_batches of fields][n_rows]`
-    pub(super) fields: Vec<Vec<Row>>,
-    pub(super) row_of: Arc<Vec<u32>>,
-    pub(super) shares: Shares,
-    /// What is corrected in cells that were outside: cells, ascending, and `[n_batches]` of each.
-    pub(super) extended: Vec<(u32, Vec<Row>)>,
-}
-
-/// All columns' fields: those of the last whole bind, and the corrections since.
-#[derive(Clone, Debug)]
-pub(super) struct Fields {
-    /// `[n_batches][n_rows]`
-    base: Vec<Vec<Row>>,
-    row_of: Arc<Vec<u32>>,
-    /// How many of the updates there are in each row of the base already. `[n_rows]`
-    included: Vec<u8>,
-    updates: Vec<Update>,
-}
-
-impl Fields {
-    /// Those of a whole bind, `[n_batches][n_rows]`.
-    pub(super) fn new(base: Vec<Vec<Row>>, row_of: Arc<Vec<u32>>) -> Self {
-        let included = vec![0; base.first().map_or(0, Vec::len)];
-        Self { base, row_of, included, updates: Vec::new() }
-    }
-
-    /// Corrections since the whole bind.
-    pub(super) fn n_updates(&self) -> usize {
-        self.updates.len()
-    }
-
-    /// Adds a correction.
-    pub(super) fn correct(&mut self, update: Update) {
-        self.updates.push(update);
-    }
-
-    /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
-        let updates = self
-            .updates
-            .iter()
-            .flat_map(|update| update.fields.iter().chain(update.extended.iter().map(|(_, row)| row)));
-        let rows: usize = self.base.iter().chain(updates).map(|rows| size_of_val(rows.as_slice())).sum();
-        rows + self.included.len()
-    }
-
-    /// Weights of all columns in a cell; zeros where it was outside. `out`: `[n_batches]`; `felt`: scratch space. They are put
-    /// down in the base as well: the next edit is likely to be close by, and asks for them again.
-    #[inline(always)]
-    fn at(&mut self, cell: usize, out: &mut [Row], felt: &mut Felt) {
-        let base_row = self.row_of[cell];
-        for (base, out) in self.base.iter().zip(out.iter_mut()) {
-            *out = if base_row == NO_CELL { ZERO } else { base[base_row as usize] };
-        }
-        let first = self.included.get(base_row as usize).map_or(0, |&n| usize::from(n));
-        let row_before = |update: &Update| update.row_of[cell];
-        let mut was_outside = self.updates[..first].last().map_or(base_row, row_before) == NO_CELL;
-        for update in &self.updates[first..] {
-            let row = update.row_of[cell];
-            if row == NO_CELL {
-                // Outside at the time: whatever it was before does not count.
-                out.fill(ZERO);
-            } else {
-                if was_outside
-                    && let Ok(k) = update.extended.binary_search_by_key(&(cell as u32), |(cell, _)| *cell)
-                {
-                    out.copy_from_slice(&update.extended[k].1);
-                }
-                update.shares.pick(felt, update.fields.iter().map(|field| &field[row as usize]));
-                update.shares.add(felt, out);
-            }
-            was_outside = row == NO_CELL;
-        }
-        if first < self.updates.len() && base_row != NO_CELL {
-            for (base, out) in self.base.iter_mut().zip(out.iter()) {
-                base[base_row as usize] = *out;
-            }
-            self.included[base_row as usize] = self.updates.len() as u8;
-        }
-    }
-}
 
 /// What the old fields leave of equations that may have changed: one row of all columns for each unknown, as the change of
 /// the cell's weights that would meet its own equation.
@@ -327,12 +241,7 @@ impl<'a> OldCells<'a> {
         let mut values = vec![ZERO; region.cells.len() * n_batches];
         dispatch(
             #[inline(always)]
-            || {
-                let mut felt = Felt::new();
-                for (&cell, out) in region.cells.iter().zip(values.chunks_exact_mut(n_batches)) {
-                    fields.at(cell as usize, out, &mut felt);
-                }
-            },
+            || fields.read(&region.cells, &mut values),
         );
         let (nothing, is_extended) = (vec![ZERO; n_batches], vec![false; region.cells.len()]);
         Self { region, values, n_batches, nothing, extended: Vec::new(), is_extended }

@@ -103,7 +103,7 @@ mod tests {
 
     use super::*;
     use crate::bind::rebind::CHANGED;
-    use crate::bind::rebind::local::Fields;
+    use crate::bind::rebind::fields::Fields;
     use crate::bind::rebind::moved::swept_by;
     use crate::bind::rebind::region::Region;
     use crate::cage::Cage;
