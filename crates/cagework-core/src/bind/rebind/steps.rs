@@ -18,7 +18,7 @@ use super::shares::add_scaled;
 
 /// What corrections may leave in any cell, over the threshold, [`lenience`] aside, before sweeps around the edit. They may live
 /// in few cells, and the norm is a mean over all: solved to the threshold as a mean, a weight near the edit was 3 to 7 times as
-/// far off as after a whole bind. With this it is 0.8 to 3.1 times (samples; with 1.8, 7.1e-5 instead of 3.8e-5 in the humanoid).
+/// far off as after a whole bind. With this it is 1.0 to 3.1 times (samples; with 1.8, 7.1e-5 instead of 3.8e-5 in the humanoid).
 const IN_ANY_CELL: f32 = 1.5;
 
 /// What a V-cycle leaves of a correction's error, at worst: 0.03 to 0.05 measured, from zero and by coarse corrections that go

@@ -66,8 +66,8 @@ pub(super) const OF_COLUMNS: Ways = Ways {
     last: UP,
 };
 
-/// For right-hand sides that start from zero. At last a half sweep more, which halves the largest error: nothing smooths
-/// again what two or three cycles leave next to the cage.
+/// For right-hand sides that start from zero. At last a half sweep more, which halves the largest error: little
+/// smooths again what two or three cycles leave next to the cage ([`AROUND`], where that is much).
 pub(super) const FROM_ZERO: Ways = Ways {
     between: &[Pass::Prolong(Prolong::Further), Red, Black, Red, BlackFurther, Red, Black],
     before_little: &[Pass::Prolong(Prolong::Further), Red, Black, Red, BlackFurther, Red, Black],
@@ -77,7 +77,8 @@ pub(super) const FROM_ZERO: Ways = Ways {
 /// Where a level's right-hand side is, if it is not the cage's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Extent<'a> {
-    /// For passes from zero, if the field's rows hold zeros: the lines along x of each plane outside which each pass leaves them.
+    /// The lines along x of each plane outside which each pass leaves rows as they are: for passes from zero, if the rows hold
+    /// zeros, and for [`AROUND`].
     /// `[n_passes][nz]`
     pub(super) reach: Option<&'a [Vec<Range<usize>>]>,
     /// Black cells with whole stencils that have some, ascending, within their colour: the rows after all cut cells'.
