@@ -39,7 +39,7 @@ impl Negligible {
 }
 
 /// A residual must be so many times what counts to be worth a batch of its own, 2.2 times as many with 24 vertices (the root of
-/// [`lenience`]: with a third more weights were 1e-4 off where a bind's are 2e-5, in a box of 18 vertices).
+/// [`lenience`]: with 7.5 instead of 5.2 times weights were 1e-4 off where a bind's are 2e-5, in a box of 18 vertices).
 const MANY: f32 = 2.4;
 
 /// Moments must be met so many times as well as weights: then most rows need not be restored after they were corrected.

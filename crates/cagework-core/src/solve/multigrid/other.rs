@@ -144,9 +144,8 @@ impl Workspace {
         }
         self.places = Arc::clone(places);
         let report = self.cycles(hierarchy, (DOWN_FROM_ZERO, &FROM_ZERO), stop, cycle_done);
-        let is_well = |report: &BatchReport| report.largest <= WELL * stop.in_any_cell;
-        if let Some(transfer) = hierarchy.transfers.first()
-            && !report.as_ref().is_none_or(is_well)
+        if let (Some(report), Some(transfer)) = (&report, hierarchy.transfers.first())
+            && report.largest > WELL * stop.in_any_cell
         {
             let extent = Extent { reach: Some(&places.reach[..AROUND.len()]), whole: &places.whole };
             let f = Rhs::Cut(&self.f[0]);

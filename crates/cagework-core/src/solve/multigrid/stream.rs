@@ -48,6 +48,7 @@ pub(super) const DOWN_FROM_COARSE: &[Pass] =
 pub(super) const UP: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, Black];
 /// After the last cycle, around right-hand sides that are not the cage's. Red cells were the last that were swept.
 pub(super) const AROUND: &[Pass] = &[Black, Red, Black, Red];
+
 /// What a solve does from one coarse correction to the next.
 #[derive(Debug)]
 pub(super) struct Ways {
