@@ -16,6 +16,8 @@ const LEFT = 38;
 const RIGHT = 8;
 const TOP = 8;
 const BOTTOM = 26;
+/** Height of a line of text. */
+const LABEL = 11;
 
 export interface Scale {
   lowest: number;
@@ -62,10 +64,12 @@ export function drawPlot(element: SVGSVGElement, curves: readonly Curve[], tau: 
     label((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 8, "iterations", "middle"),
   );
   if (tau > 0) {
+    // Below the line where there is nothing above it.
+    const above = y(tau) > TOP + LABEL;
     parts.push(
       svg("line", { x1: LEFT, x2: WIDTH - RIGHT, y1: y(tau), y2: y(tau), class: "tau" }),
       // On the left, where curves are still high.
-      label(LEFT + 4, y(tau) - 4, "done below this", "start"),
+      label(LEFT + 4, y(tau) + (above ? -4 : LABEL), "done below this", "start"),
     );
   }
   for (const curve of curves) {
