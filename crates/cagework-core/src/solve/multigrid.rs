@@ -134,8 +134,10 @@ impl Workspace {
                 return None;
             }
             if done {
-                self.up(hierarchy, 0, ways.last);
-                return Some(convergence.into_report());
+                let report = convergence.into_report();
+                let last = if report.leaves_little(&stop) { ways.last_of_little } else { ways.last };
+                self.up(hierarchy, 0, last);
+                return Some(report);
             }
             start = match hierarchy.levels.len() {
                 1 => DOWN,

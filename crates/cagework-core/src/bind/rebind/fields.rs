@@ -5,7 +5,19 @@ use std::sync::Arc;
 use crate::grid::NO_CELL;
 use crate::solve::rows::{Row, ZERO};
 
+use super::known::OfMoved;
 use super::shares::{Felt, Shares};
+
+/// What a cell that was outside began with.
+#[derive(Clone, Debug)]
+pub(super) struct Extended {
+    /// Index in the grid.
+    pub(super) cell: u32,
+    /// All columns, `[n_batches]`.
+    pub(super) row: Vec<Row>,
+    /// The moved vertices' columns as known corrections.
+    pub(super) of_moved: OfMoved,
+}
 
 /// A correction of all columns: a few fields and how much of each every column takes.
 #[derive(Clone, Debug)]
@@ -14,8 +26,8 @@ pub(super) struct Update {
     pub(super) fields: Vec<Vec<Row>>,
     pub(super) row_of: Arc<Vec<u32>>,
     pub(super) shares: Shares,
-    /// What is corrected in cells that were outside: cells, ascending, and `[n_batches]` of each.
-    pub(super) extended: Vec<(u32, Vec<Row>)>,
+    /// What is corrected in cells that were outside, by cell.
+    pub(super) extended: Vec<Extended>,
 }
 
 /// All columns' fields: those of the last whole bind, and the corrections since.
@@ -48,10 +60,9 @@ impl Fields {
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        let updates = self
-            .updates
-            .iter()
-            .flat_map(|update| update.fields.iter().chain(update.extended.iter().map(|(_, row)| row)));
+        let updates = self.updates.iter().flat_map(|update| {
+            update.fields.iter().chain(update.extended.iter().map(|extended| &extended.row))
+        });
         let rows: usize = self.base.iter().chain(updates).map(|rows| size_of_val(rows.as_slice())).sum();
         rows + self.included.len()
     }
@@ -83,11 +94,14 @@ impl Fields {
                     out.fill(ZERO);
                     continue;
                 }
+                let mut of_moved = update.shares.known.of_moved(out);
                 if row_of_before[cells[k] as usize] == NO_CELL
-                    && let Ok(k) = update.extended.binary_search_by_key(&cells[k], |(cell, _)| *cell)
+                    && let Ok(k) = update.extended.binary_search_by_key(&cells[k], |extended| extended.cell)
                 {
-                    out.copy_from_slice(&update.extended[k].1);
+                    out.copy_from_slice(&update.extended[k].row);
+                    of_moved = update.extended[k].of_moved;
                 }
+                update.shares.known.add(of_moved, out);
                 update.shares.pick(&mut felt, values[place * n_fields..][..n_fields].iter());
                 update.shares.add(&felt, out);
             }

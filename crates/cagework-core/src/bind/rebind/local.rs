@@ -9,7 +9,8 @@ use crate::solve::rows::{LANES, Row, ZERO};
 use crate::weights::affine::Columns;
 
 use super::equations::Equations;
-use super::fields::Fields;
+use super::fields::{Extended, Fields};
+use super::known::{Known, MAX_KNOWN, OfMoved};
 use super::lenience;
 use super::region::Region;
 use super::shares::{Shares, add_scaled};
@@ -39,8 +40,8 @@ impl Negligible {
 }
 
 /// A residual must be so many times what counts to be worth a batch of its own, 2.2 times as many with 24 vertices (the root of
-/// [`lenience`]: with 7.5 instead of 5.2 times weights were 1e-4 off where a bind's are 2e-5, in a box of 18 vertices).
-const MANY: f32 = 2.4;
+/// [`lenience`]: with 5.2 instead of 4.8 times weights were 7.4e-5 off where a bind's are 2e-5, in a box of 18 vertices).
+const MANY: f32 = 2.2;
 
 /// Moments must be met so many times as well as weights: then most rows need not be restored after they were corrected.
 const KEENER: f32 = 30.0;
@@ -52,8 +53,12 @@ pub(super) struct Residual {
     cells: Vec<u32>,
     diagonals: Vec<f32>,
     /// The last batch is none of columns, but of moments: [`KEENER`] times what the columns' residuals sum to, each times its
-    /// cage vertex (x, y, z, over the cage's diagonal) and by themselves. `[n_unknowns][n_batches + 1]`
+    /// cage vertex (x, y, z, over the cage's diagonal) and by themselves; and of what `times` the moved vertices' columns
+    /// are solutions for. `[n_unknowns][n_batches + 1]`
     values: Vec<Vec<Row>>,
+    known: Known,
+    /// As large as their moments are. `[at most MAX_KNOWN]`
+    times: Vec<f32>,
     negligible: Negligible,
 }
 
@@ -84,7 +89,8 @@ impl Residual {
         stencils.add_boundary(&mut values);
         stencils.extend(before, &values, old);
         let diagonals = (0..cells.len()).map(|k| stencils.diagonal(k)).collect();
-        let mut residual = Self { cells, diagonals, values, negligible };
+        let times = moved.iter().take(MAX_KNOWN).map(|(_, way)| KEENER * way.length() as f32).collect();
+        let mut residual = Self { cells, diagonals, values, known: old.known.clone(), times, negligible };
         for (k, cell) in equations.cells.iter().map(|&cell| cell as usize).enumerate() {
             let (out, moments) = residual.values[k].split_at_mut(n_batches);
             let of = |row: &[Row], column: usize| row[column / LANES][column % LANES];
@@ -99,9 +105,13 @@ impl Residual {
                     ideal += weight * (place + way - point).extend(1.0 - sum);
                 }
             };
+            let mut left = old.of_moved(cell).map(|of| of * residual.diagonals[k]);
             for neighbour in stencils.neighbours(k) {
                 add_scaled(out, old.at(neighbour), 1.0);
                 missing(neighbour, -1.0);
+                for (left, of) in left.iter_mut().zip(old.of_moved(neighbour)) {
+                    *left -= of;
+                }
             }
             add_scaled(out, old.at(cell), -residual.diagonals[k]);
             missing(cell, f64::from(residual.diagonals[k]));
@@ -115,6 +125,10 @@ impl Residual {
             if columns.is_some() {
                 let ideal = (ideal * f64::from(KEENER * scale)).as_vec4().to_array();
                 moments[0][..4].copy_from_slice(&ideal);
+            }
+            let known = moments[0][LANES - MAX_KNOWN..].iter_mut();
+            for (known, (left, times)) in known.zip(left.iter().zip(&residual.times)) {
+                *known = left * times * scale;
             }
             for w in out.iter_mut().flatten() {
                 *w *= scale;
@@ -162,10 +176,11 @@ impl Residual {
     fn split_columns(mut self, n_columns: usize) -> Split {
         let n_batches = n_columns.div_ceil(LANES);
         let many = MANY * lenience(n_batches).sqrt();
+        self.known.take_out(&mut self.values, &self.times);
         // The last four are moments.
         let columns = || (0..n_columns).chain((0..4).map(|k| n_batches * LANES + k));
         let mut right = Vec::new();
-        let mut shares = Shares::new(n_batches);
+        let mut shares = Shares::new(n_batches, self.known);
         let mut largest = vec![ZERO; n_batches + 1];
         let nothing = vec![ZERO; n_batches + 1];
         for row in &mut self.values {
@@ -230,21 +245,28 @@ pub(super) struct OldCells<'a> {
     values: Vec<Row>,
     n_batches: usize,
     nothing: Vec<Row>,
+    pub(super) known: Known,
     /// Cells that a row was put into.
-    extended: Vec<(u32, Vec<Row>)>,
-    /// Whether a row was put into each cell of the region.
-    is_extended: Vec<bool>,
+    extended: Vec<Extended>,
+    /// Number of each cell of the region among those; [`NO_CELL`] if it is none of them.
+    number_of_extended: Vec<u32>,
 }
 
 impl<'a> OldCells<'a> {
-    pub(super) fn new(fields: &mut Fields, region: &'a Region, n_batches: usize) -> Self {
+    pub(super) fn new(
+        fields: &mut Fields,
+        region: &'a Region,
+        n_batches: usize,
+        moved: &[(usize, DVec3)],
+    ) -> Self {
         let mut values = vec![ZERO; region.cells.len() * n_batches];
         dispatch(
             #[inline(always)]
             || fields.read(&region.cells, &mut values),
         );
-        let (nothing, is_extended) = (vec![ZERO; n_batches], vec![false; region.cells.len()]);
-        Self { region, values, n_batches, nothing, extended: Vec::new(), is_extended }
+        let (nothing, number_of_extended) = (vec![ZERO; n_batches], vec![NO_CELL; region.cells.len()]);
+        let known = Known::new(moved);
+        Self { region, values, n_batches, nothing, known, extended: Vec::new(), number_of_extended }
     }
 
     /// All columns of a cell of the grid; zeros for one that is none of them.
@@ -259,19 +281,34 @@ impl<'a> OldCells<'a> {
         self.n_batches
     }
 
+    /// What the moved vertices' columns are in a cell, as known corrections.
+    #[inline(always)]
+    pub(super) fn of_moved(&self, cell: usize) -> OfMoved {
+        match self.number_of_extended(cell) {
+            Some(k) => self.extended[k].of_moved,
+            None => self.known.of_moved(self.at(cell)),
+        }
+    }
+
     /// Puts a row into a cell that was outside, which must be one of them.
-    pub(super) fn set(&mut self, cell: u32, row: Vec<Row>) {
-        let number = self.region.number[cell as usize] as usize;
+    pub(super) fn set(&mut self, extended: Extended) {
+        let number = self.region.number[extended.cell as usize] as usize;
         let first = number * self.n_batches;
-        self.values[first..first + self.n_batches].copy_from_slice(&row);
-        self.is_extended[number] = true;
-        self.extended.push((cell, row));
+        self.values[first..first + self.n_batches].copy_from_slice(&extended.row);
+        self.number_of_extended[number] = self.extended.len() as u32;
+        self.extended.push(extended);
+    }
+
+    /// Number of a cell among those that a row was put into.
+    fn number_of_extended(&self, cell: usize) -> Option<usize> {
+        let number = self.region.number.get(cell);
+        let k = number.and_then(|&k| self.number_of_extended.get(k as usize)).filter(|&&k| k != NO_CELL);
+        k.map(|&k| k as usize)
     }
 
     /// Whether a row was put there.
     pub(super) fn is_extended(&self, cell: usize) -> bool {
-        let number = self.region.number.get(cell);
-        number.and_then(|&k| self.is_extended.get(k as usize)).is_some_and(|&is| is)
+        self.number_of_extended(cell).is_some()
     }
 
     /// Cells that a row was put into.
@@ -279,12 +316,9 @@ impl<'a> OldCells<'a> {
         self.extended.len()
     }
 
-    /// The rows that were put into cells, by cell.
-    pub(super) fn into_extended(mut self) -> Vec<(u32, Vec<Row>)> {
-        let mut order: Vec<[u32; 2]> =
-            (0u32..).zip(&self.extended).map(|(k, (cell, _))| [*cell, k]).collect();
-        order.sort_unstable();
-        let rows = &mut self.extended;
-        order.into_iter().map(|[cell, k]| (cell, std::mem::take(&mut rows[k as usize].1))).collect()
+    /// What was put into cells, by cell.
+    pub(super) fn into_extended(mut self) -> Vec<Extended> {
+        self.extended.sort_unstable_by_key(|extended| extended.cell);
+        self.extended
     }
 }

@@ -9,6 +9,7 @@ use crate::weights::ReplacedRow;
 use crate::weights::affine::Columns;
 use crate::weights::assemble::{Assembled, GOOD_ENOUGH, RowFacts, restore};
 
+use super::known::OfMoved;
 use super::shares::{Felt, Shares};
 
 /// A row that nothing else changes keeps its weights if the cage's move puts its vertex no further off than this, of the
@@ -70,7 +71,7 @@ impl Edit<'_> {
             let data = data.split_off_mut(..n).expect("the last row pointer is the number of weights");
             runs.push(Run { first, offset, data, facts, replaced: Vec::new() });
         }
-        let moments = Moments::new(self.shares, self.columns);
+        let moments = Moments::new(self);
         let shared = Shared { edit: *self, moments, indptr, indices };
         team.each_mut(&mut runs, |run| {
             dispatch(
@@ -136,25 +137,28 @@ impl RowFacts {
 struct Moments {
     /// `[n_corrections]`
     of_field: Vec<[f32; 4]>,
+    /// `[n_known]`
+    of_known: Vec<[f32; 4]>,
 }
 
 impl Moments {
-    fn new(shares: &Shares, columns: &Columns) -> Self {
+    fn new(edit: &Edit<'_>) -> Self {
         let of_share = |share| {
-            let (sum, point) = columns.combined(share);
+            let (sum, point) = edit.columns.combined(share);
             [sum, point.x, point.y, point.z].map(|x| x as f32)
         };
-        Self { of_field: shares.iter().map(of_share).collect() }
+        let of_field = edit.shares.iter().map(of_share).collect();
+        Self { of_field, of_known: edit.shares.known.shares().map(of_share).collect() }
     }
 
     /// Of all that is felt.
     #[inline(always)]
-    fn of(&self, felt: &Felt) -> (f64, DVec3) {
+    fn of(&self, felt: &Felt, of_known: &OfMoved) -> (f64, DVec3) {
         let mut moments = [0.0f32; 4];
-        for (field, value) in felt.iter() {
-            let of_field = self.of_field[field];
+        let known = self.of_known.iter().zip(of_known).map(|(of, value)| (of, *value));
+        for (of, value) in known.chain(felt.iter().map(|(field, value)| (&self.of_field[field], value))) {
             for k in 0..4 {
-                moments[k] += value * of_field[k];
+                moments[k] += value * of[k];
             }
         }
         let [sum, x, y, z] = moments.map(f64::from);
@@ -189,9 +193,11 @@ impl Run<'_> {
                     continue;
                 }
                 expand(indices, data, &mut row);
+                // Not where hat values are part of a weight: there stencils are new.
+                let of_known = shares.known.add(shares.known.of_moved(&row), &mut row);
                 // Of other rows small weights are dropped.
                 if indices.len() == shared.edit.n_columns {
-                    let (sum, moved) = shared.moments.of(&felt);
+                    let (sum, moved) = shared.moments.of(&felt, &of_known);
                     change = Some((sum, way + moved));
                 }
             }

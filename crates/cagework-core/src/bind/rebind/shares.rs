@@ -2,6 +2,7 @@
 
 use crate::solve::rows::{LANES, Row};
 
+use super::known::Known;
 use super::local::Negligible;
 
 /// Shares of all columns in some fields.
@@ -15,6 +16,8 @@ pub(super) struct Shares {
     /// Value of each field below which no column feels it; infinite for a last batch's lanes without a field.
     /// `[n_batches of fields]`
     pub(super) unfelt: Vec<Row>,
+    /// Fields that are there already.
+    pub(super) known: Known,
 }
 
 /// Fields that are felt somewhere, and their values there.
@@ -26,12 +29,12 @@ pub(super) struct Felt {
 }
 
 impl Shares {
-    /// None yet, for rows of so many batches.
-    pub(super) fn new(n_batches: usize) -> Self {
-        Self { n_fields: 0, n_batches, columns: Vec::new(), unfelt: Vec::new() }
+    /// None yet but the known ones, for rows of so many batches.
+    pub(super) fn new(n_batches: usize, known: Known) -> Self {
+        Self { n_fields: 0, n_batches, columns: Vec::new(), unfelt: Vec::new(), known }
     }
 
-    /// Adds a field's, which is made so much larger that they have a norm of 1, and returns how much: then the field's norm
+    /// Adds the shares of a field to be solved for, which is made so much larger that they have a norm of 1, and returns how much: then the field's norm
     /// is what it changes all columns by.
     pub(super) fn push(&mut self, mut share: Vec<Row>, negligible: Negligible) -> f32 {
         let squares = share.iter().flatten().map(|&w| f64::from(w).powi(2)).sum::<f64>();
@@ -51,7 +54,7 @@ impl Shares {
         norm
     }
 
-    /// Fields.
+    /// Fields to be solved for.
     pub(super) fn len(&self) -> usize {
         self.n_fields
     }

@@ -5,6 +5,8 @@ use crate::levels::{CutCell, Level};
 use crate::solve::rows::{LANES, Row};
 
 use super::equations::Equations;
+use super::fields::Extended;
+use super::known::MAX_KNOWN;
 use super::local::OldCells;
 use super::shares::add_scaled;
 
@@ -59,7 +61,8 @@ impl<'a> FewStencils<'a> {
     }
 
     /// Puts what meets their equations into cells that were outside, from what is known around them: then a correction is as
-    /// smooth there as elsewhere, where from nothing it would be a weight high. `boundary`: the cage's values,
+    /// smooth there as elsewhere, where from nothing it would be a weight high. Columns as known corrections, which are zero on
+    /// the cage, go on into them in the same way. `boundary`: the cage's values,
     /// `[n_equations]`. Cells with none around them stay what they are.
     pub(super) fn extend(&self, before: &Level, boundary: &[Vec<Row>], old: &mut OldCells<'_>) {
         let is_new = |cell: usize| before.row_of[cell] == NO_CELL;
@@ -69,27 +72,31 @@ impl<'a> FewStencils<'a> {
             let mut found = Vec::new();
             pending.retain(|&k| {
                 let mut row = boundary[k][..old.n_batches()].to_vec();
-                let mut weight = self.diagonal(k);
+                let (mut weight, mut of_moved) = (self.diagonal(k), [0.0; MAX_KNOWN]);
                 for cell in self.neighbours(k) {
                     if is_new(cell) && !old.is_extended(cell) {
                         weight -= 1.0;
                     } else {
                         add_scaled(&mut row, old.at(cell), 1.0);
+                        for (sum, of) in of_moved.iter_mut().zip(old.of_moved(cell)) {
+                            *sum += of;
+                        }
                     }
                 }
                 // At least one known arm, which is no longer than a cell, or what rounding leaves of none.
                 let is_known = weight > 0.5;
                 if is_known {
                     row.iter_mut().flatten().for_each(|w| *w /= weight);
-                    found.push((cells[k], row));
+                    of_moved = of_moved.map(|of| of / weight);
+                    found.push(Extended { cell: cells[k], row, of_moved });
                 }
                 !is_known
             });
             if found.is_empty() {
                 return;
             }
-            for (cell, row) in found {
-                old.set(cell, row);
+            for extended in found {
+                old.set(extended);
             }
         }
     }
@@ -137,7 +144,7 @@ mod tests {
         let base = (0..n_batches).map(|batch| vec![equal(batch); before.n_rows()]).collect();
         let mut fields = Fields::new(base, Arc::new(before.row_of.clone()));
         let needed = equations.neighbourhood(&level);
-        let mut old = OldCells::new(&mut fields, &needed, n_batches);
+        let mut old = OldCells::new(&mut fields, &needed, n_batches, &[]);
         let stencils = FewStencils::new(&level, &equations);
         let mut boundary = vec![vec![ZERO; n_batches]; equations.cells.len()];
         stencils.add_boundary(&mut boundary);

@@ -12,9 +12,10 @@ use crate::solve::multigrid::{Places, Stop};
 use crate::solve::rows::{LANES, Row, ZERO};
 use crate::solve::team::Team;
 
+use super::known::MAX_KNOWN;
 use super::lenience;
 use super::local::OldCells;
-use super::shares::add_scaled;
+use super::shares::{Shares, add_scaled};
 
 /// What corrections may leave in any cell, over the threshold, [`lenience`] aside, before sweeps around the edit. They may live
 /// in few cells, and the norm is a mean over all: solved to the threshold as a mean, a weight near the edit was 3 to 7 times as
@@ -54,21 +55,28 @@ pub(super) fn solve_for(
     Ok(solved)
 }
 
-/// Samples the old fields by stencils that are new; `cell_of`: the cell of each row they ask for. Returns the rows of the
-/// vertices `changed`: `[n_changed][n_batches]`.
+/// Samples the old fields, with the corrections that are known, by stencils that are new; `cell_of`: the cell of each row
+/// they ask for. Returns the rows of the vertices `changed`: `[n_changed][n_batches]`.
 pub(super) fn resample(
     stencils: &Stencils,
     changed: &[u32],
     cell_of: &[u32],
     old: &OldCells<'_>,
+    shares: &Shares,
     n_batches: usize,
 ) -> Vec<Row> {
     let mut rows = vec![ZERO; changed.len() * n_batches];
     for (sum, &v) in rows.chunks_exact_mut(n_batches).zip(changed) {
         let (nodes, hats) = stencils.at(v as usize);
+        let mut of_moved = [0.0; MAX_KNOWN];
         for (row, weight) in nodes {
-            add_scaled(sum, old.at(cell_of[*row as usize] as usize), *weight);
+            let cell = cell_of[*row as usize] as usize;
+            add_scaled(sum, old.at(cell), *weight);
+            for (sum, of) in of_moved.iter_mut().zip(old.of_moved(cell)) {
+                *sum += weight * of;
+            }
         }
+        shares.known.add(of_moved, sum);
         for &(column, weight) in hats {
             sum[column as usize / LANES][column as usize % LANES] += weight;
         }

@@ -1,4 +1,4 @@
-use glam::{Vec3, vec3};
+use glam::{Vec3, Vec3Swizzles, vec3};
 
 use super::{MAX_UPDATES, RebindReport, Rebinder};
 use crate::bind::{BindError, BindOptions, Binding, Method, bind};
@@ -75,6 +75,31 @@ fn rebinding_after_edits_gives_the_weights_of_a_bind() {
         assert!(!report.anew && report.solved > 0 && report.solved < report.columns, "{report:?}");
         assert_same(&rebound, &cage);
         current = cage.to_polygon_mesh();
+    }
+}
+
+/// Each moved vertex has a correction that need not be solved for, up to four of them.
+#[test]
+fn vertices_may_move_together_and_each_its_own_way() {
+    let mesh = box_mesh();
+    let cage = Cage::new(&mesh).unwrap();
+    let top: Vec<usize> = (0..cage.n_vertices())
+        .filter(|&v| mesh.positions[v].y == 1.0 && mesh.positions[v].xz().abs().max_element() < 0.9)
+        .collect();
+    assert!(top.len() > 5, "{}", top.len());
+    for n in [2, 4, top.len()] {
+        for is_together in [true, false] {
+            let (mut rebinder, _) = Rebinder::new(&points(), &cage, &options(), &Silent).unwrap();
+            let mut edited = mesh.clone();
+            for (k, &v) in top[..n].iter().enumerate() {
+                let own = vec3((1.0 + k as f32).sin(), (2.0 + k as f32).cos(), (3.0 + k as f32).sin());
+                edited.positions[v] -= 0.04 * if is_together { Vec3::Y } else { own + 1.5 * Vec3::Y };
+            }
+            let edited = Cage::new(&edited).unwrap();
+            let (rebound, report) = rebinder.rebind(&edited, &Silent).unwrap();
+            assert!(!report.anew);
+            assert_same(&rebound, &edited);
+        }
     }
 }
 

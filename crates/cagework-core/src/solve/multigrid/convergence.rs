@@ -13,6 +13,11 @@ const STALLED: f64 = 0.5;
 /// See [`ROUND_OFF`]: one such cycle may be chance.
 const MAX_STALLED: u32 = 2;
 
+/// Where a last cycle leaves so much on average, over what may be left in a cell, its coarse correction was so small that sweeps
+/// around the right-hand sides are all that it needs. (507 edits: with 0.05 the largest error of a weight is 5.3e-5 instead of
+/// 3.0e-5 where the cage has 200 vertices.)
+const LITTLE: f64 = 0.035;
+
 /// How one batch converged.
 #[derive(Clone, Debug, Default)]
 pub struct BatchReport {
@@ -38,6 +43,15 @@ pub struct Stop {
     pub contraction: f64,
     /// Largest number of V-cycles on the finest level.
     pub max_cycles: u32,
+}
+
+impl BatchReport {
+    /// Whether the last coarse correction was so small that only cells around the right-hand sides need a sweep after it; never
+    /// where only the mean counts.
+    pub(super) fn leaves_little(&self, stop: &Stop) -> bool {
+        let most = LITTLE * stop.in_any_cell;
+        most < f64::INFINITY && self.delta_squares.last().is_some_and(|square| square.sqrt() <= most)
+    }
 }
 
 impl Stop {

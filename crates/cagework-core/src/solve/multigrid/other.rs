@@ -144,12 +144,17 @@ impl Workspace {
         }
         self.places = Arc::clone(places);
         let report = self.cycles(hierarchy, (DOWN_FROM_ZERO, &FROM_ZERO), stop, cycle_done);
-        if let (Some(report), Some(transfer)) = (&report, hierarchy.transfers.first())
-            && report.largest > WELL * stop.in_any_cell
-        {
-            let extent = Extent { reach: Some(&places.reach[..AROUND.len()]), whole: &places.whole };
-            let f = Rhs::Cut(&self.f[0]);
-            stream(AROUND, level, extent, (transfer, &[]), &mut self.u[0], f, &mut []);
+        if let (Some(report), Some(transfer)) = (&report, hierarchy.transfers.first()) {
+            let n_passes = match () {
+                () if report.largest > WELL * stop.in_any_cell => AROUND.len(),
+                () if report.leaves_little(&stop) => AROUND.len() / 2,
+                () => 0,
+            };
+            if n_passes > 0 {
+                let extent = Extent { reach: Some(&places.reach[..n_passes]), whole: &places.whole };
+                let f = Rhs::Cut(&self.f[0]);
+                stream(&AROUND[..n_passes], level, extent, (transfer, &[]), &mut self.u[0], f, &mut []);
+            }
         }
         self.places = Arc::default();
         for &[number, row] in &places.red {

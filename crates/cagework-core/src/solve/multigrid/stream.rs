@@ -58,6 +58,8 @@ pub(super) struct Ways {
     pub(super) before_little: &'static [Pass],
     /// The last coarse correction and what comes after it.
     pub(super) last: &'static [Pass],
+    /// The same where the correction is little ([`BatchReport::leaves_little`](super::BatchReport)).
+    pub(super) last_of_little: &'static [Pass],
 }
 
 /// For columns, which start from the coarser level's solution; one sweep less for a last cycle with little to do.
@@ -65,6 +67,7 @@ pub(super) const OF_COLUMNS: Ways = Ways {
     between: &[Pass::Prolong(Prolong::Correct), Red, Black, Red, BlackFurther, Red, Black],
     before_little: &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black],
     last: UP,
+    last_of_little: UP,
 };
 
 /// For right-hand sides that start from zero. At last a half sweep more, which halves the largest error: little
@@ -73,6 +76,7 @@ pub(super) const FROM_ZERO: Ways = Ways {
     between: &[Pass::Prolong(Prolong::Further), Red, Black, Red, BlackFurther, Red, Black],
     before_little: &[Pass::Prolong(Prolong::Further), Red, Black, Red, BlackFurther, Red, Black],
     last: &[Pass::Prolong(Prolong::Further), Red, BlackFurther, Red],
+    last_of_little: &[Pass::Prolong(Prolong::Further), Red],
 };
 
 /// Where a level's right-hand side is, if it is not the cage's.
