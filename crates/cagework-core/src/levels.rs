@@ -4,6 +4,8 @@
 //! stays zero, the neighbour of whoever has none: `[red .., 0, black .., 0]`. A red-black sweep then streams
 //! through contiguous memory, and a *run* of whole stencils needs seven numbers, not seven gathers a cell.
 
+use std::sync::Arc;
+
 use std::ops::Range;
 
 use glam::DVec3;
@@ -13,7 +15,7 @@ use crate::grid::{Grid, NO_CELL};
 mod before;
 mod build;
 
-pub use before::{Before, Touched};
+pub use before::{Before, CellSet, Touched};
 
 /// Coarsening stops at this many unknowns: there, a few dozen sweeps cost nothing.
 const COARSEST_UNKNOWNS: usize = 200;
@@ -90,7 +92,7 @@ pub struct Level {
     /// Right-hand sides, ascending in `cut_cell`, then `column`.
     pub boundary: Vec<BoundaryTerm>,
     /// Row of each grid cell in the level's fields; [`NO_CELL`] where it is no unknown. `[nz, ny, nx]`
-    pub row_of: Vec<u32>,
+    pub row_of: Arc<Vec<u32>>,
     /// First cell, within its colour, of each colour in each line along x, and of a line after the last. `[nz * ny + 1]`
     pub lines: Vec<[u32; 2]>,
     /// Cells with no arm at all, which the axes' disagreement cut off from everything; not solved for.

@@ -4,8 +4,7 @@
 //! a residual there and nowhere else, and the residuals of all columns are combinations of a few: columns that do not
 //! belong to the moved faces vanish on them, so they look alike a few cells away. Those few are solved for, but for the largest
 //! ([`known`]), and every column, also at the mesh's vertices, takes its share of them. What is neglected ([`lenience`]) adds up,
-//! so after [`MAX_UPDATES`] edits, and when the grid or the faces change, or an edit reaches too far ([`ONE_IN`], [`REACH`]),
-//! everything is bound anew.
+//! so after [`MAX_UPDATES`] edits, or when the grid, the faces or too much changes ([`ONE_IN`], [`REACH`]), all is bound anew.
 
 mod equations;
 mod fields;
@@ -124,7 +123,7 @@ impl Kept {
         let rows = prepared.rows(solved, watch)?;
         let binding = prepared.reported(&rows, solved, sampled, watch)?;
         let Prepared { voxels, stencils, estimated, .. } = prepared;
-        let row_of = Arc::new(voxels.hierarchy.levels[0].row_of.clone());
+        let row_of = Arc::clone(&voxels.hierarchy.levels[0].row_of);
         let fields = Fields::new(base, row_of);
         Ok((Self { voxels, stencils, fields, estimated, rows }, binding))
     }
@@ -300,7 +299,8 @@ impl Rebinder {
         let level = &voxels.hierarchy.levels[0];
         let voxelized = watch.now_ms();
 
-        let is_any_gone = renumbering(before, level).is_some_and(|moved_to| stencils.renumber(&moved_to));
+        let moved_to = renumbering(before, level, voxels.touched.as_ref());
+        let is_any_gone = moved_to.is_some_and(|moved_to| stencils.renumber(&moved_to));
         // What is outside follows the closest point of the cage, which may be another one from anywhere.
         let is_stale = |v: usize| {
             region.holds_cube(to_grid(self.points[v]))
@@ -319,7 +319,7 @@ impl Rebinder {
         let (mut rank, mut sampled) = (0, stencils_made);
         if !swept.triangles.is_empty() {
             let negligible = Negligible::at(self.options.tau);
-            let equations = Equations::changed(level, before, &region);
+            let equations = Equations::changed(level, before, &region, voxels.touched.as_ref());
             let mut needed = equations.neighbourhood(level);
             let cell_of = if changed.is_empty() { Vec::new() } else { cells_of_rows(level) };
             for (row, _) in changed.iter().flat_map(|&v| stencils.at(v as usize).0) {
@@ -364,7 +364,7 @@ impl Rebinder {
                 resampled: (&changed, &resampled),
             };
             edit.apply(&mut rows, |vertex| stencils.is_outside(vertex), &team);
-            let (row_of, extended) = (Arc::new(level.row_of.clone()), old.into_extended());
+            let (row_of, extended) = (Arc::clone(&level.row_of), old.into_extended());
             let new_fields = corrections.into_iter().map(|c| c.field).collect();
             solved.field_bytes = Workspace::bytes(&voxels.hierarchy) * team.n_threads().min(right.len());
             fields.correct(Update { fields: new_fields, row_of, shares, extended });

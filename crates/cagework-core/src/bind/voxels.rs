@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::cage::Cage;
 use crate::grid::Grid;
-use crate::levels::{Boundary, Level, coarsened_until_few};
+use crate::levels::{Boundary, Level, Touched, coarsened_until_few};
 use crate::report::CellCounts;
 use crate::sample::embedded::Sampler;
 use crate::sample::{Stencils, classic};
@@ -28,6 +28,8 @@ pub(super) struct Voxels {
     classic: Option<ClassicCells>,
     /// The embedded method's cells, for the next edit.
     embedding: Option<Embedding>,
+    /// What the edit has touched of the finest grid; `None` if all was made anew.
+    pub(super) touched: Option<Touched>,
 }
 
 /// A sampler of either method.
@@ -88,7 +90,7 @@ impl Voxels {
         let bytes = hierarchy.bytes()
             + size_of_val(cells.kinds.as_slice())
             + 4 * (values.cells.len() + values.indptr.len() + 2 * values.values.len());
-        Self { hierarchy, counts, ambiguous: 0, bytes, classic: Some(cells), embedding: None }
+        Self { hierarchy, counts, ambiguous: 0, bytes, classic: Some(cells), embedding: None, touched: None }
     }
 
     fn embedded(cage: &Cage, grid: Grid, options: &BindOptions, old: Option<(&mut Self, &Cage)>) -> Self {
@@ -97,10 +99,10 @@ impl Voxels {
             let touched = embedding.edit(cage_before, cage)?;
             Some((embedding, &old.hierarchy, touched))
         });
-        let (embedding, hierarchy) = match edited {
-            Some((embedding, before, touched)) => {
+        let (embedding, hierarchy, touched) = match edited {
+            Some((embedding, before, mut touched)) => {
                 let hierarchy = before.renewed(&embedding.boundaries(cage), &touched);
-                (embedding, hierarchy)
+                (embedding, hierarchy, Some(touched.swap_remove(0)))
             }
             None => {
                 let embedding = Embedding::new(cage, &grid);
@@ -109,7 +111,7 @@ impl Voxels {
                     Solver::Jacobi => Hierarchy::single(Level::new(&boundaries[0]), cage.n_vertices()),
                     Solver::Multigrid => Hierarchy::new(&boundaries, cage.n_vertices()),
                 };
-                (embedding, hierarchy)
+                (embedding, hierarchy, None)
             }
         };
         let finest = &hierarchy.levels[0];
@@ -121,7 +123,7 @@ impl Voxels {
         };
         let bytes = embedding.bytes() + hierarchy.bytes();
         let ambiguous = embedding.ambiguous();
-        Self { hierarchy, counts, ambiguous, bytes, classic: None, embedding: Some(embedding) }
+        Self { hierarchy, counts, ambiguous, bytes, classic: None, embedding: Some(embedding), touched }
     }
 
     /// Drops what only edits need. [`Self::bytes`] stays: it was held once.

@@ -2,25 +2,52 @@
 
 use std::ops::Range;
 
-use crate::grid::Grid;
+use crate::grid::{Grid, NO_CELL};
 
 use super::build::Slab;
 use super::{CutCell, Level, Run};
 
-/// Lines along x of a level that an edit has touched.
+/// Lines along x of a level, and cells, that an edit has touched.
 #[derive(Clone, Debug)]
 pub struct Touched {
     /// Those with cells whose arms may end elsewhere now. `[nz * ny]`
     pub moved: Vec<bool>,
     /// Those that may have other unknowns. `[nz * ny]`
     pub changed: Vec<bool>,
+    /// Cells whose arms may end elsewhere now, that may be unknowns or none, or that have such neighbours.
+    pub cells: CellSet,
+}
+
+/// Some cells of a grid, a bit each.
+#[derive(Clone, Debug)]
+pub struct CellSet(Vec<u64>);
+
+impl CellSet {
+    /// None of so many cells.
+    #[must_use]
+    pub fn none(n_cells: usize) -> Self {
+        Self(vec![0; n_cells.div_ceil(64)])
+    }
+
+    /// Adds a cell, or does not.
+    #[inline]
+    pub fn add_if(&mut self, is_wanted: bool, cell: usize) {
+        self.0[cell / 64] |= u64::from(is_wanted) << (cell % 64);
+    }
+
+    /// Whether a cell is one of them.
+    #[inline]
+    #[must_use]
+    pub fn has(&self, cell: usize) -> bool {
+        self.0[cell / 64] >> (cell % 64) & 1 == 1
+    }
 }
 
 impl Touched {
     /// No lines of a grid.
     pub(crate) fn none(grid: &Grid) -> Self {
         let none = vec![false; (grid.dims[1] * grid.dims[2]) as usize];
-        Self { moved: none.clone(), changed: none }
+        Self { moved: none.clone(), changed: none, cells: CellSet::none(grid.n_cells()) }
     }
 }
 
@@ -30,6 +57,8 @@ pub struct Before<'a> {
     pub(super) level: &'a Level,
     /// Whether there may be other unknowns in a line now. `[nz * ny]`
     changed: &'a [bool],
+    /// [`Touched::cells`]
+    touched: &'a CellSet,
     /// Whether a line's stencils are made anew. `[nz * ny]`
     is_anew: Vec<bool>,
 }
@@ -38,7 +67,7 @@ impl<'a> Before<'a> {
     /// A level, and the lines that the edit has touched.
     #[must_use]
     pub fn new(level: &'a Level, touched: &'a Touched) -> Self {
-        let Touched { moved, changed } = touched;
+        let Touched { moved, changed, cells: touched } = touched;
         let ny = level.grid.dims[1] as usize;
         debug_assert_eq!(changed.len() + 1, level.lines.len(), "an edit leaves the grid");
         let mut is_anew = moved.clone();
@@ -52,7 +81,7 @@ impl<'a> Before<'a> {
                 }
             }
         }
-        Self { level, changed, is_anew }
+        Self { level, changed, touched, is_anew }
     }
 
     /// The level as it was.
@@ -80,9 +109,13 @@ impl<'a> Before<'a> {
         [0, 1].map(|c| self.level.lines[line + 1][c] - self.level.lines[line][c])
     }
 
-    /// Copies the rows of a line, whose first ones of each colour are `first` now; returns what is to be added to them.
-    pub(super) fn copy_rows(&self, line: usize, first: [u32; 2], rows: &mut [u32]) -> [u32; 2] {
-        rows.copy_from_slice(&self.level.row_of[line * rows.len()..][..rows.len()]);
+    /// The rows as they were.
+    pub(super) fn row_of(&self) -> Vec<u32> {
+        self.level.row_of.to_vec()
+    }
+
+    /// What is to be added to the rows of a line, whose first ones of each colour are `first` now.
+    pub(super) fn rows_grew_by(&self, line: usize, first: [u32; 2]) -> [u32; 2] {
         let was = self.level.lines[line];
         [0, 1].map(|c| first[c].wrapping_sub(was[c] + self.level.first_row(c) as u32))
     }
@@ -90,6 +123,19 @@ impl<'a> Before<'a> {
     /// [`Self::shift`] of all lines, `[nz * ny]`.
     pub(super) fn shifts(&self, now: &Level) -> Vec<[u32; 2]> {
         (0..self.changed.len()).map(|line| self.shift(now, line)).collect()
+    }
+
+    /// A slab with room for somewhat more than there was in some planes.
+    pub(super) fn slab_like(&self, planes: Range<u32>) -> Slab {
+        let mut slab = Slab::default();
+        for (c, colour) in self.level.colours.iter().enumerate() {
+            let [first, end] = [planes.start, planes.end].map(|z| colour.planes[z as usize]);
+            let [runs, cut] = [0, 1].map(|k| (end[k] - first[k]) as usize * 9 / 8 + 64);
+            slab.colours[c].runs.reserve(runs);
+            slab.colours[c].cut.reserve(cut);
+            slab.from[c].reserve(cut);
+        }
+        slab
     }
 
     /// End of the kept lines from (y, z) on in its plane whose rows and neighbours have moved by the same.
@@ -107,6 +153,32 @@ impl<'a> Before<'a> {
         let ny = self.level.grid.dims[1] as usize;
         [line, line.wrapping_sub(1), line + 1, line.wrapping_sub(ny), line + ny]
             .map(|line| shifts.get(line).copied().unwrap_or_default())
+    }
+
+    /// Number among all cut cells, and the cut cell, of a cell that the edit has not touched, if it has been one. `next`: of each
+    /// colour's cut cells one that is not behind it, moved on; lines begin with [`Self::first_cut`].
+    pub(super) fn untouched(&self, index: usize, colour: usize, next: &mut usize) -> Option<(u32, &CutCell)> {
+        let row = self.level.row_of[index];
+        if self.touched.has(index) || row == NO_CELL {
+            return None;
+        }
+        let cell = row - self.level.first_row(colour) as u32;
+        let cut = &self.level.colours[colour].cut;
+        *next += cut[*next..].iter().take_while(|cut| cut.cell < cell).count();
+        let found = cut.get(*next).filter(|cut| cut.cell == cell)?;
+        let before = if colour == 0 { 0 } else { self.level.colours[0].cut.len() };
+        Some(((before + *next) as u32, found))
+    }
+
+    /// Where each colour's cut cells of a line began.
+    pub(super) fn first_cut(&self, line: usize) -> [usize; 2] {
+        let z = line / self.level.grid.dims[1] as usize;
+        [0, 1].map(|c| {
+            let colour = &self.level.colours[c];
+            let [first, end] = [z, z + 1].map(|z| colour.planes[z][1] as usize);
+            let start = self.level.lines[line][c];
+            first + colour.cut[first..end].partition_point(|cut| cut.cell < start)
+        })
     }
 
     /// Copies the runs and cut cells of the lines `ys` of a plane, a stretch, to where their rows are `now`.

@@ -1,5 +1,7 @@
 //! Builds a level: rows first, then the stencils line by line.
 
+use std::sync::Arc;
+
 use crate::grid::{Grid, NO_CELL};
 use crate::voxelize::map_indices;
 
@@ -61,9 +63,16 @@ impl Level {
     }
 
     /// Adds the runs and cut cells of the line (y, z).
-    fn add_line(&self, boundary: &dyn Boundary, y: u32, z: u32, slab: &mut Slab) {
+    fn add_line(
+        &self,
+        boundary: &dyn Boundary,
+        before: Option<&Before<'_>>,
+        [y, z]: [u32; 2],
+        slab: &mut Slab,
+    ) {
         let [nx, ny, nz] = self.grid.dims;
         let line = self.grid.index([0, y, z]);
+        let mut next_cut = before.map_or([0; 2], |before| before.first_cut((z * ny + y) as usize));
         let rows = &self.row_of[line..][..nx as usize];
         let arms = &boundary.cut_arms()[line..][..nx as usize];
         let first_rows = [self.first_row(0) as u32, self.first_row(1) as u32];
@@ -100,6 +109,14 @@ impl Level {
                     _ => slab.colours[colour].runs.extend(slot.replace(run)),
                 }
             } else {
+                let untouched = before.and_then(|b| b.untouched(index, colour, &mut next_cut[colour]));
+                if let Some((number, was)) = untouched {
+                    // Its terms are what they were.
+                    slab.from[colour].resize(slab.colours[colour].cut.len(), NO_CELL);
+                    slab.from[colour].push(number);
+                    slab.colours[colour].cut.push(CutCell { cell: own, neighbours, ..*was });
+                    continue;
+                }
                 let whole = neighbours.iter().filter(|&&n| n != zero).count();
                 let number = slab.colours[colour].cut.len() as u32;
                 let weight = add_terms(boundary, cell, cut, number, &mut slab.terms[colour]);
@@ -120,7 +137,8 @@ fn build(boundary: &dyn Boundary, before: Option<&Before<'_>>) -> (Level, Vec<u3
     let shifts = before.map_or_else(Vec::new, |before| before.shifts(&level));
     let slabs = map_indices(nz.div_ceil(SLAB) as usize, |k| {
         let first = k as u32 * SLAB;
-        let mut slab = Slab::default();
+        let mut slab =
+            before.map_or_else(Slab::default, |before| before.slab_like(first..nz.min(first + SLAB)));
         for z in first..nz.min(first + SLAB) {
             slab.mark_plane();
             let mut y = 0;
@@ -131,7 +149,7 @@ fn build(boundary: &dyn Boundary, before: Option<&Before<'_>>) -> (Level, Vec<u3
                         next = before.end_of_stretch(&shifts, y, z);
                         before.copy_lines(&level, &shifts, z, y..next, &mut slab);
                     }
-                    _ => level.add_line(boundary, y, z, &mut slab),
+                    _ => level.add_line(boundary, before, [y, z], &mut slab),
                 }
                 y = next;
                 if before.is_some() {
@@ -180,7 +198,7 @@ fn number_cells(boundary: &dyn Boundary, before: Option<&Before<'_>>) -> Level {
     let grid = boundary.grid();
     let [nx, ny, nz] = grid.dims;
     let (unknowns, cut) = (boundary.unknowns(), boundary.cut_arms());
-    let mut row_of = vec![NO_CELL; grid.n_cells()];
+    let mut row_of = before.map_or_else(|| vec![NO_CELL; grid.n_cells()], Before::row_of);
     let mut lines = Vec::with_capacity((ny * nz) as usize + 1);
     let (mut n_cells, mut isolated) = ([0u32; 2], 0);
     let is_connected = |cell: [u32; 3], index: usize| {
@@ -196,6 +214,7 @@ fn number_cells(boundary: &dyn Boundary, before: Option<&Before<'_>>) -> Level {
         let (y, z) = (line as u32 % ny, line as u32 / ny);
         let first = line * nx as usize;
         let unknowns = &unknowns[first..][..nx as usize];
+        rows.fill(NO_CELL);
         for (x, row) in (0..nx).zip(rows) {
             let (cell, x) = ([x, y, z], x as usize);
             if !unknowns[x] {
@@ -220,13 +239,13 @@ fn number_cells(boundary: &dyn Boundary, before: Option<&Before<'_>>) -> Level {
         let first = [0, 1].map(|c| first_rows[c] + lines[line][c]);
         let mut by = first_rows;
         if let Some(before) = before.filter(|before| before.is_kept(line)) {
-            by = before.copy_rows(line, first, rows);
+            by = before.rows_grew_by(line, first);
         }
         let red = (line as u32 % ny + line as u32 / ny) as usize % 2;
         add_to_rows(rows, [by[red], by[1 - red]]);
     }
     let colours = n_cells.map(|n_cells| Colour { n_cells, ..Colour::default() });
-    Level { grid, colours, boundary: Vec::new(), row_of, lines, isolated }
+    Level { grid, colours, boundary: Vec::new(), row_of: Arc::new(row_of), lines, isolated }
 }
 
 /// Adds to a line's rows what is to be added in even places and in odd ones.

@@ -1,7 +1,7 @@
 //! The equations that an edit may have changed, and the cells whose old weights they and new stencils ask for.
 
 use crate::grid::NO_CELL;
-use crate::levels::Level;
+use crate::levels::{Level, Touched};
 
 use super::region::Region;
 
@@ -15,14 +15,14 @@ pub(super) struct Equations {
 
 impl Equations {
     /// Of the unknowns in a region: those that are or were next to the cage, and new ones. All others have the equation of a
-    /// cell with six neighbours, as before.
+    /// cell with six neighbours, as before. If it is known what the edit has `touched`, those only.
     #[inline(never)]
-    pub(super) fn changed(level: &Level, before: &Level, region: &Region) -> Self {
+    pub(super) fn changed(level: &Level, before: &Level, region: &Region, touched: Option<&Touched>) -> Self {
         let (cut, was_cut) = (cut_rows(level), cut_rows(before));
         let mut equations = Self { cells: Vec::new(), number: vec![NO_CELL; level.n_rows()] };
         for &cell in &region.cells {
             let (row, old_row) = (level.row_of[cell as usize], before.row_of[cell as usize]);
-            if row == NO_CELL {
+            if row == NO_CELL || touched.is_some_and(|touched| !touched.cells.has(cell as usize)) {
                 continue;
             }
             let was_whole = old_row != NO_CELL && !was_cut[old_row as usize];
@@ -72,7 +72,7 @@ fn cut_rows(level: &Level) -> Vec<bool> {
 #[inline(never)]
 pub(super) fn cells_of_rows(level: &Level) -> Vec<u32> {
     let mut cells = vec![NO_CELL; level.n_rows()];
-    for (cell, &row) in (0u32..).zip(&level.row_of) {
+    for (cell, &row) in (0u32..).zip(level.row_of.iter()) {
         if row != NO_CELL {
             cells[row as usize] = cell;
         }

@@ -9,7 +9,7 @@ use super::known::OfMoved;
 use super::shares::{Felt, Shares};
 
 /// What a cell that was outside began with.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Extended {
     /// Index in the grid.
     pub(super) cell: u32,

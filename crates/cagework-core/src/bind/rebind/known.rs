@@ -63,11 +63,10 @@ impl Known {
     }
 
     /// Takes out of residuals what known fields meet, as much of each as leaves least, in squares. `values`: of each unknown the
-    /// columns' residuals, `[n_batches]`, and a row that ends with what `times` the moved vertices' fields are the solutions
-    /// for, of which zeros are left.
+    /// columns' residuals, `[n_batches]`, and one more row, which ends with what `times` the moved vertices' fields are the
+    /// solutions for, and with zeros then.
     #[inline(always)]
-    pub(super) fn take_out(&mut self, values: &mut [Vec<Row>], times: &[f32]) {
-        let Some(n_batches) = values.first().map(|row| row.len() - 1) else { return };
+    pub(super) fn take_out(&mut self, values: &mut [Row], n_batches: usize, times: &[f32]) {
         let mut fields = vec![[0.0; MAX_KNOWN]; self.columns.len()];
         for (i, &times) in times.iter().enumerate().take(fields.len()) {
             fields[i][i] = times;
@@ -75,7 +74,7 @@ impl Known {
         for i in 0..fields.len() {
             let own = |row: &[Row]| row[n_batches][LANES - MAX_KNOWN + i];
             let mut share = vec![ZERO; n_batches + 1];
-            for row in values.iter() {
+            for row in values.chunks_exact(n_batches + 1) {
                 add_scaled(&mut share, row, own(row));
             }
             let squares = own(&share);
@@ -84,14 +83,14 @@ impl Known {
                 continue;
             }
             share.iter_mut().flatten().for_each(|w| *w /= squares);
-            for row in values.iter_mut() {
+            for row in values.chunks_exact_mut(n_batches + 1) {
                 let value = own(row);
                 add_scaled(row, &share, -value);
             }
-            for k in i + 1..fields.len() {
-                let times = share[n_batches][LANES - MAX_KNOWN + k];
-                for c in 0..=i {
-                    fields[k][c] -= times * fields[i][c];
+            let (done, later) = fields.split_at_mut(i + 1);
+            for (later, times) in later.iter_mut().zip(&share[n_batches][LANES - MAX_KNOWN + i + 1..]) {
+                for (later, own) in later.iter_mut().zip(done[i]) {
+                    *later -= times * own;
                 }
             }
             share.truncate(n_batches);
@@ -120,8 +119,8 @@ mod tests {
         let ways: Vec<(usize, DVec3)> = moved.iter().map(|&column| (column, DVec3::X)).collect();
         let times = [2.0, 0.5, 1.0];
         let amount = |column: usize, i: usize| some(100 + 7 * column + i);
-        let mut values: Vec<Vec<Row>> = (0..40)
-            .map(|k| {
+        let mut values: Vec<Row> = (0..40)
+            .flat_map(|k| {
                 let left: [f32; 3] = std::array::from_fn(|i| times[i] * some(3 * k + i));
                 let mut row = vec![ZERO; 3];
                 for column in 0..n_columns {
@@ -132,8 +131,8 @@ mod tests {
             })
             .collect();
         let mut known = Known::new(&ways);
-        known.take_out(&mut values, &times);
-        let largest = values.iter().flatten().flatten().fold(0.0, |a: f32, b| a.max(b.abs()));
+        known.take_out(&mut values, 2, &times);
+        let largest = values.iter().flatten().fold(0.0, |a: f32, b| a.max(b.abs()));
         assert!(largest <= ROUNDED, "{largest:e} is left");
 
         let old: Vec<Row> = (0..2).map(|batch| std::array::from_fn(|lane| some(8 * batch + lane))).collect();

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, DVec4};
 
-use crate::grid::NO_CELL;
+use crate::grid::{Grid, NO_CELL};
 use crate::levels::Level;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
@@ -39,9 +39,9 @@ impl Negligible {
     }
 }
 
-/// A residual must be so many times what counts to be worth a batch of its own, 2.2 times as many with 24 vertices (the root of
-/// [`lenience`]: with 5.2 instead of 4.8 times weights were 7.4e-5 off where a bind's are 2e-5, in a box of 18 vertices).
-const MANY: f32 = 2.2;
+/// What residuals change by must be so many times what counts to be worth a batch of its own, 2.2 times as many with 24 vertices
+/// (the root of [`lenience`]: then 12 times; 16 times leave weights 7.4e-5 off where a bind's are 2e-5, in a box of 18 vertices).
+const MANY: f32 = 5.5;
 
 /// Moments must be met so many times as well as weights: then most rows need not be restored after they were corrected.
 const KEENER: f32 = 30.0;
@@ -52,10 +52,14 @@ pub(super) struct Residual {
     /// Cell of each unknown.
     cells: Vec<u32>,
     diagonals: Vec<f32>,
+    /// Of each, what its arms to the cage add to the diagonal.
+    bound: Vec<f32>,
+    grid: Grid,
     /// The last batch is none of columns, but of moments: [`KEENER`] times what the columns' residuals sum to, each times its
     /// cage vertex (x, y, z, over the cage's diagonal) and by themselves; and of what `times` the moved vertices' columns
     /// are solutions for. `[n_unknowns][n_batches + 1]`
-    values: Vec<Vec<Row>>,
+    values: Vec<Row>,
+    n_batches: usize,
     known: Known,
     /// As large as their moments are. `[at most MAX_KNOWN]`
     times: Vec<f32>,
@@ -85,14 +89,20 @@ impl Residual {
     ) -> Self {
         let cells = equations.cells.clone();
         let stencils = FewStencils::new(level, equations);
-        let mut values = vec![vec![ZERO; n_batches + 1]; cells.len()];
+        let mut values = vec![ZERO; cells.len() * (n_batches + 1)];
         stencils.add_boundary(&mut values);
         stencils.extend(before, &values, old);
-        let diagonals = (0..cells.len()).map(|k| stencils.diagonal(k)).collect();
+        let diagonals: Vec<f32> = (0..cells.len()).map(|k| stencils.diagonal(k)).collect();
+        let bound =
+            diagonals.iter().enumerate().map(|(k, d)| d - stencils.neighbours(k).count() as f32).collect();
+        let grid = level.grid;
         let times = moved.iter().take(MAX_KNOWN).map(|(_, way)| KEENER * way.length() as f32).collect();
-        let mut residual = Self { cells, diagonals, values, known: old.known.clone(), times, negligible };
+        let known = old.known.clone();
+        let mut residual =
+            Self { cells, diagonals, bound, grid, values, n_batches, known, times, negligible };
         for (k, cell) in equations.cells.iter().map(|&cell| cell as usize).enumerate() {
-            let (out, moments) = residual.values[k].split_at_mut(n_batches);
+            let row = &mut residual.values[k * (n_batches + 1)..][..n_batches + 1];
+            let (out, moments) = row.split_at_mut(n_batches);
             let of = |row: &[Row], column: usize| row[column / LANES][column % LANES];
             let given: Vec<f32> = moved.iter().map(|&(column, _)| of(out, column)).collect();
             let mut ideal = DVec4::ZERO;
@@ -136,7 +146,7 @@ impl Residual {
         }
         residual.drop_negligible();
         if let Some(columns) = columns {
-            for row in &mut residual.values {
+            for row in residual.values.chunks_exact_mut(n_batches + 1) {
                 let (row, moments) = row.split_at_mut(n_batches);
                 let [x, y, z, sum, ..] = moments[0].map(|moment| f64::from(moment / KEENER));
                 columns.impose(row, sum, DVec3::new(x, y, z));
@@ -147,18 +157,42 @@ impl Residual {
 
     /// Leaves only unknowns whose equations have changed.
     fn drop_negligible(&mut self) {
-        let mut kept = 0;
+        let (mut kept, n) = (0, self.n_batches + 1);
         for k in 0..self.cells.len() {
-            if self.values[k].iter().flatten().any(|w| w.abs() >= self.negligible.residual) {
-                self.values.swap(kept, k);
+            let row = &self.values[k * n..][..n];
+            if row.iter().flatten().any(|w| w.abs() >= self.negligible.residual) {
+                self.values.copy_within(k * n..(k + 1) * n, kept * n);
                 self.cells.swap(kept, k);
                 self.diagonals.swap(kept, k);
+                self.bound.swap(kept, k);
                 kept += 1;
             }
         }
-        self.values.truncate(kept);
+        self.values.truncate(kept * n);
         self.cells.truncate(kept);
         self.diagonals.truncate(kept);
+        self.bound.truncate(kept);
+    }
+
+    /// How much a weight changes about, at most, by what is left of the columns' residuals: cells of a block that are off in the
+    /// same way change together, and only arms to the cage hold them. Residuals of both signs change next to nothing.
+    fn effect(&self) -> f32 {
+        let (n, blocks) = (self.n_batches, self.grid.coarsened());
+        let block_of = |cell: u32| blocks.index(self.grid.cell(cell as usize).map(|x| x / 2)) as u32;
+        let mut order: Vec<[u32; 2]> =
+            (0u32..).zip(&self.cells).map(|(k, &cell)| [block_of(cell), k]).collect();
+        order.sort_unstable();
+        let mut largest: f32 = 0.0;
+        for block in order.chunk_by(|a, b| a[0] == b[0]) {
+            let (mut sum, mut bound) = (vec![ZERO; n], 0.0);
+            for k in block.iter().map(|[_, k]| *k as usize) {
+                add_scaled(&mut sum, &self.values[k * (n + 1)..], self.diagonals[k]);
+                bound += self.bound[k];
+            }
+            let most = sum.iter().flatten().fold(0.0, |a: f32, w| a.max(w.abs()));
+            largest = largest.max(most / bound.max(1.0));
+        }
+        largest
     }
 
     /// Splits the residuals of all columns into a few independent ones and the columns' shares in them.
@@ -176,14 +210,14 @@ impl Residual {
     fn split_columns(mut self, n_columns: usize) -> Split {
         let n_batches = n_columns.div_ceil(LANES);
         let many = MANY * lenience(n_batches).sqrt();
-        self.known.take_out(&mut self.values, &self.times);
+        self.known.take_out(&mut self.values, n_batches, &self.times);
         // The last four are moments.
         let columns = || (0..n_columns).chain((0..4).map(|k| n_batches * LANES + k));
         let mut right = Vec::new();
-        let mut shares = Shares::new(n_batches, self.known);
+        let mut shares = Shares::new(n_batches, self.known.clone());
         let mut largest = vec![ZERO; n_batches + 1];
         let nothing = vec![ZERO; n_batches + 1];
-        for row in &mut self.values {
+        for row in self.values.chunks_exact_mut(n_batches + 1) {
             add_scaled_and_measure(row, &nothing, 0.0, &mut largest);
         }
         loop {
@@ -192,19 +226,20 @@ impl Residual {
             let rank = shares.len();
             // Another batch for little more than nothing costs as much as the one before.
             let needs_batch = rank > 0 && rank.is_multiple_of(LANES);
-            let least = if needs_batch { many } else { 1.0 } * self.negligible.residual;
-            if size(pivot) < least {
+            let least = self.negligible.residual;
+            if size(pivot) < least || needs_batch && self.effect() < many * least {
                 return Split { cells: self.cells, right, shares };
             }
-            let column: Vec<f32> = self.values.iter().map(|row| row[pivot / LANES][pivot % LANES]).collect();
+            let of_pivot = self.values.iter().skip(pivot / LANES).step_by(n_batches + 1);
+            let column: Vec<f32> = of_pivot.map(|row| row[pivot % LANES]).collect();
             let norm = column.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt() as f32;
             let unit: Vec<f32> = column.iter().map(|x| x / norm).collect();
             let mut share = vec![ZERO; n_batches + 1];
-            for (row, &q) in self.values.iter().zip(&unit) {
+            for (row, &q) in self.values.chunks_exact(n_batches + 1).zip(&unit) {
                 add_scaled(&mut share, row, q);
             }
             largest.fill(ZERO);
-            for (row, &q) in self.values.iter_mut().zip(&unit) {
+            for (row, &q) in self.values.chunks_exact_mut(n_batches + 1).zip(&unit) {
                 add_scaled_and_measure(row, &share, -q, &mut largest);
                 // Exactly, so that no column is taken twice.
                 row[pivot / LANES][pivot % LANES] = 0.0;
@@ -318,7 +353,11 @@ impl<'a> OldCells<'a> {
 
     /// What was put into cells, by cell.
     pub(super) fn into_extended(mut self) -> Vec<Extended> {
-        self.extended.sort_unstable_by_key(|extended| extended.cell);
-        self.extended
+        let mut order: Vec<[u32; 2]> =
+            (0u32..).zip(&self.extended).map(|(k, extended)| [extended.cell, k]).collect();
+        // As for blocks of residuals: another type's sort would be downloaded.
+        order.sort_unstable();
+        let all = &mut self.extended;
+        order.into_iter().map(|[_, k]| std::mem::take(&mut all[k as usize])).collect()
     }
 }

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::cage::Cage;
 use crate::grid::NO_CELL;
-use crate::levels::Level;
+use crate::levels::{Level, Touched};
 
 /// Cells that a face's corners may be off its triangles' planes, when it is cut into others: the cells that count as near
 /// cover those between.
@@ -70,14 +70,26 @@ pub(super) fn swept_by(before: &Cage, after: &Cage, to_grid: impl Fn(Vec3) -> DV
 }
 
 /// For every row of a level the one that the same cell has now; [`NO_CELL`] if it is gone. Zero rows are nobody's. `None` if
-/// all are where they were.
-pub(super) fn renumbering(before: &Level, level: &Level) -> Option<Vec<u32>> {
+/// all are where they were. Lines that an edit has not `touched`, if that is known, are taken as they are.
+pub(super) fn renumbering(before: &Level, level: &Level, touched: Option<&Touched>) -> Option<Vec<u32>> {
     if before.row_of == level.row_of {
         return None;
     }
     let mut moved_to = vec![NO_CELL; before.n_rows()];
-    for (&from, &to) in before.row_of.iter().zip(&level.row_of) {
-        if from != NO_CELL {
+    let nx = level.grid.dims[0] as usize;
+    // Cells without neighbours have no row, and may have lost one that is in another line.
+    let touched = touched.filter(|_| before.isolated + level.isolated == 0);
+    for (line, first) in before.lines.windows(2).enumerate() {
+        if touched.is_some_and(|touched| !touched.changed[line]) {
+            for c in 0..2 {
+                let [first, end] = [0, 1].map(|k| before.first_row(c) + first[k][c] as usize);
+                let now = level.first_row(c) as u32 + level.lines[line][c];
+                moved_to[first..end].iter_mut().zip(now..).for_each(|(to, now)| *to = now);
+            }
+            continue;
+        }
+        let rows = [before, level].map(|level| &level.row_of[line * nx..][..nx]);
+        for (&from, &to) in rows[0].iter().zip(rows[1]).filter(|(from, _)| **from != NO_CELL) {
             moved_to[from as usize] = to;
         }
     }
@@ -125,7 +137,8 @@ mod tests {
         neighbour.is_some_and(|c| rows.contains(&level.row_of[level.grid.index(c)]))
     }
 
-    /// What lies off the swept faces is what it was: no equation and no stencil that has changed is missed.
+    /// What lies off the swept faces is what it was: no equation and no stencil that has changed is missed, and cells whose
+    /// equations have changed count as touched.
     #[test]
     fn all_that_changes_is_near_what_is_swept() {
         let (cage, grid) = askew_c();
@@ -147,11 +160,15 @@ mod tests {
                     grid.origin + DVec3::from_array(at) * size * grid.cell
                 })
                 .collect();
+            let touched =
+                Embedding::new(&cage, &grid).edit(&cage, &edited).expect("as many levels as before");
             let [were, are] = [&cage, &edited].map(|cage| everything(cage, &grid, &points));
             let mut n_changed = [0, 0];
             for cell in (0..grid.n_cells()).filter(|&cell| were.0[cell] != are.0[cell]) {
                 n_changed[0] += 1;
                 assert!(region.number[cell] != NO_CELL, "{way} cells: the equation of {:?}", grid.cell(cell));
+                let is_known = touched[0].cells.has(cell) || were.0[cell].is_none();
+                assert!(is_known, "{way} cells: {:?} was touched", grid.cell(cell));
             }
             for (k, point) in points.iter().enumerate().filter(|(k, _)| were.1[*k] != are.1[*k]) {
                 n_changed[1] += 1;

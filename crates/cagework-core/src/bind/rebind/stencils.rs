@@ -39,13 +39,14 @@ impl<'a> FewStencils<'a> {
         self.cut_of[k].map_or(6.0, |(cut, _)| cut.diagonal)
     }
 
-    /// Adds the cage's values. `values`: of all columns, `[n_equations]`
-    pub(super) fn add_boundary(&self, values: &mut [Vec<Row>]) {
+    /// Adds the cage's values. `values`: of all columns, and whatever follows, `[n_equations][n_batches or more]`
+    pub(super) fn add_boundary(&self, values: &mut [Row]) {
+        let n = values.len() / self.equations.cells.len().max(1);
         for term in &self.level.boundary {
             let k = self.equations.number[self.level.row_of_cut(term.cut_cell as usize)];
             if k != NO_CELL {
                 let column = term.column as usize;
-                values[k as usize][column / LANES][column % LANES] += term.value;
+                values[k as usize * n + column / LANES][column % LANES] += term.value;
             }
         }
     }
@@ -62,16 +63,17 @@ impl<'a> FewStencils<'a> {
 
     /// Puts what meets their equations into cells that were outside, from what is known around them: then a correction is as
     /// smooth there as elsewhere, where from nothing it would be a weight high. Columns as known corrections, which are zero on
-    /// the cage, go on into them in the same way. `boundary`: the cage's values,
-    /// `[n_equations]`. Cells with none around them stay what they are.
-    pub(super) fn extend(&self, before: &Level, boundary: &[Vec<Row>], old: &mut OldCells<'_>) {
+    /// the cage, go on into them in the same way. `boundary`: the cage's values, as of [`Self::add_boundary`]. Cells with none
+    /// around them stay what they are.
+    pub(super) fn extend(&self, before: &Level, boundary: &[Row], old: &mut OldCells<'_>) {
         let is_new = |cell: usize| before.row_of[cell] == NO_CELL;
         let cells = &self.equations.cells;
+        let n = boundary.len() / cells.len().max(1);
         let mut pending: Vec<usize> = (0..cells.len()).filter(|&k| is_new(cells[k] as usize)).collect();
         loop {
             let mut found = Vec::new();
             pending.retain(|&k| {
-                let mut row = boundary[k][..old.n_batches()].to_vec();
+                let mut row = boundary[k * n..][..old.n_batches()].to_vec();
                 let (mut weight, mut of_moved) = (self.diagonal(k), [0.0; MAX_KNOWN]);
                 for cell in self.neighbours(k) {
                     if is_new(cell) && !old.is_extended(cell) {
@@ -135,18 +137,18 @@ mod tests {
         let to_grid = |p: Vec3| -> DVec3 { grid.to_grid(p.as_dvec3()) };
         let swept = swept_by(&smaller, &cage, to_grid).unwrap();
         let region = Region::around(&swept.triangles, CHANGED + swept.slack, &grid);
-        let equations = Equations::changed(&level, &before, &region);
+        let equations = Equations::changed(&level, &before, &region, None);
 
         let (n, n_batches) = (cage.n_vertices(), cage.n_vertices().div_ceil(LANES));
         let equal = |batch: usize| -> Row {
             std::array::from_fn(|k| if batch * LANES + k < n { 1.0 / n as f32 } else { 0.0 })
         };
         let base = (0..n_batches).map(|batch| vec![equal(batch); before.n_rows()]).collect();
-        let mut fields = Fields::new(base, Arc::new(before.row_of.clone()));
+        let mut fields = Fields::new(base, Arc::clone(&before.row_of));
         let needed = equations.neighbourhood(&level);
         let mut old = OldCells::new(&mut fields, &needed, n_batches, &[]);
         let stencils = FewStencils::new(&level, &equations);
-        let mut boundary = vec![vec![ZERO; n_batches]; equations.cells.len()];
+        let mut boundary = vec![ZERO; equations.cells.len() * n_batches];
         stencils.add_boundary(&mut boundary);
         stencils.extend(&before, &boundary, &mut old);
 

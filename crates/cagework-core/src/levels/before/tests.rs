@@ -6,7 +6,7 @@ use crate::cage::{Cage, shapes};
 use crate::cage_gen::subdivided_box;
 use crate::grid::{Grid, NO_CELL};
 use crate::levels::plain::askew_c;
-use crate::levels::{Before, Boundary, Level, Touched};
+use crate::levels::{Before, Boundary, CellSet, Level, Touched};
 use crate::mesh::Bounds;
 use crate::solve::hierarchy::Hierarchy;
 use crate::voxelize::embedded::{Embedding, shoot_lines};
@@ -184,7 +184,9 @@ fn cells_that_lose_their_last_neighbour() {
     let before = Hierarchy::new(&[was], 1);
     let new = Hierarchy::new(&[is], 1);
     assert_eq!((before.levels[0].isolated, new.levels[0].isolated), (0, 1));
-    let touched = [Touched { moved: vec![false; 8 * 3], changed }];
+    let mut cells = CellSet::none(grid.n_cells());
+    (0..grid.n_cells()).for_each(|cell| cells.add_if(true, cell));
+    let touched = [Touched { moved: vec![false; 8 * 3], changed, cells }];
     assert!(before.renewed(&[some(false)], &touched) == new);
     // And back: nobody knows then that the cell had no row.
     assert!(new.renewed(&[some(true)], &touched) == before);

@@ -13,11 +13,6 @@ const STALLED: f64 = 0.5;
 /// See [`ROUND_OFF`]: one such cycle may be chance.
 const MAX_STALLED: u32 = 2;
 
-/// Where a last cycle leaves so much on average, over what may be left in a cell, its coarse correction was so small that sweeps
-/// around the right-hand sides are all that it needs. (507 edits: with 0.05 the largest error of a weight is 5.3e-5 instead of
-/// 3.0e-5 where the cage has 200 vertices.)
-const LITTLE: f64 = 0.035;
-
 /// How one batch converged.
 #[derive(Clone, Debug, Default)]
 pub struct BatchReport {
@@ -39,6 +34,8 @@ pub struct Stop {
     pub tolerance: f64,
     /// The same for the cell with the largest; infinite if only the mean counts.
     pub in_any_cell: f64,
+    /// A last cycle that leaves no more than this, as a mean, has had little to do: sweeps around right-hand sides follow, no others.
+    pub little: f64,
     /// What a cycle leaves of the error, at worst.
     pub contraction: f64,
     /// Largest number of V-cycles on the finest level.
@@ -46,11 +43,9 @@ pub struct Stop {
 }
 
 impl BatchReport {
-    /// Whether the last coarse correction was so small that only cells around the right-hand sides need a sweep after it; never
-    /// where only the mean counts.
+    /// Whether the last coarse correction was so small that only cells around the right-hand sides need a sweep after it.
     pub(super) fn leaves_little(&self, stop: &Stop) -> bool {
-        let most = LITTLE * stop.in_any_cell;
-        most < f64::INFINITY && self.delta_squares.last().is_some_and(|square| square.sqrt() <= most)
+        self.delta_squares.last().is_some_and(|square| square.sqrt() <= stop.little)
     }
 }
 
@@ -58,7 +53,7 @@ impl Stop {
     /// By the mean over cells.
     #[must_use]
     pub fn new(tolerance: f64, max_cycles: u32) -> Self {
-        Self { tolerance, in_any_cell: f64::INFINITY, contraction: CONTRACTION, max_cycles }
+        Self { tolerance, in_any_cell: f64::INFINITY, little: 0.0, contraction: CONTRACTION, max_cycles }
     }
 }
 

@@ -183,7 +183,7 @@ mod tests {
     fn some_cells(hierarchy: &Hierarchy, first: usize, step: usize) -> (Vec<u32>, Vec<Row>) {
         let level = &hierarchy.levels[0];
         let values = some_field(level, 1);
-        let cells = (0u32..).zip(&level.row_of).filter(|(_, row)| **row != NO_CELL);
+        let cells = (0u32..).zip(level.row_of.iter()).filter(|(_, row)| **row != NO_CELL);
         let some = cells.skip(first).step_by(step);
         some.map(|(cell, row)| (cell, values[*row as usize])).unzip()
     }

@@ -176,8 +176,11 @@ mod tests {
     fn lines_that_no_right_hand_side_reaches_need_not_be_gone_through() {
         let hierarchy = hierarchy();
         let (level, transfer) = (&hierarchy.levels[0], &hierarchy.transfers[0]);
-        let cells: Vec<u32> =
-            (0u32..).zip(&level.row_of).filter(|(_, row)| **row != NO_CELL).map(|(cell, _)| cell).collect();
+        let cells: Vec<u32> = (0u32..)
+            .zip(level.row_of.iter())
+            .filter(|(_, row)| **row != NO_CELL)
+            .map(|(cell, _)| cell)
+            .collect();
         let (n, some) = (cells.len(), some_field(level, 1));
         // One at either end, one in the middle, two far apart, and none.
         for of in [&[0][..], &[n - 1], &[n / 2], &[n / 3, 2 * n / 3], &[]] {

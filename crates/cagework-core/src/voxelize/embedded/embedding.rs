@@ -85,7 +85,7 @@ impl Embedding {
                 });
                 for (cells, touched) in levels.iter_mut().zip(&mut touched) {
                     if cells.has(&place) {
-                        cells.move_walls(axis, place, [gone, come, are], &mut touched.moved);
+                        cells.move_walls(axis, place, [gone, come, are], touched);
                     }
                 }
             }
@@ -101,13 +101,13 @@ impl Embedding {
 }
 
 impl Cells {
-    /// Brings the cut arms along a line up to date: crossings that are gone, those that have come, and all. Marks lines along x.
+    /// Brings the cut arms along a line up to date: crossings that are gone, those that have come, and all.
     fn move_walls(
         &mut self,
         axis: usize,
         place: [u32; 2],
         [gone, come, all]: [&[Hit]; 3],
-        moved: &mut [bool],
+        touched: &mut Touched,
     ) {
         let nx = self.grid.dims[0] as usize;
         // All at last: an arm may end at another crossing as well.
@@ -117,7 +117,8 @@ impl Cells {
             for (cell, arm) in self.at_wall(axis, place, hit) {
                 let cut = &mut self.cut[cell];
                 *cut = if k == 0 { *cut & !arm } else { *cut | arm };
-                moved[cell / nx] |= k < 2;
+                touched.moved[cell / nx] |= k < 2;
+                touched.cells.add_if(k < 2, cell);
             }
         }
     }
@@ -132,6 +133,10 @@ fn flip(levels: &mut [Cells], cell: [u32; 3], touched: &mut [Touched]) {
         let index = cells.grid.index(cell.map(|x| x / cells.step));
         cells.inside[index] = !cells.inside[index];
         touched.changed[index / cells.grid.dims[0] as usize] = true;
+        touched.cells.add_if(true, index);
+        for neighbour in (0..6).filter_map(|d| cells.grid.neighbour(cells.grid.cell(index), d)) {
+            touched.cells.add_if(true, cells.grid.index(neighbour));
+        }
     }
 }
 
