@@ -10,8 +10,7 @@ import { readFileSync } from "node:fs";
 
 /** As many as start from one whole bind: the next one is bound anew. */
 const EDITS = 6;
-const ROUNDS = 3;
-const BINDS = 15;
+const ROUNDS = 5;
 const WARM_UP_MS = 1000;
 const PLACES = [0.1, 0.4, 0.6, 0.9];
 /** What a vertex moves by in each edit, of the model's longest side: two thirds of a cell, and a fifteenth. */
@@ -80,28 +79,26 @@ async function measure(name, mesh, { positions, corners }) {
   const all = [...axes[0].keys()];
   // The clamp has none; most of its vertices can move along y all the same.
   const free = all.some(isFree) ? all.filter(isFree) : all;
-  const whole = [];
-  // Not counted until V8 has compiled all for speed.
-  const counted = performance.now() + WARM_UP_MS;
-  while (whole.length < BINDS) {
+  // Until V8 has compiled all for speed.
+  const warm = performance.now() + WARM_UP_MS;
+  while (performance.now() < warm) {
     const binder = new Binder();
-    const isWarm = performance.now() > counted;
-    const { ms } = await bind(binder, mesh, positions, corners);
-    if (isWarm) whole.push(ms);
+    await bind(binder, mesh, positions, corners);
     binder.free();
   }
-  const edits = [];
+  const [edits, everyWhole] = [[], []];
   // The first place twice, and once not counted: the code of edits is compiled then.
   for (const [number, place] of [PLACES[0], ...PLACES].entries()) {
     const vertex = free[Math.floor(place * free.length)];
     const shares = [];
     for (const step of STEPS) {
-      const times = [];
+      // In turn: the machine's speed may change from second to second.
+      const [times, whole] = [[], []];
       let anew = 0;
       let corrections;
       for (let round = 0; round < ROUNDS; round += 1) {
         const binder = new Binder();
-        await bind(binder, mesh, positions, corners);
+        whole.push((await bind(binder, mesh, positions, corners)).ms);
         for (let k = 1; k <= EDITS; k += 1) {
           const edited = positions.slice();
           // There and back again: no further from the cage's shape after many edits than after one.
@@ -113,13 +110,14 @@ async function measure(name, mesh, { positions, corners }) {
         }
         binder.free();
       }
+      everyWhole.push(...whole);
       const how = [corrections && `${corrections} corrections`, anew && `${anew} of ${times.length} anew`];
       shares.push(`${(median(times) / median(whole)).toFixed(2)} (${how.filter(Boolean).join(", ")})`);
     }
     if (number > 0) edits.push(`vertex ${vertex} ${shares.join(" and ")}`);
   }
   const of = `${mesh.length / 3} vertices, ${positions.length / 3} columns`;
-  console.log(`${name}: ${of}; whole ${median(whole).toFixed(0)} ms; ${edits.join("; ")}`);
+  console.log(`${name}: ${of}; whole ${median(everyWhole).toFixed(0)} ms; ${edits.join("; ")}`);
 }
 
 const [mesh, cage] = process.argv.slice(2);
