@@ -13,7 +13,8 @@ use super::known::OfMoved;
 use super::shares::{Felt, Shares};
 
 /// A row that nothing else changes keeps its weights if the cage's move puts its vertex no further off than this, of the
-/// cage's diagonal: a tenth of what a corrected row may miss by.
+/// cage's diagonal: a tenth of what a corrected row may miss by. Known corrections, gradients times that, are 1e-6 there where the
+/// cage's edges are a fiftieth of the diagonal: a tenth of the threshold.
 const UNMOVED: f64 = 2e-8;
 
 /// A row that keeps fewer than one in so many of its entries is stored anew.
@@ -185,9 +186,13 @@ impl Run<'_> {
                 row.copy_from_slice(&resampled.1[next * n_batches..(next + 1) * n_batches]);
                 next += 1;
             } else {
-                let way = |&(column, way): &(usize, DVec3)| f64::from(weight_of(column, indices, data)) * way;
-                let way: DVec3 = shared.edit.moved.iter().map(way).sum();
-                if felt.is_empty() && way.length() < UNMOVED {
+                // Ways may cancel each other, but known corrections do not for that.
+                let (mut way, mut most) = (DVec3::ZERO, 0.0);
+                for &(column, moved) in shared.edit.moved {
+                    let own = f64::from(weight_of(column, indices, data)) * moved;
+                    (way, most) = (way + own, most + own.length());
+                }
+                if felt.is_empty() && most < UNMOVED {
                     let facts = &mut self.facts[k];
                     facts.error = facts.error.map(|error| error + way.length() as f32);
                     continue;
