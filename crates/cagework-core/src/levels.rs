@@ -4,9 +4,8 @@
 //! stays zero, the neighbour of whoever has none: `[red .., 0, black .., 0]`. A red-black sweep then streams
 //! through contiguous memory, and a *run* of whole stencils needs seven numbers, not seven gathers a cell.
 
-use std::sync::Arc;
-
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::DVec3;
 

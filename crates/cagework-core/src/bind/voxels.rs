@@ -121,7 +121,8 @@ impl Voxels {
             boundary: cut,
             exterior: grid.n_cells() as u64 - unknowns,
         };
-        let bytes = embedding.bytes() + hierarchy.bytes();
+        let touched_bytes = touched.as_ref().map_or(0, Touched::bytes);
+        let bytes = embedding.bytes() + hierarchy.bytes() + touched_bytes;
         let ambiguous = embedding.ambiguous();
         Self { hierarchy, counts, ambiguous, bytes, classic: None, embedding: Some(embedding), touched }
     }

@@ -49,6 +49,11 @@ impl Touched {
         let none = vec![false; (grid.dims[1] * grid.dims[2]) as usize];
         Self { moved: none.clone(), changed: none, cells: CellSet::none(grid.n_cells()) }
     }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        self.moved.len() + self.changed.len() + size_of_val(self.cells.0.as_slice())
+    }
 }
 
 /// A level before an edit, and what has become of its lines along x.
@@ -64,7 +69,7 @@ pub struct Before<'a> {
 }
 
 impl<'a> Before<'a> {
-    /// A level, and the lines that the edit has touched.
+    /// A level, and what the edit has touched of it.
     #[must_use]
     pub fn new(level: &'a Level, touched: &'a Touched) -> Self {
         let Touched { moved, changed, cells: touched } = touched;

@@ -16,6 +16,13 @@ use super::shares::add_scaled;
 /// others ask for is solved for.
 pub(super) const MAX_KNOWN: usize = LANES - 4;
 
+/// Vertices that move by less are as good as at rest: their residuals, as large as what earlier edits have left, say nothing of how
+/// much of a field a column takes. Times [`take_out`](Known::take_out): 0.003 % of the cage's diagonal.
+const LEAST_TIMES: f32 = 1e-3;
+
+/// A field is like those before it where less than this is left of its squares: f32 rounding, some hundred times.
+const ALIKE: f32 = 1e-8;
+
 /// What the columns of those vertices are somewhere; zeros beyond.
 pub(super) type OfMoved = [f32; MAX_KNOWN];
 
@@ -71,6 +78,12 @@ impl Known {
         for (i, &times) in times.iter().enumerate().take(fields.len()) {
             fields[i][i] = times;
         }
+        let mut squares_before = ZERO;
+        for row in values.iter().skip(n_batches).step_by(n_batches + 1) {
+            for lane in 0..LANES {
+                squares_before[lane] += row[lane] * row[lane];
+            }
+        }
         for i in 0..fields.len() {
             let own = |row: &[Row]| row[n_batches][LANES - MAX_KNOWN + i];
             let mut share = vec![ZERO; n_batches + 1];
@@ -78,8 +91,8 @@ impl Known {
                 add_scaled(&mut share, row, own(row));
             }
             let squares = own(&share);
-            // Of a vertex none of whose faces passes a cell there is nothing to take.
-            if squares <= f32::MIN_POSITIVE {
+            let least = (ALIKE * squares_before[LANES - MAX_KNOWN + i]).max(f32::MIN_POSITIVE);
+            if squares <= least || fields[i][i] < LEAST_TIMES {
                 continue;
             }
             share.iter_mut().flatten().for_each(|w| *w /= squares);
@@ -146,6 +159,33 @@ mod tests {
             let added = row[batch][lane] - old[batch][lane];
             assert!((added - expected).abs() <= ROUNDED, "column {column}: {added} instead of {expected}");
         }
+    }
+
+    /// One field is twice the other: nothing is left of it to take, and rounding is not taken for it.
+    #[test]
+    fn fields_that_are_alike_count_once() {
+        let mut values: Vec<Row> = (0..40)
+            .flat_map(|k| {
+                let left = some(k);
+                let mut row = vec![[some(100 + k); LANES], ZERO];
+                row[1][4..6].copy_from_slice(&[left, 2.0 * left]);
+                row
+            })
+            .collect();
+        let mut known = Known::new(&[(0, DVec3::X), (1, DVec3::X)]);
+        known.take_out(&mut values, 1, &[1.0, 1.0]);
+        assert_eq!(known.shares().count(), 1);
+        let mut row = [[1.0; LANES]];
+        known.add([1.0, 1.0, 0.0, 0.0], &mut row);
+        assert!(row[0].iter().all(|w| w.abs() < 2.0), "{row:?}");
+    }
+
+    #[test]
+    fn vertices_at_rest_have_no_field() {
+        let mut values = vec![[1.0; LANES]; 2 * 10];
+        let mut known = Known::new(&[(0, DVec3::X * 1e-7)]);
+        known.take_out(&mut values, 1, &[1e-4]);
+        assert_eq!((known.shares().count(), values), (0, vec![[1.0; LANES]; 2 * 10]));
     }
 
     #[test]

@@ -43,6 +43,12 @@ impl Negligible {
 /// (the root of [`lenience`]: then 12 times; 16 times leave weights 7.4e-5 off where a bind's are 2e-5, in a box of 18 vertices).
 const MANY: f32 = 5.5;
 
+/// So many times a residual, which may change its own cell's weight by itself, must be below that, too.
+const FLATTER: f32 = 1.5;
+
+/// An arm to the cage counts for no more than this in a block: cells on the cage do not hold those around them.
+const FIRMEST: f32 = 6.0;
+
 /// Moments must be met so many times as well as weights: then most rows need not be restored after they were corrected.
 const KEENER: f32 = 30.0;
 
@@ -174,8 +180,8 @@ impl Residual {
         self.bound.truncate(kept);
     }
 
-    /// How much a weight changes about, at most, by what is left of the columns' residuals: cells of a block that are off in the
-    /// same way change together, and only arms to the cage hold them. Residuals of both signs change next to nothing.
+    /// How much weights change about by what is left of the columns' residuals together: cells of a block that are off in the same
+    /// way change by more than each alone, and only arms to the cage hold them. Residuals of both signs do not add up.
     fn effect(&self) -> f32 {
         let (n, blocks) = (self.n_batches, self.grid.coarsened());
         let block_of = |cell: u32| blocks.index(self.grid.cell(cell as usize).map(|x| x / 2)) as u32;
@@ -186,8 +192,10 @@ impl Residual {
         for block in order.chunk_by(|a, b| a[0] == b[0]) {
             let (mut sum, mut bound) = (vec![ZERO; n], 0.0);
             for k in block.iter().map(|[_, k]| *k as usize) {
-                add_scaled(&mut sum, &self.values[k * (n + 1)..], self.diagonals[k]);
-                bound += self.bound[k];
+                let firm = self.bound[k].min(FIRMEST);
+                let share = if firm < self.bound[k] { firm / self.bound[k] } else { 1.0 };
+                add_scaled(&mut sum, &self.values[k * (n + 1)..], share * self.diagonals[k]);
+                bound += firm;
             }
             let most = sum.iter().flatten().fold(0.0, |a: f32, w| a.max(w.abs()));
             largest = largest.max(most / bound.max(1.0));
@@ -227,7 +235,8 @@ impl Residual {
             // Another batch for little more than nothing costs as much as the one before.
             let needs_batch = rank > 0 && rank.is_multiple_of(LANES);
             let least = self.negligible.residual;
-            if size(pivot) < least || needs_batch && self.effect() < many * least {
+            let is_little = || FLATTER * size(pivot) < many * least && self.effect() < many * least;
+            if size(pivot) < least || needs_batch && is_little() {
                 return Split { cells: self.cells, right, shares };
             }
             let of_pivot = self.values.iter().skip(pivot / LANES).step_by(n_batches + 1);

@@ -163,11 +163,17 @@ mod tests {
             let touched =
                 Embedding::new(&cage, &grid).edit(&cage, &edited).expect("as many levels as before");
             let [were, are] = [&cage, &edited].map(|cage| everything(cage, &grid, &points));
+            let [before, level] =
+                [&cage, &edited].map(|cage| Level::new(&Embedding::new(cage, &grid).boundaries(cage)[0]));
+            assert!(
+                renumbering(&before, &level, Some(&touched[0])) == renumbering(&before, &level, None),
+                "{way} cells: rows"
+            );
             let mut n_changed = [0, 0];
             for cell in (0..grid.n_cells()).filter(|&cell| were.0[cell] != are.0[cell]) {
                 n_changed[0] += 1;
                 assert!(region.number[cell] != NO_CELL, "{way} cells: the equation of {:?}", grid.cell(cell));
-                let is_known = touched[0].cells.has(cell) || were.0[cell].is_none();
+                let is_known = touched[0].cells.has(cell) || are.0[cell].is_none();
                 assert!(is_known, "{way} cells: {:?} was touched", grid.cell(cell));
             }
             for (k, point) in points.iter().enumerate().filter(|(k, _)| were.1[*k] != are.1[*k]) {

@@ -198,7 +198,7 @@ impl Run<'_> {
                     continue;
                 }
                 expand(indices, data, &mut row);
-                // Not where hat values are part of a weight: there stencils are new.
+                // No hat value of a moved vertex is part of such a row: at its faces stencils are new, and rows resampled.
                 let of_known = shares.known.add(shares.known.of_moved(&row), &mut row);
                 // Of other rows small weights are dropped.
                 if indices.len() == shared.edit.n_columns {

@@ -34,8 +34,8 @@ impl Shares {
         Self { n_fields: 0, n_batches, columns: Vec::new(), unfelt: Vec::new(), known }
     }
 
-    /// Adds the shares of a field to be solved for, which is made so much larger that they have a norm of 1, and returns how much: then the field's norm
-    /// is what it changes all columns by.
+    /// Adds the shares of a field to be solved for, which is made so much larger that they have a norm of 1, and returns how much:
+    /// then the field's norm is what it changes all columns by.
     pub(super) fn push(&mut self, mut share: Vec<Row>, negligible: Negligible) -> f32 {
         let squares = share.iter().flatten().map(|&w| f64::from(w).powi(2)).sum::<f64>();
         let norm = (squares.sqrt() as f32).max(f32::MIN_POSITIVE);

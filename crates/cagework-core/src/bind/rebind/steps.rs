@@ -22,9 +22,9 @@ use super::shares::{Shares, add_scaled};
 /// far off as after a whole bind. With this it is 1.0 to 3.1 times (samples; with 1.8, 7.1e-5 instead of 3.8e-5 in the humanoid).
 const IN_ANY_CELL: f32 = 1.5;
 
-/// Where a last cycle leaves so much on average, over what it may leave in a cell, sweeps around the edit are all that follows
-/// its coarse correction; [`lenience`] times as much with few vertices. (With 0.05 the largest error of a weight is 5.3e-5
-/// instead of 3.9e-5 after edits of three cages of 200 vertices by 0.1 to 1 %.)
+/// Where a last cycle leaves no more than this on average, over what it may leave in a cell, its coarse correction is followed by
+/// half a sweep everywhere and by others around the edit only; [`lenience`] times as much with few vertices: with 24 always.
+/// (With 0.05 the largest error of a weight is 5.3e-5 instead of 3.9e-5 after edits of three cages of 200 by 0.1 to 1 %.)
 const LITTLE: f32 = 0.035;
 
 /// What a V-cycle leaves of a correction's error, at worst: 0.03 to 0.05 measured, from zero and by coarse corrections that go

@@ -78,6 +78,23 @@ fn rebinding_after_edits_gives_the_weights_of_a_bind() {
     }
 }
 
+/// Cells that were outside begin with weights of their own, which the edits after it read again.
+#[test]
+fn vertices_may_go_in_and_out_again_step_by_step() {
+    let mut mesh = box_mesh();
+    let cage = Cage::new(&mesh).unwrap();
+    let (mut rebinder, _) = Rebinder::new(&points(), &cage, &options(), &Silent).unwrap();
+    for by in [0.5, -0.25, -0.15, 1e-6, 0.1] {
+        for v in mesh.positions.iter_mut().filter(|p| p.y > 0.0 && p.xz().length() < 0.8) {
+            v.y -= by * (1.0 + 0.2 * v.x);
+        }
+        let edited = Cage::new(&mesh).unwrap();
+        let (rebound, report) = rebinder.rebind(&edited, &Silent).unwrap();
+        assert!(!report.anew, "{by}: {report:?}");
+        assert_same(&rebound, &edited);
+    }
+}
+
 /// Each moved vertex has a correction that need not be solved for, up to four of them.
 #[test]
 fn vertices_may_move_together_and_each_its_own_way() {

@@ -34,7 +34,8 @@ pub struct Stop {
     pub tolerance: f64,
     /// The same for the cell with the largest; infinite if only the mean counts.
     pub in_any_cell: f64,
-    /// A last cycle that leaves no more than this, as a mean, has had little to do: sweeps around right-hand sides follow, no others.
+    /// A last cycle that leaves no more than this, as a mean, has had little to do: half a sweep follows, and others
+    /// around right-hand sides only.
     pub little: f64,
     /// What a cycle leaves of the error, at worst.
     pub contraction: f64,

@@ -51,8 +51,8 @@ impl Embedding {
         lines + self.votes.len() + self.levels.iter().map(|cells| 2 * cells.inside.len()).sum::<usize>()
     }
 
-    /// Brings it up to date with an edit that leaves the grid and the faces: it becomes what [`Self::new`] makes. Returns the lines
-    /// that it has touched on each level; `None` if there are more or fewer levels now: then it must be made anew.
+    /// Brings it up to date with an edit that leaves the grid and the faces: it becomes what [`Self::new`] makes. Returns what
+    /// it has touched on each level; `None` if there are more or fewer levels now: then it must be made anew.
     #[must_use]
     pub fn edit(&mut self, before: &Cage, cage: &Cage) -> Option<Vec<Touched>> {
         debug_assert_eq!(before.faces(), cage.faces(), "an edit leaves the faces");
