@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use cagework_benches::{GRIDS, Input};
-use cagework_core::bind::{Method, Solver};
+use cagework_core::options::{Method, Solver};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 
 fn bind(criterion: &mut Criterion) {

@@ -4,10 +4,11 @@
 //! `cargo bench -p cagework-benches --bench cages -- horse.glb cow.obj`
 
 use cagework_benches::read;
-use cagework_core::bind::{BindOptions, bind};
+use cagework_core::bind::bind;
 use cagework_core::cage_check::check;
 use cagework_core::cage_gen::{CageOptions, generate};
 use cagework_core::mesh::TriMesh;
+use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
 use cagework_core::samples;
 

@@ -5,7 +5,7 @@
 
 use std::time::Instant;
 
-use cagework_core::bind::BindOptions;
+use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
 use cagework_core::{Cage, bind};
 use cagework_gpu::render::DrawModel;

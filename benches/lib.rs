@@ -5,13 +5,14 @@
 
 use std::time::Instant;
 
-use cagework_core::bind::{BindOptions, Method, Solver, bind};
+use cagework_core::bind::bind;
 use cagework_core::grid::Grid;
+use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::progress::Silent;
 use cagework_core::sample::Stencils;
 use cagework_core::sample::embedded::Sampler;
 use cagework_core::solve::hierarchy::Hierarchy;
-use cagework_core::solve::multigrid::{Stop, Workspace};
+use cagework_core::solve::multigrid::Workspace;
 use cagework_core::voxelize::embedded::Embedding;
 use cagework_core::{Binding, Cage};
 use cagework_io::Model;
@@ -20,9 +21,6 @@ use glam::Vec3;
 
 /// The grids that whole binds are measured on.
 pub const GRIDS: [u32; 3] = [32, 64, 128];
-
-/// The default threshold for delta.
-const TAU: f64 = 1e-5;
 
 /// What is bound.
 #[derive(Debug)]
@@ -71,14 +69,14 @@ impl Input {
     #[must_use]
     pub fn hierarchy(&self, grid: u32) -> Hierarchy {
         let grid = Grid::cubic(self.cage.bounds(), grid);
-        let embedding = Embedding::new(&self.cage, &grid);
-        Hierarchy::new(&embedding.boundaries(&self.cage), self.cage.n_vertices())
+        let embedding = Embedding::new(&self.cage, &grid, true);
+        Hierarchy::new(&embedding.boundaries((&self.cage).into()), self.cage.n_vertices())
     }
 
     /// Sampling stencils of all vertices.
     #[must_use]
     pub fn stencils(&self, hierarchy: &Hierarchy) -> Stencils {
-        let sampler = Sampler::new(&self.cage, &hierarchy.levels[0]);
+        let sampler = Sampler::new((&self.cage).into(), &hierarchy.levels[0]);
         sampler.stencils(self.points.iter().map(|p| p.as_dvec3()))
     }
 }
@@ -95,8 +93,8 @@ pub fn read(path: &str) -> Model {
 
 /// Solves one batch of columns as a bind does.
 pub fn solve_batch(workspace: &mut Workspace, hierarchy: &Hierarchy, batch: usize) {
-    let stop = Stop::new(TAU / (hierarchy.n_batches() as f64).sqrt(), 20_000);
-    let report = workspace.solve(hierarchy, batch, stop, &mut |_, _| true);
+    let rule = BindOptions::default().stop_rule().of_batch(hierarchy.n_batches());
+    let report = workspace.solve(hierarchy, batch, rule, &mut |_, _| true);
     debug_assert!(report.is_some(), "nobody cancels");
 }
 

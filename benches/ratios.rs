@@ -2,7 +2,7 @@
 //! costs, and how much faster the embedded method is than the published one.
 
 use cagework_benches::{GRIDS, Input, fastest_ms, resident_workspaces, solve_batch};
-use cagework_core::bind::{Method, Solver};
+use cagework_core::options::{Method, Solver};
 use cagework_core::report::Timings;
 use cagework_core::solve::multigrid::Workspace;
 

@@ -2,8 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use cagework_core::bind::{BindError, BindOptions, Method, Solver};
+use cagework_core::bind::BindError;
 use cagework_core::deform::deform_bound;
+use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::progress::{ProgressEvent, Silent};
 use cagework_core::{Binding, Cage, Weights};
 use cagework_gpu::render::{DrawModel, DrawVertex, MeshStyle, SceneOptions};

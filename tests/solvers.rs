@@ -9,9 +9,9 @@ mod suite;
 
 use std::sync::OnceLock;
 
-use cagework_core::bind::{BindOptions, Method, Solver};
+use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::{BindError, Binding, Cage, Progress};
-use cagework_gpu::{ContextOptions, GpuContext, GpuError, PlanError, bind_gpu};
+use cagework_gpu::{ContextOptions, GpuContext, GpuError, PlanError, bind_on};
 use glam::Vec3;
 use pollster::block_on;
 use suite::BackEnd;
@@ -85,7 +85,7 @@ macro_rules! solver_suite {
 /// A back end on the processor.
 fn cpu(method: Method, solver: Solver, threads: usize) -> BackEnd {
     BackEnd {
-        bind: cagework_core::bind,
+        bind: |positions, cage, options, progress| cagework_core::bind(positions, cage, options, progress),
         options: BindOptions { method, solver, threads, ..BindOptions::default() },
     }
 }
@@ -103,8 +103,8 @@ fn gpu(method: Method, solver: Solver) -> BackEnd {
             Ok(context) => context,
             Err(error) => panic!("these tests need a Vulkan adapter: {error}"),
         });
-        match block_on(bind_gpu(positions, cage, options, progress, context)) {
-            Ok((binding, _)) => Ok(binding),
+        match block_on(bind_on(positions, cage, options, progress, context)) {
+            Ok(binding) => Ok(binding),
             Err(GpuError::Bind(error)) => Err(error),
             // The suite asks for the memory of the whole, wherever it is.
             Err(GpuError::Plan(PlanError::Memory { needed, limit })) => {
@@ -128,6 +128,9 @@ solver_suite!(classic_multigrid_one_thread, every, cpu(Method::Classic, Solver::
 solver_suite!(classic_multigrid_all_threads, every, cpu(Method::Classic, Solver::Multigrid, 0));
 solver_suite!(classic_jacobi_one_thread, every, cpu(Method::Classic, Solver::Jacobi, 1));
 solver_suite!(classic_jacobi_all_threads, every, cpu(Method::Classic, Solver::Jacobi, 0));
+
+solver_suite!(embedded_cg, embedded, cpu(Method::Embedded, Solver::ConjugateGradient, 0));
+solver_suite!(classic_cg, every, cpu(Method::Classic, Solver::ConjugateGradient, 0));
 
 /// Multigrid only: what a V-cycle promises.
 mod multigrid {

@@ -8,7 +8,7 @@ mod scenes;
 
 use std::sync::Arc;
 
-use cagework_core::bind::{BindOptions, Method};
+use cagework_core::options::{BindOptions, Method};
 use cagework_core::progress::Silent;
 use cagework_core::slice::Slice;
 use cagework_gpu::render::{

@@ -3,7 +3,7 @@
 use std::f32::consts::{PI, TAU};
 
 use cagework_core::Cage;
-use cagework_core::bind::{BindOptions, Method, Solver};
+use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::progress::Silent;
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, SceneOptions};
 use cagework_gpu::{ContextOptions, GpuContext, Session};

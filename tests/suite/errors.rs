@@ -1,6 +1,7 @@
 //! Bad input ends in an error that names it.
 
-use cagework_core::bind::{BindError, BindOptions};
+use cagework_core::bind::BindError;
+use cagework_core::options::BindOptions;
 use cagework_tests::cages::{c_shape, cage};
 use cagework_tests::points;
 use glam::Vec3;

@@ -9,7 +9,8 @@ pub(crate) mod progress;
 pub(crate) mod rows;
 pub(crate) mod shapes;
 
-use cagework_core::bind::{BindError, BindOptions, Binding, Method};
+use cagework_core::bind::{BindError, Binding};
+use cagework_core::options::{BindOptions, Method};
 use cagework_core::progress::{Progress, Silent};
 use cagework_core::{Cage, Weights};
 use glam::{DVec3, Vec3};

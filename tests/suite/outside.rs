@@ -1,7 +1,8 @@
 //! Mesh vertices outside the cage.
 
-use cagework_core::bind::{BindError, OutsidePolicy};
+use cagework_core::bind::BindError;
 use cagework_core::deform::deform_bound;
+use cagework_core::options::OutsidePolicy;
 use cagework_tests::cages::{c_shape, cage, cuboid, moved, sphere};
 use cagework_tests::{Random, points};
 use glam::Vec3;

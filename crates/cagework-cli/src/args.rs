@@ -3,11 +3,17 @@
 mod cages;
 mod render;
 
+use std::error::Error;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 pub(crate) use cages::{CageArgs, CageSource, CheckArgs, DEFAULT_DIVISIONS, DEFAULT_MARGIN, KindArg};
-use cagework_core::bind::{BindOptions, CellShape, DeltaNorm, Method, OutsidePolicy, Solver};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use cagework_core::options::{
+    self, Backend, BindOptions, CellShape, Choice, DeltaNorm, Method, Number, OutsidePolicy, Preconditioner,
+    Solver,
+};
+use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand};
 
 pub(crate) use render::{RenderArgs, Show};
 
@@ -78,7 +84,7 @@ pub(crate) struct BindArgs {
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
     /// Cells along the longest side of the cage, 8 to 512.
-    #[arg(short, long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(8..=512))]
+    #[arg(short, long, default_value_t = 64, value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: u32,
     /// Write the rest pose as the weights reconstruct it (.glb, .obj).
     #[arg(short, long, value_name = "FILE", value_parser = model_output)]
@@ -100,77 +106,68 @@ pub(crate) struct BindArgs {
 #[derive(Args, Debug)]
 pub(crate) struct SolveArgs {
     /// How the cage meets the grid: as published, or where it really is.
-    #[arg(long, value_enum, default_value_t = MethodArg::Embedded)]
-    method: MethodArg,
+    #[arg(long, default_value_t, value_parser = words::<Method>())]
+    method: Method,
     /// How Laplace's equation is solved [default: multigrid; jacobi with --method classic].
-    #[arg(long, value_enum)]
-    solver: Option<SolverArg>,
+    #[arg(long, value_parser = words::<Solver>())]
+    solver: Option<Solver>,
+    /// What conjugate gradients (--solver cg) are preconditioned by.
+    #[arg(long, default_value_t, value_parser = words::<Preconditioner>())]
+    preconditioner: Preconditioner,
     /// Threads; 0 for all.
     #[arg(long, default_value_t = 0, value_name = "N")]
     threads: usize,
-    /// Stop when delta (the paper's Eq. 2) falls below this.
-    #[arg(long, default_value = "1e-5", value_parser = positive)]
+    /// Stop when delta (the paper's Eq. 2; multigrid and cg: the error that is expected to remain) falls below this.
+    #[arg(long, default_value = "1e-5", value_parser = number::<f32>(options::TAU))]
     tau: f32,
-    /// Stop after this many Jacobi sweeps or V-cycles in any case.
-    #[arg(long, default_value_t = 20_000, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Stop after this many Jacobi sweeps, V-cycles or steps of cg in any case.
+    #[arg(long, default_value_t = 20_000, value_name = "N", value_parser = number::<u32>(options::MAX_ITERATIONS))]
     max_iterations: u32,
     /// Drop weights below this, then restore each row's sum and rest position; 0 keeps all.
-    #[arg(long, default_value_t = 0.0, value_name = "WEIGHT", value_parser = fraction)]
+    #[arg(long, default_value_t = 0.0, value_name = "WEIGHT", value_parser = number::<f32>(options::SPARSIFY))]
     sparsify: f32,
     /// Shape of the classic method's cells: of the cage's box (as published), or cubic.
-    #[arg(long, value_enum, default_value_t = CellsArg::Box)]
-    cells: CellsArg,
+    #[arg(long, default_value_t, value_parser = words::<CellShape>())]
+    cells: CellShape,
     /// How Eq. 2 is read: as a Euclidean norm, or to the letter.
-    #[arg(long, value_enum, default_value_t = DeltaArg::Euclidean)]
-    delta: DeltaArg,
+    #[arg(long, default_value_t, value_parser = words::<DeltaNorm>())]
+    delta: DeltaNorm,
     /// What to do with vertices outside the cage: bind them to its closest point, or end with an error.
-    #[arg(long, value_enum, default_value_t = OutsideArg::ClosestPoint)]
-    outside: OutsideArg,
+    #[arg(long, default_value_t, value_parser = words::<OutsidePolicy>())]
+    outside: OutsidePolicy,
     /// Refuse to start above this much working memory, in MiB.
     #[arg(long, default_value_t = 4096, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
     memory_limit: u64,
     /// Where to compute; CAGEWORK_ADAPTER chooses among several GPUs by part of a name.
-    #[arg(long, value_enum, default_value_t = BackendArg::Cpu)]
-    backend: BackendArg,
+    #[arg(long, default_value_t, value_parser = words::<Backend>())]
+    backend: Backend,
 }
 
 impl SolveArgs {
     /// Whether the GPU is to solve.
     pub(crate) fn on_gpu(&self) -> bool {
-        matches!(self.backend, BackendArg::Gpu)
+        self.backend == Backend::Gpu
     }
 
     /// The options of a bind on `grid` cells.
     pub(crate) fn options(&self, grid: u32) -> BindOptions {
-        let method = match self.method {
-            MethodArg::Classic => Method::Classic,
-            MethodArg::Embedded => Method::Embedded,
-        };
-        let solver = match (self.solver, method) {
-            (Some(SolverArg::Jacobi), _) | (None, Method::Classic) => Solver::Jacobi,
-            (Some(SolverArg::Multigrid), _) | (None, Method::Embedded) => Solver::Multigrid,
+        let usual = match self.method {
+            Method::Classic => Solver::Jacobi,
+            Method::Embedded => Solver::Multigrid,
         };
         BindOptions {
             grid,
-            method,
-            solver,
-            cell_shape: match self.cells {
-                CellsArg::Box => CellShape::Box,
-                CellsArg::Cubic => CellShape::Cubic,
-            },
-            delta_norm: match self.delta {
-                DeltaArg::Euclidean => DeltaNorm::Euclidean,
-                DeltaArg::Literal => DeltaNorm::Literal,
-            },
+            method: self.method,
+            solver: self.solver.unwrap_or(usual),
+            preconditioner: self.preconditioner,
+            cell_shape: self.cells,
+            delta_norm: self.delta,
             threads: self.threads,
             tau: self.tau,
             max_iterations: self.max_iterations,
             sparsify: self.sparsify,
             memory_limit: self.memory_limit << 20,
-            outside: match self.outside {
-                OutsideArg::ClosestPoint => OutsidePolicy::ClosestPoint,
-                OutsideArg::Refuse => OutsidePolicy::Refuse,
-            },
+            outside: self.outside,
         }
     }
 }
@@ -213,7 +210,7 @@ pub(crate) struct BenchArgs {
     #[arg(long, value_name = "CAGE", requires = "mesh")]
     pub(crate) cage: Option<CageSource>,
     /// Cells along the longest side of the cage; several, separated by commas.
-    #[arg(short, long, value_delimiter = ',', default_value = "64", value_parser = clap::value_parser!(u32).range(8..=512))]
+    #[arg(short, long, value_delimiter = ',', default_value = "64", value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: Vec<u32>,
     /// Binds of each kind; medians are reported.
     #[arg(long, default_value_t = 5, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
@@ -251,54 +248,21 @@ pub(crate) struct DemoArgs {
     pub(crate) output: PathBuf,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum MethodArg {
-    Classic,
-    Embedded,
+/// The words of an option.
+fn words<T>() -> impl TypedValueParser<Value = T>
+where
+    T: Choice + FromStr<Err: Error + Send + Sync> + Send + Sync,
+{
+    let values = T::ALL.iter().map(|(word, _)| PossibleValue::new(word.replace('_', "-")).alias(*word));
+    PossibleValuesParser::new(values).try_map(|word| word.parse::<T>())
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum SolverArg {
-    Jacobi,
-    Multigrid,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum CellsArg {
-    Box,
-    Cubic,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum DeltaArg {
-    Euclidean,
-    Literal,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum OutsideArg {
-    ClosestPoint,
-    Refuse,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum BackendArg {
-    Cpu,
-    Gpu,
-}
-
-fn positive(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("not a positive number".into()),
-    }
-}
-
-fn fraction(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
-        _ => Err("not a number from 0 to below 1".into()),
-    }
+/// A number in an option's range.
+fn number<T>(option: Number) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr + Into<f64> + Copy + Send + Sync + 'static,
+{
+    StringValueParser::new().try_map(move |text| option.parse::<T>(&text))
 }
 
 fn model_output(text: &str) -> Result<PathBuf, String> {

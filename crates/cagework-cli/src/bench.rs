@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use cagework_core::bind::{BindOptions, Method, Solver};
+use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::report::Timings;
 use cagework_core::{BindReport, Cage};
 use cagework_io::Model;

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use cagework_core::bind::{BindOptions, Binding};
+use cagework_core::bind::Binding;
 use cagework_core::deform::deform_bound;
+use cagework_core::options::BindOptions;
 use cagework_core::{Cage, bind};
-use cagework_gpu::{GpuContext, bind_gpu};
+use cagework_gpu::{GpuContext, bind_on as bind_on_gpu};
 use cagework_io::{Model, write_cage_obj, write_weights_npz};
 use glam::Vec3;
 
@@ -98,8 +99,7 @@ pub(crate) fn bind_on(
     options: &BindOptions,
 ) -> Result<Binding, CliError> {
     let bar = Bar::start();
-    let (binding, _) = pollster::block_on(bind_gpu(positions, cage, options, &bar, context))?;
-    Ok(binding)
+    Ok(pollster::block_on(bind_on_gpu(positions, cage, options, &bar, context))?)
 }
 
 /// Where the bound vertices go for a posed cage. `[n_vertices]`, object units.

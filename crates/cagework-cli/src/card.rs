@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use cagework_core::BindReport;
-use cagework_core::bind::{CellShape, Method, Solver};
+use cagework_core::options::{CellShape, Method, Solver};
 
 /// Lines on one bind. `model_notices`: what reading the mesh had to say; `written`: files that were written.
 pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathBuf]) -> String {
     let mut out = format!("bound {} vertices to {} cage vertices\n", report.vertices, report.cage_vertices);
     let mut row = |name: &str, value: String| {
-        let _ = writeln!(out, "  {name:<12}{value}");
+        let _ = writeln!(out, "  {name:<14}{value}");
     };
     let threads = if report.threads == 1 { "1 thread".into() } else { format!("{} threads", report.threads) };
     let place = report.adapter.clone().unwrap_or(threads);
@@ -25,6 +25,7 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
     let unit = match report.solver {
         Solver::Jacobi => "sweeps",
         Solver::Multigrid => "V-cycles",
+        Solver::ConjugateGradient => "steps",
     };
     let delta = report.delta_history.last().map_or(String::new(), |d| format!(", delta {d:.1e}"));
     let state = if report.converged { "converged" } else { "NOT converged" };
@@ -46,6 +47,14 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
     row(
         "rest error",
         format!("mean {:.1e}, max {:.1e} of the cage's diagonal", error.mean_rel, error.max_rel),
+    );
+    let raw = report.raw_error;
+    row(
+        "solver error",
+        format!(
+            "mean {:.1e}, max {:.1e} of the diagonal, |sum - 1| at most {:.1e}, before rows were restored",
+            raw.point_rel.mean, raw.point_rel.max, raw.sum.max
+        ),
     );
     let weights = report.weights;
     row(

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use cagework_core::bind::BindOptions;
+use cagework_core::options::BindOptions;
 use cagework_core::{BindReport, PolygonMesh};
 use cagework_io::{Model, write_cage_obj, write_weights_npz};
 use glam::Vec3;

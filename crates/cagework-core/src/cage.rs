@@ -202,15 +202,6 @@ impl Cage {
         }
     }
 
-    /// Whether each face has other hats or triangles than in a cage of the same faces `before`: a corner has moved, or the face
-    /// counts as planar no longer, or now, because the cage's diagonal is another. `[n_faces]`
-    #[must_use]
-    pub fn changed_faces(&self, before: &Self) -> Vec<bool> {
-        let has_moved = |&i: &u32| self.positions[i as usize] != before.positions[i as usize];
-        let polygons = self.polygons.iter().zip(&before.polygons);
-        self.faces.iter().zip(polygons).map(|(face, (a, b))| a != b || face.iter().any(has_moved)).collect()
-    }
-
     /// The piece of a face that a triangle lies in; none if hats are linear on the triangle.
     fn piece_of(&self, triangle: usize) -> Option<&Piece> {
         let polygon = &self.polygons[self.face_of_triangle[triangle] as usize];

@@ -2,8 +2,18 @@
 
 use glam::{Mat3, Vec3};
 
-use crate::bind::OutsideVertex;
 use crate::weights::Weights;
+
+/// A mesh vertex outside the cage: it follows the closest point of the cage, offset rigidly in that triangle's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutsideVertex {
+    /// Mesh vertex.
+    pub vertex: u32,
+    /// Corners of the cage triangle with the closest point: the frame's corners, as vertices of the surface.
+    pub corners: [u32; 3],
+    /// Offset from the closest point in the frame (edge, in-plane normal to it, triangle normal), object units.
+    pub offset: Vec3,
+}
 
 /// Positions of all mesh vertices for a posed cage: `v' = sum_i w_i(v) c_i'` (Joshi et al. 2007, Eq. 1).
 ///

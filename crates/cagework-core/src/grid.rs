@@ -4,11 +4,6 @@ use glam::DVec3;
 
 use crate::mesh::Bounds;
 
-/// Smallest number of cells along the longest side.
-pub const MIN_GRID: u32 = 8;
-/// Largest number of cells along the longest side.
-pub const MAX_GRID: u32 = 512;
-
 /// Offset of the cell centres, in cells: small and irrational-looking, so that grid lines through an axis-aligned
 /// cage do not run along its edges and vertices.
 const SHIFT: DVec3 = DVec3::new(0.013_713_7, 0.007_071_1, 0.019_318_5);

@@ -5,16 +5,12 @@
 //! through contiguous memory, and a *run* of whole stencils needs seven numbers, not seven gathers a cell.
 
 use std::ops::Range;
-use std::sync::Arc;
 
 use glam::DVec3;
 
 use crate::grid::{Grid, NO_CELL};
 
-mod before;
 mod build;
-
-pub use before::{Before, CellSet, Touched};
 
 /// Coarsening stops at this many unknowns: there, a few dozen sweeps cost nothing.
 const COARSEST_UNKNOWNS: usize = 200;
@@ -81,6 +77,16 @@ pub struct Colour {
     pub planes: Vec<[u32; 2]>,
 }
 
+impl Colour {
+    /// The runs and the cut cells of a z-plane.
+    #[inline(always)]
+    #[must_use]
+    pub fn of_plane(&self, plane: usize) -> [Range<usize>; 2] {
+        let (start, end) = (self.planes[plane], self.planes[plane + 1]);
+        [start[0] as usize..end[0] as usize, start[1] as usize..end[1] as usize]
+    }
+}
+
 /// One level: its unknowns and their stencils.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {
@@ -91,9 +97,7 @@ pub struct Level {
     /// Right-hand sides, ascending in `cut_cell`, then `column`.
     pub boundary: Vec<BoundaryTerm>,
     /// Row of each grid cell in the level's fields; [`NO_CELL`] where it is no unknown. `[nz, ny, nx]`
-    pub row_of: Arc<Vec<u32>>,
-    /// First cell, within its colour, of each colour in each line along x, and of a line after the last. `[nz * ny + 1]`
-    pub lines: Vec<[u32; 2]>,
+    pub row_of: Vec<u32>,
     /// Cells with no arm at all, which the axes' disagreement cut off from everything; not solved for.
     pub isolated: u64,
 }
@@ -148,19 +152,6 @@ impl Level {
         })
     }
 
-    /// Cells of a z-plane within their colour.
-    #[must_use]
-    pub fn cells_of_plane(&self, colour: usize, z: usize) -> Range<usize> {
-        self.cells_of_lines(colour, z, &(0..self.grid.dims[1] as usize))
-    }
-
-    /// Cells of the lines `ys` of a z-plane within their colour.
-    #[must_use]
-    pub fn cells_of_lines(&self, colour: usize, z: usize, ys: &Range<usize>) -> Range<usize> {
-        let first = z * self.grid.dims[1] as usize;
-        self.lines[first + ys.start][colour] as usize..self.lines[first + ys.end][colour] as usize
-    }
-
     /// Number of cut cells of both colours.
     #[must_use]
     pub fn n_cut(&self) -> usize {
@@ -187,7 +178,6 @@ impl Level {
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(self.row_of.as_slice())
-            + size_of_val(self.lines.as_slice())
             + size_of_val(self.boundary.as_slice())
             + self
                 .colours
@@ -210,7 +200,7 @@ pub fn coarsened_until_few<C>(
     let mut levels = vec![finest];
     loop {
         let last = &levels[levels.len() - 1];
-        if is_few(unknowns(last)) {
+        if unknowns(last).iter().filter(|&&unknown| unknown).count() <= COARSEST_UNKNOWNS {
             return levels;
         }
         let coarse = coarsen(last);
@@ -219,13 +209,6 @@ pub fn coarsened_until_few<C>(
         }
         levels.push(coarse);
     }
-}
-
-/// Whether a level has so few unknowns that it needs no coarser one. Not inlined, as three places ask.
-#[inline(never)]
-#[must_use]
-pub fn is_few(unknowns: &[bool]) -> bool {
-    unknowns.iter().filter(|&&unknown| unknown).count() <= COARSEST_UNKNOWNS
 }
 
 #[cfg(test)]

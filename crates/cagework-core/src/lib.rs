@@ -1,13 +1,15 @@
 //! Harmonic-coordinate cage deformation: the mathematics, and nothing else.
 //!
-//! Data flows one way: mesh and [`Cage`] -> grid -> levels -> (batch: solve, sample) -> [`Weights`] -> deform.
+//! Data flows one way: mesh and [`Controls`] -> grid -> levels -> (batch: solve, sample) -> [`Weights`] -> deform.
 //! No I/O, no GPU, no JavaScript; everything here compiles for `wasm32-unknown-unknown`.
 
+pub mod assemble;
 pub mod bind;
 pub mod cage;
 pub mod cage_check;
 pub mod cage_gen;
 mod contact;
+pub mod controls;
 pub mod deform;
 pub mod edit;
 pub mod enclosure;
@@ -16,6 +18,7 @@ pub mod grid;
 pub mod levels;
 pub mod mean_value;
 pub mod mesh;
+pub mod options;
 pub mod progress;
 pub mod report;
 pub mod rest_edit;
@@ -25,15 +28,18 @@ mod simd;
 pub mod slice;
 pub mod solve;
 pub mod stencil;
+pub mod team;
 pub mod transfer;
 pub mod voxelize;
 pub mod weights;
 
-pub use bind::{BindError, BindOptions, Binding, bind};
+pub use bind::{BindError, Binding, bind};
 pub use cage::{Cage, CageError, CageNotice, FaceDefect};
 pub use cage_gen::{CageOptions, GeneratedCage, subdivided_box};
+pub use controls::Controls;
 pub use mean_value::{MeanValueError, mean_value_weights};
 pub use mesh::{Bounds, PolygonMesh, TriMesh};
+pub use options::BindOptions;
 pub use progress::{Cancelled, Progress, ProgressEvent, Stage};
 pub use report::BindReport;
 pub use weights::Weights;

@@ -64,7 +64,7 @@ pub fn mean_value_weights(points: &[Vec3], cage: &Cage) -> Result<Weights, MeanV
     if rows.checked_mul(columns).is_none_or(|n| u32::try_from(n).is_err()) {
         return Err(MeanValueError::TooMany { rows, columns });
     }
-    let dense = crate::voxelize::map_indices(rows, |v| {
+    let dense = crate::team::map_indices(rows, |v| {
         let mut row = vec![0.0; columns];
         let defined = coordinates(points[v].as_dvec3(), cage, &mut row);
         defined.then(|| row.into_iter().map(|w| w as f32).collect::<Vec<f32>>())

@@ -2,17 +2,20 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::bind::{CellShape, DeltaNorm, Method, Solver};
+use crate::options::{Backend, CellShape, DeltaNorm, Method, Preconditioner, Solver};
 
 /// Everything worth knowing about one bind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BindReport {
     /// Classic (as published) or embedded.
     pub method: Method,
-    /// Jacobi or multigrid.
+    /// Jacobi, multigrid, or conjugate gradients.
     pub solver: Solver,
-    /// `cpu` or `gpu`.
-    pub backend: String,
+    /// What conjugate gradients were preconditioned by.
+    #[serde(default)]
+    pub preconditioner: Preconditioner,
+    /// Where it was computed.
+    pub backend: Backend,
     /// Name of the GPU that solved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adapter: Option<String>,
@@ -34,22 +37,19 @@ pub struct BindReport {
     pub cells: CellCounts,
     /// Cells to be solved for on each level, finest first; one entry for Jacobi.
     pub levels: Vec<u64>,
-    /// Corrections that were solved for in place of the columns, when the bind started from the one before.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub corrections: Option<u32>,
-    /// Jacobi sweeps, or V-cycles on the finest level (the largest number over the batches).
+    /// Jacobi sweeps, V-cycles on the finest level, or steps of conjugate gradients (the largest number over the batches).
     pub iterations: u32,
     /// Whether delta fell below tau before the limit on iterations.
     pub converged: bool,
-    /// Delta after every `delta_interval` iterations. Jacobi: Eq. 2, the sweep's average change of a cell. Multigrid: the
-    /// error that the V-cycle is expected to leave, Eq. 2's norm of its coarse correction times the contraction.
+    /// Delta after every `delta_interval` iterations. Jacobi: Eq. 2, the sweep's average change of a cell. The others:
+    /// the error that is expected to remain, root mean square over cells.
     /// `[iterations / delta_interval]`, rounded up.
     pub delta_history: Vec<f32>,
     /// Iterations between two entries of `delta_history`: 1, but for the GPU's Jacobi sweeps, which are checked now
     /// and then.
     #[serde(default = "one")]
     pub delta_interval: u32,
-    /// Root mean square residual of the finest level before each V-cycle; empty for Jacobi. `[iterations]`
+    /// Root mean square residual of the finest level before each iteration; empty for Jacobi. `[iterations]`
     pub residual_history: Vec<f32>,
     /// Wall-clock time of the stages, milliseconds.
     pub timings_ms: Timings,
@@ -57,6 +57,9 @@ pub struct BindReport {
     pub memory_bytes: MemoryBytes,
     /// Distance between `sum_i w_i c_i` and the mesh vertex (Eq. 3), over vertices inside the cage.
     pub rest_error: RestError,
+    /// The same and the rows' sums before rows were restored: the solver's doing alone.
+    #[serde(default)]
+    pub raw_error: RawError,
     /// Statistics of the stored weights.
     pub weights: WeightStats,
     /// Mesh vertices (rows).
@@ -123,6 +126,27 @@ pub struct RestError {
     pub max_rel: f64,
 }
 
+/// What was off before rows were restored, over vertices inside the cage. The operator and the sampling reproduce linear
+/// functions exactly, so with the embedded method this is what the solver left.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RawError {
+    /// `|sum_i w_i - 1|`.
+    pub sum: MeanMax,
+    /// Distance of `sum_i w_i c_i` from the vertex over the diagonal of the cage's bounding box.
+    pub point_rel: MeanMax,
+    /// Smallest value, before negative ones were taken for 0.
+    pub min_weight: f32,
+}
+
+/// Mean and largest of some numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeanMax {
+    /// Mean.
+    pub mean: f64,
+    /// Largest.
+    pub max: f64,
+}
+
 /// Statistics of the stored weights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WeightStats {
@@ -132,6 +156,6 @@ pub struct WeightStats {
     pub max: f32,
     /// Largest |sum of a row - 1|.
     pub max_sum_error: f64,
-    /// Stored weights; after a bind that started from another, some of them may be 0.
+    /// Stored weights.
     pub nonzeros: u64,
 }

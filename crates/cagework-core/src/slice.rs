@@ -6,10 +6,10 @@
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
-use crate::bind::{BindOptions, Method};
 use crate::cage::Cage;
 use crate::grid::Grid;
 use crate::levels::Boundary as _;
+use crate::options::{BindOptions, Method};
 use crate::voxelize::CellKind;
 use crate::voxelize::classic::{place_grid, voxelize_classic};
 use crate::voxelize::embedded::{Cells, shoot_lines, votes};
@@ -58,9 +58,9 @@ impl Slice {
         match options.method {
             Method::Embedded => {
                 let grid = Grid::cubic(cage.bounds(), options.grid);
-                let lines = shoot_lines(cage, &grid, &|_| true);
+                let lines = shoot_lines(cage, &grid);
                 let cells = Cells::finest(&lines, grid, &votes(&lines, &grid));
-                let cells = cells.with(cage, &lines);
+                let cells = cells.with(cage.into(), &lines);
                 Self::of(&grid, axis, fraction, |cell| match cells.unknowns()[grid.index(cell)] {
                     false => CellKind::Exterior,
                     true if cells.cut_arms()[grid.index(cell)] != 0 => CellKind::Boundary,
@@ -70,7 +70,7 @@ impl Slice {
             Method::Classic => {
                 let (dims, origin, cell) = place_grid(cage, options.grid, options.cell_shape);
                 let grid = Grid { dims: dims.to_array(), origin, cell };
-                let cells = voxelize_classic(cage, options.grid, options.cell_shape);
+                let cells = voxelize_classic(cage.into(), options.grid, options.cell_shape);
                 Self::of(&grid, axis, fraction, |cell| cells.kinds[grid.index(cell)])
             }
         }

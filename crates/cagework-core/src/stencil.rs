@@ -15,11 +15,11 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::bind::DeltaNorm;
 use crate::deform::triangle_frame;
 use crate::grid::NO_CELL;
+use crate::options::DeltaNorm;
 use crate::solve::rows::Prolong;
-use crate::transfer::{FURTHER, RESTRICT_CENTRE, RESTRICT_EDGE};
+use crate::transfer::{RESTRICT_CENTRE, RESTRICT_EDGE};
 use tables::{BUNDLE, LevelTable, NormalTable, OutsideTable, SLICE, SamplingTable, SlicedWeights};
 
 /// Changes of a weight below this do not count: their squares would be denormal.
@@ -153,7 +153,6 @@ pub fn prolong_correction(
             let own = &mut field[head[0] as usize * n_lanes + lane];
             match mode {
                 Prolong::Correct => *own += sum * (1.0 / n_sources as f32),
-                Prolong::Further => *own += sum * (FURTHER / n_sources as f32),
                 Prolong::Replace => *own = sum * f32::from_bits(head[1]),
             }
         }

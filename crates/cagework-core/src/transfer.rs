@@ -7,23 +7,13 @@
 //! red cells only and prolongation writes black cells only.
 
 use crate::grid::{Grid, NO_CELL};
-use crate::levels::{Before, Level};
-
-mod old;
-
-use old::Old;
+use crate::levels::Level;
 
 /// Weights of restriction: of the fine cell that is the coarse cell's own centre, and of the twelve red cells next
 /// to it across an edge.
 pub const RESTRICT_CENTRE: f32 = 0.5;
 /// See [`RESTRICT_CENTRE`].
 pub const RESTRICT_EDGE: f32 = 0.125;
-
-/// How much of the coarse correction is added where the start is zero, not the coarse solution. Errors are smooth there, and
-/// coarse levels, whose cage is a cell off, fall short of them: two V-cycles of an edit's corrections leave 0.5 tau instead of
-/// 1.6 on average (1 % of the model, four cages of 24 vertices; 0.7 with 1.04 and 1.1). After full multigrid it gains
-/// nothing: what is left lives next to the cage.
-pub const FURTHER: f32 = 1.07;
 
 /// Fine red cells around a coarse cell, rows of the fine level: its own centre first, then twelve edge neighbours.
 pub type RestrictRow = [u32; 13];
@@ -78,17 +68,6 @@ impl Transfer {
     /// Tables between `fine` and `coarse`, whose grid is `fine.grid.coarsened()`.
     #[must_use]
     pub fn new(fine: &Level, coarse: &Level) -> Self {
-        Self::built([fine, coarse], None)
-    }
-
-    /// The same from what they were before an edit. Both pairs: fine, coarse.
-    #[must_use]
-    pub fn renewed(&self, levels: [&Level; 2], before: [&Before<'_>; 2]) -> Self {
-        Self::built(levels, Some(&Old { tables: self, before, levels }))
-    }
-
-    fn built(levels: [&Level; 2], old: Option<&Old<'_>>) -> Self {
-        let [fine, coarse] = levels;
         let [nx, ny, nz] = fine.grid.dims;
         // One black cell in four has three odd coordinates, more or less.
         let n_black = fine.colours[1].n_cells as usize;
@@ -100,12 +79,7 @@ impl Transfer {
         };
         for z in 0..nz {
             tables.mark_plane();
-            let mut next = old.map_or([0; 2], |old| old.tables.planes[z as usize]);
             for y in 0..ny {
-                if let Some(old) = old.filter(|old| old.can_prolong(y, z)) {
-                    old.prolong_line(y, z, &mut next, &mut tables);
-                    continue;
-                }
                 let rows = &fine.row_of[fine.grid.index([0, y, z])..][..nx as usize];
                 for x in (1 - (y + z) % 2..nx).step_by(2).filter(|&x| rows[x as usize] != NO_CELL) {
                     let cell = rows[x as usize] - fine.first_row(1) as u32;
@@ -122,10 +96,6 @@ impl Transfer {
         tables.mark_plane();
         let [nx, ny, nz] = coarse.grid.dims;
         for (y, z) in (0..nz).flat_map(|z| (0..ny).map(move |y| (y, z))) {
-            if let Some(old) = old.filter(|old| old.can_restrict(y, z)) {
-                old.restrict_line(y, z, &mut tables);
-                continue;
-            }
             let rows = &coarse.row_of[coarse.grid.index([0, y, z])..][..nx as usize];
             for cell in (0..nx).filter(|&x| rows[x as usize] != NO_CELL).map(|x| [x, y, z]) {
                 let around = fine.rows_at(cell.map(|i| 2 * i), &AROUND);

@@ -3,7 +3,7 @@
 
 use bytemuck::Pod;
 use cagework_core::Weights;
-use cagework_core::bind::OutsideVertex;
+use cagework_core::deform::OutsideVertex;
 use cagework_core::stencil::tables::{BUNDLE, NormalTable, OutsideTable, SLICE, SlicedWeights};
 use futures_channel::oneshot;
 use glam::{Vec3, Vec4};

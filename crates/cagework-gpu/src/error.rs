@@ -1,5 +1,6 @@
 //! What can go wrong on a GPU. Every one of these leaves the CPU as the way out.
 
+use cagework_core::options::Solver;
 use cagework_core::{BindError, Cancelled};
 use thiserror::Error;
 
@@ -72,6 +73,9 @@ pub enum GpuError {
         /// What.
         missing: &'static str,
     },
+    /// A solver that runs on the CPU only.
+    #[error("the solver {0} runs on the CPU only: bind there, or choose multigrid or jacobi")]
+    Solver(Solver),
     /// The bind does not fit.
     #[error(transparent)]
     Plan(#[from] PlanError),

@@ -4,9 +4,9 @@
 //! number delta comes back instead of the whole field. Eq. 2 couples all columns of a cell, so the fields of all batches
 //! are alive together, and batches add up in one buffer of changes, a number per cell.
 
-use cagework_core::bind::DeltaNorm;
+use cagework_core::options::DeltaNorm;
 use cagework_core::solve::hierarchy::Hierarchy;
-use cagework_core::solve::jacobi::{SolveReport, StopRule};
+use cagework_core::solve::stop::{SolveReport, StopRule};
 
 use crate::buffers::{Allocator, Readback};
 use crate::error::GpuError;
@@ -92,15 +92,16 @@ impl Jacobi {
     pub async fn solve(
         &self,
         stream: &mut Stream<'_>,
-        stop: StopRule,
-        mut checked: impl FnMut(&mut Stream<'_>, u32, f32),
+        rule: StopRule,
+        norm: DeltaNorm,
+        mut checked: impl FnMut(&mut Stream<'_>, u32, f64),
     ) -> Result<(u32, SolveReport), GpuError> {
         let mut report = SolveReport::default();
-        let absolute = if stop.norm == DeltaNorm::Literal { mode::CHANGE_ABSOLUTE } else { 0 };
+        let absolute = if norm == DeltaNorm::Literal { mode::CHANGE_ABSOLUTE } else { 0 };
         let work = Work { n_quads: self.n_quads, ..Work::default() };
-        let mut done = 0;
-        while !report.converged && done < stop.max_sweeps {
-            let round = INTERVAL.min(stop.max_sweeps - done);
+        let (mut done, mut is_last) = (0, false);
+        while !is_last {
+            let round = INTERVAL.min(rule.max_iterations - done);
             for (number, batch) in self.batches.iter().enumerate() {
                 for sweep in done..done + round {
                     let launch = &batch.sweeps[sweep as usize % 2];
@@ -114,9 +115,8 @@ impl Jacobi {
             sum_into(stream, &self.roots, &self.sum, self.level.n_rows, 0).await?;
             let sum =
                 stream.read(&self.numbers, &self.readback, 4, bytemuck::pod_read_unaligned::<f32>).await?;
-            let delta = (f64::from(sum) / f64::from(self.level.n_unknowns.max(1))) as f32;
-            report.delta_history.push(delta);
-            report.converged = delta < stop.tau;
+            let delta = f64::from(sum) / f64::from(self.level.n_unknowns.max(1));
+            is_last = report.iteration_done(&rule, delta, None) || done >= rule.max_iterations;
             checked(stream, done, delta);
         }
         Ok((done, report))

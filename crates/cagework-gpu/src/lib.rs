@@ -23,9 +23,9 @@ pub mod session;
 pub mod stream;
 pub mod table;
 
-pub use bind::{bind_gpu, bind_gpu_to_edit};
+pub use bind::{bind_gpu, bind_on};
 pub use deform::{Deformer, GpuWeights};
 pub use device::{ContextOptions, GpuContext};
 pub use error::GpuError;
-pub use plan::{Fields, Plan, PlanError};
+pub use plan::{Plan, PlanError};
 pub use session::Session;

@@ -3,9 +3,8 @@
 //! Per cycle two numbers come back, the squares of the coarse correction (the stop rule's delta) and of the residual.
 
 use cagework_core::solve::hierarchy::Hierarchy;
-use cagework_core::solve::multigrid::{
-    BatchReport, COARSEST_OMEGA, COARSEST_SWEEPS, Convergence, OMEGA, Stop,
-};
+use cagework_core::solve::multigrid::{COARSEST_OMEGA, COARSEST_SWEEPS, Convergence, OMEGA};
+use cagework_core::solve::stop::{SolveReport, StopRule};
 use cagework_core::stencil::REDUCE_VALUES;
 
 use crate::buffers::{Allocator, Readback};
@@ -123,12 +122,6 @@ impl Multigrid {
         &self.levels[0].field
     }
 
-    /// Bytes of it: `[n_rows][n_quads]` of four columns.
-    #[must_use]
-    pub fn field_bytes(&self) -> u64 {
-        u64::from(self.levels[0].level.n_rows) * u64::from(self.n_quads) * QUAD_BYTES
-    }
-
     /// Solves the batch that starts at `first_column`. `cycle_done(stream, cycle, delta)` is told of each cycle.
     ///
     /// # Errors
@@ -138,9 +131,9 @@ impl Multigrid {
         stream: &mut Stream<'_>,
         hierarchy: &Hierarchy,
         first_column: u32,
-        stop: Stop,
+        rule: StopRule,
         mut cycle_done: impl FnMut(&mut Stream<'_>, u32, f64),
-    ) -> Result<BatchReport, GpuError> {
+    ) -> Result<SolveReport, GpuError> {
         for (k, level) in self.levels.iter().enumerate() {
             let n_lanes = 4 * self.n_quads;
             let context = stream.context();
@@ -156,7 +149,7 @@ impl Multigrid {
                 self.cycle(stream, k).await?;
             }
         }
-        let mut convergence = Convergence::new(stop);
+        let mut convergence = Convergence::new(rule);
         loop {
             self.cycle(stream, 0).await?;
             let [residual, delta] = stream
@@ -167,7 +160,7 @@ impl Multigrid {
             let coarse = self.levels.get(1).map_or(&self.levels[0], |l| l).level.n_unknowns;
             let n_unknowns = self.levels[0].level.n_unknowns;
             let residual = if coarsest == 0 { 0.0 } else { residual / f64::from(n_unknowns) };
-            let done = convergence.cycle_done(delta / f64::from(coarse.max(1)), 0.0, residual);
+            let done = convergence.cycle_done(delta / f64::from(coarse.max(1)), residual);
             let (cycle, delta) = convergence.latest();
             cycle_done(stream, cycle, delta);
             if done {

@@ -1,6 +1,6 @@
 //! Memory is planned before any of it is allocated: how many columns go in a batch, and what that takes.
 
-use cagework_core::bind::Solver;
+use cagework_core::options::Solver;
 use cagework_core::sample::Stencils;
 use cagework_core::solve::hierarchy::Hierarchy;
 use cagework_core::stencil::REDUCE_VALUES;
@@ -23,7 +23,7 @@ pub struct Plan {
     pub vertices_per_block: u32,
     /// Bytes of stencils, transfers and sampling tables.
     pub table_bytes: u64,
-    /// Bytes of fields, right-hand sides, blocks, and the buffer that fields are read back through.
+    /// Bytes of fields, right-hand sides, and blocks.
     pub field_bytes: u64,
 }
 
@@ -66,17 +66,6 @@ struct Sizes {
     /// Bytes that do not depend on the number of columns.
     other_bytes: u64,
     all_batches: bool,
-    /// Rows of a batch that are read back besides the sampled ones.
-    kept_rows: u64,
-}
-
-/// What becomes of the fields once they have been sampled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fields {
-    /// Batches overwrite each other's.
-    Dropped,
-    /// They are read back, which takes room for one batch more.
-    ReadBack,
 }
 
 impl Plan {
@@ -91,9 +80,8 @@ impl Plan {
         solver: Solver,
         max_binding_bytes: u64,
         memory_limit: u64,
-        fields: Fields,
     ) -> Result<Self, PlanError> {
-        let sizes = Sizes::of(hierarchy, stencils, solver, fields);
+        let sizes = Sizes::of(hierarchy, stencils, solver);
         let bindable = |what, needed| {
             let limit = max_binding_bytes;
             if needed <= limit { Ok(()) } else { Err(PlanError::Binding { what, needed, limit }) }
@@ -120,7 +108,7 @@ impl Plan {
                 n_batches: n_batches as u32,
                 vertices_per_block: vertices_per_block as u32,
                 table_bytes,
-                field_bytes: (fields + block + sizes.kept_rows * n_quads) * QUAD_BYTES,
+                field_bytes: (fields + block) * QUAD_BYTES,
             }
         };
         (1..=most_quads)
@@ -144,7 +132,7 @@ impl Plan {
 }
 
 impl Sizes {
-    fn of(hierarchy: &Hierarchy, stencils: &Stencils, solver: Solver, fields: Fields) -> Self {
+    fn of(hierarchy: &Hierarchy, stencils: &Stencils, solver: Solver) -> Self {
         let finest = &hierarchy.levels[0];
         let (n_rows, n_cut) = (finest.n_rows() as u64, finest.n_cut() as u64);
         let coarse_rows: u64 = hierarchy.levels[1..].iter().map(|l| l.n_rows() as u64).sum();
@@ -160,8 +148,8 @@ impl Sizes {
             Solver::Jacobi => 2 * n_rows + n_cut,
             // The field, red residuals, right-hand side; two fields on each coarse level. A single level keeps its old
             // values as well.
-            Solver::Multigrid if coarse_rows == 0 => 2 * n_rows + n_cut,
-            Solver::Multigrid => n_rows + red_rows + n_cut + 2 * coarse_rows,
+            _ if coarse_rows == 0 => 2 * n_rows + n_cut,
+            _ => n_rows + red_rows + n_cut + 2 * coarse_rows,
         };
         let partials = 4 * (n_rows * MAX_LANES / 4).div_ceil(REDUCE_VALUES as u64);
         Self {
@@ -175,7 +163,6 @@ impl Sizes {
             largest_rows: n_rows.max(1),
             other_bytes: 12 * n_rows + 32 * coarse_rows + transfers + partials,
             all_batches: solver == Solver::Jacobi,
-            kept_rows: if fields == Fields::ReadBack { n_rows } else { 0 },
         }
     }
 }

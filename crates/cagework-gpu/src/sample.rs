@@ -70,33 +70,24 @@ impl Sampler {
             };
             stream.run(&launch, work, n * self.n_quads).await?;
             let bytes = u64::from(n) * u64::from(self.n_quads) * QUAD_BYTES;
-            stream
-                .read(&self.block, &self.readback, bytes, |bytes| {
-                    let n_quads = self.n_quads as usize;
-                    scatter(bytes, n_quads, first_column as usize, first_vertex as usize, blocks);
-                })
-                .await?;
+            let put =
+                |bytes: &[u8]| self.scatter(bytes, first_column as usize, first_vertex as usize, blocks);
+            stream.read(&self.block, &self.readback, bytes, put).await?;
             first_vertex += n;
         }
         Ok(())
     }
-}
 
-/// Puts a block, `[row][lane]`, where the CPU would have put its own: samples of vertices, or rows of fields.
-pub(crate) fn scatter(
-    bytes: &[u8],
-    n_quads: usize,
-    first_column: usize,
-    first_row: usize,
-    blocks: &mut [Vec<Row>],
-) {
-    for (k, row) in bytes.chunks_exact(n_quads * QUAD_BYTES as usize).enumerate() {
-        for (quad, values) in row.chunks_exact(QUAD_BYTES as usize).enumerate() {
-            let column = first_column + 4 * quad;
-            // The last batch's padding may reach beyond the CPU's.
-            if let Some(block) = blocks.get_mut(column / LANES) {
-                let values: [f32; 4] = bytemuck::pod_read_unaligned(values);
-                block[first_row + k][column % LANES..column % LANES + 4].copy_from_slice(&values);
+    /// Puts a block, `[vertex][lane]`, where the CPU would have put its own samples.
+    fn scatter(&self, bytes: &[u8], first_column: usize, first_vertex: usize, blocks: &mut [Vec<Row>]) {
+        for (k, row) in bytes.chunks_exact(self.n_quads as usize * QUAD_BYTES as usize).enumerate() {
+            for (quad, values) in row.chunks_exact(QUAD_BYTES as usize).enumerate() {
+                let column = first_column + 4 * quad;
+                // The last batch's padding may reach beyond the CPU's.
+                if let Some(block) = blocks.get_mut(column / LANES) {
+                    let values: [f32; 4] = bytemuck::pod_read_unaligned(values);
+                    block[first_vertex + k][column % LANES..column % LANES + 4].copy_from_slice(&values);
+                }
             }
         }
     }

@@ -9,8 +9,9 @@ mod picture;
 
 use std::sync::Arc;
 
-use cagework_core::bind::{BindOptions, OutsideVertex};
+use cagework_core::deform::OutsideVertex;
 use cagework_core::deform::{deform_bound, vertex_normals};
+use cagework_core::options::BindOptions;
 use cagework_core::{BindReport, Bounds, Cage, Progress, Weights};
 use glam::{Vec2, Vec3};
 

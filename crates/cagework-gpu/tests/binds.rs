@@ -5,13 +5,12 @@ mod support;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use cagework_core::bind::{BindOptions, CellShape, DeltaNorm, Method, Solver};
 use cagework_core::deform::{deform_bound, vertex_normals};
+use cagework_core::options::{BindOptions, CellShape, DeltaNorm, Method, Solver};
 use cagework_core::progress::{ProgressEvent, Silent};
 use cagework_core::{BindError, Binding, Cage, Weights, bind};
 use cagework_gpu::{
-    ContextOptions, Deformer, Fields, GpuContext, GpuError, GpuWeights, Plan, PlanError, bind_gpu,
-    bind_gpu_to_edit,
+    ContextOptions, Deformer, GpuContext, GpuError, GpuWeights, Plan, PlanError, bind_gpu, bind_gpu_to_edit,
 };
 use glam::Vec3;
 use pollster::block_on;
@@ -126,7 +125,7 @@ fn what_does_not_fit_is_refused_with_numbers() {
     assert!(matches!(error, GpuError::Plan(PlanError::Binding { limit: 4096, .. })), "{error}");
     with_prepared(&positions, &cage, &options, |prepared| {
         let (hierarchy, stencils) = (prepared.hierarchy(), prepared.stencils());
-        let plan = |limit| Plan::new(hierarchy, stencils, Solver::Multigrid, 1 << 27, limit, Fields::Dropped);
+        let plan = |limit| Plan::new(hierarchy, stencils, Solver::Multigrid, 1 << 27, limit);
         let all = plan(u64::MAX).unwrap();
         assert_eq!((all.n_batches, all.n_lanes as usize), (1, hierarchy.n_columns.next_multiple_of(4)));
         let less = plan(all.bytes() - 1).unwrap();

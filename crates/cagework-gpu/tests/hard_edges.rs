@@ -2,7 +2,8 @@
 
 mod support;
 
-use cagework_core::bind::{BindOptions, bind};
+use cagework_core::bind::bind;
+use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
 use cagework_core::{Bounds, Cage, subdivided_box};
 use cagework_gpu::Session;

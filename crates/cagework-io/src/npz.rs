@@ -11,7 +11,7 @@
 use std::io::{Cursor, Read as _, Write as _};
 
 use cagework_core::Weights;
-use cagework_core::bind::OutsideVertex;
+use cagework_core::deform::OutsideVertex;
 use cagework_core::weights::WeightsError;
 use glam::Vec3;
 use thiserror::Error;

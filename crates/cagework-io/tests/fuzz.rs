@@ -3,7 +3,7 @@
 mod common;
 
 use cagework_core::Weights;
-use cagework_core::bind::OutsideVertex;
+use cagework_core::deform::OutsideVertex;
 use cagework_io::{Model, read_weights_npz, write_weights_npz};
 use common::{
     CUBE_OBJ, glb, instanced, json_of, plain_cube, quantized, read, skinned, textured_square, twist,

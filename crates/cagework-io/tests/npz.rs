@@ -5,7 +5,7 @@
 use std::io::{Cursor, Read as _, Write as _};
 
 use cagework_core::Weights;
-use cagework_core::bind::OutsideVertex;
+use cagework_core::deform::OutsideVertex;
 use cagework_io::{read_weights_npz, write_weights_npz};
 use glam::Vec3;
 use zip::write::SimpleFileOptions;

@@ -2,8 +2,9 @@
 //!
 //! It has its own GPU device and reads nothing but arrays. Results are taken apart by the page's `Engine`.
 
-use cagework_core::bind::{BindError, OutsideVertex, Rebinder};
+use cagework_core::bind::{BindError, Rebinder};
 use cagework_core::cage_gen::{CageOptions, generate};
+use cagework_core::deform::OutsideVertex;
 use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Binding, Cage, PolygonMesh, Weights, mean_value_weights, samples};
 use cagework_gpu::{ContextOptions, GpuContext, bind_gpu_to_edit};

@@ -1,9 +1,9 @@
 //! What JavaScript asks for: the option types of contract.ts.
 
 use cagework_core::BindOptions;
-use cagework_core::bind::{CellShape, DeltaNorm, Method, OutsidePolicy, Solver};
 use cagework_core::cage_gen::{CageOptions, Shape, Symmetry};
 use cagework_core::edit::{Element, GestureKind, SelectMode};
+use cagework_core::options::{CellShape, DeltaNorm, Method, OutsidePolicy, Solver};
 use cagework_gpu::render::Theme;
 use serde::Deserialize;
 

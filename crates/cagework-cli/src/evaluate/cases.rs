@@ -1,6 +1,8 @@
 //! What is run: the paper's cases, and ours beside them.
 
-use cagework_core::bind::{BindOptions, Binding, Method, OutsideVertex, Solver};
+use cagework_core::bind::Binding;
+use cagework_core::deform::OutsideVertex;
+use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::{BindReport, Cage, Weights};
 use cagework_gpu::{GpuContext, GpuError};
 use cagework_io::Model;

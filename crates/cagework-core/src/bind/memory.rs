@@ -7,14 +7,14 @@
 use glam::DVec3;
 
 use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::grid::Grid;
 use crate::levels::{BoundaryTerm, CutCell, Run};
+use crate::options::{BindOptions, Method, Solver};
 use crate::solve::jacobi;
 use crate::solve::rows::{LANES, Row};
 use crate::transfer::{ProlongRow, RestrictRow};
 use crate::voxelize::lines::Hit;
-
-use super::{BindOptions, Method, Solver};
 
 /// All coarser levels together: 1/8 + 1/64 + ... of the finest one.
 const COARSER: f64 = 1.0 / 7.0;
@@ -31,18 +31,18 @@ const SPARSE_SHARE: f64 = 0.5;
 
 /// Bytes that a bind of `n_points` different positions will need at once. `threads` 0: fields are kept elsewhere.
 pub(super) fn estimate(
-    cage: &Cage,
+    controls: Controls<'_>,
     grid: &Grid,
     n_points: usize,
     threads: usize,
     options: &BindOptions,
 ) -> u64 {
-    let (volume, area) = volume_and_area(cage);
+    let (volume, area) = volume_and_area(controls.surface());
     let cell = grid.cell;
     let n_cells = grid.n_cells() as f64;
     let n_unknowns = (volume / (cell.x * cell.y * cell.z)).min(n_cells);
     let n_cut = (CUT_PER_AREA * area / (cell.x * cell.y * cell.z).powf(2.0 / 3.0)).min(n_cells);
-    let n_columns = cage.positions().len() as f64;
+    let n_columns = controls.n_controls() as f64;
     let n_batches = (n_columns / LANES as f64).ceil();
     let row = size_of::<Row>() as f64;
 
@@ -54,12 +54,15 @@ pub(super) fn estimate(
         * (size_of::<RestrictRow>() as f64 / 8.0
             + size_of::<ProlongRow<2>>() as f64 * 3.0 / 8.0
             + size_of::<ProlongRow<8>>() as f64 / 8.0);
+    let on_levels = |finest_rows: f64| {
+        threads as f64 * row * (finest_rows + 2.0 * COARSER * n_unknowns) + transfers * (1.0 + COARSER)
+    };
     let fields = match options.solver {
         _ if threads == 0 => 0.0,
-        Solver::Multigrid => {
-            let finest = 1.5 * n_unknowns + n_cut;
-            threads as f64 * row * (finest + 2.0 * COARSER * n_unknowns) + transfers * (1.0 + COARSER)
-        }
+        Solver::Multigrid => on_levels(1.5 * n_unknowns + n_cut),
+        // Five fields; the V-cycle that preconditions has another two and a half.
+        Solver::ConjugateGradient if options.needs_coarse_levels() => on_levels(7.5 * n_unknowns + n_cut),
+        Solver::ConjugateGradient => threads as f64 * row * (5.0 * n_unknowns + n_cut),
         Solver::Jacobi => {
             jacobi::field_bytes(n_unknowns as u64, n_cut as u64, n_columns as u64, threads as u64) as f64
         }

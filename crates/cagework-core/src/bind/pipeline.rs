@@ -5,20 +5,24 @@
 
 use glam::Vec3;
 
+use crate::assemble::{Assembled, RowOptions, assemble};
 use crate::cage::Cage;
+use crate::controls::Controls;
+use crate::deform::{OutsideVertex, triangle_frame};
 use crate::mesh::{Weld, weld};
+use crate::options::{Backend, BindOptions, Method, OutsidePolicy};
 use crate::progress::{Progress, Stage};
 use crate::report::{BindReport, MemoryBytes, Timings, WeightStats};
 use crate::sample::{Outside, Stencils};
 use crate::solve::hierarchy::Hierarchy;
 use crate::solve::rows::Row;
-use crate::solve::team::{Team, VERTEX_RUN};
-use crate::weights::assemble::{Assembled, RowOptions, assemble};
+use crate::solve::stop::SolveReport;
+use crate::team::{Team, VERTEX_RUN};
 
 use super::solving::solve_and_sample;
 use super::voxels::Voxels;
 use super::watch::Watch;
-use super::{BindError, BindOptions, Binding, Method, OutsidePolicy, OutsideVertex, memory};
+use super::{BindError, Binding, memory};
 
 /// Where the fields of a solve live: what counts towards the limit on working memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,17 +35,17 @@ pub enum FieldsOn {
 
 /// A bind up to the solve: the geometry of grid and mesh.
 pub struct Prepared<'a> {
-    pub(super) positions: &'a [Vec3],
-    pub(super) cage: &'a Cage,
-    pub(super) options: &'a BindOptions,
-    pub(super) welded: Weld,
-    pub(super) points: Vec<Vec3>,
-    pub(super) team: Team,
-    pub(super) voxels: Voxels,
-    pub(super) stencils: Stencils,
-    pub(super) estimated: u64,
+    positions: &'a [Vec3],
+    controls: Controls<'a>,
+    options: &'a BindOptions,
+    welded: Weld,
+    points: Vec<Vec3>,
+    team: Team,
+    voxels: Voxels,
+    stencils: Stencils,
+    estimated: u64,
     /// On the watcher's clock: the beginning, voxels made, stencils made.
-    pub(super) times_ms: [f64; 3],
+    times_ms: [f64; 3],
 }
 
 /// The sampled columns and how the solve went.
@@ -49,18 +53,12 @@ pub struct Prepared<'a> {
 pub struct Solved {
     /// `[n_batches][n_points]` rows of lanes.
     pub blocks: Vec<Vec<Row>>,
-    /// Corrections that were solved for in place of the columns; none if all columns were.
-    pub corrections: Option<u32>,
-    /// Sweeps or V-cycles.
+    /// How the solve of all columns went.
+    pub report: SolveReport,
+    /// Sweeps, V-cycles or steps.
     pub iterations: u32,
-    /// Whether delta fell below tau.
-    pub converged: bool,
-    /// Delta after every `delta_interval` iterations.
-    pub delta_history: Vec<f32>,
-    /// Iterations between two entries of `delta_history`.
+    /// Iterations between two of the report's deltas: 1 but for the GPU's Jacobi sweeps.
     pub delta_interval: u32,
-    /// Root mean square residual before each V-cycle.
-    pub residual_history: Vec<f32>,
     /// Bytes of fields alive at once.
     pub field_bytes: usize,
     /// Bytes planned for them on a device, which the estimate made here leaves out; 0 in this process.
@@ -73,25 +71,25 @@ pub struct Solved {
 
 pub(super) fn run(
     positions: &[Vec3],
-    cage: &Cage,
+    controls: Controls<'_>,
     options: &BindOptions,
     progress: &dyn Progress,
 ) -> Result<Binding, BindError> {
     let watch = Watch::new(progress);
-    let mut prepared = Prepared::new(positions, cage, options, FieldsOn::Host, &watch)?;
-    prepared.forget_edits();
-    let solved = solve_and_sample(&prepared.voxels, &prepared.stencils, options, &prepared.team, &watch)?;
+    let prepared = Prepared::new(positions, controls, options, FieldsOn::Host, &watch)?;
+    let solved =
+        solve_and_sample(&prepared.voxels.hierarchy, &prepared.stencils, options, &prepared.team, &watch)?;
     prepared.finish(solved, &watch)
 }
 
 impl<'a> Prepared<'a> {
-    /// Checks the input, lays the cage into the grid and finds every vertex's sampling stencil.
+    /// Checks the input, lays the surface into the grid and finds every vertex's sampling stencil.
     ///
     /// # Errors
     /// Those of [`super::bind`].
     pub fn new(
         positions: &'a [Vec3],
-        cage: &'a Cage,
+        controls: Controls<'a>,
         options: &'a BindOptions,
         fields: FieldsOn,
         watch: &Watch<'_>,
@@ -109,28 +107,23 @@ impl<'a> Prepared<'a> {
         let points: Vec<Vec3> = welded.first.iter().map(|&v| positions[v as usize]).collect();
 
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
-        let grid = Voxels::grid(cage, options);
+        let grid = Voxels::grid(controls.surface(), options);
         let field_threads = if fields == FieldsOn::Host { team.n_threads() } else { 0 };
-        let estimated = memory::estimate(cage, &grid, points.len(), field_threads, options);
+        let estimated = memory::estimate(controls, &grid, points.len(), field_threads, options);
         if estimated > options.memory_limit {
             return Err(BindError::Memory { needed: estimated, limit: options.memory_limit });
         }
-        let voxels = team.install(|| Voxels::new(cage, grid, options));
+        let voxels = team.install(|| Voxels::new(controls, grid, options));
         watch.report(Stage::Voxelize, 1.0, 0, None)?;
         if voxels.hierarchy.levels[0].n_unknowns() == 0 && options.method == Method::Classic {
             return Err(BindError::NoInterior { grid: options.grid });
         }
         let voxelized = watch.now_ms();
 
-        let stencils = sampling_stencils(cage, &voxels, &points, &team, watch)?;
+        let stencils = sampling_stencils(controls, &voxels, &points, &team, watch)?;
         refuse_outside(&stencils, options, &welded)?;
         let times_ms = [began, voxelized, watch.now_ms()];
-        Ok(Self { positions, cage, options, welded, points, team, voxels, stencils, estimated, times_ms })
-    }
-
-    /// Drops what only edits need: none will follow.
-    pub fn forget_edits(&mut self) {
-        self.voxels.forget_edits();
+        Ok(Self { positions, controls, options, welded, points, team, voxels, stencils, estimated, times_ms })
     }
 
     /// What is to be solved.
@@ -145,62 +138,55 @@ impl<'a> Prepared<'a> {
         &self.stencils
     }
 
-    /// Bytes of all columns' fields on the finest level, 4 for each unknown and column.
-    #[must_use]
-    pub fn fields_bytes(&self) -> u64 {
-        let hierarchy = self.hierarchy();
-        (hierarchy.levels[0].n_rows() * hierarchy.n_batches() * size_of::<Row>()) as u64
-    }
-
     /// Makes weights and report of the sampled columns.
     ///
     /// # Errors
     /// Cancelled.
     pub fn finish(self, mut solved: Solved, watch: &Watch<'_>) -> Result<Binding, BindError> {
-        let solved_at = watch.now_ms();
-        let rows = self.rows(&mut solved, watch)?;
-        self.reported(&rows, &mut solved, solved_at, watch)
-    }
-
-    /// The rows of the sampled columns, one per different position; the samples are used up.
-    pub(super) fn rows(&self, solved: &mut Solved, watch: &Watch<'_>) -> Result<Assembled, BindError> {
+        let sampled = watch.now_ms();
         watch.report(Stage::Sample, 0.5, solved.iterations, None)?;
         let row_options = RowOptions {
             threshold: self.options.sparsify,
             preserve_affine: self.options.method == Method::Embedded,
         };
         let is_outside = |vertex| self.stencils.is_outside(vertex);
-        Ok(assemble(self.cage, &mut solved.blocks, &self.points, row_options, is_outside, &self.team))
+        let blocks_bytes: usize = solved.blocks.iter().map(|b| size_of_val(b.as_slice())).sum();
+        let rows =
+            assemble(self.controls, &mut solved.blocks, &self.points, row_options, is_outside, &self.team);
+        drop(std::mem::take(&mut solved.blocks));
+        self.reported(rows, blocks_bytes, solved, sampled, watch)
     }
 
     /// The weights of all vertices, and the report. `sampled`: when the samples were there, on the watcher's clock.
-    pub(super) fn reported(
-        &self,
-        rows: &Assembled,
-        solved: &mut Solved,
+    fn reported(
+        self,
+        rows: Assembled,
+        blocks_bytes: usize,
+        solved: Solved,
         sampled: f64,
         watch: &Watch<'_>,
     ) -> Result<Binding, BindError> {
-        let Self { positions, cage, options, welded, points, team, voxels, stencils, .. } = self;
+        let Self { positions, controls, options, welded, points, team, voxels, stencils, .. } = self;
         let [began, voxelized, stencils_made] = self.times_ms;
-        let unique = &rows.weights;
-        let (rest_error, weight_stats) = rows.statistics(f64::from(cage.diagonal()));
-        let blocks_bytes: usize = solved.blocks.iter().map(|b| size_of_val(b.as_slice())).sum();
+        let cage = controls.surface();
+        let (rest_error, raw_error, weight_stats) = rows.statistics(f64::from(cage.diagonal()));
         let held = voxels.bytes + stencils.bytes() + blocks_bytes;
-        let peak = held + solved.field_bytes.max(unique.bytes());
+        let peak = held + solved.field_bytes.max(rows.weights.bytes());
         let all_differ = points.len() == positions.len();
-        let weights = if all_differ { unique.clone() } else { unique.with_rows(&welded.unique_of) };
-        let outside = outside_vertices(cage, &stencils.outside, positions, welded);
+        let weights = if all_differ { rows.weights } else { rows.weights.with_rows(&welded.unique_of) };
+        let outside = outside_vertices(cage, &stencils.outside, positions, &welded);
         watch.report(Stage::Sample, 1.0, solved.iterations, None)?;
         let ended = watch.now_ms();
 
         let solve_ms = (sampled - stencils_made) * solved.solve_share;
         let level = &voxels.hierarchy.levels[0];
+        let narrow = |history: Vec<f64>| history.into_iter().map(|x| x as f32).collect();
         let report = BindReport {
             method: options.method,
             solver: options.solver,
-            backend: if solved.adapter.is_some() { "gpu" } else { "cpu" }.to_owned(),
-            adapter: solved.adapter.take(),
+            preconditioner: options.preconditioner,
+            backend: if solved.adapter.is_some() { Backend::Gpu } else { Backend::Cpu },
+            adapter: solved.adapter,
             threads: team.n_threads(),
             grid: options.grid,
             dims: level.grid.dims,
@@ -210,12 +196,11 @@ impl<'a> Prepared<'a> {
             tau: options.tau,
             cells: voxels.counts,
             levels: voxels.hierarchy.levels.iter().map(|l| l.n_unknowns() as u64).collect(),
-            corrections: solved.corrections,
             iterations: solved.iterations,
-            converged: solved.converged,
-            delta_history: std::mem::take(&mut solved.delta_history),
+            converged: solved.report.converged,
+            delta_history: narrow(solved.report.deltas),
             delta_interval: solved.delta_interval,
-            residual_history: std::mem::take(&mut solved.residual_history),
+            residual_history: narrow(solved.report.residuals),
             timings_ms: Timings {
                 voxelize: voxelized - began,
                 solve: solve_ms,
@@ -224,9 +209,10 @@ impl<'a> Prepared<'a> {
             },
             memory_bytes: MemoryBytes { estimated: self.estimated + solved.planned_bytes, peak: peak as u64 },
             rest_error,
+            raw_error,
             weights: WeightStats { nonzeros: weights.data().len() as u64, ..weight_stats },
             vertices: positions.len() as u64,
-            cage_vertices: cage.n_vertices() as u64,
+            cage_vertices: controls.n_controls() as u64,
             outside_vertices: outside.len() as u64,
             ambiguous_cells: voxels.ambiguous,
             notices: cage.notices().iter().map(ToString::to_string).collect(),
@@ -236,14 +222,14 @@ impl<'a> Prepared<'a> {
 }
 
 /// Stencils of all points, in runs shared among threads.
-pub(super) fn sampling_stencils(
-    cage: &Cage,
+fn sampling_stencils(
+    controls: Controls<'_>,
     voxels: &Voxels,
     points: &[Vec3],
     team: &Team,
     watch: &Watch<'_>,
 ) -> Result<Stencils, BindError> {
-    let sampler = voxels.sampler(cage);
+    let sampler = voxels.sampler(controls);
     let runs: Vec<&[Vec3]> = points.chunks(VERTEX_RUN).collect();
     let parts = team.share(
         runs.len(),
@@ -262,11 +248,7 @@ pub(super) fn sampling_stencils(
     Ok(stencils)
 }
 
-pub(super) fn refuse_outside(
-    stencils: &Stencils,
-    options: &BindOptions,
-    welded: &Weld,
-) -> Result<(), BindError> {
+fn refuse_outside(stencils: &Stencils, options: &BindOptions, welded: &Weld) -> Result<(), BindError> {
     match (options.outside, stencils.outside.first()) {
         (OutsidePolicy::Refuse, Some(first)) => Err(BindError::Outside {
             count: stencils.outside.len() as u32,
@@ -295,7 +277,7 @@ fn outside_vertices(
             let rest = corners.map(|i| cage.positions()[i as usize]);
             let closest: Vec3 = rest.iter().zip(o.barycentric).map(|(&c, b)| c * b as f32).sum();
             let offset = positions[vertex as usize] - closest;
-            let offset = crate::deform::triangle_frame(rest).transpose() * offset;
+            let offset = triangle_frame(rest).transpose() * offset;
             Some(OutsideVertex { vertex, corners, offset })
         })
         .collect()

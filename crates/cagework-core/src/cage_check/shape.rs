@@ -7,8 +7,8 @@ use glam::DVec3;
 use super::{Code, Fix, MAX_PLACES, Places, Problem, Repair, Severity, counted, diagonal, problem};
 use crate::cage::{Cage, face_triangles};
 use crate::contact::{Corners, meeting};
-use crate::grid::MAX_GRID;
 use crate::mesh::PolygonMesh;
+use crate::options::MAX_GRID;
 
 /// Triangles up to which the thickness is looked at everywhere; of more, every n-th is a place to measure from.
 const MEASURED: usize = 1500;

@@ -1,11 +1,9 @@
 //! Builds a level: rows first, then the stencils line by line.
 
-use std::sync::Arc;
-
 use crate::grid::{Grid, NO_CELL};
-use crate::voxelize::map_indices;
+use crate::team::map_indices;
 
-use super::{Before, Boundary, BoundaryTerm, Colour, CutCell, Level, Run};
+use super::{Boundary, BoundaryTerm, Colour, CutCell, Level, Run};
 
 /// Planes that a thread takes at a time: cells next to the cage, which cost most, are not spread evenly.
 const SLAB: u32 = 8;
@@ -14,34 +12,40 @@ impl Level {
     /// Builds the stencils of all unknowns.
     #[must_use]
     pub fn new(boundary: &dyn Boundary) -> Self {
-        build(boundary, None).0
+        let mut level = number_cells(boundary);
+        let [_, ny, nz] = level.grid.dims;
+        let slabs = map_indices(nz.div_ceil(SLAB) as usize, |k| {
+            let first = k as u32 * SLAB;
+            let mut slab = Slab::default();
+            for z in first..nz.min(first + SLAB) {
+                slab.mark_plane();
+                for y in 0..ny {
+                    level.add_line(boundary, [y, z], &mut slab);
+                }
+            }
+            slab
+        });
+        level.join(slabs);
+        level
     }
 
-    /// Builds it from what it was before an edit. [`Level::boundary`] has only the terms of lines that are made anew; the second
-    /// is the new number of each old cut cell whose terms are what they were, [`NO_CELL`] for the others.
-    #[must_use]
-    pub fn renewed(boundary: &dyn Boundary, before: &Before<'_>) -> (Self, Vec<u32>) {
-        build(boundary, Some(before))
-    }
-
-    /// Takes over the planes' stencils, in order. Returns, if there was a level before, the new number of each of its cut cells.
-    fn join(&mut self, slabs: Vec<Slab>, before: Option<&Before<'_>>) -> Vec<u32> {
+    /// Takes over the planes' stencils, in order.
+    fn join(&mut self, slabs: Vec<Slab>) {
         let mut terms = [Vec::new(), Vec::new()];
-        let mut from = [Vec::new(), Vec::new()];
         for (k, colour) in self.colours.iter_mut().enumerate() {
             colour.runs.reserve(slabs.iter().map(|slab| slab.colours[k].runs.len()).sum());
             colour.cut.reserve(slabs.iter().map(|slab| slab.colours[k].cut.len()).sum());
         }
         for slab in slabs {
-            for (k, part) in slab.colours.into_iter().enumerate() {
-                let colour = &mut self.colours[k];
+            for ((colour, terms), (part, part_terms)) in
+                self.colours.iter_mut().zip(&mut terms).zip(slab.colours.into_iter().zip(slab.terms))
+            {
                 let [runs, cut] = [colour.runs.len() as u32, colour.cut.len() as u32];
                 colour.planes.extend(part.planes.iter().map(|&[r, c]| [r + runs, c + cut]));
                 colour.runs.extend(part.runs);
                 colour.cut.extend(part.cut);
-                let shifted = slab.terms[k].iter().map(|t| BoundaryTerm { cut_cell: t.cut_cell + cut, ..*t });
-                terms[k].extend(shifted);
-                from[k].extend_from_slice(&slab.from[k]);
+                terms
+                    .extend(part_terms.into_iter().map(|t| BoundaryTerm { cut_cell: t.cut_cell + cut, ..t }));
             }
         }
         for colour in &mut self.colours {
@@ -52,27 +56,12 @@ impl Level {
         self.boundary = red;
         let renumbered = black.into_iter().map(|t| BoundaryTerm { cut_cell: t.cut_cell + red_cut, ..t });
         self.boundary.extend(renumbered);
-
-        let mut moved_to = vec![NO_CELL; before.map_or(0, |before| before.level.n_cut())];
-        for (first, from) in [0, red_cut].into_iter().zip(from) {
-            for (new, old) in (first..).zip(from).filter(|&(_, old)| old != NO_CELL) {
-                moved_to[old as usize] = new;
-            }
-        }
-        moved_to
     }
 
     /// Adds the runs and cut cells of the line (y, z).
-    fn add_line(
-        &self,
-        boundary: &dyn Boundary,
-        before: Option<&Before<'_>>,
-        [y, z]: [u32; 2],
-        slab: &mut Slab,
-    ) {
+    fn add_line(&self, boundary: &dyn Boundary, [y, z]: [u32; 2], slab: &mut Slab) {
         let [nx, ny, nz] = self.grid.dims;
         let line = self.grid.index([0, y, z]);
-        let mut next_cut = before.map_or([0; 2], |before| before.first_cut((z * ny + y) as usize));
         let rows = &self.row_of[line..][..nx as usize];
         let arms = &boundary.cut_arms()[line..][..nx as usize];
         let first_rows = [self.first_row(0) as u32, self.first_row(1) as u32];
@@ -109,14 +98,6 @@ impl Level {
                     _ => slab.colours[colour].runs.extend(slot.replace(run)),
                 }
             } else {
-                let untouched = before.and_then(|b| b.untouched(index, colour, &mut next_cut[colour]));
-                if let Some((number, was)) = untouched {
-                    // Its terms are what they were.
-                    slab.from[colour].resize(slab.colours[colour].cut.len(), NO_CELL);
-                    slab.from[colour].push(number);
-                    slab.colours[colour].cut.push(CutCell { cell: own, neighbours, ..*was });
-                    continue;
-                }
                 let whole = neighbours.iter().filter(|&&n| n != zero).count();
                 let number = slab.colours[colour].cut.len() as u32;
                 let weight = add_terms(boundary, cell, cut, number, &mut slab.terms[colour]);
@@ -130,49 +111,12 @@ impl Level {
     }
 }
 
-/// The level, and the new number of each cut cell of the level before, if there is one.
-fn build(boundary: &dyn Boundary, before: Option<&Before<'_>>) -> (Level, Vec<u32>) {
-    let mut level = number_cells(boundary, before);
-    let [_, ny, nz] = level.grid.dims;
-    let shifts = before.map_or_else(Vec::new, |before| before.shifts(&level));
-    let slabs = map_indices(nz.div_ceil(SLAB) as usize, |k| {
-        let first = k as u32 * SLAB;
-        let mut slab =
-            before.map_or_else(Slab::default, |before| before.slab_like(first..nz.min(first + SLAB)));
-        for z in first..nz.min(first + SLAB) {
-            slab.mark_plane();
-            let mut y = 0;
-            while y < ny {
-                let mut next = y + 1;
-                match before {
-                    Some(before) if before.is_kept((z * ny + y) as usize) => {
-                        next = before.end_of_stretch(&shifts, y, z);
-                        before.copy_lines(&level, &shifts, z, y..next, &mut slab);
-                    }
-                    _ => level.add_line(boundary, before, [y, z], &mut slab),
-                }
-                y = next;
-                if before.is_some() {
-                    for (from, colour) in slab.from.iter_mut().zip(&slab.colours) {
-                        from.resize(colour.cut.len(), NO_CELL);
-                    }
-                }
-            }
-        }
-        slab
-    });
-    let moved_to = level.join(slabs, before);
-    (level, moved_to)
-}
-
 /// Stencils of some planes, numbered from 0: what one thread makes.
 #[derive(Default)]
-pub(super) struct Slab {
+struct Slab {
     /// `n_cells` is not known here.
-    pub(super) colours: [Colour; 2],
+    colours: [Colour; 2],
     terms: [Vec<BoundaryTerm>; 2],
-    /// For each cut cell its number in the level before, if there is one; [`NO_CELL`] where it is made anew.
-    pub(super) from: [Vec<u32>; 2],
 }
 
 impl Slab {
@@ -194,27 +138,19 @@ impl Run {
 
 /// Gives the unknowns their rows: red ones from 0, black ones after the red ones' zero row. A cell whose arms all lead
 /// nowhere is left out. Stencils are still missing.
-fn number_cells(boundary: &dyn Boundary, before: Option<&Before<'_>>) -> Level {
+fn number_cells(boundary: &dyn Boundary) -> Level {
     let grid = boundary.grid();
-    let [nx, ny, nz] = grid.dims;
+    let [nx, ny, _] = grid.dims;
     let (unknowns, cut) = (boundary.unknowns(), boundary.cut_arms());
-    let mut row_of = before.map_or_else(|| vec![NO_CELL; grid.n_cells()], Before::row_of);
-    let mut lines = Vec::with_capacity((ny * nz) as usize + 1);
+    let mut row_of = vec![NO_CELL; grid.n_cells()];
     let (mut n_cells, mut isolated) = ([0u32; 2], 0);
     let is_connected = |cell: [u32; 3], index: usize| {
         cut[index] != 0 || (0..6).any(|d| grid.neighbour(cell, d).is_some_and(|c| unknowns[grid.index(c)]))
     };
     for (line, rows) in row_of.chunks_exact_mut(nx as usize).enumerate() {
-        lines.push(n_cells);
-        if let Some(before) = before.filter(|before| before.is_kept(line)) {
-            let kept = before.n_cells(line);
-            n_cells = [0, 1].map(|c| n_cells[c] + kept[c]);
-            continue;
-        }
         let (y, z) = (line as u32 % ny, line as u32 / ny);
         let first = line * nx as usize;
         let unknowns = &unknowns[first..][..nx as usize];
-        rows.fill(NO_CELL);
         for (x, row) in (0..nx).zip(rows) {
             let (cell, x) = ([x, y, z], x as usize);
             if !unknowns[x] {
@@ -230,30 +166,16 @@ fn number_cells(boundary: &dyn Boundary, before: Option<&Before<'_>>) -> Level {
             }
         }
     }
-    lines.push(n_cells);
-    let first_rows = [0, n_cells[0] + 1];
+    // Black cells were numbered from 0 too.
+    let first_black = n_cells[0] + 1;
     for (line, rows) in row_of.chunks_exact_mut(nx as usize).enumerate() {
-        if lines[line] == lines[line + 1] {
-            continue;
+        let black = 1 - (line as u32 % ny + line as u32 / ny) as usize % 2;
+        for row in rows.iter_mut().skip(black).step_by(2).filter(|row| **row != NO_CELL) {
+            *row += first_black;
         }
-        let first = [0, 1].map(|c| first_rows[c] + lines[line][c]);
-        let mut by = first_rows;
-        if let Some(before) = before.filter(|before| before.is_kept(line)) {
-            by = before.rows_grew_by(line, first);
-        }
-        let red = (line as u32 % ny + line as u32 / ny) as usize % 2;
-        add_to_rows(rows, [by[red], by[1 - red]]);
     }
     let colours = n_cells.map(|n_cells| Colour { n_cells, ..Colour::default() });
-    Level { grid, colours, boundary: Vec::new(), row_of: Arc::new(row_of), lines, isolated }
-}
-
-/// Adds to a line's rows what is to be added in even places and in odd ones.
-fn add_to_rows(rows: &mut [u32], [even, odd]: [u32; 2]) {
-    for (x, row) in rows.iter_mut().enumerate() {
-        let n = if x % 2 == 0 { even } else { odd };
-        *row = if *row == NO_CELL { NO_CELL } else { row.wrapping_add(n) };
-    }
+    Level { grid, colours, boundary: Vec::new(), row_of, isolated }
 }
 
 /// Adds the Dirichlet terms of a cell's cut arms, columns ascending; returns the sum of the arms' weights.

@@ -59,7 +59,7 @@ pub(crate) fn askew_c() -> (Cage, Grid) {
 /// Runs `test` on the finest and the next coarser level of [`askew_c`].
 pub(crate) fn on_two_levels(test: impl Fn(&Cage, &Level, &EmbeddedCells<'_>)) {
     let (cage, grid) = askew_c();
-    for boundary in &Embedding::new(&cage, &grid).boundaries(&cage)[..2] {
+    for boundary in &Embedding::new(&cage, &grid, true).boundaries((&cage).into())[..2] {
         test(&cage, &Level::new(boundary), boundary);
     }
 }
@@ -67,7 +67,7 @@ pub(crate) fn on_two_levels(test: impl Fn(&Cage, &Level, &EmbeddedCells<'_>)) {
 /// All levels of [`askew_c`].
 pub(crate) fn hierarchy() -> Hierarchy {
     let (cage, grid) = askew_c();
-    Hierarchy::new(&Embedding::new(&cage, &grid).boundaries(&cage), cage.n_vertices())
+    Hierarchy::new(&Embedding::new(&cage, &grid, true).boundaries((&cage).into()), cage.n_vertices())
 }
 
 /// A field of numbers without order in [0, 1), and its zero rows.

@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::levels::Level;
 use crate::voxelize::classic::{CellKind, ClassicCells};
 
@@ -13,7 +13,7 @@ use super::{Stencils, closest_on_cage};
 /// Stencils of points (object units): one cell each.
 #[must_use]
 pub fn stencils(
-    cage: &Cage,
+    controls: Controls<'_>,
     cells: &ClassicCells,
     level: &Level,
     points: impl Iterator<Item = DVec3>,
@@ -34,7 +34,7 @@ pub fn stencils(
                     stencil.add_hat(column, f64::from(value));
                 }
             }
-            _ => stencils.push_outside(cage, closest_on_cage(cage, point), &mut stencil),
+            _ => stencils.push_outside(controls, closest_on_cage(controls.surface(), point), &mut stencil),
         }
         stencils.push(&stencil);
     }

@@ -9,7 +9,7 @@
 
 use glam::DVec3;
 
-use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::geometry::{closest_point_on_triangle, winding_number};
 use crate::grid::{Grid, NO_CELL};
 use crate::levels::Level;
@@ -28,7 +28,7 @@ const DOUBT: f64 = 1e-6;
 /// Makes the stencils of vertices in an embedded grid.
 #[derive(Debug)]
 pub struct Sampler<'a> {
-    cage: &'a Cage,
+    controls: Controls<'a>,
     level: &'a Level,
     lists: TriangleLists,
 }
@@ -48,8 +48,8 @@ type End = (f64, Option<(u32, [f64; 3], bool)>);
 impl<'a> Sampler<'a> {
     /// A sampler for the finest level.
     #[must_use]
-    pub fn new(cage: &'a Cage, level: &'a Level) -> Self {
-        Self { cage, level, lists: TriangleLists::new(cage, &level.grid) }
+    pub fn new(controls: Controls<'a>, level: &'a Level) -> Self {
+        Self { controls, level, lists: TriangleLists::new(controls.surface(), &level.grid) }
     }
 
     /// Stencils of points (object units). Points outside the cage are listed in `outside`.
@@ -59,7 +59,8 @@ impl<'a> Sampler<'a> {
         let mut scratch = Scratch::default();
         for p in points {
             if !self.stencil(p, &mut scratch) {
-                stencils.push_outside(self.cage, closest_on_cage(self.cage, p), &mut scratch.stencil);
+                let closest = closest_on_cage(self.controls.surface(), p);
+                stencils.push_outside(self.controls, closest, &mut scratch.stencil);
             }
             stencils.push(&scratch.stencil);
         }
@@ -88,7 +89,8 @@ impl<'a> Sampler<'a> {
             self.trilinear(low, p, scratch);
         } else if let Some((triangle, barycentric)) = self.touching(p, &scratch.near) {
             let stencil = &mut scratch.stencil;
-            self.cage.hats_at(triangle, barycentric, &mut |column, hat| stencil.add_hat(column, hat));
+            self.controls
+                .values_at(triangle, barycentric, &mut |column, value| stencil.add_hat(column, value));
             return true;
         } else {
             for order in ORDERS {
@@ -110,7 +112,8 @@ impl<'a> Sampler<'a> {
     /// The triangle that a point lies on, to within the resolution of f32 coordinates. Rays from such a point hit or
     /// miss what it lies on by rounding: from a cage's own vertex they went out through an edge.
     fn touching(&self, p: DVec3, near: &[u32]) -> Option<(u32, [f64; 3])> {
-        let reach = ON_CAGE * f64::from(self.cage.diagonal()) / self.level.grid.cell.max_element();
+        let reach =
+            ON_CAGE * f64::from(self.controls.surface().diagonal()) / self.level.grid.cell.max_element();
         near.iter().find_map(|&number| {
             let t = self.lists.triangle(number);
             let closest = t.is_near_plane(p, reach).then(|| closest_point_on_triangle(p, t.corners))?;
@@ -119,7 +122,8 @@ impl<'a> Sampler<'a> {
     }
 
     fn winds_around(&self, point: DVec3) -> bool {
-        let triangles = (0..self.cage.triangles().len() as u32).map(|t| self.cage.triangle_corners(t));
+        let surface = self.controls.surface();
+        let triangles = (0..surface.triangles().len() as u32).map(|t| surface.triangle_corners(t));
         winding_number(point, triangles) > 0.5
     }
 
@@ -156,8 +160,9 @@ impl<'a> Sampler<'a> {
                 Some((_, _, faces_up)) if faces_up != (side == 1) => scratch.outside += w,
                 Some((triangle, barycentric, _)) => {
                     let stencil = &mut scratch.stencil;
-                    self.cage
-                        .hats_at(triangle, barycentric, &mut |column, hat| stencil.add_hat(column, w * hat));
+                    self.controls.values_at(triangle, barycentric, &mut |column, value| {
+                        stencil.add_hat(column, w * value);
+                    });
                 }
                 None => {
                     let mut q = p;

@@ -10,8 +10,8 @@ pub mod triangles;
 use glam::DVec3;
 
 use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::geometry::closest_point_on_triangle;
-use crate::grid::NO_CELL;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 
@@ -123,10 +123,12 @@ impl Stencils {
     }
 
     /// Makes `stencil` that of the closest point on the cage, and lists the next vertex as outside unless it is on it.
-    pub fn push_outside(&mut self, cage: &Cage, closest: Outside, stencil: &mut Stencil) {
+    pub fn push_outside(&mut self, controls: Controls<'_>, closest: Outside, stencil: &mut Stencil) {
         stencil.clear();
-        cage.hats_at(closest.triangle, closest.barycentric, &mut |column, hat| stencil.add_hat(column, hat));
-        if closest.distance > ON_CAGE * f64::from(cage.diagonal()) {
+        controls.values_at(closest.triangle, closest.barycentric, &mut |column, value| {
+            stencil.add_hat(column, value);
+        });
+        if closest.distance > ON_CAGE * f64::from(controls.surface().diagonal()) {
             self.outside.push(Outside { vertex: self.len() as u32, ..closest });
         }
     }
@@ -139,39 +141,6 @@ impl Stencils {
         self.node_start.extend(other.node_start[1..].iter().map(|s| s + n));
         self.hat_start.extend(other.hat_start[1..].iter().map(|s| s + h));
         self.outside.extend(other.outside.iter().map(|o| Outside { vertex: o.vertex + v, ..*o }));
-    }
-
-    /// Follows the rows of the field to where they went: `row_of[row]`, [`NO_CELL`] if they are gone. Returns whether any is.
-    #[must_use]
-    pub fn renumber(&mut self, row_of: &[u32]) -> bool {
-        let mut is_any_gone = false;
-        for (row, _) in &mut self.nodes {
-            *row = row_of[*row as usize];
-            is_any_gone |= *row == NO_CELL;
-        }
-        is_any_gone
-    }
-
-    /// Whether a row of the vertex's stencil is gone.
-    #[must_use]
-    pub fn has_lost_a_row(&self, vertex: usize) -> bool {
-        self.at(vertex).0.iter().any(|&(row, _)| row == NO_CELL)
-    }
-
-    /// Puts the stencils of `fresh`, one after another, in place of those of `vertices`, which ascend.
-    pub fn replace(&mut self, vertices: &[u32], fresh: &Self) {
-        splice(&mut self.node_start, &mut self.nodes, vertices, (&fresh.node_start, &fresh.nodes));
-        splice(&mut self.hat_start, &mut self.hats, vertices, (&fresh.hat_start, &fresh.hats));
-        let mut fresh =
-            fresh.outside.iter().map(|o| Outside { vertex: vertices[o.vertex as usize], ..*o }).peekable();
-        let kept = std::mem::take(&mut self.outside);
-        for o in kept.into_iter().filter(|o| vertices.binary_search(&o.vertex).is_err()) {
-            while let Some(first) = fresh.next_if(|first| first.vertex < o.vertex) {
-                self.outside.push(first);
-            }
-            self.outside.push(o);
-        }
-        self.outside.extend(fresh);
     }
 
     /// Weights of all vertices for the columns of one batch.
@@ -237,72 +206,5 @@ impl Stencils {
             + size_of_val(self.hats.as_slice())
             + size_of_val(self.node_start.as_slice())
             + size_of_val(self.hat_start.as_slice())
-    }
-}
-
-/// Puts other lists of entries in place of those of `vertices`, which ascend.
-fn splice(
-    start: &mut [u32],
-    entries: &mut Vec<(u32, f32)>,
-    vertices: &[u32],
-    (fresh_start, fresh): (&[u32], Entries<'_>),
-) {
-    let mut spliced = Vec::with_capacity(entries.len() + fresh.len());
-    // Entry and vertex up to which all is done.
-    let (mut entry, mut vertex) = (0, 0);
-    for (&v, fresh_start) in vertices.iter().zip(fresh_start.windows(2)) {
-        let v = v as usize;
-        let [begin, end] = [v, v + 1].map(|v| start[v] as usize);
-        move_by(&mut start[vertex..=v], spliced.len(), entry);
-        spliced.extend_from_slice(&entries[entry..begin]);
-        spliced.extend_from_slice(&fresh[fresh_start[0] as usize..fresh_start[1] as usize]);
-        (entry, vertex) = (end, v + 1);
-    }
-    move_by(&mut start[vertex..], spliced.len(), entry);
-    spliced.extend_from_slice(&entries[entry..]);
-    *entries = spliced;
-}
-
-fn move_by(starts: &mut [u32], to: usize, from: usize) {
-    for start in starts {
-        *start = *start + to as u32 - from as u32;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Each vertex has as many nodes as its number says, all of row `number + 10 * generation`.
-    fn stencils(numbers: &[u32], generation: u32) -> Stencils {
-        let mut all = Stencils::new();
-        for &n in numbers {
-            let nodes = (0..n).map(|k| (10 * generation + n, f64::from(k + 1))).collect();
-            all.push(&Stencil { nodes, hats: vec![(n, 1.0)] });
-        }
-        all
-    }
-
-    #[test]
-    fn replaced_stencils_are_those_of_their_vertices() {
-        let mut all = stencils(&[2, 1, 3, 1, 2], 0);
-        all.replace(&[0, 2, 3], &stencils(&[1, 4, 2], 1));
-        let expected = stencils(&[1, 1, 4, 2, 2], 0);
-        for (v, is_new) in [true, false, true, true, false].into_iter().enumerate() {
-            let (nodes, hats) = all.at(v);
-            let (expected, expected_hats) = expected.at(v);
-            let moved: Vec<(u32, f32)> =
-                expected.iter().map(|&(row, w)| (row + if is_new { 10 } else { 0 }, w)).collect();
-            assert_eq!((nodes, hats), (moved.as_slice(), expected_hats), "vertex {v}");
-        }
-        assert_eq!(all.len(), 5);
-    }
-
-    #[test]
-    fn rows_that_are_gone_are_noticed() {
-        let mut all = stencils(&[1, 2, 3], 0);
-        assert!(all.renumber(&[0, 7, NO_CELL, 5]));
-        assert_eq!([0, 1, 2].map(|v| all.has_lost_a_row(v)), [false, true, false]);
-        assert_eq!(all.at(0).0, [(7, 1.0)]);
     }
 }

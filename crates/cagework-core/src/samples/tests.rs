@@ -1,9 +1,10 @@
 use glam::Vec3;
 
 use super::{all, build};
-use crate::bind::{BindOptions, bind};
+use crate::bind::bind;
 use crate::cage::Cage;
 use crate::geometry::winding_number;
+use crate::options::BindOptions;
 use crate::progress::Silent;
 
 /// Mean distance between rest pose and reconstruction over the diagonal: f32 round-off of the corrected rows.

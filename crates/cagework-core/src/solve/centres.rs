@@ -118,7 +118,7 @@ mod tests {
             for rhs in [Rhs::Cut(&cut), Rhs::Dense(&dense)] {
                 let (mut residual, mut squares) = (vec![ZERO; fine.first_row(1)], ZERO);
                 for plane in 0..fine.grid.dims[2] as usize {
-                    residual_plane(fine, plane, &mut u, rhs, &mut residual, &mut squares);
+                    residual_plane(fine, 0, plane, &u, rhs, &mut residual, &mut squares);
                 }
                 let mut f = vec![ZERO; coarse.n_rows()];
                 let mean = centres.inject(fine, coarse, &mut u, rhs, &mut f);

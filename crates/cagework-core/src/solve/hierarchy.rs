@@ -1,9 +1,8 @@
 //! All levels of one bind with their transfers and right-hand sides in batches: what every solver reads.
 
-use crate::grid::NO_CELL;
-use crate::levels::{Before, Boundary, BoundaryTerm, Level, Touched};
+use crate::levels::{Boundary, BoundaryTerm, Level};
+use crate::team::map_indices;
 use crate::transfer::Transfer;
-use crate::voxelize::map_indices;
 
 use super::centres::Centres;
 use super::rows::{LANES, Row};
@@ -24,73 +23,18 @@ pub struct Hierarchy {
 }
 
 impl Hierarchy {
-    /// One level only: for Jacobi.
-    #[must_use]
-    pub fn single(level: Level, n_columns: usize) -> Self {
-        let (boundary, starts) = sorted_by_batch(&level.boundary, n_columns.div_ceil(LANES));
-        Self {
-            levels: vec![Level { boundary, ..level }],
-            transfers: Vec::new(),
-            centres: Centres::default(),
-            n_columns,
-            batches: vec![starts],
-        }
-    }
-
     /// Of what each level's cells see of the cage, finest first ([`coarsened_until_few`](crate::levels::coarsened_until_few)).
     #[must_use]
     pub fn new<B: Boundary>(boundaries: &[B], n_columns: usize) -> Self {
-        let boundaries: Vec<&dyn Boundary> = boundaries.iter().map(|b| b as &dyn Boundary).collect();
-        Self::of(&boundaries, n_columns, None)
-    }
-
-    /// The same from what it was before an edit of the cage that leaves the grid and the number of levels: the outcome is that
-    /// of [`Self::new`]. `touched`: of each level.
-    #[must_use]
-    pub fn renewed<B: Boundary>(&self, boundaries: &[B], touched: &[Touched]) -> Self {
-        let boundaries: Vec<&dyn Boundary> = boundaries.iter().map(|b| b as &dyn Boundary).collect();
-        debug_assert!(boundaries.len() == self.levels.len() && touched.len() == self.levels.len());
-        // Where cells without neighbours have no row, nobody knows which those were.
-        let old = self.levels.iter().all(|level| level.isolated == 0).then_some((self, touched));
-        Self::of(&boundaries, self.n_columns, old)
-    }
-
-    fn of(boundaries: &[&dyn Boundary], n_columns: usize, old: Option<(&Self, &[Touched])>) -> Self {
-        let before: Vec<Option<Before<'_>>> = map_indices(boundaries.len(), |k| {
-            let (old, touched) = old?;
-            Some(Before::new(&old.levels[k], &touched[k]))
-        });
         let n_batches = n_columns.div_ceil(LANES);
-        let levels = map_indices(boundaries.len(), |k| match (&before[k], old) {
-            (Some(before), Some((old, _))) => {
-                let (mut level, moved_to) = Level::renewed(boundaries[k], before);
-                let anew = sorted_by_batch(&level.boundary, n_batches);
-                let kept = (old.levels[k].boundary.as_slice(), old.batches[k].as_slice());
-                let starts;
-                (level.boundary, starts) = merged(kept, &moved_to, (&anew.0, &anew.1));
-                (level, starts)
-            }
-            _ => {
-                let mut level = Level::new(boundaries[k]);
-                let starts;
-                (level.boundary, starts) = sorted_by_batch(&level.boundary, n_batches);
-                (level, starts)
-            }
+        let levels = map_indices(boundaries.len(), |k| {
+            let mut level = Level::new(&boundaries[k]);
+            let starts;
+            (level.boundary, starts) = sorted_by_batch(&level.boundary, n_batches);
+            (level, starts)
         });
         let (levels, batches): (Vec<Level>, _) = levels.into_iter().unzip();
-        if old.is_some() && levels.iter().any(|level| level.isolated > 0) {
-            // A cell that has lost its last neighbour has no row, but its line has the unknowns it had.
-            return Self::of(boundaries, n_columns, None);
-        }
-        let transfers = map_indices(levels.len() - 1, |k| {
-            let [fine, coarse] = [&levels[k], &levels[k + 1]];
-            match (&before[k], &before[k + 1], old) {
-                (Some(fine_before), Some(coarse_before), Some((old, _))) => {
-                    old.transfers[k].renewed([fine, coarse], [fine_before, coarse_before])
-                }
-                _ => Transfer::new(fine, coarse),
-            }
-        });
+        let transfers = map_indices(levels.len() - 1, |k| Transfer::new(&levels[k], &levels[k + 1]));
         let centres = transfers.first().map(|t| Centres::new(&levels[0], t)).unwrap_or_default();
         Self { levels, transfers, centres, n_columns, batches }
     }
@@ -162,34 +106,4 @@ fn sorted_by_batch(terms: &[BoundaryTerm], n_batches: usize) -> (Vec<BoundaryTer
         *place += 1;
     }
     (sorted, starts)
-}
-
-/// Terms of cut cells that were there before, by the number that each has now, and of those made anew. All are sorted by
-/// batch, with where each batch starts.
-fn merged(
-    (kept, kept_starts): (&[BoundaryTerm], &[u32]),
-    moved_to: &[u32],
-    (anew, starts): (&[BoundaryTerm], &[u32]),
-) -> (Vec<BoundaryTerm>, Vec<u32>) {
-    let mut all = Vec::with_capacity(kept.len() + anew.len());
-    let mut all_starts = vec![0];
-    for (old, new) in kept_starts.windows(2).zip(starts.windows(2)) {
-        let mut anew = &anew[new[0] as usize..new[1] as usize];
-        for term in &kept[old[0] as usize..old[1] as usize] {
-            let cut_cell = moved_to[term.cut_cell as usize];
-            if cut_cell == NO_CELL {
-                continue;
-            }
-            while let [first, rest @ ..] = anew
-                && first.cut_cell < cut_cell
-            {
-                all.push(*first);
-                anew = rest;
-            }
-            all.push(BoundaryTerm { cut_cell, ..*term });
-        }
-        all.extend_from_slice(anew);
-        all_starts.push(all.len() as u32);
-    }
-    (all, all_starts)
 }

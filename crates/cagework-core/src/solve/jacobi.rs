@@ -15,11 +15,12 @@
 
 use super::hierarchy::Hierarchy;
 use super::rows::{LANES, Rhs, Row, ZERO, jacobi_plane};
-use super::team::Team;
-use crate::bind::DeltaNorm;
+use super::stop::{SolveReport, StopRule};
 use crate::levels::Level;
+use crate::options::DeltaNorm;
 use crate::progress::Cancelled;
 use crate::simd::dispatch;
+use crate::team::Team;
 
 /// Most sweeps of a batch in one round: enough to hide a batch's way into the cache.
 const MAX_ROUND: usize = 8;
@@ -29,26 +30,6 @@ const CAUTION: f64 = 0.8;
 
 /// Cells whose changes a thread adds up at a time.
 const CELLS_PER_PIECE: usize = 4096;
-
-/// When to stop.
-#[derive(Clone, Copy, Debug)]
-pub struct StopRule {
-    /// Threshold for delta.
-    pub tau: f32,
-    /// Largest number of sweeps.
-    pub max_sweeps: u32,
-    /// How Eq. 2 is read.
-    pub norm: DeltaNorm,
-}
-
-/// How the solve went.
-#[derive(Clone, Debug, Default)]
-pub struct SolveReport {
-    /// Delta after each sweep.
-    pub delta_history: Vec<f32>,
-    /// Whether delta fell below tau.
-    pub converged: bool,
-}
 
 /// Old and new values of one batch, and its right-hand side.
 #[derive(Debug)]
@@ -83,26 +64,29 @@ pub fn field_bytes(n_unknowns: u64, n_cut: u64, n_columns: u64, threads: u64) ->
 pub fn solve(
     hierarchy: &Hierarchy,
     team: &Team,
-    stop: StopRule,
-    mut sweep_done: impl FnMut(u32, f32) -> bool,
+    rule: StopRule,
+    norm: DeltaNorm,
+    mut sweep_done: impl FnMut(u32, f64) -> bool,
 ) -> Result<(Vec<Vec<Row>>, SolveReport), Cancelled> {
     let level = &hierarchy.levels[0];
     let n_shares = team.n_threads().min(hierarchy.n_batches()).max(1);
     let mut shares: Vec<Share> = team.share(n_shares, || (), |(), s| Share::new(hierarchy, s, n_shares));
     let mut report = SolveReport::default();
-    let mut round = 1;
-    while !report.converged && report.delta_history.len() < stop.max_sweeps as usize {
-        round = round.min(stop.max_sweeps as usize - report.delta_history.len());
-        team.each_mut(&mut shares, |share| share.sweep(level, round, stop.norm));
+    let (mut round, mut is_done) = (1, false);
+    while !is_done {
+        round = round.min(rule.max_iterations as usize - report.deltas.len());
+        team.each_mut(&mut shares, |share| share.sweep(level, round, norm));
         for delta in &mean_deltas(&shares, level, team)[..round] {
-            report.delta_history.push(*delta);
-            report.converged |= *delta < stop.tau;
+            // A round may pass the sweep at which the rule holds.
+            let had_converged = report.converged;
+            is_done |= report.iteration_done(&rule, *delta, None);
+            report.converged |= had_converged;
         }
-        let delta = report.delta_history[report.delta_history.len() - 1];
-        if !sweep_done(report.delta_history.len() as u32, delta) {
+        let (sweeps, delta) = report.latest();
+        if !sweep_done(sweeps, delta) {
             return Err(Cancelled);
         }
-        round = next_round(&report.delta_history, stop.tau);
+        round = next_round(&report.deltas, rule.tolerance);
     }
     let mut fields = vec![Vec::new(); hierarchy.n_batches()];
     for batch in shares.into_iter().flat_map(|s| s.batches) {
@@ -112,13 +96,13 @@ pub fn solve(
 }
 
 /// Sweeps that can be done at once without passing the sweep at which delta, which decays geometrically, meets tau.
-fn next_round(history: &[f32], tau: f32) -> usize {
+fn next_round(history: &[f64], tau: f64) -> usize {
     let n = history.len();
     if n < 4 {
         return 1;
     }
-    let rate = f64::from(history[n - 1]).ln() - f64::from(history[n - 2]).ln();
-    let remaining = (f64::from(tau).ln() - f64::from(history[n - 1]).ln()) / rate;
+    let rate = history[n - 1].ln() - history[n - 2].ln();
+    let remaining = (tau.ln() - history[n - 1].ln()) / rate;
     if remaining.is_finite() && remaining > 0.0 {
         ((CAUTION * remaining) as usize).clamp(1, MAX_ROUND)
     } else {
@@ -128,7 +112,7 @@ fn next_round(history: &[f32], tau: f32) -> usize {
 
 /// Eq. 2 averaged over cells for each sweep of a round, from the changes of all threads' columns. Both readings take
 /// the root of what the kernel summed: squares or absolute values.
-fn mean_deltas(shares: &[Share], level: &Level, team: &Team) -> [f32; MAX_ROUND] {
+fn mean_deltas(shares: &[Share], level: &Level, team: &Team) -> [f64; MAX_ROUND] {
     let n_rows = level.n_rows();
     let pieces = team.share(
         n_rows.div_ceil(CELLS_PER_PIECE),
@@ -147,7 +131,7 @@ fn mean_deltas(shares: &[Share], level: &Level, team: &Team) -> [f32; MAX_ROUND]
         }
         sums
     });
-    sums.map(|sum| (sum / level.n_unknowns().max(1) as f64) as f32)
+    sums.map(|sum| sum / level.n_unknowns().max(1) as f64)
 }
 
 /// Sum over cells of the root of their change.

@@ -15,20 +15,18 @@
 //! the next cycle's two sweeps and the residual of the red cells follow each other one z-plane apart.
 
 mod convergence;
-mod other;
 mod stream;
 
-pub use convergence::{BatchReport, Convergence, Stop, histories};
-pub use other::Places;
+pub use convergence::Convergence;
 
-use std::sync::Arc;
-
+use super::BatchSolver;
 use super::hierarchy::Hierarchy;
 use super::rows::{LANES, Rhs, Row, ZERO, over_relax_plane, relax_plane, restrict_residual};
+use super::stop::{SolveReport, StopRule};
 use crate::levels::Level;
 use crate::simd::dispatch;
 
-use stream::{DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, OF_COLUMNS, Pass, UP, Ways, add_whole, stream};
+use stream::{BETWEEN, BETWEEN_SHORT, DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, Pass, UP, stream};
 
 /// Over-relaxation of the first black half sweep: 1.1 to 1.3 all lower the error 1.5 to 2 times per cycle (Armadillo).
 pub const OMEGA: f32 = 1.2;
@@ -48,51 +46,31 @@ pub const COARSEST_OMEGA: f32 = 1.4;
 pub struct Workspace {
     /// `u[k]`: the solution, on coarse levels the correction. `[n_rows]`
     u: Vec<Vec<Row>>,
-    /// `f[0]`: one row per cut cell, then those of whole cells (`places`); `f[k]`: one row per cell.
+    /// `f[0]`: one row per cut cell, or, for [`Self::precondition`], per cell; `f[k]`: one row per cell.
     f: Vec<Vec<Row>>,
     /// Residual of the red cells of the level under way, and a zero row.
     residual: Vec<Row>,
-    /// Where the finest level's right-hand side is, if it is not the cage's.
-    places: Arc<Places>,
-    /// What the coarsest level's last sweeps changed in the cell where that is most, squared and summed over lanes.
-    largest_change: f64,
+    /// Whether `f[0]` has one row per cell.
+    is_finest_dense: bool,
 }
 
 impl Workspace {
-    /// Fields for all levels but the finest one's solution, which a solve makes.
+    /// Fields for all levels.
     #[must_use]
     pub fn new(hierarchy: &Hierarchy) -> Self {
-        // The finest level's is made by whoever solves: it may be handed out.
-        let mut u = vec![Vec::new()];
-        u.extend(hierarchy.levels[1..].iter().map(|l| vec![ZERO; l.n_rows()]));
-        let f = hierarchy
-            .levels
-            .iter()
-            .enumerate()
-            .map(|(k, l)| vec![ZERO; if k == 0 { l.n_cut() } else { l.n_rows() }])
-            .collect();
+        let fields = || hierarchy.levels.iter().map(|l| vec![ZERO; l.n_rows()]);
+        // The finest level's right-hand side is made as long as its kind asks for.
+        let mut f: Vec<_> = fields().collect();
+        f[0] = Vec::new();
         Self {
-            u,
+            u: fields().collect(),
             f,
             residual: vec![ZERO; hierarchy.levels[0].first_row(1)],
-            places: Arc::default(),
-            largest_change: 0.0,
+            is_finest_dense: false,
         }
     }
 
-    /// Bytes of a workspace for `hierarchy`, but for right-hand sides of whole cells, of which edits have a few.
-    #[must_use]
-    pub fn bytes(hierarchy: &Hierarchy) -> usize {
-        let rows: usize = hierarchy
-            .levels
-            .iter()
-            .enumerate()
-            .map(|(k, l)| if k == 0 { l.n_rows() + l.n_cut() + l.first_row(1) } else { 2 * l.n_rows() })
-            .sum();
-        rows * size_of::<Row>()
-    }
-
-    /// Solves a batch; returns how it converged. `cycle_done(cycle, delta)` may cancel by returning false.
+    /// Solves a batch; see [`BatchSolver::solve`].
     ///
     /// # Errors
     /// `None` when cancelled.
@@ -100,63 +78,51 @@ impl Workspace {
         &mut self,
         hierarchy: &Hierarchy,
         batch: usize,
-        stop: Stop,
+        rule: StopRule,
         cycle_done: &mut dyn FnMut(u32, f64) -> bool,
-    ) -> Option<BatchReport> {
+    ) -> Option<SolveReport> {
         let coarsest = hierarchy.levels.len() - 1;
-        if self.u[0].is_empty() {
-            self.u[0] = vec![ZERO; hierarchy.levels[0].n_rows()];
-        }
+        self.is_finest_dense = false;
         hierarchy.fill_cut_rhs(batch, &mut self.f[0]);
         for k in (1..=coarsest).rev() {
             hierarchy.fill_dense_rhs(k, batch, &mut self.f[k]);
             self.cycle(hierarchy, k, if k == coarsest { DOWN_FROM_ZERO } else { DOWN_FROM_COARSE });
         }
-        let start = if coarsest == 0 { DOWN_FROM_ZERO } else { DOWN_FROM_COARSE };
-        self.cycles(hierarchy, (start, &OF_COLUMNS), stop, cycle_done)
-    }
-
-    /// V-cycles on the finest level until the stop rule holds, the first of which begins with `start`.
-    fn cycles(
-        &mut self,
-        hierarchy: &Hierarchy,
-        (mut start, ways): (&[Pass], &Ways),
-        stop: Stop,
-        cycle_done: &mut dyn FnMut(u32, f64) -> bool,
-    ) -> Option<BatchReport> {
-        let mut convergence = Convergence::new(stop);
+        let mut start = if coarsest == 0 { DOWN_FROM_ZERO } else { DOWN_FROM_COARSE };
+        let mut convergence = Convergence::new(rule);
         loop {
             let (correction_square, residual_square) = self.down(hierarchy, 0, start);
-            let largest = if stop.in_any_cell < f64::INFINITY { self.largest_correction() } else { 0.0 };
-            let done = convergence.cycle_done(correction_square, largest, residual_square);
+            let done = convergence.cycle_done(correction_square, residual_square);
             let (cycle, delta) = convergence.latest();
             if !cycle_done(cycle, delta) {
                 return None;
             }
             if done {
-                let report = convergence.into_report();
-                let last = if report.leaves_little(&stop) { ways.last_of_little } else { ways.last };
-                self.up(hierarchy, 0, last);
-                return Some(report);
+                self.up(hierarchy, 0, UP);
+                return Some(convergence.into_report());
             }
-            start = match hierarchy.levels.len() {
-                1 => DOWN,
-                _ if convergence.is_nearly_done(SPARE) => ways.before_little,
-                _ => ways.between,
+            start = match coarsest {
+                0 => DOWN,
+                _ if convergence.is_nearly_done(SPARE) => BETWEEN_SHORT,
+                _ => BETWEEN,
             };
         }
     }
 
-    /// The finest level's field, `[n_rows]`; empty before the first solve and once it was handed out.
+    /// One V(2,1) cycle from zero for any right-hand side: `z` becomes roughly the solution of `A z = r`. Both `[n_rows]`.
+    pub fn precondition(&mut self, hierarchy: &Hierarchy, r: &mut Vec<Row>, z: &mut Vec<Row>) {
+        self.is_finest_dense = true;
+        std::mem::swap(&mut self.f[0], r);
+        std::mem::swap(&mut self.u[0], z);
+        self.cycle(hierarchy, 0, DOWN_FROM_ZERO);
+        std::mem::swap(&mut self.f[0], r);
+        std::mem::swap(&mut self.u[0], z);
+    }
+
+    /// The finest level's field, `[n_rows]`.
     #[must_use]
     pub fn field(&self) -> &[Row] {
         &self.u[0]
-    }
-
-    /// Hands the finest level's field out, `[n_rows]`. The next solve makes another; until then there is none to look at, to
-    /// sweep or to cycle on.
-    pub fn take_field(&mut self) -> Vec<Row> {
-        std::mem::take(&mut self.u[0])
     }
 
     /// One full relaxation of the finest level, both colours, as the solver does it: the unit in which a solve's
@@ -178,8 +144,8 @@ impl Workspace {
     }
 
     /// The right-hand side of level k.
-    fn rhs(f: &[Vec<Row>], k: usize) -> Rhs<'_> {
-        if k == 0 { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) }
+    fn rhs(f: &[Vec<Row>], k: usize, is_finest_dense: bool) -> Rhs<'_> {
+        if k == 0 && !is_finest_dense { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) }
     }
 
     /// A cycle's way down on level k, by the passes `start`, and all of it on coarser levels. Returns (squared norm of the
@@ -190,18 +156,15 @@ impl Workspace {
             if start == DOWN_FROM_ZERO {
                 self.u[k].fill(ZERO);
             }
-            let whole = self.places.extent(k, start).whole;
-            let (change, largest) = relax_coarsest(level, &mut self.u[k], Self::rhs(&self.f, k), whole);
-            self.largest_change = largest;
-            return (change, 0.0);
+            let rhs = Self::rhs(&self.f, k, self.is_finest_dense);
+            return (relax_coarsest(level, &mut self.u[k], rhs), 0.0);
         }
         let (coarse, transfer) = (&hierarchy.levels[k + 1], &hierarchy.transfers[k]);
         let (f, coarse_f) = self.f.split_at_mut(k + 1);
         let (u, coarse_u) = self.u.split_at_mut(k + 1);
         let residual = &mut self.residual[..level.first_row(1)];
-        let rhs = Self::rhs(f, k);
-        let extent = self.places.extent(k, start);
-        let squares = stream(start, level, extent, (transfer, &coarse_u[0]), &mut u[k], rhs, residual);
+        let rhs = Self::rhs(f, k, self.is_finest_dense);
+        let squares = stream(start, level, (transfer, &coarse_u[0]), &mut u[k], rhs, residual);
         let mean_square = dispatch(
             #[inline(always)]
             || {
@@ -223,27 +186,31 @@ impl Workspace {
     fn up(&mut self, hierarchy: &Hierarchy, k: usize, passes: &[Pass]) {
         if k + 1 < hierarchy.levels.len() {
             let (u, coarse_u) = self.u.split_at_mut(k + 1);
-            let rhs = Self::rhs(&self.f, k);
-            stream(
-                passes,
-                &hierarchy.levels[k],
-                self.places.extent(k, passes),
-                (&hierarchy.transfers[k], &coarse_u[0]),
-                &mut u[k],
-                rhs,
-                &mut [],
-            );
+            let rhs = Self::rhs(&self.f, k, self.is_finest_dense);
+            let from = (&hierarchy.transfers[k], coarse_u[0].as_slice());
+            stream(passes, &hierarchy.levels[k], from, &mut u[k], rhs, &mut []);
         }
     }
+}
 
-    /// Square of the latest coarse correction of the finest level in the cell where it is largest, summed over lanes; of its
-    /// latest sweeps if there is no other level.
-    fn largest_correction(&self) -> f64 {
-        if self.u.len() == 1 {
-            return self.largest_change;
-        }
-        let square = |row: &Row| row.iter().map(|w| w * w).sum::<f32>();
-        f64::from(self.u.get(1).into_iter().flatten().map(square).fold(0.0, |a, b| if b > a { b } else { a }))
+impl BatchSolver for Workspace {
+    fn solve(
+        &mut self,
+        hierarchy: &Hierarchy,
+        batch: usize,
+        rule: StopRule,
+        done: &mut dyn FnMut(u32, f64) -> bool,
+    ) -> Option<SolveReport> {
+        self.solve(hierarchy, batch, rule, done)
+    }
+
+    fn field(&self) -> &[Row] {
+        self.field()
+    }
+
+    fn bytes(&self) -> usize {
+        let rows = self.u.iter().chain(&self.f).map(Vec::len).sum::<usize>() + self.residual.len();
+        rows * size_of::<Row>()
     }
 }
 
@@ -261,8 +228,8 @@ fn relax(level: &Level, u: &mut [Row], f: Rhs<'_>) {
     );
 }
 
-/// Sweeps on the coarsest level. Returns the squared norm of the change per unknown, and its square in the cell with the most.
-fn relax_coarsest(level: &Level, u: &mut [Row], f: Rhs<'_>, whole: &[u32]) -> (f64, f64) {
+/// Sweeps on the coarsest level. Returns the squared norm of the change per unknown.
+fn relax_coarsest(level: &Level, u: &mut [Row], f: Rhs<'_>) -> f64 {
     let before = u.to_vec();
     dispatch(
         #[inline(always)]
@@ -271,21 +238,14 @@ fn relax_coarsest(level: &Level, u: &mut [Row], f: Rhs<'_>, whole: &[u32]) -> (f
                 for colour in 0..2 {
                     for plane in 0..level.grid.dims[2] as usize {
                         over_relax_plane(level, colour, plane, COARSEST_OMEGA, u, f);
-                        if colour == 1 {
-                            add_whole(level, plane, COARSEST_OMEGA, u, whole, f);
-                        }
                     }
                 }
             }
         },
     );
-    let square = |(a, b): (&Row, &Row)| a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
-    let (mut sum, mut largest) = (0.0, 0.0);
-    for square in before.iter().zip(u.iter()).map(square) {
-        sum += square;
-        largest = f64::max(largest, square);
-    }
-    (sum / level.n_unknowns().max(1) as f64, largest)
+    let square = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
+    let sum: f64 = before.as_flattened().iter().zip(u.as_flattened()).map(square).sum();
+    sum / level.n_unknowns().max(1) as f64
 }
 
 /// Sum of squares over all rows and lanes.

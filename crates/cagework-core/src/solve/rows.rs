@@ -4,13 +4,10 @@
 //! (`[red .., 0, black .., 0]`). Every kernel works on one z-plane of one colour, so that callers can let several
 //! half sweeps follow each other a plane apart and a whole smoothing pass reads the field from memory once.
 
-use crate::bind::DeltaNorm;
 use crate::grid::NO_CELL;
 use crate::levels::Level;
-use crate::transfer::{FURTHER, ProlongRow, RESTRICT_CENTRE, RESTRICT_EDGE, RestrictRow, Transfer};
-
-mod part;
-pub use part::Part;
+use crate::options::DeltaNorm;
+use crate::transfer::{ProlongRow, RESTRICT_CENTRE, RESTRICT_EDGE, RestrictRow, Transfer};
 
 /// Columns of a batch: one AVX register, two of SSE, NEON or wasm. Measured on the Armadillo: with 16, a solve takes
 /// 25 % less time at g = 64, where a batch fits the second-level cache, and 40 % more at g = 128, where it does not.
@@ -28,11 +25,12 @@ const NEGLIGIBLE: f32 = 1e-18;
 /// Right-hand side of one level.
 #[derive(Clone, Copy, Debug)]
 pub enum Rhs<'a> {
-    /// One row per cut cell, red ones first: all that the cage's values ask for. The finest level's. Rows after those are of
-    /// whole cells, which kernels leave to whoever has put them there (`multigrid::Places`).
+    /// One row per cut cell, red ones first: all that the cage's values ask for. The finest level's.
     Cut(&'a [Row]),
     /// One row per cell, in field order. A coarse level's.
     Dense(&'a [Row]),
+    /// Zero everywhere.
+    Zero,
 }
 
 impl Rhs<'_> {
@@ -42,6 +40,7 @@ impl Rhs<'_> {
         match self {
             Self::Cut(rows) => (cut != NO_CELL).then(|| &rows[cut as usize]),
             Self::Dense(rows) => Some(&rows[cell as usize]),
+            Self::Zero => None,
         }
     }
 }
@@ -51,6 +50,7 @@ impl Rhs<'_> {
 enum ColourRhs<'a> {
     Cut(&'a [Row]),
     Dense(&'a [Row]),
+    Zero,
 }
 
 impl<'a> Rhs<'a> {
@@ -64,6 +64,7 @@ impl<'a> Rhs<'a> {
                 let (red, black) = rows.split_at(level.first_row(1));
                 ColourRhs::Dense(if colour == 0 { red } else { black })
             }
+            Self::Zero => ColourRhs::Zero,
         }
     }
 }
@@ -111,13 +112,14 @@ struct Visit {
 fn visit_plane<const OLD: bool>(
     level: &Level,
     colour: usize,
-    part: &Part,
+    plane: usize,
     [old, other]: [&[Row]; 2],
     rhs: ColourRhs<'_>,
     out: &mut [Row],
     mut each: impl FnMut(&mut Row, Visit),
 ) {
-    let ([runs, cut], colour) = (part.of(level, colour), &level.colours[colour]);
+    let colour = &level.colours[colour];
+    let [runs, cut] = colour.of_plane(plane);
     for run in &colour.runs[runs] {
         let (start, n) = (run.start as usize, run.len as usize);
         let part = |first: u32, n: usize| &other[first as usize..first as usize + n];
@@ -126,7 +128,7 @@ fn visit_plane<const OLD: bool>(
         let out = &mut out[start..start + n];
         let old = if OLD { &old[start..start + n] } else { &[] };
         let f = match rhs {
-            ColourRhs::Cut(_) => None,
+            ColourRhs::Cut(_) | ColourRhs::Zero => None,
             ColourRhs::Dense(rows) => Some(&rows[start..start + n]),
         };
         for j in 0..n {
@@ -146,6 +148,7 @@ fn visit_plane<const OLD: bool>(
         let mut sum = match rhs {
             ColourRhs::Cut(rows) => rows[number],
             ColourRhs::Dense(rows) => rows[cell],
+            ColourRhs::Zero => ZERO,
         };
         for n in cut.neighbours {
             add(&mut sum, &other[n as usize]);
@@ -157,8 +160,8 @@ fn visit_plane<const OLD: bool>(
 
 /// Gauss-Seidel on one plane of one colour: `u = (sum of neighbours + f) / diagonal`.
 #[inline(always)]
-pub fn relax_plane(level: &Level, colour: usize, part: impl Into<Part>, u: &mut [Row], rhs: Rhs<'_>) {
-    over_relax_zeros_plane(level, colour, part, 1.0, u, rhs);
+pub fn relax_plane(level: &Level, colour: usize, plane: usize, u: &mut [Row], rhs: Rhs<'_>) {
+    over_relax_zeros_plane(level, colour, plane, 1.0, u, rhs);
 }
 
 /// [`over_relax_plane`] where this colour is still zero, whatever its rows hold.
@@ -166,7 +169,7 @@ pub fn relax_plane(level: &Level, colour: usize, part: impl Into<Part>, u: &mut 
 pub fn over_relax_zeros_plane(
     level: &Level,
     colour: usize,
-    part: impl Into<Part>,
+    plane: usize,
     omega: f32,
     u: &mut [Row],
     rhs: Rhs<'_>,
@@ -175,7 +178,7 @@ pub fn over_relax_zeros_plane(
     visit_plane::<false>(
         level,
         colour,
-        &part.into(),
+        plane,
         [&[], other],
         rhs.of(level, colour),
         own,
@@ -189,14 +192,14 @@ pub fn over_relax_zeros_plane(
 
 /// [`relax_plane`] of red cells where both colours are still zero, whatever their rows hold: `u = f / diagonal`.
 #[inline(always)]
-pub fn relax_zeros_plane(level: &Level, part: impl Into<Part>, u: &mut [Row], rhs: Rhs<'_>) {
+pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: Rhs<'_>) {
     let red = &level.colours[0];
     let rhs = rhs.of(level, 0);
-    let [runs, cut] = part.into().of(level, 0);
+    let [runs, cut] = red.of_plane(plane);
     for run in &red.runs[runs] {
         let cells = run.start as usize..(run.start + run.len) as usize;
         match rhs {
-            ColourRhs::Cut(_) => u[cells].fill(ZERO),
+            ColourRhs::Cut(_) | ColourRhs::Zero => u[cells].fill(ZERO),
             ColourRhs::Dense(rows) => {
                 for (row, f) in u[cells.clone()].iter_mut().zip(&rows[cells]) {
                     *row = f.map(|f| f * (1.0 / 6.0));
@@ -208,6 +211,7 @@ pub fn relax_zeros_plane(level: &Level, part: impl Into<Part>, u: &mut [Row], rh
         let f = match rhs {
             ColourRhs::Cut(rows) => rows[number],
             ColourRhs::Dense(rows) => rows[cut.cell as usize],
+            ColourRhs::Zero => ZERO,
         };
         let inverse = 1.0 / cut.diagonal;
         u[cut.cell as usize] = f.map(|f| f * inverse);
@@ -221,7 +225,7 @@ pub fn over_relax_plane(level: &Level, colour: usize, plane: usize, omega: f32, 
     visit_plane::<false>(
         level,
         colour,
-        &plane.into(),
+        plane,
         [&[], other],
         rhs.of(level, colour),
         own,
@@ -236,24 +240,27 @@ pub fn over_relax_plane(level: &Level, colour: usize, plane: usize, omega: f32, 
     );
 }
 
-/// Residual `f + sum of neighbours - diagonal u` of red cells; adds its squares to `squares`.
+/// Residual `f + sum of neighbours - diagonal u` of one plane of one colour, into that colour's rows `residual`; adds its
+/// squares to `squares`.
 #[inline(always)]
 pub fn residual_plane(
     level: &Level,
-    part: impl Into<Part>,
-    u: &mut [Row],
+    colour: usize,
+    plane: usize,
+    u: &[Row],
     rhs: Rhs<'_>,
     residual: &mut [Row],
     squares: &mut Row,
 ) {
-    let (own, other) = split(level, u, 0);
+    let (red, black) = u.split_at(level.first_row(1));
+    let parts = if colour == 0 { [red, black] } else { [black, red] };
     let mut sum_squares = *squares;
     visit_plane::<true>(
         level,
-        0,
-        &part.into(),
-        [own, other],
-        rhs.of(level, 0),
+        colour,
+        plane,
+        parts,
+        rhs.of(level, colour),
         residual,
         #[inline(always)]
         |out, Visit { old, sum, diagonal, .. }| {
@@ -288,7 +295,7 @@ pub fn jacobi_plane(
     visit_plane::<true>(
         level,
         colour,
-        &plane.into(),
+        plane,
         [old, other],
         rhs.of(level, colour),
         new,
@@ -353,8 +360,6 @@ fn gather_edges(residual: &[Row], around: &RestrictRow) -> Row {
 pub enum Prolong {
     /// Adds the coarse correction, zero outside the cage.
     Correct,
-    /// Adds [`FURTHER`] times as much.
-    Further,
     /// Replaces the value by the mean of the coarse solution where there is one.
     Replace,
 }
@@ -383,15 +388,10 @@ fn prolong_rows<const N: usize>(rows: &[ProlongRow<N>], coarse: &[Row], black: &
             add(&mut sum, &coarse[from as usize]);
         }
         let out = &mut black[row.cell as usize];
-        let share = match mode {
-            Prolong::Replace => {
-                *out = sum.map(|s| s * row.mean);
-                continue;
-            }
-            Prolong::Correct => 1.0 / N as f32,
-            Prolong::Further => FURTHER / N as f32,
-        };
-        add(out, &sum.map(|s| s * share));
+        match mode {
+            Prolong::Replace => *out = sum.map(|s| s * row.mean),
+            Prolong::Correct => add(out, &sum.map(|s| s * (1.0 / N as f32))),
+        }
     }
 }
 

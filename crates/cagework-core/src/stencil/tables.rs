@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 
-use crate::bind::OutsideVertex;
+use crate::deform::OutsideVertex;
 use crate::grid::NO_CELL;
 use crate::levels::Level;
 use crate::sample::Stencils;

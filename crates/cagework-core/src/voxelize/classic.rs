@@ -17,10 +17,11 @@
 
 use glam::{DVec3, UVec3};
 
-use super::map_indices;
-use crate::bind::CellShape;
 use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::geometry::{closest_point_on_triangle, triangle_box_overlaps};
+use crate::options::CellShape;
+use crate::team::map_indices;
 
 /// Room between the cage's box and the grid's end, in cells.
 const PADDING: f64 = 1e-3;
@@ -63,7 +64,7 @@ impl BoundaryValues {
         self.cells.binary_search(&cell).ok()
     }
 
-    /// Cage vertices and values of one row.
+    /// Controls and values of one row.
     #[must_use]
     pub fn row(&self, row: usize) -> (&[u32], &[f32]) {
         let range = self.indptr[row] as usize..self.indptr[row + 1] as usize;
@@ -89,12 +90,13 @@ pub struct ClassicCells {
 /// Types all cells of a grid around the cage and gives boundary cells their values. `grid`: cells along each axis of
 /// the cage's box, or along the longest one if cells are to be cubes; 1 to 1,024.
 #[must_use]
-pub fn voxelize_classic(cage: &Cage, grid: u32, shape: CellShape) -> ClassicCells {
+pub fn voxelize_classic(controls: Controls<'_>, grid: u32, shape: CellShape) -> ClassicCells {
+    let cage = controls.surface();
     debug_assert!((1..=1024).contains(&grid), "cells are counted in u32");
     let (dims, origin, cell_size) = place_grid(cage, grid, shape);
     let slices = triangles_of_slices(cage, dims, origin, cell_size);
     let marked =
-        map_indices(dims.z as usize, |z| mark_slice(cage, dims, origin, cell_size, z as u32, &slices[z]));
+        map_indices(dims.z as usize, |z| mark_slice(controls, dims, origin, cell_size, z as u32, &slices[z]));
 
     let slice = (dims.x * dims.y) as usize;
     let mut kinds = vec![CellKind::Untyped; slice * dims.z as usize];
@@ -156,7 +158,7 @@ fn triangles_of_slices(cage: &Cage, dims: UVec3, origin: DVec3, cell_size: DVec3
 
 /// Boundary cells of one slice (counted from its own first cell) and their values.
 fn mark_slice(
-    cage: &Cage,
+    controls: Controls<'_>,
     dims: UVec3,
     origin: DVec3,
     cell_size: DVec3,
@@ -169,6 +171,7 @@ fn mark_slice(
         triangle: u32,
         barycentric: [f64; 3],
     }
+    let cage = controls.surface();
     let mut closest: Vec<Option<Closest>> = vec![None; (dims.x * dims.y) as usize];
     let half = 0.5 * cell_size;
     let (mut in_slice, mut in_row, mut scratch) = (Vec::new(), Vec::new(), Vec::new());
@@ -202,10 +205,18 @@ fn mark_slice(
     let mut marked = BoundaryValues { indptr: vec![0], ..BoundaryValues::default() };
     for (cell, best) in closest.iter().enumerate() {
         if let Some(best) = best {
-            cage.hats_at(best.triangle, best.barycentric, &mut |i, value| {
-                marked.indices.push(i);
-                marked.values.push(value as f32);
-            });
+            let first = marked.indices.len();
+            controls.values_at(
+                best.triangle,
+                best.barycentric,
+                &mut |i, value| match marked.indices[first..].iter().position(|&other| other == i) {
+                    Some(k) => marked.values[first + k] += value as f32,
+                    None => {
+                        marked.indices.push(i);
+                        marked.values.push(value as f32);
+                    }
+                },
+            );
             marked.cells.push(cell as u32);
             marked.indptr.push(marked.indices.len() as u32);
         }

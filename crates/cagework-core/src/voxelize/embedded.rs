@@ -10,14 +10,11 @@
 //! Source: Joshi et al. 2007, section 4, for the grid; Gibou et al. 2002 for the stencil with cut arms.
 
 use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::grid::Grid;
-use crate::levels::Boundary;
+use crate::levels::{Boundary, coarsened_until_few};
 
 use super::lines::{Hit, Lines};
-
-mod embedding;
-
-pub use embedding::Embedding;
 
 /// Shortest arm, in cells: a centre this close to the cage has the cage's value to within the solver's accuracy, and
 /// a shorter arm would only cost f32 digits (1e-3 measured on the Armadillo and the horse).
@@ -33,18 +30,60 @@ pub struct Cells {
     cut: Vec<u8>,
 }
 
+/// The cage in the grid on all levels: lines through it, and what the cells of every level are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Embedding {
+    lines: [Lines; 3],
+    /// Cells about which the axes disagree.
+    pub ambiguous: u64,
+    /// Finest first; at least one.
+    levels: Vec<Cells>,
+}
+
+impl Embedding {
+    /// Of a cage, on levels of doubling cell size until few unknowns remain, or on the finest only.
+    #[must_use]
+    pub fn new(cage: &Cage, grid: &Grid, has_coarse_levels: bool) -> Self {
+        let lines = shoot_lines(cage, grid);
+        let votes = votes(&lines, grid);
+        let ambiguous = votes.iter().filter(|&&votes| is_ambiguous(votes)).count() as u64;
+        let finest = Cells::finest(&lines, *grid, &votes);
+        let levels = if has_coarse_levels {
+            coarsened_until_few(finest, |cells| &cells.inside, |cells| cells.coarsened(&lines))
+        } else {
+            vec![finest]
+        };
+        Self { lines, ambiguous, levels }
+    }
+
+    /// What each level's cells see of the cage, finest first.
+    #[must_use]
+    pub fn boundaries<'a>(&'a self, controls: Controls<'a>) -> Vec<EmbeddedCells<'a>> {
+        self.levels.iter().map(|cells| cells.with(controls, &self.lines)).collect()
+    }
+
+    /// Bytes held.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let lines: usize = self.lines.iter().map(Lines::bytes).sum();
+        // Votes were held once.
+        let finest = self.levels[0].inside.len();
+        lines + finest + self.levels.iter().map(|cells| 2 * cells.inside.len()).sum::<usize>()
+    }
+}
+
 /// The cage in the grid, on one level.
 #[derive(Debug)]
 pub struct EmbeddedCells<'a> {
-    cage: &'a Cage,
+    controls: Controls<'a>,
     lines: &'a [Lines; 3],
     cells: &'a Cells,
 }
 
-/// Lines along x, y and z through those of the cage's triangles that are `wanted`.
+/// Lines along x, y and z through the cage.
 #[must_use]
-pub fn shoot_lines(cage: &Cage, grid: &Grid, wanted: &(dyn Fn(u32) -> bool + Sync)) -> [Lines; 3] {
-    let lines = super::map_indices(3, |axis| Lines::shoot(cage, grid, axis, wanted));
+pub fn shoot_lines(cage: &Cage, grid: &Grid) -> [Lines; 3] {
+    let lines = crate::team::map_indices(3, |axis| Lines::shoot(cage, grid, axis));
     lines.try_into().expect("three axes")
 }
 
@@ -98,8 +137,7 @@ fn is_ambiguous(votes: u8) -> bool {
 }
 
 impl Cells {
-    /// The finest level. Not inlined: it is made in two places, and the page's wasm is small.
-    #[inline(never)]
+    /// The finest level.
     #[must_use]
     pub fn finest(lines: &[Lines; 3], grid: Grid, votes: &[u8]) -> Self {
         Self::with_walls(lines, grid, 1, votes.iter().map(|&votes| is_inside(votes)).collect())
@@ -117,9 +155,18 @@ impl Cells {
         let (mut cells, mut cut) = (Self { grid, step, inside, cut: Vec::new() }, vec![0; grid.n_cells()]);
         for (axis, lines) in lines.iter().enumerate() {
             for (iu, iv, hits) in lines.crossing() {
-                if cells.has(&[iu, iv]) {
-                    for hit in hits {
-                        cells.at_wall(axis, [iu, iv], hit).for_each(|(cell, arm)| cut[cell] |= arm);
+                // Only lines that this level has.
+                if (iu | iv) & (step - 1) != 0 {
+                    continue;
+                }
+                let first = cells.grid.line_start(axis, [iu / step, iv / step]);
+                let (stride, n) = (cells.grid.strides()[axis], i64::from(cells.grid.dims[axis]));
+                for hit in hits {
+                    let (below, above) = wall_between(hit.t / f64::from(step));
+                    for (x, direction) in [(below, 2 * axis), (above, 2 * axis + 1)] {
+                        if (0..n).contains(&x) {
+                            cut[first + x as usize * stride] |= 1 << direction;
+                        }
                     }
                 }
             }
@@ -128,29 +175,10 @@ impl Cells {
         cells
     }
 
-    /// Whether this level has lines or cells with these coordinates in the finest grid.
-    #[inline]
-    fn has(&self, place: &[u32]) -> bool {
-        place.iter().all(|x| x & (self.step - 1) == 0)
-    }
-
-    /// The centres of this level between which a crossing of the line of the finest grid at (u, v) lies: their cells, and the
-    /// arm of each that ends there. Only for lines that this level has.
-    #[inline]
-    fn at_wall(&self, axis: usize, place: [u32; 2], hit: &Hit) -> impl Iterator<Item = (usize, u8)> + use<> {
-        let first = self.grid.line_start(axis, place.map(|x| x / self.step));
-        let (stride, n) = (self.grid.strides()[axis], i64::from(self.grid.dims[axis]));
-        let (below, above) = wall_between(hit.t / f64::from(self.step));
-        [(below, 2 * axis), (above, 2 * axis + 1)]
-            .into_iter()
-            .filter(move |(x, _)| (0..n).contains(x))
-            .map(move |(x, direction)| (first + x as usize * stride, 1 << direction))
-    }
-
-    /// With the cage and the lines of which they were made.
+    /// With the controls on whose surface they were made, and the lines through it.
     #[must_use]
-    pub fn with<'a>(&'a self, cage: &'a Cage, lines: &'a [Lines; 3]) -> EmbeddedCells<'a> {
-        EmbeddedCells { cage, lines, cells: self }
+    pub fn with<'a>(&'a self, controls: Controls<'a>, lines: &'a [Lines; 3]) -> EmbeddedCells<'a> {
+        EmbeddedCells { controls, lines, cells: self }
     }
 }
 
@@ -194,7 +222,7 @@ impl Boundary for EmbeddedCells<'_> {
     fn arm(&self, cell: [u32; 3], direction: usize, hats: &mut dyn FnMut(u32, f64)) -> f64 {
         let Some((hit, theta)) = self.nearest(cell, direction) else { return 0.0 };
         let [b0, b1] = hit.barycentric;
-        self.cage.hats_at(hit.triangle, [b0, b1, 1.0 - b0 - b1], hats);
+        self.controls.values_at(hit.triangle, [b0, b1, 1.0 - b0 - b1], hats);
         // A comparison: wasm has no instruction for `max`.
         1.0 / if theta > MIN_ARM { theta } else { MIN_ARM }
     }

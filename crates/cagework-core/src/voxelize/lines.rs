@@ -34,15 +34,15 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Shoots all lines along `axis` through those of the cage's triangles that are `wanted`.
+    /// Shoots all lines along `axis` through the cage.
     #[must_use]
-    pub fn shoot(cage: &Cage, grid: &Grid, axis: usize, wanted: &dyn Fn(u32) -> bool) -> Self {
+    pub fn shoot(cage: &Cage, grid: &Grid, axis: usize) -> Self {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let n_u = grid.dims[u];
         let n_lines = n_u as usize * grid.dims[v] as usize;
         let mut found: Vec<(u32, Hit)> = Vec::new();
         let points: Vec<DVec3> = cage.positions().iter().map(|p| grid.to_grid(p.as_dvec3())).collect();
-        for (triangle, corners) in (0u32..).zip(cage.triangles()).filter(|(triangle, _)| wanted(*triangle)) {
+        for (triangle, corners) in (0u32..).zip(cage.triangles()) {
             cover(&points, *corners, grid, axis, |u, v, hit| {
                 found.push((u + n_u * v, Hit { triangle, ..hit }));
             });
@@ -65,60 +65,6 @@ impl Lines {
             next[line as usize] += 1;
         }
         Self { axis, n_u, start, hits }
-    }
-
-    /// Lines through an edited cage: these, without the hits of triangles that have changed, as they were, and with those that
-    /// these have now.
-    #[must_use]
-    pub fn renewed(&self, gone: &Self, come: &Self) -> Self {
-        let mut hits =
-            Vec::with_capacity((self.hits.len() + come.hits.len()).saturating_sub(gone.hits.len()));
-        let mut start = Vec::with_capacity(self.start.len());
-        // Lines with neither are copied many at a time.
-        let mut copied = 0;
-        for line in 0..self.start.len() - 1 {
-            let [old, gone_here, come_here] = [self, gone, come].map(|lines| lines.range(line));
-            start.push((hits.len() + old.start - copied) as u32);
-            if gone_here.is_empty() && come_here.is_empty() {
-                continue;
-            }
-            hits.extend_from_slice(&self.hits[copied..old.start]);
-            copied = old.end;
-            let (first, gone) = (hits.len(), &gone.hits[gone_here]);
-            hits.extend(self.hits[old].iter().filter(|hit| gone.iter().all(|g| g.triangle != hit.triangle)));
-            for hit in &come.hits[come_here] {
-                let is_before = |h: &Hit| h.t.total_cmp(&hit.t).then(h.triangle.cmp(&hit.triangle)).is_lt();
-                let place = first + hits[first..].partition_point(is_before);
-                hits.insert(place, *hit);
-            }
-        }
-        start.push((hits.len() + self.hits.len() - copied) as u32);
-        hits.extend_from_slice(&self.hits[copied..]);
-        Self { start, hits, ..*self }
-    }
-
-    /// Number of lines.
-    #[must_use]
-    pub fn n_lines(&self) -> usize {
-        self.start.len() - 1
-    }
-
-    /// A line's coordinates along the next two axes in cyclic order.
-    #[must_use]
-    pub fn place(&self, line: usize) -> [u32; 2] {
-        [line as u32 % self.n_u, line as u32 / self.n_u]
-    }
-
-    /// Whether a line crosses the cage.
-    #[must_use]
-    pub fn is_hit(&self, line: usize) -> bool {
-        !self.range(line).is_empty()
-    }
-
-    /// Hits of a line, ascending.
-    #[must_use]
-    pub fn at(&self, line: usize) -> &[Hit] {
-        &self.hits[self.range(line)]
     }
 
     /// Where a line's hits are.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use bytemuck::{Pod, Zeroable};
 use cagework_core::Weights;
-use cagework_core::bind::OutsideVertex;
+use cagework_core::deform::OutsideVertex;
 use glam::Vec3;
 
 /// Base colour without a material, linear: a light, slightly warm grey, as of unfired clay.

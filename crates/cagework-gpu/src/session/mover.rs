@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use cagework_core::Weights;
-use cagework_core::bind::OutsideVertex;
+use cagework_core::deform::OutsideVertex;
 use cagework_core::deform::{deform_bound, vertex_normals};
 use glam::{Vec3, Vec4};
 

@@ -1,6 +1,6 @@
 //! What is done for each frame: vertices follow the cage, those outside it too, and normals follow vertices.
 
-use cagework_core::bind::OutsideVertex;
+use cagework_core::deform::OutsideVertex;
 use cagework_core::stencil::tables::{BUNDLE, NormalTable, OutsideTable, SlicedWeights};
 use cagework_core::{Weights, stencil};
 use cagework_gpu::kernels;

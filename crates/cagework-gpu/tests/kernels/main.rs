@@ -4,8 +4,9 @@ mod deforming;
 #[path = "../support/mod.rs"]
 mod support;
 
-use cagework_core::bind::{BindOptions, DeltaNorm, Watch};
+use cagework_core::bind::Watch;
 use cagework_core::levels::Level;
+use cagework_core::options::{BindOptions, DeltaNorm};
 use cagework_core::progress::Silent;
 use cagework_core::sample::Stencils;
 use cagework_core::solve::hierarchy::Hierarchy;

@@ -1,8 +1,9 @@
 //! What the GPU's tests share: one device, meshes, seeded numbers, comparing.
 #![allow(dead_code, reason = "every test binary uses its part")]
 
+use cagework_core::bind::Watch;
 use cagework_core::bind::pipeline::{FieldsOn, Prepared};
-use cagework_core::bind::{BindOptions, Watch};
+use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
 use cagework_core::{Bounds, Cage, TriMesh, subdivided_box};
 use cagework_gpu::{ContextOptions, GpuContext};
@@ -118,6 +119,6 @@ pub(crate) fn with_prepared<T>(
 ) -> T {
     let watch = Watch::new(&Silent);
     let prepared =
-        Prepared::new(positions, cage, options, FieldsOn::Device, &watch).expect("the tests' input is good");
+        Prepared::new(positions, cage.into(), options, FieldsOn::Device, &watch).expect("the tests' input is good");
     use_it(&prepared)
 }

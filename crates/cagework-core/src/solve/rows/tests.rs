@@ -1,9 +1,10 @@
 //! Kernels against the plainest loops over the boundary's definition, on grids of odd dimensions.
 
 use super::*;
-use crate::bind::DeltaNorm;
 use crate::grid::Grid;
 use crate::levels::plain::{cells, hierarchy, on_two_levels, some_field};
+use crate::options::DeltaNorm;
+use crate::solve::operator;
 
 /// Sums of six values in [0, 1) in another order, over a diagonal of at least 3.
 const REORDERED: f32 = 1e-6;
@@ -159,27 +160,33 @@ fn jacobi_sweep_matches_plain_loops() {
 }
 
 #[test]
-fn red_residual_matches_plain_loops() {
+fn operator_and_residual_match_plain_loops() {
     on_two_levels(|_, level, boundary| {
         let (cut, dense) = rhs(level);
-        let mut u = some_field(level, 3);
-        let mut expected = vec![ZERO; level.first_row(1)];
-        let mut square = 0.0;
-        for (row, sum, diagonal) in plain_sums(level, boundary, 0, &u, &dense) {
-            for k in 0..LANES {
-                let residual = sum[k] - diagonal * f64::from(u[row][k]);
-                expected[row][k] = residual as f32;
-                square += residual * residual;
+        let (u, zeros) = (some_field(level, 3), vec![ZERO; level.n_rows()]);
+        for (f, sums_of) in [(Rhs::Cut(&cut), &dense), (Rhs::Dense(&dense), &dense), (Rhs::Zero, &zeros)] {
+            let mut expected = zeros.clone();
+            let mut square = 0.0;
+            for (row, sum, diagonal) in
+                [0, 1].into_iter().flat_map(|colour| plain_sums(level, boundary, colour, &u, sums_of))
+            {
+                for k in 0..LANES {
+                    let residual = sum[k] - diagonal * f64::from(u[row][k]);
+                    expected[row][k] = residual as f32;
+                    square += residual * residual;
+                }
             }
-        }
-        for f in [Rhs::Cut(&cut), Rhs::Dense(&dense)] {
-            let (mut residual, mut squares) = (vec![ZERO; level.first_row(1)], ZERO);
-            for plane in 0..level.grid.dims[2] as usize {
-                residual_plane(level, plane, &mut u, f, &mut residual, &mut squares);
-            }
+            let mut residual = zeros.clone();
+            let squares = operator::residual(level, &u, f, &mut residual);
             assert_rows_close(&residual, &expected, RESIDUAL);
             let sum: f64 = squares.iter().map(|&s| f64::from(s)).sum();
             assert!((sum - square).abs() <= 1e-4 * square, "{sum} and {square}");
+            if matches!(f, Rhs::Zero) {
+                let mut image = zeros.clone();
+                operator::apply(level, &u, &mut image);
+                let negative: Vec<Row> = expected.iter().map(|row| row.map(|r| -r)).collect();
+                assert_rows_close(&image, &negative, RESIDUAL);
+            }
         }
     });
 }
@@ -218,7 +225,7 @@ fn prolongation_matches_plain_loops() {
     for (levels, transfer) in hierarchy.levels.windows(2).zip(&hierarchy.transfers) {
         let [fine, coarse] = levels else { unreachable!("windows of two") };
         let (from, before) = (some_field(coarse, 5), some_field(fine, 6));
-        for mode in [Prolong::Correct, Prolong::Further, Prolong::Replace] {
+        for mode in [Prolong::Correct, Prolong::Replace] {
             let mut expected = before.clone();
             let black = fine.grid.cells().filter(|&c| Grid::colour(c) == 1);
             for cell in black.filter(|&c| fine.row_of[fine.grid.index(c)] != NO_CELL) {
@@ -244,7 +251,6 @@ fn prolongation_matches_plain_loops() {
                 for k in 0..LANES {
                     out[k] = match mode {
                         Prolong::Correct => out[k] + weight * sum[k],
-                        Prolong::Further => out[k] + FURTHER * weight * sum[k],
                         Prolong::Replace => sum[k] / known.max(1.0),
                     };
                 }

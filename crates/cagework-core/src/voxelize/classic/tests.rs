@@ -13,7 +13,7 @@ const SUM_TOLERANCE: f32 = 1e-6;
 
 fn voxelized(mesh: &PolygonMesh, grid: u32, shape: CellShape) -> (Cage, ClassicCells) {
     let cage = Cage::new(mesh).unwrap();
-    let cells = voxelize_classic(&cage, grid, shape);
+    let cells = voxelize_classic((&cage).into(), grid, shape);
     (cage, cells)
 }
 
@@ -143,7 +143,7 @@ fn one_thread_and_many_give_the_same_cells() {
     let cage = Cage::new(&shapes::c_shape()).unwrap();
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| voxelize_classic(&cage, 40, CellShape::Cubic))
+        pool.install(|| voxelize_classic((&cage).into(), 40, CellShape::Cubic))
     };
     assert_eq!(on(1), on(4));
 }

@@ -12,7 +12,7 @@ use crate::voxelize::embedded::{shoot_lines, votes};
 /// Asserts that lines cross the cage an even number of times and that parity along each axis and the winding number
 /// agree about every `every`-th centre.
 fn assert_watertight(cage: &Cage, grid: &Grid, every: usize) {
-    let lines = shoot_lines(cage, grid, &|_| true);
+    let lines = shoot_lines(cage, grid);
     for lines in &lines {
         for (u, v, hits) in lines.crossing() {
             assert!(hits.len().is_multiple_of(2), "{} hits on line {u}, {v}", hits.len());
@@ -65,7 +65,7 @@ fn lines_through_vertices_and_along_edges_are_counted_once() {
             let n = (6.0 / step) as u32 + 1;
             let grid = Grid { dims: [n; 3], origin: DVec3::splat(-2.0), cell: DVec3::splat(step) };
             for axis in 0..3 {
-                for (u, v, hits) in Lines::shoot(&cage, &grid, axis, &|_| true).crossing() {
+                for (u, v, hits) in Lines::shoot(&cage, &grid, axis).crossing() {
                     assert!(hits.len().is_multiple_of(2), "{} hits on line {u}, {v}", hits.len());
                 }
             }
@@ -88,7 +88,7 @@ fn hits_lie_on_the_cage() {
     let cage = Cage::new(&shapes::cuboid(Vec3::ZERO, Vec3::new(1.0, 2.0, 4.0))).unwrap();
     let grid = Grid::cubic(cage.bounds(), 16);
     for axis in 0..3 {
-        let lines = Lines::shoot(&cage, &grid, axis, &|_| true);
+        let lines = Lines::shoot(&cage, &grid, axis);
         assert!(lines.crossing().count() > 0);
         for (_, _, hits) in lines.crossing() {
             let ends: Vec<f64> = hits.iter().map(|h| grid.origin[axis] + grid.cell[axis] * h.t).collect();

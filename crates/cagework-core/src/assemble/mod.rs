@@ -1,24 +1,26 @@
 //! From batches of sampled columns to one sparse row per vertex, with the statistics of what is stored.
 
+pub mod affine;
 mod entries;
 mod facts;
 
 use glam::{DVec3, Vec3};
 
-use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
-use crate::solve::team::{Team, VERTEX_RUN};
+use crate::team::{Team, VERTEX_RUN};
 
 pub use self::facts::RowFacts;
 
 use self::entries::Entries;
-use super::Weights;
-use super::affine::Columns;
+use crate::weights::Weights;
+
+use affine::Columns;
 
 /// Rows whose sums miss by less than this (of the cage's diagonal) are good: two units in the last place of an f32
 /// near 1.
-pub(crate) const GOOD_ENOUGH: f64 = 2e-7;
+const GOOD_ENOUGH: f64 = 2e-7;
 
 /// Corrections are repeated until the sums hold, at most this often: once is enough but for rows in which the
 /// threshold dropped a large share of the weight.
@@ -61,16 +63,16 @@ struct Run<'a> {
 /// Makes the matrix of weights. `blocks[batch][vertex]`: sampled values (used up as scratch space); `points`: rest
 /// positions; `is_outside(vertex)`: whether a vertex lies outside the cage.
 pub fn assemble(
-    cage: &Cage,
+    controls: Controls<'_>,
     blocks: &mut [Vec<Row>],
     points: &[Vec3],
     options: RowOptions,
     is_outside: impl Fn(usize) -> bool + Sync,
     team: &Team,
 ) -> Assembled {
-    let columns = Columns::new(cage);
+    let columns = Columns::new(controls);
     if team.n_threads() == 1 {
-        return assemble_alone(cage, &columns, blocks, points, options, &is_outside);
+        return assemble_alone(controls, &columns, blocks, points, options, &is_outside);
     }
     let mut runs = runs_of(blocks, points, VERTEX_RUN);
     // Without a threshold it is known beforehand which weights are stored: rows are corrected on their way into the
@@ -118,13 +120,13 @@ pub fn assemble(
         );
     });
     let facts = runs.into_iter().flat_map(|run| run.facts).collect();
-    Assembled { weights: Weights::from_parts(cage.n_vertices() as u32, indptr, indices, data), facts }
+    Assembled { weights: Weights::from_parts(controls.n_controls() as u32, indptr, indices, data), facts }
 }
 
 /// The same on one thread, where rows can be put one after the other without counting them first: a third less memory
 /// is written.
 fn assemble_alone(
-    cage: &Cage,
+    controls: Controls<'_>,
     columns: &Columns,
     blocks: &mut [Vec<Row>],
     points: &[Vec3],
@@ -132,7 +134,7 @@ fn assemble_alone(
     is_outside: &impl Fn(usize) -> bool,
 ) -> Assembled {
     let mut runs = runs_of(blocks, points, points.len().max(1));
-    let most = points.len() * cage.n_vertices();
+    let most = points.len() * controls.n_controls();
     // Dense rows are nearly full; of sparse ones nobody knows.
     let room = if options.threshold > 0.0 { 0 } else { most };
     for run in &mut runs {
@@ -156,7 +158,7 @@ fn assemble_alone(
         Some(Run { entries: Entries::All { indices, data }, facts, .. }) => (indices, data, facts),
         _ => Default::default(),
     };
-    Assembled { weights: Weights::from_parts(cage.n_vertices() as u32, indptr, indices, data), facts }
+    Assembled { weights: Weights::from_parts(controls.n_controls() as u32, indptr, indices, data), facts }
 }
 
 /// Where each row starts, and where the last one ends.
@@ -191,16 +193,19 @@ fn runs_of<'a>(blocks: &'a mut [Vec<Row>], points: &'a [Vec3], length: usize) ->
 }
 
 impl Run<'_> {
-    /// Copies a vertex's sampled values, those that exceed the threshold.
+    /// Copies a vertex's sampled values, those that exceed the threshold. Returns the lowest of all.
     #[inline(always)]
-    fn load(&self, v: usize, threshold: f32, row: &mut [Row]) {
+    fn load(&self, v: usize, threshold: f32, row: &mut [Row]) -> f32 {
+        let mut lows = [f32::INFINITY; LANES];
         for (row, block) in row.iter_mut().zip(&self.blocks) {
             *row = block[v];
             // Solver and rounding leave some -1e-8: a harmonic coordinate is never negative.
-            for w in row.iter_mut() {
+            for (w, low) in row.iter_mut().zip(&mut lows) {
+                *low = if *w < *low { *w } else { *low };
                 *w = if *w > threshold { *w } else { 0.0 };
             }
         }
+        lows.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a })
     }
 
     /// Lengths of the rows if every positive weight is stored.
@@ -230,21 +235,20 @@ impl Run<'_> {
         for (v, point) in self.points.iter().enumerate() {
             let target = columns.scale(point.as_dvec3());
             let outside = is_outside(self.first + v);
-            self.load(v, 0.0, &mut row);
-            let goal = if options.preserve_affine && !outside {
-                Some(target)
+            let lowest = self.load(v, 0.0, &mut row);
+            let (raw, stored) = if options.preserve_affine && !outside {
+                self.restore_row(v, columns, options.threshold, &mut row, target)
             } else if options.threshold > 0.0 {
                 // Errors, and the place of a vertex outside, are not sparsification's to change.
-                Some(columns.combined(&row).1)
+                let raw = columns.sums(&row, target);
+                let goal = columns.combined(&row).1;
+                self.restore_row(v, columns, options.threshold, &mut row, goal);
+                (raw, columns.sums(&row, target))
             } else {
-                None
+                let raw = columns.sums(&row, target);
+                (raw, raw)
             };
-            let reached = goal.map(|goal| self.restore_row(v, columns, options.threshold, &mut row, goal));
-            let (sum, miss) = match reached {
-                Some(sums) if goal == Some(target) => sums,
-                _ => columns.sums(&row, target),
-            };
-            self.facts.push(RowFacts::of(&row, sum, (!outside).then_some(miss)));
+            self.facts.push(RowFacts::of(&row, stored, (!outside).then_some((raw, lowest))));
             take(self, v, &row);
         }
     }
@@ -267,7 +271,7 @@ impl Run<'_> {
     }
 
     /// Drops what is below the threshold and restores the row, or keeps all if that cannot be had. `row` holds the
-    /// vertex's sampled values. Returns (sum, distance from the goal over the diagonal).
+    /// vertex's sampled values. Returns the (sum, distance from the goal over the diagonal) of the sampled row and of this.
     #[inline(always)]
     fn restore_row(
         &self,
@@ -276,31 +280,37 @@ impl Run<'_> {
         threshold: f32,
         row: &mut [Row],
         goal: DVec3,
-    ) -> (f64, f64) {
-        if threshold > 0.0 {
-            self.load(v, threshold, row);
-            let (sum, miss) = restore(columns, row, goal);
-            if miss.max((sum - 1.0).abs()) <= NOT_RESTORED {
-                return (sum, miss);
-            }
-            self.load(v, 0.0, row);
+    ) -> (Sums, Sums) {
+        if threshold == 0.0 {
+            return restore(columns, row, goal);
         }
+        let sampled = columns.sums(row, goal);
+        self.load(v, threshold, row);
+        let (_, (sum, miss)) = restore(columns, row, goal);
+        if miss.max((sum - 1.0).abs()) <= NOT_RESTORED {
+            return (sampled, (sum, miss));
+        }
+        self.load(v, 0.0, row);
         restore(columns, row, goal)
     }
 }
 
-/// Corrects a row until it sums to 1 and puts its vertex at `goal`; returns its sum and how far it misses the goal.
+/// Sum of a row, and how far it misses a place over the diagonal.
+type Sums = (f64, f64);
+
+/// Corrects a row until it sums to 1 and puts its vertex at `goal`; returns its sums before (to f32) and after.
 // Part of its callers where they are compiled for several instruction sets; elsewhere four copies would be downloaded.
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[cfg_attr(target_family = "wasm", inline(never))]
-pub(crate) fn restore(columns: &Columns, row: &mut [Row], goal: DVec3) -> (f64, f64) {
-    let mut sums = (0.0, f64::INFINITY);
-    for _ in 0..MAX_CORRECTIONS {
-        columns.restore_affine(row, goal);
-        sums = columns.sums(row, goal);
-        if sums.1.max((sums.0 - 1.0).abs()) <= GOOD_ENOUGH {
+fn restore(columns: &Columns, row: &mut [Row], goal: DVec3) -> (Sums, Sums) {
+    let before = columns.restore_affine(row, goal);
+    let mut after = columns.sums(row, goal);
+    for _ in 1..MAX_CORRECTIONS {
+        if after.1.max((after.0 - 1.0).abs()) <= GOOD_ENOUGH {
             break;
         }
+        columns.restore_affine(row, goal);
+        after = columns.sums(row, goal);
     }
-    sums
+    (before, after)
 }

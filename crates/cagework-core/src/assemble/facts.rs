@@ -1,6 +1,6 @@
 //! What is found out about each row of weights that is stored, and all rows together.
 
-use crate::report::{RestError, WeightStats};
+use crate::report::{MeanMax, RawError, RestError, WeightStats};
 use crate::solve::rows::{LANES, Row, ZERO};
 
 use super::Assembled;
@@ -16,15 +16,29 @@ pub struct RowFacts {
     pub low: f32,
     /// Its largest weight.
     pub high: f32,
+    /// Before it was restored; none for vertices outside.
+    pub raw: Option<RawFacts>,
+}
+
+/// What was found out about a row before it was restored.
+#[derive(Clone, Copy, Debug)]
+pub struct RawFacts {
+    /// How far its sum was from 1.
+    pub sum_error: f32,
+    /// Distance between `sum w c` and the vertex over the cage's diagonal.
+    pub error: f32,
+    /// Its lowest value, before negative ones were taken for 0.
+    pub low: f32,
 }
 
 impl RowFacts {
-    /// Facts about a row (`[n_batches]`) with this sum, which misses the vertex by so much.
+    /// Facts about a row (`[n_batches]`) with these (sum, distance from the vertex); `raw`, for vertices inside: the same before
+    /// it was restored, and its lowest value.
     // One copy for all callers in wasm: each would be downloaded.
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
     #[cfg_attr(target_family = "wasm", inline(never))]
     #[must_use]
-    pub fn of(row: &[Row], sum: f64, miss: Option<f64>) -> Self {
+    pub fn of(row: &[Row], (sum, miss): (f64, f64), raw: Option<((f64, f64), f32)>) -> Self {
         // Comparisons, not `min` and `max`: wasm has no instruction for theirs, which say what becomes of NaN.
         let (mut lows, mut highs) = ([f32::INFINITY; LANES], ZERO);
         for row in row {
@@ -39,14 +53,18 @@ impl RowFacts {
             low = if lows[k] < low { lows[k] } else { low };
             high = if highs[k] > high { highs[k] } else { high };
         }
-        Self { error: miss.map(|miss| miss as f32), sum_error: (sum - 1.0).abs() as f32, low, high }
+        let off = |sum: f64| (sum - 1.0).abs() as f32;
+        let raw_facts =
+            |((sum, miss), low): ((f64, f64), f32)| RawFacts { sum_error: off(sum), error: miss as f32, low };
+        Self { error: raw.map(|_| miss as f32), sum_error: off(sum), low, high, raw: raw.map(raw_facts) }
     }
 }
 
 impl Assembled {
-    /// How well the rest pose is reconstructed by vertices inside a cage of this diagonal, and what the weights are like.
+    /// How well the rest pose is reconstructed by vertices inside a cage of this diagonal, how well it was before rows were
+    /// restored, and what the weights are like.
     #[must_use]
-    pub fn statistics(&self, diagonal: f64) -> (RestError, WeightStats) {
+    pub fn statistics(&self, diagonal: f64) -> (RestError, RawError, WeightStats) {
         let mut errors: Vec<f32> = self.facts.iter().filter_map(|facts| facts.error).collect();
         let mut rest_error = RestError::default();
         if !errors.is_empty() {
@@ -67,6 +85,17 @@ impl Assembled {
             weights.max = over(|f| f.high, f32::max);
             weights.max_sum_error = f64::from(over(|f| f.sum_error, f32::max));
         }
-        (rest_error, weights)
+        let raw = || self.facts.iter().filter_map(|facts| facts.raw);
+        let n = raw().count().max(1) as f64;
+        let mean_max = |of: fn(RawFacts) -> f32| MeanMax {
+            mean: raw().map(|r| f64::from(of(r))).sum::<f64>() / n,
+            max: raw().map(|r| f64::from(of(r))).fold(0.0, f64::max),
+        };
+        let raw_error = RawError {
+            sum: mean_max(|r| r.sum_error),
+            point_rel: mean_max(|r| r.error),
+            min_weight: raw().map(|r| r.low).reduce(f32::min).unwrap_or_default(),
+        };
+        (rest_error, raw_error, weights)
     }
 }

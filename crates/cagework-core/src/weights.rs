@@ -1,23 +1,15 @@
 //! Sparse weights: compressed sparse rows, one row per mesh vertex, one column per control vertex.
 
-pub mod affine;
-pub mod assemble;
-
-use std::sync::Arc;
-
 use thiserror::Error;
 
-/// A matrix of weights in compressed sparse rows (CSR). Dimensionless; each row sums to 1. A clone shares the arrays.
+/// A matrix of weights in compressed sparse rows (CSR). Dimensionless; each row sums to 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Weights {
     n_columns: u32,
-    indptr: Arc<Vec<u32>>,
-    indices: Arc<Vec<u32>>,
-    data: Arc<Vec<f32>>,
+    indptr: Vec<u32>,
+    indices: Vec<u32>,
+    data: Vec<f32>,
 }
-
-/// A row that takes another's place: (vertex, columns, weights).
-pub(crate) type ReplacedRow = (u32, Vec<u32>, Vec<f32>);
 
 /// Why three arrays are not a CSR matrix.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -91,33 +83,7 @@ impl Weights {
 
     /// A matrix from arrays that are right by construction.
     pub(crate) fn from_parts(n_columns: u32, indptr: Vec<u32>, indices: Vec<u32>, data: Vec<f32>) -> Self {
-        let (indptr, indices, data) = (Arc::new(indptr), Arc::new(indices), Arc::new(data));
         Self { n_columns, indptr, indices, data }
-    }
-
-    /// Where each row starts, the columns, and the weights to write to: in place, if no clone shares them.
-    pub(crate) fn parts_mut(&mut self) -> (&[u32], &[u32], &mut [f32]) {
-        (&self.indptr, &self.indices, Arc::make_mut(&mut self.data).as_mut_slice())
-    }
-
-    /// The matrix with other rows in some places: `rows` in ascending order of vertices, each (vertex, columns, weights).
-    #[must_use]
-    pub(crate) fn with_replaced(&self, rows: &[ReplacedRow]) -> Self {
-        let mut indptr = Vec::with_capacity(self.indptr.len());
-        indptr.push(0);
-        let more: usize = rows.iter().map(|(_, columns, _)| columns.len()).sum();
-        let (mut indices, mut data) =
-            (Vec::with_capacity(self.indices.len() + more), Vec::with_capacity(self.data.len() + more));
-        let mut next = rows.iter().peekable();
-        for row in 0..self.n_rows() {
-            let replaced = next.next_if(|(vertex, ..)| *vertex as usize == row);
-            let (columns, weights) =
-                replaced.map_or_else(|| self.row(row), |(_, c, w)| (c.as_slice(), w.as_slice()));
-            indices.extend_from_slice(columns);
-            data.extend_from_slice(weights);
-            indptr.push(indices.len() as u32);
-        }
-        Self::from_parts(self.n_columns, indptr, indices, data)
     }
 
     /// The matrix whose row v is this one's row `row_of[v]`.

@@ -8,35 +8,33 @@
 
 use glam::{DMat4, DVec3, DVec4};
 
-use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::solve::rows::{LANES, Row, ZERO};
 
 /// Added to the diagonal of the 4 x 4 system, relative to its trace: on a face of the cage all weights lie in a plane
 /// and the system is singular in its normal direction, along which there is nothing to correct.
 const RIDGE: f64 = 1e-7;
 
-/// The cage's vertices as columns of weights: rows of lanes, as batches are.
+/// The controls as columns of weights: rows of lanes, as batches are.
 #[derive(Clone, Debug)]
 pub struct Columns {
     /// Positions from the cage's centre over its diagonal. `[3][n_batches]`
     scaled: [Vec<Row>; 3],
     /// The same as f64, to measure with.
     exact: [Vec<[f64; LANES]>; 3],
-    /// 1 for columns, 0 for lanes without one. `[n_batches]`
-    ones: Vec<Row>,
-    /// Inverse of the sum of `(c, 1) (c, 1)^T` over the columns.
-    gram_inverse: DMat4,
     center: DVec3,
     diagonal: f64,
 }
 
 impl Columns {
-    /// Columns of a cage in its rest pose.
+    /// Columns at rest.
     #[must_use]
-    pub fn new(cage: &Cage) -> Self {
-        let (center, diagonal) = (cage.bounds().center().as_dvec3(), f64::from(cage.diagonal()));
+    pub fn new(controls: Controls<'_>) -> Self {
+        let surface = controls.surface();
+        let (center, diagonal) = (surface.bounds().center().as_dvec3(), f64::from(surface.diagonal()));
         let exact = [0, 1, 2].map(|axis| {
-            cage.positions()
+            controls
+                .rest()
                 .chunks(LANES)
                 .map(|batch| {
                     let mut lanes = [0.0; LANES];
@@ -48,16 +46,7 @@ impl Columns {
                 .collect::<Vec<_>>()
         });
         let scaled = exact.each_ref().map(|e| e.iter().map(|lanes| lanes.map(|x| x as f32)).collect());
-        let n = cage.n_vertices();
-        let ones =
-            (0..n).step_by(LANES).map(|first| std::array::from_fn(|k| if first + k < n { 1.0 } else { 0.0 }));
-        let mut gram = DMat4::ZERO;
-        for p in cage.positions() {
-            let p = ((p.as_dvec3() - center) / diagonal).extend(1.0);
-            gram += DMat4::from_cols(p.x * p, p.y * p, p.z * p, p.w * p);
-        }
-        let (ones, gram_inverse) = (ones.collect(), gram.inverse());
-        Self { scaled, exact, ones, gram_inverse, center, diagonal }
+        Self { scaled, exact, center, diagonal }
     }
 
     /// Batches of lanes that a row has.
@@ -103,29 +92,10 @@ impl Columns {
         (sum, DVec3::new(x, y, z))
     }
 
-    /// Changes a row of any numbers (`[n_batches]`) by as little as possible, in squares, so that it has this sum and puts its
-    /// point there (columns' units).
-    pub fn impose(&self, row: &mut [Row], sum: f64, point: DVec3) {
-        let (old_sum, old_point) = self.combined(row);
-        let off = self.gram_inverse * (point - old_point).extend(sum - old_sum);
-        // Of a flat cage, inside which nothing is.
-        if !off.is_finite() {
-            return;
-        }
-        let off = off.as_vec4();
-        let [x, y, z] = &self.scaled;
-        for ((((row, one), x), y), z) in row.iter_mut().zip(&self.ones).zip(x).zip(y).zip(z) {
-            let mut changed = *row;
-            for k in 0..LANES {
-                changed[k] += off.x * x[k] + off.y * y[k] + (off.z * z[k] + off.w * one[k]);
-            }
-            *row = changed;
-        }
-    }
-
-    /// Corrects a row so that it sums to 1 and reproduces `target` ([`Self::scale`]d).
+    /// Corrects a row so that it sums to 1 and reproduces `target` ([`Self::scale`]d). Returns what [`Self::sums`] said of it
+    /// before, to f32.
     #[inline(always)]
-    pub fn restore_affine(&self, row: &mut [Row], target: DVec3) {
+    pub fn restore_affine(&self, row: &mut [Row], target: DVec3) -> (f64, f64) {
         let t = target.as_vec3();
         let [x, y, z] = &self.scaled;
         // 1; x, y, z; xx, xy, xz, yy, yz, zz, each weighted and summed. In variables of their own, not in an array:
@@ -157,10 +127,11 @@ impl Columns {
             DVec4::new(m[2], m[5], m[7], m[8]),
             DVec4::new(m[3], m[6], m[8], m[9]),
         );
+        let before = (m[0], (DVec3::new(m[1], m[2], m[3]) + (m[0] - 1.0) * target).length());
         let ridge = RIDGE * (m[0] + m[4] + m[7] + m[9]);
         let lambda = (matrix + DMat4::from_diagonal(DVec4::splat(ridge))).inverse() * (DVec4::X - sums);
         if !lambda.is_finite() {
-            return;
+            return before;
         }
         let l = lambda.as_vec4();
         for (((w, x), y), z) in row.iter_mut().zip(x).zip(y).zip(z) {
@@ -172,6 +143,7 @@ impl Columns {
                 w[k] *= factor[k];
             }
         }
+        before
     }
 }
 

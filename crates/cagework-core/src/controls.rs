@@ -1,0 +1,132 @@
+//! Controls: what the columns of the weights are, and which values they have on the boundary.
+//!
+//! *Controls* are the columns: each has a rest position `c_j` and is moved by the user. The *surface* is the closed polygon
+//! mesh on which values are prescribed, where grid lines and rays end: vertices `s_k`. The *rows* are a matrix B,
+//! `[n_surface, n_controls]`, not negative, each row summing to 1: control j has the value `sum_k hat_k B_kj` at a point of
+//! the surface, where `hat_k` are the values of [`Cage::hats_at`]. Weights reproduce a place, `sum_j w_j c_j = x`, wherever
+//! `s_k = sum_j B_kj c_j`. For a plain cage the controls are the surface's vertices and B is the identity.
+
+use glam::Vec3;
+
+use crate::cage::Cage;
+use crate::weights::Weights;
+
+/// The controls of a bind.
+#[derive(Clone, Copy, Debug)]
+pub struct Controls<'a> {
+    rest: &'a [Vec3],
+    surface: &'a Cage,
+    /// None for the identity.
+    rows: Option<&'a Weights>,
+}
+
+impl<'a> From<&'a Cage> for Controls<'a> {
+    /// A plain cage: each of its vertices is a control.
+    fn from(cage: &'a Cage) -> Self {
+        Self { rest: cage.positions(), surface: cage, rows: None }
+    }
+}
+
+impl<'a> Controls<'a> {
+    /// Controls at `rest` (`[n_controls]`, object units) whose values on `surface` are mixed by `rows`,
+    /// `[n_surface, n_controls]`: not negative, each summing to 1.
+    ///
+    /// # Panics
+    /// If the matrix has another shape.
+    #[must_use]
+    pub fn new(rest: &'a [Vec3], surface: &'a Cage, rows: &'a Weights) -> Self {
+        assert_eq!(
+            (rows.n_rows(), rows.n_columns()),
+            (surface.n_vertices(), rest.len()),
+            "shape of the rows"
+        );
+        Self { rest, surface, rows: Some(rows) }
+    }
+
+    /// Number of controls: columns of the weights.
+    #[must_use]
+    pub fn n_controls(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// Rest positions. `[n_controls]`, object units.
+    #[must_use]
+    pub fn rest(&self) -> &'a [Vec3] {
+        self.rest
+    }
+
+    /// The surface on which values are prescribed.
+    #[must_use]
+    pub fn surface(&self) -> &'a Cage {
+        self.surface
+    }
+
+    /// Dirichlet values at a point of the surface, given by one of its triangles and barycentric coordinates in it. Calls
+    /// `each(control, value)` for values that are not zero, a control perhaps several times: they add up. They sum to 1.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    #[inline]
+    pub fn values_at(&self, triangle: u32, barycentric: [f64; 3], each: &mut dyn FnMut(u32, f64)) {
+        let Some(rows) = self.rows else { return self.surface.hats_at(triangle, barycentric, each) };
+        self.surface.hats_at(triangle, barycentric, &mut |vertex, hat| {
+            let (controls, shares) = rows.row(vertex as usize);
+            for (&control, &share) in controls.iter().zip(shares) {
+                each(control, hat * f64::from(share));
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bind::bind;
+    use crate::cage_gen::subdivided_box;
+    use crate::mesh::Bounds;
+    use crate::options::BindOptions;
+    use crate::progress::Silent;
+
+    /// f32 rounding of weights and of what the solver leaves.
+    const ROUNDED: f32 = 2e-5;
+
+    /// Trilinear coordinates of a point in the unit cube: 8 corners, x fastest.
+    fn trilinear(p: Vec3) -> [f32; 8] {
+        std::array::from_fn(|corner| {
+            (0..3).map(|a| if corner >> a & 1 == 1 { p[a] } else { 1.0 - p[a] }).product()
+        })
+    }
+
+    /// A box cut into 27 boxes whose surface takes the values of the box's eight corners, by rows of B: the harmonic function
+    /// with these values is the trilinear one, whose values on the small quads are bilinear as their hats are.
+    #[test]
+    fn rows_mix_the_values_of_the_surface() {
+        let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+        let surface = Cage::new(&subdivided_box(bounds, 0.0, [3, 3, 3])).unwrap();
+        let rest: Vec<Vec3> =
+            (0..8).map(|c| Vec3::new((c & 1) as f32, (c >> 1 & 1) as f32, (c >> 2) as f32)).collect();
+        let n = surface.n_vertices() as u32;
+        let indptr = (0..=n).map(|row| 8 * row).collect();
+        let data = surface.positions().iter().flat_map(|&p| trilinear(p)).collect();
+        let rows = Weights::new(8, indptr, (0..n).flat_map(|_| 0..8).collect(), data).unwrap();
+        let controls = Controls::new(&rest, &surface, &rows);
+
+        let points: Vec<Vec3> = (1..60)
+            .map(|k| {
+                let k = k as f32;
+                Vec3::new(0.5 + 0.45 * k.sin(), 0.5 + 0.45 * (2.0 * k).cos(), k / 60.0)
+            })
+            .collect();
+        let options = BindOptions { grid: 16, tau: 1e-7, ..BindOptions::default() };
+        let binding = bind(&points, controls, &options, &Silent).unwrap();
+        assert_eq!(binding.weights.n_columns(), 8);
+        assert!(binding.report.raw_error.point_rel.max < f64::from(ROUNDED));
+        for (v, p) in points.iter().enumerate() {
+            let (columns, weights) = binding.weights.row(v);
+            for (c, expected) in trilinear(*p).into_iter().enumerate() {
+                let w = columns.iter().position(|&k| k as usize == c).map_or(0.0, |k| weights[k]);
+                assert!((w - expected).abs() < ROUNDED, "vertex {v}, control {c}: {w}, not {expected}");
+            }
+        }
+    }
+}

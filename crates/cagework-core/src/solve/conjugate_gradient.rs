@@ -1,0 +1,236 @@
+//! Conjugate gradients on one batch of columns, preconditioned by nothing or by one V-cycle.
+//!
+//! Each lane is a system of its own, with its own step lengths; a batch ends when all of it is done. The direction is updated
+//! by Polak and Ribiere's formula, which allows a preconditioner that is not symmetric, as a V(2,1) cycle is.
+//!
+//! Delta is the error that is expected to remain: changes of the solution fall geometrically but for a ripple, so that what is
+//! left is the latest change times `rate / (1 - rate)`, with the rate of the last [`WINDOW`] steps.
+//!
+//! Sources: Hestenes, Stiefel 1952; Notay 2000, "Flexible conjugate gradients".
+
+use super::BatchSolver;
+use super::hierarchy::Hierarchy;
+use super::multigrid::Workspace;
+use super::operator;
+use super::rows::{LANES, Row, ZERO};
+use super::stop::{SolveReport, StopRule};
+use crate::simd::dispatch;
+
+/// Most steps over which the rate of convergence is measured: longer than the ripple of the changes, 5 to 8 steps.
+const WINDOW: usize = 10;
+
+/// Largest rate that is believed: a solve of a thousand steps.
+const SLOWEST: f64 = 0.99;
+
+/// Rows whose products are summed in f32 before they are added in f64.
+const ROWS_PER_SUM: usize = 1024;
+
+/// A sum for each lane.
+type Lanes = [f64; LANES];
+
+/// Fields of one batch on the finest level. `[n_rows]` each
+#[derive(Debug)]
+pub struct ConjugateGradient {
+    u: Vec<Row>,
+    residual: Vec<Row>,
+    /// The residual, preconditioned.
+    z: Vec<Row>,
+    direction: Vec<Row>,
+    /// The operator times the direction.
+    image: Vec<Row>,
+    cut_rhs: Vec<Row>,
+    multigrid: Option<Workspace>,
+}
+
+impl ConjugateGradient {
+    /// Fields for the finest level, and those of a V-cycle if it preconditions.
+    #[must_use]
+    pub fn new(hierarchy: &Hierarchy, is_preconditioned: bool) -> Self {
+        let field = || vec![ZERO; hierarchy.levels[0].n_rows()];
+        Self {
+            u: field(),
+            residual: field(),
+            z: field(),
+            direction: field(),
+            image: field(),
+            cut_rhs: Vec::new(),
+            multigrid: is_preconditioned.then(|| Workspace::new(hierarchy)),
+        }
+    }
+
+    fn precondition(&mut self, hierarchy: &Hierarchy) {
+        match &mut self.multigrid {
+            None => self.z.copy_from_slice(&self.residual),
+            Some(workspace) => workspace.precondition(hierarchy, &mut self.residual, &mut self.z),
+        }
+    }
+}
+
+impl BatchSolver for ConjugateGradient {
+    fn solve(
+        &mut self,
+        hierarchy: &Hierarchy,
+        batch: usize,
+        rule: StopRule,
+        done: &mut dyn FnMut(u32, f64) -> bool,
+    ) -> Option<SolveReport> {
+        let level = &hierarchy.levels[0];
+        let n_unknowns = level.n_unknowns().max(1) as f64;
+        hierarchy.fill_cut_rhs(batch, &mut self.cut_rhs);
+        self.u.fill(ZERO);
+        self.residual.fill(ZERO);
+        for (number, row) in self.cut_rhs.iter().enumerate() {
+            self.residual[level.row_of_cut(number)] = *row;
+        }
+        self.precondition(hierarchy);
+        self.direction.copy_from_slice(&self.z);
+        let mut descent = products(&self.residual, &self.z);
+        let mut squares = products(&self.residual, &self.residual);
+        let (mut report, mut changes) = (SolveReport::default(), Vec::new());
+        loop {
+            operator::apply(level, &self.direction, &mut self.image);
+            let curvature = products(&self.direction, &self.image);
+            let step = quotients(&descent, &curvature);
+            add(&mut self.u, &step, &self.direction);
+            add(&mut self.residual, &step.map(|s| -s), &self.image);
+
+            let lengths = products(&self.direction, &self.direction);
+            let change: f64 = step.iter().zip(&lengths).map(|(s, length)| s * s * length).sum();
+            changes.push(change / n_unknowns);
+            let residual = (squares.iter().sum::<f64>() / n_unknowns).sqrt();
+            let is_last = report.iteration_done(&rule, expected_error(&changes), Some(residual));
+            let (iteration, delta) = report.latest();
+            if !done(iteration, delta) {
+                return None;
+            }
+            if is_last {
+                return Some(report);
+            }
+
+            self.precondition(hierarchy);
+            squares = products(&self.residual, &self.residual);
+            let [before, overlap] = [descent, products(&self.z, &self.image)];
+            descent = products(&self.residual, &self.z);
+            // z . (r - r_before), where r - r_before = -step image.
+            let conjugate: Lanes = std::array::from_fn(|k| -step[k] * overlap[k]);
+            let share = quotients(&conjugate, &before);
+            scale(&mut self.direction, &share);
+            add(&mut self.direction, &[1.0; LANES], &self.z);
+        }
+    }
+
+    fn field(&self) -> &[Row] {
+        &self.u
+    }
+
+    fn bytes(&self) -> usize {
+        let rows = 5 * self.u.len() + self.cut_rhs.len();
+        rows * size_of::<Row>() + self.multigrid.as_ref().map_or(0, BatchSolver::bytes)
+    }
+}
+
+/// The error that is expected after changes with these mean squares.
+fn expected_error(squares: &[f64]) -> f64 {
+    let n = squares.len();
+    let window = (n / 2).min(WINDOW);
+    let latest = squares[n - 1].sqrt();
+    if window == 0 {
+        return latest * SLOWEST / (1.0 - SLOWEST);
+    }
+    let sum = |part: &[f64]| part.iter().sum::<f64>();
+    let (now, before) = (sum(&squares[n - window..]), sum(&squares[n - 2 * window..n - window]));
+    if now == 0.0 {
+        return 0.0;
+    }
+    let rate = (now / before).powf(0.5 / window as f64).min(SLOWEST);
+    // As the window lets expect, where one change may lie below the others by the ripple.
+    let usual = (now / window as f64).sqrt() * rate.powf(0.5 * (window - 1) as f64);
+    usual.max(latest) * rate / (1.0 - rate)
+}
+
+/// `a . b` of each lane.
+fn products(a: &[Row], b: &[Row]) -> Lanes {
+    dispatch(
+        #[inline(always)]
+        || {
+            let mut sums = [0.0; LANES];
+            for (a, b) in a.chunks(ROWS_PER_SUM).zip(b.chunks(ROWS_PER_SUM)) {
+                let mut part = ZERO;
+                for (a, b) in a.iter().zip(b) {
+                    for k in 0..LANES {
+                        part[k] += a[k] * b[k];
+                    }
+                }
+                for k in 0..LANES {
+                    sums[k] += f64::from(part[k]);
+                }
+            }
+            sums
+        },
+    )
+}
+
+/// `a / b`; 0 for a lane that is done, whose products are all 0.
+fn quotients(a: &Lanes, b: &Lanes) -> Lanes {
+    std::array::from_fn(|k| if b[k] > 0.0 { a[k] / b[k] } else { 0.0 })
+}
+
+/// `u += factor v`
+fn add(u: &mut [Row], factor: &Lanes, v: &[Row]) {
+    let factor = factor.map(|f| f as f32);
+    dispatch(
+        #[inline(always)]
+        || {
+            for (u, v) in u.iter_mut().zip(v) {
+                for k in 0..LANES {
+                    u[k] += factor[k] * v[k];
+                }
+            }
+        },
+    );
+}
+
+/// `u *= factor`
+fn scale(u: &mut [Row], factor: &Lanes) {
+    let factor = factor.map(|f| f as f32);
+    for row in u {
+        for k in 0..LANES {
+            row[k] *= factor[k];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::levels::plain::hierarchy;
+
+    /// Changes that fall by 0.8 a step leave four times the latest: 0.8 + 0.64 + ... = 0.8 / (1 - 0.8).
+    #[test]
+    fn geometric_changes_leave_their_sum() {
+        let squares: Vec<f64> = (0..40).map(|k| 0.8f64.powi(2 * k)).collect();
+        let (left, latest) = (expected_error(&squares), 0.8f64.powi(39));
+        assert!(left >= 3.9 * latest && left < 6.0 * latest, "{left} after {latest}");
+    }
+
+    /// Preconditioned or not, it ends where multigrid does, in fewer steps with the V-cycle.
+    #[test]
+    fn solution_is_multigrids() {
+        let hierarchy = hierarchy();
+        let rule = StopRule { tolerance: 1e-6, max_iterations: 500 };
+        let mut multigrid = Workspace::new(&hierarchy);
+        BatchSolver::solve(&mut multigrid, &hierarchy, 0, rule, &mut |_, _| true).unwrap();
+        let mut n_steps = Vec::new();
+        for is_preconditioned in [false, true] {
+            let mut solver = ConjugateGradient::new(&hierarchy, is_preconditioned);
+            let report = solver.solve(&hierarchy, 0, rule, &mut |_, _| true).unwrap();
+            assert!(report.converged);
+            n_steps.push(report.deltas.len());
+            let pairs = solver.field().as_flattened().iter().zip(multigrid.field().as_flattened());
+            let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            // Ten times the tolerance in the worst cell.
+            assert!(apart < 1e-5, "{apart}, preconditioned: {is_preconditioned}");
+        }
+        assert!(n_steps[1] * 2 < n_steps[0], "{n_steps:?}");
+    }
+}

@@ -1,0 +1,33 @@
+//! The discrete Laplace operator of a level: all that a solver needs to know of the cage.
+//!
+//! For the unknown of cell c with arms of weight a: `(A u)_c = (sum a) u_c - sum over whole arms of u_neighbour`, symmetric and
+//! positive definite for both methods; arms that end on the cage are in the right-hand side. Source: Gibou et al. 2002.
+
+use super::rows::{Rhs, Row, ZERO, residual_plane};
+use crate::levels::Level;
+use crate::simd::dispatch;
+
+/// `out = A u`. `u`, `out`: `[n_rows]`, the zero rows of `u` hold zeros.
+pub fn apply(level: &Level, u: &[Row], out: &mut [Row]) {
+    residual(level, u, Rhs::Zero, out);
+    for row in out {
+        *row = row.map(|r| -r);
+    }
+}
+
+/// `out = f - A u`. `u`, `out`: `[n_rows]`, the zero rows of `u` hold zeros. Returns the sum of its squares for each lane.
+pub fn residual(level: &Level, u: &[Row], f: Rhs<'_>, out: &mut [Row]) -> Row {
+    dispatch(
+        #[inline(always)]
+        || {
+            let mut squares = ZERO;
+            for plane in 0..level.grid.dims[2] as usize {
+                for colour in 0..2 {
+                    let out = &mut out[level.first_row(colour)..];
+                    residual_plane(level, colour, plane, u, f, out, &mut squares);
+                }
+            }
+            squares
+        },
+    )
+}
