@@ -3,61 +3,32 @@
 use cagework_core::BindOptions;
 use cagework_core::cage_gen::{CageOptions, Shape, Symmetry};
 use cagework_core::edit::{Element, GestureKind, SelectMode};
-use cagework_core::options::{CellShape, DeltaNorm, Method, OutsidePolicy, Solver};
+use cagework_core::options::{Backend, Solver};
 use cagework_gpu::render::Theme;
 use serde::Deserialize;
 
 use crate::error::{Answer, Fault};
 
-/// `BindOptions`.
+/// `BindOptions`: those of the core, and where to compute.
 #[derive(Clone, Copy, Deserialize)]
 pub(crate) struct BindAsked {
-    grid: u32,
-    method: Method,
-    solver: Solver,
-    pub(crate) backend: Backend,
-    cell_shape: CellShape,
-    delta_norm: DeltaNorm,
-    tau: f32,
-    max_iterations: u32,
-    sparsify: f32,
-    outside: Outside,
-    memory_limit: f64,
-}
-
-/// What computes.
-#[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Backend {
-    Gpu,
-    Cpu,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum Outside {
-    ClosestPoint,
-    Refuse,
+    backend: Backend,
+    #[serde(flatten)]
+    options: BindOptions,
 }
 
 impl From<BindAsked> for BindOptions {
     fn from(asked: BindAsked) -> Self {
-        Self {
-            grid: asked.grid,
-            method: asked.method,
-            solver: asked.solver,
-            cell_shape: asked.cell_shape,
-            delta_norm: asked.delta_norm,
-            threads: 1,
-            tau: asked.tau,
-            max_iterations: asked.max_iterations,
-            sparsify: asked.sparsify,
-            memory_limit: asked.memory_limit.max(0.0) as u64,
-            outside: match asked.outside {
-                Outside::ClosestPoint => OutsidePolicy::ClosestPoint,
-                Outside::Refuse => OutsidePolicy::Refuse,
-            },
-        }
+        asked.options
+    }
+}
+
+impl BindAsked {
+    /// Whether the processor computes: it was asked to, there is no WebGPU, or the solver runs nowhere else.
+    pub(crate) fn is_on_cpu(&self) -> bool {
+        self.backend == Backend::Cpu
+            || self.options.solver == Solver::ConjugateGradient
+            || !cfg!(feature = "webgpu")
     }
 }
 

@@ -118,7 +118,7 @@ pub(crate) fn with_prepared<T>(
     use_it: impl FnOnce(&Prepared<'_>) -> T,
 ) -> T {
     let watch = Watch::new(&Silent);
-    let prepared =
-        Prepared::new(positions, cage.into(), options, FieldsOn::Device, &watch).expect("the tests' input is good");
+    let prepared = Prepared::new(positions, cage.into(), options, FieldsOn::Device, &watch)
+        .expect("the tests' input is good");
     use_it(&prepared)
 }

@@ -1,6 +1,7 @@
 //! The cage: made, read, edited at rest, posed.
 
-use cagework_core::{BindOptions, Cage, PolygonMesh, subdivided_box};
+use cagework_core::bind::estimate_memory;
+use cagework_core::{Cage, PolygonMesh, subdivided_box};
 use cagework_io::{Model, decode_pose, encode_pose};
 use js_sys::{Function, Uint8Array};
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -136,7 +137,7 @@ impl Engine {
         let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
         let bytes = self.read(|state| {
             let (model, cage) = state.parts()?;
-            Answer::Ok(BindOptions::from(asked).estimate_memory(cage, model.positions.len())?)
+            Answer::Ok(estimate_memory(cage, model.positions.len(), &asked.into())?)
         })?;
         Ok(bytes as f64)
     }
