@@ -1,6 +1,8 @@
-//! The dependency arrows of ARCHITECTURE.md, checked against `cargo tree`.
+//! The dependency arrows of ARCHITECTURE.md, checked against `cargo tree`, and the modules of each crate against circles.
 //!
 //! A crate is a wall that a dependency must not pass, so each crate has a row here, and a crate without one is an error.
+
+mod modules;
 
 use std::collections::BTreeSet;
 
@@ -50,7 +52,7 @@ const RULES: &[Rule] = &[
 /// Checks every crate of the workspace with all its features, natively and for the browser.
 ///
 /// # Errors
-/// Names the first arrow that should not be there.
+/// Names the first arrow that should not be there, or shows the first circle.
 pub(crate) fn check() -> Result<(), String> {
     let members = tree(&["--workspace", "--depth", "0"])?;
     if let Some(stranger) = members.iter().find(|m| RULES.iter().all(|r| r.name != **m)) {
@@ -70,7 +72,7 @@ pub(crate) fn check() -> Result<(), String> {
         }
     }
     println!("arrows: {} crates depend on nothing that they must not", RULES.len());
-    Ok(())
+    modules::check()
 }
 
 /// Names of the packages in a dependency tree; development dependencies do not count.

@@ -1,0 +1,113 @@
+//! Import circles: top-level modules of a crate that use each other.
+//!
+//! Sources are read as tokens, so that paths inside macros count and words in comments do not. An edge is a path through
+//! `crate`, `super` or `self` that ends in another module; a name of the crate's root counts as the module that it is
+//! re-exported from. What only tests compile (`#[cfg(test)]`) does not count.
+
+mod read;
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeMap, VecDeque};
+use std::path::{Path, PathBuf};
+
+use crate::command::root;
+use read::Crate;
+
+/// Who uses whom, and the first line that says so (`file:line`).
+type Edges = BTreeMap<(String, String), String>;
+
+/// Checks every crate, the tests and the benches.
+///
+/// # Errors
+/// Shows one circle of the first crate that has any.
+pub(super) fn check() -> Result<(), String> {
+    let roots = crate_roots()?;
+    for (path, with_tests) in &roots {
+        let edges = edges(&Crate::read(path, *with_tests)?);
+        if let Some(circle) = shortest_circle(&edges) {
+            return Err(show(path, &circle, &edges));
+        }
+    }
+    println!("arrows: no circle between the modules of {} crates", roots.len());
+    Ok(())
+}
+
+/// Root files of all crates, and whether their tests count: `lib.rs` and `main.rs` of `crates/*/src` without, every target
+/// of the packages of tests and benches with.
+fn crate_roots() -> Result<Vec<(PathBuf, bool)>, String> {
+    let mut roots = Vec::new();
+    for folder in files_in(&root().join("crates"))? {
+        roots.extend(["src/lib.rs", "src/main.rs"].map(|file| (folder.join(file), false)));
+    }
+    for package in ["tests", "benches"] {
+        for path in files_in(&root().join(package))? {
+            roots.extend(["lib.rs", "main.rs"].map(|file| (path.join(file), true)));
+            roots.push((path, true));
+        }
+    }
+    roots.retain(|(path, _)| path.is_file() && path.extension().is_some_and(|e| e == "rs"));
+    Ok(roots)
+}
+
+/// What a folder holds, in the order of names.
+fn files_in(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let cannot = |e| format!("cannot read {}: {e}", folder.display());
+    let entries = std::fs::read_dir(folder).map_err(cannot)?;
+    let mut paths = entries.map(|e| e.map(|e| e.path())).collect::<Result<Vec<_>, _>>().map_err(cannot)?;
+    paths.sort();
+    Ok(paths)
+}
+
+/// Edges between the top-level modules of a crate; its root is one of them where it defines what others use.
+fn edges(source: &Crate) -> Edges {
+    let mut edges = Edges::new();
+    for path in &source.paths {
+        let Some(to) = source.module_of(&path.segments) else { continue };
+        if to != path.from {
+            edges.entry((path.from.clone(), to)).or_insert_with(|| path.place.clone());
+        }
+    }
+    edges
+}
+
+/// The circle with the fewest modules, its first module again at its end.
+fn shortest_circle(edges: &Edges) -> Option<Vec<String>> {
+    let circles = edges.keys().filter_map(|(from, to)| {
+        let mut way = way(edges, to, from)?;
+        way.insert(0, from.clone());
+        Some(way)
+    });
+    circles.min_by_key(Vec::len)
+}
+
+/// Shortest way along edges, both ends included: breadth first.
+fn way(edges: &Edges, from: &str, to: &str) -> Option<Vec<String>> {
+    let mut before = BTreeMap::from([(from, None)]);
+    let mut queue = VecDeque::from([from]);
+    while let Some(module) = queue.pop_front() {
+        if module == to {
+            let mut way: Vec<String> =
+                std::iter::successors(Some(module), |m| before[m]).map(str::to_owned).collect();
+            way.reverse();
+            return Some(way);
+        }
+        for (_, next) in edges.keys().filter(|(a, _)| a == module) {
+            if !before.contains_key(next.as_str()) {
+                before.insert(next, Some(module));
+                queue.push_back(next);
+            }
+        }
+    }
+    None
+}
+
+fn show(path: &Path, circle: &[String], edges: &Edges) -> String {
+    let file = path.strip_prefix(root()).unwrap_or(path);
+    let mut text = format!("modules of {} import each other: {}", file.display(), circle.join(" -> "));
+    for pair in circle.windows(2) {
+        let place = &edges[&(pair[0].clone(), pair[1].clone())];
+        text += &format!("\n  {place}: {} uses {}", pair[0], pair[1]);
+    }
+    text
+}
