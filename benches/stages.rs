@@ -5,9 +5,9 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use cagework_benches::{GRIDS, Input, resident_workspaces, solve_all, solve_batch};
+use cagework_core::assemble::{RowOptions, assemble};
 use cagework_core::solve::multigrid::Workspace;
 use cagework_core::team::Team;
-use cagework_core::weights::assemble::{RowOptions, assemble};
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 
 fn stages(criterion: &mut Criterion) {
@@ -86,7 +86,14 @@ fn sample(criterion: &mut Criterion, input: &Input, grid: u32) {
             || blocks.clone(),
             |mut blocks| {
                 let is_outside = |v: usize| stencils.is_outside(v);
-                black_box(assemble(&input.cage, &mut blocks, &input.points, options, is_outside, &team))
+                black_box(assemble(
+                    (&input.cage).into(),
+                    &mut blocks,
+                    &input.points,
+                    options,
+                    is_outside,
+                    &team,
+                ))
             },
             BatchSize::LargeInput,
         );

@@ -9,7 +9,7 @@ mod suite;
 
 use std::sync::OnceLock;
 
-use cagework_core::options::{BindOptions, Method, Solver};
+use cagework_core::options::{BindOptions, Method, Preconditioner, Solver};
 use cagework_core::{BindError, Binding, Cage, Progress};
 use cagework_gpu::{ContextOptions, GpuContext, GpuError, PlanError, bind_on};
 use glam::Vec3;
@@ -132,6 +132,31 @@ solver_suite!(classic_jacobi_all_threads, every, cpu(Method::Classic, Solver::Ja
 solver_suite!(embedded_cg, embedded, cpu(Method::Embedded, Solver::ConjugateGradient, 0));
 solver_suite!(classic_cg, every, cpu(Method::Classic, Solver::ConjugateGradient, 0));
 
+/// Preconditioned by a V-cycle.
+fn preconditioned_cg(method: Method) -> BackEnd {
+    let mut back_end = cpu(method, Solver::ConjugateGradient, 0);
+    back_end.options.preconditioner = Preconditioner::VCycle;
+    back_end
+}
+
+/// Solvers whose tau bounds the error, not the latest change.
+mod error_bounds {
+    use super::*;
+
+    #[test]
+    fn multigrid_leaves_less_than_tau_lets_expect() {
+        let multigrid = cpu(Method::Embedded, Solver::Multigrid, 0);
+        suite::raw::tau_bounds_what_the_solver_leaves(&multigrid, &[32, 64, 128]);
+    }
+
+    #[test]
+    fn conjugate_gradients_leave_less_than_tau_lets_expect() {
+        let cg = cpu(Method::Embedded, Solver::ConjugateGradient, 0);
+        suite::raw::tau_bounds_what_the_solver_leaves(&cg, &[32, 64]);
+        suite::raw::tau_bounds_what_the_solver_leaves(&preconditioned_cg(Method::Embedded), &[32, 64]);
+    }
+}
+
 /// Multigrid only: what a V-cycle promises.
 mod multigrid {
     use super::*;
@@ -155,6 +180,15 @@ mod agreement {
         for method in METHODS {
             let [jacobi, multigrid] = [Solver::Jacobi, Solver::Multigrid].map(|s| cpu(method, s, 0));
             suite::agreement::solvers_agree(&jacobi, &multigrid);
+        }
+    }
+
+    #[test]
+    fn conjugate_gradients_and_multigrid_agree() {
+        for method in METHODS {
+            let multigrid = cpu(method, Solver::Multigrid, 0);
+            suite::agreement::solvers_agree(&cpu(method, Solver::ConjugateGradient, 0), &multigrid);
+            suite::agreement::solvers_agree(&preconditioned_cg(method), &multigrid);
         }
     }
 

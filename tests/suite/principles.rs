@@ -44,6 +44,9 @@ pub(crate) fn weights_are_not_negative(back_end: &BackEnd) {
         let min = dense(&binding.weights).into_iter().fold(f32::INFINITY, f32::min);
         assert!(min >= NOT_NEGATIVE, "smallest weight {min}");
         assert!(binding.report.weights.min >= NOT_NEGATIVE);
+        // Stored weights were clipped at 0: what was solved and sampled must not have needed it.
+        let sampled = binding.report.raw_error.min_weight;
+        assert!(sampled >= NOT_NEGATIVE, "smallest weight {sampled} before clipping");
         assert!(binding.weights.data().iter().all(|w| w.is_finite()));
     }
 }
@@ -69,6 +72,9 @@ pub(crate) fn points_are_reproduced(back_end: &BackEnd) {
         assert_eq!(binding.outside, []);
         assert_combined(&binding.weights, cage.positions(), &points, REPRODUCED * diagonal);
         assert!(binding.report.rest_error.max_rel <= REPRODUCED);
+        // Rows were restored: operator, solver and sampling must have come as near without.
+        let raw = binding.report.raw_error;
+        assert!(raw.sum.max <= f64::from(SOLVED) && raw.point_rel.max <= f64::from(SOLVED), "{raw:?}");
     }
 }
 

@@ -265,6 +265,20 @@ where
     StringValueParser::new().try_map(move |text| option.parse::<T>(&text))
 }
 
+fn positive(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("not a positive number".into()),
+    }
+}
+
+fn fraction(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if (0.0..1.0).contains(&value) => Ok(value),
+        _ => Err("not a number from 0 to below 1".into()),
+    }
+}
+
 fn model_output(text: &str) -> Result<PathBuf, String> {
     output(text, &["glb", "obj"])
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use cagework_core::BindReport;
-use cagework_core::options::{CellShape, Method, Solver};
+use cagework_core::options::{CellShape, Method, Preconditioner, Solver};
 
 /// Lines on one bind. `model_notices`: what reading the mesh had to say; `written`: files that were written.
 pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathBuf]) -> String {
@@ -14,7 +14,7 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
     };
     let threads = if report.threads == 1 { "1 thread".into() } else { format!("{} threads", report.threads) };
     let place = report.adapter.clone().unwrap_or(threads);
-    row("method", format!("{}, {}, {} ({place})", method(report), solver(report.solver), report.backend));
+    row("method", format!("{}, {}, {} ({place})", method(report), solver(report), report.backend));
     let [x, y, z] = report.dims;
     row("grid", format!("{} ({x} x {y} x {z} cells)", report.grid));
     let cells = report.cells;
@@ -96,10 +96,12 @@ fn method(report: &BindReport) -> &'static str {
     }
 }
 
-fn solver(solver: Solver) -> &'static str {
-    match solver {
-        Solver::Jacobi => "Jacobi",
-        Solver::Multigrid => "multigrid",
+fn solver(report: &BindReport) -> &'static str {
+    match (report.solver, report.preconditioner) {
+        (Solver::Jacobi, _) => "Jacobi",
+        (Solver::Multigrid, _) => "multigrid",
+        (Solver::ConjugateGradient, Preconditioner::None) => "conjugate gradients",
+        (Solver::ConjugateGradient, Preconditioner::VCycle) => "conjugate gradients with V-cycles",
     }
 }
 

@@ -1,6 +1,5 @@
 //! Every option of a bind: its name, its words, its range and its default. Command, page and packages spell nothing again.
 
-use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
@@ -21,27 +20,28 @@ pub trait Choice: Copy + 'static {
 macro_rules! choice {
     ($(#[$about:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $word:literal,)+ }) => {
         $(#[$about])*
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
         pub enum $name {
             $($(#[$doc])* #[serde(rename = $word)] $variant,)+
         }
-        impl Choice for $name {
+        impl $crate::options::Choice for $name {
             const ALL: &'static [(&'static str, Self)] = &[$(($word, Self::$variant),)+];
         }
-        impl FromStr for $name {
-            type Err = UnknownWord;
-            fn from_str(text: &str) -> Result<Self, UnknownWord> {
-                choose(text)
+        impl std::str::FromStr for $name {
+            type Err = $crate::options::UnknownWord;
+            fn from_str(text: &str) -> Result<Self, Self::Err> {
+                $crate::options::choose(text)
             }
         }
-        impl fmt::Display for $name {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
                 let word = match self { $(Self::$variant => $word,)+ };
                 f.write_str(&word.replace('_', "-"))
             }
         }
     };
 }
+pub(crate) use choice;
 
 choice! {
     /// How the cage meets the grid.
@@ -136,7 +136,7 @@ pub struct UnknownWord {
 ///
 /// # Errors
 /// [`UnknownWord`] names those there are.
-fn choose<T: Choice>(text: &str) -> Result<T, UnknownWord> {
+pub(crate) fn choose<T: Choice>(text: &str) -> Result<T, UnknownWord> {
     let word = text.replace('-', "_");
     let found = T::ALL.iter().find(|(known, _)| *known == word).map(|(_, value)| *value);
     found.ok_or_else(|| UnknownWord {

@@ -40,8 +40,8 @@ pub(crate) struct CageArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(i64::from(MIN_TARGET)..=i64::from(MAX_TARGET)))]
     pub(crate) vertices: Option<u32>,
     /// Make the cage its own mirror image: if the model is (auto), never, or along an axis in any case.
-    #[arg(long, value_enum, default_value_t = SymmetryArg::Auto)]
-    pub(crate) symmetry: SymmetryArg,
+    #[arg(long, default_value_t, value_parser = super::words::<Symmetry>())]
+    pub(crate) symmetry: Symmetry,
     /// One closed part for each separate part of the model, instead of bridges between them.
     #[arg(long)]
     pub(crate) per_component: bool,
@@ -72,7 +72,7 @@ impl CageArgs {
         CageOptions {
             target: self.vertices.unwrap_or(if hull { DEFAULT_HULL } else { DEFAULT_TARGET }),
             shape: if hull { Shape::Hull } else { Shape::Follow },
-            symmetry: self.symmetry.into(),
+            symmetry: self.symmetry,
             per_component: self.per_component,
             clearance: self.clearance,
             voxels: self.voxels,
@@ -95,7 +95,7 @@ pub(crate) struct CheckArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) mesh: Option<PathBuf>,
     /// Look for parts thinner than a cell of a grid with so many cells, 8 to 512.
-    #[arg(short, long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(8..=512))]
+    #[arg(short, long, default_value_t = 64, value_parser = super::number::<u32>(cagework_core::options::GRID))]
     pub(crate) grid: u32,
     /// Mend it first; several, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT", requires = "output")]
@@ -143,28 +143,6 @@ pub(crate) enum KindArg {
     Auto,
     Box,
     Hull,
-}
-
-/// Mirrors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum SymmetryArg {
-    Auto,
-    None,
-    X,
-    Y,
-    Z,
-}
-
-impl From<SymmetryArg> for Symmetry {
-    fn from(arg: SymmetryArg) -> Self {
-        match arg {
-            SymmetryArg::Auto => Self::Auto,
-            SymmetryArg::None => Self::None,
-            SymmetryArg::X => Self::X,
-            SymmetryArg::Y => Self::Y,
-            SymmetryArg::Z => Self::Z,
-        }
-    }
 }
 
 /// Repairs.

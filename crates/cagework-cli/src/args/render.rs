@@ -76,7 +76,7 @@ pub(crate) struct RenderArgs {
     #[arg(short, long, value_name = "FILE", value_parser = png_output)]
     pub(crate) output: PathBuf,
     /// Cells along the longest side of the cage, 8 to 512.
-    #[arg(short, long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(8..=512))]
+    #[arg(short, long, default_value_t = 64, value_parser = super::number::<u32>(cagework_core::options::GRID))]
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) solve: SolveArgs,

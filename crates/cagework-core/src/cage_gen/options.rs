@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::cage::{Cage, MAX_DIAGONAL};
+use crate::options::choice;
 use crate::progress::Cancelled;
 
 /// Fewest vertices that can be asked for.
@@ -17,32 +18,32 @@ pub(super) const MAX_VOXELS: usize = 128;
 /// Largest clearance, as a fraction of the model's diagonal.
 const MAX_CLEARANCE: f32 = 0.25;
 
-/// What the cage follows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Shape {
-    /// The model, limb by limb.
-    #[default]
-    Follow,
-    /// The model's convex hull, roughly (26 planes): the simplest cage that is not a box.
-    Hull,
+choice! {
+    /// What the cage follows.
+    Shape {
+        /// The model, limb by limb.
+        #[default]
+        Follow = "follow",
+        /// The model's convex hull, roughly (26 planes): the simplest cage that is not a box.
+        Hull = "hull",
+    }
 }
 
-/// Whether the cage is its own image in a mirror through the middle of the model's box.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Symmetry {
-    /// If the model is, to within a voxel.
-    #[default]
-    Auto,
-    /// No.
-    None,
-    /// Yes, x is turned round.
-    X,
-    /// Yes, y is turned round.
-    Y,
-    /// Yes, z is turned round.
-    Z,
+choice! {
+    /// Whether the cage is its own image in a mirror through the middle of the model's box.
+    Symmetry {
+        /// If the model is, to within a voxel.
+        #[default]
+        Auto = "auto",
+        /// No.
+        None = "none",
+        /// Yes, x is turned round.
+        X = "x",
+        /// Yes, y is turned round.
+        Y = "y",
+        /// Yes, z is turned round.
+        Z = "z",
+    }
 }
 
 /// The axis that a mirror turns round.
