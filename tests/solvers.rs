@@ -144,6 +144,24 @@ mod multigrid {
     }
 }
 
+/// Multigrid on every back end; Jacobi, which takes six seconds at g = 64, is held to it by [`agreement`].
+mod accuracy {
+    use super::*;
+
+    #[test]
+    fn armadillo_is_exact_at_64() {
+        let [one, all] = [1, 0].map(|threads| cpu(Method::Embedded, Solver::Multigrid, threads));
+        for back_end in [one, all, gpu(Method::Embedded, Solver::Multigrid)] {
+            suite::reference::armadillo_is_exact_at_64(&back_end);
+        }
+    }
+
+    #[test]
+    fn armadillo_is_exact_at_128() {
+        suite::reference::armadillo_is_exact_at_128(&cpu(Method::Embedded, Solver::Multigrid, 0));
+    }
+}
+
 /// Two back ends that solve the same equations give the same weights.
 mod agreement {
     use super::*;

@@ -6,6 +6,7 @@ pub(crate) mod exact;
 pub(crate) mod outside;
 pub(crate) mod principles;
 pub(crate) mod progress;
+pub(crate) mod reference;
 pub(crate) mod rows;
 pub(crate) mod shapes;
 
