@@ -28,7 +28,7 @@ pub(crate) fn options_out_of_range_are_named(back_end: &BackEnd) {
     ];
     for (name, edit) in refused {
         let error = back_end.try_bind(&points, &cage, edit).expect_err(name);
-        assert!(matches!(error, BindError::Option { option, .. } if option == name), "{error:?}");
+        assert!(matches!(&error, BindError::Option(e) if e.option == name), "{error:?}");
         assert!(error.to_string().starts_with(&format!("{name} is ")), "{error}");
     }
 }

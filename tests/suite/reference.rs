@@ -3,7 +3,7 @@
 //! Source of the numbers: `tests/data/README.md`.
 
 use cagework_core::PolygonMesh;
-use cagework_core::bind::BindOptions;
+use cagework_core::options::BindOptions;
 use cagework_tests::cages::cage;
 use cagework_tests::dense;
 use glam::Vec3;
