@@ -9,7 +9,7 @@ mod suite;
 
 use std::sync::OnceLock;
 
-use cagework_core::options::{BindOptions, Method, Solver};
+use cagework_core::options::{BindOptions, Method, Preconditioner, Solver};
 use cagework_core::{BindError, Binding, Cage, Progress};
 use cagework_gpu::{ContextOptions, GpuContext, GpuError, PlanError, bind_on};
 use glam::Vec3;
@@ -144,14 +144,17 @@ mod multigrid {
     }
 }
 
-/// Multigrid on every back end; Jacobi, which takes six seconds at g = 64, is held to it by [`agreement`].
+/// Multigrid on every back end, and conjugate gradients preconditioned by it. Without, and by Jacobi, a solve takes many
+/// seconds at g = 64: [`agreement`] and the suite hold these to it.
 mod accuracy {
     use super::*;
 
     #[test]
     fn armadillo_is_exact_at_64() {
         let [one, all] = [1, 0].map(|threads| cpu(Method::Embedded, Solver::Multigrid, threads));
-        for back_end in [one, all, gpu(Method::Embedded, Solver::Multigrid)] {
+        let mut cg = cpu(Method::Embedded, Solver::ConjugateGradient, 0);
+        cg.options.preconditioner = Preconditioner::VCycle;
+        for back_end in [one, all, cg, gpu(Method::Embedded, Solver::Multigrid)] {
             suite::reference::armadillo_is_exact_at_64(&back_end);
         }
     }
