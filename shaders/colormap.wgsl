@@ -9,7 +9,7 @@ const STOPS = array<vec3f, 10>(
 /// What negative weights are drawn in: magenta, which cividis has not. Linear.
 const NEGATIVE_COLOR = vec3f(0.68, 0.02, 0.28);
 /// Weights below it are negative: what rounding leaves is not.
-const NEGATIVE = -1e-5f;
+const NEGATIVE_THRESHOLD = -1e-5f;
 
 /// Colour of a value from 0 to 1, linear.
 fn cividis(value: f32) -> vec3f {

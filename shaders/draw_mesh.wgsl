@@ -46,7 +46,7 @@ fn value_color(value: f32) -> vec3f {
         let digits = log(max(value, 1e-20)) / log(10.0);
         return cividis((digits - surface.low) / (surface.high - surface.low));
     }
-    if value < NEGATIVE { return NEGATIVE_COLOR; }
+    if value < NEGATIVE_THRESHOLD { return NEGATIVE_COLOR; }
     return cividis((value - surface.low) / (surface.high - surface.low));
 }
 

@@ -48,7 +48,7 @@ fn fragment(in: Varying) -> @location(0) vec4f {
     if slice.high > 0.0 && content.x != EXTERIOR {
         let value = bitcast<f32>(content.y);
         color = vec4f(cividis(value / slice.high), 1.0);
-        if value < NEGATIVE { color = vec4f(NEGATIVE_COLOR, 1.0); }
+        if value < NEGATIVE_THRESHOLD { color = vec4f(NEGATIVE_COLOR, 1.0); }
     }
     let distance = abs(fract(in.place - 0.5) - 0.5) / max(slope, vec2f(1e-6));
     let covers = clamp(vec2f(0.5 * camera.scale + 0.5) - distance, vec2f(0.0), vec2f(1.0));

@@ -169,6 +169,27 @@ mod multigrid {
     }
 }
 
+/// Multigrid on every back end, and conjugate gradients preconditioned by it. Without, and by Jacobi, a solve takes many
+/// seconds at g = 64: [`agreement`] and the suite hold these to it.
+mod accuracy {
+    use super::*;
+
+    #[test]
+    fn armadillo_is_exact_at_64() {
+        let [one, all] = [1, 0].map(|threads| cpu(Method::Embedded, Solver::Multigrid, threads));
+        let mut cg = cpu(Method::Embedded, Solver::ConjugateGradient, 0);
+        cg.options.preconditioner = Preconditioner::VCycle;
+        for back_end in [one, all, cg, gpu(Method::Embedded, Solver::Multigrid)] {
+            suite::reference::armadillo_is_exact_at_64(&back_end);
+        }
+    }
+
+    #[test]
+    fn armadillo_is_exact_at_128() {
+        suite::reference::armadillo_is_exact_at_128(&cpu(Method::Embedded, Solver::Multigrid, 0));
+    }
+}
+
 /// Two back ends that solve the same equations give the same weights.
 mod agreement {
     use super::*;

@@ -7,6 +7,7 @@ pub(crate) mod outside;
 pub(crate) mod principles;
 pub(crate) mod progress;
 pub(crate) mod raw;
+pub(crate) mod reference;
 pub(crate) mod rows;
 pub(crate) mod shapes;
 

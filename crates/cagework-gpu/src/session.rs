@@ -271,7 +271,7 @@ impl Session {
         let weights = self.weights()?;
         match self.scene.mesh {
             MeshStyle::Weights { column } => {
-                Some([0.0, weights.column(column).fold(colormap::LOWEST_RANGE, f32::max)])
+                Some([0.0, weights.column(column).fold(colormap::MIN_WEIGHT_RANGE, f32::max)])
             }
             MeshStyle::Errors => Some(colormap::ERROR_RANGE),
             MeshStyle::Hidden | MeshStyle::Solid | MeshStyle::Clay => None,

@@ -170,7 +170,7 @@ fn constants_equal_rusts() {
     same(&shaders::LINES, "STATE_SHIFT", f64::from(STATE_SHIFT));
     same(&shaders::LINES, "HIDDEN", f64::from(HIDDEN));
     // An f32 on one side, the number as written on the other.
-    assert_eq!(constant(&shaders::MESH, "NEGATIVE") as f32, colormap::NEGATIVE);
+    assert_eq!(constant(&shaders::MESH, "NEGATIVE_THRESHOLD") as f32, colormap::NEGATIVE_THRESHOLD);
 }
 
 /// The stops of the colour map stand in the shader as in Rust.

@@ -16,8 +16,8 @@ const USAGE: &str = "usage: cargo xtask TASK
   start [ARGS]   build the page and serve it on this machine (ARGS for `vite preview`: --port 8080, --open)
   build          build the page into dist/, and the release `cagework` (target/release/cagework)
   test           every test there is: Rust, wasm32 builds, glTF validator, TypeScript, the page in a browser
-  check          format, lints, documentation, dependency arrows, types, biome
-  arrows         the dependency arrows of ARCHITECTURE.md only
+  check          format, lints, documentation, dependency arrows, import circles, types, biome
+  arrows         the dependency arrows of ARCHITECTURE.md and import circles only
   wasm [--dev]   crates/cagework-web as a JavaScript package, web/src/pkg
   page           build the page only
   page-test [ARGS]  build the page and test it in a browser (ARGS for Playwright)

@@ -15,8 +15,8 @@ use super::cases::Evaluation;
 /// Width and height of a picture.
 const SIZE: [u32; 2] = [720, 540];
 
-/// How far the cage of figure 6 is bent from end to end, radians.
-const BEND: f32 = 0.9;
+/// Angle by which the cage of figure 6 is bent from end to end, radians.
+const BEND_ANGLE: f32 = 0.9;
 
 /// All pictures as (file name, PNG).
 ///
@@ -65,9 +65,9 @@ fn bent(cage: &Cage) -> Vec<Vec3> {
     let length = extent.x.max(extent.z);
     let turn = |p: Vec3| {
         if along_x {
-            Quat::from_rotation_z(BEND * p.x / length)
+            Quat::from_rotation_z(BEND_ANGLE * p.x / length)
         } else {
-            Quat::from_rotation_x(-BEND * p.z / length)
+            Quat::from_rotation_x(-BEND_ANGLE * p.z / length)
         }
     };
     cage.positions().iter().map(|&p| center + turn(p - center) * (p - center)).collect()

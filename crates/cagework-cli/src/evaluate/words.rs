@@ -98,8 +98,8 @@ fn gpu_verdicts(evaluation: &Evaluation, out: &mut String) {
     }
 }
 
-/// How much two factors a sweep may differ (in their logarithms) and still be one decay.
-const SAME_DECAY: f64 = 1.25;
+/// Largest ratio of two decay rates (logarithms of the factor for a sweep) that count as one.
+const MAX_DECAY_RATIO: f64 = 1.25;
 
 fn delta_verdict(evaluation: &Evaluation, out: &mut String) {
     let Some(run) = evaluation.delta_run(Way::PaperOneThread) else { return };
@@ -111,7 +111,7 @@ fn delta_verdict(evaluation: &Evaluation, out: &mut String) {
     let last = h.len().saturating_sub(1);
     if let (Some(third), Some(fourth)) = (rate(last / 2, 3 * last / 4), rate(3 * last / 4, last)) {
         let bend = third.ln() / fourth.ln();
-        let straight = if bend < SAME_DECAY && bend > 1.0 / SAME_DECAY {
+        let straight = if bend < MAX_DECAY_RATIO && bend > 1.0 / MAX_DECAY_RATIO {
             "which is geometric decay: a straight line over the number of sweeps"
         } else {
             "which is no single geometric decay"

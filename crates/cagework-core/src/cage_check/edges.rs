@@ -7,7 +7,7 @@ use crate::cage::{Side, sides_of};
 use crate::mesh::PolygonMesh;
 
 /// Vertices nearer than this fraction of the diagonal are at one place: the rounding of six decimals in a file.
-pub(super) const SAME_PLACE: f64 = 2e-6;
+pub(super) const WELD_DISTANCE: f64 = 2e-6;
 
 /// All sides of sound faces, sorted by edge.
 #[derive(Debug)]
@@ -85,7 +85,7 @@ impl Edges {
 
 /// For each vertex the first one at the same place, and how many have an earlier one.
 pub(super) fn same_places(mesh: &PolygonMesh) -> (Vec<u32>, usize) {
-    let reach = SAME_PLACE * diagonal(mesh);
+    let reach = WELD_DISTANCE * diagonal(mesh);
     let size = (2.0 * reach).max(f64::MIN_POSITIVE);
     let mut at_place: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
     let mut first: Vec<u32> = (0..mesh.positions.len() as u32).collect();

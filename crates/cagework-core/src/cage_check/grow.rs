@@ -9,7 +9,7 @@ use crate::geometry::closest_point_on_triangle;
 use crate::mesh::{Bounds, PolygonMesh};
 
 /// Rounds of moving; each makes room for the vertices that are outside now.
-const ROUNDS: usize = 40;
+const MAX_ROUNDS: usize = 40;
 
 /// Room left beyond the model, as a fraction of the cage's diagonal.
 const MARGIN: f64 = 0.004;
@@ -18,7 +18,7 @@ const MARGIN: f64 = 0.004;
 pub(super) fn grow(mesh: &mut PolygonMesh, model: &[Vec3]) -> Result<usize, RepairError> {
     let before = mesh.positions.clone();
     let mut left = 0;
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let cage = Cage::new(mesh)?;
         let outside = Enclosure::new(&cage, model).outside();
         left = outside.len();

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 /// Edge of a bucket in voxels.
-const SIZE: f64 = 4.0;
+const BUCKET_EDGE: f64 = 4.0;
 
 /// Lists of triangles by place. Stale entries stay until somebody reads their list.
 #[derive(Debug)]
@@ -20,7 +20,7 @@ pub(super) struct Buckets {
 impl Buckets {
     /// Empty lists for a box of this size around the origin, and `n` triangles.
     pub(super) fn new(half: DVec3, n: usize) -> Self {
-        let dims = half.to_array().map(|h| (2.0 * h / SIZE).ceil() as usize + 1);
+        let dims = half.to_array().map(|h| (2.0 * h / BUCKET_EDGE).ceil() as usize + 1);
         Self {
             origin: -half,
             dims,
@@ -92,7 +92,7 @@ impl Buckets {
 /// Buckets along each axis that a box overlaps; what lies beyond the grid is kept in the outermost ones.
 fn range(origin: DVec3, dims: [usize; 3], min: DVec3, max: DVec3) -> [[usize; 2]; 3] {
     [0, 1, 2].map(|k| {
-        let at = |p: DVec3| (((p[k] - origin[k]) / SIZE).max(0.0) as usize).min(dims[k] - 1);
+        let at = |p: DVec3| (((p[k] - origin[k]) / BUCKET_EDGE).max(0.0) as usize).min(dims[k] - 1);
         [at(min), at(max)]
     })
 }
@@ -102,10 +102,10 @@ fn bucket_bounds(origin: DVec3, dims: [usize; 3], at: [usize; 3]) -> [DVec3; 2] 
     let [mut min, mut max] = [DVec3::NEG_INFINITY, DVec3::INFINITY];
     for k in 0..3 {
         if at[k] > 0 {
-            min[k] = origin[k] + SIZE * at[k] as f64;
+            min[k] = origin[k] + BUCKET_EDGE * at[k] as f64;
         }
         if at[k] + 1 < dims[k] {
-            max[k] = origin[k] + SIZE * (at[k] + 1) as f64;
+            max[k] = origin[k] + BUCKET_EDGE * (at[k] + 1) as f64;
         }
     }
     [min, max]

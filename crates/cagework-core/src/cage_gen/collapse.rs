@@ -15,23 +15,23 @@ use super::quadric::Quadric;
 use crate::contact::Corners;
 use crate::progress::Cancelled;
 
-/// How far out along the normal the merged vertex is tried, in voxels.
-const PUSHES: [f64; 8] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.1, 2.8, 3.6];
+/// Where the merged vertex is tried, voxels along the normal.
+const NORMAL_OFFSETS: [f64; 8] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.1, 2.8, 3.6];
 
 /// Smallest cosine between a triangle's normals before and after.
-const TURN: f64 = 0.15;
+const MIN_COLLAPSE_COSINE: f64 = 0.15;
 
 /// Smallest quality (4 sqrt(3) area over summed squared edges; 1 for an equilateral triangle) of a new triangle.
-const QUALITY: f64 = 0.12;
+const MIN_QUALITY: f64 = 0.12;
 
 /// Most triangles around a vertex.
-const VALENCE: usize = 11;
+const MAX_VALENCE: usize = 11;
 
-/// An edge is put back if its place costs more than this times what was expected.
-const DEARER: f64 = 1.2;
+/// An edge waits again if it costs more than this times what was expected.
+const MAX_COST_RATIO: f64 = 1.2;
 
-/// Collapses between two looks at whether the work was cancelled.
-const WATCH_EVERY: usize = 64;
+/// Collapses from one check whether the work was cancelled to the next.
+const COLLAPSES_PER_CHECK: usize = 64;
 
 /// An edge waiting to be collapsed.
 #[derive(Debug, PartialEq)]
@@ -151,12 +151,12 @@ impl<'g, 'a> Collapser<'g, 'a> {
                 continue;
             }
             steps += 1;
-            if steps % WATCH_EVERY == 0 {
+            if steps % COLLAPSES_PER_CHECK == 0 {
                 go_on((before - self.count) as f32 / (before - target) as f32)?;
             }
             let Some((at, cost)) = self.place_of(a, b) else { continue };
             let next = self.heap.peek().map_or(f64::INFINITY, |next| next.cost);
-            if cost > DEARER * waiting.cost + 1e-9 && cost > next {
+            if cost > MAX_COST_RATIO * waiting.cost + 1e-9 && cost > next {
                 self.heap.push(Waiting { cost, ..waiting });
                 continue;
             }
@@ -217,7 +217,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         if sides.is_empty() || common != sides.len() {
             return false;
         }
-        if near_a.len() + near_b.len() - 2 - common > VALENCE {
+        if near_a.len() + near_b.len() - 2 - common > MAX_VALENCE {
             return false;
         }
         if on_mirror(a) && on_mirror(b) && sides.len() != 1 {
@@ -278,8 +278,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         let [p, q] = [kept, gone].map(|v| self.surface.positions[v as usize]);
         let middle =
             if pinned.is_some() && !self.surface.on_mirror[gone as usize] { p } else { 0.5 * (p + q) };
-        let mut candidates = Vec::with_capacity(2 * PUSHES.len() + 2);
-        for push in PUSHES {
+        let mut candidates = Vec::with_capacity(2 * NORMAL_OFFSETS.len() + 2);
+        for push in NORMAL_OFFSETS {
             candidates.push(optimum + push * outward);
             candidates.push(middle + push * outward);
         }
@@ -310,7 +310,9 @@ impl<'g, 'a> Collapser<'g, 'a> {
                 }
             }
             let after = moved.normal();
-            if quality(&moved.at) < QUALITY || before.dot(after) < TURN * before.length() * after.length() {
+            if quality(&moved.at) < MIN_QUALITY
+                || before.dot(after) < MIN_COLLAPSE_COSINE * before.length() * after.length()
+            {
                 return false;
             }
             new.push(moved);

@@ -6,11 +6,11 @@
 
 use glam::DVec3;
 
-/// Widening of voxels that keeps rounding on the safe side.
-const SLACK: f64 = 1e-6;
+/// Widening of voxels, in voxels, above f64's rounding.
+const ROUNDING_MARGIN: f64 = 1e-6;
 
 /// An axis whose x component is below this says nothing about x.
-const ACROSS: f64 = 1e-12;
+const MIN_AXIS_X: f64 = 1e-12;
 
 /// A triangle among voxels.
 #[derive(Debug)]
@@ -37,7 +37,7 @@ struct Slanted {
 impl Footprint {
     /// The footprint of a triangle in voxel units, for voxels grown by `grow` on all sides.
     pub(crate) fn new(triangle: [DVec3; 3], grow: f64) -> Self {
-        let half = 0.5 + grow + SLACK;
+        let half = 0.5 + grow + ROUNDING_MARGIN;
         let [a, b, c] = triangle;
         let mut footprint = Self {
             slanted: [Slanted::default(); 10],
@@ -62,7 +62,7 @@ impl Footprint {
         let [p, q, r] = triangle.map(|v| axis.dot(v));
         let reach = half * (axis.x.abs() + axis.y.abs() + axis.z.abs());
         let (low, high) = (p.min(q).min(r) - reach, p.max(q).max(r) + reach);
-        if axis.x.abs() > ACROSS {
+        if axis.x.abs() > MIN_AXIS_X {
             let scale = 1.0 / axis.x;
             let (one, other) = (low * scale, high * scale);
             self.slanted[self.n_slanted] =
@@ -100,7 +100,7 @@ impl Footprint {
             low = low.max(s.low - at);
             high = high.min(s.high - at);
         }
-        let (first, end) = (ceil(low - 0.5 - SLACK), ceil(high - 0.5 + SLACK).min(n));
+        let (first, end) = (ceil(low - 0.5 - ROUNDING_MARGIN), ceil(high - 0.5 + ROUNDING_MARGIN).min(n));
         (first < end).then(|| (first, end - 1))
     }
 }
@@ -114,7 +114,7 @@ pub(super) fn any_run(
     dims: [usize; 3],
     each: impl Fn(usize, usize, usize, usize) -> bool,
 ) -> bool {
-    let half = 0.5 + grow + SLACK;
+    let half = 0.5 + grow + ROUNDING_MARGIN;
     let [a, b, c] = triangle;
     let [xs, ys, zs] = rows(a.min(b).min(c) - half, a.max(b).max(c) + half, dims);
     if xs[0] >= xs[1] {
@@ -136,7 +136,7 @@ pub(super) fn any_run(
 
 /// First voxel and the one after the last whose centre is in a box, along each axis.
 fn rows(min: DVec3, max: DVec3, dims: [usize; 3]) -> [[usize; 2]; 3] {
-    [0, 1, 2].map(|k| [ceil(min[k] - 0.5).min(dims[k]), ceil(max[k] - 0.5 + SLACK).min(dims[k])])
+    [0, 1, 2].map(|k| [ceil(min[k] - 0.5).min(dims[k]), ceil(max[k] - 0.5 + ROUNDING_MARGIN).min(dims[k])])
 }
 
 /// The next whole number, at least 0. Not `f64::ceil`, which is a call on plain x86-64.

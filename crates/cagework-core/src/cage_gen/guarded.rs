@@ -9,10 +9,10 @@ use super::voxels::Voxels;
 use crate::contact::{Corners, meet};
 
 /// Parts of the cage that are not neighbours stay this far apart, in voxels.
-const GAP: f64 = 0.05;
+const MIN_GAP: f64 = 0.05;
 
 /// Vertices beside the mirror plane stay this far from it, in voxels.
-const OFF_MIRROR: f64 = 0.1;
+const MIN_MIRROR_DISTANCE: f64 = 0.1;
 
 /// What the surface must keep away from.
 #[derive(Debug)]
@@ -128,7 +128,7 @@ impl<'a> Guarded<'a> {
     /// surface and of each other.
     pub(super) fn may_stand(&mut self, new: &[Corners], gone: &[u32]) -> bool {
         if let Some(axis) = self.mirror {
-            let beside = |i: u32, p: DVec3| self.on_mirror[i as usize] || p[axis] >= OFF_MIRROR;
+            let beside = |i: u32, p: DVec3| self.on_mirror[i as usize] || p[axis] >= MIN_MIRROR_DISTANCE;
             if new.iter().any(|t| t.index.iter().zip(t.at).any(|(&i, p)| !beside(i, p))) {
                 return false;
             }
@@ -136,20 +136,20 @@ impl<'a> Guarded<'a> {
         if new.iter().any(|t| !self.obstacle.is_clear(t.at, self.band.as_ref())) {
             return false;
         }
-        if new.iter().enumerate().any(|(k, a)| new[..k].iter().any(|b| meet(a, b, GAP))) {
+        if new.iter().enumerate().any(|(k, a)| new[..k].iter().any(|b| meet(a, b, MIN_GAP))) {
             return false;
         }
-        let min = new.iter().fold(DVec3::INFINITY, |m, t| m.min(t.min())) - GAP;
-        let max = new.iter().fold(DVec3::NEG_INFINITY, |m, t| m.max(t.max())) + GAP;
+        let min = new.iter().fold(DVec3::INFINITY, |m, t| m.min(t.min())) - MIN_GAP;
+        let max = new.iter().fold(DVec3::NEG_INFINITY, |m, t| m.max(t.max())) + MIN_GAP;
         let mut near = std::mem::take(&mut self.near);
         let bounds = &self.bounds;
         self.buckets.near(min, max, |t| bounds[t as usize], &mut near);
         let clear = near.iter().filter(|t| !gone.contains(t)).all(|&t| {
             let other = self.corners(t);
-            let (low, high) = (other.min() - GAP, other.max() + GAP);
+            let (low, high) = (other.min() - MIN_GAP, other.max() + MIN_GAP);
             new.iter().all(|corners| {
                 let apart = corners.min().cmpgt(high).any() || corners.max().cmplt(low).any();
-                apart || !meet(corners, &other, GAP)
+                apart || !meet(corners, &other, MIN_GAP)
             })
         });
         self.near = near;
@@ -166,7 +166,7 @@ impl<'a> Guarded<'a> {
             self.buckets.near(corners.min(), corners.max(), |t| bounds[t as usize], &mut near);
             for &other in near.iter().filter(|&&other| other > t) {
                 let other = self.corners(other);
-                if meet(&corners, &other, GAP) {
+                if meet(&corners, &other, MIN_GAP) {
                     offenders.extend(corners.index);
                     offenders.extend(other.index);
                 }

@@ -7,15 +7,14 @@ use super::footprint::Footprint;
 use super::voxels::Voxels;
 use crate::progress::Cancelled;
 
-/// Voxels are this much larger than the model's length divided by their number: its ends lie inside voxels, not
-/// between two of them.
-const ROOM: f64 = 1.002;
+/// Edge of a voxel over the model's length divided by their number: its ends lie inside voxels, not between two.
+const VOXEL_ENLARGEMENT: f64 = 1.002;
 
-/// A voxel is at least this fraction of the largest coordinate, so that f32 positions can tell its parts apart.
-const RESOLVED: f64 = 2e-5;
+/// Smallest edge of a voxel over the largest coordinate: f32 positions can tell its parts apart.
+const MIN_VOXEL_RATIO: f64 = 2e-5;
 
-/// Triangles between two looks at whether the work was cancelled.
-const WATCH_EVERY: usize = 4096;
+/// Triangles from one check whether the work was cancelled to the next.
+const TRIANGLES_PER_CHECK: usize = 4096;
 
 /// A lattice of cubic voxels. Lattice coordinates count voxels from the box's corner; *centred* ones from its centre.
 #[derive(Clone, Debug)]
@@ -35,7 +34,9 @@ impl Lattice {
         let largest = min.abs().max(max.abs()).max_element();
         // A model of one point has no size of its own: take the unit of length.
         let smallest = if extent.max_element() > 0.0 { f64::from(f32::MIN_POSITIVE) } else { 1.0 / n as f64 };
-        let cell = (ROOM * extent.max_element() / n as f64).max(RESOLVED * largest).max(smallest);
+        let cell = (VOXEL_ENLARGEMENT * extent.max_element() / n as f64)
+            .max(MIN_VOXEL_RATIO * largest)
+            .max(smallest);
         let dims = extent.to_array().map(|e| 2 * ((0.5 * e / cell).ceil() as usize).max(1) + 2 * pad);
         Self { center: 0.5 * (min + max), cell, dims }
     }
@@ -77,7 +78,7 @@ impl Lattice {
             voxels.add(voxel_of(p));
         }
         for (k, t) in triangles.iter().enumerate() {
-            if k % WATCH_EVERY == 0 {
+            if k % TRIANGLES_PER_CHECK == 0 {
                 go_on(k as f32 / triangles.len() as f32)?;
             }
             let corners = t.map(|i| points[i as usize]);

@@ -8,7 +8,7 @@
 //!
 //! Sources: Xian, Lin, Gao 2009 (voxels and hull); Garland, Heckbert 1997 (quadrics); Sander et al. 2000
 //! (progressive hulls). Changes: the constraint is a bit set of voxels and a grid of the cage's own triangles, not a
-//! linear program; symmetric models are simplified as one half.
+//! linear program; symmetric models are simplified as one half. Where the constants come from: `docs/notes/cage-generator.md`.
 
 mod buckets;
 mod collapse;
@@ -40,15 +40,15 @@ use shell::Shell;
 pub use subdivided_box::subdivided_box;
 use verify::verified;
 
-/// Lattices tried until the target is met.
-const TRIES: usize = 4;
+/// Most lattices that are tried until the target is met.
+const MAX_LATTICES: usize = 4;
 
-/// A cage may have this many times the vertices asked for before a coarser lattice is tried.
-const NEAR_TARGET: f64 = 1.1;
+/// Vertices of a cage over those asked for, above which a coarser lattice is tried.
+const MAX_TARGET_RATIO: f64 = 1.1;
 
 /// Layers of voxels around the hull in which the cage must stay, tried one after the other until the target is met:
 /// as far as possible it spans no gap. At last anywhere.
-const BANDS: [Option<usize>; 5] = [Some(1), Some(2), Some(3), Some(5), None];
+const BAND_LAYERS: [Option<usize>; 5] = [Some(1), Some(2), Some(3), Some(5), None];
 
 /// Makes a cage that encloses a model strictly.
 ///
@@ -69,7 +69,7 @@ pub fn generate(
     let mut voxels = if options.voxels > 0 { options.voxels as usize } else { first_voxels(target) };
     let mut best: Option<GeneratedCage> = None;
     let mut tried = Vec::new();
-    for attempt in 0..TRIES {
+    for attempt in 0..MAX_LATTICES {
         tried.push(voxels);
         let go_on = |stage: Stage, share: f32| {
             let fraction = (attempt as f32 + share) / (attempt + 1) as f32;
@@ -85,7 +85,7 @@ pub fn generate(
             target: options.target,
             vertices: cage.n_vertices() as u32,
             faces: cage.faces().len() as u32,
-            target_met: cage.n_vertices() as f64 <= NEAR_TARGET * target as f64,
+            target_met: cage.n_vertices() as f64 <= MAX_TARGET_RATIO * target as f64,
             voxels: voxels as u32,
             voxel_size: shell.lattice.cell as f32,
             clearance: shell.clearance as f32,
@@ -133,10 +133,10 @@ fn simplified(
         let mut guarded = Guarded::new(shell.hull.clone(), &shell.obstacle);
         let mut collapser = Collapser::new(&mut guarded);
         let mut left = n_hull;
-        for (k, layers) in BANDS.iter().enumerate() {
+        for (k, layers) in BAND_LAYERS.iter().enumerate() {
             collapser.surface.set_band(layers.map(|layers| shell.band(layers)));
-            let from = 0.7 * k as f32 / BANDS.len() as f32;
-            left = collapser.run(aim, &|share| go_on(from + 0.7 * share / BANDS.len() as f32))?;
+            let from = 0.7 * k as f32 / BAND_LAYERS.len() as f32;
+            left = collapser.run(aim, &|share| go_on(from + 0.7 * share / BAND_LAYERS.len() as f32))?;
             if left <= aim {
                 break;
             }

@@ -4,8 +4,8 @@
 
 use glam::{DMat3, DVec3};
 
-/// A small pull towards where a vertex came from, relative to the planes: keeps triangles of flat parts of even size.
-const PULL: f64 = 0.004;
+/// Weight of the distance to where a vertex came from, the planes' being 1: triangles of flat parts keep an even size.
+const POINT_WEIGHT: f64 = 0.004;
 
 /// `p . a p - 2 b . p + c`: squared distances weighted by area, voxel units.
 #[derive(Clone, Copy, Debug, Default)]
@@ -29,9 +29,9 @@ impl Quadric {
         let d = n.dot(corner);
         let plane = DMat3::from_cols(n * n.x, n * n.y, n * n.z);
         Self {
-            a: area * (plane + PULL * DMat3::IDENTITY),
-            b: area * (d * n + PULL * corner),
-            c: area * (d * d + PULL * corner.length_squared()),
+            a: area * (plane + POINT_WEIGHT * DMat3::IDENTITY),
+            b: area * (d * n + POINT_WEIGHT * corner),
+            c: area * (d * d + POINT_WEIGHT * corner.length_squared()),
             area,
         }
     }

@@ -12,23 +12,23 @@ use crate::progress::Cancelled;
 /// Rounds over all vertices and edges; after six, pictures no longer change.
 const ROUNDS: usize = 6;
 
-/// How much a mean squared distance of one voxel from the hull weighs against the inverse quality of triangles.
-const FIDELITY: f64 = 1.5;
+/// Weight of the mean squared distance from the hull (voxels squared) against the inverse quality of triangles.
+const DISTANCE_WEIGHT: f64 = 1.5;
 
-/// Shares of the way that are tried.
-const STEPS: [f64; 3] = [0.8, 0.4, 0.15];
+/// Shares of a vertex's way that are tried.
+const STEP_SHARES: [f64; 3] = [0.8, 0.4, 0.15];
 
-/// A change must lower the energy by this much.
-const WORTH: f64 = 1e-3;
+/// A change must lower the energy (dimensionless) by this much.
+const MIN_DECREASE: f64 = 1e-3;
 
 /// Smallest cosine between a triangle's normals before and after a move.
-const TURN: f64 = 0.5;
+const MIN_MOVE_COSINE: f64 = 0.5;
 
 /// Smallest cosine between the two triangles of a swapped edge and each of those before.
-const SWAP_TURN: f64 = 0.6;
+const MIN_SWAP_COSINE: f64 = 0.6;
 
 /// Most triangles around a vertex after a swap.
-const VALENCE: usize = 9;
+const MAX_VALENCE: usize = 9;
 
 /// Improves the surface under its own constraints.
 ///
@@ -58,7 +58,7 @@ pub(super) fn relax(
 }
 
 fn fit(quadric: &Quadric, p: DVec3) -> f64 {
-    FIDELITY * quadric.at(p) / quadric.area.max(1e-12)
+    DISTANCE_WEIGHT * quadric.at(p) / quadric.area.max(1e-12)
 }
 
 fn shape<'t>(triangles: impl Iterator<Item = &'t Corners>) -> f64 {
@@ -80,18 +80,18 @@ fn slide(surface: &mut Guarded<'_>, quadrics: &[Quadric], v: u32) {
     let home = quadric.minimum(pinned).map_or(DVec3::ZERO, |o| (o - p).clamp_length_max(2.0));
     let energy = fit(quadric, p) + shape(star.iter());
     for direction in [home + tangential, tangential, home, normal * normal.dot(home), mean - p] {
-        for step in STEPS {
+        for step in STEP_SHARES {
             let mut q = p + step * direction;
             if let Some(axis) = pinned {
                 q[axis] = 0.0;
             }
             let moved: Vec<Corners> = star.iter().map(|t| with_corner(t, v, q)).collect();
-            if fit(quadric, q) + shape(moved.iter()) > energy - WORTH {
+            if fit(quadric, q) + shape(moved.iter()) > energy - MIN_DECREASE {
                 continue;
             }
             let turned = star.iter().zip(&moved).any(|(before, after)| {
                 let (m, n) = (before.normal(), after.normal());
-                m.dot(n) < TURN * m.length() * n.length()
+                m.dot(n) < MIN_MOVE_COSINE * m.length() * n.length()
             });
             if !turned && surface.may_stand(&moved, &gone) {
                 surface.place(v, q);
@@ -133,7 +133,7 @@ fn swap(surface: &mut Guarded<'_>, quadrics: &[Quadric], t: u32, k: usize) {
         || near.contains(&d)
         || (on_mirror(c) && on_mirror(d))
         || [a, b].iter().any(|&v| triangles_of(v) <= least(v))
-        || [c, d].iter().any(|&v| triangles_of(v) >= VALENCE)
+        || [c, d].iter().any(|&v| triangles_of(v) >= MAX_VALENCE)
     {
         return;
     }
@@ -144,13 +144,13 @@ fn swap(surface: &mut Guarded<'_>, quadrics: &[Quadric], t: u32, k: usize) {
         let quadric = quadrics[v as usize].plus(&quadrics[w as usize]);
         fit(&quadric, 0.5 * (at(v) + at(w)))
     };
-    if edge(c, d) + shape(after.iter()) > edge(a, b) + shape(before.iter()) - WORTH {
+    if edge(c, d) + shape(after.iter()) > edge(a, b) + shape(before.iter()) - MIN_DECREASE {
         return;
     }
     let bent = before.iter().any(|m| {
         after.iter().any(|n| {
             let (m, n) = (m.normal(), n.normal());
-            m.dot(n) < SWAP_TURN * m.length() * n.length()
+            m.dot(n) < MIN_SWAP_COSINE * m.length() * n.length()
         })
     });
     if !bent && surface.may_stand(&after, &[t, other]) {

@@ -15,17 +15,17 @@ use super::voxels::Voxels;
 use super::{CageOptions, Shape, Symmetry};
 use crate::progress::Cancelled;
 
-/// A mirror is taken if this share of the solid's voxels has an image within one voxel.
-const ALIKE: f64 = 0.985;
+/// Smallest share of the solid's voxels with an image within one voxel for which a mirror is taken.
+const MIN_MIRROR_SHARE: f64 = 0.985;
 
-/// Room between the solid's box and the lattice's, apart from dilation: the outermost layer stays empty.
-const PAD: usize = 6;
+/// Voxels between the solid's box and the lattice's, apart from dilation: the outermost layer stays empty.
+const MARGIN_VOXELS: usize = 6;
 
 /// Clearance in voxels unless the caller asks for more.
-const CLEARANCE: f64 = 0.5;
+const DEFAULT_CLEARANCE: f64 = 0.5;
 
-/// What smoothing leaves of a voxel's width, less rounding: the clearance that a hull one voxel off has.
-const KEPT: f64 = 1.0 - SMOOTHING_REACH - 1e-3;
+/// Clearance in voxels of a hull one voxel off: what smoothing leaves, less rounding.
+const HULL_CLEARANCE: f64 = 1.0 - SMOOTHING_REACH - 1e-3;
 
 /// A solid in a lattice and the hull around it.
 #[derive(Debug)]
@@ -57,10 +57,11 @@ impl Shell {
     ) -> Result<Self, Cancelled> {
         let asked = f64::from(options.clearance) * max.distance(min);
         // Layers of voxels between solid and hull: enough for the clearance that was asked for.
-        let layers_for = |cell: f64| ((asked / cell).max(CLEARANCE) + 1.0 - KEPT).ceil() as usize;
-        let rough = Lattice::around(min, max, n, PAD);
+        let layers_for =
+            |cell: f64| ((asked / cell).max(DEFAULT_CLEARANCE) + 1.0 - HULL_CLEARANCE).ceil() as usize;
+        let rough = Lattice::around(min, max, n, MARGIN_VOXELS);
         let layers = layers_for(rough.cell);
-        let lattice = Lattice::around(min, max, n, PAD + layers);
+        let lattice = Lattice::around(min, max, n, MARGIN_VOXELS + layers);
         let touched = match options.shape {
             Shape::Follow => lattice.touched(positions, triangles, &|f| go_on(0.5 * f))?,
             Shape::Hull => slab_hull(&lattice, positions),
@@ -83,7 +84,7 @@ impl Shell {
         go_on(0.8)?;
         let stairs = Surface::of(&hull, mirror);
         let filled = hull;
-        let clearance = (asked / lattice.cell).max(CLEARANCE);
+        let clearance = (asked / lattice.cell).max(DEFAULT_CLEARANCE);
         // Whole voxels of it by dilation, the rest as distance.
         let whole = clearance.floor();
         let mut keep_out = solid.clone();
@@ -149,7 +150,7 @@ fn find_mirror(solid: &Voxels, symmetry: Symmetry) -> Option<usize> {
         Symmetry::Z => Some(2),
         Symmetry::Auto => [0, 2, 1].into_iter().find(|&axis| {
             let image = solid.mirrored(axis).dilated();
-            solid.overlap(&image) as f64 >= ALIKE * solid.count() as f64
+            solid.overlap(&image) as f64 >= MIN_MIRROR_SHARE * solid.count() as f64
         }),
     }
 }

@@ -15,7 +15,7 @@ const ROUNDING: f32 = 1e-6;
 type Soup = (Vec<Vec3>, Vec<[u32; 3]>);
 
 /// Winding numbers of closed surfaces are whole, apart from rounding of angles.
-const WHOLE: f64 = 1e-6;
+const WINDING_TOLERANCE: f64 = 1e-6;
 
 fn winding(cage: &Cage, p: Vec3) -> f64 {
     winding_number(p.as_dvec3(), (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t)))
@@ -33,7 +33,7 @@ fn assert_promise((positions, _): &Soup, made: &GeneratedCage) {
     let step = (positions.len() / 200).max(1);
     for &p in positions.iter().step_by(step) {
         let w = winding(cage, p);
-        assert!((w - 1.0).abs() < WHOLE, "{p} has winding number {w}");
+        assert!((w - 1.0).abs() < WINDING_TOLERANCE, "{p} has winding number {w}");
     }
     assert_eq!(made.report.vertices as usize, cage.n_vertices());
     assert_eq!(
@@ -118,14 +118,14 @@ fn cage_goes_into_the_gap_between_legs() {
         let made = make(&trousers(), &options(target));
         assert!(made.report.target_met, "{:?}", made.report);
         let between = winding(&made.cage, vec3(0.0, -0.6, 0.0));
-        assert!(between.abs() < WHOLE, "with {target} vertices the legs are webbed: {between}");
+        assert!(between.abs() < WINDING_TOLERANCE, "with {target} vertices the legs are webbed: {between}");
     }
 }
 
 #[test]
 fn cage_of_a_ring_keeps_its_hole() {
     let made = make(&ring(), &options(80));
-    assert!(winding(&made.cage, Vec3::ZERO).abs() < WHOLE);
+    assert!(winding(&made.cage, Vec3::ZERO).abs() < WINDING_TOLERANCE);
     // Euler characteristic of a torus: V - E + F = 0 with 2 E = 3 F.
     assert_eq!(2 * made.cage.n_vertices(), made.cage.triangles().len());
 }
@@ -166,7 +166,10 @@ fn hull_is_coarse_and_convex_in_the_large() {
     let hull = CageOptions { shape: Shape::Hull, ..options(16) };
     let made = make(&trousers(), &hull);
     assert!(made.report.target_met);
-    assert!((winding(&made.cage, vec3(0.0, -0.6, 0.0)) - 1.0).abs() < WHOLE, "no gap between the legs");
+    assert!(
+        (winding(&made.cage, vec3(0.0, -0.6, 0.0)) - 1.0).abs() < WINDING_TOLERANCE,
+        "no gap between the legs"
+    );
 }
 
 #[test]

@@ -5,11 +5,11 @@ use glam::{Quat, Vec2, Vec3};
 use super::pull::Pull;
 use super::view::View;
 
-/// A plane seen at less than this (sine of the angle) is dragged in the view plane instead: a pixel would be a leap.
-const GRAZING: f32 = 0.05;
+/// Sine of the angle below which a plane is dragged in the view plane instead: a pixel would be a leap.
+const MIN_PLANE_SINE: f32 = 0.05;
 
-/// Nearer to the middle than this many pixels, a scale gesture does not start: a pixel would be a large factor.
-const NEAREST_SCALE: f32 = 8.0;
+/// Pixels from the middle that a scale gesture starts with at least: nearer, a pixel would be a large factor.
+const MIN_SCALE_DISTANCE: f32 = 8.0;
 
 /// What a gesture does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -206,7 +206,7 @@ impl Gesture {
         let Some((center, _)) = view.project(self.pivot) else { return 1.0 };
         let from = self.pointer_start - center;
         // The part along the first direction, so that crossing the middle mirrors.
-        let reach = from.length().max(NEAREST_SCALE);
+        let reach = from.length().max(MIN_SCALE_DISTANCE);
         let direction = if from == Vec2::ZERO { Vec2::X } else { from.normalize() };
         1.0 + (self.pointer - self.pointer_start).dot(direction) / reach
     }
@@ -238,7 +238,7 @@ fn along_axis(view: &dyn View, pointer: Vec2, through: Vec3, axis: Vec3) -> Opti
     let between = through - origin;
     let cosine = direction.dot(axis);
     let sine_squared = 1.0 - cosine * cosine;
-    if sine_squared < GRAZING * GRAZING {
+    if sine_squared < MIN_PLANE_SINE * MIN_PLANE_SINE {
         return None;
     }
     Some((cosine * direction.dot(between) - axis.dot(between)) / sine_squared)
@@ -248,7 +248,7 @@ fn along_axis(view: &dyn View, pointer: Vec2, through: Vec3, axis: Vec3) -> Opti
 fn in_plane(view: &dyn View, pointer: Vec2, through: Vec3, normal: Vec3) -> Option<Vec3> {
     let (origin, direction) = view.ray(pointer);
     let towards = direction.dot(normal);
-    if towards.abs() < GRAZING {
+    if towards.abs() < MIN_PLANE_SINE {
         return None;
     }
     let along = (through - origin).dot(normal) / towards;

@@ -7,10 +7,10 @@
 pub const ERROR_RANGE: [f32; 2] = [-8.0, -1.0];
 
 /// Weights below this are drawn as negative: what rounding leaves is not.
-pub const NEGATIVE: f32 = -1e-5;
+pub const NEGATIVE_THRESHOLD: f32 = -1e-5;
 
-/// Weights are drawn from 0 to their largest one, but to no less than this: what is nothing is not blown up.
-pub const LOWEST_RANGE: f32 = 1e-3;
+/// Weights are drawn from 0 to their largest one, but to this at least.
+pub const MIN_WEIGHT_RANGE: f32 = 1e-3;
 
 /// Cividis at ten equal steps, sRGB.
 pub const STOPS: [[u8; 3]; 10] = [

@@ -45,17 +45,17 @@ impl Kind {
     /// Shader, depth, and whether it is blended.
     fn recipe(self) -> (&'static DrawShader, Depth, bool) {
         match self {
-            Self::Background => (&shaders::BACKGROUND, NO_DEPTH, false),
-            Self::Mesh => (&shaders::MESH, SOLID, false),
-            Self::MeshBlended => (&shaders::MESH, OVER, true),
-            Self::Lines => (&shaders::LINES, OVER, true),
-            Self::LinesBehind => (&shaders::LINES, BEHIND, true),
-            Self::Points => (&shaders::POINTS, OVER, true),
-            Self::PointsBehind => (&shaders::POINTS, BEHIND, true),
-            Self::Faces => (&shaders::FACES, OVER, true),
-            Self::Floor => (&shaders::FLOOR, OVER, true),
-            Self::Slice => (&shaders::SLICE, SOLID, true),
-            Self::Gizmo => (&shaders::GIZMO, SOLID, true),
+            Self::Background => (&shaders::BACKGROUND, DEPTH_IGNORED, false),
+            Self::Mesh => (&shaders::MESH, DEPTH_NEAREST, false),
+            Self::MeshBlended => (&shaders::MESH, DEPTH_VISIBLE, true),
+            Self::Lines => (&shaders::LINES, DEPTH_VISIBLE, true),
+            Self::LinesBehind => (&shaders::LINES, DEPTH_HIDDEN, true),
+            Self::Points => (&shaders::POINTS, DEPTH_VISIBLE, true),
+            Self::PointsBehind => (&shaders::POINTS, DEPTH_HIDDEN, true),
+            Self::Faces => (&shaders::FACES, DEPTH_VISIBLE, true),
+            Self::Floor => (&shaders::FLOOR, DEPTH_VISIBLE, true),
+            Self::Slice => (&shaders::SLICE, DEPTH_NEAREST, true),
+            Self::Gizmo => (&shaders::GIZMO, DEPTH_NEAREST, true),
         }
     }
 }
@@ -86,13 +86,13 @@ struct Depth {
 }
 
 /// What is nearer covers what is behind.
-const SOLID: Depth = Depth { compare: CompareFunction::Less, write: true };
+const DEPTH_NEAREST: Depth = Depth { compare: CompareFunction::Less, write: true };
 /// Shows where nothing nearer is, and covers nothing.
-const OVER: Depth = Depth { compare: CompareFunction::LessEqual, write: false };
+const DEPTH_VISIBLE: Depth = Depth { compare: CompareFunction::LessEqual, write: false };
 /// Shows where something nearer is.
-const BEHIND: Depth = Depth { compare: CompareFunction::Greater, write: false };
+const DEPTH_HIDDEN: Depth = Depth { compare: CompareFunction::Greater, write: false };
 /// Knows no depth.
-const NO_DEPTH: Depth = Depth { compare: CompareFunction::Always, write: false };
+const DEPTH_IGNORED: Depth = Depth { compare: CompareFunction::Always, write: false };
 
 pub(super) fn layout_of(context: &GpuContext, name: &str, bindings: &[DrawBinding]) -> wgpu::BindGroupLayout {
     let entries: Vec<_> = (0u32..)

@@ -1,6 +1,6 @@
 //! The slice of the grid on the GPU: a table of its cells, made by the CPU.
 
-use super::colormap::LOWEST_RANGE;
+use super::colormap::MIN_WEIGHT_RANGE;
 use super::layout::SliceView as Uniform;
 use super::pipelines::Layouts;
 use super::scene::{SliceView, Theme};
@@ -21,7 +21,7 @@ impl SlicePlane {
         let palette = theme.palette();
         let uniform = Uniform {
             corner: slice.corner.to_array(),
-            high: values.as_ref().map_or(0.0, |v| v.iter().copied().fold(LOWEST_RANGE, f32::max)),
+            high: values.as_ref().map_or(0.0, |v| v.iter().copied().fold(MIN_WEIGHT_RANGE, f32::max)),
             u: slice.u.to_array(),
             n_u: slice.dims[0],
             v: slice.v.to_array(),

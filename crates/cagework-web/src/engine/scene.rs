@@ -1,7 +1,7 @@
 //! What is shown, and what its colours mean.
 
 use cagework_gpu::render::MeshStyle;
-use cagework_gpu::render::colormap::{ERROR_RANGE, LOWEST_RANGE};
+use cagework_gpu::render::colormap::{ERROR_RANGE, MIN_WEIGHT_RANGE};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -58,7 +58,7 @@ impl Engine {
         let largest = self.with_session(|session| {
             let weights =
                 session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
-            Ok(weights.column(column).fold(LOWEST_RANGE, f32::max))
+            Ok(weights.column(column).fold(MIN_WEIGHT_RANGE, f32::max))
         });
         // The GPU is busy with other weights: the page asks again when they are in.
         largest.unwrap_or(1.0)

@@ -1,0 +1,72 @@
+//! A cage that is not convex, against weights that know no grid: quadratic finite elements, and Walk on Spheres.
+//!
+//! Source of the numbers: `tests/data/README.md`.
+
+use cagework_core::PolygonMesh;
+use cagework_core::options::BindOptions;
+use cagework_tests::cages::cage;
+use cagework_tests::dense;
+use glam::Vec3;
+
+use super::BackEnd;
+
+/// Vertices that have weights by Walk on Spheres, too: the first ones.
+const N_WALKED: usize = 100;
+
+/// Largest mean error of a weight at g = 64, where 6.9e-5 was measured; weights of the nearest centre
+/// away from the cage make it 3.3e-4, and 1.8e-4 at g = 128.
+const LIMIT_AT_64: f64 = 1.05e-4;
+
+/// The same at g = 128, where 2.3e-5 was measured; the finite elements' own mean error is 1.3e-5.
+const LIMIT_AT_128: f64 = 3.6e-5;
+
+/// Little-endian words of a NumPy file in `tests/data/armadillo`.
+macro_rules! npy {
+    ($name:literal) => {
+        words(include_bytes!(concat!("../data/armadillo/", $name, ".npy")))
+    };
+}
+
+/// What follows the header, whose length is in bytes 8 and 9.
+fn words(npy: &[u8]) -> impl Iterator<Item = [u8; 4]> {
+    let header = usize::from(u16::from_le_bytes([npy[8], npy[9]]));
+    npy[10 + header..].chunks_exact(4).map(|word| word.try_into().expect("four bytes"))
+}
+
+fn points(words: impl Iterator<Item = [u8; 4]>) -> Vec<Vec3> {
+    let values: Vec<f32> = words.map(f32::from_le_bytes).collect();
+    values.chunks_exact(3).map(Vec3::from_slice).collect()
+}
+
+/// Mean of |a - b|.
+fn mean_difference(a: &[f32], b: impl Iterator<Item = [u8; 4]>) -> f64 {
+    let b: Vec<f32> = b.map(f32::from_le_bytes).collect();
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(&b).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / a.len() as f64
+}
+
+pub(crate) fn armadillo_is_exact_at_64(back_end: &BackEnd) {
+    mean_error_is_below(LIMIT_AT_64, back_end, 64);
+}
+
+pub(crate) fn armadillo_is_exact_at_128(back_end: &BackEnd) {
+    mean_error_is_below(LIMIT_AT_128, back_end, 128);
+}
+
+fn mean_error_is_below(limit: f64, back_end: &BackEnd, grid: u32) {
+    let corners: Vec<u32> = npy!("cage_triangles").map(u32::from_le_bytes).collect();
+    let faces = corners.chunks_exact(3).map(<[u32]>::to_vec).collect();
+    let cage = cage(&PolygonMesh { positions: points(npy!("cage_positions")), faces });
+    // As a user binds, not to the last digit.
+    let tau = BindOptions::default().tau;
+    let binding = back_end.bind_with(&points(npy!("points")), &cage, |o| (o.grid, o.tau) = (grid, tau));
+    assert_eq!(binding.report.outside_vertices, 0);
+    let weights = dense(&binding.weights);
+    let error = mean_difference(&weights, npy!("weights_fem"));
+    assert!(error <= limit, "mean difference from finite elements is {error:e}, more than {limit:e}");
+    // A witness that shares nothing with finite elements; its own error adds one standard error on average at most.
+    let walked = &weights[..N_WALKED * cage.n_vertices()];
+    let noise = mean_difference(&vec![0.0; walked.len()], npy!("stderr_wos"));
+    let (error, limit) = (mean_difference(walked, npy!("weights_wos")), limit + noise);
+    assert!(error <= limit, "mean difference from Walk on Spheres is {error:e}, more than {limit:e}");
+}
