@@ -1,12 +1,14 @@
 //! From mesh and cage to weights: the one call that runs every stage.
 
 mod memory;
+mod outside;
 pub mod pipeline;
 mod rebind;
 mod solving;
 mod voxels;
 mod watch;
 
+pub use outside::Misfit;
 pub use rebind::{RebindReport, Rebinder};
 pub use watch::Watch;
 
@@ -190,6 +192,14 @@ pub enum BindError {
         /// The first.
         first: u32,
     },
+    /// No vertex is inside the cage.
+    #[error("none of the model's {} vertices is inside the cage; {misfit}", outside::grouped(*vertices))]
+    NoneInside {
+        /// Vertices of the model.
+        vertices: usize,
+        /// How the two lie to each other.
+        misfit: Misfit,
+    },
     /// Cancelled by the caller.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -200,7 +210,7 @@ pub enum BindError {
 /// `positions`: `[n_vertices]`, object units, any order, repeats allowed (equal positions are solved once).
 ///
 /// # Errors
-/// [`BindError`]: options out of range, empty or not finite mesh, memory above the limit, cancelled.
+/// [`BindError`]: options out of range, empty or not finite mesh, memory above the limit, no vertex inside, cancelled.
 pub fn bind(
     positions: &[Vec3],
     cage: &Cage,

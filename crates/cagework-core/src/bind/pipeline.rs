@@ -15,6 +15,7 @@ use crate::solve::rows::Row;
 use crate::solve::team::{Team, VERTEX_RUN};
 use crate::weights::assemble::{Assembled, RowOptions, assemble};
 
+use super::outside::refuse_unless_any_is_inside;
 use super::solving::solve_and_sample;
 use super::voxels::Voxels;
 use super::watch::Watch;
@@ -123,6 +124,7 @@ impl<'a> Prepared<'a> {
         let voxelized = watch.now_ms();
 
         let stencils = sampling_stencils(cage, &voxels, &points, &team, watch)?;
+        refuse_unless_any_is_inside(cage, positions, &stencils)?;
         refuse_outside(&stencils, options, &welded)?;
         let times_ms = [began, voxelized, watch.now_ms()];
         Ok(Self { positions, cage, options, welded, points, team, voxels, stencils, estimated, times_ms })
