@@ -80,8 +80,8 @@ pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u
     report(
         Code::DegenerateFace,
         degenerate,
-        "face has no area, a corner twice, or an outline that crosses itself",
-        "faces have no area, a corner twice, or an outline that crosses itself",
+        "face has no area, a corner twice, too many corners, or an outline that crosses itself",
+        "faces have no area, a corner twice, too many corners, or an outline that crosses itself",
         drop(),
     );
     report(
