@@ -1,178 +1,244 @@
-//! Random and damaged input: always a model or an error, never a panic, never minutes.
+//! Mutated files through everything that reads them: each ends in a result or an error, within seconds, and without a panic.
+//!
+//! `cargo xtask fuzz --minutes 60` takes a seed from the clock and says which; `--seed 1` gives the same inputs in every run.
+//! What fails is written to `target/fuzz`, and `cargo xtask fuzz FILE` does it again.
+//!
+//! Inputs are tried in a process of its own, because a stack that overflows and memory that runs out end one. It says the number
+//! of each input before it tries it; when it ends, or falls silent, the number is known and so is the input.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod inputs;
+mod survive;
 
-use cagework_core::Weights;
-use cagework_core::bind::OutsideVertex;
-use cagework_io::{Model, read_weights_npz, write_weights_npz};
-use common::{
-    CUBE_OBJ, glb, instanced, json_of, plain_cube, quantized, read, skinned, textured_square, twist,
-};
-use glam::Vec3;
-use proptest::prelude::*;
-use proptest::sample::Index;
-use serde_json::{Value, json};
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitCode, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
 
-/// One change to a file.
-#[derive(Clone, Debug)]
-enum Damage {
-    Set(Index, u8),
-    Cut(Index),
-    Insert(Index, Vec<u8>),
-    Repeat(Index, Index),
-}
+/// Longest time on the processor for one input; the slowest takes a second.
+const LIMIT: Duration = Duration::from_secs(10);
 
-/// Bytes that mean something to a parser.
-const SYNTAX: &[u8] = b"0123456789-.,/e \\\n{}[]\"";
+/// Longest time on the clock: whoever waits that long waits for nothing, or all others have the processor.
+const PATIENCE: Duration = Duration::from_secs(600);
 
-fn damage() -> impl Strategy<Value = Vec<Damage>> {
-    let one = prop_oneof![
-        4 => (any::<Index>(), any::<u8>()).prop_map(|(at, b)| Damage::Set(at, b)),
-        1 => any::<Index>().prop_map(Damage::Cut),
-        2 => (any::<Index>(), prop::collection::vec(prop_oneof![any::<u8>(), prop::sample::select(SYNTAX)], 1..5))
-            .prop_map(|(at, bytes)| Damage::Insert(at, bytes)),
-        1 => (any::<Index>(), any::<Index>()).prop_map(|(a, b)| Damage::Repeat(a, b)),
-    ];
-    prop::collection::vec(one, 1..6)
-}
+/// Address space of the process that tries inputs, KiB: none needs more than a few MiB.
+const MEMORY_KIB: &str = "4194304";
 
-fn damaged(mut bytes: Vec<u8>, damage: &[Damage]) -> Vec<u8> {
-    for d in damage {
-        if bytes.is_empty() {
-            break;
-        }
-        match d {
-            Damage::Set(at, b) => {
-                let at = at.index(bytes.len());
-                bytes[at] = *b;
+/// Failures after which the rest of the time would be more of the same.
+const MAX_FAILURES: u64 = 50;
+
+const USAGE: &str = "usage: cargo xtask fuzz [--minutes N] [--seed S] | FILE ...";
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    match args.as_slice() {
+        ["--try", seed, first] => {
+            if let (Ok(seed), Ok(first)) = (seed.parse(), first.parse()) {
+                try_from(seed, first);
             }
-            Damage::Cut(at) => bytes.truncate(at.index(bytes.len())),
-            Damage::Insert(at, new) => {
-                let at = at.index(bytes.len());
-                bytes.splice(at..at, new.iter().copied());
+            ExitCode::FAILURE
+        }
+        ["--try", file] => {
+            println!("0");
+            match std::fs::read(file) {
+                Ok(bytes) => survive::survive(&bytes),
+                Err(e) => {
+                    eprintln!("cannot read {file}: {e}");
+                    return ExitCode::FAILURE;
+                }
             }
-            Damage::Repeat(a, b) => {
-                let (a, b) = (a.index(bytes.len()), b.index(bytes.len()));
-                let part = bytes[a.min(b)..a.max(b)].to_vec();
-                bytes.splice(a..a, part);
+            ExitCode::SUCCESS
+        }
+        [] => fuzz(1.0, None),
+        ["--minutes", minutes] => minutes.parse().map_or_else(|_| usage(), |m| fuzz(m, None)),
+        ["--minutes", minutes, "--seed", seed] => match (minutes.parse(), seed.parse()) {
+            (Ok(minutes), Ok(seed)) => fuzz(minutes, Some(seed)),
+            _ => usage(),
+        },
+        [first, ..] if first.starts_with("--") => usage(),
+        files => try_files(files),
+    }
+}
+
+fn usage() -> ExitCode {
+    eprintln!("{USAGE}");
+    ExitCode::from(2)
+}
+
+/// Tries inputs until somebody ends this process.
+fn try_from(seed: u64, first: u64) {
+    let mut inputs = inputs::Inputs::new(seed);
+    let mut out = std::io::stdout().lock();
+    for number in first.. {
+        let said = writeln!(out, "{number}").and_then(|()| out.flush());
+        if said.is_err() {
+            return;
+        }
+        survive::survive(&inputs.get(number));
+    }
+}
+
+/// A process that tries inputs, and the numbers that it says.
+struct Trial {
+    process: Child,
+    numbers: Receiver<u64>,
+    /// When the input under way was begun, and how much time the process had had on the processor.
+    since: (Instant, Duration),
+}
+
+impl Trial {
+    fn start(args: &[&str]) -> Self {
+        let program = std::env::current_exe().expect("this program has a file");
+        let mut process = Command::new("sh")
+            .args(["-c", &format!("ulimit -v {MEMORY_KIB} && exec \"$0\" --try \"$@\"")])
+            .arg(program)
+            .args(args)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("there is a shell");
+        let lines = BufReader::new(process.stdout.take().expect("it was asked for")).lines();
+        let (send, numbers) = channel();
+        std::thread::spawn(move || {
+            for number in lines.map_while(Result::ok).filter_map(|line| line.parse().ok()) {
+                if send.send(number).is_err() {
+                    return;
+                }
+            }
+        });
+        Self { process, numbers, since: (Instant::now(), Duration::ZERO) }
+    }
+
+    /// The next input's number, and the processor's time for the one before. An error tells that the process has ended, or that it
+    /// takes too long.
+    fn next(&mut self) -> Result<(u64, Duration), RecvTimeoutError> {
+        loop {
+            let number = self.numbers.recv_timeout(Duration::from_secs(1));
+            let now = (Instant::now(), self.busy().unwrap_or(self.since.1 + self.since.0.elapsed()));
+            let took = now.1.saturating_sub(self.since.1);
+            match number {
+                Ok(number) => {
+                    self.since = now;
+                    return Ok((number, took));
+                }
+                Err(RecvTimeoutError::Timeout) if took < LIMIT && self.since.0.elapsed() < PATIENCE => {}
+                Err(e) => return Err(e),
             }
         }
     }
-    bytes
-}
 
-fn samples() -> Vec<Vec<u8>> {
-    vec![
-        plain_cube().glb(),
-        textured_square().glb(),
-        instanced().glb(),
-        skinned().glb(),
-        quantized().glb(),
-        CUBE_OBJ.as_bytes().to_vec(),
-    ]
-}
+    /// How long the process has been on the processor, as Linux counts it: in hundredths of a second.
+    fn busy(&self) -> Option<Duration> {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.process.id())).ok()?;
+        let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+        let ticks = |k: usize| fields.get(k)?.parse::<u64>().ok();
+        Some(Duration::from_millis(10 * (ticks(11)? + ticks(12)?)))
+    }
 
-/// Reads, and exports what could be read: both may fail, neither may panic; a GLB that was written can be read.
-fn try_everything(bytes: &[u8]) {
-    let Ok(model) = read("x", bytes) else { return };
-    assert!(model.positions.iter().all(|p| p.is_finite()));
-    assert!(model.triangles.iter().flatten().all(|&v| (v as usize) < model.positions.len()));
-    let moved: Vec<Vec3> = model.positions.iter().map(|&p| twist(p.clamp_length_max(1e6))).collect();
-    let _ = model.cage_mesh();
-    let _ = model.write_obj(&moved);
-    if let Ok(glb) = model.write_glb_poses(&model.positions, &[("moved".into(), moved)]) {
-        let again = Model::read("y.glb", &glb, &mut |_| None);
-        assert!(again.is_ok(), "{}", again.err().map(|e| e.to_string()).unwrap_or_default());
+    /// How it ended; none if all is well.
+    fn end(mut self, timed_out: bool) -> Option<String> {
+        if timed_out {
+            // It may have ended by itself meanwhile.
+            let _ = self.process.kill();
+        }
+        match self.process.wait() {
+            _ if timed_out => Some(format!("not done after {} s", LIMIT.as_secs())),
+            Ok(status) if status.success() => None,
+            Ok(status) => Some(format!("ended with {status}")),
+            Err(e) => Some(e.to_string()),
+        }
     }
 }
 
-/// Every number and list of a document, as paths.
-fn places(value: &Value, path: &str, out: &mut Vec<String>) {
-    match value {
-        Value::Object(object) => {
-            for (key, value) in object {
-                places(value, &format!("{path}/{}", key.replace('~', "~0").replace('/', "~1")), out);
+/// Tries what `target/fuzz` or anybody else has kept.
+fn try_files(files: &[&str]) -> ExitCode {
+    let mut outcome = ExitCode::SUCCESS;
+    for file in files {
+        let path = root().join(file);
+        let mut trial = Trial::start(&[&path.display().to_string()]);
+        let began = Instant::now();
+        // Its number, then nothing.
+        let ended = trial.next().and_then(|_| trial.next());
+        match trial.end(matches!(ended, Err(RecvTimeoutError::Timeout))) {
+            None => println!("{file}: survived in {} ms", began.elapsed().as_millis()),
+            Some(how) => {
+                println!("{file}: {how}");
+                outcome = ExitCode::FAILURE;
             }
         }
-        Value::Array(items) => {
-            out.push(path.to_owned());
-            items.iter().enumerate().for_each(|(i, item)| places(item, &format!("{path}/{i}"), out));
-        }
-        _ => out.push(path.to_owned()),
     }
+    outcome
 }
 
-fn odd_value() -> impl Strategy<Value = Value> {
-    prop_oneof![
-        (0_u64..12).prop_map(Value::from),
-        prop::sample::select(vec![
-            json!(-1),
-            json!(u64::MAX),
-            json!(u32::MAX),
-            json!(1e38),
-            json!(-0.0),
-            json!(null),
-            json!([]),
-            json!({}),
-            json!("x"),
-            json!([0, 0, 0]),
-            json!(5126),
-            json!(5121),
-            json!("VEC3"),
-            json!("SCALAR"),
-        ]),
-    ]
+/// Tries inputs for some minutes. Success if all of them have ended well.
+fn fuzz(minutes: f64, seed: Option<u64>) -> ExitCode {
+    let clock = || std::time::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs());
+    let seed = seed.unwrap_or_else(clock);
+    println!("fuzz: seed {seed}, {minutes} minutes");
+    let began = Instant::now();
+    let until = began + Duration::from_secs_f64(60.0 * minutes.clamp(0.0, 1e5));
+    let (mut next, mut failures, mut said) = (0, 0, began);
+    let (mut slowest, mut slowest_number) = (Duration::ZERO, 0);
+    while Instant::now() < until && failures < MAX_FAILURES {
+        let mut trial = Trial::start(&[&seed.to_string(), &next.to_string()]);
+        let mut current = next;
+        let ended = loop {
+            match trial.next() {
+                Ok((number, took)) => {
+                    if number > current && took > slowest {
+                        (slowest, slowest_number) = (took, current);
+                    }
+                    current = number;
+                    if Instant::now() >= until {
+                        break None;
+                    }
+                    if said.elapsed() > Duration::from_secs(60) {
+                        said = Instant::now();
+                        println!("fuzz: {current} inputs, {failures} failures so far");
+                    }
+                }
+                Err(e) => break Some(e),
+            }
+        };
+        let how = trial.end(ended != Some(RecvTimeoutError::Disconnected));
+        // The input under way when the time is over is not counted.
+        next = current + u64::from(ended.is_some());
+        if ended.is_some() {
+            failures += 1;
+            let how = how.unwrap_or_else(|| "ended".to_owned());
+            match keep(seed, current) {
+                Ok(path) => println!(
+                    "fuzz: input {current} of seed {seed} {how}; again: cargo xtask fuzz {}",
+                    path.display()
+                ),
+                Err(e) => println!("fuzz: input {current} of seed {seed} {how}; it cannot be kept: {e}"),
+            }
+        }
+    }
+    println!(
+        "fuzz: seed {seed}, {next} inputs in {} s, {failures} failures; the slowest, input {slowest_number}, took {} ms",
+        began.elapsed().as_secs(),
+        slowest.as_millis()
+    );
+    if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+/// Writes an input down; its path from the repository's root.
+fn keep(seed: u64, number: u64) -> std::io::Result<PathBuf> {
+    let path = Path::new("target/fuzz").join(format!("{seed}-{number}"));
+    std::fs::create_dir_all(root().join("target/fuzz"))?;
+    std::fs::write(root().join(&path), inputs::Inputs::new(seed).get(number))?;
+    Ok(path)
+}
 
-    #[test]
-    fn random_bytes_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..300), magic in 0..4) {
-        let magic: &[u8] = [&b""[..], b"glTF\x02\0\0\0", b"{\"asset\":{\"version\":\"2.0\"},", b"v 0 0 0\nf "][magic as usize];
-        try_everything(&[magic, &bytes].concat());
-        let _ = read_weights_npz(&bytes);
-    }
-
-    #[test]
-    fn damaged_files_are_survived(which in any::<Index>(), damage in damage()) {
-        let samples = samples();
-        try_everything(&damaged(which.get(&samples).clone(), &damage));
-    }
-
-    #[test]
-    fn odd_values_in_the_json_are_survived(which in 0..5_usize, changes in prop::collection::vec((any::<Index>(), odd_value()), 1..4)) {
-        let sample = &samples()[which];
-        let mut json = json_of(sample);
-        for (at, value) in changes {
-            let mut paths = Vec::new();
-            places(&json, "", &mut paths);
-            *json.pointer_mut(&paths[at.index(paths.len())]).unwrap() = value;
-        }
-        let json_length = u32::from_le_bytes(sample[12..16].try_into().unwrap()) as usize;
-        try_everything(&glb(&json, Some(&sample[28 + json_length..])));
-    }
-
-    #[test]
-    fn lines_of_numbers_and_slashes_are_survived(lines in prop::collection::vec("(v|vn|vt|f|usemtl|#|f|v) [-0-9./ e\\\\]{0,12}", 0..20)) {
-        try_everything(format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{}", lines.join("\n")).as_bytes());
-    }
-
-    #[test]
-    fn polygons_of_any_shape_are_survived(points in prop::collection::vec(prop::array::uniform3(-1e3_f32..1e3), 3..40)) {
-        let mut text = String::new();
-        for [x, y, z] in &points {
-            text += &format!("v {x} {y} {z}\n");
-        }
-        text += "f";
-        (1..=points.len()).for_each(|i| text += &format!(" {i}"));
-        prop_assert_eq!(read("x.obj", text.as_bytes()).unwrap().triangles.len(), points.len() - 2);
-    }
-
-    #[test]
-    fn damaged_weights_are_survived(damage in damage()) {
-        let weights = Weights::new(5, vec![0, 2, 2, 5], vec![0, 4, 1, 2, 3], vec![0.25, 0.75, 0.5, 0.375, 0.125]).unwrap();
-        let outside = OutsideVertex { vertex: 2, corners: [1, 2, 4], offset: Vec3::ONE };
-        let _ = read_weights_npz(&damaged(write_weights_npz(&weights, &[outside]), &damage));
-    }
+/// The repository's root; tests run in the folder of their crate.
+fn root() -> PathBuf {
+    // crates/cagework-io is two levels below it.
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .ancestors()
+        .nth(2)
+        .expect("the crate lies in the repository")
+        .to_path_buf()
 }
