@@ -124,8 +124,7 @@ impl<'a> Prepared<'a> {
         let voxelized = watch.now_ms();
 
         let stencils = sampling_stencils(cage, &voxels, &points, &team, watch)?;
-        refuse_unless_any_is_inside(cage, positions, &stencils)?;
-        refuse_outside(&stencils, options, &welded)?;
+        refuse_outside(cage, positions, &stencils, options, &welded)?;
         let times_ms = [began, voxelized, watch.now_ms()];
         Ok(Self { positions, cage, options, welded, points, team, voxels, stencils, estimated, times_ms })
     }
@@ -265,10 +264,13 @@ pub(super) fn sampling_stencils(
 }
 
 pub(super) fn refuse_outside(
+    cage: &Cage,
+    positions: &[Vec3],
     stencils: &Stencils,
     options: &BindOptions,
     welded: &Weld,
 ) -> Result<(), BindError> {
+    refuse_unless_any_is_inside(cage, positions, stencils)?;
     match (options.outside, stencils.outside.first()) {
         (OutsidePolicy::Refuse, Some(first)) => Err(BindError::Outside {
             count: stencils.outside.len() as u32,

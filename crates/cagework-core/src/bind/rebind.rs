@@ -40,7 +40,6 @@ use self::moved::{moved_columns, renumbering, swept_by};
 use self::region::Region;
 use self::rows::Edit;
 use self::steps::{resample, solve_for};
-use super::outside::refuse_unless_any_is_inside;
 use super::pipeline::{FieldsOn, Prepared, Solved, refuse_outside, sampling_stencils};
 use super::solving::{FieldFate, multigrid_columns};
 use super::voxels::Voxels;
@@ -313,8 +312,7 @@ impl Rebinder {
             let points: Vec<Vec3> = changed.iter().map(|&v| self.points[v as usize]).collect();
             stencils.replace(&changed, &sampling_stencils(cage, &voxels, &points, &team, watch)?);
         }
-        refuse_unless_any_is_inside(cage, &self.positions, &stencils)?;
-        refuse_outside(&stencils, &self.options, &self.welded)?;
+        refuse_outside(cage, &self.positions, &stencils, &self.options, &self.welded)?;
         let stencils_made = watch.now_ms();
 
         let mut solved = Solved { converged: true, delta_interval: 1, solve_share: 1.0, ..Solved::default() };
