@@ -24,7 +24,7 @@ pub struct Misfit {
 
 impl Misfit {
     fn of(cage: Bounds, model: Bounds) -> Self {
-        let [low, high, min, max] = [cage.min, cage.max, model.min, model.max].map(|p| p.as_dvec3());
+        let [low, high, min, max] = [cage.min, cage.max, model.min, model.max].map(Vec3::as_dvec3);
         let gap = (low - max).max(min - high).max(DVec3::ZERO).length();
         Self { gap, ratio: max.distance(min) / high.distance(low) }
     }
