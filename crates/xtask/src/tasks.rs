@@ -42,6 +42,9 @@ pub(crate) fn check() -> Result<(), String> {
     npm::install()?;
     run("cargo", &["fmt", "--all", "--check"], &[])?;
     run("cargo", &["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"], &[])?;
+    // Not among all targets, because `cargo test` leaves it to [`fuzz`].
+    let fuzz = ["clippy", "--package", "cagework-io", "--test", "fuzz", "--locked", "--", "-D", "warnings"];
+    run("cargo", &fuzz, &[])?;
     let web = ["clippy", "--package", "cagework-web", "--target", "wasm32-unknown-unknown", "--locked"];
     run("cargo", &[&web[..], &["--", "-D", "warnings"]].concat(), &[])?;
     run("cargo", &["doc", "--workspace", "--no-deps", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")])?;

@@ -12,7 +12,8 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use serde_json::{Value, json};
 
 use crate::common::{
-    CUBE_OBJ, cube, glb, instanced, json_of, plain_cube, quantized, read, skinned, textured_square, twist,
+    Builder, CUBE_OBJ, cube, glb, instanced, json_of, plain_cube, quantized, read, skinned, textured_square,
+    twist,
 };
 
 /// Samples that are GLBs come first.
@@ -44,7 +45,7 @@ impl Inputs {
 pub(crate) fn samples() -> Vec<Vec<u8>> {
     let mut samples: Vec<Vec<u8>> = [plain_cube(), textured_square(), instanced(), skinned(), quantized()]
         .iter()
-        .map(|b| b.glb())
+        .map(Builder::glb)
         .collect();
     let model = read("cube.obj", CUBE_OBJ.as_bytes()).expect("it is one");
     let bent: Vec<Vec3> = cube().into_iter().map(twist).collect();
