@@ -56,6 +56,7 @@ macro_rules! solver_suite {
             rows::dropping_small_weights_keeps_sums_and_rest_pose,
             outside::vertices_outside_are_listed_and_follow_rigidly,
             outside::refusal_names_count_and_first_vertex,
+            outside::cage_around_nothing_is_refused,
             errors::options_out_of_range_are_named,
             errors::bad_meshes_are_named,
             errors::memory_limit_is_kept_and_named,

@@ -66,6 +66,20 @@ pub(crate) fn refusal_names_count_and_first_vertex(back_end: &BackEnd) {
     assert_eq!(inside.report.outside_vertices, 0);
 }
 
+/// A cage elsewhere, or in another unit.
+pub(crate) fn cage_around_nothing_is_refused(back_end: &BackEnd) {
+    let vertices = points::inside(&cage(&c_shape()), 20, 45);
+    let away = cage(&moved(&c_shape(), |p| p + Vec3::new(0.0, 0.0, 2e4)));
+    let small = cage(&moved(&c_shape(), |p| Vec3::new(2.5, 1.5, 0.5) + 1e-3 * p));
+    for outside in [OutsidePolicy::ClosestPoint, OutsidePolicy::Refuse] {
+        for (cage, said) in [(&away, "2e4 away"), (&small, "times smaller")] {
+            let error = back_end.try_bind(&vertices, cage, |o| o.outside = outside).unwrap_err();
+            assert!(matches!(error, BindError::NoneInside { vertices: 20, .. }), "{error:?}");
+            assert!(error.to_string().contains(said), "{error}");
+        }
+    }
+}
+
 /// Vertices of a cage made from the model, or a model that touches its cage: on it, whatever rounding says.
 pub(crate) fn vertices_on_the_cage_are_not_outside(back_end: &BackEnd) {
     let turn = Random::new(43).rotation();

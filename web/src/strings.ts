@@ -80,6 +80,7 @@ const FIXES: Record<string, NonNullable<Explained["fix"]>> = {
   Empty: "file",
   Missing: "file",
   Outside: "regenerate",
+  NoneInside: "regenerate",
   DeviceLost: "reload",
 };
 

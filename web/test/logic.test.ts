@@ -114,6 +114,8 @@ describe("words", () => {
     const error = new Error("needs 3 GB");
     error.name = "Memory";
     expect(explain(error, "No bind").fix).toBe("coarser");
+    error.name = "NoneInside";
+    expect(explain(error, "No bind").fix).toBe("regenerate");
     expect(explain("plain", "No bind")).toEqual({ title: "No bind", message: "Plain." });
   });
   it("know a cancellation", () => {

@@ -98,6 +98,10 @@ impl CliError {
             Self::Bind(BindError::Outside { .. }) | Self::Gpu(GpuError::Bind(BindError::Outside { .. })) => {
                 Some("`--outside closest-point` binds such vertices to the closest point of the cage")
             }
+            Self::Bind(BindError::NoneInside { .. })
+            | Self::Gpu(GpuError::Bind(BindError::NoneInside { .. })) => Some(
+                "`--outside closest-point` cannot help: it is for vertices next to others that are inside; `--cage auto` makes a cage that fits",
+            ),
             Self::Gpu(GpuError::NoAdapter { .. }) => Some(
                 "a bind does not need one: leave out `--backend gpu`; CAGEWORK_ADAPTER chooses among several",
             ),

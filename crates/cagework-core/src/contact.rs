@@ -15,10 +15,13 @@ const TOUCH: f64 = 1e-10;
 /// Cosine of the smallest angle between two faces with a common edge (2 degrees): sharper is folded.
 const FOLDED: f64 = 0.9994;
 
+/// Most pairs that [`meeting`] lists: where thousands of triangles go through each other, their pairs would fill the memory.
+pub(crate) const MAX_PAIRS: usize = 100_000;
+
 /// A triangle with its corners' vertex numbers, which say what it shares with others.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Corners {
-    /// Vertex numbers.
+    /// Vertex numbers, three different ones.
     pub(crate) index: [u32; 3],
     /// Their positions.
     pub(crate) at: [DVec3; 3],
@@ -49,6 +52,7 @@ impl Corners {
 /// Whether two triangles of a surface meet anywhere but in the vertices and edges that they share. Triangles that
 /// share nothing must be more than `gap` apart.
 pub(crate) fn meet(a: &Corners, b: &Corners, gap: f64) -> bool {
+    debug_assert!([a, b].iter().all(|Corners { index: [i, j, k], .. }| i != j && j != k && k != i));
     let mut shared = [(0, 0); 3];
     let mut n = 0;
     for (i, va) in a.index.iter().enumerate() {
@@ -78,7 +82,8 @@ fn ascending(x: f64, number: u32) -> [u32; 3] {
     [(key >> 32) as u32, key as u32, number]
 }
 
-/// Pairs of triangles of one surface that meet where they should not, each once, in order. `[n_triangles]` given.
+/// Pairs of triangles of one surface that meet where they should not, each once, in order. `[n_triangles]` given. It stops
+/// at [`MAX_PAIRS`].
 ///
 /// Sweep along x: `n log n` for surfaces whose triangles are small against the whole.
 pub(crate) fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
@@ -86,7 +91,7 @@ pub(crate) fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
     order.sort_unstable();
     let mut active: Vec<u32> = Vec::new();
     let mut pairs = Vec::new();
-    for [.., t] in order {
+    'sweep: for [.., t] in order {
         let from = triangles[t as usize].min().x;
         active.retain(|&other| triangles[other as usize].max().x >= from);
         let corners = &triangles[t as usize];
@@ -96,6 +101,9 @@ pub(crate) fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
             let apart = rival.min().cmpgt(max).any() || rival.max().cmplt(min).any();
             if !apart && meet(corners, rival, 0.0) {
                 pairs.push([t.min(other), t.max(other)]);
+                if pairs.len() == MAX_PAIRS {
+                    break 'sweep;
+                }
             }
         }
         active.push(t);

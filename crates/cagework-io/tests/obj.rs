@@ -7,6 +7,7 @@ mod common;
 use cagework_io::{Format, write_cage_obj};
 use common::{CUBE_OBJ, cube, read, twist, volume};
 use glam::Vec3;
+use proptest::prelude::*;
 
 /// Message of a failed read.
 fn fault(text: &str) -> String {
@@ -176,4 +177,19 @@ fn wrong_positions_are_refused() {
     assert!(message.contains("1 positions for a model of 8 vertices"), "{message}");
     let message = model.write_glb(&[Vec3::NAN; 8]).unwrap_err().to_string();
     assert!(message.contains("vertex 0 is not a finite number"), "{message}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn polygons_of_any_shape_become_two_triangles_fewer_than_corners(points in prop::collection::vec(prop::array::uniform3(-1e3_f32..1e3), 3..40)) {
+        let mut text = String::new();
+        for [x, y, z] in &points {
+            text += &format!("v {x} {y} {z}\n");
+        }
+        text += "f";
+        (1..=points.len()).for_each(|i| text += &format!(" {i}"));
+        prop_assert_eq!(read("x.obj", text.as_bytes()).unwrap().triangles.len(), points.len() - 2);
+    }
 }

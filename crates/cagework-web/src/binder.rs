@@ -140,7 +140,11 @@ impl Binder {
         if centers.is_empty() {
             return Ok(None);
         }
-        let binding = self.run(&centers, &parts.cage, asked, progress).await?;
+        let binding = match self.run(&centers, &parts.cage, asked, progress).await {
+            // Rounding may put all of a layer that only grazes the cage outside.
+            Err(fault) if fault.is("NoneInside") => return Ok(None),
+            ran => ran?,
+        };
         let (weights, outside) = (binding.weights, Vec::new());
         Ok(Some(Bound { weights, outside, report: JsValue::UNDEFINED }))
     }

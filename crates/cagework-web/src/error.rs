@@ -30,6 +30,11 @@ impl Fault {
         Self { name: name.to_owned(), message: message.into() }
     }
 
+    /// Whether this is the error of that name.
+    pub(crate) fn is(&self, name: &str) -> bool {
+        self.name == name
+    }
+
     /// There is none of what is needed.
     pub(crate) fn missing(what: &str, how: &str) -> Self {
         Self::new("Missing", format!("there is no {what} yet: {how}"))

@@ -17,6 +17,8 @@ const USAGE: &str = "usage: cargo xtask TASK
   build          build the page into dist/, and the release `cagework` (target/release/cagework)
   test           every test there is: Rust, wasm32 builds, glTF validator, TypeScript, the page in a browser
   check          format, lints, documentation, dependency arrows, import circles, types, biome
+  fuzz [--minutes N] [--seed S] | FILE ...
+                 damaged files through all that reads them; what fails is kept in target/fuzz, and FILE is tried again
   arrows         the dependency arrows of ARCHITECTURE.md and import circles only
   wasm [--dev]   crates/cagework-web as a JavaScript package, web/src/pkg
   page           build the page only
@@ -35,6 +37,7 @@ fn main() -> ExitCode {
         ["demo", rest @ ..] => tasks::demo(rest),
         ["build"] => tasks::build(),
         ["test"] => tasks::test(),
+        ["fuzz", rest @ ..] => tasks::fuzz(rest),
         ["check"] => tasks::check(),
         ["arrows"] => arrows::check(),
         ["wasm"] => wasm::build(wasm::Profile::Web),

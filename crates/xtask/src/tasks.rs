@@ -20,6 +20,8 @@ pub(crate) fn build() -> Result<(), String> {
 pub(crate) fn test() -> Result<(), String> {
     npm::install()?;
     run("cargo", &["test", "--workspace", "--locked"], &[])?;
+    // The same inputs in each run; `cargo xtask fuzz` alone takes others each time.
+    fuzz(&["--minutes", "1", "--seed", "1"])?;
     // The browser's half: no threads, no file system, no surprises when the page arrives.
     let packages = ["--package", "cagework-core", "--package", "cagework-io", "--no-default-features"];
     let wasm = ["check", "--locked", "--target", "wasm32-unknown-unknown"];
@@ -29,11 +31,20 @@ pub(crate) fn test() -> Result<(), String> {
     site::test_page(&[])
 }
 
+/// Damaged files through everything that reads them. As tests are built: overflows and debug assertions count.
+pub(crate) fn fuzz(args: &[&str]) -> Result<(), String> {
+    let fixed = ["test", "--quiet", "--locked", "--package", "cagework-io", "--test", "fuzz", "--"];
+    run("cargo", &[&fixed[..], args].concat(), &[])
+}
+
 /// Everything that can fail because the source is untidy.
 pub(crate) fn check() -> Result<(), String> {
     npm::install()?;
     run("cargo", &["fmt", "--all", "--check"], &[])?;
     run("cargo", &["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"], &[])?;
+    // Not among all targets, because `cargo test` leaves it to [`fuzz`].
+    let fuzz = ["clippy", "--package", "cagework-io", "--test", "fuzz", "--locked", "--", "-D", "warnings"];
+    run("cargo", &fuzz, &[])?;
     let web = ["clippy", "--package", "cagework-web", "--target", "wasm32-unknown-unknown", "--locked"];
     run("cargo", &[&web[..], &["--", "-D", "warnings"]].concat(), &[])?;
     run("cargo", &["doc", "--workspace", "--no-deps", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")])?;

@@ -129,6 +129,40 @@ fn vertices_outside_the_cage_can_be_refused() {
     );
 }
 
+/// Such a bind succeeded with all vertices outside, each of which then followed a far triangle.
+#[test]
+fn cage_elsewhere_or_in_another_unit_is_refused_whatever_is_to_be_done_outside() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    sandbox.write("far.obj", box_obj(&CORNERS.map(|[x, y, z]| [x + 10_001.7, y, z])));
+    sandbox.write("small.obj", box_obj(&CORNERS.map(|c| c.map(|x| 0.01 * x))));
+    for policy in ["closest-point", "refuse"] {
+        for (cage, said) in [
+            // From 0.7 to 10,000.7.
+            ("far.obj", "none of the model's 178 vertices is inside the cage; the cage is 1e4 away from it"),
+            ("small.obj", "the cage is 70 times smaller than the model"),
+        ] {
+            let args = format!("bind mesh.obj --cage {cage} -g 8 --outside {policy}");
+            assert_refused(&sandbox, &args, &[said, "`--outside closest-point` cannot help"]);
+        }
+    }
+}
+
+/// Both ended in a panic: a cube with a vertex far away, and one with two corners of a face at one place.
+#[test]
+fn damaged_cages_are_checked_and_mended_as_far_as_can_be() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    let closed = box_obj(&CORNERS);
+    sandbox.write("far.obj", closed.replacen("v -1 -1 -1", "v -1 -1429490.567295 -1", 1));
+    sandbox.write("damaged.obj", closed.replacen("v -1 -1 -1", "v 1 -1 -1", 1));
+    sandbox.run("check far.obj --mesh mesh.obj").success().stdout(contains("valid as a cage"));
+    for repair in ["weld,drop-degenerate,fill-holes,flip", "weld", "grow"] {
+        for file in ["far.obj", "damaged.obj"] {
+            let args = format!("check {file} --mesh mesh.obj --repair {repair} -o mended.obj");
+            sandbox.run(&args).stderr(contains("panicked").not());
+        }
+    }
+}
+
 #[test]
 fn memory_limit_is_kept_with_the_number() {
     let sandbox = Sandbox::with_sphere_in_box();

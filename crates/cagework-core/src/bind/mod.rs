@@ -1,11 +1,13 @@
 //! From mesh and cage to weights: the one call that runs every stage.
 
 mod memory;
+mod outside;
 pub mod pipeline;
 mod solving;
 mod voxels;
 mod watch;
 
+pub use outside::Misfit;
 pub use watch::Watch;
 
 use glam::Vec3;
@@ -70,6 +72,14 @@ pub enum BindError {
         /// The first.
         first: u32,
     },
+    /// No vertex is inside the cage.
+    #[error("none of the model's {} vertices is inside the cage; {misfit}", outside::grouped(*vertices))]
+    NoneInside {
+        /// Vertices of the model.
+        vertices: usize,
+        /// How the two lie to each other.
+        misfit: Misfit,
+    },
     /// Cancelled by the caller.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -80,7 +90,7 @@ pub enum BindError {
 /// `positions`: `[n_vertices]`, object units, any order, repeats allowed (equal positions are solved once).
 ///
 /// # Errors
-/// [`BindError`]: options out of range, empty or not finite mesh, memory above the limit, cancelled.
+/// [`BindError`]: options out of range, empty or not finite mesh, memory above the limit, no vertex inside, cancelled.
 pub fn bind<'a>(
     positions: &[Vec3],
     controls: impl Into<Controls<'a>>,

@@ -19,6 +19,7 @@ use crate::solve::rows::Row;
 use crate::solve::stop::SolveReport;
 use crate::team::{Team, VERTEX_RUN};
 
+use super::outside::refuse_unless_any_is_inside;
 use super::solving::solve_and_sample;
 use super::voxels::Voxels;
 use super::watch::Watch;
@@ -121,7 +122,7 @@ impl<'a> Prepared<'a> {
         let voxelized = watch.now_ms();
 
         let stencils = sampling_stencils(controls, &voxels, &points, &team, watch)?;
-        refuse_outside(&stencils, options, &welded)?;
+        refuse_outside(controls.surface(), positions, &stencils, options, &welded)?;
         let times_ms = [began, voxelized, watch.now_ms()];
         Ok(Self { positions, controls, options, welded, points, team, voxels, stencils, estimated, times_ms })
     }
@@ -248,7 +249,14 @@ fn sampling_stencils(
     Ok(stencils)
 }
 
-fn refuse_outside(stencils: &Stencils, options: &BindOptions, welded: &Weld) -> Result<(), BindError> {
+fn refuse_outside(
+    cage: &Cage,
+    positions: &[Vec3],
+    stencils: &Stencils,
+    options: &BindOptions,
+    welded: &Weld,
+) -> Result<(), BindError> {
+    refuse_unless_any_is_inside(cage, positions, stencils)?;
     match (options.outside, stencils.outside.first()) {
         (OutsidePolicy::Refuse, Some(first)) => Err(BindError::Outside {
             count: stencils.outside.len() as u32,

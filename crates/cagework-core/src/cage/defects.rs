@@ -4,6 +4,7 @@ use std::fmt;
 
 use thiserror::Error;
 
+use super::polygon::MAX_CORNERS;
 use super::{MAX_DIAGONAL, MIN_DIAGONAL};
 
 /// Why a polygon mesh is not a cage. Vertices and faces are counted from 0.
@@ -115,6 +116,12 @@ pub enum FaceDefect {
     /// All corners are on a line, or areas cancel.
     #[error("it has no area")]
     NoArea,
+    /// Cutting it into triangles would take too long.
+    #[error("it has {corners} corners, more than {MAX_CORNERS}; cut it into triangles")]
+    TooManyCorners {
+        /// Its corners.
+        corners: usize,
+    },
     /// Two of its edges cross.
     #[error("its outline crosses itself; cut it into triangles")]
     CrossesItself,

@@ -21,6 +21,9 @@ const MIN_TURN: f64 = 1e-3;
 /// Most corners for Meyer's formula, a product of one factor an edge: more could underflow.
 const MAX_CONVEX_CORNERS: usize = 32;
 
+/// Most corners of a face: cutting it takes the square of them, or the cube at worst.
+pub(super) const MAX_CORNERS: usize = 1000;
+
 /// How boundary values are interpolated on a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Hats {
@@ -71,6 +74,9 @@ impl Polygon {
     /// Measures a face with three corners or more; `diagonal` of the cage.
     pub(super) fn new(corners: &[DVec3], diagonal: f64) -> Result<Self, FaceDefect> {
         let n = corners.len();
+        if n > MAX_CORNERS {
+            return Err(FaceDefect::TooManyCorners { corners: n });
+        }
         let center = corners.iter().sum::<DVec3>() / n as f64;
         let arms: Vec<DVec3> = corners.iter().map(|&p| p - center).collect();
         // Newell's normal: its length is twice the area of the projection that has the largest one.

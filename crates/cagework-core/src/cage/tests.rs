@@ -262,6 +262,15 @@ fn crossed_face_is_rejected() {
     assert_eq!(defect(&mesh), (0, FaceDefect::CrossesItself));
 }
 
+/// Cutting a disc of a million corners took more than their square.
+#[test]
+fn face_of_too_many_corners_is_rejected() {
+    let disc = |n: u32| (0..n).map(move |k| f64::from(k) / f64::from(n) * std::f64::consts::TAU);
+    let outline = |n| disc(n).map(|a| [a.cos() as f32, a.sin() as f32]).collect::<Vec<_>>();
+    assert!(Cage::new(&prism(&outline(1000), 1.0)).is_ok());
+    assert_eq!(defect(&prism(&outline(1001), 1.0)), (0, FaceDefect::TooManyCorners { corners: 1001 }));
+}
+
 #[test]
 fn flat_component_is_rejected() {
     let mut mesh = octahedron();

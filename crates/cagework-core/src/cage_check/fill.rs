@@ -16,21 +16,24 @@ pub(crate) fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
         next.entry(to).or_default().push(from);
     }
     let mut found = Vec::new();
-    while let Some((&start, _)) = next.iter().find(|(_, to)| !to.is_empty()) {
-        let mut path = vec![start];
-        while let Some(from) = path.last().copied()
-            && let Some(to) = next.get_mut(&from).and_then(Vec::pop)
-        {
-            if let Some(back) = next.get_mut(&to)
-                && let Some(k) = back.iter().position(|&v| v == from)
+    let starts: Vec<u32> = next.keys().copied().collect();
+    for start in starts {
+        while !next[&start].is_empty() {
+            let mut path = vec![start];
+            while let Some(from) = path.last().copied()
+                && let Some(to) = next.get_mut(&from).and_then(Vec::pop)
             {
-                back.swap_remove(k);
+                if let Some(back) = next.get_mut(&to)
+                    && let Some(k) = back.iter().position(|&v| v == from)
+                {
+                    back.swap_remove(k);
+                }
+                if let Some(k) = path.iter().position(|&v| v == to) {
+                    // Where holes touch in a vertex, the path closes early: cut the loop off and go on.
+                    found.push(path.split_off(k));
+                }
+                path.push(to);
             }
-            if let Some(k) = path.iter().position(|&v| v == to) {
-                // Where holes touch in a vertex, the path closes early: cut the loop off and go on.
-                found.push(path.split_off(k));
-            }
-            path.push(to);
         }
     }
     found.retain(|outline| outline.len() >= 3);

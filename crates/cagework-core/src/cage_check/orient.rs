@@ -58,17 +58,39 @@ pub(super) fn components(mesh: &PolygonMesh, sound: &[u32], edges: &Edges) -> Ve
     components
 }
 
+/// Fewest triangles that go more than half around a point.
+const ENCLOSING: usize = 3;
+
+fn corners_of_box(triangles: &[[DVec3; 3]]) -> [DVec3; 2] {
+    let corners = || triangles.iter().flatten().copied();
+    [corners().fold(DVec3::INFINITY, DVec3::min), corners().fold(DVec3::NEG_INFINITY, DVec3::max)]
+}
+
 /// Turns whole components whose volume has the wrong sign: negative, or positive for one inside another.
 fn turn_outward(mesh: &PolygonMesh, components: &mut [Component]) {
     let solids: Vec<Vec<[DVec3; 3]>> = components.iter().map(|c| triangles(mesh, c)).collect();
+    // A soup may have as many components as faces: only those that can have something inside are looked at.
+    let around: Vec<(usize, [DVec3; 2])> = solids
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| s.len() >= ENCLOSING)
+        .map(|(j, s)| (j, corners_of_box(s)))
+        .collect();
     for (k, component) in components.iter_mut().enumerate() {
         let Some(first) = solids[k].first() else { continue };
         let center = solids[k].iter().flatten().sum::<DVec3>() / (3 * solids[k].len()) as f64;
         let volume: f64 =
             solids[k].iter().map(|t| t.map(|p| p - center)).map(|[a, b, c]| a.dot(b.cross(c))).sum();
         let probe = (first[0] + first[1] + first[2]) / 3.0;
-        let depth =
-            (0..solids.len()).filter(|&j| j != k && winding_number(probe, &solids[j]).abs() > 0.5).count();
+        let depth = around
+            .iter()
+            .filter(|(j, [min, max])| {
+                *j != k
+                    && probe.cmpge(*min).all()
+                    && probe.cmple(*max).all()
+                    && winding_number(probe, &solids[*j]).abs() > 0.5
+            })
+            .count();
         if (volume < 0.0) != (depth % 2 == 1) {
             for turn in &mut component.turn {
                 *turn = !*turn;

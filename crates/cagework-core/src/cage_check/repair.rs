@@ -1,6 +1,6 @@
 //! What can be mended without asking.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -159,11 +159,16 @@ fn drop_degenerate(repaired: &mut Repaired) {
 fn fill_holes(repaired: &mut Repaired) {
     let mesh = &mut repaired.mesh;
     let sound = shape::sound_faces(mesh, &mut Vec::new());
-    let open = Edges::of(mesh, &sound).open();
+    let edges = Edges::of(mesh, &sound);
+    let behind: HashMap<[u32; 2], u32> =
+        edges.groups().filter(|g| g.len() == 1).map(|g| ([g[0].lo, g[0].hi], g[0].face)).collect();
     let at: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
     let mut filled = 0;
-    for outline in fill::loops(&open) {
-        if let Some(triangles) = fill::triangulate(&outline, &at, &mesh.faces) {
+    for outline in fill::loops(&edges.open()) {
+        let sides = outline.iter().zip(outline.iter().cycle().skip(1));
+        let around = sides.filter_map(|(&a, &b)| behind.get(&[a.min(b), a.max(b)]));
+        let around: Vec<Vec<u32>> = around.map(|&f| mesh.faces[f as usize].clone()).collect();
+        if let Some(triangles) = fill::triangulate(&outline, &at, &around) {
             mesh.faces.extend(triangles.into_iter().map(|t| t.to_vec()));
             filled += 1;
         }

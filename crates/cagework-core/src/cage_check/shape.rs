@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{Code, Fix, MAX_PLACES, Places, Problem, Repair, Severity, counted, diagonal, problem};
 use crate::cage::{Cage, face_triangles};
-use crate::contact::{Corners, meeting};
+use crate::contact::{Corners, MAX_PAIRS, meeting};
 use crate::mesh::PolygonMesh;
 use crate::options::MAX_GRID;
 
@@ -80,8 +80,8 @@ pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u
     report(
         Code::DegenerateFace,
         degenerate,
-        "face has no area, a corner twice, or an outline that crosses itself",
-        "faces have no area, a corner twice, or an outline that crosses itself",
+        "face has no area, a corner twice, too many corners, or an outline that crosses itself",
+        "faces have no area, a corner twice, too many corners, or an outline that crosses itself",
         drop(),
     );
     report(
@@ -97,17 +97,29 @@ pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u
 /// Sound faces as triangles with the face that each was cut from.
 fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
     let diagonal = diagonal(mesh);
-    // Vertices at one place count as one, so that neighbours across a seam do not seem to meet.
-    let (first, _) = super::edges::same_places(mesh);
     let (mut triangles, mut face_of) = (Vec::new(), Vec::new());
     for &f in sound {
         let face = &mesh.faces[f as usize];
         let corners: Vec<DVec3> = face.iter().map(|&i| mesh.positions[i as usize].as_dvec3()).collect();
         for t in face_triangles(&corners, diagonal).unwrap_or_default() {
-            let index = t.map(|k| first[face[k as usize] as usize]);
-            triangles.push(Corners { index, at: t.map(|k| corners[k as usize]) });
+            triangles
+                .push(Corners { index: t.map(|k| face[k as usize]), at: t.map(|k| corners[k as usize]) });
             face_of.push(f);
         }
+    }
+    // Vertices at one place count as one, so that neighbours across a seam do not seem to meet; but not the corners of one
+    // triangle, as where the mesh is that small against its diagonal.
+    let (mut first, _) = super::edges::same_places(mesh);
+    for Corners { index, .. } in &triangles {
+        let named = index.map(|i| first[i as usize]);
+        for (k, &i) in index.iter().enumerate() {
+            if named[(k + 1) % 3] == named[k] || named[(k + 2) % 3] == named[k] {
+                first[i as usize] = i;
+            }
+        }
+    }
+    for corners in &mut triangles {
+        corners.index = corners.index.map(|i| first[i as usize]);
     }
     (triangles, face_of)
 }
@@ -118,7 +130,8 @@ pub(super) fn report_crossings(mesh: &PolygonMesh, sound: &[u32], found: &mut Ve
     let mut faces = Vec::new();
     let mut points = Vec::new();
     let mut count = 0;
-    for [a, b] in meeting(&triangles) {
+    let pairs = meeting(&triangles);
+    for &[a, b] in &pairs {
         let (f, g) = (face_of[a as usize], face_of[b as usize]);
         if f == g {
             continue;
@@ -141,7 +154,8 @@ pub(super) fn report_crossings(mesh: &PolygonMesh, sound: &[u32], found: &mut Ve
             Severity::Error,
             count,
             format!(
-                "The cage goes through itself: {} meet. Move their vertices apart.",
+                "The cage goes through itself: {}{} meet. Move their vertices apart.",
+                if pairs.len() == MAX_PAIRS { "at least " } else { "" },
                 counted(count, "pair of triangles", "pairs of triangles")
             ),
         )

@@ -208,3 +208,59 @@ proptest! {
         }
     }
 }
+
+/// A cage that is being shaped had one vertex dragged far away: what is left of the cube is small against the diagonal, so its
+/// other corners counted as one, and a triangle shared corners with its neighbour that it does not have. That was a panic.
+#[test]
+fn cube_with_a_vertex_far_away_is_checked() {
+    let mut mesh = box_mesh(1);
+    mesh.positions[0].y = -1_429_490.6;
+    let found = check(&mesh, Some(&[Vec3::ZERO]), Some(64));
+    assert!(found.valid, "closed, and no face goes through another one: {:?}", found.problems);
+    // Within 2e-6 of the diagonal, 2.86, of the first of seven are all but the one across the cube, at 3.46.
+    assert_eq!(found.problem(Code::DuplicateVertex).unwrap().count, 5);
+    // Its sister from a damaged file: two corners of a face are at one place.
+    let mut mesh = box_mesh(1);
+    mesh.positions[1] = mesh.positions[0];
+    assert!(check(&mesh, Some(&[Vec3::ZERO]), Some(64)).problem(Code::DuplicateVertex).is_some());
+    let repaired = mended(&mesh, &[Repair::Weld, Repair::DropDegenerate, Repair::FillHoles, Repair::Flip]);
+    assert_eq!(codes(&repaired), [], "a cube without one of its edges");
+}
+
+/// What a file of separate triangles has: as many parts and holes as faces. Each was compared with all others, half an hour
+/// for the 100,000 of a model that was taken for its cage.
+#[test]
+fn soup_of_separate_triangles_is_checked_and_repaired_within_seconds() {
+    let mut soup = PolygonMesh::default();
+    for k in 0..30_000_u32 {
+        let corner = vec3((k % 200) as f32, (k / 200) as f32, 0.0);
+        soup.positions.extend([corner, corner + 0.5 * Vec3::X, corner + 0.5 * Vec3::Y]);
+        soup.faces.push(vec![3 * k, 3 * k + 1, 3 * k + 2]);
+    }
+    let repairs = [Repair::Weld, Repair::DropDegenerate, Repair::FillHoles, Repair::Flip];
+    let (found, repaired) = within_seconds(move || (check(&soup, None, None), mended(&soup, &repairs)));
+    assert_eq!(found.components, 30_000);
+    assert_eq!(found.problem(Code::OpenEdge).unwrap().count, 90_000);
+    assert_eq!(repaired.faces.len(), 60_000, "each hole was filled with the triangle's other side");
+}
+
+/// Triangles that all go through each other: the pairs of 100,000 of them are 40 GB.
+#[test]
+fn crossings_are_listed_up_to_a_limit() {
+    let mut star = PolygonMesh::default();
+    for k in 0..1000_u32 {
+        let (s, c) = (0.006 * k as f32).sin_cos();
+        star.positions.extend([vec3(c, s, -1.0), vec3(c, s, 1.0), vec3(-c, -s, 0.01 * k as f32)]);
+        star.faces.push(vec![3 * k, 3 * k + 1, 3 * k + 2]);
+    }
+    let found = check(&star, None, None);
+    let crossing = found.problem(Code::SelfIntersection).unwrap();
+    assert!(crossing.count == 100_000 && crossing.message.contains("at least"), "{}", crossing.message);
+}
+
+/// The outcome of `work`, which must be there long before anybody gives up waiting: a tenth of the limit on a slow machine.
+fn within_seconds<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
+    let (send, receive) = std::sync::mpsc::channel();
+    std::thread::spawn(move || send.send(work()));
+    receive.recv_timeout(std::time::Duration::from_secs(60)).expect("it takes a second")
+}

@@ -1,0 +1,131 @@
+//! A cage that holds nothing of the model: told before it is solved for, with what is likely to be wrong.
+
+use std::fmt;
+
+use glam::{DVec3, Vec3};
+
+use super::BindError;
+use crate::cage::Cage;
+use crate::mesh::Bounds;
+use crate::sample::Stencils;
+
+/// Cage and model that differ in size by this factor or more are taken to be in different units, of which feet and metres differ
+/// least; a cage is seldom twice as large as its model.
+const OTHER_UNIT: f64 = 3.0;
+
+/// How a cage and a model lie to each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Misfit {
+    /// Distance between their boxes, object units; 0 if they overlap.
+    pub gap: f64,
+    /// Diagonal of the model's box over that of the cage's.
+    pub ratio: f64,
+}
+
+impl Misfit {
+    fn of(cage: Bounds, model: Bounds) -> Self {
+        let [low, high, min, max] = [cage.min, cage.max, model.min, model.max].map(Vec3::as_dvec3);
+        let gap = (low - max).max(min - high).max(DVec3::ZERO).length();
+        Self { gap, ratio: max.distance(min) / high.distance(low) }
+    }
+}
+
+/// What is wrong and what to do.
+impl fmt::Display for Misfit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let gap = about(self.gap);
+        // A model of one point has no size.
+        let size = if self.ratio >= OTHER_UNIT {
+            Some(format!("{} times smaller than the model", about(self.ratio)))
+        } else if self.ratio > 0.0 && self.ratio <= 1.0 / OTHER_UNIT {
+            Some(format!("{} times larger than the model", about(1.0 / self.ratio)))
+        } else {
+            None
+        };
+        match (self.gap > 0.0, size) {
+            (true, None) => write!(f, "the cage is {gap} away from it: move one of them to the other"),
+            (true, Some(size)) => write!(
+                f,
+                "the cage is {gap} away from it and {size}: bring both into the same unit and place"
+            ),
+            (false, Some(size)) => write!(f, "the cage is {size}: bring both into the same unit"),
+            (false, None) => f.write_str(
+                "they overlap, but it lies beside what the cage encloses: is the cage another model's?",
+            ),
+        }
+    }
+}
+
+/// A length or factor with two digits: what a reader takes in.
+fn about(x: f64) -> String {
+    let rounded = format!("{x:.1e}").parse().unwrap_or(x);
+    if (0.01..1e4).contains(&rounded) { rounded.to_string() } else { format!("{rounded:e}") }
+}
+
+/// A count with commas: `15,002`.
+pub(super) fn grouped(n: usize) -> String {
+    let digits = n.to_string();
+    let mut grouped = String::new();
+    for (k, digit) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) {
+            grouped.push(',');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+/// [`BindError::NoneInside`] if the cage holds none of the model: nothing would follow it but by its closest point.
+/// `positions` of the file, `stencils` of those that differ.
+pub(super) fn refuse_unless_any_is_inside(
+    cage: &Cage,
+    positions: &[Vec3],
+    stencils: &Stencils,
+) -> Result<(), BindError> {
+    match Bounds::of(positions) {
+        Some(model) if stencils.outside.len() == stencils.len() => {
+            let misfit = Misfit::of(cage.bounds(), model);
+            Err(BindError::NoneInside { vertices: positions.len(), misfit })
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bind::bind;
+use crate::options::BindOptions;
+    use crate::cage_gen::subdivided_box;
+    use crate::progress::Silent;
+
+    /// What binding points of the unit cube to a box cage says.
+    fn said(min: Vec3, size: f32) -> String {
+        let bounds = Bounds { min, max: min + size };
+        let cage = Cage::new(&subdivided_box(bounds, 0.0, [1, 1, 1])).unwrap();
+        let points: Vec<Vec3> =
+            (0..15_002).map(|k| Vec3::new((k % 2) as f32, (k / 2) as f32 / 7500.0, 0.0)).collect();
+        bind(&points, &cage, &BindOptions { grid: 8, ..BindOptions::default() }, &Silent)
+            .unwrap_err()
+            .to_string()
+    }
+
+    /// Such a cage was bound to, with all vertices outside, and the model then turned with a far triangle.
+    #[test]
+    fn cage_that_holds_nothing_is_refused_with_what_is_wrong() {
+        let elsewhere = said(Vec3::new(10_001.0, 0.0, -0.5), 1.0);
+        let expected =
+            "none of the model's 15,002 vertices is inside the cage; the cage is 1e4 away from it: move";
+        assert!(elsewhere.starts_with(expected), "{elsewhere}");
+        // Diagonal of the points, root of 2, over root of 3 times 0.01.
+        let small = said(Vec3::new(0.2, 0.3, -0.005), 0.01);
+        assert!(
+            small.ends_with("; the cage is 82 times smaller than the model: bring both into the same unit"),
+            "{small}"
+        );
+        let both = said(Vec3::new(3.0, 0.0, 0.0), 100.0);
+        assert!(both.contains("the cage is 2 away from it and 120 times larger than the model: "), "{both}");
+        let beside = said(Vec3::new(0.1, 0.1, -0.4), 0.8);
+        assert!(beside.contains("beside what the cage encloses"), "{beside}");
+    }
+}

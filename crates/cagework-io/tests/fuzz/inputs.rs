@@ -1,0 +1,290 @@
+//! Inputs by number: files of every kind that is read, damaged at random.
+
+use cagework_core::deform::OutsideVertex;
+use cagework_core::mesh::Bounds;
+use cagework_core::{PolygonMesh, Weights, subdivided_box};
+use cagework_io::{encode_pose, write_cage_obj, write_project, write_weights_npz};
+use glam::Vec3;
+use proptest::prelude::*;
+use proptest::sample::{Index, select};
+use proptest::strategy::ValueTree as _;
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use serde_json::{Value, json};
+
+use crate::common::{
+    Builder, CUBE_OBJ, cube, glb, instanced, json_of, plain_cube, quantized, read, skinned, textured_square,
+    twist,
+};
+
+/// Samples that are GLBs come first.
+const N_GLB: usize = 5;
+
+/// All inputs of a seed.
+pub(crate) struct Inputs {
+    seed: u64,
+    files: BoxedStrategy<Vec<u8>>,
+}
+
+impl Inputs {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self { seed, files: files() }
+    }
+
+    /// Input `number`; the others need not have been asked for.
+    pub(crate) fn get(&mut self, number: u64) -> Vec<u8> {
+        let mut seed = [0; 32];
+        seed[..8].copy_from_slice(&self.seed.to_le_bytes());
+        seed[8..16].copy_from_slice(&number.to_le_bytes());
+        let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
+        let mut runner = TestRunner::new_with_rng(Config::default(), rng);
+        self.files.new_tree(&mut runner).expect("nothing is filtered").current()
+    }
+}
+
+/// What is damaged: small files of every kind, so that every byte has its turn.
+pub(crate) fn samples() -> Vec<Vec<u8>> {
+    let mut samples: Vec<Vec<u8>> = [plain_cube(), textured_square(), instanced(), skinned(), quantized()]
+        .iter()
+        .map(Builder::glb)
+        .collect();
+    let model = read("cube.obj", CUBE_OBJ.as_bytes()).expect("it is one");
+    let bent: Vec<Vec3> = cube().into_iter().map(twist).collect();
+    let weights = Weights::new(5, vec![0, 2, 2, 5], vec![0, 4, 1, 2, 3], vec![0.25, 0.75, 0.5, 0.375, 0.125]);
+    let outside = OutsideVertex { vertex: 2, corners: [1, 2, 4], offset: Vec3::ONE };
+    samples.push(CUBE_OBJ.as_bytes().to_vec());
+    samples.push(
+        write_project(&model, &model.cage_mesh(), &[("bent".into(), bent.clone())], "{}").expect("it fits"),
+    );
+    samples.push(write_weights_npz(&weights.expect("they are"), &[outside]));
+    samples.push(encode_pose(&cube(), &bent));
+    samples.extend(cages().iter().map(write_cage_obj));
+    samples
+}
+
+/// Closed meshes: quads, a concave polygon, and a cavity.
+pub(crate) fn cages() -> Vec<PolygonMesh> {
+    let unit = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    let block = |shrink, divisions| subdivided_box(unit, shrink, [divisions; 3]);
+    let l_shape = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)];
+    let mut prism = PolygonMesh::default();
+    for z in [0.0, 1.0] {
+        prism.positions.extend(l_shape.map(|(x, y)| Vec3::new(x as f32, y as f32, z)));
+    }
+    prism.faces = vec![(0..6).rev().collect(), (6..12).collect()];
+    prism.faces.extend((0..6).map(|k| vec![k, (k + 1) % 6, 6 + (k + 1) % 6, 6 + k]));
+    let mut hollow = block(0.0, 1);
+    let inner = block(-0.1, 1);
+    hollow.positions.extend(inner.positions);
+    hollow.faces.extend(inner.faces.into_iter().map(|f| f.into_iter().rev().map(|i| i + 8).collect()));
+    vec![block(0.0, 1), block(0.0, 2), prism, hollow]
+}
+
+fn files() -> BoxedStrategy<Vec<u8>> {
+    let samples = samples();
+    let glbs = samples[..N_GLB].to_vec();
+    let texts: Vec<String> =
+        cages().iter().map(|c| String::from_utf8(write_cage_obj(c)).expect("text")).collect();
+    let magic: Vec<&[u8]> =
+        vec![b"", b"glTF\x02\0\0\0", b"{\"asset\":{\"version\":\"2.0\"},", b"PK\x03\x04", b"v 0 0 0\nf "];
+    prop_oneof![
+        1 => (select(magic), prop::collection::vec(any::<u8>(), 0..300)).prop_map(|(magic, bytes)| [magic, &bytes].concat()),
+        1 => prop::collection::vec("(v|vn|vt|f|usemtl|#|f|v) [-0-9./ e\\\\]{0,12}", 0..20)
+            .prop_map(|lines| format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{}", lines.join("\n")).into_bytes()),
+        4 => (select(samples), prop::collection::vec(damage(), 1..6)).prop_map(|(sample, damage)| damaged(sample, &damage)),
+        3 => (select(glbs), prop::collection::vec((any::<Index>(), odd_value()), 1..4), any::<bool>())
+            .prop_map(|(glb, changes, as_text)| odd_json(&glb, changes, as_text)),
+        5 => (select(texts), prop::collection::vec(line_damage(), 1..6)).prop_map(|(text, damage)| damaged_lines(&text, &damage)),
+        2 => soup(),
+    ]
+    .boxed()
+}
+
+/// One change to a file.
+#[derive(Clone, Debug)]
+enum Damage {
+    Set(Index, u8),
+    Number(Index, f32),
+    Cut(Index),
+    Insert(Index, Vec<u8>),
+    Repeat(Index, Index),
+}
+
+/// Bytes that mean something to a parser.
+const SYNTAX: &[u8] = b"0123456789-.,/e \\\n{}[]\"";
+
+fn damage() -> impl Strategy<Value = Damage> {
+    prop_oneof![
+        4 => (any::<Index>(), any::<u8>()).prop_map(|(at, b)| Damage::Set(at, b)),
+        2 => (any::<Index>(), odd_number()).prop_map(|(at, x)| Damage::Number(at, x)),
+        1 => any::<Index>().prop_map(Damage::Cut),
+        2 => (any::<Index>(), prop::collection::vec(prop_oneof![any::<u8>(), select(SYNTAX)], 1..5))
+            .prop_map(|(at, bytes)| Damage::Insert(at, bytes)),
+        1 => (any::<Index>(), any::<Index>()).prop_map(|(a, b)| Damage::Repeat(a, b)),
+    ]
+}
+
+fn damaged(mut bytes: Vec<u8>, damage: &[Damage]) -> Vec<u8> {
+    for d in damage {
+        let n = bytes.len();
+        if n < 4 {
+            break;
+        }
+        match d {
+            Damage::Set(at, b) => bytes[at.index(n)] = *b,
+            Damage::Number(at, x) => {
+                let at = at.index(n / 4) * 4;
+                bytes[at..at + 4].copy_from_slice(&x.to_le_bytes());
+            }
+            Damage::Cut(at) => bytes.truncate(at.index(n)),
+            Damage::Insert(at, new) => {
+                let at = at.index(n);
+                bytes.splice(at..at, new.iter().copied());
+            }
+            Damage::Repeat(a, b) => {
+                let (a, b) = (a.index(n), b.index(n));
+                let part = bytes[a.min(b)..a.max(b)].to_vec();
+                bytes.splice(a..a, part);
+            }
+        }
+    }
+    bytes
+}
+
+/// Coordinates from all over, and such as make others coincide.
+fn odd_number() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        3 => -2.0_f32..3.0,
+        3 => select(vec![0.0, 1.0, 0.5, -1.0, 1e-7, 1.000_001, -0.0]),
+        2 => (-45..39_i32, prop::bool::ANY).prop_map(|(e, minus)| if minus { -(10_f32.powi(e)) } else { 10_f32.powi(e) }),
+        1 => -3e6_f32..3e6,
+        1 => select(vec![f32::NAN, f32::INFINITY, f32::MAX, f32::MIN_POSITIVE]),
+    ]
+}
+
+/// One change to the lines of an OBJ.
+#[derive(Clone, Debug)]
+enum LineDamage {
+    Word(Index, Index, String),
+    Swap(Index, Index),
+    Drop(Index),
+    Repeat(Index, Index),
+}
+
+fn line_damage() -> impl Strategy<Value = LineDamage> {
+    let word = prop_oneof![
+        4 => odd_number().prop_map(|x| x.to_string()),
+        3 => (-4..30_i32).prop_map(|i| i.to_string()),
+        1 => "[-0-9./ev\\\\]{0,4}",
+    ];
+    prop_oneof![
+        6 => (any::<Index>(), any::<Index>(), word).prop_map(|(line, at, word)| LineDamage::Word(line, at, word)),
+        2 => (any::<Index>(), any::<Index>()).prop_map(|(a, b)| LineDamage::Swap(a, b)),
+        1 => any::<Index>().prop_map(LineDamage::Drop),
+        1 => (any::<Index>(), any::<Index>()).prop_map(|(a, b)| LineDamage::Repeat(a, b)),
+    ]
+}
+
+fn damaged_lines(text: &str, damage: &[LineDamage]) -> Vec<u8> {
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    for d in damage {
+        let n = lines.len();
+        match d {
+            LineDamage::Word(line, at, word) => {
+                let line = &mut lines[line.index(n)];
+                let mut words: Vec<&str> = line.split(' ').collect();
+                let at = at.index(words.len());
+                words[at] = word;
+                *line = words.join(" ");
+            }
+            LineDamage::Swap(a, b) => lines.swap(a.index(n), b.index(n)),
+            LineDamage::Drop(at) if n > 1 => {
+                lines.remove(at.index(n));
+            }
+            LineDamage::Drop(_) => {}
+            LineDamage::Repeat(a, b) => lines.insert(a.index(n), lines[b.index(n)].clone()),
+        }
+    }
+    lines.join("\n").into_bytes()
+}
+
+/// Any faces between a few points, some of them at one place.
+fn soup() -> impl Strategy<Value = Vec<u8>> {
+    let coordinate =
+        prop_oneof![6 => (0..4_i32).prop_map(|x| x as f32), 3 => -2.0_f32..2.0, 1 => odd_number()];
+    let points = prop::collection::vec(prop::array::uniform3(coordinate), 4..20);
+    let faces = prop::collection::vec(prop::collection::vec(any::<Index>(), 3..7), 1..30);
+    (points, faces).prop_map(|(points, faces)| {
+        let corner = |i: &Index| i.index(points.len()) as u32;
+        let faces = faces.iter().map(|f| f.iter().map(corner).collect()).collect();
+        write_cage_obj(&PolygonMesh { positions: points.iter().map(|&p| p.into()).collect(), faces })
+    })
+}
+
+/// Every number and list of a document, as paths.
+fn places(value: &Value, path: &str, out: &mut Vec<String>) {
+    match value {
+        Value::Object(object) => {
+            for (key, value) in object {
+                places(value, &format!("{path}/{}", key.replace('~', "~0").replace('/', "~1")), out);
+            }
+        }
+        Value::Array(items) => {
+            out.push(path.to_owned());
+            items.iter().enumerate().for_each(|(i, item)| places(item, &format!("{path}/{i}"), out));
+        }
+        _ => out.push(path.to_owned()),
+    }
+}
+
+fn odd_value() -> impl Strategy<Value = Value> {
+    prop_oneof![
+        (0_u64..12).prop_map(Value::from),
+        select(vec![
+            json!(-1),
+            json!(u64::MAX),
+            json!(u32::MAX),
+            json!(1e38),
+            json!(-0.0),
+            json!(null),
+            json!([]),
+            json!({}),
+            json!("x"),
+            json!([0, 0, 0]),
+            json!(5126),
+            json!(5121),
+            json!("VEC3"),
+            json!("SCALAR"),
+        ]),
+    ]
+}
+
+/// A GLB with odd values in its JSON; as text it is a glTF that asks for its buffer by name.
+fn odd_json(sample: &[u8], changes: Vec<(Index, Value)>, as_text: bool) -> Vec<u8> {
+    let mut json = json_of(sample);
+    if as_text {
+        json["buffers"][0]["uri"] = sample_name(sample).into();
+    }
+    for (at, value) in changes {
+        let mut paths = Vec::new();
+        places(&json, "", &mut paths);
+        let Some(place) = paths.get(at.index(paths.len().max(1))) else { break };
+        *json.pointer_mut(place).expect("it is there") = value;
+    }
+    if as_text { json.to_string().into_bytes() } else { glb(&json, Some(bin_of(sample))) }
+}
+
+/// What a glTF made of a sample calls its buffer: its length, which no two share.
+fn sample_name(sample: &[u8]) -> String {
+    format!("{}.bin", sample.len())
+}
+
+/// The binary chunk of a GLB.
+fn bin_of(glb: &[u8]) -> &[u8] {
+    let json = u32::from_le_bytes([glb[12], glb[13], glb[14], glb[15]]) as usize;
+    &glb[28 + json..]
+}
+
+/// The file beside a glTF.
+pub(crate) fn beside(samples: &[Vec<u8>], name: &str) -> Option<Vec<u8>> {
+    samples[..N_GLB].iter().find(|s| sample_name(s) == name).map(|s| bin_of(s).to_vec())
+}

@@ -1,0 +1,148 @@
+//! What is done with each input: everything that the command and the page do with a file.
+
+use std::sync::LazyLock;
+
+use cagework_core::options::{BindOptions, Method, OutsidePolicy, Solver};
+use cagework_core::cage_check::{Repair, check, repair};
+use cagework_core::cage_gen::{CageOptions, Shape, Symmetry, generate};
+use cagework_core::deform::deform_bound;
+use cagework_core::mesh::Bounds;
+use cagework_core::progress::Silent;
+use cagework_core::{Binding, Cage, PolygonMesh, bind};
+use cagework_io::{Model, decode_pose, encode_pose, read_project, read_weights_npz, write_weights_npz};
+use glam::Vec3;
+
+use crate::common::{CUBE_OBJ, cube, read, twist};
+use crate::inputs;
+
+const GRID: u32 = 8;
+
+/// What inputs meet.
+struct Rest {
+    samples: Vec<Vec<u8>>,
+    /// A cage that poses are for.
+    cage: Model,
+    /// Points inside it.
+    binding: Binding,
+}
+
+static REST: LazyLock<Rest> = LazyLock::new(|| {
+    let cage = read("cube.obj", CUBE_OBJ.as_bytes()).expect("it is one");
+    let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    let closed = Cage::new(&cage.cage_mesh()).expect("it is closed");
+    let options = BindOptions { grid: GRID, ..BindOptions::default() };
+    let binding = bind(&lattice(bounds), &closed, &options, &Silent).expect("points are inside");
+    Rest { samples: inputs::samples(), cage, binding }
+});
+
+/// Reads `bytes` as each kind of file, and goes on with whatever comes of it.
+pub(crate) fn survive(bytes: &[u8]) {
+    if let Ok((weights, outside)) = read_weights_npz(bytes) {
+        let again =
+            read_weights_npz(&write_weights_npz(&weights, &outside)).expect("what was written can be read");
+        assert_eq!((again.0.n_rows(), again.1.len()), (weights.n_rows(), outside.len()));
+    }
+    if let Ok(pose) = decode_pose(&cube(), bytes) {
+        let _ = encode_pose(&cube(), &pose);
+        let _ = deform_bound(&REST.binding.weights, &REST.binding.outside, &pose);
+    }
+    let choice = bytes.iter().fold(0_u32, |h, &b| h.wrapping_mul(31).wrapping_add(b.into())) >> 7;
+    if let Ok(Some(project)) = read_project("x", bytes) {
+        as_cage(&project.cage, choice);
+    }
+    let read = Model::read("x", bytes, &mut |name| inputs::beside(&REST.samples, name));
+    if let Ok(model) = read {
+        as_file(&model);
+        as_pose(&model);
+        as_model(&model, choice);
+        as_cage(&model.cage_mesh(), choice);
+    }
+}
+
+/// A GLB that was written can be read.
+fn as_file(model: &Model) {
+    assert!(model.positions.iter().all(|p| p.is_finite()));
+    assert!(model.triangles.iter().flatten().all(|&v| (v as usize) < model.positions.len()));
+    let moved: Vec<Vec3> = model.positions.iter().map(|&p| twist(p.clamp_length_max(1e6))).collect();
+    let _ = model.look();
+    let _ = model.write_obj(&moved);
+    if let Ok(glb) = model.write_glb_poses(&model.positions, &[("moved".into(), moved)]) {
+        let again = Model::read("y.glb", &glb, &mut |_| None);
+        assert!(again.is_ok(), "{}", again.err().map(|e| e.to_string()).unwrap_or_default());
+    }
+}
+
+fn as_pose(model: &Model) {
+    if let Ok(pose) = REST.cage.pose_positions(model) {
+        let _ = deform_bound(&REST.binding.weights, &REST.binding.outside, &pose);
+    }
+}
+
+/// A cage is made for it, and it is bound to that.
+fn as_model(model: &Model, choice: u32) {
+    let flags = |bit: u32| choice >> bit & 1 == 1;
+    let options = CageOptions {
+        target: 12 + choice % 40,
+        shape: if flags(8) { Shape::Hull } else { Shape::Follow },
+        symmetry: [Symmetry::Auto, Symmetry::None, Symmetry::X, Symmetry::Z][choice as usize >> 9 & 3],
+        per_component: flags(11),
+        clearance: if flags(12) { 0.25 } else { 0.0 },
+        // Coarse mostly: the finer, the fewer inputs.
+        voxels: if choice >> 13 & 3 == 0 { 0 } else { 8 },
+    };
+    if let Ok(made) = generate(&model.positions, &model.triangles, &options, &Silent) {
+        assert_eq!(made.cage.notices(), []);
+        let options = bind_options(choice);
+        match bind(&model.positions, &made.cage, &options, &Silent) {
+            Ok(binding) => {
+                assert_eq!(binding.weights.n_rows(), model.positions.len());
+                assert!(binding.weights.data().iter().all(|w| w.is_finite()));
+            }
+            // All of the model is inside, but the published cells may be too large for it.
+            Err(error) => assert_eq!(options.method, Method::Classic, "{error}"),
+        }
+    }
+}
+
+/// It is checked, repaired and checked again, and points in its box are bound to it.
+fn as_cage(mesh: &PolygonMesh, choice: u32) {
+    let finite: Vec<Vec3> = mesh.positions.iter().copied().filter(|p| p.is_finite()).collect();
+    let bounds = Bounds::of(&finite).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ONE });
+    let points = lattice(bounds);
+    let found = check(mesh, Some(&points), Some(GRID));
+    assert!(!found.valid || Cage::new(mesh).is_ok());
+    bind_to(mesh, &points, choice);
+    let repairs = [Repair::Weld, Repair::DropDegenerate, Repair::FillHoles, Repair::Flip];
+    let Ok(repaired) = repair(mesh, &repairs, None) else { return };
+    let _ = check(&repaired.mesh, Some(&points), Some(GRID));
+    bind_to(&repaired.mesh, &points, choice);
+    if let Ok(grown) = repair(&repaired.mesh, &[Repair::Grow], Some(&points)) {
+        bind_to(&grown.mesh, &points, choice);
+    }
+}
+
+fn bind_to(mesh: &PolygonMesh, points: &[Vec3], choice: u32) {
+    let Ok(cage) = Cage::new(mesh) else { return };
+    if let Ok(binding) = bind(points, &cage, &bind_options(choice), &Silent) {
+        assert!(binding.weights.data().iter().all(|w| w.is_finite()));
+        let _ = deform_bound(&binding.weights, &binding.outside, cage.positions());
+    }
+}
+
+fn bind_options(choice: u32) -> BindOptions {
+    BindOptions {
+        grid: GRID,
+        method: if choice & 16 == 0 { Method::Embedded } else { Method::Classic },
+        solver: if choice & 96 == 96 { Solver::Jacobi } else { Solver::Multigrid },
+        outside: if choice & 128 == 0 { OutsidePolicy::ClosestPoint } else { OutsidePolicy::Refuse },
+        threads: 1,
+        ..BindOptions::default()
+    }
+}
+
+/// Points throughout a box, its corners among them.
+fn lattice(bounds: Bounds) -> Vec<Vec3> {
+    let at = |k: u32| k as f32 / 4.0;
+    let points = (0..125).map(|k| Vec3::new(at(k % 5), at(k / 5 % 5), at(k / 25)));
+    points.map(|t| bounds.min * (1.0 - t) + bounds.max * t).collect()
+}
