@@ -4,9 +4,11 @@ mod cages;
 mod render;
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 pub(crate) use cages::{CageArgs, CageSource, CheckArgs, DEFAULT_DIVISIONS, DEFAULT_MARGIN, KindArg};
 use cagework_core::bind::{BindOptions, CellShape, DeltaNorm, Method, OutsidePolicy, Solver};
+use cagework_io::ModelFormat;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use render::{RenderArgs, Show};
@@ -80,9 +82,9 @@ pub(crate) struct BindArgs {
     /// Cells along the longest side of the cage, 8 to 512.
     #[arg(short, long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(8..=512))]
     pub(crate) grid: u32,
-    /// Write the rest pose as the weights reconstruct it (.glb, .obj).
-    #[arg(short, long, value_name = "FILE", value_parser = model_output)]
-    pub(crate) output: Option<PathBuf>,
+    /// Write the rest pose as the weights reconstruct it; the name's ending says the format.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<ModelOutput>,
     /// Write the weights (.npz; one row per vertex of the mesh file, one column per cage vertex).
     #[arg(long, value_name = "FILE", value_parser = npz_output)]
     pub(crate) weights: Option<PathBuf>,
@@ -196,9 +198,9 @@ pub(crate) struct DeformArgs {
     /// The cage, moved: same vertices in the same order. May be given several times.
     #[arg(long, value_name = "FILE", required = true)]
     pub(crate) pose: Vec<PathBuf>,
-    /// File to write (.glb, .obj).
-    #[arg(short, long, value_name = "FILE", value_parser = model_output)]
-    pub(crate) output: PathBuf,
+    /// File to write; the name's ending says the format.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: ModelOutput,
 }
 
 /// `cagework bench`
@@ -251,6 +253,25 @@ pub(crate) struct DemoArgs {
     pub(crate) output: PathBuf,
 }
 
+/// A model's file to write.
+#[derive(Clone, Debug)]
+pub(crate) struct ModelOutput {
+    /// The file.
+    pub(crate) path: PathBuf,
+    /// The format that its name asks for.
+    pub(crate) format: ModelFormat,
+}
+
+impl FromStr for ModelOutput {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let format = ModelFormat::of_export(text)
+            .ok_or_else(|| wrong_ending(&ModelFormat::ALL.map(ModelFormat::export_extension)))?;
+        Ok(Self { path: text.into(), format })
+    }
+}
+
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum MethodArg {
     Classic,
@@ -301,10 +322,6 @@ fn fraction(text: &str) -> Result<f32, String> {
     }
 }
 
-fn model_output(text: &str) -> Result<PathBuf, String> {
-    output(text, &["glb", "obj"])
-}
-
 fn npz_output(text: &str) -> Result<PathBuf, String> {
     output(text, &["npz"])
 }
@@ -319,6 +336,10 @@ fn output(text: &str, extensions: &[&str]) -> Result<PathBuf, String> {
     if extensions.contains(&given.as_str()) {
         return Ok(path);
     }
+    Err(wrong_ending(extensions))
+}
+
+fn wrong_ending(extensions: &[&str]) -> String {
     let known = extensions.iter().map(|e| format!(".{e}")).collect::<Vec<_>>().join(" or ");
-    Err(format!("the name must end in {known}"))
+    format!("the name must end in {known}")
 }

@@ -31,7 +31,7 @@ struct Checked {
 pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
     let inputs: Vec<_> =
         std::iter::once(&args.cage).chain(&args.mesh).map(std::path::PathBuf::as_path).collect();
-    let outputs: Vec<_> = args.output.iter().map(std::path::PathBuf::as_path).collect();
+    let outputs: Vec<_> = args.output.iter().map(|output| output.path.as_path()).collect();
     check_outputs(&outputs, &inputs)?;
     let mut cage = load_model(&args.cage)?.cage_mesh();
     let model = args.mesh.as_deref().map(load_model).transpose()?;
@@ -42,13 +42,13 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
         output: None,
         check: check(&cage, inside, Some(args.grid)),
     };
-    if let Some(path) = &args.output {
+    if let Some(output) = &args.output {
         let repairs: Vec<Repair> = args.repair.iter().map(|&r| r.into()).collect();
         let mended = repair(&cage, &repairs, inside)?;
         cage = mended.mesh;
-        write_cage(path, &cage)?;
+        write_cage(output, &cage)?;
         checked.repaired = mended.done;
-        checked.output = Some(path.display().to_string());
+        checked.output = Some(output.path.display().to_string());
         checked.check = check(&cage, inside, Some(args.grid));
     }
     print(&if as_json { json(&checked) } else { text(&checked) })?;

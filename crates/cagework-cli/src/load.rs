@@ -2,15 +2,16 @@
 
 use std::path::Path;
 
+use cagework_core::cage_gen::{CageGenError, CageReport, generate};
 use cagework_core::samples::{self, Sample};
-use cagework_core::{Bounds, Cage, CageError, PolygonMesh, TriMesh, subdivided_box};
+use cagework_core::{Bounds, Cage, CageError, CageOptions, PolygonMesh, TriMesh, subdivided_box};
 use cagework_io::{Model, write_cage_obj};
 use glam::Vec3;
 
 use crate::args::{CageSource, DEFAULT_MARGIN};
-use crate::cage::generate_for;
 use crate::error::CliError;
 use crate::files::{read, read_beside};
+use crate::progress::Bar;
 
 /// A cage with the document that it came from, which knows how a pose of it is read.
 #[derive(Debug)]
@@ -89,6 +90,19 @@ pub(crate) fn load_cage(source: &CageSource, around: &Model) -> Result<LoadedCag
     let cage = Cage::new(&model.cage_mesh())
         .map_err(|source| CliError::Cage { name: model.name.clone(), source })?;
     Ok(LoadedCage { cage, model })
+}
+
+/// A generated cage around a model, with progress on the terminal.
+///
+/// # Errors
+/// Those of [`generate`].
+pub(crate) fn generate_for(
+    model: &Model,
+    options: &CageOptions,
+) -> Result<(PolygonMesh, CageReport), CageGenError> {
+    let bar = Bar::start();
+    let made = generate(&model.positions, &model.triangles, options, &bar)?;
+    Ok((made.cage.to_polygon_mesh(), made.report))
 }
 
 /// A subdivided box around positions. `margin`: fraction of their bounding box's diagonal.

@@ -3,42 +3,47 @@
 use cagework_core::mesh::weld;
 use cagework_core::{PolygonMesh, TriMesh};
 use glam::Vec3;
+use thiserror::Error;
 
-use crate::error::{PoseError, ReadError, WriteError};
-use crate::gltf::{self, GltfDocument, Pose, Rest};
+use crate::counts::Counts;
+use crate::error::{PoseError, WriteError};
+use crate::format::{FormatError, ModelFormat};
+use crate::gltf::{self, GltfDocument, GltfError, Pose, Rest};
 use crate::look::Look;
-use crate::obj::{self, ObjDocument};
+use crate::obj::{self, ObjDocument, ObjError};
 
-/// Format of a model's document.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Wavefront OBJ.
-    Obj,
-    /// glTF 2.0, as JSON or GLB.
-    Gltf,
-}
-
-/// How much of everything a document has. OBJ counts `o` and `g` lines as nodes, `usemtl` names as materials.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Scenes.
-    pub scenes: usize,
-    /// Nodes.
-    pub nodes: usize,
-    /// Meshes.
-    pub meshes: usize,
-    /// Triangle primitives in use; a mesh shown twice counts twice.
-    pub primitives: usize,
-    /// Materials.
-    pub materials: usize,
-    /// Textures.
-    pub textures: usize,
-    /// Skins.
-    pub skins: usize,
-    /// Animations.
-    pub animations: usize,
-    /// Morph targets of all meshes.
-    pub morph_targets: usize,
+/// Why bytes could not be read as a model.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum ReadError {
+    /// The content is no format that is read here.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// Vertices, but no faces, where faces are needed.
+    #[error(
+        "{name} has {vertices} vertices but no faces: export it with faces (a file of positions only works as a pose)"
+    )]
+    NoFaces {
+        /// Name of the model.
+        name: String,
+        /// Vertices it has.
+        vertices: usize,
+    },
+    /// A fault in an OBJ file.
+    #[error("{name}: {source}")]
+    Obj {
+        /// Name the caller gave.
+        name: String,
+        /// The fault.
+        source: ObjError,
+    },
+    /// A fault in a glTF file.
+    #[error("{name}: {source}")]
+    Gltf {
+        /// Name the caller gave.
+        name: String,
+        /// The fault.
+        source: GltfError,
+    },
 }
 
 /// A model that was read from bytes.
@@ -77,8 +82,8 @@ impl Model {
         bytes: &[u8],
         resolve: &mut dyn FnMut(&str) -> Option<Vec<u8>>,
     ) -> Result<Self, ReadError> {
-        match sniff(name, bytes)? {
-            Format::Gltf => {
+        match ModelFormat::of_file(name, bytes)? {
+            ModelFormat::Gltf => {
                 let fault = |source| ReadError::Gltf { name: name.into(), source };
                 let model = gltf::read(name, bytes, resolve).map_err(fault)?;
                 Ok(Self {
@@ -90,7 +95,7 @@ impl Model {
                     document: Document::Gltf(Box::new(model.document)),
                 })
             }
-            Format::Obj => {
+            ModelFormat::Obj => {
                 let model = obj::read(bytes, resolve)
                     .map_err(|source| ReadError::Obj { name: name.into(), source })?;
                 let corner = |c: u32| model.document.corners[c as usize].v;
@@ -123,10 +128,10 @@ impl Model {
 
     /// Format of the document.
     #[must_use]
-    pub fn format(&self) -> Format {
+    pub fn format(&self) -> ModelFormat {
         match self.document {
-            Document::Obj(_) => Format::Obj,
-            Document::Gltf(_) => Format::Gltf,
+            Document::Obj(_) => ModelFormat::Obj,
+            Document::Gltf(_) => ModelFormat::Gltf,
         }
     }
 
@@ -201,6 +206,17 @@ impl Model {
             cage: self.name.clone(),
             expected: first.len(),
         })
+    }
+
+    /// The model with new positions as a file of `format`.
+    ///
+    /// # Errors
+    /// Those of [`Self::write_obj`] and [`Self::write_glb`].
+    pub fn write(&self, format: ModelFormat, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        match format {
+            ModelFormat::Obj => self.write_obj(positions),
+            ModelFormat::Gltf => self.write_glb(positions),
+        }
     }
 
     /// The model with new positions as an OBJ file.
@@ -282,35 +298,5 @@ impl Model {
             Some(vertex) => Err(WriteError::NotFinite { vertex }),
             None => Ok(()),
         }
-    }
-}
-
-/// Format by content; a name that promises another, or content known to be something else, is an error that says so.
-fn sniff(name: &str, bytes: &[u8]) -> Result<Format, ReadError> {
-    let format = |found, hint| Err(ReadError::Format { name: name.into(), found, hint });
-    let export = "export it as GLB or OBJ";
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
-    let extension = name.rsplit_once('.').map_or(String::new(), |(_, e)| e.to_ascii_lowercase());
-    match bytes {
-        [] => return format("empty", "the file has no bytes"),
-        [b'g', b'l', b'T', b'F', ..] => return Ok(Format::Gltf),
-        [b'P', b'K', 3, 4, ..] => return format("a zip archive", "unpack it first"),
-        [b'K', b'a', b'y', b'd', b'a', b'r', b'a', ..] => return format("an FBX file", export),
-        [b'B', b'L', b'E', b'N', b'D', b'E', b'R', ..] => return format("a Blender file", export),
-        [b'p', b'l', b'y', b'\n' | b'\r', ..] => return format("a PLY file", export),
-        _ => {}
-    }
-    if text.first() == Some(&b'{') {
-        return Ok(Format::Gltf);
-    }
-    match extension.as_str() {
-        "glb" => {
-            format("not a GLB", "its first four bytes are not 'glTF': it is damaged or has the wrong name")
-        }
-        "gltf" => format("not a glTF", "it does not begin with '{': it is damaged or has the wrong name"),
-        "stl" | "ply" | "fbx" | "dae" | "usdz" | "usd" | "3ds" | "blend" | "off" => {
-            format("not OBJ or glTF", export)
-        }
-        _ => Ok(Format::Obj),
     }
 }

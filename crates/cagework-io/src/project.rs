@@ -10,12 +10,9 @@ use glam::Vec3;
 use serde_json::{Value, json};
 use thiserror::Error;
 
-use crate::error::{ReadError, WriteError};
-use crate::gltf::{self, Pack, push};
-use crate::model::{Document, Model};
-
-/// Name of the extension of the document.
-pub const EXTENSION: &str = "CAGEWORK_project";
+use crate::error::WriteError;
+use crate::gltf::{self, PROJECT_EXTENSION as EXTENSION, Pack, push};
+use crate::model::{Document, Model, ReadError};
 
 /// Version that is written, and the only one that is read.
 const VERSION: u64 = 1;

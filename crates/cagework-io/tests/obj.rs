@@ -4,7 +4,7 @@
 
 mod common;
 
-use cagework_io::{Format, write_cage_obj};
+use cagework_io::{ModelFormat, write_cage_obj};
 use common::{CUBE_OBJ, cube, read, twist, volume};
 use glam::Vec3;
 
@@ -16,7 +16,7 @@ fn fault(text: &str) -> String {
 #[test]
 fn every_v_line_is_a_vertex_in_file_order() {
     let model = read("x.obj", b"v 9 9 9\nv 0 0 0\no a\nv 1 0 0\ng b\nv 0 1 0\nf 2 3 4\n").unwrap();
-    assert_eq!(model.format(), Format::Obj);
+    assert_eq!(model.format(), ModelFormat::Obj);
     assert_eq!(model.positions, [Vec3::splat(9.0), Vec3::ZERO, Vec3::X, Vec3::Y]);
     assert_eq!(model.triangles, [[1, 2, 3]]);
     assert_eq!(model.counts.nodes, 2);

@@ -15,7 +15,6 @@ use cagework_core::Cage;
 use cagework_io::Model;
 
 use crate::args::EvaluateArgs;
-use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{json, make_folder, print, write};
 use crate::gpu;
@@ -78,7 +77,7 @@ fn reconstructions(
     for reconstruction in &evaluation.reconstructions {
         let positions = cagework_core::deform::deform_vertices(&reconstruction.weights, cage.positions());
         let path = directory.join(format!("{}.glb", reconstruction.figure));
-        write(&path, &export(model, &positions, &path)?)?;
+        write(&path, &model.write_glb(&positions).map_err(|e| CliError::file(&path, e))?)?;
     }
     Ok(())
 }

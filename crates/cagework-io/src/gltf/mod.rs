@@ -23,7 +23,7 @@ use glam::Vec3;
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::model::Counts;
+use crate::counts::Counts;
 use scene::{Instance, Worlds};
 
 pub(crate) use build::build_from_obj;
@@ -31,6 +31,7 @@ pub use build::write_mesh_glb;
 pub(crate) use container::{glb_of, glb_parts};
 pub(crate) use export::write_obj;
 pub(crate) use look::look;
+pub use pack::PROJECT_EXTENSION;
 pub(crate) use pack::{Pack, push};
 pub(crate) use patch::{Pose, Rest, embed_images, patch};
 
