@@ -177,3 +177,18 @@ fn wrong_positions_are_refused() {
     let message = model.write_glb(&[Vec3::NAN; 8]).unwrap_err().to_string();
     assert!(message.contains("vertex 0 is not a finite number"), "{message}");
 }
+
+#[test]
+fn smoothing_is_kept_in_an_obj_and_shown_by_a_glb() {
+    let cube = read("x.obj", CUBE_OBJ.as_bytes()).unwrap().cage_mesh();
+    let smooth = String::from_utf8(write_cage_obj(&cube)).unwrap();
+    let flat = smooth.replacen("f ", "s off\nf ", 1);
+    let model = read("x.obj", flat.as_bytes()).unwrap();
+    assert_eq!(String::from_utf8(model.write_obj(&model.positions).unwrap()).unwrap(), flat);
+    // Three flat faces at each of eight corners.
+    let vertices = |text: &str| {
+        let model = read("x.obj", text.as_bytes()).unwrap();
+        read("x.glb", &model.write_glb(&model.positions).unwrap()).unwrap().positions.len()
+    };
+    assert_eq!((vertices(&flat), vertices(&smooth)), (24, 8));
+}
