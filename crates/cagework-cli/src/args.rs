@@ -8,7 +8,7 @@ use std::str::FromStr;
 
 pub(crate) use cages::{CageArgs, CageSource, CheckArgs, DEFAULT_DIVISIONS, DEFAULT_MARGIN, KindArg};
 use cagework_core::bind::{BindOptions, CellShape, DeltaNorm, Method, OutsidePolicy, Solver};
-use cagework_io::ModelFormat;
+use cagework_io::{ModelFormat, UpAxis};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use render::{RenderArgs, Show};
@@ -63,6 +63,8 @@ pub(crate) enum Command {
 pub(crate) struct InfoArgs {
     /// Model to look at (.obj, .gltf, .glb).
     pub(crate) model: PathBuf,
+    #[command(flatten)]
+    pub(crate) up: UpArgs,
 }
 
 /// `cagework bind`
@@ -75,6 +77,8 @@ pub(crate) struct InfoArgs {
 pub(crate) struct BindArgs {
     /// Mesh to bind (.obj, .gltf, .glb).
     pub(crate) mesh: PathBuf,
+    #[command(flatten)]
+    pub(crate) up: UpArgs,
     /// Cage: a file; auto or auto:VERTICES for one that follows the mesh; hull or hull:VERTICES; box or
     /// box:DIVISIONS for a subdivided box.
     #[arg(long, value_name = "CAGE")]
@@ -96,6 +100,25 @@ pub(crate) struct BindArgs {
     pub(crate) save_cage: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) solve: SolveArgs,
+}
+
+/// Which way is up: shared by all that show a model, or make or read its cage.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct UpArgs {
+    /// Axis that points up in the files. With z, model, cage and poses are turned to Y up when they are read, and what
+    /// is written is turned back.
+    #[arg(long, value_enum, default_value_t = UpArg::Y, value_name = "AXIS")]
+    up: UpArg,
+}
+
+impl UpArgs {
+    /// The axis.
+    pub(crate) fn axis(self) -> UpAxis {
+        match self.up {
+            UpArg::Y => UpAxis::Y,
+            UpArg::Z => UpAxis::Z,
+        }
+    }
 }
 
 /// How to solve: shared by `bind` and what else binds.
@@ -189,6 +212,8 @@ impl SolveArgs {
 pub(crate) struct DeformArgs {
     /// The mesh that was bound (.obj, .gltf, .glb).
     pub(crate) mesh: PathBuf,
+    #[command(flatten)]
+    pub(crate) up: UpArgs,
     /// The cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
@@ -270,6 +295,12 @@ impl FromStr for ModelOutput {
             .ok_or_else(|| wrong_ending(&ModelFormat::ALL.map(ModelFormat::export_extension)))?;
         Ok(Self { path: text.into(), format })
     }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum UpArg {
+    Y,
+    Z,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

@@ -35,7 +35,7 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     }
     check_outputs(&outputs, &inputs)?;
 
-    let model = load_model(&args.mesh)?;
+    let model = load_model(&args.mesh, args.up.axis())?;
     let cage = load_cage(&args.cage, &model)?.cage;
     let binding = bind_positions(&model.positions, &cage, &args.solve, args.grid)?;
 
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
         write(&output.path, &export(&model, &deform(&binding, cage.positions()), output)?)?;
     }
     if let Some(path) = &args.save_cage {
-        write(path, &write_cage_obj(&cage.to_polygon_mesh()))?;
+        write(path, &write_cage_obj(&model.up().mesh_turned_back(&cage.to_polygon_mesh())))?;
     }
     let report = json(&binding.report);
     if let Some(path) = report_file {

@@ -32,7 +32,7 @@ struct Made {
 /// When the model cannot be read or the cage cannot be made or written.
 pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
     check_outputs(&[&args.output.path], &[&args.model])?;
-    let model = load_model(&args.model)?;
+    let model = load_model(&args.model, args.up.axis())?;
     let mut made = Made {
         output: args.output.path.display().to_string(),
         kind: "box",
@@ -56,7 +56,7 @@ pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
         }
     };
     (made.vertices, made.faces) = (cage.positions.len(), cage.faces.len());
-    write_cage(&args.output, &cage)?;
+    write_cage(&args.output, &model.up().mesh_turned_back(&cage))?;
     if as_json {
         return print(&json(&made));
     }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use cagework_core::cage_check::{CageCheck, Fix, Repair, Severity, check, repair};
+use cagework_io::UpAxis;
 use serde::Serialize;
 
 use crate::args::CheckArgs;
@@ -33,8 +34,10 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
         std::iter::once(&args.cage).chain(&args.mesh).map(std::path::PathBuf::as_path).collect();
     let outputs: Vec<_> = args.output.iter().map(|output| output.path.as_path()).collect();
     check_outputs(&outputs, &inputs)?;
-    let mut cage = load_model(&args.cage)?.cage_mesh();
-    let model = args.mesh.as_deref().map(load_model).transpose()?;
+    // Which way is up makes no difference to what is wrong with a cage.
+    let load = |path| load_model(path, UpAxis::Y);
+    let mut cage = load(&args.cage)?.cage_mesh();
+    let model = args.mesh.as_deref().map(load).transpose()?;
     let inside = model.as_ref().map(|m| m.positions.as_slice());
     let mut checked = Checked {
         file: args.cage.display().to_string(),

@@ -53,7 +53,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         });
     }
 
-    let model = load_model(&args.mesh)?;
+    let model = load_model(&args.mesh, args.up.axis())?;
     let cage = load_cage(&args.cage, &model)?;
     let (weights, outside) =
         read_weights_npz(&read(&args.weights)?).map_err(|e| CliError::file(&args.weights, e))?;

@@ -53,7 +53,7 @@ struct CageInfo {
 /// # Errors
 /// When the model cannot be read.
 pub(crate) fn run(args: &InfoArgs, as_json: bool) -> Result<(), CliError> {
-    let model = load_model(&args.model)?;
+    let model = load_model(&args.model, args.up.axis())?;
     let info = inspect(&args.model.display().to_string(), &model)?;
     print(&if as_json { json(&info) } else { text(&info) })
 }

@@ -19,6 +19,7 @@ mod npz;
 mod obj;
 mod pose_code;
 mod project;
+mod up;
 
 pub use counts::Counts;
 pub use error::{PoseError, WriteError};
@@ -30,3 +31,4 @@ pub use npz::{NpzError, read_weights_npz, write_weights_npz};
 pub use obj::{ObjError, write_cage_obj};
 pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
 pub use project::{Project, ProjectError, read_project, write_project};
+pub use up::UpAxis;

@@ -1,5 +1,7 @@
 //! A model: vertices and triangles, and the document they came from.
 
+use std::borrow::Cow;
+
 use cagework_core::mesh::weld;
 use cagework_core::{PolygonMesh, TriMesh};
 use glam::Vec3;
@@ -11,6 +13,7 @@ use crate::format::{FormatError, ModelFormat};
 use crate::gltf::{self, GltfDocument, GltfError, Pose, Rest};
 use crate::look::Look;
 use crate::obj::{self, ObjDocument, ObjError};
+use crate::up::UpAxis;
 
 /// Why bytes could not be read as a model.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -51,7 +54,7 @@ pub enum ReadError {
 pub struct Model {
     /// Name the caller gave.
     pub name: String,
-    /// World-space position of every vertex, in the order of the input (see the crate's root), not welded.
+    /// World-space position of every vertex, Y up, in the order of the input (see the crate's root), not welded.
     pub positions: Vec<Vec3>,
     /// Triangles, counter-clockwise seen from outside; polygons are triangulated.
     pub triangles: Vec<[u32; 3]>,
@@ -59,6 +62,8 @@ pub struct Model {
     pub counts: Counts,
     /// What the user should know: each a sentence.
     pub notices: Vec<String>,
+    /// What points up in the document.
+    up: UpAxis,
     pub(crate) document: Document,
 }
 
@@ -92,6 +97,7 @@ impl Model {
                     triangles: model.triangles,
                     counts: model.counts,
                     notices: model.notices,
+                    up: UpAxis::Y,
                     document: Document::Gltf(Box::new(model.document)),
                 })
             }
@@ -111,10 +117,28 @@ impl Model {
                         ..Counts::default()
                     },
                     notices: model.notices,
+                    up: UpAxis::Y,
                     document: Document::Obj(Box::new(model.document)),
                 })
             }
         }
+    }
+
+    /// What points up in the file; Y unless said otherwise.
+    #[must_use]
+    pub fn up(&self) -> UpAxis {
+        self.up
+    }
+
+    /// Says what points up in the file, and turns the model to it. Files written later have the file's axes.
+    pub fn set_up(&mut self, up: UpAxis) {
+        self.positions = up.turned(&self.positions_in_file()).into_owned();
+        self.up = up;
+    }
+
+    /// Positions at rest as they are in the file.
+    pub(crate) fn positions_in_file(&self) -> Cow<'_, [Vec3]> {
+        self.up.turned_back(&self.positions)
     }
 
     /// How the model looks: texture coordinates, colours, materials, undecoded images.
@@ -228,9 +252,13 @@ impl Model {
     /// [`WriteError`] when there is not one finite position for each vertex.
     pub fn write_obj(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
         self.check(positions)?;
+        let (rest, positions) = (self.positions_in_file(), self.up.turned_back(positions));
         match &self.document {
-            Document::Obj(document) => Ok(obj::patch(document, &self.positions, positions)),
-            Document::Gltf(document) => gltf::write_obj(document, self.rest(), positions),
+            Document::Obj(document) => Ok(obj::patch(document, &rest, &positions)),
+            Document::Gltf(document) => {
+                let rest = Rest { positions: &rest, triangles: &self.triangles };
+                gltf::write_obj(document, rest, &positions)
+            }
         }
     }
 
@@ -257,37 +285,33 @@ impl Model {
         rest: &[Vec3],
         poses: &[(String, Vec<Vec3>)],
     ) -> Result<Vec<u8>, WriteError> {
-        let poses: Vec<Pose<'_>> = poses.iter().map(|(name, positions)| Pose { name, positions }).collect();
-        self.glb(rest, &poses)
+        self.glb(rest, poses)
     }
 
-    fn glb(&self, base: &[Vec3], poses: &[Pose<'_>]) -> Result<Vec<u8>, WriteError> {
+    fn glb(&self, base: &[Vec3], poses: &[(String, Vec<Vec3>)]) -> Result<Vec<u8>, WriteError> {
         self.check(base)?;
-        poses.iter().try_for_each(|pose| self.check(pose.positions))?;
+        poses.iter().try_for_each(|(_, positions)| self.check(positions))?;
         if self.triangles.is_empty() {
             return Err(WriteError::NoFaces);
         }
+        let at_rest = self.positions_in_file();
+        let base = self.up.turned_back(base);
+        let turned: Vec<_> = poses.iter().map(|(_, positions)| self.up.turned_back(positions)).collect();
         let document = match &self.document {
-            Document::Gltf(document) => return gltf::patch(document, self.rest(), base, poses),
+            Document::Gltf(document) => {
+                let rest = Rest { positions: &at_rest, triangles: &self.triangles };
+                return gltf::patch(document, rest, &base, &named(poses, &turned));
+            }
             Document::Obj(document) => document,
         };
         // One way to deform a GLB: make one of the shape at rest, then patch that.
         let stem = self.name.rsplit_once('.').map_or(self.name.as_str(), |(stem, _)| stem);
-        let (glb, source) = gltf::build_from_obj(stem, document, &self.positions)?;
+        let (glb, source) = gltf::build_from_obj(stem, document, &at_rest)?;
         let built = gltf::read(&self.name, &glb, &mut |_| None)?;
         let spread = |positions: &[Vec3]| source.iter().map(|&v| positions[v as usize]).collect::<Vec<_>>();
-        let spread_poses: Vec<Vec<Vec3>> = poses.iter().map(|pose| spread(pose.positions)).collect();
-        let poses: Vec<Pose<'_>> = poses
-            .iter()
-            .zip(&spread_poses)
-            .map(|(pose, positions)| Pose { name: pose.name, positions })
-            .collect();
+        let spread_poses: Vec<_> = turned.iter().map(|positions| spread(positions).into()).collect();
         let rest = Rest { positions: &built.positions, triangles: &built.triangles };
-        gltf::patch(&built.document, rest, &spread(base), &poses)
-    }
-
-    fn rest(&self) -> Rest<'_> {
-        Rest { positions: &self.positions, triangles: &self.triangles }
+        gltf::patch(&built.document, rest, &spread(&base), &named(poses, &spread_poses))
     }
 
     fn check(&self, positions: &[Vec3]) -> Result<(), WriteError> {
@@ -299,4 +323,9 @@ impl Model {
             None => Ok(()),
         }
     }
+}
+
+/// Poses by the names of `poses`.
+fn named<'a>(poses: &'a [(String, Vec<Vec3>)], positions: &'a [Cow<'_, [Vec3]>]) -> Vec<Pose<'a>> {
+    poses.iter().zip(positions).map(|((name, _), positions)| Pose { name, positions }).collect()
 }

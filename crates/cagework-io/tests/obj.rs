@@ -4,8 +4,8 @@
 
 mod common;
 
-use cagework_io::{ModelFormat, write_cage_obj};
-use common::{CUBE_OBJ, cube, read, twist, volume};
+use cagework_io::{ModelFormat, UpAxis, write_cage_obj};
+use common::{CUBE_OBJ, cube, plain_cube, read, twist, volume};
 use glam::Vec3;
 
 /// Message of a failed read.
@@ -191,4 +191,30 @@ fn smoothing_is_kept_in_an_obj_and_shown_by_a_glb() {
         read("x.glb", &model.write_glb(&model.positions).unwrap()).unwrap().positions.len()
     };
     assert_eq!((vertices(&flat), vertices(&smooth)), (24, 8));
+}
+
+#[test]
+fn model_with_z_up_stands_upright_and_is_written_as_it_lay() {
+    for bytes in [CUBE_OBJ.as_bytes().to_vec(), plain_cube().glb()] {
+        let lying = read("x", &bytes).unwrap();
+        let mut upright = lying.clone();
+        upright.set_up(UpAxis::Z);
+        // A turn by -90 degrees about x: what was up is y, and what was behind is -z.
+        for (p, q) in lying.positions.iter().zip(&upright.positions) {
+            assert_eq!(*q, Vec3::new(p.x, p.z, -p.y));
+        }
+        let moved = |positions: &[Vec3]| positions.iter().map(|&p| twist(p)).collect::<Vec<_>>();
+        let shape = moved(&lying.positions);
+        let poses = [("a".to_owned(), moved(&shape))];
+        let turned = |positions: &[Vec3]| UpAxis::Z.turned(positions).into_owned();
+        let turned_poses = [("a".to_owned(), turned(&poses[0].1))];
+        assert_eq!(lying.write_obj(&shape), upright.write_obj(&turned(&shape)));
+        assert_eq!(lying.write_glb(&shape), upright.write_glb(&turned(&shape)));
+        assert_eq!(
+            lying.write_glb_poses(&shape, &poses),
+            upright.write_glb_poses(&turned(&shape), &turned_poses)
+        );
+        upright.set_up(UpAxis::Y);
+        assert_eq!(upright.positions, lying.positions);
+    }
 }

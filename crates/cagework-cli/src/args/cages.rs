@@ -7,7 +7,7 @@ use cagework_core::cage_check::Repair;
 use cagework_core::cage_gen::{CageOptions, MAX_TARGET, MIN_TARGET, Shape, Symmetry};
 use clap::{Args, ValueEnum};
 
-use super::{ModelOutput, fraction, positive};
+use super::{ModelOutput, UpArgs, fraction, positive};
 
 /// Quads along each edge of a box cage unless said otherwise.
 pub(crate) const DEFAULT_DIVISIONS: u32 = 2;
@@ -29,6 +29,8 @@ const DEFAULT_HULL: u32 = 24;
 pub(crate) struct CageArgs {
     /// Model to make a cage for (.obj, .gltf, .glb).
     pub(crate) model: PathBuf,
+    #[command(flatten)]
+    pub(crate) up: UpArgs,
     /// File to write (.obj keeps the cage's vertices as they are, .glb opens anywhere).
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,

@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use cagework_core::Cage;
-use cagework_io::Model;
+use cagework_io::{Model, UpAxis};
 
 use crate::args::EvaluateArgs;
 use crate::error::CliError;
@@ -55,7 +55,7 @@ pub(crate) fn run(args: &EvaluateArgs, as_json: bool) -> Result<(), CliError> {
 
 fn input(args: &EvaluateArgs) -> Result<(String, Model, Cage), CliError> {
     if let (Some(mesh), Some(cage)) = (&args.mesh, &args.cage) {
-        let model = load_model(mesh)?;
+        let model = load_model(mesh, UpAxis::Y)?;
         let cage = load_cage(cage, &model)?.cage;
         return Ok((mesh.display().to_string(), model, cage));
     }
