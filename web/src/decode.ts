@@ -2,7 +2,7 @@
 
 import { type Document, WebIO } from "@gltf-transform/core";
 import { ALL_EXTENSIONS, EXTMeshoptCompression, KHRDracoMeshCompression } from "@gltf-transform/extensions";
-import { dequantize } from "@gltf-transform/functions";
+import { dequantize, unpartition } from "@gltf-transform/functions";
 import dracoWasm from "draco3dgltf/draco_decoder_gltf.wasm?url";
 import createDecoder from "draco3dgltf/draco_decoder_gltf_nodejs.js";
 import { MeshoptDecoder } from "meshoptimizer/decoder";
@@ -24,7 +24,8 @@ export async function decompress(
   });
   try {
     const document = await readDocument(io, renamed(bytes), sibling);
-    await document.transform(dequantize());
+    // A GLB has one buffer; meshopt's fallback is a second one.
+    await document.transform(dequantize(), unpartition());
     for (const extension of document.getRoot().listExtensionsUsed()) {
       const { extensionName } = extension;
       if ([KHRDracoMeshCompression, EXTMeshoptCompression].some((e) => e.EXTENSION_NAME === extensionName)) {

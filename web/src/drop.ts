@@ -24,7 +24,8 @@ export function extension(name: string): string {
   return dot < 0 ? "" : base.slice(dot + 1).toLowerCase();
 }
 
-function isModel(name: string): boolean {
+/** Whether a name's ending is that of a model. */
+export function isModel(name: string): boolean {
   return (MODELS as readonly string[]).includes(extension(name));
 }
 

@@ -12,8 +12,9 @@ use cagework_core::options::{
     self, Backend, BindOptions, CellShape, Choice, DeltaNorm, Method, Number, OutsidePolicy, Preconditioner,
     Solver,
 };
+use cagework_io::{ModelFormat, UpAxis};
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use render::{RenderArgs, Show};
 
@@ -67,6 +68,8 @@ pub(crate) enum Command {
 pub(crate) struct InfoArgs {
     /// Model to look at (.obj, .gltf, .glb).
     pub(crate) model: PathBuf,
+    #[command(flatten)]
+    pub(crate) up: UpArgs,
 }
 
 /// `cagework bind`
@@ -79,6 +82,8 @@ pub(crate) struct InfoArgs {
 pub(crate) struct BindArgs {
     /// Mesh to bind (.obj, .gltf, .glb).
     pub(crate) mesh: PathBuf,
+    #[command(flatten)]
+    pub(crate) up: UpArgs,
     /// Cage: a file; auto or auto:VERTICES for one that follows the mesh; hull or hull:VERTICES; box or
     /// box:DIVISIONS for a subdivided box.
     #[arg(long, value_name = "CAGE")]
@@ -86,9 +91,9 @@ pub(crate) struct BindArgs {
     /// Cells along the longest side of the cage, 8 to 512.
     #[arg(short, long, default_value_t = 64, value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: u32,
-    /// Write the rest pose as the weights reconstruct it (.glb, .obj).
-    #[arg(short, long, value_name = "FILE", value_parser = model_output)]
-    pub(crate) output: Option<PathBuf>,
+    /// Write the rest pose as the weights reconstruct it; the name's ending says the format.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<ModelOutput>,
     /// Write the weights (.npz; one row per vertex of the mesh file, one column per cage vertex).
     #[arg(long, value_name = "FILE", value_parser = npz_output)]
     pub(crate) weights: Option<PathBuf>,
@@ -100,6 +105,25 @@ pub(crate) struct BindArgs {
     pub(crate) save_cage: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) solve: SolveArgs,
+}
+
+/// Which way is up: shared by all that show a model, or make or read its cage.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct UpArgs {
+    /// Axis that points up in the files. With z, model, cage and poses are turned to Y up when they are read, and what
+    /// is written is turned back.
+    #[arg(long, value_enum, default_value_t = UpArg::Y, value_name = "AXIS")]
+    up: UpArg,
+}
+
+impl UpArgs {
+    /// The axis.
+    pub(crate) fn axis(self) -> UpAxis {
+        match self.up {
+            UpArg::Y => UpAxis::Y,
+            UpArg::Z => UpAxis::Z,
+        }
+    }
 }
 
 /// How to solve: shared by `bind` and what else binds.
@@ -184,6 +208,8 @@ impl SolveArgs {
 pub(crate) struct DeformArgs {
     /// The mesh that was bound (.obj, .gltf, .glb).
     pub(crate) mesh: PathBuf,
+    #[command(flatten)]
+    pub(crate) up: UpArgs,
     /// The cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
@@ -193,9 +219,9 @@ pub(crate) struct DeformArgs {
     /// The cage, moved: same vertices in the same order. May be given several times.
     #[arg(long, value_name = "FILE", required = true)]
     pub(crate) pose: Vec<PathBuf>,
-    /// File to write (.glb, .obj).
-    #[arg(short, long, value_name = "FILE", value_parser = model_output)]
-    pub(crate) output: PathBuf,
+    /// File to write; the name's ending says the format.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: ModelOutput,
 }
 
 /// `cagework bench`
@@ -248,6 +274,31 @@ pub(crate) struct DemoArgs {
     pub(crate) output: PathBuf,
 }
 
+/// A model's file to write.
+#[derive(Clone, Debug)]
+pub(crate) struct ModelOutput {
+    /// The file.
+    pub(crate) path: PathBuf,
+    /// The format that its name asks for.
+    pub(crate) format: ModelFormat,
+}
+
+impl FromStr for ModelOutput {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let format = ModelFormat::of_export(text)
+            .ok_or_else(|| wrong_ending(&ModelFormat::ALL.map(ModelFormat::export_extension)))?;
+        Ok(Self { path: text.into(), format })
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum UpArg {
+    Y,
+    Z,
+}
+
 /// The words of an option.
 fn words<T>() -> impl TypedValueParser<Value = T>
 where
@@ -279,10 +330,6 @@ fn fraction(text: &str) -> Result<f32, String> {
     }
 }
 
-fn model_output(text: &str) -> Result<PathBuf, String> {
-    output(text, &["glb", "obj"])
-}
-
 fn npz_output(text: &str) -> Result<PathBuf, String> {
     output(text, &["npz"])
 }
@@ -297,6 +344,10 @@ fn output(text: &str, extensions: &[&str]) -> Result<PathBuf, String> {
     if extensions.contains(&given.as_str()) {
         return Ok(path);
     }
+    Err(wrong_ending(extensions))
+}
+
+fn wrong_ending(extensions: &[&str]) -> String {
     let known = extensions.iter().map(|e| format!(".{e}")).collect::<Vec<_>>().join(" or ");
-    Err(format!("the name must end in {known}"))
+    format!("the name must end in {known}")
 }

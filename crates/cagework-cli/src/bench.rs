@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::report::Timings;
 use cagework_core::{BindReport, Cage};
-use cagework_io::Model;
+use cagework_io::{Model, UpAxis};
 use serde::Serialize;
 
 use crate::args::BenchArgs;
@@ -78,7 +78,7 @@ const CASES: [(Method, Solver, usize); 4] = [
 pub(crate) fn run(args: &BenchArgs, as_json: bool) -> Result<(), CliError> {
     let (name, model, cage) = match (&args.mesh, &args.cage) {
         (Some(mesh), Some(cage)) => {
-            let model = load_model(mesh)?;
+            let model = load_model(mesh, UpAxis::Y)?;
             let cage = load_cage(cage, &model)?.cage;
             (mesh.display().to_string(), model, cage)
         }

@@ -10,7 +10,7 @@ use cagework_gpu::{GpuContext, bind_on as bind_on_gpu};
 use cagework_io::{Model, write_cage_obj, write_weights_npz};
 use glam::Vec3;
 
-use crate::args::{BindArgs, CageSource, SolveArgs};
+use crate::args::{BindArgs, CageSource, ModelOutput, SolveArgs};
 use crate::card;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, write};
@@ -25,29 +25,29 @@ use crate::progress::Bar;
 pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     let report_file = args.report.as_deref().filter(|path| *path != Path::new("-"));
     let report_to_stdout = as_json || (args.report.is_some() && report_file.is_none());
-    let outputs: Vec<&Path> =
-        [args.output.as_deref(), args.weights.as_deref(), report_file, args.save_cage.as_deref()]
-            .into_iter()
-            .flatten()
-            .collect();
+    let output = args.output.as_ref().map(|output| output.path.as_path());
+    let outputs: Vec<&Path> = [output, args.weights.as_deref(), report_file, args.save_cage.as_deref()]
+        .into_iter()
+        .flatten()
+        .collect();
     let mut inputs = vec![args.mesh.as_path()];
     if let CageSource::File(path) = &args.cage {
         inputs.push(path);
     }
     check_outputs(&outputs, &inputs)?;
 
-    let model = load_model(&args.mesh)?;
+    let model = load_model(&args.mesh, args.up.axis())?;
     let cage = load_cage(&args.cage, &model)?.cage;
     let binding = bind_positions(&model.positions, &cage, &args.solve, args.grid)?;
 
     if let Some(path) = &args.weights {
         write(path, &write_weights_npz(&binding.weights, &binding.outside))?;
     }
-    if let Some(path) = &args.output {
-        write(path, &export(&model, &deform(&binding, cage.positions()), path)?)?;
+    if let Some(output) = &args.output {
+        write(&output.path, &export(&model, &deform(&binding, cage.positions()), output)?)?;
     }
     if let Some(path) = &args.save_cage {
-        write(path, &write_cage_obj(&cage.to_polygon_mesh()))?;
+        write(path, &write_cage_obj(&model.up().mesh_turned_back(&cage.to_polygon_mesh())))?;
     }
     let report = json(&binding.report);
     if let Some(path) = report_file {
@@ -107,16 +107,10 @@ pub(crate) fn deform(binding: &Binding, cage_positions: &[Vec3]) -> Vec<Vec3> {
     deform_bound(&binding.weights, &binding.outside, cage_positions)
 }
 
-/// The model's own document with new positions, in the format that the name asks for.
+/// The model's own document with new positions, in the format that the output asks for.
 ///
 /// # Errors
 /// When the model cannot be written in that format.
-pub(crate) fn export(model: &Model, positions: &[Vec3], path: &Path) -> Result<Vec<u8>, CliError> {
-    let bytes = if is_obj(path) { model.write_obj(positions) } else { model.write_glb(positions) };
-    bytes.map_err(|e| CliError::file(path, e))
-}
-
-/// Whether a name asks for an OBJ; the command line has let only .obj and .glb through.
-pub(crate) fn is_obj(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"))
+pub(crate) fn export(model: &Model, positions: &[Vec3], output: &ModelOutput) -> Result<Vec<u8>, CliError> {
+    model.write(output.format, positions).map_err(|e| CliError::file(&output.path, e))
 }

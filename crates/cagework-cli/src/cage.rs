@@ -1,16 +1,14 @@
 //! `cagework cage`: a cage for a model.
 
-use cagework_core::cage_gen::{CageGenError, CageReport, generate};
-use cagework_core::{CageOptions, PolygonMesh};
-use cagework_io::{Model, write_cage_obj};
+use cagework_core::PolygonMesh;
+use cagework_core::cage_gen::CageReport;
 use serde::Serialize;
 
-use crate::args::{CageArgs, DEFAULT_DIVISIONS, KindArg};
-use crate::bind::{export, is_obj};
+use crate::args::{CageArgs, DEFAULT_DIVISIONS, KindArg, ModelOutput};
+use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, write};
-use crate::load::{box_mesh, generated_model, load_model};
-use crate::progress::Bar;
+use crate::load::{box_mesh, generate_for, generated_model, load_model};
 
 /// What was made; its JSON is the output of `--json`.
 #[derive(Debug, Serialize)]
@@ -33,10 +31,10 @@ struct Made {
 /// # Errors
 /// When the model cannot be read or the cage cannot be made or written.
 pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
-    check_outputs(&[&args.output], &[&args.model])?;
-    let model = load_model(&args.model)?;
+    check_outputs(&[&args.output.path], &[&args.model])?;
+    let model = load_model(&args.model, args.up.axis())?;
     let mut made = Made {
-        output: args.output.display().to_string(),
+        output: args.output.path.display().to_string(),
         kind: "box",
         vertices: 0,
         faces: 0,
@@ -58,37 +56,19 @@ pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
         }
     };
     (made.vertices, made.faces) = (cage.positions.len(), cage.faces.len());
-    write_cage(args.output.as_path(), &cage)?;
+    write_cage(&args.output, &model.up().mesh_turned_back(&cage))?;
     if as_json {
         return print(&json(&made));
     }
     print(&text(&made))
 }
 
-/// A generated cage around a model, with progress on the terminal.
-///
-/// # Errors
-/// Those of [`generate`].
-pub(crate) fn generate_for(
-    model: &Model,
-    options: &CageOptions,
-) -> Result<(PolygonMesh, CageReport), CageGenError> {
-    let bar = Bar::start();
-    let made = generate(&model.positions, &model.triangles, options, &bar)?;
-    Ok((made.cage.to_polygon_mesh(), made.report))
-}
-
-/// Writes a cage in the format that the name asks for.
+/// Writes a cage in the format that the output asks for.
 ///
 /// # Errors
 /// When it cannot be written.
-pub(crate) fn write_cage(path: &std::path::Path, cage: &PolygonMesh) -> Result<(), CliError> {
-    let bytes = if is_obj(path) {
-        write_cage_obj(cage)
-    } else {
-        export(&generated_model("cage.obj", cage)?, &cage.positions, path)?
-    };
-    write(path, &bytes)
+pub(crate) fn write_cage(output: &ModelOutput, cage: &PolygonMesh) -> Result<(), CliError> {
+    write(&output.path, &export(&generated_model("cage.obj", cage)?, &cage.positions, output)?)
 }
 
 /// A length of a model of any size, to three digits.

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use cagework_core::cage_check::{CageCheck, Fix, Repair, Severity, check, repair};
+use cagework_io::UpAxis;
 use serde::Serialize;
 
 use crate::args::CheckArgs;
@@ -31,10 +32,12 @@ struct Checked {
 pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
     let inputs: Vec<_> =
         std::iter::once(&args.cage).chain(&args.mesh).map(std::path::PathBuf::as_path).collect();
-    let outputs: Vec<_> = args.output.iter().map(std::path::PathBuf::as_path).collect();
+    let outputs: Vec<_> = args.output.iter().map(|output| output.path.as_path()).collect();
     check_outputs(&outputs, &inputs)?;
-    let mut cage = load_model(&args.cage)?.cage_mesh();
-    let model = args.mesh.as_deref().map(load_model).transpose()?;
+    // Which way is up makes no difference to what is wrong with a cage.
+    let load = |path| load_model(path, UpAxis::Y);
+    let mut cage = load(&args.cage)?.cage_mesh();
+    let model = args.mesh.as_deref().map(load).transpose()?;
     let inside = model.as_ref().map(|m| m.positions.as_slice());
     let mut checked = Checked {
         file: args.cage.display().to_string(),
@@ -42,13 +45,13 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
         output: None,
         check: check(&cage, inside, Some(args.grid)),
     };
-    if let Some(path) = &args.output {
+    if let Some(output) = &args.output {
         let repairs: Vec<Repair> = args.repair.iter().map(|&r| r.into()).collect();
         let mended = repair(&cage, &repairs, inside)?;
         cage = mended.mesh;
-        write_cage(path, &cage)?;
+        write_cage(output, &cage)?;
         checked.repaired = mended.done;
-        checked.output = Some(path.display().to_string());
+        checked.output = Some(output.path.display().to_string());
         checked.check = check(&cage, inside, Some(args.grid));
     }
     print(&if as_json { json(&checked) } else { text(&checked) })?;

@@ -10,7 +10,7 @@ use glam::Vec3;
 use serde::Serialize;
 
 use crate::args::{CageSource, DeformArgs};
-use crate::bind::{export, is_obj};
+use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, read, write};
 use crate::load::{load_cage, load_model};
@@ -38,19 +38,22 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     if let CageSource::File(path) = &args.cage {
         inputs.push(path);
     }
-    check_outputs(&[&args.output], &inputs)?;
-    if is_obj(&args.output) && args.pose.len() > 1 {
+    let output = &args.output.path;
+    check_outputs(&[output], &inputs)?;
+    let format = args.output.format;
+    if !format.holds_poses() && args.pose.len() > 1 {
         return Err(CliError::Mismatch {
             message: format!(
-                "{}: an OBJ holds one pose, but {} were given",
-                args.output.display(),
+                "{}: a file of format {} holds one pose, but {} were given",
+                output.display(),
+                format.name(),
                 args.pose.len()
             ),
             hint: "write a .glb, which gets one morph target per pose, or run the command once per pose",
         });
     }
 
-    let model = load_model(&args.mesh)?;
+    let model = load_model(&args.mesh, args.up.axis())?;
     let cage = load_cage(&args.cage, &model)?;
     let (weights, outside) =
         read_weights_npz(&read(&args.weights)?).map_err(|e| CliError::file(&args.weights, e))?;
@@ -68,12 +71,12 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         export(&model, only, &args.output)?
     } else {
         let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(deformed).collect();
-        model.write_glb_poses(&model.positions, &named).map_err(|e| CliError::file(&args.output, e))?
+        model.write_glb_poses(&model.positions, &named).map_err(|e| CliError::file(output, e))?
     };
-    write(&args.output, &bytes)?;
+    write(output, &bytes)?;
 
     let done = Deformed {
-        output: args.output.display().to_string(),
+        output: output.display().to_string(),
         vertices: n_vertices,
         cage_vertices: n_cage,
         outside_vertices: outside.len(),

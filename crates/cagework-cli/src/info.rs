@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use cagework_core::mesh::weld;
 use cagework_core::{Bounds, Cage};
-use cagework_io::{Format, Model};
+use cagework_io::Model;
 use serde::Serialize;
 
 use crate::args::InfoArgs;
@@ -53,7 +53,7 @@ struct CageInfo {
 /// # Errors
 /// When the model cannot be read.
 pub(crate) fn run(args: &InfoArgs, as_json: bool) -> Result<(), CliError> {
-    let model = load_model(&args.model)?;
+    let model = load_model(&args.model, args.up.axis())?;
     let info = inspect(&args.model.display().to_string(), &model)?;
     print(&if as_json { json(&info) } else { text(&info) })
 }
@@ -73,10 +73,7 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
     };
     Ok(Info {
         file: file.to_owned(),
-        format: match model.format() {
-            Format::Obj => "obj",
-            Format::Gltf => "gltf",
-        },
+        format: model.format().name(),
         vertices: model.positions.len(),
         unique_vertices: welded.first.len(),
         triangles: model.triangles.len(),

@@ -2,15 +2,16 @@
 
 use std::path::Path;
 
+use cagework_core::cage_gen::{CageGenError, CageReport, generate};
 use cagework_core::samples::{self, Sample};
-use cagework_core::{Bounds, Cage, CageError, PolygonMesh, TriMesh, subdivided_box};
-use cagework_io::{Model, write_cage_obj};
+use cagework_core::{Bounds, Cage, CageError, CageOptions, PolygonMesh, TriMesh, subdivided_box};
+use cagework_io::{Model, UpAxis, write_cage_obj};
 use glam::Vec3;
 
 use crate::args::{CageSource, DEFAULT_MARGIN};
-use crate::cage::generate_for;
 use crate::error::CliError;
 use crate::files::{read, read_beside};
+use crate::progress::Bar;
 
 /// A cage with the document that it came from, which knows how a pose of it is read.
 #[derive(Debug)]
@@ -18,22 +19,27 @@ pub(crate) struct LoadedCage {
     /// The cage.
     pub(crate) cage: Cage,
     model: Model,
+    /// What points up in the files of its poses.
+    up: UpAxis,
 }
 
-/// Reads a model with faces.
+/// Reads a model with faces. `up`: what points up in the file.
 ///
 /// # Errors
 /// When the file cannot be read or has no faces.
-pub(crate) fn load_model(path: &Path) -> Result<Model, CliError> {
-    let model = load_any(path)?;
+pub(crate) fn load_model(path: &Path, up: UpAxis) -> Result<Model, CliError> {
+    let model = load_any(path, up)?;
     model.require_faces()?;
     Ok(model)
 }
 
 /// Reads a model, or a bare list of positions.
-fn load_any(path: &Path) -> Result<Model, CliError> {
+fn load_any(path: &Path, up: UpAxis) -> Result<Model, CliError> {
     let bytes = read(path)?;
-    Ok(Model::read(&path.display().to_string(), &bytes, &mut |relative| read_beside(path, relative))?)
+    let name = path.display().to_string();
+    let mut model = Model::read(&name, &bytes, &mut |relative| read_beside(path, relative))?;
+    model.set_up(up);
+    Ok(model)
 }
 
 /// A mesh made by formula as the model that its OBJ file would be.
@@ -74,13 +80,13 @@ pub(crate) fn built_in() -> Result<BuiltIn, CliError> {
     Ok(BuiltIn { name: id.to_owned(), mesh, model, cage, poses })
 }
 
-/// The cage that `source` names, for a model.
+/// The cage that `source` names, for a model; a file has the model's axes.
 ///
 /// # Errors
 /// When the file cannot be read or is no cage.
 pub(crate) fn load_cage(source: &CageSource, around: &Model) -> Result<LoadedCage, CliError> {
     let model = match source {
-        CageSource::File(path) => load_model(path)?,
+        CageSource::File(path) => load_model(path, around.up())?,
         CageSource::Box { divisions } => {
             generated_model("box cage", &box_mesh(&around.positions, *divisions, DEFAULT_MARGIN)?)?
         }
@@ -88,7 +94,20 @@ pub(crate) fn load_cage(source: &CageSource, around: &Model) -> Result<LoadedCag
     };
     let cage = Cage::new(&model.cage_mesh())
         .map_err(|source| CliError::Cage { name: model.name.clone(), source })?;
-    Ok(LoadedCage { cage, model })
+    Ok(LoadedCage { cage, model, up: around.up() })
+}
+
+/// A generated cage around a model, with progress on the terminal.
+///
+/// # Errors
+/// Those of [`generate`].
+pub(crate) fn generate_for(
+    model: &Model,
+    options: &CageOptions,
+) -> Result<(PolygonMesh, CageReport), CageGenError> {
+    let bar = Bar::start();
+    let made = generate(&model.positions, &model.triangles, options, &bar)?;
+    Ok((made.cage.to_polygon_mesh(), made.report))
 }
 
 /// A subdivided box around positions. `margin`: fraction of their bounding box's diagonal.
@@ -107,6 +126,6 @@ impl LoadedCage {
     /// # Errors
     /// When the file cannot be read or has another number of vertices than the cage.
     pub(crate) fn load_pose(&self, path: &Path) -> Result<Vec<Vec3>, CliError> {
-        Ok(self.model.pose_positions(&load_any(path)?)?)
+        Ok(self.model.pose_positions(&load_any(path, self.up)?)?)
     }
 }

@@ -47,7 +47,7 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     }
     check_outputs(&[&args.output], &inputs)?;
     check_compared(args)?;
-    let model = load_model(&args.model)?;
+    let model = load_model(&args.model, args.up.axis())?;
     let cage = args.cage.as_ref().map(|source| load_cage(source, &model)).transpose()?;
     let (drawn, mut notices) = gpu::draw_model(&model);
     notices.splice(0..0, model.notices.iter().cloned());

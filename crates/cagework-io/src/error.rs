@@ -1,50 +1,6 @@
-//! Errors that concern a model as a whole; each format has its own.
+//! Why files of any format could not be written, or do not belong together.
 
 use thiserror::Error;
-
-use crate::gltf::GltfError;
-use crate::obj::ObjError;
-
-/// Why bytes could not be read as a model.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum ReadError {
-    /// The content is no format that is read here.
-    #[error("{name} is {found}: {hint}")]
-    Format {
-        /// Name the caller gave.
-        name: String,
-        /// What it seems to be.
-        found: &'static str,
-        /// What to do.
-        hint: &'static str,
-    },
-    /// Vertices, but no faces, where faces are needed.
-    #[error(
-        "{name} has {vertices} vertices but no faces: export it with faces (a file of positions only works as a pose)"
-    )]
-    NoFaces {
-        /// Name of the model.
-        name: String,
-        /// Vertices it has.
-        vertices: usize,
-    },
-    /// A fault in an OBJ file.
-    #[error("{name}: {source}")]
-    Obj {
-        /// Name the caller gave.
-        name: String,
-        /// The fault.
-        source: ObjError,
-    },
-    /// A fault in a glTF file.
-    #[error("{name}: {source}")]
-    Gltf {
-        /// Name the caller gave.
-        name: String,
-        /// The fault.
-        source: GltfError,
-    },
-}
 
 /// Why a model could not be written.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]

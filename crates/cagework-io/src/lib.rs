@@ -8,7 +8,9 @@
 //! mesh the nodes that show it by ascending index, for each node the mesh's triangle primitives in order (so a file
 //! whose meshes are shown once each has its primitives in document order), unwelded.
 
+mod counts;
 mod error;
+mod format;
 mod gltf;
 mod look;
 mod model;
@@ -17,12 +19,16 @@ mod npz;
 mod obj;
 mod pose_code;
 mod project;
+mod up;
 
-pub use error::{PoseError, ReadError, WriteError};
-pub use gltf::{GltfError, write_mesh_glb};
+pub use counts::Counts;
+pub use error::{PoseError, WriteError};
+pub use format::{FormatError, ModelFormat};
+pub use gltf::{GltfError, PROJECT_EXTENSION, write_mesh_glb};
 pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
-pub use model::{Counts, Format, Model};
+pub use model::{Model, ReadError};
 pub use npz::{NpzError, read_weights_npz, write_weights_npz};
 pub use obj::{ObjError, write_cage_obj};
 pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
-pub use project::{EXTENSION, Project, ProjectError, read_project, write_project};
+pub use project::{Project, ProjectError, read_project, write_project};
+pub use up::UpAxis;

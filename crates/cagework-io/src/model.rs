@@ -1,44 +1,52 @@
 //! A model: vertices and triangles, and the document they came from.
 
+use std::borrow::Cow;
+
 use cagework_core::mesh::weld;
 use cagework_core::{PolygonMesh, TriMesh};
 use glam::Vec3;
+use thiserror::Error;
 
-use crate::error::{PoseError, ReadError, WriteError};
-use crate::gltf::{self, GltfDocument, Pose, Rest};
+use crate::counts::Counts;
+use crate::error::{PoseError, WriteError};
+use crate::format::{FormatError, ModelFormat};
+use crate::gltf::{self, GltfDocument, GltfError, Pose, Rest};
 use crate::look::Look;
-use crate::obj::{self, ObjDocument};
+use crate::obj::{self, ObjDocument, ObjError};
+use crate::up::UpAxis;
 
-/// Format of a model's document.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Wavefront OBJ.
-    Obj,
-    /// glTF 2.0, as JSON or GLB.
-    Gltf,
-}
-
-/// How much of everything a document has. OBJ counts `o` and `g` lines as nodes, `usemtl` names as materials.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Scenes.
-    pub scenes: usize,
-    /// Nodes.
-    pub nodes: usize,
-    /// Meshes.
-    pub meshes: usize,
-    /// Triangle primitives in use; a mesh shown twice counts twice.
-    pub primitives: usize,
-    /// Materials.
-    pub materials: usize,
-    /// Textures.
-    pub textures: usize,
-    /// Skins.
-    pub skins: usize,
-    /// Animations.
-    pub animations: usize,
-    /// Morph targets of all meshes.
-    pub morph_targets: usize,
+/// Why bytes could not be read as a model.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum ReadError {
+    /// The content is no format that is read here.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// Vertices, but no faces, where faces are needed.
+    #[error(
+        "{name} has {vertices} vertices but no faces: export it with faces (a file of positions only works as a pose)"
+    )]
+    NoFaces {
+        /// Name of the model.
+        name: String,
+        /// Vertices it has.
+        vertices: usize,
+    },
+    /// A fault in an OBJ file.
+    #[error("{name}: {source}")]
+    Obj {
+        /// Name the caller gave.
+        name: String,
+        /// The fault.
+        source: ObjError,
+    },
+    /// A fault in a glTF file.
+    #[error("{name}: {source}")]
+    Gltf {
+        /// Name the caller gave.
+        name: String,
+        /// The fault.
+        source: GltfError,
+    },
 }
 
 /// A model that was read from bytes.
@@ -46,7 +54,7 @@ pub struct Counts {
 pub struct Model {
     /// Name the caller gave.
     pub name: String,
-    /// World-space position of every vertex, in the order of the input (see the crate's root), not welded.
+    /// World-space position of every vertex, Y up, in the order of the input (see the crate's root), not welded.
     pub positions: Vec<Vec3>,
     /// Triangles, counter-clockwise seen from outside; polygons are triangulated.
     pub triangles: Vec<[u32; 3]>,
@@ -54,6 +62,8 @@ pub struct Model {
     pub counts: Counts,
     /// What the user should know: each a sentence.
     pub notices: Vec<String>,
+    /// What points up in the document.
+    up: UpAxis,
     pub(crate) document: Document,
 }
 
@@ -77,8 +87,8 @@ impl Model {
         bytes: &[u8],
         resolve: &mut dyn FnMut(&str) -> Option<Vec<u8>>,
     ) -> Result<Self, ReadError> {
-        match sniff(name, bytes)? {
-            Format::Gltf => {
+        match ModelFormat::of_file(name, bytes)? {
+            ModelFormat::Gltf => {
                 let fault = |source| ReadError::Gltf { name: name.into(), source };
                 let model = gltf::read(name, bytes, resolve).map_err(fault)?;
                 Ok(Self {
@@ -87,10 +97,11 @@ impl Model {
                     triangles: model.triangles,
                     counts: model.counts,
                     notices: model.notices,
+                    up: UpAxis::Y,
                     document: Document::Gltf(Box::new(model.document)),
                 })
             }
-            Format::Obj => {
+            ModelFormat::Obj => {
                 let model = obj::read(bytes, resolve)
                     .map_err(|source| ReadError::Obj { name: name.into(), source })?;
                 let corner = |c: u32| model.document.corners[c as usize].v;
@@ -106,10 +117,28 @@ impl Model {
                         ..Counts::default()
                     },
                     notices: model.notices,
+                    up: UpAxis::Y,
                     document: Document::Obj(Box::new(model.document)),
                 })
             }
         }
+    }
+
+    /// What points up in the file; Y unless said otherwise.
+    #[must_use]
+    pub fn up(&self) -> UpAxis {
+        self.up
+    }
+
+    /// Says what points up in the file, and turns the model to it. Files written later have the file's axes.
+    pub fn set_up(&mut self, up: UpAxis) {
+        self.positions = up.turned(&self.positions_in_file()).into_owned();
+        self.up = up;
+    }
+
+    /// Positions at rest as they are in the file.
+    pub(crate) fn positions_in_file(&self) -> Cow<'_, [Vec3]> {
+        self.up.turned_back(&self.positions)
     }
 
     /// How the model looks: texture coordinates, colours, materials, undecoded images.
@@ -123,10 +152,10 @@ impl Model {
 
     /// Format of the document.
     #[must_use]
-    pub fn format(&self) -> Format {
+    pub fn format(&self) -> ModelFormat {
         match self.document {
-            Document::Obj(_) => Format::Obj,
-            Document::Gltf(_) => Format::Gltf,
+            Document::Obj(_) => ModelFormat::Obj,
+            Document::Gltf(_) => ModelFormat::Gltf,
         }
     }
 
@@ -203,6 +232,17 @@ impl Model {
         })
     }
 
+    /// The model with new positions as a file of `format`.
+    ///
+    /// # Errors
+    /// Those of [`Self::write_obj`] and [`Self::write_glb`].
+    pub fn write(&self, format: ModelFormat, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        match format {
+            ModelFormat::Obj => self.write_obj(positions),
+            ModelFormat::Gltf => self.write_glb(positions),
+        }
+    }
+
     /// The model with new positions as an OBJ file.
     ///
     /// An OBJ keeps everything but its coordinates and normals byte for byte; a glTF becomes a new OBJ with its vertices
@@ -212,9 +252,13 @@ impl Model {
     /// [`WriteError`] when there is not one finite position for each vertex.
     pub fn write_obj(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
         self.check(positions)?;
+        let (rest, positions) = (self.positions_in_file(), self.up.turned_back(positions));
         match &self.document {
-            Document::Obj(document) => Ok(obj::patch(document, &self.positions, positions)),
-            Document::Gltf(document) => gltf::write_obj(document, self.rest(), positions),
+            Document::Obj(document) => Ok(obj::patch(document, &rest, &positions)),
+            Document::Gltf(document) => {
+                let rest = Rest { positions: &rest, triangles: &self.triangles };
+                gltf::write_obj(document, rest, &positions)
+            }
         }
     }
 
@@ -241,37 +285,33 @@ impl Model {
         rest: &[Vec3],
         poses: &[(String, Vec<Vec3>)],
     ) -> Result<Vec<u8>, WriteError> {
-        let poses: Vec<Pose<'_>> = poses.iter().map(|(name, positions)| Pose { name, positions }).collect();
-        self.glb(rest, &poses)
+        self.glb(rest, poses)
     }
 
-    fn glb(&self, base: &[Vec3], poses: &[Pose<'_>]) -> Result<Vec<u8>, WriteError> {
+    fn glb(&self, base: &[Vec3], poses: &[(String, Vec<Vec3>)]) -> Result<Vec<u8>, WriteError> {
         self.check(base)?;
-        poses.iter().try_for_each(|pose| self.check(pose.positions))?;
+        poses.iter().try_for_each(|(_, positions)| self.check(positions))?;
         if self.triangles.is_empty() {
             return Err(WriteError::NoFaces);
         }
+        let at_rest = self.positions_in_file();
+        let base = self.up.turned_back(base);
+        let turned: Vec<_> = poses.iter().map(|(_, positions)| self.up.turned_back(positions)).collect();
         let document = match &self.document {
-            Document::Gltf(document) => return gltf::patch(document, self.rest(), base, poses),
+            Document::Gltf(document) => {
+                let rest = Rest { positions: &at_rest, triangles: &self.triangles };
+                return gltf::patch(document, rest, &base, &named(poses, &turned));
+            }
             Document::Obj(document) => document,
         };
         // One way to deform a GLB: make one of the shape at rest, then patch that.
         let stem = self.name.rsplit_once('.').map_or(self.name.as_str(), |(stem, _)| stem);
-        let (glb, source) = gltf::build_from_obj(stem, document, &self.positions)?;
+        let (glb, source) = gltf::build_from_obj(stem, document, &at_rest)?;
         let built = gltf::read(&self.name, &glb, &mut |_| None)?;
         let spread = |positions: &[Vec3]| source.iter().map(|&v| positions[v as usize]).collect::<Vec<_>>();
-        let spread_poses: Vec<Vec<Vec3>> = poses.iter().map(|pose| spread(pose.positions)).collect();
-        let poses: Vec<Pose<'_>> = poses
-            .iter()
-            .zip(&spread_poses)
-            .map(|(pose, positions)| Pose { name: pose.name, positions })
-            .collect();
+        let spread_poses: Vec<_> = turned.iter().map(|positions| spread(positions).into()).collect();
         let rest = Rest { positions: &built.positions, triangles: &built.triangles };
-        gltf::patch(&built.document, rest, &spread(base), &poses)
-    }
-
-    fn rest(&self) -> Rest<'_> {
-        Rest { positions: &self.positions, triangles: &self.triangles }
+        gltf::patch(&built.document, rest, &spread(&base), &named(poses, &spread_poses))
     }
 
     fn check(&self, positions: &[Vec3]) -> Result<(), WriteError> {
@@ -285,32 +325,7 @@ impl Model {
     }
 }
 
-/// Format by content; a name that promises another, or content known to be something else, is an error that says so.
-fn sniff(name: &str, bytes: &[u8]) -> Result<Format, ReadError> {
-    let format = |found, hint| Err(ReadError::Format { name: name.into(), found, hint });
-    let export = "export it as GLB or OBJ";
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
-    let extension = name.rsplit_once('.').map_or(String::new(), |(_, e)| e.to_ascii_lowercase());
-    match bytes {
-        [] => return format("empty", "the file has no bytes"),
-        [b'g', b'l', b'T', b'F', ..] => return Ok(Format::Gltf),
-        [b'P', b'K', 3, 4, ..] => return format("a zip archive", "unpack it first"),
-        [b'K', b'a', b'y', b'd', b'a', b'r', b'a', ..] => return format("an FBX file", export),
-        [b'B', b'L', b'E', b'N', b'D', b'E', b'R', ..] => return format("a Blender file", export),
-        [b'p', b'l', b'y', b'\n' | b'\r', ..] => return format("a PLY file", export),
-        _ => {}
-    }
-    if text.first() == Some(&b'{') {
-        return Ok(Format::Gltf);
-    }
-    match extension.as_str() {
-        "glb" => {
-            format("not a GLB", "its first four bytes are not 'glTF': it is damaged or has the wrong name")
-        }
-        "gltf" => format("not a glTF", "it does not begin with '{': it is damaged or has the wrong name"),
-        "stl" | "ply" | "fbx" | "dae" | "usdz" | "usd" | "3ds" | "blend" | "off" => {
-            format("not OBJ or glTF", export)
-        }
-        _ => Ok(Format::Obj),
-    }
+/// Poses by the names of `poses`.
+fn named<'a>(poses: &'a [(String, Vec<Vec3>)], positions: &'a [Cow<'_, [Vec3]>]) -> Vec<Pose<'a>> {
+    poses.iter().zip(positions).map(|((name, _), positions)| Pose { name, positions }).collect()
 }

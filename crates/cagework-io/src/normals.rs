@@ -4,7 +4,7 @@
 //! area-weighted normals are computed before and after, and each original normal (and tangent) is turned by the rotation
 //! between the two. At rest the result is the original; where the original was the area-weighted normal, it is the new
 //! area-weighted normal. Vertices at one rest position whose normals agree are one surface there (a UV seam) and stay
-//! smooth; where they differ there is a hard edge and it stays hard.
+//! smooth; where they differ there is a hard edge and it stays hard. Without normals, a smoothing group is one surface.
 
 use cagework_core::mesh::weld;
 use glam::{DVec3, Quat, Vec3};
@@ -32,24 +32,28 @@ impl Shading {
     }
 
     /// `vertex`: model vertex of each shading vertex; `normal`: its original unit normal, zero where it has none;
-    /// `triangles`: of shading vertices; `positions`: of model vertices, at rest.
+    /// `surface`: what it belongs to if it has none, empty where that is not known; `triangles`: of shading vertices;
+    /// `positions`: of model vertices, at rest.
     pub(crate) fn new(
         positions: &[Vec3],
         vertex: Vec<u32>,
         mut normal: Vec<Vec3>,
+        surface: &[u32],
         triangles: Vec<[u32; 3]>,
     ) -> Self {
         let welded = weld(positions);
-        let mut at_place: Vec<Vec<(u32, Vec3)>> = vec![Vec::new(); welded.first.len()];
+        let mut at_place: Vec<Vec<(u32, Vec3, u32)>> = vec![Vec::new(); welded.first.len()];
         let mut n_clusters = 0;
         let mut cluster = Vec::with_capacity(vertex.len());
-        for (&v, &n) in vertex.iter().zip(&normal) {
+        for (k, (&v, &n)) in vertex.iter().zip(&normal).enumerate() {
+            let surface = surface.get(k).copied().unwrap_or(0);
             let here = &mut at_place[welded.unique_of[v as usize] as usize];
-            let same =
-                |&&(_, m): &&(u32, Vec3)| n.dot(m) >= SAME_NORMAL || (n == Vec3::ZERO && m == Vec3::ZERO);
-            let found = here.iter().take(MAX_CLUSTERS_AT_ONE_PLACE).find(same).map(|&(c, _)| c);
+            let same = |&&(_, m, other): &&(u32, Vec3, u32)| {
+                n.dot(m) >= SAME_NORMAL || (n == Vec3::ZERO && m == Vec3::ZERO && surface == other)
+            };
+            let found = here.iter().take(MAX_CLUSTERS_AT_ONE_PLACE).find(same).map(|&(c, ..)| c);
             cluster.push(found.unwrap_or_else(|| {
-                here.push((n_clusters, n));
+                here.push((n_clusters, n, surface));
                 n_clusters += 1;
                 n_clusters - 1
             }));

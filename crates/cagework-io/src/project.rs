@@ -2,7 +2,7 @@
 //!
 //! The visible part is the model at rest, its document unchanged, and the cage as lines. What only we read is in the
 //! extension [`EXTENSION`] of the document: buffer views with the cage's positions, its faces (for each the number of
-//! corners, then the corners) and the poses, all little endian. An OBJ travels as it is in a buffer view; what viewers
+//! corners, then the corners) and the poses, all little endian and in the model's axes, and which of them points up. An OBJ travels as it is in a buffer view; what viewers
 //! see is made from it. Weights are not kept: they are made again from the same settings.
 
 use cagework_core::PolygonMesh;
@@ -10,12 +10,10 @@ use glam::Vec3;
 use serde_json::{Value, json};
 use thiserror::Error;
 
-use crate::error::{ReadError, WriteError};
-use crate::gltf::{self, Pack, push};
-use crate::model::{Document, Model};
-
-/// Name of the extension of the document.
-pub const EXTENSION: &str = "CAGEWORK_project";
+use crate::error::WriteError;
+use crate::gltf::{self, PROJECT_EXTENSION as EXTENSION, Pack, push};
+use crate::model::{Document, Model, ReadError};
+use crate::up::UpAxis;
 
 /// Version that is written, and the only one that is read.
 const VERSION: u64 = 1;
@@ -72,7 +70,7 @@ pub fn write_project(
     let (document, source) = match &model.document {
         Document::Gltf(document) => (&**document, None),
         Document::Obj(document) => {
-            let (glb, _) = gltf::build_from_obj(&model.name, document, &model.positions)?;
+            let (glb, _) = gltf::build_from_obj(&model.name, document, &model.positions_in_file())?;
             built = gltf::read(&model.name, &glb, &mut |_| None)?.document;
             (&built, Some(&document.bytes))
         }
@@ -80,10 +78,15 @@ pub fn write_project(
     let mut json = document.json.clone();
     let mut pack = Pack::of(document);
     gltf::embed_images(document, &mut json, &mut pack);
+    let up = model.up();
+    let cage = &up.mesh_turned_back(cage);
     let node = add_cage(&mut json, &mut pack, cage);
     let mut view =
         |json: &mut Value, bytes: Vec<u8>| json!({ "bufferView": pack.push_view(json, bytes, None) });
     let mut project = json!({ "version": VERSION, "name": model.name, "node": node, "settings": settings });
+    if up == UpAxis::Z {
+        project["up"] = "z".into();
+    }
     if let Some(source) = source {
         project["source"] = view(&mut json, source.clone());
     }
@@ -93,7 +96,7 @@ pub fn write_project(
     });
     project["poses"] = json!([]);
     for (name, positions) in poses {
-        let mut pose = view(&mut json, position_bytes(positions));
+        let mut pose = view(&mut json, position_bytes(&up.turned_back(positions)));
         pose["name"] = name.as_str().into();
         push(&mut project, "poses", pose);
     }
@@ -129,6 +132,9 @@ pub fn read_project(name: &str, bytes: &[u8]) -> Result<Option<Project>, Project
         bin.get(start as usize..start.checked_add(view["byteLength"].as_u64()?)? as usize)
     };
     let model_name = project["name"].as_str().unwrap_or(name);
+    // Projects from before the choice have none.
+    let up = if project["up"] == "z" { UpAxis::Z } else { UpAxis::Y };
+    let positions_of = |bytes: &[u8]| Some(up.turned(&positions_of(bytes)?).into_owned());
     let cage = &project["cage"];
     let positions = view(&cage["positions"]).and_then(positions_of).ok_or(damaged("its cage is cut off"))?;
     let faces =
@@ -139,7 +145,7 @@ pub fn read_project(name: &str, bytes: &[u8]) -> Result<Option<Project>, Project
         poses.push((pose["name"].as_str().unwrap_or_default().to_owned(), positions));
     }
     let settings = project["settings"].as_str().unwrap_or_default().to_owned();
-    let model = if project["source"].is_object() {
+    let mut model = if project["source"].is_object() {
         let source = view(&project["source"]).ok_or(damaged("its model is cut off"))?;
         Model::read(model_name, source, &mut |_| None)?
     } else {
@@ -147,6 +153,7 @@ pub fn read_project(name: &str, bytes: &[u8]) -> Result<Option<Project>, Project
         let plain = gltf::glb_of(&json, &bin).map_err(|_| damaged("it cannot be put together again"))?;
         Model::read(model_name, &plain, &mut |_| None)?
     };
+    model.set_up(up);
     Ok(Some(Project { model, cage: PolygonMesh { positions, faces }, poses, settings }))
 }
 

@@ -4,7 +4,7 @@
 
 mod common;
 
-use cagework_io::{Format, Model};
+use cagework_io::{Model, ModelFormat};
 use common::{
     Builder, CUBE, CUBE_TRIANGLES, I16, U8, U32, cube, floats, glb, instanced, plain_cube, quantized, read,
     relative_error, skinned, volume,
@@ -30,7 +30,7 @@ fn plain_glb_and_gltf_with_files_read_the_same() {
     let b = plain_cube();
     let model = read_glb(&b);
     assert_cube(&model, &cube());
-    assert_eq!((model.format(), model.counts.nodes, model.counts.primitives), (Format::Gltf, 1, 1));
+    assert_eq!((model.format(), model.counts.nodes, model.counts.primitives), (ModelFormat::Gltf, 1, 1));
     assert!((volume(&model) - 1.0).abs() < ROUNDING);
     let mut json = b.json.clone();
     json["buffers"] = json!([{ "byteLength": b.bin.len(), "uri": "my%20cube.bin" }]);

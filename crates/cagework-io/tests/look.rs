@@ -171,6 +171,11 @@ fn obj_colours_after_coordinates_are_the_vertices() {
 
 /// A cube of eight vertices that its six faces share, with the normals that `normals` gives each corner of a face.
 fn shared_cube(normals: impl Fn(usize, usize) -> usize) -> Look {
+    smoothed_cube(normals, |_| "")
+}
+
+/// The same with the lines that `before` puts before each face.
+fn smoothed_cube(normals: impl Fn(usize, usize) -> usize, before: impl Fn(usize) -> &'static str) -> Look {
     let mut text = String::new();
     for k in 0..8 {
         let p = [k & 1, k >> 1 & 1, k >> 2].map(|bit| 2 * bit - 1);
@@ -186,7 +191,7 @@ fn shared_cube(normals: impl Fn(usize, usize) -> usize) -> Look {
             0 => format!(" {v}"),
             n => format!(" {v}//{n}"),
         });
-        text += &format!("f{}\n", corners.concat());
+        text += &format!("{}f{}\n", before(f), corners.concat());
     }
     obj(&text, &[])
 }
@@ -233,4 +238,30 @@ fn smooth_obj_keeps_its_vertices() {
     assert_eq!(lid.copies.len(), 4);
     let lone = shared_cube(|face, v| if face == 3 { 0 } else { v });
     assert!(lone.copies.is_empty(), "corners without a normal stay with the vertex");
+}
+
+/// An OBJ without normals was drawn smooth, although it said `s off`.
+#[test]
+fn faces_without_smoothing_are_flat() {
+    let hard = shared_cube(|face, _| 9 + face);
+    for off in ["s off\n", "s 0\n"] {
+        assert_eq!(smoothed_cube(|_, _| 0, |face| if face == 0 { off } else { "" }), hard, "{off}");
+    }
+    // What stands before the first line has the format's default, which is off.
+    assert_eq!(smoothed_cube(|_, _| 0, |face| if face == 5 { "s off\n" } else { "" }), hard);
+}
+
+#[test]
+fn smoothing_groups_share_no_normal() {
+    let smooth = shared_cube(|_, _| 0);
+    assert_eq!(smoothed_cube(|_, _| 0, |_| "s 1\n"), smooth);
+    // Face 3 alone in a group: its four vertices are there twice.
+    let lid = smoothed_cube(|_, _| 0, |face| if face == 3 { "s 2\n" } else { "s 1\n" });
+    let mut twice = lid.copies.clone();
+    twice.sort_unstable();
+    assert_eq!(twice, [2, 3, 6, 7], "the corners of face 3");
+    // A group goes on where its number comes again, and a normal says more than a group.
+    let again = smoothed_cube(|_, _| 0, |face| ["s 1\n", "s 2\n"][face % 2]);
+    assert_eq!(again.copies.len(), 6, "all faces around two opposite corners are of one group");
+    assert_eq!(smoothed_cube(|_, v| v, |_| "s off\n"), smooth);
 }

@@ -4,8 +4,8 @@
 
 mod common;
 
-use cagework_io::{Format, write_cage_obj};
-use common::{CUBE_OBJ, cube, read, twist, volume};
+use cagework_io::{ModelFormat, UpAxis, write_cage_obj};
+use common::{CUBE_OBJ, cube, plain_cube, read, twist, volume};
 use glam::Vec3;
 use proptest::prelude::*;
 
@@ -17,7 +17,7 @@ fn fault(text: &str) -> String {
 #[test]
 fn every_v_line_is_a_vertex_in_file_order() {
     let model = read("x.obj", b"v 9 9 9\nv 0 0 0\no a\nv 1 0 0\ng b\nv 0 1 0\nf 2 3 4\n").unwrap();
-    assert_eq!(model.format(), Format::Obj);
+    assert_eq!(model.format(), ModelFormat::Obj);
     assert_eq!(model.positions, [Vec3::splat(9.0), Vec3::ZERO, Vec3::X, Vec3::Y]);
     assert_eq!(model.triangles, [[1, 2, 3]]);
     assert_eq!(model.counts.nodes, 2);
@@ -177,6 +177,47 @@ fn wrong_positions_are_refused() {
     assert!(message.contains("1 positions for a model of 8 vertices"), "{message}");
     let message = model.write_glb(&[Vec3::NAN; 8]).unwrap_err().to_string();
     assert!(message.contains("vertex 0 is not a finite number"), "{message}");
+}
+
+#[test]
+fn smoothing_is_kept_in_an_obj_and_shown_by_a_glb() {
+    let cube = read("x.obj", CUBE_OBJ.as_bytes()).unwrap().cage_mesh();
+    let smooth = String::from_utf8(write_cage_obj(&cube)).unwrap();
+    let flat = smooth.replacen("f ", "s off\nf ", 1);
+    let model = read("x.obj", flat.as_bytes()).unwrap();
+    assert_eq!(String::from_utf8(model.write_obj(&model.positions).unwrap()).unwrap(), flat);
+    // Three flat faces at each of eight corners.
+    let vertices = |text: &str| {
+        let model = read("x.obj", text.as_bytes()).unwrap();
+        read("x.glb", &model.write_glb(&model.positions).unwrap()).unwrap().positions.len()
+    };
+    assert_eq!((vertices(&flat), vertices(&smooth)), (24, 8));
+}
+
+#[test]
+fn model_with_z_up_stands_upright_and_is_written_as_it_lay() {
+    for bytes in [CUBE_OBJ.as_bytes().to_vec(), plain_cube().glb()] {
+        let lying = read("x", &bytes).unwrap();
+        let mut upright = lying.clone();
+        upright.set_up(UpAxis::Z);
+        // A turn by -90 degrees about x: what was up is y, and what was behind is -z.
+        for (p, q) in lying.positions.iter().zip(&upright.positions) {
+            assert_eq!(*q, Vec3::new(p.x, p.z, -p.y));
+        }
+        let moved = |positions: &[Vec3]| positions.iter().map(|&p| twist(p)).collect::<Vec<_>>();
+        let shape = moved(&lying.positions);
+        let poses = [("a".to_owned(), moved(&shape))];
+        let turned = |positions: &[Vec3]| UpAxis::Z.turned(positions).into_owned();
+        let turned_poses = [("a".to_owned(), turned(&poses[0].1))];
+        assert_eq!(lying.write_obj(&shape), upright.write_obj(&turned(&shape)));
+        assert_eq!(lying.write_glb(&shape), upright.write_glb(&turned(&shape)));
+        assert_eq!(
+            lying.write_glb_poses(&shape, &poses),
+            upright.write_glb_poses(&turned(&shape), &turned_poses)
+        );
+        upright.set_up(UpAxis::Y);
+        assert_eq!(upright.positions, lying.positions);
+    }
 }
 
 proptest! {

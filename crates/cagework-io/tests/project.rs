@@ -5,7 +5,7 @@
 mod common;
 
 use cagework_core::{PolygonMesh, subdivided_box};
-use cagework_io::{Model, Project, ProjectError, read_project, write_project};
+use cagework_io::{Model, Project, ProjectError, UpAxis, read_project, write_project};
 use common::{CUBE_OBJ, PNG, glb, instanced, json_of, plain_cube, quantized, read, skinned, textured_square};
 use glam::Vec3;
 use serde_json::json;
@@ -24,7 +24,7 @@ fn models() -> Vec<Model> {
 }
 
 fn cage(model: &Model) -> PolygonMesh {
-    subdivided_box(cagework_core::Bounds::of(&model.positions).unwrap(), 0.1, [2, 1, 1])
+    subdivided_box(bounds(&model.positions), 0.1, [2, 1, 1])
 }
 
 fn poses(cage: &PolygonMesh) -> Vec<(String, Vec<Vec3>)> {
@@ -56,6 +56,32 @@ fn everything_comes_back_as_it_was() {
         assert_eq!((&project.cage, &project.poses), (&cage, &poses(&cage)));
         assert_eq!(project.settings, SETTINGS);
     }
+}
+
+#[test]
+fn what_points_up_is_kept_and_others_see_the_files_own_axes() {
+    for mut model in models() {
+        let lying = model.positions.clone();
+        model.set_up(UpAxis::Z);
+        let bytes = written(&model);
+        let project = reopened(&bytes);
+        assert_eq!((project.model.up(), &project.model.positions), (UpAxis::Z, &model.positions));
+        let cage = cage(&model);
+        assert_eq!((&project.cage, &project.poses), (&cage, &poses(&cage)));
+        let seen = read("seen.glb", &bytes).unwrap();
+        assert_eq!(bounds(&seen.positions), bounds(&lying), "{}", model.name);
+        let json = json_of(&bytes);
+        let lines =
+            json["meshes"].as_array().unwrap().last().unwrap()["primitives"][0]["attributes"]["POSITION"]
+                .as_u64()
+                .unwrap();
+        let in_file = bounds(&UpAxis::Z.mesh_turned_back(&cage).positions);
+        assert_eq!(json["accessors"][lines as usize]["max"], json!(in_file.max.to_array()));
+    }
+}
+
+fn bounds(positions: &[Vec3]) -> cagework_core::Bounds {
+    cagework_core::Bounds::of(positions).unwrap()
 }
 
 #[test]

@@ -92,7 +92,7 @@ impl From<ReadError> for Fault {
         match &error {
             ReadError::Gltf { source, .. } => fault.named(&Self::of(source)),
             ReadError::Obj { source, .. } => fault.named(&Self::of(source)),
-            ReadError::Format { .. } | ReadError::NoFaces { .. } => fault,
+            ReadError::Format(_) | ReadError::NoFaces { .. } => fault,
         }
     }
 }

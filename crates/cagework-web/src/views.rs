@@ -3,7 +3,7 @@
 use cagework_core::cage::CageNotice;
 use cagework_core::edit::Topology;
 use cagework_core::{Bounds, Cage, PolygonMesh};
-use cagework_io::{Format, Model};
+use cagework_io::Model;
 use serde::Serialize;
 use wasm_bindgen::JsValue;
 
@@ -48,10 +48,7 @@ impl ModelInfo {
         let counts = model.counts;
         Self {
             name: model.name.clone(),
-            format: match model.format() {
-                Format::Obj => "obj",
-                Format::Gltf => "gltf",
-            },
+            format: model.format().name(),
             vertices: model.positions.len(),
             triangles: model.triangles.len(),
             faces: model.n_faces(),

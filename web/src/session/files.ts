@@ -1,7 +1,7 @@
 /** Dropped files to bytes: which one is the model, and where its siblings are. */
 
 import type { NamedFile } from "../contract";
-import { extension } from "../drop";
+import { extension, isModel } from "../drop";
 import type { Loaded } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { named } from "./client";
@@ -9,8 +9,6 @@ import { decodeTextures } from "./textures";
 
 /** Larger files are refused, bytes: the browser's memory for them would be several times as much. */
 const LARGEST = 1 << 30;
-
-const MODELS = ["glb", "gltf", "obj"];
 
 export interface Bytes {
   readonly name: string;
@@ -20,7 +18,7 @@ export interface Bytes {
 
 /** The model's bytes and those of its siblings. */
 export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
-  const main = files.find(({ name }) => MODELS.includes(extension(name))) ?? files[0];
+  const main = files.find(({ name }) => isModel(name)) ?? files[0];
   if (!main) throw named("Empty", "there is no file to open");
   const bytes = await read(main);
   const siblings = new Map<string, Uint8Array>();

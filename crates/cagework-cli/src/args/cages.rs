@@ -7,7 +7,7 @@ use cagework_core::cage_check::Repair;
 use cagework_core::cage_gen::{CageOptions, MAX_TARGET, MIN_TARGET, Shape, Symmetry};
 use clap::{Args, ValueEnum};
 
-use super::{fraction, model_output, positive};
+use super::{ModelOutput, UpArgs, fraction, positive};
 
 /// Quads along each edge of a box cage unless said otherwise.
 pub(crate) const DEFAULT_DIVISIONS: u32 = 2;
@@ -29,9 +29,11 @@ const DEFAULT_HULL: u32 = 24;
 pub(crate) struct CageArgs {
     /// Model to make a cage for (.obj, .gltf, .glb).
     pub(crate) model: PathBuf,
+    #[command(flatten)]
+    pub(crate) up: UpArgs,
     /// File to write (.obj keeps the cage's vertices as they are, .glb opens anywhere).
-    #[arg(short, long, value_name = "FILE", value_parser = model_output)]
-    pub(crate) output: PathBuf,
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: ModelOutput,
     /// What the cage follows: the model limb by limb, its box, or its convex hull
     /// [default: auto; box if --divisions is given].
     #[arg(long, value_enum)]
@@ -100,9 +102,9 @@ pub(crate) struct CheckArgs {
     /// Mend it first; several, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT", requires = "output")]
     pub(crate) repair: Vec<RepairArg>,
-    /// Write the mended cage (.obj, .glb).
-    #[arg(short, long, value_name = "FILE", requires = "repair", value_parser = model_output)]
-    pub(crate) output: Option<PathBuf>,
+    /// Write the mended cage; the name's ending says the format.
+    #[arg(short, long, value_name = "FILE", requires = "repair")]
+    pub(crate) output: Option<ModelOutput>,
 }
 
 /// Where a cage comes from.

@@ -7,7 +7,7 @@ use cagework_gpu::render::{AxisView, Camera, Theme};
 use cagework_gpu::session::MAX_PICTURE;
 use clap::{Args, ValueEnum};
 
-use super::{CageSource, SolveArgs, output};
+use super::{CageSource, SolveArgs, UpArgs, output};
 
 /// `cagework render`
 #[derive(Args, Debug)]
@@ -22,6 +22,8 @@ use super::{CageSource, SolveArgs, output};
 pub(crate) struct RenderArgs {
     /// Model to draw (.obj, .gltf, .glb).
     pub(crate) model: PathBuf,
+    #[command(flatten)]
+    pub(crate) up: UpArgs,
     /// Cage: a file, or box or box:DIVISIONS for a subdivided box around the model.
     #[arg(long, value_name = "CAGE", required_if_eq_any = [
         ("show", "wireframe"), ("show", "weights"), ("show", "error"), ("show", "cells"), ("show", "slice"),

@@ -12,10 +12,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use cagework_core::Cage;
-use cagework_io::Model;
+use cagework_io::{Model, UpAxis};
 
 use crate::args::EvaluateArgs;
-use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{json, make_folder, print, write};
 use crate::gpu;
@@ -56,7 +55,7 @@ pub(crate) fn run(args: &EvaluateArgs, as_json: bool) -> Result<(), CliError> {
 
 fn input(args: &EvaluateArgs) -> Result<(String, Model, Cage), CliError> {
     if let (Some(mesh), Some(cage)) = (&args.mesh, &args.cage) {
-        let model = load_model(mesh)?;
+        let model = load_model(mesh, UpAxis::Y)?;
         let cage = load_cage(cage, &model)?.cage;
         return Ok((mesh.display().to_string(), model, cage));
     }
@@ -78,7 +77,7 @@ fn reconstructions(
     for reconstruction in &evaluation.reconstructions {
         let positions = cagework_core::deform::deform_vertices(&reconstruction.weights, cage.positions());
         let path = directory.join(format!("{}.glb", reconstruction.figure));
-        write(&path, &export(model, &positions, &path)?)?;
+        write(&path, &model.write_glb(&positions).map_err(|e| CliError::file(&path, e))?)?;
     }
     Ok(())
 }

@@ -108,3 +108,36 @@ fn output_does_not_overwrite_a_pose() {
         .code(1)
         .stderr(contains("affine.obj").and(contains("overwritten")));
 }
+
+/// `--up z` turns what is read and turns back what is written: nothing about the files changes.
+#[test]
+fn files_with_z_up_keep_their_axes() {
+    let sandbox = bound();
+    let long = |[x, y, z]: [f64; 3]| [x, y, 2.0 * z + 5.0];
+    let mesh: Vec<_> = obj_positions(&sandbox.read("mesh.obj")).into_iter().map(long).collect();
+    let mesh_obj = String::from_utf8(sandbox.read("mesh.obj")).unwrap();
+    let faces: String = mesh_obj.lines().filter(|l| l.starts_with("f ")).map(|l| format!("{l}\n")).collect();
+    sandbox.write(
+        "mesh.obj",
+        mesh.iter().map(|p| format!("v {} {} {}\n", p[0], p[1], p[2])).collect::<String>() + &faces,
+    );
+    sandbox.write("cage.obj", box_obj(&CORNERS.map(long)));
+    sandbox.write("affine.obj", box_obj(&CORNERS.map(|p| affine(long(p)))));
+    sandbox
+        .run("bind mesh.obj --up z --cage cage.obj -g 16 --weights w.npz --save-cage used.obj -o rest.obj")
+        .success();
+    assert_close(&obj_positions(&sandbox.read("used.obj")), &CORNERS.map(long), 0.0);
+    assert_close(&obj_positions(&sandbox.read("rest.obj")), &mesh, TOLERANCE);
+    sandbox
+        .run("deform mesh.obj --up z --cage cage.obj --weights w.npz --pose affine.obj -o out.obj")
+        .success();
+    let expected: Vec<_> = mesh.iter().copied().map(affine).collect();
+    assert_close(&obj_positions(&sandbox.read("out.obj")), &expected, TOLERANCE);
+
+    // The long side stands upright, and a cage that is made lies as the model does.
+    let bounds = &sandbox.json("info mesh.obj --up z --json")["bounds"];
+    let upright = |corner: &str| bounds[corner][1].as_f64().unwrap();
+    assert!((upright("min") - 3.6).abs() < TOLERANCE && (upright("max") - 6.4).abs() < TOLERANCE, "{bounds}");
+    sandbox.run("cage mesh.obj --up z --vertices 24 -o made.obj").success();
+    sandbox.run("check made.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
+}

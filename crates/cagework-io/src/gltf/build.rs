@@ -14,7 +14,7 @@ use crate::obj::{NONE, ObjDocument};
 /// A GLB with the OBJ's shape at rest, and for each of its vertices the `v` line it came from.
 ///
 /// One node, one mesh, one primitive for each `usemtl`; a vertex for each different corner (position, texture
-/// coordinate, normal). Without `vn` lines the normals are area-weighted and smooth. Materials have their names and a
+/// coordinate, normal). Without `vn` lines the normals are area-weighted, over a smoothing group where the file has any. Materials have their names and a
 /// plain surface: `.mtl` files are not read.
 pub(crate) fn build_from_obj(
     name: &str,

@@ -11,9 +11,9 @@ use serde_json::{Value, json};
 use super::{GltfError, Image};
 use crate::look::sniff_image;
 
-/// Extensions that hide geometry from a reader without their decoder.
-const COMPRESSED: [&str; 3] =
-    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
+/// Extensions that hide geometry from a reader without their decoder; meshopt's has the same streams by both names.
+pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
+pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 /// Bytes of a GLB's header.
 const GLB_HEADER: usize = 12;
 /// Parts of the document that geometry does not need: a fault in one of them must not refuse the file.
@@ -41,8 +41,17 @@ pub(crate) fn load(
     let (json, bin) = split(bytes)?;
     let mut json: Value = serde_json::from_slice(&json).map_err(|e| GltfError::Json(e.to_string()))?;
     check_version(&json)?;
+    #[cfg(not(feature = "decompress"))]
     check_compression(name, &json)?;
     let buffers = load_buffers(&mut json, bin.as_deref(), resolve)?;
+    #[cfg(feature = "decompress")]
+    let buffers = {
+        let mut buffers = buffers;
+        super::decompress::decompress(&mut json, &mut buffers).map_err(|(extension, problem)| {
+            compressed(name, extension, format!("could not be decoded: {problem}"))
+        })?;
+        buffers
+    };
     let images = load_images(&json, resolve, notices);
     let root = typed(&json)?;
     Ok(Loaded { json, root, buffers, images })
@@ -102,22 +111,24 @@ fn check_version(json: &Value) -> Result<(), GltfError> {
     }
 }
 
+fn compressed(name: &str, extension: &str, problem: String) -> GltfError {
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    let output = format!("{stem}-plain.glb");
+    GltfError::Compressed { extension: extension.into(), problem, name: name.into(), output }
+}
+
+#[cfg(not(feature = "decompress"))]
 fn check_compression(name: &str, json: &Value) -> Result<(), GltfError> {
     let has = |object: &Value, extension: &str| object["extensions"].get(extension).is_some();
     let items = |object: &Value, key: &str| object[key].as_array().cloned().unwrap_or_default();
-    for extension in COMPRESSED {
+    for extension in [DRACO].into_iter().chain(MESHOPT) {
         let required = items(json, "extensionsRequired").iter().any(|e| e == extension);
         let in_views = items(json, "bufferViews").iter().any(|view| has(view, extension));
         let in_meshes = json["meshes"].as_array().into_iter().flatten().any(|mesh| {
             mesh["primitives"].as_array().into_iter().flatten().any(|primitive| has(primitive, extension))
         });
         if required || in_views || in_meshes {
-            let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
-            return Err(GltfError::Compressed {
-                extension: extension.into(),
-                name: name.into(),
-                output: format!("{stem}-plain.glb"),
-            });
+            return Err(compressed(name, extension, "there is no decoder here".into()));
         }
     }
     Ok(())
@@ -147,10 +158,15 @@ fn load_buffers(
     resolve: Resolve<'_>,
 ) -> Result<Vec<Vec<u8>>, GltfError> {
     let mut buffers = Vec::new();
+    let fallbacks = fallbacks(json);
     let list = json.get_mut("buffers").and_then(Value::as_array_mut);
     for (number, buffer) in list.into_iter().flatten().enumerate() {
         let declared = buffer["byteLength"].as_u64().unwrap_or(0);
         let uri = buffer.as_object_mut().and_then(|b| b.shift_remove("uri"));
+        if fallbacks.contains(&(number as u64)) {
+            buffers.push(Vec::new());
+            continue;
+        }
         let bytes = match uri.as_ref().and_then(Value::as_str) {
             Some(uri) => match fetch(uri, resolve) {
                 Some((bytes, _)) => bytes,
@@ -165,6 +181,19 @@ fn load_buffers(
         buffers.push(bytes);
     }
     Ok(buffers)
+}
+
+/// Buffers that only compressed views name: they are for programs without a decoder, and may not be there.
+fn fallbacks(json: &Value) -> Vec<u64> {
+    let views = || json["bufferViews"].as_array().into_iter().flatten();
+    let is_packed = |view: &Value| MESHOPT.iter().any(|name| view["extensions"].get(name).is_some());
+    let named = |packed: bool| {
+        views().filter(move |view| is_packed(view) == packed).filter_map(|view| view["buffer"].as_u64())
+    };
+    let streams =
+        views().flat_map(|view| MESHOPT.iter().filter_map(|n| view["extensions"][n]["buffer"].as_u64()));
+    let used: Vec<u64> = named(false).chain(streams).collect();
+    named(true).filter(|buffer| !used.contains(buffer)).collect()
 }
 
 fn load_images(json: &Value, resolve: Resolve<'_>, notices: &mut Vec<String>) -> Vec<Option<Image>> {

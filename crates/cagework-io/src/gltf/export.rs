@@ -35,7 +35,7 @@ pub(crate) fn write_obj(
         });
     }
     let vertices = (0..positions.len() as u32).collect();
-    let shading = Shading::new(rest.positions, vertices, original, rest.triangles.to_vec());
+    let shading = Shading::new(rest.positions, vertices, original, &[], rest.triangles.to_vec());
     let new = shading.normals(&shading.rotations(positions));
     for (part, slot) in parts.iter_mut().zip(&document.slots) {
         if !part.normals.is_empty() {

@@ -145,7 +145,7 @@ fn colours(document: &GltfDocument, slot: &Slot, vertices: &mut [LookVertex]) {
 /// Lets vertices that are one surface at one place name one of them.
 fn smooth_seams(positions: &[Vec3], normals: Vec<Vec3>, triangles: &[[u32; 3]], vertices: &mut [LookVertex]) {
     let all = (0..positions.len() as u32).collect();
-    let shading = Shading::new(positions, all, normals, triangles.to_vec());
+    let shading = Shading::new(positions, all, normals, &[], triangles.to_vec());
     let mut first: Vec<Option<u32>> = vec![None; positions.len()];
     for (v, &cluster) in (0u32..).zip(shading.clusters()) {
         vertices[v as usize].source = *first[cluster as usize].get_or_insert(v);

@@ -10,6 +10,8 @@ mod accessor;
 mod animate;
 mod build;
 mod container;
+#[cfg(feature = "decompress")]
+mod decompress;
 mod export;
 mod geometry;
 mod look;
@@ -23,7 +25,7 @@ use glam::Vec3;
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::model::Counts;
+use crate::counts::Counts;
 use scene::{Instance, Worlds};
 
 pub(crate) use build::build_from_obj;
@@ -31,6 +33,7 @@ pub use build::write_mesh_glb;
 pub(crate) use container::{glb_of, glb_parts};
 pub(crate) use export::write_obj;
 pub(crate) use look::look;
+pub use pack::PROJECT_EXTENSION;
 pub(crate) use pack::{Pack, push};
 pub(crate) use patch::{Pose, Rest, embed_images, patch};
 
@@ -43,13 +46,16 @@ pub enum GltfError {
     /// The JSON is damaged or not glTF 2.0.
     #[error("not readable as glTF 2.0: {0}")]
     Json(String),
-    /// Compressed geometry.
+    /// Compressed geometry that could not be decoded; without the feature `decompress`, any.
     #[error(
-        "its geometry is compressed ({extension}); convert it first: npx @gltf-transform/cli copy {name} {output}"
+        "its geometry is compressed ({extension}), and {problem}; convert it first: \
+         npx @gltf-transform/cli copy {name} {output}"
     )]
     Compressed {
         /// The extension.
         extension: String,
+        /// Why it was not decoded.
+        problem: String,
         /// Name of the file.
         name: String,
         /// Name to convert to.

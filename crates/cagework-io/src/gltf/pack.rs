@@ -18,6 +18,9 @@ const INDICES: u32 = 34963;
 /// Every component type's size divides it.
 const ALIGN: usize = 4;
 
+/// Name of the extension of a document that holds a project.
+pub const PROJECT_EXTENSION: &str = "CAGEWORK_project";
+
 /// Extensions that refer to accessors nowhere but in the places [`each_accessor`] visits. With any other extension
 /// nothing is thrown away: an index nobody here knows of must not move.
 const KNOWN_EXTENSIONS: [&str; 9] = [
@@ -29,7 +32,7 @@ const KNOWN_EXTENSIONS: [&str; 9] = [
     "KHR_animation_pointer",
     "KHR_xmp",
     "EXT_mesh_gpu_instancing",
-    crate::project::EXTENSION,
+    PROJECT_EXTENSION,
 ];
 
 /// Bytes of all buffer views of a document under way.

@@ -199,7 +199,7 @@ impl Normals {
             }
         }
         let vertices = (0..rest.positions.len() as u32).collect();
-        let shading = Shading::new(rest.positions, vertices, normals, rest.triangles.to_vec());
+        let shading = Shading::new(rest.positions, vertices, normals, &[], rest.triangles.to_vec());
         Ok(Self { shading, present })
     }
 }

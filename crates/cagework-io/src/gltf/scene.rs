@@ -6,7 +6,7 @@ use glam::{DMat4, DQuat, DVec3, Mat4};
 use serde_json::Value;
 
 use super::{GltfDocument, GltfError, get};
-use crate::model::Counts;
+use crate::counts::Counts;
 
 /// World transform of every node, in f64: a transform and its inverse must give back an f32.
 #[derive(Clone, Debug)]

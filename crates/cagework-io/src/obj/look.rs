@@ -114,22 +114,23 @@ pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
     look
 }
 
-/// What each corner moves and is shaded with: its vertex, or a copy of it where the file's normals say that another
-/// surface meets it there. Corners without a normal have nothing to say. `[n_corners]`
+/// What each corner moves and is shaded with: its vertex, or a copy of it where the file's normals or smoothing groups
+/// say that another surface meets it there. Other corners have nothing to say. `[n_corners]`
 fn sources(document: &ObjDocument, positions: &[Vec3], copies: &mut Vec<u32>) -> Vec<u32> {
     let vertices: Vec<u32> = document.corners.iter().map(|corner| corner.v).collect();
-    let normal = |vn: u32| document.normals.get(vn as usize).copied().unwrap_or(Vec3::ZERO);
-    let normals: Vec<Vec3> = document.corners.iter().map(|corner| normal(corner.vn)).collect();
-    if normals.iter().all(|n| *n == Vec3::ZERO) {
+    let normals: Vec<Vec3> = document.corners.iter().map(|corner| document.normal(corner)).collect();
+    let surfaces = document.surfaces();
+    let says: Vec<bool> = normals.iter().zip(&surfaces).map(|(n, &s)| *n != Vec3::ZERO || s != 0).collect();
+    if !says.contains(&true) {
         return vertices;
     }
-    let shading = Shading::new(positions, vertices.clone(), normals.clone(), document.triangles.clone());
+    let shading = Shading::new(positions, vertices.clone(), normals, &surfaces, document.triangles.clone());
     let mut taken = vec![false; positions.len()];
     let mut source_of = HashMap::new();
-    let corners = vertices.into_iter().zip(normals).zip(shading.clusters());
+    let corners = vertices.into_iter().zip(says).zip(shading.clusters());
     corners
-        .map(|((v, normal), &surface)| {
-            if normal == Vec3::ZERO {
+        .map(|((v, says), &surface)| {
+            if !says {
                 return v;
             }
             *source_of.entry(surface).or_insert_with(|| {

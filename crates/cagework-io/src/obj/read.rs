@@ -88,6 +88,8 @@ pub(crate) struct ObjDocument {
     pub(crate) face_starts: Vec<u32>,
     /// Material of each face, an index into `materials`, or [`NONE`].
     pub(crate) face_materials: Vec<u32>,
+    /// Smoothing group of each face, 0 for none; empty if the file has no `s` line.
+    face_smoothing: Vec<u32>,
     /// Names after `usemtl`, in order of first use.
     pub(crate) materials: Vec<String>,
     /// Triangles as indices into `corners`.
@@ -99,6 +101,27 @@ pub(crate) struct ObjDocument {
 }
 
 impl ObjDocument {
+    /// Normal of a corner; zero where it has none.
+    pub(crate) fn normal(&self, corner: &Corner) -> Vec3 {
+        self.normals.get(corner.vn as usize).copied().unwrap_or(Vec3::ZERO)
+    }
+
+    /// For each corner without a normal the surface that its `s` line makes it part of, from 1: a smoothing group, or
+    /// the face alone. 0 where a normal says it, or nothing does. `[n_corners]`
+    pub(crate) fn surfaces(&self) -> Vec<u32> {
+        let mut surfaces = vec![0; self.corners.len()];
+        let mut first_face = HashMap::new();
+        for ((face, ends), &group) in (1..).zip(self.face_starts.windows(2)).zip(&self.face_smoothing) {
+            let surface = if group == 0 { face } else { *first_face.entry(group).or_insert(face) };
+            for c in ends[0] as usize..ends[1] as usize {
+                if self.normal(&self.corners[c]) == Vec3::ZERO {
+                    surfaces[c] = surface;
+                }
+            }
+        }
+        surfaces
+    }
+
     /// Triangles (of corners) of each material, in order of first use.
     pub(crate) fn by_material(&self) -> Vec<(u32, Vec<[u32; 3]>)> {
         let mut groups: Vec<(u32, Vec<[u32; 3]>)> = Vec::new();
@@ -135,6 +158,9 @@ struct Reader<'a> {
     document: ObjDocument,
     material_numbers: HashMap<&'a [u8], u32>,
     material: u32,
+    /// Number after the last `s` line; the format's default is off.
+    smoothing: u32,
+    has_smoothing: bool,
     /// Corners that name a vertex not yet defined: line and index.
     forward: Vec<(usize, u32)>,
     groups: usize,
@@ -153,6 +179,8 @@ pub(crate) fn read(
         document: ObjDocument { face_starts: vec![0], ..ObjDocument::default() },
         material_numbers: HashMap::new(),
         material: NONE,
+        smoothing: 0,
+        has_smoothing: false,
         forward: Vec::new(),
         groups: 0,
         bad_attributes: 0,
@@ -206,6 +234,11 @@ impl<'a> Reader<'a> {
             }
             b"f" | b"fo" => self.face(line.number, words)?,
             b"o" | b"g" => self.groups += 1,
+            b"s" => {
+                if let Some(group) = words.next().and_then(|t| smoothing_group(&bytes[t])) {
+                    (self.smoothing, self.has_smoothing) = (group, true);
+                }
+            }
             b"usemtl" => self.use_material(line),
             b"mtllib" => {
                 let name = rest_of(&bytes[line.range.clone()], b"mtllib");
@@ -255,6 +288,7 @@ impl<'a> Reader<'a> {
         check_count(self.document.corners.len(), line)?;
         self.document.face_starts.push(self.document.corners.len() as u32);
         self.document.face_materials.push(self.material);
+        self.document.face_smoothing.push(self.smoothing);
         Ok(())
     }
 
@@ -287,6 +321,9 @@ impl<'a> Reader<'a> {
             }
         }
         self.triangulate();
+        if !self.has_smoothing {
+            self.document.face_smoothing.clear();
+        }
         let mut notices = Vec::new();
         let mut notice = |count: usize, text: &str| {
             if count > 0 {
@@ -324,6 +361,11 @@ fn number(token: &[u8]) -> Option<f32> {
 
 fn integer(token: &[u8]) -> Option<i64> {
     std::str::from_utf8(token).ok()?.parse().ok()
+}
+
+/// Smoothing group as written, 0 for `off`; nothing where it is neither.
+fn smoothing_group(word: &[u8]) -> Option<u32> {
+    if word == b"off" { Some(0) } else { u32::try_from(integer(word)?).ok() }
 }
 
 /// Index from 0 of an index as written: from 1, or negative, counted back from the `count` elements so far.

@@ -10,7 +10,7 @@ use super::lex::{lines, tokens};
 use super::read::{NONE, ObjDocument};
 use crate::normals::Shading;
 
-/// Distinct (vertex, normal) pairs of a file's corners.
+/// Distinct pairs of a vertex and a normal at a file's corners; where there is none, of a vertex and a surface.
 pub(crate) struct Pairs {
     /// The pairs as vertices for shading.
     pub(crate) shading: Shading,
@@ -24,22 +24,23 @@ impl ObjDocument {
     /// Pairs in order of first use, with the shape at rest.
     pub(crate) fn pairs(&self, rest: &[Vec3]) -> Pairs {
         let mut numbers = HashMap::new();
-        let (mut vertex, mut vn) = (Vec::new(), Vec::new());
+        let (mut vertex, mut vn, mut normal, mut surface) = (vec![], vec![], vec![], vec![]);
         let of_corner: Vec<u32> = self
             .corners
             .iter()
-            .map(|c| {
-                *numbers.entry((c.v, c.vn)).or_insert_with(|| {
+            .zip(self.surfaces())
+            .map(|(c, s)| {
+                *numbers.entry((c.v, c.vn, s)).or_insert_with(|| {
                     vertex.push(c.v);
                     vn.push(c.vn);
+                    normal.push(self.normal(c));
+                    surface.push(s);
                     vertex.len() as u32 - 1
                 })
             })
             .collect();
-        let normal =
-            vn.iter().map(|&n| if n == NONE { Vec3::ZERO } else { self.normals[n as usize] }).collect();
         let triangles = self.triangles.iter().map(|t| t.map(|c| of_corner[c as usize])).collect();
-        Pairs { shading: Shading::new(rest, vertex, normal, triangles), of_corner, vn }
+        Pairs { shading: Shading::new(rest, vertex, normal, &surface, triangles), of_corner, vn }
     }
 }
 

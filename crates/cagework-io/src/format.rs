@@ -1,0 +1,98 @@
+//! The formats of models: the one list of what is read and written.
+
+use thiserror::Error;
+
+/// Format of a model's file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ModelFormat {
+    /// Wavefront OBJ.
+    Obj,
+    /// glTF 2.0: JSON or GLB to read, GLB to write.
+    Gltf,
+}
+
+/// The content of a file is no format that is read here.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{name} is {found}: {hint}")]
+pub struct FormatError {
+    /// Name the caller gave.
+    pub name: String,
+    /// What it seems to be.
+    pub found: &'static str,
+    /// What to do.
+    pub hint: &'static str,
+}
+
+impl ModelFormat {
+    /// Every format, in the order in which people are told of them.
+    pub const ALL: [Self; 2] = [Self::Gltf, Self::Obj];
+
+    /// Short name, lower case.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Obj => "obj",
+            Self::Gltf => "gltf",
+        }
+    }
+
+    /// Ending of names of files that are written, lower case, without the dot.
+    #[must_use]
+    pub fn export_extension(self) -> &'static str {
+        match self {
+            Self::Obj => "obj",
+            Self::Gltf => "glb",
+        }
+    }
+
+    /// Whether one file holds several poses.
+    #[must_use]
+    pub fn holds_poses(self) -> bool {
+        match self {
+            Self::Obj => false,
+            Self::Gltf => true,
+        }
+    }
+
+    /// The format that the name of a file to be written asks for by its ending.
+    #[must_use]
+    pub fn of_export(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|format| extension(name) == format.export_extension())
+    }
+
+    /// The format of a file to be read, by its content.
+    ///
+    /// # Errors
+    /// [`FormatError`] when its name promises another, or its content is known to be something else.
+    pub fn of_file(name: &str, bytes: &[u8]) -> Result<Self, FormatError> {
+        let fault = |found, hint| Err(FormatError { name: name.into(), found, hint });
+        let export = "export it as GLB or OBJ";
+        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+        match bytes {
+            [] => return fault("empty", "the file has no bytes"),
+            [b'g', b'l', b'T', b'F', ..] => return Ok(Self::Gltf),
+            [b'P', b'K', 3, 4, ..] => return fault("a zip archive", "unpack it first"),
+            [b'K', b'a', b'y', b'd', b'a', b'r', b'a', ..] => return fault("an FBX file", export),
+            [b'B', b'L', b'E', b'N', b'D', b'E', b'R', ..] => return fault("a Blender file", export),
+            [b'p', b'l', b'y', b'\n' | b'\r', ..] => return fault("a PLY file", export),
+            _ => {}
+        }
+        if text.first() == Some(&b'{') {
+            return Ok(Self::Gltf);
+        }
+        match extension(name).as_str() {
+            "glb" => {
+                fault("not a GLB", "its first four bytes are not 'glTF': it is damaged or has the wrong name")
+            }
+            "gltf" => fault("not a glTF", "it does not begin with '{': it is damaged or has the wrong name"),
+            "stl" | "ply" | "fbx" | "dae" | "usdz" | "usd" | "3ds" | "blend" | "off" => {
+                fault("not OBJ or glTF", export)
+            }
+            _ => Ok(Self::Obj),
+        }
+    }
+}
+
+fn extension(name: &str) -> String {
+    name.rsplit_once('.').map_or(String::new(), |(_, extension)| extension.to_ascii_lowercase())
+}

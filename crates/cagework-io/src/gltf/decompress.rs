@@ -1,0 +1,170 @@
+//! Draco and meshopt: compressed geometry becomes plain buffer views before anything else looks at the document.
+
+use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointIndex};
+use meshoptimizer_rs::Workspace;
+use meshoptimizer_rs::codec::{BufferView, Filter, Mode};
+use serde_json::{Map, Value, json};
+
+use super::accessor::MAX_ELEMENTS;
+use super::container::{DRACO, MESHOPT};
+use super::pack::push;
+
+/// Most bytes that one stream becomes; a few hundred bytes may claim anything.
+const MAX_BYTES: u64 = 1 << 30;
+
+type Buffers = Vec<Vec<u8>>;
+
+/// Decodes all that is compressed; buffers are added to `buffers` and to the document.
+///
+/// # Errors
+/// The extension and what is wrong with its stream.
+pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), (&'static str, String)> {
+    for extension in MESHOPT {
+        for number in 0..json["bufferViews"].as_array().map_or(0, Vec::len) {
+            let Some(packed) = take(json, &format!("/bufferViews/{number}"), extension) else { continue };
+            let bytes = meshopt(&packed, buffers).map_err(|problem| (extension, problem))?;
+            let length = bytes.len();
+            let buffer = push_buffer(json, buffers, bytes);
+            let view = &mut json["bufferViews"][number];
+            (view["buffer"], view["byteOffset"], view["byteLength"]) =
+                (buffer.into(), 0.into(), length.into());
+        }
+    }
+    for m in 0..json["meshes"].as_array().map_or(0, Vec::len) {
+        for p in 0..json["meshes"][m]["primitives"].as_array().map_or(0, Vec::len) {
+            let place = format!("/meshes/{m}/primitives/{p}");
+            let Some(packed) = take(json, &place, DRACO) else { continue };
+            draco(json, buffers, &place, &packed).map_err(|problem| (DRACO, problem))?;
+        }
+    }
+    let Some(document) = json.as_object_mut() else { return Ok(()) };
+    for key in ["extensionsUsed", "extensionsRequired"] {
+        let Some(names) = document.get_mut(key).and_then(Value::as_array_mut) else { continue };
+        names.retain(|name| name != DRACO && MESHOPT.iter().all(|meshopt| name != meshopt));
+        if names.is_empty() {
+            document.shift_remove(key);
+        }
+    }
+    Ok(())
+}
+
+/// Takes an extension away from the object at `place`.
+fn take(json: &mut Value, place: &str, extension: &str) -> Option<Value> {
+    let object = json.pointer_mut(place)?.as_object_mut()?;
+    let extensions = object.get_mut("extensions")?.as_object_mut()?;
+    let packed = extensions.shift_remove(extension)?;
+    if extensions.is_empty() {
+        object.shift_remove("extensions");
+    }
+    Some(packed)
+}
+
+fn push_buffer(json: &mut Value, buffers: &mut Buffers, bytes: Vec<u8>) -> usize {
+    let buffer = push(json, "buffers", json!({ "byteLength": bytes.len() }));
+    buffers.push(bytes);
+    buffer
+}
+
+/// The bytes that a buffer view, or meshopt's extension of one, names.
+fn bytes_of<'a>(view: &Value, buffers: &'a Buffers) -> Option<&'a [u8]> {
+    let number = |key: &str| view[key].as_u64().and_then(|n| usize::try_from(n).ok());
+    let start = number("byteOffset").unwrap_or(0);
+    buffers.get(number("buffer")?)?.get(start..start.checked_add(number("byteLength")?)?)
+}
+
+fn meshopt(packed: &Value, buffers: &Buffers) -> Result<Vec<u8>, String> {
+    let number = |key: &str| packed[key].as_u64().filter(|&n| n <= MAX_BYTES).map_or(0, |n| n as usize);
+    let source = bytes_of(packed, buffers).ok_or("its stream is cut off")?;
+    let decode = || {
+        let mode = Mode::parse(packed["mode"].as_str().unwrap_or_default())?;
+        let filter = Filter::parse(packed["filter"].as_str().unwrap_or("NONE"))?;
+        // The workspace refuses more than a gigabyte.
+        BufferView::new(mode, filter, number("count"), number("byteStride"))?
+            .decode(source, &mut Workspace::default())
+    };
+    decode().map_err(|error| error.to_string())
+}
+
+/// Puts the mesh of a Draco stream into the accessors of its primitive.
+fn draco(json: &mut Value, buffers: &mut Buffers, place: &str, packed: &Value) -> Result<(), String> {
+    let view = packed["bufferView"].as_u64().unwrap_or(u64::MAX) as usize;
+    let source = json["bufferViews"].get(view).and_then(|view| bytes_of(view, buffers));
+    let limits = DecodeLimits::default()
+        .with_max_points(MAX_ELEMENTS)
+        .with_max_faces(2 * MAX_ELEMENTS)
+        .with_max_decoded_bytes(MAX_BYTES);
+    let mut stream = DecoderBuffer::new(source.ok_or("its stream is cut off")?).with_limits(limits);
+    let mut mesh = Mesh::new();
+    MeshDecoder::new().decode(&mut stream, &mut mesh).map_err(|error| error.to_string())?;
+
+    let primitive = json.pointer(place).and_then(Value::as_object).cloned().unwrap_or_default();
+    for (name, id) in packed["attributes"].as_object().into_iter().flatten() {
+        let accessor = primitive.get("attributes").and_then(|a| a[name].as_u64());
+        let id = id.as_u64().and_then(|id| u32::try_from(id).ok());
+        let attribute = id.and_then(|id| mesh.attribute_by_unique_id(id));
+        let (Some(accessor), Some(attribute)) = (accessor, attribute) else {
+            return Err(format!("it has no attribute for {name}"));
+        };
+        let (kind, element) = layout(attribute).ok_or_else(|| format!("{name} has an unknown type"))?;
+        // Elements of vertex attributes are aligned.
+        let stride = element.next_multiple_of(4);
+        let mut bytes = Vec::with_capacity(stride * mesh.num_points());
+        for point in 0..mesh.num_points() as u32 {
+            let start = attribute.mapped_index(PointIndex(point)).0 as usize * element;
+            let value = attribute.buffer().data().get(start..start + element);
+            bytes.extend_from_slice(value.ok_or_else(|| format!("{name} is cut off"))?);
+            bytes.resize(bytes.len().next_multiple_of(4), 0);
+        }
+        let view = json!({ "byteStride": stride });
+        fill(json, buffers, accessor as usize, bytes, view, (kind, mesh.num_points()))?;
+    }
+    let corners = mesh.faces().iter().flatten();
+    let bytes: Vec<u8> = corners.flat_map(|corner| corner.0.to_le_bytes()).collect();
+    let indices = match primitive.get("indices").and_then(Value::as_u64) {
+        Some(indices) => indices as usize,
+        None => push(json, "accessors", json!({ "type": "SCALAR" })),
+    };
+    fill(json, buffers, indices, bytes, json!({}), (UNSIGNED_INT, 3 * mesh.num_faces()))?;
+    json.pointer_mut(place).ok_or("its primitive is not there")?["indices"] = indices.into();
+    Ok(())
+}
+
+/// glTF's component types.
+const UNSIGNED_INT: u32 = 5125;
+
+/// Component type and bytes of an element; nothing for what glTF does not have.
+fn layout(attribute: &PointAttribute) -> Option<(u32, usize)> {
+    let kind = match attribute.data_type() {
+        DataType::Int8 => 5120,
+        DataType::Uint8 => 5121,
+        DataType::Int16 => 5122,
+        DataType::Uint16 => 5123,
+        DataType::Uint32 => UNSIGNED_INT,
+        DataType::Float32 => 5126,
+        _ => return None,
+    };
+    Some((kind, attribute.data_type().byte_length() * usize::from(attribute.num_components())))
+}
+
+/// Lets an accessor read `bytes`: `count` components or vectors of a component type.
+fn fill(
+    json: &mut Value,
+    buffers: &mut Buffers,
+    accessor: usize,
+    bytes: Vec<u8>,
+    mut view: Value,
+    (kind, count): (u32, usize),
+) -> Result<(), String> {
+    view["byteLength"] = bytes.len().into();
+    view["buffer"] = push_buffer(json, buffers, bytes).into();
+    let view = push(json, "bufferViews", view);
+    let accessor: &mut Map<String, Value> = json["accessors"]
+        .get_mut(accessor)
+        .and_then(Value::as_object_mut)
+        .ok_or_else(|| format!("accessor {accessor} is not there"))?;
+    accessor.shift_remove("byteOffset");
+    accessor.insert("bufferView".into(), view.into());
+    accessor.insert("componentType".into(), kind.into());
+    accessor.insert("count".into(), count.into());
+    Ok(())
+}

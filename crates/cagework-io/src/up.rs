@@ -1,0 +1,43 @@
+//! Which axis of a file points up.
+
+use std::borrow::Cow;
+
+use cagework_core::PolygonMesh;
+use glam::Vec3;
+
+/// The axis that points up in a file. Everything that is not in a file has Y up: a file with Z up is turned by 90
+/// degrees about x when it is read, and back when it is written. Both are exact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UpAxis {
+    /// Y, as glTF prescribes.
+    #[default]
+    Y,
+    /// Z, as CAD programs and some OBJ files have it.
+    Z,
+}
+
+impl UpAxis {
+    /// Positions of a file with Y up.
+    #[must_use]
+    pub fn turned(self, positions: &[Vec3]) -> Cow<'_, [Vec3]> {
+        match self {
+            Self::Y => positions.into(),
+            Self::Z => positions.iter().map(|p| Vec3::new(p.x, p.z, -p.y)).collect(),
+        }
+    }
+
+    /// Positions with Y up as they are in a file.
+    #[must_use]
+    pub fn turned_back(self, positions: &[Vec3]) -> Cow<'_, [Vec3]> {
+        match self {
+            Self::Y => positions.into(),
+            Self::Z => positions.iter().map(|p| Vec3::new(p.x, -p.z, p.y)).collect(),
+        }
+    }
+
+    /// A mesh with Y up as it is in a file.
+    #[must_use]
+    pub fn mesh_turned_back(self, mesh: &PolygonMesh) -> PolygonMesh {
+        PolygonMesh { positions: self.turned_back(&mesh.positions).into_owned(), faces: mesh.faces.clone() }
+    }
+}

@@ -1,0 +1,44 @@
+import { NodeIO } from "@gltf-transform/core";
+import { describe, expect, it } from "vitest";
+import { meshoptGlb } from "../e2e/models";
+import { decompress } from "../src/decode";
+
+const GLB_HEADER = 12;
+const CHUNK_HEADER = 8;
+
+interface Json {
+  buffers: { byteLength: number; uri?: string; extensions?: object }[];
+  extensionsRequired?: string[];
+}
+
+/** A meshopt file as .gltf: its streams in worm.bin, and a second buffer for programs without the decoder. */
+async function twoBuffers(change: (json: Json) => void) {
+  const bytes = await meshoptGlb();
+  const start = GLB_HEADER + CHUNK_HEADER;
+  const end = start + new DataView(bytes.buffer, bytes.byteOffset).getUint32(GLB_HEADER, true);
+  const json: Json = JSON.parse(new TextDecoder().decode(bytes.subarray(start, end)));
+  Object.assign(json.buffers[0] ?? {}, { uri: "worm.bin" });
+  change(json);
+  const streams = bytes.subarray(end + CHUNK_HEADER);
+  const sibling = (path: string) => (path === "worm.bin" ? streams : undefined);
+  return decompress("worm.gltf", new TextEncoder().encode(JSON.stringify(json)), sibling);
+}
+
+describe("a file compressed by meshopt", () => {
+  const cases: [string, (json: Json) => void][] = [
+    ["marked as fallback", () => undefined],
+    // As the extension's own sample has it: who knows no meshopt reads the second buffer.
+    ["that others read", (json) => delete json.extensionsRequired],
+    ["without a mark", (json) => delete json.buffers[1]?.extensions],
+    // Nobody has to fetch what is not read.
+    ["in a file that is not there", (json) => Object.assign(json.buffers[1] ?? {}, { uri: "fallback.bin" })],
+  ];
+  // "GLB must have 0-1 buffers", it said.
+  it.each(cases)("with a second buffer %s is opened", async (_, change) => {
+    const plain = await new NodeIO().readBinary(await twoBuffers(change));
+    const [mesh] = plain.getRoot().listMeshes();
+    const indices = mesh?.listPrimitives()[0]?.getIndices();
+    expect(indices?.getCount()).toBe(3 * 2 * 40 * 32);
+    expect(plain.getRoot().listBuffers()).toHaveLength(1);
+  });
+});
