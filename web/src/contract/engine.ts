@@ -70,7 +70,7 @@ export interface Engine {
 
   // --- gestures: begin, then drag/constrain/type, then end. One gesture is one undo step (page keeps positions before).
   beginTransform(gesture: Gesture, x: number, y: number): boolean;
-  /** The gizmo's handle under the pointer, undefined for none. */
+  /** The gizmo's handle under the pointer, or the nearest within `radius` (as for `pick`); undefined for none. */
   gizmoAt(x: number, y: number, radius: number): GizmoHandle | undefined;
   /** Begins the gesture of that handle. */
   beginGizmo(handle: GizmoHandle, x: number, y: number): boolean;

@@ -48,7 +48,9 @@ export function attachPointer(stage: Stage, app: App): void {
         mode: event.shiftKey || store.get().additive ? "add" : mod ? "remove" : "replace",
       };
     if (store.get().cage && store.get().scene.cage) {
-      const handle = engine().gizmoAt(at.x, at.y, radiusOf(event));
+      // A vertex below a finger comes before a gizmo beside it.
+      const isOnVertex = engine().pick(at.x, at.y, MOUSE_RADIUS).length > 0;
+      const handle = engine().gizmoAt(at.x, at.y, isOnVertex ? MOUSE_RADIUS : radiusOf(event));
       if (handle !== undefined && edit.beginGizmo(handle, at.x, at.y)) return { kind: "gizmo" };
       const vertices = engine().pick(at.x, at.y, radiusOf(event));
       if (vertices.length > 0) {

@@ -40,53 +40,51 @@ const MAX_VERTICES: u64 = 4 * 64 * 8 * 6;
 
 type Vertex = [f32; 10];
 
-/// The part of a gizmo under the pointer. `cursor`: pixels of the camera's viewport.
+/// The part of a gizmo under the pointer; where there is none, the nearest one within `radius`, as a finger needs it.
+/// `cursor` and `radius`: pixels of the camera's viewport.
 #[must_use]
-pub fn pick_gizmo(camera: &Camera, gizmo: &Gizmo, cursor: Vec2) -> Option<GizmoPart> {
+pub fn pick_gizmo(camera: &Camera, gizmo: &Gizmo, cursor: Vec2, radius: f32) -> Option<GizmoPart> {
     let size = GIZMO_PX * camera.units_per_pixel(gizmo.center);
     let at = |p: Vec3| camera.project(gizmo.center + size * (gizmo.rotation * p)).map(|p| p.position);
-    let center = at(Vec3::ZERO)?;
-    if gizmo.mode != GizmoMode::Rotate && center.distance(cursor) <= 1.2 * REACH_PX {
+    let center = at(Vec3::ZERO)?.distance(cursor);
+    if gizmo.mode != GizmoMode::Rotate && center <= 1.2 * REACH_PX {
         return Some(GizmoPart::View);
     }
-    let to_ring = |axis: u8, at: &dyn Fn(Vec3) -> Option<Vec2>| {
-        ring_points(axis)
-            .zip(ring_points(axis).cycle().skip(1))
-            .filter_map(|(a, b)| Some(to_segment(cursor, at(a)?, at(b)?)))
-            .fold(f32::INFINITY, f32::min)
+    let to_line = |a: Vec3, b: Vec3| Some(to_segment(cursor, at(a)?, at(b)?));
+    let along = |axis: u8| match gizmo.mode {
+        GizmoMode::Rotate => nearest(ring_points(axis), to_line),
+        GizmoMode::Move | GizmoMode::Scale => {
+            to_line(AXIS_START * unit(axis), unit(axis)).unwrap_or(f32::INFINITY)
+        }
     };
-    let mut best: Option<(f32, GizmoPart)> = None;
-    if gizmo.mode == GizmoMode::Rotate {
-        let facing = facing(camera);
-        let at = |p: Vec3| camera.project(gizmo.center + size * VIEW_RING * (facing * p)).map(|p| p.position);
-        let distance = to_ring(2, &at);
-        best = (distance <= REACH_PX).then_some((distance, GizmoPart::View));
+    let facing_ring = || {
+        let facing = gizmo.rotation.inverse() * facing(camera);
+        nearest(ring_points(2).map(|p| VIEW_RING * (facing * p)), to_line)
+    };
+    let around = (gizmo.mode == GizmoMode::Rotate).then(|| (facing_ring(), GizmoPart::View));
+    let thin = around.into_iter().chain((0..3).map(|axis| (along(axis), GizmoPart::Axis(axis))));
+    let thin =
+        thin.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(distance, _)| *distance <= REACH_PX.max(radius));
+    if let Some((_, part)) = thin.filter(|(distance, _)| *distance <= REACH_PX) {
+        return Some(part);
     }
-    for axis in 0..3u8 {
-        let distance = match gizmo.mode {
-            GizmoMode::Rotate => to_ring(axis, &at),
-            GizmoMode::Move | GizmoMode::Scale => {
-                let along = unit(axis);
-                match (at(AXIS_START * along), at(along)) {
-                    (Some(a), Some(b)) => to_segment(cursor, a, b),
-                    _ => f32::INFINITY,
-                }
-            }
-        };
-        if distance <= REACH_PX && best.is_none_or(|(d, _)| distance < d) {
-            best = Some((distance, GizmoPart::Axis(axis)));
-        }
-    }
-    if best.is_none() && gizmo.mode == GizmoMode::Move {
-        for axis in 0..3u8 {
-            let corners = plane_corners(axis).map(at);
-            let [Some(a), Some(b), Some(c), Some(d)] = corners else { continue };
-            if is_in_quad(cursor, [a, b, c, d]) {
-                return Some(GizmoPart::Plane(axis));
-            }
-        }
-    }
-    best.map(|(_, part)| part)
+    let square = |axis: u8| {
+        let [a, b, c, d] = plane_corners(axis).map(at);
+        let corners = [a?, b?, c?, d?];
+        let inside = is_in_quad(cursor, corners);
+        let rim = || nearest(plane_corners(axis).into_iter(), to_line);
+        Some((if inside { 0.0 } else { rim() }, GizmoPart::Plane(axis)))
+    };
+    let planes = (0..3u8).filter(|_| gizmo.mode == GizmoMode::Move).filter_map(square);
+    let whole = (gizmo.mode != GizmoMode::Rotate).then_some((center, GizmoPart::View));
+    let all = planes.chain(thin).chain(whole).filter(|(distance, _)| *distance <= radius);
+    all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, part)| part)
+}
+
+/// Least distance to the sides of a closed line; `to_line` answers that of one side, nothing for one behind the eye.
+fn nearest(points: impl Iterator<Item = Vec3> + Clone, to_line: impl Fn(Vec3, Vec3) -> Option<f32>) -> f32 {
+    let sides = points.clone().zip(points.cycle().skip(1));
+    sides.filter_map(|(a, b)| to_line(a, b)).fold(f32::INFINITY, f32::min)
 }
 
 fn unit(axis: u8) -> Vec3 {
@@ -277,22 +275,25 @@ mod tests {
             gizmo.mode = mode;
             for axis in 0..3 {
                 let cursor = at(&camera, &gizmo, 0.7 * unit(axis));
-                assert_eq!(pick_gizmo(&camera, &gizmo, cursor), Some(GizmoPart::Axis(axis)));
+                assert_eq!(pick_gizmo(&camera, &gizmo, cursor, 0.0), Some(GizmoPart::Axis(axis)));
             }
-            assert_eq!(pick_gizmo(&camera, &gizmo, at(&camera, &gizmo, Vec3::ZERO)), Some(GizmoPart::View));
+            assert_eq!(
+                pick_gizmo(&camera, &gizmo, at(&camera, &gizmo, Vec3::ZERO), 0.0),
+                Some(GizmoPart::View)
+            );
         }
         gizmo.mode = GizmoMode::Move;
         for axis in 0..3 {
             let cursor = at(&camera, &gizmo, 0.4 * (unit(axis + 1) + unit(axis + 2)));
-            assert_eq!(pick_gizmo(&camera, &gizmo, cursor), Some(GizmoPart::Plane(axis)));
+            assert_eq!(pick_gizmo(&camera, &gizmo, cursor, 0.0), Some(GizmoPart::Plane(axis)));
         }
         gizmo.mode = GizmoMode::Rotate;
         for axis in 0..3u8 {
             let (sin, cos) = (0.6f32).sin_cos();
             let cursor = at(&camera, &gizmo, cos * unit(axis + 1) + sin * unit(axis + 2));
-            assert_eq!(pick_gizmo(&camera, &gizmo, cursor), Some(GizmoPart::Axis(axis)));
+            assert_eq!(pick_gizmo(&camera, &gizmo, cursor, 0.0), Some(GizmoPart::Axis(axis)));
         }
-        assert_eq!(pick_gizmo(&camera, &gizmo, Vec2::ZERO), None);
+        assert_eq!(pick_gizmo(&camera, &gizmo, Vec2::ZERO, 0.0), None);
     }
 
     #[test]
@@ -306,12 +307,40 @@ mod tests {
             let away = Vec2::from_angle(TAU * k as f32 / 12.0);
             for (radius, part) in [(1.0, Some(GizmoPart::View)), (1.0 + 12.0 / GIZMO_PX, None)] {
                 let cursor = center + radius * VIEW_RING * GIZMO_PX * away;
-                assert_eq!(pick_gizmo(&camera, &gizmo, cursor), part, "{k}, {radius}");
+                assert_eq!(pick_gizmo(&camera, &gizmo, cursor, 0.0), part, "{k}, {radius}");
             }
         }
         gizmo.mode = GizmoMode::Move;
         let cursor = center + VIEW_RING * GIZMO_PX * Vec2::NEG_Y;
-        assert_eq!(pick_gizmo(&camera, &gizmo, cursor), None, "arrows have no ring");
+        assert_eq!(pick_gizmo(&camera, &gizmo, cursor, 0.0), None, "arrows have no ring");
+    }
+
+    /// Fingers missed all parts by more than 8 pixels, because the radius they are given was ignored.
+    #[test]
+    fn finger_finds_what_a_mouse_misses_and_a_part_below_it_comes_first() {
+        let (camera, mut gizmo) = scene();
+        for mode in [GizmoMode::Move, GizmoMode::Scale, GizmoMode::Rotate] {
+            gizmo.mode = mode;
+            let (tip, part) = match mode {
+                GizmoMode::Rotate => (facing(&camera) * Vec3::X * VIEW_RING, GizmoPart::View),
+                _ => (Vec3::Y, GizmoPart::Axis(1)),
+            };
+            let [center, end] = [Vec3::ZERO, gizmo.rotation.inverse() * tip].map(|p| at(&camera, &gizmo, p));
+            let beyond = |pixels: f32| end + pixels * (end - center).normalize();
+            for (pixels, finger, mouse) in
+                [(7.0, Some(part), Some(part)), (20.0, Some(part), None), (28.0, None, None)]
+            {
+                assert_eq!(pick_gizmo(&camera, &gizmo, beyond(pixels), 24.0), finger, "{mode:?}, {pixels}");
+                assert_eq!(pick_gizmo(&camera, &gizmo, beyond(pixels), 8.0), mouse, "{mode:?}, {pixels}");
+            }
+        }
+        gizmo.mode = GizmoMode::Move;
+        let square = at(&camera, &gizmo, 0.4 * (Vec3::X + Vec3::Y));
+        assert_eq!(
+            pick_gizmo(&camera, &gizmo, square, 24.0),
+            Some(GizmoPart::Plane(2)),
+            "axes lie beside it"
+        );
     }
 
     #[test]

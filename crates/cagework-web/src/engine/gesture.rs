@@ -28,13 +28,13 @@ impl Engine {
         Ok(self.change(|state| state.begin(kind, x, y)))
     }
 
-    /// The gizmo's handle under the pointer; undefined for none.
+    /// The gizmo's handle under the pointer, or the nearest one within `radius`, CSS pixels; undefined for none.
     #[wasm_bindgen(js_name = gizmoAt)]
     #[must_use]
-    pub fn gizmo_at(&self, x: f32, y: f32, _radius: f32) -> Option<String> {
+    pub fn gizmo_at(&self, x: f32, y: f32, radius: f32) -> Option<String> {
         let part = self.read(|state| {
             let gizmo = state.gizmo()?;
-            pick_gizmo(&state.camera, &gizmo, state.pointer(x, y))
+            pick_gizmo(&state.camera, &gizmo, state.pointer(x, y), radius)
         });
         if self.read(|state| state.gesture.is_none() && state.active_part != part) {
             self.change(|state| {
