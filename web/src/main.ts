@@ -41,6 +41,9 @@ import { createUnsupported } from "./ui/unsupported";
 import { createStage } from "./ui/viewport";
 import { createWithout } from "./ui/without";
 
+/** A hand that has not moved the cage for so long rests. */
+const PAUSE_MS = 150;
+
 function byId(id: string): HTMLElement {
   const element = document.getElementById(id);
   if (!element) throw new Error(`the page lacks #${id}`);
@@ -77,13 +80,15 @@ async function main(): Promise<void> {
 
   const bind = createBind(ctx);
   const project = createProject(ctx);
-  let rebind: ReturnType<typeof setTimeout> | undefined;
-  /** A changed cage is bound again once the hand rests, ms; a fine grid waits for the user's word. */
+  let soon: ReturnType<typeof setTimeout> | undefined;
+  /** A changed cage is bound again once the hand rests; a fine grid waits for the user's word. */
   const bindSoon = (pause: number) => {
-    clearTimeout(rebind);
-    rebind = setTimeout(() => {
+    clearTimeout(soon);
+    soon = setTimeout(() => {
       const { cage: now, bindOptions } = store.get();
-      if (now?.usable && !bind.covers() && !edit.active() && bindOptions.grid <= 128) void bind.start(true);
+      // A gesture may end without a change, and then nobody else would ask for the bind.
+      if (edit.active()) bindSoon(PAUSE_MS);
+      else if (now?.usable && !bind.covers() && bindOptions.grid <= 128) void bind.start(true);
     }, pause);
   };
   const edit = createEdit(ctx, {
@@ -93,7 +98,7 @@ async function main(): Promise<void> {
   const follow = () => {
     edit.sync();
     view.refresh();
-    bindSoon(600);
+    bindSoon(PAUSE_MS);
   };
   const cage = createCage(ctx, follow, (grid) => {
     bind.setOptions({ grid });

@@ -16,7 +16,7 @@ import type {
 import { BIND_DEFAULTS } from "./defaults";
 import { findAdapter, hasWebGl2, lackOf } from "./session/adapter";
 import type { Artifact } from "./session/artifact";
-import { canGoOn, type KeptBind, startBind } from "./session/bind";
+import { requireCurrent, startBind } from "./session/bind";
 import { createClient } from "./session/client";
 import { load, readFiles } from "./session/files";
 import { createFrames } from "./session/frames";
@@ -126,7 +126,6 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   const cage = () => ({ positions: engine.restPositions(), corners: engine.cageCorners() });
   const stateOf = () => engine.cageState() ?? null;
   let bind: Job<BindReport> | undefined;
-  let kept: KeptBind | undefined;
   let slice: Job<void> | undefined;
   let meanValue: Job<void> | undefined;
 
@@ -135,7 +134,6 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     const { settings } = loaded;
     const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
     bind?.cancel();
-    kept = undefined;
     const read: ModelInfo = await raw.open(loaded);
     const model = { ...read, notices: [...read.notices, ...notices] };
     const project = settings === undefined ? null : { poses, settings };
@@ -167,38 +165,36 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     },
     bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport> {
       bind?.cancel();
-      const asked = possible(options);
-      const { positions, corners } = cage();
-      const again = canGoOn(kept, asked, { positions, corners });
-      kept = undefined;
       bind = startBind({
         client,
         engine,
         raw,
         adapter,
-        options: asked,
+        options: possible(options),
         listener,
-        cage: { positions, corners },
-        again,
-        keep: (bound) => {
-          kept = bound;
-        },
+        cage: cage(),
       });
       return bind;
     },
     estimateMemory: (options) => raw.estimateMemory(possible(options)),
     bindMeanValue() {
       meanValue?.cancel();
-      const job = client.run("meanValue", { positions: raw.modelPositions(), cage: cage() });
-      meanValue = chain(job, ({ indptr, indices, data }) => raw.adoptOther(indptr, indices, data));
+      const bound = cage();
+      const job = client.run("meanValue", { positions: raw.modelPositions(), cage: bound });
+      meanValue = chain(job, ({ indptr, indices, data }) => {
+        requireCurrent(engine, bound);
+        return raw.adoptOther(indptr, indices, data);
+      });
       return meanValue;
     },
     loadSlice(axis, fraction, grid) {
       slice?.cancel();
       const options = possible({ ...BIND_DEFAULTS, grid });
-      const job = client.run("slice", { cage: cage(), axis, fraction, options });
+      const cut = cage();
+      const job = client.run("slice", { cage: cut, axis, fraction, options });
       const none = { indptr: new Uint32Array(), indices: new Uint32Array(), data: new Float32Array() };
       slice = chain(job, (rows) => {
+        requireCurrent(engine, cut);
         const { indptr, indices, data } = rows ?? none;
         raw.takeSlice(axis, fraction, options, indptr, indices, data);
       });

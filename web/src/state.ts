@@ -207,8 +207,3 @@ export function fittingPoses(state: AppState): readonly Pose[] {
   const n = (state.cage?.info.vertices ?? 0) * 3;
   return state.poses.filter((pose) => pose.positions.length === n);
 }
-
-/** Whether a bind after an edit only made up for what the edit changed: its time says nothing about a whole bind's. */
-export function isEdit(report: BindReport): boolean {
-  return report.corrections !== undefined;
-}

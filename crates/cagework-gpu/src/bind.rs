@@ -59,6 +59,20 @@ pub async fn bind_gpu(
     Ok((binding, weights))
 }
 
+/// [`bind_gpu`] for weights that go elsewhere: nothing is uploaded.
+///
+/// # Errors
+/// As [`bind_gpu`].
+pub async fn bind_on(
+    positions: &[Vec3],
+    cage: &Cage,
+    options: &BindOptions,
+    progress: &dyn Progress,
+    context: &GpuContext,
+) -> Result<Binding, GpuError> {
+    Ok(bind_gpu_to_edit(positions, cage, options, 0, progress, context).await?.0)
+}
+
 /// [`bind_gpu`] for a cage that will be edited: the fields are read back, so that the next bind can start from them, on the
 /// CPU. Without them if there are none to keep ([`Rebinder::can_keep`]) or if they and the CPU's arrays exceed
 /// `most_to_keep`, bytes.

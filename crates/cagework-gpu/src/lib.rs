@@ -23,7 +23,7 @@ pub mod session;
 pub mod stream;
 pub mod table;
 
-pub use bind::{bind_gpu, bind_gpu_to_edit};
+pub use bind::{bind_gpu, bind_gpu_to_edit, bind_on};
 pub use deform::{Deformer, GpuWeights};
 pub use device::{ContextOptions, GpuContext};
 pub use error::GpuError;

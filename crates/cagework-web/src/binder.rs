@@ -2,11 +2,11 @@
 //!
 //! It has its own GPU device and reads nothing but arrays. Results are taken apart by the page's `Engine`.
 
-use cagework_core::bind::{BindError, OutsideVertex, Rebinder};
+use cagework_core::bind::OutsideVertex;
 use cagework_core::cage_gen::{CageOptions, generate};
 use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Binding, Cage, PolygonMesh, Weights, mean_value_weights, samples};
-use cagework_gpu::{ContextOptions, GpuContext, bind_gpu_to_edit};
+use cagework_gpu::{ContextOptions, GpuContext, bind_on};
 use glam::Vec3;
 use js_sys::Function;
 use wasm_bindgen::JsValue;
@@ -23,12 +23,7 @@ use crate::views::object;
 #[wasm_bindgen]
 pub struct Binder {
     gpu: Option<GpuContext>,
-    /// What the last bind left behind, and where it ran: after a small edit of the cage the next one starts from it.
-    kept: Option<(Backend, Rebinder)>,
 }
-
-/// Most memory, bytes, that a bind may need whose fields are kept: enough for g = 128, and a tenth of what a module can have.
-const MOST_TO_KEEP: u64 = 384 << 20;
 
 /// Weights on their way to the page: compressed sparse rows, and the vertices outside the cage.
 #[wasm_bindgen]
@@ -36,7 +31,6 @@ pub struct Bound {
     weights: Weights,
     outside: Vec<OutsideVertex>,
     report: JsValue,
-    kept: bool,
 }
 
 /// A mesh of polygons on its way to the page.
@@ -72,7 +66,7 @@ impl Binder {
     #[must_use]
     #[allow(clippy::new_without_default, reason = "only JavaScript makes one")]
     pub fn new() -> Self {
-        Self { gpu: None, kept: None }
+        Self { gpu: None }
     }
 
     /// Opens a GPU for the binds to come, unless there is one, or none that could bind.
@@ -93,7 +87,7 @@ impl Binder {
     /// # Errors
     /// Those of a bind; when the arrays are no cage; `Missing` when the GPU is asked for and not open.
     pub async fn bind(
-        &mut self,
+        &self,
         positions: Vec<f32>,
         cage: Vec<f32>,
         corners: Vec<u32>,
@@ -103,16 +97,9 @@ impl Binder {
         let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
         let parts = Parts::new(&positions, &cage, &corners)?;
         drop(positions);
-        let place = if is_here(asked) { Backend::Cpu } else { Backend::Gpu };
-        let listener = Listener::new(progress);
-        let binding = match self.corrected(&parts, asked, place, &listener)? {
-            Some(binding) => binding,
-            None if place == Backend::Cpu => self.bind_here(&parts, &asked.into(), &listener)?,
-            None => self.bind_there(&parts, &asked.into(), &listener).await?,
-        };
+        let binding = self.run(&parts.positions, &parts.cage, asked, progress).await?;
         let report = object(&binding.report)?;
-        let kept = self.kept.as_ref().is_some_and(|(_, rebinder)| rebinder.keeps());
-        Ok(Bound { weights: binding.weights, outside: binding.outside, report, kept })
+        Ok(Bound { weights: binding.weights, outside: binding.outside, report })
     }
 
     /// Mean value coordinates, by formula; the arrays are those of `bind`.
@@ -128,7 +115,7 @@ impl Binder {
     ) -> Result<Bound, JsValue> {
         let parts = Parts::new(positions, cage, corners)?;
         let weights = mean_value_weights(&parts.positions, &parts.cage).map_err(Fault::from)?;
-        Ok(Bound { weights, outside: Vec::new(), report: JsValue::UNDEFINED, kept: false })
+        Ok(Bound { weights, outside: Vec::new(), report: JsValue::UNDEFINED })
     }
 
     /// Coordinates at the centres of a slice's cells: rows for `Engine.takeSlice`. Takes the cage's arrays, the axis,
@@ -155,7 +142,7 @@ impl Binder {
         }
         let binding = self.run(&centers, &parts.cage, asked, progress).await?;
         let (weights, outside) = (binding.weights, Vec::new());
-        Ok(Some(Bound { weights, outside, report: JsValue::UNDEFINED, kept: false }))
+        Ok(Some(Bound { weights, outside, report: JsValue::UNDEFINED }))
     }
 
     /// A cage for a model: `CageOptions` of contract.ts. `progress` as for `bind`.
@@ -201,62 +188,7 @@ fn is_here(asked: BindAsked) -> bool {
     asked.backend == Backend::Cpu || !cfg!(feature = "webgpu")
 }
 
-/// The options of a bind whose fields are kept.
-fn frugal(options: &BindOptions) -> BindOptions {
-    BindOptions { memory_limit: options.memory_limit.min(MOST_TO_KEEP), ..*options }
-}
-
 impl Binder {
-    /// Binds to an edited cage from what the last bind left behind, on the processor, if that was of the same model and asked
-    /// for in the same way.
-    fn corrected(
-        &mut self,
-        parts: &Parts,
-        asked: BindAsked,
-        place: Backend,
-        listener: &Listener,
-    ) -> Answer<Option<Binding>> {
-        // Another model's is dropped here: its memory is needed now. Whoever binds to the same cage again wants it done again.
-        let kept = self.kept.take().filter(|(bound_by, rebinder)| {
-            *bound_by == place
-                && rebinder.fits(&parts.positions, &frugal(&asked.into()))
-                && !rebinder.is_bound_to(&parts.cage)
-        });
-        let Some((_, mut rebinder)) = kept else { return Ok(None) };
-        let corrected = rebinder.correct(&parts.cage, listener)?;
-        self.kept = corrected.is_some().then_some((place, rebinder));
-        Ok(corrected.map(|(binding, _)| binding))
-    }
-
-    /// Binds on the processor, and keeps what the next bind can start from if there is memory for it.
-    fn bind_here(&mut self, parts: &Parts, options: &BindOptions, listener: &Listener) -> Answer<Binding> {
-        let Parts { positions, cage } = parts;
-        match Rebinder::new(positions, cage, &frugal(options), listener) {
-            Ok((rebinder, binding)) => {
-                self.kept = Some((Backend::Cpu, rebinder));
-                Ok(binding)
-            }
-            // Without the fields it may fit.
-            Err(BindError::Memory { .. }) => Ok(cagework_core::bind(positions, cage, options, listener)?),
-            Err(error) => Err(error.into()),
-        }
-    }
-
-    /// The same on the GPU.
-    async fn bind_there(
-        &mut self,
-        parts: &Parts,
-        options: &BindOptions,
-        listener: &Listener,
-    ) -> Answer<Binding> {
-        let Parts { positions, cage } = parts;
-        let most = frugal(options).memory_limit;
-        let (binding, rebinder) =
-            bind_gpu_to_edit(positions, cage, options, most, listener, self.open()?).await?;
-        self.kept = rebinder.map(|rebinder| (Backend::Gpu, rebinder));
-        Ok(binding)
-    }
-
     fn open(&self) -> Answer<&GpuContext> {
         self.gpu.as_ref().ok_or_else(|| Fault::missing("GPU", "open one first"))
     }
@@ -273,7 +205,7 @@ impl Binder {
         if is_here(asked) {
             return Ok(cagework_core::bind(positions, cage, &options, &listener)?);
         }
-        Ok(bind_gpu_to_edit(positions, cage, &options, 0, &listener, self.open()?).await?.0)
+        Ok(bind_on(positions, cage, &options, &listener, self.open()?).await?)
     }
 }
 
@@ -312,13 +244,6 @@ impl Bound {
     #[must_use]
     pub fn offsets(&self) -> Vec<f32> {
         self.outside.iter().flat_map(|o| o.offset.to_array()).collect()
-    }
-
-    /// Whether a bind after a small edit of the cage can start from what this one left behind.
-    #[wasm_bindgen(getter)]
-    #[must_use]
-    pub fn kept(&self) -> bool {
-        self.kept
     }
 
     /// The bind report; undefined for mean value coordinates and slices.

@@ -2,7 +2,7 @@
 
 import type { BindEvent, BindOptions, BindReport, CageState, Job } from "../contract";
 import { createEta, type Eta } from "../eta";
-import { type BindRun, cageBroken, isEdit } from "../state";
+import { type BindRun, cageBroken } from "../state";
 import { sentence } from "../strings";
 import { attempt, type Context } from "./context";
 
@@ -144,13 +144,7 @@ function start(pass: BindRun["pass"]): BindRun {
 
 /** Whether two binds were done the same way, so that one report takes the other's place. */
 export function sameWay(a: BindReport, b: BindReport): boolean {
-  return (
-    a.method === b.method &&
-    a.solver === b.solver &&
-    a.grid === b.grid &&
-    a.backend === b.backend &&
-    isEdit(a) === isEdit(b)
-  );
+  return a.method === b.method && a.solver === b.solver && a.grid === b.grid && a.backend === b.backend;
 }
 
 /** Longest curve kept; beyond it every second point goes, which a plot of 300 pixels does not miss. */

@@ -52,8 +52,6 @@ export interface BindReport {
   readonly tau: number;
   readonly cells: { readonly interior: number; readonly boundary: number; readonly exterior: number };
   readonly levels: readonly number[];
-  /** Corrections that were solved for in place of the columns, when the bind started from the one before. */
-  readonly corrections?: number;
   readonly iterations: number;
   readonly converged: boolean;
   readonly delta_history: readonly number[];

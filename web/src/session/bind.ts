@@ -29,26 +29,6 @@ export interface BindStart {
   readonly options: BindOptions;
   readonly listener: (event: BindEvent) => void;
   readonly cage: CageArrays;
-  /** Whether the worker's last bind left what this one can start from: then it is as quick as a coarse one. */
-  readonly again: boolean;
-  /** Hears what the worker kept for a next bind as fine to start from. */
-  readonly keep: (kept: KeptBind | undefined) => void;
-}
-
-/** What the worker keeps of the last bind: it is of use for the same options and the same faces. */
-export interface KeptBind extends CageArrays {
-  readonly options: BindOptions;
-}
-
-/** Whether a bind can start from what is kept: some of the cage's vertices have moved. With none moved it is asked for once
- * more, and done once more. */
-export function canGoOn(kept: KeptBind | undefined, options: BindOptions, cage: CageArrays): boolean {
-  return (
-    kept !== undefined &&
-    JSON.stringify(kept.options) === JSON.stringify(options) &&
-    same(kept.corners, cage.corners) &&
-    !same(kept.positions, cage.positions)
-  );
 }
 
 type Pass = "coarse" | "fine";
@@ -71,11 +51,9 @@ export function startBind(start: BindStart): Job<BindReport> {
 
   async function once(pass: Pass, asked: BindOptions): Promise<BindReport> {
     job = client.run("bind", { positions, cage, options: asked }, step(pass));
-    const { indptr, indices, data, outside, offsets, report, kept } = await job.done;
-    if (pass === "fine" && !isCancelled) start.keep(kept ? { options: asked, ...cage } : undefined);
-    const isCurrent =
-      same(cage.positions, engine.restPositions()) && same(cage.corners, engine.cageCorners());
-    if (isCancelled || !isCurrent || !report) throw named("Cancelled", "cancelled");
+    const { indptr, indices, data, outside, offsets, report } = await job.done;
+    if (isCancelled || !report) throw named("Cancelled", "cancelled");
+    requireCurrent(engine, cage);
     await raw.adopt(indptr, indices, data, outside, offsets);
     const whole = report.backend === "gpu" ? { ...report, adapter } : report;
     listener({ kind: "adopted", pass, report: whole });
@@ -97,7 +75,7 @@ export function startBind(start: BindStart): Job<BindReport> {
   }
 
   async function all(): Promise<BindReport> {
-    if (!engine.bound && !start.again && options.grid > COARSE) await run("coarse");
+    if (!engine.bound && options.grid > COARSE) await run("coarse");
     if (isCancelled) throw named("Cancelled", "cancelled");
     return run("fine");
   }
@@ -114,6 +92,12 @@ export function startBind(start: BindStart): Job<BindReport> {
 /** Quick, whatever was asked for. */
 function coarse(options: BindOptions): BindOptions {
   return { ...options, grid: COARSE, solver: "multigrid" };
+}
+
+/** Work for a cage that there is no more ends here: nothing of it is shown. */
+export function requireCurrent(engine: Engine, { positions, corners }: CageArrays): void {
+  const isCurrent = same(positions, engine.restPositions()) && same(corners, engine.cageCorners());
+  if (!isCurrent) throw named("Cancelled", "there is another cage by now");
 }
 
 function same(a: ArrayLike<number>, b: ArrayLike<number>): boolean {

@@ -16,8 +16,6 @@ export interface BoundArrays {
   readonly outside: Uint32Array;
   readonly offsets: Float32Array;
   readonly report: BindReport | undefined;
-  /** Whether the next bind can start from what this one left behind. */
-  readonly kept: boolean;
 }
 
 export interface SampleArrays {

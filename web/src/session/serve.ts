@@ -97,9 +97,9 @@ function createWork(pkg: Package): Work {
 
 /** Arrays of what was bound; its memory in the module is given back. */
 function taken(bound: Bound): BoundArrays {
-  const { indptr, indices, data, outside, offsets, report, kept } = bound;
+  const { indptr, indices, data, outside, offsets, report } = bound;
   bound.free();
-  return { indptr, indices, data, outside, offsets, report, kept };
+  return { indptr, indices, data, outside, offsets, report };
 }
 
 function polygons(mesh: Polygons): CageArrays {

@@ -2,7 +2,6 @@
 
 import type { BindReport } from "../contract";
 import { bytes, count, duration, percent, plural, scientific } from "../format";
-import { isEdit } from "../state";
 import { sentence } from "../strings";
 import { facts } from "./controls";
 import { h } from "./dom";
@@ -44,7 +43,6 @@ export function reportCard(report: BindReport): HTMLElement {
       ["Method", `${METHODS[report.method]}, ${SOLVERS[report.solver]}`],
       ["Grid", `${report.dims.join(" × ")} cells`],
       ["Computed on", where],
-      ...(isEdit(report) ? [["Started from", startedFrom(report)] as const] : []),
       ["Rest error, mean", scientific(report.rest_error.mean_rel)],
       ["Rest error, largest", scientific(report.rest_error.max_rel)],
       ["Weights", `${scientific(report.weights.min)} to ${scientific(report.weights.max)}`],
@@ -78,11 +76,6 @@ export function reportCard(report: BindReport): HTMLElement {
   );
 }
 
-/** What a bind made of the one before. */
-function startedFrom(report: BindReport): string {
-  return `the last bind, by ${plural(report.corrections ?? 0, "correction")}`;
-}
-
 /** Method, solver, grid and place of a bind, in short. */
 function wayOf({ method, solver, grid, backend }: BindReport): string {
   return `${method === "classic" ? "Classic" : "Embedded"}, ${SOLVERS[solver]}, ${grid}, ${backend.toUpperCase()}`;
@@ -104,7 +97,7 @@ export function compareTable(reports: readonly BindReport[]): HTMLElement {
         {},
         h("th", {
           attrs: { scope: "row" },
-          text: `${wayOf(report)}${isEdit(report) ? ", after an edit" : ""}`,
+          text: wayOf(report),
         }),
         h("td", { text: duration(report.timings_ms.total) }),
         h("td", { text: scientific(report.rest_error.mean_rel) }),

@@ -98,7 +98,7 @@ impl Engine {
             gpu.main.adopt(bound.0, bound.1).await.map_err(Fault::from)?;
         }
         if !is_current() {
-            return Err(Fault::new("Cancelled", "there is another cage by now").into());
+            return Err(overtaken().into());
         }
         self.change(|state| {
             state.is_bound = true;
@@ -119,10 +119,14 @@ impl Engine {
         data: Vec<f32>,
     ) -> Result<(), JsValue> {
         let bound = self.read(|state| crate::binder::unpack(state, indptr, indices, data, &[], &[]))?;
+        let generation = self.read(|state| state.generation);
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         let mut other = gpu.main.twin().await.map_err(Fault::from)?;
         other.adopt(bound.0, bound.1).await.map_err(Fault::from)?;
+        if self.read(|state| state.generation) != generation {
+            return Err(overtaken().into());
+        }
         gpu.other = Some(other);
         self.change(|state| {
             state.has_other = true;
@@ -231,6 +235,10 @@ async fn upload_cage(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> {
     gpu.main.set_cage(&cage).await?;
     state.borrow_mut().on_gpu = Some(generation);
     Ok(())
+}
+
+fn overtaken() -> Fault {
+    Fault::new("Cancelled", "there is another cage by now")
 }
 
 fn lost() -> Fault {
