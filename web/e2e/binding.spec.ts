@@ -42,6 +42,7 @@ for (const backend of ["gpu", "cpu"] as const) {
         grid: 192,
         method: "embedded",
         solver: "multigrid",
+        preconditioner: "none",
         backend,
         cell_shape: "box",
         delta_norm: "euclidean",

@@ -144,7 +144,13 @@ function start(pass: BindRun["pass"]): BindRun {
 
 /** Whether two binds were done the same way, so that one report takes the other's place. */
 export function sameWay(a: BindReport, b: BindReport): boolean {
-  return a.method === b.method && a.solver === b.solver && a.grid === b.grid && a.backend === b.backend;
+  return (
+    a.method === b.method &&
+    a.solver === b.solver &&
+    a.preconditioner === b.preconditioner &&
+    a.grid === b.grid &&
+    a.backend === b.backend
+  );
 }
 
 /** Longest curve kept; beyond it every second point goes, which a plot of 300 pixels does not miss. */
