@@ -18,6 +18,7 @@ pub mod engine;
 mod error;
 #[cfg(target_family = "wasm")]
 mod gpu;
+mod incoming;
 pub mod loaded;
 mod options;
 mod problems;

@@ -136,6 +136,26 @@ impl Weights {
         Self::from_parts(self.n_columns, indptr, indices, data)
     }
 
+    /// A matrix without rows, with room for those that [`Self::append`] adds.
+    #[must_use]
+    pub fn with_room(n_columns: u32, n_rows: usize, n_nonzeros: usize) -> Self {
+        let mut indptr = Vec::with_capacity(n_rows + 1);
+        indptr.push(0);
+        Self::from_parts(n_columns, indptr, Vec::with_capacity(n_nonzeros), Vec::with_capacity(n_nonzeros))
+    }
+
+    /// Adds the rows of another matrix after its own.
+    ///
+    /// # Panics
+    /// If the other one has other columns.
+    pub fn append(&mut self, more: &Self) {
+        assert_eq!(self.n_columns, more.n_columns, "columns are the same");
+        let n = self.indices.len() as u32;
+        Arc::make_mut(&mut self.indptr).extend(more.indptr.iter().skip(1).map(|end| n + end));
+        Arc::make_mut(&mut self.indices).extend_from_slice(&more.indices);
+        Arc::make_mut(&mut self.data).extend_from_slice(&more.data);
+    }
+
     /// Bytes held.
     #[must_use]
     pub fn bytes(&self) -> usize {
