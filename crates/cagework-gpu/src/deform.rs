@@ -21,7 +21,7 @@ const WORK_STRIDE: u64 = 256;
 /// Workgroups along an axis, the baseline's limit.
 const MAX_GROUPS: u32 = 65_535;
 
-/// Weights that are uploaded at once, and then a little more: about 10 ms of a page's main thread. Far less than a binding holds.
+/// Weights that are uploaded at once, but for what fills the last slice: about 10 ms of a page's main thread.
 const PART: u32 = 1 << 19;
 
 /// A bind's weights on the GPU.
@@ -61,10 +61,12 @@ impl GpuWeights {
         let table = OutsideTable::new(outside);
         let corners = allocator.table("corners for outside vertices", &table.corners)?;
         let offsets = allocator.table("offsets of outside vertices", &table.offsets)?;
+        // Where lists differ most, a weight takes a place in each bundle of its slice.
+        let most = PART.min((context.max_binding_bytes / (SLICE * size_of::<[f32; BUNDLE]>()) as u64) as u32);
         let (mut parts, mut bytes, mut begin) = (Vec::new(), 0, 0);
         while begin < n_vertices {
-            let most = weights.indptr()[begin] + PART;
-            let more = weights.indptr()[begin..].partition_point(|&end| end <= most);
+            let start = weights.indptr()[begin];
+            let more = weights.indptr()[begin..].partition_point(|&end| end - start <= most);
             let end = (begin + more.next_multiple_of(SLICE * BUNDLE)).min(n_vertices);
             let sliced = SlicedWeights::of_rows(weights, begin..end);
             parts.push(Part {

@@ -210,3 +210,20 @@ impl Weights {
         (0..self.n_rows()).map(|row| self.row(row))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_that_are_appended_make_the_matrix_they_were_cut_from() {
+        let (indptr, indices, data) =
+            (vec![0, 2, 2, 3, 5], vec![0, 2, 1, 0, 1], vec![0.5, 0.5, 1.0, 0.25, 0.75]);
+        let whole = Weights::new(3, indptr, indices, data).unwrap();
+        let mut made = Weights::with_room(3, 4, 5);
+        for range in [0..1, 1..3, 3..4] {
+            made.append(&whole.with_rows(&range.collect::<Vec<u32>>()));
+        }
+        assert_eq!(made, whole);
+    }
+}
