@@ -188,15 +188,41 @@ export async function drop(page: Page, files: readonly Dropped[]): Promise<void>
   await letGo(page, await carry(page, files));
 }
 
+/** Waits until what was changed before is drawn with all its pixels. */
+export async function drawn(page: Page): Promise<void> {
+  await page.evaluate(
+    () =>
+      new Promise<void>((done) => {
+        const stop = globalThis.cagework?.onFrame(() => {
+          stop?.();
+          done();
+        });
+        globalThis.cagework?.draw();
+      }),
+  );
+  await page.waitForFunction(isSharp);
+}
+
+/** Waits until nothing of the page moves by itself. */
+export async function calm(page: Page): Promise<void> {
+  await page.waitForFunction(() =>
+    document.getAnimations().every(({ playState, effect }) => {
+      const endless = effect?.getComputedTiming().endTime === Number.POSITIVE_INFINITY;
+      return endless || playState !== "running";
+    }),
+  );
+}
+
+const isSharp = () => {
+  const canvas = document.querySelector("canvas");
+  return !canvas || canvas.width >= Math.floor(canvas.clientWidth * Math.min(2, devicePixelRatio));
+};
+
 /** A picture waits so long for the canvas to have all its pixels, ms; while something is computed it never has. */
 const SHARPENED = 2000;
 
 /** Saves a picture of the page, as sharp as it gets. */
 export async function shoot(page: Page, name: string): Promise<void> {
-  const isSharp = () => {
-    const canvas = document.querySelector("canvas");
-    return !canvas || canvas.width >= Math.floor(canvas.clientWidth * Math.min(2, devicePixelRatio));
-  };
   await page.waitForFunction(isSharp, undefined, { timeout: SHARPENED }).catch(() => undefined);
   await page.screenshot({ path: join(SCREENS, `${name}.png`) });
 }
