@@ -221,8 +221,8 @@ export function sayOptions(options: BindOptions): string {
   const { method, solver, preconditioner } = options;
   if (solver === "cg") {
     return preconditioner === "v_cycle"
-      ? "Conjugate gradients, each step begun by a V-cycle. Compare its curve with those of multigrid and Jacobi."
-      : "Conjugate gradients look at all sweeps before. Compare their curve with those of multigrid and Jacobi.";
+      ? "Conjugate gradients, each step begun by a V-cycle. Compare the curve with multigrid's and Jacobi's."
+      : "Conjugate gradients: no step undoes what those before have reached. Compare the curve with multigrid's and Jacobi's.";
   }
   if (method === "embedded") {
     return solver === "multigrid"

@@ -81,11 +81,11 @@ export function drawPlot(element: SVGSVGElement, curves: readonly Curve[], tau: 
     ),
   );
   if (tau > 0) {
-    // Below the line where there is nothing above it.
-    const above = y(tau) > TOP + LABEL;
+    // Below the line where there is room: curves come from above.
+    const above = y(tau) > HEIGHT - BOTTOM - LABEL;
     parts.push(
       svg("line", { x1: LEFT, x2: WIDTH - RIGHT, y1: y(tau), y2: y(tau), class: "tau" }),
-      // On the left, where curves are still high.
+      // On the left, where they are still high.
       label(LEFT + 4, y(tau) + (above ? -4 : LABEL), "done below this", "start"),
     );
   }

@@ -18,10 +18,11 @@ export function verdict(report: BindReport): string {
   if (!report.converged)
     return "Stopped before it was done; raise the iteration limit for converged weights.";
   if (report.rest_error.max_rel < INVISIBLE)
-    return (
-      "At rest the model is where it was, to less than can be seen: after the solve the weights of each vertex are " +
-      "restored to add up to 1 and to give its place. The solver's own error is what they were off by before."
-    );
+    return [
+      "At rest the model is where it was, to less than can be seen: after the solve, each vertex's weights are restored to",
+      "add up to 1 and to give its place.",
+      ...(report.raw_error ? ["The solver error is how far off they were before."] : []),
+    ].join(" ");
   return `At rest the model is off by up to ${scientific(report.rest_error.max_rel * 100)} % of the cage's size.`;
 }
 
@@ -49,7 +50,7 @@ export function reportCard(report: BindReport): HTMLElement {
       ["Computed on", where],
       ["Rest error, mean", scientific(report.rest_error.mean_rel)],
       ["Rest error, largest", scientific(report.rest_error.max_rel)],
-      ...rawFacts("Solver's error", report.raw_error?.point_rel),
+      ...rawFacts("Solver error", report.raw_error?.point_rel),
       ["Weights", `${scientific(report.weights.min)} to ${scientific(report.weights.max)}`],
     ]),
     h(
@@ -70,7 +71,7 @@ export function reportCard(report: BindReport): HTMLElement {
           ["Sample", duration(report.timings_ms.sample)],
           ["Memory, estimated", bytes(report.memory_bytes.estimated)],
           ["Memory, most used", bytes(report.memory_bytes.peak)],
-          ...rawFacts("Solver's sums off by", report.raw_error?.sum),
+          ...rawFacts("Solver: sums off by", report.raw_error?.sum),
           ["Sum of a row off by", scientific(report.weights.max_sum_error)],
           ["Weights stored", `${count(report.weights.nonzeros)} (${percent(density(report))})`],
           ["Outside the cage", plural(report.outside_vertices, "vertex", "vertices")],
