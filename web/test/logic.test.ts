@@ -11,6 +11,7 @@ import { ago, isSoftware } from "../src/start";
 import { explain, isCancelled, sentence } from "../src/strings";
 import { curvesOf } from "../src/ui/curves";
 import { historyPoints, scaleOf } from "../src/ui/plot";
+import { verdict } from "../src/ui/report";
 import { recognise } from "../src/ui/unsupported";
 
 describe("typed amounts", () => {
@@ -124,6 +125,18 @@ describe("the plot", () => {
     for (let i = 2; i < 5000; i += 1) curve = grown(curve, i, 1 / i);
     expect(curve.length).toBeLessThanOrEqual(601);
     expect(curve.at(-1)?.[0]).toBe(4999);
+  });
+});
+
+describe("the verdict on a bind", () => {
+  const report = (max_rel: number, raw_error?: BindReport["raw_error"]) =>
+    ({ converged: true, rest_error: { max_rel }, ...(raw_error && { raw_error }) }) as unknown as BindReport;
+  it("calls nothing exact that was made so after the solve, and names the solver's error where it is known", () => {
+    const errors = { mean: 1e-6, max: 1e-5 };
+    const restored = verdict(report(1e-8, { sum: errors, point_rel: errors }));
+    expect(restored).toMatch(/weights are restored .* The solver error is/);
+    expect(verdict(report(1e-8))).not.toMatch(/solver error/);
+    expect(verdict(report(1e-2))).toBe("At rest the model is off by up to 1 % of the cage's size.");
   });
 });
 
