@@ -12,9 +12,9 @@ export default defineConfig({
   workers: 1,
   fullyParallel: false,
   forbidOnly: true,
-  // A machine under load takes several times as long as one of its own, and its software GPU may lose a page.
+  // A machine under load takes several times as long as one of its own.
   timeout: 180_000,
-  retries: 2,
+  retries: 0,
   expect: { timeout: 20_000 },
   reporter: [["list"]],
   use: {

@@ -42,6 +42,7 @@ for (const backend of ["gpu", "cpu"] as const) {
         grid: 192,
         method: "embedded",
         solver: "multigrid",
+        preconditioner: "none",
         backend,
         cell_shape: "box",
         delta_norm: "euclidean",
@@ -76,5 +77,12 @@ test("the bind panel compares the paper's method with ours", async ({ page }) =>
   await page.getByRole("button", { name: "The paper's" }).click();
   await page.keyboard.press("Control+Enter");
   await bound(page);
+  const rows = page.getByRole("table", { name: "Binds of this cage" }).locator("tbody tr");
+  await expect(rows.getByRole("rowheader")).toHaveText([/Classic, Jacobi/, /Embedded, multigrid/]);
+  const errors = (await rows.locator("td:last-child").allTextContents()).map(Number);
+  // The classic method moves each vertex to its cell's middle.
+  expect(errors[0], `rest errors ${errors}`).toBeGreaterThan(100 * (errors[1] ?? 1));
+  await expect(page.locator(".curves li")).toHaveText(["Jacobi", "multigrid"]);
+  await expect(page.locator(".plot polyline")).toHaveCount(2);
   await shoot(page, "bind-panel");
 });

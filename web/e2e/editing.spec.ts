@@ -1,5 +1,6 @@
 /** Editing by keyboard and pointer. */
 
+import { showsColours } from "./stories";
 import { cagePositions, drag, expect, handle, largestMove, open, reachable, shoot, test } from "./support";
 
 test("everything that a pose needs works without a pointer", async ({ page }) => {
@@ -51,27 +52,15 @@ test("turning, moving and zooming leave the model alone", async ({ page }) => {
   await page.mouse.move(700, 220, { steps: 4 });
   await page.mouse.up();
   await page.mouse.wheel(0, -300);
-  await page.waitForTimeout(200);
-  const turned = await handle(page, 0);
-  expect(Math.hypot(turned.x - first.x, turned.y - first.y)).toBeGreaterThan(2);
+  const turned = async () => {
+    const { x, y } = await handle(page, 0);
+    return Math.hypot(x - first.x, y - first.y);
+  };
+  await expect.poll(turned).toBeGreaterThan(2);
   expect(await cagePositions(page)).toEqual(before);
 });
 
 test("colours, slice and comparison are shown", async ({ page }) => {
   await open(page);
-  const vertex = await reachable(page);
-  const { x, y } = await handle(page, vertex);
-  await page.mouse.click(x, y);
-  await page.keyboard.press("k");
-  await page.waitForTimeout(300);
-  await shoot(page, "heat-map");
-  await page.keyboard.press("k");
-  await page.evaluate(async () => {
-    const session = globalThis.cagework;
-    await session?.loadSlice(0, 0.5, 32).done;
-    await session?.bindMeanValue().done;
-  });
-  await page.keyboard.press("n");
-  await page.waitForTimeout(300);
-  await shoot(page, "see");
+  await showsColours(page, "see");
 });

@@ -3,7 +3,7 @@
 import type { Page } from "@playwright/test";
 import type { GizmoHandle } from "../src/contract";
 import { box } from "./models";
-import { bound, cagePositions, drop, expect, handle, open, reachable, shoot, test } from "./support";
+import { bound, cagePositions, drawn, drop, expect, handle, open, reachable, shoot, test } from "./support";
 
 /** Largest distance of numbers that should be alike: `f32` of a model two units long. */
 const ALIKE = 1e-4;
@@ -198,7 +198,7 @@ async function difference(page: Page): Promise<{ different: number; left: number
         if (!element.querySelector("canvas")) element.style.visibility = visibility;
     }, visibility);
   await veil("hidden");
-  await page.waitForTimeout(400);
+  await drawn(page);
   const shot = await page.locator("canvas").first().screenshot();
   await veil("");
   return page.evaluate(async (base64) => {

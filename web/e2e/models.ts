@@ -90,6 +90,32 @@ export async function gltfFiles(): Promise<{ name: string; bytes: Uint8Array }[]
   return [{ name: "worm.gltf", bytes: new TextEncoder().encode(JSON.stringify(json)) }, ...files];
 }
 
+/** A torus of about so many vertices, as GLB: radii 1 and 0.35. */
+export async function torus(vertices: number): Promise<Uint8Array> {
+  const around = Math.round(Math.sqrt(vertices / 3));
+  const rings = Math.round(vertices / around);
+  const positions = new Float32Array(3 * rings * around);
+  const indices = new Uint32Array(6 * rings * around);
+  for (let k = 0; k < rings * around; k++) {
+    const [ring, i] = [Math.floor(k / around), k % around];
+    const [turn, angle] = [(2 * Math.PI * ring) / rings, (2 * Math.PI * i) / around];
+    const radius = 1 + 0.35 * Math.cos(angle);
+    positions.set([radius * Math.cos(turn), 0.35 * Math.sin(angle), radius * Math.sin(turn)], 3 * k);
+    const beside = k - i + ((i + 1) % around);
+    const [next, across] = [k, beside].map((v) => (v + around) % (rings * around)) as [number, number];
+    indices.set([k, beside, next, beside, across, next], 6 * k);
+  }
+  const document = new Document();
+  const buffer = document.createBuffer();
+  const primitive = document
+    .createPrimitive()
+    .setAttribute("POSITION", document.createAccessor().setType("VEC3").setArray(positions).setBuffer(buffer))
+    .setIndices(document.createAccessor().setType("SCALAR").setArray(indices).setBuffer(buffer));
+  const node = document.createNode("torus").setMesh(document.createMesh("torus").addPrimitive(primitive));
+  document.createScene().addChild(node);
+  return new NodeIO().writeBinary(document);
+}
+
 export async function dracoGlb(): Promise<Uint8Array> {
   const { document: made } = document();
   made.createExtension(KHRDracoMeshCompression).setRequired(true);

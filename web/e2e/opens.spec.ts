@@ -1,7 +1,8 @@
 /** The page opens with a model that can be dragged at once. */
 
+import type { Page } from "@playwright/test";
 import { followsAHandle } from "./stories";
-import { cagePositions, drag, expect, largestMove, open, shoot, test } from "./support";
+import { cagePositions, drag, drawn, expect, largestMove, open, shoot, test } from "./support";
 
 test("opens with a sample that is bound, and dragging deforms it", async ({ page }) => {
   await open(page);
@@ -22,25 +23,45 @@ test("works below any path, from its own files alone", async ({ page }) => {
 
 test("an idle page draws nothing", async ({ page }) => {
   await open(page);
+  await drawn(page);
   const frames = await page.evaluate(async () => {
     let frames = 0;
     const stop = globalThis.cagework?.onFrame(() => {
       frames += 1;
     });
-    await new Promise((done) => setTimeout(done, 1500));
+    // The browser draws a second long, the page nothing.
+    for (let k = 0; k < 60; k++) await new Promise(requestAnimationFrame);
     stop?.();
     return frames;
   });
-  expect(frames).toBeLessThanOrEqual(1);
+  expect(frames).toBe(0);
 });
+
+/** Whether the browser keeps work that was saved after a moment, ms since 1970. */
+const savedSince = (page: Page, moment: number): Promise<boolean> =>
+  page.evaluate(
+    (moment) =>
+      new Promise<boolean>((answer) => {
+        const opened = indexedDB.open("cagework");
+        opened.onsuccess = () => {
+          const { result } = opened;
+          const saved = result.objectStoreNames.contains("projects")
+            ? result.transaction("projects").objectStore("projects").get("autosave")
+            : undefined;
+          result.close();
+          if (!saved) answer(false);
+          else saved.onsuccess = () => answer((saved.result?.when ?? 0) > moment);
+        };
+      }),
+    moment,
+  );
 
 test("keeps the work of the last visit", async ({ page }) => {
   await open(page);
+  const before = await page.evaluate(() => Date.now());
   await drag(page, 50, 30);
   const posed = await cagePositions(page);
-  await page.waitForFunction(() => indexedDB.databases().then((list) => list.length > 0));
-  // Saved a moment after the last change.
-  await page.waitForTimeout(2500);
+  await expect.poll(() => savedSince(page, before)).toBe(true);
   await page.reload();
   await open(page);
   expect(largestMove(posed, await cagePositions(page)), "the pose is back").toBeLessThan(1e-3);

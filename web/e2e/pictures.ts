@@ -5,7 +5,7 @@ import { join } from "node:path";
 import { test } from "@playwright/test";
 import type { BindOptions, Point, SceneOptions } from "../src/contract";
 import { BIND_DEFAULTS, PAPER_DEFAULTS, SCENE_DEFAULTS } from "../src/defaults";
-import { open } from "./support";
+import { drawn, open } from "./support";
 
 const FOLDER = join(import.meta.dirname, "../public/samples");
 
@@ -76,7 +76,7 @@ test("pictures of the documents", async ({ page }) => {
   await open(page);
   await page.getByRole("button", { name: "Pose it" }).click();
   await page.getByRole("button", { name: "Show", exact: false }).first().click();
-  await page.waitForTimeout(2000);
+  await drawn(page);
   await page.screenshot({ path: join(DOCUMENTS, "page.jpg"), quality: 90 });
   for (const figure of FIGURES) {
     const data = await page.evaluate(
@@ -120,7 +120,7 @@ test("pictures of the documents", async ({ page }) => {
       writeFileSync(join(DOCUMENTS, `${figure.name}.webp`), Uint8Array.from(data));
     } else {
       // Two halves are drawn on the page only, under its tools.
-      await page.waitForTimeout(2000);
+      await drawn(page);
       const view = await page.locator("canvas").first().boundingBox();
       if (!view) throw new Error("no view");
       const clip = { x: view.x, y: view.y + 0.2 * view.height, width: view.width, height: 0.7 * view.height };

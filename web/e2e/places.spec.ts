@@ -1,7 +1,7 @@
 /** Other browsers, other screens, other people. */
 
 import { complaintsOfAxe, survives } from "./stories";
-import { expect, open, shoot, test } from "./support";
+import { calm, expect, open, shoot, test } from "./support";
 
 test("nothing for axe to complain about, light and dark", async ({ page }) => {
   for (const scheme of ["light", "dark"] as const) {
@@ -9,7 +9,7 @@ test("nothing for axe to complain about, light and dark", async ({ page }) => {
     await open(page);
     for (const step of ["Model", "Cage", "Bind", "Pose", "Export"]) {
       await page.getByRole("button", { name: step, exact: false }).first().click();
-      await page.waitForTimeout(250);
+      await calm(page);
       expect(await complaintsOfAxe(page), `${scheme}, ${step}`).toEqual([]);
       await shoot(page, `${scheme}-${step.toLowerCase()}`);
     }

@@ -8,10 +8,13 @@ import {
   cagePositions,
   download,
   drag,
+  drawn,
   drop,
   expect,
+  handle,
   largestMove,
   modelPositions,
+  reachable,
   shoot,
 } from "./support";
 
@@ -42,6 +45,38 @@ export async function followsAHandle(page: Page, picture: string): Promise<void>
   expect(largestMove(before.model, await modelPositions(page)), "and the model").toBeLessThan(1e-6);
   await page.keyboard.press("Control+y");
   expect(largestMove(after.cage, await cagePositions(page)), "redo brings it back").toBeLessThan(1e-6);
+}
+
+/** A heat map of a vertex, a slice through the grid, and harmonic beside mean value coordinates: each with its legend. */
+export async function showsColours(page: Page, picture: string): Promise<void> {
+  const pixels = async () => {
+    await drawn(page);
+    return page.locator("canvas").first().screenshot();
+  };
+  const vertex = await reachable(page);
+  const { x, y } = await handle(page, vertex);
+  await page.mouse.click(x, y);
+  const plain = await pixels();
+  const legend = page.locator(".legend");
+  await expect(legend).toBeHidden();
+  await page.keyboard.press("k");
+  await expect(legend).toContainText(`Weight of vertex ${vertex}`);
+  const coloured = await pixels();
+  expect(coloured.equals(plain), "the model has the colours of weights").toBe(false);
+  await shoot(page, `${picture}-heat-map`);
+  await page.keyboard.press("k");
+  await page.keyboard.press("n");
+  const slice = page.getByRole("group", { name: "Slice through the grid" });
+  await slice.getByRole("radio", { name: "Cells" }).check({ force: true });
+  // There once the slice has been computed.
+  await expect(legend).toContainText("Cells");
+  expect((await pixels()).equals(plain), "cells of the grid are shown").toBe(false);
+  await shoot(page, `${picture}-slice`);
+  await slice.getByRole("radio", { name: "Off" }).check({ force: true });
+  await page.getByRole("switch", { name: "Harmonic beside mean value" }).check();
+  await expect(page.getByText("Mean value", { exact: true })).toBeVisible();
+  await drawn(page);
+  await shoot(page, `${picture}-compare`);
 }
 
 /** Drops a model and poses it. */

@@ -2,7 +2,7 @@
 
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
-import { test as base, expect, type Page } from "@playwright/test";
+import { test as base, expect, type JSHandle, type Page } from "@playwright/test";
 import type { Session } from "../src/contract";
 
 declare global {
@@ -163,10 +163,10 @@ export interface Dropped {
   readonly bytes: Uint8Array;
 }
 
-/** Drops files on the window, as a hand would. */
-export async function drop(page: Page, files: readonly Dropped[]): Promise<void> {
+/** Files in a hand, on their way to the window. */
+export async function carry(page: Page, files: readonly Dropped[]): Promise<JSHandle<DataTransfer>> {
   const packed = files.map(({ name, bytes }) => ({ name, base64: Buffer.from(bytes).toString("base64") }));
-  const data = await page.evaluateHandle((packed) => {
+  return page.evaluateHandle((packed) => {
     const transfer = new DataTransfer();
     for (const { name, base64 } of packed) {
       const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
@@ -174,20 +174,55 @@ export async function drop(page: Page, files: readonly Dropped[]): Promise<void>
     }
     return transfer;
   }, packed);
+}
+
+/** Lets go of them above the window. */
+export async function letGo(page: Page, data: JSHandle<DataTransfer>): Promise<void> {
   for (const type of ["dragenter", "dragover", "drop"]) {
     await page.locator("#stage").dispatchEvent(type, { dataTransfer: data });
   }
 }
+
+/** Drops files on the window, as a hand would. */
+export async function drop(page: Page, files: readonly Dropped[]): Promise<void> {
+  await letGo(page, await carry(page, files));
+}
+
+/** Waits until what was changed before is drawn with all its pixels. */
+export async function drawn(page: Page): Promise<void> {
+  await page.evaluate(
+    () =>
+      new Promise<void>((done) => {
+        const stop = globalThis.cagework?.onFrame(() => {
+          stop?.();
+          done();
+        });
+        globalThis.cagework?.draw();
+      }),
+  );
+  await page.waitForFunction(isSharp);
+}
+
+/** Waits until nothing of the page moves by itself. */
+export async function calm(page: Page): Promise<void> {
+  await page.waitForFunction(() =>
+    document.getAnimations().every(({ playState, effect }) => {
+      const endless = effect?.getComputedTiming().endTime === Number.POSITIVE_INFINITY;
+      return endless || playState !== "running";
+    }),
+  );
+}
+
+const isSharp = () => {
+  const canvas = document.querySelector("canvas");
+  return !canvas || canvas.width >= Math.floor(canvas.clientWidth * Math.min(2, devicePixelRatio));
+};
 
 /** A picture waits so long for the canvas to have all its pixels, ms; while something is computed it never has. */
 const SHARPENED = 2000;
 
 /** Saves a picture of the page, as sharp as it gets. */
 export async function shoot(page: Page, name: string): Promise<void> {
-  const isSharp = () => {
-    const canvas = document.querySelector("canvas");
-    return !canvas || canvas.width >= Math.floor(canvas.clientWidth * Math.min(2, devicePixelRatio));
-  };
   await page.waitForFunction(isSharp, undefined, { timeout: SHARPENED }).catch(() => undefined);
   await page.screenshot({ path: join(SCREENS, `${name}.png`) });
 }

@@ -2,8 +2,15 @@
 
 import type { Page } from "@playwright/test";
 import { WITH_WEBGL } from "./browser";
-import { complaintsOfAxe, exportsAPicture, exportsWhatIsShown, followsAHandle, survives } from "./stories";
-import { bound, expect, handle, open, reachable, shoot, test } from "./support";
+import {
+  complaintsOfAxe,
+  exportsAPicture,
+  exportsWhatIsShown,
+  followsAHandle,
+  showsColours,
+  survives,
+} from "./stories";
+import { bound, calm, expect, open, shoot, test } from "./support";
 
 test.use({ launchOptions: WITH_WEBGL });
 
@@ -46,7 +53,7 @@ test("says once what is different, and how to get WebGPU", async ({ page }) => {
   await expect(page.getByText(/compute through WebGPU only/)).toBeVisible();
   for (const scheme of ["light", "dark"] as const) {
     await page.emulateMedia({ colorScheme: scheme });
-    await page.waitForTimeout(250);
+    await calm(page);
     expect(await complaintsOfAxe(page), scheme).toEqual([]);
     await shoot(page, `webgl-${scheme}-bind`);
   }
@@ -66,22 +73,7 @@ test("a dropped GLB is bound on the processor and exported", async ({ page }) =>
 
 test("colours, slice and comparison are shown", async ({ page }) => {
   await open(page);
-  const { x, y } = await handle(page, await reachable(page));
-  await page.mouse.click(x, y);
-  await page.keyboard.press("k");
-  await page.waitForTimeout(300);
-  await shoot(page, "webgl-heat-map");
-  await page.keyboard.press("k");
-  await page.evaluate(() => globalThis.cagework?.loadSlice(0, 0.5, 32).done);
-  await page.keyboard.press("n");
-  await page.waitForTimeout(300);
-  await shoot(page, "webgl-slice");
-  await page.keyboard.press("v");
-  const compare = page.getByRole("switch", { name: "Harmonic beside mean value" });
-  await compare.check();
-  await expect(page.getByText("Mean value", { exact: true })).toBeVisible();
-  await page.waitForTimeout(300);
-  await shoot(page, "webgl-compare");
+  await showsColours(page, "webgl");
 });
 
 test("a lost context comes back with model and pose", async ({ page }) => {

@@ -6,6 +6,7 @@ export const BIND_DEFAULTS: BindOptions = {
   grid: 64,
   method: "embedded",
   solver: "multigrid",
+  preconditioner: "none",
   backend: "gpu",
   cell_shape: "box",
   delta_norm: "euclidean",

@@ -110,7 +110,8 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   );
   setTimeout(begin, LONGEST_EMPTY);
   /** Where nothing else can, the processor computes, whatever a project was saved with. */
-  const possible = (options: BindOptions): BindOptions => (lack ? { ...options, backend: "cpu" } : options);
+  const possible = (options: BindOptions): BindOptions =>
+    lack || options.solver === "cg" ? { ...options, backend: "cpu" } : options;
   /** WebGL2 tells the canvas, and nobody else, that it was lost. */
   const guard = (canvas: HTMLCanvasElement) => {
     canvas.addEventListener("webglcontextlost", () => raw.lose());

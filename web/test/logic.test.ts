@@ -3,12 +3,15 @@ import { grown } from "../src/actions/bind";
 import { freshName } from "../src/actions/poses";
 import { poseOf, readSettings } from "../src/actions/project";
 import { nextAmount } from "../src/amount";
+import type { BindReport } from "../src/contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS } from "../src/defaults";
 import { rectangle } from "../src/input/pointer";
 import { pinch } from "../src/input/touch";
 import { ago, isSoftware } from "../src/start";
 import { explain, isCancelled, sentence } from "../src/strings";
+import { curvesOf } from "../src/ui/curves";
 import { historyPoints, scaleOf } from "../src/ui/plot";
+import { verdict } from "../src/ui/report";
 import { recognise } from "../src/ui/unsupported";
 
 describe("typed amounts", () => {
@@ -58,6 +61,10 @@ describe("settings of a project", () => {
     const { voxels: _, ...before } = { ...CAGE_DEFAULTS, vertices: 120 };
     expect(readSettings(JSON.stringify({ cage: before }))).toEqual({ cage: { ...before, voxels: 0 } });
   });
+  it("of before there was a preconditioner have none", () => {
+    const { preconditioner: _, ...before } = BIND_DEFAULTS;
+    expect(readSettings(JSON.stringify({ bind: before }))).toEqual({ bind: BIND_DEFAULTS });
+  });
   it("are dropped part by part when they are not what they should be", () => {
     expect(readSettings("not json")).toEqual({});
     expect(readSettings("[1]")).toEqual({});
@@ -83,13 +90,32 @@ describe("the plot", () => {
       ],
       1e-5,
     );
-    expect(scale).toEqual({ lowest: -5, highest: -1, last: 9 });
+    expect(scale).toEqual({ lowest: -5, highest: -1, last: 9, logarithmic: false });
   });
   it("places a history by its interval and skips zeros", () => {
     expect(historyPoints([0.1, 0, 0.01], 10)).toEqual([
       [10, 0.1],
       [30, 0.01],
     ]);
+  });
+  it("compares three solvers, and stretches the few iterations of one beside the many of another", () => {
+    const report = (solver: BindReport["solver"], history: number[]) =>
+      ({ solver, delta_history: history, delta_interval: 1 }) as unknown as BindReport;
+    const jacobi = report("jacobi", [0.5, ...Array<number>(99).fill(1e-3)]);
+    const state = {
+      bindRun: null,
+      bindOptions: BIND_DEFAULTS,
+      report: report("multigrid", [1e-3, 1e-5]),
+      earlier: [report("multigrid", [1e-2]), report("cg", [1e-1, 1e-2]), jacobi],
+    };
+    const curves = curvesOf(state);
+    expect(curves.map(({ name, kind }) => [name, kind])).toEqual([
+      ["multigrid", "now"],
+      ["conjugate gradients", "before"],
+      ["Jacobi", "earlier"],
+    ]);
+    expect(scaleOf(curves, 1e-5)).toMatchObject({ last: 100, logarithmic: true });
+    expect(scaleOf(curves.slice(0, 2), 1e-5)).toMatchObject({ last: 2, logarithmic: false });
   });
   it("grows by new iterations only, and stays short", () => {
     let curve = grown([], 1, 0.5);
@@ -99,6 +125,18 @@ describe("the plot", () => {
     for (let i = 2; i < 5000; i += 1) curve = grown(curve, i, 1 / i);
     expect(curve.length).toBeLessThanOrEqual(601);
     expect(curve.at(-1)?.[0]).toBe(4999);
+  });
+});
+
+describe("the verdict on a bind", () => {
+  const report = (max_rel: number, raw_error?: BindReport["raw_error"]) =>
+    ({ converged: true, rest_error: { max_rel }, ...(raw_error && { raw_error }) }) as unknown as BindReport;
+  it("calls nothing exact that was made so after the solve, and names the solver's error where it is known", () => {
+    const errors = { mean: 1e-6, max: 1e-5 };
+    const restored = verdict(report(1e-8, { sum: errors, point_rel: errors }));
+    expect(restored).toMatch(/weights are restored .* The solver error is/);
+    expect(verdict(report(1e-8))).not.toMatch(/solver error/);
+    expect(verdict(report(1e-2))).toBe("At rest the model is off by up to 1 % of the cage's size.");
   });
 });
 

@@ -102,6 +102,26 @@ impl Weights {
         Self::from_parts(self.n_columns, indptr, indices, data)
     }
 
+    /// A matrix without rows, with room for those that [`Self::append`] adds.
+    #[must_use]
+    pub fn with_room(n_columns: u32, n_rows: usize, n_nonzeros: usize) -> Self {
+        let mut indptr = Vec::with_capacity(n_rows + 1);
+        indptr.push(0);
+        Self::from_parts(n_columns, indptr, Vec::with_capacity(n_nonzeros), Vec::with_capacity(n_nonzeros))
+    }
+
+    /// Adds the rows of another matrix after its own.
+    ///
+    /// # Panics
+    /// If the other one has other columns.
+    pub fn append(&mut self, more: &Self) {
+        assert_eq!(self.n_columns, more.n_columns, "columns are the same");
+        let n = self.indices.len() as u32;
+        Arc::make_mut(&mut self.indptr).extend(more.indptr.iter().skip(1).map(|end| n + end));
+        Arc::make_mut(&mut self.indices).extend_from_slice(&more.indices);
+        Arc::make_mut(&mut self.data).extend_from_slice(&more.data);
+    }
+
     /// Bytes held.
     #[must_use]
     pub fn bytes(&self) -> usize {
@@ -154,5 +174,22 @@ impl Weights {
     /// All rows in order.
     pub fn rows(&self) -> impl Iterator<Item = (&[u32], &[f32])> {
         (0..self.n_rows()).map(|row| self.row(row))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_that_are_appended_make_the_matrix_they_were_cut_from() {
+        let (indptr, indices, data) =
+            (vec![0, 2, 2, 3, 5], vec![0, 2, 1, 0, 1], vec![0.5, 0.5, 1.0, 0.25, 0.75]);
+        let whole = Weights::new(3, indptr, indices, data).unwrap();
+        let mut made = Weights::with_room(3, 4, 5);
+        for range in [0..1, 1..3, 3..4] {
+            made.append(&whole.with_rows(&range.collect::<Vec<u32>>()));
+        }
+        assert_eq!(made, whole);
     }
 }

@@ -21,10 +21,13 @@ const WORK_STRIDE: u64 = 256;
 /// Workgroups along an axis, the baseline's limit.
 const MAX_GROUPS: u32 = 65_535;
 
+/// Weights that are uploaded at once, but for what fills the last slice: about 10 ms of a page's main thread.
+const PART: u32 = 1 << 19;
+
 /// A bind's weights on the GPU.
 #[derive(Debug)]
 pub struct GpuWeights {
-    /// Parts whose entries fit into one binding, each a whole number of slices.
+    /// Each of a whole number of slices.
     parts: Vec<Part>,
     corners: wgpu::Buffer,
     offsets: wgpu::Buffer,
@@ -53,41 +56,41 @@ impl GpuWeights {
         weights: &Weights,
         outside: &[OutsideVertex],
     ) -> Result<Self, GpuError> {
+        let n_vertices = weights.n_rows();
         let mut allocator = Allocator::new(context, "the weights");
-        let sliced = SlicedWeights::new(weights);
-        let n_vertices = weights.n_rows() as u32;
-        let slice_bytes = (SLICE * size_of::<[f32; BUNDLE]>()) as u64;
-        let most = (context.max_binding_bytes / slice_bytes) as u32;
-        let n_slices = sliced.slices.len() - 1;
-        let mut parts = Vec::new();
-        let mut begin = 0;
-        while begin < n_slices {
-            let start = sliced.slices[begin];
-            let more = sliced.slices[begin + 1..].partition_point(|&end| end - start <= most);
-            let end = begin + more.max(1);
-            let starts: Vec<u32> = sliced.slices[begin..=end].iter().map(|s| s - start).collect();
-            let entries = start as usize * SLICE..sliced.slices[end] as usize * SLICE;
-            let first_vertex = begin * SLICE * BUNDLE;
-            parts.push(Part {
-                first_vertex: first_vertex as u32,
-                n_vertices: ((end - begin) * SLICE * BUNDLE).min(n_vertices as usize - first_vertex) as u32,
-                slices: allocator.table("slices of weights", &starts)?,
-                columns: allocator.table("columns of weights", &sliced.columns[entries.clone()])?,
-                weights: allocator.table("weights", &sliced.weights[entries])?,
-            });
-            begin = end;
-        }
         let table = OutsideTable::new(outside);
         let corners = allocator.table("corners for outside vertices", &table.corners)?;
         let offsets = allocator.table("offsets of outside vertices", &table.offsets)?;
+        // Where lists differ most, a weight takes a place in each bundle of its slice.
+        let most = PART.min((context.max_binding_bytes / (SLICE * size_of::<[f32; BUNDLE]>()) as u64) as u32);
+        let (mut parts, mut bytes, mut begin) = (Vec::new(), 0, 0);
+        while begin < n_vertices {
+            let start = weights.indptr()[begin];
+            let more = weights.indptr()[begin..].partition_point(|&end| end - start <= most);
+            let end = (begin + more.next_multiple_of(SLICE * BUNDLE)).min(n_vertices);
+            let sliced = SlicedWeights::of_rows(weights, begin..end);
+            parts.push(Part {
+                first_vertex: begin as u32,
+                n_vertices: (end - begin) as u32,
+                slices: allocator.table("slices of weights", &sliced.slices)?,
+                columns: allocator.table("columns of weights", &sliced.columns)?,
+                weights: allocator.table("weights", &sliced.weights)?,
+            });
+            begin = end;
+            if begin < n_vertices {
+                // Whatever else waits for this thread has its turn: a browser's events and frames.
+                bytes += allocator.settle().await?;
+                allocator = Allocator::new(context, "the weights");
+            }
+        }
         Ok(Self {
             parts,
             corners,
             offsets,
             n_outside: outside.len() as u32,
-            n_vertices,
+            n_vertices: n_vertices as u32,
             n_columns: weights.n_columns() as u32,
-            bytes: allocator.settle().await?,
+            bytes: bytes + allocator.settle().await?,
         })
     }
 

@@ -16,7 +16,6 @@ use crate::arrays::{corners, flat, points, polygon_mesh};
 use crate::clock::Listener;
 use crate::error::{Answer, Fault};
 use crate::options::{BindAsked, CageAsked};
-use crate::state::State;
 use crate::views::object;
 
 /// Binds, makes cages, cuts slices and builds samples.
@@ -299,23 +298,4 @@ impl BuiltSample {
     pub fn pose_positions(&self, index: usize) -> Vec<f32> {
         self.poses.get(index).map(|(_, positions)| flat(positions)).unwrap_or_default()
     }
-}
-
-/// Arrays of a [`Bound`] to weights and outside vertices that fit the cage.
-pub(crate) fn unpack(
-    state: &State,
-    indptr: Vec<u32>,
-    indices: Vec<u32>,
-    data: Vec<f32>,
-    outside: &[u32],
-    offsets: &[f32],
-) -> Answer<(Weights, Vec<OutsideVertex>)> {
-    let weights = Weights::new(state.rest.positions.len() as u32, indptr, indices, data)?;
-    let (frames, offsets) = (outside.as_chunks::<4>().0, points(offsets));
-    let outside = frames.iter().zip(offsets).map(|(&[vertex, a, b, c], offset)| OutsideVertex {
-        vertex,
-        corners: [a, b, c],
-        offset,
-    });
-    Ok((weights, outside.collect()))
 }

@@ -18,6 +18,7 @@ pub mod engine;
 mod error;
 #[cfg(target_family = "wasm")]
 mod gpu;
+mod incoming;
 pub mod loaded;
 mod options;
 mod problems;
@@ -29,8 +30,14 @@ mod views;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 
-/// Called once by the glue: panics become messages in the console.
+#[wasm_bindgen]
+extern "C" {
+    #[wasm_bindgen(js_namespace = console, js_name = error)]
+    fn complain(message: &str);
+}
+
+/// Called once by the glue: panics become messages in the console, instead of "unreachable".
 #[wasm_bindgen(start)]
 pub fn start() {
-    console_error_panic_hook::set_once();
+    std::panic::set_hook(Box::new(|panic| complain(&panic.to_string())));
 }

@@ -24,13 +24,29 @@ pub struct Loaded {
 
 #[wasm_bindgen]
 impl Loaded {
-    /// Reads an OBJ, glTF, GLB or project file. `sibling` is called with the path of each file that it refers to and
+    /// Reads an OBJ, glTF, GLB or project file; [`Self::prepare`] comes next. `sibling` is called with the path of each file that it refers to and
     /// returns a Uint8Array or undefined.
     ///
     /// # Errors
     /// When the file cannot be read.
     pub fn read(name: &str, bytes: &[u8], sibling: &Function) -> Result<Loaded, JsValue> {
         Ok(Self::from_bytes(name, bytes, sibling)?)
+    }
+
+    /// Finds out how the model looks. A step of its own, so that a page answers between the two.
+    pub fn prepare(&mut self) {
+        self.look = self.model.look();
+        self.textures = vec![DrawTexture::default(); self.look.images.len()];
+        let wrap = |wrap: LookWrap| match wrap {
+            LookWrap::Repeat => Wrap::Repeat,
+            LookWrap::Mirror => Wrap::Mirror,
+            LookWrap::Clamp => Wrap::Clamp,
+        };
+        for group in &self.look.groups {
+            if let Some(image) = group.image {
+                self.textures[image as usize].wrap = group.wrap.map(wrap);
+            }
+        }
     }
 
     /// Textures to decode.
@@ -104,18 +120,7 @@ impl Loaded {
     }
 
     fn new(model: Model) -> Self {
-        let look = model.look();
-        let wrap = |wrap: LookWrap| match wrap {
-            LookWrap::Repeat => Wrap::Repeat,
-            LookWrap::Mirror => Wrap::Mirror,
-            LookWrap::Clamp => Wrap::Clamp,
-        };
-        let mut textures = vec![DrawTexture::default(); look.images.len()];
-        for group in &look.groups {
-            if let Some(image) = group.image {
-                textures[image as usize].wrap = group.wrap.map(wrap);
-            }
-        }
+        let (look, textures) = (Look::default(), Vec::new());
         Self { model, cage: None, look, textures, poses: Vec::new(), settings: None }
     }
 

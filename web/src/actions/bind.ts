@@ -40,14 +40,16 @@ export function createBind(ctx: Context): BindActions {
   };
   store.watch(["model", "cage", "bindOptions"], estimate);
 
-  const adopted = (report: BindReport) => {
+  /** The report that is shown is of a coarse pass, which nobody asked for and no bind is compared with. */
+  let isCoarse = false;
+  const adopted = (report: BindReport, pass: BindRun["pass"]) => {
     const { report: last, earlier } = store.get();
-    const same = last && sameWay(last, report);
+    const before = last && !isCoarse ? [last, ...earlier] : earlier;
+    isCoarse = pass === "coarse";
     store.set({
       bound: true,
       report,
-      earlier:
-        last && !same ? [last, ...earlier.filter((e) => !sameWay(e, report))].slice(0, EARLIER) : earlier,
+      earlier: before.filter((e) => !sameWay(e, report)).slice(0, EARLIER),
     });
     const { scene } = store.get();
     if (scene.colour === "material" || scene.colour === "clay") return;
@@ -89,7 +91,7 @@ export function createBind(ctx: Context): BindActions {
             break;
           }
           case "adopted":
-            adopted(event.report);
+            adopted(event.report, event.pass);
             break;
           case "fallback":
             ctx.tell.say(sentence(event.reason));
@@ -103,7 +105,7 @@ export function createBind(ctx: Context): BindActions {
       const ok = await attempt(ctx, "The bind did not finish", async () => {
         const report = await running.done;
         if (mine !== turn) return;
-        adopted(report);
+        adopted(report, "fine");
         if (!report.converged) {
           ctx.tell.say(
             "The solver stopped at its iteration limit, before the change fell below the threshold.",
@@ -144,7 +146,13 @@ function start(pass: BindRun["pass"]): BindRun {
 
 /** Whether two binds were done the same way, so that one report takes the other's place. */
 export function sameWay(a: BindReport, b: BindReport): boolean {
-  return a.method === b.method && a.solver === b.solver && a.grid === b.grid && a.backend === b.backend;
+  return (
+    a.method === b.method &&
+    a.solver === b.solver &&
+    a.preconditioner === b.preconditioner &&
+    a.grid === b.grid &&
+    a.backend === b.backend
+  );
 }
 
 /** Longest curve kept; beyond it every second point goes, which a plot of 300 pixels does not miss. */

@@ -1,7 +1,7 @@
 /** Keeping work: autosave in the browser, the project file, the share link, and coming back from each. */
 
 import type { BindOptions, NamedFile } from "../contract";
-import { CAGE_DEFAULTS, type CageWish } from "../defaults";
+import { BIND_DEFAULTS, CAGE_DEFAULTS, type CageWish } from "../defaults";
 import { stem } from "../format";
 import { encodeShare, fromBase64Url, toBase64Url } from "../share";
 import { forgetLocally, loadLocally, saveLocally } from "../store";
@@ -138,8 +138,10 @@ export function readSettings(text: string): Settings {
   if (typeof value !== "object" || value === null) return {};
   const from = value as Record<string, unknown>;
   const settings: Settings = {};
-  if (isBind(from.bind)) settings.bind = from.bind;
-  // Projects from before `voxels` have none.
+  // Projects from before `preconditioner` and `voxels` have none.
+  const bind = typeof from.bind === "object" &&
+    from.bind && { preconditioner: BIND_DEFAULTS.preconditioner, ...from.bind };
+  if (isBind(bind)) settings.bind = bind;
   const cage = typeof from.cage === "object" && from.cage && { ...CAGE_DEFAULTS, ...from.cage };
   if (isCage(cage)) settings.cage = cage;
   if (typeof from.sample === "string") settings.sample = from.sample;
@@ -167,7 +169,8 @@ function isBind(value: unknown): value is BindOptions {
     v.grid >= 8 &&
     v.grid <= 512 &&
     (v.method === "embedded" || v.method === "classic") &&
-    (v.solver === "multigrid" || v.solver === "jacobi") &&
+    (v.solver === "multigrid" || v.solver === "jacobi" || v.solver === "cg") &&
+    (v.preconditioner === "none" || v.preconditioner === "v_cycle") &&
     (v.backend === "gpu" || v.backend === "cpu") &&
     (v.cell_shape === "box" || v.cell_shape === "cubic") &&
     (v.delta_norm === "euclidean" || v.delta_norm === "literal") &&

@@ -6,7 +6,10 @@ export interface BindOptions {
   /** Cells along the longest side, 8 to 512. */
   readonly grid: number;
   readonly method: "embedded" | "classic";
-  readonly solver: "multigrid" | "jacobi";
+  /** Conjugate gradients ("cg") run on the processor only. */
+  readonly solver: "multigrid" | "jacobi" | "cg";
+  /** Of conjugate gradients; no other solver looks at it. */
+  readonly preconditioner: "none" | "v_cycle";
   readonly backend: "gpu" | "cpu";
   /** Classic only. */
   readonly cell_shape: "box" | "cubic";
@@ -40,7 +43,8 @@ export type BindEvent =
 /** As in Rust's BindReport, snake_case as there. */
 export interface BindReport {
   readonly method: "classic" | "embedded";
-  readonly solver: "jacobi" | "multigrid";
+  readonly solver: "jacobi" | "multigrid" | "cg";
+  readonly preconditioner?: "none" | "v_cycle";
   readonly backend: "cpu" | "gpu";
   readonly adapter?: string;
   readonly threads: number;
@@ -71,6 +75,12 @@ export interface BindReport {
     readonly max: number;
     readonly mean_rel: number;
     readonly max_rel: number;
+  };
+  /** What the solver left, before rows were restored: how far they are from a sum of 1, and how far their points from the
+   * vertices, over the cage's diagonal. Of vertices inside the cage. */
+  readonly raw_error?: {
+    readonly sum: { readonly mean: number; readonly max: number };
+    readonly point_rel: { readonly mean: number; readonly max: number };
   };
   readonly weights: {
     readonly min: number;

@@ -9,8 +9,8 @@ export interface SceneOptions {
   readonly floor: boolean;
   /** Show the model and the cage at rest (Space held). */
   readonly original: boolean;
-  /** "weight": heat map of the vertex selected last; "error": rest error, log; "negative": weights below 0 marked. */
-  readonly colour: "material" | "clay" | "weight" | "error" | "negative";
+  /** "weight": heat map of the vertex selected last; "error": rest error, log. */
+  readonly colour: "material" | "clay" | "weight" | "error";
   /** Plane loaded by `loadSlice`; "value": coordinate of the vertex selected last. */
   readonly slice: "off" | "kinds" | "value";
   readonly gizmo: "none" | "move" | "rotate" | "scale";

@@ -61,6 +61,9 @@ export interface Read {
   readonly notices: readonly string[];
 }
 
+/** Events and frames that wait have their turn. */
+const pause = () => new Promise((resolve) => setTimeout(resolve));
+
 /** Reads a model, decompressed if need be, its textures decoded. */
 export async function load(pkg: Package, { name, bytes, sibling }: Bytes): Promise<Read> {
   let loaded: Loaded;
@@ -71,6 +74,8 @@ export async function load(pkg: Package, { name, bytes, sibling }: Bytes): Promi
     const { decompress } = await import("../decode");
     loaded = pkg.Loaded.read(name, await decompress(name, bytes, sibling), sibling);
   }
+  await pause();
+  loaded.prepare();
   const failed = await decodeTextures(loaded);
   const many = failed === 1 ? "a texture" : `${failed} textures`;
   const notice = `this browser cannot decode ${many}: the material's plain colour is shown, exports keep the file`;

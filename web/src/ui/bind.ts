@@ -7,10 +7,11 @@ import { bytes, count, percent, scientific, timeLeft } from "../format";
 import { cageBroken } from "../state";
 import { STAGES } from "../strings";
 import { button, head, numberField, section, segments, slider, toggle } from "./controls";
+import { curvesOf, legendOf } from "./curves";
 import { fill, h, setText } from "./dom";
 import { icon } from "./icons";
 import { createPlace } from "./place";
-import { type Curve, createPlot, drawPlot, historyPoints } from "./plot";
+import { createPlot, drawPlot } from "./plot";
 import { compareTable, reportCard } from "./report";
 
 const GRIDS = ["32", "64", "128", "256"] as const;
@@ -54,8 +55,14 @@ export function createBindPanel(app: App): HTMLElement {
     [
       { value: "multigrid", label: "Multigrid" },
       { value: "jacobi", label: "Jacobi" },
+      { value: "cg", label: "Conj. gradients", title: "Conjugate gradients, on the processor" },
     ],
     (value) => set({ solver: value }),
+  );
+  const preconditioned = toggle(
+    "Preconditioned by a V-cycle",
+    "Each step begins with a cycle of multigrid: a few steps instead of a hundred.",
+    (on) => set({ preconditioner: on ? "v_cycle" : "none" }),
   );
   const about = h("p", { class: "hint" });
   const memory = h("p", { class: "memory" });
@@ -123,15 +130,17 @@ export function createBindPanel(app: App): HTMLElement {
     { class: "figure" },
     h("figcaption", { class: "section-title", text: "Change per iteration" }),
   );
-  figure.append(plot);
+  const legend = h("ul", { class: "curves" });
   const now = h("p", { class: "hint" });
-  figure.append(now);
+  figure.append(plot, legend, now);
   const result = h("div", { class: "stack" });
 
   store.watch(["bindOptions"], ({ bindOptions: o }) => {
     grid.set(String(o.grid) as Grid);
     method.set(o.method);
     solver.set(o.solver);
+    preconditioned.set(o.preconditioner === "v_cycle");
+    preconditioned.element.hidden = o.solver !== "cg";
     tau.set(Math.round(Math.log10(o.tau)));
     limit.set(o.max_iterations);
     sparsify.set(o.sparsify === 0 ? "0" : o.sparsify < 1e-4 ? "0.00001" : "0.001");
@@ -151,7 +160,8 @@ export function createBindPanel(app: App): HTMLElement {
       wrong ? String(state.memory) : `Needs about ${bytes(Number(state.memory))} of memory.`,
     );
   });
-  store.watch(["bindRun", "report", "bindOptions"], ({ bindRun, report, bindOptions }) => {
+  store.watch(["bindRun", "report", "earlier", "bindOptions"], (state) => {
+    const { bindRun, report, bindOptions } = state;
     running.hidden = bindRun === null;
     if (bindRun) {
       setText(stage, `${STAGES[bindRun.stage]}${bindRun.pass === "coarse" ? ", coarse first" : ""}`);
@@ -159,10 +169,11 @@ export function createBindPanel(app: App): HTMLElement {
       bar.value = bindRun.fraction;
       setText(left, bindRun.etaMs === null ? "Working out how long it takes" : timeLeft(bindRun.etaMs));
     }
-    const curves = curvesOf(bindRun, report);
-    figure.hidden = curves.every((curve) => curve.points.length === 0);
+    const curves = curvesOf(state).filter((curve) => curve.points.length > 0);
+    fill(legend, ...legendOf(curves));
+    figure.hidden = curves.length === 0;
     if (!figure.hidden) drawPlot(plot, curves, bindRun ? bindOptions.tau : (report?.tau ?? bindOptions.tau));
-    const last = curves.at(-1)?.points.at(-1);
+    const last = curves[0]?.points.at(-1);
     setText(now, last ? `${scientific(last[1])} after ${count(last[0])} iterations` : "");
   });
   store.watch(["report", "earlier", "bound"], ({ report, earlier, bound }) => {
@@ -196,6 +207,7 @@ export function createBindPanel(app: App): HTMLElement {
       grid.element,
       method.element,
       solver.element,
+      preconditioned.element,
       about,
       ...createPlace(app),
       memory,
@@ -204,28 +216,17 @@ export function createBindPanel(app: App): HTMLElement {
   );
 }
 
-function curvesOf(
-  run: ReturnType<App["store"]["get"]>["bindRun"],
-  report: ReturnType<App["store"]["get"]>["report"],
-): Curve[] {
-  const before: Curve | null = report
-    ? {
-        name: "last",
-        kind: run ? "before" : "now",
-        points: historyPoints(report.delta_history, report.delta_interval),
-      }
-    : null;
-  if (!run) return before ? [before] : [];
-  const live: Curve = { name: "now", kind: "now", points: run.curve };
-  return before ? [before, live] : [live];
-}
-
 /** What the chosen combination is, as a sentence. */
 export function sayOptions(options: BindOptions): string {
-  const { method, solver } = options;
+  const { method, solver, preconditioner } = options;
+  if (solver === "cg") {
+    return preconditioner === "v_cycle"
+      ? "Conjugate gradients, each step begun by a V-cycle. Compare the curve with multigrid's and Jacobi's."
+      : "Conjugate gradients: no step undoes what those before have reached. Compare the curve with multigrid's and Jacobi's.";
+  }
   if (method === "embedded") {
     return solver === "multigrid"
-      ? "Ours: the cage cuts the cells exactly where it is, coarse grids do the long distances. Exact and fast."
+      ? "Ours: the cage cuts the cells exactly where it is, coarse grids do the long distances."
       : "Our cells with the paper's sweeps: as exact, but slower. Watch the curve flatten.";
   }
   return solver === "jacobi"

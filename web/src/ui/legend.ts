@@ -35,6 +35,5 @@ function legendTitle(scene: SceneOptions, last: number): string {
   if (scene.slice === "kinds") return "Cells";
   if (scene.slice === "value") return `Coordinate of vertex ${last}`;
   if (scene.colour === "weight") return `Weight of vertex ${last}`;
-  if (scene.colour === "error") return "Rest error";
-  return "Negative weights";
+  return "Rest error";
 }

@@ -22,11 +22,13 @@ export function createPlace(app: App): HTMLElement[] {
     backend.set(lack ? "cpu" : bindOptions.backend);
     steps.hidden = lack === null;
     hint.hidden = lack === null && (adapter === "" || bindOptions.backend === "cpu");
+    const chosen =
+      bindOptions.solver === "cg"
+        ? "Conjugate gradients are computed on the processor, also when the graphics card is chosen."
+        : `Graphics card: ${adapter}`;
     setText(
       hint,
-      lack
-        ? "Graphics cards compute through WebGPU only, which this browser does not offer here."
-        : `Graphics card: ${adapter}`,
+      lack ? "Graphics cards compute through WebGPU only, which this browser does not offer here." : chosen,
     );
   });
   return [backend.element, hint, h("div", { class: "row" }, steps)];

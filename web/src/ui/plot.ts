@@ -6,9 +6,15 @@ import { svg } from "./dom";
 export interface Curve {
   name: string;
   points: readonly (readonly [iteration: number, delta: number])[];
-  /** Class for the colour: "now" or "before". */
-  kind: "now" | "before";
+  /** Class for the colour. */
+  kind: (typeof KINDS)[number];
 }
+
+/** The bind of the moment, and two to compare it with. */
+export const KINDS = ["now", "before", "earlier"] as const;
+
+/** From so many times as many iterations on, curves are drawn over their logarithm: the short one would be a stroke. */
+const FAR_APART = 20;
 
 const WIDTH = 328;
 const HEIGHT = 168;
@@ -23,6 +29,8 @@ export interface Scale {
   lowest: number;
   highest: number;
   last: number;
+  /** Whether iterations are on a logarithmic scale, too. */
+  logarithmic: boolean;
 }
 
 /** Powers of ten and iterations that hold all points and the threshold. */
@@ -30,21 +38,25 @@ export function scaleOf(curves: readonly Curve[], tau: number): Scale {
   const deltas = curves
     .flatMap((curve) => curve.points.map(([, delta]) => delta))
     .filter((delta) => delta > 0);
-  const iterations = curves.flatMap((curve) => curve.points.map(([iteration]) => iteration));
+  const lasts = curves.flatMap((curve) => curve.points.at(-1)?.[0] ?? []);
+  const last = Math.max(1, ...lasts);
   const all = tau > 0 ? [...deltas, tau] : deltas;
   const lowest = Math.floor(Math.log10(Math.min(...all, 1)));
   const highest = Math.ceil(Math.log10(Math.max(...all, 1e-9)));
   return {
     lowest,
     highest: Math.max(highest, lowest + 1),
-    last: Math.max(1, ...iterations),
+    last,
+    logarithmic: last > FAR_APART * Math.min(...lasts),
   };
 }
 
 /** Draws into `element`, in place of what was there. */
 export function drawPlot(element: SVGSVGElement, curves: readonly Curve[], tau: number): void {
   const scale = scaleOf(curves, tau);
-  const x = (iteration: number) => LEFT + (iteration / scale.last) * (WIDTH - LEFT - RIGHT);
+  const along = ({ last, logarithmic }: Scale, iteration: number) =>
+    logarithmic ? Math.log(Math.max(1, iteration)) / Math.log(last) : iteration / last;
+  const x = (iteration: number) => LEFT + along(scale, iteration) * (WIDTH - LEFT - RIGHT);
   const y = (delta: number) => {
     const share = (Math.log10(delta) - scale.lowest) / (scale.highest - scale.lowest);
     return HEIGHT - BOTTOM - Math.min(1, Math.max(0, share)) * (HEIGHT - TOP - BOTTOM);
@@ -59,16 +71,21 @@ export function drawPlot(element: SVGSVGElement, curves: readonly Curve[], tau: 
     );
   }
   parts.push(
-    label(LEFT, HEIGHT - 8, "0", "middle"),
+    label(LEFT, HEIGHT - 8, scale.logarithmic ? "1" : "0", "middle"),
     label(WIDTH - RIGHT, HEIGHT - 8, count(scale.last), "end"),
-    label((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 8, "iterations", "middle"),
+    label(
+      (LEFT + WIDTH - RIGHT) / 2,
+      HEIGHT - 8,
+      scale.logarithmic ? "iterations, logarithmic" : "iterations",
+      "middle",
+    ),
   );
   if (tau > 0) {
-    // Below the line where there is nothing above it.
-    const above = y(tau) > TOP + LABEL;
+    // Below the line where there is room: curves come from above.
+    const above = y(tau) > HEIGHT - BOTTOM - LABEL;
     parts.push(
       svg("line", { x1: LEFT, x2: WIDTH - RIGHT, y1: y(tau), y2: y(tau), class: "tau" }),
-      // On the left, where curves are still high.
+      // On the left, where they are still high.
       label(LEFT + 4, y(tau) + (above ? -4 : LABEL), "done below this", "start"),
     );
   }

@@ -8,16 +8,21 @@ import { h } from "./dom";
 import { icon } from "./icons";
 
 export const METHODS = { embedded: "Embedded (ours)", classic: "Classic (the paper)" } as const;
-const SOLVERS = { multigrid: "multigrid", jacobi: "Jacobi" } as const;
+const SOLVERS = { multigrid: "multigrid", jacobi: "Jacobi", cg: "conjugate gradients" } as const;
 
 /** A largest rest error below this share of the cage's diagonal cannot be seen: a tenth of a pixel of 4K. */
 const INVISIBLE = 2.5e-5;
 
 /** The verdict as one sentence. */
 export function verdict(report: BindReport): string {
-  if (!report.converged) return "Stopped before it was done; raise the iteration limit for exact weights.";
+  if (!report.converged)
+    return "Stopped before it was done; raise the iteration limit for converged weights.";
   if (report.rest_error.max_rel < INVISIBLE)
-    return "Exact: at rest the model is where it was, to less than can be seen.";
+    return [
+      "At rest the model is where it was, to less than can be seen: after the solve, each vertex's weights are restored to",
+      "add up to 1 and to give its place.",
+      ...(report.raw_error ? ["The solver error is how far off they were before."] : []),
+    ].join(" ");
   return `At rest the model is off by up to ${scientific(report.rest_error.max_rel * 100)} % of the cage's size.`;
 }
 
@@ -40,11 +45,12 @@ export function reportCard(report: BindReport): HTMLElement {
     ),
     h("p", { class: "hint", text: verdict(report) }),
     facts([
-      ["Method", `${METHODS[report.method]}, ${SOLVERS[report.solver]}`],
+      ["Method", `${METHODS[report.method]}, ${solverName(report)}`],
       ["Grid", `${report.dims.join(" × ")} cells`],
       ["Computed on", where],
       ["Rest error, mean", scientific(report.rest_error.mean_rel)],
       ["Rest error, largest", scientific(report.rest_error.max_rel)],
+      ...rawFacts("Solver error", report.raw_error?.point_rel),
       ["Weights", `${scientific(report.weights.min)} to ${scientific(report.weights.max)}`],
     ]),
     h(
@@ -65,6 +71,7 @@ export function reportCard(report: BindReport): HTMLElement {
           ["Sample", duration(report.timings_ms.sample)],
           ["Memory, estimated", bytes(report.memory_bytes.estimated)],
           ["Memory, most used", bytes(report.memory_bytes.peak)],
+          ...rawFacts("Solver: sums off by", report.raw_error?.sum),
           ["Sum of a row off by", scientific(report.weights.max_sum_error)],
           ["Weights stored", `${count(report.weights.nonzeros)} (${percent(density(report))})`],
           ["Outside the cage", plural(report.outside_vertices, "vertex", "vertices")],
@@ -76,9 +83,25 @@ export function reportCard(report: BindReport): HTMLElement {
   );
 }
 
+/** What the solver left of something, if the report says so. */
+function rawFacts(name: string, error: { mean: number; max: number } | undefined): [string, string][] {
+  if (!error) return [];
+  return [
+    [`${name}, mean`, scientific(error.mean)],
+    [`${name}, largest`, scientific(error.max)],
+  ];
+}
+
+/** Solver and preconditioner, in words. */
+export function solverName(by: Pick<BindReport, "solver" | "preconditioner">): string {
+  const isPreconditioned = by.solver === "cg" && by.preconditioner === "v_cycle";
+  return `${SOLVERS[by.solver]}${isPreconditioned ? " with V-cycles" : ""}`;
+}
+
 /** Method, solver, grid and place of a bind, in short. */
-function wayOf({ method, solver, grid, backend }: BindReport): string {
-  return `${method === "classic" ? "Classic" : "Embedded"}, ${SOLVERS[solver]}, ${grid}, ${backend.toUpperCase()}`;
+function wayOf(report: BindReport): string {
+  const { method, grid, backend } = report;
+  return `${method === "classic" ? "Classic" : "Embedded"}, ${solverName(report)}, ${grid}, ${backend.toUpperCase()}`;
 }
 
 /** Share of the weights that is stored. */

@@ -12,7 +12,6 @@ const COLOURS: Record<SceneOptions["colour"], string> = {
   clay: "One even colour: the shape is easier to judge.",
   weight: "How much each point follows the vertex selected last. Select another one to see its share.",
   error: "Distance from where the model should be at rest, logarithmic. Our method leaves almost none.",
-  negative: "Points that move against a cage vertex. Harmonic coordinates have none.",
 };
 
 export function createSeePanel(app: App): HTMLElement {
@@ -24,7 +23,6 @@ export function createSeePanel(app: App): HTMLElement {
       { value: "clay", label: "Clay" },
       { value: "weight", label: "Weight" },
       { value: "error", label: "Error" },
-      { value: "negative", label: "Negative" },
     ],
     (value) => view.scene({ colour: value }),
   );
@@ -111,7 +109,7 @@ export function createSeePanel(app: App): HTMLElement {
   });
   store.watch(["scene", "selected", "bound"], ({ scene, selected, bound }) => {
     colour.set(scene.colour);
-    for (const value of ["weight", "error", "negative"] as const) colour.enable(value, bound);
+    for (const value of ["weight", "error"] as const) colour.enable(value, bound);
     setText(
       about,
       scene.colour === "weight" && selected.last < 0

@@ -95,8 +95,8 @@ pub(super) fn refuse_unless_any_is_inside(
 mod tests {
     use super::*;
     use crate::bind::bind;
-use crate::options::BindOptions;
     use crate::cage_gen::subdivided_box;
+    use crate::options::BindOptions;
     use crate::progress::Silent;
 
     /// What binding points of the unit cube to a box cage says.

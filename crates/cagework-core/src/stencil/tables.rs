@@ -1,5 +1,7 @@
 //! The arrays that kernels and twins read: geometry flattened to plain numbers, ready to be uploaded.
 
+use std::ops::Range;
+
 use glam::Vec4;
 
 use crate::deform::OutsideVertex;
@@ -165,14 +167,21 @@ impl SlicedWeights {
     /// Slices of a matrix of weights.
     #[must_use]
     pub fn new(weights: &Weights) -> Self {
-        let n_slices = weights.n_rows().div_ceil(BUNDLE * SLICE);
+        Self::of_rows(weights, 0..weights.n_rows())
+    }
+
+    /// Slices of some of its rows.
+    #[must_use]
+    pub fn of_rows(weights: &Weights, range: Range<usize>) -> Self {
+        let n_slices = range.len().div_ceil(BUNDLE * SLICE);
         let mut sliced = Self { slices: vec![0], ..Self::default() };
         // Where a column stands in the bundle's list: the bundle that listed it last, and where.
         let mut listed = vec![(u32::MAX, 0); weights.n_columns()];
         let mut lists: [Vec<u32>; SLICE] = Default::default();
         let rows = |slice: usize, lane: usize| {
-            let first = (slice * SLICE + lane) * BUNDLE;
-            (0..BUNDLE).map(move |j| first + j).take_while(|&row| row < weights.n_rows())
+            let first = range.start + (slice * SLICE + lane) * BUNDLE;
+            let end = range.end;
+            (0..BUNDLE).map(move |j| first + j).take_while(move |&row| row < end)
         };
         for slice in 0..n_slices {
             for (lane, list) in lists.iter_mut().enumerate() {

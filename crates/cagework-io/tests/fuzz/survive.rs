@@ -2,11 +2,11 @@
 
 use std::sync::LazyLock;
 
-use cagework_core::options::{BindOptions, Method, OutsidePolicy, Solver};
 use cagework_core::cage_check::{Repair, check, repair};
 use cagework_core::cage_gen::{CageOptions, Shape, Symmetry, generate};
 use cagework_core::deform::deform_bound;
 use cagework_core::mesh::Bounds;
+use cagework_core::options::{BindOptions, Method, OutsidePolicy, Solver};
 use cagework_core::progress::Silent;
 use cagework_core::{Binding, Cage, PolygonMesh, bind};
 use cagework_io::{Model, decode_pose, encode_pose, read_project, read_weights_npz, write_weights_npz};

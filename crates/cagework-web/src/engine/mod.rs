@@ -18,7 +18,7 @@ use std::rc::Rc;
 
 use async_lock::Mutex;
 use cagework_gpu::Session;
-use js_sys::Function;
+use js_sys::{Float32Array, Function, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen_futures::spawn_local;
@@ -26,6 +26,7 @@ use web_sys::HtmlCanvasElement;
 
 use crate::error::{Answer, Fault};
 use crate::gpu::{Gpu, SharedGpu};
+use crate::incoming::{self, page_turn};
 use crate::loaded::Loaded;
 use crate::state::State;
 use crate::surface::Surface;
@@ -58,12 +59,14 @@ impl Engine {
     /// When the GPU has no room for it; what was open stays open.
     pub async fn open(&self, mut loaded: Loaded) -> Result<JsValue, JsValue> {
         let draw = loaded.draw_model();
+        page_turn().await;
         {
             let mut gpu = self.gpu.lock().await;
             let gpu = gpu.as_mut().ok_or_else(lost)?;
             gpu.main.set_model(draw).await.map_err(Fault::from)?;
             gpu.other = None;
         }
+        page_turn().await;
         let info = ModelInfo::of(&loaded.model);
         let cage = loaded.cage.take();
         self.change(|state| state.set_model(loaded.model));
@@ -81,21 +84,22 @@ impl Engine {
     pub async fn adopt(
         &self,
         indptr: Vec<u32>,
-        indices: Vec<u32>,
-        data: Vec<f32>,
+        indices: Uint32Array,
+        data: Float32Array,
         outside: Vec<u32>,
         offsets: Vec<f32>,
     ) -> Result<(), JsValue> {
-        let bound =
-            self.read(|state| crate::binder::unpack(state, indptr, indices, data, &outside, &offsets))?;
-        let generation = self.read(|state| state.generation);
+        let (generation, n_columns) =
+            self.read(|state| (state.generation, state.rest.positions.len() as u32));
+        let weights = incoming::weights(n_columns, &indptr, &indices, &data).await?;
+        let outside = incoming::outside(&outside, &offsets);
         let is_current = || self.read(|state| state.generation) == generation;
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         // The cage may still be waiting for its turn, and would take the weights away again.
         upload_cage(&self.state, gpu).await?;
         if is_current() {
-            gpu.main.adopt(bound.0, bound.1).await.map_err(Fault::from)?;
+            gpu.main.adopt(weights, outside).await.map_err(Fault::from)?;
         }
         if !is_current() {
             return Err(overtaken().into());
@@ -115,15 +119,19 @@ impl Engine {
     pub async fn adopt_other(
         &self,
         indptr: Vec<u32>,
-        indices: Vec<u32>,
-        data: Vec<f32>,
+        indices: Uint32Array,
+        data: Float32Array,
     ) -> Result<(), JsValue> {
-        let bound = self.read(|state| crate::binder::unpack(state, indptr, indices, data, &[], &[]))?;
-        let generation = self.read(|state| state.generation);
+        let (generation, n_columns) =
+            self.read(|state| (state.generation, state.rest.positions.len() as u32));
+        let weights = incoming::weights(n_columns, &indptr, &indices, &data).await?;
+        if self.read(|state| state.generation) != generation {
+            return Err(overtaken().into());
+        }
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         let mut other = gpu.main.twin().await.map_err(Fault::from)?;
-        other.adopt(bound.0, bound.1).await.map_err(Fault::from)?;
+        other.adopt(weights, Vec::new()).await.map_err(Fault::from)?;
         if self.read(|state| state.generation) != generation {
             return Err(overtaken().into());
         }

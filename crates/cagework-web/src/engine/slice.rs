@@ -2,13 +2,12 @@
 
 use std::sync::Arc;
 
-use cagework_core::BindOptions;
 use cagework_core::slice::Slice;
+use cagework_core::{BindOptions, Weights};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
-use crate::binder::unpack;
 use crate::error::{Answer, Fault};
 use crate::options::BindAsked;
 
@@ -34,7 +33,7 @@ impl Engine {
             let (_, cage) = state.parts()?;
             let mut slice = Slice::new(cage, &BindOptions::from(asked), axis.min(2), fraction);
             if !data.is_empty() {
-                slice.set_weights(unpack(state, indptr, indices, data, &[], &[])?.0)?;
+                slice.set_weights(Weights::new(cage.n_vertices() as u32, indptr, indices, data)?)?;
             }
             Answer::Ok(slice)
         })?;

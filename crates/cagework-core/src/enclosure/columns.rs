@@ -1,0 +1,97 @@
+//! Winding numbers of many points: by the faces that a line upwards along z crosses.
+//!
+//! A closed surface winds around a point as often as a line from it to infinity leaves the surface more than it enters.
+//! Faces are sorted into columns, so that each line meets few. A line that passes an edge, or a point that lies on a
+//! face, as nearly as rounding could matter, is left to [`super::winding_number`].
+
+use glam::{DVec2, DVec3};
+
+/// What counts as near: 1e7 times the rounding of f64, over the surface's extent (an area: over its square).
+const NEAR: f64 = 1e-9;
+
+/// Columns along x and along y are at most so many: a table of them stays in the cache.
+const MOST_COLUMNS: f64 = 64.0;
+
+/// Faces of a closed surface by columns along z.
+pub(super) struct Columns<'a> {
+    triangles: &'a [[DVec3; 3]],
+    /// Corner of the first column, and columns for each unit of length.
+    low: DVec2,
+    per_unit: DVec2,
+    side: usize,
+    extent: f64,
+    /// Numbers of the triangles over each column. `[side * side]`
+    over: Vec<Vec<u32>>,
+}
+
+impl<'a> Columns<'a> {
+    pub(super) fn new(triangles: &'a [[DVec3; 3]]) -> Self {
+        let corners = || triangles.iter().flatten().map(|p| p.truncate());
+        let low = corners().fold(DVec2::INFINITY, DVec2::min);
+        let high = corners().fold(DVec2::NEG_INFINITY, DVec2::max);
+        let all = || triangles.iter().flatten();
+        let extent = (all().fold(DVec3::NEG_INFINITY, |a, p| a.max(*p))
+            - all().fold(DVec3::INFINITY, |a, p| a.min(*p)))
+        .length();
+        let side = (2.0 * (triangles.len() as f64).sqrt()).clamp(1.0, MOST_COLUMNS).floor();
+        let per_unit = DVec2::splat(side) / (high - low).max(DVec2::splat(f64::MIN_POSITIVE));
+        let side = side as usize;
+        let mut columns =
+            Self { triangles, low, per_unit, side, extent, over: vec![Vec::new(); side * side] };
+        for (number, triangle) in (0u32..).zip(triangles) {
+            let corners = triangle.map(|p| p.truncate());
+            let near = DVec2::splat(NEAR * extent);
+            let [first, last] = [
+                columns.column(corners[0].min(corners[1]).min(corners[2]) - near),
+                columns.column(corners[0].max(corners[1]).max(corners[2]) + near),
+            ];
+            for y in first[1]..=last[1] {
+                for x in first[0]..=last[0] {
+                    columns.over[y * side + x].push(number);
+                }
+            }
+        }
+        columns
+    }
+
+    /// The column of a point; the outermost one beyond them.
+    fn column(&self, p: DVec2) -> [usize; 2] {
+        let last = (self.side - 1) as f64;
+        ((p - self.low) * self.per_unit).clamp(DVec2::ZERO, DVec2::splat(last)).to_array().map(|x| x as usize)
+    }
+
+    /// How often the surface winds around a point; nothing where rounding might matter.
+    pub(super) fn winding_number(&self, point: DVec3) -> Option<f64> {
+        let p = point.truncate();
+        let [x, y] = self.column(p);
+        let mut leaves = 0;
+        for &number in &self.over[y * self.side + x] {
+            let corners = self.triangles[number as usize];
+            let [a, b, c] = corners.map(|q| q.truncate() - p);
+            // Twice the areas of the point with each side.
+            let areas = [b.perp_dot(c), c.perp_dot(a), a.perp_dot(b)];
+            let near = NEAR * self.extent * self.extent;
+            if areas.iter().any(|&area| area > near) && areas.iter().any(|&area| area < -near) {
+                continue;
+            }
+            if areas.iter().any(|area| area.abs() <= near) {
+                let distance = NEAR * self.extent;
+                let is_beside = a.min(b).min(c).cmpgt(DVec2::splat(distance)).any()
+                    || a.max(b).max(c).cmplt(DVec2::splat(-distance)).any();
+                if is_beside {
+                    continue;
+                }
+                return None;
+            }
+            let total: f64 = areas.iter().sum();
+            let height: f64 = areas.iter().zip(corners).map(|(area, q)| area * q.z).sum::<f64>() / total;
+            if (height - point.z).abs() <= NEAR * self.extent {
+                return None;
+            }
+            if height > point.z {
+                leaves += if total > 0.0 { 1 } else { -1 };
+            }
+        }
+        Some(f64::from(leaves))
+    }
+}

@@ -1,0 +1,64 @@
+//! What the worker has bound, taken over by the page's module a little at a time: a page answers meanwhile.
+
+use cagework_core::Weights;
+use cagework_core::deform::OutsideVertex;
+use js_sys::{Float32Array, Promise, Uint32Array};
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+use wasm_bindgen_futures::JsFuture;
+
+use crate::arrays::points;
+use crate::error::Answer;
+
+/// Weights that are copied and looked at between two turns of the page: a few milliseconds of its main thread.
+const PART: u32 = 1 << 18;
+
+#[wasm_bindgen]
+extern "C" {
+    #[wasm_bindgen(js_name = setTimeout)]
+    fn set_timeout(then: &js_sys::Function, ms: u32);
+}
+
+/// Lets the page have its turn: events and frames that wait.
+pub(crate) async fn page_turn() {
+    let promise = Promise::new(&mut |resolve, _| set_timeout(&resolve, 0));
+    // A timer does not fail.
+    let _: Result<JsValue, JsValue> = JsFuture::from(promise).await;
+}
+
+/// Weights from arrays of a `Bound`.
+pub(crate) async fn weights(
+    n_columns: u32,
+    indptr: &[u32],
+    indices: &Uint32Array,
+    data: &Float32Array,
+) -> Answer<Weights> {
+    let n = indices.length().min(data.length());
+    let mut weights = Weights::with_room(n_columns, indptr.len(), n as usize);
+    let mut rows = indptr;
+    while let [start, rest @ ..] = rows
+        && !rest.is_empty()
+    {
+        let count = rest.partition_point(|&end| end <= start.saturating_add(PART)).max(1);
+        let (ends, end) = (&rest[..count], rest[count - 1]);
+        let pointers = std::iter::once(0).chain(ends.iter().map(|&e| e.wrapping_sub(*start))).collect();
+        let (indices, data) = (indices.subarray(*start, end).to_vec(), data.subarray(*start, end).to_vec());
+        weights.append(&Weights::new(n_columns, pointers, indices, data)?);
+        rows = &rows[count..];
+        if rows.len() > 1 {
+            page_turn().await;
+        }
+    }
+    Ok(weights)
+}
+
+/// Vertices outside the cage: for each of them itself and the corners of its frame, and its offset.
+pub(crate) fn outside(frames: &[u32], offsets: &[f32]) -> Vec<OutsideVertex> {
+    let frames = frames.as_chunks::<4>().0.iter();
+    let outside = frames.zip(points(offsets)).map(|(&[vertex, a, b, c], offset)| OutsideVertex {
+        vertex,
+        corners: [a, b, c],
+        offset,
+    });
+    outside.collect()
+}

@@ -1,0 +1,37 @@
+/** Which binds' changes the plot compares: the bind of the moment, and the last ones by other solvers. */
+
+import type { BindReport } from "../contract";
+import type { AppState } from "../state";
+import { h } from "./dom";
+import { type Curve, historyPoints, KINDS } from "./plot";
+import { solverName } from "./report";
+
+/** Curves, the one of the moment first; of each solver the latest beside it. */
+export function curvesOf({ bindRun, report, earlier, bindOptions }: CurveState): Curve[] {
+  const reports = report ? [report, ...earlier] : [];
+  const now = bindRun
+    ? { name: bindRun.pass === "coarse" ? "coarse first" : solverName(bindOptions), points: bindRun.curve }
+    : reports.slice(0, 1).map(pointsOf)[0];
+  if (!now) return [];
+  const names = new Set(bindRun ? [] : [now.name]);
+  const others = reports.map(pointsOf).filter(({ name }) => !names.has(name) && names.add(name));
+  const shown = [now, ...others].slice(0, KINDS.length);
+  return shown.map((curve, k) => ({ ...curve, kind: KINDS[k] ?? "now" }));
+}
+
+export type CurveState = Pick<AppState, "bindRun" | "report" | "earlier" | "bindOptions">;
+
+function pointsOf(report: BindReport) {
+  return {
+    name: solverName(report),
+    points: historyPoints(report.delta_history, report.delta_interval),
+  };
+}
+
+/** What each colour stands for; nothing for a single curve. */
+export function legendOf(curves: readonly Curve[]): HTMLElement[] {
+  if (curves.length < 2) return [];
+  return curves.map(({ name, kind }, k) =>
+    h("li", { class: kind, text: k > 0 && name === curves[0]?.name ? `${name}, before` : name }),
+  );
+}
