@@ -285,7 +285,7 @@ mod tests {
     use super::*;
 
     fn assert_words<
-        T: Choice + PartialEq + fmt::Debug + fmt::Display + FromStr<Err = UnknownWord> + Serialize,
+        T: Choice + PartialEq + std::fmt::Debug + std::fmt::Display + FromStr<Err = UnknownWord> + Serialize,
     >() {
         for &(word, value) in T::ALL {
             assert_eq!([word.parse(), value.to_string().parse()], [Ok(value), Ok(value)]);

@@ -117,9 +117,9 @@ impl Weights {
     pub fn append(&mut self, more: &Self) {
         assert_eq!(self.n_columns, more.n_columns, "columns are the same");
         let n = self.indices.len() as u32;
-        Arc::make_mut(&mut self.indptr).extend(more.indptr.iter().skip(1).map(|end| n + end));
-        Arc::make_mut(&mut self.indices).extend_from_slice(&more.indices);
-        Arc::make_mut(&mut self.data).extend_from_slice(&more.data);
+        self.indptr.extend(more.indptr.iter().skip(1).map(|end| n + end));
+        self.indices.extend_from_slice(&more.indices);
+        self.data.extend_from_slice(&more.data);
     }
 
     /// Bytes held.

@@ -6,12 +6,10 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use cagework_core::deform::{deform_bound, vertex_normals};
-use cagework_core::options::{BindOptions, CellShape, DeltaNorm, Method, Solver};
+use cagework_core::options::{Backend, BindOptions, CellShape, DeltaNorm, Method, Solver};
 use cagework_core::progress::{ProgressEvent, Silent};
 use cagework_core::{BindError, Binding, Cage, Weights, bind};
-use cagework_gpu::{
-    ContextOptions, Deformer, GpuContext, GpuError, GpuWeights, Plan, PlanError, bind_gpu, bind_gpu_to_edit,
-};
+use cagework_gpu::{ContextOptions, Deformer, GpuContext, GpuError, GpuWeights, Plan, PlanError, bind_gpu};
 use glam::Vec3;
 use pollster::block_on;
 use support::{assert_close, cage, egg, flat, gpu, gpu_with, with_prepared};
@@ -66,7 +64,7 @@ fn weights_equal_the_cpus() {
             assert!(!gpu.outside.is_empty(), "some vertices are outside");
             let (g, c) = (&gpu.report, &cpu.report);
             assert!(g.converged, "{method:?} {solver:?}: {:?}", g.delta_history);
-            assert_eq!((g.backend.as_str(), c.backend.as_str()), ("gpu", "cpu"));
+            assert_eq!([g.backend, c.backend], [Backend::Gpu, Backend::Cpu]);
             assert_eq!((g.adapter.is_some(), c.adapter.is_some()), (true, false));
             assert_eq!((g.cells, &g.levels, g.dims), (c.cells, &c.levels, c.dims));
             assert!(g.iterations.abs_diff(c.iterations) <= g.delta_interval, "{g:?}\n{c:?}");
@@ -137,41 +135,12 @@ fn what_does_not_fit_is_refused_with_numbers() {
 }
 
 #[test]
-fn an_edit_starts_from_the_fields_of_a_bind_on_the_gpu() {
-    let (cage, positions) = (cage([3, 3, 3]), points());
-    // Bindings for two quads of columns at a time: the fields come back in several batches.
-    let options = BindOptions { grid: 40, ..options(Method::Embedded, Solver::Multigrid) };
-    let rows = u64::from(options.grid + 2).pow(3);
-    let limit = Some(2 * 16 * rows);
-    let context = gpu_with(&ContextOptions { max_binding_bytes: limit, ..ContextOptions::default() });
-    let mut mesh = cage.to_polygon_mesh();
-    let bounds = cage.bounds();
-    // The grid is laid into the bounding box, which must stay.
-    let is_free = |p: &&mut Vec3| (0..3).all(|a| p[a] > bounds.min[a] && p[a] < bounds.max[a]);
-    *mesh.positions.iter_mut().find(is_free).expect("a vertex inside the bounding box") *= 0.97;
-    let edited = Cage::new(&mesh).unwrap();
-    let bind_with = |options: &BindOptions, most| {
-        block_on(bind_gpu_to_edit(&positions, &cage, options, most, &Silent, &context)).unwrap()
-    };
-
-    let (binding, rebinder) = bind_with(&options, u64::MAX);
-    let on_cpu = bind(&positions, &cage, &options, &Silent).unwrap();
-    assert_close(&dense(&binding.weights), &dense(&on_cpu.weights), WEIGHT_TOLERANCE);
-    assert_eq!(binding.report.backend, "gpu");
-    let mut rebinder = rebinder.expect("there is room for the fields");
-    assert!(rebinder.is_bound_to(&cage) && !rebinder.is_bound_to(&edited));
-    let (corrected, report) = rebinder.correct(&edited, &Silent).unwrap().expect("a small edit");
-    assert!(!report.anew && report.solved > 0 && report.solved < report.columns, "{report:?}");
-    assert_eq!(
-        (corrected.report.backend.as_str(), corrected.report.corrections),
-        ("cpu", Some(report.solved))
-    );
-    let anew = bind(&positions, &edited, &options, &Silent).unwrap();
-    assert_close(&dense(&corrected.weights), &dense(&anew.weights), WEIGHT_TOLERANCE);
-
-    assert!(bind_with(&options, 1000).1.is_none(), "a kilobyte is not enough");
-    let sparse = BindOptions { sparsify: 1e-5, ..options };
-    assert!(bind_with(&sparse, u64::MAX).1.is_none(), "nobody knows how small the dropped weights were");
+fn a_solver_of_the_cpu_is_refused_by_name() {
+    let (context, cage, positions) = (gpu(), cage([1, 1, 1]), egg(3, 4).positions);
+    let options = options(Method::Embedded, Solver::ConjugateGradient);
+    let error = block_on(bind_gpu(&positions, &cage, &options, &Silent, &context)).unwrap_err();
+    assert_eq!(error, GpuError::Solver(Solver::ConjugateGradient));
+    assert!(error.to_string().starts_with("the solver cg runs on the CPU only"), "{error}");
 }
 
 #[test]
