@@ -25,5 +25,5 @@ fn jacobi_cells(@builtin(global_invocation_id) id: vec3u) {
     sum += u_in[neighbours[6u * row + 3u] * work.n_quads + quad];
     sum += u_in[neighbours[6u * row + 4u] * work.n_quads + quad];
     sum += u_in[neighbours[6u * row + 5u] * work.n_quads + quad];
-    u_out[row * work.n_quads + quad] = sum * (1.0 / diagonal[row]);
+    u_out[row * work.n_quads + quad] = sum / diagonal[row];
 }

@@ -26,9 +26,11 @@ fn relax_cells(@builtin(global_invocation_id) id: vec3u) {
     sum += field[neighbours[6u * row + 4u] * work.n_quads + quad];
     sum += field[neighbours[6u * row + 5u] * work.n_quads + quad];
     let own = row * work.n_quads + quad;
+    // Divided, not times 1/6, which is rounded up: sums over columns would creep away from 1.
+    let mean = sum / diagonal[row];
     if work.omega == 1.0 {
-        field[own] = sum * (1.0 / diagonal[row]);
+        field[own] = mean;
     } else {
-        field[own] = field[own] * (1.0 - work.omega) + sum * (work.omega / diagonal[row]);
+        field[own] += work.omega * (mean - field[own]);
     }
 }

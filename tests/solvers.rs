@@ -147,14 +147,16 @@ mod error_bounds {
     #[test]
     fn multigrid_leaves_less_than_tau_lets_expect() {
         let multigrid = cpu(Method::Embedded, Solver::Multigrid, 0);
-        suite::raw::tau_bounds_what_the_solver_leaves(&multigrid, &[32, 64, 128]);
+        suite::raw::tau_bounds_what_the_solver_leaves(&multigrid, &[32, 64, 128], 2e-6);
+        suite::raw::rounding_does_not_add_up_over_columns(&multigrid);
     }
 
     #[test]
     fn conjugate_gradients_leave_less_than_tau_lets_expect() {
         let cg = cpu(Method::Embedded, Solver::ConjugateGradient, 0);
-        suite::raw::tau_bounds_what_the_solver_leaves(&cg, &[32, 64]);
-        suite::raw::tau_bounds_what_the_solver_leaves(&preconditioned_cg(Method::Embedded), &[32, 64]);
+        // They end nearer to tau than V-cycles do, each of which leaves a tenth.
+        suite::raw::tau_bounds_what_the_solver_leaves(&cg, &[32], 1e-5);
+        suite::raw::tau_bounds_what_the_solver_leaves(&preconditioned_cg(Method::Embedded), &[32, 64], 1e-5);
     }
 }
 

@@ -52,7 +52,7 @@ pub fn relax_cells(
         for lane in 0..n_lanes {
             let sum = gather(level, n_lanes, row, lane, rhs, field);
             let own = &mut field[row * n_lanes + lane];
-            *own = *own * (1.0 - omega) + sum * (omega / level.diagonal[row]);
+            *own += omega * (sum / level.diagonal[row] - *own);
         }
     }
 }
@@ -70,7 +70,7 @@ pub fn jacobi_cells(
     for row in rows {
         for lane in 0..n_lanes {
             u_out[row * n_lanes + lane] =
-                gather(level, n_lanes, row, lane, rhs, u_in) * (1.0 / level.diagonal[row]);
+                gather(level, n_lanes, row, lane, rhs, u_in) / level.diagonal[row];
         }
     }
 }
