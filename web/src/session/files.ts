@@ -1,6 +1,6 @@
 /** Dropped files to bytes: which one is the model, and where its siblings are. */
 
-import type { NamedFile } from "../contract";
+import type { NamedFile, UpAxis } from "../contract";
 import { extension, isModel } from "../drop";
 import type { Loaded } from "../pkg/cagework";
 import type { Package } from "./artifact";
@@ -14,6 +14,8 @@ export interface Bytes {
   readonly name: string;
   readonly bytes: Uint8Array;
   readonly sibling: (path: string) => Uint8Array | undefined;
+  /** What points up in it, if that is not what the file says. */
+  readonly up?: UpAxis;
 }
 
 /** The model's bytes and those of its siblings. */
@@ -62,7 +64,7 @@ export interface Read {
 }
 
 /** Reads a model, decompressed if need be, its textures decoded. */
-export async function load(pkg: Package, { name, bytes, sibling }: Bytes): Promise<Read> {
+export async function load(pkg: Package, { name, bytes, sibling, up }: Bytes): Promise<Read> {
   let loaded: Loaded;
   try {
     loaded = pkg.Loaded.read(name, bytes, sibling);
@@ -71,6 +73,7 @@ export async function load(pkg: Package, { name, bytes, sibling }: Bytes): Promi
     const { decompress } = await import("../decode");
     loaded = pkg.Loaded.read(name, await decompress(name, bytes, sibling), sibling);
   }
+  if (up) loaded.setUp(up);
   const failed = await decodeTextures(loaded);
   const many = failed === 1 ? "a texture" : `${failed} textures`;
   const notice = `this browser cannot decode ${many}: the material's plain colour is shown, exports keep the file`;
