@@ -3,7 +3,7 @@
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { dracoGlb, glb, gltfFiles, meshoptGlb, obj } from "./models";
+import { box, dracoGlb, glb, gltfFiles, meshoptGlb, obj } from "./models";
 import { bound, cagePositions, drag, drop, expect, open, shoot, test } from "./support";
 
 test.describe("good files", () => {
@@ -62,6 +62,39 @@ test("a dropped folder is opened with all that lies in it", async ({ page }) => 
   await expect(facts).toContainText(new RegExp(`Textures\\s*${textures}`));
   await shoot(page, "dropped-folder");
   rmSync(folder, { recursive: true });
+});
+
+test("a model with Z up is turned with its cage and pose, and files keep their axes", async ({ page }) => {
+  await open(page);
+  await drop(page, [
+    { name: "tower.obj", bytes: box([0.5, 0.7, 1.5]) },
+    { name: "tower-cage.obj", bytes: box([0.8, 1, 2]) },
+  ]);
+  await bound(page);
+  await drag(page, 30, -20);
+  const lying = await cagePositions(page);
+  await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  const choice = page.getByRole("group", { name: "Up in the file" });
+  await choice.getByRole("radio", { name: "Z" }).click();
+  // By -90 degrees about x. A kept pose has 16 bits for the longest way of a vertex.
+  const TOLERANCE = 1e-3;
+  const farthest = (a: number[], b: number[]) => Math.max(...a.map((x, k) => Math.abs(x - (b[k] ?? 1e9))));
+  const upright = lying.map((x, k) => [x, lying[k + 1] ?? 0, -(lying[k - 1] ?? 0)][k % 3] ?? 0);
+  await expect.poll(async () => farthest(await cagePositions(page), upright)).toBeLessThan(TOLERANCE);
+  await bound(page);
+  const files = await page.evaluate(() => {
+    const engine = globalThis.cagework?.engine;
+    const cage = new TextDecoder().decode(engine?.exportCage());
+    return { cage, project: Array.from(engine?.writeProject([], [], "{}") ?? []) };
+  });
+  const written = files.cage.match(/^v .*/gm)?.flatMap((line) => line.split(" ").slice(1).map(Number));
+  expect(farthest(written ?? [], lying)).toBeLessThan(TOLERANCE);
+  await shoot(page, "turned");
+  await drop(page, [{ name: "tower.cagework.glb", bytes: Uint8Array.from(files.project) }]);
+  await bound(page);
+  await expect(choice.getByLabel("Z")).toBeChecked();
+  const heights = (await cagePositions(page)).filter((_, k) => k % 3 === 1);
+  expect(Math.max(...heights)).toBe(2);
 });
 
 test("bad files say what is wrong, and the model stays", async ({ page, complaints }) => {

@@ -126,6 +126,7 @@ async function main(): Promise<void> {
       if (pose) current().engine.decodePose(pose);
       edit.sync();
     },
+    writeProject: project.write,
   });
 
   const choose = (accept: string, folder: boolean, then: (files: NamedFile[]) => void) => {

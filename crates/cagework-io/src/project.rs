@@ -84,9 +84,7 @@ pub fn write_project(
     let mut view =
         |json: &mut Value, bytes: Vec<u8>| json!({ "bufferView": pack.push_view(json, bytes, None) });
     let mut project = json!({ "version": VERSION, "name": model.name, "node": node, "settings": settings });
-    if up == UpAxis::Z {
-        project["up"] = "z".into();
-    }
+    project["up"] = up.name().into();
     if let Some(source) = source {
         project["source"] = view(&mut json, source.clone());
     }
@@ -133,7 +131,7 @@ pub fn read_project(name: &str, bytes: &[u8]) -> Result<Option<Project>, Project
     };
     let model_name = project["name"].as_str().unwrap_or(name);
     // Projects from before the choice have none.
-    let up = if project["up"] == "z" { UpAxis::Z } else { UpAxis::Y };
+    let up = project["up"].as_str().and_then(UpAxis::named).unwrap_or_default();
     let positions_of = |bytes: &[u8]| Some(up.turned(&positions_of(bytes)?).into_owned());
     let cage = &project["cage"];
     let positions = view(&cage["positions"]).and_then(positions_of).ok_or(damaged("its cage is cut off"))?;

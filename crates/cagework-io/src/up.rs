@@ -17,6 +17,21 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
+    /// The axis as files and the page call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Y => "y",
+            Self::Z => "z",
+        }
+    }
+
+    /// The axis of that name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::Y, Self::Z].into_iter().find(|up| up.name() == name)
+    }
+
     /// Positions of a file with Y up.
     #[must_use]
     pub fn turned(self, positions: &[Vec3]) -> Cow<'_, [Vec3]> {

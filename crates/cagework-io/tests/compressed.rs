@@ -31,7 +31,7 @@ fn draco_stream() -> Vec<u8> {
     mesh.add_attribute(positions);
     mesh.set_num_faces(CUBE_TRIANGLES.len());
     for (f, t) in (0..).zip(CUBE_TRIANGLES) {
-        mesh.set_face(FaceIndex(f), t.map(|v| PointIndex(u32::from(v))));
+        mesh.set_face(FaceIndex(f), t.map(PointIndex));
     }
     let mut encoder = MeshEncoder::new();
     encoder.set_mesh(mesh);
@@ -59,7 +59,7 @@ fn meshopt(extension: &str) -> Builder {
     let workspace = &mut Workspace::default();
     let encoding = VertexEncoding::new(0, 0).unwrap();
     let vertices = encode_vertex_buffer(&floats(), CUBE.len(), 12, encoding, workspace).unwrap();
-    let corners: Vec<u32> = CUBE_TRIANGLES.as_flattened().iter().map(|&v| u32::from(v)).collect();
+    let corners: Vec<u32> = CUBE_TRIANGLES.as_flattened().to_vec();
     let indices = encode_index_buffer(&corners, IndexEncoding::DEFAULT, workspace).unwrap();
     for (key, stream, mode, count, stride) in [
         ("attributes", vertices, "ATTRIBUTES", CUBE.len(), 12),

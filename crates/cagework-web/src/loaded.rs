@@ -2,7 +2,7 @@
 
 use cagework_core::PolygonMesh;
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
-use cagework_io::{Look, LookAlpha, LookWrap, Model, read_project};
+use cagework_io::{Look, LookAlpha, LookWrap, Model, UpAxis, read_project};
 use glam::Vec3;
 use js_sys::{Function, Uint8Array};
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -10,6 +10,7 @@ use wasm_bindgen::{JsCast as _, JsValue};
 
 use crate::arrays::flat;
 use crate::error::Answer;
+use crate::options::unknown;
 
 /// A model with its looks, and what else was in its file.
 #[wasm_bindgen]
@@ -47,6 +48,22 @@ impl Loaded {
                 self.textures[image as usize].wrap = group.wrap.map(wrap);
             }
         }
+    }
+
+    /// Says what points up in the file, y or z: model, cage and poses are turned.
+    ///
+    /// # Errors
+    /// When it is another word.
+    #[wasm_bindgen(js_name = setUp)]
+    pub fn set_up(&mut self, up: &str) -> Result<(), JsValue> {
+        let (before, up) = (self.model.up(), UpAxis::named(up).ok_or_else(|| unknown("axis", up))?);
+        let turn = |positions: &mut Vec<Vec3>| {
+            *positions = up.turned(&before.turned_back(positions)).into_owned();
+        };
+        self.model.set_up(up);
+        self.cage.iter_mut().for_each(|cage| turn(&mut cage.positions));
+        self.poses.iter_mut().for_each(|(_, positions)| turn(positions));
+        Ok(())
     }
 
     /// Textures to decode.

@@ -9,7 +9,7 @@ use cagework_core::slice::Slice;
 use cagework_core::{Bounds, Cage, PolygonMesh};
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, GizmoPart};
-use cagework_io::Model;
+use cagework_io::{Model, UpAxis};
 use glam::{Vec2, Vec3};
 
 use crate::error::Fault;
@@ -96,6 +96,11 @@ impl State {
 
     pub(crate) fn model_positions(&self) -> Option<&[Vec3]> {
         self.model.as_ref().map(|m| &m.positions[..])
+    }
+
+    /// What points up in the model's file.
+    pub(crate) fn up(&self) -> UpAxis {
+        self.model.as_ref().map_or_else(UpAxis::default, Model::up)
     }
 
     /// Tells the camera where everything is.

@@ -31,6 +31,7 @@ impl BoundsView {
 pub(crate) struct ModelInfo {
     name: String,
     format: &'static str,
+    up: &'static str,
     vertices: usize,
     triangles: usize,
     faces: usize,
@@ -49,6 +50,7 @@ impl ModelInfo {
         Self {
             name: model.name.clone(),
             format: model.format().name(),
+            up: model.up().name(),
             vertices: model.positions.len(),
             triangles: model.triangles.len(),
             faces: model.n_faces(),

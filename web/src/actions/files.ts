@@ -1,6 +1,6 @@
 /** Opening: samples, files and projects. What is opened gets a cage and is bound without further questions. */
 
-import type { NamedFile, Opened, Sample } from "../contract";
+import type { NamedFile, Opened, Sample, UpAxis } from "../contract";
 import { planDrop } from "../drop";
 import { stem } from "../format";
 import type { StepName } from "../state";
@@ -13,6 +13,8 @@ export interface Files {
   openSample(id: string): Promise<boolean>;
   /** Files of a drop or a file button; names and kinds decide. */
   openFiles(files: readonly NamedFile[]): Promise<boolean>;
+  /** The model with another axis up; its cage and poses turn with it. */
+  turn(up: UpAxis): Promise<boolean>;
 }
 
 export interface Follow {
@@ -25,6 +27,8 @@ export interface Follow {
   applySettings(settings: Settings): void;
   /** And its pose. */
   applyPose(settings: Settings): void;
+  /** What is open, as a project. */
+  writeProject(): Uint8Array;
 }
 
 /** Largest file read without asking, bytes: beyond it the browser's memory for the page is at risk. */
@@ -127,6 +131,11 @@ export function createFiles(ctx: Context, follow: Follow): Files {
         const own = files.filter((file) => file !== second);
         const opened = await ctx.session().openFiles([main, ...own.filter((file) => file !== main)]);
         await take(opened, null, second ? [second] : undefined);
+      });
+    },
+    turn(up) {
+      return busy("Turning the model", "The model could not be turned", async () => {
+        await take(await ctx.session().turn(follow.writeProject(), up), null);
       });
     },
   };

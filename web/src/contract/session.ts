@@ -28,6 +28,8 @@ export interface Session {
    */
   openFiles(files: readonly NamedFile[]): Promise<Opened>;
   openSample(id: string): Promise<Opened>;
+  /** Opens a project again with another axis up: model, cage and poses are turned. */
+  turn(project: Uint8Array, up: UpAxis): Promise<Opened>;
   /** A cage from a file (.obj, .glb, .gltf). A mesh that is no cage yet is kept as a draft: `usable` is false. */
   openCage(files: readonly NamedFile[]): Promise<CageState>;
   /** Makes a cage for the model, in the worker. */
@@ -95,9 +97,13 @@ export interface Opened {
   readonly poses?: readonly Pose[];
 }
 
+/** What points up in the model's file; inside, and on the screen, Y does. */
+export type UpAxis = "y" | "z";
+
 export interface ModelInfo {
   readonly name: string;
   readonly format: "obj" | "gltf";
+  readonly up: UpAxis;
   readonly vertices: number;
   readonly triangles: number;
   readonly faces: number;

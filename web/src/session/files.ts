@@ -1,6 +1,6 @@
 /** Dropped files to bytes: which one is the model, and where its siblings are. */
 
-import type { NamedFile } from "../contract";
+import type { NamedFile, UpAxis } from "../contract";
 import { extension, isModel } from "../drop";
 import type { Loaded } from "../pkg/cagework";
 import type { Package } from "./artifact";
@@ -14,6 +14,8 @@ export interface Bytes {
   readonly name: string;
   readonly bytes: Uint8Array;
   readonly sibling: (path: string) => Uint8Array | undefined;
+  /** What points up in it, if that is not what the file says. */
+  readonly up?: UpAxis;
 }
 
 /** The model's bytes and those of its siblings. */
@@ -65,7 +67,7 @@ export interface Read {
 const pause = () => new Promise((resolve) => setTimeout(resolve));
 
 /** Reads a model, decompressed if need be, its textures decoded. */
-export async function load(pkg: Package, { name, bytes, sibling }: Bytes): Promise<Read> {
+export async function load(pkg: Package, { name, bytes, sibling, up }: Bytes): Promise<Read> {
   let loaded: Loaded;
   try {
     loaded = pkg.Loaded.read(name, bytes, sibling);
@@ -74,6 +76,7 @@ export async function load(pkg: Package, { name, bytes, sibling }: Bytes): Promi
     const { decompress } = await import("../decode");
     loaded = pkg.Loaded.read(name, await decompress(name, bytes, sibling), sibling);
   }
+  if (up) loaded.setUp(up);
   await pause();
   loaded.prepare();
   const failed = await decodeTextures(loaded);

@@ -1,15 +1,23 @@
 /** Step 1: what is open, how to open something else, and samples. */
 
 import type { App } from "../app";
-import type { ModelInfo } from "../contract";
+import type { ModelInfo, UpAxis } from "../contract";
 import { count, scientific } from "../format";
 import { PRIVACY, SAMPLES, sentence } from "../strings";
-import { button, facts, head, section } from "./controls";
+import { button, facts, head, section, segments } from "./controls";
 import { fill, h, keyed } from "./dom";
 import { icon } from "./icons";
 
 export function createModelPanel(app: App): HTMLElement {
   const card = h("div");
+  const up = segments<UpAxis>(
+    "Up in the file",
+    [
+      { value: "y", label: "Y", title: "As glTF prescribes" },
+      { value: "z", label: "Z", title: "Turn a model that lies on its back" },
+    ],
+    (axis) => void app.files.turn(axis),
+  );
   const gallery = h("ul", { class: "gallery" });
   const element = h(
     "div",
@@ -37,12 +45,15 @@ export function createModelPanel(app: App): HTMLElement {
     ),
     section("Samples", gallery),
     card,
+    up.element,
     h("p", { class: "privacy" }, icon("lock"), h("span", { text: PRIVACY })),
   );
 
   app.store.watch(["model", "sample", "samples"], ({ model, sample, samples }) => {
     const sentenceOf = samples.find(({ id }) => id === sample)?.sentence;
     fill(card, model ? modelCard(model, sentenceOf) : null);
+    up.element.hidden = !model;
+    if (model) up.set(model.up);
   });
 
   const showSamples = keyed(gallery, () =>

@@ -117,6 +117,13 @@ fn draco(json: &mut Value, buffers: &mut Buffers, place: &str, packed: &Value) -
         }
         let view = json!({ "byteStride": stride });
         fill(json, buffers, accessor as usize, bytes, view, (kind, mesh.num_points()))?;
+        if name != "POSITION"
+            && let Some(accessor) = json["accessors"][accessor as usize].as_object_mut()
+        {
+            // They are of the values before Draco's quantisation. A deformed shape gets bounds of its own.
+            accessor.shift_remove("min");
+            accessor.shift_remove("max");
+        }
     }
     let corners = mesh.faces().iter().flatten();
     let bytes: Vec<u8> = corners.flat_map(|corner| corner.0.to_le_bytes()).collect();

@@ -113,9 +113,10 @@ impl ObjDocument {
         let mut first_face = HashMap::new();
         for ((face, ends), &group) in (1..).zip(self.face_starts.windows(2)).zip(&self.face_smoothing) {
             let surface = if group == 0 { face } else { *first_face.entry(group).or_insert(face) };
-            for c in ends[0] as usize..ends[1] as usize {
-                if self.normal(&self.corners[c]) == Vec3::ZERO {
-                    surfaces[c] = surface;
+            let corners = ends[0] as usize..ends[1] as usize;
+            for (of_corner, corner) in surfaces[corners.clone()].iter_mut().zip(&self.corners[corners]) {
+                if self.normal(corner) == Vec3::ZERO {
+                    *of_corner = surface;
                 }
             }
         }

@@ -11,6 +11,7 @@ use super::Engine;
 use crate::arrays::{corners, flat, points, polygon_mesh};
 use crate::error::{Answer, Fault};
 use crate::options::BindAsked;
+use crate::state::State;
 use crate::views::object;
 
 /// Room between the model and a box around it, in diagonals of the model.
@@ -37,7 +38,7 @@ impl Engine {
         Ok(self.put_cage(mesh)?)
     }
 
-    /// Reads a cage from a file; a mesh that is no cage yet becomes a draft.
+    /// Reads a cage from a file with the model's axes; a mesh that is no cage yet becomes a draft.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -47,7 +48,8 @@ impl Engine {
             let found = sibling.call1(&JsValue::NULL, &path.into()).ok()?;
             Some(found.dyn_into::<Uint8Array>().ok()?.to_vec())
         };
-        let model = Model::read(name, bytes, &mut resolve).map_err(Fault::from)?;
+        let mut model = Model::read(name, bytes, &mut resolve).map_err(Fault::from)?;
+        model.set_up(self.read(State::up));
         model.require_faces().map_err(Fault::from)?;
         Ok(self.put_cage(model.cage_mesh())?)
     }
@@ -142,11 +144,14 @@ impl Engine {
         Ok(bytes as f64)
     }
 
-    /// The pose of the moment in few bytes.
+    /// The pose of the moment in few bytes, in the axes of the model's file.
     #[wasm_bindgen(js_name = encodePose)]
     #[must_use]
     pub fn encode_pose(&self) -> Vec<u8> {
-        self.read(|state| encode_pose(&state.rest.positions, &state.positions))
+        self.read(|state| {
+            let in_file = |positions| state.up().turned_back(positions);
+            encode_pose(&in_file(&state.rest.positions), &in_file(&state.positions))
+        })
     }
 
     /// Takes a pose from `encodePose`.
@@ -155,8 +160,9 @@ impl Engine {
     /// When it is damaged or belongs to another cage.
     #[wasm_bindgen(js_name = decodePose)]
     pub fn decode_pose(&self, bytes: &[u8]) -> Result<(), JsValue> {
-        let pose = self.read(|state| decode_pose(&state.rest.positions, bytes)).map_err(Fault::from)?;
-        self.change(|state| state.move_to(pose));
+        let pose = self.read(|state| decode_pose(&state.up().turned_back(&state.rest.positions), bytes));
+        let pose = pose.map_err(Fault::from)?;
+        self.change(|state| state.move_to(state.up().turned(&pose).into_owned()));
         Ok(())
     }
 }

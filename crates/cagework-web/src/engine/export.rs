@@ -54,7 +54,7 @@ impl Engine {
         if mesh.faces.is_empty() {
             return Err(Fault::missing("cage", "make one first").into());
         }
-        Ok(write_cage_obj(&mesh))
+        Ok(write_cage_obj(&self.read(State::up).mesh_turned_back(&mesh)))
     }
 
     /// Weights as NPZ, which SciPy loads.
