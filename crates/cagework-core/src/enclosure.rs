@@ -163,7 +163,7 @@ mod tests {
                 let expected = winding_number(p.as_dvec3(), &triangles);
                 match columns.winding_number(p.as_dvec3()) {
                     Some(actual) => {
-                        assert!((actual - expected).abs() < ROUNDING, "{p}: {actual}, {expected}")
+                        assert!((actual - expected).abs() < ROUNDING, "{p}: {actual}, {expected}");
                     }
                     None => left += 1,
                 }

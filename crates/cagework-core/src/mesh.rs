@@ -1,8 +1,7 @@
 //! Meshes as plain arrays, their bounds, and welding of vertices that were split at seams.
 
-use std::collections::HashMap;
-
 use glam::Vec3;
+use rustc_hash::{FxBuildHasher, FxHashMap};
 
 /// Axis-aligned bounding box, in object units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,7 +74,8 @@ pub struct Weld {
 /// Welds vertices whose positions are equal (`-0` equals `0`); the order of first occurrence is kept.
 #[must_use]
 pub fn weld(positions: &[Vec3]) -> Weld {
-    let mut seen: HashMap<[u32; 3], u32> = HashMap::with_capacity(positions.len());
+    let mut seen: FxHashMap<[u32; 3], u32> =
+        FxHashMap::with_capacity_and_hasher(positions.len(), FxBuildHasher);
     let mut welded = Weld { first: Vec::new(), unique_of: Vec::with_capacity(positions.len()) };
     for (v, p) in positions.iter().enumerate() {
         // Adding zero turns -0 into +0, so that both have the same bits.

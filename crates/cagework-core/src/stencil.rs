@@ -69,8 +69,7 @@ pub fn jacobi_cells(
 ) {
     for row in rows {
         for lane in 0..n_lanes {
-            u_out[row * n_lanes + lane] =
-                gather(level, n_lanes, row, lane, rhs, u_in) / level.diagonal[row];
+            u_out[row * n_lanes + lane] = gather(level, n_lanes, row, lane, rhs, u_in) / level.diagonal[row];
         }
     }
 }

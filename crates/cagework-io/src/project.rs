@@ -112,8 +112,14 @@ pub fn write_project(
 /// # Errors
 /// [`ProjectError`] when it is one that cannot be read.
 pub fn read_project(name: &str, bytes: &[u8]) -> Result<Option<Project>, ProjectError> {
-    // A search is cheaper than a parse of every GLB that is opened.
-    if !bytes.starts_with(b"glTF") || !bytes.windows(EXTENSION.len()).any(|w| w == EXTENSION.as_bytes()) {
+    // A search is cheaper than a parse of every GLB that is opened. Its first chunk is the JSON.
+    let json = match bytes {
+        [b'g', b'l', b'T', b'F', _, _, _, _, _, _, _, _, a, b, c, d, _, _, _, _, rest @ ..] => {
+            &rest[..rest.len().min(u32::from_le_bytes([*a, *b, *c, *d]) as usize)]
+        }
+        _ => return Ok(None),
+    };
+    if !json.windows(EXTENSION.len()).any(|w| w == EXTENSION.as_bytes()) {
         return Ok(None);
     }
     let damaged = |what| ProjectError::Damaged { name: name.into(), what };

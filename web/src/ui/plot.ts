@@ -85,8 +85,10 @@ export function drawPlot(element: SVGSVGElement, curves: readonly Curve[], tau: 
     const above = y(tau) > HEIGHT - BOTTOM - LABEL;
     parts.push(
       svg("line", { x1: LEFT, x2: WIDTH - RIGHT, y1: y(tau), y2: y(tau), class: "tau" }),
-      // On the left, where they are still high.
-      label(LEFT + 4, y(tau) + (above ? -4 : LABEL), "done below this", "start"),
+      // Where curves are still high: on the left, or on the right where the short ones end on the left.
+      scale.logarithmic
+        ? label(WIDTH - RIGHT - 4, y(tau) + (above ? -4 : LABEL), "done below this", "end")
+        : label(LEFT + 4, y(tau) + (above ? -4 : LABEL), "done below this", "start"),
     );
   }
   for (const curve of curves) {

@@ -26,7 +26,6 @@ export function createSeePanel(app: App): HTMLElement {
     ],
     (value) => view.scene({ colour: value }),
   );
-  colour.element.classList.add("wrapping");
   const about = h("p", { class: "hint" });
   const compare = toggle(
     "Harmonic beside mean value",

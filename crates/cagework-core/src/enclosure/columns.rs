@@ -39,7 +39,7 @@ impl<'a> Columns<'a> {
         let mut columns =
             Self { triangles, low, per_unit, side, extent, over: vec![Vec::new(); side * side] };
         for (number, triangle) in (0u32..).zip(triangles) {
-            let corners = triangle.map(|p| p.truncate());
+            let corners = triangle.map(DVec3::truncate);
             let near = DVec2::splat(NEAR * extent);
             let [first, last] = [
                 columns.column(corners[0].min(corners[1]).min(corners[2]) - near),
