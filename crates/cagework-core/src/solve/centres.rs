@@ -2,7 +2,7 @@
 //!
 //! After a red-black sweep that ends with black, the residual is zero on black cells and, once errors are smooth, nearly the
 //! same on neighbouring red ones: the red cell in a coarse cell's centre stands for all that restriction would gather, and
-//! a quarter of the red residuals are enough (what it does to convergence: measured, see ARCHITECTURE.md). Not for a first
+//! a quarter of the red residuals are enough (measured: docs/notes/multigrid.md). Not for a first
 //! guess, whose residuals differ from cell to cell.
 
 use crate::grid::NO_CELL;

@@ -233,8 +233,9 @@ pub fn over_relax_plane(level: &Level, colour: usize, plane: usize, omega: f32, 
         own,
         #[inline(always)]
         |row, visit| {
+            let old = *row;
             for k in 0..LANES {
-                row[k] += omega * (visit.sum[k] / visit.diagonal - row[k]);
+                row[k] = old[k] + omega * (visit.sum[k] / visit.diagonal - old[k]);
             }
         },
     );
