@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::Instant;
 
-use cagework_core::Weights;
 use cagework_core::deform::deform_bound;
+use cagework_core::{Controls, Weights};
 use cagework_io::read_weights_npz;
 use glam::Vec3;
 use serde::Serialize;
@@ -58,7 +58,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     let (weights, outside) =
         read_weights_npz(&read(&args.weights)?).map_err(|e| CliError::file(&args.weights, e))?;
     let n_vertices = model.positions.len();
-    let n_cage = cage.cage.positions().len();
+    let n_cage = Controls::from(&cage.cage).n_controls();
     check_weights(&args.weights, &weights, n_vertices, n_cage)?;
     let poses = args.pose.iter().map(|path| cage.load_pose(path)).collect::<Result<Vec<_>, _>>()?;
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use cagework_core::bind::Binding;
 use cagework_core::slice::Slice;
-use cagework_core::{Cage, Weights, mean_value_weights};
+use cagework_core::{Cage, Controls, Weights, mean_value_weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView};
 use cagework_io::{Model, read_weights_npz};
@@ -165,7 +165,7 @@ fn prepare(
     session: &mut Session,
     scene: &mut SceneOptions,
 ) -> Result<(), CliError> {
-    let n_cage = cage.cage.n_vertices();
+    let n_cage = Controls::from(&cage.cage).n_controls();
     if matches!(args.show, Show::Weights | Show::Slice) && args.column as usize >= n_cage {
         return Err(CliError::Mismatch {
             message: format!("--column is {}, but the cage has {n_cage} vertices", args.column),

@@ -128,7 +128,6 @@ pub(crate) enum Colour {
     Clay,
     Weight,
     Error,
-    Negative,
 }
 
 /// What the slice shows.

@@ -18,11 +18,11 @@ impl State {
             Colour::Material => MeshStyle::Solid,
             Colour::Clay => MeshStyle::Clay,
             Colour::Error if self.is_bound => MeshStyle::Errors,
-            Colour::Weight | Colour::Negative if self.is_bound => match self.selection.last() {
+            Colour::Weight if self.is_bound => match self.selection.last() {
                 Some(column) => MeshStyle::Weights { column },
                 None => MeshStyle::Clay,
             },
-            Colour::Weight | Colour::Negative | Colour::Error => MeshStyle::Clay,
+            Colour::Weight | Colour::Error => MeshStyle::Clay,
         }
     }
 

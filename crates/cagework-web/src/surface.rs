@@ -125,7 +125,8 @@ impl Surface {
         &mut self,
         session: &mut Session,
         other: Option<&mut Session>,
-        (size, scale): ([u32; 2], f32),
+        size: [u32; 2],
+        scale: f32,
         wanted: Wanted,
     ) -> Answer<Drawn> {
         let context = session.context().clone();

@@ -15,6 +15,23 @@ use crate::solve::rows::{LANES, Row, ZERO};
 /// and the system is singular in its normal direction, along which there is nothing to correct.
 const RIDGE: f64 = 1e-7;
 
+/// What a row of weights adds up to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sums {
+    /// Its sum.
+    pub sum: f64,
+    /// Distance between `sum w c` and a target over the cage's diagonal.
+    pub miss: f64,
+}
+
+impl Sums {
+    /// How far it is from a row that sums to 1 and meets the target.
+    #[must_use]
+    pub fn error(&self) -> f64 {
+        self.miss.max((self.sum - 1.0).abs())
+    }
+}
+
 /// The controls as columns of weights: rows of lanes, as batches are.
 #[derive(Clone, Debug)]
 pub struct Columns {
@@ -61,12 +78,12 @@ impl Columns {
         (point - self.center) / self.diagonal
     }
 
-    /// (sum of a row, distance between `sum w c` and the target over the diagonal). `row`: `[n_batches]`.
+    /// What a row adds up to. `row`: `[n_batches]`.
     #[inline(always)]
     #[must_use]
-    pub fn sums(&self, row: &[Row], target: DVec3) -> (f64, f64) {
+    pub fn sums(&self, row: &[Row], target: DVec3) -> Sums {
         let (sum, point) = self.combined(row);
-        (sum, (point - target).length())
+        Sums { sum, miss: (point - target).length() }
     }
 
     /// (sum of a row, where it puts its vertex in the columns' units). `row`: `[n_batches]`.
@@ -95,7 +112,7 @@ impl Columns {
     /// Corrects a row so that it sums to 1 and reproduces `target` ([`Self::scale`]d). Returns what [`Self::sums`] said of it
     /// before, to f32.
     #[inline(always)]
-    pub fn restore_affine(&self, row: &mut [Row], target: DVec3) -> (f64, f64) {
+    pub fn restore_affine(&self, row: &mut [Row], target: DVec3) -> Sums {
         let t = target.as_vec3();
         let [x, y, z] = &self.scaled;
         // 1; x, y, z; xx, xy, xz, yy, yz, zz, each weighted and summed. In variables of their own, not in an array:
@@ -127,7 +144,8 @@ impl Columns {
             DVec4::new(m[2], m[5], m[7], m[8]),
             DVec4::new(m[3], m[6], m[8], m[9]),
         );
-        let before = (m[0], (DVec3::new(m[1], m[2], m[3]) + (m[0] - 1.0) * target).length());
+        let point_off = DVec3::new(m[1], m[2], m[3]) + (m[0] - 1.0) * target;
+        let before = Sums { sum: m[0], miss: point_off.length() };
         let ridge = RIDGE * (m[0] + m[4] + m[7] + m[9]);
         let lambda = (matrix + DMat4::from_diagonal(DVec4::splat(ridge))).inverse() * (DVec4::X - sums);
         if !lambda.is_finite() {

@@ -4,6 +4,7 @@ use crate::report::{MeanMax, RawError, RestError, WeightStats};
 use crate::solve::rows::{LANES, Row, ZERO};
 
 use super::Assembled;
+use super::affine::Sums;
 
 /// What was found out about a row of weights.
 #[derive(Clone, Copy, Debug)]
@@ -17,28 +18,25 @@ pub struct RowFacts {
     /// Its largest weight.
     pub high: f32,
     /// Before it was restored; none for vertices outside.
-    pub raw: Option<RawFacts>,
+    pub raw: Option<RawRow>,
 }
 
 /// What was found out about a row before it was restored.
 #[derive(Clone, Copy, Debug)]
-pub struct RawFacts {
-    /// How far its sum was from 1.
-    pub sum_error: f32,
-    /// Distance between `sum w c` and the vertex over the cage's diagonal.
-    pub error: f32,
+pub struct RawRow {
+    /// What it added up to.
+    pub sums: Sums,
     /// Its lowest value, before negative ones were taken for 0.
-    pub low: f32,
+    pub lowest: f32,
 }
 
 impl RowFacts {
-    /// Facts about a row (`[n_batches]`) with these (sum, distance from the vertex); `raw`, for vertices inside: the same before
-    /// it was restored, and its lowest value.
+    /// Facts about a row (`[n_batches]`) that adds up to `sums`; `raw`, for vertices inside: before it was restored.
     // One copy for all callers in wasm: each would be downloaded.
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
     #[cfg_attr(target_family = "wasm", inline(never))]
     #[must_use]
-    pub fn of(row: &[Row], (sum, miss): (f64, f64), raw: Option<((f64, f64), f32)>) -> Self {
+    pub fn of(row: &[Row], sums: Sums, raw: Option<RawRow>) -> Self {
         // Comparisons, not `min` and `max`: wasm has no instruction for theirs, which say what becomes of NaN.
         let (mut lows, mut highs) = ([f32::INFINITY; LANES], ZERO);
         for row in row {
@@ -53,10 +51,8 @@ impl RowFacts {
             low = if lows[k] < low { lows[k] } else { low };
             high = if highs[k] > high { highs[k] } else { high };
         }
-        let off = |sum: f64| (sum - 1.0).abs() as f32;
-        let raw_facts =
-            |((sum, miss), low): ((f64, f64), f32)| RawFacts { sum_error: off(sum), error: miss as f32, low };
-        Self { error: raw.map(|_| miss as f32), sum_error: off(sum), low, high, raw: raw.map(raw_facts) }
+        let sum_error = (sums.sum - 1.0).abs() as f32;
+        Self { error: raw.map(|_| sums.miss as f32), sum_error, low, high, raw }
     }
 }
 
@@ -87,14 +83,14 @@ impl Assembled {
         }
         let raw = || self.facts.iter().filter_map(|facts| facts.raw);
         let n = raw().count().max(1) as f64;
-        let mean_max = |of: fn(RawFacts) -> f32| MeanMax {
-            mean: raw().map(|r| f64::from(of(r))).sum::<f64>() / n,
-            max: raw().map(|r| f64::from(of(r))).fold(0.0, f64::max),
+        let mean_max = |of: fn(RawRow) -> f64| MeanMax {
+            mean: raw().map(of).sum::<f64>() / n,
+            max: raw().map(of).fold(0.0, f64::max),
         };
         let raw_error = RawError {
-            sum: mean_max(|r| r.sum_error),
-            point_rel: mean_max(|r| r.error),
-            min_weight: raw().map(|r| r.low).reduce(f32::min).unwrap_or_default(),
+            sum: mean_max(|r| (r.sums.sum - 1.0).abs()),
+            point_rel: mean_max(|r| r.sums.miss),
+            min_weight: raw().map(|r| r.lowest).reduce(f32::min).unwrap_or_default(),
         };
         (rest_error, raw_error, weights)
     }

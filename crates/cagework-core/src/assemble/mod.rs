@@ -11,12 +11,12 @@ use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 use crate::team::{Team, VERTEX_RUN};
 
-pub use self::facts::RowFacts;
+pub use self::facts::{RawRow, RowFacts};
 
 use self::entries::Entries;
 use crate::weights::Weights;
 
-use affine::Columns;
+use affine::{Columns, Sums};
 
 /// Rows whose sums miss by less than this (of the cage's diagonal) are good: two units in the last place of an f32
 /// near 1.
@@ -248,7 +248,7 @@ impl Run<'_> {
                 let raw = columns.sums(&row, target);
                 (raw, raw)
             };
-            self.facts.push(RowFacts::of(&row, stored, (!outside).then_some((raw, lowest))));
+            self.facts.push(RowFacts::of(&row, stored, (!outside).then_some(RawRow { sums: raw, lowest })));
             take(self, v, &row);
         }
     }
@@ -271,7 +271,7 @@ impl Run<'_> {
     }
 
     /// Drops what is below the threshold and restores the row, or keeps all if that cannot be had. `row` holds the
-    /// vertex's sampled values. Returns the (sum, distance from the goal over the diagonal) of the sampled row and of this.
+    /// vertex's sampled values. Returns what the sampled row and this one add up to.
     #[inline(always)]
     fn restore_row(
         &self,
@@ -286,17 +286,14 @@ impl Run<'_> {
         }
         let sampled = columns.sums(row, goal);
         self.load(v, threshold, row);
-        let (_, (sum, miss)) = restore(columns, row, goal);
-        if miss.max((sum - 1.0).abs()) <= NOT_RESTORED {
-            return (sampled, (sum, miss));
+        let (_, restored) = restore(columns, row, goal);
+        if restored.error() <= NOT_RESTORED {
+            return (sampled, restored);
         }
         self.load(v, 0.0, row);
         restore(columns, row, goal)
     }
 }
-
-/// Sum of a row, and how far it misses a place over the diagonal.
-type Sums = (f64, f64);
 
 /// Corrects a row until it sums to 1 and puts its vertex at `goal`; returns its sums before (to f32) and after.
 // Part of its callers where they are compiled for several instruction sets; elsewhere four copies would be downloaded.
@@ -306,7 +303,7 @@ fn restore(columns: &Columns, row: &mut [Row], goal: DVec3) -> (Sums, Sums) {
     let before = columns.restore_affine(row, goal);
     let mut after = columns.sums(row, goal);
     for _ in 1..MAX_CORRECTIONS {
-        if after.1.max((after.0 - 1.0).abs()) <= GOOD_ENOUGH {
+        if after.error() <= GOOD_ENOUGH {
             break;
         }
         columns.restore_affine(row, goal);

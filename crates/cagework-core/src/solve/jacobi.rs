@@ -14,7 +14,7 @@
 //! Eq. 2 couples all columns of a cell, so all batches' fields are alive together here, unlike in multigrid.
 
 use super::hierarchy::Hierarchy;
-use super::rows::{LANES, Rhs, Row, ZERO, jacobi_plane};
+use super::rows::{Changes, LANES, Rhs, Row, ZERO, jacobi_plane};
 use super::stop::{SolveReport, StopRule};
 use crate::levels::Level;
 use crate::options::DeltaNorm;
@@ -176,7 +176,7 @@ impl Share {
         }
         for batch in &mut self.batches {
             for changes in &mut self.changes[..round] {
-                let (old, new, f) = (&mut batch.old, &mut batch.new, Rhs::Cut(&batch.f));
+                let (old, new, f) = (&batch.old, &mut batch.new, Rhs::Cut(&batch.f));
                 sweep(level, old, new, f, norm, changes);
                 std::mem::swap(&mut batch.old, &mut batch.new);
             }
@@ -185,14 +185,14 @@ impl Share {
 }
 
 /// One sweep of both colours; plane by plane, so that both read a plane while it is near.
-fn sweep(level: &Level, old: &mut [Row], new: &mut [Row], f: Rhs<'_>, norm: DeltaNorm, changes: &mut [f32]) {
+fn sweep(level: &Level, old: &[Row], new: &mut [Row], f: Rhs<'_>, norm: DeltaNorm, changes: &mut [f32]) {
     dispatch(
         #[inline(always)]
         || {
             for plane in 0..level.grid.dims[2] as usize {
                 for colour in 0..2 {
-                    let first = level.first_row(colour);
-                    jacobi_plane(level, colour, plane, [old, new], f, norm, &mut changes[first..]);
+                    let of_cells = &mut changes[level.first_row(colour)..];
+                    jacobi_plane(level, colour, plane, old, new, f, Changes { norm, of_cells });
                 }
             }
         },

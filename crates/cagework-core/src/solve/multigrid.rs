@@ -164,7 +164,7 @@ impl Workspace {
         let (u, coarse_u) = self.u.split_at_mut(k + 1);
         let residual = &mut self.residual[..level.first_row(1)];
         let rhs = Self::rhs(f, k, self.is_finest_dense);
-        let squares = stream(start, level, (transfer, &coarse_u[0]), &mut u[k], rhs, residual);
+        let squares = stream(start, level, transfer, &coarse_u[0], &mut u[k], rhs, residual);
         let mean_square = dispatch(
             #[inline(always)]
             || {
@@ -187,8 +187,8 @@ impl Workspace {
         if k + 1 < hierarchy.levels.len() {
             let (u, coarse_u) = self.u.split_at_mut(k + 1);
             let rhs = Self::rhs(&self.f, k, self.is_finest_dense);
-            let from = (&hierarchy.transfers[k], coarse_u[0].as_slice());
-            stream(passes, &hierarchy.levels[k], from, &mut u[k], rhs, &mut []);
+            let (level, transfer) = (&hierarchy.levels[k], &hierarchy.transfers[k]);
+            stream(passes, level, transfer, &coarse_u[0], &mut u[k], rhs, &mut []);
         }
     }
 }

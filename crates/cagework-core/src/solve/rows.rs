@@ -77,6 +77,12 @@ pub fn split<'a>(level: &Level, field: &'a mut [Row], colour: usize) -> (&'a mut
 }
 
 #[inline(always)]
+fn halves<'a>(level: &Level, field: &'a [Row], colour: usize) -> Halves<'a> {
+    let (red, black) = field.split_at(level.first_row(1));
+    if colour == 0 { Halves { own: red, other: black } } else { Halves { own: black, other: red } }
+}
+
+#[inline(always)]
 fn add(sum: &mut Row, row: &Row) {
     for k in 0..LANES {
         sum[k] += row[k];
@@ -104,6 +110,15 @@ struct Visit {
     diagonal: f32,
 }
 
+/// A field, as one colour sees it.
+#[derive(Clone, Copy)]
+struct Halves<'a> {
+    /// Its own values; may be empty where they are not looked at.
+    own: &'a [Row],
+    /// The other colour's.
+    other: &'a [Row],
+}
+
 /// Calls `each(row of out, visit)` for each cell of a colour's plane; `old`, if `OLD`, is the field that [`Visit::old`]
 /// comes from, else it may be empty.
 ///
@@ -113,11 +128,12 @@ fn visit_plane<const OLD: bool>(
     level: &Level,
     colour: usize,
     plane: usize,
-    [old, other]: [&[Row]; 2],
+    field: Halves<'_>,
     rhs: ColourRhs<'_>,
     out: &mut [Row],
     mut each: impl FnMut(&mut Row, Visit),
 ) {
+    let Halves { own: old, other } = field;
     let colour = &level.colours[colour];
     let [runs, cut] = colour.of_plane(plane);
     for run in &colour.runs[runs] {
@@ -182,7 +198,7 @@ pub fn over_relax_zeros_plane(
         level,
         colour,
         plane,
-        [&[], other],
+        Halves { own: &[], other },
         rhs.of(level, colour),
         own,
         #[inline(always)]
@@ -228,7 +244,7 @@ pub fn over_relax_plane(level: &Level, colour: usize, plane: usize, omega: f32, 
         level,
         colour,
         plane,
-        [&[], other],
+        Halves { own: &[], other },
         rhs.of(level, colour),
         own,
         #[inline(always)]
@@ -253,14 +269,12 @@ pub fn residual_plane(
     residual: &mut [Row],
     squares: &mut Row,
 ) {
-    let (red, black) = u.split_at(level.first_row(1));
-    let parts = if colour == 0 { [red, black] } else { [black, red] };
     let mut sum_squares = *squares;
     visit_plane::<true>(
         level,
         colour,
         plane,
-        parts,
+        halves(level, u, colour),
         rhs.of(level, colour),
         residual,
         #[inline(always)]
@@ -278,26 +292,33 @@ pub fn residual_plane(
     *squares = sum_squares;
 }
 
-/// Jacobi on one plane of one colour, from `old` to `new`; `changes[cell]` grows by the cell's change, squared and
-/// summed over lanes, or, literally, its absolute value, summed.
+/// Where a sweep adds up how far cells have moved.
+#[derive(Debug)]
+pub struct Changes<'a> {
+    /// What is summed over lanes: squares, or, literally, absolute values.
+    pub norm: DeltaNorm,
+    /// Of each cell of the colour.
+    pub of_cells: &'a mut [f32],
+}
+
+/// Jacobi on one plane of one colour, from `old` to `new`, both `[n_rows]`; `changes` grow by the cells' changes.
 #[inline(always)]
 pub fn jacobi_plane(
     level: &Level,
     colour: usize,
     plane: usize,
-    [old, new]: [&mut [Row]; 2],
+    old: &[Row],
+    new: &mut [Row],
     rhs: Rhs<'_>,
-    norm: DeltaNorm,
-    changes: &mut [f32],
+    changes: Changes<'_>,
 ) {
-    let (old, other) = split(level, old, colour);
     let (new, _) = split(level, new, colour);
-    let is_literal = norm == DeltaNorm::Literal;
+    let (is_literal, changes) = (changes.norm == DeltaNorm::Literal, changes.of_cells);
     visit_plane::<true>(
         level,
         colour,
         plane,
-        [old, other],
+        halves(level, old, colour),
         rhs.of(level, colour),
         new,
         #[inline(always)]

@@ -82,7 +82,7 @@ impl Mesh {
             };
             groups.push(Group::new(context, layouts, &mut allocator, &group, view, wrap)?);
         }
-        let vertices = bind_vertices(context, layouts, [&rest, &rest_normals, &values]);
+        let vertices = bind_vertices(context, layouts, &rest, &rest_normals, &values);
         let n_vertices = n as u32;
         let positions = rest.clone();
         allocator.settle().await?;
@@ -97,7 +97,7 @@ impl Mesh {
         positions: &Table,
         normals: &Table,
     ) {
-        self.vertices = bind_vertices(context, layouts, [positions, normals, &self.values]);
+        self.vertices = bind_vertices(context, layouts, positions, normals, &self.values);
         self.positions = positions.clone();
     }
 
@@ -144,7 +144,9 @@ impl Mesh {
 fn bind_vertices(
     context: &GpuContext,
     layouts: &Layouts,
-    [positions, normals, values]: [&Table; 3],
+    positions: &Table,
+    normals: &Table,
+    values: &Table,
 ) -> wgpu::BindGroup {
     context.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("vertices"),

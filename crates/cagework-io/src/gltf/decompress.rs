@@ -116,7 +116,7 @@ fn draco(json: &mut Value, buffers: &mut Buffers, place: &str, packed: &Value) -
             bytes.resize(bytes.len().next_multiple_of(4), 0);
         }
         let view = json!({ "byteStride": stride });
-        fill(json, buffers, accessor as usize, bytes, view, (kind, mesh.num_points()))?;
+        fill(json, buffers, accessor as usize, bytes, view, kind, mesh.num_points())?;
         if name != "POSITION"
             && let Some(accessor) = json["accessors"][accessor as usize].as_object_mut()
         {
@@ -131,7 +131,7 @@ fn draco(json: &mut Value, buffers: &mut Buffers, place: &str, packed: &Value) -
         Some(indices) => indices as usize,
         None => push(json, "accessors", json!({ "type": "SCALAR" })),
     };
-    fill(json, buffers, indices, bytes, json!({}), (UNSIGNED_INT, 3 * mesh.num_faces()))?;
+    fill(json, buffers, indices, bytes, json!({}), UNSIGNED_INT, 3 * mesh.num_faces())?;
     json.pointer_mut(place).ok_or("its primitive is not there")?["indices"] = indices.into();
     Ok(())
 }
@@ -160,7 +160,8 @@ fn fill(
     accessor: usize,
     bytes: Vec<u8>,
     mut view: Value,
-    (kind, count): (u32, usize),
+    component_type: u32,
+    count: usize,
 ) -> Result<(), String> {
     view["byteLength"] = bytes.len().into();
     view["buffer"] = push_buffer(json, buffers, bytes).into();
@@ -171,7 +172,7 @@ fn fill(
         .ok_or_else(|| format!("accessor {accessor} is not there"))?;
     accessor.shift_remove("byteOffset");
     accessor.insert("bufferView".into(), view.into());
-    accessor.insert("componentType".into(), kind.into());
+    accessor.insert("componentType".into(), component_type.into());
     accessor.insert("count".into(), count.into());
     Ok(())
 }

@@ -70,7 +70,7 @@ pub(crate) fn patch(
         let normal = has_normals.then(|| pack.push_vec3(&mut json, &shape.normals, false));
         let tangent = tangents.map(|t| pack.push_floats(&mut json, &t, 4, true, false));
         let primitive = &mut json["meshes"][place.mesh]["primitives"][slot.primitive as usize];
-        patch_primitive(primitive, place.detached, [Some(position), normal, tangent], indices);
+        patch_primitive(primitive, place.detached, Some(position), normal, tangent, indices);
         shapes.push(shape);
     }
     for pose in poses {
@@ -270,7 +270,9 @@ fn is_mirrored(document: &GltfDocument, slot: &Slot) -> Result<bool, WriteError>
 fn patch_primitive(
     primitive: &mut Value,
     detached: bool,
-    [position, normal, tangent]: [Option<usize>; 3],
+    position: Option<usize>,
+    normal: Option<usize>,
+    tangent: Option<usize>,
     indices: Option<usize>,
 ) {
     if let Some(object) = primitive.as_object_mut() {

@@ -104,8 +104,8 @@ impl Engine {
         }
         state.write(&mut gpu.main, gpu.other.as_mut());
         let pixels = (state.size * state.scale).round();
-        let target = ([pixels.x as u32, pixels.y as u32], state.scale);
+        let (size, scale) = ([pixels.x as u32, pixels.y as u32], state.scale);
         let other = gpu.other.as_mut().filter(|_| state.is_split());
-        gpu.surface.draw(&mut gpu.main, other, target, wanted)
+        gpu.surface.draw(&mut gpu.main, other, size, scale, wanted)
     }
 }

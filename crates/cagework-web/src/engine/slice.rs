@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use cagework_core::slice::Slice;
-use cagework_core::{BindOptions, Weights};
+use cagework_core::{BindOptions, Controls, Weights};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -33,7 +33,12 @@ impl Engine {
             let (_, cage) = state.parts()?;
             let mut slice = Slice::new(cage, &BindOptions::from(asked), axis.min(2), fraction);
             if !data.is_empty() {
-                slice.set_weights(Weights::new(cage.n_vertices() as u32, indptr, indices, data)?)?;
+                slice.set_weights(Weights::new(
+                    Controls::from(cage).n_controls() as u32,
+                    indptr,
+                    indices,
+                    data,
+                )?)?;
             }
             Answer::Ok(slice)
         })?;

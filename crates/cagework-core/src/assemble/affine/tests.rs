@@ -34,7 +34,7 @@ proptest! {
         let off: Vec<f32> = exact.iter().zip(&noise).map(|(w, n)| w * (1.0 + n)).collect();
         let mut row = rows_of(&off);
         columns.restore_affine(&mut row, columns.scale(target));
-        let (sum, miss) = columns.sums(&row, columns.scale(target));
+        let Sums { sum, miss } = columns.sums(&row, columns.scale(target));
         prop_assert!((sum - 1.0).abs() <= RESTORED && miss <= RESTORED, "sum {}, off by {}", sum, miss);
         for (i, w) in row.iter().flatten().take(16).enumerate() {
             prop_assert_eq!(*w == 0.0, off[i] == 0.0);
@@ -60,7 +60,7 @@ fn row_on_a_face_is_corrected_within_its_plane() {
     let mut row = rows_of(&[0.3, 0.2, 0.3, 0.1, 0.0, 0.0, 0.0, 0.0]);
     let target = columns.scale(DVec3::new(0.4, 0.5, 0.0));
     columns.restore_affine(&mut row, target);
-    let (sum, miss) = columns.sums(&row, target);
+    let Sums { sum, miss } = columns.sums(&row, target);
     assert!((sum - 1.0).abs() <= RESTORED && miss <= RESTORED, "sum {sum}, off by {miss}");
     assert!(row[0].iter().all(|w| *w >= 0.0) && row[0][4..].iter().all(|w| *w == 0.0));
 }

@@ -55,7 +55,8 @@ pub(super) const BETWEEN_SHORT: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red
 pub(super) fn stream(
     passes: &[Pass],
     level: &Level,
-    (transfer, coarse): (&Transfer, &[Row]),
+    transfer: &Transfer,
+    coarse: &[Row],
     u: &mut [Row],
     f: Rhs<'_>,
     residual: &mut [Row],
