@@ -135,7 +135,7 @@ fn expected_error(squares: &[f64]) -> f64 {
     let window = (n / 2).min(WINDOW);
     let latest = squares[n - 1].sqrt();
     if window == 0 {
-        return latest * SLOWEST / (1.0 - SLOWEST);
+        return 1.0;
     }
     let sum = |part: &[f64]| part.iter().sum::<f64>();
     let (now, before) = (sum(&squares[n - window..]), sum(&squares[n - 2 * window..n - window]));
@@ -145,7 +145,8 @@ fn expected_error(squares: &[f64]) -> f64 {
     let rate = (now / before).powf(0.5 / window as f64).min(SLOWEST);
     // As the window lets expect, where one change may lie below the others by the ripple.
     let usual = (now / window as f64).sqrt() * rate.powf(0.5 * (window - 1) as f64);
-    usual.max(latest) * rate / (1.0 - rate)
+    // No weight is off by more than 1.
+    (usual.max(latest) * rate / (1.0 - rate)).min(1.0)
 }
 
 /// `a . b` of each lane.
