@@ -11,6 +11,7 @@ use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::progress::Silent;
 use cagework_core::sample::Stencils;
 use cagework_core::sample::embedded::Sampler;
+use cagework_core::solve::BatchSolver as _;
 use cagework_core::solve::hierarchy::Hierarchy;
 use cagework_core::solve::multigrid::Workspace;
 use cagework_core::voxelize::embedded::Embedding;

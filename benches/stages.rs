@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use cagework_benches::{GRIDS, Input, resident_workspaces, solve_all, solve_batch};
 use cagework_core::assemble::{RowOptions, assemble};
+use cagework_core::solve::BatchSolver as _;
 use cagework_core::solve::multigrid::Workspace;
 use cagework_core::team::Team;
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};

@@ -220,7 +220,7 @@ mod tests {
         let hierarchy = hierarchy();
         let rule = StopRule { tolerance: 1e-6, max_iterations: 500 };
         let mut multigrid = Workspace::new(&hierarchy);
-        BatchSolver::solve(&mut multigrid, &hierarchy, 0, rule, &mut |_, _| true).unwrap();
+        multigrid.solve(&hierarchy, 0, rule, &mut |_, _| true).unwrap();
         let mut n_steps = Vec::new();
         for is_preconditioned in [false, true] {
             let mut solver = ConjugateGradient::new(&hierarchy, is_preconditioned);

@@ -70,45 +70,6 @@ impl Workspace {
         }
     }
 
-    /// Solves a batch; see [`BatchSolver::solve`].
-    ///
-    /// # Errors
-    /// `None` when cancelled.
-    pub fn solve(
-        &mut self,
-        hierarchy: &Hierarchy,
-        batch: usize,
-        rule: StopRule,
-        cycle_done: &mut dyn FnMut(u32, f64) -> bool,
-    ) -> Option<SolveReport> {
-        let coarsest = hierarchy.levels.len() - 1;
-        self.is_finest_dense = false;
-        hierarchy.fill_cut_rhs(batch, &mut self.f[0]);
-        for k in (1..=coarsest).rev() {
-            hierarchy.fill_dense_rhs(k, batch, &mut self.f[k]);
-            self.cycle(hierarchy, k, if k == coarsest { DOWN_FROM_ZERO } else { DOWN_FROM_COARSE });
-        }
-        let mut start = if coarsest == 0 { DOWN_FROM_ZERO } else { DOWN_FROM_COARSE };
-        let mut convergence = Convergence::new(rule);
-        loop {
-            let (correction_square, residual_square) = self.down(hierarchy, 0, start);
-            let done = convergence.cycle_done(correction_square, residual_square);
-            let (cycle, delta) = convergence.latest();
-            if !cycle_done(cycle, delta) {
-                return None;
-            }
-            if done {
-                self.up(hierarchy, 0, UP);
-                return Some(convergence.into_report());
-            }
-            start = match coarsest {
-                0 => DOWN,
-                _ if convergence.is_nearly_done(SPARE) => BETWEEN_SHORT,
-                _ => BETWEEN,
-            };
-        }
-    }
-
     /// One V(2,1) cycle from zero for any right-hand side: `z` becomes roughly the solution of `A z = r`. Both `[n_rows]`.
     pub fn precondition(&mut self, hierarchy: &Hierarchy, r: &mut Vec<Row>, z: &mut Vec<Row>) {
         self.is_finest_dense = true;
@@ -117,12 +78,6 @@ impl Workspace {
         self.cycle(hierarchy, 0, DOWN_FROM_ZERO);
         std::mem::swap(&mut self.f[0], r);
         std::mem::swap(&mut self.u[0], z);
-    }
-
-    /// The finest level's field, `[n_rows]`.
-    #[must_use]
-    pub fn field(&self) -> &[Row] {
-        &self.u[0]
     }
 
     /// One full relaxation of the finest level, both colours, as the solver does it: the unit in which a solve's
@@ -199,13 +154,38 @@ impl BatchSolver for Workspace {
         hierarchy: &Hierarchy,
         batch: usize,
         rule: StopRule,
-        done: &mut dyn FnMut(u32, f64) -> bool,
+        cycle_done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<SolveReport> {
-        self.solve(hierarchy, batch, rule, done)
+        let coarsest = hierarchy.levels.len() - 1;
+        self.is_finest_dense = false;
+        hierarchy.fill_cut_rhs(batch, &mut self.f[0]);
+        for k in (1..=coarsest).rev() {
+            hierarchy.fill_dense_rhs(k, batch, &mut self.f[k]);
+            self.cycle(hierarchy, k, if k == coarsest { DOWN_FROM_ZERO } else { DOWN_FROM_COARSE });
+        }
+        let mut start = if coarsest == 0 { DOWN_FROM_ZERO } else { DOWN_FROM_COARSE };
+        let mut convergence = Convergence::new(rule);
+        loop {
+            let (correction_square, residual_square) = self.down(hierarchy, 0, start);
+            let done = convergence.cycle_done(correction_square, residual_square);
+            let (cycle, delta) = convergence.latest();
+            if !cycle_done(cycle, delta) {
+                return None;
+            }
+            if done {
+                self.up(hierarchy, 0, UP);
+                return Some(convergence.into_report());
+            }
+            start = match coarsest {
+                0 => DOWN,
+                _ if convergence.is_nearly_done(SPARE) => BETWEEN_SHORT,
+                _ => BETWEEN,
+            };
+        }
     }
 
     fn field(&self) -> &[Row] {
-        self.field()
+        &self.u[0]
     }
 
     fn bytes(&self) -> usize {

@@ -4,10 +4,14 @@
 //! (`[red .., 0, black .., 0]`). Every kernel works on one z-plane of one colour, so that callers can let several
 //! half sweeps follow each other a plane apart and a whole smoothing pass reads the field from memory once.
 
-use crate::grid::NO_CELL;
 use crate::levels::Level;
 use crate::options::DeltaNorm;
 use crate::transfer::{ProlongRow, RESTRICT_CENTRE, RESTRICT_EDGE, RestrictRow, Transfer};
+
+mod rhs;
+
+use rhs::ColourRhs;
+pub use rhs::Rhs;
 
 /// Columns of a batch: one AVX register, two of SSE, NEON or wasm. Measured on the Armadillo: with 16, a solve takes
 /// 25 % less time at g = 64, where a batch fits the second-level cache, and 40 % more at g = 128, where it does not.
@@ -21,53 +25,6 @@ pub const ZERO: Row = [0.0; LANES];
 
 /// Changes of a weight below this do not count: their squares would be denormal numbers.
 const NEGLIGIBLE: f32 = 1e-18;
-
-/// Right-hand side of one level.
-#[derive(Clone, Copy, Debug)]
-pub enum Rhs<'a> {
-    /// One row per cut cell, red ones first: all that the cage's values ask for. The finest level's.
-    Cut(&'a [Row]),
-    /// One row per cell, in field order. A coarse level's.
-    Dense(&'a [Row]),
-    /// Zero everywhere.
-    Zero,
-}
-
-impl Rhs<'_> {
-    /// The right-hand side of a red cell, which is number `cut` of the red cut cells; none for whole cells that need none.
-    #[inline(always)]
-    pub(super) fn of_red(&self, cell: u32, cut: u32) -> Option<&Row> {
-        match self {
-            Self::Cut(rows) => (cut != NO_CELL).then(|| &rows[cut as usize]),
-            Self::Dense(rows) => Some(&rows[cell as usize]),
-            Self::Zero => None,
-        }
-    }
-}
-
-/// One colour's part of a [`Rhs`].
-#[derive(Clone, Copy)]
-enum ColourRhs<'a> {
-    Cut(&'a [Row]),
-    Dense(&'a [Row]),
-    Zero,
-}
-
-impl<'a> Rhs<'a> {
-    fn of(self, level: &Level, colour: usize) -> ColourRhs<'a> {
-        match self {
-            Self::Cut(rows) => {
-                let (red, black) = rows.split_at(level.colours[0].cut.len());
-                ColourRhs::Cut(if colour == 0 { red } else { black })
-            }
-            Self::Dense(rows) => {
-                let (red, black) = rows.split_at(level.first_row(1));
-                ColourRhs::Dense(if colour == 0 { red } else { black })
-            }
-            Self::Zero => ColourRhs::Zero,
-        }
-    }
-}
 
 /// Both colours of a field: (the one that is written, the one that is read).
 #[inline(always)]

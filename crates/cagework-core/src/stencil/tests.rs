@@ -5,6 +5,7 @@ use crate::cage_gen::subdivided_box;
 use crate::mesh::Bounds;
 use crate::options::BindOptions;
 use crate::progress::Silent;
+use crate::solve::BatchSolver as _;
 use crate::solve::jacobi;
 use crate::solve::multigrid::{COARSEST_OMEGA, COARSEST_SWEEPS, OMEGA, Workspace};
 use crate::solve::rows::{LANES, Row};

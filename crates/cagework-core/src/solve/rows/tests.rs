@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::grid::Grid;
+use crate::grid::NO_CELL;
 use crate::levels::plain::{cells, hierarchy, on_two_levels, some_field};
 use crate::options::DeltaNorm;
 use crate::solve::operator;
