@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::report::Timings;
 use cagework_core::{BindReport, Cage};
-use cagework_io::{Model, UpAxis};
+use cagework_io::{Model, UpAxis, shown};
 use serde::Serialize;
 
 use crate::args::BenchArgs;
@@ -164,7 +164,10 @@ fn median(sorted: &[f64]) -> f64 {
 fn text(bench: &Bench) -> String {
     let mut out = format!(
         "{}: {} vertices, {} cage vertices; medians of {} binds\n",
-        bench.mesh, bench.vertices, bench.cage_vertices, bench.runs
+        shown(&bench.mesh),
+        bench.vertices,
+        bench.cage_vertices,
+        bench.runs
     );
     for grid in &bench.grids {
         let _ = writeln!(

@@ -2,6 +2,7 @@
 
 use cagework_core::PolygonMesh;
 use cagework_core::cage_gen::CageReport;
+use cagework_io::shown;
 use serde::Serialize;
 
 use crate::args::{CageArgs, DEFAULT_DIVISIONS, KindArg, ModelOutput};
@@ -84,12 +85,14 @@ fn text(made: &Made) -> String {
     let Some(report) = &made.report else {
         return format!(
             "wrote {}: a box of {} vertices and {} faces",
-            made.output, made.vertices, made.faces
+            shown(&made.output),
+            made.vertices,
+            made.faces
         );
     };
     let mut text = format!(
         "wrote {}: {} vertices and {} triangles in {:.0} ms; it keeps {} from the model",
-        made.output,
+        shown(&made.output),
         made.vertices,
         made.faces,
         report.elapsed_ms,

@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use cagework_core::BindReport;
 use cagework_core::options::{CellShape, Method, Preconditioner, Solver};
 
+use crate::files::shown_path;
+
 /// Lines on one bind. `model_notices`: what reading the mesh had to say; `written`: files that were written.
 pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathBuf]) -> String {
     let mut out = format!("bound {} vertices to {} cage vertices\n", report.vertices, report.cage_vertices);
@@ -83,7 +85,7 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
         let _ = writeln!(out, "note: {notice}");
     }
     for path in written {
-        let _ = writeln!(out, "wrote {}", path.display());
+        let _ = writeln!(out, "wrote {}", shown_path(path));
     }
     out
 }

@@ -3,13 +3,13 @@
 use std::fmt::Write as _;
 
 use cagework_core::cage_check::{CageCheck, Fix, Repair, Severity, check, repair};
-use cagework_io::UpAxis;
+use cagework_io::{UpAxis, shown};
 use serde::Serialize;
 
 use crate::args::CheckArgs;
 use crate::cage::write_cage;
 use crate::error::CliError;
-use crate::files::{check_outputs, json, print};
+use crate::files::{check_outputs, json, print, shown_path};
 use crate::load::load_model;
 
 /// What `check` says; its JSON is the output of `--json`.
@@ -62,7 +62,7 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
     Err(CliError::Mismatch {
         message: format!(
             "{} cannot be used as a cage: {errors} {}",
-            args.cage.display(),
+            shown_path(&args.cage),
             if errors == 1 { "kind of fault" } else { "kinds of faults" }
         ),
         hint: "`cagework check CAGE --repair weld,drop-degenerate,fill-holes,flip -o FILE` mends what it can",
@@ -73,7 +73,7 @@ fn text(checked: &Checked) -> String {
     let check = &checked.check;
     let mut out = format!(
         "{}: {} vertices, {} faces, {} {}\n",
-        checked.file,
+        shown(&checked.file),
         check.vertices,
         check.faces,
         check.components,
@@ -108,7 +108,7 @@ fn text(checked: &Checked) -> String {
         out.push('\n');
     }
     if let Some(output) = &checked.output {
-        let _ = writeln!(out, "wrote {output}");
+        let _ = writeln!(out, "wrote {}", shown(output));
     }
     out
 }

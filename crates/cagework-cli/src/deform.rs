@@ -5,14 +5,14 @@ use std::time::Instant;
 
 use cagework_core::deform::deform_bound;
 use cagework_core::{Controls, Weights};
-use cagework_io::read_weights_npz;
+use cagework_io::{read_weights_npz, shown};
 use glam::Vec3;
 use serde::Serialize;
 
 use crate::args::{CageSource, DeformArgs};
 use crate::bind::export;
 use crate::error::CliError;
-use crate::files::{check_outputs, json, print, read, write};
+use crate::files::{check_outputs, json, print, read, shown_path, write};
 use crate::load::{load_cage, load_model};
 
 /// What was done; its JSON is the output of `--json`.
@@ -45,7 +45,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         return Err(CliError::Mismatch {
             message: format!(
                 "{}: a file of format {} holds one pose, but {} were given",
-                output.display(),
+                shown_path(output),
                 format.name(),
                 args.pose.len()
             ),
@@ -104,7 +104,7 @@ pub(crate) fn check_weights(
         message: format!(
             "{}: holds weights of {} mesh vertices for {} cage vertices, but the mesh has {n_vertices} vertices and \
              the cage {n_cage}",
-            path.display(),
+            shown_path(path),
             weights.n_rows(),
             weights.n_columns(),
         ),
@@ -119,13 +119,20 @@ fn pose_name(path: &Path) -> String {
 
 fn text(done: &Deformed) -> String {
     let poses = if let [only] = done.poses.as_slice() {
-        format!("pose {only}")
+        format!("pose {}", shown(only))
     } else {
-        format!("{} poses as morph targets ({}) and an animation", done.poses.len(), done.poses.join(", "))
+        format!(
+            "{} poses as morph targets ({}) and an animation",
+            done.poses.len(),
+            shown(&done.poses.join(", "))
+        )
     };
     let mut out = format!(
         "deformed {} vertices by {} cage vertices in {:.1} ms\nwrote {}: {poses}\n",
-        done.vertices, done.cage_vertices, done.deform_ms, done.output
+        done.vertices,
+        done.cage_vertices,
+        done.deform_ms,
+        shown(&done.output)
     );
     for notice in &done.notices {
         out += &format!("note: {notice}\n");

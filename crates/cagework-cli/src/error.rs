@@ -9,13 +9,16 @@ use cagework_core::cage::CageError;
 use cagework_core::cage_check::RepairError;
 use cagework_core::cage_gen::CageGenError;
 use cagework_gpu::GpuError;
+use cagework_io::shown;
 use thiserror::Error;
+
+use crate::files::shown_path;
 
 /// Why a command failed.
 #[derive(Debug, Error)]
 pub(crate) enum CliError {
     /// Something about a file.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}", shown_path(path))]
     File {
         /// The file.
         path: PathBuf,
@@ -29,7 +32,7 @@ pub(crate) enum CliError {
     #[error(transparent)]
     Pose(#[from] cagework_io::PoseError),
     /// The cage is not one.
-    #[error("{name}: {source}")]
+    #[error("{}: {source}", shown(name))]
     Cage {
         /// File or description of the cage.
         name: String,

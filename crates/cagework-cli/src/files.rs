@@ -1,9 +1,13 @@
 //! Files in and out: the only place of the command that touches the file system.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
+use cagework_io::shown;
+use cap_fs_ext::OpenOptionsSyncExt as _;
+use cap_std::ambient_authority;
+use cap_std::fs::{Dir, File, OpenOptions};
 use serde::Serialize;
 
 use crate::error::CliError;
@@ -14,41 +18,66 @@ const MAX_FILE_BYTES: u64 = 2 << 30;
 /// Reads a whole file.
 ///
 /// # Errors
-/// When it is missing, a folder, empty, too large, or cannot be read.
+/// When it is missing, no regular file, empty, too large, or cannot be read.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, CliError> {
-    let fail = |message: String| CliError::file(path, message);
-    let metadata = fs::metadata(path).map_err(|e| fail(reason(&e)))?;
-    if metadata.is_dir() {
-        return Err(fail("is a folder, not a file".into()));
-    }
-    if metadata.len() > MAX_FILE_BYTES {
-        return Err(fail(format!(
-            "is {} MiB large; at most {} MiB are read",
-            metadata.len() >> 20,
-            MAX_FILE_BYTES >> 20
-        )));
-    }
-    let mut bytes = Vec::new();
-    // A pipe has no length: limit it while reading.
-    let read = File::open(path).and_then(|file| file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes));
-    read.map_err(|e| fail(reason(&e)))?;
-    if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(fail(format!("is more than {} MiB large, which is not read", MAX_FILE_BYTES >> 20)));
-    }
-    if bytes.is_empty() {
-        return Err(fail("is empty".into()));
-    }
-    Ok(bytes)
+    let file = File::open_ambient_with(path, &to_read(), ambient_authority()).map_err(|e| reason(&e));
+    file.and_then(content).map_err(|problem| CliError::file(path, problem))
 }
 
-/// Reads a file that another one names by a relative path, such as a glTF's buffer; nothing when it cannot be read.
-pub(crate) fn read_beside(main: &Path, relative: &str) -> Option<Vec<u8>> {
-    let relative = Path::new(relative);
-    // A model must not name files elsewhere on the machine.
-    if relative.is_absolute() {
-        return None;
+/// Reads a file that another one names by a relative path, such as a glTF's buffer. Nothing when there is none.
+///
+/// # Errors
+/// When [`read`] refuses it, or the path or a link on it leads out of the other file's folder; as what follows its name.
+pub(crate) fn read_beside(main: &Path, relative: &str) -> Option<Result<Vec<u8>, String>> {
+    let folder = Dir::open_ambient_dir(folder_of(main), ambient_authority());
+    match folder.and_then(|folder| folder.open_with(relative, &to_read())) {
+        Ok(file) => Some(content(file)),
+        Err(error) => match error.kind() {
+            ErrorKind::NotFound => None,
+            // Not from the operating system but from cap-std.
+            ErrorKind::PermissionDenied if error.raw_os_error().is_none() => {
+                Some(Err("leads out of the model's folder".into()))
+            }
+            _ => Some(Err(format!("cannot be read ({})", reason(&error)))),
+        },
     }
-    read(&main.parent().unwrap_or(Path::new("")).join(relative)).ok()
+}
+
+/// To open what may be a pipe: without this that waits until somebody writes.
+fn to_read() -> OpenOptions {
+    let mut options = OpenOptions::new();
+    options.read(true).nonblock(true);
+    options
+}
+
+/// All of an open file; or why not, as what follows its name.
+fn content(file: File) -> Result<Vec<u8>, String> {
+    // Of the open file: what the name means may have changed since.
+    let metadata = file.metadata().map_err(|e| reason(&e))?;
+    if metadata.is_dir() {
+        return Err("is a folder, not a file".into());
+    }
+    if !metadata.is_file() {
+        return Err("is a pipe or a device, not a regular file".into());
+    }
+    let too_large = |bytes: u64| {
+        let limit = MAX_FILE_BYTES >> 20;
+        (bytes > MAX_FILE_BYTES)
+            .then(|| format!("is {} MiB large; at most {limit} MiB are read", bytes >> 20))
+    };
+    if let Some(problem) = too_large(metadata.len()) {
+        return Err(problem);
+    }
+    // Files that the system makes as they are read, such as those in /proc, are of this length too.
+    if metadata.len() == 0 {
+        return Err("is empty".into());
+    }
+    let mut bytes = Vec::new();
+    let no_memory = || format!("needs {} MiB of memory to be read, more than there is", metadata.len() >> 20);
+    bytes.try_reserve_exact(metadata.len() as usize).map_err(|_| no_memory())?;
+    // It may grow meanwhile.
+    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|e| reason(&e))?;
+    too_large(bytes.len() as u64).map_or(Ok(bytes), Err)
 }
 
 /// Checks, before the work starts, that outputs can be written and will not destroy an input or each other.
@@ -62,8 +91,8 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
             return Err(CliError::Mismatch {
                 message: format!(
                     "{}: cannot be written, there is no folder {}",
-                    output.display(),
-                    folder.display()
+                    shown_path(output),
+                    shown_path(folder)
                 ),
                 hint: "make the folder first",
             });
@@ -73,13 +102,13 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
         }
         if inputs.iter().any(|input| same_file(input, output)) {
             return Err(CliError::Mismatch {
-                message: format!("{}: is an input and would be overwritten", output.display()),
+                message: format!("{}: is an input and would be overwritten", shown_path(output)),
                 hint: "choose another name for the output",
             });
         }
         if outputs[..i].iter().any(|other| same_file(other, output)) {
             return Err(CliError::Mismatch {
-                message: format!("{}: is named for two outputs", output.display()),
+                message: format!("{}: is named for two outputs", shown_path(output)),
                 hint: "choose different names",
             });
         }
@@ -114,6 +143,11 @@ pub(crate) fn print(text: &str) -> Result<(), CliError> {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(CliError::file(Path::new("stdout"), reason(&e))),
         _ => Ok(()),
     }
+}
+
+/// A path for a message.
+pub(crate) fn shown_path(path: &Path) -> String {
+    shown(&path.display().to_string())
 }
 
 /// A value as indented JSON.

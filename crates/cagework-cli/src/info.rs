@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use cagework_core::mesh::weld;
 use cagework_core::{Bounds, Cage};
-use cagework_io::Model;
+use cagework_io::{Model, shown};
 use serde::Serialize;
 
 use crate::args::InfoArgs;
@@ -107,7 +107,7 @@ fn is_closed(triangles: &[[u32; 3]], unique_of: &[u32]) -> bool {
 }
 
 fn text(info: &Info) -> String {
-    let mut out = format!("{} ({})\n", info.file, info.format);
+    let mut out = format!("{} ({})\n", shown(&info.file), info.format);
     let mut row = |name: &str, value: String| {
         let _ = writeln!(out, "  {name:<12}{value}");
     };

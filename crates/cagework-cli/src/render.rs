@@ -9,7 +9,7 @@ use cagework_core::slice::Slice;
 use cagework_core::{Cage, Controls, Weights, mean_value_weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView};
-use cagework_io::{Model, read_weights_npz};
+use cagework_io::{Model, read_weights_npz, shown};
 use serde::Serialize;
 
 use crate::args::{CageSource, RenderArgs, Show};
@@ -216,7 +216,9 @@ fn text(done: &Rendered) -> String {
     let [width, height] = done.size;
     let mut out = format!(
         "drew {width} x {height} pixels on {} in {:.0} ms\nwrote {}\n",
-        done.adapter, done.render_ms, done.output
+        done.adapter,
+        done.render_ms,
+        shown(&done.output)
     );
     if let Some([left, right]) = done.compared {
         out += &format!("left: {left}; right: {right}\n");

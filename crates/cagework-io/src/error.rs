@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::shown::shown;
+
 /// Why a model could not be written.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum WriteError {
@@ -36,7 +38,9 @@ pub enum WriteError {
 /// Why a file is not a pose of a cage.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
-    "pose {pose} has {given} vertices, but cage {cage} has {expected}: a pose keeps the cage's vertices and their order"
+    "pose {} has {given} vertices, but cage {} has {expected}: a pose keeps the cage's vertices and their order",
+    shown(pose),
+    shown(cage)
 )]
 pub struct PoseError {
     /// Name of the pose.

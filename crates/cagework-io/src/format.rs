@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::shown::shown;
+
 /// Format of a model's file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ModelFormat {
@@ -13,7 +15,7 @@ pub enum ModelFormat {
 
 /// The content of a file is no format that is read here.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("{name} is {found}: {hint}")]
+#[error("{} is {found}: {hint}", shown(name))]
 pub struct FormatError {
     /// Name the caller gave.
     pub name: String,

@@ -19,6 +19,8 @@ mod npz;
 mod obj;
 mod pose_code;
 mod project;
+mod shown;
+mod siblings;
 mod up;
 
 pub use counts::Counts;
@@ -31,4 +33,6 @@ pub use npz::{NpzError, read_weights_npz, write_weights_npz};
 pub use obj::{ObjError, write_cage_obj};
 pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
 pub use project::{Project, ProjectError, read_project, write_project};
+pub use shown::shown;
+pub use siblings::Resolve;
 pub use up::UpAxis;

@@ -81,9 +81,9 @@ pub enum LookWrap {
 /// An encoded image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LookImage {
-    /// PNG, JPEG or whatever the file has.
+    /// PNG, JPEG, WebP or KTX2.
     pub bytes: Vec<u8>,
-    /// Media type, by content where that is known.
+    /// Media type, by content.
     pub mime: String,
 }
 
@@ -108,13 +108,13 @@ impl LookVertex {
     }
 }
 
-/// Media type by content: a wrong `mimeType` makes viewers refuse the texture.
+/// Media type by content, of the formats that glTF has: what a file calls an image may be anything.
 pub(crate) fn sniff_image(bytes: &[u8]) -> Option<&'static str> {
     match bytes {
-        [0x89, b'P', b'N', b'G', ..] => Some("image/png"),
+        [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Some("image/png"),
         [0xff, 0xd8, 0xff, ..] => Some("image/jpeg"),
         [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some("image/webp"),
-        [0xab, b'K', b'T', b'X', b' ', b'2', b'0', ..] => Some("image/ktx2"),
+        [0xab, b'K', b'T', b'X', b' ', b'2', b'0', 0xbb, b'\r', b'\n', 0x1a, b'\n', ..] => Some("image/ktx2"),
         _ => None,
     }
 }

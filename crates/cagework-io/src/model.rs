@@ -13,6 +13,8 @@ use crate::format::{FormatError, ModelFormat};
 use crate::gltf::{self, GltfDocument, GltfError, Pose, Rest};
 use crate::look::Look;
 use crate::obj::{self, ObjDocument, ObjError};
+use crate::shown::shown;
+use crate::siblings::Resolve;
 use crate::up::UpAxis;
 
 /// Why bytes could not be read as a model.
@@ -23,7 +25,8 @@ pub enum ReadError {
     Format(#[from] FormatError),
     /// Vertices, but no faces, where faces are needed.
     #[error(
-        "{name} has {vertices} vertices but no faces: export it with faces (a file of positions only works as a pose)"
+        "{} has {vertices} vertices but no faces: export it with faces (a file of positions only works as a pose)",
+        shown(name)
     )]
     NoFaces {
         /// Name of the model.
@@ -32,7 +35,7 @@ pub enum ReadError {
         vertices: usize,
     },
     /// A fault in an OBJ file.
-    #[error("{name}: {source}")]
+    #[error("{}: {source}", shown(name))]
     Obj {
         /// Name the caller gave.
         name: String,
@@ -40,7 +43,7 @@ pub enum ReadError {
         source: ObjError,
     },
     /// A fault in a glTF file.
-    #[error("{name}: {source}")]
+    #[error("{}: {source}", shown(name))]
     Gltf {
         /// Name the caller gave.
         name: String,
@@ -77,16 +80,12 @@ impl Model {
     /// Reads an OBJ, glTF or GLB file; the content decides which, `name` helps with the error if it is none of them.
     ///
     /// `resolve` is asked for sibling files (buffers and textures of a `.gltf`, materials and textures of an OBJ) by
-    /// relative path, percent-decoded;
-    /// `data:` URIs are decoded here. A file of vertices without faces is read: it may be a pose.
+    /// relative path, each once; `data:` URIs are decoded here. A buffer that is not read is an error, anything else a
+    /// notice. A file of vertices without faces is read: it may be a pose.
     ///
     /// # Errors
     /// [`ReadError`], which names the line, accessor, node or file at fault.
-    pub fn read(
-        name: &str,
-        bytes: &[u8],
-        resolve: &mut dyn FnMut(&str) -> Option<Vec<u8>>,
-    ) -> Result<Self, ReadError> {
+    pub fn read(name: &str, bytes: &[u8], resolve: &mut Resolve<'_>) -> Result<Self, ReadError> {
         match ModelFormat::of_file(name, bytes)? {
             ModelFormat::Gltf => {
                 let fault = |source| ReadError::Gltf { name: name.into(), source };

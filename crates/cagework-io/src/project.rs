@@ -13,6 +13,7 @@ use thiserror::Error;
 use crate::error::WriteError;
 use crate::gltf::{self, PROJECT_EXTENSION as EXTENSION, Pack, push};
 use crate::model::{Document, Model, ReadError};
+use crate::shown::shown;
 use crate::up::UpAxis;
 
 /// Version that is written, and the only one that is read.
@@ -38,7 +39,10 @@ pub enum ProjectError {
     #[error(transparent)]
     Model(#[from] ReadError),
     /// From another version of this program.
-    #[error("{name} is a project of version {found}, but this program reads version {VERSION}: update it")]
+    #[error(
+        "{} is a project of version {found}, but this program reads version {VERSION}: update it",
+        shown(name)
+    )]
     Version {
         /// Name the caller gave.
         name: String,
@@ -46,7 +50,7 @@ pub enum ProjectError {
         found: u64,
     },
     /// A part of it is not what it should be.
-    #[error("{name} is a damaged project: {what}")]
+    #[error("{} is a damaged project: {what}", shown(name))]
     Damaged {
         /// Name the caller gave.
         name: String,

@@ -21,7 +21,7 @@ fn deformed(model: &Model) -> Vec<Vec3> {
 
 fn square() -> Model {
     let bytes = textured_square().glb();
-    Model::read("square.glb", &bytes, &mut |uri| (uri == "red dot.png").then(|| PNG.to_vec())).unwrap()
+    Model::read("square.glb", &bytes, &mut |uri| (uri == "red dot.png").then(|| Ok(PNG.to_vec()))).unwrap()
 }
 
 #[test]

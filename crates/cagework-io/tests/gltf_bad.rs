@@ -168,10 +168,10 @@ fn missing_files_are_named() {
     b.json["buffers"] = json!([{ "byteLength": 100, "uri": "far%20away.bin" }]);
     let text = serde_json::to_vec(&b.json).unwrap();
     let error = read("x.gltf", &text).unwrap_err();
-    let expected = GltfError::MissingFile { uri: "far away.bin".into() };
+    let expected = GltfError::MissingFile { uri: "far away.bin".into(), problem: "is not there".into() };
     assert_eq!(error, ReadError::Gltf { name: "x.gltf".into(), source: expected });
     let short =
-        cagework_io::Model::read("x.gltf", &text, &mut |_| Some(vec![0; 10])).unwrap_err().to_string();
+        cagework_io::Model::read("x.gltf", &text, &mut |_| Some(Ok(vec![0; 10]))).unwrap_err().to_string();
     assert!(short.contains("buffer 0 says it has 100 bytes but has 10"), "{short}");
 }
 

@@ -36,7 +36,7 @@ fn plain_glb_and_gltf_with_files_read_the_same() {
     json["buffers"] = json!([{ "byteLength": b.bin.len(), "uri": "my%20cube.bin" }]);
     let text = [b"\xef\xbb\xbf \n", serde_json::to_vec(&json).unwrap().as_slice()].concat();
     let with_file =
-        Model::read("x.gltf", &text[..], &mut |uri| (uri == "my cube.bin").then(|| b.bin.clone()));
+        Model::read("x.gltf", &text[..], &mut |uri| (uri == "my cube.bin").then(|| Ok(b.bin.clone())));
     // A byte order mark is not JSON, but some exporters write it; blanks after it are JSON.
     assert_eq!(with_file.unwrap().positions, cube());
     let hex: String = b.bin.iter().map(|byte| format!("%{byte:02x}")).collect();

@@ -16,7 +16,8 @@ fn look(builder: &Builder) -> Look {
 }
 
 fn obj(text: &str, files: &[(&str, &[u8])]) -> Look {
-    let mut resolve = |name: &str| files.iter().find(|(n, _)| *n == name).map(|(_, bytes)| bytes.to_vec());
+    let mut resolve =
+        |name: &str| files.iter().find(|(n, _)| *n == name).map(|(_, bytes)| Ok(bytes.to_vec()));
     Model::read("x.obj", text.as_bytes(), &mut resolve).unwrap().look()
 }
 
@@ -27,7 +28,7 @@ fn texture_is_found_beside_the_file() {
     b.json["textures"][0]["sampler"] = json!(0);
     let bytes = b.glb();
     let model =
-        Model::read("x.glb", &bytes, &mut |name| (name == "red dot.png").then(|| PNG.to_vec())).unwrap();
+        Model::read("x.glb", &bytes, &mut |name| (name == "red dot.png").then(|| Ok(PNG.to_vec()))).unwrap();
     let look = model.look();
     assert_eq!((look.images.len(), look.images[0].mime.as_str()), (1, "image/png"));
     assert_eq!(look.images[0].bytes, PNG);

@@ -14,7 +14,8 @@ const SETTINGS: &str = r#"{"grid":128,"name":"Überpose"}"#;
 
 fn models() -> Vec<Model> {
     let square = textured_square().glb();
-    let square = Model::read("square.glb", &square, &mut |uri| (uri == "red dot.png").then(|| PNG.to_vec()));
+    let square =
+        Model::read("square.glb", &square, &mut |uri| (uri == "red dot.png").then(|| Ok(PNG.to_vec())));
     let mut models = vec![square.unwrap()];
     models.extend(
         [plain_cube(), instanced(), skinned(), quantized()].map(|b| read("x.glb", &b.glb()).unwrap()),

@@ -129,7 +129,7 @@ impl Loaded {
         }
         let mut resolve = |path: &str| {
             let found = sibling.call1(&JsValue::NULL, &path.into()).ok()?;
-            Some(found.dyn_into::<Uint8Array>().ok()?.to_vec())
+            Some(Ok(found.dyn_into::<Uint8Array>().ok()?.to_vec()))
         };
         let model = Model::read(name, bytes, &mut resolve)?;
         model.require_faces()?;

@@ -16,7 +16,7 @@ use cagework_io::{Model, UpAxis};
 
 use crate::args::EvaluateArgs;
 use crate::error::CliError;
-use crate::files::{json, make_folder, print, write};
+use crate::files::{json, make_folder, print, shown_path, write};
 use crate::gpu;
 use crate::load::{BuiltIn, built_in, load_cage, load_model};
 
@@ -49,7 +49,7 @@ pub(crate) fn run(args: &EvaluateArgs, as_json: bool) -> Result<(), CliError> {
     print(&if as_json {
         json(&evaluation.summary())
     } else {
-        format!("{}\nwrote {}\n", words::verdicts(&evaluation), directory.join("report.md").display())
+        format!("{}\nwrote {}\n", words::verdicts(&evaluation), shown_path(&directory.join("report.md")))
     })
 }
 

@@ -10,5 +10,6 @@ mod cages;
 mod deform;
 mod evaluate;
 mod render;
+mod siblings;
 mod support;
 mod usage;

@@ -3,6 +3,8 @@
 //! Own decoder: that of the crate `gltf` asserts `f32` positions (so it panics on KHR_mesh_quantization) and slices
 //! unchecked. No count is believed before the bytes behind it are there.
 
+use std::sync::Arc;
+
 use ::gltf::json::Root;
 use ::gltf::json::accessor::{ComponentType, Type};
 use ::gltf::json::validation::Checked;
@@ -16,7 +18,7 @@ pub(crate) const MAX_ELEMENTS: u64 = 1 << 25;
 #[derive(Clone, Copy)]
 pub(crate) struct Source<'a> {
     pub(crate) root: &'a Root,
-    pub(crate) buffers: &'a [Vec<u8>],
+    pub(crate) buffers: &'a [Arc<Vec<u8>>],
 }
 
 /// One component as a number: `f32`, or an integer that is kept or normalised.

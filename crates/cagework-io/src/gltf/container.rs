@@ -1,6 +1,7 @@
 //! From bytes to JSON, buffers and images.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use ::gltf::binary::{Glb, Header};
 use ::gltf::json::Root;
@@ -8,8 +9,10 @@ use data_url::DataUrl;
 use percent_encoding::percent_decode_str;
 use serde_json::{Value, json};
 
-use super::{GltfError, Image};
+use super::GltfError;
 use crate::look::sniff_image;
+use crate::shown::{MAX_NAME_CHARS, shown_start};
+use crate::siblings::{Absent, Image, NO_IMAGE, Resolve, Siblings};
 
 /// Extensions that hide geometry from a reader without their decoder; meshopt's has the same streams by both names.
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
@@ -23,19 +26,18 @@ const NOT_GEOMETRY: [&str; 8] =
 pub(crate) struct Loaded {
     pub(crate) json: Value,
     pub(crate) root: Root,
-    pub(crate) buffers: Vec<Vec<u8>>,
+    pub(crate) buffers: Vec<Arc<Vec<u8>>>,
     pub(crate) images: Vec<Option<Image>>,
 }
 
 /// JSON and binary chunk.
 type Chunks<'a> = (Cow<'a, [u8]>, Option<Cow<'a, [u8]>>);
-type Resolve<'a> = &'a mut dyn FnMut(&str) -> Option<Vec<u8>>;
 
 /// Loads the document and everything it refers to.
 pub(crate) fn load(
     name: &str,
     bytes: &[u8],
-    resolve: Resolve<'_>,
+    resolve: &mut Resolve<'_>,
     notices: &mut Vec<String>,
 ) -> Result<Loaded, GltfError> {
     let (json, bin) = split(bytes)?;
@@ -43,7 +45,8 @@ pub(crate) fn load(
     check_version(&json)?;
     #[cfg(not(feature = "decompress"))]
     check_compression(name, &json)?;
-    let buffers = load_buffers(&mut json, bin.as_deref(), resolve)?;
+    let mut siblings = Siblings::new(resolve);
+    let buffers = load_buffers(&mut json, bin.as_deref(), &mut siblings)?;
     #[cfg(feature = "decompress")]
     let buffers = {
         let mut buffers = buffers;
@@ -52,8 +55,8 @@ pub(crate) fn load(
         })?;
         buffers
     };
-    let images = load_images(&json, resolve, notices);
     let root = typed(&json)?;
+    let images = load_images(&json, &root, &buffers, &mut siblings, notices);
     Ok(Loaded { json, root, buffers, images })
 }
 
@@ -155,8 +158,8 @@ fn typed(json: &Value) -> Result<Root, GltfError> {
 fn load_buffers(
     json: &mut Value,
     bin: Option<&[u8]>,
-    resolve: Resolve<'_>,
-) -> Result<Vec<Vec<u8>>, GltfError> {
+    siblings: &mut Siblings<'_>,
+) -> Result<Vec<Arc<Vec<u8>>>, GltfError> {
     let mut buffers = Vec::new();
     let fallbacks = fallbacks(json);
     let list = json.get_mut("buffers").and_then(Value::as_array_mut);
@@ -164,16 +167,17 @@ fn load_buffers(
         let declared = buffer["byteLength"].as_u64().unwrap_or(0);
         let uri = buffer.as_object_mut().and_then(|b| b.shift_remove("uri"));
         if fallbacks.contains(&(number as u64)) {
-            buffers.push(Vec::new());
+            buffers.push(Arc::default());
             continue;
         }
         let bytes = match uri.as_ref().and_then(Value::as_str) {
-            Some(uri) => match fetch(uri, resolve) {
-                Some((bytes, _)) => bytes,
-                None => return Err(GltfError::MissingFile { uri: shown_uri(uri) }),
-            },
-            None if number == 0 => bin.unwrap_or_default().to_vec(),
-            None => Vec::new(),
+            Some(uri) => match data_of(uri) {
+                Some(data) => data,
+                None => siblings.file(&decoded(uri)),
+            }
+            .map_err(|why| GltfError::MissingFile { uri: shown_uri(uri), problem: why.to_string() })?,
+            None if number == 0 => Arc::new(bin.unwrap_or_default().to_vec()),
+            None => Arc::default(),
         };
         if declared > bytes.len() as u64 {
             return Err(GltfError::Buffer { buffer: number, declared, found: bytes.len() as u64 });
@@ -196,38 +200,70 @@ fn fallbacks(json: &Value) -> Vec<u64> {
     named(true).filter(|buffer| !used.contains(buffer)).collect()
 }
 
-fn load_images(json: &Value, resolve: Resolve<'_>, notices: &mut Vec<String>) -> Vec<Option<Image>> {
+/// Images that are not in a buffer view; the notices name each that is not there or no image.
+fn load_images(
+    json: &Value,
+    root: &Root,
+    buffers: &[Arc<Vec<u8>>],
+    siblings: &mut Siblings<'_>,
+    notices: &mut Vec<String>,
+) -> Vec<Option<Image>> {
     let list = json["images"].as_array();
     list.into_iter()
         .flatten()
-        .map(|image| {
-            let uri = image["uri"].as_str()?;
-            let Some((bytes, mime)) = fetch(uri, resolve) else {
-                notices
-                    .push(format!("texture '{}' is not there: exports keep the reference", shown_uri(uri)));
+        .enumerate()
+        .map(|(number, image)| {
+            let Some(uri) = image["uri"].as_str() else {
+                let view = image["bufferView"].as_u64().and_then(|view| view_bytes(root, buffers, view));
+                if view.is_some_and(|bytes| sniff_image(bytes).is_none()) {
+                    notices.push(format!("image {number} {NO_IMAGE}: it is not drawn"));
+                }
                 return None;
             };
-            let declared = image["mimeType"].as_str().map(str::to_owned);
-            let mime = sniff_image(&bytes).map(str::to_owned).or(declared).or(mime)?;
-            Some(Image { bytes, mime })
+            let otherwise = "exports keep the reference";
+            match data_of(uri) {
+                None => siblings.image(&decoded(uri), otherwise, notices),
+                Some(data) => {
+                    let image = data.and_then(Image::new);
+                    if let Err(reason) = &image {
+                        notices.push(format!("texture '{}' {reason}: {otherwise}", shown_uri(uri)));
+                    }
+                    image.ok()
+                }
+            }
         })
         .collect()
 }
 
-/// Bytes and media type behind a URI: `data:` is decoded, anything else is asked for.
-fn fetch(uri: &str, resolve: Resolve<'_>) -> Option<(Vec<u8>, Option<String>)> {
-    if uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
-        let url = DataUrl::process(uri).ok()?;
-        let mime = url.mime_type();
-        let mime = format!("{}/{}", mime.type_, mime.subtype);
-        return url.decode_to_vec().ok().map(|(bytes, _)| (bytes, Some(mime)));
+/// The bytes of a buffer view; nothing where the buffer is too short.
+pub(super) fn view_bytes<'a>(root: &Root, buffers: &'a [Arc<Vec<u8>>], view: u64) -> Option<&'a [u8]> {
+    let view = root.buffer_views.get(usize::try_from(view).ok()?)?;
+    let start = usize::try_from(view.byte_offset.map_or(0, |o| o.0)).ok()?;
+    let end = start.checked_add(usize::try_from(view.byte_length.0).ok()?)?;
+    buffers.get(view.buffer.value())?.get(start..end)
+}
+
+/// The bytes of a `data:` URI; nothing for any other URI.
+///
+/// # Errors
+/// That it cannot be decoded.
+fn data_of(uri: &str) -> Option<Result<Arc<Vec<u8>>, Absent>> {
+    if !uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
+        return None;
     }
-    resolve(&percent_decode_str(uri).decode_utf8_lossy()).map(|bytes| (bytes, None))
+    let decoded = DataUrl::process(uri).ok().and_then(|url| url.decode_to_vec().ok());
+    Some(
+        decoded
+            .map(|(bytes, _)| Arc::new(bytes))
+            .ok_or_else(|| Absent::Refused("is no valid data: URI".into())),
+    )
+}
+
+fn decoded(uri: &str) -> Cow<'_, str> {
+    percent_decode_str(uri).decode_utf8_lossy()
 }
 
 /// A URI for a message: a `data:` URI may have megabytes.
 fn shown_uri(uri: &str) -> String {
-    /// As long as a long path.
-    const MAX_CHARS: usize = 120;
-    percent_decode_str(uri).decode_utf8_lossy().chars().take(MAX_CHARS).collect()
+    shown_start(&decoded(uri), MAX_NAME_CHARS)
 }

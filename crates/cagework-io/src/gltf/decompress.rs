@@ -1,5 +1,7 @@
 //! Draco and meshopt: compressed geometry becomes plain buffer views before anything else looks at the document.
 
+use std::sync::Arc;
+
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointIndex};
 use meshoptimizer_rs::Workspace;
 use meshoptimizer_rs::codec::{BufferView, Filter, Mode};
@@ -12,7 +14,7 @@ use super::pack::push;
 /// Most bytes that one stream becomes; a few hundred bytes may claim anything.
 const MAX_BYTES: u64 = 1 << 30;
 
-type Buffers = Vec<Vec<u8>>;
+type Buffers = Vec<Arc<Vec<u8>>>;
 
 /// Decodes all that is compressed; buffers are added to `buffers` and to the document.
 ///
@@ -61,7 +63,7 @@ fn take(json: &mut Value, place: &str, extension: &str) -> Option<Value> {
 
 fn push_buffer(json: &mut Value, buffers: &mut Buffers, bytes: Vec<u8>) -> usize {
     let buffer = push(json, "buffers", json!({ "byteLength": bytes.len() }));
-    buffers.push(bytes);
+    buffers.push(Arc::new(bytes));
     buffer
 }
 

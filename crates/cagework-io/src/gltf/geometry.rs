@@ -9,6 +9,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::accessor::{MAX_ELEMENTS, Source};
 use super::scene::{Instance, name_of};
 use super::{GltfDocument, GltfError, Slot, skin};
+use crate::shown::{MAX_NAME_CHARS, shown_start};
 
 /// Most triangles of a model.
 const MAX_TRIANGLES: u64 = 1 << 26;
@@ -76,6 +77,7 @@ pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result
         if instance.skin.is_some() {
             let name =
                 instance.node.map_or_else(String::new, |n| name_of(&document.json, "nodes", n, "node"));
+            let name = shown_start(&name, MAX_NAME_CHARS);
             notices.push(format!("'{name}' is skinned: bound in its rest pose, exported without its skin"));
         }
         if let Some(node) = instance.node

@@ -1,27 +1,30 @@
 //! Materials of a glTF: base colour and its texture.
 
+use std::collections::HashMap;
+
 use ::gltf::json::mesh::Semantic;
 use glam::{Vec2, Vec3};
 use serde_json::Value;
 
 use super::accessor::Source;
+use super::container::view_bytes;
 use super::geometry::{attribute, world_normals};
 use super::{GltfDocument, Slot};
 use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap, sniff_image};
 use crate::normals::Shading;
 
-/// Images of a document that materials ask for, each once.
+/// Images of a document that materials ask for, each once, whatever number the document gives it.
 struct Images<'a> {
     document: &'a GltfDocument,
-    numbers: Vec<Option<u32>>,
+    /// By where the bytes are.
+    numbers: HashMap<(*const u8, usize), u32>,
     found: Vec<LookImage>,
 }
 
 /// How a document looks. `positions`, `triangles`: the model's.
 pub(crate) fn look(document: &GltfDocument, positions: &[Vec3], triangles: &[[u32; 3]]) -> Look {
     let mut vertices: Vec<LookVertex> = (0..positions.len() as u32).map(LookVertex::plain).collect();
-    let n_images = document.json["images"].as_array().map_or(0, Vec::len);
-    let mut images = Images { document, numbers: vec![None; n_images], found: Vec::new() };
+    let mut images = Images { document, numbers: HashMap::new(), found: Vec::new() };
     let mut normals = vec![Vec3::ZERO; positions.len()];
     let mut groups = Vec::new();
     for slot in &document.slots {
@@ -153,28 +156,21 @@ fn smooth_seams(positions: &[Vec3], normals: Vec<Vec3>, triangles: &[[u32; 3]], 
 }
 
 impl Images<'_> {
-    /// Number of an image among those found; nothing if its bytes are not there.
+    /// Number of an image among those found; nothing if its bytes are not there or no image.
     fn number(&mut self, image: usize) -> Option<u32> {
-        let known = *self.numbers.get(image)?;
-        known.or_else(|| {
-            let found = self.read(image)?;
-            self.found.push(found);
-            let number = self.found.len() as u32 - 1;
-            self.numbers[image] = Some(number);
-            Some(number)
-        })
-    }
-
-    fn read(&self, image: usize) -> Option<LookImage> {
-        if let Some(image) = self.document.images.get(image)?.as_ref() {
-            return Some(LookImage { bytes: image.bytes.clone(), mime: image.mime.clone() });
-        }
-        let json = &self.document.json["images"][image];
-        let view = self.document.root.buffer_views.get(json["bufferView"].as_u64()? as usize)?;
-        let start = view.byte_offset.map_or(0, |o| o.0) as usize;
-        let end = start.checked_add(view.byte_length.0 as usize)?;
-        let bytes = self.document.buffers.get(view.buffer.value())?.get(start..end)?.to_vec();
-        let mime = sniff_image(&bytes).or(json["mimeType"].as_str())?.to_owned();
-        Some(LookImage { bytes, mime })
+        let document = self.document;
+        let bytes = match document.images.get(image)? {
+            Some(image) => image.bytes.as_slice(),
+            None => {
+                let view = document.json["images"][image]["bufferView"].as_u64()?;
+                view_bytes(&document.root, &document.buffers, view)?
+            }
+        };
+        let mime = sniff_image(bytes)?;
+        let number = *self.numbers.entry((bytes.as_ptr(), bytes.len())).or_insert_with(|| {
+            self.found.push(LookImage { bytes: bytes.to_vec(), mime: mime.to_owned() });
+            self.found.len() as u32 - 1
+        });
+        Some(number)
     }
 }

@@ -20,12 +20,16 @@ mod patch;
 mod scene;
 mod skin;
 
+use std::sync::Arc;
+
 use ::gltf::json::Root;
 use glam::Vec3;
 use serde_json::Value;
 use thiserror::Error;
 
 use crate::counts::Counts;
+use crate::shown::shown;
+use crate::siblings::{Image, Resolve};
 use scene::{Instance, Worlds};
 
 pub(crate) use build::build_from_obj;
@@ -41,15 +45,18 @@ pub(crate) use patch::{Pose, Rest, embed_images, patch};
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum GltfError {
     /// The binary container is damaged.
-    #[error("not a readable GLB: {0}")]
+    #[error("not a readable GLB: {}", shown(.0))]
     Container(String),
     /// The JSON is damaged or not glTF 2.0.
-    #[error("not readable as glTF 2.0: {0}")]
+    #[error("not readable as glTF 2.0: {}", shown(.0))]
     Json(String),
     /// Compressed geometry that could not be decoded; without the feature `decompress`, any.
     #[error(
-        "its geometry is compressed ({extension}), and {problem}; convert it first: \
-         npx @gltf-transform/cli copy {name} {output}"
+        "its geometry is compressed ({extension}), and {}; convert it first: \
+         npx @gltf-transform/cli copy {} {}",
+        shown(problem),
+        shown(name),
+        shown(output)
     )]
     Compressed {
         /// The extension.
@@ -61,11 +68,13 @@ pub enum GltfError {
         /// Name to convert to.
         output: String,
     },
-    /// A file that this one refers to was not there.
-    #[error("it needs the file '{uri}', which is not there: keep it beside the .gltf, or use a .glb")]
+    /// A buffer's file was not read.
+    #[error("it needs the file '{uri}', which {problem}: keep it beside the .gltf, or use a .glb")]
     MissingFile {
-        /// Its URI, decoded.
+        /// Its URI, decoded and as [`shown`].
         uri: String,
+        /// Why not.
+        problem: String,
     },
     /// A buffer has too few bytes.
     #[error("buffer {buffer} says it has {declared} bytes but has {found}: the file is cut off")]
@@ -128,13 +137,6 @@ pub enum GltfError {
     },
 }
 
-/// An image that is not in a buffer view: its bytes and its media type.
-#[derive(Clone, Debug)]
-pub(crate) struct Image {
-    pub(crate) bytes: Vec<u8>,
-    pub(crate) mime: String,
-}
-
 /// A glTF file as it was read.
 #[derive(Clone, Debug)]
 pub(crate) struct GltfDocument {
@@ -143,7 +145,7 @@ pub(crate) struct GltfDocument {
     /// The parts of it that geometry needs, typed.
     pub(crate) root: Root,
     /// Bytes of each buffer.
-    pub(crate) buffers: Vec<Vec<u8>>,
+    pub(crate) buffers: Vec<Arc<Vec<u8>>>,
     /// Images that came by URI and were found.
     pub(crate) images: Vec<Option<Image>>,
     worlds: Worlds,
@@ -173,11 +175,7 @@ pub(crate) struct GltfModel {
 }
 
 /// Reads a glTF or GLB file; `resolve` fetches sibling files by their decoded relative URI.
-pub(crate) fn read(
-    name: &str,
-    bytes: &[u8],
-    resolve: &mut dyn FnMut(&str) -> Option<Vec<u8>>,
-) -> Result<GltfModel, GltfError> {
+pub(crate) fn read(name: &str, bytes: &[u8], resolve: &mut Resolve<'_>) -> Result<GltfModel, GltfError> {
     let mut notices = Vec::new();
     let loaded = container::load(name, bytes, resolve, &mut notices)?;
     let worlds = Worlds::new(&loaded.root)?;

@@ -7,6 +7,7 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::GltfDocument;
+use super::container::view_bytes;
 use crate::error::WriteError;
 
 const F32: u32 = 5126;
@@ -49,10 +50,9 @@ impl<'a> Pack<'a> {
 
     /// The views of a document.
     pub(crate) fn of(document: &'a GltfDocument) -> Self {
-        let views = document.root.buffer_views.iter().map(|view| {
-            let start = usize::try_from(view.byte_offset.map_or(0, |o| o.0)).ok()?;
-            let end = start.checked_add(usize::try_from(view.byte_length.0).ok()?)?;
-            let bytes = document.buffers.get(view.buffer.value())?.get(start..end)?;
+        let views = (0u64..).zip(&document.root.buffer_views).map(|(number, view)| {
+            let bytes = view_bytes(&document.root, &document.buffers, number)?;
+            let start = view.byte_offset.map_or(0, |o| o.0) as usize;
             Some((bytes.into(), start % ALIGN))
         });
         Self { views: views.collect() }

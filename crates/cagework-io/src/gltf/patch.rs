@@ -8,6 +8,9 @@
 //!   move vertices that are already where they belong. So does a mesh under a transform that flattens it.
 //! * Morph targets were bound at their default weights and are dropped, with the animations of those weights.
 
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use glam::{DMat3, DMat4, DVec3, Quat, Vec3};
 use serde_json::{Value, json};
 
@@ -296,12 +299,16 @@ fn patch_primitive(
 
 /// Moves images that came by URI into the file: a GLB travels alone.
 pub(crate) fn embed_images(document: &GltfDocument, json: &mut Value, pack: &mut Pack<'_>) {
+    // Images of one file share its bytes.
+    let mut views = HashMap::new();
     for (number, image) in document.images.iter().enumerate() {
         let Some(image) = image else { continue };
-        let view = pack.push_view(json, image.bytes.clone(), None);
+        let view = *views
+            .entry(Arc::as_ptr(&image.bytes))
+            .or_insert_with(|| pack.push_view(json, image.bytes.to_vec(), None));
         let Some(object) = json["images"][number].as_object_mut() else { continue };
         object.shift_remove("uri");
-        object.insert("mimeType".into(), image.mime.clone().into());
+        object.insert("mimeType".into(), image.mime.into());
         object.insert("bufferView".into(), view.into());
     }
 }

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::shown::shown_start;
+
 /// One logical line: a physical one, or several joined by backslashes.
 #[derive(Clone, Debug)]
 pub(crate) struct Line {
@@ -96,11 +98,11 @@ pub(crate) fn tokens(bytes: &[u8], line: Range<usize>) -> impl Iterator<Item = R
     })
 }
 
-/// Text of a token for a message: lossy, short.
+/// Text of a token for a message: lossy, short, without control characters.
 pub(crate) fn shown(token: &[u8]) -> String {
     /// Enough to find it in the file, short enough for one line.
     const MAX_CHARS: usize = 40;
-    String::from_utf8_lossy(token).chars().take(MAX_CHARS).collect()
+    shown_start(&String::from_utf8_lossy(token), MAX_CHARS)
 }
 
 #[cfg(test)]

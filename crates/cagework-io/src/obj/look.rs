@@ -1,27 +1,30 @@
 //! Materials of an OBJ: its `.mtl` files, as far as colours go.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use super::lex::{lines, tokens};
 use glam::Vec3;
 
 use super::{NONE, ObjDocument};
-use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, linear_from_srgb, sniff_image};
+use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, linear_from_srgb};
 use crate::normals::Shading;
+use crate::siblings::{Image, Siblings};
 
 /// One material of a `.mtl` file.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct Material {
     /// `Kd` with `d` as its alpha, as written.
     pub(crate) color: [f32; 4],
-    /// `map_Kd`, as bytes.
-    pub(crate) image: Option<Vec<u8>>,
+    /// `map_Kd`.
+    pub(crate) image: Option<Image>,
 }
 
-/// Reads the materials of a `.mtl` file by name; `resolve` fetches textures.
+/// Reads the materials of a `.mtl` file by name, with their textures.
 pub(crate) fn read_materials(
     bytes: &[u8],
-    resolve: &mut dyn FnMut(&str) -> Option<Vec<u8>>,
+    siblings: &mut Siblings<'_>,
+    notices: &mut Vec<String>,
     into: &mut HashMap<String, Material>,
 ) {
     let mut name: Option<String> = None;
@@ -47,7 +50,7 @@ pub(crate) fn read_materials(
             b"Tr" => material.color[3] = 1.0 - number().unwrap_or(0.0),
             // Options such as -s 1 1 1 stand before the name, which may itself have blanks; only plain names are read.
             b"map_Kd" if !rest.starts_with('-') => {
-                material.image = resolve(&rest.replace('\\', "/"));
+                material.image = siblings.image(&rest.replace('\\', "/"), "it is left out", notices);
             }
             _ => {}
         }
@@ -76,7 +79,7 @@ pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
             look.vertices.len() as u32 - 1
         })
     };
-    let mut images: HashMap<u32, Option<u32>> = HashMap::new();
+    let mut images = HashMap::new();
     for (material, triangles) in document.by_material() {
         let start = look.triangles.len() as u32;
         for t in triangles {
@@ -87,11 +90,11 @@ pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
         let name = document.materials.get(material as usize);
         match name.and_then(|name| document.looks.get(name)) {
             Some(found) => {
-                let image = *images.entry(material).or_insert_with(|| {
-                    let bytes = found.image.clone()?;
-                    let mime = sniff_image(&bytes)?.to_owned();
-                    look.images.push(LookImage { bytes, mime });
-                    Some(look.images.len() as u32 - 1)
+                let image = found.image.as_ref().map(|image| {
+                    *images.entry(Arc::as_ptr(&image.bytes)).or_insert_with(|| {
+                        look.images.push(LookImage { bytes: image.bytes.to_vec(), mime: image.mime.into() });
+                        look.images.len() as u32 - 1
+                    })
                 });
                 let [r, g, b, alpha] = found.color;
                 // A texture replaces the colour, as programs that write black beside a texture mean it.

@@ -1,6 +1,6 @@
 //! OBJ in: every `v` line a vertex, every `f` line a polygon, nothing renumbered.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use glam::Vec3;
@@ -9,6 +9,8 @@ use thiserror::Error;
 use super::lex::{Line, lines, shown, tokens};
 use super::look::{Material, read_materials, rest_of};
 use super::triangulate::Triangulator;
+use crate::shown::{MAX_NAME_CHARS, shown_start};
+use crate::siblings::{Absent, Resolve, Siblings};
 
 /// Why an OBJ file could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -167,13 +169,14 @@ struct Reader<'a> {
     groups: usize,
     bad_attributes: usize,
     ignored: usize,
+    siblings: Siblings<'a>,
+    /// Names after `mtllib` so far.
+    libraries: HashSet<String>,
+    notices: Vec<String>,
 }
 
 /// Reads an OBJ file; `resolve` fetches its materials and their textures by relative path.
-pub(crate) fn read(
-    bytes: &[u8],
-    resolve: &mut dyn FnMut(&str) -> Option<Vec<u8>>,
-) -> Result<ObjModel, ObjError> {
+pub(crate) fn read(bytes: &[u8], resolve: &mut Resolve<'_>) -> Result<ObjModel, ObjError> {
     let mut reader = Reader {
         bytes,
         positions: Vec::new(),
@@ -186,19 +189,18 @@ pub(crate) fn read(
         groups: 0,
         bad_attributes: 0,
         ignored: 0,
+        siblings: Siblings::new(resolve),
+        libraries: HashSet::new(),
+        notices: Vec::new(),
     };
     for line in lines(bytes) {
-        reader.line(&line, resolve)?;
+        reader.line(&line)?;
     }
     reader.finish()
 }
 
 impl<'a> Reader<'a> {
-    fn line(
-        &mut self,
-        line: &Line,
-        resolve: &mut dyn FnMut(&str) -> Option<Vec<u8>>,
-    ) -> Result<(), ObjError> {
+    fn line(&mut self, line: &Line) -> Result<(), ObjError> {
         let bytes = self.bytes;
         let mut words = tokens(bytes, line.range.clone());
         let Some(keyword) = words.next() else { return Ok(()) };
@@ -241,12 +243,7 @@ impl<'a> Reader<'a> {
                 }
             }
             b"usemtl" => self.use_material(line),
-            b"mtllib" => {
-                let name = rest_of(&bytes[line.range.clone()], b"mtllib");
-                if let Some(file) = resolve(&name.replace('\\', "/")) {
-                    read_materials(&file, resolve, &mut self.document.looks);
-                }
-            }
+            b"mtllib" => self.library(&rest_of(&bytes[line.range.clone()], b"mtllib")),
             b"l" | b"p" | b"curv" | b"curv2" | b"surf" => self.ignored += 1,
             _ => {}
         }
@@ -293,6 +290,23 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
+    /// Reads a file of materials, once however often it is named.
+    fn library(&mut self, name: &str) {
+        let name = name.replace('\\', "/");
+        match self.libraries.insert(name.clone()).then(|| self.siblings.file(&name)) {
+            Some(Ok(file)) => {
+                let looks = &mut self.document.looks;
+                read_materials(&file, &mut self.siblings, &mut self.notices, looks);
+            }
+            Some(Err(Absent::Refused(reason))) => {
+                let name = shown_start(&name, MAX_NAME_CHARS);
+                self.notices.push(format!("material file '{name}' {reason}: it is left out"));
+            }
+            // Many an OBJ travels alone.
+            Some(Err(Absent::Missing)) | None => {}
+        }
+    }
+
     fn use_material(&mut self, line: &Line) {
         let text = &self.bytes[line.range.clone()];
         let name = text.trim_ascii().strip_prefix(b"usemtl").unwrap_or_default().trim_ascii();
@@ -325,7 +339,7 @@ impl<'a> Reader<'a> {
         if !self.has_smoothing {
             self.document.face_smoothing.clear();
         }
-        let mut notices = Vec::new();
+        let mut notices = self.notices;
         let mut notice = |count: usize, text: &str| {
             if count > 0 {
                 notices.push(format!("{count} {text}"));

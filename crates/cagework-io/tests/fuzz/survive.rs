@@ -50,7 +50,7 @@ pub(crate) fn survive(bytes: &[u8]) {
     if let Ok(Some(project)) = read_project("x", bytes) {
         as_cage(&project.cage, choice);
     }
-    let read = Model::read("x", bytes, &mut |name| inputs::beside(&REST.samples, name));
+    let read = Model::read("x", bytes, &mut |name| inputs::beside(&REST.samples, name).map(Ok));
     if let Ok(model) = read {
         as_file(&model);
         as_pose(&model);

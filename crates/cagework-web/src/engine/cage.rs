@@ -46,7 +46,7 @@ impl Engine {
     pub fn load_cage(&self, name: &str, bytes: &[u8], sibling: &Function) -> Result<JsValue, JsValue> {
         let mut resolve = |path: &str| {
             let found = sibling.call1(&JsValue::NULL, &path.into()).ok()?;
-            Some(found.dyn_into::<Uint8Array>().ok()?.to_vec())
+            Some(Ok(found.dyn_into::<Uint8Array>().ok()?.to_vec()))
         };
         let mut model = Model::read(name, bytes, &mut resolve).map_err(Fault::from)?;
         model.set_up(self.read(State::up));

@@ -1,0 +1,103 @@
+//! The files that a model names.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use thiserror::Error;
+
+use crate::look::sniff_image;
+use crate::shown::{MAX_NAME_CHARS, shown_start};
+
+/// Fetches a file that a model names by a relative path, percent-decoded. `None`: there is none. An error says why it is
+/// not read, as what follows its name: "is a folder".
+pub type Resolve<'a> = dyn FnMut(&str) -> Option<Result<Vec<u8>, String>> + 'a;
+
+/// Most bytes of all files that one model names: as many as the model itself may have.
+const MAX_BYTES: u64 = 2 << 30;
+
+/// An encoded image, known by its content to be one.
+#[derive(Clone, Debug)]
+pub(crate) struct Image {
+    pub(crate) bytes: Arc<Vec<u8>>,
+    pub(crate) mime: &'static str,
+}
+
+/// Why there is no file or image of a name, as what follows it.
+#[derive(Clone, Debug, Error)]
+pub(crate) enum Absent {
+    /// Nobody has it.
+    #[error("is not there")]
+    Missing,
+    /// It is there.
+    #[error("{0}")]
+    Refused(String),
+}
+
+/// The files that one model names, each asked for once and shared by all that name it.
+pub(crate) struct Siblings<'a> {
+    resolve: &'a mut Resolve<'a>,
+    files: HashMap<String, Result<Arc<Vec<u8>>, Absent>>,
+    images: HashMap<String, Option<Image>>,
+    bytes: u64,
+}
+
+impl Image {
+    /// # Errors
+    /// That the bytes are no image.
+    pub(crate) fn new(bytes: Arc<Vec<u8>>) -> Result<Self, Absent> {
+        match sniff_image(&bytes) {
+            Some(mime) => Ok(Self { bytes, mime }),
+            None => Err(Absent::Refused(NO_IMAGE.into())),
+        }
+    }
+}
+
+/// What follows the name of what should be an image.
+pub(crate) const NO_IMAGE: &str = "is no PNG, JPEG, WebP or KTX2 image";
+
+impl<'a> Siblings<'a> {
+    /// Files that `resolve` fetches.
+    pub(crate) fn new(resolve: &'a mut Resolve<'_>) -> Self {
+        Self { resolve, files: HashMap::new(), images: HashMap::new(), bytes: 0 }
+    }
+
+    /// The file of this name.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub(crate) fn file(&mut self, name: &str) -> Result<Arc<Vec<u8>>, Absent> {
+        if let Some(known) = self.files.get(name) {
+            return known.clone();
+        }
+        let found = match (self.resolve)(name) {
+            None => Err(Absent::Missing),
+            Some(Err(reason)) => Err(Absent::Refused(reason)),
+            Some(Ok(bytes)) if bytes.len() as u64 > MAX_BYTES - self.bytes => {
+                let limit = MAX_BYTES >> 20;
+                Err(Absent::Refused(format!(
+                    "is too large: all files that a model names may have {limit} MiB"
+                )))
+            }
+            Some(Ok(bytes)) => {
+                self.bytes += bytes.len() as u64;
+                Ok(Arc::new(bytes))
+            }
+        };
+        self.files.insert(name.to_owned(), found.clone());
+        found
+    }
+
+    /// The image of this name. Where there is none the notices say so, once, and what becomes of it: `otherwise`.
+    pub(crate) fn image(&mut self, name: &str, otherwise: &str, notices: &mut Vec<String>) -> Option<Image> {
+        if let Some(known) = self.images.get(name) {
+            return known.clone();
+        }
+        let image = self.file(name).and_then(Image::new);
+        if let Err(reason) = &image {
+            notices.push(format!("texture '{}' {reason}: {otherwise}", shown_start(name, MAX_NAME_CHARS)));
+        }
+        let image = image.ok();
+        self.images.insert(name.to_owned(), image.clone());
+        image
+    }
+}
