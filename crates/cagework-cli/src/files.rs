@@ -1,15 +1,26 @@
 //! Files in and out: the only place of the command that touches the file system.
 
+mod outputs;
+mod whole;
+
 use std::fs::{self, File};
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 
 use crate::error::CliError;
 
+pub(crate) use outputs::{check_outputs, refuse_files_read, write};
+#[cfg(unix)]
+pub(crate) use whole::abandon;
+
 /// Largest file that is read, bytes: above it the model's arrays would not fit a 32-bit index any more.
 const MAX_FILE_BYTES: u64 = 2 << 30;
+
+/// All files that were read so far, those that a model names (buffers, materials, textures) among them.
+static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Reads a whole file.
 ///
@@ -38,6 +49,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, CliError> {
     if bytes.is_empty() {
         return Err(fail("is empty".into()));
     }
+    READ.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_path_buf());
     Ok(bytes)
 }
 
@@ -49,50 +61,6 @@ pub(crate) fn read_beside(main: &Path, relative: &str) -> Option<Vec<u8>> {
         return None;
     }
     read(&main.parent().unwrap_or(Path::new("")).join(relative)).ok()
-}
-
-/// Checks, before the work starts, that outputs can be written and will not destroy an input or each other.
-///
-/// # Errors
-/// When a folder is missing or two names mean one file.
-pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), CliError> {
-    for (i, output) in outputs.iter().enumerate() {
-        let folder = folder_of(output);
-        if !folder.is_dir() {
-            return Err(CliError::Mismatch {
-                message: format!(
-                    "{}: cannot be written, there is no folder {}",
-                    output.display(),
-                    folder.display()
-                ),
-                hint: "make the folder first",
-            });
-        }
-        if output.is_dir() {
-            return Err(CliError::file(output, "cannot be written, it is a folder"));
-        }
-        if inputs.iter().any(|input| same_file(input, output)) {
-            return Err(CliError::Mismatch {
-                message: format!("{}: is an input and would be overwritten", output.display()),
-                hint: "choose another name for the output",
-            });
-        }
-        if outputs[..i].iter().any(|other| same_file(other, output)) {
-            return Err(CliError::Mismatch {
-                message: format!("{}: is named for two outputs", output.display()),
-                hint: "choose different names",
-            });
-        }
-    }
-    Ok(())
-}
-
-/// Writes a whole file.
-///
-/// # Errors
-/// When it cannot be written.
-pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    fs::write(path, bytes).map_err(|e| CliError::file(path, format!("cannot be written: {}", reason(&e))))
 }
 
 /// Makes a folder and the ones above it.
@@ -128,28 +96,14 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Whether two names mean one file; neither need exist.
-fn same_file(a: &Path, b: &Path) -> bool {
-    let resolve = |path: &Path| -> Option<PathBuf> {
-        fs::canonicalize(path)
-            .or_else(|_| {
-                Ok::<_, std::io::Error>(
-                    fs::canonicalize(folder_of(path))?.join(path.file_name().unwrap_or_default()),
-                )
-            })
-            .ok()
-    };
-    // Devices such as /dev/null may well be named twice.
-    let special = fs::metadata(a).is_ok_and(|m| !m.is_file());
-    !special && resolve(a).is_some_and(|a| resolve(b) == Some(a))
-}
-
 /// An operating-system error in our own words.
 fn reason(error: &std::io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => "there is no such file".into(),
         ErrorKind::PermissionDenied => "permission denied".into(),
         ErrorKind::OutOfMemory => "not enough memory to read it".into(),
+        ErrorKind::StorageFull => "the disk is full".into(),
+        ErrorKind::FileTooLarge => "it would be larger than files may be here (`ulimit -f`)".into(),
         _ => error.to_string(),
     }
 }
