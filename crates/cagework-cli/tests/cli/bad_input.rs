@@ -115,7 +115,7 @@ fn cages_without_an_inside_are_refused_by_every_command() {
     assert_refused(
         &sandbox,
         "cage far.obj --kind box --divisions 16 -o box.obj",
-        &["box cage", "degenerate"],
+        &["box cage", "nearer to the origin"],
     );
     assert!(!sandbox.path("box.obj").exists());
 }
