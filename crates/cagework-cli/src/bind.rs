@@ -13,7 +13,7 @@ use glam::Vec3;
 use crate::args::{BindArgs, CageSource, ModelOutput, SolveArgs};
 use crate::card;
 use crate::error::CliError;
-use crate::files::{check_outputs, json, print, write};
+use crate::files::{check_outputs, json, print, refuse_files_read, write};
 use crate::gpu;
 use crate::load::{load_cage, load_model};
 use crate::progress::Bar;
@@ -38,6 +38,7 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
 
     let model = load_model(&args.mesh, args.up.axis())?;
     let cage = load_cage(&args.cage, &model)?.cage;
+    refuse_files_read(&outputs)?;
     let binding = bind_positions(&model.positions, &cage, &args.solve, args.grid)?;
 
     if let Some(path) = &args.weights {

@@ -1,8 +1,12 @@
 //! Files in and out: the only place of the command that touches the file system.
 
+mod outputs;
+mod whole;
+
 use std::fs;
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use cagework_io::shown;
 use cap_fs_ext::OpenOptionsSyncExt as _;
@@ -12,8 +16,15 @@ use serde::Serialize;
 
 use crate::error::CliError;
 
+pub(crate) use outputs::{check_outputs, refuse_files_read, write};
+#[cfg(unix)]
+pub(crate) use whole::abandon;
+
 /// Largest file that is read, bytes: above it the model's arrays would not fit a 32-bit index any more.
 const MAX_FILE_BYTES: u64 = 2 << 30;
+
+/// All files that were read so far, those that a model names (buffers, materials, textures) among them.
+static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Reads a whole file.
 ///
@@ -21,7 +32,9 @@ const MAX_FILE_BYTES: u64 = 2 << 30;
 /// When it is missing, no regular file, empty, too large, or cannot be read.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, CliError> {
     let file = File::open_ambient_with(path, &to_read(), ambient_authority()).map_err(|e| reason(&e));
-    file.and_then(content).map_err(|problem| CliError::file(path, problem))
+    let bytes = file.and_then(content).map_err(|problem| CliError::file(path, problem))?;
+    note_read(path.to_path_buf());
+    Ok(bytes)
 }
 
 /// Reads a file that another one names by a relative path, such as a glTF's buffer. Nothing when there is none.
@@ -31,7 +44,10 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, CliError> {
 pub(crate) fn read_beside(main: &Path, relative: &str) -> Option<Result<Vec<u8>, String>> {
     let folder = Dir::open_ambient_dir(folder_of(main), ambient_authority());
     match folder.and_then(|folder| folder.open_with(relative, &to_read())) {
-        Ok(file) => Some(content(file)),
+        Ok(file) => {
+            note_read(folder_of(main).join(relative));
+            Some(content(file))
+        }
         Err(error) => match error.kind() {
             ErrorKind::NotFound => None,
             // Not from the operating system but from cap-std.
@@ -41,6 +57,11 @@ pub(crate) fn read_beside(main: &Path, relative: &str) -> Option<Result<Vec<u8>,
             _ => Some(Err(format!("cannot be read ({})", reason(&error)))),
         },
     }
+}
+
+/// Remembers a file that was read: no output may take its place.
+fn note_read(path: PathBuf) {
+    READ.lock().unwrap_or_else(PoisonError::into_inner).push(path);
 }
 
 /// To open what may be a pipe: without this that waits until somebody writes.
@@ -78,50 +99,6 @@ fn content(file: File) -> Result<Vec<u8>, String> {
     // It may grow meanwhile.
     file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|e| reason(&e))?;
     too_large(bytes.len() as u64).map_or(Ok(bytes), Err)
-}
-
-/// Checks, before the work starts, that outputs can be written and will not destroy an input or each other.
-///
-/// # Errors
-/// When a folder is missing or two names mean one file.
-pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), CliError> {
-    for (i, output) in outputs.iter().enumerate() {
-        let folder = folder_of(output);
-        if !folder.is_dir() {
-            return Err(CliError::Mismatch {
-                message: format!(
-                    "{}: cannot be written, there is no folder {}",
-                    shown_path(output),
-                    shown_path(folder)
-                ),
-                hint: "make the folder first",
-            });
-        }
-        if output.is_dir() {
-            return Err(CliError::file(output, "cannot be written, it is a folder"));
-        }
-        if inputs.iter().any(|input| same_file(input, output)) {
-            return Err(CliError::Mismatch {
-                message: format!("{}: is an input and would be overwritten", shown_path(output)),
-                hint: "choose another name for the output",
-            });
-        }
-        if outputs[..i].iter().any(|other| same_file(other, output)) {
-            return Err(CliError::Mismatch {
-                message: format!("{}: is named for two outputs", shown_path(output)),
-                hint: "choose different names",
-            });
-        }
-    }
-    Ok(())
-}
-
-/// Writes a whole file.
-///
-/// # Errors
-/// When it cannot be written.
-pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    fs::write(path, bytes).map_err(|e| CliError::file(path, format!("cannot be written: {}", reason(&e))))
 }
 
 /// Makes a folder and the ones above it.
@@ -162,28 +139,14 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Whether two names mean one file; neither need exist.
-fn same_file(a: &Path, b: &Path) -> bool {
-    let resolve = |path: &Path| -> Option<PathBuf> {
-        fs::canonicalize(path)
-            .or_else(|_| {
-                Ok::<_, std::io::Error>(
-                    fs::canonicalize(folder_of(path))?.join(path.file_name().unwrap_or_default()),
-                )
-            })
-            .ok()
-    };
-    // Devices such as /dev/null may well be named twice.
-    let special = fs::metadata(a).is_ok_and(|m| !m.is_file());
-    !special && resolve(a).is_some_and(|a| resolve(b) == Some(a))
-}
-
 /// An operating-system error in our own words.
 fn reason(error: &std::io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => "there is no such file".into(),
         ErrorKind::PermissionDenied => "permission denied".into(),
         ErrorKind::OutOfMemory => "not enough memory to read it".into(),
+        ErrorKind::StorageFull => "the disk is full".into(),
+        ErrorKind::FileTooLarge => "it would be larger than files may be here (`ulimit -f`)".into(),
         _ => error.to_string(),
     }
 }

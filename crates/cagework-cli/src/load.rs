@@ -113,11 +113,16 @@ pub(crate) fn generate_for(
 /// A subdivided box around positions. `margin`: fraction of their bounding box's diagonal.
 ///
 /// # Errors
-/// When there are no positions.
+/// When there are no positions, or numbers have no room for such a box: too large, or too far from the origin.
 pub(crate) fn box_mesh(positions: &[Vec3], divisions: u32, margin: f32) -> Result<PolygonMesh, CliError> {
     let bounds = Bounds::of(positions)
         .ok_or_else(|| CliError::Cage { name: "box cage".into(), source: CageError::Empty })?;
-    Ok(subdivided_box(bounds, margin, [divisions; 3]))
+    let mesh = subdivided_box(bounds, margin, [divisions; 3]);
+    Cage::new(&mesh).map_err(|source| CliError::Mismatch {
+        message: format!("box cage: numbers of 32 bits have no room for it: {source}"),
+        hint: "move the model nearer to the origin, scale it, or give a smaller --margin",
+    })?;
+    Ok(mesh)
 }
 
 impl LoadedCage {

@@ -18,6 +18,7 @@ mod info;
 mod load;
 mod progress;
 mod render;
+mod signals;
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -32,6 +33,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    signals::listen();
     let outcome = match &cli.command {
         Command::Info(args) => info::run(args, cli.json),
         Command::Bind(args) => bind::run(args, cli.json),

@@ -1,48 +1,32 @@
-//! Progress on a terminal, and Ctrl-C.
+//! Progress on a terminal.
 
 use std::io::IsTerminal as _;
 use std::ops::ControlFlow;
-use std::sync::Once;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use cagework_core::progress::{Progress, ProgressEvent, Stage};
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Set by Ctrl-C.
-static CANCELLED: AtomicBool = AtomicBool::new(false);
+use crate::signals::{self, Asking};
 
 /// Steps of the bar: more than a terminal has columns.
 const STEPS: u64 = 1000;
 
-/// Exit code after a second Ctrl-C: 128 + SIGINT, as shells count.
-const INTERRUPTED: i32 = 130;
-
-/// A progress bar on stderr when that is a terminal, and nothing otherwise; cancels on Ctrl-C.
+/// A progress bar on stderr when that is a terminal, and nothing otherwise; cancels on Ctrl-C and SIGTERM.
 pub(crate) struct Bar {
     bar: ProgressBar,
+    _asking: Asking,
 }
 
 impl Bar {
-    /// Shows the bar and starts to listen to Ctrl-C.
+    /// Shows the bar; from now on Ctrl-C cancels.
     pub(crate) fn start() -> Self {
-        static LISTEN: Once = Once::new();
-        LISTEN.call_once(|| {
-            let listening = ctrlc::set_handler(|| {
-                // The first one ends the work in good order, the second one ends it.
-                if CANCELLED.swap(true, Ordering::Relaxed) {
-                    std::process::exit(INTERRUPTED);
-                }
-            });
-            // Without a handler Ctrl-C ends the program, which is what it is for.
-            drop(listening);
-        });
         let bar =
             if std::io::stderr().is_terminal() { ProgressBar::new(STEPS) } else { ProgressBar::hidden() };
         let style = ProgressStyle::with_template("{prefix:10} [{bar:30}] {percent:>3}%  ETA {eta:<4} {msg}")
             .expect("the template is a constant")
             .progress_chars("=> ");
         bar.set_style(style);
-        Self { bar }
+        Self { bar, _asking: Asking::start() }
     }
 }
 
@@ -54,7 +38,7 @@ impl Drop for Bar {
 
 impl Progress for Bar {
     fn report(&self, event: ProgressEvent) -> ControlFlow<()> {
-        if CANCELLED.load(Ordering::Relaxed) {
+        if signals::cancelled() {
             return ControlFlow::Break(());
         }
         if !self.bar.is_hidden() {

@@ -40,6 +40,14 @@ pub enum WeightsError {
         /// Columns there are.
         n_columns: u32,
     },
+    /// A row has two weights for one column.
+    #[error("row {row} names column {column} twice; sum them with matrix.sum_duplicates()")]
+    Duplicate {
+        /// The row.
+        row: usize,
+        /// The column.
+        column: u32,
+    },
     /// A weight is not a finite number.
     #[error("row {row} has a weight that is not a finite number")]
     NotFinite {
@@ -73,6 +81,14 @@ impl Weights {
         for (row, (indices, data)) in weights.rows().enumerate() {
             if let Some(&column) = indices.iter().find(|&&c| c >= n_columns) {
                 return Err(WeightsError::Column { row, column, n_columns });
+            }
+            // Most rows ascend, which leaves no room for duplicates.
+            if !indices.is_sorted_by(|a, b| a < b) {
+                let mut sorted = indices.to_vec();
+                sorted.sort_unstable();
+                if let Some(twice) = sorted.windows(2).find(|w| w[0] == w[1]) {
+                    return Err(WeightsError::Duplicate { row, column: twice[0] });
+                }
             }
             if data.iter().any(|w| !w.is_finite()) {
                 return Err(WeightsError::NotFinite { row });

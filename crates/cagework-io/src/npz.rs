@@ -132,20 +132,20 @@ pub fn read_weights_npz(bytes: &[u8]) -> Result<(Weights, Vec<OutsideVertex>), N
             format.fault(&format!("is '{found}', but only csr is read: convert it with matrix.tocsr()"))
         );
     }
-    let shape = required(&mut zip, "shape")?.unsigned()?;
+    let shape = required(&mut zip, "shape")?.rows_of(&[])?.unsigned()?;
     let [rows, columns] = shape[..] else {
         return Err(NpzError::Array {
             array: "shape",
             problem: format!("has {} values, not 2", shape.len()),
         });
     };
-    let indptr = required(&mut zip, "indptr")?.unsigned()?;
+    let indptr = required(&mut zip, "indptr")?.rows_of(&[])?.unsigned()?;
     if indptr.len() as u64 != u64::from(rows) + 1 {
         let problem = format!("has {} values for {rows} rows; it must have one more than rows", indptr.len());
         return Err(NpzError::Array { array: "indptr", problem });
     }
-    let indices = required(&mut zip, "indices")?.unsigned()?;
-    let data = required(&mut zip, "data")?.floats()?;
+    let indices = required(&mut zip, "indices")?.rows_of(&[])?.unsigned()?;
+    let data = required(&mut zip, "data")?.rows_of(&[])?.floats()?;
     let weights = Weights::new(columns, indptr, indices, data)?;
     let outside = read_outside(&mut zip, rows, columns)?;
     Ok((weights, outside))
@@ -157,9 +157,9 @@ fn read_outside(
     columns: u32,
 ) -> Result<Vec<OutsideVertex>, NpzError> {
     let Some(vertices) = array(zip, "outside_vertex")? else { return Ok(Vec::new()) };
-    let vertices = vertices.unsigned()?;
-    let corners = required(zip, "outside_corners")?.unsigned()?;
-    let offsets = required(zip, "outside_offset")?.floats()?;
+    let vertices = vertices.rows_of(&[])?.unsigned()?;
+    let corners = required(zip, "outside_corners")?.rows_of(&[3])?.unsigned()?;
+    let offsets = required(zip, "outside_offset")?.rows_of(&[3])?.floats()?;
     let fault = |array, problem: String| Err(NpzError::Array { array, problem });
     let n = vertices.len();
     if corners.len() != 3 * n || offsets.len() != 3 * n {
@@ -189,6 +189,8 @@ fn read_outside(
 struct NpyArray {
     name: &'static str,
     dtype: String,
+    /// Lengths along the axes.
+    shape: Vec<usize>,
     data: Vec<u8>,
 }
 
@@ -217,8 +219,9 @@ fn array(zip: &mut ZipArchive<Cursor<&[u8]>>, name: &'static str) -> Result<Opti
     if field(text, "'fortran_order':").is_none_or(|f| !f.starts_with("False")) {
         return Err(fault("is in Fortran order; save it in C order".into()));
     }
+    let shape = field(text, "'shape':").and_then(lengths).ok_or_else(bad)?;
     bytes.drain(..start);
-    Ok(Some(NpyArray { name, dtype, data: bytes }))
+    Ok(Some(NpyArray { name, dtype, shape, data: bytes }))
 }
 
 /// Start of the data and text of the header of an `.npy` file, versions 1 to 3.
@@ -240,14 +243,35 @@ fn quoted(text: &str) -> Option<&str> {
     text.strip_prefix('\'')?.split_once('\'').map(|(inner, _)| inner)
 }
 
+/// The numbers of a tuple such as `(4, 3)`.
+fn lengths(text: &str) -> Option<Vec<usize>> {
+    let (inner, _) = text.strip_prefix('(')?.split_once(')')?;
+    inner.split(',').map(str::trim).filter(|word| !word.is_empty()).map(|word| word.parse().ok()).collect()
+}
+
 impl NpyArray {
     fn fault(&self, problem: &str) -> NpzError {
         NpzError::Array { array: self.name, problem: problem.to_owned() }
     }
 
+    /// The array, if its lengths along all axes but the first are these.
+    fn rows_of(self, lengths: &[usize]) -> Result<Self, NpzError> {
+        if self.shape.get(1..) == Some(lengths) {
+            return Ok(self);
+        }
+        let wanted = if lengths.is_empty() { "one axis".to_owned() } else { format!("rows of {lengths:?}") };
+        Err(self.fault(&format!("is of shape {:?}; it must have {wanted}", self.shape)))
+    }
+
     fn chunks<const N: usize>(&self) -> Result<impl Iterator<Item = [u8; N]>, NpzError> {
+        let values = self.shape.iter().try_fold(1_usize, |n, &length| n.checked_mul(length));
         let (chunks, rest) = self.data.as_chunks::<N>();
-        if rest.is_empty() { Ok(chunks.iter().copied()) } else { Err(self.fault("is cut off")) }
+        if values == Some(chunks.len()) && rest.is_empty() {
+            return Ok(chunks.iter().copied());
+        }
+        let problem =
+            format!("has {} bytes, which is not what its shape {:?} takes", self.data.len(), self.shape);
+        Err(self.fault(&problem))
     }
 
     /// Values of an integer array; each must fit 32 bits and not be negative.

@@ -98,7 +98,7 @@ fn faults_are_named() {
     let csc = rewritten(|n, d| Some(if n == "format.npy" { [&d[..128], b"csc"].concat() } else { d }));
     assert!(message(&csc).contains("tocsr"));
     let cut = rewritten(|n, d| Some(if n == "data.npy" { d[..d.len() - 2].to_vec() } else { d }));
-    assert!(message(&cut).contains("cut off"));
+    assert!(message(&cut).contains("18 bytes"));
     let high = rewritten(|n, d| {
         Some(if n == "indices.npy" { [&d[..d.len() - 4], &9_i32.to_le_bytes()].concat() } else { d })
     });
@@ -107,4 +107,35 @@ fn faults_are_named() {
         Some(if n == "indices.npy" { [&d[..d.len() - 4], &(-1_i32).to_le_bytes()].concat() } else { d })
     });
     assert!(message(&negative).contains("negative"));
+    // Columns 1, 2, 3 of the last row become 1, 2, 1, which do not ascend.
+    let twice = rewritten(|n, d| {
+        Some(if n == "indices.npy" { [&d[..d.len() - 4], &1_i32.to_le_bytes()].concat() } else { d })
+    });
+    assert!(message(&twice).contains("row 2 names column 1 twice"));
+}
+
+/// The shape in an array's header was not looked at.
+#[test]
+fn shapes_that_the_data_do_not_have_are_refused() {
+    for (name, from, to) in [
+        ("indices.npy", "(5,), }", "(6,), }"),
+        ("data.npy", "(5,), }", "(4,), }"),
+        ("data.npy", "(5,), }", "(5, 1)}"),
+        ("indptr.npy", "(4,), }", "(2, 2)}"),
+        ("shape.npy", "(2,), }", "(), }  "),
+        ("outside_corners.npy", "(1, 3), }", "(3, 1), }"),
+        ("outside_offset.npy", "(1, 3), }", "(3,), }  "),
+        // Whose product is 4 again in 64 bits.
+        ("indptr.npy", "(4,), }                               ", "(4611686018427387905, 4), }           "),
+    ] {
+        let wrong = rewritten(|n, d| {
+            if n != name {
+                return Some(d);
+            }
+            let place = d.windows(from.len()).position(|w| w == from.as_bytes()).unwrap();
+            Some([&d[..place], to.as_bytes(), &d[place + from.len()..]].concat())
+        });
+        let message = read_weights_npz(&wrong).unwrap_err().to_string();
+        assert!(message.contains(&name.replace(".npy", "")) && message.contains("shape"), "{to}: {message}");
+    }
 }

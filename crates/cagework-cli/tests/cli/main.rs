@@ -9,6 +9,8 @@ mod cage_and_info;
 mod cages;
 mod deform;
 mod evaluate;
+#[cfg(unix)]
+mod outputs;
 mod render;
 mod siblings;
 mod support;

@@ -58,6 +58,15 @@ impl Sandbox {
         std::fs::read(self.path(name)).unwrap()
     }
 
+    /// Names of all files and folders in the folder, sorted.
+    pub(crate) fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.folder.path()).unwrap();
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
     /// `cagework` in the folder with words separated by blanks, not run yet.
     pub(crate) fn command(&self, args: &str) -> Command {
         let mut command = cargo_bin_cmd!("cagework");

@@ -124,7 +124,7 @@ pub struct Problem {
 /// All that is known about a cage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CageCheck {
-    /// Whether it can be used: [`Cage::new`] takes it and it does not go through itself.
+    /// Whether it can be used: no problem is an error.
     pub valid: bool,
     /// Whether all of the model is inside, if a model was given and that can be told.
     pub encloses: Option<bool>,
@@ -160,7 +160,7 @@ pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> C
     edges.report(mesh, &mut found);
     edges::report_vertices(mesh, &sound, &mut found);
     let components = orient::report(mesh, &sound, &edges, &mut found);
-    let crossing = shape::report_crossings(mesh, &sound, &mut found);
+    shape::report_crossings(mesh, &sound, &mut found);
     let cage = Cage::new(mesh);
     if let Err(error) = &cage
         && !found.iter().any(|p| p.severity == Severity::Error)
@@ -183,9 +183,9 @@ pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> C
     let mut order: Vec<[u32; 2]> = (0u32..).zip(&found).map(|(k, p)| [kind(p), k]).collect();
     order.sort_unstable();
     let mut found: Vec<Option<Problem>> = found.into_iter().map(Some).collect();
-    let problems = order.into_iter().filter_map(|[_, k]| found[k as usize].take()).collect();
+    let problems: Vec<Problem> = order.into_iter().filter_map(|[_, k]| found[k as usize].take()).collect();
     CageCheck {
-        valid: cage.is_ok() && !crossing,
+        valid: !problems.iter().any(|p| p.severity == Severity::Error),
         encloses,
         vertices: mesh.positions.len(),
         faces: mesh.faces.len(),
@@ -228,8 +228,9 @@ fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
-/// Diagonal of the box of all finite vertices, object units.
+/// Diagonal of the box of all finite vertices of faces, object units: [`Cage::diagonal`] as far as there is one.
 fn diagonal(mesh: &PolygonMesh) -> f64 {
-    let finite: Vec<Vec3> = mesh.positions.iter().copied().filter(|p| p.is_finite()).collect();
+    let used = mesh.faces.iter().flatten().filter_map(|&i| mesh.positions.get(i as usize));
+    let finite: Vec<Vec3> = used.copied().filter(|p| p.is_finite()).collect();
     Bounds::of(&finite).map_or(0.0, |b| b.max.as_dvec3().distance(b.min.as_dvec3()))
 }

@@ -124,8 +124,8 @@ fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
     (triangles, face_of)
 }
 
-/// Reports faces that go through each other; whether there are any.
-pub(super) fn report_crossings(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec<Problem>) -> bool {
+/// Reports faces that go through each other.
+pub(super) fn report_crossings(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec<Problem>) {
     let (triangles, face_of) = triangles(mesh, sound);
     let mut faces = Vec::new();
     let mut points = Vec::new();
@@ -143,7 +143,7 @@ pub(super) fn report_crossings(mesh: &PolygonMesh, sound: &[u32], found: &mut Ve
         }
     }
     if count == 0 {
-        return false;
+        return;
     }
     faces.sort_unstable();
     faces.dedup();
@@ -160,7 +160,6 @@ pub(super) fn report_crossings(mesh: &PolygonMesh, sound: &[u32], found: &mut Ve
             ),
         )
     });
-    true
 }
 
 /// A point near where two triangles meet: the middle of where their boxes overlap.

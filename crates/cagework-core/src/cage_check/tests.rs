@@ -26,6 +26,17 @@ fn sound_cage_has_no_problems() {
     assert!((found.thickness.unwrap() - 2.0).abs() < 1e-6, "the box is 2 wide");
 }
 
+/// The size of the mesh was taken from all vertices: beside a far one of no face, all faces seemed to have no area, and
+/// the cage was valid all the same.
+#[test]
+fn valid_cage_has_no_fault_though_a_vertex_of_no_face_is_far_away() {
+    let mut mesh = box_mesh(2);
+    mesh.positions.push(Vec3::splat(1e12));
+    let found = check(&mesh, None, None);
+    assert!(found.valid);
+    assert_eq!(codes(&mesh), [Code::UnusedVertex]);
+}
+
 #[test]
 fn hole_is_found_with_its_edges_and_filled() {
     let mut mesh = box_mesh(2);

@@ -1,0 +1,119 @@
+//! Outputs: none destroys an input, a file that an input names, or another output.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::PoisonError;
+
+use cagework_core::bind::BindError;
+use cagework_core::progress::Cancelled;
+
+use super::whole::replace;
+use super::{READ, folder_of, reason};
+use crate::error::CliError;
+use crate::signals;
+
+/// Most symbolic links on the way to a file, as on Linux.
+const MAX_LINKS: usize = 40;
+
+/// Folders whose names stand for files that are open already, such as `/dev/stdout`.
+const OPEN_FILES: [&str; 2] = ["/proc", "/dev/fd"];
+
+/// Checks, before the work starts, that outputs can be written and will not destroy an input or each other.
+///
+/// # Errors
+/// When a folder is missing or two names mean one file.
+pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), CliError> {
+    for (i, output) in outputs.iter().enumerate() {
+        let folder = folder_of(output);
+        if !folder.is_dir() {
+            return Err(CliError::Mismatch {
+                message: format!(
+                    "{}: cannot be written, there is no folder {}",
+                    output.display(),
+                    folder.display()
+                ),
+                hint: "make the folder first",
+            });
+        }
+        if output.is_dir() {
+            return Err(CliError::file(output, "cannot be written, it is a folder"));
+        }
+        refuse_inputs(output, inputs)?;
+        if outputs[..i].iter().any(|other| same_file(other, output)) {
+            return Err(CliError::Mismatch {
+                message: format!("{}: is named for two outputs", output.display()),
+                hint: "choose different names",
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Checks, once all inputs are read and before anything is written, that no output is one of the files that were read.
+///
+/// # Errors
+/// When an output is such a file, under this or another name.
+pub(crate) fn refuse_files_read(outputs: &[&Path]) -> Result<(), CliError> {
+    let read = READ.lock().unwrap_or_else(PoisonError::into_inner);
+    let read: Vec<&Path> = read.iter().map(PathBuf::as_path).collect();
+    outputs.iter().try_for_each(|output| refuse_inputs(output, &read))
+}
+
+/// Writes a whole file, or leaves the older one as it was. A symbolic link stays, and the file that it leads to is
+/// replaced; devices, pipes and files that are open already are written to as they are.
+///
+/// # Errors
+/// When it cannot be written, is a file that was read, or the work was cancelled meanwhile.
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
+    // The work may have been over before it asked.
+    if signals::cancelled() {
+        return Err(BindError::Cancelled(Cancelled).into());
+    }
+    refuse_files_read(&[path])?;
+    let written = place(path).and_then(|place| match place {
+        Some(file) => replace(&file, bytes),
+        None => fs::write(path, bytes),
+    });
+    written.map_err(|e| CliError::file(path, format!("cannot be written: {}", reason(&e))))
+}
+
+fn refuse_inputs(output: &Path, inputs: &[&Path]) -> Result<(), CliError> {
+    if inputs.iter().any(|input| same_file(input, output)) {
+        return Err(CliError::Mismatch {
+            message: format!("{}: is an input and would be overwritten", output.display()),
+            hint: "choose another name for the output",
+        });
+    }
+    Ok(())
+}
+
+/// Whether two names mean one regular file; neither need exist. Devices such as /dev/null may well be named twice.
+fn same_file(a: &Path, b: &Path) -> bool {
+    match (place(a), place(b)) {
+        // Hard links have different names and are one file.
+        (Ok(Some(a)), Ok(Some(b))) => a == b || same_file::is_same_file(a, b).unwrap_or(false),
+        _ => false,
+    }
+}
+
+/// The file that a name leads to through symbolic links, which need not exist. `None`: a device, a pipe or a file that
+/// is open already.
+fn place(path: &Path) -> io::Result<Option<PathBuf>> {
+    if fs::metadata(path).is_ok_and(|m| !m.is_file()) {
+        return Ok(None);
+    }
+    let mut place = path.to_path_buf();
+    for _ in 0..MAX_LINKS {
+        let folder = fs::canonicalize(folder_of(&place))?;
+        if OPEN_FILES.iter().any(|open| folder.starts_with(open)) {
+            return Ok(None);
+        }
+        let file = folder.join(place.file_name().unwrap_or_default());
+        match fs::read_link(&file) {
+            Ok(target) => place = folder.join(target),
+            Err(_) => return Ok(Some(file)),
+        }
+    }
+    Err(io::Error::other("its symbolic links go round in a circle"))
+}
