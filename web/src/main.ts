@@ -123,7 +123,11 @@ async function main(): Promise<void> {
     },
     applyPose(settings) {
       const pose = poseOf(settings);
-      if (pose) current().engine.decodePose(pose);
+      try {
+        if (pose) current().engine.decodePose(pose);
+      } catch {
+        tell.say("The pose in this project is damaged; it opens at rest.");
+      }
       edit.sync();
     },
     writeProject: project.write,
@@ -164,7 +168,7 @@ async function main(): Promise<void> {
     chooseModel: () => choose(MODELS, false, (list) => void files.openFiles(list)),
     chooseFolder: () => choose("", true, (list) => void files.openFiles(list)),
     chooseCage: () => choose(".obj,.glb,.gltf,.bin", false, (list) => void cage.load(list)),
-    share: () => void share(),
+    share: () => void exports.share(),
     showWays: () => without.show(store.get().lack ?? "NoWebGPU"),
     startFresh: () => void project.forget().then(() => files.openSample(store.get().samples[0]?.id ?? "")),
     pointer: () => ({ x: 0, y: 0 }),
@@ -183,28 +187,6 @@ async function main(): Promise<void> {
     file: () => app.chooseModel(),
     regenerate: () => cage.repair("regenerate"),
     reload: () => location.reload(),
-  };
-
-  const share = async () => {
-    const link = await project.link();
-    if (!link) {
-      tell.say(
-        "A link can hold a sample in its own cage and pose, but no files of yours. Save a project file to pass this on.",
-        {
-          label: "Save the project",
-          run: () => void exports.save("project"),
-        },
-      );
-      return;
-    }
-    try {
-      await navigator.clipboard.writeText(link);
-      tell.say("Link copied. Whoever opens it sees this sample in this pose.");
-    } catch {
-      // No access to the clipboard: the address bar can be copied by hand.
-      window.history.replaceState(null, "", link);
-      tell.say("The link is in the address bar; copy it from there.");
-    }
   };
 
   createBar(byId("bar"), app, sheet.show);

@@ -23,6 +23,7 @@ pub mod loaded;
 mod options;
 mod problems;
 mod scene;
+pub mod settings;
 mod state;
 #[cfg(target_family = "wasm")]
 mod surface;
