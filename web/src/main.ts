@@ -11,6 +11,7 @@ import { createProject, poseOf } from "./actions/project";
 import { createView } from "./actions/view";
 import type { App } from "./app";
 import type { NamedFile, Session } from "./contract";
+import { watchCrashes } from "./crash";
 import { createHistory } from "./history";
 import { createCommands } from "./input/commands";
 import { attachDrop } from "./input/drop";
@@ -22,11 +23,12 @@ import { lackOf } from "./session/adapter";
 import { decodeShare } from "./share";
 import { startUp } from "./start";
 import { createStore, INITIAL } from "./state";
-import { hasLocally, loadTheme } from "./store";
+import { forgetCrash, hasLocally, loadTheme } from "./store";
 import { type Explained, explain, FIX_LABELS, PRODUCT } from "./strings";
 import { createBar } from "./ui/bar";
 import { createBindPanel } from "./ui/bind";
 import { createCagePanel } from "./ui/cage";
+import { askAfterCrash } from "./ui/crashed";
 import { h } from "./ui/dom";
 import { createExportPanel } from "./ui/export";
 import { attachLost } from "./ui/lost";
@@ -80,6 +82,17 @@ async function main(): Promise<void> {
 
   const bind = createBind(ctx);
   const project = createProject(ctx);
+  /** Not by its link again, which may be the cause. */
+  const restart = () => {
+    window.history.replaceState(null, "", location.pathname + location.search);
+    location.reload();
+  };
+  const crashes = watchCrashes(store, restart, (crash) => {
+    askAfterCrash(crash, () => {
+      forgetCrash();
+      void project.forget().then(restart);
+    });
+  });
   let soon: ReturnType<typeof setTimeout> | undefined;
   /** A changed cage is bound again once the hand rests; a fine grid waits for the user's word. */
   const bindSoon = (pause: number) => {
@@ -222,7 +235,14 @@ async function main(): Promise<void> {
   });
   const notice = session.lack && without.notice(session.lack);
   if (notice) stageElement.before(notice);
-  startUp({ app, stage, theme: loadTheme(), shared: () => decodeShare(location.hash), product: PRODUCT });
+  startUp({
+    app,
+    stage,
+    crashes,
+    theme: loadTheme(),
+    shared: () => decodeShare(location.hash),
+    product: PRODUCT,
+  });
 }
 
 void main();

@@ -2,9 +2,11 @@
 
 import { report } from "./actions/context";
 import type { App } from "./app";
+import type { Crash, Crashes } from "./crash";
 import { percent } from "./format";
 import type { Shared } from "./share";
 import type { Theme } from "./store";
+import { CRASHED, showReport } from "./ui/crashed";
 import type { Stage } from "./ui/viewport";
 
 /** Sharper than this nobody sees, and it costs four times the pixels. */
@@ -13,12 +15,13 @@ const MOST_SHARP = 2;
 export interface Start {
   app: App;
   stage: Stage;
+  crashes: Crashes;
   theme: Theme;
   shared: () => Promise<Shared | undefined>;
   product: string;
 }
 
-export function startUp({ app, stage, theme, shared, product }: Start): void {
+export function startUp({ app, stage, crashes, theme, shared, product }: Start): void {
   const { store } = app;
   const session = app.ctx.session();
   store.set({ adapter: session.adapter, lack: session.lack, samples: session.samples, busy: null });
@@ -49,18 +52,31 @@ export function startUp({ app, stage, theme, shared, product }: Start): void {
     },
   );
 
-  void open(app, shared);
+  const stop = session.onFrame(() => {
+    if (!store.get().bound) return;
+    crashes.settled();
+    stop();
+  });
+  void open(app, shared, crashes.before);
   window.addEventListener("hashchange", () => {
     void openShared(app, shared).then(({ damage }) => sayDamage(app, damage));
   });
 }
 
 /** A link comes first, then the work of the last visit, then the first sample. */
-async function open(app: App, shared: () => Promise<Shared | undefined>): Promise<void> {
+async function open(
+  app: App,
+  shared: () => Promise<Shared | undefined>,
+  crash: Crash | undefined,
+): Promise<void> {
   const link = await openShared(app, shared);
   if (!link.opened) await openKept(app);
   // Last, because whatever is opened takes messages away.
   sayDamage(app, link.damage);
+  if (crash) {
+    const report = { label: "Show the report", run: () => showReport(crash) };
+    app.ctx.tell.problem({ title: CRASHED, message: crash.during }, report);
+  }
 }
 
 async function openKept(app: App): Promise<void> {

@@ -1,6 +1,7 @@
 /** Keeping work: autosave in the browser, the project file, the share link, and coming back from each. */
 
 import type { NamedFile, Settings } from "../contract";
+import { isFatal } from "../crash";
 import { stem } from "../format";
 import { encodeShare, fromBase64Url, toBase64Url } from "../share";
 import { forgetLocally, loadLocally, saveLocally } from "../store";
@@ -69,7 +70,11 @@ export function createProject(ctx: Context): Project {
       const when = Date.now();
       await saveLocally({ bytes, name: model.name, when });
       store.set({ savedAt: when });
-    } catch {
+    } catch (error) {
+      if (isFatal(error)) {
+        reportError(error);
+        return;
+      }
       // Private windows and full disks refuse: say it once, and do not try again.
       failed = true;
       ctx.tell.say(
