@@ -62,14 +62,11 @@ pub fn read_settings(text: &str, defaults: &str) -> Result<JsValue, JsValue> {
 impl Settings {
     fn read(text: &str, defaults: &Map<String, Value>) -> Self {
         let mut settings = Self::default();
-        let mut given: Map<String, Value> =
-            match serde_json::from_str(if text.is_empty() { "{}" } else { text }) {
-                Ok(given) => given,
-                Err(_) => {
-                    settings.notices.push("The settings of this project cannot be read.".to_owned());
-                    return settings;
-                }
-            };
+        let text = if text.is_empty() { "{}" } else { text };
+        let Ok(mut given) = serde_json::from_str::<Map<String, Value>>(text) else {
+            settings.notices.push("The settings of this project cannot be read.".to_owned());
+            return settings;
+        };
         settings.bind = settings.group("bind", &mut given, defaults, |asked: BindAsked| {
             BindOptions::from(asked).check().map_err(|wrong| wrong.allowed)
         });
