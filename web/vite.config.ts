@@ -9,6 +9,8 @@ export default defineConfig({
     emptyOutDir: true,
     target: "es2023",
     assetsInlineLimit: 0,
+    // Read and taken away by crates/xtask/src/licences.rs.
+    license: { fileName: "licences-npm.json" },
     modulePreload: { polyfill: false },
   },
   worker: { format: "es" },

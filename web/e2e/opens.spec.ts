@@ -1,6 +1,6 @@
 /** The page opens with a model that can be dragged at once. */
 
-import type { Page } from "@playwright/test";
+import { savedSince } from "./kept";
 import { followsAHandle } from "./stories";
 import { cagePositions, drag, drawn, expect, largestMove, open, shoot, test } from "./support";
 
@@ -36,25 +36,6 @@ test("an idle page draws nothing", async ({ page }) => {
   });
   expect(frames).toBe(0);
 });
-
-/** Whether the browser keeps work that was saved after a moment, ms since 1970. */
-const savedSince = (page: Page, moment: number): Promise<boolean> =>
-  page.evaluate(
-    (moment) =>
-      new Promise<boolean>((answer) => {
-        const opened = indexedDB.open("cagework");
-        opened.onsuccess = () => {
-          const { result } = opened;
-          const saved = result.objectStoreNames.contains("projects")
-            ? result.transaction("projects").objectStore("projects").get("autosave")
-            : undefined;
-          result.close();
-          if (!saved) answer(false);
-          else saved.onsuccess = () => answer((saved.result?.when ?? 0) > moment);
-        };
-      }),
-    moment,
-  );
 
 test("keeps the work of the last visit", async ({ page }) => {
   await open(page);

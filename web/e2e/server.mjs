@@ -17,6 +17,7 @@ const TYPES = {
   ".svg": "image/svg+xml",
   ".webp": "image/webp",
   ".json": "application/json",
+  ".txt": "text/plain; charset=utf-8",
 };
 
 createServer(async (request, response) => {

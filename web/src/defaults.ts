@@ -1,6 +1,6 @@
 /** What is chosen before anybody chose anything. The reasons are in Rust, next to each option. */
 
-import type { BindOptions, CageOptions, SceneOptions } from "./contract";
+import type { BindOptions, CageWish, SceneOptions } from "./contract";
 
 export const BIND_DEFAULTS: BindOptions = {
   grid: 64,
@@ -19,13 +19,6 @@ export const BIND_DEFAULTS: BindOptions = {
 
 /** What the paper did. */
 export const PAPER_DEFAULTS: BindOptions = { ...BIND_DEFAULTS, method: "classic", solver: "jacobi" };
-
-/** What the cage is asked for; `shape` and `per_component` go beyond the contract's least. */
-export interface CageWish extends CageOptions {
-  readonly shape: "follow" | "hull";
-  /** A cage for each separate part of the model, instead of one for all. */
-  readonly per_component: boolean;
-}
 
 export const CAGE_DEFAULTS: CageWish = {
   vertices: 80,

@@ -11,6 +11,7 @@ import { createProject, poseOf } from "./actions/project";
 import { createView } from "./actions/view";
 import type { App } from "./app";
 import type { NamedFile, Session } from "./contract";
+import { watchCrashes } from "./crash";
 import { createHistory } from "./history";
 import { createCommands } from "./input/commands";
 import { attachDrop } from "./input/drop";
@@ -22,11 +23,12 @@ import { lackOf } from "./session/adapter";
 import { decodeShare } from "./share";
 import { startUp } from "./start";
 import { createStore, INITIAL } from "./state";
-import { hasLocally, loadTheme } from "./store";
+import { forgetCrash, hasLocally, loadTheme } from "./store";
 import { type Explained, explain, FIX_LABELS, PRODUCT } from "./strings";
 import { createBar } from "./ui/bar";
 import { createBindPanel } from "./ui/bind";
 import { createCagePanel } from "./ui/cage";
+import { askAfterCrash } from "./ui/crashed";
 import { h } from "./ui/dom";
 import { createExportPanel } from "./ui/export";
 import { attachLost } from "./ui/lost";
@@ -80,6 +82,17 @@ async function main(): Promise<void> {
 
   const bind = createBind(ctx);
   const project = createProject(ctx);
+  /** Not by its link again, which may be the cause. */
+  const restart = () => {
+    window.history.replaceState(null, "", location.pathname + location.search);
+    location.reload();
+  };
+  const crashes = watchCrashes(store, restart, (crash) => {
+    askAfterCrash(crash, () => {
+      forgetCrash();
+      void project.forget().then(restart);
+    });
+  });
   let soon: ReturnType<typeof setTimeout> | undefined;
   /** A changed cage is bound again once the hand rests; a fine grid waits for the user's word. */
   const bindSoon = (pause: number) => {
@@ -123,7 +136,11 @@ async function main(): Promise<void> {
     },
     applyPose(settings) {
       const pose = poseOf(settings);
-      if (pose) current().engine.decodePose(pose);
+      try {
+        if (pose) current().engine.decodePose(pose);
+      } catch {
+        tell.say("The pose in this project is damaged; it opens at rest.");
+      }
       edit.sync();
     },
     writeProject: project.write,
@@ -164,7 +181,7 @@ async function main(): Promise<void> {
     chooseModel: () => choose(MODELS, false, (list) => void files.openFiles(list)),
     chooseFolder: () => choose("", true, (list) => void files.openFiles(list)),
     chooseCage: () => choose(".obj,.glb,.gltf,.bin", false, (list) => void cage.load(list)),
-    share: () => void share(),
+    share: () => void exports.share(),
     showWays: () => without.show(store.get().lack ?? "NoWebGPU"),
     startFresh: () => void project.forget().then(() => files.openSample(store.get().samples[0]?.id ?? "")),
     pointer: () => ({ x: 0, y: 0 }),
@@ -183,28 +200,6 @@ async function main(): Promise<void> {
     file: () => app.chooseModel(),
     regenerate: () => cage.repair("regenerate"),
     reload: () => location.reload(),
-  };
-
-  const share = async () => {
-    const link = await project.link();
-    if (!link) {
-      tell.say(
-        "A link can hold a sample in its own cage and pose, but no files of yours. Save a project file to pass this on.",
-        {
-          label: "Save the project",
-          run: () => void exports.save("project"),
-        },
-      );
-      return;
-    }
-    try {
-      await navigator.clipboard.writeText(link);
-      tell.say("Link copied. Whoever opens it sees this sample in this pose.");
-    } catch {
-      // No access to the clipboard: the address bar can be copied by hand.
-      window.history.replaceState(null, "", link);
-      tell.say("The link is in the address bar; copy it from there.");
-    }
   };
 
   createBar(byId("bar"), app, sheet.show);
@@ -240,7 +235,14 @@ async function main(): Promise<void> {
   });
   const notice = session.lack && without.notice(session.lack);
   if (notice) stageElement.before(notice);
-  startUp({ app, stage, theme: loadTheme(), shared: () => decodeShare(location.hash), product: PRODUCT });
+  startUp({
+    app,
+    stage,
+    crashes,
+    theme: loadTheme(),
+    shared: () => decodeShare(location.hash),
+    product: PRODUCT,
+  });
 }
 
 void main();

@@ -156,6 +156,7 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       return { ...opened, cage: state, poses };
     },
     turn: (bytes, up) => openBytes({ name: "turned.glb", bytes, sibling: () => undefined, up }),
+    readSettings: (text, defaults) => pkg.readSettings(text, JSON.stringify(defaults)),
     async openCage(files: readonly NamedFile[]): Promise<CageState> {
       const { name, bytes, sibling } = await readFiles(files);
       return raw.loadCage(name, bytes, sibling);

@@ -20,19 +20,28 @@ export async function encodeShare(shared: Shared): Promise<string> {
   return `#${fields}`;
 }
 
-/** What a fragment says; undefined when it is no share link. A pose that cannot be read is an error. */
+/** What a fragment says; undefined when it is no share link. One that is cut off or cannot be read is an error. */
 export async function decodeShare(fragment: string): Promise<Shared | undefined> {
-  if (fragment.length < 2 || fragment.length > LONGEST) return undefined;
   const fields = new URLSearchParams(fragment.slice(1));
   const sample = fields.get("sample");
-  if (!sample) return undefined;
   const cage = fields.get("cage");
   const pose = fields.get("pose");
+  if (sample === null && pose === null) return undefined;
+  if (!sample) throw new Error("it does not say which sample it shows");
+  if (fragment.length > LONGEST) throw new Error(`it is longer than ${LONGEST} letters`);
   return {
     sample,
     ...(cage === null ? {} : { cage }),
-    ...(pose === null ? {} : { pose: await unpack(fromBase64Url(pose)) }),
+    ...(pose === null ? {} : { pose: await readPose(pose) }),
   };
+}
+
+async function readPose(text: string): Promise<Uint8Array> {
+  try {
+    return await unpack(fromBase64Url(text));
+  } catch {
+    throw new Error("its pose cannot be read");
+  }
 }
 
 async function through(

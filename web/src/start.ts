@@ -1,10 +1,12 @@
 /** The first moments of a visit, and what goes on by itself: size, title, autosave, and what to open. */
 
-import { attempt } from "./actions/context";
+import { report } from "./actions/context";
 import type { App } from "./app";
+import type { Crash, Crashes } from "./crash";
 import { percent } from "./format";
 import type { Shared } from "./share";
 import type { Theme } from "./store";
+import { CRASHED, showReport } from "./ui/crashed";
 import type { Stage } from "./ui/viewport";
 
 /** Sharper than this nobody sees, and it costs four times the pixels. */
@@ -13,12 +15,13 @@ const MOST_SHARP = 2;
 export interface Start {
   app: App;
   stage: Stage;
+  crashes: Crashes;
   theme: Theme;
   shared: () => Promise<Shared | undefined>;
   product: string;
 }
 
-export function startUp({ app, stage, theme, shared, product }: Start): void {
+export function startUp({ app, stage, crashes, theme, shared, product }: Start): void {
   const { store } = app;
   const session = app.ctx.session();
   store.set({ adapter: session.adapter, lack: session.lack, samples: session.samples, busy: null });
@@ -49,13 +52,34 @@ export function startUp({ app, stage, theme, shared, product }: Start): void {
     },
   );
 
-  void open(app, shared);
-  window.addEventListener("hashchange", () => void openShared(app, shared));
+  const stop = session.onFrame(() => {
+    if (!store.get().bound) return;
+    crashes.settled();
+    stop();
+  });
+  void open(app, shared, crashes.before);
+  window.addEventListener("hashchange", () => {
+    void openShared(app, shared).then(({ damage }) => sayDamage(app, damage));
+  });
 }
 
 /** A link comes first, then the work of the last visit, then the first sample. */
-async function open(app: App, shared: () => Promise<Shared | undefined>): Promise<void> {
-  if (await openShared(app, shared)) return;
+async function open(
+  app: App,
+  shared: () => Promise<Shared | undefined>,
+  crash: Crash | undefined,
+): Promise<void> {
+  const link = await openShared(app, shared);
+  if (!link.opened) await openKept(app);
+  // Last, because whatever is opened takes messages away.
+  sayDamage(app, link.damage);
+  if (crash) {
+    const report = { label: "Show the report", run: () => showReport(crash) };
+    app.ctx.tell.problem({ title: CRASHED, message: crash.during }, report);
+  }
+}
+
+async function openKept(app: App): Promise<void> {
   const kept = await app.project.restore();
   if (kept && (await app.files.openFiles(kept.files))) {
     app.store.set({ step: "pose", savedAt: kept.when });
@@ -69,29 +93,32 @@ async function open(app: App, shared: () => Promise<Shared | undefined>): Promis
   if (first) await app.files.openSample(first.id);
 }
 
-async function openShared(app: App, shared: () => Promise<Shared | undefined>): Promise<boolean> {
-  let link: Shared | undefined;
-  const readable = await attempt(app.ctx, "The pose in this link cannot be read", async () => {
-    link = await shared();
-  });
-  if (!readable || !link) return false;
-  const { sample, pose } = link;
-  if (!app.store.get().samples.some(({ id }) => id === sample)) {
-    app.ctx.tell.problem({
-      title: "This link is not for this page",
-      message: `There is no sample called "${sample}" here.`,
-    });
-    return false;
+/** Opens what a link shows. Says whether there is something open now, and what is wrong with the link. */
+async function openShared(
+  app: App,
+  shared: () => Promise<Shared | undefined>,
+): Promise<{ opened: boolean; damage?: unknown }> {
+  let opened = false;
+  try {
+    const link = await shared();
+    if (!link) return { opened };
+    const { sample, pose } = link;
+    if (!app.store.get().samples.some(({ id }) => id === sample)) {
+      throw new Error(`there is no sample called "${sample.slice(0, 40)}" here`);
+    }
+    opened = await app.files.openSample(sample);
+    if (!opened) return { opened };
+    app.store.set({ step: "pose" });
+    if (pose) app.ctx.session().engine.decodePose(pose);
+    app.edit.sync();
+    return { opened };
+  } catch (damage) {
+    return { opened, damage };
   }
-  if (!(await app.files.openSample(sample))) return false;
-  if (pose) {
-    await attempt(app.ctx, "The pose in this link does not fit", () => {
-      app.ctx.session().engine.decodePose(pose);
-      app.edit.sync();
-    });
-  }
-  app.store.set({ step: "pose" });
-  return true;
+}
+
+function sayDamage(app: App, damage: unknown): void {
+  if (damage !== undefined) report(app.ctx, "This link is damaged", damage);
 }
 
 /** How long ago, in words. */

@@ -5,6 +5,7 @@ import type {
   BindReport,
   Element as CageElement,
   CageState,
+  CageWish,
   Lack,
   Legend,
   ModelInfo,
@@ -12,7 +13,7 @@ import type {
   Sample,
   SceneOptions,
 } from "./contract";
-import { BIND_DEFAULTS, CAGE_DEFAULTS, type CageWish, SCENE_DEFAULTS } from "./defaults";
+import { BIND_DEFAULTS, CAGE_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
 import type { Theme } from "./store";
 
 export const STEPS = ["model", "cage", "bind", "pose", "export"] as const;

@@ -1,5 +1,7 @@
 /** What the browser keeps between visits: the project of the moment, in IndexedDB, the theme, and notices that were read. Nothing leaves it. */
 
+import type { Crash } from "./crash";
+
 const DATABASE = "cagework";
 const TABLE = "projects";
 const KEY = "autosave";
@@ -70,6 +72,36 @@ function isSaved(value: unknown): value is Saved {
   return (
     saved.bytes instanceof Uint8Array && typeof saved.name === "string" && typeof saved.when === "number"
   );
+}
+
+const CRASH = "cagework.crash";
+
+/** Keeps what happened for the page that comes after in this tab; whether that was possible. */
+export function keepCrash(crash: Crash): boolean {
+  try {
+    sessionStorage.setItem(CRASH, JSON.stringify(crash));
+    return true;
+  } catch {
+    return false;
+  }
+}
+
+/** What happened to the page before in this tab. */
+export function lastCrash(): Crash | undefined {
+  try {
+    const { during, report } = JSON.parse(sessionStorage.getItem(CRASH) ?? "{}");
+    return typeof during === "string" && typeof report === "string" ? { during, report } : undefined;
+  } catch {
+    return undefined;
+  }
+}
+
+export function forgetCrash(): void {
+  try {
+    sessionStorage.removeItem(CRASH);
+  } catch {
+    // Storage is forbidden: nothing was kept.
+  }
 }
 
 export type Theme = "auto" | "light" | "dark";

@@ -1,10 +1,10 @@
 import { describe, expect, it } from "vitest";
 import { grown } from "../src/actions/bind";
 import { freshName } from "../src/actions/poses";
-import { poseOf, readSettings } from "../src/actions/project";
+import { poseOf } from "../src/actions/project";
 import { nextAmount } from "../src/amount";
 import type { BindReport } from "../src/contract";
-import { BIND_DEFAULTS, CAGE_DEFAULTS } from "../src/defaults";
+import { BIND_DEFAULTS } from "../src/defaults";
 import { rectangle } from "../src/input/pointer";
 import { pinch } from "../src/input/touch";
 import { ago, isSoftware } from "../src/start";
@@ -50,29 +50,9 @@ describe("two fingers", () => {
   });
 });
 
-describe("settings of a project", () => {
-  it("come back as they were", () => {
-    const text = JSON.stringify({ bind: BIND_DEFAULTS, symmetry: true, pose: "AAEC" });
-    const settings = readSettings(text);
-    expect(settings).toEqual({ bind: BIND_DEFAULTS, symmetry: true, pose: "AAEC" });
-    expect(poseOf(settings)).toEqual(Uint8Array.of(0, 1, 2));
-  });
-  it("of before there were voxels leave them to the vertices", () => {
-    const { voxels: _, ...before } = { ...CAGE_DEFAULTS, vertices: 120 };
-    expect(readSettings(JSON.stringify({ cage: before }))).toEqual({ cage: { ...before, voxels: 0 } });
-  });
-  it("of before there was a preconditioner have none", () => {
-    const { preconditioner: _, ...before } = BIND_DEFAULTS;
-    expect(readSettings(JSON.stringify({ bind: before }))).toEqual({ bind: BIND_DEFAULTS });
-  });
-  it("are dropped part by part when they are not what they should be", () => {
-    expect(readSettings("not json")).toEqual({});
-    expect(readSettings("[1]")).toEqual({});
-    expect(readSettings(JSON.stringify({ cage: "none" }))).toEqual({});
-    expect(readSettings(JSON.stringify({ cage: { vertices: "many" } }))).toEqual({});
-    expect(readSettings(JSON.stringify({ bind: { grid: 100_000 }, pose: 7 }))).toEqual({});
-    expect(poseOf({ pose: "***" })).toBeUndefined();
-  });
+it("the pose of a project is bytes, or none when it cannot be read", () => {
+  expect(poseOf({ pose: "AAEC" })).toEqual(Uint8Array.of(0, 1, 2));
+  expect(poseOf({ pose: "***" })).toBeUndefined();
 });
 
 describe("the plot", () => {

@@ -21,11 +21,14 @@ describe("share links", () => {
   it("are not every fragment", async () => {
     expect(await decodeShare("")).toBeUndefined();
     expect(await decodeShare("#top")).toBeUndefined();
-    expect(await decodeShare(`#sample=${"x".repeat(20_000)}`)).toBeUndefined();
   });
 
-  it("with a damaged pose are an error", async () => {
-    await expect(decodeShare("#sample=rat&pose=****")).rejects.toThrow();
+  it("that are damaged are an error that says how", async () => {
+    await expect(decodeShare("#sample=rat&pose=****")).rejects.toThrow("its pose cannot be read");
+    await expect(decodeShare(`#sample=rat&pose=${"A".repeat(20_000)}`)).rejects.toThrow("16384 letters");
+    await expect(decodeShare("#sample=&pose=AAAA")).rejects.toThrow("which sample");
+    const link = await encodeShare({ sample: "rat", pose });
+    await expect(decodeShare(link.slice(0, -60))).rejects.toThrow("its pose cannot be read");
   });
 
   it("encode every byte", () => {

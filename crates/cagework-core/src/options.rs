@@ -160,23 +160,26 @@ pub struct OutOfRange {
 /// An option whose value is a number.
 #[derive(Clone, Copy, Debug)]
 pub struct Number {
-    name: &'static str,
-    allowed: &'static str,
-    is_allowed: fn(f64) -> bool,
+    pub(crate) name: &'static str,
+    pub(crate) allowed: &'static str,
+    pub(crate) is_allowed: fn(f64) -> bool,
 }
 
 /// Cells along the longest side.
 pub const GRID: Number = Number {
     name: "grid",
     allowed: "a whole number from 8 to 512",
-    is_allowed: |g| (f64::from(MIN_GRID)..=f64::from(MAX_GRID)).contains(&g),
+    is_allowed: |g| g.fract() == 0.0 && (f64::from(MIN_GRID)..=f64::from(MAX_GRID)).contains(&g),
 };
 /// Threshold for delta.
 pub const TAU: Number =
     Number { name: "tau", allowed: "a number above 0", is_allowed: |tau| tau.is_finite() && tau > 0.0 };
 /// Limit on iterations.
-pub const MAX_ITERATIONS: Number =
-    Number { name: "max_iterations", allowed: "a whole number from 1 on", is_allowed: |n| n >= 1.0 };
+pub const MAX_ITERATIONS: Number = Number {
+    name: "max_iterations",
+    allowed: "a whole number from 1 on",
+    is_allowed: |n| n.fract() == 0.0 && n >= 1.0,
+};
 /// Threshold for weights.
 pub const SPARSIFY: Number = Number {
     name: "sparsify",
@@ -312,6 +315,7 @@ mod tests {
         let refused = GRID.parse::<u32>("7").unwrap_err();
         assert_eq!(refused.to_string(), "grid is 7; it must be a whole number from 8 to 512");
         assert!(GRID.parse::<u32>("8").is_ok() && GRID.parse::<u32>("64.5").is_err());
+        assert!(GRID.check(64.5).is_err() && MAX_ITERATIONS.check(1.5).is_err());
         assert!(TAU.check(0.0).is_err() && TAU.check(f32::NAN).is_err() && TAU.check(f32::INFINITY).is_err());
         assert!(BindOptions { sparsify: 0.1, ..BindOptions::default() }.check().is_err());
     }

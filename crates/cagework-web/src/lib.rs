@@ -23,6 +23,7 @@ pub mod loaded;
 mod options;
 mod problems;
 mod scene;
+pub mod settings;
 mod state;
 #[cfg(target_family = "wasm")]
 mod surface;
@@ -32,12 +33,17 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 #[wasm_bindgen]
 extern "C" {
-    #[wasm_bindgen(js_namespace = console, js_name = error)]
-    fn complain(message: &str);
+    #[wasm_bindgen(js_name = reportError)]
+    fn report_error(error: &js_sys::Error);
 }
 
-/// Called once by the glue: panics become messages in the console, instead of "unreachable".
+/// Called once by the glue: a panic becomes an error called `Panic` that nobody can catch by accident, in the console with
+/// its place and message, and for the page's `crash.ts` or the worker's page to hear. What follows is a trap.
 #[wasm_bindgen(start)]
 pub fn start() {
-    std::panic::set_hook(Box::new(|panic| complain(&panic.to_string())));
+    std::panic::set_hook(Box::new(|panic| {
+        let error = js_sys::Error::new(&panic.to_string());
+        error.set_name("Panic");
+        report_error(&error);
+    }));
 }

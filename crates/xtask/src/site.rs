@@ -1,6 +1,7 @@
 //! The page: built into `dist/`, served, tested in a browser.
 
 use crate::command::{root, run};
+use crate::licences;
 use crate::npm::{self, exec};
 use crate::wasm::{self, Profile};
 
@@ -28,6 +29,7 @@ pub(crate) fn build() -> Result<(), String> {
     npm::install()?;
     wasm::build(Profile::Web)?;
     exec(&["vite", "build", "web", "--config", "web/vite.config.ts", "--logLevel", "warn"])?;
+    licences::of_page(&root().join(FOLDER))?;
     check_sizes()?;
     println!("the page is in {FOLDER}/: any web server can serve it, from any path");
     Ok(())

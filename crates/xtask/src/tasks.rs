@@ -2,7 +2,7 @@
 
 use crate::command::{root, run};
 use crate::npm::{self, exec};
-use crate::{arrows, site};
+use crate::{arrows, licences, site, wasm};
 
 /// Builds the release command and runs it on its built-in sample.
 pub(crate) fn demo(args: &[&str]) -> Result<(), String> {
@@ -13,7 +13,8 @@ pub(crate) fn demo(args: &[&str]) -> Result<(), String> {
 /// Builds the page, and the release command (`target/release/cagework`).
 pub(crate) fn build() -> Result<(), String> {
     site::build()?;
-    run("cargo", &["build", "--release", "--locked", "--package", "cagework-cli"], &[])
+    run("cargo", &["build", "--release", "--locked", "--package", "cagework-cli"], &[])?;
+    licences::of_command(&wasm::target_folder()?.join("release"))
 }
 
 /// Everything that can fail because the program is wrong.

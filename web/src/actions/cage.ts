@@ -1,7 +1,6 @@
 /** Getting a cage: made for the model, a box, or a file; and repairing it. */
 
-import type { CageState, Job, Mend, NamedFile, RepairKind } from "../contract";
-import type { CageWish } from "../defaults";
+import type { CageState, CageWish, Job, Mend, NamedFile, RepairKind } from "../contract";
 import type { CageSource } from "../state";
 import { attempt, type Context, report } from "./context";
 

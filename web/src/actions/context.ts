@@ -1,6 +1,7 @@
 /** What every action needs: the session, the state, the history and a voice. */
 
 import type { Session } from "../contract";
+import { isFatal } from "../crash";
 import type { History } from "../history";
 import type { Store } from "../state";
 import { type Explained, explain, isCancelled } from "../strings";
@@ -46,6 +47,11 @@ export async function attempt(
 /** Shows an error, once. */
 export function report(ctx: Context, title: string, error: unknown): void {
   if (isCancelled(error)) return;
+  if (isFatal(error)) {
+    // More than this action failed: see crash.ts.
+    reportError(error);
+    return;
+  }
   const explained = explain(error, title);
   ctx.tell.problem(explained, explained.fix ? ctx.fixFor(explained.fix) : undefined);
 }

@@ -10,6 +10,8 @@ export type ExportKind = "glb" | "poses" | "cage" | "weights" | "picture" | "pro
 
 export interface Exports {
   save(kind: ExportKind): Promise<void>;
+  /** A link to what is open, on the clipboard if it may be. */
+  share(): Promise<void>;
   pictureSize(scale: number): void;
 }
 
@@ -48,7 +50,7 @@ export function createExports(ctx: Context, project: Project, viewport: () => DO
     return ctx.session().picture(Math.round(width * fit), Math.round(height * fit));
   };
 
-  return {
+  const exports: Exports = {
     async save(kind) {
       const name = stem(ctx.store.get().model?.name ?? "model");
       await attempt(ctx, "The file could not be written", async () => {
@@ -58,10 +60,29 @@ export function createExports(ctx: Context, project: Project, viewport: () => DO
         ctx.tell.say(`${file} is in your downloads (${size(blob.size)}).`);
       });
     },
+    async share() {
+      const link = await project.link();
+      if (!link) {
+        ctx.tell.say(
+          "A link can hold a sample in its own cage and pose, but no files of yours. Save a project file to pass this on.",
+          { label: "Save the project", run: () => void exports.save("project") },
+        );
+        return;
+      }
+      try {
+        await navigator.clipboard.writeText(link);
+        ctx.tell.say("Link copied. Whoever opens it sees this sample in this pose.");
+      } catch {
+        // No access to the clipboard: the address bar can be copied by hand.
+        window.history.replaceState(null, "", link);
+        ctx.tell.say("The link is in the address bar; copy it from there.");
+      }
+    },
     pictureSize(value) {
       scale = value;
     },
   };
+  return exports;
 }
 
 const SUFFIX: Record<Exclude<ExportKind, "project">, string> = {

@@ -1,13 +1,12 @@
 /** Opening: samples, files and projects. What is opened gets a cage and is bound without further questions. */
 
-import type { NamedFile, Opened, Sample, UpAxis } from "../contract";
+import type { NamedFile, Opened, Sample, Settings, UpAxis } from "../contract";
+import { BIND_DEFAULTS, CAGE_DEFAULTS } from "../defaults";
 import { planDrop } from "../drop";
 import { stem } from "../format";
 import type { StepName } from "../state";
 import { sentence } from "../strings";
 import { attempt, type Context } from "./context";
-import type { Settings } from "./project";
-import { readSettings } from "./project";
 
 export interface Files {
   openSample(id: string): Promise<boolean>;
@@ -42,7 +41,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
   const take = async (opened: Opened, sample: string | null, cageFiles?: readonly NamedFile[]) => {
     turn += 1;
     const mine = turn;
-    const settings = opened.project ? readSettings(opened.project.settings) : {};
+    const settings = settingsOf(opened);
     const poses = opened.project?.poses ?? opened.poses ?? [];
     ctx.history.clear();
     store.set({
@@ -62,7 +61,16 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     store.set({ sample: ofSample, sampleCage: ofSample !== null && opened.cage !== null });
     follow.applyPose(settings);
     for (const notice of opened.model.notices) ctx.tell.say(sentence(notice));
+    if (settings.notices.length > 0) ctx.tell.say(settings.notices.join(" "));
     void prepare(mine, cageFiles, sample !== null || opened.project !== null);
+  };
+
+  const settingsOf = (opened: Opened) => {
+    // The memory limit is this computer's: no file says how much it has.
+    const bind = { ...BIND_DEFAULTS, memory_limit: store.get().bindOptions.memory_limit };
+    const { project } = opened;
+    const none: Settings & { notices: readonly string[] } = { notices: [] };
+    return project ? ctx.session().readSettings(project.settings, { bind, cage: CAGE_DEFAULTS }) : none;
   };
 
   const goTo = (from: readonly StepName[], step: StepName) => {

@@ -1,21 +1,11 @@
 /** Keeping work: autosave in the browser, the project file, the share link, and coming back from each. */
 
-import type { BindOptions, NamedFile } from "../contract";
-import { BIND_DEFAULTS, CAGE_DEFAULTS, type CageWish } from "../defaults";
+import type { NamedFile, Settings } from "../contract";
+import { isFatal } from "../crash";
 import { stem } from "../format";
 import { encodeShare, fromBase64Url, toBase64Url } from "../share";
 import { forgetLocally, loadLocally, saveLocally } from "../store";
 import { attempt, type Context } from "./context";
-
-/** The page's own part of a project file. */
-export interface Settings {
-  bind?: BindOptions;
-  cage?: CageWish;
-  sample?: string;
-  symmetry?: boolean;
-  /** `Engine.encodePose`, base 64. */
-  pose?: string;
-}
 
 export interface Project {
   /** The project file's bytes. */
@@ -80,7 +70,11 @@ export function createProject(ctx: Context): Project {
       const when = Date.now();
       await saveLocally({ bytes, name: model.name, when });
       store.set({ savedAt: when });
-    } catch {
+    } catch (error) {
+      if (isFatal(error)) {
+        reportError(error);
+        return;
+      }
       // Private windows and full disks refuse: say it once, and do not try again.
       failed = true;
       ctx.tell.say(
@@ -127,29 +121,6 @@ export function createProject(ctx: Context): Project {
   };
 }
 
-/** Settings from a file, or none: files come from anywhere, so that each part is looked at. */
-export function readSettings(text: string): Settings {
-  let value: unknown;
-  try {
-    value = JSON.parse(text || "{}");
-  } catch {
-    return {};
-  }
-  if (typeof value !== "object" || value === null) return {};
-  const from = value as Record<string, unknown>;
-  const settings: Settings = {};
-  // Projects from before `preconditioner` and `voxels` have none.
-  const bind = typeof from.bind === "object" &&
-    from.bind && { preconditioner: BIND_DEFAULTS.preconditioner, ...from.bind };
-  if (isBind(bind)) settings.bind = bind;
-  const cage = typeof from.cage === "object" && from.cage && { ...CAGE_DEFAULTS, ...from.cage };
-  if (isCage(cage)) settings.cage = cage;
-  if (typeof from.sample === "string") settings.sample = from.sample;
-  if (typeof from.symmetry === "boolean") settings.symmetry = from.symmetry;
-  if (typeof from.pose === "string") settings.pose = from.pose;
-  return settings;
-}
-
 /** The pose of settings as bytes, if it has one that can be read. */
 export function poseOf(settings: Settings): Uint8Array | undefined {
   if (settings.pose === undefined) return undefined;
@@ -159,35 +130,4 @@ export function poseOf(settings: Settings): Uint8Array | undefined {
     // A damaged pose is no reason to refuse the project; it opens at rest.
     return undefined;
   }
-}
-
-function isBind(value: unknown): value is BindOptions {
-  if (typeof value !== "object" || value === null) return false;
-  const v = value as Partial<BindOptions>;
-  return (
-    typeof v.grid === "number" &&
-    v.grid >= 8 &&
-    v.grid <= 512 &&
-    (v.method === "embedded" || v.method === "classic") &&
-    (v.solver === "multigrid" || v.solver === "jacobi" || v.solver === "cg") &&
-    (v.preconditioner === "none" || v.preconditioner === "v_cycle") &&
-    (v.backend === "gpu" || v.backend === "cpu") &&
-    (v.cell_shape === "box" || v.cell_shape === "cubic") &&
-    (v.delta_norm === "euclidean" || v.delta_norm === "literal") &&
-    (v.outside === "closest_point" || v.outside === "refuse") &&
-    [v.tau, v.max_iterations, v.sparsify, v.memory_limit].every((n) => typeof n === "number" && n >= 0)
-  );
-}
-
-function isCage(value: unknown): value is CageWish {
-  if (typeof value !== "object" || value === null) return false;
-  const v = value as Partial<CageWish>;
-  return (
-    typeof v.vertices === "number" &&
-    typeof v.margin === "number" &&
-    typeof v.voxels === "number" &&
-    (v.shape === "follow" || v.shape === "hull") &&
-    typeof v.per_component === "boolean" &&
-    (v.symmetry === "auto" || v.symmetry === "on" || v.symmetry === "off")
-  );
 }

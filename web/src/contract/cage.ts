@@ -39,14 +39,21 @@ export interface Mend {
 export type RepairKind = "fill_holes" | "turn_faces" | "grow" | "drop_parts" | "weld" | "regenerate";
 
 export interface CageOptions {
-  /** Vertices wanted, 8 to 400. */
+  /** Vertices wanted, 12 to 400. */
   readonly vertices: number;
-  /** Distance from the model, fraction of its diagonal, 0.01 to 0.2. */
+  /** Distance from the model, fraction of its diagonal, 0 to 0.25. */
   readonly margin: number;
   /** Mirror-symmetric in x, if the model is (found out by itself with "auto"). */
   readonly symmetry: "auto" | "on" | "off";
   /** Voxels along the model's longest side, 8 to 128: gaps narrower than three of them are closed. 0: by the vertices. */
   readonly voxels: number;
+}
+
+/** What the cage is asked for; `shape` and `per_component` go beyond the least. */
+export interface CageWish extends CageOptions {
+  readonly shape: "follow" | "hull";
+  /** A cage for each separate part of the model, instead of one for all. */
+  readonly per_component: boolean;
 }
 
 /** Edits of the rest cage's topology, on the selection. */

@@ -1,7 +1,7 @@
 /** What `session.ts` offers: files, jobs in the worker, frames. */
 
 import type { BindEvent, BindOptions, BindReport } from "./bind";
-import type { CageOptions, CageState } from "./cage";
+import type { CageOptions, CageState, CageWish } from "./cage";
 import type { Engine } from "./engine";
 import type { Pose } from "./scene";
 
@@ -30,6 +30,11 @@ export interface Session {
   openSample(id: string): Promise<Opened>;
   /** Opens a project again with another axis up: model, cage and poses are turned. */
   turn(project: Uint8Array, up: UpAxis): Promise<Opened>;
+  /**
+   * A project's settings, each checked as the options of a call are: what cannot be used is the default, and `notices` say
+   * so. The memory limit is the default's.
+   */
+  readSettings(text: string, defaults: Defaults): Settings & { readonly notices: readonly string[] };
   /** A cage from a file (.obj, .glb, .gltf). A mesh that is no cage yet is kept as a draft: `usable` is false. */
   openCage(files: readonly NamedFile[]): Promise<CageState>;
   /** Makes a cage for the model, in the worker. */
@@ -95,6 +100,20 @@ export interface Opened {
   readonly project: { readonly poses: readonly Pose[]; readonly settings: string } | null;
   /** Prepared poses of a sample. */
   readonly poses?: readonly Pose[];
+}
+
+/** The page's own part of a project file. */
+export interface Settings {
+  readonly bind?: BindOptions;
+  readonly cage?: CageWish;
+  readonly sample?: string;
+  readonly symmetry?: boolean;
+  /** `Engine.encodePose`, base 64. */
+  readonly pose?: string;
+}
+export interface Defaults {
+  readonly bind: BindOptions;
+  readonly cage: CageWish;
 }
 
 /** What points up in the model's file; inside, and on the screen, Y does. */

@@ -41,7 +41,8 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
     started.addEventListener("message", ({ data }: MessageEvent<FromWorker>) => hear(data));
     started.addEventListener("error", (event) => {
       event.preventDefault();
-      restart(named("Worker", event.message || "the worker stopped"));
+      // One that has been replaced already may still be heard.
+      if (started === worker) restart(named("Worker", event.message || "the worker stopped"));
     });
     say(started, { kind: "start", module });
     return started;
@@ -59,6 +60,16 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
       return;
     }
     waiting.delete(message.id);
+    if (message.kind === "failed" && message.name === "RuntimeError") {
+      // A trap: this instance fails with whatever it is asked next.
+      const error = named(
+        "Worker",
+        `the computation broke off (${message.message}): it may need too much memory`,
+      );
+      job.failed(error);
+      restart(error);
+      return;
+    }
     if (message.kind === "done") job.done(message.output as never);
     else job.failed(named(message.name, message.message));
   }

@@ -1,8 +1,7 @@
 /** Step 2: where the cage comes from, what is wrong with it, and shaping it. */
 
 import type { App } from "../app";
-import type { CageOptions, CageState, Problem, RestEdit } from "../contract";
-import type { CageWish } from "../defaults";
+import type { CageOptions, CageState, CageWish, Problem, RestEdit } from "../contract";
 import { count, percent, plural } from "../format";
 import type { CageSource } from "../state";
 import { sentence } from "../strings";

@@ -47,6 +47,11 @@ export function createModelPanel(app: App): HTMLElement {
     card,
     up.element,
     h("p", { class: "privacy" }, icon("lock"), h("span", { text: PRIVACY })),
+    h(
+      "p",
+      { class: "hint" },
+      h("a", { attrs: { href: "./licences.txt", target: "_blank" }, text: "Licences" }),
+    ),
   );
 
   app.store.watch(["model", "sample", "samples"], ({ model, sample, samples }) => {

@@ -33,7 +33,8 @@ use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
 use collapse::Collapser;
 use guarded::Guarded;
 pub use options::{
-    CageGenError, CageOptions, CageReport, GeneratedCage, MAX_TARGET, MIN_TARGET, Mirror, Shape, Symmetry,
+    CLEARANCE, CageGenError, CageOptions, CageReport, GeneratedCage, MAX_TARGET, MIN_TARGET, Mirror, Shape,
+    Symmetry, TARGET, VOXELS,
 };
 use options::{MAX_VOXELS, MIN_VOXELS};
 use shell::Shell;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::cage::{Cage, MAX_DIAGONAL};
-use crate::options::choice;
+use crate::options::{Number, OutOfRange, choice};
 use crate::progress::Cancelled;
 
 /// Fewest vertices that can be asked for.
@@ -15,8 +15,24 @@ pub const MAX_TARGET: u32 = 400;
 /// Coarsest and finest lattice.
 pub(super) const MIN_VOXELS: usize = 8;
 pub(super) const MAX_VOXELS: usize = 128;
-/// Largest clearance, as a fraction of the model's diagonal.
-const MAX_CLEARANCE: f32 = 0.25;
+/// Range of [`CageOptions::target`].
+pub const TARGET: Number = Number {
+    name: "target",
+    allowed: "a whole number from 12 to 400",
+    is_allowed: |n| n.fract() == 0.0 && (f64::from(MIN_TARGET)..=f64::from(MAX_TARGET)).contains(&n),
+};
+/// Range of [`CageOptions::clearance`].
+pub const CLEARANCE: Number = Number {
+    name: "clearance",
+    allowed: "a fraction of the diagonal from 0 to 0.25",
+    is_allowed: |part| (0.0..=0.25).contains(&part),
+};
+/// Range of [`CageOptions::voxels`].
+pub const VOXELS: Number = Number {
+    name: "voxels",
+    allowed: "0 (automatic) or a whole number from 8 to 128",
+    is_allowed: |n| n == 0.0 || n.fract() == 0.0 && (MIN_VOXELS as f64..=MAX_VOXELS as f64).contains(&n),
+};
 
 choice! {
     /// What the cage follows.
@@ -97,6 +113,18 @@ impl Default for CageOptions {
     }
 }
 
+impl CageOptions {
+    /// Checks every option's range.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names the first that is wrong.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        TARGET.check(self.target)?;
+        CLEARANCE.check(self.clearance)?;
+        VOXELS.check(self.voxels)
+    }
+}
+
 /// A cage and how it came about.
 #[derive(Clone, Debug)]
 pub struct GeneratedCage {
@@ -141,15 +169,8 @@ pub struct CageReport {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum CageGenError {
     /// An option is out of range.
-    #[error("{option} is {value}; it must be {allowed}")]
-    Option {
-        /// Name of the option.
-        option: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it may be.
-        allowed: &'static str,
-    },
+    #[error(transparent)]
+    Option(#[from] OutOfRange),
     /// The model has no vertices.
     #[error("model has no vertices: there is nothing to make a cage for")]
     Empty,
@@ -191,18 +212,7 @@ pub(super) fn check(
     triangles: &[[u32; 3]],
     options: &CageOptions,
 ) -> Result<[DVec3; 2], CageGenError> {
-    if !(MIN_TARGET..=MAX_TARGET).contains(&options.target) {
-        let (value, allowed) = (f64::from(options.target), "a whole number from 12 to 400");
-        return Err(CageGenError::Option { option: "target", value, allowed });
-    }
-    if !(0.0..=MAX_CLEARANCE).contains(&options.clearance) {
-        let (value, allowed) = (f64::from(options.clearance), "a fraction of the diagonal from 0 to 0.25");
-        return Err(CageGenError::Option { option: "clearance", value, allowed });
-    }
-    if options.voxels != 0 && !(MIN_VOXELS..=MAX_VOXELS).contains(&(options.voxels as usize)) {
-        let (value, allowed) = (f64::from(options.voxels), "0 (automatic) or a whole number from 8 to 128");
-        return Err(CageGenError::Option { option: "voxels", value, allowed });
-    }
+    options.check()?;
     if positions.is_empty() {
         return Err(CageGenError::Empty);
     }

@@ -7,6 +7,7 @@ use super::{CageGenError, CageOptions, GeneratedCage, Mirror, Shape, Symmetry, g
 use crate::cage::Cage;
 use crate::contact::{Corners, meeting};
 use crate::geometry::winding_number;
+use crate::options::OutOfRange;
 use crate::progress::{ProgressEvent, Silent};
 
 /// Positions of the order of 1, rounded to f32 and mirrored.
@@ -213,12 +214,12 @@ fn bad_input_is_refused_in_words() {
     assert!(matches!(error, CageGenError::Index { triangle: 0, vertex: 9999, .. }));
     assert!(matches!(
         refused(&positions, &triangles, &options(5)),
-        CageGenError::Option { option: "target", .. }
+        CageGenError::Option(OutOfRange { option: "target", .. })
     ));
     let wide = CageOptions { clearance: 0.5, ..options(80) };
     assert!(matches!(
         refused(&positions, &triangles, &wide),
-        CageGenError::Option { option: "clearance", .. }
+        CageGenError::Option(OutOfRange { option: "clearance", .. })
     ));
     let huge: Vec<Vec3> = positions.iter().map(|&p| p * 1e30).collect();
     assert!(matches!(refused(&huge, &triangles, &options(80)), CageGenError::Size { .. }));

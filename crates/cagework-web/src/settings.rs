@@ -1,0 +1,235 @@
+//! The page's settings in a project: files come from anywhere, so each part is looked at before it is taken.
+
+use std::mem::discriminant;
+
+use cagework_core::BindOptions;
+use cagework_core::cage_gen::{CLEARANCE, CageOptions, TARGET, VOXELS};
+use cagework_core::options::{GRID, MAX_ITERATIONS, Number, SPARSIFY, TAU};
+use cagework_core::samples;
+use serde::Serialize;
+use serde_json::{Map, Value};
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use crate::error::Fault;
+use crate::options::{BindAsked, CageAsked};
+use crate::views::object;
+
+/// Longest value that is repeated in a notice, characters.
+const SHOWN: usize = 40;
+
+/// Numbers of the page's settings, by their names there.
+const NUMBERS: [(&str, Number); 7] = [
+    ("grid", GRID),
+    ("tau", TAU),
+    ("max_iterations", MAX_ITERATIONS),
+    ("sparsify", SPARSIFY),
+    ("vertices", TARGET),
+    ("margin", CLEARANCE),
+    ("voxels", VOXELS),
+];
+
+/// `Settings` of project.ts, as far as they can be used.
+#[derive(Debug, Default, PartialEq, Serialize)]
+struct Settings {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bind: Option<Map<String, Value>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cage: Option<Map<String, Value>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sample: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    symmetry: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pose: Option<String>,
+    /// What was wrong, in whole sentences.
+    notices: Vec<String>,
+}
+
+/// Settings of a project as far as they can be used, and what was wrong with the rest. `text` is their JSON; `defaults`
+/// the JSON of an object with `bind` and `cage`, for what is missing or wrong. The memory limit is always that of
+/// `defaults`: it belongs to the computer, not to the project.
+///
+/// # Errors
+/// `Argument` when `defaults` is something else.
+#[wasm_bindgen(js_name = readSettings)]
+pub fn read_settings(text: &str, defaults: &str) -> Result<JsValue, JsValue> {
+    let defaults: Map<String, Value> =
+        serde_json::from_str(defaults).map_err(|error| Fault::new("Argument", error.to_string()))?;
+    Ok(object(&Settings::read(text, &defaults))?)
+}
+
+impl Settings {
+    fn read(text: &str, defaults: &Map<String, Value>) -> Self {
+        let mut settings = Self::default();
+        let text = if text.is_empty() { "{}" } else { text };
+        let Ok(mut given) = serde_json::from_str::<Map<String, Value>>(text) else {
+            settings.notices.push("The settings of this project cannot be read.".to_owned());
+            return settings;
+        };
+        settings.bind = settings.group("bind", &mut given, defaults, |asked: BindAsked| {
+            BindOptions::from(asked).check().map_err(|wrong| wrong.allowed)
+        });
+        settings.cage = settings.group("cage", &mut given, defaults, |asked: CageAsked| {
+            CageOptions::from(asked).check().map_err(|wrong| wrong.allowed)
+        });
+        let word = |key: &str| given.get(key).and_then(Value::as_str).map(str::to_owned);
+        settings.pose = word("pose");
+        settings.sample = word("sample").filter(|id| samples::all().iter().any(|sample| sample.id == id));
+        settings.symmetry = given.get("symmetry").and_then(Value::as_bool);
+        settings
+    }
+
+    /// The options of one group, one after the other put in the place of the default; none when the group is not there.
+    fn group<T: serde::de::DeserializeOwned>(
+        &mut self,
+        name: &str,
+        given: &mut Map<String, Value>,
+        defaults: &Map<String, Value>,
+        check: impl Fn(T) -> Result<(), &'static str>,
+    ) -> Option<Map<String, Value>> {
+        let Value::Object(given) = given.remove(name)? else { return None };
+        let defaults = defaults.get(name)?.as_object()?;
+        let mut taken = defaults.clone();
+        for (key, default) in defaults.iter().filter(|(key, _)| *key != "memory_limit") {
+            let Some(value) = given.get(key) else { continue };
+            taken.insert(key.clone(), value.clone());
+            let wrong = match is_in_range(key, value) {
+                Err(allowed) => Some(format!("; it must be {allowed}")),
+                // A word's name as the key of an object would pass for the word.
+                Ok(()) if discriminant(value) != discriminant(default) => Some(String::new()),
+                Ok(()) => match serde_json::from_value(Value::Object(taken.clone())) {
+                    Err(error) => Some(format!(" ({error})")),
+                    Ok(asked) => check(asked).err().map(|allowed| format!("; it must be {allowed}")),
+                },
+            };
+            if let Some(wrong) = wrong {
+                let (name, value, instead) = (key.replace('_', " "), shown(value), shown(default));
+                self.notices
+                    .push(format!("In this project {name} is {value}{wrong}: {instead} is taken instead."));
+                taken.insert(key.clone(), default.clone());
+            }
+        }
+        Some(taken)
+    }
+}
+
+/// Whether a number is one that the option can have; its range if not. Options that are no numbers are not looked at.
+fn is_in_range(key: &str, value: &Value) -> Result<(), &'static str> {
+    let Some((_, number)) = NUMBERS.iter().find(|(name, _)| *name == key) else { return Ok(()) };
+    number.check(value.as_f64().unwrap_or(f64::NAN)).map_err(|wrong| wrong.allowed)
+}
+
+fn shown(value: &Value) -> String {
+    value.to_string().chars().take(SHOWN).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    const GIB: u64 = 1 << 30;
+
+    /// What the page takes where a project says nothing.
+    fn defaults() -> Map<String, Value> {
+        let all = json!({
+            "bind": {
+                "grid": 64, "method": "embedded", "solver": "multigrid", "preconditioner": "none",
+                "backend": "gpu", "cell_shape": "box", "delta_norm": "euclidean", "tau": 1e-5,
+                "max_iterations": 20_000, "sparsify": 0, "outside": "closest_point", "memory_limit": 2 * GIB,
+            },
+            "cage": {
+                "vertices": 80, "margin": 0, "symmetry": "auto", "voxels": 0, "shape": "follow",
+                "per_component": false,
+            },
+        });
+        all.as_object().cloned().unwrap()
+    }
+
+    fn read(settings: &Value) -> Settings {
+        Settings::read(&settings.to_string(), &defaults())
+    }
+
+    #[test]
+    fn settings_come_back_as_they_were() {
+        let mut saved = defaults();
+        saved["bind"]["grid"] = json!(128);
+        saved["bind"]["tau"] = json!(0.001);
+        saved["cage"]["vertices"] = json!(120);
+        let rest = json!({ "symmetry": true, "pose": "AAEC", "sample": "rat" });
+        saved.extend(rest.as_object().cloned().unwrap());
+        let settings = read(&Value::Object(saved.clone()));
+        assert_eq!(settings.notices, Vec::<String>::new());
+        assert_eq!(serde_json::to_value(settings).unwrap(), {
+            saved.insert("notices".to_owned(), json!([]));
+            Value::Object(saved)
+        });
+    }
+
+    #[test]
+    fn what_older_projects_do_not_say_is_the_default() {
+        let settings = read(&json!({ "bind": { "grid": 32 }, "cage": { "vertices": 120 } }));
+        let bind = settings.bind.unwrap();
+        assert_eq!((&bind["grid"], &bind["preconditioner"]), (&json!(32), &json!("none")));
+        let cage = settings.cage.unwrap();
+        assert_eq!((&cage["vertices"], &cage["voxels"]), (&json!(120), &json!(0)));
+        assert_eq!(read(&json!({})), Settings::default());
+        assert_eq!(Settings::read("", &defaults()), Settings::default());
+    }
+
+    /// A project said so once, and no bind and no estimate worked any more until the page was loaded anew.
+    #[test]
+    fn values_that_no_bind_and_no_cage_can_have_are_not_taken() {
+        for (group, key, value, allowed) in [
+            ("bind", "grid", json!(64.5), "a whole number from 8 to 512"),
+            ("bind", "grid", json!(100_000), "a whole number from 8 to 512"),
+            ("bind", "tau", json!(0), "a number above 0"),
+            // Above 0 in 64 bits; in the 32 of the solver it is not.
+            ("bind", "tau", json!(1e-60), "a number above 0"),
+            ("bind", "max_iterations", json!(1e300), "expected u32"),
+            ("bind", "sparsify", json!(0.5), "a threshold below 0.1"),
+            ("bind", "solver", json!("gauss"), "expected one of `jacobi`"),
+            ("bind", "backend", json!({ "gpu": null }), "is taken instead"),
+            ("cage", "vertices", json!(9_000_000_000_u64), "a whole number from 12 to 400"),
+            ("cage", "vertices", json!("many"), "a whole number from 12 to 400"),
+            ("cage", "margin", json!(-0.1), "from 0 to 0.25"),
+            ("cage", "voxels", json!(4), "8 to 128"),
+        ] {
+            let mut given = json!({ "bind": { "grid": 32 }, "cage": { "vertices": 100 } });
+            given[group][key] = value.clone();
+            let settings = serde_json::to_value(read(&given)).unwrap();
+            assert_eq!(settings[group][key], defaults()[group][key], "{key} {value}");
+            let notices = settings["notices"].as_array().unwrap();
+            assert!(notices.len() == 1 && notices[0].as_str().unwrap().contains(allowed), "{notices:?}");
+            // Nothing else is lost with it.
+            if key != "grid" {
+                assert_eq!(settings["bind"]["grid"], 32);
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_does_not_change_the_memory_limit() {
+        for bytes in [json!(0), json!(-1), json!(1_000_000_000_000_000_000_u64), json!(1e18), json!("all")] {
+            let settings = read(&json!({ "bind": { "memory_limit": bytes } }));
+            assert_eq!(
+                (&settings.bind.unwrap()["memory_limit"], settings.notices.len()),
+                (&json!(2 * GIB), 0)
+            );
+        }
+    }
+
+    #[test]
+    fn text_that_is_no_settings_changes_nothing_and_says_so() {
+        for text in ["not json", "[1]", "7"] {
+            let settings = Settings::read(text, &defaults());
+            assert_eq!(settings.notices, ["The settings of this project cannot be read."]);
+            assert_eq!((settings.bind, settings.cage), (None, None));
+        }
+        let odd =
+            read(&json!({ "bind": "none", "cage": [], "pose": 7, "sample": "nobody", "symmetry": "yes" }));
+        assert_eq!(odd, Settings::default());
+    }
+}

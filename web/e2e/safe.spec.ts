@@ -1,0 +1,151 @@
+/** What may go wrong and must not break the page: settings of a project, links, crashes of the module; and whose work it is. */
+
+import type { Page } from "@playwright/test";
+import { savedSince } from "./kept";
+import { bound, cagePositions, drag, drop, expect, largestMove, open, shoot, test } from "./support";
+
+test("a project whose settings no bind could have is opened with others, and says which", async ({
+  page,
+}) => {
+  await open(page);
+  // All of them were taken once; then neither a bind nor an estimate worked until the page was loaded anew.
+  const settings = {
+    bind: { grid: 64.5, tau: 0, memory_limit: 1e18 },
+    cage: { vertices: 9e9 },
+    pose: "AAEC",
+    sample: "nobody",
+  };
+  const project = await page.evaluate(
+    (settings) => Array.from(globalThis.cagework?.engine.writeProject([], [], settings) ?? []),
+    JSON.stringify(settings),
+  );
+  await drop(page, [{ name: "strange.cagework.glb", bytes: Uint8Array.from(project) }]);
+  const said = page.locator("#toasts");
+  await expect(said).toContainText(
+    "grid is 64.5; it must be a whole number from 8 to 512: 64 is taken instead",
+  );
+  await expect(said).toContainText("tau is 0; it must be a number above 0");
+  await expect(said).toContainText("vertices is 9000000000; it must be a whole number from 12 to 400");
+  await expect(said).toContainText("The pose in this project is damaged");
+  await bound(page);
+  await drag(page, 30, 20);
+});
+
+test("a damaged link says so and opens the page", async ({ page }) => {
+  await open(page, "./#sample=rat&pose=****");
+  const alert = page.locator("#toasts [role=alert]");
+  await expect(alert).toContainText("This link is damaged");
+  await expect(alert).toContainText("Its pose cannot be read.");
+  const before = await cagePositions(page);
+  await drag(page, 30, 20);
+  expect(await cagePositions(page)).not.toEqual(before);
+});
+
+/** More than a module's memory can hold: taking it in is a trap. */
+const TOO_MUCH = 2_400_000_000;
+
+/** Calls of the engine as a handler of events would make them: what they throw reaches the window. */
+async function crash(page: Page, how: "panic" | "out of memory"): Promise<void> {
+  await page.evaluate(
+    ([how, bytes]) => {
+      setTimeout(() => {
+        const engine = globalThis.cagework?.engine;
+        // A box of more squares than can be counted, and more numbers than there is room for.
+        if (how === "panic") engine?.boxCage(3000);
+        else engine?.setCagePositions(new Float32Array(bytes / 4));
+      });
+    },
+    [how, TOO_MUCH] as const,
+  );
+}
+
+for (const how of ["panic", "out of memory"] as const) {
+  test(`${how} in wasm: the page is begun anew with the work that was kept, and says what happened`, async ({
+    page,
+    complaints,
+  }) => {
+    await open(page);
+    const before = await page.evaluate(() => Date.now());
+    await drag(page, 50, 30);
+    const posed = await cagePositions(page);
+    await expect.poll(() => savedSince(page, before)).toBe(true);
+    await crash(page, how);
+    const alert = page.locator("#toasts [role=alert]");
+    await expect(alert).toContainText("Cagework stopped, and was begun anew", { timeout: 60_000 });
+    await expect(alert).toContainText("It happened with Rat open.");
+    await bound(page);
+    expect(largestMove(posed, await cagePositions(page)), "the pose is back").toBeLessThan(1e-3);
+    await drag(page, -20, 10);
+    await alert.getByRole("button", { name: "Show the report" }).click();
+    const report = page.getByRole("dialog", { name: "Report" });
+    await expect(report).toContainText(how === "panic" ? "panicked at" : "unreachable");
+    await shoot(page, "crash-report");
+    expect(complaints.join(), "the console has it, too").toMatch(/panicked at|unreachable/);
+    complaints.length = 0;
+  });
+}
+
+test("a file that crashes the page is named and not opened again", async ({ page, complaints }) => {
+  await open(page);
+  await page.evaluate((bytes) => {
+    Blob.prototype.arrayBuffer = async () => new ArrayBuffer(bytes);
+  }, TOO_MUCH);
+  await drop(page, [{ name: "huge.glb", bytes: new Uint8Array(100) }]);
+  const alert = page.locator("#toasts [role=alert]");
+  await expect(alert).toContainText("It happened while opening huge.glb.", { timeout: 60_000 });
+  await bound(page);
+  await expect(page).toHaveTitle(/Rat/);
+  complaints.length = 0;
+});
+
+test("kept work that crashes the page twice is not opened a third time, and Start fresh forgets it", async ({
+  page,
+  complaints,
+}) => {
+  await open(page);
+  const before = await page.evaluate(() => Date.now());
+  await drag(page, 50, 30);
+  await expect.poll(() => savedSince(page, before)).toBe(true);
+  await page.addInitScript((bytes) => {
+    Blob.prototype.arrayBuffer = async () => new ArrayBuffer(bytes);
+    const visits = Number(sessionStorage.getItem("visits") ?? 0);
+    sessionStorage.setItem("visits", String(visits + 1));
+  }, TOO_MUCH);
+  await page.reload();
+  const question = page.getByRole("dialog", { name: "Cagework stopped again" });
+  await expect(question).toContainText("It happened while opening Rat.cagework.glb.", { timeout: 60_000 });
+  await shoot(page, "crash-again");
+  const visits = () => page.evaluate(() => Number(sessionStorage.getItem("visits")));
+  expect(await visits()).toBe(2);
+  await question.getByRole("button", { name: "Start fresh" }).click();
+  await bound(page);
+  await expect(page).toHaveTitle(/Rat/);
+  expect(await visits()).toBe(3);
+  await drag(page, 20, 10);
+  complaints.length = 0;
+});
+
+test("the page has the licences of all that is compiled into it", async ({ page, context }) => {
+  await open(page);
+  await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  const opened = context.waitForEvent("page");
+  await page.getByRole("link", { name: "Licences" }).click();
+  const licences = await opened;
+  const text = (await licences.textContent("body")) ?? "";
+  for (const name of [
+    "wgpu",
+    "glam",
+    "serde",
+    "gltf",
+    "@gltf-transform/core",
+    "draco3dgltf",
+    "meshoptimizer",
+  ])
+    expect(text).toMatch(new RegExp(`^${name} v\\d.*: .*(MIT|Apache)`, "m"));
+  expect(text).toContain("Permission is hereby granted");
+  expect(text).toContain("Apache License");
+  // Tools that only build the page are no part of it.
+  expect(text).not.toMatch(/^(vite|syn|wasm-bindgen-cli-support) v/m);
+  const library = await page.request.get("./rust-standard-library.html");
+  expect(library.ok()).toBe(true);
+});
