@@ -95,31 +95,6 @@ fn meshes_that_are_no_cages_are_refused_with_the_place() {
     assert_refused(&sandbox, "bind mesh.obj --cage open.obj -g 8", &["not closed", "edge"]);
 }
 
-/// The first was bound though it has no inside; the others were written, with coordinates that are not numbers and with
-/// faces without area.
-#[test]
-fn cages_without_an_inside_are_refused_by_every_command() {
-    let sandbox = Sandbox::with_sphere_in_box();
-    let closed = box_obj(&CORNERS);
-    let (vertices, faces) = closed.split_at(closed.find('f').unwrap());
-    let again = |word: &str| word.parse().map_or(word.to_owned(), |i: u32| (i + 8).to_string());
-    let faces_again: String =
-        faces.lines().map(|line| line.split(' ').map(again).collect::<Vec<_>>().join(" ") + "\n").collect();
-    sandbox.write("twice.obj", format!("{vertices}{vertices}{faces}{faces_again}"));
-    assert_refused(&sandbox, "bind mesh.obj --cage twice.obj -g 8", &["faces 0 and 6 have the same corners"]);
-    sandbox.run("check twice.obj").code(1).stdout(contains("fault"));
-    assert_refused(&sandbox, "cage mesh.obj --kind box --margin 3e38 -o box.obj", &["box cage"]);
-    // At 16,777,216 and beyond f32 has whole numbers only.
-    let far: String = CORNERS.iter().map(|[x, y, z]| format!("v {} {y} {z}\n", x + 3e7)).collect();
-    sandbox.write("far.obj", far + faces);
-    assert_refused(
-        &sandbox,
-        "cage far.obj --kind box --divisions 16 -o box.obj",
-        &["box cage", "nearer to the origin"],
-    );
-    assert!(!sandbox.path("box.obj").exists());
-}
-
 #[test]
 fn outputs_are_checked_before_the_work() {
     let sandbox = Sandbox::with_sphere_in_box();

@@ -53,7 +53,7 @@ pub enum CageError {
         /// What is wrong with it.
         why: FaceDefect,
     },
-    /// Two faces have the same outline, of the same vertices or of others at the same places.
+    /// Two faces have the same outline.
     #[error("cage faces {first} and {second} have the same corners: delete one of them")]
     DuplicateFace {
         /// The first of the two.

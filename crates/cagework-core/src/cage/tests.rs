@@ -191,17 +191,6 @@ fn doubled_face_is_rejected() {
     assert_eq!(error(&mesh), CageError::DuplicateFace { first: 0, second: 6 });
 }
 
-/// Such a cage was taken for two parts, had no inside, and was bound.
-#[test]
-fn cage_whose_faces_come_twice_with_vertices_of_their_own_is_rejected() {
-    let mut mesh = cube();
-    let again = PolygonMesh::clone(&mesh);
-    let n = mesh.positions.len() as u32;
-    mesh.positions.extend(again.positions);
-    mesh.faces.extend(again.faces.into_iter().map(|face| face.into_iter().map(|i| n + i).collect()));
-    assert_eq!(error(&mesh), CageError::DuplicateFace { first: 0, second: 6 });
-}
-
 #[test]
 fn seams_are_closed_with_a_notice() {
     // As a glTF cube with flat normals: four vertices of its own for each face.

@@ -67,15 +67,13 @@ pub(super) fn check_repeats(faces: &[Vec<u32>]) -> Result<(), CageError> {
 /// neighbours agree. Indices must have been checked.
 pub(super) fn close(mesh: &PolygonMesh, notices: &mut Vec<CageNotice>) -> Result<Surface, CageError> {
     let mut faces = mesh.faces.clone();
-    let sides = match check_edges(&mesh.positions, &faces) {
+    let sides = match check_edges(&faces) {
         Err(open @ CageError::Open { .. }) => {
             let notice = weld_seams(&mesh.positions, &mut faces).ok_or(open.clone())?;
-            let sides = check_repeats(&faces).and_then(|()| check_edges(&mesh.positions, &faces)).map_err(
-                |welded| {
-                    // Anything but a remaining hole would be a fault of the welding, not of the cage.
-                    if matches!(welded, CageError::Open { .. }) { welded } else { open }
-                },
-            )?;
+            let sides = check_repeats(&faces).and_then(|()| check_edges(&faces)).map_err(|welded| {
+                // Anything but a remaining hole would be a fault of the welding, not of the cage.
+                if matches!(welded, CageError::Open { .. }) { welded } else { open }
+            })?;
             notices.push(notice);
             sides
         }
@@ -85,8 +83,8 @@ pub(super) fn close(mesh: &PolygonMesh, notices: &mut Vec<CageNotice>) -> Result
 }
 
 /// All sides, sorted by edge: on success two of each.
-fn check_edges(positions: &[Vec3], faces: &[Vec<u32>]) -> Result<Vec<Side>, CageError> {
-    check_duplicates(positions, faces)?;
+fn check_edges(faces: &[Vec<u32>]) -> Result<Vec<Side>, CageError> {
+    check_duplicates(faces)?;
     let sides = sides_of(faces, 0..faces.len() as u32);
     let mut open = None;
     let mut count = 0;
@@ -106,14 +104,11 @@ fn check_edges(positions: &[Vec3], faces: &[Vec<u32>]) -> Result<Vec<Side>, Cage
     }
 }
 
-/// Two faces must not have the same outline, whichever way round, even if each has vertices of its own: a cage that comes
-/// twice has no inside.
-fn check_duplicates(positions: &[Vec3], faces: &[Vec<u32>]) -> Result<(), CageError> {
-    let place = first_at_place(positions, 0..positions.len());
+/// Two faces must not have the same outline, whichever way round.
+fn check_duplicates(faces: &[Vec<u32>]) -> Result<(), CageError> {
     let mut first_with: HashMap<Vec<u32>, u32> = HashMap::with_capacity(faces.len());
     for (f, face) in faces.iter().enumerate() {
         let n = face.len();
-        let face: Vec<u32> = face.iter().map(|&i| place[i as usize]).collect();
         let start = (0..n).min_by_key(|&k| face[k]).unwrap_or(0);
         let ahead = face[(start + 1) % n] < face[(start + n - 1) % n];
         let outline: Vec<u32> = (0..n).map(|k| face[(start + if ahead { k } else { n - k }) % n]).collect();
@@ -144,25 +139,22 @@ fn weld_seams(positions: &[Vec3], faces: &mut [Vec<u32>]) -> Option<CageNotice> 
             on_seam[e[1] as usize] = true;
         }
     }
-    let stands_for = first_at_place(positions, (0..positions.len()).filter(|&v| on_seam[v]));
-    let mut joined = (0u32..).zip(&stands_for).filter(|(v, w)| v != *w).map(|(v, _)| v);
+    let mut stands_for: Vec<u32> = (0..positions.len() as u32).collect();
+    let mut at_place: HashMap<[u32; 3], u32> = HashMap::new();
+    let (mut vertices, mut first) = (0, None);
+    for v in (0..positions.len()).filter(|&v| on_seam[v]) {
+        // Adding zero turns -0 into +0, so that both have the same bits.
+        let place = (positions[v] + Vec3::ZERO).to_array().map(f32::to_bits);
+        stands_for[v] = *at_place.entry(place).or_insert(v as u32);
+        if stands_for[v] != v as u32 {
+            vertices += 1;
+            first.get_or_insert(v as u32);
+        }
+    }
     for i in faces.iter_mut().flatten() {
         *i = stands_for[*i as usize];
     }
-    let first = joined.next()?;
-    Some(CageNotice::Welded { vertices: 1 + joined.count(), first })
-}
-
-/// For each vertex the first of `some` at exactly its place; for those that are not of `some`, itself.
-fn first_at_place(positions: &[Vec3], some: impl Iterator<Item = usize>) -> Vec<u32> {
-    let mut first: Vec<u32> = (0..positions.len() as u32).collect();
-    let mut at_place: HashMap<[u32; 3], u32> = HashMap::new();
-    for v in some {
-        // Adding zero turns -0 into +0, so that both have the same bits.
-        let place = (positions[v] + Vec3::ZERO).to_array().map(f32::to_bits);
-        first[v] = *at_place.entry(place).or_insert(v as u32);
-    }
-    first
+    first.map(|first| CageNotice::Welded { vertices, first })
 }
 
 /// Turns faces until all of a component run along shared edges in opposite directions, and numbers the components.
