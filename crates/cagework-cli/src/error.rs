@@ -12,7 +12,10 @@ use cagework_gpu::GpuError;
 use cagework_io::shown;
 use thiserror::Error;
 
-use crate::files::shown_path;
+/// A path for a message.
+pub(crate) fn shown_path(path: &Path) -> String {
+    shown(&path.display().to_string())
+}
 
 /// Why a command failed.
 #[derive(Debug, Error)]

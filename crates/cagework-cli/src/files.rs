@@ -8,13 +8,13 @@ use std::io::{ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use cagework_io::shown;
 use cap_fs_ext::OpenOptionsSyncExt as _;
 use cap_std::ambient_authority;
 use cap_std::fs::{Dir, File, OpenOptions};
 use serde::Serialize;
 
 use crate::error::CliError;
+pub(crate) use crate::error::shown_path;
 
 pub(crate) use outputs::{check_outputs, refuse_files_read, write};
 #[cfg(unix)]
@@ -120,11 +120,6 @@ pub(crate) fn print(text: &str) -> Result<(), CliError> {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(CliError::file(Path::new("stdout"), reason(&e))),
         _ => Ok(()),
     }
-}
-
-/// A path for a message.
-pub(crate) fn shown_path(path: &Path) -> String {
-    shown(&path.display().to_string())
 }
 
 /// A value as indented JSON.

@@ -4,7 +4,7 @@
 //! by Polak and Ribiere's formula, which allows a preconditioner that is not symmetric, as a V(2,1) cycle is.
 //!
 //! Delta is the error that is expected to remain: changes of the solution fall geometrically but for a ripple, so that what is
-//! left is the latest change times `rate / (1 - rate)`, with the rate of the last [`WINDOW`] steps.
+//! left is the latest change times `rate / (1 - rate)`, with the rate of the last `WINDOW` steps.
 //!
 //! Sources: Hestenes, Stiefel 1952; Notay 2000, "Flexible conjugate gradients".
 
