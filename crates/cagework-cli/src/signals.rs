@@ -30,9 +30,9 @@ impl Drop for Asking {
 }
 
 /// Starts to listen: the first Ctrl-C or SIGTERM ends work in good order, if there is some that asks; any other ends
-/// the process, without the file that is being written.
+/// the process through `abandon`, without the file that is being written.
 #[cfg(unix)]
-pub(crate) fn listen() {
+pub(crate) fn listen(abandon: fn(&mut dyn FnMut())) {
     use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
@@ -47,7 +47,7 @@ pub(crate) fn listen() {
             }
             let first = !CANCELLED.swap(true, Ordering::SeqCst);
             if !first || ASKING.load(Ordering::SeqCst) == 0 {
-                crate::files::abandon(|| drop(emulate_default_handler(signal)));
+                abandon(&mut || drop(emulate_default_handler(signal)));
             }
         }
     });
@@ -55,4 +55,4 @@ pub(crate) fn listen() {
 
 /// Elsewhere a signal ends the program at once.
 #[cfg(not(unix))]
-pub(crate) fn listen() {}
+pub(crate) fn listen(_abandon: fn(&mut dyn FnMut())) {}

@@ -47,8 +47,7 @@ pub(super) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Removes an unfinished file and does `end`, which is to end the process; nothing is renamed meanwhile.
-#[cfg(unix)]
-pub(crate) fn abandon(end: impl FnOnce()) {
+pub(crate) fn abandon(end: &mut dyn FnMut()) {
     let unfinished = unfinished();
     if let Some(path) = &*unfinished {
         // Nobody is left to tell.
