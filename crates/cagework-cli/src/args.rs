@@ -69,7 +69,7 @@ pub(crate) struct InfoArgs {
     /// Model to look at (.obj, .gltf, .glb).
     pub(crate) model: PathBuf,
     #[command(flatten)]
-    pub(crate) up: UpArgs,
+    pub(crate) read: ReadArgs,
 }
 
 /// `cagework bind`
@@ -83,7 +83,7 @@ pub(crate) struct BindArgs {
     /// Mesh to bind (.obj, .gltf, .glb).
     pub(crate) mesh: PathBuf,
     #[command(flatten)]
-    pub(crate) up: UpArgs,
+    pub(crate) read: ReadArgs,
     /// Cage: a file; auto or auto:VERTICES for one that follows the mesh; hull or hull:VERTICES; box or
     /// box:DIVISIONS for a subdivided box.
     #[arg(long, value_name = "CAGE")]
@@ -107,22 +107,48 @@ pub(crate) struct BindArgs {
     pub(crate) solve: SolveArgs,
 }
 
-/// Which way is up: shared by all that show a model, or make or read its cage.
+/// How models are read: shared by all that show a model, or make or read its cage.
 #[derive(Args, Clone, Copy, Debug)]
-pub(crate) struct UpArgs {
+pub(crate) struct ReadArgs {
     /// Axis that points up in the files. With z, model, cage and poses are turned to Y up when they are read, and what
     /// is written is turned back.
     #[arg(long, value_enum, default_value_t = UpArg::Y, value_name = "AXIS")]
     up: UpArg,
+    #[command(flatten)]
+    pub(crate) memory: MemoryArgs,
 }
 
-impl UpArgs {
+impl ReadArgs {
     /// The axis.
     pub(crate) fn axis(self) -> UpAxis {
         match self.up {
             UpArg::Y => UpAxis::Y,
             UpArg::Z => UpAxis::Z,
         }
+    }
+}
+
+/// How much memory may be taken.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct MemoryArgs {
+    /// Refuse to start what would need more memory than this, in MiB: reading models, binding, writing.
+    #[arg(long, default_value_t = DEFAULT_MEMORY_MIB, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    memory_limit: u64,
+}
+
+/// Memory that may be taken unless said otherwise, MiB.
+const DEFAULT_MEMORY_MIB: u64 = 4096;
+
+impl Default for MemoryArgs {
+    fn default() -> Self {
+        Self { memory_limit: DEFAULT_MEMORY_MIB }
+    }
+}
+
+impl MemoryArgs {
+    /// The limit, bytes.
+    pub(crate) fn bytes(self) -> u64 {
+        self.memory_limit << 20
     }
 }
 
@@ -159,9 +185,6 @@ pub(crate) struct SolveArgs {
     /// What to do with vertices outside the cage: bind them to its closest point, or end with an error.
     #[arg(long, default_value_t, value_parser = words::<OutsidePolicy>())]
     outside: OutsidePolicy,
-    /// Refuse to start above this much working memory, in MiB.
-    #[arg(long, default_value_t = 4096, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
-    memory_limit: u64,
     /// Where to compute; CAGEWORK_ADAPTER chooses among several GPUs by part of a name.
     #[arg(long, default_value_t, value_parser = words::<Backend>())]
     backend: Backend,
@@ -173,8 +196,8 @@ impl SolveArgs {
         self.backend == Backend::Gpu
     }
 
-    /// The options of a bind on `grid` cells.
-    pub(crate) fn options(&self, grid: u32) -> BindOptions {
+    /// The options of a bind on `grid` cells within a limit on memory.
+    pub(crate) fn options(&self, grid: u32, memory: MemoryArgs) -> BindOptions {
         let usual = match self.method {
             Method::Classic => Solver::Jacobi,
             Method::Embedded => Solver::Multigrid,
@@ -190,8 +213,9 @@ impl SolveArgs {
             tau: self.tau,
             max_iterations: self.max_iterations,
             sparsify: self.sparsify,
-            memory_limit: self.memory_limit << 20,
+            memory_limit: memory.bytes(),
             outside: self.outside,
+            ..BindOptions::default()
         }
     }
 }
@@ -209,7 +233,7 @@ pub(crate) struct DeformArgs {
     /// The mesh that was bound (.obj, .gltf, .glb).
     pub(crate) mesh: PathBuf,
     #[command(flatten)]
-    pub(crate) up: UpArgs,
+    pub(crate) read: ReadArgs,
     /// The cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,

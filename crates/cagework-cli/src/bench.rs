@@ -8,7 +8,7 @@ use cagework_core::{BindReport, Cage};
 use cagework_io::{Model, UpAxis, shown};
 use serde::Serialize;
 
-use crate::args::BenchArgs;
+use crate::args::{BenchArgs, MemoryArgs};
 use crate::bind::bind_model;
 use crate::card::duration;
 use crate::error::CliError;
@@ -78,8 +78,8 @@ const CASES: [(Method, Solver, usize); 4] = [
 pub(crate) fn run(args: &BenchArgs, as_json: bool) -> Result<(), CliError> {
     let (name, model, cage) = match (&args.mesh, &args.cage) {
         (Some(mesh), Some(cage)) => {
-            let model = load_model(mesh, UpAxis::Y)?;
-            let cage = load_cage(cage, &model)?.cage;
+            let model = load_model(mesh, UpAxis::Y, MemoryArgs::default())?;
+            let cage = load_cage(cage, &model, MemoryArgs::default())?.cage;
             (mesh.display().to_string(), model, cage)
         }
         _ => {

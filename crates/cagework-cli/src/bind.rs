@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use cagework_core::bind::Binding;
+use cagework_core::bind::{BindError, Binding, weights_bytes};
 use cagework_core::deform::deform_bound;
 use cagework_core::options::BindOptions;
-use cagework_core::{Cage, bind};
+use cagework_core::{Cage, Controls, bind};
 use cagework_gpu::{GpuContext, bind_on as bind_on_gpu};
 use cagework_io::{Model, write_cage_obj, write_weights_npz};
 use glam::Vec3;
 
-use crate::args::{BindArgs, CageSource, ModelOutput, SolveArgs};
+use crate::args::{BindArgs, CageSource, ModelOutput};
 use crate::card;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, refuse_files_read, write};
@@ -36,10 +36,17 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     }
     check_outputs(&outputs, &inputs)?;
 
-    let model = load_model(&args.mesh, args.up.axis())?;
-    let cage = load_cage(&args.cage, &model)?.cage;
+    let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
+    let cage = load_cage(&args.cage, &model, args.read.memory)?.cage;
     refuse_files_read(&outputs)?;
-    let binding = bind_positions(&model.positions, &cage, &args.solve, args.grid)?;
+    let options = BindOptions { held: model.bytes(), ..args.solve.options(args.grid, args.read.memory) };
+    let to_write = memory_to_write(args, &model, &cage, options.sparsify);
+    if to_write > options.memory_limit {
+        return Err(BindError::Memory { needed: to_write, limit: options.memory_limit }.into());
+    }
+    let mut binding = bind_positions(&model.positions, &cage, args.solve.on_gpu(), &options)?;
+    let memory = &mut binding.report.memory_bytes;
+    memory.estimated = memory.estimated.max(to_write);
 
     if let Some(path) = &args.weights {
         write(path, &write_weights_npz(&binding.weights, &binding.outside))?;
@@ -70,23 +77,30 @@ pub(crate) fn bind_model(model: &Model, cage: &Cage, options: &BindOptions) -> R
     Ok(bind(&model.positions, cage, options, &bar)?)
 }
 
-/// Binds positions where the arguments say, with progress on the terminal.
+/// Bytes that are in use at once while the outputs are written: the model, its weights, and a file.
+fn memory_to_write(args: &BindArgs, model: &Model, cage: &Cage, sparsify: f32) -> u64 {
+    let weights = weights_bytes(model.positions.len(), Controls::from(cage).n_controls(), sparsify);
+    let npz = if args.weights.is_some() { weights } else { 0 };
+    let output = args.output.as_ref().map_or(0, |output| model.bytes_to_write(output.format));
+    model.bytes() + weights + npz.max(output)
+}
+
+/// Binds positions on the GPU or the processor, with progress on the terminal.
 ///
 /// # Errors
 /// When the bind fails or is cancelled, or there is no GPU.
 pub(crate) fn bind_positions(
     positions: &[Vec3],
     cage: &Cage,
-    solve: &SolveArgs,
-    grid: u32,
+    on_gpu: bool,
+    options: &BindOptions,
 ) -> Result<Binding, CliError> {
-    let options = solve.options(grid);
-    if solve.on_gpu() {
+    if on_gpu {
         let context = gpu::open()?;
-        return bind_on(&context, positions, cage, &options);
+        return bind_on(&context, positions, cage, options);
     }
     let bar = Bar::start();
-    Ok(bind(positions, cage, &options, &bar)?)
+    Ok(bind(positions, cage, options, &bar)?)
 }
 
 /// Binds positions on a GPU, with progress on the terminal.

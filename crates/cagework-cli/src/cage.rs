@@ -33,7 +33,7 @@ struct Made {
 /// When the model cannot be read or the cage cannot be made or written.
 pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
     check_outputs(&[&args.output.path], &[&args.model])?;
-    let model = load_model(&args.model, args.up.axis())?;
+    let model = load_model(&args.model, args.read.axis(), args.read.memory)?;
     let mut made = Made {
         output: args.output.path.display().to_string(),
         kind: "box",

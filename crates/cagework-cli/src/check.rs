@@ -10,7 +10,7 @@ use crate::args::CheckArgs;
 use crate::cage::write_cage;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, shown_path};
-use crate::load::load_model;
+use crate::load::{cage_mesh, load_model};
 
 /// What `check` says; its JSON is the output of `--json`.
 #[derive(Debug, Serialize)]
@@ -35,8 +35,9 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
     let outputs: Vec<_> = args.output.iter().map(|output| output.path.as_path()).collect();
     check_outputs(&outputs, &inputs)?;
     // Which way is up makes no difference to what is wrong with a cage.
-    let load = |path| load_model(path, UpAxis::Y);
-    let mut cage = load(&args.cage)?.cage_mesh();
+    let load = |path| load_model(path, UpAxis::Y, args.memory);
+    let refused = |source| CliError::Cage { name: args.cage.display().to_string(), source };
+    let mut cage = cage_mesh(&load(&args.cage)?).map_err(refused)?;
     let model = args.mesh.as_deref().map(load).transpose()?;
     let inside = model.as_ref().map(|m| m.positions.as_slice());
     let mut checked = Checked {

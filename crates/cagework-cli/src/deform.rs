@@ -53,10 +53,10 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         });
     }
 
-    let model = load_model(&args.mesh, args.up.axis())?;
-    let cage = load_cage(&args.cage, &model)?;
-    let (weights, outside) =
-        read_weights_npz(&read(&args.weights)?).map_err(|e| CliError::file(&args.weights, e))?;
+    let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
+    let cage = load_cage(&args.cage, &model, args.read.memory)?;
+    let (weights, outside) = read_weights_npz(&read(&args.weights)?, args.read.memory.bytes())
+        .map_err(|e| CliError::file(&args.weights, e))?;
     let n_vertices = model.positions.len();
     let n_cage = Controls::from(&cage.cage).n_controls();
     check_weights(&args.weights, &weights, n_vertices, n_cage)?;

@@ -9,7 +9,7 @@ use cagework_core::cage::CageError;
 use cagework_core::cage_check::RepairError;
 use cagework_core::cage_gen::CageGenError;
 use cagework_gpu::GpuError;
-use cagework_io::shown;
+use cagework_io::{GltfError, ObjError, ReadError, shown};
 use thiserror::Error;
 
 /// A path for a message.
@@ -30,7 +30,7 @@ pub(crate) enum CliError {
     },
     /// A file's own reader already names it.
     #[error(transparent)]
-    Read(#[from] cagework_io::ReadError),
+    Read(#[from] ReadError),
     /// A pose is not one of the cage.
     #[error(transparent)]
     Pose(#[from] cagework_io::PoseError),
@@ -114,6 +114,10 @@ impl CliError {
             Self::Bind(BindError::Memory { .. }) | Self::Gpu(GpuError::Bind(BindError::Memory { .. })) => {
                 Some("the limit is set by --memory-limit, in MiB")
             }
+            Self::Read(
+                ReadError::Obj { source: ObjError::Memory(_), .. }
+                | ReadError::Gltf { source: GltfError::Memory(_), .. },
+            ) => Some("the limit is set by --memory-limit, in MiB"),
             Self::Repair(RepairError::NoModel) => Some("`--mesh` names it"),
             _ => None,
         }

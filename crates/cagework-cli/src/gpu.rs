@@ -1,5 +1,7 @@
 //! The GPU from the command's side: opening one, and models as they are drawn.
 
+use std::io::Cursor;
+
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
 use cagework_gpu::{ContextOptions, GpuContext, GpuError};
 use cagework_io::{LookAlpha, LookImage, LookWrap, Model};
@@ -7,8 +9,14 @@ use image::ImageReader;
 
 use crate::error::CliError;
 
-/// Largest texture that is decoded, pixels along a side: a damaged file may claim anything.
-const MAX_TEXTURE_SIDE: u32 = 16_384;
+/// Most pixels of a texture that is decoded, 8192 x 8192: a damaged file may claim anything.
+const MAX_TEXTURE_PIXELS: u64 = 1 << 26;
+
+/// Most pixels of all textures together: half a gigabyte here, and more on the GPU.
+const MAX_PIXELS: u64 = 1 << 27;
+
+/// Larger textures are drawn with fewer pixels: no picture shows more, pixels along a side.
+const DRAWN_SIDE: u32 = 4096;
 
 /// Opens a GPU.
 ///
@@ -23,18 +31,19 @@ pub(crate) fn draw_model(model: &Model) -> (DrawModel, Vec<String>) {
     let look = model.look();
     let mut notices = Vec::new();
     let mut textures = Vec::new();
+    let mut left = MAX_PIXELS;
     // Images that cannot be decoded leave the plain colour.
     let numbers: Vec<Option<u32>> = look
         .images
         .iter()
-        .enumerate()
-        .map(|(number, image)| match decode(image) {
-            Ok(texture) => {
+        .map(|image| match decode(image, &mut left) {
+            Ok((texture, notice)) => {
+                notices.extend(notice);
                 textures.push(texture);
                 Some(textures.len() as u32 - 1)
             }
-            Err(error) => {
-                notices.push(format!("texture {number} ({}) is not drawn: {error}", image.mime));
+            Err(problem) => {
+                notices.push(format!("texture '{}' ({}) is not drawn: {problem}", image.name, image.mime));
                 None
             }
         })
@@ -81,15 +90,34 @@ fn wrap(wrap: LookWrap) -> Wrap {
     }
 }
 
-fn decode(image: &LookImage) -> Result<DrawTexture, image::ImageError> {
-    let mut reader = ImageReader::new(std::io::Cursor::new(&image.bytes)).with_guessed_format()?;
-    let mut limits = image::Limits::default();
-    limits.max_image_width = Some(MAX_TEXTURE_SIDE);
-    limits.max_image_height = Some(MAX_TEXTURE_SIDE);
-    reader.limits(limits);
-    let rgba = reader.decode()?.into_rgba8();
+/// Decodes a texture, of at most `left` pixels, and takes its pixels off them; what the user should know about it.
+fn decode(image: &LookImage, left: &mut u64) -> Result<(DrawTexture, Option<String>), String> {
+    let reader = || {
+        let reader = ImageReader::new(Cursor::new(&image.bytes)).with_guessed_format();
+        reader.map_err(|e| e.to_string())
+    };
+    let (width, height) = reader()?.into_dimensions().map_err(|e| e.to_string())?;
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels > MAX_TEXTURE_PIXELS {
+        return Err(format!(
+            "it has {width} x {height} pixels, more than the limit of {MAX_TEXTURE_PIXELS}: make it smaller"
+        ));
+    }
+    let drawn = pixels.min(u64::from(DRAWN_SIDE).pow(2));
+    let rest = left.checked_sub(drawn);
+    *left =
+        rest.ok_or_else(|| format!("all textures have more than {MAX_PIXELS} pixels: make them smaller"))?;
+    let mut decoded = reader()?.decode().map_err(|e| e.to_string())?;
+    let mut notice = None;
+    if width.max(height) > DRAWN_SIDE {
+        decoded = decoded.thumbnail(DRAWN_SIDE, DRAWN_SIDE);
+        let size =
+            format!("{width} x {height} pixels: drawn with {} x {}", decoded.width(), decoded.height());
+        notice = Some(format!("texture '{}' has {size}", image.name));
+    }
+    let rgba = decoded.into_rgba8();
     let (width, height) = rgba.dimensions();
-    Ok(DrawTexture { width, height, rgba: rgba.into_raw(), ..DrawTexture::default() })
+    Ok((DrawTexture { width, height, rgba: rgba.into_raw(), ..DrawTexture::default() }, notice))
 }
 
 /// RGBA pixels as the bytes of a PNG.
@@ -102,7 +130,7 @@ pub(crate) fn png(rgba: Vec<u8>, [width, height]: [u32; 2]) -> Result<Vec<u8>, C
         .ok_or_else(|| failed("the picture has another size than asked for".into()))?;
     // Opaque: a quarter less to store and to look through.
     let picture = image::DynamicImage::ImageRgba8(picture).into_rgb8();
-    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut bytes = Cursor::new(Vec::new());
     picture.write_to(&mut bytes, image::ImageFormat::Png).map_err(|e| failed(e.to_string()))?;
     Ok(bytes.into_inner())
 }

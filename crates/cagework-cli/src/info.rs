@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::args::InfoArgs;
 use crate::error::CliError;
 use crate::files::{json, print};
-use crate::load::load_model;
+use crate::load::{cage_mesh, load_model};
 
 /// What `info` says; its JSON is the output of `--json`.
 #[derive(Debug, Serialize)]
@@ -53,7 +53,7 @@ struct CageInfo {
 /// # Errors
 /// When the model cannot be read.
 pub(crate) fn run(args: &InfoArgs, as_json: bool) -> Result<(), CliError> {
-    let model = load_model(&args.model, args.up.axis())?;
+    let model = load_model(&args.model, args.read.axis(), args.read.memory)?;
     let info = inspect(&args.model.display().to_string(), &model)?;
     print(&if as_json { json(&info) } else { text(&info) })
 }
@@ -63,7 +63,7 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
     let bounds =
         Bounds::of(&model.positions).ok_or_else(|| CliError::file(file.as_ref(), "has no vertices"))?;
     let welded = weld(&model.positions);
-    let cage = match Cage::new(&model.cage_mesh()) {
+    let cage = match cage_mesh(model).and_then(|mesh| Cage::new(&mesh)) {
         Ok(cage) => CageInfo {
             valid: true,
             problem: None,

@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
+use cagework_core::cage::MAX_FACES;
 use cagework_core::cage_gen::{CageGenError, CageReport, generate};
 use cagework_core::samples::{self, Sample};
 use cagework_core::{Bounds, Cage, CageError, CageOptions, PolygonMesh, TriMesh, subdivided_box};
 use cagework_io::{Model, UpAxis, write_cage_obj};
 use glam::Vec3;
 
-use crate::args::{CageSource, DEFAULT_MARGIN};
+use crate::args::{CageSource, DEFAULT_MARGIN, MemoryArgs};
 use crate::error::CliError;
 use crate::files::{read, read_beside};
 use crate::progress::Bar;
@@ -21,23 +22,36 @@ pub(crate) struct LoadedCage {
     model: Model,
     /// What points up in the files of its poses.
     up: UpAxis,
+    /// Memory that a pose may take.
+    memory: MemoryArgs,
 }
 
 /// Reads a model with faces. `up`: what points up in the file.
 ///
 /// # Errors
-/// When the file cannot be read or has no faces.
-pub(crate) fn load_model(path: &Path, up: UpAxis) -> Result<Model, CliError> {
-    let model = load_any(path, up)?;
+/// When the file cannot be read or has no faces, or the memory does not suffice.
+pub(crate) fn load_model(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
+    let model = load_any(path, up, memory)?;
     model.require_faces()?;
     Ok(model)
 }
 
+/// A model as a cage that was not looked at yet.
+///
+/// # Errors
+/// When it has too many faces.
+pub(crate) fn cage_mesh(model: &Model) -> Result<PolygonMesh, CageError> {
+    // Before the faces are listed: that takes more memory than the model.
+    let faces = model.n_faces();
+    if faces > MAX_FACES { Err(CageError::TooManyFaces { faces }) } else { Ok(model.cage_mesh()) }
+}
+
 /// Reads a model, or a bare list of positions.
-fn load_any(path: &Path, up: UpAxis) -> Result<Model, CliError> {
+fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
     let bytes = read(path)?;
     let name = path.display().to_string();
-    let mut model = Model::read(&name, &bytes, &mut |relative| read_beside(path, relative))?;
+    let mut beside = |relative: &str| read_beside(path, relative);
+    let mut model = Model::read_within(&name, &bytes, &mut beside, memory.bytes())?;
     model.set_up(up);
     Ok(model)
 }
@@ -84,17 +98,22 @@ pub(crate) fn built_in() -> Result<BuiltIn, CliError> {
 ///
 /// # Errors
 /// When the file cannot be read or is no cage.
-pub(crate) fn load_cage(source: &CageSource, around: &Model) -> Result<LoadedCage, CliError> {
+pub(crate) fn load_cage(
+    source: &CageSource,
+    around: &Model,
+    memory: MemoryArgs,
+) -> Result<LoadedCage, CliError> {
     let model = match source {
-        CageSource::File(path) => load_model(path, around.up())?,
+        CageSource::File(path) => load_model(path, around.up(), memory)?,
         CageSource::Box { divisions } => {
             generated_model("box cage", &box_mesh(&around.positions, *divisions, DEFAULT_MARGIN)?)?
         }
         CageSource::Auto(options) => generated_model("generated cage", &generate_for(around, options)?.0)?,
     };
-    let cage = Cage::new(&model.cage_mesh())
+    let cage = cage_mesh(&model)
+        .and_then(|mesh| Cage::new(&mesh))
         .map_err(|source| CliError::Cage { name: model.name.clone(), source })?;
-    Ok(LoadedCage { cage, model, up: around.up() })
+    Ok(LoadedCage { cage, model, up: around.up(), memory })
 }
 
 /// A generated cage around a model, with progress on the terminal.
@@ -131,6 +150,6 @@ impl LoadedCage {
     /// # Errors
     /// When the file cannot be read or has another number of vertices than the cage.
     pub(crate) fn load_pose(&self, path: &Path) -> Result<Vec<Vec3>, CliError> {
-        Ok(self.model.pose_positions(&load_any(path, self.up)?)?)
+        Ok(self.model.pose_positions(&load_any(path, self.up, self.memory)?)?)
     }
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use cagework_core::bind::Binding;
 use cagework_core::slice::Slice;
-use cagework_core::{Cage, Controls, Weights, mean_value_weights};
+use cagework_core::{BindOptions, Cage, Controls, Weights, mean_value_weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView};
 use cagework_io::{Model, read_weights_npz, shown};
@@ -47,8 +47,8 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     }
     check_outputs(&[&args.output], &inputs)?;
     check_compared(args)?;
-    let model = load_model(&args.model, args.up.axis())?;
-    let cage = args.cage.as_ref().map(|source| load_cage(source, &model)).transpose()?;
+    let model = load_model(&args.model, args.read.axis(), args.read.memory)?;
+    let cage = args.cage.as_ref().map(|source| load_cage(source, &model, args.read.memory)).transpose()?;
     let (drawn, mut notices) = gpu::draw_model(&model);
     notices.splice(0..0, model.notices.iter().cloned());
     let mut session = Session::new(gpu::open()?);
@@ -178,14 +178,16 @@ fn prepare(
     if needs_weights {
         let (weights, outside) = match &args.weights {
             Some(path) => {
-                let (weights, outside) =
-                    read_weights_npz(&read(path)?).map_err(|e| CliError::file(path, e))?;
+                let (weights, outside) = read_weights_npz(&read(path)?, args.read.memory.bytes())
+                    .map_err(|e| CliError::file(path, e))?;
                 check_weights(path, &weights, model.positions.len(), n_cage)?;
                 (weights, outside)
             }
             None => {
+                let held = model.bytes();
+                let options = BindOptions { held, ..args.solve.options(args.grid, args.read.memory) };
                 let Binding { weights, outside, .. } =
-                    bind_positions(&model.positions, &cage.cage, &args.solve, args.grid)?;
+                    bind_positions(&model.positions, &cage.cage, args.solve.on_gpu(), &options)?;
                 (weights, outside)
             }
         };
@@ -201,11 +203,11 @@ fn prepare(
 }
 
 fn slice(args: &RenderArgs, cage: &Cage) -> Result<SliceView, CliError> {
-    let options = args.solve.options(args.grid);
+    let options = args.solve.options(args.grid, args.read.memory);
     let mut slice = Slice::new(cage, &options, args.axis as usize, args.at);
     let mut column = None;
     if args.show == Show::Slice && !slice.cells.is_empty() {
-        let weights: Weights = bind_positions(&slice.centers(), cage, &args.solve, args.grid)?.weights;
+        let weights: Weights = bind_positions(&slice.centers(), cage, args.solve.on_gpu(), &options)?.weights;
         slice.set_weights(weights).map_err(|e| CliError::file(Path::new("slice"), e))?;
         column = Some(args.column);
     }

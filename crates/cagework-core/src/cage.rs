@@ -36,6 +36,9 @@ pub const MIN_DIAGONAL: f64 = 1e-12;
 /// Largest diagonal of a cage, object units; the reason is the same.
 pub const MAX_DIAGONAL: f64 = 1e12;
 
+/// Most faces of a cage: a model that is taken for one has more, and looking at each of them would take minutes.
+pub const MAX_FACES: usize = 100_000;
+
 /// Corners up to which hat values need no heap memory.
 const STACK_CORNERS: usize = 8;
 
@@ -68,6 +71,7 @@ impl Cage {
         let diagonal = bounds.max.as_dvec3().distance(bounds.min.as_dvec3());
         let mut notices = Vec::new();
         let mut surface = topology::close(mesh, &mut notices)?;
+        topology::check_doubled(&mesh.positions, &surface)?;
         let polygons = orient::orient(&mesh.positions, &mut surface, diagonal, &mut notices)?;
         topology::note_vertices(mesh, &surface, &mut notices);
 
@@ -220,6 +224,9 @@ fn check_numbers(mesh: &PolygonMesh) -> Result<Bounds, CageError> {
     let n = mesh.positions.len();
     if mesh.faces.is_empty() || n == 0 {
         return Err(CageError::Empty);
+    }
+    if mesh.faces.len() > MAX_FACES {
+        return Err(CageError::TooManyFaces { faces: mesh.faces.len() });
     }
     if let Some(vertex) = mesh.positions.iter().position(|p| !p.is_finite()) {
         return Err(CageError::NotFinite { vertex: vertex as u32 });

@@ -3,6 +3,8 @@
 //! What counts depends on what they share. Nothing: they must keep a gap (separating axes). One vertex: apart from it
 //! they must not meet. An edge: they must not be folded onto each other.
 
+use std::ops::ControlFlow;
+
 use glam::DVec3;
 
 /// Sine of the angle below which a direction counts as lying in a plane: far above the rounding of f64, far below
@@ -16,7 +18,13 @@ const TOUCH: f64 = 1e-10;
 const FOLDED: f64 = 0.9994;
 
 /// Most pairs that [`meeting`] lists: where thousands of triangles go through each other, their pairs would fill the memory.
-pub(crate) const MAX_PAIRS: usize = 100_000;
+const MAX_PAIRS: usize = 100_000;
+
+/// Most comparisons of triangles' boxes in a search, some seconds: 40,000 triangles that all meet have 800 million pairs.
+const MAX_COMPARISONS: u64 = 1 << 30;
+
+/// Comparisons of boxes that take as long as one of triangles.
+const COMPARISONS_OF_TRIANGLES: u64 = 40;
 
 /// A triangle with its corners' vertex numbers, which say what it shares with others.
 #[derive(Clone, Copy, Debug)]
@@ -84,32 +92,47 @@ fn ascending(x: f64, number: u32) -> [u32; 3] {
 
 /// Pairs of triangles of one surface that meet where they should not, each once, in order. `[n_triangles]` given. It stops
 /// at [`MAX_PAIRS`].
+pub(crate) fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
+    let mut pairs = Vec::new();
+    each_meeting(triangles, |pair| {
+        pairs.push(pair);
+        if pairs.len() < MAX_PAIRS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    pairs.sort_unstable();
+    pairs
+}
+
+/// Calls `each` with every pair of triangles of one surface that meet where they should not, lower number first. Returns
+/// whether those were all: `each` may end the search, and so do [`MAX_COMPARISONS`].
 ///
 /// Sweep along x: `n log n` for surfaces whose triangles are small against the whole.
-pub(crate) fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
+pub(crate) fn each_meeting(triangles: &[Corners], mut each: impl FnMut([u32; 2]) -> ControlFlow<()>) -> bool {
     let mut order: Vec<[u32; 3]> = (0u32..).zip(triangles).map(|(t, c)| ascending(c.min().x, t)).collect();
     order.sort_unstable();
     let mut active: Vec<u32> = Vec::new();
-    let mut pairs = Vec::new();
-    'sweep: for [.., t] in order {
+    let mut comparisons = 0;
+    for [.., t] in order {
         let from = triangles[t as usize].min().x;
+        comparisons += 2 * active.len() as u64;
         active.retain(|&other| triangles[other as usize].max().x >= from);
         let corners = &triangles[t as usize];
         let (min, max) = (corners.min(), corners.max());
         for &other in &active {
             let rival = &triangles[other as usize];
-            let apart = rival.min().cmpgt(max).any() || rival.max().cmplt(min).any();
-            if !apart && meet(corners, rival, 0.0) {
-                pairs.push([t.min(other), t.max(other)]);
-                if pairs.len() == MAX_PAIRS {
-                    break 'sweep;
-                }
+            if rival.min().cmpgt(max).any() || rival.max().cmplt(min).any() {
+                continue;
             }
+            comparisons += COMPARISONS_OF_TRIANGLES;
+            if meet(corners, rival, 0.0) && each([t.min(other), t.max(other)]).is_break() {
+                return false;
+            }
+        }
+        if comparisons > MAX_COMPARISONS {
+            return false;
         }
         active.push(t);
     }
-    pairs.sort_unstable();
-    pairs
+    true
 }
 
 /// Whether some axis separates two triangles by more than `gap`. Exact for a gap of 0, but that touching counts as

@@ -32,6 +32,7 @@ pub mod team;
 pub mod transfer;
 pub mod voxelize;
 pub mod weights;
+mod words;
 
 pub use bind::{BindError, Binding, bind};
 pub use cage::{Cage, CageError, CageNotice, FaceDefect};

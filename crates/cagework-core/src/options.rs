@@ -235,10 +235,13 @@ pub struct BindOptions {
     pub max_iterations: u32,
     /// Weights below it are dropped (then sum and rest pose are restored); 0 = keep all. Default 0.
     pub sparsify: f32,
-    /// Refuse to start above this many bytes of working memory. Default 4 GiB.
+    /// Refuse to start above this many bytes of memory, `held` ones included. Default 4 GiB.
     pub memory_limit: u64,
     /// Default closest point.
     pub outside: OutsidePolicy,
+    /// Bytes that the caller holds meanwhile, a model and its document: they count towards the limit. Default 0.
+    #[serde(skip)]
+    pub held: u64,
 }
 
 impl Default for BindOptions {
@@ -256,6 +259,7 @@ impl Default for BindOptions {
             sparsify: 0.0,
             memory_limit: 4 << 30,
             outside: OutsidePolicy::default(),
+            held: 0,
         }
     }
 }

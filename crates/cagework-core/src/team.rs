@@ -8,6 +8,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Vertices that a thread takes at a time: small enough to share out evenly, large enough not to notice.
 pub const VERTEX_RUN: usize = 512;
 
+/// Most threads for each processor: more only take memory.
+const MAX_PER_PROCESSOR: usize = 4;
+
 /// A fixed number of threads.
 #[derive(Debug)]
 pub struct Team {
@@ -17,16 +20,13 @@ pub struct Team {
 }
 
 impl Team {
-    /// A team of `threads` (0: one per processor). Falls back to the caller's thread if none can be started.
+    /// A team of `threads` (0: one per processor), at most four for each processor. Falls back to the caller's thread if none can be started.
     #[must_use]
     pub fn new(threads: usize) -> Self {
         #[cfg(feature = "parallel")]
         {
-            let wanted = if threads == 0 {
-                std::thread::available_parallelism().map_or(1, usize::from)
-            } else {
-                threads
-            };
+            let processors = std::thread::available_parallelism().map_or(1, usize::from);
+            let wanted = if threads == 0 { processors } else { threads.min(MAX_PER_PROCESSOR * processors) };
             let pool = if wanted > 1 {
                 rayon::ThreadPoolBuilder::new().num_threads(wanted).build().ok()
             } else {
@@ -46,6 +46,15 @@ impl Team {
     #[must_use]
     pub fn n_threads(&self) -> usize {
         self.n_threads
+    }
+
+    /// What to say if these are fewer than the `asked` threads.
+    #[must_use]
+    pub fn notice(&self, asked: usize) -> Option<String> {
+        let used = self.n_threads;
+        (asked > used).then(|| {
+            format!("{asked} threads were asked for, but {used} are used: at most {MAX_PER_PROCESSOR} for each processor.")
+        })
     }
 
     /// Runs `member(thread)` once on each thread; results in thread order.
@@ -120,6 +129,17 @@ pub(crate) fn map_indices<T: Send>(n: usize, f: impl Fn(usize) -> T + Send + Syn
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn more_threads_than_four_for_each_processor_are_a_notice() {
+        let team = Team::new(100_000);
+        let processors = std::thread::available_parallelism().unwrap().get();
+        let expected = if cfg!(feature = "parallel") { 4 * processors } else { 1 };
+        assert_eq!(team.n_threads(), expected);
+        let said = format!("100000 threads were asked for, but {expected} are used");
+        assert!(team.notice(100_000).unwrap().starts_with(&said));
+        assert_eq!(team.notice(expected), None);
+    }
 
     #[test]
     fn every_piece_is_done_once_and_in_order() {

@@ -81,6 +81,8 @@ pub enum LookWrap {
 /// An encoded image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LookImage {
+    /// What the file calls it, for messages.
+    pub name: String,
     /// PNG, JPEG, WebP or KTX2.
     pub bytes: Vec<u8>,
     /// Media type, by content.

@@ -67,6 +67,7 @@ pub struct Model {
     pub notices: Vec<String>,
     /// What points up in the document.
     up: UpAxis,
+    bytes: u64,
     pub(crate) document: Document,
 }
 
@@ -81,15 +82,29 @@ impl Model {
     ///
     /// `resolve` is asked for sibling files (buffers and textures of a `.gltf`, materials and textures of an OBJ) by
     /// relative path, each once; `data:` URIs are decoded here. A buffer that is not read is an error, anything else a
-    /// notice. A file of vertices without faces is read: it may be a pose.
+    /// notice. A file of vertices without faces is read: it may be a pose. Memory is limited by what there is.
     ///
     /// # Errors
     /// [`ReadError`], which names the line, accessor, node or file at fault.
     pub fn read(name: &str, bytes: &[u8], resolve: &mut Resolve<'_>) -> Result<Self, ReadError> {
+        Self::read_within(name, bytes, resolve, u64::MAX)
+    }
+
+    /// As [`Self::read`], within `memory_limit` bytes: `bytes` and what they become, up to the table of different
+    /// positions.
+    ///
+    /// # Errors
+    /// [`ReadError`]; of memory, before it is allocated.
+    pub fn read_within(
+        name: &str,
+        bytes: &[u8],
+        resolve: &mut Resolve<'_>,
+        memory_limit: u64,
+    ) -> Result<Self, ReadError> {
         match ModelFormat::of_file(name, bytes)? {
             ModelFormat::Gltf => {
                 let fault = |source| ReadError::Gltf { name: name.into(), source };
-                let model = gltf::read(name, bytes, resolve).map_err(fault)?;
+                let model = gltf::read(name, bytes, resolve, memory_limit).map_err(fault)?;
                 Ok(Self {
                     name: name.into(),
                     positions: model.positions,
@@ -97,11 +112,12 @@ impl Model {
                     counts: model.counts,
                     notices: model.notices,
                     up: UpAxis::Y,
+                    bytes: model.document.bytes,
                     document: Document::Gltf(Box::new(model.document)),
                 })
             }
             ModelFormat::Obj => {
-                let model = obj::read(bytes, resolve)
+                let model = obj::read(bytes, resolve, memory_limit)
                     .map_err(|source| ReadError::Obj { name: name.into(), source })?;
                 let corner = |c: u32| model.document.corners[c as usize].v;
                 Ok(Self {
@@ -117,10 +133,33 @@ impl Model {
                     },
                     notices: model.notices,
                     up: UpAxis::Y,
+                    bytes: model.bytes,
                     document: Document::Obj(Box::new(model.document)),
                 })
             }
         }
+    }
+
+    /// Bytes that the model takes with the document it came from, about.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Bytes that writing it takes besides, at once, about.
+    #[must_use]
+    pub fn bytes_to_write(&self, format: ModelFormat) -> u64 {
+        /// Normals before and after, and the new positions; in a GLB once more as they are in the file.
+        const VERTEX_BYTES: u64 = 300;
+        const TRIANGLE_BYTES: u64 = 60;
+        /// New accessors and buffer views as JSON.
+        const PRIMITIVE_BYTES: u64 = 4000;
+        let mut bytes =
+            VERTEX_BYTES * self.positions.len() as u64 + TRIANGLE_BYTES * self.triangles.len() as u64;
+        if format == ModelFormat::Gltf {
+            bytes += PRIMITIVE_BYTES * self.counts.primitives as u64;
+        }
+        bytes + self.bytes
     }
 
     /// What points up in the file; Y unless said otherwise.
@@ -306,7 +345,7 @@ impl Model {
         // One way to deform a GLB: make one of the shape at rest, then patch that.
         let stem = self.name.rsplit_once('.').map_or(self.name.as_str(), |(stem, _)| stem);
         let (glb, source) = gltf::build_from_obj(stem, document, &at_rest)?;
-        let built = gltf::read(&self.name, &glb, &mut |_| None)?;
+        let built = gltf::read(&self.name, &glb, &mut |_| None, u64::MAX)?;
         let spread = |positions: &[Vec3]| source.iter().map(|&v| positions[v as usize]).collect::<Vec<_>>();
         let spread_poses: Vec<_> = turned.iter().map(|positions| spread(positions).into()).collect();
         let rest = Rest { positions: &built.positions, triangles: &built.triangles };

@@ -19,6 +19,8 @@ use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
+use crate::memory::MemoryError;
+
 /// Why a weights file could not be read.
 #[derive(Debug, Error)]
 pub enum NpzError {
@@ -38,6 +40,9 @@ pub enum NpzError {
         /// What is wrong with it.
         problem: String,
     },
+    /// More memory than is allowed.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// The arrays are no CSR matrix.
     #[error(transparent)]
     Weights(#[from] WeightsError),
@@ -49,8 +54,8 @@ impl From<ZipError> for NpzError {
     }
 }
 
-/// Most bytes of one array after decompression: a small file must not fill the memory.
-const MAX_ARRAY_BYTES: u64 = 4 << 30;
+/// Most bytes of an array's header: NumPy's have a hundred or two.
+const MAX_HEADER: u64 = 1 << 16;
 /// NumPy aligns the data to this.
 const NPY_ALIGN: usize = 64;
 const NPY_MAGIC: &[u8; 6] = b"\x93NUMPY";
@@ -60,47 +65,58 @@ const NPY_MAGIC: &[u8; 6] = b"\x93NUMPY";
 pub fn write_weights_npz(weights: &Weights, outside: &[OutsideVertex]) -> Vec<u8> {
     let n = outside.len();
     let shape = [weights.n_rows() as i64, weights.n_columns() as i64];
-    let mut arrays = vec![
-        ("format", "|S3", vec![], b"csr".to_vec()),
-        ("shape", "<i8", vec![2], bytes_of(shape.map(i64::to_le_bytes))),
-        (
-            "indptr",
-            "<i4",
-            vec![weights.indptr().len()],
-            bytes_of(weights.indptr().iter().map(|x| x.to_le_bytes())),
-        ),
-        (
-            "indices",
-            "<i4",
-            vec![weights.indices().len()],
-            bytes_of(weights.indices().iter().map(|x| x.to_le_bytes())),
-        ),
-        ("data", "<f4", vec![weights.data().len()], bytes_of(weights.data().iter().map(|x| x.to_le_bytes()))),
-    ];
+    let bytes = weights.bytes() + size_of_val(outside) + ROOM_FOR_HEADERS;
+    let mut zip = NpzWriter {
+        zip: ZipWriter::new(Cursor::new(Vec::with_capacity(bytes))),
+        // The zip epoch, 1980: no clock.
+        options: SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            .last_modified_time(DateTime::default())
+            .large_file(weights.data().len() > (u32::MAX / 8) as usize),
+    };
+    zip.put("format", "|S3", &[], [*b"csr"]);
+    zip.put("shape", "<i8", &[2], shape.map(i64::to_le_bytes));
+    zip.put("indptr", "<i4", &[weights.indptr().len()], weights.indptr().iter().map(|x| x.to_le_bytes()));
+    zip.put("indices", "<i4", &[weights.indices().len()], weights.indices().iter().map(|x| x.to_le_bytes()));
+    zip.put("data", "<f4", &[weights.data().len()], weights.data().iter().map(|x| x.to_le_bytes()));
     if n > 0 {
-        let vertices = outside.iter().map(|o| o.vertex.to_le_bytes());
+        zip.put("outside_vertex", "<i4", &[n], outside.iter().map(|o| o.vertex.to_le_bytes()));
         let corners = outside.iter().flat_map(|o| o.corners).map(u32::to_le_bytes);
+        zip.put("outside_corners", "<i4", &[n, 3], corners);
         let offsets = outside.iter().flat_map(|o| o.offset.to_array()).map(f32::to_le_bytes);
-        arrays.push(("outside_vertex", "<i4", vec![n], bytes_of(vertices)));
-        arrays.push(("outside_corners", "<i4", vec![n, 3], bytes_of(corners)));
-        arrays.push(("outside_offset", "<f4", vec![n, 3], bytes_of(offsets)));
+        zip.put("outside_offset", "<f4", &[n, 3], offsets);
     }
-    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    // The zip epoch, 1980: no clock.
-    let options = SimpleFileOptions::default()
-        .compression_method(CompressionMethod::Stored)
-        .last_modified_time(DateTime::default())
-        .large_file(weights.data().len() > (u32::MAX / 8) as usize);
-    for (name, dtype, shape, data) in arrays {
-        zip.start_file(format!("{name}.npy"), options).expect("names are distinct, memory does not fail");
-        zip.write_all(&npy_header(dtype, &shape)).expect("writing to memory does not fail");
-        zip.write_all(&data).expect("writing to memory does not fail");
-    }
-    zip.finish().expect("writing to memory does not fail").into_inner()
+    zip.zip.finish().expect("writing to memory does not fail").into_inner()
 }
 
-fn bytes_of<const N: usize>(values: impl IntoIterator<Item = [u8; N]>) -> Vec<u8> {
-    values.into_iter().flatten().collect()
+/// Bytes of all headers of an archive, more than enough: so that its memory does not grow by doubling.
+const ROOM_FOR_HEADERS: usize = 4096;
+
+struct NpzWriter {
+    zip: ZipWriter<Cursor<Vec<u8>>>,
+    options: SimpleFileOptions,
+}
+
+impl NpzWriter {
+    /// Adds an array, a run of its values at a time: there is no second copy of it.
+    fn put<const N: usize>(
+        &mut self,
+        name: &str,
+        dtype: &str,
+        shape: &[usize],
+        values: impl IntoIterator<Item = [u8; N]>,
+    ) {
+        /// Values written at a time.
+        const RUN: usize = 1 << 14;
+        let name = format!("{name}.npy");
+        self.zip.start_file(name, self.options).expect("names are distinct, memory does not fail");
+        self.zip.write_all(&npy_header(dtype, shape)).expect("writing to memory does not fail");
+        let mut values = values.into_iter().peekable();
+        while values.peek().is_some() {
+            let run: Vec<u8> = values.by_ref().take(RUN).flatten().collect();
+            self.zip.write_all(&run).expect("writing to memory does not fail");
+        }
+    }
 }
 
 fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
@@ -119,12 +135,13 @@ fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
     out
 }
 
-/// Reads weights and the vertices outside the cage.
+/// Reads weights and the vertices outside the cage within `memory_limit` bytes, besides those of the file.
 ///
 /// # Errors
-/// [`NpzError`] when the file is no archive, an array is missing or of a wrong type, or the arrays are no CSR matrix.
-pub fn read_weights_npz(bytes: &[u8]) -> Result<(Weights, Vec<OutsideVertex>), NpzError> {
-    let mut zip = ZipArchive::new(Cursor::new(bytes))?;
+/// [`NpzError`] when the file is no archive, an array is missing, of a wrong type or too large, or the arrays are no CSR
+/// matrix.
+pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<(Weights, Vec<OutsideVertex>), NpzError> {
+    let mut zip = Archive { zip: ZipArchive::new(Cursor::new(bytes))?, unpacked: 0, memory_limit };
     let format = required(&mut zip, "format")?;
     if format.data != b"csr" {
         let found = String::from_utf8_lossy(&format.data).into_owned();
@@ -151,11 +168,7 @@ pub fn read_weights_npz(bytes: &[u8]) -> Result<(Weights, Vec<OutsideVertex>), N
     Ok((weights, outside))
 }
 
-fn read_outside(
-    zip: &mut ZipArchive<Cursor<&[u8]>>,
-    rows: u32,
-    columns: u32,
-) -> Result<Vec<OutsideVertex>, NpzError> {
+fn read_outside(zip: &mut Archive<'_>, rows: u32, columns: u32) -> Result<Vec<OutsideVertex>, NpzError> {
     let Some(vertices) = array(zip, "outside_vertex")? else { return Ok(Vec::new()) };
     let vertices = vertices.rows_of(&[])?.unsigned()?;
     let corners = required(zip, "outside_corners")?.rows_of(&[3])?.unsigned()?;
@@ -186,6 +199,14 @@ fn read_outside(
         .collect())
 }
 
+/// An archive that is being read.
+struct Archive<'a> {
+    zip: ZipArchive<Cursor<&'a [u8]>>,
+    /// Bytes of the arrays so far, as they are in the file and as they are used.
+    unpacked: u64,
+    memory_limit: u64,
+}
+
 struct NpyArray {
     name: &'static str,
     dtype: String,
@@ -194,45 +215,60 @@ struct NpyArray {
     data: Vec<u8>,
 }
 
-fn required(zip: &mut ZipArchive<Cursor<&[u8]>>, name: &'static str) -> Result<NpyArray, NpzError> {
+fn required(zip: &mut Archive<'_>, name: &'static str) -> Result<NpyArray, NpzError> {
     array(zip, name)?.ok_or(NpzError::Missing(name))
 }
 
-fn array(zip: &mut ZipArchive<Cursor<&[u8]>>, name: &'static str) -> Result<Option<NpyArray>, NpzError> {
-    let entry = match zip.by_name(&format!("{name}.npy")) {
+/// Unpacks an array as far as its shape needs: neither the archive's directory nor its streams are believed.
+fn array(archive: &mut Archive<'_>, name: &'static str) -> Result<Option<NpyArray>, NpzError> {
+    let mut entry = match archive.zip.by_name(&format!("{name}.npy")) {
         Err(ZipError::FileNotFound) => return Ok(None),
         other => other?,
     };
     let fault = |problem: String| NpzError::Array { array: name, problem };
-    let mut bytes = Vec::new();
-    // Grows as it reads: the size in the archive's directory is not to be trusted.
-    entry
-        .take(MAX_ARRAY_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|e| fault(format!("cannot be unpacked: {e}")))?;
-    if bytes.len() as u64 > MAX_ARRAY_BYTES {
-        return Err(fault(format!("is larger than the limit of {} GiB", MAX_ARRAY_BYTES >> 30)));
-    }
     let bad = || fault("is not in NumPy's .npy format".into());
-    let (start, text) = header(&bytes).ok_or_else(bad)?;
+    let mut unpack = |most: u64, into: &mut Vec<u8>| {
+        let unpacked = entry.by_ref().take(most).read_to_end(into);
+        unpacked.map_err(|e| fault(format!("cannot be unpacked: {e}")))
+    };
+    let mut bytes = Vec::new();
+    unpack(START_BYTES, &mut bytes)?;
+    let end = header_end(&bytes).filter(|&end| end <= MAX_HEADER).ok_or_else(bad)?;
+    unpack(end.saturating_sub(START_BYTES), &mut bytes)?;
+    let text = bytes.get(TEXT..end as usize).ok_or_else(bad)?;
+    let text = std::str::from_utf8(text).map_err(|_| bad())?;
     let dtype = field(text, "'descr':").and_then(quoted).ok_or_else(bad)?.to_owned();
     if field(text, "'fortran_order':").is_none_or(|f| !f.starts_with("False")) {
         return Err(fault("is in Fortran order; save it in C order".into()));
     }
     let shape = field(text, "'shape':").and_then(lengths).ok_or_else(bad)?;
-    bytes.drain(..start);
-    Ok(Some(NpyArray { name, dtype, shape, data: bytes }))
+    // Other types are refused by whoever wants their values.
+    let width = dtype.get(2..).and_then(|width| width.parse().ok()).unwrap_or(8);
+    let needed = shape.iter().try_fold(width, |n: u64, &length| n.checked_mul(length as u64));
+    let needed = needed.ok_or_else(|| fault(format!("is of shape {shape:?}, which no memory holds")))?;
+    archive.unpacked = archive.unpacked.saturating_add(2 * needed.min(u64::MAX / 2));
+    MemoryError::check(archive.unpacked, archive.memory_limit)?;
+    let mut data = Vec::new();
+    // One more tells of a stream that does not end where it should.
+    unpack(needed.saturating_add(1), &mut data)?;
+    if data.len() as u64 > needed {
+        return Err(fault(format!("has more than the {needed} bytes that its shape {shape:?} takes")));
+    }
+    Ok(Some(NpyArray { name, dtype, shape, data }))
 }
 
-/// Start of the data and text of the header of an `.npy` file, versions 1 to 3.
-fn header(bytes: &[u8]) -> Option<(usize, &str)> {
+/// Bytes that tell a header's length: magic, version, and a length of two bytes or four.
+const START_BYTES: u64 = 12;
+/// Where its text begins, or the upper half of a length of four bytes.
+const TEXT: usize = 10;
+
+/// Where the header of an `.npy` file ends, versions 1 to 3.
+fn header_end(bytes: &[u8]) -> Option<u64> {
     let rest = bytes.strip_prefix(NPY_MAGIC)?;
-    let (length, start) = match rest.first()? {
-        1 => (u32::from(u16::from_le_bytes(rest.get(2..4)?.try_into().ok()?)), 10),
-        _ => (u32::from_le_bytes(rest.get(2..6)?.try_into().ok()?), 12),
-    };
-    let end = start + length as usize;
-    Some((end, std::str::from_utf8(bytes.get(start..end)?).ok()?))
+    match rest.first()? {
+        1 => Some(10 + u64::from(u16::from_le_bytes(rest.get(2..4)?.try_into().ok()?))),
+        _ => Some(12 + u64::from(u32::from_le_bytes(rest.get(2..6)?.try_into().ok()?))),
+    }
 }
 
 fn field<'a>(header: &'a str, key: &str) -> Option<&'a str> {

@@ -75,7 +75,7 @@ pub fn write_project(
         Document::Gltf(document) => (&**document, None),
         Document::Obj(document) => {
             let (glb, _) = gltf::build_from_obj(&model.name, document, &model.positions_in_file())?;
-            built = gltf::read(&model.name, &glb, &mut |_| None)?.document;
+            built = gltf::read(&model.name, &glb, &mut |_| None, u64::MAX)?.document;
             (&built, Some(&document.bytes))
         }
     };
@@ -111,11 +111,11 @@ pub fn write_project(
     pack.finish(json)
 }
 
-/// Reads a project; `None` when the file is no project.
+/// Reads a project within `memory_limit` bytes; `None` when the file is no project.
 ///
 /// # Errors
 /// [`ProjectError`] when it is one that cannot be read.
-pub fn read_project(name: &str, bytes: &[u8]) -> Result<Option<Project>, ProjectError> {
+pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Option<Project>, ProjectError> {
     // A search is cheaper than a parse of every GLB that is opened. Its first chunk is the JSON.
     let json = match bytes {
         [b'g', b'l', b'T', b'F', _, _, _, _, _, _, _, _, a, b, c, d, _, _, _, _, rest @ ..] => {
@@ -127,8 +127,8 @@ pub fn read_project(name: &str, bytes: &[u8]) -> Result<Option<Project>, Project
         return Ok(None);
     }
     let damaged = |what| ProjectError::Damaged { name: name.into(), what };
-    let (mut json, bin) =
-        gltf::glb_parts(bytes).map_err(|source| ReadError::Gltf { name: name.into(), source })?;
+    let (mut json, bin) = gltf::glb_parts(bytes, memory_limit)
+        .map_err(|source| ReadError::Gltf { name: name.into(), source })?;
     let Some(project) = take_project(&mut json) else { return Ok(None) };
     let found = project["version"].as_u64().unwrap_or(0);
     if found != VERSION {
@@ -155,11 +155,11 @@ pub fn read_project(name: &str, bytes: &[u8]) -> Result<Option<Project>, Project
     let settings = project["settings"].as_str().unwrap_or_default().to_owned();
     let mut model = if project["source"].is_object() {
         let source = view(&project["source"]).ok_or(damaged("its model is cut off"))?;
-        Model::read(model_name, source, &mut |_| None)?
+        Model::read_within(model_name, source, &mut |_| None, memory_limit)?
     } else {
         drop_cage(&mut json, project["node"].as_u64());
         let plain = gltf::glb_of(&json, &bin).map_err(|_| damaged("it cannot be put together again"))?;
-        Model::read(model_name, &plain, &mut |_| None)?
+        Model::read_within(model_name, &plain, &mut |_| None, memory_limit)?
     };
     model.set_up(up);
     Ok(Some(Project { model, cage: PolygonMesh { positions, faces }, poses, settings }))

@@ -18,6 +18,8 @@ const MAX_BYTES: u64 = 2 << 30;
 /// An encoded image, known by its content to be one.
 #[derive(Clone, Debug)]
 pub(crate) struct Image {
+    /// What the model calls it, shortened.
+    pub(crate) name: Arc<str>,
     pub(crate) bytes: Arc<Vec<u8>>,
     pub(crate) mime: &'static str,
 }
@@ -38,15 +40,18 @@ pub(crate) struct Siblings<'a> {
     resolve: &'a mut Resolve<'a>,
     files: HashMap<String, Result<Arc<Vec<u8>>, Absent>>,
     images: HashMap<String, Option<Image>>,
+    /// Bytes of them.
     bytes: u64,
+    /// Most bytes of them.
+    limit: u64,
 }
 
 impl Image {
     /// # Errors
     /// That the bytes are no image.
-    pub(crate) fn new(bytes: Arc<Vec<u8>>) -> Result<Self, Absent> {
+    pub(crate) fn new(name: &str, bytes: Arc<Vec<u8>>) -> Result<Self, Absent> {
         match sniff_image(&bytes) {
-            Some(mime) => Ok(Self { bytes, mime }),
+            Some(mime) => Ok(Self { name: shown_start(name, MAX_NAME_CHARS).into(), bytes, mime }),
             None => Err(Absent::Refused(NO_IMAGE.into())),
         }
     }
@@ -56,9 +61,15 @@ impl Image {
 pub(crate) const NO_IMAGE: &str = "is no PNG, JPEG, WebP or KTX2 image";
 
 impl<'a> Siblings<'a> {
-    /// Files that `resolve` fetches.
-    pub(crate) fn new(resolve: &'a mut Resolve<'_>) -> Self {
-        Self { resolve, files: HashMap::new(), images: HashMap::new(), bytes: 0 }
+    /// Files that `resolve` fetches, as far as they fit into `memory_limit` bytes.
+    pub(crate) fn new(resolve: &'a mut Resolve<'_>, memory_limit: u64) -> Self {
+        let limit = memory_limit.min(MAX_BYTES);
+        Self { resolve, files: HashMap::new(), images: HashMap::new(), bytes: 0, limit }
+    }
+
+    /// Bytes of all files that were read.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.bytes
     }
 
     /// The file of this name.
@@ -72,8 +83,8 @@ impl<'a> Siblings<'a> {
         let found = match (self.resolve)(name) {
             None => Err(Absent::Missing),
             Some(Err(reason)) => Err(Absent::Refused(reason)),
-            Some(Ok(bytes)) if bytes.len() as u64 > MAX_BYTES - self.bytes => {
-                let limit = MAX_BYTES >> 20;
+            Some(Ok(bytes)) if bytes.len() as u64 > self.limit - self.bytes => {
+                let limit = self.limit >> 20;
                 Err(Absent::Refused(format!(
                     "is too large: all files that a model names may have {limit} MiB"
                 )))
@@ -92,7 +103,7 @@ impl<'a> Siblings<'a> {
         if let Some(known) = self.images.get(name) {
             return known.clone();
         }
-        let image = self.file(name).and_then(Image::new);
+        let image = self.file(name).and_then(|bytes| Image::new(name, bytes));
         if let Err(reason) = &image {
             notices.push(format!("texture '{}' {reason}: {otherwise}", shown_start(name, MAX_NAME_CHARS)));
         }

@@ -4,8 +4,8 @@
 
 mod common;
 
-use cagework_io::{GltfError, ReadError};
-use common::{Builder, floats, glb, plain_cube, read, skinned};
+use cagework_io::{GltfError, Model, ReadError};
+use common::{Builder, F32, U32, floats, glb, plain_cube, read, skinned};
 use serde_json::json;
 
 fn fault(bytes: &[u8]) -> String {
@@ -83,7 +83,7 @@ fn accessors_that_do_not_fit_are_errors() {
         (fault_of(|b| b.json["accessors"][0]["count"] = 9.into()), "accessor 0 needs 9 elements"),
         (
             fault_of(|b| b.json["accessors"][0]["count"] = json!(1_u64 << 40)),
-            "more than the limit of 33554432",
+            "more than the limit of 16777216",
         ),
         (fault_of(|b| b.json["accessors"][0]["byteOffset"] = json!(u64::MAX)), "accessor 0 needs 8 elements"),
         (
@@ -109,6 +109,62 @@ fn accessors_that_do_not_fit_are_errors() {
     assert!(message.contains("sparse value for element 8"), "{message}");
 }
 
+/// Eighteen kilobytes of a file were read for hours: a thousand morph targets of zeros that no buffer holds.
+#[test]
+fn attributes_of_another_count_than_the_vertices_name_both() {
+    let zeros = |b: &mut Builder, kind: &str| {
+        b.push("accessors", json!({ "componentType": F32, "count": 1 << 24, "type": kind }))
+    };
+    for (name, kind) in
+        [("NORMAL", "VEC3"), ("TANGENT", "VEC4"), ("TEXCOORD_0", "VEC2"), ("WEIGHTS_0", "VEC4")]
+    {
+        let message = fault_of(|b| {
+            let many = zeros(b, kind);
+            b.primitive(0)["attributes"][name] = many.into();
+        });
+        let said = format!("accessor 2 has 16777216 elements for {name}, but there are 8 vertices");
+        assert!(message.contains(&said), "{message}");
+    }
+    let message = fault_of(|b| {
+        let many = zeros(b, "VEC3");
+        b.primitive(0)["targets"] = json!(vec![json!({ "POSITION": many }); 1000]);
+    });
+    assert!(
+        message.contains("16777216 elements for POSITION of morph target 0, but there are 8"),
+        "{message}"
+    );
+    let mut b = skinned();
+    let many = zeros(&mut b, "MAT4");
+    b.json["skins"][0]["inverseBindMatrices"] = many.into();
+    assert!(fault(&b.glb()).contains("16777216 elements for inverse bind matrices, but there are 2 joints"));
+}
+
+/// What nodes and primitives ask for together was allocated, whatever it was.
+#[test]
+fn what_a_document_becomes_is_counted_before_it_is_allocated() {
+    let mut b = plain_cube();
+    let nodes = 3_000_000_usize.div_ceil(8);
+    b.json["nodes"] = vec![json!({ "mesh": 0 }); nodes].into();
+    b.json["scenes"][0]["nodes"] = (0..nodes).collect::<Vec<_>>().into();
+    let within = |b: &Builder, limit| Model::read_within("x.glb", &b.glb(), &mut |_| None, limit);
+    let message = within(&b, 256 << 20).unwrap_err().to_string();
+    assert!(message.contains("MiB of memory, more than the limit of 256 MiB"), "{message}");
+    // A thousand primitives at three hundred thousand nodes; no more of them are looked at than there are.
+    let primitive = b.primitive(0).clone();
+    b.json["meshes"][0]["primitives"] = vec![primitive; 1000].into();
+    let message = within(&b, u64::MAX).unwrap_err().to_string();
+    assert!(message.contains("vertices: 3000000000, more than the limit of 16777216"), "{message}");
+    let message = fault_of(|b| {
+        let zeros = json!({ "componentType": U32, "count": 1 << 24, "type": "SCALAR" });
+        let zeros = b.push("accessors", zeros);
+        let primitive = b.primitive(0);
+        primitive["indices"] = zeros.into();
+        let primitives = vec![primitive.clone(); 100];
+        b.json["meshes"][0]["primitives"] = primitives.into();
+    });
+    assert!(message.contains("triangles: 559240500, more than the limit of 33554432"), "{message}");
+}
+
 #[test]
 fn nodes_that_are_no_tree_are_errors() {
     let nodes = |nodes| fault_of(move |b| b.json["nodes"] = nodes);
@@ -126,8 +182,14 @@ fn deep_trees_need_no_stack() {
     let mut b = plain_cube();
     let mut nodes: Vec<_> = (1..depth).map(|i| json!({ "children": [i] })).collect();
     nodes.push(json!({ "mesh": 0 }));
-    b.json["nodes"] = nodes.into();
+    b.json["nodes"] = nodes.clone().into();
     assert_eq!(read("x.glb", &b.glb()).unwrap().positions.len(), 8);
+    // One look at each: going up from each to the scene's top took a minute.
+    for node in &mut nodes {
+        node["mesh"] = 0.into();
+    }
+    b.json["nodes"] = nodes.into();
+    assert_eq!(read("x.glb", &b.glb()).unwrap().positions.len(), 8 * depth);
 }
 
 #[test]
@@ -170,8 +232,7 @@ fn missing_files_are_named() {
     let error = read("x.gltf", &text).unwrap_err();
     let expected = GltfError::MissingFile { uri: "far away.bin".into(), problem: "is not there".into() };
     assert_eq!(error, ReadError::Gltf { name: "x.gltf".into(), source: expected });
-    let short =
-        cagework_io::Model::read("x.gltf", &text, &mut |_| Some(Ok(vec![0; 10]))).unwrap_err().to_string();
+    let short = Model::read("x.gltf", &text, &mut |_| Some(Ok(vec![0; 10]))).unwrap_err().to_string();
     assert!(short.contains("buffer 0 says it has 100 bytes but has 10"), "{short}");
 }
 

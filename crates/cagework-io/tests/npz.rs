@@ -11,6 +11,9 @@ use glam::Vec3;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
+/// Of memory, bytes.
+const LIMIT: u64 = 1 << 20;
+
 fn sample() -> (Weights, Vec<OutsideVertex>) {
     let weights =
         Weights::new(5, vec![0, 2, 2, 5], vec![0, 4, 1, 2, 3], vec![0.25, 0.75, 0.5, 0.375, 0.125]).unwrap();
@@ -42,9 +45,9 @@ fn weights_survive_and_bytes_repeat() {
     let (weights, outside) = sample();
     let bytes = write_weights_npz(&weights, &outside);
     assert_eq!(bytes, write_weights_npz(&weights, &outside));
-    assert_eq!(read_weights_npz(&bytes).unwrap(), (weights.clone(), outside));
+    assert_eq!(read_weights_npz(&bytes, LIMIT).unwrap(), (weights.clone(), outside));
     let bytes = write_weights_npz(&weights, &[]);
-    assert_eq!(read_weights_npz(&bytes).unwrap(), (weights, vec![]));
+    assert_eq!(read_weights_npz(&bytes, LIMIT).unwrap(), (weights, vec![]));
 }
 
 #[test]
@@ -80,12 +83,12 @@ fn deflated_files_with_wide_numbers_are_read() {
         out.extend(body);
         Some(out)
     });
-    assert_eq!(read_weights_npz(&wide).unwrap(), sample());
+    assert_eq!(read_weights_npz(&wide, LIMIT).unwrap(), sample());
 }
 
 #[test]
 fn faults_are_named() {
-    let message = |bytes: &[u8]| read_weights_npz(bytes).unwrap_err().to_string();
+    let message = |bytes: &[u8]| read_weights_npz(bytes, LIMIT).unwrap_err().to_string();
     assert!(message(b"no zip").contains("not an .npz"));
     for name in ["format", "shape", "indptr", "indices", "data"] {
         let file = format!("{name}.npy");
@@ -135,7 +138,23 @@ fn shapes_that_the_data_do_not_have_are_refused() {
             let place = d.windows(from.len()).position(|w| w == from.as_bytes()).unwrap();
             Some([&d[..place], to.as_bytes(), &d[place + from.len()..]].concat())
         });
-        let message = read_weights_npz(&wrong).unwrap_err().to_string();
+        let message = read_weights_npz(&wrong, LIMIT).unwrap_err().to_string();
         assert!(message.contains(&name.replace(".npy", "")) && message.contains("shape"), "{to}: {message}");
     }
+}
+
+/// Entries were unpacked as far as they went, and 4 GB of zeros take 4 MB of a file.
+#[test]
+fn entries_are_unpacked_as_far_as_their_shapes_need() {
+    let endless = rewritten(|n, d| Some(if n == "format.npy" { [d, vec![0; 9 << 20]].concat() } else { d }));
+    let message = read_weights_npz(&endless, LIMIT).unwrap_err().to_string();
+    assert!(message.contains("'format': has more than the 3 bytes"), "{message}");
+    // 40 MB of an honest shape; the header keeps its length.
+    let honest = rewritten(|n, d| {
+        let header = String::from_utf8_lossy(&d[10..128.min(d.len())]).replace("(4,), }       ", "(10000000,), }");
+        let header = [&d[..10], header.as_bytes()].concat();
+        Some(if n == "indptr.npy" { [header, vec![0; 40_000_000]].concat() } else { d })
+    });
+    let message = read_weights_npz(&honest, LIMIT).unwrap_err().to_string();
+    assert!(message.contains("needs about 77 MiB of memory, more than the limit of 1 MiB"), "{message}");
 }

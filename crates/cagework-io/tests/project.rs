@@ -39,7 +39,7 @@ fn written(model: &Model) -> Vec<u8> {
 }
 
 fn reopened(bytes: &[u8]) -> Project {
-    read_project("saved.glb", bytes).unwrap().unwrap()
+    read_project("saved.glb", bytes, u64::MAX).unwrap().unwrap()
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn others_see_the_model_and_the_cage_as_lines() {
 #[test]
 fn other_files_are_no_projects() {
     for bytes in [plain_cube().glb(), CUBE_OBJ.as_bytes().to_vec(), Vec::new(), b"glTF".to_vec()] {
-        assert!(read_project("x.glb", &bytes).unwrap().is_none());
+        assert!(read_project("x.glb", &bytes, u64::MAX).unwrap().is_none());
     }
 }
 
@@ -121,11 +121,11 @@ fn damage_and_other_versions_are_named() {
     let mut json = json_of(&bytes);
     let bin = &bytes[bytes.len() - json["buffers"][0]["byteLength"].as_u64().unwrap() as usize..];
     json["extensions"]["CAGEWORK_project"]["version"] = json!(7);
-    let newer = read_project("x.glb", &glb(&json, Some(bin)));
+    let newer = read_project("x.glb", &glb(&json, Some(bin)), u64::MAX);
     assert!(matches!(newer, Err(ProjectError::Version { found: 7, .. })));
     json["extensions"]["CAGEWORK_project"]["version"] = json!(1);
     json["extensions"]["CAGEWORK_project"]["cage"]["faces"]["bufferView"] = json!(1_000_000);
-    let damaged = read_project("x.glb", &glb(&json, Some(bin)));
+    let damaged = read_project("x.glb", &glb(&json, Some(bin)), u64::MAX);
     assert!(matches!(damaged, Err(ProjectError::Damaged { .. })), "{damaged:?}");
-    assert!(read_project("x.glb", &bytes[..bytes.len() - 9]).is_err());
+    assert!(read_project("x.glb", &bytes[..bytes.len() - 9], u64::MAX).is_err());
 }

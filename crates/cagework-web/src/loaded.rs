@@ -118,9 +118,12 @@ impl Loaded {
     }
 }
 
+/// Bytes that reading a file may take: a tab has 4 GiB, of which drawing and binding take their part.
+pub(crate) const READ_LIMIT: u64 = 1 << 30;
+
 impl Loaded {
     fn from_bytes(name: &str, bytes: &[u8], sibling: &Function) -> Answer<Self> {
-        if let Some(project) = read_project(name, bytes)? {
+        if let Some(project) = read_project(name, bytes, READ_LIMIT)? {
             let mut loaded = Self::new(project.model);
             loaded.cage = Some(project.cage);
             loaded.poses = project.poses;
@@ -131,7 +134,7 @@ impl Loaded {
             let found = sibling.call1(&JsValue::NULL, &path.into()).ok()?;
             Some(Ok(found.dyn_into::<Uint8Array>().ok()?.to_vec()))
         };
-        let model = Model::read(name, bytes, &mut resolve)?;
+        let model = Model::read_within(name, bytes, &mut resolve, READ_LIMIT)?;
         model.require_faces()?;
         Ok(Self::new(model))
     }

@@ -7,7 +7,7 @@ use cagework_core::cage_check::Repair;
 use cagework_core::cage_gen::{CageOptions, MAX_TARGET, MIN_TARGET, Shape, Symmetry};
 use clap::{Args, ValueEnum};
 
-use super::{ModelOutput, UpArgs, fraction, positive};
+use super::{MemoryArgs, ModelOutput, ReadArgs, fraction, positive};
 
 /// Quads along each edge of a box cage unless said otherwise.
 pub(crate) const DEFAULT_DIVISIONS: u32 = 2;
@@ -30,7 +30,7 @@ pub(crate) struct CageArgs {
     /// Model to make a cage for (.obj, .gltf, .glb).
     pub(crate) model: PathBuf,
     #[command(flatten)]
-    pub(crate) up: UpArgs,
+    pub(crate) read: ReadArgs,
     /// File to write (.obj keeps the cage's vertices as they are, .glb opens anywhere).
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,
@@ -105,6 +105,8 @@ pub(crate) struct CheckArgs {
     /// Write the mended cage; the name's ending says the format.
     #[arg(short, long, value_name = "FILE", requires = "repair")]
     pub(crate) output: Option<ModelOutput>,
+    #[command(flatten)]
+    pub(crate) memory: MemoryArgs,
 }
 
 /// Where a cage comes from.

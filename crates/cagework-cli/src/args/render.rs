@@ -7,7 +7,7 @@ use cagework_gpu::render::{AxisView, Camera, Theme};
 use cagework_gpu::session::MAX_PICTURE;
 use clap::{Args, ValueEnum};
 
-use super::{CageSource, SolveArgs, UpArgs, output};
+use super::{CageSource, ReadArgs, SolveArgs, output};
 
 /// `cagework render`
 #[derive(Args, Debug)]
@@ -23,7 +23,7 @@ pub(crate) struct RenderArgs {
     /// Model to draw (.obj, .gltf, .glb).
     pub(crate) model: PathBuf,
     #[command(flatten)]
-    pub(crate) up: UpArgs,
+    pub(crate) read: ReadArgs,
     /// Cage: a file, or box or box:DIVISIONS for a subdivided box around the model.
     #[arg(long, value_name = "CAGE", required_if_eq_any = [
         ("show", "wireframe"), ("show", "weights"), ("show", "error"), ("show", "cells"), ("show", "slice"),

@@ -14,7 +14,7 @@ use std::path::Path;
 use cagework_core::Cage;
 use cagework_io::{Model, UpAxis};
 
-use crate::args::EvaluateArgs;
+use crate::args::{EvaluateArgs, MemoryArgs};
 use crate::error::CliError;
 use crate::files::{json, make_folder, print, shown_path, write};
 use crate::gpu;
@@ -55,13 +55,13 @@ pub(crate) fn run(args: &EvaluateArgs, as_json: bool) -> Result<(), CliError> {
 
 fn input(args: &EvaluateArgs) -> Result<(String, Model, Cage), CliError> {
     if let (Some(mesh), Some(cage)) = (&args.mesh, &args.cage) {
-        let model = load_model(mesh, UpAxis::Y)?;
-        let cage = load_cage(cage, &model)?.cage;
+        let model = load_model(mesh, UpAxis::Y, MemoryArgs::default())?;
+        let cage = load_cage(cage, &model, MemoryArgs::default())?.cage;
         return Ok((mesh.display().to_string(), model, cage));
     }
     let BuiltIn { name, model, cage: own, .. } = built_in()?;
     let cage = match &args.cage {
-        Some(source) => load_cage(source, &model)?.cage,
+        Some(source) => load_cage(source, &model, MemoryArgs::default())?.cage,
         None => own,
     };
     Ok((format!("built-in sample, {name}"), model, cage))

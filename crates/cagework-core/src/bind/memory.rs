@@ -23,17 +23,36 @@ const COARSER: f64 = 1.0 / 7.0;
 /// end on up to three cage vertices each.
 const CUT_PER_AREA: f64 = 1.5;
 
+/// What a vertex of the file takes: which position it has.
+const WELD_BYTES: f64 = 4.0;
+
 /// Sampling stencil of a vertex: up to 8 rows and a dozen Dirichlet values of 8 bytes.
 const STENCIL_BYTES: f64 = 160.0;
 
 /// Weights that a vertex keeps when small ones are dropped: a third of the columns at most (Armadillo at 1e-5: 30 %).
 const SPARSE_SHARE: f64 = 0.5;
 
-/// Bytes that a bind of `n_points` different positions will need at once. `threads` 0: fields are kept elsewhere.
+/// Bytes of the weights of `n_rows` vertices.
+#[must_use]
+pub fn weights_bytes(n_rows: usize, n_columns: usize, sparsify: f32) -> u64 {
+    let share = if sparsify > 0.0 { SPARSE_SHARE } else { 1.0 };
+    (n_rows as f64 * (share * n_columns as f64 * 8.0 + 4.0)) as u64
+}
+
+/// How many vertices a bind has.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Vertices {
+    /// In the file.
+    pub(super) rows: usize,
+    /// Different positions.
+    pub(super) points: usize,
+}
+
+/// Bytes that a bind will need at once. `threads` 0: fields are kept elsewhere.
 pub(super) fn estimate(
     controls: Controls<'_>,
     grid: &Grid,
-    n_points: usize,
+    vertices: Vertices,
     threads: usize,
     options: &BindOptions,
 ) -> u64 {
@@ -45,6 +64,8 @@ pub(super) fn estimate(
     let n_columns = controls.n_controls() as f64;
     let n_batches = (n_columns / LANES as f64).ceil();
     let row = size_of::<Row>() as f64;
+    // A thread without a batch has no fields.
+    let threads = threads.min(n_batches as usize);
 
     let voxels = n_cells * if options.method == Method::Embedded { 7.0 } else { 5.0 };
     let stencils = n_cut * (size_of::<CutCell>() + size_of::<Run>() + 8 * size_of::<BoundaryTerm>()) as f64;
@@ -67,10 +88,14 @@ pub(super) fn estimate(
             jacobi::field_bytes(n_unknowns as u64, n_cut as u64, n_columns as u64, threads as u64) as f64
         }
     };
-    let share = if options.sparsify > 0.0 { SPARSE_SHARE } else { 1.0 };
-    let points = n_points as f64;
-    let weights = points * (n_batches * row + 2.0 * share * n_columns * 8.0 + STENCIL_BYTES);
-    (voxels * (1.0 + COARSER) + lines + stencils * (1.0 + 2.0 * COARSER) + fields + weights) as u64
+    let Vertices { rows, points } = vertices;
+    let bytes_of = |n| weights_bytes(n, controls.n_controls(), options.sparsify) as f64;
+    let blocks = points as f64 * n_batches * row;
+    // Rows of points that several vertices share are copied once all of them are there.
+    let copies = if rows > points { bytes_of(rows) } else { blocks };
+    let weights = (blocks + fields).max(bytes_of(points) + copies.max(blocks));
+    let held = options.held as f64 + WELD_BYTES * rows as f64 + (STENCIL_BYTES + 12.0) * points as f64;
+    (held + voxels * (1.0 + COARSER) + lines + stencils * (1.0 + 2.0 * COARSER) + weights) as u64
 }
 
 /// Volume enclosed (divergence theorem) and area of the cage.

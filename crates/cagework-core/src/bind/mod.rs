@@ -7,6 +7,7 @@ mod solving;
 mod voxels;
 mod watch;
 
+pub use memory::weights_bytes;
 pub use outside::Misfit;
 pub use watch::Watch;
 
@@ -19,6 +20,7 @@ use crate::options::{BindOptions, OutOfRange};
 use crate::progress::{Cancelled, Progress};
 use crate::report::BindReport;
 use crate::weights::Weights;
+use crate::words::grouped;
 
 /// The result of a bind.
 #[derive(Clone, Debug)]
@@ -73,7 +75,7 @@ pub enum BindError {
         first: u32,
     },
     /// No vertex is inside the cage.
-    #[error("none of the model's {} vertices is inside the cage; {misfit}", outside::grouped(*vertices))]
+    #[error("none of the model's {} vertices is inside the cage; {misfit}", grouped(*vertices))]
     NoneInside {
         /// Vertices of the model.
         vertices: usize,
@@ -113,5 +115,6 @@ pub fn estimate_memory<'a>(
     options.check()?;
     let controls = controls.into();
     let grid = voxels::Voxels::grid(controls.surface(), options);
-    Ok(memory::estimate(controls, &grid, n_points, options.threads.max(1), options))
+    let vertices = memory::Vertices { rows: n_points, points: n_points };
+    Ok(memory::estimate(controls, &grid, vertices, options.threads.max(1), options))
 }

@@ -62,19 +62,6 @@ fn about(x: f64) -> String {
     if (0.01..1e4).contains(&rounded) { rounded.to_string() } else { format!("{rounded:e}") }
 }
 
-/// A count with commas: `15,002`.
-pub(super) fn grouped(n: usize) -> String {
-    let digits = n.to_string();
-    let mut grouped = String::new();
-    for (k, digit) in digits.chars().enumerate() {
-        if k > 0 && (digits.len() - k).is_multiple_of(3) {
-            grouped.push(',');
-        }
-        grouped.push(digit);
-    }
-    grouped
-}
-
 /// [`BindError::NoneInside`] if the cage holds none of the model: nothing would follow it but by its closest point.
 /// `positions` of the file, `stencils` of those that differ.
 pub(super) fn refuse_unless_any_is_inside(

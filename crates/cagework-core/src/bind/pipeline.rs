@@ -110,7 +110,13 @@ impl<'a> Prepared<'a> {
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
         let grid = Voxels::grid(controls.surface(), options);
         let field_threads = if fields == FieldsOn::Host { team.n_threads() } else { 0 };
-        let estimated = memory::estimate(controls, &grid, points.len(), field_threads, options);
+        let estimated = memory::estimate(
+            controls,
+            &grid,
+            memory::Vertices { rows: positions.len(), points: points.len() },
+            field_threads,
+            options,
+        );
         if estimated > options.memory_limit {
             return Err(BindError::Memory { needed: estimated, limit: options.memory_limit });
         }
@@ -171,10 +177,14 @@ impl<'a> Prepared<'a> {
         let [began, voxelized, stencils_made] = self.times_ms;
         let cage = controls.surface();
         let (rest_error, raw_error, weight_stats) = rows.statistics(f64::from(cage.diagonal()));
-        let held = voxels.bytes + stencils.bytes() + blocks_bytes;
-        let peak = held + solved.field_bytes.max(rows.weights.bytes());
+        let held =
+            options.held as usize + size_of_val(welded.unique_of.as_slice()) + size_of_val(points.as_slice());
+        let held = held + voxels.bytes + stencils.bytes();
+        let of_points = rows.weights.bytes();
         let all_differ = points.len() == positions.len();
         let weights = if all_differ { rows.weights } else { rows.weights.with_rows(&welded.unique_of) };
+        let copies = if all_differ { 0 } else { weights.bytes() };
+        let peak = held + (blocks_bytes + solved.field_bytes).max(of_points + blocks_bytes.max(copies));
         let outside = outside_vertices(cage, &stencils.outside, positions, &welded);
         watch.report(Stage::Sample, 1.0, solved.iterations, None)?;
         let ended = watch.now_ms();
@@ -216,7 +226,12 @@ impl<'a> Prepared<'a> {
             cage_vertices: controls.n_controls() as u64,
             outside_vertices: outside.len() as u64,
             ambiguous_cells: voxels.ambiguous,
-            notices: cage.notices().iter().map(ToString::to_string).collect(),
+            notices: cage
+                .notices()
+                .iter()
+                .map(ToString::to_string)
+                .chain(team.notice(options.threads))
+                .collect(),
         };
         Ok(Binding { weights, outside, report })
     }

@@ -5,7 +5,8 @@ use std::fmt;
 use thiserror::Error;
 
 use super::polygon::MAX_CORNERS;
-use super::{MAX_DIAGONAL, MIN_DIAGONAL};
+use super::{MAX_DIAGONAL, MAX_FACES, MIN_DIAGONAL};
+use crate::words::{counted, grouped};
 
 /// Why a polygon mesh is not a cage. Vertices and faces are counted from 0.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -60,6 +61,20 @@ pub enum CageError {
         first: u32,
         /// The second of the two.
         second: u32,
+    },
+    /// Two closed parts lie on each other, face on face.
+    #[error("cage component {second} lies on component {first}, face on face: delete one of them")]
+    DoubledPart {
+        /// The first of the two, in order of first faces.
+        first: u32,
+        /// The second of the two.
+        second: u32,
+    },
+    /// More faces than anyone moves by hand.
+    #[error("cage has {} faces, more than {}: use a simpler mesh around the model", grouped(*faces), grouped(MAX_FACES))]
+    TooManyFaces {
+        /// Its faces.
+        faces: usize,
     },
     /// An edge belongs to one face only.
     #[error(
@@ -167,11 +182,6 @@ pub enum CageNotice {
     },
 }
 
-/// `1 vertex`, `2 vertices`.
-fn count(n: usize, one: &str, many: &str) -> String {
-    format!("{n} {}", if n == 1 { one } else { many })
-}
-
 impl fmt::Display for CageNotice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
@@ -179,7 +189,7 @@ impl fmt::Display for CageNotice {
                 f,
                 "The cage was split along seams: for {} (from vertex {first} on) another one at the same place is \
                  used; the weights of the copies are zero.",
-                count(vertices, "vertex", "vertices")
+                counted(vertices, "vertex", "vertices")
             ),
             Self::Flipped { component, faces, of } if faces == of => {
                 write!(f, "Component {component} of the cage was inside out: all its {of} faces were turned.")
@@ -187,7 +197,7 @@ impl fmt::Display for CageNotice {
             Self::Flipped { component, faces, of } => write!(
                 f,
                 "In component {component} of the cage {} of {of} pointed the wrong way: they were turned.",
-                count(faces, "face", "faces")
+                counted(faces, "face", "faces")
             ),
             Self::Cavity { component } => {
                 write!(f, "Component {component} of the cage lies inside another one: it bounds a cavity.")
@@ -195,12 +205,12 @@ impl fmt::Display for CageNotice {
             Self::UnusedVertices { vertices, first } => write!(
                 f,
                 "The cage has {} of no face (from vertex {first} on): the weights are zero.",
-                count(vertices, "vertex", "vertices")
+                counted(vertices, "vertex", "vertices")
             ),
             Self::TouchingVertices { vertices, first } => write!(
                 f,
                 "Parts of the cage touch in {} (from vertex {first} on); this does no harm.",
-                count(vertices, "vertex", "vertices")
+                counted(vertices, "vertex", "vertices")
             ),
         }
     }

@@ -27,10 +27,10 @@ pub(super) fn orient(
         (0..surface.faces.len()).map(|f| measure(&surface.faces, f)).collect::<Result<Vec<_>, _>>()?;
 
     let mut components = vec![Vec::new(); surface.n_components];
-    let mut first_face = vec![u32::MAX; surface.n_components];
+    let mut faces_of = vec![Vec::new(); surface.n_components];
     for (f, polygon) in polygons.iter().enumerate() {
         let component = surface.component[f] as usize;
-        first_face[component] = first_face[component].min(f as u32);
+        faces_of[component].push(f);
         let corner = |k: u32| positions[surface.faces[f][k as usize] as usize].as_dvec3();
         components[component].extend(polygon.triangles.iter().map(|t| t.map(corner)));
     }
@@ -38,16 +38,15 @@ pub(super) fn orient(
     for (component, solid) in solids.iter().enumerate() {
         // Volume over area is the thickness of a sheet: flat if it is lost in the rounding of coordinates.
         if solid.volume.abs() <= FLAT_HEIGHT * diagonal * solid.area {
-            return Err(CageError::Flat { component: component as u32, face: first_face[component] });
+            return Err(CageError::Flat { component: component as u32, face: faces_of[component][0] as u32 });
         }
     }
     for (component, solid) in solids.iter().enumerate() {
         let depth = (0..solids.len()).filter(|&k| k != component && solid.is_inside(&solids[k])).count();
         let cavity = depth % 2 == 1;
-        let faces = (0..surface.faces.len()).filter(|&f| surface.component[f] as usize == component);
-        let faces: Vec<usize> = faces.collect();
+        let faces = &faces_of[component];
         if (solid.volume < 0.0) != cavity {
-            for &f in &faces {
+            for &f in faces {
                 surface.turn(f);
                 polygons[f] = measure(&surface.faces, f)?;
             }

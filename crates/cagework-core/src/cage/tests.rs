@@ -191,6 +191,35 @@ fn doubled_face_is_rejected() {
     assert_eq!(error(&mesh), CageError::DuplicateFace { first: 0, second: 6 });
 }
 
+/// Such a cage was bound; its solid is empty.
+#[test]
+fn part_that_lies_on_another_is_rejected() {
+    let beside = cuboid(Vec3::new(5.0, 0.0, 0.0), Vec3::new(6.0, 1.0, 1.0));
+    let mut turned = cube();
+    turned.faces.reverse();
+    turned.faces.iter_mut().for_each(|face| face.rotate_left(1));
+    for copy in [cube(), inside_out(cube()), turned] {
+        let doubled = together(&together(&cube(), &beside), &copy);
+        assert_eq!(error(&doubled), CageError::DoubledPart { first: 0, second: 2 });
+    }
+    // Stacked parts share a face, and a nested one has other places.
+    let Bounds { min, max } = Cage::new(&cube()).unwrap().bounds();
+    let above = cuboid(Vec3::new(min.x, max.y, min.z), Vec3::new(max.x, 2.0 * max.y - min.y, max.z));
+    assert!(Cage::new(&together(&cube(), &above)).is_ok());
+    let inner = cuboid(0.5 * (min + max) - 0.1, 0.5 * (min + max) + 0.1);
+    assert!(Cage::new(&together(&cube(), &inner)).is_ok());
+}
+
+#[test]
+fn cage_of_too_many_faces_is_rejected_at_once() {
+    let faces = MAX_FACES + 1;
+    let soup = PolygonMesh { positions: tetrahedron().positions, faces: vec![vec![0, 1, 2]; faces] };
+    assert_eq!(
+        error(&soup).to_string(),
+        "cage has 100,001 faces, more than 100,000: use a simpler mesh around the model"
+    );
+}
+
 #[test]
 fn seams_are_closed_with_a_notice() {
     // As a glTF cube with flat normals: four vertices of its own for each face.

@@ -1,11 +1,12 @@
 //! Which faces share an edge: closedness, seams, components and consistent orientation.
 
 use std::collections::{HashMap, VecDeque};
+use std::hash::{BuildHasher as _, RandomState};
 
 use glam::Vec3;
 
 use super::defects::{CageError, CageNotice, FaceDefect};
-use crate::mesh::PolygonMesh;
+use crate::mesh::{PolygonMesh, weld};
 
 /// A side of a face: the edge between `lo` and `hi`, run through from `lo` to `hi` if `forward`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,12 +109,40 @@ fn check_edges(faces: &[Vec<u32>]) -> Result<Vec<Side>, CageError> {
 fn check_duplicates(faces: &[Vec<u32>]) -> Result<(), CageError> {
     let mut first_with: HashMap<Vec<u32>, u32> = HashMap::with_capacity(faces.len());
     for (f, face) in faces.iter().enumerate() {
-        let n = face.len();
-        let start = (0..n).min_by_key(|&k| face[k]).unwrap_or(0);
-        let ahead = face[(start + 1) % n] < face[(start + n - 1) % n];
-        let outline: Vec<u32> = (0..n).map(|k| face[(start + if ahead { k } else { n - k }) % n]).collect();
-        if let Some(first) = first_with.insert(outline, f as u32) {
+        if let Some(first) = first_with.insert(outline(face), f as u32) {
             return Err(CageError::DuplicateFace { first, second: f as u32 });
+        }
+    }
+    Ok(())
+}
+
+/// The corners of a face, the same wherever they begin and whichever way they run.
+fn outline(face: &[u32]) -> Vec<u32> {
+    let n = face.len();
+    let start = (0..n).min_by_key(|&k| face[k]).unwrap_or(0);
+    let ahead = face[(start + 1) % n] < face[(start + n - 1) % n];
+    (0..n).map(|k| face[(start + if ahead { k } else { n - k }) % n]).collect()
+}
+
+/// No closed part may lie on another one, face on face: the solid between them is empty. Parts that share some faces at
+/// their places are stacked, and have one.
+pub(super) fn check_doubled(positions: &[Vec3], surface: &Surface) -> Result<(), CageError> {
+    if surface.n_components < 2 {
+        return Ok(());
+    }
+    let place = weld(positions).unique_of;
+    let hasher = RandomState::new();
+    // A sum does not depend on the order of faces.
+    let mut sums = vec![0_u64; surface.n_components];
+    for (face, &component) in surface.faces.iter().zip(&surface.component) {
+        let places: Vec<u32> = face.iter().map(|&i| place[i as usize]).collect();
+        let sum = &mut sums[component as usize];
+        *sum = sum.wrapping_add(hasher.hash_one(outline(&places)));
+    }
+    let mut first_with = HashMap::new();
+    for (component, sum) in (0u32..).zip(sums) {
+        if let Some(first) = first_with.insert(sum, component) {
+            return Err(CageError::DoubledPart { first, second: component });
         }
     }
     Ok(())

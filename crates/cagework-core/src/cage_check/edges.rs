@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 
-use super::{Code, Fix, Places, Problem, Repair, Severity, counted, diagonal, problem};
+use super::{Code, Fix, Places, Problem, Repair, Severity, diagonal, problem};
 use crate::cage::{Side, sides_of};
 use crate::mesh::PolygonMesh;
+use crate::words::counted;
 
 /// Vertices nearer than this fraction of the diagonal are at one place: the rounding of six decimals in a file.
 pub(super) const WELD_DISTANCE: f64 = 2e-6;
@@ -191,20 +192,28 @@ fn pinched(mesh: &PolygonMesh, sound: &[u32]) -> Vec<u32> {
     let mut pinched = Vec::new();
     for around in corners.chunk_by(|a, b| a[0] == b[0]) {
         // Corners hang together if they share a neighbour.
-        let mut reached = vec![false; around.len()];
-        let mut stack = vec![0];
-        reached[0] = true;
-        while let Some(k) = stack.pop() {
-            for (j, other) in around.iter().enumerate() {
-                if !reached[j] && around[k][1..].iter().any(|n| other[1..].contains(n)) {
-                    reached[j] = true;
-                    stack.push(j);
-                }
-            }
+        let mut neighbours: Vec<[u32; 2]> =
+            (0u32..).zip(around).flat_map(|(k, c)| [[c[1], k], [c[2], k]]).collect();
+        neighbours.sort_unstable();
+        let mut root: Vec<u32> = (0..around.len() as u32).collect();
+        let mut fans = around.len();
+        for pair in neighbours.windows(2).filter(|pair| pair[0][0] == pair[1][0]) {
+            let [a, b] = [pair[0][1], pair[1][1]].map(|k| find(&mut root, k));
+            root[a as usize] = b;
+            fans -= usize::from(a != b);
         }
-        if reached.contains(&false) {
+        if fans > 1 {
             pinched.push(around[0][0]);
         }
     }
     pinched
+}
+
+/// What stands for all that `k` hangs together with; later searches are shorter.
+fn find(root: &mut [u32], mut k: u32) -> u32 {
+    while root[k as usize] != k {
+        root[k as usize] = root[root[k as usize] as usize];
+        k = root[k as usize];
+    }
+    k
 }

@@ -15,9 +15,10 @@ mod tests;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::cage::Cage;
+use crate::cage::{Cage, CageError, MAX_FACES};
 use crate::enclosure::Enclosure;
 use crate::mesh::{Bounds, PolygonMesh};
+use crate::words::counted;
 
 pub(crate) use fill::{loops, triangulate};
 pub use repair::{Repair, RepairError, Repaired, repair};
@@ -155,6 +156,19 @@ impl CageCheck {
 #[must_use]
 pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> CageCheck {
     let mut found = Vec::new();
+    if mesh.faces.len() > MAX_FACES {
+        let error = CageError::TooManyFaces { faces: mesh.faces.len() };
+        found.push(problem(Code::NotACage, Severity::Error, 1, error.to_string()));
+        return CageCheck {
+            valid: false,
+            encloses: None,
+            vertices: mesh.positions.len(),
+            faces: mesh.faces.len(),
+            components: 0,
+            thickness: None,
+            problems: found,
+        };
+    }
     let sound = shape::sound_faces(mesh, &mut found);
     let edges = edges::Edges::of(mesh, &sound);
     edges.report(mesh, &mut found);
@@ -221,11 +235,6 @@ fn report_outside(cage: &Cage, model: &[Vec3], found: &mut Vec<Problem>) -> bool
 /// A problem without places and fixes.
 fn problem(code: Code, severity: Severity, count: usize, message: String) -> Problem {
     Problem { code, severity, count, places: Places::default(), message, fixes: Vec::new() }
-}
-
-/// `1 edge`, `2 edges`.
-fn counted(n: usize, one: &str, many: &str) -> String {
-    format!("{n} {}", if n == 1 { one } else { many })
 }
 
 /// Diagonal of the box of all finite vertices of faces, object units: [`Cage::diagonal`] as far as there is one.

@@ -5,9 +5,10 @@ use std::collections::VecDeque;
 use glam::DVec3;
 
 use super::edges::Edges;
-use super::{Code, Fix, Places, Problem, Repair, Severity, counted, problem};
+use super::{Code, Fix, Places, Problem, Repair, Severity, problem};
 use crate::enclosure::winding_number;
 use crate::mesh::PolygonMesh;
+use crate::words::counted;
 
 /// Faces of one part of the surface.
 #[derive(Clone, Debug)]

@@ -1,14 +1,16 @@
 //! Faults of faces and of the shape: faces without area, faces through each other, thin parts.
 
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 
 use glam::DVec3;
 
-use super::{Code, Fix, MAX_PLACES, Places, Problem, Repair, Severity, counted, diagonal, problem};
+use super::{Code, Fix, MAX_PLACES, Places, Problem, Repair, Severity, diagonal, problem};
 use crate::cage::{Cage, face_triangles};
-use crate::contact::{Corners, MAX_PAIRS, meeting};
+use crate::contact::{Corners, each_meeting};
 use crate::mesh::PolygonMesh;
 use crate::options::MAX_GRID;
+use crate::words::{counted, grouped};
 
 /// Triangles up to which the thickness is looked at everywhere; of more, every n-th is a place to measure from.
 const MEASURED: usize = 1500;
@@ -127,37 +129,39 @@ fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
 /// Reports faces that go through each other.
 pub(super) fn report_crossings(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec<Problem>) {
     let (triangles, face_of) = triangles(mesh, sound);
-    let mut faces = Vec::new();
-    let mut points = Vec::new();
+    let mut pairs = Vec::new();
     let mut count = 0;
-    let pairs = meeting(&triangles);
-    for &[a, b] in &pairs {
-        let (f, g) = (face_of[a as usize], face_of[b as usize]);
-        if f == g {
-            continue;
+    let complete = each_meeting(&triangles, |[a, b]| {
+        if face_of[a as usize] != face_of[b as usize] {
+            count += 1;
+            if pairs.len() < MAX_PLACES {
+                pairs.push([a, b]);
+            }
         }
-        count += 1;
-        faces.extend([f, g]);
-        if points.len() < MAX_PLACES {
-            points.push(between(&triangles[a as usize], &triangles[b as usize]).as_vec3().to_array());
-        }
-    }
-    if count == 0 {
+        ControlFlow::Continue(())
+    });
+    if count == 0 && complete {
         return;
     }
+    pairs.sort_unstable();
+    let mut faces: Vec<u32> = pairs.iter().flatten().map(|&t| face_of[t as usize]).collect();
     faces.sort_unstable();
     faces.dedup();
+    let point =
+        |&[a, b]: &[u32; 2]| between(&triangles[a as usize], &triangles[b as usize]).as_vec3().to_array();
+    let listed = counted(pairs.len(), "pair of triangles", "pairs of triangles");
+    let more = match (count - pairs.len(), complete) {
+        (0, true) => String::new(),
+        (n, true) => format!(", and {} more", grouped(n)),
+        (n, false) => format!(", and at least {} more", grouped(n)),
+    };
     found.push(Problem {
-        places: Places { faces, points, ..Places::default() },
+        places: Places { faces, points: pairs.iter().map(point).collect(), ..Places::default() },
         ..problem(
             Code::SelfIntersection,
             Severity::Error,
             count,
-            format!(
-                "The cage goes through itself: {}{} meet. Move their vertices apart.",
-                if pairs.len() == MAX_PAIRS { "at least " } else { "" },
-                counted(count, "pair of triangles", "pairs of triangles")
-            ),
+            format!("The cage goes through itself: {listed} meet{more}. Move their vertices apart."),
         )
     });
 }

@@ -1,10 +1,11 @@
 use glam::{Vec3, vec3};
 use proptest::prelude::*;
 
-use super::{Code, Fix, Repair, Severity, check, repair};
+use super::{Code, Fix, MAX_PLACES, Repair, Severity, check, repair};
 use crate::cage::Cage;
 use crate::cage_gen::subdivided_box;
 use crate::mesh::{Bounds, PolygonMesh};
+use crate::words::grouped;
 
 fn box_mesh(divisions: u32) -> PolygonMesh {
     subdivided_box(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }, 0.0, [divisions; 3])
@@ -257,16 +258,36 @@ fn soup_of_separate_triangles_is_checked_and_repaired_within_seconds() {
 
 /// Triangles that all go through each other: the pairs of 100,000 of them are 40 GB.
 #[test]
-fn crossings_are_listed_up_to_a_limit() {
-    let mut star = PolygonMesh::default();
-    for k in 0..1000_u32 {
-        let (s, c) = (0.006 * k as f32).sin_cos();
-        star.positions.extend([vec3(c, s, -1.0), vec3(c, s, 1.0), vec3(-c, -s, 0.01 * k as f32)]);
-        star.faces.push(vec![3 * k, 3 * k + 1, 3 * k + 2]);
-    }
-    let found = check(&star, None, None);
+fn crossings_are_counted_and_listed_up_to_a_limit() {
+    let star = |n: u32| {
+        let mut star = PolygonMesh::default();
+        for k in 0..n {
+            let (s, c) = (6.0 * k as f32 / n as f32).sin_cos();
+            star.positions.extend([
+                vec3(c, s, -1.0),
+                vec3(c, s, 1.0),
+                vec3(-c, -s, 10.0 * k as f32 / n as f32),
+            ]);
+            star.faces.push(vec![3 * k, 3 * k + 1, 3 * k + 2]);
+        }
+        star
+    };
+    let found = check(&star(200), None, None);
     let crossing = found.problem(Code::SelfIntersection).unwrap();
-    assert!(crossing.count == 100_000 && crossing.message.contains("at least"), "{}", crossing.message);
+    let said = format!(
+        "{} pairs of triangles meet, and {} more.",
+        grouped(MAX_PLACES),
+        grouped(crossing.count - MAX_PLACES)
+    );
+    assert!(crossing.message.contains(&said), "{}", crossing.message);
+    assert_eq!(crossing.places.points.len(), MAX_PLACES);
+    let found = within_seconds(move || check(&star(20_000), None, None));
+    let crossing = found.problem(Code::SelfIntersection).unwrap();
+    assert!(
+        crossing.message.contains(", and at least ") && crossing.count > 1_000_000,
+        "{}",
+        crossing.message
+    );
 }
 
 /// The outcome of `work`, which must be there long before anybody gives up waiting: a tenth of the limit on a slow machine.

@@ -11,8 +11,8 @@ use ::gltf::json::validation::Checked;
 
 use super::{GltfError, get};
 
-/// Most elements of one accessor, and most vertices of a model: half a gigabyte of positions.
-pub(crate) const MAX_ELEMENTS: u64 = 1 << 25;
+/// Most elements of one accessor, and most vertices of a model: with what is needed to read and weld them, a gigabyte.
+pub(crate) const MAX_ELEMENTS: u64 = 1 << 24;
 
 /// What accessors are read from.
 #[derive(Clone, Copy)]
@@ -205,7 +205,7 @@ impl<'a> Source<'a> {
         let start = view_start.checked_add(offset);
         let length = match count {
             0 => Some(0),
-            // At most 2^25 elements, but a stride may be anything.
+            // At most 2^24 elements, but a stride may be anything.
             _ => (stride as u64).checked_mul(count as u64 - 1).and_then(|n| n.checked_add(size as u64)),
         };
         let end = start.zip(length).and_then(|(start, length)| start.checked_add(length));

@@ -1,16 +1,18 @@
 //! From bytes to JSON, buffers and images.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use ::gltf::binary::{Glb, Header};
 use ::gltf::json::Root;
 use data_url::DataUrl;
 use percent_encoding::percent_decode_str;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::GltfError;
 use crate::look::sniff_image;
+use crate::memory::MemoryError;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 use crate::siblings::{Absent, Image, NO_IMAGE, Resolve, Siblings};
 
@@ -28,6 +30,8 @@ pub(crate) struct Loaded {
     pub(crate) root: Root,
     pub(crate) buffers: Vec<Arc<Vec<u8>>>,
     pub(crate) images: Vec<Option<Image>>,
+    /// Bytes that all of it takes, about.
+    pub(crate) bytes: u64,
 }
 
 /// JSON and binary chunk.
@@ -38,14 +42,17 @@ pub(crate) fn load(
     name: &str,
     bytes: &[u8],
     resolve: &mut Resolve<'_>,
+    memory_limit: u64,
     notices: &mut Vec<String>,
 ) -> Result<Loaded, GltfError> {
     let (json, bin) = split(bytes)?;
+    let of_json = bytes_of_json(&json);
+    MemoryError::check(of_json + bytes.len() as u64, memory_limit)?;
     let mut json: Value = serde_json::from_slice(&json).map_err(|e| GltfError::Json(e.to_string()))?;
     check_version(&json)?;
     #[cfg(not(feature = "decompress"))]
     check_compression(name, &json)?;
-    let mut siblings = Siblings::new(resolve);
+    let mut siblings = Siblings::new(resolve, memory_limit);
     let buffers = load_buffers(&mut json, bin.as_deref(), &mut siblings)?;
     #[cfg(feature = "decompress")]
     let buffers = {
@@ -57,7 +64,22 @@ pub(crate) fn load(
     };
     let root = typed(&json)?;
     let images = load_images(&json, &root, &buffers, &mut siblings, notices);
-    Ok(Loaded { json, root, buffers, images })
+    // The caller still holds the file itself; buffers and images of one file share its bytes.
+    let mut seen = HashSet::new();
+    let loaded = buffers.iter().chain(images.iter().flatten().map(|image| &image.bytes));
+    let loaded = loaded.filter(|bytes| seen.insert(Arc::as_ptr(bytes))).map(|bytes| bytes.len() as u64);
+    let held = of_json + bytes.len() as u64 + loaded.sum::<u64>();
+    MemoryError::check(held, memory_limit)?;
+    Ok(Loaded { json, root, buffers, images, bytes: held })
+}
+
+/// Bytes that JSON takes once it is read: its text, twice for a while, and every value in it as a value of any kind and
+/// as one of the document's own.
+fn bytes_of_json(text: &[u8]) -> u64 {
+    const VALUE_BYTES: u64 = 140;
+    // Those in strings are counted too: names have few, and data of a buffer has one.
+    let values = text.iter().filter(|b| matches!(b, b',' | b':' | b'[' | b'{')).count() as u64;
+    2 * text.len() as u64 + VALUE_BYTES * values
 }
 
 /// JSON and binary chunk of a GLB; a file without the GLB magic is JSON itself.
@@ -91,8 +113,9 @@ fn split(bytes: &[u8]) -> Result<Chunks<'_>, GltfError> {
 }
 
 /// JSON and binary chunk of a GLB, nothing resolved.
-pub(crate) fn glb_parts(bytes: &[u8]) -> Result<(Value, Vec<u8>), GltfError> {
+pub(crate) fn glb_parts(bytes: &[u8], memory_limit: u64) -> Result<(Value, Vec<u8>), GltfError> {
     let (json, bin) = split(bytes)?;
+    MemoryError::check(bytes_of_json(&json) + 2 * bytes.len() as u64, memory_limit)?;
     let json: Value = serde_json::from_slice(&json).map_err(|e| GltfError::Json(e.to_string()))?;
     check_version(&json)?;
     Ok((json, bin.map(Cow::into_owned).unwrap_or_default()))
@@ -142,10 +165,9 @@ fn typed(json: &Value) -> Result<Root, GltfError> {
     let Value::Object(object) = json else {
         return Err(GltfError::Json("the JSON is not an object".into()));
     };
-    let mut geometry = object.clone();
-    for key in NOT_GEOMETRY {
-        geometry.shift_remove(key);
-    }
+    let of_geometry = object.iter().filter(|(key, _)| !NOT_GEOMETRY.contains(&key.as_str()));
+    let mut geometry: Map<String, Value> =
+        of_geometry.map(|(key, value)| (key.clone(), value.clone())).collect();
     // The specification lets a scene have no nodes; the library does not.
     for scene in geometry.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
         if let Some(scene) = scene.as_object_mut() {
@@ -224,7 +246,7 @@ fn load_images(
             match data_of(uri) {
                 None => siblings.image(&decoded(uri), otherwise, notices),
                 Some(data) => {
-                    let image = data.and_then(Image::new);
+                    let image = data.and_then(|bytes| Image::new(&format!("image {number}"), bytes));
                     if let Err(reason) = &image {
                         notices.push(format!("texture '{}' {reason}: {otherwise}", shown_uri(uri)));
                     }

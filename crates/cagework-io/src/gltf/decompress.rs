@@ -11,7 +11,7 @@ use super::accessor::MAX_ELEMENTS;
 use super::container::{DRACO, MESHOPT};
 use super::pack::push;
 
-/// Most bytes that one stream becomes; a few hundred bytes may claim anything.
+/// Most bytes that all streams become; a few hundred bytes may claim anything.
 const MAX_BYTES: u64 = 1 << 30;
 
 type Buffers = Vec<Arc<Vec<u8>>>;
@@ -21,11 +21,13 @@ type Buffers = Vec<Arc<Vec<u8>>>;
 /// # Errors
 /// The extension and what is wrong with its stream.
 pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), (&'static str, String)> {
+    let mut left = MAX_BYTES;
     for extension in MESHOPT {
         for number in 0..json["bufferViews"].as_array().map_or(0, Vec::len) {
             let Some(packed) = take(json, &format!("/bufferViews/{number}"), extension) else { continue };
-            let bytes = meshopt(&packed, buffers).map_err(|problem| (extension, problem))?;
+            let bytes = meshopt(&packed, buffers, left).map_err(|problem| (extension, problem))?;
             let length = bytes.len();
+            left = left.saturating_sub(length as u64);
             let buffer = push_buffer(json, buffers, bytes);
             let view = &mut json["bufferViews"][number];
             (view["buffer"], view["byteOffset"], view["byteLength"]) =
@@ -36,7 +38,9 @@ pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), 
         for p in 0..json["meshes"][m]["primitives"].as_array().map_or(0, Vec::len) {
             let place = format!("/meshes/{m}/primitives/{p}");
             let Some(packed) = take(json, &place, DRACO) else { continue };
-            draco(json, buffers, &place, &packed).map_err(|problem| (DRACO, problem))?;
+            let before = buffers.len();
+            draco(json, buffers, &place, &packed, left).map_err(|problem| (DRACO, problem))?;
+            left = left.saturating_sub(buffers[before..].iter().map(|b| b.len() as u64).sum());
         }
     }
     let Some(document) = json.as_object_mut() else { return Ok(()) };
@@ -74,13 +78,15 @@ fn bytes_of<'a>(view: &Value, buffers: &'a Buffers) -> Option<&'a [u8]> {
     buffers.get(number("buffer")?)?.get(start..start.checked_add(number("byteLength")?)?)
 }
 
-fn meshopt(packed: &Value, buffers: &Buffers) -> Result<Vec<u8>, String> {
+fn meshopt(packed: &Value, buffers: &Buffers, left: u64) -> Result<Vec<u8>, String> {
     let number = |key: &str| packed[key].as_u64().filter(|&n| n <= MAX_BYTES).map_or(0, |n| n as usize);
     let source = bytes_of(packed, buffers).ok_or("its stream is cut off")?;
+    if (number("count") as u64).saturating_mul(number("byteStride") as u64) > left {
+        return Err(format!("all streams together become more than {} MiB", MAX_BYTES >> 20));
+    }
     let decode = || {
         let mode = Mode::parse(packed["mode"].as_str().unwrap_or_default())?;
         let filter = Filter::parse(packed["filter"].as_str().unwrap_or("NONE"))?;
-        // The workspace refuses more than a gigabyte.
         BufferView::new(mode, filter, number("count"), number("byteStride"))?
             .decode(source, &mut Workspace::default())
     };
@@ -88,13 +94,19 @@ fn meshopt(packed: &Value, buffers: &Buffers) -> Result<Vec<u8>, String> {
 }
 
 /// Puts the mesh of a Draco stream into the accessors of its primitive.
-fn draco(json: &mut Value, buffers: &mut Buffers, place: &str, packed: &Value) -> Result<(), String> {
+fn draco(
+    json: &mut Value,
+    buffers: &mut Buffers,
+    place: &str,
+    packed: &Value,
+    left: u64,
+) -> Result<(), String> {
     let view = packed["bufferView"].as_u64().unwrap_or(u64::MAX) as usize;
     let source = json["bufferViews"].get(view).and_then(|view| bytes_of(view, buffers));
     let limits = DecodeLimits::default()
         .with_max_points(MAX_ELEMENTS)
         .with_max_faces(2 * MAX_ELEMENTS)
-        .with_max_decoded_bytes(MAX_BYTES);
+        .with_max_decoded_bytes(left);
     let mut stream = DecoderBuffer::new(source.ok_or("its stream is cut off")?).with_limits(limits);
     let mut mesh = Mesh::new();
     MeshDecoder::new().decode(&mut stream, &mut mesh).map_err(|error| error.to_string())?;

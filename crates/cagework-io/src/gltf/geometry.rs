@@ -6,13 +6,10 @@ use ::gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
-use super::accessor::{MAX_ELEMENTS, Source};
+use super::accessor::Source;
 use super::scene::{Instance, name_of};
 use super::{GltfDocument, GltfError, Slot, skin};
 use crate::shown::{MAX_NAME_CHARS, shown_start};
-
-/// Most triangles of a model.
-const MAX_TRIANGLES: u64 = 1 << 26;
 
 pub(crate) struct Geometry {
     pub(crate) positions: Vec<Vec3>,
@@ -35,22 +32,15 @@ impl GltfDocument {
 pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result<Geometry, GltfError> {
     let mut geometry = Geometry { positions: Vec::new(), triangles: Vec::new(), slots: Vec::new() };
     let (mut skipped, mut morphed, mut ragged) = (0, 0, 0);
+    let (mut skinned, mut repeated) = (Vec::new(), Vec::new());
     for (number, instance) in document.instances.iter().enumerate() {
         let mesh = &document.root.meshes[instance.mesh as usize];
         for (p, primitive) in mesh.primitives.iter().enumerate() {
-            let Some(position) = attribute(primitive, Semantic::Positions) else {
-                skipped += 1;
-                continue;
-            };
-            let Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) =
-                primitive.mode
-            else {
+            let Some((position, mode)) = surface(primitive) else {
                 skipped += 1;
                 continue;
             };
             let start = geometry.positions.len();
-            let count = document.source().count(position)?;
-            limit("vertices", start as u64 + count, MAX_ELEMENTS)?;
             let (local, n_morphed) = positions(document, instance, primitive, position)?;
             morphed += n_morphed;
             let frame = Frame::of(document, instance, primitive, local.len())?;
@@ -75,18 +65,26 @@ pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result
             });
         }
         if instance.skin.is_some() {
-            let name =
-                instance.node.map_or_else(String::new, |n| name_of(&document.json, "nodes", n, "node"));
-            let name = shown_start(&name, MAX_NAME_CHARS);
-            notices.push(format!("'{name}' is skinned: bound in its rest pose, exported without its skin"));
+            skinned.push(instance.node);
         }
         if let Some(node) = instance.node
             && document.json["nodes"][node as usize]["extensions"].get("EXT_mesh_gpu_instancing").is_some()
         {
-            notices.push(format!(
-                "node {node} draws its mesh many times over: only the one at the node is bound"
-            ));
+            repeated.push(node);
         }
+    }
+    if let Some(first) = skinned.first() {
+        let name = first.map_or_else(String::new, |n| name_of(&document.json, "nodes", n, "node"));
+        let name = shown_start(&name, MAX_NAME_CHARS);
+        let others = others(skinned.len());
+        notices
+            .push(format!("'{name}'{others} is skinned: bound in its rest pose, exported without its skin"));
+    }
+    if let Some(node) = repeated.first() {
+        let others = others(repeated.len());
+        notices.push(format!(
+            "node {node}{others} draws its mesh many times over: only the one at the node is bound"
+        ));
     }
     if geometry.positions.is_empty() {
         return Err(GltfError::NoTriangles);
@@ -104,6 +102,11 @@ pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result
     Ok(geometry)
 }
 
+/// What stands after the first of `n` names.
+fn others(n: usize) -> String {
+    if n > 1 { format!(" (as {} more)", n - 1) } else { String::new() }
+}
+
 /// What an export will need must not fail only then, after a long bind.
 fn check_attributes(document: &GltfDocument, primitive: &Primitive) -> Result<(), GltfError> {
     if let Some(normals) = attribute(primitive, Semantic::Normals) {
@@ -115,8 +118,15 @@ fn check_attributes(document: &GltfDocument, primitive: &Primitive) -> Result<()
     Ok(())
 }
 
-fn limit(what: &'static str, count: u64, limit: u64) -> Result<(), GltfError> {
-    if count > limit { Err(GltfError::TooLarge { what, count, limit }) } else { Ok(()) }
+/// Accessor of the positions and mode of a primitive of triangles; nothing for points and lines.
+pub(super) fn surface(primitive: &Primitive) -> Option<(u32, Mode)> {
+    let position = attribute(primitive, Semantic::Positions)?;
+    match primitive.mode {
+        Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => {
+            Some((position, mode))
+        }
+        _ => None,
+    }
 }
 
 pub(super) fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<u32> {
@@ -224,7 +234,6 @@ fn triangles(
         Mode::Triangles => indices.len() / 3,
         _ => indices.len().saturating_sub(2),
     };
-    limit("triangles", (geometry.triangles.len() + n) as u64, MAX_TRIANGLES)?;
     for k in 0..n {
         let [a, b, c] = match mode {
             Mode::Triangles => [3 * k, 3 * k + 1, 3 * k + 2],
@@ -248,7 +257,6 @@ pub(super) fn world_normals(document: &GltfDocument, slot: &Slot) -> Result<Opti
     let Some(accessor) = attribute(primitive, Semantic::Normals) else { return Ok(None) };
     let mut local = vectors(document, accessor, "NORMAL")?;
     add_morphs(document, instance, primitive, "NORMAL", |t| t.normals, &mut local)?;
-    local.resize(slot.count as usize, DVec3::ZERO);
     let frame = Frame::of(document, instance, primitive, local.len())?;
     let world = local.iter().enumerate().map(|(v, &n)| {
         let m = DMat3::from_mat4(frame.world(v));
@@ -268,8 +276,7 @@ pub(super) fn world_tangents(
 ) -> Result<Option<Vec<(Vec3, f32)>>, GltfError> {
     let (instance, primitive) = document.primitive(slot);
     let Some(accessor) = attribute(primitive, Semantic::Tangents) else { return Ok(None) };
-    let mut local = document.source().floats::<4>(accessor, "TANGENT")?;
-    local.resize(slot.count as usize, [1.0, 0.0, 0.0, 1.0]);
+    let local = document.source().floats::<4>(accessor, "TANGENT")?;
     let frame = Frame::of(document, instance, primitive, local.len())?;
     let world = local.iter().enumerate().map(|(v, &[x, y, z, w])| {
         let t = frame.world(v).transform_vector3(DVec3::new(x.into(), y.into(), z.into()));

@@ -9,9 +9,11 @@ use serde_json::Value;
 use super::accessor::Source;
 use super::container::view_bytes;
 use super::geometry::{attribute, world_normals};
+use super::scene::name_of;
 use super::{GltfDocument, Slot};
 use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap, sniff_image};
 use crate::normals::Shading;
+use crate::shown::{MAX_NAME_CHARS, shown_start};
 
 /// Images of a document that materials ask for, each once, whatever number the document gives it.
 struct Images<'a> {
@@ -159,16 +161,18 @@ impl Images<'_> {
     /// Number of an image among those found; nothing if its bytes are not there or no image.
     fn number(&mut self, image: usize) -> Option<u32> {
         let document = self.document;
-        let bytes = match document.images.get(image)? {
-            Some(image) => image.bytes.as_slice(),
+        let (name, bytes) = match document.images.get(image)? {
+            Some(image) => (image.name.to_string(), image.bytes.as_slice()),
             None => {
                 let view = document.json["images"][image]["bufferView"].as_u64()?;
-                view_bytes(&document.root, &document.buffers, view)?
+                let name = name_of(&document.json, "images", image as u32, "image");
+                let bytes = view_bytes(&document.root, &document.buffers, view)?;
+                (shown_start(&name, MAX_NAME_CHARS), bytes)
             }
         };
         let mime = sniff_image(bytes)?;
         let number = *self.numbers.entry((bytes.as_ptr(), bytes.len())).or_insert_with(|| {
-            self.found.push(LookImage { bytes: bytes.to_vec(), mime: mime.to_owned() });
+            self.found.push(LookImage { name, bytes: bytes.to_vec(), mime: mime.to_owned() });
             self.found.len() as u32 - 1
         });
         Some(number)

@@ -18,16 +18,18 @@ mod look;
 mod pack;
 mod patch;
 mod scene;
+mod size;
 mod skin;
 
 use std::sync::Arc;
 
 use ::gltf::json::Root;
-use glam::Vec3;
+use glam::{DMat4, Vec3};
 use serde_json::Value;
 use thiserror::Error;
 
 use crate::counts::Counts;
+use crate::memory::MemoryError;
 use crate::shown::shown;
 use crate::siblings::{Image, Resolve};
 use scene::{Instance, Worlds};
@@ -106,6 +108,22 @@ pub enum GltfError {
         /// What is wrong with it.
         problem: String,
     },
+    /// An accessor has another number of elements than what it is for.
+    #[error(
+        "accessor {accessor} has {count} elements for {what}, but there are {expected} {of}: export it anew"
+    )]
+    Count {
+        /// The accessor.
+        accessor: u32,
+        /// What it is for.
+        what: String,
+        /// Elements it has.
+        count: u64,
+        /// Elements it must have.
+        expected: u64,
+        /// What they are for.
+        of: &'static str,
+    },
     /// A position that is not a finite number.
     #[error("accessor {accessor}: the position of its vertex {vertex} is not a finite number")]
     NotFinite {
@@ -125,8 +143,11 @@ pub enum GltfError {
     /// No triangles at all.
     #[error("it has no triangles (points and lines are not surfaces)")]
     NoTriangles,
+    /// More memory than is allowed.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// More elements than are read.
-    #[error("{what}: {count}, more than the limit of {limit}")]
+    #[error("{what}: {count}, more than the limit of {limit}: use a smaller model")]
     TooLarge {
         /// What there is too much of.
         what: &'static str,
@@ -148,9 +169,12 @@ pub(crate) struct GltfDocument {
     pub(crate) buffers: Vec<Arc<Vec<u8>>>,
     /// Images that came by URI and were found.
     pub(crate) images: Vec<Option<Image>>,
-    worlds: Worlds,
     /// Meshes shown, in vertex order.
     instances: Vec<Instance>,
+    /// World from bind space for each joint of the skins that are shown. `[n_skins][n_joints]`
+    joints: Vec<Vec<DMat4>>,
+    /// Bytes that it and its geometry take, about.
+    pub(crate) bytes: u64,
     /// Where their primitives' vertices and triangles are.
     slots: Vec<Slot>,
 }
@@ -174,10 +198,15 @@ pub(crate) struct GltfModel {
     pub(crate) notices: Vec<String>,
 }
 
-/// Reads a glTF or GLB file; `resolve` fetches sibling files by their decoded relative URI.
-pub(crate) fn read(name: &str, bytes: &[u8], resolve: &mut Resolve<'_>) -> Result<GltfModel, GltfError> {
+/// Reads a glTF or GLB file within `memory_limit` bytes; `resolve` fetches sibling files by their decoded relative URI.
+pub(crate) fn read(
+    name: &str,
+    bytes: &[u8],
+    resolve: &mut Resolve<'_>,
+    memory_limit: u64,
+) -> Result<GltfModel, GltfError> {
     let mut notices = Vec::new();
-    let loaded = container::load(name, bytes, resolve, &mut notices)?;
+    let loaded = container::load(name, bytes, resolve, memory_limit, &mut notices)?;
     let worlds = Worlds::new(&loaded.root)?;
     let instances = scene::instances(&loaded.root, &worlds, &mut notices)?;
     let mut document = GltfDocument {
@@ -185,10 +214,15 @@ pub(crate) fn read(name: &str, bytes: &[u8], resolve: &mut Resolve<'_>) -> Resul
         root: loaded.root,
         buffers: loaded.buffers,
         images: loaded.images,
-        worlds,
         instances,
+        joints: Vec::new(),
+        bytes: loaded.bytes,
         slots: Vec::new(),
     };
+    // The file is the caller's, and gone when it has been read.
+    let model = size::check(&document, loaded.bytes, memory_limit)?;
+    document.bytes = loaded.bytes - bytes.len() as u64 + model;
+    document.joints = skin::joints(&document, &worlds)?;
     let geometry = geometry::read(&document, &mut notices)?;
     document.slots = geometry.slots;
     let counts = scene::counts(&document);

@@ -12,7 +12,8 @@ use crate::counts::Counts;
 #[derive(Clone, Debug)]
 pub(crate) struct Worlds {
     pub(crate) world: Vec<DMat4>,
-    parent: Vec<Option<u32>>,
+    /// Every node after its parent, with its parent.
+    order: Vec<(u32, Option<u32>)>,
 }
 
 /// One mesh shown by one node.
@@ -49,11 +50,13 @@ impl Worlds {
         }
         let mut world = vec![DMat4::IDENTITY; n];
         let mut reached = vec![false; n];
+        let mut order = Vec::with_capacity(n);
         let mut stack: Vec<usize> = (0..n).filter(|&i| parent[i].is_none()).collect();
         while let Some(node) = stack.pop() {
             let above = parent[node].map_or(DMat4::IDENTITY, |p| world[p as usize]);
             world[node] = above * local(&root.nodes[node]);
             reached[node] = true;
+            order.push((node as u32, parent[node]));
             if !world[node].is_finite() {
                 return Err(GltfError::Node {
                     node: node as u32,
@@ -67,13 +70,15 @@ impl Worlds {
                 node: node as u32,
                 problem: "is its own ancestor: the nodes must be a tree",
             }),
-            None => Ok(Self { world, parent }),
+            None => Ok(Self { world, order }),
         }
     }
 
-    /// Whether `node` or one of its ancestors is among `nodes` (a flag for each node).
-    fn under(&self, node: usize, nodes: &[bool]) -> bool {
-        std::iter::successors(Some(node), |&n| self.parent[n].map(|p| p as usize)).any(|n| nodes[n])
+    /// Marks what hangs below marked nodes (a flag for each node).
+    fn mark_below(&self, nodes: &mut [bool]) {
+        for &(node, parent) in &self.order {
+            nodes[node as usize] |= parent.is_some_and(|p| nodes[p as usize]);
+        }
     }
 }
 
@@ -113,12 +118,13 @@ pub(crate) fn instances(
             .map(|mesh| Instance { node: None, mesh, skin: None, world: DMat4::IDENTITY })
             .collect());
     }
-    let mut tops = vec![root.scenes.is_empty(); root.nodes.len()];
+    let mut in_scene = vec![root.scenes.is_empty(); root.nodes.len()];
     let scene = root.scene.map_or(0, |s| s.value());
     if !root.scenes.is_empty() {
         for node in &get(&root.scenes, scene, "scene", || "the document".into())?.nodes {
-            tops[node.value()] = true;
+            in_scene[node.value()] = true;
         }
+        worlds.mark_below(&mut in_scene);
     }
     let mut shown = Vec::new();
     let mut elsewhere = Vec::new();
@@ -134,7 +140,7 @@ pub(crate) fn instances(
             skin: node.skin.map(|s| s.value() as u32),
             world: worlds.world[i],
         };
-        if worlds.under(i, &tops) { shown.push(instance) } else { elsewhere.push(instance) }
+        if in_scene[i] { shown.push(instance) } else { elsewhere.push(instance) }
     }
     if shown.is_empty() && !elsewhere.is_empty() {
         notices.push(format!("scene {scene} shows no mesh: the meshes of all nodes are used"));

@@ -1,19 +1,54 @@
 //! Skins: where joints hold a mesh's vertices at rest.
 
 use ::gltf::json::mesh::{Primitive, Semantic};
+use ::gltf::json::skin::Skin;
 use ::gltf::json::validation::Checked;
 use glam::{DMat4, Mat4};
 
-use super::scene::Instance;
+use super::scene::{Instance, Worlds};
 use super::{GltfDocument, GltfError, get};
 
 /// Most sets `JOINTS_n` that are read: 32 joints for a vertex.
 const MAX_SETS: u32 = 8;
 
-/// World from mesh for each vertex of a skinned primitive: `sum_j w_j * world_j * inverse_bind_j`.
+/// World from bind space for each joint: `world_j * inverse_bind_j`, of the skins that are shown; others stay empty.
 ///
-/// The joints stand where the node tree puts them, which is what viewers show with no animation playing. The
-/// transform of the mesh's own node plays no part (glTF 2.0, section 3.7.3.3).
+/// The joints stand where the node tree puts them, which is what viewers show with no animation playing.
+pub(crate) fn joints(document: &GltfDocument, worlds: &Worlds) -> Result<Vec<Vec<DMat4>>, GltfError> {
+    let skins = &document.root.skins;
+    let mut joints = vec![Vec::new(); skins.len()];
+    let mut is_shown = vec![false; skins.len()];
+    document.instances.iter().filter_map(|i| i.skin).for_each(|skin| is_shown[skin as usize] = true);
+    for (number, skin) in skins.iter().enumerate().filter(|(number, _)| is_shown[*number]) {
+        let from = || format!("skin {number}");
+        let binds = skin.inverse_bind_matrices.map(|a| inverse_binds(document, a.value() as u32, skin));
+        let binds = binds.transpose()?;
+        for (j, node) in skin.joints.iter().enumerate() {
+            let world = *get(&worlds.world, node.value(), "joint node", from)?;
+            let bind = match &binds {
+                Some(binds) => Mat4::from_cols_array(get(binds, j, "inverse bind matrix", from)?).as_dmat4(),
+                None => DMat4::IDENTITY,
+            };
+            joints[number].push(world * bind);
+        }
+    }
+    Ok(joints)
+}
+
+/// The matrices of a skin; there may be more than it has joints, but not of zeros that no buffer holds.
+fn inverse_binds(document: &GltfDocument, accessor: u32, skin: &Skin) -> Result<Vec<[f32; 16]>, GltfError> {
+    let (count, expected) = (document.source().count(accessor)?, skin.joints.len() as u64);
+    let in_buffer = document.root.accessors[accessor as usize].buffer_view.is_some();
+    if count > expected && !in_buffer {
+        let what = "inverse bind matrices".to_owned();
+        return Err(GltfError::Count { accessor, what, count, expected, of: "joints" });
+    }
+    document.source().floats::<16>(accessor, "a skin")
+}
+
+/// World from mesh for each vertex of a skinned primitive: `sum_j w_j * joint_j`.
+///
+/// The transform of the mesh's own node plays no part (glTF 2.0, section 3.7.3.3).
 pub(crate) fn matrices(
     document: &GltfDocument,
     instance: &Instance,
@@ -22,19 +57,8 @@ pub(crate) fn matrices(
     count: usize,
 ) -> Result<Vec<DMat4>, GltfError> {
     let source = document.source();
-    let s = &document.root.skins[skin as usize];
+    let joints = &document.joints[skin as usize];
     let from = || format!("skin {skin}");
-    let binds =
-        s.inverse_bind_matrices.map(|a| source.floats::<16>(a.value() as u32, "a skin")).transpose()?;
-    let mut joints = Vec::with_capacity(s.joints.len());
-    for (j, node) in s.joints.iter().enumerate() {
-        let world = *get(&document.worlds.world, node.value(), "joint node", from)?;
-        let bind = match &binds {
-            Some(binds) => Mat4::from_cols_array(get(binds, j, "inverse bind matrix", from)?).as_dmat4(),
-            None => DMat4::IDENTITY,
-        };
-        joints.push(world * bind);
-    }
     let mut sum = vec![DMat4::ZERO; count];
     let mut total = vec![0.0_f64; count];
     for set in 0..MAX_SETS {
@@ -51,7 +75,7 @@ pub(crate) fn matrices(
                 .zip(get(&weights, v, "element", || format!("accessor {w}: a vertex"))?)
             {
                 if weight.is_finite() && weight > 0.0 {
-                    sum[v] += f64::from(weight) * *get(&joints, joint as usize, "joint", from)?;
+                    sum[v] += f64::from(weight) * *get(joints, joint as usize, "joint", from)?;
                     total[v] += f64::from(weight);
                 }
             }

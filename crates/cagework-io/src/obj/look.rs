@@ -92,7 +92,8 @@ pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
             Some(found) => {
                 let image = found.image.as_ref().map(|image| {
                     *images.entry(Arc::as_ptr(&image.bytes)).or_insert_with(|| {
-                        look.images.push(LookImage { bytes: image.bytes.to_vec(), mime: image.mime.into() });
+                        let (name, mime) = (image.name.as_ref().into(), image.mime.into());
+                        look.images.push(LookImage { name, bytes: image.bytes.to_vec(), mime });
                         look.images.len() as u32 - 1
                     })
                 });

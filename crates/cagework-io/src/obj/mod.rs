@@ -4,14 +4,15 @@
 //! polygons or hands them over without their lines; here the row of a weight is the number of a `v` line, cages keep
 //! their polygons, errors name a line, and an export is the user's file with other numbers in it.
 
+mod error;
 mod lex;
 mod look;
 mod read;
 mod triangulate;
 mod write;
 
+pub use error::ObjError;
 pub(crate) use look::look;
-pub use read::ObjError;
 pub(crate) use read::{NONE, ObjDocument, read};
 pub use write::write_cage_obj;
 pub(crate) use write::{ObjPart, patch, write_new};

@@ -4,65 +4,14 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use glam::Vec3;
-use thiserror::Error;
 
+use super::error::ObjError;
 use super::lex::{Line, lines, shown, tokens};
 use super::look::{Material, read_materials, rest_of};
 use super::triangulate::Triangulator;
+use crate::memory::MemoryError;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 use crate::siblings::{Absent, Resolve, Siblings};
-
-/// Why an OBJ file could not be read.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum ObjError {
-    /// A coordinate is missing or no number.
-    #[error("line {line}: {axis} coordinate is {found}; it must be a finite number such as 1.25")]
-    Coordinate {
-        /// Line, from 1.
-        line: usize,
-        /// Which coordinate.
-        axis: char,
-        /// What stands there.
-        found: String,
-    },
-    /// A corner of a face is no index.
-    #[error("line {line}: face corner '{found}' is not an index such as 7, 7/2, 7//3 or -1")]
-    Corner {
-        /// Line, from 1.
-        line: usize,
-        /// What stands there.
-        found: String,
-    },
-    /// A face names a vertex that does not exist.
-    #[error("line {line}: face names vertex {index}, but there are {vertices}")]
-    Vertex {
-        /// Line, from 1.
-        line: usize,
-        /// Index as written.
-        index: i64,
-        /// Vertices there are (so far, for a relative index).
-        vertices: usize,
-    },
-    /// A face with fewer than three corners.
-    #[error("line {line}: face has {corners} corners; it needs at least 3")]
-    Face {
-        /// Line, from 1.
-        line: usize,
-        /// Corners it has.
-        corners: usize,
-    },
-    /// No `v` line at all.
-    #[error("no vertices: an OBJ file has lines such as 'v 0 1 0'")]
-    Empty,
-    /// More elements than 32-bit indices can name.
-    #[error("line {line}: more than {limit} vertices or corners")]
-    TooLarge {
-        /// Line, from 1.
-        line: usize,
-        /// The limit.
-        limit: u32,
-    },
-}
 
 /// An index that is not there.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -152,6 +101,8 @@ pub(crate) struct ObjModel {
     pub(crate) document: ObjDocument,
     /// `o` and `g` lines.
     pub(crate) groups: usize,
+    /// Bytes that it takes, about.
+    pub(crate) bytes: u64,
     pub(crate) notices: Vec<String>,
 }
 
@@ -172,11 +123,18 @@ struct Reader<'a> {
     siblings: Siblings<'a>,
     /// Names after `mtllib` so far.
     libraries: HashSet<String>,
+    memory_limit: u64,
     notices: Vec<String>,
 }
 
-/// Reads an OBJ file; `resolve` fetches its materials and their textures by relative path.
-pub(crate) fn read(bytes: &[u8], resolve: &mut Resolve<'_>) -> Result<ObjModel, ObjError> {
+/// Bytes that a vertex takes in the table of different positions.
+const WELD_BYTES: u64 = 36;
+
+/// Lines or corners after which the memory is looked at again.
+const LINES_BETWEEN: usize = 1 << 12;
+
+/// Reads an OBJ file within `memory_limit` bytes; `resolve` fetches its materials and their textures by relative path.
+pub(crate) fn read(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit: u64) -> Result<ObjModel, ObjError> {
     let mut reader = Reader {
         bytes,
         positions: Vec::new(),
@@ -189,12 +147,16 @@ pub(crate) fn read(bytes: &[u8], resolve: &mut Resolve<'_>) -> Result<ObjModel, 
         groups: 0,
         bad_attributes: 0,
         ignored: 0,
-        siblings: Siblings::new(resolve),
+        siblings: Siblings::new(resolve, memory_limit),
         libraries: HashSet::new(),
+        memory_limit,
         notices: Vec::new(),
     };
-    for line in lines(bytes) {
+    for (number, line) in lines(bytes).enumerate() {
         reader.line(&line)?;
+        if number.is_multiple_of(LINES_BETWEEN) {
+            reader.check_memory()?;
+        }
     }
     reader.finish()
 }
@@ -250,9 +212,31 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
+    /// Bytes that what was read so far takes with its triangles and until it is welded; lists grow by doubling.
+    fn check_memory(&self) -> Result<u64, MemoryError> {
+        let document = &self.document;
+        let lists = [
+            (24 + WELD_BYTES, self.positions.len()),
+            (16, document.texcoords.len()),
+            (24, document.normals.len()),
+            // With one triangle each, both as corners and as vertices.
+            (24 + 24, document.corners.len()),
+            (24, document.face_materials.len()),
+            (80, document.colors.len()),
+            (200, document.materials.len() + document.looks.len() + self.libraries.len()),
+        ];
+        let lists: u64 = lists.iter().map(|&(bytes, n)| bytes * n as u64).sum();
+        // The caller holds the file, and the document a copy of it.
+        let needed = 2 * self.bytes.len() as u64 + self.siblings.bytes() + lists;
+        MemoryError::check(needed, self.memory_limit).map(|()| needed)
+    }
+
     fn face(&mut self, line: usize, words: impl Iterator<Item = Range<usize>>) -> Result<(), ObjError> {
         let start = self.document.corners.len();
         for token in words {
+            if self.document.corners.len().is_multiple_of(LINES_BETWEEN) {
+                self.check_memory()?;
+            }
             let token = &self.bytes[token];
             let bad = || ObjError::Corner { line, found: shown(token) };
             let mut parts = token.split(|&b| b == b'/');
@@ -265,11 +249,13 @@ impl<'a> Reader<'a> {
             if v as usize >= self.positions.len() {
                 self.forward.push((line, v));
             }
-            let mut attribute = |count: usize| match parts.next() {
-                None | Some(b"") => Ok(NONE),
-                Some(part) => {
-                    let index = integer(part).ok_or_else(bad)?;
-                    Ok(resolve(index, count).unwrap_or(NONE))
+            let mut attribute = |count: usize| -> Result<u32, ObjError> {
+                match parts.next() {
+                    None | Some(b"") => Ok(NONE),
+                    Some(part) => {
+                        let index = integer(part).ok_or_else(bad)?;
+                        Ok(resolve(index, count).unwrap_or(NONE))
+                    }
                 }
             };
             let vt = attribute(self.document.texcoords.len())?;
@@ -322,6 +308,7 @@ impl<'a> Reader<'a> {
         if vertices == 0 {
             return Err(ObjError::Empty);
         }
+        let reading = self.check_memory()?;
         if let Some(&(line, v)) = self.forward.iter().find(|&&(_, v)| v as usize >= vertices) {
             return Err(ObjError::Vertex { line, index: i64::from(v) + 1, vertices });
         }
@@ -349,7 +336,16 @@ impl<'a> Reader<'a> {
         notice(self.bad_attributes, "'vt' or 'vn' lines are not numbers: read as zero");
         notice(self.ignored, "line, point or curve elements are not surfaces: left as they are");
         self.document.bytes = self.bytes.to_vec();
-        Ok(ObjModel { positions: self.positions, document: self.document, groups: self.groups, notices })
+        let (bytes, welding) = (self.bytes.len() as u64, WELD_BYTES * vertices as u64);
+        // The file is the caller's, and gone when it has been read.
+        let bytes = reading - bytes - welding;
+        Ok(ObjModel {
+            positions: self.positions,
+            document: self.document,
+            groups: self.groups,
+            bytes,
+            notices,
+        })
     }
 
     fn triangulate(&mut self) {

@@ -3,25 +3,28 @@
 use earcut::Earcut;
 use glam::{DVec3, Vec3};
 
-/// Most corners that ears are clipped from: a star of 100,000 corners takes 4 s, growing with the square.
-const MAX_CLIPPED: usize = 1 << 16;
+/// Most squares of the corners of all polygons that ears are clipped from: a star of 65,536 corners takes 2 s, growing
+/// with the square.
+const MAX_CLIPPED: u64 = 1 << 32;
 
 /// Scratch memory for many polygons.
 pub(crate) struct Triangulator {
     earcut: Earcut<f64>,
     flat: Vec<[f64; 2]>,
     corners: Vec<u32>,
+    /// Of [`MAX_CLIPPED`].
+    left: u64,
 }
 
 impl Triangulator {
     pub(crate) fn new() -> Self {
-        Self { earcut: Earcut::new(), flat: Vec::new(), corners: Vec::new() }
+        Self { earcut: Earcut::new(), flat: Vec::new(), corners: Vec::new(), left: MAX_CLIPPED }
     }
 
     /// Appends the triangles of `polygon` (its corners' positions, in order) as `base` + corner numbers.
     ///
     /// A fan where that is right, otherwise ear clipping in the polygon's mean plane. A polygon that has no plane,
-    /// crosses itself or is huge still gets its n - 2 triangles, as a fan.
+    /// crosses itself or is huge, or comes after many such, still gets its n - 2 triangles, as a fan.
     pub(crate) fn triangulate(&mut self, polygon: &[Vec3], base: u32, out: &mut Vec<[u32; 3]>) {
         let n = polygon.len() as u32;
         if n < 3 {
@@ -31,7 +34,7 @@ impl Triangulator {
         let normal = newell_normal(&p);
         let fan_is_right = (2..p.len()).all(|k| (p[k - 1] - p[0]).cross(p[k] - p[0]).dot(normal) > 0.0);
         if !fan_is_right
-            && p.len() <= MAX_CLIPPED
+            && self.may_clip(p.len() as u64)
             && let Some(normal) = normal.try_normalize()
             && self.clip_ears(&p, normal)
         {
@@ -39,6 +42,13 @@ impl Triangulator {
             return;
         }
         out.extend((2..n).map(|k| [base, base + k - 1, base + k]));
+    }
+
+    /// Whether there is time for another polygon of `n` corners.
+    fn may_clip(&mut self, n: u64) -> bool {
+        let left = self.left.checked_sub(n * n);
+        self.left = left.unwrap_or(self.left);
+        left.is_some()
     }
 
     /// Ear clipping in the plane of `normal`; false when it does not cover the polygon.

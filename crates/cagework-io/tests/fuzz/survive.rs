@@ -35,11 +35,14 @@ static REST: LazyLock<Rest> = LazyLock::new(|| {
     Rest { samples: inputs::samples(), cage, binding }
 });
 
+/// Of memory, bytes, for each thing that is read.
+const LIMIT: u64 = 1 << 28;
+
 /// Reads `bytes` as each kind of file, and goes on with whatever comes of it.
 pub(crate) fn survive(bytes: &[u8]) {
-    if let Ok((weights, outside)) = read_weights_npz(bytes) {
-        let again =
-            read_weights_npz(&write_weights_npz(&weights, &outside)).expect("what was written can be read");
+    if let Ok((weights, outside)) = read_weights_npz(bytes, LIMIT) {
+        let again = read_weights_npz(&write_weights_npz(&weights, &outside), LIMIT)
+            .expect("what was written can be read");
         assert_eq!((again.0.n_rows(), again.1.len()), (weights.n_rows(), outside.len()));
     }
     if let Ok(pose) = decode_pose(&cube(), bytes) {
@@ -47,10 +50,10 @@ pub(crate) fn survive(bytes: &[u8]) {
         let _ = deform_bound(&REST.binding.weights, &REST.binding.outside, &pose);
     }
     let choice = bytes.iter().fold(0_u32, |h, &b| h.wrapping_mul(31).wrapping_add(b.into())) >> 7;
-    if let Ok(Some(project)) = read_project("x", bytes) {
+    if let Ok(Some(project)) = read_project("x", bytes, LIMIT) {
         as_cage(&project.cage, choice);
     }
-    let read = Model::read("x", bytes, &mut |name| inputs::beside(&REST.samples, name).map(Ok));
+    let read = Model::read_within("x", bytes, &mut |name| inputs::beside(&REST.samples, name).map(Ok), LIMIT);
     if let Ok(model) = read {
         as_file(&model);
         as_pose(&model);

@@ -10,6 +10,7 @@ use wasm_bindgen::{JsCast as _, JsValue};
 use super::Engine;
 use crate::arrays::{corners, flat, points, polygon_mesh};
 use crate::error::{Answer, Fault};
+use crate::loaded::READ_LIMIT;
 use crate::options::BindAsked;
 use crate::state::State;
 use crate::views::object;
@@ -48,7 +49,7 @@ impl Engine {
             let found = sibling.call1(&JsValue::NULL, &path.into()).ok()?;
             Some(Ok(found.dyn_into::<Uint8Array>().ok()?.to_vec()))
         };
-        let mut model = Model::read(name, bytes, &mut resolve).map_err(Fault::from)?;
+        let mut model = Model::read_within(name, bytes, &mut resolve, READ_LIMIT).map_err(Fault::from)?;
         model.set_up(self.read(State::up));
         model.require_faces().map_err(Fault::from)?;
         Ok(self.put_cage(model.cage_mesh())?)

@@ -1,0 +1,275 @@
+//! Files that ask for endless work or memory: small ones of every kind, through four commands, within limits that the
+//! system enforces. The table of what each took is printed (`--nocapture`).
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
+#![cfg(target_os = "linux")]
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{Cursor, Write as _};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+/// Seconds that a command may take, of a build without optimisation.
+const SECONDS: f64 = 10.0;
+
+/// Memory that a command may take, MB.
+const MEGABYTES: u64 = 1000;
+
+/// What one command took.
+struct Run {
+    code: Option<i32>,
+    seconds: f64,
+    megabytes: u64,
+    said: String,
+}
+
+/// Runs the command in `folder` with 4 GB of addresses and looks at its memory until it ends.
+fn run(folder: &Path, args: &str) -> Run {
+    let limits = format!("ulimit -v 4000000; exec timeout -s KILL {SECONDS} \"$0\" {args}");
+    let stderr = folder.join("stderr.txt");
+    let began = Instant::now();
+    let mut child = Command::new("sh")
+        .args(["-c", &limits, env!("CARGO_BIN_EXE_cagework")])
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(fs::File::create(&stderr).unwrap())
+        .spawn()
+        .unwrap();
+    let mut kilobytes = 0;
+    let status = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        kilobytes = peak_of(child.id()).map_or(kilobytes, |now| kilobytes.max(now));
+        std::thread::sleep(Duration::from_millis(2));
+    };
+    Run {
+        code: status.code(),
+        seconds: began.elapsed().as_secs_f64(),
+        megabytes: kilobytes / 1000,
+        said: fs::read_to_string(stderr).unwrap(),
+    }
+}
+
+/// Most memory that a process, or the one that it started, has had so far, kB.
+fn peak_of(process: u32) -> Option<u64> {
+    let children = fs::read_to_string(format!("/proc/{process}/task/{process}/children")).ok()?;
+    let process = children.split_whitespace().next().map_or(process.to_string(), str::to_owned);
+    let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.split_whitespace().next()?.parse().ok()
+}
+
+const TETRAHEDRON: [[f32; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+const V: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\n";
+const F: &str = "f 1/1 3/1 2/1\nf 1/1 2/1 4/1\nf 1/1 4/1 3/1\nf 2/1 3/1 4/1\n";
+/// Elements of an accessor of zeros.
+const MANY: u32 = 1 << 24;
+
+/// A tetrahedron as GLB, its document changed; accessor 2 is of `MANY` zeros.
+fn glb(change: impl FnOnce(&mut Value)) -> Vec<u8> {
+    let mut bin: Vec<u8> = TETRAHEDRON.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+    bin.extend([0_u16, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3].iter().flat_map(|i| i.to_le_bytes()));
+    let mut json = json!({
+        "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1 }] }],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3" },
+            { "bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR" },
+            { "componentType": 5126, "count": MANY, "type": "VEC3" },
+            { "componentType": 5125, "count": MANY, "type": "SCALAR" },
+        ],
+        "bufferViews": [
+            { "buffer": 0, "byteLength": 48 },
+            { "buffer": 0, "byteOffset": 48, "byteLength": 24 },
+        ],
+        "buffers": [{ "byteLength": 72 }],
+    });
+    change(&mut json);
+    let mut text = serde_json::to_vec(&json).unwrap();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut out = b"glTF\x02\0\0\0".to_vec();
+    out.extend((28 + text.len() as u32 + bin.len() as u32).to_le_bytes());
+    for (kind, chunk) in [(b"JSON", text), (b"BIN\0", bin)] {
+        out.extend((chunk.len() as u32).to_le_bytes());
+        out.extend(kind);
+        out.extend(chunk);
+    }
+    out
+}
+
+/// `n` nodes; `child(i)` hangs below node i.
+fn nodes(json: &mut Value, n: usize, is_chain: bool) {
+    let node = |i: usize| {
+        if is_chain && i + 1 < n { json!({ "mesh": 0, "children": [i + 1] }) } else { json!({ "mesh": 0 }) }
+    };
+    json["nodes"] = (0..n).map(node).collect();
+    json["scenes"][0]["nodes"] = if is_chain { json!([0]) } else { (0..n).collect() };
+}
+
+/// A PNG of one colour.
+fn png(width: u32, height: u32) -> Vec<u8> {
+    let mut bytes = Cursor::new(Vec::new());
+    image::GrayImage::new(width, height).write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+/// A polygon of `n` corners at `place(i)`.
+fn polygon(n: usize, place: impl Fn(usize) -> [f64; 3]) -> String {
+    let mut text: String = (0..n).map(place).map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+    text.push('f');
+    (1..=n).for_each(|i| write!(text, " {i}").unwrap());
+    text
+}
+
+/// A number from 0 to 1, the same in each run.
+fn noise(i: usize) -> f64 {
+    (i as f64 * 12.9898).sin().mul_add(43_758.545, 0.0).rem_euclid(1.0)
+}
+
+fn triangles_that_all_meet(n: usize) -> String {
+    let mut text: String = (0..3 * n)
+        .map(|i| format!("v {} {} {}\n", noise(3 * i), noise(3 * i + 1), noise(3 * i + 2)))
+        .collect();
+    (0..n).for_each(|i| writeln!(text, "f {} {} {}", 3 * i + 1, 3 * i + 2, 3 * i + 3).unwrap());
+    text
+}
+
+/// Every kind of file, small, by name; those without a name of a model are only named by others.
+fn files() -> Vec<(&'static str, Vec<u8>)> {
+    let obj = |head: &str| format!("{head}{V}usemtl a\n{F}").into_bytes();
+    let textured: String = (0..40).map(|i| format!("usemtl a{i}\n{F}")).collect();
+    let materials = |name: &str| (0..40).map(|i| format!("newmtl a{i}\nmap_Kd {name}\n")).collect::<String>();
+    let circle = |i: usize| [(i as f64 * 6e-5).cos(), (i as f64 * 6e-5).sin(), 0.0];
+    let deep = [b"[".repeat(100_000), b"]".repeat(100_000)].concat();
+    vec![
+        (
+            "morph_zero.glb",
+            glb(|d| {
+                d["meshes"][0]["primitives"][0]["targets"] = json!(vec![json!({ "POSITION": 2 }); 1000]);
+                d["meshes"][0]["weights"] = json!([1.0; 1000].to_vec());
+            }),
+        ),
+        (
+            "normals_zero.glb",
+            glb(|d| {
+                let primitive = json!({ "attributes": { "POSITION": 0, "NORMAL": 2 }, "indices": 1 });
+                d["meshes"][0]["primitives"] = json!(vec![primitive; 1000]);
+            }),
+        ),
+        (
+            "pos_zero.glb",
+            glb(|d| {
+                d["meshes"][0]["primitives"][0] = json!({ "attributes": { "POSITION": 2 }, "indices": 3 });
+            }),
+        ),
+        (
+            "pos_zero_x10.glb",
+            glb(|d| {
+                let primitive = json!({ "attributes": { "POSITION": 2 }, "indices": 3 });
+                d["meshes"][0]["primitives"] = json!(vec![primitive; 10]);
+            }),
+        ),
+        (
+            "indices_zero.glb",
+            glb(|d| {
+                let primitive = json!({ "attributes": { "POSITION": 0 }, "indices": 3 });
+                d["meshes"][0]["primitives"] = json!(vec![primitive; 1000]);
+            }),
+        ),
+        ("chain.glb", glb(|d| nodes(d, 20_000, true))),
+        ("nodes.glb", glb(|d| nodes(d, 50_000, false))),
+        (
+            "nodes_x1000.glb",
+            glb(|d| {
+                nodes(d, 50_000, false);
+                let primitive = d["meshes"][0]["primitives"][0].clone();
+                d["meshes"][0]["primitives"] = json!(vec![primitive; 1000]);
+            }),
+        ),
+        ("cycle.glb", glb(|d| d["nodes"] = json!([{ "mesh": 0, "children": [1] }, { "children": [0] }]))),
+        ("materials.glb", glb(|d| d["materials"] = vec![json!({ "name": "m" }); 100_000].into())),
+        ("count.glb", glb(|d| d["accessors"][0]["count"] = json!(1_u64 << 63))),
+        (
+            "sparse.glb",
+            glb(|d| {
+                d["accessors"][0]["sparse"] = json!({ "count": u32::MAX, "values": { "bufferView": 0 },
+                "indices": { "bufferView": 1, "componentType": 5123 } });
+            }),
+        ),
+        ("deep.gltf", [br#"{"asset":{"version":"2.0"},"extras":"#.as_slice(), &deep, b"}"].concat()),
+        ("mtllib.obj", obj(&"mtllib huge.mtl\n".repeat(100_000))),
+        ("huge.mtl", "newmtl a\nKd 1 0 0\n".repeat(20_000).into()),
+        (
+            "usemtl.obj",
+            (0..100_000).fold(obj(""), |mut text, i| {
+                writeln!(text, "usemtl m{i}\nf 1 2 3").unwrap();
+                text
+            }),
+        ),
+        ("line.obj", obj(&format!("# {}\n", "x".repeat(10_000_000)))),
+        ("token.obj", obj(&format!("v {} 0 0\n", "1".repeat(10_000_000)))),
+        ("polygon_circle.obj", polygon(100_000, circle).into()),
+        ("polygon_noise.obj", polygon(5000, |i| [noise(i), noise(i + 5000), noise(i + 10_000)]).into()),
+        ("polygon_comb.obj", polygon(5000, |i| [i as f64, (i % 2) as f64, 0.0]).into()),
+        ("all_meet.obj", triangles_that_all_meet(2000).into()),
+        ("texture_large.obj", obj("mtllib large.mtl\n")),
+        ("large.mtl", "newmtl a\nmap_Kd large.png\n".into()),
+        ("large.png", png(65_535, 1025)),
+        ("texture_shared.obj", format!("mtllib shared.mtl\n{V}{textured}").into()),
+        ("shared.mtl", materials("shared.png").into()),
+        ("shared.png", png(4100, 4100)),
+        ("far.obj", format!("{}\n{F}", V.replace("v 1 0 0", "v 1e30 0 0")).into()),
+        ("tetrahedron.obj", obj("")),
+        ("doubled.obj", format!("{V}{F}{V}{}", "f -4 -2 -3\nf -4 -3 -1\nf -4 -1 -2\nf -3 -2 -1\n").into()),
+    ]
+}
+
+/// What may be said when something is refused, and nothing else.
+fn assert_in_good_order(what: &str, run: &Run) {
+    assert!(
+        matches!(run.code, Some(0 | 1)),
+        "{what}: {:?} after {:.1} s: {}",
+        run.code,
+        run.seconds,
+        run.said
+    );
+    assert!(run.code == Some(0) || run.said.starts_with("error: "), "{what}: {}", run.said);
+    assert!(!run.said.contains("panicked") && !run.said.contains("is not there"), "{what}: {}", run.said);
+    assert!(run.megabytes <= MEGABYTES, "{what}: {} MB", run.megabytes);
+}
+
+#[test]
+fn every_command_ends_with_a_result_or_a_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let files = files();
+    for (name, bytes) in &files {
+        fs::write(folder.join(name), bytes).unwrap();
+    }
+    let mut table = String::from("| file | command | exit | s | MB | stderr |\n|---|---|---|---|---|---|\n");
+    let models = files.iter().filter(|(name, _)| !name.ends_with(".mtl") && !name.ends_with(".png"));
+    for (name, _) in models {
+        for command in [
+            "info FILE",
+            "check FILE",
+            "bind FILE --cage box:2 -g 16 -o out.glb --weights out.npz",
+            "render FILE -o out.png --size 64x64",
+        ] {
+            let run = run(folder, &command.replace("FILE", name));
+            let (word, said) =
+                (command.split(' ').next().unwrap(), run.said.lines().next().unwrap_or_default());
+            let (code, seconds, said) =
+                (run.code.unwrap_or(-1), run.seconds, said.chars().take(100).collect::<String>());
+            writeln!(table, "| {name} | {word} | {code} | {seconds:.1} | {} | {said} |", run.megabytes)
+                .unwrap();
+            assert_in_good_order(&format!("{table}\n{name}, {word}"), &run);
+        }
+    }
+    std::io::stdout().write_all(table.as_bytes()).unwrap();
+}
