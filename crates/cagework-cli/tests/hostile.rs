@@ -182,8 +182,8 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
                 d["meshes"][0]["primitives"] = json!(vec![primitive; 1000]);
             }),
         ),
-        ("chain.glb", glb(|d| nodes(d, 20_000, true))),
-        ("nodes.glb", glb(|d| nodes(d, 50_000, false))),
+        ("chain.glb", glb(|d| nodes(d, 2000, true))),
+        ("nodes.glb", glb(|d| nodes(d, 300_000, false))),
         (
             "nodes_x1000.glb",
             glb(|d| {

@@ -153,7 +153,7 @@ impl Model {
         const VERTEX_BYTES: u64 = 300;
         const TRIANGLE_BYTES: u64 = 60;
         /// New accessors and buffer views as JSON.
-        const PRIMITIVE_BYTES: u64 = 4000;
+        const PRIMITIVE_BYTES: u64 = 6000;
         let mut bytes =
             VERTEX_BYTES * self.positions.len() as u64 + TRIANGLE_BYTES * self.triangles.len() as u64;
         if format == ModelFormat::Gltf {

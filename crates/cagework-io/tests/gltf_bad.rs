@@ -143,17 +143,19 @@ fn attributes_of_another_count_than_the_vertices_name_both() {
 #[test]
 fn what_a_document_becomes_is_counted_before_it_is_allocated() {
     let mut b = plain_cube();
-    let nodes = 3_000_000_usize.div_ceil(8);
+    let nodes = 100_000;
     b.json["nodes"] = vec![json!({ "mesh": 0 }); nodes].into();
     b.json["scenes"][0]["nodes"] = (0..nodes).collect::<Vec<_>>().into();
     let within = |b: &Builder, limit| Model::read_within("x.glb", &b.glb(), &mut |_| None, limit);
-    let message = within(&b, 256 << 20).unwrap_err().to_string();
-    assert!(message.contains("MiB of memory, more than the limit of 256 MiB"), "{message}");
-    // A thousand primitives at three hundred thousand nodes; no more of them are looked at than there are.
+    let message = within(&b, 128 << 20).unwrap_err().to_string();
+    assert!(message.contains("MiB of memory, more than the limit of 128 MiB"), "{message}");
+    // A thousand primitives at each node; no more of them are looked at than there are.
     let primitive = b.primitive(0).clone();
     b.json["meshes"][0]["primitives"] = vec![primitive; 1000].into();
     let message = within(&b, u64::MAX).unwrap_err().to_string();
-    assert!(message.contains("vertices: 3000000000, more than the limit of 16777216"), "{message}");
+    assert!(message.contains("vertices: 800000000, more than the limit of 16777216"), "{message}");
+    b.json["nodes"] = vec![json!({}); 1 << 19].into();
+    assert!(fault(&b.glb()).contains("nodes: 524288, more than the limit of 262144"));
     let message = fault_of(|b| {
         let zeros = json!({ "componentType": U32, "count": 1 << 24, "type": "SCALAR" });
         let zeros = b.push("accessors", zeros);

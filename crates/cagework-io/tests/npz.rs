@@ -151,7 +151,8 @@ fn entries_are_unpacked_as_far_as_their_shapes_need() {
     assert!(message.contains("'format': has more than the 3 bytes"), "{message}");
     // 40 MB of an honest shape; the header keeps its length.
     let honest = rewritten(|n, d| {
-        let header = String::from_utf8_lossy(&d[10..128.min(d.len())]).replace("(4,), }       ", "(10000000,), }");
+        let header =
+            String::from_utf8_lossy(&d[10..128.min(d.len())]).replace("(4,), }       ", "(10000000,), }");
         let header = [&d[..10], header.as_bytes()].concat();
         Some(if n == "indptr.npy" { [header, vec![0; 40_000_000]].concat() } else { d })
     });

@@ -234,3 +234,11 @@ proptest! {
         prop_assert_eq!(read("x.obj", text.as_bytes()).unwrap().triangles.len(), points.len() - 2);
     }
 }
+
+/// Each became a primitive: a gigabyte and minutes for a million of them.
+#[test]
+fn materials_have_a_limit() {
+    let text: String = (0..20_000).map(|i| format!("usemtl m{i}\n")).collect();
+    let error = read("x.obj", format!("v 0 0 0\n{text}").as_bytes()).unwrap_err().to_string();
+    assert_eq!(error, "x.obj: line 16386: more than 16384 different materials: join some");
+}

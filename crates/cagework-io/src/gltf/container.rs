@@ -19,6 +19,8 @@ use crate::siblings::{Absent, Image, NO_IMAGE, Resolve, Siblings};
 /// Extensions that hide geometry from a reader without their decoder; meshopt's has the same streams by both names.
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
+/// Most nodes of a document: they take a kilobyte each.
+const MAX_NODES: u64 = 1 << 18;
 /// Bytes of a GLB's header.
 const GLB_HEADER: usize = 12;
 /// Parts of the document that geometry does not need: a fault in one of them must not refuse the file.
@@ -50,6 +52,10 @@ pub(crate) fn load(
     MemoryError::check(of_json + bytes.len() as u64, memory_limit)?;
     let mut json: Value = serde_json::from_slice(&json).map_err(|e| GltfError::Json(e.to_string()))?;
     check_version(&json)?;
+    let nodes = json["nodes"].as_array().map_or(0, Vec::len) as u64;
+    if nodes > MAX_NODES {
+        return Err(GltfError::TooLarge { what: "nodes", count: nodes, limit: MAX_NODES });
+    }
     #[cfg(not(feature = "decompress"))]
     check_compression(name, &json)?;
     let mut siblings = Siblings::new(resolve, memory_limit);
@@ -273,12 +279,14 @@ fn data_of(uri: &str) -> Option<Result<Arc<Vec<u8>>, Absent>> {
     if !uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
         return None;
     }
-    let decoded = DataUrl::process(uri).ok().and_then(|url| url.decode_to_vec().ok());
-    Some(
-        decoded
-            .map(|(bytes, _)| Arc::new(bytes))
-            .ok_or_else(|| Absent::Refused("is no valid data: URI".into())),
-    )
+    // Of base64; growing by doubling would take as much again.
+    let mut bytes = Vec::with_capacity(uri.len() / 4 * 3);
+    let append = |part: &[u8]| {
+        bytes.extend_from_slice(part);
+        Ok::<(), std::convert::Infallible>(())
+    };
+    let decoded = DataUrl::process(uri).is_ok_and(|url| url.decode(append).is_ok());
+    Some(if decoded { Ok(Arc::new(bytes)) } else { Err(Absent::Refused("is no valid data: URI".into())) })
 }
 
 fn decoded(uri: &str) -> Cow<'_, str> {

@@ -17,6 +17,9 @@ use crate::memory::MemoryError;
 /// Most triangles of a model.
 const MAX_TRIANGLES: u64 = 2 * MAX_ELEMENTS;
 
+/// Most primitives of all nodes: each is drawn on its own, and takes some kilobytes of a document that is written.
+const MAX_PRIMITIVES: u64 = 1 << 17;
+
 /// Most values that are decoded: vertices times attributes and morph targets, and corners of triangles; a second or two.
 const MAX_DECODED: u64 = 1 << 28;
 
@@ -61,7 +64,7 @@ pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u6
     for (what, count, limit) in [
         ("vertices", whole.vertices, MAX_ELEMENTS),
         ("triangles", whole.triangles, MAX_TRIANGLES),
-        ("primitives of all nodes", whole.primitives, MAX_ELEMENTS),
+        ("primitives of all nodes", whole.primitives, MAX_PRIMITIVES),
         ("values of attributes and morph targets", whole.decoded, MAX_DECODED),
     ] {
         if count > limit {

@@ -49,6 +49,14 @@ pub enum ObjError {
     /// More memory than is allowed.
     #[error(transparent)]
     Memory(#[from] MemoryError),
+    /// More materials than can be drawn, and written as primitives.
+    #[error("line {line}: more than {limit} different materials: join some")]
+    Materials {
+        /// Line, from 1.
+        line: usize,
+        /// The limit.
+        limit: usize,
+    },
     /// More elements than 32-bit indices can name.
     #[error("line {line}: more than {limit} vertices or corners")]
     TooLarge {

@@ -130,6 +130,9 @@ struct Reader<'a> {
 /// Bytes that a vertex takes in the table of different positions.
 const WELD_BYTES: u64 = 36;
 
+/// Most materials that `usemtl` names: each is drawn on its own, and a primitive of a GLB.
+const MAX_MATERIALS: usize = 1 << 14;
+
 /// Lines or corners after which the memory is looked at again.
 const LINES_BETWEEN: usize = 1 << 12;
 
@@ -204,7 +207,7 @@ impl<'a> Reader<'a> {
                     (self.smoothing, self.has_smoothing) = (group, true);
                 }
             }
-            b"usemtl" => self.use_material(line),
+            b"usemtl" => self.use_material(line)?,
             b"mtllib" => self.library(&rest_of(&bytes[line.range.clone()], b"mtllib")),
             b"l" | b"p" | b"curv" | b"curv2" | b"surf" => self.ignored += 1,
             _ => {}
@@ -293,7 +296,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn use_material(&mut self, line: &Line) {
+    fn use_material(&mut self, line: &Line) -> Result<(), ObjError> {
         let text = &self.bytes[line.range.clone()];
         let name = text.trim_ascii().strip_prefix(b"usemtl").unwrap_or_default().trim_ascii();
         let materials = &mut self.document.materials;
@@ -301,6 +304,10 @@ impl<'a> Reader<'a> {
             materials.push(String::from_utf8_lossy(name).into_owned());
             materials.len() as u32 - 1
         });
+        if materials.len() > MAX_MATERIALS {
+            return Err(ObjError::Materials { line: line.number, limit: MAX_MATERIALS });
+        }
+        Ok(())
     }
 
     fn finish(mut self) -> Result<ObjModel, ObjError> {
