@@ -273,3 +273,44 @@ fn every_command_ends_with_a_result_or_a_sentence() {
     }
     std::io::stdout().write_all(table.as_bytes()).unwrap();
 }
+
+/// On a file with repeated positions it was a ten thousandth of what was used.
+#[test]
+fn estimate_is_near_the_memory_that_is_used() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let points = |n: usize, different: usize| {
+        let place = |i: usize| [0, 1, 2].map(|k| noise(3 * (i % different) + k));
+        let vertices: String =
+            (0..n).map(place).map(|[x, y, z]| format!("v {x:.5} {y:.5} {z:.5}\n")).collect();
+        let faces = (0..n / 3).map(|i| format!("f {} {} {}\n", 3 * i + 1, 3 * i + 2, 3 * i + 3));
+        vertices + &faces.collect::<String>()
+    };
+    fs::write(folder.join("tetrahedron.glb"), glb(|_| ())).unwrap();
+    fs::write(folder.join("repeated.obj"), points(600_000, 500)).unwrap();
+    fs::write(folder.join("different.obj"), points(200_000, 200_000)).unwrap();
+    let many = glb(|d| {
+        nodes(d, 60_000, false);
+        let nodes = d["nodes"].as_array_mut().unwrap().iter_mut().enumerate();
+        nodes.for_each(|(i, node)| node["translation"] = json!([i as f64 * 1e-5, 0.0, 0.0]));
+    });
+    fs::write(folder.join("nodes.glb"), many).unwrap();
+    let of_program = run(folder, "bind tetrahedron.glb --cage box:2 -g 8").megabytes;
+    for bind in [
+        "repeated.obj --cage box:2 -g 16 --weights out.npz",
+        "different.obj --cage box:2 -g 16",
+        "nodes.glb --cage box:2 -g 16",
+        "tetrahedron.glb --cage box:4 -g 80 --threads 8",
+    ] {
+        let run = run(folder, &format!("bind {bind} --report report.json"));
+        assert_eq!(run.code, Some(0), "{bind}: {}", run.said);
+        let report: Value = serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap();
+        let estimated = report["memory_bytes"]["estimated"].as_f64().unwrap() / 1e6;
+        let used = (run.megabytes - of_program) as f64;
+        println!("{bind}: {estimated:.0} MB estimated, {used} MB used");
+        assert!(
+            (0.75..=1.25).contains(&(estimated / used)),
+            "{bind}: {estimated:.0} MB estimated, {used} MB used"
+        );
+    }
+}

@@ -149,17 +149,17 @@ impl Model {
     /// Bytes that writing it takes besides, at once, about.
     #[must_use]
     pub fn bytes_to_write(&self, format: ModelFormat) -> u64 {
-        /// Normals before and after, and the new positions; in a GLB once more as they are in the file.
+        /// Normals before and after, the new positions, and the file; an OBJ may be without normals.
         const VERTEX_BYTES: u64 = 300;
         const TRIANGLE_BYTES: u64 = 60;
         /// New accessors and buffer views as JSON.
         const PRIMITIVE_BYTES: u64 = 6000;
-        let mut bytes =
-            VERTEX_BYTES * self.positions.len() as u64 + TRIANGLE_BYTES * self.triangles.len() as u64;
-        if format == ModelFormat::Gltf {
-            bytes += PRIMITIVE_BYTES * self.counts.primitives as u64;
+        let n = |count: usize| count as u64;
+        let shape = VERTEX_BYTES * n(self.positions.len()) + TRIANGLE_BYTES * n(self.triangles.len());
+        match format {
+            ModelFormat::Gltf => shape + PRIMITIVE_BYTES * n(self.counts.primitives) + self.bytes,
+            ModelFormat::Obj => shape / 3 + self.bytes,
         }
-        bytes + self.bytes
     }
 
     /// What points up in the file; Y unless said otherwise.
