@@ -21,7 +21,7 @@ const FOLDED: f64 = 0.9994;
 const MAX_PAIRS: usize = 100_000;
 
 /// Most comparisons of triangles' boxes in a search, some seconds: 40,000 triangles that all meet have 800 million pairs.
-const MAX_COMPARISONS: u64 = 1 << 30;
+const MAX_COMPARISONS: u64 = 1 << 29;
 
 /// Comparisons of boxes that take as long as one of triangles.
 const COMPARISONS_OF_TRIANGLES: u64 = 40;
