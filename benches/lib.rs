@@ -77,7 +77,8 @@ impl Input {
     /// Sampling stencils of all vertices.
     #[must_use]
     pub fn stencils(&self, hierarchy: &Hierarchy) -> Stencils {
-        let sampler = Sampler::new((&self.cage).into(), &hierarchy.levels[0]);
+        let overlaps = Overlaps::default();
+        let sampler = Sampler::new((&self.cage).into(), &hierarchy.levels[0], &overlaps);
         sampler.stencils(self.points.iter().map(|p| p.as_dvec3()))
     }
 }

@@ -6,16 +6,20 @@
 //! convex combination along a straight segment inside the cage: the result is non-negative, sums to 1 and reproduces
 //! linear functions exactly, never reaches a centre behind a wall, and works where no centre is inside at all. In a
 //! cube that the cage does not meet it is trilinear interpolation. The three cyclic orders of the axes are averaged.
+//! Next to re-entrant edges rays are split, see [`super::edges`].
 
 use glam::DVec3;
 
+use crate::cage::ON_CAGE;
 use crate::controls::Controls;
 use crate::geometry::{closest_point_on_triangle, winding_number};
 use crate::grid::{Grid, NO_CELL};
 use crate::levels::Level;
+use crate::voxelize::lines::Overlaps;
 
+use super::edges::{EdgeLists, Passage};
 use super::triangles::TriangleLists;
-use super::{ON_CAGE, Stencil, Stencils, closest_on_cage};
+use super::{Stencil, Stencils, closest_on_cage};
 
 /// Orders of the axes; their mean has no preferred direction. All six orders cost twice as much and change the error
 /// against finite elements by less than 1 % (Armadillo, g = 32, 64, 128).
@@ -25,18 +29,30 @@ const ORDERS: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
 /// as doubtful and its winding number decides.
 const DOUBT: f64 = 1e-6;
 
+/// Without a facet, the winding number of a place on it is half the sum of those on its two sides: 0.5 on a wall, 1 on a
+/// wall that two parts share, 1.5 or more within.
+const WITHIN: f64 = 1.25;
+
+/// Share of the way to a facet's middle by which places on its sides are moved.
+const OFF_SIDES: f64 = 1e-6;
+
 /// Makes the stencils of vertices in an embedded grid.
 #[derive(Debug)]
 pub struct Sampler<'a> {
     controls: Controls<'a>,
     level: &'a Level,
     lists: TriangleLists,
+    edges: EdgeLists,
+    overlaps: &'a Overlaps,
+    /// Faces no further apart than this, in cells, are in one place.
+    same: f64,
 }
 
 /// Scratch space of one thread.
 #[derive(Debug, Default)]
 struct Scratch {
     near: Vec<u32>,
+    edges: Vec<u32>,
     stencil: Stencil,
     /// Weight of ends that lie outside the cage.
     outside: f64,
@@ -48,8 +64,12 @@ type End = (f64, Option<(u32, [f64; 3], bool)>);
 impl<'a> Sampler<'a> {
     /// A sampler for the finest level.
     #[must_use]
-    pub fn new(controls: Controls<'a>, level: &'a Level) -> Self {
-        Self { controls, level, lists: TriangleLists::new(controls.surface(), &level.grid) }
+    pub fn new(controls: Controls<'a>, level: &'a Level, overlaps: &'a Overlaps) -> Self {
+        let (surface, grid) = (controls.surface(), &level.grid);
+        let lists = TriangleLists::new(surface, grid);
+        let edges = EdgeLists::new(surface, grid, &lists);
+        let same = ON_CAGE * f64::from(surface.diagonal()) / grid.cell.max_element();
+        Self { controls, level, lists, edges, overlaps, same }
     }
 
     /// Stencils of points (object units). Points outside the cage are listed in `outside`.
@@ -70,7 +90,7 @@ impl<'a> Sampler<'a> {
     /// Bytes held.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        self.lists.bytes()
+        self.lists.bytes() + self.edges.bytes()
     }
 
     /// Fills `scratch.stencil`; false if the point is outside the cage.
@@ -85,7 +105,8 @@ impl<'a> Sampler<'a> {
         }
         let low = p.floor().to_array().map(|x| x as u32);
         self.lists.in_cube(low, &mut scratch.near);
-        if scratch.near.is_empty() {
+        self.edges.in_cube(low, &mut scratch.edges);
+        if scratch.near.is_empty() && scratch.edges.is_empty() {
             self.trilinear(low, p, scratch);
         } else if let Some((triangle, barycentric)) = self.touching(p, &scratch.near) {
             let stencil = &mut scratch.stencil;
@@ -94,7 +115,7 @@ impl<'a> Sampler<'a> {
             return true;
         } else {
             for order in ORDERS {
-                self.descend(low, p, &order, 1.0 / ORDERS.len() as f64, scratch);
+                self.descend(low, p, &order, 1.0 / ORDERS.len() as f64, true, scratch);
             }
         }
         let doubtful = scratch.outside > DOUBT && scratch.outside < 1.0 - DOUBT;
@@ -112,18 +133,17 @@ impl<'a> Sampler<'a> {
     /// The triangle that a point lies on, to within the resolution of f32 coordinates. Rays from such a point hit or
     /// miss what it lies on by rounding: from a cage's own vertex they went out through an edge.
     fn touching(&self, p: DVec3, near: &[u32]) -> Option<(u32, [f64; 3])> {
-        let reach =
-            ON_CAGE * f64::from(self.controls.surface().diagonal()) / self.level.grid.cell.max_element();
         near.iter().find_map(|&number| {
             let t = self.lists.triangle(number);
-            let closest = t.is_near_plane(p, reach).then(|| closest_point_on_triangle(p, t.corners))?;
-            (closest.point.distance(p) <= reach).then_some((number, closest.barycentric))
+            let closest = t.is_near_plane(p, self.same).then(|| closest_point_on_triangle(p, t.corners))?;
+            let touches = closest.point.distance(p) <= self.same && !self.is_within(number, closest.barycentric);
+            touches.then_some((number, closest.barycentric))
         })
     }
 
     fn winds_around(&self, point: DVec3) -> bool {
         let surface = self.controls.surface();
-        let triangles = (0..surface.triangles().len() as u32).map(|t| surface.triangle_corners(t));
+        let triangles = (0..surface.facets().len() as u32).map(|t| surface.facet_corners(t));
         winding_number(point, triangles) > 0.5
     }
 
@@ -144,51 +164,173 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// Interpolates along `order[0]`, then along the rest; `p` lies in the cube from `low`.
-    fn descend(&self, low: [u32; 3], p: DVec3, order: &[usize], weight: f64, scratch: &mut Scratch) {
+    /// Interpolates along `order[0]`, then along the rest; `p` lies in the cube from `low`. `splits`: whether rays that pass
+    /// a re-entrant edge are split.
+    fn descend(
+        &self,
+        low: [u32; 3],
+        p: DVec3,
+        order: &[usize],
+        weight: f64,
+        splits: bool,
+        scratch: &mut Scratch,
+    ) {
         let axis = order[0];
-        let from = f64::from(low[axis]);
-        let ends = self.ends(p, axis, from, &scratch.near);
-        let (below, above) = (ends[0].0, ends[1].0);
-        let t = if below + above > 0.0 { below / (below + above) } else { 0.0 };
-        for (side, (end, w)) in ends.into_iter().zip([weight * (1.0 - t), weight * t]).enumerate() {
-            if w == 0.0 {
-                continue;
+        let ends = self.ends(p, axis, f64::from(low[axis]), &scratch.near);
+        if splits && !scratch.edges.is_empty() {
+            let passed = [0, 1]
+                .map(|side| self.edges.passed(&scratch.edges, p, axis, side == 1, ends[side].0));
+            if passed.iter().any(|passages| !passages.is_empty()) {
+                return self.descend_past(low, p, order, weight, ends, &passed, scratch);
             }
-            match end.1 {
-                // From inside one meets the back of a face: going up, one that faces up.
-                Some((_, _, faces_up)) if faces_up != (side == 1) => scratch.outside += w,
-                Some((triangle, barycentric, _)) => {
-                    let stencil = &mut scratch.stencil;
-                    self.controls.values_at(triangle, barycentric, &mut |column, value| {
-                        stencil.add_hat(column, w * value);
-                    });
-                }
-                None => {
-                    let mut q = p;
-                    q[axis] = from + side as f64;
-                    if order.len() > 1 {
-                        self.descend(low, q, &order[1..], w, scratch);
+        }
+        let [below, above] = ends;
+        let t = share(below.0, above.0);
+        self.follow(low, p, order, (0, below), weight * (1.0 - t), splits, scratch);
+        self.follow(low, p, order, (1, above), weight * t, splits, scratch);
+    }
+
+    /// The same where rays pass edges: each part of one ray is paired with each part of the other.
+    fn descend_past(
+        &self,
+        low: [u32; 3],
+        p: DVec3,
+        order: &[usize],
+        weight: f64,
+        ends: [End; 2],
+        passed: &[Vec<Passage>; 2],
+        scratch: &mut Scratch,
+    ) {
+        // (share of the ray, its length, the edge it ends at; none for the ray's own end)
+        let parts = [0, 1].map(|side| {
+            let mut left = 1.0;
+            let mut parts = Vec::new();
+            for passage in &passed[side] {
+                parts.push((left * passage.share(), passage.distance, Some(passage)));
+                left -= left * passage.share();
+            }
+            parts.push((left, ends[side].0, None));
+            parts
+        });
+        for side in 0..2 {
+            for &(part, length, passage) in &parts[side] {
+                let of_pairs = parts[1 - side].iter().map(|&(other, other_length, _)| {
+                    let t = if side == 0 {
+                        1.0 - share(length, other_length)
                     } else {
-                        let bits = [0, 1, 2].map(|a| u32::from(q[a] != f64::from(low[a])));
-                        self.add_centre(low, bits, w, scratch);
+                        share(other_length, length)
+                    };
+                    other * t
+                });
+                let w = weight * part * of_pairs.sum::<f64>();
+                match passage {
+                    None => self.follow(low, p, order, (side, ends[side]), w, true, scratch),
+                    Some(passage) => {
+                        let mut beside = p;
+                        beside[order[0]] += if side == 1 { length } else { -length };
+                        self.descend_beside(low, beside, passage, w, scratch);
                     }
                 }
             }
         }
     }
 
-    /// The two ends of the segment through `p` along `axis` between `from` and `from + 1`, cut by the cage.
+    /// The value at `p`, beside an edge: interpolated between the edge and what is on the other side.
+    fn descend_beside(&self, low: [u32; 3], p: DVec3, passage: &Passage, weight: f64, scratch: &mut Scratch) {
+        let axis = passage.across;
+        let order = [axis, (axis + 1) % 3, (axis + 2) % 3];
+        let ends = self.ends(p, axis, f64::from(low[axis]), &scratch.near);
+        let side = usize::from(passage.offset > 0.0);
+        let offset = passage.offset.abs();
+        if offset >= ends[side].0 {
+            // Something is closer.
+            return self.descend(low, p, &order, weight, false, scratch);
+        }
+        let t = share(offset, ends[1 - side].0);
+        self.add_wall(passage.facet, passage.barycentric, weight * (1.0 - t), scratch);
+        self.follow(low, p, &order, (1 - side, ends[1 - side]), weight * t, false, scratch);
+    }
+
+    /// Adds the value at an end of the segment through `p` along `order[0]`; `end`: above (1) or below (0), and where.
+    fn follow(
+        &self,
+        low: [u32; 3],
+        p: DVec3,
+        order: &[usize],
+        (side, end): (usize, End),
+        weight: f64,
+        splits: bool,
+        scratch: &mut Scratch,
+    ) {
+        if weight == 0.0 {
+            return;
+        }
+        match end.1 {
+            // From inside one meets the back of a face: going up, one that faces up.
+            Some((_, _, faces_up)) if faces_up != (side == 1) => scratch.outside += weight,
+            Some((facet, barycentric, _)) => self.add_wall(facet, barycentric, weight, scratch),
+            None => {
+                let mut q = p;
+                q[order[0]] = f64::from(low[order[0]]) + side as f64;
+                if order.len() > 1 {
+                    self.descend(low, q, &order[1..], weight, splits, scratch);
+                } else {
+                    let bits = [0, 1, 2].map(|a| u32::from(q[a] != f64::from(low[a])));
+                    self.add_centre(low, bits, weight, scratch);
+                }
+            }
+        }
+    }
+
+    fn add_wall(&self, facet: u32, barycentric: [f64; 3], weight: f64, scratch: &mut Scratch) {
+        let stencil = &mut scratch.stencil;
+        self.controls
+            .values_at(facet, barycentric, &mut |column, value| stencil.add_hat(column, weight * value));
+    }
+
+    /// The two ends of the segment through `p` along `axis` between `from` and `from + 1`, cut by the cage. Of faces in the
+    /// same place, as where two parts share one, the one that is seen from behind counts.
     fn ends(&self, p: DVec3, axis: usize, from: f64, near: &[u32]) -> [End; 2] {
         let mut ends: [End; 2] = [(p[axis] - from, None), (from + 1.0 - p[axis], None)];
         for &number in near {
             if let Some(c) = self.lists.triangle(number).crossing(p, axis) {
-                let end = &mut ends[usize::from(c.distance > 0.0)];
-                if c.distance.abs() < end.0 {
-                    *end = (c.distance.abs(), Some((number, c.barycentric, c.faces_up)));
+                let up = c.distance > 0.0;
+                let end = &mut ends[usize::from(up)];
+                let distance = c.distance.abs();
+                let nearer = match end.1 {
+                    None => distance < end.0,
+                    Some((_, _, faces_up)) => {
+                        let prefers = f64::from(i8::from(c.faces_up == up) - i8::from(faces_up == up));
+                        distance < end.0 + self.same * prefers
+                    }
+                };
+                if nearer && !self.is_within(number, c.barycentric) {
+                    *end = (distance, Some((number, c.barycentric, c.faces_up)));
                 }
             }
         }
         ends
     }
+
+    /// Whether a place on a facet lies inside the cage, where parts of it overlap: no wall.
+    fn is_within(&self, facet: u32, barycentric: [f64; 3]) -> bool {
+        let Overlaps { low, high, .. } = self.overlaps;
+        if self.overlaps.parts.is_empty() {
+            return false;
+        }
+        let corners = self.lists.triangle(facet).corners;
+        let place: DVec3 = corners.iter().zip(barycentric).map(|(&c, b)| b * c).sum();
+        if (place + 1.0).cmplt(*low).any() || (place - 1.0).cmpgt(*high).any() {
+            return false;
+        }
+        // Off the facet's sides, where it is not clear what the neighbours add.
+        let place = place.lerp(corners.iter().sum::<DVec3>() / 3.0, OFF_SIDES);
+        let others = self.lists.all().iter().enumerate().filter(|(k, _)| *k != facet as usize);
+        winding_number(place, others.map(|(_, t)| t.corners)) > WITHIN
+    }
+}
+
+/// How far along a segment a point lies, from the ends' distances: 0 at the first.
+fn share(first: f64, second: f64) -> f64 {
+    if first + second > 0.0 { first / (first + second) } else { 0.0 }
 }
