@@ -32,8 +32,9 @@ pub(crate) fn dropped_weights_are_not_missed(back_end: &BackEnd) {
         let change = largest_change(&all, &sparse);
         assert!(change <= 5e-3, "a weight of {} vertices changes by {change}", cage.n_vertices());
         let posed = twisted(cage.positions(), cage.diagonal());
-        let off = combined(&all, &posed).iter().zip(combined(&sparse, &posed)).map(|(a, b)| a.distance(b));
-        let off = off.fold(0.0, f64::max) / f64::from(cage.diagonal());
+        let [all, sparse] = [all, sparse].map(|weights| combined(&weights, &posed));
+        let off = all.iter().zip(&sparse).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        let off = off / f64::from(cage.diagonal());
         assert!(off <= 1e-3, "a pose of {} vertices is off by {off}", cage.n_vertices());
     }
 }
@@ -135,7 +136,7 @@ pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
     }
 }
 
-/// Next to a re-entrant edge weights are continuous, to what the true field does in a hundredth of a cell. Rays that just
+/// Next to a re-entrant edge weights are continuous, to what the true field does in 1/250 of a cell. Rays that just
 /// missed it and rays that met it gave values up to 0.034 apart.
 pub(crate) fn weights_do_not_jump_at_re_entrant_edges(back_end: &BackEnd) {
     let turn = Random::new(75).rotation();
@@ -146,27 +147,28 @@ pub(crate) fn weights_do_not_jump_at_re_entrant_edges(back_end: &BackEnd) {
             .filter(|&v| l_shape().positions[v].truncate() == Vec2::ONE)
             .collect();
         let [a, b] = [inner[0], inner[1]].map(|v| cage.positions()[v]);
+        let is_clear = |p: &Vec3| {
+            let from_edge = (*p - a).reject_from((b - a).normalize()).length();
+            points::is_inside(&cage, *p) && from_edge > 0.1 * cell
+        };
         let mut random = Random::new(76);
-        let mut largest = 0.0f32;
-        for _ in 0..150 {
+        let lines = std::iter::repeat_with(|| {
             let near = a.lerp(b, random.between(0.2, 0.8));
             let ends = [0, 1].map(|_| near + 1.5 * cell * random.point(Vec3::NEG_ONE, Vec3::ONE));
-            let n = (ends[0].distance(ends[1]) / (0.01 * cell)).ceil() as usize;
-            let line: Vec<Vec3> = (0..=n).map(|k| ends[0].lerp(ends[1], k as f32 / n as f32)).collect();
-            let is_clear = |p: &Vec3| {
-                points::is_inside(&cage, *p) && (*p - a).reject_from((b - a).normalize()).length() > 0.1 * cell
-            };
-            if !line.iter().all(is_clear) {
-                continue;
-            }
-            let weights = dense(&back_end.bind_with(&line, &cage, |o| o.grid = 64).weights);
-            let columns = cage.n_vertices();
-            for v in 0..n {
-                for k in 0..columns {
-                    largest = largest.max((weights[v * columns + k] - weights[(v + 1) * columns + k]).abs());
-                }
+            let n = (ends[0].distance(ends[1]) / (0.004 * cell)).ceil() as usize;
+            (0..=n).map(|k| ends[0].lerp(ends[1], k as f32 / n as f32)).collect::<Vec<Vec3>>()
+        });
+        let lines: Vec<_> = lines.filter(|line| line.iter().all(is_clear)).take(200).collect();
+        let weights = dense(&back_end.bind_with(&lines.concat(), &cage, |o| o.grid = 64).weights);
+        let mut rows = weights.chunks(cage.n_vertices());
+        let mut largest = 0.0f32;
+        for line in lines {
+            let rows: Vec<&[f32]> = rows.by_ref().take(line.len()).collect();
+            for (before, after) in rows.windows(2).map(|w| (w[0], w[1])) {
+                largest = before.iter().zip(after).map(|(b, a)| (b - a).abs()).fold(largest, f32::max);
             }
         }
+        eprintln!("LARGEST {largest}");
         assert!(largest <= 4e-3, "a weight jumps by {largest}");
     }
 }

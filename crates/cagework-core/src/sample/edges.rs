@@ -20,6 +20,9 @@ const SHARP: f64 = 0.15;
 /// A component of a unit normal this small is rounding.
 const PARALLEL: f64 = 1e-9;
 
+/// An edge no further than this, in cells, before a ray's end is where it ends.
+const ON_WALL: f64 = 1e-6;
+
 /// A re-entrant edge, in cells.
 #[derive(Clone, Copy, Debug)]
 struct Edge {
@@ -112,7 +115,9 @@ impl EdgeLists {
             }
             let beside = a + s * (b - a) - p;
             let distance = if up { beside[axis] } else { -beside[axis] };
-            if distance > 0.0 && distance < end && beside[across].abs() < REACH {
+            // Right beside an edge, only one of the two rays passes it; on a wall that ends at the edge, none.
+            let ahead = distance > 0.0 || up && distance == 0.0;
+            if ahead && distance < end - ON_WALL && beside[across].abs() < REACH {
                 let mut barycentric = [0.0; 3];
                 (barycentric[edge.corners[0]], barycentric[edge.corners[1]]) = (1.0 - s, s);
                 let offset = beside[across];
