@@ -20,8 +20,8 @@ const SHARP: f64 = 0.15;
 /// A component of a unit normal this small is rounding.
 const PARALLEL: f64 = 1e-9;
 
-/// An edge no further than this, in cells, before a ray's end is where it ends.
-const ON_WALL: f64 = 1e-6;
+/// A place no further than this, in cells, from an edge is on it.
+pub(super) const ON_EDGE: f64 = 1e-6;
 
 /// A re-entrant edge, in cells.
 #[derive(Clone, Copy, Debug)]
@@ -42,17 +42,19 @@ pub(super) struct Passage {
     /// The axis along which the edge is beside the ray there, and how far: positive above.
     pub(super) across: usize,
     pub(super) offset: f64,
+    /// Share of the ray that ends here.
+    pub(super) share: f64,
     /// The place on the edge.
     pub(super) facet: u32,
     pub(super) barycentric: [f64; 3],
 }
 
 impl Passage {
-    /// Share of the ray that ends here.
-    pub(super) fn share(&self) -> f64 {
-        let x = self.offset.abs() / REACH;
-        1.0 - x * x * (3.0 - 2.0 * x)
-    }
+}
+
+/// Falls smoothly from 1 at 0 to 0 at 1 and beyond.
+fn fade(x: f64) -> f64 {
+    if x < 1.0 { 1.0 - x * x * (3.0 - 2.0 * x) } else { 0.0 }
 }
 
 /// Re-entrant edges, listed by blocks of cells.
@@ -101,9 +103,18 @@ impl EdgeLists {
         });
     }
 
-    /// Where a ray from `p` along `axis`, upwards or not, passes some of the edges before it ends at `end`; nearest first.
-    pub(super) fn passed(&self, some: &[u32], p: DVec3, axis: usize, up: bool, end: f64) -> Vec<Passage> {
+    /// Where a ray from `p` along `axis`, upwards or not, passes some of the edges; nearest first. `end`: where it ends; if
+    /// that is no wall, edges beyond count as well, the less the further they are.
+    pub(super) fn passed(
+        &self,
+        some: &[u32],
+        p: DVec3,
+        axis: usize,
+        up: bool,
+        (end, is_wall): (f64, bool),
+    ) -> Vec<Passage> {
         let mut passages = Vec::new();
+        let beyond = end.min(REACH);
         for &number in some {
             let edge = &self.edges[number as usize];
             let Some(across) = edge.across[axis] else { continue };
@@ -117,11 +128,17 @@ impl EdgeLists {
             let distance = if up { beside[axis] } else { -beside[axis] };
             // Right beside an edge, only one of the two rays passes it; on a wall that ends at the edge, none.
             let ahead = distance > 0.0 || up && distance == 0.0;
-            if ahead && distance < end - ON_WALL && beside[across].abs() < REACH {
+            let offset = beside[across];
+            let fading = match (distance < end - ON_EDGE, is_wall) {
+                (true, _) => 1.0,
+                (false, true) => 0.0,
+                (false, false) => fade((distance - end).max(0.0) / beyond),
+            };
+            let share = fading * fade(offset.abs() / REACH);
+            if ahead && share > 0.0 {
                 let mut barycentric = [0.0; 3];
                 (barycentric[edge.corners[0]], barycentric[edge.corners[1]]) = (1.0 - s, s);
-                let offset = beside[across];
-                passages.push(Passage { distance, across, offset, facet: edge.facet, barycentric });
+                passages.push(Passage { distance, across, offset, share, facet: edge.facet, barycentric });
             }
         }
         passages.sort_by(|a, b| a.distance.total_cmp(&b.distance));

@@ -17,7 +17,7 @@ use crate::grid::{Grid, NO_CELL};
 use crate::levels::Level;
 use crate::voxelize::lines::Overlaps;
 
-use super::edges::{EdgeLists, Passage};
+use super::edges::{EdgeLists, ON_EDGE, Passage};
 use super::triangles::TriangleLists;
 use super::{Stencil, Stencils, closest_on_cage};
 
@@ -53,13 +53,19 @@ pub struct Sampler<'a> {
 struct Scratch {
     near: Vec<u32>,
     edges: Vec<u32>,
+    /// Facets near a place beside an edge, and near the one that is away from the edge.
+    here: Vec<u32>,
+    other: Vec<u32>,
     stencil: Stencil,
     /// Weight of ends that lie outside the cage.
     outside: f64,
 }
 
-/// One end of a segment: its distance from the start, and the crossing if it lies on the cage.
-type End = (f64, Option<(u32, [f64; 3], bool)>);
+/// A place on the cage: facet, barycentric coordinates, and whether the facet faces up the ray's axis.
+type Wall = (u32, [f64; 3], bool);
+
+/// One end of a segment: its distance from the start, and where it lies on the cage if it does.
+type End = (f64, Option<Wall>);
 
 impl<'a> Sampler<'a> {
     /// A sampler for the finest level.
@@ -176,10 +182,11 @@ impl<'a> Sampler<'a> {
         scratch: &mut Scratch,
     ) {
         let axis = order[0];
-        let ends = self.ends(p, axis, f64::from(low[axis]), &scratch.near);
+        let below = p[axis] - f64::from(low[axis]);
+        let ends = self.ends(p, axis, [below, 1.0 - below], scratch.near.iter());
         if splits && !scratch.edges.is_empty() {
             let passed = [0, 1]
-                .map(|side| self.edges.passed(&scratch.edges, p, axis, side == 1, ends[side].0));
+                .map(|side| self.edges.passed(&scratch.edges, p, axis, side == 1, (ends[side].0, ends[side].1.is_some())));
             if passed.iter().any(|passages| !passages.is_empty()) {
                 return self.descend_past(low, p, order, weight, ends, &passed, scratch);
             }
@@ -206,8 +213,16 @@ impl<'a> Sampler<'a> {
             let mut left = 1.0;
             let mut parts = Vec::new();
             for passage in &passed[side] {
-                parts.push((left * passage.share(), passage.distance, Some(passage)));
-                left -= left * passage.share();
+                if passage.distance > ends[side].0 {
+                    let beyond = along(p, order[0], side, passage.distance);
+                    self.lists.in_cube(self.cube_of(beyond), &mut scratch.other);
+                    let reach = [passage.distance; 2];
+                    if self.ends(p, order[0], reach, scratch.other.iter())[side].1.is_some() {
+                        continue;
+                    }
+                }
+                parts.push((left * passage.share, passage.distance, Some(passage)));
+                left -= left * passage.share;
             }
             parts.push((left, ends[side].0, None));
             parts
@@ -226,29 +241,61 @@ impl<'a> Sampler<'a> {
                 match passage {
                     None => self.follow(low, p, order, (side, ends[side]), w, true, scratch),
                     Some(passage) => {
-                        let mut beside = p;
-                        beside[order[0]] += if side == 1 { length } else { -length };
-                        self.descend_beside(low, beside, passage, w, scratch);
+                        let beside = along(p, order[0], side, length);
+                        self.descend_beside(beside, passage, w, scratch);
                     }
                 }
             }
         }
     }
 
-    /// The value at `p`, beside an edge: interpolated between the edge and what is on the other side.
-    fn descend_beside(&self, low: [u32; 3], p: DVec3, passage: &Passage, weight: f64, scratch: &mut Scratch) {
-        let axis = passage.across;
-        let order = [axis, (axis + 1) % 3, (axis + 2) % 3];
-        let ends = self.ends(p, axis, f64::from(low[axis]), &scratch.near);
-        let side = usize::from(passage.offset > 0.0);
-        let offset = passage.offset.abs();
-        if offset >= ends[side].0 {
-            // Something is closer.
-            return self.descend(low, p, &order, weight, false, scratch);
+    /// The value at `p`, beside an edge: interpolated between the edge and the place one cell away from it, on the other
+    /// side of `p`. That place depends on nothing but `p`, be it in another cube or not.
+    fn descend_beside(&self, p: DVec3, passage: &Passage, weight: f64, scratch: &mut Scratch) {
+        let Passage { across: axis, offset, .. } = *passage;
+        if offset.abs() <= ON_EDGE {
+            return self.add_wall(passage.facet, passage.barycentric, weight, scratch);
         }
-        let t = share(offset, ends[1 - side].0);
-        self.add_wall(passage.facet, passage.barycentric, weight * (1.0 - t), scratch);
-        self.follow(low, p, &order, (1 - side, ends[1 - side]), weight * t, false, scratch);
+        let side = usize::from(offset > 0.0);
+        let mut away = p;
+        away[axis] += offset - 1f64.copysign(offset);
+        let low = self.cube_of(away);
+        self.lists.in_cube(low, &mut scratch.other);
+        self.lists.in_cube(self.cube_of(p), &mut scratch.here);
+        let mut reach = [1.0 - offset.abs(); 2];
+        // The edge's own faces do not hide it.
+        reach[side] = offset.abs() - ON_EDGE;
+        let ends = self.ends(p, axis, reach, scratch.here.iter().chain(&scratch.other));
+        let t = share(ends[side].0, ends[1 - side].0);
+        match ends[side].1 {
+            None => self.add_wall(passage.facet, passage.barycentric, weight * (1.0 - t), scratch),
+            Some(wall) => self.meet(wall, side, weight * (1.0 - t), scratch),
+        }
+        match ends[1 - side].1 {
+            None => {
+                std::mem::swap(&mut scratch.near, &mut scratch.other);
+                let order = [(axis + 1) % 3, (axis + 2) % 3, axis];
+                self.descend(low, away, &order, weight * t, false, scratch);
+                std::mem::swap(&mut scratch.near, &mut scratch.other);
+            }
+            Some(wall) => self.meet(wall, 1 - side, weight * t, scratch),
+        }
+    }
+
+    /// The low corner of the cube in which a place lies.
+    fn cube_of(&self, p: DVec3) -> [u32; 3] {
+        let highest = DVec3::from_array(self.level.grid.dims.map(|d| f64::from(d) - 2.0));
+        p.floor().clamp(DVec3::ZERO, highest).to_array().map(|x| x as u32)
+    }
+
+    /// Adds the value of a wall that a ray going up (1) or down (0) meets.
+    fn meet(&self, (facet, barycentric, faces_up): Wall, side: usize, weight: f64, scratch: &mut Scratch) {
+        // From inside one meets the back of a face: going up, one that faces up.
+        if faces_up == (side == 1) {
+            self.add_wall(facet, barycentric, weight, scratch);
+        } else {
+            scratch.outside += weight;
+        }
     }
 
     /// Adds the value at an end of the segment through `p` along `order[0]`; `end`: above (1) or below (0), and where.
@@ -266,9 +313,7 @@ impl<'a> Sampler<'a> {
             return;
         }
         match end.1 {
-            // From inside one meets the back of a face: going up, one that faces up.
-            Some((_, _, faces_up)) if faces_up != (side == 1) => scratch.outside += weight,
-            Some((facet, barycentric, _)) => self.add_wall(facet, barycentric, weight, scratch),
+            Some(wall) => self.meet(wall, side, weight, scratch),
             None => {
                 let mut q = p;
                 q[order[0]] = f64::from(low[order[0]]) + side as f64;
@@ -288,10 +333,10 @@ impl<'a> Sampler<'a> {
             .values_at(facet, barycentric, &mut |column, value| stencil.add_hat(column, weight * value));
     }
 
-    /// The two ends of the segment through `p` along `axis` between `from` and `from + 1`, cut by the cage. Of faces in the
+    /// The two ends of the segment through `p` along `axis` that reaches so far down and up, cut by the cage. Of faces in the
     /// same place, as where two parts share one, the one that is seen from behind counts.
-    fn ends(&self, p: DVec3, axis: usize, from: f64, near: &[u32]) -> [End; 2] {
-        let mut ends: [End; 2] = [(p[axis] - from, None), (from + 1.0 - p[axis], None)];
+    fn ends<'b>(&self, p: DVec3, axis: usize, reach: [f64; 2], near: impl Iterator<Item = &'b u32>) -> [End; 2] {
+        let mut ends: [End; 2] = reach.map(|reach| (reach, None));
         for &number in near {
             if let Some(c) = self.lists.triangle(number).crossing(p, axis) {
                 let up = c.distance > 0.0;
@@ -328,6 +373,12 @@ impl<'a> Sampler<'a> {
         let others = self.lists.all().iter().enumerate().filter(|(k, _)| *k != facet as usize);
         winding_number(place, others.map(|(_, t)| t.corners)) > WITHIN
     }
+}
+
+/// Where a ray from `p` up (1) or down (0) an axis is after so many cells.
+fn along(mut p: DVec3, axis: usize, side: usize, length: f64) -> DVec3 {
+    p[axis] += if side == 1 { length } else { -length };
+    p
 }
 
 /// How far along a segment a point lies, from the ends' distances: 0 at the first.
