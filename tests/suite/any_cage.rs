@@ -55,7 +55,8 @@ fn assert_bound_as_alone(back_end: &BackEnd, a: &PolygonMesh, b: &PolygonMesh, t
         for v in 0..points.len() {
             for column in 0..both.n_vertices() {
                 let w = got[v * both.n_vertices() + column];
-                let alone = columns.contains(&column).then(|| expected[v * columns.len() + column - columns.start]);
+                let alone =
+                    columns.contains(&column).then(|| expected[v * columns.len() + column - columns.start]);
                 let off = (w - alone.unwrap_or(0.0)).abs();
                 assert!(off <= tolerance, "vertex {v}, column {column}: {w}, alone {alone:?}");
             }
@@ -117,10 +118,16 @@ pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
         let boxes = [[DVec3::ZERO, DVec3::splat(4.0)], limb];
         let [body, arm] = boxes.map(|[low, high]| cuboid(low.as_vec3(), high.as_vec3()));
         let both = cage(&together(&body, &arm));
-        let points: Vec<Vec3> =
-            [[3.0, 2.0, 2.0], [3.9, 1.9, 1.9], [4.5, 1.6, 2.0], [5.5, 2.2, 1.5], [1.0, 3.0, 0.5], [2.5, 1.3, 2.0]]
-                .map(Vec3::from)
-                .to_vec();
+        let points: Vec<Vec3> = [
+            [3.0, 2.0, 2.0],
+            [3.9, 1.9, 1.9],
+            [4.5, 1.6, 2.0],
+            [5.5, 2.2, 1.5],
+            [1.0, 3.0, 0.5],
+            [2.5, 1.3, 2.0],
+        ]
+        .map(Vec3::from)
+        .to_vec();
         let binding = back_end.bind_with(&points, &both, |o| o.grid = 64);
         assert_eq!(binding.report.outside_vertices, 0);
         let notices = &binding.report.notices;
@@ -168,9 +175,8 @@ pub(crate) fn weights_do_not_jump_at_re_entrant_edges(back_end: &BackEnd) {
             let line: Vec<Vec3> = (0..=n).map(|k| ends[0].lerp(ends[1], k as f32 / n as f32)).collect();
             let way = (b - a).normalize();
             // On the edge itself the true field is as steep as can be.
-            let is_clear = |p: &Vec3| {
-                (*p - a).reject_from(way).length() > 0.1 * cell && points::is_inside(&cage, *p)
-            };
+            let is_clear =
+                |p: &Vec3| (*p - a).reject_from(way).length() > 0.1 * cell && points::is_inside(&cage, *p);
             if line.iter().all(is_clear) { line } else { Vec::new() }
         });
         let lines: Vec<Vec<Vec3>> = lines.filter(|line| line.len() > 1).take(200).collect();
@@ -180,12 +186,9 @@ pub(crate) fn weights_do_not_jump_at_re_entrant_edges(back_end: &BackEnd) {
         for line in &lines {
             let rows: Vec<&[f32]> = rows.by_ref().take(line.len()).collect();
             for (before, after) in rows.windows(2).map(|w| (w[0], w[1])) {
-                let j = before.iter().zip(after).map(|(b, a)| (b - a).abs()).fold(0.0, f32::max);
-                if j > 3e-3 { let v = rows_at(&lines, line, before, &weights, cage.n_vertices()); eprintln!("J {j} {:?} {:?}", v, edges.iter().map(|[a,b]| { let t = ((v - *a).dot(*b - *a) / (*b-*a).length_squared()).clamp(0.0,1.0); (v - a.lerp(*b, t)).length() / cell }).fold(f32::INFINITY, f32::min)); }
                 largest = before.iter().zip(after).map(|(b, a)| (b - a).abs()).fold(largest, f32::max);
             }
         }
-        eprintln!("LARGEST {largest} lines {} edges {}", lines.len(), edges.len());
         assert!(largest <= 4e-3, "a weight jumps by {largest}");
     }
 }
@@ -231,9 +234,4 @@ pub(crate) fn what_the_grid_cannot_resolve_is_said(back_end: &BackEnd) {
     let cube = cage(&cuboid(Vec3::ZERO, Vec3::ONE));
     let report = back_end.bind(&points::inside(&cube, 50, 79), &cube).report;
     assert!(report.notices.is_empty(), "{:?}", report.notices);
-}
-
-fn rows_at(lines: &[Vec<Vec3>], _line: &[Vec3], row: &[f32], all: &[f32], n: usize) -> Vec3 {
-    let at = (row.as_ptr() as usize - all.as_ptr() as usize) / 4 / n;
-    lines.concat()[at]
 }

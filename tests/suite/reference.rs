@@ -2,8 +2,8 @@
 //!
 //! Source of the numbers: `tests/data/README.md`.
 
-use cagework_core::{Cage, PolygonMesh};
 use cagework_core::options::BindOptions;
+use cagework_core::{Cage, PolygonMesh};
 use cagework_tests::cages::cage;
 use cagework_tests::dense;
 use glam::Vec3;
@@ -68,7 +68,6 @@ fn mean_error_is_below(limit: f64, back_end: &BackEnd, grid: u32) {
     assert_eq!(binding.report.outside_vertices, 0);
     let weights = dense(&binding.weights);
     let error = mean_difference(&weights, npy!("weights_fem"));
-    eprintln!("ERROR {grid} {error:e}");
     assert!(error <= limit, "mean difference from finite elements is {error:e}, more than {limit:e}");
     // A witness that shares nothing with finite elements; its own error adds one standard error on average at most.
     let walked = &weights[..N_WALKED * cage.n_vertices()];

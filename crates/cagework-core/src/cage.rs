@@ -174,7 +174,8 @@ impl Cage {
         let at = |i: u32| positions[i as usize].as_dvec3();
         let mut points: Vec<DVec3> = (0..self.positions.len() as u32).map(at).collect();
         for (face, polygon) in self.faces.iter().zip(&self.polygons) {
-            let inner = polygon.inner.iter().map(|hats| face.iter().zip(hats).map(|(&i, h)| *h * at(i)).sum());
+            let inner =
+                polygon.inner.iter().map(|hats| face.iter().zip(hats).map(|(&i, h)| *h * at(i)).sum());
             points.extend(inner.collect::<Vec<DVec3>>());
         }
         points

@@ -26,7 +26,8 @@ impl Enclosure {
     /// Finds the winding numbers of all points.
     #[must_use]
     pub fn new(cage: &Cage, points: &[Vec3]) -> Self {
-        let corners: Vec<[DVec3; 3]> = (0..cage.facets().len() as u32).map(|t| cage.facet_corners(t)).collect();
+        let corners: Vec<[DVec3; 3]> =
+            (0..cage.facets().len() as u32).map(|t| cage.facet_corners(t)).collect();
         let columns = Columns::new(&corners);
         let winding = |p: DVec3| columns.winding_number(p).unwrap_or_else(|| winding_number(p, &corners));
         let winding = points.iter().map(|p| winding(p.as_dvec3())).collect();

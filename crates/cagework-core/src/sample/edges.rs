@@ -12,7 +12,7 @@ use crate::cage::Cage;
 use crate::grid::Grid;
 
 /// Distance, in cells, up to which a passing ray notices an edge.
-pub(super) const REACH: f64 = 0.5;
+pub(super) const REACH: f64 = 0.25;
 
 /// Sine of the angle by which the cage turns inwards at an edge for rays to notice: at flatter ones little can jump.
 const SHARP: f64 = 0.15;
@@ -49,8 +49,7 @@ pub(super) struct Passage {
     pub(super) barycentric: [f64; 3],
 }
 
-impl Passage {
-}
+impl Passage {}
 
 /// Falls smoothly from 1 at 0 to 0 at 1 and beyond.
 fn fade(x: f64) -> f64 {
@@ -82,7 +81,8 @@ impl EdgeLists {
                 _ => None,
             })
             .collect();
-        let boxes = edges.iter().map(|e| (e.ends[0].min(e.ends[1]) - REACH, e.ends[0].max(e.ends[1]) + REACH));
+        let boxes =
+            edges.iter().map(|e| (e.ends[0].min(e.ends[1]) - REACH, e.ends[0].max(e.ends[1]) + REACH));
         let blocks = Blocks::new(grid, boxes);
         Self { edges, blocks }
     }

@@ -67,6 +67,17 @@ type Wall = (u32, [f64; 3], bool);
 /// One end of a segment: its distance from the start, and where it lies on the cage if it does.
 type End = (f64, Option<Wall>);
 
+/// What a part of a split ray ends at.
+#[derive(Clone, Copy)]
+enum Stop<'a> {
+    /// Beside an edge that it passes.
+    Beside(&'a Passage),
+    /// At a wall beyond the plane where the ray ends.
+    Wall(Wall),
+    /// Where the ray ends.
+    End,
+}
+
 impl<'a> Sampler<'a> {
     /// A sampler for the finest level.
     #[must_use]
@@ -142,7 +153,8 @@ impl<'a> Sampler<'a> {
         near.iter().find_map(|&number| {
             let t = self.lists.triangle(number);
             let closest = t.is_near_plane(p, self.same).then(|| closest_point_on_triangle(p, t.corners))?;
-            let touches = closest.point.distance(p) <= self.same && !self.is_within(number, closest.barycentric);
+            let touches =
+                closest.point.distance(p) <= self.same && !self.is_within(number, closest.barycentric);
             touches.then_some((number, closest.barycentric))
         })
     }
@@ -185,8 +197,9 @@ impl<'a> Sampler<'a> {
         let below = p[axis] - f64::from(low[axis]);
         let ends = self.ends(p, axis, [below, 1.0 - below], scratch.near.iter());
         if splits && !scratch.edges.is_empty() {
-            let passed = [0, 1]
-                .map(|side| self.edges.passed(&scratch.edges, p, axis, side == 1, (ends[side].0, ends[side].1.is_some())));
+            let passed = [0, 1].map(|side| {
+                self.edges.passed(&scratch.edges, p, axis, side == 1, (ends[side].0, ends[side].1.is_some()))
+            });
             if passed.iter().any(|passages| !passages.is_empty()) {
                 return self.descend_past(low, p, order, weight, ends, &passed, scratch);
             }
@@ -208,27 +221,28 @@ impl<'a> Sampler<'a> {
         passed: &[Vec<Passage>; 2],
         scratch: &mut Scratch,
     ) {
-        // (share of the ray, its length, the edge it ends at; none for the ray's own end)
+        // (share of the ray, its length, what it ends at)
         let parts = [0, 1].map(|side| {
             let mut left = 1.0;
             let mut parts = Vec::new();
             for passage in &passed[side] {
+                let mut stop = (passage.distance, Stop::Beside(passage));
                 if passage.distance > ends[side].0 {
+                    // Beyond the plane; a wall may be before it.
                     let beyond = along(p, order[0], side, passage.distance);
                     self.lists.in_cube(self.cube_of(beyond), &mut scratch.other);
                     let reach = [passage.distance; 2];
-                    if self.ends(p, order[0], reach, scratch.other.iter())[side].1.is_some() {
-                        continue;
-                    }
+                    let end = self.ends(p, order[0], reach, scratch.other.iter())[side];
+                    stop = end.1.map_or(stop, |wall| (end.0, Stop::Wall(wall)));
                 }
-                parts.push((left * passage.share, passage.distance, Some(passage)));
+                parts.push((left * passage.share, stop.0, stop.1));
                 left -= left * passage.share;
             }
-            parts.push((left, ends[side].0, None));
+            parts.push((left, ends[side].0, Stop::End));
             parts
         });
         for side in 0..2 {
-            for &(part, length, passage) in &parts[side] {
+            for &(part, length, stop) in &parts[side] {
                 let of_pairs = parts[1 - side].iter().map(|&(other, other_length, _)| {
                     let t = if side == 0 {
                         1.0 - share(length, other_length)
@@ -238,9 +252,10 @@ impl<'a> Sampler<'a> {
                     other * t
                 });
                 let w = weight * part * of_pairs.sum::<f64>();
-                match passage {
-                    None => self.follow(low, p, order, (side, ends[side]), w, true, scratch),
-                    Some(passage) => {
+                match stop {
+                    Stop::End => self.follow(low, p, order, (side, ends[side]), w, true, scratch),
+                    Stop::Wall(wall) => self.meet(wall, side, w, scratch),
+                    Stop::Beside(passage) => {
                         let beside = along(p, order[0], side, length);
                         self.descend_beside(beside, passage, w, scratch);
                     }
@@ -335,7 +350,13 @@ impl<'a> Sampler<'a> {
 
     /// The two ends of the segment through `p` along `axis` that reaches so far down and up, cut by the cage. Of faces in the
     /// same place, as where two parts share one, the one that is seen from behind counts.
-    fn ends<'b>(&self, p: DVec3, axis: usize, reach: [f64; 2], near: impl Iterator<Item = &'b u32>) -> [End; 2] {
+    fn ends<'b>(
+        &self,
+        p: DVec3,
+        axis: usize,
+        reach: [f64; 2],
+        near: impl Iterator<Item = &'b u32>,
+    ) -> [End; 2] {
         let mut ends: [End; 2] = reach.map(|reach| (reach, None));
         for &number in near {
             if let Some(c) = self.lists.triangle(number).crossing(p, axis) {

@@ -69,9 +69,13 @@ impl Overlaps {
             n => format!(" (and {n} more such pairs)"),
         };
         Some(if a == b {
-            format!("Component {a} of the cage goes through itself{more}: what it encloses twice counts as inside.")
+            format!(
+                "Component {a} of the cage goes through itself{more}: what it encloses twice counts as inside."
+            )
         } else {
-            format!("Components {a} and {b} of the cage overlap{more}: they are bound as one, without walls inside.")
+            format!(
+                "Components {a} and {b} of the cage overlap{more}: they are bound as one, without walls inside."
+            )
         })
     }
 
