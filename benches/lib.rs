@@ -15,6 +15,7 @@ use cagework_core::solve::BatchSolver as _;
 use cagework_core::solve::hierarchy::Hierarchy;
 use cagework_core::solve::multigrid::Workspace;
 use cagework_core::voxelize::embedded::Embedding;
+use cagework_core::voxelize::lines::Overlaps;
 use cagework_core::{Binding, Cage};
 use cagework_io::Model;
 use cagework_tests::creature::{creature, creature_cage};

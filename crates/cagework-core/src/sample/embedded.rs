@@ -67,6 +67,19 @@ type Wall = (u32, [f64; 3], bool);
 /// One end of a segment: its distance from the start, and where it lies on the cage if it does.
 type End = (f64, Option<Wall>);
 
+/// A place in a cube between centres, and how it is interpolated.
+#[derive(Clone, Copy)]
+struct At<'a> {
+    /// The cube's low corner.
+    low: [u32; 3],
+    p: DVec3,
+    /// Axes to interpolate along; the place lies on the cube's border along the others.
+    order: &'a [usize],
+    weight: f64,
+    /// Whether rays that pass a re-entrant edge are split.
+    splits: bool,
+}
+
 /// What a part of a split ray ends at.
 #[derive(Clone, Copy)]
 enum Stop<'a> {
@@ -132,7 +145,8 @@ impl<'a> Sampler<'a> {
             return true;
         } else {
             for order in ORDERS {
-                self.descend(low, p, &order, 1.0 / ORDERS.len() as f64, true, scratch);
+                let weight = 1.0 / ORDERS.len() as f64;
+                self.descend(At { low, p, order: &order, weight, splits: true }, scratch);
             }
         }
         let doubtful = scratch.outside > DOUBT && scratch.outside < 1.0 - DOUBT;
@@ -182,17 +196,9 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// Interpolates along `order[0]`, then along the rest; `p` lies in the cube from `low`. `splits`: whether rays that pass
-    /// a re-entrant edge are split.
-    fn descend(
-        &self,
-        low: [u32; 3],
-        p: DVec3,
-        order: &[usize],
-        weight: f64,
-        splits: bool,
-        scratch: &mut Scratch,
-    ) {
+    /// Interpolates along the first axis, then along the rest.
+    fn descend(&self, at: At<'_>, scratch: &mut Scratch) {
+        let At { low, p, order, weight, splits } = at;
         let axis = order[0];
         let below = p[axis] - f64::from(low[axis]);
         let ends = self.ends(p, axis, [below, 1.0 - below], scratch.near.iter());
@@ -201,26 +207,18 @@ impl<'a> Sampler<'a> {
                 self.edges.passed(&scratch.edges, p, axis, side == 1, (ends[side].0, ends[side].1.is_some()))
             });
             if passed.iter().any(|passages| !passages.is_empty()) {
-                return self.descend_past(low, p, order, weight, ends, &passed, scratch);
+                return self.descend_past(at, ends, &passed, scratch);
             }
         }
         let [below, above] = ends;
         let t = share(below.0, above.0);
-        self.follow(low, p, order, (0, below), weight * (1.0 - t), splits, scratch);
-        self.follow(low, p, order, (1, above), weight * t, splits, scratch);
+        self.follow(At { weight: weight * (1.0 - t), ..at }, 0, below, scratch);
+        self.follow(At { weight: weight * t, ..at }, 1, above, scratch);
     }
 
     /// The same where rays pass edges: each part of one ray is paired with each part of the other.
-    fn descend_past(
-        &self,
-        low: [u32; 3],
-        p: DVec3,
-        order: &[usize],
-        weight: f64,
-        ends: [End; 2],
-        passed: &[Vec<Passage>; 2],
-        scratch: &mut Scratch,
-    ) {
+    fn descend_past(&self, at: At<'_>, ends: [End; 2], passed: &[Vec<Passage>; 2], scratch: &mut Scratch) {
+        let (p, axis) = (at.p, at.order[0]);
         // (share of the ray, its length, what it ends at)
         let parts = [0, 1].map(|side| {
             let mut left = 1.0;
@@ -229,10 +227,10 @@ impl<'a> Sampler<'a> {
                 let mut stop = (passage.distance, Stop::Beside(passage));
                 if passage.distance > ends[side].0 {
                     // Beyond the plane; a wall may be before it.
-                    let beyond = along(p, order[0], side, passage.distance);
+                    let beyond = along(p, axis, side, passage.distance);
                     self.lists.in_cube(self.cube_of(beyond), &mut scratch.other);
                     let reach = [passage.distance; 2];
-                    let end = self.ends(p, order[0], reach, scratch.other.iter())[side];
+                    let end = self.ends(p, axis, reach, scratch.other.iter())[side];
                     stop = end.1.map_or(stop, |wall| (end.0, Stop::Wall(wall)));
                 }
                 parts.push((left * passage.share, stop.0, stop.1));
@@ -244,20 +242,15 @@ impl<'a> Sampler<'a> {
         for side in 0..2 {
             for &(part, length, stop) in &parts[side] {
                 let of_pairs = parts[1 - side].iter().map(|&(other, other_length, _)| {
-                    let t = if side == 0 {
-                        1.0 - share(length, other_length)
-                    } else {
-                        share(other_length, length)
-                    };
-                    other * t
+                    let t = share(length, other_length);
+                    other * if side == 0 || length + other_length > 0.0 { 1.0 - t } else { 0.0 }
                 });
-                let w = weight * part * of_pairs.sum::<f64>();
+                let weight = at.weight * part * of_pairs.sum::<f64>();
                 match stop {
-                    Stop::End => self.follow(low, p, order, (side, ends[side]), w, true, scratch),
-                    Stop::Wall(wall) => self.meet(wall, side, w, scratch),
+                    Stop::End => self.follow(At { weight, ..at }, side, ends[side], scratch),
+                    Stop::Wall(wall) => self.meet(wall, side, weight, scratch),
                     Stop::Beside(passage) => {
-                        let beside = along(p, order[0], side, length);
-                        self.descend_beside(beside, passage, w, scratch);
+                        self.descend_beside(along(p, axis, side, length), passage, weight, scratch);
                     }
                 }
             }
@@ -290,7 +283,8 @@ impl<'a> Sampler<'a> {
             None => {
                 std::mem::swap(&mut scratch.near, &mut scratch.other);
                 let order = [(axis + 1) % 3, (axis + 2) % 3, axis];
-                self.descend(low, away, &order, weight * t, false, scratch);
+                let at = At { low, p: away, order: &order, weight: weight * t, splits: false };
+                self.descend(at, scratch);
                 std::mem::swap(&mut scratch.near, &mut scratch.other);
             }
             Some(wall) => self.meet(wall, 1 - side, weight * t, scratch),
@@ -313,17 +307,9 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// Adds the value at an end of the segment through `p` along `order[0]`; `end`: above (1) or below (0), and where.
-    fn follow(
-        &self,
-        low: [u32; 3],
-        p: DVec3,
-        order: &[usize],
-        (side, end): (usize, End),
-        weight: f64,
-        splits: bool,
-        scratch: &mut Scratch,
-    ) {
+    /// Adds the value at the upper (1) or lower (0) end of the segment along the first axis.
+    fn follow(&self, at: At<'_>, side: usize, end: End, scratch: &mut Scratch) {
+        let At { low, p, order, weight, .. } = at;
         if weight == 0.0 {
             return;
         }
@@ -333,7 +319,7 @@ impl<'a> Sampler<'a> {
                 let mut q = p;
                 q[order[0]] = f64::from(low[order[0]]) + side as f64;
                 if order.len() > 1 {
-                    self.descend(low, q, &order[1..], weight, splits, scratch);
+                    self.descend(At { p: q, order: &order[1..], ..at }, scratch);
                 } else {
                     let bits = [0, 1, 2].map(|a| u32::from(q[a] != f64::from(low[a])));
                     self.add_centre(low, bits, weight, scratch);
