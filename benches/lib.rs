@@ -15,6 +15,7 @@ use cagework_core::solve::BatchSolver as _;
 use cagework_core::solve::hierarchy::Hierarchy;
 use cagework_core::solve::multigrid::Workspace;
 use cagework_core::voxelize::embedded::Embedding;
+use cagework_core::voxelize::lines::Overlaps;
 use cagework_core::{Binding, Cage};
 use cagework_io::Model;
 use cagework_tests::creature::{creature, creature_cage};
@@ -77,7 +78,8 @@ impl Input {
     /// Sampling stencils of all vertices.
     #[must_use]
     pub fn stencils(&self, hierarchy: &Hierarchy) -> Stencils {
-        let sampler = Sampler::new((&self.cage).into(), &hierarchy.levels[0]);
+        let overlaps = Overlaps::default();
+        let sampler = Sampler::new((&self.cage).into(), &hierarchy.levels[0], &overlaps);
         sampler.stencils(self.points.iter().map(|p| p.as_dvec3()))
     }
 }

@@ -172,6 +172,20 @@ mod multigrid {
     }
 }
 
+/// Cages on which weights were once wrong. All back ends read the same levels and stencils; one is enough.
+mod any_cage {
+    use super::*;
+
+    properties! { cpu(Method::Embedded, Solver::Multigrid, 0);
+        any_cage::dropped_weights_are_not_missed,
+        any_cage::parts_that_share_a_face_do_not_leak,
+        any_cage::overlapping_parts_are_bound_as_one,
+        any_cage::weights_do_not_jump_at_re_entrant_edges,
+        any_cage::weights_are_continuous_in_a_cages_corners,
+        any_cage::what_the_grid_cannot_resolve_is_said,
+    }
+}
+
 /// Multigrid on every back end, and conjugate gradients preconditioned by it. Without, and by Jacobi, a solve takes many
 /// seconds at g = 64: [`agreement`] and the suite hold these to it.
 mod accuracy {

@@ -1,6 +1,7 @@
 //! Properties of solvers, each a function of a back end.
 
 pub(crate) mod agreement;
+pub(crate) mod any_cage;
 pub(crate) mod errors;
 pub(crate) mod exact;
 pub(crate) mod outside;

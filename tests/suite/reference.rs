@@ -2,8 +2,8 @@
 //!
 //! Source of the numbers: `tests/data/README.md`.
 
-use cagework_core::PolygonMesh;
 use cagework_core::options::BindOptions;
+use cagework_core::{Cage, PolygonMesh};
 use cagework_tests::cages::cage;
 use cagework_tests::dense;
 use glam::Vec3;
@@ -53,10 +53,15 @@ pub(crate) fn armadillo_is_exact_at_128(back_end: &BackEnd) {
     mean_error_is_below(LIMIT_AT_128, back_end, 128);
 }
 
-fn mean_error_is_below(limit: f64, back_end: &BackEnd, grid: u32) {
+/// The Armadillo's cage.
+pub(crate) fn armadillo_cage() -> Cage {
     let corners: Vec<u32> = npy!("cage_triangles").map(u32::from_le_bytes).collect();
     let faces = corners.chunks_exact(3).map(<[u32]>::to_vec).collect();
-    let cage = cage(&PolygonMesh { positions: points(npy!("cage_positions")), faces });
+    cage(&PolygonMesh { positions: points(npy!("cage_positions")), faces })
+}
+
+fn mean_error_is_below(limit: f64, back_end: &BackEnd, grid: u32) {
+    let cage = armadillo_cage();
     // As a user binds, not to the last digit.
     let tau = BindOptions::default().tau;
     let binding = back_end.bind_with(&points(npy!("points")), &cage, |o| (o.grid, o.tau) = (grid, tau));

@@ -9,8 +9,8 @@ use crate::Random;
 /// Whether a point lies inside, by its winding number.
 #[must_use]
 pub fn is_inside(cage: &Cage, point: Vec3) -> bool {
-    let triangles = (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
-    winding_number(point.as_dvec3(), triangles) > 0.5
+    let facets = (0..cage.facets().len() as u32).map(|f| cage.facet_corners(f));
+    winding_number(point.as_dvec3(), facets) > 0.5
 }
 
 /// `n` random points inside a cage.

@@ -173,7 +173,8 @@ pub(crate) struct SolveArgs {
     /// Stop after this many Jacobi sweeps, V-cycles or steps of cg in any case.
     #[arg(long, default_value_t = 20_000, value_name = "N", value_parser = number::<u32>(options::MAX_ITERATIONS))]
     max_iterations: u32,
-    /// Drop weights below this, then restore each row's sum and rest position; 0 keeps all.
+    /// Drop the smallest weights of a row as long as their sum is not above this, then restore its sum and rest position; 0
+    /// keeps all.
     #[arg(long, default_value_t = 0.0, value_name = "WEIGHT", value_parser = number::<f32>(options::SPARSIFY))]
     sparsify: f32,
     /// Shape of the classic method's cells: of the cage's box (as published), or cubic.

@@ -30,7 +30,11 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
         Solver::ConjugateGradient => "steps",
     };
     let delta = report.delta_history.last().map_or(String::new(), |d| format!(", delta {d:.1e}"));
-    let state = if report.converged { "converged" } else { "NOT converged" };
+    let state = match (report.converged, report.at_round_off) {
+        (true, false) => "converged",
+        (true, true) => "converged to f32",
+        _ => "NOT converged",
+    };
     row("solve", format!("{} {unit}, {state}{delta}", report.iterations));
     let t = report.timings_ms;
     row(

@@ -11,6 +11,7 @@
 mod defects;
 mod hats;
 mod orient;
+mod patch;
 mod pieces;
 mod polygon;
 #[cfg(test)]
@@ -29,7 +30,7 @@ use glam::{DVec2, DVec3, Vec3};
 use crate::mesh::{Bounds, PolygonMesh};
 
 pub use defects::{CageError, CageNotice, FaceDefect};
-use polygon::{Hats, Piece, Polygon};
+use polygon::{Hats, Polygon};
 
 /// Smallest diagonal of a cage, object units: squares and cubes of lengths stay far from the end of f32 and f64.
 pub const MIN_DIAGONAL: f64 = 1e-12;
@@ -38,6 +39,10 @@ pub const MAX_DIAGONAL: f64 = 1e12;
 
 /// Most faces of a cage: a model that is taken for one has more, and looking at each of them would take minutes.
 pub const MAX_FACES: usize = 100_000;
+
+/// A point this close to the cage (over the cage's diagonal) is on it, whatever side rounding put it on: the resolution of
+/// f32 coordinates.
+pub(crate) const ON_CAGE: f64 = 1e-6;
 
 /// Corners up to which hat values need no heap memory.
 const STACK_CORNERS: usize = 8;
@@ -49,10 +54,12 @@ pub struct Cage {
     faces: Vec<Vec<u32>>,
     triangles: Vec<[u32; 3]>,
     face_of_triangle: Vec<u32>,
-    /// Corners of each triangle as corners of its face.
-    local: Vec<[u32; 3]>,
-    /// Rank of each triangle among those of its face.
-    local_rank: Vec<u32>,
+    component_of_face: Vec<u32>,
+    facets: Vec<[u32; 3]>,
+    facet_points: Vec<DVec3>,
+    face_of_facet: Vec<u32>,
+    /// Rank of each face's first facet.
+    first_facet: Vec<u32>,
     polygons: Vec<Polygon>,
     bounds: Bounds,
     notices: Vec<CageNotice>,
@@ -80,21 +87,30 @@ impl Cage {
             positions: mesh.positions.clone(),
             triangles: Vec::new(),
             face_of_triangle: Vec::new(),
-            local: Vec::new(),
-            local_rank: Vec::new(),
+            component_of_face: surface.component,
+            facets: Vec::new(),
+            facet_points: Vec::new(),
+            face_of_facet: Vec::new(),
+            first_facet: Vec::new(),
             faces,
             polygons,
             bounds,
             notices,
         };
-        for (f, (face, polygon)) in cage.faces.iter().zip(&cage.polygons).enumerate() {
-            for (rank, &local) in polygon.triangles.iter().enumerate() {
-                cage.triangles.push(local.map(|k| face[k as usize]));
-                cage.face_of_triangle.push(f as u32);
-                cage.local.push(local);
-                cage.local_rank.push(rank as u32);
-            }
+        let mut n_points = cage.positions.len();
+        for (f, (face, polygon)) in (0u32..).zip(cage.faces.iter().zip(&cage.polygons)) {
+            cage.triangles.extend(polygon.triangles.iter().map(|t| t.map(|k| face[k as usize])));
+            cage.face_of_triangle.resize(cage.triangles.len(), f);
+            let point = |k: u32| {
+                let inner = || (n_points + k as usize - face.len()) as u32;
+                face.get(k as usize).copied().unwrap_or_else(inner)
+            };
+            cage.first_facet.push(cage.facets.len() as u32);
+            cage.facets.extend(polygon.facets.iter().map(|facet| facet.map(point)));
+            cage.face_of_facet.resize(cage.facets.len(), f);
+            n_points += polygon.inner.len();
         }
+        cage.facet_points = cage.facet_points_at(&cage.positions);
         Ok(cage)
     }
 
@@ -128,10 +144,69 @@ impl Cage {
         &self.face_of_triangle
     }
 
+    /// The closed part that each face belongs to, in order of first faces. `[n_faces]`
+    #[must_use]
+    pub fn component_of_face(&self) -> &[u32] {
+        &self.component_of_face
+    }
+
+    /// The surface that a model is bound to, as [`Self::facet_points`], counter-clockwise seen from outside:
+    /// [`Self::triangles`], but bent faces are cut finer. `[n_facets]`
+    #[must_use]
+    pub fn facets(&self) -> &[[u32; 3]] {
+        &self.facets
+    }
+
+    /// The face that each facet was cut from. `[n_facets]`
+    #[must_use]
+    pub fn face_of_facet(&self) -> &[u32] {
+        &self.face_of_facet
+    }
+
+    /// The cage's vertices, then points inside bent faces, object units. `[n_cage + n_inner]`
+    #[must_use]
+    pub fn facet_points(&self) -> &[DVec3] {
+        &self.facet_points
+    }
+
+    /// The same with the cage's vertices moved to `positions`. `[n_cage]`
+    ///
+    /// # Panics
+    /// If there are fewer positions than cage vertices.
+    #[must_use]
+    pub fn facet_points_at(&self, positions: &[Vec3]) -> Vec<DVec3> {
+        let at = |i: u32| positions[i as usize].as_dvec3();
+        let mut points: Vec<DVec3> = (0..self.positions.len() as u32).map(at).collect();
+        for (face, polygon) in self.faces.iter().zip(&self.polygons) {
+            let inner =
+                polygon.inner.iter().map(|hats| face.iter().zip(hats).map(|(&i, h)| *h * at(i)).sum());
+            points.extend(inner.collect::<Vec<DVec3>>());
+        }
+        points
+    }
+
+    /// Corners of one of [`Self::facets`], object units.
+    #[must_use]
+    pub fn facet_corners(&self, facet: u32) -> [DVec3; 3] {
+        self.facets[facet as usize].map(|i| self.facet_points[i as usize])
+    }
+
     /// Corners of one of [`Self::triangles`], object units.
     #[must_use]
     pub fn triangle_corners(&self, triangle: u32) -> [DVec3; 3] {
         self.triangles[triangle as usize].map(|i| self.positions[i as usize].as_dvec3())
+    }
+
+    /// The one of [`Self::triangles`] in whose frame points near a facet are kept.
+    ///
+    /// # Panics
+    /// If there is no such facet.
+    #[must_use]
+    pub fn triangle_near(&self, facet: u32) -> [u32; 3] {
+        let f = self.face_of_facet[facet as usize] as usize;
+        let (face, polygon) = (&self.faces[f], &self.polygons[f]);
+        let rank = (facet - self.first_facet[f]) as usize;
+        polygon.triangles[rank * polygon.triangles.len() / polygon.facets.len()].map(|k| face[k as usize])
     }
 
     /// Bounding box of the surface (vertices of no face do not count), object units.
@@ -159,31 +234,33 @@ impl Cage {
     }
 
     /// Dirichlet values ("hats") of all cage vertices at a point of the surface, given by one of
-    /// [`Self::triangles`] and barycentric coordinates in it. Calls `each(cage vertex, value)` for every vertex whose
-    /// value is not zero; the values sum to 1 and reproduce the point.
+    /// [`Self::facets`] and barycentric coordinates in it. Calls `each(cage vertex, value)` for every vertex whose
+    /// value is not zero; the values sum to 1 and reproduce the point (on a bent face, to 2 % of its bend).
     ///
     /// Linear on triangles; Meyer et al. 2002 on convex planar polygons (bilinear on a rectangle). Other planar polygons
     /// are cut into convex pieces, each with the coordinates of its own corners, because mean value coordinates of the
     /// whole are negative next to a re-entrant corner and reach across the gap of a C; they serve for pieces with
-    /// straight corners. A polygon that is not planar is split into triangles and linear on each, because a curved
-    /// patch would reproduce points that are not on the triangles that rays meet. All are linear along edges, so
-    /// neighbouring faces agree; none is negative.
+    /// straight corners. A bent face is a patch over the plane that fits it best, where its outline is convex, with the
+    /// coordinates of that outline: they change continuously as a flat face is bent. Where the outline is not convex, it
+    /// is split into triangles, and hats are linear on each. All are linear along edges, so neighbouring faces agree; none
+    /// is negative.
     ///
     /// # Panics
-    /// If there is no such triangle.
-    pub fn hats_at(&self, triangle: u32, barycentric: [f64; 3], each: &mut dyn FnMut(u32, f64)) {
-        let t = triangle as usize;
-        let Some(piece) = self.piece_of(t) else {
-            for (&i, b) in self.triangles[t].iter().zip(barycentric) {
+    /// If there is no such facet.
+    pub fn hats_at(&self, facet: u32, barycentric: [f64; 3], each: &mut dyn FnMut(u32, f64)) {
+        let f = self.face_of_facet[facet as usize] as usize;
+        let (face, polygon) = (&self.faces[f], &self.polygons[f]);
+        let rank = (facet - self.first_facet[f]) as usize;
+        let piece = polygon.piece_of_facet.get(rank).map(|&piece| &polygon.pieces[piece as usize]);
+        let Some(piece) = piece.filter(|piece| piece.hats != Hats::Linear) else {
+            for (&i, b) in self.facets[facet as usize].iter().zip(barycentric) {
                 if b != 0.0 {
                     each(i, b);
                 }
             }
             return;
         };
-        let f = self.face_of_triangle[t] as usize;
-        let (face, outline) = (&self.faces[f], &self.polygons[f].outline);
-        let corners = self.local[t].map(|k| outline[k as usize]);
+        let corners = polygon.facets[rank].map(|k| polygon.outline[k as usize]);
         let point = corners.iter().zip(barycentric).fold(DVec2::ZERO, |p, (&q, b)| p + b * q);
         let n = piece.corners.len();
         let (mut stack, mut heap);
@@ -194,23 +271,11 @@ impl Cage {
             heap = vec![0.0; 2 * n];
             &mut heap
         };
-        let (values, areas) = both.split_at_mut(n);
-        match piece.hats {
-            Hats::Convex => hats::wachspress(&piece.outline, point, values, areas),
-            Hats::Linear | Hats::MeanValue => hats::mean_value(&piece.outline, point, values),
-        }
-        for (&k, &value) in piece.corners.iter().zip(values.iter()) {
+        for (&k, &value) in piece.corners.iter().zip(piece.values(point, both)) {
             if value != 0.0 {
                 each(face[k as usize], value);
             }
         }
-    }
-
-    /// The piece of a face that a triangle lies in; none if hats are linear on the triangle.
-    fn piece_of(&self, triangle: usize) -> Option<&Piece> {
-        let polygon = &self.polygons[self.face_of_triangle[triangle] as usize];
-        let piece = *polygon.piece_of_triangle.get(self.local_rank[triangle] as usize)?;
-        Some(&polygon.pieces[piece as usize]).filter(|piece| piece.hats != Hats::Linear)
     }
 }
 

@@ -18,8 +18,7 @@ const INSIDE: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub struct Enclosure {
     points: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
-    rest: Vec<Vec3>,
+    cage: Cage,
     winding: Vec<f64>,
 }
 
@@ -27,14 +26,12 @@ impl Enclosure {
     /// Finds the winding numbers of all points.
     #[must_use]
     pub fn new(cage: &Cage, points: &[Vec3]) -> Self {
-        let triangles = cage.triangles().to_vec();
-        let rest = cage.positions().to_vec();
         let corners: Vec<[DVec3; 3]> =
-            (0..triangles.len() as u32).map(|t| cage.triangle_corners(t)).collect();
+            (0..cage.facets().len() as u32).map(|t| cage.facet_corners(t)).collect();
         let columns = Columns::new(&corners);
         let winding = |p: DVec3| columns.winding_number(p).unwrap_or_else(|| winding_number(p, &corners));
         let winding = points.iter().map(|p| winding(p.as_dvec3())).collect();
-        Self { points: points.to_vec(), triangles, rest, winding }
+        Self { points: points.to_vec(), cage: cage.clone(), winding }
     }
 
     /// Points that are not inside the cage as it was given, ascending.
@@ -51,11 +48,12 @@ impl Enclosure {
     /// If there are fewer positions than cage vertices.
     #[must_use]
     pub fn outside_of(&self, positions: &[Vec3]) -> Vec<u32> {
-        let at = |of: &[Vec3], t: &[u32; 3]| t.map(|i| of[i as usize].as_dvec3());
-        let moved = |t: &&[u32; 3]| t.iter().any(|&i| self.rest[i as usize] != positions[i as usize]);
-        let changed: Vec<&[u32; 3]> = self.triangles.iter().filter(moved).collect();
-        let before: Vec<[DVec3; 3]> = changed.iter().map(|t| at(&self.rest, t)).collect();
-        let after: Vec<[DVec3; 3]> = changed.iter().map(|t| at(positions, t)).collect();
+        let (rest, now) = (self.cage.facet_points(), self.cage.facet_points_at(positions));
+        let at = |of: &[DVec3], t: &[u32; 3]| t.map(|i| of[i as usize]);
+        let moved = |t: &&[u32; 3]| t.iter().any(|&i| rest[i as usize] != now[i as usize]);
+        let changed: Vec<&[u32; 3]> = self.cage.facets().iter().filter(moved).collect();
+        let before: Vec<[DVec3; 3]> = changed.iter().map(|t| at(rest, t)).collect();
+        let after: Vec<[DVec3; 3]> = changed.iter().map(|t| at(&now, t)).collect();
         let corners: Vec<Vec3> = before.iter().chain(&after).flatten().map(|p| p.as_vec3()).collect();
         let swept = Bounds::of(&corners);
         let mut outside = Vec::new();

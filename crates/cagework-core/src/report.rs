@@ -41,6 +41,8 @@ pub struct BindReport {
     pub iterations: u32,
     /// Whether delta fell below tau before the limit on iterations.
     pub converged: bool,
+    /// Whether f32 ended the solve, having no more digits to give, before delta met tau.
+    pub at_round_off: bool,
     /// Delta after every `delta_interval` iterations. Jacobi: Eq. 2, the sweep's average change of a cell. The others:
     /// the error that is expected to remain, root mean square over cells.
     /// `[iterations / delta_interval]`, rounded up.

@@ -6,6 +6,7 @@
 
 use cagework_core::options::DeltaNorm;
 use cagework_core::solve::hierarchy::Hierarchy;
+use cagework_core::solve::jacobi::STALLED_SWEEPS;
 use cagework_core::solve::stop::{SolveReport, StopRule};
 
 use crate::buffers::{Allocator, Readback};
@@ -116,7 +117,9 @@ impl Jacobi {
             let sum =
                 stream.read(&self.numbers, &self.readback, 4, bytemuck::pod_read_unaligned::<f32>).await?;
             let delta = f64::from(sum) / f64::from(self.level.n_unknowns.max(1));
-            is_last = report.iteration_done(&rule, delta, None) || done >= rule.max_iterations;
+            is_last = report.iteration_done(&rule, delta, None)
+                || done >= rule.max_iterations
+                || report.ends_at_round_off(STALLED_SWEEPS / INTERVAL as usize);
             checked(stream, done, delta);
         }
         Ok((done, report))

@@ -23,10 +23,6 @@ pub(crate) fn test() -> Result<(), String> {
     run("cargo", &["test", "--workspace", "--locked"], &[])?;
     // The same inputs in each run; `cargo xtask fuzz` alone takes others each time.
     fuzz(&["--minutes", "1", "--seed", "1"])?;
-    // The browser's half: no threads, no file system, no surprises when the page arrives.
-    let packages = ["--package", "cagework-core", "--package", "cagework-io", "--no-default-features"];
-    let wasm = ["check", "--locked", "--target", "wasm32-unknown-unknown"];
-    run("cargo", &[&wasm[..], &packages].concat(), &[])?;
     validate_exports()?;
     site::test_scripts()?;
     site::test_page(&[])
@@ -34,7 +30,8 @@ pub(crate) fn test() -> Result<(), String> {
 
 /// Damaged files through everything that reads them. As tests are built: overflows and debug assertions count.
 pub(crate) fn fuzz(args: &[&str]) -> Result<(), String> {
-    let fixed = ["test", "--quiet", "--locked", "--package", "cagework-io", "--test", "fuzz", "--"];
+    // The workspace's features, as `cargo test` has built them.
+    let fixed = ["test", "--quiet", "--locked", "--workspace", "--test", "fuzz", "--"];
     run("cargo", &[&fixed[..], args].concat(), &[])
 }
 
@@ -44,7 +41,7 @@ pub(crate) fn check() -> Result<(), String> {
     run("cargo", &["fmt", "--all", "--check"], &[])?;
     run("cargo", &["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"], &[])?;
     // Not among all targets, because `cargo test` leaves it to [`fuzz`].
-    let fuzz = ["clippy", "--package", "cagework-io", "--test", "fuzz", "--locked", "--", "-D", "warnings"];
+    let fuzz = ["clippy", "--workspace", "--test", "fuzz", "--locked", "--", "-D", "warnings"];
     run("cargo", &fuzz, &[])?;
     let web = ["clippy", "--package", "cagework-web", "--target", "wasm32-unknown-unknown", "--locked"];
     run("cargo", &[&web[..], &["--", "-D", "warnings"]].concat(), &[])?;
@@ -59,8 +56,9 @@ fn validate_exports() -> Result<(), String> {
     let folder = root().join("target/exported-samples");
     let folder = folder.to_str().ok_or("the repository's path is not UTF-8")?;
     std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {folder}: {e}"))?;
-    let export =
-        ["run", "--quiet", "--locked", "--package", "cagework-io", "--example", "export_samples", "--"];
-    run("cargo", &[&export[..], &[folder]].concat(), &[])?;
+    // Built with the workspace's features, as `cargo test` has done already; `cargo run` would build with its package's.
+    run("cargo", &["build", "--quiet", "--locked", "--workspace", "--example", "export_samples"], &[])?;
+    let export = wasm::target_folder()?.join("debug/examples/export_samples");
+    run(export.to_str().ok_or("the target folder's path is not UTF-8")?, &[folder], &[])?;
     run("node", &["crates/cagework-io/tests/validate.mjs", folder], &[])
 }

@@ -58,6 +58,7 @@ export interface BindReport {
   readonly levels: readonly number[];
   readonly iterations: number;
   readonly converged: boolean;
+  readonly at_round_off: boolean;
   readonly delta_history: readonly number[];
   readonly delta_interval: number;
   readonly residual_history: readonly number[];

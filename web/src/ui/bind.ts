@@ -79,8 +79,8 @@ export function createBindPanel(app: App): HTMLElement {
     "Drop small weights",
     [
       { value: "0", label: "Keep all" },
-      { value: "0.00001", label: "Below 1e-5" },
-      { value: "0.001", label: "Below 1e-3" },
+      { value: "0.00001", label: "Up to 1e-5 a row" },
+      { value: "0.001", label: "Up to 1e-3 a row" },
     ],
     (value) => set({ sparsify: Number(value) }),
   );

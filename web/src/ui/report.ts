@@ -40,7 +40,7 @@ export function reportCard(report: BindReport): HTMLElement {
         "span",
         { class: `badge ${good ? "good" : "warn"}` },
         icon(good ? "check" : "warning"),
-        report.converged ? "Converged" : "Not converged",
+        report.at_round_off ? "Converged to f32" : report.converged ? "Converged" : "Not converged",
       ),
     ),
     h("p", { class: "hint", text: verdict(report) }),

@@ -3,8 +3,9 @@
 //! The correction is the smallest one relative to the weights themselves: among all corrections d of the row w that
 //! restore the four sums, it minimises `sum d_i^2 / w_i`. Its solution is `d_i = w_i phi_i . lambda` with the 4 x 4
 //! system `(sum w_i phi_i phi_i^T) lambda = e_1 - sum w_i phi_i`, `phi_i = (1, (c_i - v) / s)`, s the cage's diagonal.
-//! Zero weights stay zero, so the row stays as sparse as it was, and small weights change little, so it stays
-//! non-negative.
+//! Zero weights stay zero, so the row stays as sparse as it was. Each weight is multiplied by a factor that is linear in
+//! the control's position: next to 1, and the row not negative, as long as the sums miss by little. Nothing here bounds the
+//! factors; who drops weights must look at them.
 
 use glam::{DMat4, DVec3, DVec4};
 

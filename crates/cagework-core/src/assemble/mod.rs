@@ -4,6 +4,8 @@ pub mod affine;
 mod entries;
 mod facts;
 
+use std::ops::RangeInclusive;
+
 use glam::{DVec3, Vec3};
 
 use crate::controls::Controls;
@@ -30,11 +32,17 @@ const MAX_CORRECTIONS: usize = 3;
 /// the many small weights of the vertices off the face are what holds the vertex away from it.
 const NOT_RESTORED: f64 = 1e-6;
 
+/// So does a row of which a weight would change by a factor outside this range,
+const FACTORS: RangeInclusive<f32> = 0.5..=2.0;
+
+/// or by more than this many times the threshold.
+const CHANGE: f32 = 5.0;
+
 /// How rows are made from sampled values.
 #[derive(Clone, Copy, Debug)]
 pub struct RowOptions {
-    /// Weights below are dropped; 0 keeps all that are not zero. What is dropped changes neither a row's sum nor where
-    /// it puts its vertex.
+    /// The smallest weights of a row are dropped as long as their sum is not above it; 0 keeps all that are not zero. What
+    /// is dropped changes neither a row's sum nor where it puts its vertex.
     pub threshold: f32,
     /// Restore sum and rest position of every row. Off for the classic method, which shows its errors.
     pub preserve_affine: bool,
@@ -193,16 +201,16 @@ fn runs_of<'a>(blocks: &'a mut [Vec<Row>], points: &'a [Vec3], length: usize) ->
 }
 
 impl Run<'_> {
-    /// Copies a vertex's sampled values, those that exceed the threshold. Returns the lowest of all.
+    /// Copies a vertex's sampled values, those that are positive and not below `least`. Returns the lowest of all.
     #[inline(always)]
-    fn load(&self, v: usize, threshold: f32, row: &mut [Row]) -> f32 {
+    fn load(&self, v: usize, least: f32, row: &mut [Row]) -> f32 {
         let mut lows = [f32::INFINITY; LANES];
         for (row, block) in row.iter_mut().zip(&self.blocks) {
             *row = block[v];
             // Solver and rounding leave some -1e-8: a harmonic coordinate is never negative.
             for (w, low) in row.iter_mut().zip(&mut lows) {
                 *low = if *w < *low { *w } else { *low };
-                *w = if *w > threshold { *w } else { 0.0 };
+                *w = if *w > 0.0 && *w >= least { *w } else { 0.0 };
             }
         }
         lows.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a })
@@ -270,7 +278,7 @@ impl Run<'_> {
         }
     }
 
-    /// Drops what is below the threshold and restores the row, or keeps all if that cannot be had. `row` holds the
+    /// Drops small weights and restores the row, or keeps all if that cannot be had. `row` holds the
     /// vertex's sampled values. Returns what the sampled row and this one add up to.
     #[inline(always)]
     fn restore_row(
@@ -285,14 +293,33 @@ impl Run<'_> {
             return restore(columns, row, goal);
         }
         let sampled = columns.sums(row, goal);
-        self.load(v, threshold, row);
+        self.load(v, least_kept(row, threshold), row);
         let (_, restored) = restore(columns, row, goal);
-        if restored.error() <= NOT_RESTORED {
+        let bounded = row.iter().zip(&self.blocks).all(|(row, block)| {
+            row.iter().zip(&block[v]).all(|(&w, &was)| {
+                w == 0.0 || (FACTORS.contains(&(w / was)) && (w - was).abs() <= CHANGE * threshold)
+            })
+        });
+        if bounded && restored.error() <= NOT_RESTORED {
             return (sampled, restored);
         }
         self.load(v, 0.0, row);
         restore(columns, row, goal)
     }
+}
+
+/// The smallest weight that is kept if the sum of those below may be `most`.
+fn least_kept(row: &[Row], most: f32) -> f32 {
+    let mut small: Vec<f32> = row.iter().flatten().copied().filter(|&w| w > 0.0 && w <= most).collect();
+    small.sort_unstable_by(f32::total_cmp);
+    let mut sum = 0.0;
+    small
+        .into_iter()
+        .find(|w| {
+            sum += w;
+            sum > most
+        })
+        .unwrap_or(most)
 }
 
 /// Corrects a row until it sums to 1 and puts its vertex at `goal`; returns its sums before (to f32) and after.

@@ -3,7 +3,7 @@
 //! Everything but the middle is the same for every back end: [`Prepared::new`], then whoever solves makes a
 //! [`Solved`], then [`Prepared::finish`].
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::assemble::{Assembled, RowOptions, assemble};
 use crate::cage::Cage;
@@ -191,6 +191,8 @@ impl<'a> Prepared<'a> {
 
         let solve_ms = (sampled - stencils_made) * solved.solve_share;
         let level = &voxels.hierarchy.levels[0];
+        let mut notices: Vec<String> = cage.notices().iter().map(ToString::to_string).collect();
+        notices.extend(team.notice(options.threads).into_iter().chain(voxels.notices));
         let narrow = |history: Vec<f64>| history.into_iter().map(|x| x as f32).collect();
         let report = BindReport {
             method: options.method,
@@ -209,6 +211,7 @@ impl<'a> Prepared<'a> {
             levels: voxels.hierarchy.levels.iter().map(|l| l.n_unknowns() as u64).collect(),
             iterations: solved.iterations,
             converged: solved.report.converged,
+            at_round_off: solved.report.at_round_off,
             delta_history: narrow(solved.report.deltas),
             delta_interval: solved.delta_interval,
             residual_history: narrow(solved.report.residuals),
@@ -226,12 +229,7 @@ impl<'a> Prepared<'a> {
             cage_vertices: controls.n_controls() as u64,
             outside_vertices: outside.len() as u64,
             ambiguous_cells: voxels.ambiguous,
-            notices: cage
-                .notices()
-                .iter()
-                .map(ToString::to_string)
-                .chain(team.notice(options.threads))
-                .collect(),
+            notices,
         };
         Ok(Binding { weights, outside, report })
     }
@@ -296,10 +294,11 @@ fn outside_vertices(
         .zip(&welded.unique_of)
         .filter_map(|(vertex, &unique)| {
             let o = found(unique)?;
-            let corners = cage.triangles()[o.triangle as usize];
+            let corners = cage.triangle_near(o.triangle);
             let rest = corners.map(|i| cage.positions()[i as usize]);
-            let closest: Vec3 = rest.iter().zip(o.barycentric).map(|(&c, b)| c * b as f32).sum();
-            let offset = positions[vertex as usize] - closest;
+            let facet = cage.facet_corners(o.triangle);
+            let closest: DVec3 = facet.iter().zip(o.barycentric).map(|(&c, b)| b * c).sum();
+            let offset = positions[vertex as usize] - closest.as_vec3();
             let offset = triangle_frame(rest).transpose() * offset;
             Some(OutsideVertex { vertex, corners, offset })
         })

@@ -13,6 +13,7 @@ use crate::sample::{Stencils, classic};
 use crate::solve::hierarchy::Hierarchy;
 use crate::voxelize::classic::{ClassicCells, place_grid};
 use crate::voxelize::embedded::Embedding;
+use crate::voxelize::lines::Overlaps;
 use crate::voxelize::published::PublishedCells;
 use crate::voxelize::{CellKind, voxelize_classic};
 
@@ -23,6 +24,10 @@ pub(super) struct Voxels {
     pub(super) counts: CellCounts,
     /// Cells about which the axes disagreed.
     pub(super) ambiguous: u64,
+    /// What a user should know about the cage in this grid.
+    pub(super) notices: Vec<String>,
+    /// Where parts of the cage overlap.
+    overlaps: Overlaps,
     /// Bytes held at most.
     pub(super) bytes: usize,
     classic: Option<ClassicCells>,
@@ -73,7 +78,15 @@ impl Voxels {
         let bytes = hierarchy.bytes()
             + size_of_val(cells.kinds.as_slice())
             + 4 * (values.cells.len() + values.indptr.len() + 2 * values.values.len());
-        Self { hierarchy, counts, ambiguous: 0, bytes, classic: Some(cells) }
+        Self {
+            hierarchy,
+            counts,
+            ambiguous: 0,
+            notices: Vec::new(),
+            overlaps: Overlaps::default(),
+            bytes,
+            classic: Some(cells),
+        }
     }
 
     fn embedded(controls: Controls<'_>, grid: Grid, options: &BindOptions) -> Self {
@@ -87,14 +100,22 @@ impl Voxels {
             exterior: grid.n_cells() as u64 - unknowns,
         };
         let bytes = embedding.bytes() + hierarchy.bytes();
-        Self { hierarchy, counts, ambiguous: embedding.ambiguous, bytes, classic: None }
+        Self {
+            hierarchy,
+            counts,
+            ambiguous: embedding.ambiguous,
+            notices: embedding.notices(controls.surface(), options.grid),
+            overlaps: embedding.overlaps(),
+            bytes,
+            classic: None,
+        }
     }
 
     pub(super) fn sampler<'a>(&'a self, controls: Controls<'a>) -> AnySampler<'a> {
         let level = &self.hierarchy.levels[0];
         match &self.classic {
             Some(cells) => AnySampler::Classic(controls, cells, level),
-            None => AnySampler::Embedded(Sampler::new(controls, level)),
+            None => AnySampler::Embedded(Sampler::new(controls, level, &self.overlaps)),
         }
     }
 }

@@ -7,9 +7,12 @@ use super::polygon::{FLAT_HEIGHT, Polygon};
 use super::topology::Surface;
 use crate::geometry::winding_number;
 
-/// Points of a component that are tested for lying inside another one. Odd, so that there is a majority; more than
-/// one, because a point may lie on the other component where they touch.
-const NESTING_SAMPLES: usize = 7;
+/// Points of a component that are tested for lying inside another one. Odd, so that there is a majority; many, because a
+/// point may lie on the other component where they touch, and because components may overlap.
+const NESTING_SAMPLES: usize = 31;
+
+/// A winding number below this is that of a point outside, not on the surface.
+const CLEARLY_OUTSIDE: f64 = 0.25;
 
 /// Turns the faces of every component away from the solid (outward, or into a cavity) and measures all faces.
 /// `diagonal` of the cage's bounding box.
@@ -89,17 +92,19 @@ impl Solid {
         Self { triangles, min, max, volume, area }
     }
 
-    /// Whether this component lies inside `other`; they are taken not to intersect.
+    /// Whether this component lies inside `other`; not if they overlap.
     fn is_inside(&self, other: &Self) -> bool {
         if self.min.cmplt(other.min).any() || self.max.cmpgt(other.max).any() {
             return false;
         }
         let n = self.triangles.len();
         let samples = NESTING_SAMPLES.min(if n.is_multiple_of(2) { n - 1 } else { n });
-        let inside = (0..samples).filter(|k| {
+        let windings = (0..samples).map(|k| {
             let [a, b, c] = self.triangles[k * n / samples];
-            winding_number((a + b + c) / 3.0, other.triangles.iter().copied()).abs() > 0.5
+            winding_number((a + b + c) / 3.0, other.triangles.iter().copied()).abs()
         });
-        2 * inside.count() > samples
+        let windings: Vec<f64> = windings.collect();
+        let inside = windings.iter().filter(|w| **w > 0.5).count();
+        2 * inside > samples && windings.iter().all(|w| *w > CLEARLY_OUTSIDE)
     }
 }

@@ -3,6 +3,8 @@
 use glam::{DVec2, DVec3};
 
 use super::defects::FaceDefect;
+use super::hats;
+use super::patch::{self, Facets};
 use super::pieces::{Pieces, convex_pieces};
 use super::triangulate::{cross, ear_clip};
 
@@ -38,14 +40,19 @@ pub(super) enum Hats {
 /// A face in its plane.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Polygon {
-    /// Corners in the plane, counter-clockwise seen from outside; empty if hats are linear everywhere.
+    /// Corners in the plane, counter-clockwise seen from outside, then the patch's inner points; empty if hats are linear
+    /// everywhere.
     pub(super) outline: Vec<DVec2>,
     /// What carries hats of its own; empty if hats are linear everywhere.
     pub(super) pieces: Vec<Piece>,
     /// Triangles that cover the face, as corners of it, turned like it.
     pub(super) triangles: Vec<[u32; 3]>,
-    /// The piece that each triangle lies in; empty if hats are linear everywhere.
-    pub(super) piece_of_triangle: Vec<u32>,
+    /// The surface on which hats are prescribed: the triangles, or those of a patch, as corners and inner points.
+    pub(super) facets: Vec<[u32; 3]>,
+    /// The piece that each facet lies in; empty if hats are linear everywhere.
+    pub(super) piece_of_facet: Vec<u32>,
+    /// The hats of the patch's inner points. `[n_inner][n_corners]`
+    pub(super) inner: Vec<Vec<f64>>,
 }
 
 /// A convex part of a face.
@@ -67,6 +74,16 @@ impl Piece {
             _ => Hats::MeanValue,
         };
         Self { hats, corners, outline }
+    }
+
+    /// Values of its corners' hats at a point. `both`: scratch space, `[2][n_corners]`; returns its first half.
+    pub(super) fn values<'a>(&self, point: DVec2, both: &'a mut [f64]) -> &'a [f64] {
+        let (values, areas) = both.split_at_mut(self.corners.len());
+        match self.hats {
+            Hats::Convex => hats::wachspress(&self.outline, point, values, areas),
+            Hats::Linear | Hats::MeanValue => hats::mean_value(&self.outline, point, values),
+        }
+        values
     }
 }
 
@@ -92,7 +109,12 @@ impl Polygon {
         let outline = project(&arms, normal);
         let height = arms.iter().map(|p| p.dot(normal).abs()).fold(0.0, f64::max);
         if height > PLANAR * diagonal {
-            return Ok(Self::linear(if n == 4 { split_quad(&arms, normal) } else { ear_clip(&outline)? }));
+            let triangles = if n == 4 { split_quad(&arms, normal) } else { ear_clip(&outline)? };
+            return Ok(if is_convex(&outline) {
+                Self::patch(outline, triangles)
+            } else {
+                Self::linear(triangles)
+            });
         }
         let Pieces { corners, triangles, piece_of_triangle } = if is_convex(&outline) {
             Pieces {
@@ -106,11 +128,30 @@ impl Polygon {
             convex_pieces(&outline)?
         };
         let pieces = corners.into_iter().map(|corners| Piece::new(&outline, corners)).collect();
-        Ok(Self { outline, pieces, triangles, piece_of_triangle })
+        let facets = triangles.clone();
+        Ok(Self { outline, pieces, triangles, facets, piece_of_facet: piece_of_triangle, inner: Vec::new() })
     }
 
     fn linear(triangles: Vec<[u32; 3]>) -> Self {
-        Self { outline: Vec::new(), pieces: Vec::new(), triangles, piece_of_triangle: Vec::new() }
+        Self {
+            outline: Vec::new(),
+            pieces: Vec::new(),
+            facets: triangles.clone(),
+            triangles,
+            piece_of_facet: Vec::new(),
+            inner: Vec::new(),
+        }
+    }
+
+    /// A bent face whose outline, seen along its normal, is convex.
+    fn patch(mut outline: Vec<DVec2>, triangles: Vec<[u32; 3]>) -> Self {
+        let Facets { inner: points, facets } = patch::facets(&outline);
+        let piece = Piece::new(&outline, (0..outline.len() as u32).collect());
+        let mut both = vec![0.0; 2 * outline.len()];
+        let inner = points.iter().map(|&p| piece.values(p, &mut both).to_vec()).collect();
+        outline.extend(points);
+        let piece_of_facet = vec![0; facets.len()];
+        Self { outline, pieces: vec![piece], triangles, facets, piece_of_facet, inner }
     }
 }
 

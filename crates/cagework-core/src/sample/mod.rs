@@ -4,27 +4,24 @@
 //! it is computed once per bind and applied to every batch of columns.
 
 pub mod classic;
+mod edges;
 pub mod embedded;
 pub mod triangles;
 
 use glam::DVec3;
 
-use crate::cage::Cage;
+use crate::cage::{Cage, ON_CAGE};
 use crate::controls::Controls;
 use crate::geometry::closest_point_on_triangle;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
-
-/// A point this close to the cage (over the cage's diagonal) is on it, whatever side rounding put it on: the
-/// resolution of f32 coordinates.
-const ON_CAGE: f64 = 1e-6;
 
 /// A vertex outside the cage and the point of the cage closest to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outside {
     /// Vertex.
     pub vertex: u32,
-    /// Cage triangle with the closest point.
+    /// Facet of the cage with the closest point.
     pub triangle: u32,
     /// The closest point in it.
     pub barycentric: [f64; 3],
@@ -36,8 +33,8 @@ pub struct Outside {
 #[must_use]
 pub fn closest_on_cage(cage: &Cage, point: DVec3) -> Outside {
     let mut best = Outside { vertex: 0, triangle: 0, barycentric: [1.0, 0.0, 0.0], distance: f64::INFINITY };
-    for triangle in 0..cage.triangles().len() as u32 {
-        let closest = closest_point_on_triangle(point, cage.triangle_corners(triangle));
+    for triangle in 0..cage.facets().len() as u32 {
+        let closest = closest_point_on_triangle(point, cage.facet_corners(triangle));
         let distance = closest.point.distance(point);
         if distance < best.distance {
             best = Outside { vertex: 0, triangle, barycentric: closest.barycentric, distance };

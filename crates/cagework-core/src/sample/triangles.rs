@@ -11,7 +11,7 @@ const BLOCK: u32 = 8;
 /// Slack of the overlap tests, in cells, against rounding of the transformed corners (values up to 512 in f64).
 const SLACK: f64 = 1e-9;
 
-/// A cage triangle in cell coordinates.
+/// A facet of the cage in cell coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct CellTriangle {
     /// Corners.
@@ -21,22 +21,94 @@ pub struct CellTriangle {
     normal: DVec3,
 }
 
-/// Triangles of the cage, listed by blocks of cells.
+/// Which of some boxes meet each block of cells.
 #[derive(Clone, Debug)]
-pub struct TriangleLists {
-    triangles: Vec<CellTriangle>,
+pub struct Blocks {
     n_blocks: [u32; 3],
     start: Vec<u32>,
     list: Vec<u32>,
 }
 
+impl Blocks {
+    /// Lists boxes (low and high corner, in cells) by block.
+    pub fn new(grid: &Grid, boxes: impl Iterator<Item = (DVec3, DVec3)> + Clone) -> Self {
+        let n_blocks = grid.dims.map(|d| d.div_ceil(BLOCK));
+        let mut blocks = Self { n_blocks, start: Vec::new(), list: Vec::new() };
+        let n: usize = n_blocks.iter().map(|&n| n as usize).product();
+        let mut counts = vec![0u32; n + 1];
+        blocks.each(boxes.clone(), |block, _| counts[block + 1] += 1);
+        for b in 0..n {
+            counts[b + 1] += counts[b];
+        }
+        let mut next = counts.clone();
+        let mut list = vec![0; counts[n] as usize];
+        blocks.each(boxes, |block, number| {
+            list[next[block] as usize] = number;
+            next[block] += 1;
+        });
+        (blocks.start, blocks.list) = (counts, list);
+        blocks
+    }
+
+    fn each(&self, boxes: impl Iterator<Item = (DVec3, DVec3)>, mut each: impl FnMut(usize, u32)) {
+        for (number, (low, high)) in boxes.enumerate() {
+            let block = |x: f64, axis: usize| {
+                ((x / f64::from(BLOCK)).floor().max(0.0) as u32).min(self.n_blocks[axis] - 1)
+            };
+            for z in block(low.z, 2)..=block(high.z, 2) {
+                for y in block(low.y, 1)..=block(high.y, 1) {
+                    for x in block(low.x, 0)..=block(high.x, 0) {
+                        each(self.index([x, y, z]), number as u32);
+                    }
+                }
+            }
+        }
+    }
+
+    fn index(&self, [x, y, z]: [u32; 3]) -> usize {
+        ((z * self.n_blocks[1] + y) * self.n_blocks[0] + x) as usize
+    }
+
+    /// Boxes that may meet the cube between centre `low` and centre `low + 1` (along every axis), some several times.
+    #[inline]
+    pub fn near(&self, low: [u32; 3], mut found: impl FnMut(u32)) {
+        // A cube may reach over a block's upper border by one cell centre: the block of its low corner and of its
+        // high corner may differ, but every box that meets the cube is listed in one of those blocks.
+        let first = low.map(|x| x / BLOCK);
+        let last = low.map(|x| (x + 1) / BLOCK);
+        for z in first[2]..=last[2].min(self.n_blocks[2] - 1) {
+            for y in first[1]..=last[1].min(self.n_blocks[1] - 1) {
+                for x in first[0]..=last[0].min(self.n_blocks[0] - 1) {
+                    let block = self.index([x, y, z]);
+                    for &number in &self.list[self.start[block] as usize..self.start[block + 1] as usize] {
+                        found(number);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Bytes held.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.start.as_slice()) + size_of_val(self.list.as_slice())
+    }
+}
+
+/// Facets of the cage, listed by blocks of cells.
+#[derive(Clone, Debug)]
+pub struct TriangleLists {
+    triangles: Vec<CellTriangle>,
+    blocks: Blocks,
+}
+
 impl TriangleLists {
-    /// Lists the cage's triangles by block.
+    /// Lists the cage's facets by block.
     #[must_use]
     pub fn new(cage: &Cage, grid: &Grid) -> Self {
-        let points: Vec<DVec3> = cage.positions().iter().map(|p| grid.to_grid(p.as_dvec3())).collect();
+        let points: Vec<DVec3> = cage.facet_points().iter().map(|&p| grid.to_grid(p)).collect();
         let triangles: Vec<CellTriangle> = cage
-            .triangles()
+            .facets()
             .iter()
             .map(|t| {
                 let corners = t.map(|i| points[i as usize]);
@@ -49,42 +121,8 @@ impl TriangleLists {
                 }
             })
             .collect();
-        let n_blocks = grid.dims.map(|d| d.div_ceil(BLOCK));
-        let mut lists = Self { triangles, n_blocks, start: Vec::new(), list: Vec::new() };
-        let n: usize = n_blocks.iter().map(|&n| n as usize).product();
-        let mut counts = vec![0u32; n + 1];
-        lists.each_block(|block, _| counts[block + 1] += 1);
-        for b in 0..n {
-            counts[b + 1] += counts[b];
-        }
-        let mut next = counts.clone();
-        let mut list = vec![0; counts[n] as usize];
-        lists.each_block(|block, triangle| {
-            list[next[block] as usize] = triangle;
-            next[block] += 1;
-        });
-        (lists.start, lists.list) = (counts, list);
-        lists
-    }
-
-    fn each_block(&self, mut each: impl FnMut(usize, u32)) {
-        for (number, triangle) in self.triangles.iter().enumerate() {
-            let block = |x: f64, axis: usize| {
-                ((x / f64::from(BLOCK)).floor().max(0.0) as u32).min(self.n_blocks[axis] - 1)
-            };
-            let (low, high) = (triangle.low, triangle.high);
-            for z in block(low.z, 2)..=block(high.z, 2) {
-                for y in block(low.y, 1)..=block(high.y, 1) {
-                    for x in block(low.x, 0)..=block(high.x, 0) {
-                        each(self.block_index([x, y, z]), number as u32);
-                    }
-                }
-            }
-        }
-    }
-
-    fn block_index(&self, [x, y, z]: [u32; 3]) -> usize {
-        ((z * self.n_blocks[1] + y) * self.n_blocks[0] + x) as usize
+        let blocks = Blocks::new(grid, triangles.iter().map(|t| (t.low, t.high)));
+        Self { triangles, blocks }
     }
 
     /// Triangles that may meet the cube between centre `low` and centre `low + 1` (along every axis).
@@ -93,28 +131,23 @@ impl TriangleLists {
         let cube_low = DVec3::from_array(low.map(f64::from));
         let cube_high = cube_low + 1.0;
         let middle = cube_low + 0.5;
-        // A cube may reach over a block's upper border by one cell centre: the block of its low corner and of its
-        // high corner may differ, but every triangle that meets the cube is listed in one of those blocks.
-        let first = low.map(|x| x / BLOCK);
-        let last = low.map(|x| (x + 1) / BLOCK);
-        for z in first[2]..=last[2].min(self.n_blocks[2] - 1) {
-            for y in first[1]..=last[1].min(self.n_blocks[1] - 1) {
-                for x in first[0]..=last[0].min(self.n_blocks[0] - 1) {
-                    let block = self.block_index([x, y, z]);
-                    for &number in &self.list[self.start[block] as usize..self.start[block + 1] as usize] {
-                        let t = &self.triangles[number as usize];
-                        if t.low.cmple(cube_high).all()
-                            && t.high.cmpge(cube_low).all()
-                            && (middle - t.corners[0]).dot(t.normal).abs()
-                                <= 0.5 * t.normal.abs().element_sum() * (1.0 + SLACK) + SLACK
-                            && !found.contains(&number)
-                        {
-                            found.push(number);
-                        }
-                    }
-                }
+        self.blocks.near(low, |number| {
+            let t = &self.triangles[number as usize];
+            if t.low.cmple(cube_high).all()
+                && t.high.cmpge(cube_low).all()
+                && (middle - t.corners[0]).dot(t.normal).abs()
+                    <= 0.5 * t.normal.abs().element_sum() * (1.0 + SLACK) + SLACK
+                && !found.contains(&number)
+            {
+                found.push(number);
             }
-        }
+        });
+    }
+
+    /// All of them.
+    #[must_use]
+    pub fn all(&self) -> &[CellTriangle] {
+        &self.triangles
     }
 
     /// One triangle.
@@ -126,9 +159,7 @@ impl TriangleLists {
     /// Bytes held.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        size_of_val(self.triangles.as_slice())
-            + size_of_val(self.start.as_slice())
-            + size_of_val(self.list.as_slice())
+        size_of_val(self.triangles.as_slice()) + self.blocks.bytes()
     }
 }
 
@@ -144,6 +175,12 @@ pub struct Crossing {
 }
 
 impl CellTriangle {
+    /// Unit normal, facing out of the cage.
+    #[must_use]
+    pub fn unit_normal(&self) -> DVec3 {
+        self.normal.normalize_or_zero()
+    }
+
     /// Whether a point lies within `reach` cells of the triangle's plane.
     #[inline]
     #[must_use]

@@ -55,6 +55,9 @@ pub fn field_bytes(n_unknowns: u64, n_cut: u64, n_columns: u64, threads: u64) ->
         + threads * MAX_ROUND as u64 * 4 * (n_unknowns + 2)
 }
 
+/// So many sweeps without a smaller delta only move rounding about.
+pub const STALLED_SWEEPS: usize = 128;
+
 /// Solves all columns on the finest level. Returns the batches' fields in order.
 ///
 /// `sweep_done(sweeps, delta)` is called after each round and cancels by returning false.
@@ -81,6 +84,7 @@ pub fn solve(
             let had_converged = report.converged;
             is_done |= report.iteration_done(&rule, *delta, None);
             report.converged |= had_converged;
+            is_done = is_done || report.ends_at_round_off(STALLED_SWEEPS);
         }
         let (sweeps, delta) = report.latest();
         if !sweep_done(sweeps, delta) {

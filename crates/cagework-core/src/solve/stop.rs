@@ -27,9 +27,15 @@ pub struct SolveReport {
     pub deltas: Vec<f64>,
     /// Root mean square residual before each iteration; empty for Jacobi.
     pub residuals: Vec<f64>,
-    /// Whether delta met the tolerance.
+    /// Whether delta met the tolerance, or f32 has no more digits to give.
     pub converged: bool,
+    /// Whether it was f32 that ended it, above the tolerance.
+    pub at_round_off: bool,
 }
+
+/// Below this delta f32 may have no more digits to give: what is left of changes is rounding (3e-8 to 1e-7 on a C-shaped
+/// cage, g = 16 to 40).
+pub const ROUND_OFF: f64 = 1e-6;
 
 impl SolveReport {
     /// Takes down an iteration. Returns whether it was the last.
@@ -38,6 +44,17 @@ impl SolveReport {
         self.residuals.extend(residual);
         self.converged = delta <= rule.tolerance;
         self.converged || self.deltas.len() >= rule.max_iterations as usize
+    }
+
+    /// Ends the solve as converged if none of the latest `n` deltas is below all before, near [`ROUND_OFF`]. Returns whether
+    /// it did.
+    pub fn ends_at_round_off(&mut self, n: usize) -> bool {
+        let (before, latest) = self.deltas.split_at(self.deltas.len().saturating_sub(n));
+        let least = |deltas: &[f64]| deltas.iter().copied().fold(f64::INFINITY, f64::min);
+        let best = least(before);
+        self.at_round_off = !self.converged && best < ROUND_OFF && least(latest) >= best;
+        self.converged |= self.at_round_off;
+        self.at_round_off
     }
 
     /// Number and delta of the latest iteration.
@@ -61,6 +78,7 @@ impl SolveReport {
             deltas: history(|r| &r.deltas),
             residuals: history(|r| &r.residuals),
             converged: batches.iter().all(|r| r.converged),
+            at_round_off: batches.iter().any(|r| r.at_round_off),
         }
     }
 }
@@ -89,6 +107,7 @@ mod tests {
             deltas: deltas.to_vec(),
             residuals: deltas.to_vec(),
             converged: true,
+            ..SolveReport::default()
         };
         let all = SolveReport::together(&[batch(&[30.0, 3.0]), batch(&[40.0, 8.0, 4.0])]);
         assert_eq!(all.deltas, [50.0, 73f64.sqrt(), 5.0]);

@@ -147,8 +147,8 @@ fn cell_range(low: f64, high: f64, n: u32) -> std::ops::RangeInclusive<u32> {
 /// For each slice of constant z, the triangles that may meet it, ascending. `[nz]`
 fn triangles_of_slices(cage: &Cage, dims: UVec3, origin: DVec3, cell_size: DVec3) -> Vec<Vec<u32>> {
     let mut slices = vec![Vec::new(); dims.z as usize];
-    for t in 0..cage.triangles().len() as u32 {
-        let [a, b, c] = cage.triangle_corners(t).map(|p| (p.z - origin.z) / cell_size.z + 0.5);
+    for t in 0..cage.facets().len() as u32 {
+        let [a, b, c] = cage.facet_corners(t).map(|p| (p.z - origin.z) / cell_size.z + 0.5);
         for z in cell_range(a.min(b).min(c), a.max(b).max(c), dims.z) {
             slices[z as usize].push(t);
         }
@@ -176,7 +176,7 @@ fn mark_slice(
     let half = 0.5 * cell_size;
     let (mut in_slice, mut in_row, mut scratch) = (Vec::new(), Vec::new(), Vec::new());
     for &t in triangles {
-        let triangle = cage.triangle_corners(t);
+        let triangle = cage.facet_corners(t);
         // In cells from the grid's corner: a cell is [x, x + 1].
         let in_cells = triangle.map(|p| (p - origin) / cell_size + DVec3::splat(0.5));
         in_slice.clear();

@@ -14,7 +14,8 @@ use crate::controls::Controls;
 use crate::grid::Grid;
 use crate::levels::{Boundary, coarsened_until_few};
 
-use super::lines::{Hit, Lines};
+use super::lines::{Hit, Lines, Overlaps};
+use super::resolution;
 
 /// Shortest arm, in cells: a centre this close to the cage has the cage's value to within the solver's accuracy, and
 /// a shorter arm would only cost f32 digits (1e-3 measured on the Armadillo and the horse).
@@ -60,6 +61,20 @@ impl Embedding {
     #[must_use]
     pub fn boundaries<'a>(&'a self, controls: Controls<'a>) -> Vec<EmbeddedCells<'a>> {
         self.levels.iter().map(|cells| cells.with(controls, &self.lines)).collect()
+    }
+
+    /// What a user should know about the cage in this grid. `cells`: along the cage's longest side.
+    #[must_use]
+    pub fn notices(&self, cage: &Cage, cells: u32) -> Vec<String> {
+        let grid = &self.levels[0].grid;
+        let unresolved = resolution::notice(cage, grid, &self.lines, cells);
+        self.overlaps().notice().into_iter().chain(unresolved).collect()
+    }
+
+    /// Where parts of the cage overlap: only the walls of their union count.
+    #[must_use]
+    pub fn overlaps(&self) -> Overlaps {
+        Overlaps::of(&self.lines)
     }
 
     /// Bytes held.

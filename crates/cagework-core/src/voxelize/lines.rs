@@ -4,12 +4,16 @@
 //! the same numbers in the same order for both triangles that share it. A line exactly through an edge or a vertex
 //! counts as one a little beside it, the same way for all edges (simulation of simplicity: Edelsbrunner, Muecke 1990),
 //! so that it crosses there exactly once or, at a silhouette, an even number of times.
+//!
+//! The cage's inside is where its winding number is above zero: of parts that overlap only the walls of their union are
+//! kept, as in Jacobson et al. 2013. Where two parts share a face, a line leaves the one before it enters the other.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::cage::Cage;
+use crate::cage::{Cage, ON_CAGE};
 use crate::grid::Grid;
 
 /// One crossing of a grid line and the cage.
@@ -17,10 +21,12 @@ use crate::grid::Grid;
 pub struct Hit {
     /// Position along the line, in cells: cell centres are whole numbers.
     pub t: f64,
-    /// Cage triangle.
+    /// Facet of the cage.
     pub triangle: u32,
     /// Barycentric coordinates of the first two corners.
     pub barycentric: [f64; 2],
+    /// Whether the triangle faces up the axis: a line going up leaves the cage there.
+    pub faces_up: bool,
 }
 
 /// All grid lines along one axis; the hits of a line ascend. Lines are numbered `u + n_u * v`, where u and v are the
@@ -31,6 +37,64 @@ pub struct Lines {
     n_u: u32,
     start: Vec<u32>,
     hits: Vec<Hit>,
+    overlaps: Overlaps,
+    /// Faces that lines meet. `[n_faces]`
+    met: Vec<bool>,
+}
+
+/// Where the cage encloses a place more than once, as far as lines notice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Overlaps {
+    /// Pairs of parts (numbers of components), the same one twice if it goes through itself.
+    pub parts: BTreeSet<[u32; 2]>,
+    /// The box around all walls that lie inside, in cells.
+    pub low: DVec3,
+    /// Its other corner.
+    pub high: DVec3,
+}
+
+impl Default for Overlaps {
+    fn default() -> Self {
+        Self { parts: BTreeSet::new(), low: DVec3::INFINITY, high: DVec3::NEG_INFINITY }
+    }
+}
+
+impl Overlaps {
+    /// What a user should know about them, if anything.
+    #[must_use]
+    pub fn notice(&self) -> Option<String> {
+        let &[a, b] = self.parts.first()?;
+        let more = match self.parts.len() - 1 {
+            0 => String::new(),
+            n => format!(" (and {n} more such pairs)"),
+        };
+        Some(if a == b {
+            format!(
+                "Component {a} of the cage goes through itself{more}: what it encloses twice counts as inside."
+            )
+        } else {
+            format!(
+                "Components {a} and {b} of the cage overlap{more}: they are bound as one, without walls inside."
+            )
+        })
+    }
+
+    /// Adds a wall that lies inside, and the parts that overlap there.
+    fn add(&mut self, parts: Option<[u32; 2]>, wall: DVec3) {
+        (self.low, self.high) = (self.low.min(wall), self.high.max(wall));
+        self.parts.extend(parts.map(|[a, b]| [a.min(b), a.max(b)]));
+    }
+
+    /// Those of all three axes.
+    #[must_use]
+    pub fn of(lines: &[Lines; 3]) -> Self {
+        let mut all = Self::default();
+        for overlaps in lines.iter().map(|lines| &lines.overlaps) {
+            all.parts.extend(&overlaps.parts);
+            (all.low, all.high) = (all.low.min(overlaps.low), all.high.max(overlaps.high));
+        }
+        all
+    }
 }
 
 impl Lines {
@@ -41,8 +105,8 @@ impl Lines {
         let n_u = grid.dims[u];
         let n_lines = n_u as usize * grid.dims[v] as usize;
         let mut found: Vec<(u32, Hit)> = Vec::new();
-        let points: Vec<DVec3> = cage.positions().iter().map(|p| grid.to_grid(p.as_dvec3())).collect();
-        for (triangle, corners) in (0u32..).zip(cage.triangles()) {
+        let points: Vec<DVec3> = cage.facet_points().iter().map(|&p| grid.to_grid(p)).collect();
+        for (triangle, corners) in (0u32..).zip(cage.facets()) {
             cover(&points, *corners, grid, axis, |u, v, hit| {
                 found.push((u + n_u * v, Hit { triangle, ..hit }));
             });
@@ -56,7 +120,7 @@ impl Lines {
             start[line + 1] += start[line];
         }
         let mut next = start.clone();
-        let mut hits = vec![Hit { t: 0.0, triangle: 0, barycentric: [0.0; 2] }; found.len()];
+        let mut hits = vec![Hit { t: 0.0, triangle: 0, barycentric: [0.0; 2], faces_up: false }; found.len()];
         for (line, hit) in found {
             let (first, end) = (start[line as usize] as usize, next[line as usize] as usize);
             let before = hits[first..end].partition_point(|h| h.t.total_cmp(&hit.t).is_le());
@@ -64,7 +128,70 @@ impl Lines {
             hits[first + before] = hit;
             next[line as usize] += 1;
         }
-        Self { axis, n_u, start, hits }
+        let mut met = vec![false; cage.faces().len()];
+        hits.iter().for_each(|hit| met[cage.face_of_facet()[hit.triangle as usize] as usize] = true);
+        let mut lines = Self { axis, n_u, start, hits, overlaps: Overlaps::default(), met };
+        lines.keep_walls(cage, ON_CAGE * f64::from(cage.diagonal()) / grid.cell[axis]);
+        lines
+    }
+
+    /// Keeps the hits in which a line enters or leaves the cage. Hits not further apart than `same` (cells) are in one
+    /// place: inside the cage a line leaves a part there before it enters another.
+    fn keep_walls(&mut self, cage: &Cage, same: f64) {
+        let part = |hit: &Hit| cage.component_of_face()[cage.face_of_facet()[hit.triangle as usize] as usize];
+        let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
+        let (mut kept, mut open) = (0, Vec::new());
+        for line in 0..self.start.len() - 1 {
+            let range = self.range(line);
+            self.start[line] = kept as u32;
+            // How many times the line is inside, and of which parts.
+            let mut depth = 0;
+            open.clear();
+            let mut first = range.start;
+            while first < range.end {
+                let place = self.hits[first].t;
+                let n = self.hits[first..range.end].partition_point(|hit| hit.t - place <= same);
+                if n > 1 {
+                    let leaves_first = depth > 0;
+                    self.hits[first..first + n].sort_by_key(|hit| hit.faces_up != leaves_first);
+                    self.hits[first..first + n].iter_mut().for_each(|hit| hit.t = place);
+                }
+                for k in first..first + n {
+                    let hit = self.hits[k];
+                    let before = depth;
+                    depth += if hit.faces_up { -1 } else { 1 };
+                    if (before > 0) != (depth > 0) {
+                        self.hits[kept] = hit;
+                        kept += 1;
+                    } else if depth > 0 {
+                        let mut wall = DVec3::splat(hit.t);
+                        wall[u] = f64::from(line as u32 % self.n_u);
+                        wall[v] = f64::from(line as u32 / self.n_u);
+                        let part = part(&hit);
+                        let other = open.iter().find(|&&open| open != part).unwrap_or(&part);
+                        self.overlaps.add((depth > before).then_some([*other, part]), wall);
+                    }
+                    if depth <= 0 {
+                        open.clear();
+                    } else if depth > before {
+                        open.push(part(&hit));
+                    } else if let Some(k) = open.iter().rposition(|&open| open == part(&hit)) {
+                        open.remove(k);
+                    }
+                }
+                first += n;
+            }
+        }
+        if let Some(end) = self.start.last_mut() {
+            *end = kept as u32;
+        }
+        self.hits.truncate(kept);
+    }
+
+    /// Whether a line meets a face of the cage, be it inside another part.
+    #[must_use]
+    pub fn meets_face(&self, face: usize) -> bool {
+        self.met[face]
     }
 
     /// Where a line's hits are.
@@ -128,7 +255,7 @@ fn cover(
             }
             let w = [e0, e1, e2].map(|e| (e / area).clamp(0.0, 1.0));
             let t = w[0] * p[0][axis] + w[1] * p[1][axis] + w[2] * p[2][axis];
-            let hit = Hit { t, triangle: 0, barycentric: [w[0], w[1]] };
+            let hit = Hit { t, triangle: 0, barycentric: [w[0], w[1]], faces_up: area > 0.0 };
             found(iu as u32, iv as u32, hit);
         }
     }

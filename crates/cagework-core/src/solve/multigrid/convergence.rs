@@ -1,18 +1,15 @@
 //! What a V-cycle is expected to leave of the error, the same on every back end.
 
-use crate::solve::stop::{SolveReport, StopRule};
+use crate::solve::stop::{ROUND_OFF, SolveReport, StopRule};
 
 /// What a V-cycle leaves of the error, at worst: 0.03 to 0.10 measured, on the Armadillo and on boxes.
 const CONTRACTION: f64 = 0.12;
 
-/// Below this correction, cycles that no longer make it [`STALLED`] times smaller only move rounding about: f32 has no more
-/// digits to give (3e-8 to 1e-7 on a C-shaped cage, g = 16 to 40), and a tau that asks for them is never met.
-const ROUND_OFF: f64 = 1e-6;
-
-/// See [`ROUND_OFF`].
+/// Below [`ROUND_OFF`], cycles that no longer make the correction this many times smaller only move rounding about, and a
+/// tau that asks for more is never met.
 const STALLED: f64 = 0.5;
 
-/// See [`ROUND_OFF`]: one such cycle may be chance.
+/// See [`STALLED`]: one such cycle may be chance.
 const MAX_STALLED: u32 = 2;
 
 /// A batch's way to convergence.
@@ -48,7 +45,10 @@ impl Convergence {
         // The first one has none before it.
         self.ratio = if ratio > 0.0 { ratio } else { self.ratio };
         self.correction = correction;
-        done || self.stalled == MAX_STALLED
+        if !done && self.stalled == MAX_STALLED {
+            (self.report.converged, self.report.at_round_off) = (true, true);
+        }
+        done || self.report.at_round_off
     }
 
     /// Whether the next cycle is expected to meet the tolerance with this factor to spare.
@@ -79,6 +79,7 @@ mod tests {
         let mut convergence = Convergence::new(StopRule { tolerance: 0.0, max_iterations: 99 });
         let last = (1..99).find(|_| convergence.cycle_done(1e-7_f64.powi(2), 0.0));
         assert_eq!(last, Some(3));
-        assert!(!convergence.into_report().converged);
+        let report = convergence.into_report();
+        assert!(report.converged && report.at_round_off);
     }
 }

@@ -40,7 +40,7 @@ fn assert_sound(cage: &Cage, cells: &ClassicCells, pockets: bool) {
     }
     for (cell, kind) in cells.kinds.iter().enumerate() {
         let inside = || {
-            let triangles = (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
+            let triangles = (0..cage.facets().len() as u32).map(|t| cage.facet_corners(t));
             winding_number(center(cells, cell), triangles) > 0.5
         };
         match kind {
@@ -113,8 +113,8 @@ fn boundary_values_are_those_of_the_closest_triangle_in_the_cell() {
         for cell in 0..cells.kinds.len() {
             let center = center(&cells, cell);
             let mut closest: Option<(f64, u32, [f64; 3])> = None;
-            for t in 0..cage.triangles().len() as u32 {
-                let triangle = cage.triangle_corners(t);
+            for t in 0..cage.facets().len() as u32 {
+                let triangle = cage.facet_corners(t);
                 if triangle_box_overlaps(center, 0.5 * cells.cell_size, triangle) {
                     let found = closest_point_on_triangle(center, triangle);
                     let distance_squared = found.point.distance_squared(center);

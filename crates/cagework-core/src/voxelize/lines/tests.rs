@@ -25,7 +25,7 @@ fn assert_watertight(cage: &Cage, grid: &Grid, every: usize) {
     }
     let votes = votes(&lines, grid);
     assert!(votes.iter().all(|votes| [0, 3].contains(votes)), "the axes agree");
-    let triangles = || (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
+    let triangles = || (0..cage.facets().len() as u32).map(|t| cage.facet_corners(t));
     for cell in grid.cells().step_by(every) {
         let winding = winding_number(grid.center(cell), triangles());
         // In between on the surface itself, where either is right.
