@@ -6,7 +6,7 @@
 //! convex combination along a straight segment inside the cage: the result is non-negative, sums to 1 and reproduces
 //! linear functions exactly, never reaches a centre behind a wall, and works where no centre is inside at all. In a
 //! cube that the cage does not meet it is trilinear interpolation. The three cyclic orders of the axes are averaged.
-//! Next to re-entrant edges rays are split, see [`super::edges`].
+//! Next to re-entrant edges rays are split, see `edges.rs`.
 
 use glam::DVec3;
 
