@@ -14,8 +14,12 @@ use crate::grid::Grid;
 /// Distance, in cells, up to which a passing ray notices an edge.
 pub(super) const REACH: f64 = 0.25;
 
+/// Square of how far the middle of a cube may be from an edge that a ray in it notices, or beyond it: half the cube's
+/// diagonal, and [`REACH`] along two axes.
+const NEAR_SQUARED: f64 = 1.5;
+
 /// Sine of the angle by which the cage turns inwards at an edge for rays to notice: at flatter ones little can jump.
-const SHARP: f64 = 0.15;
+const SHARP: f64 = 0.25;
 
 /// A component of a unit normal this small is rounding.
 const PARALLEL: f64 = 1e-9;
@@ -93,11 +97,12 @@ impl EdgeLists {
         if self.edges.is_empty() {
             return;
         }
-        let cube = DVec3::from_array(low.map(f64::from));
+        let middle = DVec3::from_array(low.map(|x| f64::from(x) + 0.5));
         self.blocks.near(low, |number| {
             let [a, b] = self.edges[number as usize].ends;
-            let meets = (a.min(b) - REACH).cmple(cube + 1.0).all() && (a.max(b) + REACH).cmpge(cube).all();
-            if meets && !found.contains(&number) {
+            let (way, to) = (b - a, middle - a);
+            let s = (to.dot(way) / way.length_squared()).clamp(0.0, 1.0);
+            if (to - s * way).length_squared() < NEAR_SQUARED && !found.contains(&number) {
                 found.push(number);
             }
         });
