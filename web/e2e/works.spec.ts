@@ -74,12 +74,14 @@ test("two tabs with two works, and a third visit lists both", async ({ page, con
 test("a tab that is loaded again has its own work, whatever else is kept", async ({ page, context }) => {
   await open(page);
   await work(page, "workA");
+  await work(page, "workB");
   const other = await context.newPage();
   await open(other);
-  await work(other, "workB");
+  await expect(other, "the only work that no other tab has open").toHaveTitle(/workA/);
+  await work(other, "workC");
   for (const [tab, name] of [
-    [page, /workA/],
-    [other, /workB/],
+    [page, /workB/],
+    [other, /workC/],
   ] as const) {
     await tab.reload();
     await expect(tab).toHaveTitle(name);
