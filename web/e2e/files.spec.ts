@@ -125,7 +125,7 @@ test("a file too large for a browser is refused before it is read", async ({ pag
     const file = new File(["glTF"], "huge.glb");
     Object.defineProperty(file, "size", { value: 5 * 2 ** 30 });
     const session = globalThis.cagework;
-    return session?.openFiles([{ name: file.name, path: file.name, file }]).catch((error) => {
+    return session?.readFiles([{ name: file.name, path: file.name, file }]).done.catch((error) => {
       document.body.dataset.refused = `${error.name}: ${error.message}`;
     });
   });

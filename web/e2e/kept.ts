@@ -2,21 +2,73 @@
 
 import type { Page } from "@playwright/test";
 
-/** Whether the browser keeps work that was saved after a moment, ms since 1970. */
-export const savedSince = (page: Page, moment: number): Promise<boolean> =>
+/** Whether the browser keeps work that was saved after a moment, ms since 1970; `name`: of that model. */
+export const savedSince = (page: Page, moment: number, name = ""): Promise<boolean> =>
   page.evaluate(
-    (moment) =>
+    ({ moment, name }) =>
       new Promise<boolean>((answer) => {
         const opened = indexedDB.open("cagework");
         opened.onsuccess = () => {
           const { result } = opened;
-          const saved = result.objectStoreNames.contains("projects")
-            ? result.transaction("projects").objectStore("projects").get("autosave")
+          const saved = result.objectStoreNames.contains("entries")
+            ? result.transaction("entries").objectStore("entries").getAll()
             : undefined;
           result.close();
+          const isIt = (entry: { when: number; name: string }) =>
+            entry.when > moment && entry.name.includes(name);
           if (!saved) answer(false);
-          else saved.onsuccess = () => answer((saved.result?.when ?? 0) > moment);
+          else saved.onsuccess = () => answer(saved.result.some(isIt));
         };
       }),
-    moment,
+    { moment, name },
+  );
+
+/** What the page kept before work had entries: one project. */
+export const keepAsBefore = (page: Page, bytes: Uint8Array, name: string, when: number): Promise<void> =>
+  page.evaluate(
+    ({ bytes, name, when }) =>
+      new Promise<void>((done, fail) => {
+        const opened = indexedDB.open("cagework", 1);
+        opened.onerror = () => fail(opened.error);
+        opened.onupgradeneeded = () => opened.result.createObjectStore("projects");
+        opened.onsuccess = () => {
+          const { result } = opened;
+          const transaction = result.transaction("projects", "readwrite");
+          transaction.objectStore("projects").put({ bytes: Uint8Array.from(bytes), name, when }, "autosave");
+          transaction.oncomplete = () => {
+            result.close();
+            done();
+          };
+        };
+      }),
+    { bytes: Array.from(bytes), name, when },
+  );
+
+/** Cuts kept files off, as a disk that failed might; or makes all that is kept 31 days older. */
+export const changeKept = (page: Page, how: "cut" | "age"): Promise<void> =>
+  page.evaluate(
+    (how) =>
+      new Promise<void>((done) => {
+        const opened = indexedDB.open("cagework");
+        opened.onsuccess = () => {
+          const { result } = opened;
+          const table = how === "cut" ? "projects" : "entries";
+          const transaction = result.transaction(table, "readwrite");
+          const request = transaction.objectStore(table).openCursor();
+          request.onsuccess = () => {
+            const cursor = request.result;
+            if (!cursor) return;
+            const { value } = cursor;
+            cursor.update(
+              how === "cut" ? value.slice(0, 1000) : { ...value, when: value.when - 31 * 86_400_000 },
+            );
+            cursor.continue();
+          };
+          transaction.oncomplete = () => {
+            result.close();
+            done();
+          };
+        };
+      }),
+    how,
   );

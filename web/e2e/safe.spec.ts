@@ -1,8 +1,20 @@
 /** What may go wrong and must not break the page: settings of a project, links, crashes of the module; and whose work it is. */
 
-import type { Page } from "@playwright/test";
 import { savedSince } from "./kept";
-import { bound, cagePositions, drag, drop, expect, largestMove, open, shoot, test } from "./support";
+import {
+  bound,
+  cagePositions,
+  crash,
+  drag,
+  drop,
+  expect,
+  largestMove,
+  open,
+  shoot,
+  spoilReading,
+  TOO_MUCH,
+  test,
+} from "./support";
 
 test("a project whose settings no bind could have is opened with others, and says which", async ({
   page,
@@ -41,24 +53,6 @@ test("a damaged link says so and opens the page", async ({ page }) => {
   expect(await cagePositions(page)).not.toEqual(before);
 });
 
-/** More than a module's memory can hold: taking it in is a trap. */
-const TOO_MUCH = 2_400_000_000;
-
-/** Calls of the engine as a handler of events would make them: what they throw reaches the window. */
-async function crash(page: Page, how: "panic" | "out of memory"): Promise<void> {
-  await page.evaluate(
-    ([how, bytes]) => {
-      setTimeout(() => {
-        const engine = globalThis.cagework?.engine;
-        // A box of more squares than can be counted, and more numbers than there is room for.
-        if (how === "panic") engine?.boxCage(3000);
-        else engine?.setCagePositions(new Float32Array(bytes / 4));
-      });
-    },
-    [how, TOO_MUCH] as const,
-  );
-}
-
 for (const how of ["panic", "out of memory"] as const) {
   test(`${how} in wasm: the page is begun anew with the work that was kept, and says what happened`, async ({
     page,
@@ -85,12 +79,12 @@ for (const how of ["panic", "out of memory"] as const) {
   });
 }
 
-test("a file that crashes the page is named and not opened again", async ({ page, complaints }) => {
+test("a file that the page stops with is named and not opened again", async ({ page, complaints }) => {
+  await spoilReading(page, "hang");
   await open(page);
-  await page.evaluate((bytes) => {
-    Blob.prototype.arrayBuffer = async () => new ArrayBuffer(bytes);
-  }, TOO_MUCH);
   await drop(page, [{ name: "huge.glb", bytes: new Uint8Array(100) }]);
+  await expect(page.locator("#stage .busy")).toContainText("huge.glb");
+  await crash(page, "out of memory");
   const alert = page.locator("#toasts [role=alert]");
   await expect(alert).toContainText("It happened while opening huge.glb.", { timeout: 60_000 });
   await bound(page);
@@ -98,7 +92,7 @@ test("a file that crashes the page is named and not opened again", async ({ page
   complaints.length = 0;
 });
 
-test("kept work that crashes the page twice is not opened a third time, and Start fresh forgets it", async ({
+test("kept work that the page stops with twice is not opened a third time, and stays kept", async ({
   page,
   complaints,
 }) => {
@@ -106,10 +100,15 @@ test("kept work that crashes the page twice is not opened a third time, and Star
   const before = await page.evaluate(() => Date.now());
   await drag(page, 50, 30);
   await expect.poll(() => savedSince(page, before)).toBe(true);
+  await spoilReading(page, "hang", "all");
   await page.addInitScript((bytes) => {
-    Blob.prototype.arrayBuffer = async () => new ArrayBuffer(bytes);
     const visits = Number(sessionStorage.getItem("visits") ?? 0);
     sessionStorage.setItem("visits", String(visits + 1));
+    const timer = setInterval(() => {
+      if (!document.querySelector("#stage .busy")?.textContent?.includes("Rat.cagework.glb")) return;
+      clearInterval(timer);
+      globalThis.cagework?.engine.setCagePositions(new Float32Array(bytes / 4));
+    }, 20);
   }, TOO_MUCH);
   await page.reload();
   const question = page.getByRole("dialog", { name: "Cagework stopped again" });
@@ -122,6 +121,11 @@ test("kept work that crashes the page twice is not opened a third time, and Star
   await expect(page).toHaveTitle(/Rat/);
   expect(await visits()).toBe(3);
   await drag(page, 20, 10);
+  await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  await page.getByRole("button", { name: /^Kept in this browser/ }).click();
+  await expect(page.getByRole("dialog", { name: "Kept in this browser" })).toContainText(
+    "Cagework stopped with it the last time.",
+  );
   complaints.length = 0;
 });
 

@@ -236,3 +236,42 @@ export async function download(page: Page, kind: string): Promise<Dropped> {
   ]);
   return { name: file.suggestedFilename(), bytes: readFileSync(await file.path()) };
 }
+
+/** More than a module's memory can hold: taking it in is a trap. */
+export const TOO_MUCH = 2_400_000_000;
+
+/** Calls of the engine as a handler of events would make them: what they throw reaches the window. */
+export async function crash(page: Page, how: "panic" | "out of memory"): Promise<void> {
+  await page.evaluate(
+    ([how, bytes]) => {
+      setTimeout(() => {
+        const engine = globalThis.cagework?.engine;
+        // A box of more squares than can be counted, and more numbers than there is room for.
+        if (how === "panic") engine?.boxCage(3000);
+        else engine?.setCagePositions(new Float32Array(bytes / 4));
+      });
+    },
+    [how, TOO_MUCH] as const,
+  );
+}
+
+/**
+ * Makes workers fail, or never end, when they read a file of 100 bytes; or any file. Must be called before the page is
+ * loaded.
+ */
+export async function spoilReading(
+  page: Page,
+  how: "trap" | "hang",
+  which: 100 | "all" = 100,
+): Promise<void> {
+  const act = how === "trap" ? `return new ArrayBuffer(${TOO_MUCH});` : "for (;;);";
+  const spoiled = `const real = Blob.prototype.arrayBuffer;
+    Blob.prototype.arrayBuffer = async function () {
+      if (${which === "all"} || this.size === 100) { ${act} }
+      return real.call(this);
+    };`;
+  await page.route(/\/worker[^/]*\.js$/, async (route) => {
+    const response = await route.fetch();
+    await route.fulfill({ response, body: `{ ${spoiled} }\n${await response.text()}` });
+  });
+}

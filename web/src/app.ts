@@ -9,6 +9,7 @@ import type { Files } from "./actions/files";
 import type { PoseActions } from "./actions/poses";
 import type { Project } from "./actions/project";
 import type { View } from "./actions/view";
+import type { WorkActions } from "./actions/works";
 import type { Command } from "./input/shortcuts";
 import type { StepName, Store } from "./state";
 
@@ -22,6 +23,7 @@ export interface App {
   readonly view: View;
   readonly files: Files;
   readonly project: Project;
+  readonly works: WorkActions;
   readonly exports: Exports;
   readonly mac: boolean;
   /** Runs what a shortcut stands for. */
@@ -34,7 +36,7 @@ export interface App {
   share(): void;
   /** How to switch WebGPU on, where it is missing. */
   showWays(): void;
-  /** Forgets what was kept and begins with the first sample. */
+  /** Begins with the first sample; what is open stays kept. */
   startFresh(): void;
   /** Where the pointer was last, CSS pixels in the view. */
   pointer: () => { x: number; y: number };

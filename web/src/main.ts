@@ -4,15 +4,17 @@ import { createBind } from "./actions/bind";
 import { createCage } from "./actions/cage";
 import type { Context, Fix } from "./actions/context";
 import { createEdit } from "./actions/edit";
-import { createExports, named } from "./actions/exports";
+import { createExports } from "./actions/exports";
 import { createFiles } from "./actions/files";
 import { createPoses } from "./actions/poses";
 import { createProject, poseOf } from "./actions/project";
 import { createView } from "./actions/view";
+import { createWorks } from "./actions/works";
 import type { App } from "./app";
-import type { NamedFile, Session } from "./contract";
+import type { Session } from "./contract";
 import { watchCrashes } from "./crash";
 import { createHistory } from "./history";
+import { choose } from "./input/choose";
 import { createCommands } from "./input/commands";
 import { attachDrop } from "./input/drop";
 import { attachKeyboard } from "./input/keyboard";
@@ -21,15 +23,14 @@ import { isMac, shortcutText } from "./input/shortcuts";
 import { openSession } from "./session";
 import { lackOf } from "./session/adapter";
 import { decodeShare } from "./share";
-import { startUp } from "./start";
+import { isFresh, startUp } from "./start";
 import { createStore, INITIAL } from "./state";
-import { forgetCrash, hasLocally, loadTheme } from "./store";
+import { forgetCrash, loadTheme } from "./store";
 import { type Explained, explain, FIX_LABELS, PRODUCT } from "./strings";
 import { createBar } from "./ui/bar";
 import { createBindPanel } from "./ui/bind";
 import { createCagePanel } from "./ui/cage";
 import { askAfterCrash } from "./ui/crashed";
-import { h } from "./ui/dom";
 import { createExportPanel } from "./ui/export";
 import { attachLost } from "./ui/lost";
 import { createModelPanel } from "./ui/model";
@@ -42,6 +43,7 @@ import { createToasts } from "./ui/toasts";
 import { createUnsupported } from "./ui/unsupported";
 import { createStage } from "./ui/viewport";
 import { createWithout } from "./ui/without";
+import { createWorksList } from "./ui/works";
 
 /** A hand that has not moved the cage for so long rests. */
 const PAUSE_MS = 150;
@@ -50,11 +52,6 @@ function byId(id: string): HTMLElement {
   const element = document.getElementById(id);
   if (!element) throw new Error(`the page lacks #${id}`);
   return element;
-}
-
-/** Whether this visit begins with the first sample: no link, and nothing to come back to. */
-async function isFresh(): Promise<boolean> {
-  return location.hash.length <= 1 && !(await hasLocally());
 }
 
 async function main(): Promise<void> {
@@ -82,6 +79,12 @@ async function main(): Promise<void> {
 
   const bind = createBind(ctx);
   const project = createProject(ctx);
+  const startFresh = () => void files.openSample(store.get().samples[0]?.id ?? "");
+  const works = createWorks(ctx, {
+    write: project.write,
+    openFiles: (list) => files.openFiles(list),
+    startFresh,
+  });
   /** Not by its link again, which may be the cause. */
   const restart = () => {
     window.history.replaceState(null, "", location.pathname + location.search);
@@ -90,7 +93,7 @@ async function main(): Promise<void> {
   const crashes = watchCrashes(store, restart, (crash) => {
     askAfterCrash(crash, () => {
       forgetCrash();
-      void project.forget().then(restart);
+      void works.distrust().finally(restart);
     });
   });
   let soon: ReturnType<typeof setTimeout> | undefined;
@@ -144,17 +147,13 @@ async function main(): Promise<void> {
       edit.sync();
     },
     writeProject: project.write,
+    keep() {
+      edit.setEditingRest(false);
+      return works.flush();
+    },
+    leave: works.leave,
   });
 
-  const choose = (accept: string, folder: boolean, then: (files: NamedFile[]) => void) => {
-    const input = h("input", { attrs: { type: "file", multiple: "", accept } });
-    if (folder) input.webkitdirectory = true;
-    input.addEventListener("change", () => {
-      const list = named(input.files ?? []);
-      if (list.length > 0) then(list);
-    });
-    input.click();
-  };
   const MODELS = ".glb,.gltf,.obj,.bin,.png,.jpg,.jpeg,.webp,.ktx2,.mtl,model/gltf-binary,model/gltf+json";
 
   const mac = isMac(navigator.platform);
@@ -171,6 +170,7 @@ async function main(): Promise<void> {
     view,
     files,
     project,
+    works,
     exports,
     mac,
     run: (command) => commands[command](),
@@ -183,10 +183,11 @@ async function main(): Promise<void> {
     chooseCage: () => choose(".obj,.glb,.gltf,.bin", false, (list) => void cage.load(list)),
     share: () => void exports.share(),
     showWays: () => without.show(store.get().lack ?? "NoWebGPU"),
-    startFresh: () => void project.forget().then(() => files.openSample(store.get().samples[0]?.id ?? "")),
+    startFresh,
     pointer: () => ({ x: 0, y: 0 }),
     key: (command) => shortcutText(command, mac),
   };
+  root.append(createWorksList(app));
   const commands = createCommands(app, sheet.show);
   const fixes: Record<NonNullable<Explained["fix"]>, () => void> = {
     coarser() {

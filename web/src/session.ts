@@ -4,24 +4,25 @@ import type {
   BindEvent,
   BindOptions,
   BindReport,
-  CageState,
   Job,
   Lack,
   ModelInfo,
-  NamedFile,
   Opened,
   Engine as PageEngine,
+  ReadFile,
   Session,
+  UpAxis,
 } from "./contract";
 import { BIND_DEFAULTS } from "./defaults";
 import { findAdapter, hasWebGl2, lackOf } from "./session/adapter";
-import type { Artifact } from "./session/artifact";
+import { type Artifact, compile } from "./session/artifact";
 import { requireCurrent, startBind } from "./session/bind";
 import { createClient } from "./session/client";
-import { load, readFiles } from "./session/files";
 import { createFrames } from "./session/frames";
 import { chain } from "./session/jobs";
+import type { CheckedCage, ReadModel } from "./session/messages";
 import { once, prepareSample, samples } from "./session/opening";
+import { createReader, load } from "./session/reader";
 import { WEBGPU } from "./session/webgpu";
 
 declare global {
@@ -31,6 +32,9 @@ declare global {
 
 /** The stage shows its background for so long at most if nothing is opened, ms. */
 const LONGEST_EMPTY = 3000;
+
+/** What a file of the page's own has: nothing that anybody would have to look for. */
+const OWN = { siblings: new Map(), up: undefined, textures: [], cage: undefined, notices: [], took: 0 };
 
 /** Where the picture goes; a canvas that one interface has used is lost to the other. */
 export interface Canvases {
@@ -130,13 +134,18 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   let slice: Job<void> | undefined;
   let meanValue: Job<void> | undefined;
 
-  async function openBytes(bytes: Parameters<typeof load>[1]): Promise<Opened> {
-    const { loaded, notices } = await load(pkg, bytes);
+  const reader = createReader(() => createClient(module, openWorker));
+  const adoptCage = ({ positions, corners, isSound }: CheckedCage) =>
+    engine.setCage(positions, corners, isSound);
+
+  async function openRead(read: ReadModel): Promise<Opened> {
+    const loaded = await load(pkg, read);
     const { settings } = loaded;
     const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
     bind?.cancel();
-    const read: ModelInfo = await raw.open(loaded);
-    const model = { ...read, notices: [...read.notices, ...notices] };
+    const info: ModelInfo = await raw.open(loaded);
+    if (read.cage) adoptCage(read.cage);
+    const model = { ...info, notices: [...info.notices, ...read.notices] };
     const project = settings === undefined ? null : { poses, settings };
     return { model, cage: stateOf(), project };
   }
@@ -146,25 +155,30 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     adapter,
     lack,
     samples: samples(pkg),
-    openFiles: async (files) => openBytes(await readFiles(files)).finally(begin),
+    readFiles: (files, hear) => reader.model(files, undefined, hear),
+    open: (read: ReadFile) => openRead(read as ReadModel).finally(begin),
     async openSample(id) {
       const { glb, cage, poses } = await buildSample(id);
       const label = samples(pkg).find((sample) => sample.id === id)?.label ?? id;
-      const opened = await openBytes({ name: `${label}.glb`, bytes: glb, sibling: () => undefined });
+      const name = `${label}.glb`;
+      const opened = await openRead({ ...OWN, name, bytes: glb });
       const state = engine.setCage(cage.positions, cage.corners);
       begin();
       return { ...opened, cage: state, poses };
     },
-    turn: (bytes, up) => openBytes({ name: "turned.glb", bytes, sibling: () => undefined, up }),
-    readSettings: (text, defaults) => pkg.readSettings(text, JSON.stringify(defaults)),
-    async openCage(files: readonly NamedFile[]): Promise<CageState> {
-      const { name, bytes, sibling } = await readFiles(files);
-      return raw.loadCage(name, bytes, sibling);
+    async turn(bytes, up) {
+      const name = "turned.glb";
+      const file = new Blob([new Uint8Array(bytes)]);
+      return openRead(await reader.model([{ name, path: name, file }], up).done);
     },
+    readSettings: (text, defaults) => pkg.readSettings(text, JSON.stringify(defaults)),
+    readCage: (files, hear) =>
+      reader.cage({ files, up: raw.up() as UpAxis, model: raw.modelPositions() }, hear),
+    openCage: (read: ReadFile) => adoptCage(read as CheckedCage),
     generateCage(options, onProgress) {
       const input = { positions: raw.modelPositions(), triangles: raw.modelTriangles(), options };
       const job = client.run("cage", input, ({ fraction }) => onProgress(fraction));
-      return chain(job, ({ positions, corners }) => engine.setCage(positions, corners));
+      return chain(job, adoptCage);
     },
     bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport> {
       bind?.cancel();
@@ -231,14 +245,4 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   };
   globalThis.cagework = session;
   return session;
-}
-
-/** Compiles while it downloads, where the server says that it is wasm. */
-async function compile(url: string): Promise<WebAssembly.Module> {
-  const response = await fetch(url);
-  if (!response.ok) throw new Error(`${url} could not be downloaded (${response.status})`);
-  if (response.headers.get("Content-Type")?.startsWith("application/wasm")) {
-    return WebAssembly.compileStreaming(response);
-  }
-  return WebAssembly.compile(await response.arrayBuffer());
 }

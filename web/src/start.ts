@@ -8,6 +8,7 @@ import type { Shared } from "./share";
 import type { Theme } from "./store";
 import { CRASHED, showReport } from "./ui/crashed";
 import type { Stage } from "./ui/viewport";
+import { hasEntries } from "./works/database";
 
 /** Sharper than this nobody sees, and it costs four times the pixels. */
 const MOST_SHARP = 2;
@@ -48,7 +49,7 @@ export function startUp({ app, stage, crashes, theme, shared, product }: Start):
     ({ bound, sampleCage, undoLabel }) => {
       // A sample that nobody has touched is no work to come back to.
       const untouched = sampleCage && undoLabel === null;
-      if (bound && !untouched) app.project.touch();
+      if (bound && !untouched) app.works.touch();
     },
   );
 
@@ -63,6 +64,11 @@ export function startUp({ app, stage, crashes, theme, shared, product }: Start):
   });
 }
 
+/** Whether this visit begins with the first sample: no link, and nothing to come back to. */
+export async function isFresh(): Promise<boolean> {
+  return location.hash.length <= 1 && !(await hasEntries());
+}
+
 /** A link comes first, then the work of the last visit, then the first sample. */
 async function open(
   app: App,
@@ -70,7 +76,8 @@ async function open(
   crash: Crash | undefined,
 ): Promise<void> {
   const link = await openShared(app, shared);
-  if (!link.opened) await openKept(app);
+  if (!link.opened) await openFirst(app);
+  else void app.works.refresh();
   // Last, because whatever is opened takes messages away.
   sayDamage(app, link.damage);
   if (crash) {
@@ -79,17 +86,12 @@ async function open(
   }
 }
 
-async function openKept(app: App): Promise<void> {
-  const kept = await app.project.restore();
-  if (kept && (await app.files.openFiles(kept.files))) {
-    app.store.set({ step: "pose", savedAt: kept.when });
-    app.ctx.tell.say(`Your work on ${kept.name} is back, as you left it ${ago(Date.now() - kept.when)}.`, {
-      label: "Start fresh",
-      run: () => app.startFresh(),
-    });
-    return;
-  }
-  const first = app.store.get().samples[0];
+/** What this tab had open, or the only work there is; else a sample, and the list of what there is to choose from. */
+async function openFirst(app: App): Promise<void> {
+  if (await app.works.restore()) return;
+  const { works, samples } = app.store.get();
+  if (works.length > 1) app.store.set({ worksOpen: true });
+  const [first] = samples;
   if (first) await app.files.openSample(first.id);
 }
 
@@ -119,17 +121,6 @@ async function openShared(
 
 function sayDamage(app: App, damage: unknown): void {
   if (damage !== undefined) report(app.ctx, "This link is damaged", damage);
-}
-
-/** How long ago, in words. */
-export function ago(ms: number): string {
-  const minutes = Math.round(ms / 60_000);
-  if (minutes < 1) return "a moment ago";
-  if (minutes < 60) return `${minutes} minute${minutes === 1 ? "" : "s"} ago`;
-  const hours = Math.round(minutes / 60);
-  if (hours < 24) return `${hours} hour${hours === 1 ? "" : "s"} ago`;
-  const days = Math.round(hours / 24);
-  return `${days} day${days === 1 ? "" : "s"} ago`;
 }
 
 /** Whether a GPU is made of processor cores: then the processor itself binds faster, and drawing does not wait for it. */

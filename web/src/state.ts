@@ -15,6 +15,7 @@ import type {
 } from "./contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
 import type { Theme } from "./store";
+import type { Work } from "./works/entry";
 
 export const STEPS = ["model", "cage", "bind", "pose", "export"] as const;
 export type StepName = (typeof STEPS)[number];
@@ -55,6 +56,12 @@ export interface AppState {
   samples: readonly Sample[];
   /** What keeps the whole page waiting, as a sentence; null when nothing does. */
   busy: string | null;
+  /** How far that is, in words. */
+  busyStep: string;
+  /** Gives it up; null where that is not possible. */
+  cancelBusy: (() => void) | null;
+  /** Goes on with it, where the user is asked before; null otherwise. */
+  goOn: (() => void) | null;
   model: ModelInfo | null;
   /** The sample that is open, null for a file of the user's. */
   sample: string | null;
@@ -106,6 +113,10 @@ export interface AppState {
   theme: Theme;
   /** When the project was kept in the browser last, ms since 1970. */
   savedAt: number | null;
+  /** What this browser keeps, newest first. */
+  works: readonly Work[];
+  /** Whether the list of it is shown. */
+  worksOpen: boolean;
 }
 
 export const INITIAL: AppState = {
@@ -114,6 +125,9 @@ export const INITIAL: AppState = {
   lack: null,
   samples: [],
   busy: "Starting",
+  busyStep: "",
+  cancelBusy: null,
+  goOn: null,
   model: null,
   sample: null,
   cage: null,
@@ -153,6 +167,8 @@ export const INITIAL: AppState = {
   redoLabel: null,
   theme: "auto",
   savedAt: null,
+  works: [],
+  worksOpen: false,
 };
 
 export interface Store {

@@ -1,5 +1,7 @@
 /** Sentences that more than one place says, or that belong to data. */
 
+import { percent } from "./format";
+
 export const PRODUCT = "Cagework";
 
 /** What is different without WebGPU. */
@@ -21,6 +23,19 @@ export const STAGES = {
   solve: "Solving for the coordinates",
   sample: "Reading weights",
 } as const;
+
+const READING = {
+  bytes: "Reading the file",
+  decompress: "Decompressing it",
+  geometry: "Finding vertices and faces",
+  textures: "Decoding textures",
+  check: "Checking the cage",
+} as const;
+
+/** What a worker does with a file. */
+export function sayReading(stage: keyof typeof READING, fraction: number): string {
+  return fraction > 0 ? `${READING[stage]}, ${percent(fraction)}` : READING[stage];
+}
 
 export const GESTURES = { grab: "Move", rotate: "Rotate", scale: "Scale" } as const;
 

@@ -7,7 +7,7 @@ import type { BindReport } from "../src/contract";
 import { BIND_DEFAULTS } from "../src/defaults";
 import { rectangle } from "../src/input/pointer";
 import { pinch } from "../src/input/touch";
-import { ago, isSoftware } from "../src/start";
+import { isSoftware } from "../src/start";
 import { explain, isCancelled, sentence } from "../src/strings";
 import { curvesOf } from "../src/ui/curves";
 import { historyPoints, scaleOf } from "../src/ui/plot";
@@ -145,12 +145,6 @@ describe("words", () => {
     const poses = ["Pose 2", "Jump"].map((name) => ({ name, positions: new Float32Array() }));
     expect(freshName(poses)).toBe("Pose 3");
     expect(freshName(poses.slice(0, 1))).toBe("Pose 3");
-  });
-  it("say how long ago", () => {
-    expect(ago(10_000)).toBe("a moment ago");
-    expect(ago(60_000)).toBe("1 minute ago");
-    expect(ago(7_200_000)).toBe("2 hours ago");
-    expect(ago(3 * 86_400_000)).toBe("3 days ago");
   });
 });
 

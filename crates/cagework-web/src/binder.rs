@@ -16,6 +16,7 @@ use crate::arrays::{corners, flat, points, polygon_mesh};
 use crate::clock::Listener;
 use crate::error::{Answer, Fault};
 use crate::options::{BindAsked, CageAsked};
+use crate::problems;
 use crate::views::object;
 
 /// Binds, makes cages, cuts slices and builds samples.
@@ -35,7 +36,7 @@ pub struct Bound {
 /// A mesh of polygons on its way to the page.
 #[wasm_bindgen]
 pub struct Polygons {
-    mesh: PolygonMesh,
+    pub(crate) mesh: PolygonMesh,
 }
 
 /// A built sample.
@@ -165,6 +166,16 @@ impl Binder {
         let listener = Listener::new(progress);
         let made = generate(&points(positions), &triangles, &CageOptions::from(asked), &listener);
         Ok(Polygons { mesh: made.map_err(Fault::from)?.cage.to_polygon_mesh() })
+    }
+
+    /// Whether nothing at all is wrong with a cage for a model, `[n_vertices, 3]`; a cage's arrays are those of `bind`.
+    ///
+    /// # Errors
+    /// When the arrays are no mesh.
+    #[wasm_bindgen(js_name = isSound)]
+    pub fn is_sound(model: &[f32], positions: &[f32], corners: &[u32]) -> Result<bool, JsValue> {
+        let mesh = polygon_mesh(positions, corners)?;
+        Ok(problems::find(&mesh, Some(&points(model))).problems.is_empty())
     }
 
     /// Identifier, label and what there is to see of each sample, in turn.

@@ -9,6 +9,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast as _, JsValue};
 
 use crate::arrays::flat;
+use crate::binder::Polygons;
 use crate::error::Answer;
 use crate::options::unknown;
 
@@ -16,7 +17,7 @@ use crate::options::unknown;
 #[wasm_bindgen]
 pub struct Loaded {
     pub(crate) model: Model,
-    pub(crate) cage: Option<PolygonMesh>,
+    cage: Option<PolygonMesh>,
     look: Look,
     textures: Vec<DrawTexture>,
     poses: Vec<(String, Vec<Vec3>)>,
@@ -64,6 +65,27 @@ impl Loaded {
         self.cage.iter_mut().for_each(|cage| turn(&mut cage.positions));
         self.poses.iter_mut().for_each(|(_, positions)| turn(positions));
         Ok(())
+    }
+
+    /// The model's vertices. `[n_vertices, 3]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn positions(&self) -> Vec<f32> {
+        flat(&self.model.positions)
+    }
+
+    /// The cage of a project; undefined in any other file.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn cage(&self) -> Option<Polygons> {
+        self.cage.clone().map(|mesh| Polygons { mesh })
+    }
+
+    /// The model itself as a cage.
+    #[wasm_bindgen(js_name = asCage)]
+    #[must_use]
+    pub fn as_cage(&self) -> Polygons {
+        Polygons { mesh: self.model.cage_mesh() }
     }
 
     /// Textures to decode.

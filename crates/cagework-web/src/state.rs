@@ -27,7 +27,7 @@ pub(crate) struct State {
     pub(crate) rest: PolygonMesh,
     pub(crate) topology: Topology,
     pub(crate) symmetry: Symmetry,
-    /// What is wrong with the cage.
+    /// What is wrong with the cage; none where nothing is.
     pub(crate) check: Option<CageCheck>,
     /// Some vertices of the model, to be watched while the rest cage is dragged; made when first asked.
     pub(crate) watched: Option<Enclosure>,
@@ -66,15 +66,16 @@ impl State {
     /// Another model, without a cage.
     pub(crate) fn set_model(&mut self, model: Model) {
         self.model = Some(model);
-        self.set_cage(PolygonMesh::default());
+        self.set_cage(PolygonMesh::default(), true);
         self.camera = Camera::default();
         self.fit_camera();
         self.frame_all();
     }
 
-    /// Another cage, or a draft of one.
-    pub(crate) fn set_cage(&mut self, mesh: PolygonMesh) {
-        self.check = (!mesh.faces.is_empty()).then(|| problems::find(&mesh, self.model_positions()));
+    /// Another cage, or a draft of one; checked unless it is known to be sound.
+    pub(crate) fn set_cage(&mut self, mesh: PolygonMesh, is_sound: bool) {
+        let is_checked = is_sound || mesh.faces.is_empty();
+        self.check = (!is_checked).then(|| problems::find(&mesh, self.model_positions()));
         self.cage = Cage::new(&mesh).ok();
         // Turned outward, seams closed.
         self.rest = self.cage.as_ref().map_or(mesh, Cage::to_polygon_mesh);

@@ -16,8 +16,8 @@ const HEAD: &str = include_str!("licences.txt");
 const NOTICES: &str = "licences.txt";
 /// Name of what belongs to the standard library.
 const STANDARD_LIBRARY: &str = "rust-standard-library.html";
-/// What Vite says of the npm packages, below the page's folder; see vite.config.ts.
-const OF_NPM: &str = "licences-npm.json";
+/// What Vite says of the npm packages in the page and in its workers, below the page's folder; see vite.config.ts.
+const OF_NPM: [&str; 2] = ["licences-npm.json", "licences-npm-workers.json"];
 /// How files begin that hold a licence or what it asks to be kept, in lower case.
 const BEGINNINGS: [&str; 6] = ["licen", "copying", "copyright", "notice", "unlicense", "third"];
 
@@ -40,9 +40,11 @@ pub(crate) fn of_page(folder: &Path) -> Result<(), String> {
     let target = "wasm32-unknown-unknown";
     let mut parts = of_crates("cagework-web", target, &[])?;
     parts.extend(of_crates("cagework-web", target, &["--no-default-features", "--features", "webgl"])?);
-    let of_npm = folder.join(OF_NPM);
-    parts.extend(of_npm_packages(&read(&of_npm)?)?);
-    std::fs::remove_file(&of_npm).map_err(|e| format!("cannot remove {}: {e}", of_npm.display()))?;
+    for name in OF_NPM {
+        let of_npm = folder.join(name);
+        parts.extend(of_npm_packages(&read(&of_npm)?)?);
+        std::fs::remove_file(&of_npm).map_err(|e| format!("cannot remove {}: {e}", of_npm.display()))?;
+    }
     write(folder, parts)
 }
 
@@ -112,7 +114,7 @@ fn texts_in(folder: &Path) -> Result<Vec<String>, String> {
 /// What Vite says of the packages that it bundled.
 fn of_npm_packages(json: &str) -> Result<Vec<Part>, String> {
     let found: Vec<Value> =
-        serde_json::from_str(json).map_err(|e| format!("{OF_NPM} cannot be read: {e}"))?;
+        serde_json::from_str(json).map_err(|e| format!("{} cannot be read: {e}", OF_NPM.join(" or ")))?;
     let word = |of: &Value, key: &str| of[key].as_str().unwrap_or_default().to_owned();
     let part = |of: &Value| Part {
         name: format!("{} v{}", word(of, "name"), word(of, "version")),

@@ -2,7 +2,7 @@
 
 import type { CageState, CageWish, Job, Mend, NamedFile, RepairKind } from "../contract";
 import type { CageSource } from "../state";
-import { attempt, type Context, report } from "./context";
+import { attempt, type Context, report, waitFor } from "./context";
 
 export interface CageActions {
   /** Makes a cage the way the Cage panel says. True when there is a new one. */
@@ -99,7 +99,9 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
       const before = ctx.store.get().cage ? now() : undefined;
       ctx.tell.clear();
       return attempt(ctx, "This cage cannot be used", async () => {
-        const state = await ctx.session().openCage(files);
+        const name = files[0]?.name ?? "the cage";
+        const read = await waitFor(ctx, `Opening ${name}`, (hear) => ctx.session().readCage(files, hear));
+        const state = ctx.session().openCage(read);
         ctx.store.set({ cageSource: "file" });
         take(LOAD, before, state);
       });

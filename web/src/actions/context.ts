@@ -1,10 +1,11 @@
 /** What every action needs: the session, the state, the history and a voice. */
 
-import type { Session } from "../contract";
+import type { Job, ReadFile, Reading, Session } from "../contract";
 import { isFatal } from "../crash";
+import { duration } from "../format";
 import type { History } from "../history";
 import type { Store } from "../state";
-import { type Explained, explain, isCancelled } from "../strings";
+import { type Explained, explain, isCancelled, sayReading } from "../strings";
 
 export interface Fix {
   label: string;
@@ -41,6 +42,37 @@ export async function attempt(
   } catch (error) {
     report(ctx, title, error);
     return false;
+  }
+}
+
+/** A page that would not answer for longer asks before, ms. */
+const LONG_MS = 4000;
+
+/** While a file is read the page waits, says how far it is, and lets the user give it up. */
+export async function waitFor(
+  ctx: Context,
+  what: string,
+  work: (hear: (progress: Reading) => void) => Job<ReadFile>,
+): Promise<ReadFile> {
+  const { store } = ctx;
+  const job = work(({ stage, fraction }) => store.set({ busyStep: sayReading(stage, fraction) }));
+  let cancelBusy = job.cancel;
+  store.set({ busy: what, busyStep: "", cancelBusy });
+  try {
+    const read = await job.done;
+    if (read.took > LONG_MS) {
+      await new Promise<void>((goOn, giveUp) => {
+        cancelBusy = () => giveUp(Object.assign(new Error("cancelled"), { name: "Cancelled" }));
+        const busyStep = `The page will not answer for ${duration(read.took)}`;
+        store.set({ busyStep, goOn, cancelBusy });
+      });
+    }
+    return read;
+  } finally {
+    // Another one may be waited for by now.
+    if (store.get().cancelBusy === cancelBusy) {
+      store.set({ busy: null, busyStep: "", cancelBusy: null, goOn: null });
+    }
   }
 }
 

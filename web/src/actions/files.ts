@@ -6,7 +6,7 @@ import { planDrop } from "../drop";
 import { stem } from "../format";
 import type { StepName } from "../state";
 import { sentence } from "../strings";
-import { attempt, type Context } from "./context";
+import { attempt, type Context, waitFor } from "./context";
 
 export interface Files {
   openSample(id: string): Promise<boolean>;
@@ -28,6 +28,10 @@ export interface Follow {
   applyPose(settings: Settings): void;
   /** What is open, as a project. */
   writeProject(): Uint8Array;
+  /** Keeps what is open: something else will be. */
+  keep(): Promise<void>;
+  /** Something else is open. */
+  leave(): void;
 }
 
 /** Largest file read without asking, bytes: beyond it the browser's memory for the page is at risk. */
@@ -37,6 +41,9 @@ export function createFiles(ctx: Context, follow: Follow): Files {
   const { store } = ctx;
   /** Each opening has a number: a later one makes an earlier one's end meaningless. */
   let turn = 0;
+  /** And each wait: the page waits until the last one ends. */
+  let waits = 0;
+  let replacing: Promise<unknown> = Promise.resolve();
 
   const take = async (opened: Opened, sample: string | null, cageFiles?: readonly NamedFile[]) => {
     turn += 1;
@@ -95,19 +102,33 @@ export function createFiles(ctx: Context, follow: Follow): Files {
   };
 
   const busy = async (what: string, title: string, work: () => Promise<void>): Promise<boolean> => {
+    waits += 1;
+    const mine = waits;
     store.set({ busy: what });
     ctx.tell.clear();
     const ok = await attempt(ctx, title, work);
-    store.set({ busy: null });
+    if (mine === waits) store.set({ busy: null });
     return ok;
+  };
+
+  /** Opens something else, one after the other in the order asked for; what is open until then stays kept. */
+  const replace = (open: () => Promise<Opened>, sample: string | null, cageFiles?: readonly NamedFile[]) => {
+    const result = replacing.then(async () => {
+      await follow.keep();
+      const opened = await open();
+      follow.leave();
+      await take(opened, sample, cageFiles);
+    });
+    replacing = result.catch(() => undefined);
+    return result;
   };
 
   return {
     openSample(id) {
       const label = store.get().samples.find((sample) => sample.id === id)?.label ?? id;
-      return busy(`Opening ${label}`, "The sample could not be opened", async () => {
-        await take(await ctx.session().openSample(id), id);
-      });
+      return busy(`Opening ${label}`, "The sample could not be opened", () =>
+        replace(() => ctx.session().openSample(id), id),
+      );
     },
     openFiles(files) {
       const plan = planDrop(files.map((file) => file.path || file.name));
@@ -135,10 +156,14 @@ export function createFiles(ctx: Context, follow: Follow): Files {
         );
         return Promise.resolve(false);
       }
-      return busy(`Opening ${main.name}`, `${main.name} could not be opened`, async () => {
-        const own = files.filter((file) => file !== second);
-        const opened = await ctx.session().openFiles([main, ...own.filter((file) => file !== main)]);
-        await take(opened, null, second ? [second] : undefined);
+      const what = `Opening ${main.name}`;
+      const title = `${main.name} could not be opened`;
+      const cageFiles = second && [second];
+      const own = [main, ...files.filter((file) => file !== second && file !== main)];
+      return busy(what, title, async () => {
+        const read = await waitFor(ctx, what, (hear) => ctx.session().readFiles(own, hear));
+        store.set({ busy: what });
+        await replace(() => ctx.session().open(read), null, cageFiles);
       });
     },
     turn(up) {

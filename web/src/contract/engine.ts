@@ -32,8 +32,11 @@ export interface Engine {
   setEditingRest(editing: boolean): void;
   /** Only while editing the rest cage. The selection afterwards is what was made. */
   editRest(edit: RestEdit): CageState;
-  /** Takes a cage given as arrays: undo of topology edits. `corners`: for each face its number of corners, then them. */
-  setCage(positions: Float32Array, corners: Uint32Array): CageState;
+  /**
+   * Takes a cage given as arrays: undo of topology edits. `corners`: for each face its number of corners, then them.
+   * `isSound`: the worker found nothing wrong with it; without, it is checked here.
+   */
+  setCage(positions: Float32Array, corners: Uint32Array, isSound?: boolean): CageState;
   /** The moved rest cage becomes the cage; it has to be bound again. */
   commitRest(): CageState;
   cageState(): CageState | undefined;

@@ -22,11 +22,13 @@ export interface Session {
   readonly samples: readonly Sample[];
 
   /**
-   * Opens what was dropped or chosen: one .glb/.gltf/.obj (with siblings of a .gltf; paths of a folder drop through
-   * `path`), or a project GLB. Draco and meshopt are decoded (their decoders load only then), textures decoded.
-   * A project's cage and poses are open afterwards too.
+   * Reads what was dropped or chosen, in a worker of its own: one .glb/.gltf/.obj (with siblings of a .gltf; paths of a
+   * folder drop through `path`), or a project GLB. Draco and meshopt are decoded (their decoders load only then), textures
+   * decoded. Whatever the file does, what is open stays open.
    */
-  openFiles(files: readonly NamedFile[]): Promise<Opened>;
+  readFiles(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<ReadFile>;
+  /** Opens what was read, once; a project's cage and poses are open afterwards too. */
+  open(read: ReadFile): Promise<Opened>;
   openSample(id: string): Promise<Opened>;
   /** Opens a project again with another axis up: model, cage and poses are turned. */
   turn(project: Uint8Array, up: UpAxis): Promise<Opened>;
@@ -35,8 +37,10 @@ export interface Session {
    * so. The memory limit is the default's.
    */
   readSettings(text: string, defaults: Defaults): Settings & { readonly notices: readonly string[] };
-  /** A cage from a file (.obj, .glb, .gltf). A mesh that is no cage yet is kept as a draft: `usable` is false. */
-  openCage(files: readonly NamedFile[]): Promise<CageState>;
+  /** Reads a cage from a file (.obj, .glb, .gltf) as a model is read, and checks it. */
+  readCage(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<ReadFile>;
+  /** Takes it. A mesh that is no cage yet is kept as a draft: `usable` is false. */
+  openCage(read: ReadFile): CageState;
   /** Makes a cage for the model, in the worker. */
   generateCage(options: CageOptions, onProgress: (fraction: number) => void): Job<CageState>;
 
@@ -90,6 +94,19 @@ export interface Sample {
   readonly label: string;
   /** What there is to see. */
   readonly sentence?: string;
+}
+
+/** What a worker does with a file. */
+export interface Reading {
+  readonly stage: "bytes" | "decompress" | "geometry" | "textures" | "check";
+  /** Of the stage, 0 to 1; 0 where nobody can know. */
+  readonly fraction: number;
+}
+
+/** A file that a worker has read without harm. */
+export interface ReadFile {
+  /** How long the page will not answer while it is opened, about, ms. */
+  readonly took: number;
 }
 
 export interface Opened {

@@ -38,7 +38,11 @@ export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions
     const mod = event.ctrlKey || event.metaKey;
     if (!gesture && !mod && isControlKey(event.target, event.key)) return;
     if (mod && event.target instanceof HTMLElement && event.target.closest("dialog")) return;
-    const { editingRest, busy, model } = app.store.get();
+    const { editingRest, busy, cancelBusy, model } = app.store.get();
+    if (event.key === "Escape" && cancelBusy && !document.querySelector("dialog[open]")) {
+      cancelBusy();
+      return;
+    }
     if (gesture && !mod && app.edit.type(event.key)) {
       event.preventDefault();
       return;

@@ -9,3 +9,13 @@ export interface Artifact {
   readonly wasm: string;
   openWorker(): Worker;
 }
+
+/** Compiles while it downloads, where the server says that it is wasm. */
+export async function compile(url: string): Promise<WebAssembly.Module> {
+  const response = await fetch(url);
+  if (!response.ok) throw new Error(`${url} could not be downloaded (${response.status})`);
+  if (response.headers.get("Content-Type")?.startsWith("application/wasm")) {
+    return WebAssembly.compileStreaming(response);
+  }
+  return WebAssembly.compile(await response.arrayBuffer());
+}

@@ -4,7 +4,7 @@ import type { BindEvent, BindOptions, BindReport, Engine, Job } from "../contrac
 import { createEta } from "../eta";
 import type { Engine as RawEngine } from "../pkg/cagework";
 import { type Client, named } from "./client";
-import type { BoundArrays, CageArrays, Step } from "./messages";
+import type { BindStage, BoundArrays, CageArrays, Step } from "./messages";
 
 /** Cells of the first pass. */
 const COARSE = 32;
@@ -43,7 +43,7 @@ export function startBind(start: BindStart): Job<BindReport> {
   const step = (pass: Pass) => {
     const eta = createEta(performance.now());
     return ({ stage, fraction, iteration, delta }: Step) => {
-      if (isCancelled || stage === "simplify") return;
+      if (isCancelled || !isOfBind(stage)) return;
       const etaMs = eta.update(fraction, performance.now()) ?? null;
       listener({ kind: "progress", pass, stage, fraction, etaMs, iteration, delta });
     };
@@ -88,6 +88,9 @@ export function startBind(start: BindStart): Job<BindReport> {
     },
   };
 }
+
+const isOfBind = (stage: Step["stage"]): stage is BindStage =>
+  stage === "voxelize" || stage === "solve" || stage === "sample";
 
 /** Quick, whatever was asked for. */
 function coarse(options: BindOptions): BindOptions {

@@ -1,11 +1,8 @@
 /** Dropped files to bytes: which one is the model, and where its siblings are. */
 
-import type { NamedFile, UpAxis } from "../contract";
+import type { NamedFile } from "../contract";
 import { extension, isModel } from "../drop";
-import type { Loaded } from "../pkg/cagework";
-import type { Package } from "./artifact";
 import { named } from "./client";
-import { decodeTextures } from "./textures";
 
 /** Larger files are refused, bytes: the browser's memory for them would be several times as much. */
 const LARGEST = 1 << 30;
@@ -13,9 +10,16 @@ const LARGEST = 1 << 30;
 export interface Bytes {
   readonly name: string;
   readonly bytes: Uint8Array;
-  readonly sibling: (path: string) => Uint8Array | undefined;
-  /** What points up in it, if that is not what the file says. */
-  readonly up?: UpAxis;
+  /** What lies beside it, by name and by path from its folder. */
+  readonly siblings: ReadonlyMap<string, Uint8Array>;
+}
+
+/** Finds a sibling by the path that the model has for it. */
+export function siblingOf(siblings: Bytes["siblings"]): (path: string) => Uint8Array | undefined {
+  return (path) => {
+    const plain = path.replace(/^(\.\/)+/, "");
+    return siblings.get(plain) ?? siblings.get(plain.slice(plain.lastIndexOf("/") + 1));
+  };
 }
 
 /** The model's bytes and those of its siblings. */
@@ -32,21 +36,18 @@ export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
       if (file.path.startsWith(folder)) siblings.set(file.path.slice(folder.length), content);
     }
   }
-  const sibling = (path: string) => {
-    const plain = path.replace(/^(\.\/)+/, "");
-    return siblings.get(plain) ?? siblings.get(plain.slice(plain.lastIndexOf("/") + 1));
-  };
-  return { name: main.name, bytes, sibling };
+  return { name: main.name, bytes, siblings };
+}
+
+/** What is said of a file that is too large; undefined when none is. */
+export function tooLarge(files: readonly NamedFile[]): Error | undefined {
+  const large = files.find(({ file }) => file.size > LARGEST);
+  const size = ((large?.file.size ?? 0) / LARGEST).toFixed(1);
+  const message = `${large?.name} has ${size} GiB; files of up to 1 GiB are opened: make it smaller first`;
+  return large && named("TooLarge", message);
 }
 
 async function read({ name, file }: NamedFile): Promise<Uint8Array> {
-  if (file.size > LARGEST) {
-    const size = (file.size / LARGEST).toFixed(1);
-    throw named(
-      "TooLarge",
-      `${name} has ${size} GiB; files of up to 1 GiB are opened: make it smaller first`,
-    );
-  }
   try {
     return new Uint8Array(await file.arrayBuffer());
   } catch {
@@ -55,32 +56,4 @@ async function read({ name, file }: NamedFile): Promise<Uint8Array> {
       `${name} could not be read: it may have been moved, or is too large for this browser`,
     );
   }
-}
-
-/** A model that was read, and what the page should say about it. */
-export interface Read {
-  readonly loaded: Loaded;
-  readonly notices: readonly string[];
-}
-
-/** Events and frames that wait have their turn. */
-const pause = () => new Promise((resolve) => setTimeout(resolve));
-
-/** Reads a model, decompressed if need be, its textures decoded. */
-export async function load(pkg: Package, { name, bytes, sibling, up }: Bytes): Promise<Read> {
-  let loaded: Loaded;
-  try {
-    loaded = pkg.Loaded.read(name, bytes, sibling);
-  } catch (error) {
-    if (!(error instanceof Error) || error.name !== "Compressed") throw error;
-    const { decompress } = await import("../decode");
-    loaded = pkg.Loaded.read(name, await decompress(name, bytes, sibling), sibling);
-  }
-  if (up) loaded.setUp(up);
-  await pause();
-  loaded.prepare();
-  const failed = await decodeTextures(loaded);
-  const many = failed === 1 ? "a texture" : `${failed} textures`;
-  const notice = `this browser cannot decode ${many}: the material's plain colour is shown, exports keep the file`;
-  return { loaded, notices: failed > 0 ? [notice] : [] };
 }

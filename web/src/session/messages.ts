@@ -1,11 +1,40 @@
 /** What page and worker say to each other. */
 
-import type { BindOptions, BindReport, CageOptions } from "../contract";
+import type { BindOptions, BindReport, CageOptions, NamedFile, UpAxis } from "../contract";
+import type { Bytes } from "./files";
 
 /** Cage as arrays: positions `[n_cage, 3]`; for each face the number of its corners, then them. */
 export interface CageArrays {
   readonly positions: Float32Array;
   readonly corners: Uint32Array;
+}
+
+/** A cage that was checked once without harm. */
+export interface CheckedCage extends CageArrays {
+  /** Nothing is wrong with it. */
+  readonly isSound: boolean;
+  /** What the page will need for it, ms: to find again what is wrong. */
+  readonly took: number;
+}
+
+/** A decoded image: red, green, blue, alpha; rows from the top. */
+export interface Texture {
+  readonly width: number;
+  readonly height: number;
+  readonly rgba: Uint8Array;
+}
+
+/** A file that was read once without harm. */
+export interface ReadModel extends Bytes {
+  /** What points up in it, if that is not what the file says. */
+  readonly up: UpAxis | undefined;
+  /** By number; null where there is none, or none that this browser could decode. */
+  readonly textures: readonly (Texture | null)[];
+  /** A project's. */
+  readonly cage: CheckedCage | undefined;
+  readonly notices: readonly string[];
+  /** What the module needed for it, ms: as long as the page will need. */
+  readonly took: number;
 }
 
 /** Weights as compressed sparse rows, and vertices outside the cage. */
@@ -34,16 +63,27 @@ export interface Jobs {
   };
   cage: {
     input: { positions: Float32Array; triangles: Uint32Array; options: CageOptions };
-    output: CageArrays;
+    output: CheckedCage;
+  };
+  read: { input: { files: readonly NamedFile[]; up: UpAxis | undefined }; output: ReadModel };
+  /** `model`: the vertices to be enclosed, `[n_vertices, 3]`. */
+  readCage: {
+    input: { files: readonly NamedFile[]; up: UpAxis; model: Float32Array };
+    output: CheckedCage;
   };
   sample: { input: { id: string }; output: SampleArrays };
 }
 
 export type JobKind = keyof Jobs;
 
+/** Of a bind. */
+export type BindStage = "voxelize" | "solve" | "sample";
+/** Of reading a file. */
+export type ReadStage = "bytes" | "decompress" | "geometry" | "textures" | "check";
+
 /** One step of a job. */
 export interface Step {
-  readonly stage: "voxelize" | "solve" | "sample" | "simplify";
+  readonly stage: BindStage | "simplify" | ReadStage;
   readonly fraction: number;
   readonly iteration: number;
   readonly delta: number | null;

@@ -1,8 +1,9 @@
 /** The worker: runs what takes longer than a frame, one job after the other. */
 
-import type { Binder, Bound, Polygons } from "../pkg/cagework";
+import type { Binder, Bound } from "../pkg/cagework";
 import type { Package } from "./artifact";
-import type { BoundArrays, CageArrays, FromWorker, JobKind, Jobs, Step, ToWorker } from "./messages";
+import type { BoundArrays, FromWorker, JobKind, Jobs, Step, ToWorker } from "./messages";
+import { checked, polygons, readCage, readModel } from "./reading";
 
 /** Steps are told at most this often, ms: a page draws no more of them. */
 const STEP_PAUSE = 33;
@@ -48,10 +49,12 @@ async function answer(work: Work, id: number, job: JobKind, input: unknown): Pro
 /** Tells the page of steps now and then; answers false once the job is cancelled. */
 function steps(id: number): (step: Step) => boolean {
   let last = Number.NEGATIVE_INFINITY;
+  let stage: string | undefined;
   return (step) => {
     const now = performance.now();
-    if (now - last >= STEP_PAUSE) {
+    if (now - last >= STEP_PAUSE || step.stage !== stage) {
       last = now;
+      stage = step.stage;
       send({ kind: "step", id, step });
     }
     return !cancelled.has(id);
@@ -83,8 +86,11 @@ function createWork(pkg: Package): Work {
       return bound && taken(bound);
     },
     async cage({ positions, triangles, options }, step) {
-      return polygons((await binder(false)).generateCage(positions, triangles, options, step));
+      const cage = (await binder(false)).generateCage(positions, triangles, options, step);
+      return checked(pkg, cage, positions);
     },
+    read: (input, step) => readModel(pkg, input, step),
+    readCage: (input, step) => readCage(pkg, input, step),
     async sample({ id }) {
       const sample = pkg.Binder.buildSample(id);
       const poses = sample.poseNames.map((name, k) => ({ name, positions: sample.posePositions(k) }));
@@ -102,15 +108,15 @@ function taken(bound: Bound): BoundArrays {
   return { indptr, indices, data, outside, offsets, report };
 }
 
-function polygons(mesh: Polygons): CageArrays {
-  const { positions, corners } = mesh;
-  mesh.free();
-  return { positions, corners };
-}
-
-/** Buffers of all typed arrays in a result: handed over, not copied. */
+/** Buffers of all typed arrays in a result, each once: handed over, not copied. */
 function buffers(value: unknown): ArrayBuffer[] {
-  if (ArrayBuffer.isView(value)) return value.buffer instanceof ArrayBuffer ? [value.buffer] : [];
-  if (typeof value === "object" && value !== null) return Object.values(value).flatMap(buffers);
-  return [];
+  const found = new Set<ArrayBuffer>();
+  const look = (value: unknown): void => {
+    if (ArrayBuffer.isView(value)) {
+      if (value.buffer instanceof ArrayBuffer) found.add(value.buffer);
+    } else if (value instanceof Map) for (const item of value.values()) look(item);
+    else if (typeof value === "object" && value !== null) for (const item of Object.values(value)) look(item);
+  };
+  look(value);
+  return [...found];
 }

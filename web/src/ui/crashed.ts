@@ -20,7 +20,7 @@ export function askAfterCrash(crash: Crash, startFresh: () => void): void {
   const fresh = button("Start fresh", startFresh, { kind: "primary" });
   const texts = [
     `${crash.during} It was the second time, so nothing is opened again by itself.`,
-    "Start fresh forgets the work that this browser keeps, and begins with a sample.",
+    "Start fresh begins with a sample. The work stays kept, and opens only when you ask for it.",
   ];
   const dialog = dialogOf("Cagework stopped again", texts, crash, [fresh, again]);
   // Behind it there is no page that could be used.

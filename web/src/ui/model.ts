@@ -5,7 +5,7 @@ import type { ModelInfo, UpAxis } from "../contract";
 import { count, scientific } from "../format";
 import { PRIVACY, SAMPLES, sentence } from "../strings";
 import { button, facts, head, section, segments } from "./controls";
-import { fill, h, keyed } from "./dom";
+import { fill, h, keyed, setText } from "./dom";
 import { icon } from "./icons";
 
 export function createModelPanel(app: App): HTMLElement {
@@ -19,6 +19,12 @@ export function createModelPanel(app: App): HTMLElement {
     (axis) => void app.files.turn(axis),
   );
   const gallery = h("ul", { class: "gallery" });
+  const showKept = button("", () => app.store.set({ worksOpen: true }), { icon: "save", kind: "small" });
+  const kept = h("div", { class: "row" }, showKept);
+  app.store.watch(["works"], ({ works }) => {
+    kept.hidden = works.length === 0;
+    setText(showKept.lastElementChild ?? showKept, `Kept in this browser (${works.length})`);
+  });
   const element = h(
     "div",
     { class: "stack loose" },
@@ -43,6 +49,7 @@ export function createModelPanel(app: App): HTMLElement {
         button("Open a folder", () => app.chooseFolder(), { icon: "open", kind: "small" }),
       ),
     ),
+    kept,
     section("Samples", gallery),
     card,
     up.element,

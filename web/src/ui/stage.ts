@@ -4,6 +4,7 @@ import type { App } from "../app";
 import type { Element as CageElement, CageState, SceneOptions } from "../contract";
 import type { AppState } from "../state";
 import { hintFor, sentence } from "../strings";
+import { createBusy } from "./busy";
 import { iconButton, press, segments } from "./controls";
 import { fill, h, setText } from "./dom";
 import { type IconName, icon } from "./icons";
@@ -124,8 +125,7 @@ export function createOverlays(
     h("span", { text: "Harmonic" }),
     h("span", { text: "Mean value" }),
   );
-  const busyText = h("p");
-  const busy = h("div", { class: "busy" }, h("span", { class: "spinner" }), busyText);
+  const busy = createBusy(app);
 
   const encloses = h("span", { class: "floating badge encloses", attrs: { role: "status" } });
   store.watch(["editingRest", "cage", "strays"], ({ editingRest, cage, strays }) => {
@@ -135,10 +135,6 @@ export function createOverlays(
 
   element.append(mode.element, encloses, tools, looks, legend, compare, bottom, see, busy);
 
-  store.watch(["busy"], (state) => {
-    busy.hidden = state.busy === null;
-    setText(busyText, state.busy ? `${state.busy}…` : "");
-  });
   store.watch(["cage"], ({ cage }) => {
     tools.hidden = cage === null;
     mode.element.hidden = cage === null;

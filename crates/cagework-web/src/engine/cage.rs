@@ -2,17 +2,14 @@
 
 use cagework_core::bind::estimate_memory;
 use cagework_core::{Cage, PolygonMesh, subdivided_box};
-use cagework_io::{Model, decode_pose, encode_pose};
-use js_sys::{Function, Uint8Array};
+use cagework_io::{decode_pose, encode_pose};
+use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
-use wasm_bindgen::{JsCast as _, JsValue};
 
 use super::Engine;
 use crate::arrays::{corners, flat, points, polygon_mesh};
 use crate::error::{Answer, Fault};
-use crate::loaded::READ_LIMIT;
 use crate::options::BindAsked;
-use crate::state::State;
 use crate::views::object;
 
 /// Room between the model and a box around it, in diagonals of the model.
@@ -39,29 +36,20 @@ impl Engine {
         Ok(self.put_cage(mesh)?)
     }
 
-    /// Reads a cage from a file with the model's axes; a mesh that is no cage yet becomes a draft.
-    ///
-    /// # Errors
-    /// When the file cannot be read.
-    #[wasm_bindgen(js_name = loadCage)]
-    pub fn load_cage(&self, name: &str, bytes: &[u8], sibling: &Function) -> Result<JsValue, JsValue> {
-        let mut resolve = |path: &str| {
-            let found = sibling.call1(&JsValue::NULL, &path.into()).ok()?;
-            Some(Ok(found.dyn_into::<Uint8Array>().ok()?.to_vec()))
-        };
-        let mut model = Model::read_within(name, bytes, &mut resolve, READ_LIMIT).map_err(Fault::from)?;
-        model.set_up(self.read(State::up));
-        model.require_faces().map_err(Fault::from)?;
-        Ok(self.put_cage(model.cage_mesh())?)
-    }
-
-    /// Takes a cage given as arrays; `corners`: for each face their number, then them.
+    /// Takes a cage given as arrays; `corners`: for each face their number, then them. A mesh that is no cage yet becomes
+    /// a draft. `is_sound` when the worker's `Binder.isSound` said so of it and the model: it is not checked again.
     ///
     /// # Errors
     /// When the arrays are no mesh.
     #[wasm_bindgen(js_name = setCage)]
-    pub fn set_cage(&self, positions: &[f32], corners: &[u32]) -> Result<JsValue, JsValue> {
-        Ok(self.put_cage(polygon_mesh(positions, corners)?)?)
+    pub fn set_cage(
+        &self,
+        positions: &[f32],
+        corners: &[u32],
+        is_sound: Option<bool>,
+    ) -> Result<JsValue, JsValue> {
+        self.take_cage(polygon_mesh(positions, corners)?, is_sound == Some(true));
+        Ok(self.state_object()?)
     }
 
     /// The cage, or undefined without one.
@@ -171,7 +159,7 @@ impl Engine {
 impl Engine {
     /// Another cage or draft, and what the page is told about it.
     pub(super) fn put_cage(&self, mesh: PolygonMesh) -> Answer<JsValue> {
-        self.take_cage(mesh);
+        self.take_cage(mesh, false);
         self.state_object()
     }
 

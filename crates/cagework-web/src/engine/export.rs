@@ -85,6 +85,12 @@ impl Engine {
         Ok(self.read(|state| Answer::Ok(write_project(state.the_model()?, &state.rest, &poses, settings)?))?)
     }
 
+    /// What points up in the model's file, y or z.
+    #[must_use]
+    pub fn up(&self) -> String {
+        self.read(|state| state.up().name().to_owned())
+    }
+
     /// The model's vertices at rest. `[n_vertices, 3]`
     #[wasm_bindgen(js_name = modelPositions)]
     #[must_use]

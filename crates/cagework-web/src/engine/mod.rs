@@ -17,6 +17,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use async_lock::Mutex;
+use cagework_core::PolygonMesh;
 use cagework_gpu::Session;
 use js_sys::{Float32Array, Function, Uint32Array};
 use wasm_bindgen::JsValue;
@@ -53,7 +54,7 @@ impl Engine {
         Ok(Self { state: Rc::default(), gpu: Rc::new(Mutex::new(Some(gpu))), invalidate })
     }
 
-    /// Shows a file that was read: its model, and its cage if it has one. The file's handle is used up.
+    /// Shows the model of a file that was read. The file's handle is used up.
     ///
     /// # Errors
     /// When the GPU has no room for it; what was open stays open.
@@ -68,11 +69,7 @@ impl Engine {
         }
         page_turn().await;
         let info = ModelInfo::of(&loaded.model);
-        let cage = loaded.cage.take();
         self.change(|state| state.set_model(loaded.model));
-        if let Some(cage) = cage {
-            self.take_cage(cage);
-        }
         Ok(object(&info)?)
     }
 
@@ -204,9 +201,9 @@ impl Engine {
         changed
     }
 
-    /// Another cage, here at once and on the GPU when it has answered.
-    fn take_cage(&self, mesh: cagework_core::PolygonMesh) {
-        self.change(|state| state.set_cage(mesh));
+    /// Another cage, here at once and on the GPU when it has answered; checked unless it is known to be sound.
+    fn take_cage(&self, mesh: PolygonMesh, is_sound: bool) {
+        self.change(|state| state.set_cage(mesh, is_sound));
         let (state, gpu, invalidate) =
             (Rc::clone(&self.state), Rc::clone(&self.gpu), self.invalidate.clone());
         spawn_local(async move {

@@ -1,0 +1,201 @@
+/** Work that the browser keeps: a piece for each model, one tab at a time. */
+
+import type { Page } from "@playwright/test";
+import { changeKept, keepAsBefore, savedSince } from "./kept";
+import { box } from "./models";
+import { complaintsOfAxe } from "./stories";
+import { bound, cagePositions, calm, drag, drop, expect, largestMove, open, shoot, test } from "./support";
+
+/** Drops a box in a cage and waits until the browser keeps it. */
+async function work(page: Page, name: string): Promise<void> {
+  const before = await page.evaluate(() => Date.now());
+  await drop(page, [
+    { name: `${name}.obj`, bytes: box(0.5) },
+    { name: `${name}-cage.obj`, bytes: box(0.8) },
+  ]);
+  await expect(page).toHaveTitle(new RegExp(name));
+  await bound(page);
+  await expect.poll(() => savedSince(page, before, name), { timeout: 60_000 }).toBe(true);
+}
+
+/** Goes to where the page's storage is, and not the page. */
+async function leave(page: Page): Promise<void> {
+  await page.route("**/favicon.ico", (route) => route.fulfill({ body: "" }));
+  await page.goto("./licences.txt");
+}
+
+const listOf = (page: Page) => page.getByRole("dialog", { name: "Kept in this browser" });
+
+/** Opens the list from the step Model. */
+async function showList(page: Page): Promise<void> {
+  await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  await page.getByRole("button", { name: /^Kept in this browser/ }).click();
+}
+
+test("two tabs with two works, and a third visit lists both", async ({ page, context }) => {
+  await open(page);
+  await work(page, "workA");
+  const second = await context.newPage();
+  await open(second);
+  await expect(second, "another tab has the only work open").toHaveTitle(/Rat/);
+  await work(second, "workB");
+
+  const third = await context.newPage();
+  await third.goto("./");
+  const rows = listOf(third).getByRole("listitem");
+  await expect(rows).toHaveText([/^workB\.obj.*open in another tab/, /^workA\.obj.*open in another tab/]);
+  await expect(rows.first()).toContainText(/a moment ago|1 minute ago/);
+  await expect(rows.first()).toContainText(/\d (B|KB)/);
+  await bound(third);
+  expect(await complaintsOfAxe(third)).toEqual([]);
+  await shoot(third, "works-elsewhere");
+
+  await page.close();
+  await second.close();
+  await third.reload();
+  await expect(rows).toHaveCount(2);
+  await expect(rows.first()).not.toContainText("another tab");
+  for (const scheme of ["light", "dark"] as const) {
+    await third.emulateMedia({ colorScheme: scheme });
+    for (const [width, height] of [
+      [1440, 900],
+      [390, 844],
+    ] as const) {
+      await third.setViewportSize({ width, height });
+      await calm(third);
+      await shoot(third, `works-${scheme}-${width}`);
+    }
+  }
+  await listOf(third).getByRole("button", { name: "Open workA.obj" }).click();
+  await expect(third).toHaveTitle(/workA/);
+  await bound(third);
+});
+
+test("a tab that is loaded again has its own work, whatever else is kept", async ({ page, context }) => {
+  await open(page);
+  await work(page, "workA");
+  await work(page, "workB");
+  const other = await context.newPage();
+  await open(other);
+  await expect(other, "the only work that no other tab has open").toHaveTitle(/workA/);
+  await work(other, "workC");
+  for (const [tab, name] of [
+    [page, /workB/],
+    [other, /workC/],
+  ] as const) {
+    await tab.reload();
+    await expect(tab).toHaveTitle(name);
+    await bound(tab);
+  }
+});
+
+test("a second model keeps the first, and one click brings it back", async ({ page }) => {
+  await open(page);
+  await work(page, "workA");
+  const before = await page.evaluate(() => Date.now());
+  await drag(page, 30, 20);
+  const posed = await cagePositions(page);
+  await expect.poll(() => savedSince(page, before, "workA")).toBe(true);
+  await work(page, "workB");
+  const kept = page.locator("#toasts").getByText("Your work on workA.obj is kept in this browser.");
+  await expect(kept).toBeVisible();
+  await page.getByRole("button", { name: "Go back to it" }).click();
+  await expect(page).toHaveTitle(/workA/);
+  await bound(page);
+  expect(largestMove(posed, await cagePositions(page)), "with its pose").toBeLessThan(1e-3);
+  await showList(page);
+  await expect(listOf(page).getByRole("listitem")).toHaveText([/workA\.obj.*open here/, /workB\.obj/]);
+});
+
+test("what was changed a moment before another model came is kept", async ({ page }) => {
+  await open(page);
+  await drag(page, 50, 30);
+  // Within the pause after which work is kept by itself.
+  await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  await page.locator('[data-sample="clamp"]').click();
+  await expect(page).toHaveTitle(/Clamp/i);
+  await bound(page);
+  await showList(page);
+  await expect(listOf(page).getByRole("listitem")).toHaveText([/^Rat/]);
+});
+
+test("samples that nobody touched leave nothing", async ({ page }) => {
+  await open(page);
+  await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  for (const sample of ["clamp", "strider"]) {
+    await page.locator(`[data-sample="${sample}"]`).click();
+    await expect(page).toHaveTitle(new RegExp(sample, "i"));
+    await bound(page);
+  }
+  expect(await savedSince(page, 0)).toBe(false);
+});
+
+test("Delete takes two clicks, and what is deleted is gone", async ({ page }) => {
+  await open(page);
+  await work(page, "workA");
+  await work(page, "workB");
+  await showList(page);
+  const list = listOf(page);
+  await list.getByRole("button", { name: "Delete workA.obj", exact: true }).click();
+  await expect(list.getByRole("listitem")).toHaveCount(2);
+  await list.getByRole("button", { name: "Really delete workA.obj" }).click();
+  await expect(list.getByRole("listitem")).toHaveText([/workB\.obj/]);
+  await page.reload();
+  await bound(page);
+  expect(await savedSince(page, 0, "workA")).toBe(false);
+  expect(await savedSince(page, 0, "workB")).toBe(true);
+});
+
+test("work of 31 days ago is deleted", async ({ page, context }) => {
+  await open(page);
+  await work(page, "workA");
+  await leave(page);
+  await changeKept(page, "age");
+  const next = await context.newPage();
+  await open(next);
+  await expect(next).toHaveTitle(/Rat/);
+  expect(await savedSince(next, 0)).toBe(false);
+});
+
+test("damaged work is deleted, and a sentence says so", async ({ page }) => {
+  await open(page);
+  await work(page, "workA");
+  await leave(page);
+  await changeKept(page, "cut");
+  await open(page);
+  await expect(page.locator("#toasts")).toContainText(
+    "The work on workA.obj that this browser kept was damaged",
+  );
+  await expect(page).toHaveTitle(/Rat/);
+  expect(await savedSince(page, 0)).toBe(false);
+});
+
+test("the one project that was kept before is an entry now", async ({ page }) => {
+  await open(page);
+  const project = await page.evaluate(() =>
+    Array.from(globalThis.cagework?.engine.writeProject([], [], "{}") ?? []),
+  );
+  await leave(page);
+  await page.evaluate(() => new Promise((done) => (indexedDB.deleteDatabase("cagework").onsuccess = done)));
+  await keepAsBefore(page, Uint8Array.from(project), "horse.glb", Date.now() - 120_000);
+  await open(page);
+  await expect(page.locator("#toasts")).toContainText(
+    "Your work on horse.glb is back, as you left it 2 minutes ago.",
+  );
+  await showList(page);
+  await expect(listOf(page).getByRole("listitem")).toHaveText([/^horse\.glb.*open here/]);
+});
+
+test("a full disk is said, with what to do", async ({ page }) => {
+  await open(page);
+  await page.evaluate(() => {
+    IDBObjectStore.prototype.put = () => {
+      throw new DOMException("full", "QuotaExceededError");
+    };
+  });
+  await drag(page, 30, 20);
+  const said = page.locator("#toasts");
+  await expect(said).toContainText("This browser has no room left to keep your work on Rat.");
+  await said.getByRole("button", { name: "Show kept work" }).click();
+  await expect(listOf(page)).toContainText("There is nothing yet.");
+});

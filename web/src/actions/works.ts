@@ -1,0 +1,224 @@
+/** Keeping work: each piece has an entry of its own in this browser, and one tab at a time has it open. */
+
+import type { NamedFile } from "../contract";
+import { isFatal } from "../crash";
+import { bytes as sizeOf, stem } from "../format";
+import { deleteEntry, newId, readEntries, readFile, writeEntry } from "../works/database";
+import { ago, type Entry, isExpired, newestFirst, toOpen, type Work } from "../works/entry";
+import { heldIds, hold, ownId, rememberOwn } from "../works/holds";
+import { attempt, type Context } from "./context";
+
+export interface WorkActions {
+  /** Keeps what is open a little later; many calls make one. */
+  touch(): void;
+  /** Keeps at once what would be kept later, and a model that was not yet: something else will be opened. */
+  flush(): Promise<void>;
+  /** Something else is open: what was before stays kept. */
+  leave(): void;
+  /** Reads anew what is kept, for `AppState.works`. */
+  refresh(): Promise<void>;
+  /** Opens what is kept; a copy of what another tab has open. */
+  open(work: Work): Promise<boolean>;
+  remove(id: string): Promise<void>;
+  /** Opens what a visit opens by itself; false when there is nothing, or more to choose from. */
+  restore(): Promise<boolean>;
+  /** What this tab had open is not opened by itself any more: the page stops with it. */
+  distrust(): Promise<void>;
+}
+
+const PAUSE_MS = 1500;
+/** Larger projects are not kept by themselves, bytes: writing them would be felt with each change. */
+const LARGEST = 200 * 1024 ** 2;
+
+const SAVE_A_FILE = "Save a project file (step Export) before you close the page.";
+
+export interface WorkNeeds {
+  /** The project file of what is open. */
+  write(): Uint8Array;
+  /** Opens files, as a drop does. */
+  openFiles(files: readonly NamedFile[]): Promise<boolean>;
+  startFresh(): void;
+}
+
+export function createWorks(ctx: Context, { write, openFiles, startFresh }: WorkNeeds): WorkActions {
+  const { store } = ctx;
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  let saving: Promise<void> | undefined;
+  /** What is open could not be kept; that was said. */
+  let hasFailed = false;
+  /** What is open, and how other tabs may have it. */
+  let current: { readonly id: string; readonly name: string; readonly release: () => void } | undefined;
+
+  const hasWork = () => store.get().cage?.usable === true && store.get().model !== null && !hasFailed;
+
+  const fail = (error: unknown, name: string) => {
+    if (isFatal(error)) {
+      reportError(error);
+      return;
+    }
+    hasFailed = true;
+    const isFull = error instanceof DOMException && error.name === "QuotaExceededError";
+    // Private windows refuse as well: once is enough to say so.
+    const text = isFull
+      ? `This browser has no room left to keep your work on ${name}. ${SAVE_A_FILE}`
+      : `This browser does not let the page keep your work. ${SAVE_A_FILE}`;
+    ctx.tell.say(text, isFull ? showList : undefined);
+  };
+
+  const put = async () => {
+    const name = current?.name ?? store.get().model?.name ?? "";
+    try {
+      const file = write();
+      if (file.length > LARGEST) {
+        hasFailed = true;
+        const size = `${sizeOf(file.length)}, of ${sizeOf(LARGEST)} at most`;
+        ctx.tell.say(`Your work on ${name} is too large to be kept by itself (${size}). ${SAVE_A_FILE}`);
+        return;
+      }
+      if (!current) {
+        const id = newId();
+        current = { id, name, release: (await hold(id)) ?? (() => undefined) };
+      }
+      const { id } = current;
+      const when = Date.now();
+      await writeEntry({ id, name, when, size: file.length }, file);
+      rememberOwn(id);
+      store.set({ savedAt: when });
+      await refresh();
+    } catch (error) {
+      fail(error, name);
+    }
+  };
+
+  const save = async () => {
+    await saving;
+    clearTimeout(timer);
+    timer = undefined;
+    if (!hasWork()) return;
+    saving = put();
+    await saving;
+  };
+
+  const touch = () => {
+    clearTimeout(timer);
+    timer = setTimeout(() => {
+      const { bindRun, gesture, playing, editingRest } = store.get();
+      if (bindRun || gesture || playing || editingRest) touch();
+      else void save();
+    }, PAUSE_MS);
+  };
+
+  const refresh = async () => {
+    try {
+      const [{ entries, damaged }, held] = [await readEntries(), await heldIds()];
+      if (damaged > 0) ctx.tell.say("Some of the work that this browser kept was damaged, and is deleted.");
+      const works = newestFirst(entries).map((entry): Work => {
+        if (entry.id === current?.id) return { ...entry, where: "here" };
+        return { ...entry, where: held.has(entry.id) ? "elsewhere" : "nowhere" };
+      });
+      const isOver = (work: Work) => work.where === "nowhere" && isExpired(work, Date.now());
+      for (const { id } of works.filter(isOver)) await deleteEntry(id);
+      store.set({ works: works.filter((work) => !isOver(work)) });
+    } catch {
+      // Storage is forbidden: nothing is kept.
+      store.set({ works: [] });
+    }
+  };
+
+  const drop = () => {
+    current?.release();
+    current = undefined;
+    hasFailed = false;
+    rememberOwn(null);
+  };
+
+  const fileOf = async ({ id, name }: Entry): Promise<NamedFile | undefined> => {
+    const file = await readFile(id);
+    if (!file) {
+      await deleteEntry(id);
+      await refresh();
+      ctx.tell.say(`The work on ${name} that this browser kept was damaged, and is deleted.`);
+      return undefined;
+    }
+    const path = `${stem(name)}.cagework.glb`;
+    return { name: path, path, file: new Blob([new Uint8Array(file)]) };
+  };
+
+  const open = async (work: Work, isFirst = false): Promise<boolean> => {
+    const isCopy = work.where === "elsewhere" && !isFirst;
+    const release = isCopy ? undefined : await hold(work.id);
+    // Should the page stop with it, the next one must know.
+    if (isFirst) rememberOwn(release ? work.id : null);
+    if (!isCopy && !release) {
+      await refresh();
+      ctx.tell.say(`${work.name} is open in another tab.`, showList);
+      return false;
+    }
+    const file = await fileOf(work).catch(() => undefined);
+    const isOpen = file !== undefined && (await openFiles([file]));
+    if (!isOpen) {
+      release?.();
+      if (isFirst) rememberOwn(null);
+      if (isFirst && file) {
+        ctx.tell.say(`Your work on ${work.name} could not be opened. It stays kept.`, showList);
+      }
+    }
+    if (isOpen && release) {
+      current = { id: work.id, name: work.name, release };
+      rememberOwn(work.id);
+      store.set({ step: "pose", savedAt: work.when });
+    }
+    await refresh();
+    return isOpen;
+  };
+
+  const showList = { label: "Show kept work", run: () => store.set({ worksOpen: true }) };
+
+  return {
+    touch,
+    async flush() {
+      const { sample } = store.get();
+      if (timer !== undefined || (sample === null && !current)) await save();
+      await saving;
+    },
+    leave() {
+      clearTimeout(timer);
+      timer = undefined;
+      const left = store.get().works.find(({ id }) => id === current?.id);
+      drop();
+      store.set({ savedAt: null });
+      void refresh();
+      if (!left) return;
+      const back = { label: "Go back to it", run: () => void open({ ...left, where: "nowhere" }) };
+      ctx.tell.say(`Your work on ${left.name} is kept in this browser.`, back);
+    },
+    refresh,
+    open,
+    async remove(id) {
+      if (current?.id === id) {
+        clearTimeout(timer);
+        timer = undefined;
+        drop();
+      }
+      hasFailed = false;
+      await attempt(ctx, "The kept work could not be deleted", () => deleteEntry(id));
+      await refresh();
+    },
+    async restore() {
+      await refresh();
+      const { works } = store.get();
+      const chosen = toOpen(works, ownId());
+      if (!chosen || !(await open(chosen, true))) return false;
+      const text = `Your work on ${chosen.name} is back, as you left it ${ago(Date.now() - chosen.when)}.`;
+      const fresh = { label: "Start fresh", run: startFresh };
+      ctx.tell.say(text, works.length > 1 ? showList : fresh);
+      return true;
+    },
+    async distrust() {
+      const { entries } = await readEntries();
+      const entry = entries.find(({ id }) => id === ownId());
+      if (entry) await writeEntry({ ...entry, stopped: true });
+      rememberOwn(null);
+    },
+  };
+}

@@ -1,0 +1,84 @@
+/** The worker's half of opening a file: whatever its bytes could make endless, or break, happens here first. */
+
+import type { Loaded, Polygons } from "../pkg/cagework";
+import type { Package } from "./artifact";
+import { type Bytes, readFiles, siblingOf } from "./files";
+import type { CageArrays, CheckedCage, Jobs, ReadModel, ReadStage, Step } from "./messages";
+import { decodeTextures } from "./textures";
+
+type Tell = (step: Step) => void;
+
+const say = (tell: Tell, stage: ReadStage, fraction = 0) =>
+  tell({ stage, fraction, iteration: 0, delta: null });
+
+/** Reads a model, decompressed if need be, its textures decoded and a project's cage checked. */
+export async function readModel(
+  pkg: Package,
+  { files, up }: Jobs["read"]["input"],
+  tell: Tell,
+): Promise<ReadModel> {
+  const { loaded, bytes } = await read(pkg, files, tell);
+  const began = performance.now();
+  if (up) loaded.setUp(up);
+  loaded.prepare();
+  const took = bytes.took + performance.now() - began;
+  const { textures, failed } = await decodeTextures(loaded, (share) => say(tell, "textures", share));
+  const many = failed === 1 ? "a texture" : `${failed} textures`;
+  const notice = `this browser cannot decode ${many}: the material's plain colour is shown, exports keep the file`;
+  say(tell, "check");
+  const mesh = loaded.cage;
+  const cage = mesh && checked(pkg, mesh, loaded.positions);
+  const all = took + (cage?.took ?? 0);
+  return { ...bytes, up, textures, cage, notices: failed > 0 ? [notice] : [], took: all };
+}
+
+/** Reads a file as a cage and checks it. */
+export async function readCage(
+  pkg: Package,
+  { files, up, model }: Jobs["readCage"]["input"],
+  tell: Tell,
+): Promise<CheckedCage> {
+  const { loaded } = await read(pkg, files, tell);
+  loaded.setUp(up);
+  say(tell, "check");
+  return checked(pkg, loaded.asCage(), model);
+}
+
+/** A cage as arrays, and what is wrong with it for the model's vertices. */
+export function checked(pkg: Package, cage: Polygons, model: Float32Array): CheckedCage {
+  const { positions, corners } = polygons(cage);
+  const began = performance.now();
+  const isSound = pkg.Binder.isSound(model, positions, corners);
+  return { positions, corners, isSound, took: isSound ? 0 : performance.now() - began };
+}
+
+/** Arrays of a mesh; its memory in the module is given back. */
+export function polygons(mesh: Polygons): CageArrays {
+  const { positions, corners } = mesh;
+  mesh.free();
+  return { positions, corners };
+}
+
+async function read(
+  pkg: Package,
+  files: Jobs["read"]["input"]["files"],
+  tell: Tell,
+): Promise<{ loaded: Loaded; bytes: Bytes & { took: number } }> {
+  say(tell, "bytes");
+  const file = await readFiles(files);
+  const sibling = siblingOf(file.siblings);
+  const timed = (bytes: Uint8Array) => {
+    say(tell, "geometry");
+    const began = performance.now();
+    const loaded = pkg.Loaded.read(file.name, bytes, sibling);
+    return { loaded, bytes: { ...file, bytes, took: performance.now() - began } };
+  };
+  try {
+    return timed(file.bytes);
+  } catch (error) {
+    if (!(error instanceof Error) || error.name !== "Compressed") throw error;
+    say(tell, "decompress");
+    const { decompress } = await import("../decode");
+    return timed(await decompress(file.name, file.bytes, sibling));
+  }
+}

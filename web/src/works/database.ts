@@ -1,0 +1,95 @@
+/** Kept work in IndexedDB: entries and their project files apart, so that a list of entries reads no file. Nothing leaves it. */
+
+import { type Entry, isEntry, isWhole, takeOver } from "./entry";
+
+const DATABASE = "cagework";
+const VERSION = 2;
+const ENTRIES = "entries";
+const FILES = "projects";
+/** Where version 1 had the one project that it kept. */
+const ONLY = "autosave";
+
+/** A name for new work; plain HTTP has no `randomUUID`. */
+export function newId(): string {
+  return crypto.randomUUID?.() ?? Array.from(crypto.getRandomValues(new Uint32Array(4))).join("-");
+}
+
+function open(): Promise<IDBDatabase> {
+  return new Promise((resolve, reject) => {
+    const request = indexedDB.open(DATABASE, VERSION);
+    request.onupgradeneeded = ({ oldVersion }) => {
+      const entries = request.result.createObjectStore(ENTRIES);
+      if (oldVersion === 0) request.result.createObjectStore(FILES);
+      const files = request.transaction?.objectStore(FILES);
+      if (oldVersion === 0 || !files) return;
+      const only = files.get(ONLY);
+      only.onsuccess = () => {
+        const taken = takeOver(only.result, newId());
+        files.delete(ONLY);
+        if (!taken) return;
+        entries.put(taken.entry, taken.entry.id);
+        files.put(taken.bytes, taken.entry.id);
+      };
+    };
+    request.onsuccess = () => resolve(request.result);
+    request.onerror = () => reject(request.error);
+  });
+}
+
+async function run<T>(
+  mode: IDBTransactionMode,
+  work: (entries: IDBObjectStore, files: IDBObjectStore) => IDBRequest<T>,
+): Promise<T> {
+  const database = await open();
+  try {
+    return await new Promise<T>((resolve, reject) => {
+      const transaction = database.transaction([ENTRIES, FILES], mode);
+      const request = work(transaction.objectStore(ENTRIES), transaction.objectStore(FILES));
+      transaction.oncomplete = () => resolve(request.result);
+      transaction.onabort = () => reject(transaction.error);
+      transaction.onerror = () => reject(transaction.error);
+    });
+  } finally {
+    database.close();
+  }
+}
+
+/** Whether there is any work; a browser that forbids storage keeps none. */
+export async function hasEntries(): Promise<boolean> {
+  return (await run("readonly", (entries) => entries.count()).catch(() => 0)) > 0;
+}
+
+/** All entries; those that are none are deleted, `damaged` says how many. */
+export async function readEntries(): Promise<{ entries: Entry[]; damaged: number }> {
+  let names: IDBRequest<IDBValidKey[]> | undefined;
+  const values: unknown[] = await run("readonly", (entries) => {
+    names = entries.getAllKeys();
+    return entries.getAll();
+  });
+  const keys = (names?.result ?? []).map(String);
+  const isGood = (value: unknown, k: number): value is Entry => isEntry(value) && value.id === keys[k];
+  const damaged = keys.filter((_, k) => !isGood(values[k], k));
+  for (const key of damaged) await deleteEntry(key);
+  return { entries: values.filter(isGood), damaged: damaged.length };
+}
+
+/** The project file of an entry; undefined when it is not whole. */
+export async function readFile(id: string): Promise<Uint8Array | undefined> {
+  const file: unknown = await run("readonly", (_, files) => files.get(id));
+  return isWhole(file) ? file : undefined;
+}
+
+/** Keeps an entry, in place of the one of that name; without a file the one that is there stays. */
+export async function writeEntry(entry: Entry, file?: Uint8Array): Promise<void> {
+  await run("readwrite", (entries, files) => {
+    if (file) files.put(file, entry.id);
+    return entries.put(entry, entry.id);
+  });
+}
+
+export async function deleteEntry(id: string): Promise<void> {
+  await run("readwrite", (entries, files) => {
+    files.delete(id);
+    return entries.delete(id);
+  });
+}

@@ -1,0 +1,72 @@
+import { expect, it } from "vitest";
+import type { NamedFile } from "../src/contract";
+import { type Client, named } from "../src/session/client";
+import { createReader } from "../src/session/reader";
+import { sayReading } from "../src/strings";
+
+const file = (name: string, size = 10): NamedFile => ({ name, path: name, file: { size } as Blob });
+
+/** A worker that answers when it is told to, and how it was treated. */
+function workers() {
+  const opened: { closed: number; answer: (output: object) => void; fail: (error: Error) => void }[] = [];
+  const open = (): Client => {
+    const worker = { closed: 0, answer: (_: object) => {}, fail: (_: Error) => {} };
+    const done = new Promise<never>((resolve, reject) => {
+      worker.answer = (output) => resolve(output as never);
+      worker.fail = reject;
+    });
+    const close = () => {
+      worker.closed += 1;
+      worker.fail(named("Cancelled", "the page is closing"));
+    };
+    opened.push(worker);
+    return { run: () => ({ done, cancel: close }), isBusy: () => true, close };
+  };
+  return { opened, open };
+}
+
+it("each file is read by a worker that ends with it", async () => {
+  const { opened, open } = workers();
+  const reader = createReader(open);
+  for (const k of [0, 1]) {
+    const job = reader.model([file("a.obj")], undefined);
+    opened[k]?.answer({ name: "a.obj" });
+    expect(await job.done).toEqual({ name: "a.obj" });
+    expect(opened[k]?.closed).toBeGreaterThan(0);
+  }
+  expect(opened.length).toBe(2);
+});
+
+it("Cancel and another file end what is being read", async () => {
+  const { opened, open } = workers();
+  const reader = createReader(open);
+  const first = reader.model([file("a.obj")], undefined);
+  const second = reader.model([file("b.obj")], undefined);
+  await expect(first.done).rejects.toMatchObject({ name: "Cancelled" });
+  expect(opened[1]?.closed).toBe(0);
+  second.cancel();
+  await expect(second.done).rejects.toMatchObject({ name: "Cancelled" });
+});
+
+it("a worker that broke is a sentence, an error of the file stays what it is", async () => {
+  const { opened, open } = workers();
+  const reader = createReader(open);
+  const broken = reader.model([file("a.obj")], undefined);
+  opened[0]?.fail(named("Worker", "unreachable"));
+  await expect(broken.done).rejects.toThrow("reading it broke off");
+  const bad = reader.model([file("b.obj")], undefined);
+  opened[1]?.fail(named("Format", "not a GLB"));
+  await expect(bad.done).rejects.toMatchObject({ name: "Format", message: "not a GLB" });
+});
+
+it("a file too large for a browser gets no worker", async () => {
+  const { opened, open } = workers();
+  const job = createReader(open).model([file("a.glb"), file("huge.bin", 5 * 2 ** 30)], undefined);
+  await expect(job.done).rejects.toThrow("huge.bin has 5.0 GiB");
+  expect(opened.length).toBe(0);
+});
+
+it("how far reading is, is said with a share where there is one", () => {
+  expect(sayReading("geometry", 0)).toBe("Finding vertices and faces");
+  expect(sayReading("textures", 0.4)).toBe("Decoding textures, 40 %");
+});

@@ -1,0 +1,111 @@
+import { afterEach, describe, expect, it, vi } from "vitest";
+import {
+  ago,
+  type Entry,
+  isEntry,
+  isExpired,
+  isWhole,
+  newestFirst,
+  takeOver,
+  toOpen,
+  type Work,
+} from "../src/works/entry";
+import { heldIds, hold } from "../src/works/holds";
+
+const DAY = 86_400_000;
+
+const entry = (id: string, when: number): Entry => ({ id, name: `${id}.obj`, when, size: 100 });
+const work = (id: string, where: Work["where"] = "nowhere"): Work => ({ ...entry(id, 0), where });
+
+/** A GLB of nothing but its head: magic, version 2, length. */
+function glb(length: number): Uint8Array {
+  const bytes = new Uint8Array(length);
+  const view = new DataView(bytes.buffer);
+  for (const [k, value] of [0x46546c67, 2, length].entries()) view.setUint32(4 * k, value, true);
+  return bytes;
+}
+
+describe("entries", () => {
+  it("say how long ago", () => {
+    expect(ago(10_000)).toBe("a moment ago");
+    expect(ago(60_000)).toBe("1 minute ago");
+    expect(ago(7_200_000)).toBe("2 hours ago");
+    expect(ago(3 * DAY)).toBe("3 days ago");
+  });
+  it("stand newest first, and the list that was given stays", () => {
+    const list = [entry("a", 10), entry("b", 30), entry("c", 20)];
+    expect(newestFirst(list).map(({ id }) => id)).toEqual(["b", "c", "a"]);
+    expect(list[0]?.id).toBe("a");
+  });
+  it("are over after 30 days", () => {
+    expect(isExpired(entry("a", 0), 30 * DAY)).toBe(false);
+    expect(isExpired(entry("a", 0), 30 * DAY + 1)).toBe(true);
+  });
+  it("are told from what is none", () => {
+    expect(isEntry(entry("a", 5))).toBe(true);
+    const bad = [null, "a", {}, { ...entry("a", 5), when: Number.NaN }, { ...entry("a", 5), size: -1 }];
+    expect(bad.map(isEntry)).toEqual(bad.map(() => false));
+    expect(isEntry({ ...entry("a", 5), name: 7 })).toBe(false);
+  });
+  it("have a file that is whole", () => {
+    expect(isWhole(glb(40))).toBe(true);
+    expect([glb(40).slice(0, 30), new Uint8Array(40), glb(40).buffer, undefined].map(isWhole)).toEqual([
+      false,
+      false,
+      false,
+      false,
+    ]);
+    // A view into something larger.
+    const larger = new Uint8Array(60);
+    larger.set(glb(40), 8);
+    expect(isWhole(larger.subarray(8, 48))).toBe(true);
+  });
+});
+
+it("the one project of before becomes an entry, unless it is damaged", () => {
+  const saved = { bytes: glb(40), name: "horse.glb", when: 7 };
+  expect(takeOver(saved, "x")).toEqual({
+    entry: { id: "x", name: "horse.glb", when: 7, size: 40 },
+    bytes: saved.bytes,
+  });
+  const bad = [
+    undefined,
+    { ...saved, bytes: new Uint8Array(3) },
+    { ...saved, name: undefined },
+    { ...saved, when: "now" },
+  ];
+  expect(bad.map((value) => takeOver(value, "x"))).toEqual(bad.map(() => undefined));
+});
+
+describe("what a visit opens by itself", () => {
+  const opened = (works: Work[], own: string | null = null) => toOpen(works, own)?.id;
+  it("is the only work there is", () => expect(opened([work("a")])).toBe("a"));
+  it("is nothing where there is a choice", () => expect(opened([work("a"), work("b")])).toBeUndefined());
+  it("is what this tab had open, whatever else there is", () =>
+    expect(opened([work("a"), work("b")], "b")).toBe("b"));
+  it("is never what another tab has open", () => {
+    expect(opened([work("a", "elsewhere")])).toBeUndefined();
+    expect(opened([work("a", "elsewhere"), work("b")])).toBe("b");
+  });
+  it("may still be held by the page before in this tab", () => {
+    expect(opened([work("a", "elsewhere"), work("b")], "a")).toBe("a");
+  });
+  it("is never what the page stopped with", () => {
+    expect(opened([{ ...work("a"), stopped: true }], "a")).toBeUndefined();
+    expect(opened([{ ...work("a"), stopped: true }, work("b")])).toBeUndefined();
+  });
+});
+
+describe("locks", () => {
+  afterEach(() => vi.unstubAllGlobals());
+  it("are given by nobody on plain HTTP: then everything is free", async () => {
+    vi.stubGlobal("navigator", {});
+    expect(await hold("a")).toBeDefined();
+    expect([...(await heldIds())]).toEqual([]);
+  });
+  it("of other pages of the origin are no work", async () => {
+    const held = [{ name: "cagework.work.a" }, { name: "somebody's" }, {}];
+    vi.stubGlobal("navigator", { locks: { query: async () => ({ held }) } });
+    expect([...(await heldIds())]).toEqual(["a"]);
+  });
+});
