@@ -290,3 +290,15 @@ fn pose_of_a_welded_cage_is_found_by_its_vertices() {
         cage.cage_mesh().positions.iter().map(|p| Vec3::new(2.0 * p.x, p.y, p.z)).collect();
     assert_eq!(cage.pose_positions(&read_glb(&b)).unwrap(), expected);
 }
+
+/// Written as it was, the attribute would name one of the accessors that are added: the fuzzer's input 2817 of seed 1795420617.
+#[test]
+fn attribute_without_an_accessor_is_left_out_and_named() {
+    let mut b = plain_cube();
+    b.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 9.into();
+    let model = read("x.glb", &b.glb()).unwrap();
+    assert!(model.notices[0].contains("TEXCOORD_0 of mesh 0, accessor 9"), "{:?}", model.notices);
+    let poses = [("a".into(), model.positions.clone()), ("b".into(), model.positions.clone())];
+    let written = model.write_glb_poses(&model.positions, &poses).unwrap();
+    assert_eq!(read("y.glb", &written).unwrap().positions, model.positions);
+}

@@ -13,7 +13,7 @@ use serde_json::{Map, Value, json};
 use super::GltfError;
 use crate::look::sniff_image;
 use crate::memory::MemoryError;
-use crate::shown::{MAX_NAME_CHARS, shown_start};
+use crate::shown::{MAX_NAME_CHARS, shown, shown_start};
 use crate::siblings::{Absent, Image, NO_IMAGE, Resolve, Siblings};
 
 /// Extensions that hide geometry from a reader without their decoder; meshopt's has the same streams by both names.
@@ -68,6 +68,7 @@ pub(crate) fn load(
         })?;
         buffers
     };
+    drop_missing(&mut json, notices);
     let root = typed(&json)?;
     let images = load_images(&json, &root, &buffers, &mut siblings, notices);
     // The caller still holds the file itself; buffers and images of one file share its bytes.
@@ -77,6 +78,31 @@ pub(crate) fn load(
     let held = of_json + bytes.len() as u64 + loaded.sum::<u64>();
     MemoryError::check(held, memory_limit)?;
     Ok(Loaded { json, root, buffers, images, bytes: held })
+}
+
+/// Takes out attributes that only pictures need and whose accessor is not there. Accessors that are written later would take
+/// its number.
+fn drop_missing(json: &mut Value, notices: &mut Vec<String>) {
+    let n_accessors = json["accessors"].as_array().map_or(0, Vec::len) as u64;
+    let mut missing = Vec::new();
+    let mut meshes = json.get_mut("meshes").and_then(Value::as_array_mut);
+    for (mesh, value) in meshes.iter_mut().flat_map(|meshes| meshes.iter_mut()).enumerate() {
+        let primitives = value.get_mut("primitives").and_then(Value::as_array_mut).into_iter().flatten();
+        for attributes in primitives.filter_map(|p| p.get_mut("attributes")?.as_object_mut()) {
+            attributes.retain(|name, accessor| {
+                let is_drawn = ["TEXCOORD_", "COLOR_", "_"].iter().any(|start| name.starts_with(start));
+                let is_missing = is_drawn && accessor.as_u64().is_some_and(|number| number >= n_accessors);
+                if is_missing {
+                    missing.push(format!("{} of mesh {mesh}, accessor {accessor}", shown(name)));
+                }
+                !is_missing
+            });
+        }
+    }
+    if let Some(first) = missing.first() {
+        notices
+            .push(format!("attributes without an accessor are left out ({} in all): {first}", missing.len()));
+    }
 }
 
 /// Bytes that JSON takes once it is read: its text, twice for a while, and every value in it as a value of any kind and

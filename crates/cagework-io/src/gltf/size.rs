@@ -5,8 +5,7 @@
 
 use ::gltf::json::Index;
 use ::gltf::json::accessor::Accessor;
-use ::gltf::json::mesh::{Mode, Primitive, Semantic};
-use ::gltf::json::validation::Checked;
+use ::gltf::json::mesh::{Mode, Primitive};
 
 use super::accessor::MAX_ELEMENTS;
 use super::geometry::surface;
@@ -121,14 +120,6 @@ fn check_counts(document: &GltfDocument, primitive: &Primitive, vertices: u64) -
         Err(GltfError::Count { accessor, what: what(), count, expected: vertices, of: "vertices" })
     };
     for (semantic, index) in &primitive.attributes {
-        // What only pictures need may be missing.
-        let is_drawn = matches!(
-            semantic,
-            Checked::Valid(Semantic::TexCoords(_) | Semantic::Colors(_)) | Checked::Invalid
-        );
-        if is_drawn && index.value() >= document.root.accessors.len() {
-            continue;
-        }
         check(&|| semantic.to_string(), index)?;
     }
     for (number, target) in primitive.targets.iter().flatten().enumerate() {
