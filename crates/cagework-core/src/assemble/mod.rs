@@ -308,18 +308,17 @@ impl Run<'_> {
     }
 }
 
-/// The smallest weight that is kept if the sum of those below may be `most`.
+/// A weight such that the sum of all below is at most `most`: the largest one, found by halving the bits of positive
+/// numbers, which ascend as they do.
 fn least_kept(row: &[Row], most: f32) -> f32 {
-    let mut small: Vec<f32> = row.iter().flatten().copied().filter(|&w| w > 0.0 && w <= most).collect();
-    small.sort_unstable_by(f32::total_cmp);
-    let mut sum = 0.0;
-    small
-        .into_iter()
-        .find(|w| {
-            sum += w;
-            sum > most
-        })
-        .unwrap_or(most)
+    let (mut low, mut high) = (0, most.to_bits() + 1);
+    while high - low > 1 {
+        let middle = low + (high - low) / 2;
+        let least = f32::from_bits(middle);
+        let below: f32 = row.iter().flatten().map(|&w| if w < least { w } else { 0.0 }).sum();
+        if below <= most { low = middle } else { high = middle }
+    }
+    f32::from_bits(low)
 }
 
 /// Corrects a row until it sums to 1 and puts its vertex at `goal`; returns its sums before (to f32) and after.

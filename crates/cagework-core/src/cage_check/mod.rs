@@ -174,8 +174,8 @@ pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> C
     edges.report(mesh, &mut found);
     edges::report_vertices(mesh, &sound, &mut found);
     let components = orient::report(mesh, &sound, &edges, &mut found);
-    shape::report_crossings(mesh, &sound, &mut found);
     let cage = Cage::new(mesh);
+    shape::report_crossings(mesh, cage.as_ref().ok(), &sound, &mut found);
     if let Err(error) = &cage
         && !found.iter().any(|p| p.severity == Severity::Error)
     {

@@ -126,13 +126,22 @@ fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
     (triangles, face_of)
 }
 
-/// Reports faces that go through each other.
-pub(super) fn report_crossings(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec<Problem>) {
+/// Reports faces that go through each other: an error, but where they belong to different parts of a `cage`.
+pub(super) fn report_crossings(
+    mesh: &PolygonMesh,
+    cage: Option<&Cage>,
+    sound: &[u32],
+    found: &mut Vec<Problem>,
+) {
+    let parts = cage.map(Cage::component_of_face);
+    let mut of_parts = parts.is_some();
     let (triangles, face_of) = triangles(mesh, sound);
     let mut pairs = Vec::new();
     let mut count = 0;
     let complete = each_meeting(&triangles, |[a, b]| {
-        if face_of[a as usize] != face_of[b as usize] {
+        let [f, g] = [a, b].map(|t| face_of[t as usize] as usize);
+        if f != g {
+            of_parts = of_parts && parts.is_some_and(|part| part[f] != part[g]);
             count += 1;
             if pairs.len() < MAX_PLACES {
                 pairs.push([a, b]);
@@ -155,14 +164,17 @@ pub(super) fn report_crossings(mesh: &PolygonMesh, sound: &[u32], found: &mut Ve
         (n, true) => format!(", and {} more", grouped(n)),
         (n, false) => format!(", and at least {} more", grouped(n)),
     };
+    let (severity, message) = if of_parts {
+        let what = "Parts of the cage overlap or touch";
+        let then = "Where they overlap they are bound as one, without the walls inside.";
+        (Severity::Warning, format!("{what}: {listed} meet{more}. {then}"))
+    } else {
+        let what = "The cage goes through itself";
+        (Severity::Error, format!("{what}: {listed} meet{more}. Move their vertices apart."))
+    };
     found.push(Problem {
         places: Places { faces, points: pairs.iter().map(point).collect(), ..Places::default() },
-        ..problem(
-            Code::SelfIntersection,
-            Severity::Error,
-            count,
-            format!("The cage goes through itself: {listed} meet{more}. Move their vertices apart."),
-        )
+        ..problem(Code::SelfIntersection, severity, count, message)
     });
 }
 

@@ -102,7 +102,14 @@ fn crossing_faces_are_found_where_they_cross() {
     mesh.positions.extend(other.positions.iter().map(|p| *p + vec3(1.3, 0.2, 0.1)));
     mesh.faces.extend(other.faces.iter().map(|f| f.iter().map(|i| i + 8).collect::<Vec<_>>()));
     let found = check(&mesh, None, None);
-    assert!(!found.valid, "Cage::new does not look for it, this does");
+    assert!(found.valid, "parts that overlap are bound as one");
+    assert!(found.problems[0].message.starts_with("Parts of the cage overlap"));
+    // A part that goes through itself: a vertex of a box pushed out through the side across.
+    let mut pushed = box_mesh(3);
+    let through = pushed.positions.iter().position(|p| p.x < -0.99 && p.y.abs() < 0.5 && p.z.abs() < 0.5);
+    pushed.positions[through.unwrap()].x = 2.0;
+    let crossing = check(&pushed, None, None);
+    assert!(!crossing.valid, "Cage::new does not look for it, this does");
     let problem = found.problem(Code::SelfIntersection).unwrap();
     for p in &problem.places.points {
         assert!((-0.3..=1.3).contains(&p[0]), "{p:?} is not where the boxes overlap");

@@ -143,10 +143,11 @@ impl EdgeLists {
             if ahead && share > 0.0 {
                 let mut barycentric = [0.0; 3];
                 (barycentric[edge.corners[0]], barycentric[edge.corners[1]]) = (1.0 - s, s);
-                passages.push(Passage { distance, across, offset, share, facet: edge.facet, barycentric });
+                let at = passages.partition_point(|p: &Passage| p.distance <= distance);
+                passages
+                    .insert(at, Passage { distance, across, offset, share, facet: edge.facet, barycentric });
             }
         }
-        passages.sort_by(|a, b| a.distance.total_cmp(&b.distance));
         passages
     }
 

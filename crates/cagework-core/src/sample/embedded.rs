@@ -201,7 +201,7 @@ impl<'a> Sampler<'a> {
         let At { low, p, order, weight, splits } = at;
         let axis = order[0];
         let below = p[axis] - f64::from(low[axis]);
-        let ends = self.ends(p, axis, [below, 1.0 - below], scratch.near.iter());
+        let ends = self.ends(p, axis, [below, 1.0 - below], [&scratch.near, &[]]);
         if splits && !scratch.edges.is_empty() {
             let passed = [0, 1].map(|side| {
                 self.edges.passed(&scratch.edges, p, axis, side == 1, (ends[side].0, ends[side].1.is_some()))
@@ -230,7 +230,7 @@ impl<'a> Sampler<'a> {
                     let beyond = along(p, axis, side, passage.distance);
                     self.lists.in_cube(self.cube_of(beyond), &mut scratch.other);
                     let reach = [passage.distance; 2];
-                    let end = self.ends(p, axis, reach, scratch.other.iter())[side];
+                    let end = self.ends(p, axis, reach, [&scratch.other, &[]])[side];
                     stop = end.1.map_or(stop, |wall| (end.0, Stop::Wall(wall)));
                 }
                 parts.push((left * passage.share, stop.0, stop.1));
@@ -273,7 +273,7 @@ impl<'a> Sampler<'a> {
         let mut reach = [1.0 - offset.abs(); 2];
         // The edge's own faces do not hide it.
         reach[side] = offset.abs() - ON_EDGE;
-        let ends = self.ends(p, axis, reach, scratch.here.iter().chain(&scratch.other));
+        let ends = self.ends(p, axis, reach, [&scratch.here, &scratch.other]);
         let t = share(ends[side].0, ends[1 - side].0);
         match ends[side].1 {
             None => self.add_wall(passage.facet, passage.barycentric, weight * (1.0 - t), scratch),
@@ -336,15 +336,9 @@ impl<'a> Sampler<'a> {
 
     /// The two ends of the segment through `p` along `axis` that reaches so far down and up, cut by the cage. Of faces in the
     /// same place, as where two parts share one, the one that is seen from behind counts.
-    fn ends<'b>(
-        &self,
-        p: DVec3,
-        axis: usize,
-        reach: [f64; 2],
-        near: impl Iterator<Item = &'b u32>,
-    ) -> [End; 2] {
+    fn ends(&self, p: DVec3, axis: usize, reach: [f64; 2], near: [&[u32]; 2]) -> [End; 2] {
         let mut ends: [End; 2] = reach.map(|reach| (reach, None));
-        for &number in near {
+        for &number in near.into_iter().flatten() {
             if let Some(c) = self.lists.triangle(number).crossing(p, axis) {
                 let up = c.distance > 0.0;
                 let end = &mut ends[usize::from(up)];

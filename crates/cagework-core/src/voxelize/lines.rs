@@ -8,7 +8,6 @@
 //! The cage's inside is where its winding number is above zero: of parts that overlap only the walls of their union are
 //! kept, as in Jacobson et al. 2013. Where two parts share a face, a line leaves the one before it enters the other.
 
-use std::collections::BTreeSet;
 use std::ops::Range;
 
 use glam::DVec3;
@@ -46,7 +45,7 @@ pub struct Lines {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overlaps {
     /// Pairs of parts (numbers of components), the same one twice if it goes through itself.
-    pub parts: BTreeSet<[u32; 2]>,
+    pub parts: Vec<[u32; 2]>,
     /// The box around all walls that lie inside, in cells.
     pub low: DVec3,
     /// Its other corner.
@@ -55,7 +54,7 @@ pub struct Overlaps {
 
 impl Default for Overlaps {
     fn default() -> Self {
-        Self { parts: BTreeSet::new(), low: DVec3::INFINITY, high: DVec3::NEG_INFINITY }
+        Self { parts: Vec::new(), low: DVec3::INFINITY, high: DVec3::NEG_INFINITY }
     }
 }
 
@@ -63,7 +62,7 @@ impl Overlaps {
     /// What a user should know about them, if anything.
     #[must_use]
     pub fn notice(&self) -> Option<String> {
-        let &[a, b] = self.parts.first()?;
+        let &[a, b] = self.parts.iter().min()?;
         let more = match self.parts.len() - 1 {
             0 => String::new(),
             n => format!(" (and {n} more such pairs)"),
@@ -82,7 +81,11 @@ impl Overlaps {
     /// Adds a wall that lies inside, and the parts that overlap there.
     fn add(&mut self, parts: Option<[u32; 2]>, wall: DVec3) {
         (self.low, self.high) = (self.low.min(wall), self.high.max(wall));
-        self.parts.extend(parts.map(|[a, b]| [a.min(b), a.max(b)]));
+        if let Some(pair) = parts.map(|[a, b]| [a.min(b), a.max(b)])
+            && !self.parts.contains(&pair)
+        {
+            self.parts.push(pair);
+        }
     }
 
     /// Those of all three axes.
@@ -90,7 +93,7 @@ impl Overlaps {
     pub fn of(lines: &[Lines; 3]) -> Self {
         let mut all = Self::default();
         for overlaps in lines.iter().map(|lines| &lines.overlaps) {
-            all.parts.extend(&overlaps.parts);
+            overlaps.parts.iter().for_each(|&pair| all.add(Some(pair), overlaps.low));
             (all.low, all.high) = (all.low.min(overlaps.low), all.high.max(overlaps.high));
         }
         all
@@ -140,7 +143,7 @@ impl Lines {
     fn keep_walls(&mut self, cage: &Cage, same: f64) {
         let part = |hit: &Hit| cage.component_of_face()[cage.face_of_facet()[hit.triangle as usize] as usize];
         let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
-        let (mut kept, mut open) = (0, Vec::new());
+        let (mut kept, mut open, mut group) = (0, Vec::new(), Vec::new());
         for line in 0..self.start.len() - 1 {
             let range = self.range(line);
             self.start[line] = kept as u32;
@@ -151,13 +154,14 @@ impl Lines {
             while first < range.end {
                 let place = self.hits[first].t;
                 let n = self.hits[first..range.end].partition_point(|hit| hit.t - place <= same);
-                if n > 1 {
-                    let leaves_first = depth > 0;
-                    self.hits[first..first + n].sort_by_key(|hit| hit.faces_up != leaves_first);
-                    self.hits[first..first + n].iter_mut().for_each(|hit| hit.t = place);
-                }
-                for k in first..first + n {
-                    let hit = self.hits[k];
+                group.clear();
+                group.extend_from_slice(&self.hits[first..first + n]);
+                let leaves_first = depth > 0;
+                let ordered = [leaves_first, !leaves_first]
+                    .into_iter()
+                    .flat_map(|up| group.iter().filter(move |hit| hit.faces_up == up));
+                for hit in ordered {
+                    let hit = Hit { t: place, ..*hit };
                     let before = depth;
                     depth += if hit.faces_up { -1 } else { 1 };
                     if (before > 0) != (depth > 0) {
