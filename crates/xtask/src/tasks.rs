@@ -17,10 +17,13 @@ pub(crate) fn build() -> Result<(), String> {
     licences::of_command(&wasm::target_folder()?.join("release"))
 }
 
+/// What is tested, and built with the same features each time: benches have no tests, and criterion takes half a minute.
+const TESTED: [&str; 3] = ["--workspace", "--exclude", "cagework-benches"];
+
 /// Everything that can fail because the program is wrong.
 pub(crate) fn test() -> Result<(), String> {
     npm::install()?;
-    run("cargo", &["test", "--workspace", "--locked"], &[])?;
+    run("cargo", &[&["test", "--locked"], &TESTED[..]].concat(), &[])?;
     // The same inputs in each run; `cargo xtask fuzz` alone takes others each time.
     fuzz(&["--minutes", "1", "--seed", "1"])?;
     validate_exports()?;
@@ -31,8 +34,11 @@ pub(crate) fn test() -> Result<(), String> {
 /// Damaged files through everything that reads them. As tests are built: overflows and debug assertions count.
 pub(crate) fn fuzz(args: &[&str]) -> Result<(), String> {
     // The workspace's features, as `cargo test` has built them.
-    let fixed = ["test", "--quiet", "--locked", "--workspace", "--test", "fuzz", "--"];
-    run("cargo", &[&fixed[..], args].concat(), &[])
+    run(
+        "cargo",
+        &[&["test", "--quiet", "--locked"], &TESTED[..], &["--test", "fuzz", "--"], args].concat(),
+        &[],
+    )
 }
 
 /// Everything that can fail because the source is untidy.
@@ -43,8 +49,6 @@ pub(crate) fn check() -> Result<(), String> {
     // Not among all targets, because `cargo test` leaves it to [`fuzz`].
     let fuzz = ["clippy", "--workspace", "--test", "fuzz", "--locked", "--", "-D", "warnings"];
     run("cargo", &fuzz, &[])?;
-    let web = ["clippy", "--package", "cagework-web", "--target", "wasm32-unknown-unknown", "--locked"];
-    run("cargo", &[&web[..], &["--", "-D", "warnings"]].concat(), &[])?;
     run("cargo", &["doc", "--workspace", "--no-deps", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")])?;
     arrows::check()?;
     site::check_types()?;
@@ -57,7 +61,11 @@ fn validate_exports() -> Result<(), String> {
     let folder = folder.to_str().ok_or("the repository's path is not UTF-8")?;
     std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {folder}: {e}"))?;
     // Built with the workspace's features, as `cargo test` has done already; `cargo run` would build with its package's.
-    run("cargo", &["build", "--quiet", "--locked", "--workspace", "--example", "export_samples"], &[])?;
+    run(
+        "cargo",
+        &[&["build", "--quiet", "--locked"], &TESTED[..], &["--example", "export_samples"]].concat(),
+        &[],
+    )?;
     let export = wasm::target_folder()?.join("debug/examples/export_samples");
     run(export.to_str().ok_or("the target folder's path is not UTF-8")?, &[folder], &[])?;
     run("node", &["crates/cagework-io/tests/validate.mjs", folder], &[])
