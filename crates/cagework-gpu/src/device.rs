@@ -149,6 +149,12 @@ impl GpuContext {
         cfg!(feature = "webgl") && (cfg!(target_family = "wasm") || self.draws_only)
     }
 
+    /// Whether processor cores play the GPU.
+    #[must_use]
+    pub fn is_software(&self) -> bool {
+        self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
+    }
+
     /// Name of the GPU as people know it.
     #[must_use]
     pub fn adapter_name(&self) -> String {

@@ -1,3 +1,4 @@
+use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 
 use crate::support::{CORNERS, Sandbox, box_obj};
@@ -70,6 +71,20 @@ fn what_cannot_be_drawn_is_refused_before_the_work() {
     }
     let args = "render mesh.obj --cage cage.obj --show weights --column 8 -o p.png";
     sandbox.run(args).code(1).stderr(contains("the cage has 8 vertices"));
+}
+
+/// 20,000 triangles that fill the picture took the software adapter minutes. Tests draw on no other.
+#[test]
+fn triangles_over_each_other_are_counted() {
+    let sandbox = Sandbox::new();
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    for (n, code) in [(100, 0), (20_000, 1)] {
+        sandbox.write("mesh.obj", corners.to_owned() + &"f 1 2 3\n".repeat(n));
+        let drawn = sandbox.run("render mesh.obj --view front --size 640x480 -o p.png").code(code);
+        if code == 1 {
+            drawn.stderr(contains("triangles over each pixel").and(contains("a smaller --size")));
+        }
+    }
 }
 
 /// A C of boxes: two arms along x with a gap between them, from 0 to 1 in y. `v` and quads, counter-clockwise outside.
