@@ -53,8 +53,6 @@ pub(super) struct Passage {
     pub(super) barycentric: [f64; 3],
 }
 
-impl Passage {}
-
 /// Falls smoothly from 1 at 0 to 0 at 1 and beyond.
 fn fade(x: f64) -> f64 {
     if x < 1.0 { 1.0 - x * x * (3.0 - 2.0 * x) } else { 0.0 }
