@@ -19,7 +19,7 @@ const SUM: f64 = 1e-5;
 const REPRODUCED: f64 = 1e-5;
 
 /// Cages of all kinds: triangles and quads, convex and not, along the grid and askew.
-fn cages() -> Vec<Cage> {
+pub(crate) fn cages() -> Vec<Cage> {
     let turn = Random::new(7).rotation();
     let askew = |mesh: &PolygonMesh| moved(mesh, |p| turn * p);
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];

@@ -45,10 +45,43 @@ pub fn octahedron() -> PolygonMesh {
     PolygonMesh { positions, faces: faces.collect() }
 }
 
-/// An octahedron whose faces are cut in four `times` times, pushed onto the unit sphere.
+/// Twelve corners at distance 1, as far from each other as can be.
+#[must_use]
+pub fn icosahedron() -> PolygonMesh {
+    let golden = f32::midpoint(1.0, 5.0_f32.sqrt());
+    let corner = |k: usize| {
+        let sign = |bit: usize| if k >> bit & 1 == 0 { 1.0 } else { -1.0 };
+        let mut at = [0.0, sign(0), sign(1) * golden];
+        at.rotate_right(k / 4);
+        Vec3::from(at)
+    };
+    let positions: Vec<Vec3> = (0..12).map(corner).collect();
+    // Corners 2 apart are neighbours.
+    let is_near = |a: usize, b: usize| (positions[a].distance(positions[b]) - 2.0).abs() < 1e-3;
+    let mut faces = Vec::new();
+    for (a, b, c) in (0..12).flat_map(|a| (a..12).flat_map(move |b| (b..12).map(move |c| (a, b, c)))) {
+        if is_near(a, b) && is_near(b, c) && is_near(c, a) {
+            let is_outward = positions[a].dot(positions[b].cross(positions[c])) > 0.0;
+            let [b, c] = if is_outward { [b, c] } else { [c, b] };
+            faces.push(vec![a as u32, b as u32, c as u32]);
+        }
+    }
+    PolygonMesh { positions: positions.into_iter().map(Vec3::normalize).collect(), faces }
+}
+
+/// An octahedron whose faces are cut in four `times` times, pushed onto the unit sphere: 6, 18, 66, 258, 1,026 vertices.
 #[must_use]
 pub fn sphere(times: u32) -> PolygonMesh {
-    let mut mesh = octahedron();
+    rounded(octahedron(), times)
+}
+
+/// As [`sphere`], of an icosahedron: 12, 42, 162, 642, 2,562 vertices.
+#[must_use]
+pub fn icosphere(times: u32) -> PolygonMesh {
+    rounded(icosahedron(), times)
+}
+
+fn rounded(mut mesh: PolygonMesh, times: u32) -> PolygonMesh {
     for _ in 0..times {
         let mut middles = BTreeMap::new();
         let mut positions = mesh.positions;

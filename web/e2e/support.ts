@@ -247,7 +247,7 @@ export async function crash(page: Page, how: "panic" | "out of memory"): Promise
       setTimeout(() => {
         const engine = globalThis.cagework?.engine;
         // A box of more squares than can be counted, and more numbers than there is room for.
-        if (how === "panic") engine?.boxCage(3000);
+        if (how === "panic") globalThis.cagework?.boxCage(3000);
         else engine?.setCagePositions(new Float32Array(bytes / 4));
       });
     },

@@ -108,7 +108,7 @@ async function main(): Promise<void> {
     }, pause);
   };
   const edit = createEdit(ctx, {
-    changed: (state) => cage.adopt(state),
+    changed: (state, check) => cage.adopt(state, check),
     left: () => bindSoon(0),
   });
   const follow = () => {
@@ -126,7 +126,7 @@ async function main(): Promise<void> {
   const poses = createPoses(ctx, edit);
   const exports = createExports(ctx, project, () => stage.viewport.getBoundingClientRect());
   const files = createFiles(ctx, {
-    adoptCage: ({ cage: state }) => cage.adopt(state),
+    adoptCage: (opened) => cage.adopt(opened.cage, opened.check),
     makeCage: () => cage.make(),
     loadCage: (list) => cage.load(list),
     bind: () => bind.start(),
@@ -199,7 +199,7 @@ async function main(): Promise<void> {
       void bind.start();
     },
     file: () => app.chooseModel(),
-    regenerate: () => cage.repair("regenerate"),
+    regenerate: () => void cage.repair("regenerate"),
     reload: () => location.reload(),
   };
 

@@ -4,6 +4,8 @@ import type {
   BindEvent,
   BindOptions,
   BindReport,
+  Check,
+  CheckedCage,
   Job,
   Lack,
   ModelInfo,
@@ -20,9 +22,10 @@ import { requireCurrent, startBind } from "./session/bind";
 import { createClient } from "./session/client";
 import { createFrames } from "./session/frames";
 import { chain } from "./session/jobs";
-import type { CheckedCage, ReadModel } from "./session/messages";
+import type { ReadModel } from "./session/messages";
 import { once, prepareSample, samples } from "./session/opening";
-import { createReader, load } from "./session/reader";
+import { createApart, load } from "./session/reader";
+import { polygons } from "./session/reading";
 import { WEBGPU } from "./session/webgpu";
 
 declare global {
@@ -129,14 +132,20 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   void watch();
 
   const cage = () => ({ positions: engine.restPositions(), corners: engine.cageCorners() });
-  const stateOf = () => engine.cageState() ?? null;
   let bind: Job<BindReport> | undefined;
   let slice: Job<void> | undefined;
   let meanValue: Job<void> | undefined;
 
-  const reader = createReader(() => createClient(module, openWorker));
-  const adoptCage = ({ positions, corners, isSound }: CheckedCage) =>
-    engine.setCage(positions, corners, isSound);
+  const openApart = () => createClient(module, openWorker);
+  const reading = createApart(openApart);
+  const checking = createApart(openApart);
+  const mark = ({ vertices, edges, faces, points, outside }: Check) =>
+    engine.showFaults(vertices, edges, faces, points, outside);
+  const takeCage = ({ positions, corners, check }: CheckedCage) => {
+    const state = engine.setCage(positions, corners);
+    if (check) mark(check);
+    return state;
+  };
 
   async function openRead(read: ReadModel): Promise<Opened> {
     const loaded = await load(pkg, read);
@@ -144,10 +153,10 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
     bind?.cancel();
     const info: ModelInfo = await raw.open(loaded);
-    if (read.cage) adoptCage(read.cage);
+    const cage = read.cage ? takeCage(read.cage) : null;
     const model = { ...info, notices: [...info.notices, ...read.notices] };
     const project = settings === undefined ? null : { poses, settings };
-    return { model, cage: stateOf(), project };
+    return { model, cage, check: read.cage?.check ?? null, project };
   }
 
   const session: Session = {
@@ -155,30 +164,39 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     adapter,
     lack,
     samples: samples(pkg),
-    readFiles: (files, hear) => reader.model(files, undefined, hear),
+    readFiles: (files, hear) => reading("read", { files, up: undefined }, hear),
     open: (read: ReadFile) => openRead(read as ReadModel).finally(begin),
     async openSample(id) {
       const { glb, cage, poses } = await buildSample(id);
       const label = samples(pkg).find((sample) => sample.id === id)?.label ?? id;
       const name = `${label}.glb`;
       const opened = await openRead({ ...OWN, name, bytes: glb });
-      const state = engine.setCage(cage.positions, cage.corners);
+      const state = takeCage(cage);
       begin();
-      return { ...opened, cage: state, poses };
+      return { ...opened, cage: state, check: cage.check, poses };
     },
     async turn(bytes, up) {
       const name = "turned.glb";
       const file = new Blob([new Uint8Array(bytes)]);
-      return openRead(await reader.model([{ name, path: name, file }], up).done);
+      return openRead(await reading("read", { files: [{ name, path: name, file }], up }).done);
     },
     readSettings: (text, defaults) => pkg.readSettings(text, JSON.stringify(defaults)),
     readCage: (files, hear) =>
-      reader.cage({ files, up: raw.up() as UpAxis, model: raw.modelPositions() }, hear),
-    openCage: (read: ReadFile) => adoptCage(read as CheckedCage),
+      reading("readCage", { files, up: raw.up() as UpAxis, model: raw.modelPositions() }, hear),
+    boxCage: (divisions) => polygons(raw.boxCage(divisions)),
+    checkCage() {
+      const asked = cage();
+      return chain(checking("check", { cage: asked, model: raw.modelPositions() }), (check) => {
+        requireCurrent(engine, asked);
+        mark(check);
+        return check;
+      });
+    },
+    repair: (kind) => checking("repair", { kind, cage: cage(), model: raw.modelPositions() }),
+    takeCage,
     generateCage(options, onProgress) {
       const input = { positions: raw.modelPositions(), triangles: raw.modelTriangles(), options };
-      const job = client.run("cage", input, ({ fraction }) => onProgress(fraction));
-      return chain(job, adoptCage);
+      return client.run("cage", input, ({ fraction }) => onProgress(fraction));
     },
     bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport> {
       bind?.cancel();

@@ -6,6 +6,7 @@ import type {
   Element as CageElement,
   CageState,
   CageWish,
+  Check,
   Lack,
   Legend,
   ModelInfo,
@@ -66,6 +67,8 @@ export interface AppState {
   /** The sample that is open, null for a file of the user's. */
   sample: string | null;
   cage: CageState | null;
+  /** What is wrong with it; null while that is not known. */
+  check: Check | null;
   cageSource: CageSource;
   /** The cage is the one that the sample came with, so that a link can refer to it. */
   sampleCage: boolean;
@@ -131,6 +134,7 @@ export const INITIAL: AppState = {
   model: null,
   sample: null,
   cage: null,
+  check: null,
   cageSource: "auto",
   sampleCage: false,
   cageOptions: CAGE_DEFAULTS,

@@ -1,7 +1,7 @@
 import { expect, it } from "vitest";
 import type { NamedFile } from "../src/contract";
 import { type Client, named } from "../src/session/client";
-import { createReader } from "../src/session/reader";
+import { createApart } from "../src/session/reader";
 import { sayReading } from "../src/strings";
 
 const file = (name: string, size = 10): NamedFile => ({ name, path: name, file: { size } as Blob });
@@ -27,9 +27,9 @@ function workers() {
 
 it("each file is read by a worker that ends with it", async () => {
   const { opened, open } = workers();
-  const reader = createReader(open);
+  const apart = createApart(open);
   for (const k of [0, 1]) {
-    const job = reader.model([file("a.obj")], undefined);
+    const job = apart("read", { files: [file("a.obj")], up: undefined });
     opened[k]?.answer({ name: "a.obj" });
     expect(await job.done).toEqual({ name: "a.obj" });
     expect(opened[k]?.closed).toBeGreaterThan(0);
@@ -39,9 +39,9 @@ it("each file is read by a worker that ends with it", async () => {
 
 it("Cancel and another file end what is being read", async () => {
   const { opened, open } = workers();
-  const reader = createReader(open);
-  const first = reader.model([file("a.obj")], undefined);
-  const second = reader.model([file("b.obj")], undefined);
+  const apart = createApart(open);
+  const first = apart("read", { files: [file("a.obj")], up: undefined });
+  const second = apart("read", { files: [file("b.obj")], up: undefined });
   await expect(first.done).rejects.toMatchObject({ name: "Cancelled" });
   expect(opened[1]?.closed).toBe(0);
   second.cancel();
@@ -50,18 +50,21 @@ it("Cancel and another file end what is being read", async () => {
 
 it("a worker that broke is a sentence, an error of the file stays what it is", async () => {
   const { opened, open } = workers();
-  const reader = createReader(open);
-  const broken = reader.model([file("a.obj")], undefined);
+  const apart = createApart(open);
+  const broken = apart("read", { files: [file("a.obj")], up: undefined });
   opened[0]?.fail(named("Worker", "unreachable"));
   await expect(broken.done).rejects.toThrow("reading it broke off");
-  const bad = reader.model([file("b.obj")], undefined);
+  const bad = apart("read", { files: [file("b.obj")], up: undefined });
   opened[1]?.fail(named("Format", "not a GLB"));
   await expect(bad.done).rejects.toMatchObject({ name: "Format", message: "not a GLB" });
 });
 
 it("a file too large for a browser gets no worker", async () => {
   const { opened, open } = workers();
-  const job = createReader(open).model([file("a.glb"), file("huge.bin", 5 * 2 ** 30)], undefined);
+  const job = createApart(open)("read", {
+    files: [file("a.glb"), file("huge.bin", 5 * 2 ** 30)],
+    up: undefined,
+  });
   await expect(job.done).rejects.toThrow("huge.bin has 5.0 GiB");
   expect(opened.length).toBe(0);
 });

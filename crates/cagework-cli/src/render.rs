@@ -8,7 +8,7 @@ use cagework_core::bind::Binding;
 use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Cage, Controls, Weights, mean_value_weights};
 use cagework_gpu::Session;
-use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView};
+use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView, check_layers};
 use cagework_io::{Model, read_weights_npz, shown};
 use serde::Serialize;
 
@@ -75,7 +75,7 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     }
     camera.set_viewport(glam::Vec2::from(part.map(|s| s as f32)));
     session.frame_all();
-    check_layers(&session, &model, part)?;
+    check_layers(session.context(), session.camera(), &model.positions, &model.triangles, part)?;
 
     let started = Instant::now();
     let mut rgba = pollster::block_on(session.picture(part, args.scale))?;
@@ -96,35 +96,6 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
         notices,
     };
     print(&if as_json { json(&done) } else { text(&done) })
-}
-
-/// Most pixels, counted for each triangle that covers them, that an adapter made of processor cores draws: some 10 s.
-const SOFTWARE_PIXELS: f64 = 2e8;
-
-/// Refuses a picture of so many triangles over each other that a software adapter would draw for minutes.
-fn check_layers(session: &Session, model: &Model, size: [u32; 2]) -> Result<(), CliError> {
-    if !session.context().is_software() {
-        return Ok(());
-    }
-    let picture = f64::from(size[0]) * f64::from(size[1]);
-    let places: Vec<_> =
-        model.positions.iter().map(|&p| session.camera().project(p).map(|at| at.position)).collect();
-    let area = |t: &[u32; 3]| {
-        let [a, b, c] = t.map(|i| places[i as usize]);
-        let (Some(a), Some(b), Some(c)) = (a, b, c) else { return picture };
-        f64::from(0.5 * (b - a).perp_dot(c - a).abs()).min(picture)
-    };
-    let pixels: f64 = model.triangles.iter().map(area).sum();
-    if pixels <= SOFTWARE_PIXELS {
-        return Ok(());
-    }
-    let layers = pixels / picture;
-    let message = format!(
-        "the model has {layers:.0} triangles over each pixel; {} would draw {pixels:.1e} pixels, more than the limit of \
-         {SOFTWARE_PIXELS:e}",
-        session.context().adapter_name()
-    );
-    Err(CliError::Mismatch { message, hint: "use a GPU, or a smaller --size" })
 }
 
 /// Refuses a comparison of what no weights move.

@@ -67,6 +67,18 @@ pub enum GpuError {
         /// What does not.
         reason: String,
     },
+    /// A GPU made of processor cores would draw for minutes.
+    #[error(
+        "the model's {triangles} triangles cover {pixels:.1e} pixels, each counted for each triangle; without a graphics card the limit is {limit:e}: use one, or a smaller picture"
+    )]
+    Layers {
+        /// How many there are.
+        triangles: usize,
+        /// Pixels, counted for each triangle that covers them.
+        pixels: f64,
+        /// Most that are drawn.
+        limit: f64,
+    },
     /// Something has to come first.
     #[error("there is no {missing} yet: load one first")]
     NotReady {

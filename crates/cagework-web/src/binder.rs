@@ -2,6 +2,7 @@
 //!
 //! It has its own GPU device and reads nothing but arrays. Results are taken apart by the page's `Engine`.
 
+use cagework_core::cage_check::repair;
 use cagework_core::cage_gen::{CageOptions, generate};
 use cagework_core::deform::OutsideVertex;
 use cagework_core::slice::Slice;
@@ -15,8 +16,8 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use crate::arrays::{corners, flat, points, polygon_mesh};
 use crate::clock::Listener;
 use crate::error::{Answer, Fault};
-use crate::options::{BindAsked, CageAsked};
-use crate::problems;
+use crate::options::{BindAsked, CageAsked, unknown};
+use crate::problems::{self, Check};
 use crate::views::object;
 
 /// Binds, makes cages, cuts slices and builds samples.
@@ -43,6 +44,7 @@ pub struct Polygons {
 #[wasm_bindgen]
 pub struct BuiltSample {
     glb: Vec<u8>,
+    positions: Vec<Vec3>,
     cage: PolygonMesh,
     poses: Vec<(String, Vec<Vec3>)>,
 }
@@ -168,14 +170,31 @@ impl Binder {
         Ok(Polygons { mesh: made.map_err(Fault::from)?.cage.to_polygon_mesh() })
     }
 
-    /// Whether nothing at all is wrong with a cage for a model, `[n_vertices, 3]`; a cage's arrays are those of `bind`.
+    /// What is wrong with a cage for a model, `[n_vertices, 3]`; a cage's arrays are those of `bind`.
     ///
     /// # Errors
     /// When the arrays are no mesh.
-    #[wasm_bindgen(js_name = isSound)]
-    pub fn is_sound(model: &[f32], positions: &[f32], corners: &[u32]) -> Result<bool, JsValue> {
+    #[wasm_bindgen(js_name = checkCage)]
+    pub fn check_cage(model: &[f32], positions: &[f32], corners: &[u32]) -> Result<Check, JsValue> {
         let mesh = polygon_mesh(positions, corners)?;
-        Ok(problems::find(&mesh, Some(&points(model))).problems.is_empty())
+        Ok(Check { check: problems::find(&mesh, Some(&points(model))) })
+    }
+
+    /// A repaired cage: `RepairKind` of contract.ts, then the arrays of `checkCage`.
+    ///
+    /// # Errors
+    /// When there is no such repair, or growing did not help.
+    #[wasm_bindgen(js_name = repairCage)]
+    pub fn repair_cage(
+        kind: &str,
+        model: &[f32],
+        positions: &[f32],
+        corners: &[u32],
+    ) -> Result<Polygons, JsValue> {
+        let asked = problems::repair_named(kind).ok_or_else(|| unknown("repair", kind))?;
+        let mesh = polygon_mesh(positions, corners)?;
+        let repaired = repair(&mesh, &[asked], Some(&points(model))).map_err(Fault::from)?;
+        Ok(Polygons { mesh: repaired.mesh })
     }
 
     /// Identifier, label and what there is to see of each sample, in turn.
@@ -190,10 +209,11 @@ impl Binder {
     /// When there is none of that name.
     #[wasm_bindgen(js_name = buildSample)]
     pub fn build_sample(id: &str) -> Result<BuiltSample, JsValue> {
-        let sample = samples::build(id).ok_or_else(|| crate::options::unknown("sample", id))?;
+        let sample = samples::build(id).ok_or_else(|| unknown("sample", id))?;
         let glb =
             cagework_io::write_mesh_glb(&sample.name, &sample.mesh, &sample.colours).map_err(Fault::from)?;
-        Ok(BuiltSample { glb, cage: sample.cage, poses: sample.poses })
+        let positions = sample.mesh.positions;
+        Ok(BuiltSample { glb, positions, cage: sample.cage, poses: sample.poses })
     }
 }
 
@@ -287,6 +307,13 @@ impl BuiltSample {
     #[must_use]
     pub fn glb(&self) -> Vec<u8> {
         self.glb.clone()
+    }
+
+    /// The model's vertices. `[n_vertices, 3]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn positions(&self) -> Vec<f32> {
+        flat(&self.positions)
     }
 
     /// Its cage.

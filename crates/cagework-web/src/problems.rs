@@ -4,6 +4,8 @@ use cagework_core::PolygonMesh;
 use cagework_core::cage_check::{CageCheck, Code, Fix, Places, Problem, Repair, Severity, check};
 use cagework_gpu::render::Marks;
 use glam::Vec3;
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::views;
 
@@ -66,28 +68,92 @@ fn kind(code: Code) -> String {
     }
 }
 
-/// Places of all faults. Notes are not marked: they need no attention.
-pub(crate) fn marks(check: &CageCheck, mesh: &PolygonMesh, positions: &[Vec3], is_draft: bool) -> Marks {
-    let at = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::ZERO);
-    let mut marks = Marks::default();
-    for problem in check.problems.iter().filter(|p| p.severity != Severity::Note) {
-        let Places { vertices, edges, faces, points } = &problem.places;
+/// What a worker found wrong with a cage, on its way to the page: sentences, and the places for `Engine.showFaults`.
+#[wasm_bindgen]
+pub struct Check {
+    pub(crate) check: CageCheck,
+}
+
+#[wasm_bindgen]
+impl Check {
+    /// `Problem[]` of contract.ts.
+    ///
+    /// # Errors
+    /// Never.
+    #[wasm_bindgen(getter)]
+    pub fn problems(&self) -> Result<JsValue, JsValue> {
+        let shown: Vec<_> = self.check.problems.iter().map(view).collect();
+        Ok(views::object(&shown)?)
+    }
+
+    /// Vertices of the cage.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn vertices(&self) -> Vec<u32> {
+        self.places(false).flat_map(|p| p.vertices.iter().copied()).collect()
+    }
+
+    /// Edges of the cage. `[n, 2]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn edges(&self) -> Vec<u32> {
+        self.places(false).flat_map(|p| p.edges.iter().flatten().copied()).collect()
+    }
+
+    /// Faces of the cage.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn faces(&self) -> Vec<u32> {
+        self.places(false).flat_map(|p| p.faces.iter().copied()).collect()
+    }
+
+    /// Points in space. `[n, 3]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn points(&self) -> Vec<f32> {
+        self.places(false).flat_map(|p| p.points.iter().flatten().copied()).collect()
+    }
+
+    /// Vertices of the model that are outside.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn outside(&self) -> Vec<u32> {
+        self.places(true).flat_map(|p| p.vertices.iter().copied()).collect()
+    }
+}
+
+impl Check {
+    /// Places in the cage, or those of the model's vertices outside. Notes are not marked: they need no attention.
+    fn places(&self, are_outside: bool) -> impl Iterator<Item = &Places> {
+        let shown =
+            move |p: &&Problem| p.severity != Severity::Note && (p.code == Code::ModelOutside) == are_outside;
+        self.check.problems.iter().filter(shown).map(|p| &p.places)
+    }
+}
+
+/// Places of a [`Check`], as the page keeps them.
+#[derive(Default)]
+pub(crate) struct Faults {
+    pub(crate) in_cage: Places,
+    /// Vertices of the model.
+    pub(crate) outside: Vec<u32>,
+}
+
+impl Faults {
+    /// What is drawn for them; a draft is drawn as a whole.
+    pub(crate) fn marks(&self, mesh: &PolygonMesh, positions: &[Vec3], is_draft: bool) -> Marks {
+        let at = |i: u32| positions.get(i as usize).copied().unwrap_or(Vec3::ZERO);
+        let Places { vertices, edges, faces, points } = &self.in_cage;
+        let mut marks = Marks { mesh_vertices: self.outside.clone(), ..Marks::default() };
         marks.segments.extend(edges.iter().map(|e| e.map(at)));
-        for face in faces.iter().filter_map(|&f| mesh.faces.get(f as usize)) {
-            marks.segments.extend((0..face.len()).map(|k| [at(face[k]), at(face[(k + 1) % face.len()])]));
-        }
-        if problem.code == Code::ModelOutside {
-            marks.mesh_vertices.extend(vertices);
-        } else {
-            marks.points.extend(vertices.iter().map(|&v| at(v)));
-            marks.points.extend(points.iter().copied().map(Vec3::from_array));
-        }
-    }
-    if is_draft {
+        let faces = faces.iter().filter_map(|&f| mesh.faces.get(f as usize));
         // Nothing else draws a mesh that is no cage.
-        for face in &mesh.faces {
+        let all = is_draft.then_some(&mesh.faces).into_iter().flatten();
+        for face in faces.chain(all) {
             marks.segments.extend((0..face.len()).map(|k| [at(face[k]), at(face[(k + 1) % face.len()])]));
         }
+        marks.points.extend(vertices.iter().map(|&v| at(v)));
+        marks.points.extend(points.iter().copied().map(Vec3::from_array));
+        marks
     }
-    marks
 }

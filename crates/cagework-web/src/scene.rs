@@ -7,7 +7,6 @@ use cagework_gpu::render::{Gizmo, GizmoMode, Marks, MeshStyle, SceneOptions, Sel
 use glam::Quat;
 
 use crate::options::{Colour, GizmoAsked, SliceShown};
-use crate::problems;
 use crate::state::State;
 
 impl State {
@@ -87,9 +86,9 @@ impl State {
 
     /// Places with a problem; all of a draft is one.
     fn marks(&self) -> Marks {
-        match self.check.as_ref().filter(|_| self.view.problems) {
-            Some(check) => problems::marks(check, &self.rest, &self.positions, self.cage.is_none()),
-            None => Marks::default(),
+        if !self.view.problems {
+            return Marks::default();
         }
+        self.faults.marks(&self.rest, &self.positions, self.cage.is_none())
     }
 }

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use cagework_core::cage_check::CageCheck;
 use cagework_core::edit::{Element, Gesture, Pull, Selection, SharedPull, Symmetry, Topology};
 use cagework_core::enclosure::Enclosure;
 use cagework_core::slice::Slice;
@@ -14,7 +13,7 @@ use glam::{Vec2, Vec3};
 
 use crate::error::Fault;
 use crate::options::SceneAsked;
-use crate::problems;
+use crate::problems::Faults;
 use crate::views::{CageInfo, CageState};
 
 /// Model, cage, selection, gesture and camera of a page.
@@ -27,8 +26,8 @@ pub(crate) struct State {
     pub(crate) rest: PolygonMesh,
     pub(crate) topology: Topology,
     pub(crate) symmetry: Symmetry,
-    /// What is wrong with the cage; none where nothing is.
-    pub(crate) check: Option<CageCheck>,
+    /// Where something is wrong with the cage, once it was checked.
+    pub(crate) faults: Faults,
     /// Some vertices of the model, to be watched while the rest cage is dragged; made when first asked.
     pub(crate) watched: Option<Enclosure>,
     /// Where the cage is. `[n_cage]`
@@ -66,16 +65,15 @@ impl State {
     /// Another model, without a cage.
     pub(crate) fn set_model(&mut self, model: Model) {
         self.model = Some(model);
-        self.set_cage(PolygonMesh::default(), true);
+        self.set_cage(PolygonMesh::default());
         self.camera = Camera::default();
         self.fit_camera();
         self.frame_all();
     }
 
-    /// Another cage, or a draft of one; checked unless it is known to be sound.
-    pub(crate) fn set_cage(&mut self, mesh: PolygonMesh, is_sound: bool) {
-        let is_checked = is_sound || mesh.faces.is_empty();
-        self.check = (!is_checked).then(|| problems::find(&mesh, self.model_positions()));
+    /// Another cage, or a draft of one.
+    pub(crate) fn set_cage(&mut self, mesh: PolygonMesh) {
+        self.faults = Faults::default();
         self.cage = Cage::new(&mesh).ok();
         // Turned outward, seams closed.
         self.rest = self.cage.as_ref().map_or(mesh, Cage::to_polygon_mesh);
@@ -93,10 +91,6 @@ impl State {
         self.is_moved = true;
         self.is_changed = true;
         self.fit_camera();
-    }
-
-    pub(crate) fn model_positions(&self) -> Option<&[Vec3]> {
-        self.model.as_ref().map(|m| &m.positions[..])
     }
 
     /// What points up in the model's file.
@@ -129,6 +123,18 @@ impl State {
         Vec2::new(if self.is_split() && x >= half { x - half } else { x }, y)
     }
 
+    /// Where a model will be seen from when it opens, and the pixels of its picture.
+    pub(crate) fn view_of(&self, model: &Model) -> (Camera, [u32; 2]) {
+        let size = (self.size * self.scale).max(Vec2::ONE);
+        let mut camera = Camera::default();
+        camera.set_viewport(size);
+        if let Some(bounds) = Bounds::of(&model.positions) {
+            camera.set_scene(bounds);
+            camera.frame(bounds);
+        }
+        (camera, size.as_uvec2().to_array())
+    }
+
     /// Where model and cage are at rest.
     pub(crate) fn bounds(&self) -> Option<Bounds> {
         let model = self.model.as_ref().and_then(|m| Bounds::of(&m.positions));
@@ -149,7 +155,6 @@ impl State {
         (!self.rest.faces.is_empty()).then(|| CageState {
             usable: self.cage.is_some(),
             info: CageInfo::of(&self.rest, self.cage.as_ref()),
-            problems: self.check.iter().flat_map(|c| &c.problems).map(problems::view).collect(),
         })
     }
 

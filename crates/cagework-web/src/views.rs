@@ -95,7 +95,6 @@ impl CageInfo {
 pub(crate) struct CageState {
     pub(crate) usable: bool,
     pub(crate) info: CageInfo,
-    pub(crate) problems: Vec<Problem>,
 }
 
 /// `Problem`.

@@ -1,19 +1,19 @@
 /** Getting a cage: made for the model, a box, or a file; and repairing it. */
 
-import type { CageState, CageWish, Job, Mend, NamedFile, RepairKind } from "../contract";
+import type { CageState, CageWish, Check, CheckedCage, Job, Mend, NamedFile, RepairKind } from "../contract";
 import type { CageSource } from "../state";
-import { attempt, type Context, report, waitFor } from "./context";
+import { attempt, type Context, waitFor } from "./context";
 
 export interface CageActions {
   /** Makes a cage the way the Cage panel says. True when there is a new one. */
   make(): Promise<boolean>;
   cancel(): void;
   load(files: readonly NamedFile[]): Promise<boolean>;
-  repair(kind: RepairKind): void;
+  repair(kind: RepairKind): Promise<boolean>;
   /** What the button beside a problem does. */
   mend(fix: Mend): void;
-  /** The page's side of a new or changed cage. */
-  adopt(state: CageState | null): void;
+  /** The page's side of a new or changed cage; one that was not checked yet is now. */
+  adopt(state: CageState | null, check: Check | null): void;
 }
 
 /** A hull needs few vertices: it has no limbs to follow. */
@@ -23,13 +23,20 @@ const HULL_VERTICES = 24;
 const LOAD = "Load a cage";
 
 export function createCage(ctx: Context, after: () => void, refine: (grid: number) => void): CageActions {
-  let job: Job<CageState> | undefined;
+  let job: Job<CheckedCage> | undefined;
   /** Counts generations: what an older one still says is not heard. */
   let turn = 0;
 
-  const adopt = (state: CageState | null) => {
+  const look = (cage: CageState) =>
+    attempt(ctx, "The cage could not be checked", async () => {
+      const check = await ctx.session().checkCage().done;
+      if (ctx.store.get().cage === cage) ctx.store.set({ check });
+    });
+
+  const adopt = (state: CageState | null, check: Check | null) => {
     ctx.store.set({
       cage: state,
+      check,
       sampleCage: false,
       bound: false,
       report: null,
@@ -37,23 +44,25 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
       meanValueReady: false,
       scene: { ...ctx.store.get().scene, compare: false, slice: "off" },
     });
+    if (state && !check) void look(state);
     after();
   };
 
-  const now = () => {
+  const now = (): CheckedCage | undefined => {
     const { engine } = ctx.session();
-    return { positions: engine.restPositions(), corners: engine.cageCorners() };
+    const { cage, check } = ctx.store.get();
+    return cage ? { positions: engine.restPositions(), corners: engine.cageCorners(), check } : undefined;
   };
 
+  const set = (cage: CheckedCage) => adopt(ctx.session().takeCage(cage), cage.check);
+
   /** Takes a new cage as a step of the history; the first cage of a model is none. */
-  const take = (label: string, before: ReturnType<typeof now> | undefined, state: CageState) => {
-    adopt(state);
+  const take = (label: string, before: CheckedCage | undefined, cage: CheckedCage) => {
+    set(cage);
     // A cage from elsewhere may reach beyond the view.
     if (!before || label === LOAD) ctx.session().engine.frameAll();
-    if (!before) return;
     const next = now();
-    const set = (shape: typeof next) => adopt(ctx.session().engine.setCage(shape.positions, shape.corners));
-    ctx.history.push({ label, undo: () => set(before), redo: () => set(next) });
+    if (before && next) ctx.history.push({ label, undo: () => set(before), redo: () => set(next) });
   };
 
   const generate = async (source: CageSource) => {
@@ -68,12 +77,12 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
     });
     job = running;
     try {
-      const state = await running.done;
-      const { vertices } = state.info;
+      const made = await running.done;
+      const vertices = made.positions.length / 3;
       if (vertices > options.vertices) {
         ctx.tell.say(`The model's holes and gaps need ${vertices} vertices instead of ${options.vertices}.`);
       }
-      return state;
+      return made;
     } finally {
       if (mine === turn) {
         job = undefined;
@@ -84,43 +93,42 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
 
   return {
     make() {
-      const { cageSource, boxDivisions, cage } = ctx.store.get();
-      const before = cage ? now() : undefined;
+      const { cageSource, boxDivisions } = ctx.store.get();
+      const before = now();
       job?.cancel();
       ctx.tell.clear();
       return attempt(ctx, "No cage could be made", async () => {
-        const { engine } = ctx.session();
-        const state = cageSource === "box" ? engine.boxCage(boxDivisions) : await generate(cageSource);
-        take("Make a cage", before, state);
+        const box = () => ({ ...ctx.session().boxCage(boxDivisions), check: null });
+        take("Make a cage", before, cageSource === "box" ? box() : await generate(cageSource));
       });
     },
     cancel: () => job?.cancel(),
     load(files) {
-      const before = ctx.store.get().cage ? now() : undefined;
+      const before = now();
       ctx.tell.clear();
       return attempt(ctx, "This cage cannot be used", async () => {
         const name = files[0]?.name ?? "the cage";
         const read = await waitFor(ctx, `Opening ${name}`, (hear) => ctx.session().readCage(files, hear));
-        const state = ctx.session().openCage(read);
         ctx.store.set({ cageSource: "file" });
-        take(LOAD, before, state);
+        take(LOAD, before, read);
       });
     },
     repair(kind) {
-      const before = ctx.store.get().cage ? now() : undefined;
       if (kind === "regenerate") {
         ctx.store.set({ cageSource: "auto" });
-        void this.make();
-        return;
+        return this.make();
       }
-      try {
-        take("Repair the cage", before, ctx.session().engine.repair(kind));
-      } catch (error) {
-        report(ctx, "The repair did not work", error);
-      }
+      const before = now();
+      return attempt(ctx, "The repair did not work", async () => {
+        take(
+          "Repair the cage",
+          before,
+          await waitFor(ctx, "Repairing the cage", () => ctx.session().repair(kind)),
+        );
+      });
     },
     mend({ kind, cells }) {
-      if (kind !== "refine_grid") this.repair(kind);
+      if (kind !== "refine_grid") void this.repair(kind);
       else if (cells !== null) refine(cells);
     },
     adopt,

@@ -49,21 +49,22 @@ export async function attempt(
 const LONG_MS = 4000;
 
 /** While a file is read the page waits, says how far it is, and lets the user give it up. */
-export async function waitFor(
+export async function waitFor<T extends object>(
   ctx: Context,
   what: string,
-  work: (hear: (progress: Reading) => void) => Job<ReadFile>,
-): Promise<ReadFile> {
+  work: (hear: (progress: Reading) => void) => Job<T>,
+): Promise<T> {
   const { store } = ctx;
   const job = work(({ stage, fraction }) => store.set({ busyStep: sayReading(stage, fraction) }));
   let cancelBusy = job.cancel;
   store.set({ busy: what, busyStep: "", cancelBusy });
   try {
     const read = await job.done;
-    if (read.took > LONG_MS) {
+    const took = "took" in read ? (read as ReadFile).took : 0;
+    if (took > LONG_MS) {
       await new Promise<void>((goOn, giveUp) => {
         cancelBusy = () => giveUp(Object.assign(new Error("cancelled"), { name: "Cancelled" }));
-        const busyStep = `The page will not answer for ${duration(read.took)}`;
+        const busyStep = `The page will not answer for ${duration(took)}`;
         store.set({ busyStep, goOn, cancelBusy });
       });
     }

@@ -1,7 +1,7 @@
 /** Moving the cage: gestures, fields, arrows, each one step of the history, in the pose or in the rest cage. */
 
 import { nextAmount } from "../amount";
-import type { CageState, Gesture, GizmoHandle, RestEdit } from "../contract";
+import type { CageState, Check, CheckedCage, Gesture, GizmoHandle, RestEdit } from "../contract";
 import { plural } from "../format";
 import { GESTURES, REST_EDITS } from "../strings";
 import { type Context, report } from "./context";
@@ -33,25 +33,25 @@ export interface Edit {
 
 /** What the rest of the page does when the cage at rest changed. */
 export interface RestListener {
-  changed(state: CageState): void;
+  changed(state: CageState, check: Check | null): void;
   left(): void;
-}
-
-interface Rest {
-  positions: Float32Array;
-  corners: Uint32Array;
 }
 
 const NUDGE_PAUSE_MS = 600;
 export function createEdit(ctx: Context, rest: RestListener): Edit {
   const engine = () => ctx.session().engine;
   let before: Float32Array | undefined;
-  let beforeRest: Rest | undefined;
+  let beforeRest: CheckedCage | undefined;
   let verb = "Move";
   let typed = "";
-  let nudging: { before: Float32Array; beforeRest: Rest; timer: ReturnType<typeof setTimeout> } | undefined;
+  let nudging:
+    | { before: Float32Array; beforeRest: CheckedCage; timer: ReturnType<typeof setTimeout> }
+    | undefined;
 
-  const restNow = (): Rest => ({ positions: engine().restPositions(), corners: engine().cageCorners() });
+  const restNow = (): CheckedCage => {
+    const { check } = ctx.store.get();
+    return { positions: engine().restPositions(), corners: engine().cageCorners(), check };
+  };
 
   const sync = () => {
     const e = engine();
@@ -98,20 +98,20 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
     sync();
   };
 
-  const setRest = (shape: Rest) => {
-    rest.changed(engine().setCage(shape.positions, shape.corners));
+  const setRest = (shape: CheckedCage) => {
+    rest.changed(ctx.session().takeCage(shape), shape.check);
     sync();
   };
 
-  const pushRest = (label: string, from: Rest, state: CageState) => {
-    const to = restNow();
+  const pushRest = (label: string, from: CheckedCage, state: CageState) => {
+    const to = { ...restNow(), check: null };
     ctx.history.push({ label, undo: () => setRest(from), redo: () => setRest(to) });
-    rest.changed(state);
+    rest.changed(state, null);
     sync();
   };
 
   /** What moved since `from` becomes a step. */
-  const keep = (label: string, from: Float32Array, fromRest: Rest) => {
+  const keep = (label: string, from: Float32Array, fromRest: CheckedCage) => {
     if (!ctx.store.get().editingRest) {
       forgetShares();
       pushPose(label, from);

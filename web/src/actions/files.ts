@@ -34,9 +34,6 @@ export interface Follow {
   leave(): void;
 }
 
-/** Largest file read without asking, bytes: beyond it the browser's memory for the page is at risk. */
-const LARGEST = 2 * 1024 ** 3;
-
 export function createFiles(ctx: Context, follow: Follow): Files {
   const { store } = ctx;
   /** Each opening has a number: a later one makes an earlier one's end meaningless. */
@@ -138,14 +135,6 @@ export function createFiles(ctx: Context, follow: Follow): Files {
         return Promise.resolve(false);
       }
       const second = plan.second === undefined ? undefined : files[plan.second];
-      const tooLarge = files.find((file) => file.file.size > LARGEST);
-      if (tooLarge) {
-        ctx.tell.problem({
-          title: "This file is too large",
-          message: `${tooLarge.name} has more than 2 GB. Make it smaller in a modelling program, by fewer triangles or smaller textures.`,
-        });
-        return Promise.resolve(false);
-      }
       if (main.file.size === 0) {
         ctx.tell.problem(
           {

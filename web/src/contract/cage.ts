@@ -16,7 +16,27 @@ export interface CageInfo {
 export interface CageState {
   readonly usable: boolean;
   readonly info: CageInfo;
+}
+
+/** Cage as arrays: positions `[n_cage, 3]`; for each face the number of its corners, then them. */
+export interface CageArrays {
+  readonly positions: Float32Array;
+  readonly corners: Uint32Array;
+}
+
+/** What is wrong with a cage, and where: in it, or in the model (`outside`). */
+export interface Check {
   readonly problems: readonly Problem[];
+  readonly vertices: Uint32Array;
+  readonly edges: Uint32Array;
+  readonly faces: Uint32Array;
+  readonly points: Float32Array;
+  readonly outside: Uint32Array;
+}
+
+/** A cage that a worker has looked at; null while it has not. */
+export interface CheckedCage extends CageArrays {
+  readonly check: Check | null;
 }
 
 export interface Problem {
@@ -26,7 +46,7 @@ export interface Problem {
   /** A whole sentence with numbers. */
   readonly message: string;
   readonly count: number;
-  /** A repair that helps: pass `kind` to `engine.repair`, show `label` on the button ("Fill 2 holes"). */
+  /** A repair that helps: pass `kind` to `Session.repair`, show `label` on the button ("Fill 2 holes"). */
   readonly fix: Mend | null;
 }
 

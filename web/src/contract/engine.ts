@@ -1,6 +1,6 @@
 /** The synchronous side: `Engine` of crates/cagework-web. */
 
-import type { CageState, Problem, RepairKind, RestEdit } from "./cage";
+import type { CageState, RestEdit } from "./cage";
 import type { Element, Gesture, GizmoHandle, Legend, SceneOptions, SelectMode } from "./scene";
 
 export interface Engine {
@@ -23,9 +23,6 @@ export interface Engine {
   legend(): Legend | undefined;
 
   // --- cage
-  boxCage(divisions: number): CageState;
-  checkCage(): readonly Problem[];
-  repair(kind: RepairKind): CageState;
   /** Of some of the model's vertices, how many are outside of the cage as it is dragged now. For every movement. */
   strays(): number;
   /** Whether gestures change the rest cage, without the model following. */
@@ -33,10 +30,18 @@ export interface Engine {
   /** Only while editing the rest cage. The selection afterwards is what was made. */
   editRest(edit: RestEdit): CageState;
   /**
-   * Takes a cage given as arrays: undo of topology edits. `corners`: for each face its number of corners, then them.
-   * `isSound`: the worker found nothing wrong with it; without, it is checked here.
+   * Takes a cage given as arrays, unchecked (`Session.takeCage` brings its check along). `corners`: for each face its
+   * number of corners, then them.
    */
-  setCage(positions: Float32Array, corners: Uint32Array, isSound?: boolean): CageState;
+  setCage(positions: Float32Array, corners: Uint32Array): CageState;
+  /** Marks what a `Check` of the cage has found. */
+  showFaults(
+    vertices: Uint32Array,
+    edges: Uint32Array,
+    faces: Uint32Array,
+    points: Float32Array,
+    outside: Uint32Array,
+  ): void;
   /** The moved rest cage becomes the cage; it has to be bound again. */
   commitRest(): CageState;
   cageState(): CageState | undefined;

@@ -1,7 +1,7 @@
 /** What `session.ts` offers: files, jobs in the worker, frames. */
 
 import type { BindEvent, BindOptions, BindReport } from "./bind";
-import type { CageOptions, CageState, CageWish } from "./cage";
+import type { CageArrays, CageOptions, CageState, CageWish, Check, CheckedCage, RepairKind } from "./cage";
 import type { Engine } from "./engine";
 import type { Pose } from "./scene";
 
@@ -38,11 +38,17 @@ export interface Session {
    */
   readSettings(text: string, defaults: Defaults): Settings & { readonly notices: readonly string[] };
   /** Reads a cage from a file (.obj, .glb, .gltf) as a model is read, and checks it. */
-  readCage(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<ReadFile>;
-  /** Takes it. A mesh that is no cage yet is kept as a draft: `usable` is false. */
-  openCage(read: ReadFile): CageState;
+  readCage(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<CheckedCage>;
+  /** A box around the model, its longest side cut into `divisions`. */
+  boxCage(divisions: number): CageArrays;
   /** Makes a cage for the model, in the worker. */
-  generateCage(options: CageOptions, onProgress: (fraction: number) => void): Job<CageState>;
+  generateCage(options: CageOptions, onProgress: (fraction: number) => void): Job<CheckedCage>;
+  /** Checks the cage at rest as it is, in a worker of its own, and marks what is wrong. */
+  checkCage(): Job<Check>;
+  /** The cage at rest, repaired, in that worker too. */
+  repair(kind: RepairKind): Job<CheckedCage>;
+  /** Takes a cage, and marks what is wrong with it. A mesh that is no cage yet is kept as a draft: `usable` is false. */
+  takeCage(cage: CheckedCage): CageState;
 
   /**
    * Binds in the worker: coarse (g = 32) first if that is less than asked, then as asked; each result is adopted as
@@ -113,6 +119,8 @@ export interface Opened {
   readonly model: ModelInfo;
   /** The cage that came along (sample, project); null when there is none yet. */
   readonly cage: CageState | null;
+  /** What is wrong with it; null without one. */
+  readonly check: Check | null;
   /** Set when a project was opened. `settings` is what `writeProject` was given. */
   readonly project: { readonly poses: readonly Pose[]; readonly settings: string } | null;
   /** Prepared poses of a sample. */

@@ -1,10 +1,10 @@
 /** A bind: coarse first so that the model can be dragged at once, then as asked. */
 
-import type { BindEvent, BindOptions, BindReport, Engine, Job } from "../contract";
+import type { BindEvent, BindOptions, BindReport, CageArrays, Engine, Job } from "../contract";
 import { createEta } from "../eta";
 import type { Engine as RawEngine } from "../pkg/cagework";
 import { type Client, named } from "./client";
-import type { BindStage, BoundArrays, CageArrays, Step } from "./messages";
+import type { BindStage, BoundArrays, Step } from "./messages";
 
 /** Cells of the first pass. */
 const COARSE = 32;

@@ -1,21 +1,17 @@
 /** What page and worker say to each other. */
 
-import type { BindOptions, BindReport, CageOptions, NamedFile, UpAxis } from "../contract";
+import type {
+  BindOptions,
+  BindReport,
+  CageArrays,
+  CageOptions,
+  Check,
+  CheckedCage,
+  NamedFile,
+  RepairKind,
+  UpAxis,
+} from "../contract";
 import type { Bytes } from "./files";
-
-/** Cage as arrays: positions `[n_cage, 3]`; for each face the number of its corners, then them. */
-export interface CageArrays {
-  readonly positions: Float32Array;
-  readonly corners: Uint32Array;
-}
-
-/** A cage that was checked once without harm. */
-export interface CheckedCage extends CageArrays {
-  /** Nothing is wrong with it. */
-  readonly isSound: boolean;
-  /** What the page will need for it, ms: to find again what is wrong. */
-  readonly took: number;
-}
 
 /** A decoded image: red, green, blue, alpha; rows from the top. */
 export interface Texture {
@@ -49,7 +45,7 @@ export interface BoundArrays {
 
 export interface SampleArrays {
   readonly glb: Uint8Array;
-  readonly cage: CageArrays;
+  readonly cage: CheckedCage;
   readonly poses: readonly { readonly name: string; readonly positions: Float32Array }[];
 }
 
@@ -71,6 +67,8 @@ export interface Jobs {
     input: { files: readonly NamedFile[]; up: UpAxis; model: Float32Array };
     output: CheckedCage;
   };
+  check: { input: { cage: CageArrays; model: Float32Array }; output: Check };
+  repair: { input: { kind: RepairKind; cage: CageArrays; model: Float32Array }; output: CheckedCage };
   sample: { input: { id: string }; output: SampleArrays };
 }
 

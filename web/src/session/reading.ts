@@ -1,9 +1,10 @@
 /** The worker's half of opening a file: whatever its bytes could make endless, or break, happens here first. */
 
+import type { CageArrays, Check, CheckedCage } from "../contract";
 import type { Loaded, Polygons } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { type Bytes, readFiles, siblingOf } from "./files";
-import type { CageArrays, CheckedCage, Jobs, ReadModel, ReadStage, Step } from "./messages";
+import type { Jobs, ReadModel, ReadStage, Step } from "./messages";
 import { decodeTextures } from "./textures";
 
 type Tell = (step: Step) => void;
@@ -28,8 +29,7 @@ export async function readModel(
   say(tell, "check");
   const mesh = loaded.cage;
   const cage = mesh && checked(pkg, mesh, loaded.positions);
-  const all = took + (cage?.took ?? 0);
-  return { ...bytes, up, textures, cage, notices: failed > 0 ? [notice] : [], took: all };
+  return { ...bytes, up, textures, cage, notices: failed > 0 ? [notice] : [], took };
 }
 
 /** Reads a file as a cage and checks it. */
@@ -46,10 +46,16 @@ export async function readCage(
 
 /** A cage as arrays, and what is wrong with it for the model's vertices. */
 export function checked(pkg: Package, cage: Polygons, model: Float32Array): CheckedCage {
-  const { positions, corners } = polygons(cage);
-  const began = performance.now();
-  const isSound = pkg.Binder.isSound(model, positions, corners);
-  return { positions, corners, isSound, took: isSound ? 0 : performance.now() - began };
+  const arrays = polygons(cage);
+  return { ...arrays, check: check(pkg, arrays, model) };
+}
+
+/** What is wrong with a cage for the model's vertices. */
+export function check(pkg: Package, { positions, corners }: CageArrays, model: Float32Array): Check {
+  const found = pkg.Binder.checkCage(model, positions, corners);
+  const { problems, vertices, edges, faces, points, outside } = found;
+  found.free();
+  return { problems, vertices, edges, faces, points, outside };
 }
 
 /** Arrays of a mesh; its memory in the module is given back. */

@@ -3,7 +3,7 @@
 import type { Binder, Bound } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import type { BoundArrays, FromWorker, JobKind, Jobs, Step, ToWorker } from "./messages";
-import { checked, polygons, readCage, readModel } from "./reading";
+import { check, checked, readCage, readModel } from "./reading";
 
 /** Steps are told at most this often, ms: a page draws no more of them. */
 const STEP_PAUSE = 33;
@@ -91,10 +91,14 @@ function createWork(pkg: Package): Work {
     },
     read: (input, step) => readModel(pkg, input, step),
     readCage: (input, step) => readCage(pkg, input, step),
+    check: async ({ cage, model }) => check(pkg, cage, model),
+    async repair({ kind, cage, model }) {
+      return checked(pkg, pkg.Binder.repairCage(kind, model, cage.positions, cage.corners), model);
+    },
     async sample({ id }) {
       const sample = pkg.Binder.buildSample(id);
       const poses = sample.poseNames.map((name, k) => ({ name, positions: sample.posePositions(k) }));
-      const output = { glb: sample.glb, cage: polygons(sample.cage), poses };
+      const output = { glb: sample.glb, cage: checked(pkg, sample.cage, sample.positions), poses };
       sample.free();
       return output;
     },

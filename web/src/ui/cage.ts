@@ -1,7 +1,7 @@
 /** Step 2: where the cage comes from, what is wrong with it, and shaping it. */
 
 import type { App } from "../app";
-import type { CageOptions, CageState, CageWish, Problem, RestEdit } from "../contract";
+import type { CageOptions, CageState, CageWish, Check, Problem, RestEdit } from "../contract";
 import { count, percent, plural } from "../format";
 import type { CageSource } from "../state";
 import { sentence } from "../strings";
@@ -143,9 +143,9 @@ export function createCagePanel(app: App): HTMLElement {
     make.disabled = cageProgress !== null || !model;
     load.disabled = !model;
   });
-  store.watch(["cage", "bindOptions"], ({ cage }) => {
-    fill(result, cage ? cageCard(cage) : empty());
-    for (const problem of cage?.problems ?? []) result.append(problemCard(problem, app));
+  store.watch(["cage", "check", "bindOptions"], ({ cage, check }) => {
+    fill(result, cage ? cageCard(cage, check) : empty());
+    for (const problem of check?.problems ?? []) result.append(problemCard(problem, app));
     restBox.hidden = cage === null;
   });
   store.watch(["editingRest", "element", "selected"], ({ editingRest, element, selected }) => {
@@ -197,13 +197,15 @@ function empty(): HTMLElement {
   return h("p", { class: "empty", text: "No cage yet. Make one: it takes less than a second." });
 }
 
-function cageCard(cage: CageState): HTMLElement {
-  const outside = cage.problems.some((problem) => problem.kind === "Outside");
-  const badge = cage.usable
-    ? outside
-      ? h("span", { class: "badge warn" }, icon("warning"), "Vertices outside")
-      : h("span", { class: "badge good" }, icon("check"), "Encloses the model")
-    : h("span", { class: "badge bad" }, icon("warning"), "Needs repair");
+function badgeOf(cage: CageState, check: Check | null): HTMLElement {
+  if (!cage.usable) return h("span", { class: "badge bad" }, icon("warning"), "Needs repair");
+  if (!check) return h("span", { class: "badge" }, "Checking…");
+  return check.problems.some((problem) => problem.kind === "Outside")
+    ? h("span", { class: "badge warn" }, icon("warning"), "Vertices outside")
+    : h("span", { class: "badge good" }, icon("check"), "Encloses the model");
+}
+
+function cageCard(cage: CageState, check: Check | null): HTMLElement {
   return h(
     "div",
     { class: "card stack tight" },
@@ -211,7 +213,7 @@ function cageCard(cage: CageState): HTMLElement {
       "div",
       { class: "row" },
       h("strong", { class: "grow", text: plural(cage.info.vertices, "vertex", "vertices") }),
-      badge,
+      badgeOf(cage, check),
     ),
     facts([
       ["Edges", count(cage.info.edges)],

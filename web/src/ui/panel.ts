@@ -60,7 +60,7 @@ function cageActions(state: AppState, app: App): { primary: Action; second?: Act
   if (!state.cage) {
     return { primary: { label: "Make a cage", icon: "cage", run: () => void app.cage.make() } };
   }
-  const fix = state.cage.problems.find((problem) => problem.severity === "error" && problem.fix)?.fix;
+  const fix = state.check?.problems.find((problem) => problem.severity === "error" && problem.fix)?.fix;
   if (cageBroken(state)) {
     return fix
       ? { primary: { label: fix.label, icon: "patch", run: () => app.cage.mend(fix) } }
@@ -95,7 +95,7 @@ export function createPanel(element: HTMLElement, app: App, bodies: Record<StepN
   });
 
   let footKey = "";
-  app.store.watch(["step", "model", "cage", "bindRun", "bound", "cageProgress"], (state) => {
+  app.store.watch(["step", "model", "cage", "check", "bindRun", "bound", "cageProgress"], (state) => {
     const { primary, second } = nextActions(state, app);
     const key = `${state.step}|${primary.label}|${second?.label}`;
     if (key === footKey) return;

@@ -1,7 +1,7 @@
 /** What lies on the view: tools, legend, status line. */
 
 import type { App } from "../app";
-import type { Element as CageElement, CageState, SceneOptions } from "../contract";
+import type { Element as CageElement, SceneOptions } from "../contract";
 import type { AppState } from "../state";
 import { hintFor, sentence } from "../strings";
 import { createBusy } from "./busy";
@@ -128,9 +128,9 @@ export function createOverlays(
   const busy = createBusy(app);
 
   const encloses = h("span", { class: "floating badge encloses", attrs: { role: "status" } });
-  store.watch(["editingRest", "cage", "strays"], ({ editingRest, cage, strays }) => {
-    encloses.hidden = !editingRest || cage === null;
-    if (cage) showEnclosure(encloses, cage, strays > 0);
+  store.watch(["editingRest", "cage", "check", "strays"], (state) => {
+    encloses.hidden = !state.editingRest || state.cage === null;
+    showEnclosure(encloses, state);
   });
 
   element.append(mode.element, encloses, tools, looks, legend, compare, bottom, see, busy);
@@ -202,11 +202,13 @@ export function createOverlays(
 }
 
 /** The live check while the cage is shaped. */
-function showEnclosure(badge: HTMLElement, cage: CageState, strays: boolean): void {
-  const fault = cage.problems.find((problem) => problem.severity !== "note");
-  const message = strays ? "Part of the model is outside." : fault ? sentence(fault.message) : null;
-  badge.classList.toggle("good", cage.usable && message === null);
-  badge.classList.toggle("warn", cage.usable && message !== null);
-  badge.classList.toggle("bad", !cage.usable);
-  fill(badge, icon(message === null ? "check" : "warning"), message ?? "Encloses the model");
+function showEnclosure(badge: HTMLElement, { cage, check, strays }: AppState): void {
+  const fault = check?.problems.find((problem) => problem.severity !== "note");
+  const message = strays > 0 ? "Part of the model is outside." : fault && sentence(fault.message);
+  const isBad = cage?.usable === false;
+  badge.classList.toggle("good", !isBad && !message && check !== null);
+  badge.classList.toggle("warn", !isBad && Boolean(message));
+  badge.classList.toggle("bad", isBad);
+  if (message || check) fill(badge, icon(message ? "warning" : "check"), message ?? "Encloses the model");
+  else fill(badge, "Checking…");
 }

@@ -8,6 +8,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::arrays::{corners, flat, points, polygon_mesh};
+use crate::binder::Polygons;
 use crate::error::{Answer, Fault};
 use crate::options::BindAsked;
 use crate::views::object;
@@ -17,12 +18,12 @@ const BOX_MARGIN: f32 = 0.04;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Puts a box around the model, its longest side cut into `divisions`, the others to match.
+    /// A box around the model, its longest side cut into `divisions`, the others to match.
     ///
     /// # Errors
     /// When no model is open.
     #[wasm_bindgen(js_name = boxCage)]
-    pub fn box_cage(&self, divisions: u32) -> Result<JsValue, JsValue> {
+    pub fn box_cage(&self, divisions: u32) -> Result<Polygons, JsValue> {
         let mesh = self.read(|state| {
             let bounds = state
                 .model
@@ -33,23 +34,17 @@ impl Engine {
             let cut = |side: f32| (side / longest * divisions as f32).round().max(1.0) as u32;
             Answer::Ok(subdivided_box(bounds, BOX_MARGIN, bounds.extent().to_array().map(cut)))
         })?;
-        Ok(self.put_cage(mesh)?)
+        Ok(Polygons { mesh })
     }
 
     /// Takes a cage given as arrays; `corners`: for each face their number, then them. A mesh that is no cage yet becomes
-    /// a draft. `is_sound` when the worker's `Binder.isSound` said so of it and the model: it is not checked again.
+    /// a draft. What is wrong with it the worker's `Binder.checkCage` finds.
     ///
     /// # Errors
     /// When the arrays are no mesh.
     #[wasm_bindgen(js_name = setCage)]
-    pub fn set_cage(
-        &self,
-        positions: &[f32],
-        corners: &[u32],
-        is_sound: Option<bool>,
-    ) -> Result<JsValue, JsValue> {
-        self.take_cage(polygon_mesh(positions, corners)?, is_sound == Some(true));
-        Ok(self.state_object()?)
+    pub fn set_cage(&self, positions: &[f32], corners: &[u32]) -> Result<JsValue, JsValue> {
+        Ok(self.put_cage(polygon_mesh(positions, corners)?)?)
     }
 
     /// The cage, or undefined without one.
@@ -159,7 +154,7 @@ impl Engine {
 impl Engine {
     /// Another cage or draft, and what the page is told about it.
     pub(super) fn put_cage(&self, mesh: PolygonMesh) -> Answer<JsValue> {
-        self.take_cage(mesh, false);
+        self.take_cage(mesh);
         self.state_object()
     }
 

@@ -19,6 +19,8 @@ use std::rc::Rc;
 use async_lock::Mutex;
 use cagework_core::PolygonMesh;
 use cagework_gpu::Session;
+use cagework_gpu::render::check_layers;
+use cagework_io::Model;
 use js_sys::{Float32Array, Function, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -57,13 +59,16 @@ impl Engine {
     /// Shows the model of a file that was read. The file's handle is used up.
     ///
     /// # Errors
-    /// When the GPU has no room for it; what was open stays open.
+    /// When the GPU has no room for it, or draws too slowly for its many layers; what was open stays open.
     pub async fn open(&self, mut loaded: Loaded) -> Result<JsValue, JsValue> {
+        let (camera, size) = self.read(|state| state.view_of(&loaded.model));
         let draw = loaded.draw_model();
         page_turn().await;
         {
             let mut gpu = self.gpu.lock().await;
             let gpu = gpu.as_mut().ok_or_else(lost)?;
+            let Model { positions, triangles, .. } = &loaded.model;
+            check_layers(gpu.main.context(), &camera, positions, triangles, size).map_err(Fault::from)?;
             gpu.main.set_model(draw).await.map_err(Fault::from)?;
             gpu.other = None;
         }
@@ -201,9 +206,9 @@ impl Engine {
         changed
     }
 
-    /// Another cage, here at once and on the GPU when it has answered; checked unless it is known to be sound.
-    fn take_cage(&self, mesh: PolygonMesh, is_sound: bool) {
-        self.change(|state| state.set_cage(mesh, is_sound));
+    /// Another cage, here at once and on the GPU when it has answered.
+    fn take_cage(&self, mesh: PolygonMesh) {
+        self.change(|state| state.set_cage(mesh));
         let (state, gpu, invalidate) =
             (Rc::clone(&self.state), Rc::clone(&self.gpu), self.invalidate.clone());
         spawn_local(async move {

@@ -1,7 +1,7 @@
 //! Editing the cage itself: faults, repairs, and its edges and faces.
 
 use cagework_core::PolygonMesh;
-use cagework_core::cage_check::repair;
+use cagework_core::cage_check::Places;
 use cagework_core::edit::SelectMode;
 use cagework_core::enclosure::Enclosure;
 use cagework_core::rest_edit::{Edited, collapse_edge, delete_faces, extrude_face, split_edge};
@@ -11,9 +11,8 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::Engine;
 use crate::error::{Answer, Fault};
 use crate::options::unknown;
-use crate::problems;
+use crate::problems::Faults;
 use crate::state::State;
-use crate::views::object;
 
 /// Most pairs of a vertex and a triangle that are looked at while the cage is dragged: a frame has no time for more.
 const WATCHED_PAIRS: usize = 250_000;
@@ -23,23 +22,25 @@ const EXTRUSION: f32 = 0.08;
 
 #[wasm_bindgen]
 impl Engine {
-    /// What is wrong with the cage as it is now: `Problem[]` of contract.ts.
-    ///
-    /// # Errors
-    /// Never.
-    #[wasm_bindgen(js_name = checkCage)]
-    pub fn check_cage(&self) -> Result<JsValue, JsValue> {
-        let found = self.read(|state| problems::find(&state.shown_mesh(), state.model_positions()));
-        let shown: Vec<_> = found.problems.iter().map(problems::view).collect();
+    /// Marks what is wrong with the cage: the places of the worker's `Check`.
+    #[wasm_bindgen(js_name = showFaults)]
+    pub fn show_faults(
+        &self,
+        vertices: Vec<u32>,
+        edges: &[u32],
+        faces: Vec<u32>,
+        points: &[f32],
+        outside: Vec<u32>,
+    ) {
+        let (edges, points) = (edges.as_chunks().0.to_vec(), points.as_chunks().0.to_vec());
         self.change(|state| {
-            state.check = Some(found);
+            state.faults = Faults { in_cage: Places { vertices, edges, faces, points }, outside };
             state.is_changed = true;
         });
-        Ok(object(&shown)?)
     }
 
     /// How many of some vertices of the model, spread evenly over it, lie outside of the cage as it is dragged now.
-    /// Quick enough for every movement of the pointer; what counts is [`Engine::check_cage`] at the end.
+    /// Quick enough for every movement of the pointer; what counts is the check at the end.
     #[must_use]
     pub fn strays(&self) -> u32 {
         // What nobody sees does not change: no frame is asked for.
@@ -53,17 +54,6 @@ impl Engine {
             Enclosure::new(cage, &some)
         });
         watched.outside_of(&state.positions).len() as u32
-    }
-
-    /// Repairs the cage.
-    ///
-    /// # Errors
-    /// When there is no such repair, or growing did not help.
-    pub fn repair(&self, kind: &str) -> Result<JsValue, JsValue> {
-        let asked = problems::repair_named(kind).ok_or_else(|| unknown("repair", kind))?;
-        let repaired =
-            self.read(|state| repair(&state.rest, &[asked], state.model_positions())).map_err(Fault::from)?;
-        Ok(self.put_cage(repaired.mesh)?)
     }
 
     /// Edits the rest cage where it is selected: split_edge, collapse_edge, extrude_face, delete_vertex, delete_face.
