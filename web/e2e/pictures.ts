@@ -3,7 +3,7 @@
 import { mkdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "@playwright/test";
-import type { BindOptions, Point, SceneOptions } from "../src/contract";
+import type { BindOptions, Bounds, SceneOptions } from "../src/contract";
 import { BIND_DEFAULTS, PAPER_DEFAULTS, SCENE_DEFAULTS } from "../src/defaults";
 import { drawn, open } from "./support";
 
@@ -47,7 +47,7 @@ interface Figure {
   readonly bind: Partial<BindOptions> | "mean value";
   readonly pose?: number;
   /** The cage vertex that reaches farthest along this direction. */
-  readonly farthest?: Point;
+  readonly farthest?: Bounds["min"];
   readonly slice?: 0 | 1 | 2;
   readonly scene: Partial<SceneOptions>;
 }

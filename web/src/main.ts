@@ -199,7 +199,7 @@ async function main(): Promise<void> {
       void bind.start();
     },
     file: () => app.chooseModel(),
-    regenerate: () => void cage.repair("regenerate"),
+    regenerate: () => void cage.regenerate(),
     reload: () => location.reload(),
   };
 

@@ -10,10 +10,8 @@ import type {
   Lack,
   ModelInfo,
   Opened,
-  Engine as PageEngine,
   ReadFile,
   Session,
-  UpAxis,
 } from "./contract";
 import { BIND_DEFAULTS } from "./defaults";
 import { findAdapter, hasWebGl2, lackOf } from "./session/adapter";
@@ -101,17 +99,16 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   const client = createClient(module, openWorker);
   const buildSample = prepareSample(client, samples(pkg)[0]?.id, fresh);
   const frames = createFrames();
-  const raw = await pkg.Engine.create(canvas, frames.ask).catch((error: unknown) => {
+  const engine = await pkg.Engine.create(canvas, frames.ask).catch((error: unknown) => {
     client.close();
     throw error;
   });
-  const engine = raw as unknown as PageEngine;
   // What cannot be had now is asked for again by the first frame, which says why.
-  raw.warm().catch(() => undefined);
+  engine.warm().catch(() => undefined);
   /** Begins to draw: with the first model, because a slow GPU's empty frame is what that would wait for. */
   const begin = once(() =>
     frames.start(
-      (sharp) => raw.drawFrame(sharp),
+      (sharp) => engine.drawFrame(sharp),
       () => !client.isBusy(),
     ),
   );
@@ -121,12 +118,12 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     lack || options.solver === "cg" ? { ...options, backend: "cpu" } : options;
   /** WebGL2 tells the canvas, and nobody else, that it was lost. */
   const guard = (canvas: HTMLCanvasElement) => {
-    canvas.addEventListener("webglcontextlost", () => raw.lose());
+    canvas.addEventListener("webglcontextlost", () => engine.lose());
   };
   guard(canvas);
   const losses = new Set<(reason: string) => void>();
   const watch = async () => {
-    const reason = await raw.lost();
+    const reason = await engine.lost();
     for (const listener of losses) listener(reason);
   };
   void watch();
@@ -152,7 +149,7 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     const { settings } = loaded;
     const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
     bind?.cancel();
-    const info: ModelInfo = await raw.open(loaded);
+    const info: ModelInfo = await engine.open(loaded);
     const cage = read.cage ? takeCage(read.cage) : null;
     const model = { ...info, notices: [...info.notices, ...read.notices] };
     const project = settings === undefined ? null : { poses, settings };
@@ -182,20 +179,20 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     },
     readSettings: (text, defaults) => pkg.readSettings(text, JSON.stringify(defaults)),
     readCage: (files, hear) =>
-      reading("readCage", { files, up: raw.up() as UpAxis, model: raw.modelPositions() }, hear),
-    boxCage: (divisions) => polygons(raw.boxCage(divisions)),
+      reading("readCage", { files, up: engine.up(), model: engine.modelPositions() }, hear),
+    boxCage: (divisions) => polygons(engine.boxCage(divisions)),
     checkCage() {
       const asked = cage();
-      return chain(checking("check", { cage: asked, model: raw.modelPositions() }), (check) => {
+      return chain(checking("check", { cage: asked, model: engine.modelPositions() }), (check) => {
         requireCurrent(engine, asked);
         mark(check);
         return check;
       });
     },
-    repair: (kind) => checking("repair", { kind, cage: cage(), model: raw.modelPositions() }),
+    repair: (kind) => checking("repair", { kind, cage: cage(), model: engine.modelPositions() }),
     takeCage,
     generateCage(options, onProgress) {
-      const input = { positions: raw.modelPositions(), triangles: raw.modelTriangles(), options };
+      const input = { positions: engine.modelPositions(), triangles: engine.modelTriangles(), options };
       return client.run("cage", input, ({ fraction }) => onProgress(fraction));
     },
     bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport> {
@@ -203,7 +200,6 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       bind = startBind({
         client,
         engine,
-        raw,
         adapter,
         options: possible(options),
         listener,
@@ -211,14 +207,14 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       });
       return bind;
     },
-    estimateMemory: (options) => raw.estimateMemory(possible(options)),
+    estimateMemory: (options) => engine.estimateMemory(possible(options)),
     bindMeanValue() {
       meanValue?.cancel();
       const bound = cage();
-      const job = client.run("meanValue", { positions: raw.modelPositions(), cage: bound });
+      const job = client.run("meanValue", { positions: engine.modelPositions(), cage: bound });
       meanValue = chain(job, ({ indptr, indices, data }) => {
         requireCurrent(engine, bound);
-        return raw.adoptOther(indptr, indices, data);
+        return engine.adoptOther(indptr, indices, data);
       });
       return meanValue;
     },
@@ -231,34 +227,34 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       slice = chain(job, (rows) => {
         requireCurrent(engine, cut);
         const { indptr, indices, data } = rows ?? none;
-        raw.takeSlice(axis, fraction, options, indptr, indices, data);
+        engine.takeSlice(axis, fraction, options, indptr, indices, data);
       });
       return slice;
     },
     draw: frames.ask,
     onFrame: frames.listen,
     async picture(width, height) {
-      const pixels = new Uint8ClampedArray(await raw.picture(width, height));
+      const pixels = new Uint8ClampedArray(await engine.picture(width, height));
       const canvas = new OffscreenCanvas(width, height);
       canvas.getContext("2d")?.putImageData(new ImageData(pixels, width, height), 0, 0);
       return canvas.convertToBlob({ type: "image/png" });
     },
-    readPositions: () => raw.readPositions(),
+    readPositions: () => engine.readPositions(),
     onLost(listener) {
       losses.add(listener);
       return () => losses.delete(listener);
     },
     async recover(fresh) {
       guard(fresh);
-      await raw.recover(fresh);
+      await engine.recover(fresh);
       void watch();
     },
-    loseDevice: () => raw.lose(),
+    loseDevice: () => engine.lose(),
     memory: () => memory.buffer.byteLength,
     close() {
       frames.stop();
       client.close();
-      raw.free();
+      engine.free();
     },
   };
   globalThis.cagework = session;

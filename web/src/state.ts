@@ -4,8 +4,8 @@ import type {
   BindOptions,
   BindReport,
   Element as CageElement,
+  CageOptions,
   CageState,
-  CageWish,
   Check,
   Lack,
   Legend,
@@ -13,6 +13,7 @@ import type {
   Pose,
   Sample,
   SceneOptions,
+  Stage,
 } from "./contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
 import type { Theme } from "./store";
@@ -23,7 +24,7 @@ export type StepName = (typeof STEPS)[number];
 
 export interface BindRun {
   pass: "coarse" | "fine";
-  stage: "voxelize" | "solve" | "sample";
+  stage: Stage;
   /** Of the pass, 0 to 1. */
   fraction: number;
   etaMs: number | null;
@@ -72,7 +73,7 @@ export interface AppState {
   cageSource: CageSource;
   /** The cage is the one that the sample came with, so that a link can refer to it. */
   sampleCage: boolean;
-  cageOptions: CageWish;
+  cageOptions: CageOptions;
   boxDivisions: number;
   /** Share of the cage generation done; null when none runs. */
   cageProgress: number | null;

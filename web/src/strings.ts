@@ -1,5 +1,6 @@
 /** Sentences that more than one place says, or that belong to data. */
 
+import type { ErrorName, Stage } from "./contract";
 import { percent } from "./format";
 
 export const PRODUCT = "Cagework";
@@ -18,11 +19,12 @@ export const SAMPLES: Record<string, { sentence: string; icon: "spark" | "pose" 
   strider: { sentence: "Legs as thin as a grid cell. Bend one, the others keep still.", icon: "model" },
 };
 
-export const STAGES = {
+export const STAGES: Readonly<Record<Stage, string>> = {
+  simplify: "Making a cage",
   voxelize: "Sorting grid cells",
   solve: "Solving for the coordinates",
   sample: "Reading weights",
-} as const;
+};
 
 const READING = {
   bytes: "Reading the file",
@@ -86,9 +88,8 @@ export interface Explained {
   fix?: "coarser" | "cpu" | "file" | "regenerate" | "reload";
 }
 
-const FIXES: Record<string, NonNullable<Explained["fix"]>> = {
+const FIXES: Readonly<Partial<Record<ErrorName | "Empty", NonNullable<Explained["fix"]>>>> = {
   Memory: "coarser",
-  TooLarge: "coarser",
   Gpu: "cpu",
   NoAdapter: "cpu",
   Format: "file",
@@ -111,7 +112,7 @@ export const FIX_LABELS: Record<NonNullable<Explained["fix"]>, string> = {
 export function explain(error: unknown, title: string): Explained {
   const name = error instanceof Error ? error.name : "";
   const message = sentence(error instanceof Error ? error.message : String(error));
-  const fix = FIXES[name];
+  const fix = FIXES[name as ErrorName];
   return fix ? { title, message, fix } : { title, message };
 }
 

@@ -21,6 +21,7 @@ macro_rules! choice {
     ($(#[$about:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $word:literal,)+ }) => {
         $(#[$about])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+        #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
         pub enum $name {
             $($(#[$doc])* #[serde(rename = $word)] $variant,)+
         }
@@ -214,6 +215,7 @@ impl Number {
 /// Options of a bind.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct BindOptions {
     /// Cells along the longest side (each side for classic box cells), 8 to 512. Default 64.
     pub grid: u32,
@@ -227,7 +229,8 @@ pub struct BindOptions {
     pub cell_shape: CellShape,
     /// Default Euclidean; only Jacobi looks at it.
     pub delta_norm: DeltaNorm,
-    /// Threads; 0 = all. Default 0.
+    /// Threads; 0 = all. Default 0. (The page has one.)
+    #[cfg_attr(feature = "typescript", ts(skip))]
     pub threads: usize,
     /// Stop when delta falls below it. Default 1e-5.
     pub tau: f32,
@@ -241,6 +244,7 @@ pub struct BindOptions {
     pub outside: OutsidePolicy,
     /// Bytes that the caller holds meanwhile, a model and its document: they count towards the limit. Default 0.
     #[serde(skip)]
+    #[cfg_attr(feature = "typescript", ts(skip))]
     pub held: u64,
 }
 

@@ -8,6 +8,7 @@ use thiserror::Error;
 /// The stages of a bind, in order, and those of making a cage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Stage {
     /// The cage is laid into the grid.
     Voxelize,

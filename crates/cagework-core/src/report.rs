@@ -6,6 +6,7 @@ use crate::options::{Backend, CellShape, DeltaNorm, Method, Preconditioner, Solv
 
 /// Everything worth knowing about one bind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct BindReport {
     /// Classic (as published) or embedded.
     pub method: Method,
@@ -18,6 +19,7 @@ pub struct BindReport {
     pub backend: Backend,
     /// Name of the GPU that solved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "typescript", ts(optional))]
     pub adapter: Option<String>,
     /// Threads that solved.
     pub threads: usize,
@@ -82,6 +84,7 @@ fn one() -> u32 {
 
 /// Cells per kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct CellCounts {
     /// Cells that are solved for.
     pub interior: u64,
@@ -93,6 +96,7 @@ pub struct CellCounts {
 
 /// Stage times in milliseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Timings {
     /// Cage into grid, levels, transfer tables.
     pub voxelize: f64,
@@ -106,6 +110,7 @@ pub struct Timings {
 
 /// Working memory, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct MemoryBytes {
     /// Estimated before anything was allocated.
     pub estimated: u64,
@@ -115,6 +120,7 @@ pub struct MemoryBytes {
 
 /// Reconstruction error of the rest pose (Eq. 3).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct RestError {
     /// Mean, object units.
     pub mean: f64,
@@ -131,6 +137,7 @@ pub struct RestError {
 /// What was off before rows were restored, over vertices inside the cage. The operator and the sampling reproduce linear
 /// functions exactly, so with the embedded method this is what the solver left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct RawError {
     /// `|sum_i w_i - 1|`.
     pub sum: MeanMax,
@@ -142,6 +149,7 @@ pub struct RawError {
 
 /// Mean and largest of some numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct MeanMax {
     /// Mean.
     pub mean: f64,
@@ -151,6 +159,7 @@ pub struct MeanMax {
 
 /// Statistics of the stored weights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct WeightStats {
     /// Smallest weight.
     pub min: f32,

@@ -5,7 +5,9 @@ use thiserror::Error;
 use crate::shown::shown;
 
 /// Format of a model's file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum ModelFormat {
     /// Wavefront OBJ.
     Obj,

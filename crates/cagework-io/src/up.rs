@@ -7,7 +7,9 @@ use glam::Vec3;
 
 /// The axis that points up in a file. Everything that is not in a file has Y up: a file with Z up is turned by 90
 /// degrees about x when it is read, and back when it is written. Both are exact.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum UpAxis {
     /// Y, as glTF prescribes.
     #[default]

@@ -3,7 +3,7 @@
 use cagework_core::PolygonMesh;
 use glam::Vec3;
 
-use crate::error::{Answer, Fault};
+use crate::error::{Answer, ErrorName, Fault};
 
 /// `[n, 3]` flattened to points.
 pub(crate) fn points(flat: &[f32]) -> Vec<Vec3> {
@@ -24,7 +24,7 @@ pub(crate) fn polygon_mesh(positions: &[f32], corners: &[u32]) -> Answer<Polygon
     let mut rest = corners;
     while let [count, tail @ ..] = rest {
         let Some((face, tail)) = tail.split_at_checked(*count as usize) else {
-            return Err(Fault::new("Argument", "the last face of the cage is cut off"));
+            return Err(Fault::new(ErrorName::Error, "the last face of the cage is cut off"));
         };
         faces.push(face.to_vec());
         rest = tail;

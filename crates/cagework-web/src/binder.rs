@@ -15,8 +15,8 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::arrays::{corners, flat, points, polygon_mesh};
 use crate::clock::Listener;
-use crate::error::{Answer, Fault};
-use crate::options::{BindAsked, CageAsked, unknown};
+use crate::error::{Answer, ErrorName, Fault};
+use crate::options::{BindAsked, CageAsked, taken};
 use crate::problems::{self, Check};
 use crate::views::object;
 
@@ -93,10 +93,10 @@ impl Binder {
         positions: Vec<f32>,
         cage: Vec<f32>,
         corners: Vec<u32>,
-        options: JsValue,
-        progress: Function,
+        #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Bound, JsValue> {
-        let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
+        let asked: BindAsked = taken(options)?;
         let parts = Parts::new(&positions, &cage, &corners)?;
         drop(positions);
         let binding = self.run(&parts.positions, &parts.cage, asked, progress).await?;
@@ -133,10 +133,10 @@ impl Binder {
         corners: Vec<u32>,
         axis: usize,
         fraction: f32,
-        options: JsValue,
-        progress: Function,
+        #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Option<Bound>, JsValue> {
-        let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
+        let asked: BindAsked = taken(options)?;
         let parts = Parts::new(&[], &cage, &corners)?;
         let centers = Slice::new(&parts.cage, &asked.into(), axis.min(2), fraction).centers();
         if centers.is_empty() {
@@ -144,7 +144,7 @@ impl Binder {
         }
         let binding = match self.run(&centers, &parts.cage, asked, progress).await {
             // Rounding may put all of a layer that only grazes the cage outside.
-            Err(fault) if fault.is("NoneInside") => return Ok(None),
+            Err(fault) if fault.is(ErrorName::NoneInside) => return Ok(None),
             ran => ran?,
         };
         let (weights, outside) = (binding.weights, Vec::new());
@@ -160,10 +160,10 @@ impl Binder {
         &self,
         positions: &[f32],
         triangles: &[u32],
-        options: JsValue,
-        progress: Function,
+        #[wasm_bindgen(unchecked_param_type = "CageOptions")] options: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Polygons, JsValue> {
-        let asked: CageAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
+        let asked: CageAsked = taken(options)?;
         let triangles: Vec<[u32; 3]> = triangles.as_chunks().0.to_vec();
         let listener = Listener::new(progress);
         let made = generate(&points(positions), &triangles, &CageOptions::from(asked), &listener);
@@ -180,18 +180,18 @@ impl Binder {
         Ok(Check { check: problems::find(&mesh, Some(&points(model))) })
     }
 
-    /// A repaired cage: `RepairKind` of contract.ts, then the arrays of `checkCage`.
+    /// A repaired cage, from the arrays of `checkCage`.
     ///
     /// # Errors
-    /// When there is no such repair, or growing did not help.
+    /// When growing did not help.
     #[wasm_bindgen(js_name = repairCage)]
     pub fn repair_cage(
-        kind: &str,
+        #[wasm_bindgen(unchecked_param_type = "Repair")] kind: JsValue,
         model: &[f32],
         positions: &[f32],
         corners: &[u32],
     ) -> Result<Polygons, JsValue> {
-        let asked = problems::repair_named(kind).ok_or_else(|| unknown("repair", kind))?;
+        let asked = taken(kind)?;
         let mesh = polygon_mesh(positions, corners)?;
         let repaired = repair(&mesh, &[asked], Some(&points(model))).map_err(Fault::from)?;
         Ok(Polygons { mesh: repaired.mesh })
@@ -209,7 +209,8 @@ impl Binder {
     /// When there is none of that name.
     #[wasm_bindgen(js_name = buildSample)]
     pub fn build_sample(id: &str) -> Result<BuiltSample, JsValue> {
-        let sample = samples::build(id).ok_or_else(|| unknown("sample", id))?;
+        let unknown = || Fault::new(ErrorName::Error, format!("there is no sample called {id:?}"));
+        let sample = samples::build(id).ok_or_else(unknown)?;
         let glb =
             cagework_io::write_mesh_glb(&sample.name, &sample.mesh, &sample.colours).map_err(Fault::from)?;
         let positions = sample.mesh.positions;
@@ -276,7 +277,7 @@ impl Bound {
     }
 
     /// The bind report; undefined for mean value coordinates and slices.
-    #[wasm_bindgen(getter)]
+    #[wasm_bindgen(getter, unchecked_return_type = "BindReport | undefined")]
     #[must_use]
     pub fn report(&self) -> JsValue {
         self.report.clone()

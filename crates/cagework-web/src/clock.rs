@@ -9,6 +9,8 @@ use serde::Serialize;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
+use crate::views::object;
+
 #[wasm_bindgen]
 extern "C" {
     /// Milliseconds since the page or worker began.
@@ -38,9 +40,10 @@ impl Drop for Listener {
     }
 }
 
-/// `ProgressEvent` of contract.ts.
+/// A [`ProgressEvent`].
 #[derive(Serialize)]
-struct Event {
+#[cfg_attr(test, derive(ts_rs::TS), ts(rename = "Progress"))]
+pub(crate) struct Event {
     stage: cagework_core::Stage,
     fraction: f32,
     iteration: u32,
@@ -52,7 +55,7 @@ impl Progress for Listener {
         let ProgressEvent { stage, fraction, iteration, delta } = event;
         let Some(listener) = LISTENER.with_borrow(Clone::clone) else { return ControlFlow::Continue(()) };
         let event = Event { stage, fraction, iteration, delta };
-        let Ok(event) = serde_wasm_bindgen::to_value(&event) else { return ControlFlow::Continue(()) };
+        let Ok(event) = object(&event) else { return ControlFlow::Continue(()) };
         match listener.call1(&JsValue::NULL, &event) {
             Ok(answer) if answer == JsValue::FALSE => ControlFlow::Break(()),
             Ok(_) => ControlFlow::Continue(()),

@@ -1,6 +1,6 @@
-//! Errors as JavaScript has them: name = variant, message = sentence.
+//! Errors as JavaScript has them: what the page decides by is their name, the sentence is for people.
 
-use std::fmt::{Debug, Display};
+use std::fmt::Display;
 
 use cagework_core::cage::CageError;
 use cagework_core::cage_check::RepairError;
@@ -11,13 +11,48 @@ use cagework_core::slice::SliceError;
 use cagework_core::weights::WeightsError;
 use cagework_core::{BindError, MeanValueError};
 use cagework_gpu::GpuError;
-use cagework_io::{NpzError, PoseCodeError, ProjectError, ReadError, WriteError};
+use cagework_io::{GltfError, NpzError, PoseCodeError, ProjectError, ReadError, WriteError};
+use serde::Serialize;
 use wasm_bindgen::JsValue;
+
+use crate::views::object;
+
+/// What kinds of errors the page tells apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) enum ErrorName {
+    /// Somebody gave it up, or something else overtook it.
+    Cancelled,
+    /// A file's geometry is compressed, and JavaScript has what decompresses it.
+    Compressed,
+    /// A file cannot be read.
+    Format,
+    /// A bind needs more memory than it may take.
+    Memory,
+    /// Vertices of the model are outside the cage.
+    Outside,
+    /// All of them are.
+    NoneInside,
+    /// There is no GPU.
+    NoAdapter,
+    /// It gives no device.
+    NoDevice,
+    /// The device is gone.
+    DeviceLost,
+    /// The GPU cannot do it; the processor may.
+    Gpu,
+    /// The canvas cannot be drawn into.
+    Canvas,
+    /// Something has to come first.
+    Missing,
+    /// Anything else.
+    Error,
+}
 
 /// An error on its way to JavaScript.
 #[derive(Debug)]
 pub(crate) struct Fault {
-    name: String,
+    name: ErrorName,
     message: String,
 }
 
@@ -26,55 +61,43 @@ pub(crate) type Answer<T> = Result<T, Fault>;
 
 impl Fault {
     /// An error of this crate's own.
-    pub(crate) fn new(name: &str, message: impl Into<String>) -> Self {
-        Self { name: name.to_owned(), message: message.into() }
+    pub(crate) fn new(name: ErrorName, message: impl Display) -> Self {
+        Self { name, message: message.to_string() }
     }
 
     /// Whether this is the error of that name.
-    pub(crate) fn is(&self, name: &str) -> bool {
+    pub(crate) fn is(&self, name: ErrorName) -> bool {
         self.name == name
     }
 
     /// There is none of what is needed.
     pub(crate) fn missing(what: &str, how: &str) -> Self {
-        Self::new("Missing", format!("there is no {what} yet: {how}"))
-    }
-
-    /// Named for the variant of `error`: the first word of its debug output.
-    fn of(error: &(impl Debug + Display)) -> Self {
-        let debug = format!("{error:?}");
-        let end = debug.find(|c: char| !c.is_alphanumeric()).unwrap_or(debug.len());
-        Self { name: debug[..end].to_owned(), message: error.to_string() }
-    }
-
-    fn named(mut self, inner: &Self) -> Self {
-        self.name.clone_from(&inner.name);
-        self
+        Self::new(ErrorName::Missing, format!("there is no {what} yet: {how}"))
     }
 }
 
 impl From<Fault> for JsValue {
     fn from(fault: Fault) -> Self {
         let error = js_sys::Error::new(&fault.message);
-        error.set_name(&fault.name);
+        let name = object(&fault.name).ok().and_then(|name| name.as_string());
+        error.set_name(&name.unwrap_or_default());
         error.into()
     }
 }
 
+/// Errors of which the page tells no more than their sentence.
 macro_rules! plain {
     ($($error:ty),*) => {$(
         impl From<$error> for Fault {
             fn from(error: $error) -> Self {
-                Self::of(&error)
+                Self::new(ErrorName::Error, error)
             }
         }
     )*};
 }
 
 plain!(
-    BindError,
     CageError,
-    CageGenError,
     MeanValueError,
     NpzError,
     PoseCodeError,
@@ -83,17 +106,34 @@ plain!(
     RestEditError,
     SliceError,
     WeightsError,
-    WriteError
+    WriteError,
+    serde_wasm_bindgen::Error
 );
+
+impl From<BindError> for Fault {
+    fn from(error: BindError) -> Self {
+        let name = match error {
+            BindError::Cancelled(_) => ErrorName::Cancelled,
+            BindError::Memory { .. } => ErrorName::Memory,
+            BindError::Outside { .. } => ErrorName::Outside,
+            BindError::NoneInside { .. } => ErrorName::NoneInside,
+            _ => ErrorName::Error,
+        };
+        Self::new(name, error)
+    }
+}
+
+impl From<CageGenError> for Fault {
+    fn from(error: CageGenError) -> Self {
+        let is_cancelled = matches!(error, CageGenError::Cancelled(_));
+        Self::new(if is_cancelled { ErrorName::Cancelled } else { ErrorName::Error }, error)
+    }
+}
 
 impl From<ReadError> for Fault {
     fn from(error: ReadError) -> Self {
-        let fault = Self::of(&error);
-        match &error {
-            ReadError::Gltf { source, .. } => fault.named(&Self::of(source)),
-            ReadError::Obj { source, .. } => fault.named(&Self::of(source)),
-            ReadError::Format(_) | ReadError::NoFaces { .. } => fault,
-        }
+        let is_compressed = matches!(&error, ReadError::Gltf { source: GltfError::Compressed { .. }, .. });
+        Self::new(if is_compressed { ErrorName::Compressed } else { ErrorName::Format }, error)
     }
 }
 
@@ -101,22 +141,24 @@ impl From<ProjectError> for Fault {
     fn from(error: ProjectError) -> Self {
         match error {
             ProjectError::Model(error) => error.into(),
-            other => Self::of(&other),
+            other => Self::new(ErrorName::Format, other),
         }
     }
 }
 
 impl From<GpuError> for Fault {
     fn from(error: GpuError) -> Self {
-        match error {
-            GpuError::Bind(error) => error.into(),
-            other => Self::of(&other),
-        }
-    }
-}
-
-impl From<serde_wasm_bindgen::Error> for Fault {
-    fn from(error: serde_wasm_bindgen::Error) -> Self {
-        Self::new("Argument", error.to_string())
+        let name = match error {
+            GpuError::Bind(error) => return error.into(),
+            GpuError::NoAdapter { .. } => ErrorName::NoAdapter,
+            GpuError::NoDevice { .. } => ErrorName::NoDevice,
+            GpuError::DeviceLost { .. } => ErrorName::DeviceLost,
+            GpuError::OutOfMemory { .. }
+            | GpuError::Refused { .. }
+            | GpuError::Timeout { .. }
+            | GpuError::Plan(_) => ErrorName::Gpu,
+            _ => ErrorName::Error,
+        };
+        Self::new(name, error)
     }
 }

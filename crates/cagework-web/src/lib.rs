@@ -12,6 +12,8 @@
 
 mod arrays;
 pub mod binder;
+#[cfg(test)]
+mod border;
 mod clock;
 #[cfg(target_family = "wasm")]
 pub mod engine;
@@ -30,6 +32,13 @@ mod surface;
 mod views;
 
 use wasm_bindgen::prelude::wasm_bindgen;
+
+/// The types of `unchecked_*_type` below: serde's, as `border.rs` writes them for TypeScript.
+#[wasm_bindgen(typescript_custom_section)]
+const TYPES: &str = r#"
+import type { BindOptions, BindReport, CageOptions, CageState, Element, Gesture, GizmoHandle, Legend, ModelInfo,
+  Problem, Progress, Repair, RestEdit, SceneOptions, SelectMode, Settings, UpAxis } from "../contract/generated";
+"#;
 
 #[wasm_bindgen]
 extern "C" {

@@ -11,7 +11,7 @@ use wasm_bindgen::{JsCast as _, JsValue};
 use crate::arrays::flat;
 use crate::binder::Polygons;
 use crate::error::Answer;
-use crate::options::unknown;
+use crate::options::taken;
 
 /// A model with its looks, and what else was in its file.
 #[wasm_bindgen]
@@ -56,8 +56,11 @@ impl Loaded {
     /// # Errors
     /// When it is another word.
     #[wasm_bindgen(js_name = setUp)]
-    pub fn set_up(&mut self, up: &str) -> Result<(), JsValue> {
-        let (before, up) = (self.model.up(), UpAxis::named(up).ok_or_else(|| unknown("axis", up))?);
+    pub fn set_up(
+        &mut self,
+        #[wasm_bindgen(unchecked_param_type = "UpAxis")] up: JsValue,
+    ) -> Result<(), JsValue> {
+        let (before, up): (_, UpAxis) = (self.model.up(), taken(up)?);
         let turn = |positions: &mut Vec<Vec3>| {
             *positions = up.turned(&before.turned_back(positions)).into_owned();
         };

@@ -2,19 +2,22 @@
 
 use cagework_core::BindOptions;
 use cagework_core::cage_gen::{CageOptions, Shape, Symmetry};
-use cagework_core::edit::{Element, GestureKind, SelectMode};
 use cagework_core::options::{Backend, Solver};
 use cagework_gpu::render::Theme;
-use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use wasm_bindgen::JsValue;
 
-use crate::error::{Answer, Fault};
+use crate::error::Answer;
 
 /// `BindOptions`: those of the core, and where to compute.
 #[derive(Clone, Copy, Deserialize)]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[cfg_attr(test, ts(rename = "BindOptions"))]
 pub(crate) struct BindAsked {
-    backend: Backend,
+    pub(crate) backend: Backend,
     #[serde(flatten)]
-    options: BindOptions,
+    pub(crate) options: BindOptions,
 }
 
 impl From<BindAsked> for BindOptions {
@@ -34,6 +37,8 @@ impl BindAsked {
 
 /// `CageOptions`.
 #[derive(Clone, Copy, Deserialize)]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[cfg_attr(test, ts(rename = "CageOptions"))]
 pub(crate) struct CageAsked {
     vertices: u32,
     margin: f32,
@@ -47,10 +52,26 @@ pub(crate) struct CageAsked {
 
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum SymmetryAsked {
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[cfg_attr(test, ts(rename = "CageSymmetry"))]
+pub(crate) enum SymmetryAsked {
     Auto,
     On,
     Off,
+}
+
+#[cfg(test)]
+impl From<CageOptions> for CageAsked {
+    fn from(options: CageOptions) -> Self {
+        let CageOptions { target: vertices, clearance: margin, voxels, shape, per_component, symmetry } =
+            options;
+        let symmetry = match symmetry {
+            Symmetry::Auto => SymmetryAsked::Auto,
+            Symmetry::None => SymmetryAsked::Off,
+            _ => SymmetryAsked::On,
+        };
+        Self { vertices, margin, symmetry, voxels, shape, per_component }
+    }
 }
 
 impl From<CageAsked> for CageOptions {
@@ -72,6 +93,8 @@ impl From<CageAsked> for CageOptions {
 
 /// `SceneOptions`.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[cfg_attr(test, ts(rename = "SceneOptions"))]
 pub(crate) struct SceneAsked {
     theme: ThemeAsked,
     pub(crate) model: bool,
@@ -115,7 +138,9 @@ impl SceneAsked {
 
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
-enum ThemeAsked {
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[cfg_attr(test, ts(rename = "Theme"))]
+pub(crate) enum ThemeAsked {
     Light,
     Dark,
 }
@@ -123,6 +148,7 @@ enum ThemeAsked {
 /// What colours of the mesh mean.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 pub(crate) enum Colour {
     Material,
     Clay,
@@ -133,6 +159,7 @@ pub(crate) enum Colour {
 /// What the slice shows.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 pub(crate) enum SliceShown {
     Off,
     Kinds,
@@ -142,6 +169,8 @@ pub(crate) enum SliceShown {
 /// The gizmo.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[cfg_attr(test, ts(rename = "Gizmo"))]
 pub(crate) enum GizmoAsked {
     None,
     Move,
@@ -149,38 +178,36 @@ pub(crate) enum GizmoAsked {
     Scale,
 }
 
-/// How to select, by its name.
-pub(crate) fn select_mode(name: &str) -> Answer<SelectMode> {
-    Ok(match name {
-        "replace" => SelectMode::Replace,
-        "add" => SelectMode::Add,
-        "remove" => SelectMode::Remove,
-        "toggle" => SelectMode::Toggle,
-        other => return Err(unknown("way to select", other)),
-    })
+/// A part of the gizmo: an axis, the plane normal to it, or the whole.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) enum GizmoHandle {
+    X,
+    Y,
+    Z,
+    PlaneX,
+    PlaneY,
+    PlaneZ,
+    All,
 }
 
-/// What clicks select, by its name.
-pub(crate) fn element(name: &str) -> Answer<Element> {
-    Ok(match name {
-        "vertex" => Element::Vertex,
-        "edge" => Element::Edge,
-        "face" => Element::Face,
-        other => return Err(unknown("element", other)),
-    })
+/// Edits of the rest cage, on the selection.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) enum RestEdit {
+    SplitEdge,
+    CollapseEdge,
+    ExtrudeFace,
+    DeleteVertex,
+    DeleteFace,
 }
 
-/// A gesture, by its name.
-pub(crate) fn gesture(name: &str) -> Answer<GestureKind> {
-    Ok(match name {
-        "grab" => GestureKind::Grab,
-        "rotate" => GestureKind::Rotate,
-        "scale" => GestureKind::Scale,
-        other => return Err(unknown("gesture", other)),
-    })
-}
-
-/// A word that this program does not know: the page and the wasm file are of different versions.
-pub(crate) fn unknown(what: &str, word: &str) -> Fault {
-    Fault::new("Argument", format!("there is no {what} called {word:?}"))
+/// A word or an object that JavaScript says, typed there as what it becomes here.
+///
+/// # Errors
+/// `Argument` when it is something else: the page and the wasm file are of different versions.
+pub(crate) fn taken<T: DeserializeOwned>(said: JsValue) -> Answer<T> {
+    Ok(serde_wasm_bindgen::from_value(said)?)
 }

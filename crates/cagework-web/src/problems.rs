@@ -7,7 +7,7 @@ use glam::Vec3;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use crate::views;
+use crate::views::{self, Mend};
 
 /// Cells along the longest side that parts of a cage should be thicker than: the default of a bind.
 const USUAL_GRID: u32 = 64;
@@ -17,54 +17,31 @@ pub(crate) fn find(mesh: &PolygonMesh, model: Option<&[Vec3]>) -> CageCheck {
     check(mesh, model, Some(USUAL_GRID))
 }
 
-/// A repair by the name that contract.ts has for it.
-pub(crate) fn repair_named(name: &str) -> Option<Repair> {
-    Some(match name {
-        "weld" => Repair::Weld,
-        "drop_parts" => Repair::DropDegenerate,
-        "fill_holes" => Repair::FillHoles,
-        "turn_faces" => Repair::Flip,
-        "grow" => Repair::Grow,
-        _ => return None,
-    })
-}
-
-/// `Problem` of contract.ts.
-pub(crate) fn view(problem: &Problem) -> views::Problem {
+/// A problem as the page says it.
+fn view(problem: &Problem) -> views::Problem {
     let n = problem.count;
-    let many =
-        |one: &str, many: &str| if n == 1 { one.to_owned() } else { many.replace('#', &n.to_string()) };
+    let label = |repair| match repair {
+        Repair::Weld => "Join them".to_owned(),
+        Repair::DropDegenerate if n == 1 => "Drop it".to_owned(),
+        Repair::DropDegenerate => format!("Drop all {n}"),
+        Repair::FillHoles => "Fill the holes".to_owned(),
+        Repair::Flip => "Turn them outward".to_owned(),
+        Repair::Grow => "Grow the cage".to_owned(),
+    };
     // The best one stands first.
     let fix = problem.fixes.first().map(|fix| match *fix {
-        Fix::Repair { repair } => match repair {
-            Repair::Weld => ("weld", many("Join them", "Join them"), None),
-            Repair::DropDegenerate => ("drop_parts", many("Drop it", "Drop all #"), None),
-            Repair::FillHoles => ("fill_holes", "Fill the holes".to_owned(), None),
-            Repair::Flip => ("turn_faces", "Turn them outward".to_owned(), None),
-            Repair::Grow => ("grow", "Grow the cage".to_owned(), None),
-        },
-        Fix::Grid { cells } => ("refine_grid", format!("Bind with {cells} cells"), Some(cells)),
+        Fix::Repair { repair } => views::Fix { label: label(repair), mend: Mend::Repair { repair } },
+        Fix::Grid { cells } => {
+            views::Fix { label: format!("Bind with {cells} cells"), mend: Mend::Grid { cells } }
+        }
     });
-    let fix = fix.or_else(|| {
-        (problem.severity == Severity::Error).then(|| ("regenerate", "Make a new cage".to_owned(), None))
-    });
+    let regenerate = || views::Fix { label: "Make a new cage".to_owned(), mend: Mend::Regenerate };
     views::Problem {
-        kind: kind(problem.code),
-        severity: match problem.severity {
-            Severity::Error => "error",
-            Severity::Warning => "warning",
-            Severity::Note => "note",
-        },
+        code: problem.code,
+        severity: problem.severity,
         message: problem.message.clone(),
         count: n,
-        fix: fix.map(|(kind, label, cells)| views::Fix { kind, label, cells }),
-    }
-}
-
-fn kind(code: Code) -> String {
-    match code {
-        Code::ModelOutside => "Outside".to_owned(),
-        other => format!("{other:?}"),
+        fix: fix.or_else(|| (problem.severity == Severity::Error).then(regenerate)),
     }
 }
 
@@ -76,11 +53,11 @@ pub struct Check {
 
 #[wasm_bindgen]
 impl Check {
-    /// `Problem[]` of contract.ts.
+    /// What is said.
     ///
     /// # Errors
     /// Never.
-    #[wasm_bindgen(getter)]
+    #[wasm_bindgen(getter, unchecked_return_type = "readonly Problem[]")]
     pub fn problems(&self) -> Result<JsValue, JsValue> {
         let shown: Vec<_> = self.check.problems.iter().map(view).collect();
         Ok(views::object(&shown)?)

@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use crate::error::Fault;
+use crate::error::{ErrorName, Fault};
 use crate::options::{BindAsked, CageAsked};
 use crate::views::object;
 
@@ -29,18 +29,25 @@ const NUMBERS: [(&str, Number); 7] = [
     ("voxels", VOXELS),
 ];
 
-/// `Settings` of project.ts, as far as they can be used.
+/// The page's part of a project, as far as it can be used.
 #[derive(Debug, Default, PartialEq, Serialize)]
-struct Settings {
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) struct Settings {
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional, as = "Option<BindAsked>"))]
     bind: Option<Map<String, Value>>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional, as = "Option<CageAsked>"))]
     cage: Option<Map<String, Value>>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     sample: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     symmetry: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    /// `Engine.encodePose`, base 64.
+    #[cfg_attr(test, ts(optional))]
     pose: Option<String>,
     /// What was wrong, in whole sentences.
     notices: Vec<String>,
@@ -51,11 +58,11 @@ struct Settings {
 /// `defaults`: it belongs to the computer, not to the project.
 ///
 /// # Errors
-/// `Argument` when `defaults` is something else.
-#[wasm_bindgen(js_name = readSettings)]
+/// When `defaults` is something else.
+#[wasm_bindgen(js_name = readSettings, unchecked_return_type = "Settings")]
 pub fn read_settings(text: &str, defaults: &str) -> Result<JsValue, JsValue> {
     let defaults: Map<String, Value> =
-        serde_json::from_str(defaults).map_err(|error| Fault::new("Argument", error.to_string()))?;
+        serde_json::from_str(defaults).map_err(|error| Fault::new(ErrorName::Error, error))?;
     Ok(object(&Settings::read(text, &defaults))?)
 }
 

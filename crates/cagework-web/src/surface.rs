@@ -8,7 +8,7 @@ use cagework_gpu::{ContextOptions, GpuContext, GpuError, Session, device};
 use web_sys::HtmlCanvasElement;
 
 use crate::clock::now_ms;
-use crate::error::{Answer, Fault};
+use crate::error::{Answer, ErrorName, Fault};
 
 /// Frames that the GPU may be behind: with one it would wait for us, with more a slow one shows what was long ago.
 const MOST_IN_FLIGHT: u32 = 2;
@@ -76,7 +76,7 @@ impl Surface {
         let instance = device::instance();
         let surface = instance
             .create_surface(wgpu::SurfaceTarget::Canvas(canvas))
-            .map_err(|error| Fault::new("Canvas", error.to_string()))?;
+            .map_err(|error| Fault::new(ErrorName::Canvas, error))?;
         let adapter = instance
             .request_adapter(&wgpu::RequestAdapterOptions {
                 power_preference: wgpu::PowerPreference::HighPerformance,
@@ -89,7 +89,7 @@ impl Surface {
         let context = GpuContext::with_adapter(instance, adapter, &options).await?;
         let mut config = surface
             .get_default_config(&context.adapter, size[0], size[1])
-            .ok_or_else(|| Fault::new("Canvas", "this GPU cannot draw into a canvas"))?;
+            .ok_or_else(|| Fault::new(ErrorName::Canvas, "this GPU cannot draw into a canvas"))?;
         let format = config.format.add_srgb_suffix();
         config.alpha_mode = wgpu::CompositeAlphaMode::Opaque;
         // WebGL2's canvas takes no copies, but encodes as it should.

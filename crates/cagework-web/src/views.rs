@@ -1,9 +1,10 @@
 //! What JavaScript is told about things, as plain objects: the types of contract.ts.
 
 use cagework_core::cage::CageNotice;
+use cagework_core::cage_check::{Code, Repair, Severity};
 use cagework_core::edit::Topology;
 use cagework_core::{Bounds, Cage, PolygonMesh};
-use cagework_io::Model;
+use cagework_io::{Model, ModelFormat, UpAxis};
 use serde::Serialize;
 use wasm_bindgen::JsValue;
 
@@ -11,6 +12,8 @@ use crate::error::Answer;
 
 /// Corners of a box.
 #[derive(Clone, Copy, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[cfg_attr(test, ts(rename = "Bounds"))]
 pub(crate) struct BoundsView {
     min: [f32; 3],
     max: [f32; 3],
@@ -28,10 +31,11 @@ impl BoundsView {
 /// `ModelInfo`.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct ModelInfo {
     name: String,
-    format: &'static str,
-    up: &'static str,
+    format: ModelFormat,
+    up: UpAxis,
     vertices: usize,
     triangles: usize,
     faces: usize,
@@ -49,8 +53,8 @@ impl ModelInfo {
         let counts = model.counts;
         Self {
             name: model.name.clone(),
-            format: model.format().name(),
-            up: model.up().name(),
+            format: model.format(),
+            up: model.up(),
             vertices: model.positions.len(),
             triangles: model.triangles.len(),
             faces: model.n_faces(),
@@ -67,6 +71,7 @@ impl ModelInfo {
 
 /// `CageInfo`.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct CageInfo {
     vertices: usize,
     edges: usize,
@@ -92,37 +97,64 @@ impl CageInfo {
 
 /// `CageState`.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct CageState {
     pub(crate) usable: bool,
     pub(crate) info: CageInfo,
 }
 
-/// `Problem`.
-#[derive(Clone, Serialize)]
+/// A kind of fault, as the page says it.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Problem {
-    pub(crate) kind: String,
-    pub(crate) severity: &'static str,
+    pub(crate) code: Code,
+    pub(crate) severity: Severity,
+    /// A whole sentence with numbers.
     pub(crate) message: String,
     pub(crate) count: usize,
     pub(crate) fix: Option<Fix>,
 }
 
-/// A repair and what its button says.
-#[derive(Clone, Serialize)]
+/// What helps, and what its button says.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Fix {
-    pub(crate) kind: &'static str,
     pub(crate) label: String,
-    /// Cells of the grid that the fix asks for.
-    pub(crate) cells: Option<u32>,
+    #[serde(flatten)]
+    pub(crate) mend: Mend,
+}
+
+/// What a button beside a problem does.
+#[derive(Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) enum Mend {
+    /// Repairs the cage.
+    Repair { repair: Repair },
+    /// Binds with so many cells.
+    Grid { cells: u32 },
+    /// Makes another cage.
+    Regenerate,
 }
 
 /// `Legend`.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Legend {
     pub(crate) low: f32,
     pub(crate) high: f32,
     pub(crate) logarithmic: bool,
-    pub(crate) map: &'static str,
+    pub(crate) map: ColorMap,
+}
+
+/// How colours of a legend follow each other.
+#[derive(Serialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) enum ColorMap {
+    Viridis,
+    Error,
+    Kinds,
 }
 
 /// A plain object of JavaScript; what is not there is null.

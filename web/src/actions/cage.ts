@@ -1,6 +1,6 @@
 /** Getting a cage: made for the model, a box, or a file; and repairing it. */
 
-import type { CageState, CageWish, Check, CheckedCage, Job, Mend, NamedFile, RepairKind } from "../contract";
+import type { CageOptions, CageState, Check, CheckedCage, Job, Mend, NamedFile, Repair } from "../contract";
 import type { CageSource } from "../state";
 import { attempt, type Context, waitFor } from "./context";
 
@@ -9,7 +9,9 @@ export interface CageActions {
   make(): Promise<boolean>;
   cancel(): void;
   load(files: readonly NamedFile[]): Promise<boolean>;
-  repair(kind: RepairKind): Promise<boolean>;
+  repair(kind: Repair): Promise<boolean>;
+  /** Another one, by itself. */
+  regenerate(): Promise<boolean>;
   /** What the button beside a problem does. */
   mend(fix: Mend): void;
   /** The page's side of a new or changed cage; one that was not checked yet is now. */
@@ -68,7 +70,7 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
   const generate = async (source: CageSource) => {
     const { cageOptions } = ctx.store.get();
     const hull = { shape: "hull", vertices: HULL_VERTICES, voxels: 0 } as const;
-    const options: CageWish = source === "hull" ? { ...cageOptions, ...hull } : cageOptions;
+    const options: CageOptions = source === "hull" ? { ...cageOptions, ...hull } : cageOptions;
     turn += 1;
     const mine = turn;
     ctx.store.set({ cageProgress: 0 });
@@ -114,10 +116,6 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
       });
     },
     repair(kind) {
-      if (kind === "regenerate") {
-        ctx.store.set({ cageSource: "auto" });
-        return this.make();
-      }
       const before = now();
       return attempt(ctx, "The repair did not work", async () => {
         take(
@@ -127,9 +125,14 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
         );
       });
     },
-    mend({ kind, cells }) {
-      if (kind !== "refine_grid") void this.repair(kind);
-      else if (cells !== null) refine(cells);
+    regenerate() {
+      ctx.store.set({ cageSource: "auto" });
+      return this.make();
+    },
+    mend(fix) {
+      if (fix.kind === "repair") void this.repair(fix.repair);
+      else if (fix.kind === "grid") refine(fix.cells);
+      else void this.regenerate();
     },
     adopt,
   };

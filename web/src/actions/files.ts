@@ -69,12 +69,12 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     void prepare(mine, cageFiles, sample !== null || opened.project !== null);
   };
 
-  const settingsOf = (opened: Opened) => {
+  const settingsOf = (opened: Opened): Settings => {
     // The memory limit is this computer's: no file says how much it has.
     const bind = { ...BIND_DEFAULTS, memory_limit: store.get().bindOptions.memory_limit };
     const { project } = opened;
-    const none: Settings & { notices: readonly string[] } = { notices: [] };
-    return project ? ctx.session().readSettings(project.settings, { bind, cage: CAGE_DEFAULTS }) : none;
+    if (!project) return { notices: [] };
+    return ctx.session().readSettings(project.settings, { bind, cage: CAGE_DEFAULTS });
   };
 
   const goTo = (from: readonly StepName[], step: StepName) => {

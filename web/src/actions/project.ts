@@ -19,7 +19,7 @@ export function createProject(ctx: Context): Project {
   const settings = (): string => {
     const state = store.get();
     const pose = state.posed ? toBase64Url(ctx.session().engine.encodePose()) : undefined;
-    const all: Settings = {
+    const all: Omit<Settings, "notices"> = {
       bind: state.bindOptions,
       cage: state.cageOptions,
       symmetry: state.symmetry,
@@ -56,7 +56,7 @@ export function createProject(ctx: Context): Project {
 }
 
 /** The pose of settings as bytes, if it has one that can be read. */
-export function poseOf(settings: Settings): Uint8Array | undefined {
+export function poseOf(settings: Pick<Settings, "pose">): Uint8Array | undefined {
   if (settings.pose === undefined) return undefined;
   try {
     return fromBase64Url(settings.pose);

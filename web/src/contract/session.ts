@@ -1,14 +1,23 @@
 /** What `session.ts` offers: files, jobs in the worker, frames. */
 
-import type { BindEvent, BindOptions, BindReport } from "./bind";
-import type { CageArrays, CageOptions, CageState, CageWish, Check, CheckedCage, RepairKind } from "./cage";
-import type { Engine } from "./engine";
-import type { Pose } from "./scene";
+import type { Engine } from "../pkg/cagework";
+import type { BindEvent } from "./bind";
+import type { CageArrays, Check, CheckedCage } from "./cage";
+import type {
+  BindOptions,
+  BindReport,
+  CageOptions,
+  CageState,
+  ErrorName,
+  ModelInfo,
+  Repair,
+  Settings,
+  UpAxis,
+} from "./generated";
 
-export type Point = readonly [x: number, y: number, z: number];
-export interface Bounds {
-  readonly min: Point;
-  readonly max: Point;
+export interface Pose {
+  readonly name: string;
+  readonly positions: Float32Array;
 }
 
 export interface Session {
@@ -36,7 +45,7 @@ export interface Session {
    * A project's settings, each checked as the options of a call are: what cannot be used is the default, and `notices` say
    * so. The memory limit is the default's.
    */
-  readSettings(text: string, defaults: Defaults): Settings & { readonly notices: readonly string[] };
+  readSettings(text: string, defaults: Defaults): Settings;
   /** Reads a cage from a file (.obj, .glb, .gltf) as a model is read, and checks it. */
   readCage(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<CheckedCage>;
   /** A box around the model, its longest side cut into `divisions`. */
@@ -46,7 +55,7 @@ export interface Session {
   /** Checks the cage at rest as it is, in a worker of its own, and marks what is wrong. */
   checkCage(): Job<Check>;
   /** The cage at rest, repaired, in that worker too. */
-  repair(kind: RepairKind): Job<CheckedCage>;
+  repair(kind: Repair): Job<CheckedCage>;
   /** Takes a cage, and marks what is wrong with it. A mesh that is no cage yet is kept as a draft: `usable` is false. */
   takeCage(cage: CheckedCage): CageState;
 
@@ -84,7 +93,7 @@ export interface Session {
 }
 
 /** What is missing: the browser has no WebGPU, or has it and found no graphics card for it, or that did not start. */
-export type Lack = "NoWebGPU" | "NoAdapter" | "NoDevice";
+export type Lack = "NoWebGPU" | Extract<ErrorName, "NoAdapter" | "NoDevice">;
 
 export interface Job<T> {
   readonly done: Promise<T>;
@@ -127,36 +136,7 @@ export interface Opened {
   readonly poses?: readonly Pose[];
 }
 
-/** The page's own part of a project file. */
-export interface Settings {
-  readonly bind?: BindOptions;
-  readonly cage?: CageWish;
-  readonly sample?: string;
-  readonly symmetry?: boolean;
-  /** `Engine.encodePose`, base 64. */
-  readonly pose?: string;
-}
 export interface Defaults {
   readonly bind: BindOptions;
-  readonly cage: CageWish;
-}
-
-/** What points up in the model's file; inside, and on the screen, Y does. */
-export type UpAxis = "y" | "z";
-
-export interface ModelInfo {
-  readonly name: string;
-  readonly format: "obj" | "gltf";
-  readonly up: UpAxis;
-  readonly vertices: number;
-  readonly triangles: number;
-  readonly faces: number;
-  readonly materials: number;
-  readonly textures: number;
-  readonly skins: number;
-  readonly animations: number;
-  readonly morphTargets: number;
-  readonly bounds: Bounds;
-  /** Whole sentences. */
-  readonly notices: readonly string[];
+  readonly cage: CageOptions;
 }

@@ -1,30 +1,34 @@
 /** A bind: coarse first so that the model can be dragged at once, then as asked. */
 
-import type { BindEvent, BindOptions, BindReport, CageArrays, Engine, Job } from "../contract";
+import type {
+  BindEvent,
+  BindOptions,
+  BindReport,
+  CageArrays,
+  Engine,
+  ErrorName,
+  Job,
+  Progress,
+} from "../contract";
 import { createEta } from "../eta";
-import type { Engine as RawEngine } from "../pkg/cagework";
 import { type Client, named } from "./client";
-import type { BindStage, BoundArrays, Step } from "./messages";
+import type { BoundArrays } from "./messages";
 
 /** Cells of the first pass. */
 const COARSE = 32;
 
 /** Errors that mean the GPU cannot, though the CPU may. */
-const GPU_ERRORS = [
+const GPU_ERRORS: readonly string[] = [
   "NoAdapter",
   "NoDevice",
   "DeviceLost",
-  "OutOfMemory",
-  "Refused",
-  "Timeout",
-  "Plan",
+  "Gpu",
   "Missing",
-];
+] satisfies ErrorName[];
 
 export interface BindStart {
   readonly client: Client;
   readonly engine: Engine;
-  readonly raw: RawEngine;
   readonly adapter: string;
   readonly options: BindOptions;
   readonly listener: (event: BindEvent) => void;
@@ -34,16 +38,16 @@ export interface BindStart {
 type Pass = "coarse" | "fine";
 
 export function startBind(start: BindStart): Job<BindReport> {
-  const { client, engine, raw, adapter, listener, cage } = start;
+  const { client, engine, adapter, listener, cage } = start;
   let options = start.options;
   let job: Job<BoundArrays> | undefined;
   let isCancelled = false;
-  const positions = raw.modelPositions();
+  const positions = engine.modelPositions();
 
   const step = (pass: Pass) => {
     const eta = createEta(performance.now());
-    return ({ stage, fraction, iteration, delta }: Step) => {
-      if (isCancelled || !isOfBind(stage)) return;
+    return ({ stage, fraction, iteration, delta }: Progress) => {
+      if (isCancelled) return;
       const etaMs = eta.update(fraction, performance.now()) ?? null;
       listener({ kind: "progress", pass, stage, fraction, etaMs, iteration, delta });
     };
@@ -54,7 +58,7 @@ export function startBind(start: BindStart): Job<BindReport> {
     const { indptr, indices, data, outside, offsets, report } = await job.done;
     if (isCancelled || !report) throw named("Cancelled", "cancelled");
     requireCurrent(engine, cage);
-    await raw.adopt(indptr, indices, data, outside, offsets);
+    await engine.adopt(indptr, indices, data, outside, offsets);
     const whole = report.backend === "gpu" ? { ...report, adapter } : report;
     listener({ kind: "adopted", pass, report: whole });
     return whole;
@@ -88,9 +92,6 @@ export function startBind(start: BindStart): Job<BindReport> {
     },
   };
 }
-
-const isOfBind = (stage: Step["stage"]): stage is BindStage =>
-  stage === "voxelize" || stage === "solve" || stage === "sample";
 
 /** Quick, whatever was asked for. */
 function coarse(options: BindOptions): BindOptions {

@@ -1,7 +1,7 @@
 /** The worker as promises. */
 
 import type { Job } from "../contract";
-import type { FromWorker, JobKind, Jobs, Step, ToWorker } from "./messages";
+import type { FromWorker, JobKind, Jobs, ToWorker } from "./messages";
 
 /** A cancelled job has this long to stop by itself, ms: on the CPU it hears nothing until it is done. */
 const PATIENCE = 400;
@@ -9,14 +9,14 @@ const PATIENCE = 400;
 interface Waiting {
   readonly done: (output: never) => void;
   readonly failed: (error: Error) => void;
-  readonly step: ((step: Step) => void) | undefined;
+  readonly step: ((step: never) => void) | undefined;
 }
 
 export interface Client {
   run<K extends JobKind>(
     job: K,
     input: Jobs[K]["input"],
-    step?: (step: Step) => void,
+    step?: (step: Jobs[K]["step"]) => void,
   ): Job<Jobs[K]["output"]>;
   /** Whether a job is under way. */
   isBusy(): boolean;
@@ -56,7 +56,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
     const job = waiting.get(message.id);
     if (!job) return;
     if (message.kind === "step") {
-      job.step?.(message.step);
+      job.step?.(message.step as never);
       return;
     }
     waiting.delete(message.id);

@@ -8,7 +8,9 @@ import type {
   Check,
   CheckedCage,
   NamedFile,
-  RepairKind,
+  Progress,
+  Reading,
+  Repair,
   UpAxis,
 } from "../contract";
 import type { Bytes } from "./files";
@@ -49,43 +51,48 @@ export interface SampleArrays {
   readonly poses: readonly { readonly name: string; readonly positions: Float32Array }[];
 }
 
-/** A job's name, what it needs, and what it results in. */
+/** A job's name, what it needs, its steps, and what it results in. */
 export interface Jobs {
-  bind: { input: { positions: Float32Array; cage: CageArrays; options: BindOptions }; output: BoundArrays };
-  meanValue: { input: { positions: Float32Array; cage: CageArrays }; output: BoundArrays };
+  bind: {
+    input: { positions: Float32Array; cage: CageArrays; options: BindOptions };
+    step: Progress;
+    output: BoundArrays;
+  };
+  meanValue: { input: { positions: Float32Array; cage: CageArrays }; step: never; output: BoundArrays };
   slice: {
     input: { cage: CageArrays; axis: number; fraction: number; options: BindOptions };
+    step: Progress;
     output: BoundArrays | undefined;
   };
   cage: {
     input: { positions: Float32Array; triangles: Uint32Array; options: CageOptions };
+    step: Progress;
     output: CheckedCage;
   };
-  read: { input: { files: readonly NamedFile[]; up: UpAxis | undefined }; output: ReadModel };
+  read: {
+    input: { files: readonly NamedFile[]; up: UpAxis | undefined };
+    step: Reading;
+    output: ReadModel;
+  };
   /** `model`: the vertices to be enclosed, `[n_vertices, 3]`. */
   readCage: {
     input: { files: readonly NamedFile[]; up: UpAxis; model: Float32Array };
+    step: Reading;
     output: CheckedCage;
   };
-  check: { input: { cage: CageArrays; model: Float32Array }; output: Check };
-  repair: { input: { kind: RepairKind; cage: CageArrays; model: Float32Array }; output: CheckedCage };
-  sample: { input: { id: string }; output: SampleArrays };
+  check: { input: { cage: CageArrays; model: Float32Array }; step: never; output: Check };
+  repair: {
+    input: { kind: Repair; cage: CageArrays; model: Float32Array };
+    step: never;
+    output: CheckedCage;
+  };
+  sample: { input: { id: string }; step: never; output: SampleArrays };
 }
 
 export type JobKind = keyof Jobs;
 
-/** Of a bind. */
-export type BindStage = "voxelize" | "solve" | "sample";
-/** Of reading a file. */
-export type ReadStage = "bytes" | "decompress" | "geometry" | "textures" | "check";
-
 /** One step of a job. */
-export interface Step {
-  readonly stage: BindStage | "simplify" | ReadStage;
-  readonly fraction: number;
-  readonly iteration: number;
-  readonly delta: number | null;
-}
+export type Step = Progress | Reading;
 
 export type ToWorker =
   | { readonly kind: "start"; readonly module: WebAssembly.Module }

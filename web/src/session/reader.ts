@@ -5,7 +5,7 @@ import type { Loaded } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { type Client, named } from "./client";
 import { siblingOf, tooLarge } from "./files";
-import type { Jobs, ReadModel, Step } from "./messages";
+import type { Jobs, ReadModel } from "./messages";
 
 export type Hear = ((progress: Reading) => void) | undefined;
 
@@ -25,9 +25,8 @@ export function createApart(open: () => Client): Apart {
     if (refused) return { done: Promise.reject(refused), cancel: () => {} };
     const client = open();
     stop = client.close;
-    const tell = ({ stage, fraction }: Step) => hear?.({ stage: stage as Reading["stage"], fraction });
     const what = "files" in input ? "reading it" : "looking at the cage";
-    const done = client.run(job, input, tell).done.catch((error: Error) => {
+    const done = client.run(job, input, hear).done.catch((error: Error) => {
       if (error.name !== "Worker") throw error;
       throw named(
         "Worker",

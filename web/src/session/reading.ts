@@ -1,16 +1,15 @@
 /** The worker's half of opening a file: whatever its bytes could make endless, or break, happens here first. */
 
-import type { CageArrays, Check, CheckedCage } from "../contract";
+import type { CageArrays, Check, CheckedCage, Reading } from "../contract";
 import type { Loaded, Polygons } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import { type Bytes, readFiles, siblingOf } from "./files";
-import type { Jobs, ReadModel, ReadStage, Step } from "./messages";
+import type { Jobs, ReadModel } from "./messages";
 import { decodeTextures } from "./textures";
 
-type Tell = (step: Step) => void;
+type Tell = (step: Reading) => void;
 
-const say = (tell: Tell, stage: ReadStage, fraction = 0) =>
-  tell({ stage, fraction, iteration: 0, delta: null });
+const say = (tell: Tell, stage: Reading["stage"], fraction = 0) => tell({ stage, fraction });
 
 /** Reads a model, decompressed if need be, its textures decoded and a project's cage checked. */
 export async function readModel(

@@ -62,7 +62,10 @@ function steps(id: number): (step: Step) => boolean {
 }
 
 type Work = {
-  [K in JobKind]: (input: Jobs[K]["input"], step: (step: Step) => boolean) => Promise<Jobs[K]["output"]>;
+  [K in JobKind]: (
+    input: Jobs[K]["input"],
+    step: (step: Jobs[K]["step"]) => boolean,
+  ) => Promise<Jobs[K]["output"]>;
 };
 
 function createWork(pkg: Package): Work {

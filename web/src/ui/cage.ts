@@ -1,7 +1,8 @@
 /** Step 2: where the cage comes from, what is wrong with it, and shaping it. */
 
 import type { App } from "../app";
-import type { CageOptions, CageState, CageWish, Check, Problem, RestEdit } from "../contract";
+import type { CageOptions, CageState, Check, Problem, RestEdit } from "../contract";
+import { RANGES } from "../defaults";
 import { count, percent, plural } from "../format";
 import type { CageSource } from "../state";
 import { sentence } from "../strings";
@@ -23,7 +24,7 @@ const GAP_VOXELS = 3;
 
 export function createCagePanel(app: App): HTMLElement {
   const { store } = app;
-  const setOptions = (patch: Partial<CageWish>) =>
+  const setOptions = (patch: Partial<CageOptions>) =>
     store.set({ cageOptions: { ...store.get().cageOptions, ...patch } });
 
   const source = segments<CageSource>(
@@ -38,8 +39,10 @@ export function createCagePanel(app: App): HTMLElement {
     { hideLabel: true },
   );
   const about = h("p", { class: "hint" });
-  const target = slider("Vertices wanted", { min: 12, max: 400, step: 2, format: count }, (vertices) =>
-    setOptions({ vertices }),
+  const target = slider(
+    "Vertices wanted",
+    { min: RANGES.vertices[0], max: RANGES.vertices[1], step: 2, format: count },
+    (vertices) => setOptions({ vertices }),
   );
   const margin = slider(
     "Room around the model",
@@ -55,7 +58,7 @@ export function createCagePanel(app: App): HTMLElement {
     "Gaps that stay open",
     {
       min: COARSEST,
-      max: 128,
+      max: RANGES.voxels[1],
       step: 8,
       format: (v) =>
         v === COARSEST
@@ -200,7 +203,7 @@ function empty(): HTMLElement {
 function badgeOf(cage: CageState, check: Check | null): HTMLElement {
   if (!cage.usable) return h("span", { class: "badge bad" }, icon("warning"), "Needs repair");
   if (!check) return h("span", { class: "badge" }, "Checking…");
-  return check.problems.some((problem) => problem.kind === "Outside")
+  return check.problems.some((problem) => problem.code === "model_outside")
     ? h("span", { class: "badge warn" }, icon("warning"), "Vertices outside")
     : h("span", { class: "badge good" }, icon("check"), "Encloses the model");
 }
@@ -226,7 +229,7 @@ function cageCard(cage: CageState, check: Check | null): HTMLElement {
 function problemCard(problem: Problem, app: App): HTMLElement {
   const { fix } = problem;
   // Once the grid is as fine as asked for, nothing is left to do.
-  const done = fix?.kind === "refine_grid" && app.store.get().bindOptions.grid >= (fix.cells ?? 0);
+  const done = fix?.kind === "grid" && app.store.get().bindOptions.grid >= fix.cells;
   return h(
     "div",
     { class: `problem-card ${problem.severity}` },

@@ -1,6 +1,6 @@
 /** The result card: what a bind did and how exact it is, in words first. */
 
-import type { BindReport } from "../contract";
+import type { BindReport, MeanMax } from "../contract";
 import { bytes, count, duration, percent, plural, scientific } from "../format";
 import { sentence } from "../strings";
 import { facts } from "./controls";
@@ -14,14 +14,14 @@ const SOLVERS = { multigrid: "multigrid", jacobi: "Jacobi", cg: "conjugate gradi
 const INVISIBLE = 2.5e-5;
 
 /** The verdict as one sentence. */
-export function verdict(report: BindReport): string {
+export function verdict(report: Pick<BindReport, "converged" | "rest_error">): string {
   if (!report.converged)
     return "Stopped before it was done; raise the iteration limit for converged weights.";
   if (report.rest_error.max_rel < INVISIBLE)
     return [
       "At rest the model is where it was, to less than can be seen: after the solve, each vertex's weights are restored to",
       "add up to 1 and to give its place.",
-      ...(report.raw_error ? ["The solver error is how far off they were before."] : []),
+      "The solver error is how far off they were before.",
     ].join(" ");
   return `At rest the model is off by up to ${scientific(report.rest_error.max_rel * 100)} % of the cage's size.`;
 }
@@ -50,7 +50,7 @@ export function reportCard(report: BindReport): HTMLElement {
       ["Computed on", where],
       ["Rest error, mean", scientific(report.rest_error.mean_rel)],
       ["Rest error, largest", scientific(report.rest_error.max_rel)],
-      ...rawFacts("Solver error", report.raw_error?.point_rel),
+      ...rawFacts("Solver error", report.raw_error.point_rel),
       ["Weights", `${scientific(report.weights.min)} to ${scientific(report.weights.max)}`],
     ]),
     h(
@@ -71,7 +71,7 @@ export function reportCard(report: BindReport): HTMLElement {
           ["Sample", duration(report.timings_ms.sample)],
           ["Memory, estimated", bytes(report.memory_bytes.estimated)],
           ["Memory, most used", bytes(report.memory_bytes.peak)],
-          ...rawFacts("Solver: sums off by", report.raw_error?.sum),
+          ...rawFacts("Solver: sums off by", report.raw_error.sum),
           ["Sum of a row off by", scientific(report.weights.max_sum_error)],
           ["Weights stored", `${count(report.weights.nonzeros)} (${percent(density(report))})`],
           ["Outside the cage", plural(report.outside_vertices, "vertex", "vertices")],
@@ -83,9 +83,8 @@ export function reportCard(report: BindReport): HTMLElement {
   );
 }
 
-/** What the solver left of something, if the report says so. */
-function rawFacts(name: string, error: { mean: number; max: number } | undefined): [string, string][] {
-  if (!error) return [];
+/** What the solver left of something. */
+function rawFacts(name: string, error: MeanMax): [string, string][] {
   return [
     [`${name}, mean`, scientific(error.mean)],
     [`${name}, largest`, scientific(error.max)],

@@ -29,6 +29,7 @@ pub const MAX_PLACES: usize = 2000;
 /// What is wrong. The names are stable: programs may rely on them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Code {
     /// There are no faces.
     Empty,
@@ -67,6 +68,7 @@ pub enum Code {
 /// How bad it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Severity {
     /// It cannot be bound, or not rightly.
     Error,

@@ -14,6 +14,7 @@ use crate::mesh::PolygonMesh;
 /// A repair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Repair {
     /// Joins vertices at one place.
     Weld,

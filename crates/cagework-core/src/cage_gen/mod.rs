@@ -33,10 +33,9 @@ use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
 use collapse::Collapser;
 use guarded::Guarded;
 pub use options::{
-    CLEARANCE, CageGenError, CageOptions, CageReport, GeneratedCage, MAX_TARGET, MIN_TARGET, Mirror, Shape,
-    Symmetry, TARGET, VOXELS,
+    CLEARANCE, CageGenError, CageOptions, CageReport, GeneratedCage, MAX_CLEARANCE, MAX_TARGET, MAX_VOXELS,
+    MIN_TARGET, MIN_VOXELS, Mirror, Shape, Symmetry, TARGET, VOXELS,
 };
-use options::{MAX_VOXELS, MIN_VOXELS};
 use shell::Shell;
 pub use subdivided_box::subdivided_box;
 use verify::verified;

@@ -13,8 +13,11 @@ pub const MIN_TARGET: u32 = 12;
 /// Most vertices that can be asked for.
 pub const MAX_TARGET: u32 = 400;
 /// Coarsest and finest lattice.
-pub(super) const MIN_VOXELS: usize = 8;
-pub(super) const MAX_VOXELS: usize = 128;
+pub const MIN_VOXELS: usize = 8;
+/// See [`MIN_VOXELS`].
+pub const MAX_VOXELS: usize = 128;
+/// Largest distance to keep from the model, a fraction of its diagonal.
+pub const MAX_CLEARANCE: f32 = 0.25;
 /// Range of [`CageOptions::target`].
 pub const TARGET: Number = Number {
     name: "target",
@@ -25,7 +28,7 @@ pub const TARGET: Number = Number {
 pub const CLEARANCE: Number = Number {
     name: "clearance",
     allowed: "a fraction of the diagonal from 0 to 0.25",
-    is_allowed: |part| (0.0..=0.25).contains(&part),
+    is_allowed: |part| (0.0..=f64::from(MAX_CLEARANCE)).contains(&part),
 };
 /// Range of [`CageOptions::voxels`].
 pub const VOXELS: Number = Number {

@@ -12,7 +12,9 @@ const MIN_PLANE_SINE: f32 = 0.05;
 const MIN_SCALE_DISTANCE: f32 = 8.0;
 
 /// What a gesture does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS), ts(rename = "Gesture"))]
 pub enum GestureKind {
     /// Moves.
     Grab,

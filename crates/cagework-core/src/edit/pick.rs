@@ -5,7 +5,9 @@ use glam::{Vec2, Vec3};
 use super::view::View;
 
 /// What a click selects.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Element {
     /// A vertex.
     #[default]

@@ -5,7 +5,9 @@ use glam::Vec3;
 use super::pick::Topology;
 
 /// How new vertices join those that are selected.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum SelectMode {
     /// Only the new ones.
     #[default]

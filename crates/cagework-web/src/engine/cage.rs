@@ -10,7 +10,7 @@ use super::Engine;
 use crate::arrays::{corners, flat, points, polygon_mesh};
 use crate::binder::Polygons;
 use crate::error::{Answer, Fault};
-use crate::options::BindAsked;
+use crate::options::{BindAsked, taken};
 use crate::views::object;
 
 /// Room between the model and a box around it, in diagonals of the model.
@@ -42,7 +42,7 @@ impl Engine {
     ///
     /// # Errors
     /// When the arrays are no mesh.
-    #[wasm_bindgen(js_name = setCage)]
+    #[wasm_bindgen(js_name = setCage, unchecked_return_type = "CageState")]
     pub fn set_cage(&self, positions: &[f32], corners: &[u32]) -> Result<JsValue, JsValue> {
         Ok(self.put_cage(polygon_mesh(positions, corners)?)?)
     }
@@ -51,7 +51,7 @@ impl Engine {
     ///
     /// # Errors
     /// Never.
-    #[wasm_bindgen(js_name = cageState)]
+    #[wasm_bindgen(js_name = cageState, unchecked_return_type = "CageState | undefined")]
     pub fn cage_state(&self) -> Result<JsValue, JsValue> {
         Ok(self.state_object()?)
     }
@@ -100,7 +100,7 @@ impl Engine {
     ///
     /// # Errors
     /// When the positions are no cage; nothing changes then.
-    #[wasm_bindgen(js_name = commitRest)]
+    #[wasm_bindgen(js_name = commitRest, unchecked_return_type = "CageState")]
     pub fn commit_rest(&self) -> Result<JsValue, JsValue> {
         let (mesh, selection, last) = self.read(|state| {
             let mesh = PolygonMesh { positions: state.positions.clone(), faces: state.rest.faces.clone() };
@@ -119,8 +119,11 @@ impl Engine {
     /// # Errors
     /// When there is no cage or an option is out of range.
     #[wasm_bindgen(js_name = estimateMemory)]
-    pub fn estimate_memory(&self, options: JsValue) -> Result<f64, JsValue> {
-        let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
+    pub fn estimate_memory(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
+    ) -> Result<f64, JsValue> {
+        let asked: BindAsked = taken(options)?;
         let bytes = self.read(|state| {
             let (model, cage) = state.parts()?;
             Answer::Ok(estimate_memory(cage, model.positions.len(), &asked.into())?)

@@ -11,8 +11,9 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::Engine;
 use super::gesture::pose_list;
 use crate::arrays::flat;
-use crate::error::{Answer, Fault};
+use crate::error::{Answer, ErrorName, Fault};
 use crate::state::State;
+use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
@@ -32,7 +33,11 @@ impl Engine {
     /// # Errors
     /// When it cannot be written.
     #[wasm_bindgen(js_name = exportPoses)]
-    pub fn export_poses(&self, names: Vec<String>, poses: &Array) -> Result<Vec<u8>, JsValue> {
+    pub fn export_poses(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "readonly string[]")] names: Vec<String>,
+        #[wasm_bindgen(unchecked_param_type = "readonly Float32Array[]")] poses: &Array,
+    ) -> Result<Vec<u8>, JsValue> {
         let posed = self.deformed(&pose_list(poses))?;
         let named: Vec<(String, Vec<Vec3>)> = names.into_iter().zip(posed).collect();
         Ok(self.read(|state| {
@@ -77,18 +82,21 @@ impl Engine {
     #[wasm_bindgen(js_name = writeProject)]
     pub fn write_project(
         &self,
-        names: Vec<String>,
-        poses: &Array,
+        #[wasm_bindgen(unchecked_param_type = "readonly string[]")] names: Vec<String>,
+        #[wasm_bindgen(unchecked_param_type = "readonly Float32Array[]")] poses: &Array,
         settings: &str,
     ) -> Result<Vec<u8>, JsValue> {
         let poses: Vec<(String, Vec<Vec3>)> = names.into_iter().zip(pose_list(poses)).collect();
         Ok(self.read(|state| Answer::Ok(write_project(state.the_model()?, &state.rest, &poses, settings)?))?)
     }
 
-    /// What points up in the model's file, y or z.
-    #[must_use]
-    pub fn up(&self) -> String {
-        self.read(|state| state.up().name().to_owned())
+    /// What points up in the model's file.
+    ///
+    /// # Errors
+    /// Never.
+    #[wasm_bindgen(unchecked_return_type = "UpAxis")]
+    pub fn up(&self) -> Result<JsValue, JsValue> {
+        Ok(self.read(|state| object(&state.up()))?)
     }
 
     /// The model's vertices at rest. `[n_vertices, 3]`
@@ -120,7 +128,7 @@ impl Engine {
                     if pose.len() == weights.n_columns() {
                         Ok(deform_bound(weights, session.outside(), pose))
                     } else {
-                        Err(Fault::new("PoseError", "a pose belongs to another cage"))
+                        Err(Fault::new(ErrorName::Error, "a pose belongs to another cage"))
                     }
                 })
                 .collect()

@@ -10,8 +10,9 @@ use wasm_bindgen::{JsCast as _, JsValue};
 use super::Engine;
 use crate::arrays::points;
 use crate::error::Fault;
-use crate::options::{GizmoAsked, gesture, unknown};
+use crate::options::{GizmoAsked, GizmoHandle, taken};
 use crate::state::State;
+use crate::views::object;
 
 /// Movements below this fraction of a pixel are none.
 const STILL: f32 = 1e-3;
@@ -23,15 +24,22 @@ impl Engine {
     /// # Errors
     /// When the gesture is another.
     #[wasm_bindgen(js_name = beginTransform)]
-    pub fn begin_transform(&self, kind: &str, x: f32, y: f32) -> Result<bool, JsValue> {
-        let kind = gesture(kind)?;
+    pub fn begin_transform(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "Gesture")] kind: JsValue,
+        x: f32,
+        y: f32,
+    ) -> Result<bool, JsValue> {
+        let kind = taken(kind)?;
         Ok(self.change(|state| state.begin(kind, x, y)))
     }
 
     /// The gizmo's handle under the pointer, or the nearest one within `radius`, CSS pixels; undefined for none.
-    #[wasm_bindgen(js_name = gizmoAt)]
-    #[must_use]
-    pub fn gizmo_at(&self, x: f32, y: f32, radius: f32) -> Option<String> {
+    ///
+    /// # Errors
+    /// Never.
+    #[wasm_bindgen(js_name = gizmoAt, unchecked_return_type = "GizmoHandle | undefined")]
+    pub fn gizmo_at(&self, x: f32, y: f32, radius: f32) -> Result<JsValue, JsValue> {
         let part = self.read(|state| {
             let gizmo = state.gizmo()?;
             pick_gizmo(&state.camera, &gizmo, state.pointer(x, y), radius)
@@ -42,18 +50,7 @@ impl Engine {
                 state.is_changed = true;
             });
         }
-        part.map(|part| {
-            match part {
-                GizmoPart::Axis(0) => "x",
-                GizmoPart::Axis(1) => "y",
-                GizmoPart::Axis(_) => "z",
-                GizmoPart::Plane(0) => "plane_x",
-                GizmoPart::Plane(1) => "plane_y",
-                GizmoPart::Plane(_) => "plane_z",
-                GizmoPart::View => "all",
-            }
-            .to_owned()
-        })
+        Ok(part.map_or(Ok(JsValue::UNDEFINED), |part| object(&handle_of(part)))?)
     }
 
     /// Begins the gesture of one of the gizmo's handles.
@@ -61,17 +58,13 @@ impl Engine {
     /// # Errors
     /// When there is no such handle.
     #[wasm_bindgen(js_name = beginGizmo)]
-    pub fn begin_gizmo(&self, handle: &str, x: f32, y: f32) -> Result<bool, JsValue> {
-        let (part, constraint) = match handle {
-            "x" => (GizmoPart::Axis(0), Constraint::Axis(0)),
-            "y" => (GizmoPart::Axis(1), Constraint::Axis(1)),
-            "z" => (GizmoPart::Axis(2), Constraint::Axis(2)),
-            "plane_x" => (GizmoPart::Plane(0), Constraint::Plane(0)),
-            "plane_y" => (GizmoPart::Plane(1), Constraint::Plane(1)),
-            "plane_z" => (GizmoPart::Plane(2), Constraint::Plane(2)),
-            "all" => (GizmoPart::View, Constraint::Free),
-            other => return Err(unknown("handle", other).into()),
-        };
+    pub fn begin_gizmo(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "GizmoHandle")] handle: JsValue,
+        x: f32,
+        y: f32,
+    ) -> Result<bool, JsValue> {
+        let (part, constraint) = part_of(taken(handle)?);
         Ok(self.change(|state| {
             let kind = match state.view.gizmo {
                 GizmoAsked::None | GizmoAsked::Move => GestureKind::Grab,
@@ -171,7 +164,11 @@ impl Engine {
     ///
     /// # Errors
     /// When a pose belongs to another cage.
-    pub fn blend(&self, poses: &Array, shares: &[f32]) -> Result<(), JsValue> {
+    pub fn blend(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "readonly Float32Array[]")] poses: &Array,
+        shares: &[f32],
+    ) -> Result<(), JsValue> {
         let poses = pose_list(poses);
         let mixed = self.read(|state| blend(&state.rest.positions, &poses, shares)).map_err(Fault::from)?;
         self.change(|state| state.move_to(mixed));
@@ -183,11 +180,41 @@ impl Engine {
     /// # Errors
     /// When a pose belongs to another cage.
     #[wasm_bindgen(js_name = playAt)]
-    pub fn play_at(&self, poses: &Array, seconds: f32) -> Result<(), JsValue> {
+    pub fn play_at(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "readonly Float32Array[]")] poses: &Array,
+        seconds: f32,
+    ) -> Result<(), JsValue> {
         let poses = pose_list(poses);
         let now = self.read(|state| moment(&state.rest.positions, &poses, seconds)).map_err(Fault::from)?;
         self.change(|state| state.move_to(now));
         Ok(())
+    }
+}
+
+/// The name of a part of the gizmo.
+fn handle_of(part: GizmoPart) -> GizmoHandle {
+    match part {
+        GizmoPart::Axis(0) => GizmoHandle::X,
+        GizmoPart::Axis(1) => GizmoHandle::Y,
+        GizmoPart::Axis(_) => GizmoHandle::Z,
+        GizmoPart::Plane(0) => GizmoHandle::PlaneX,
+        GizmoPart::Plane(1) => GizmoHandle::PlaneY,
+        GizmoPart::Plane(_) => GizmoHandle::PlaneZ,
+        GizmoPart::View => GizmoHandle::All,
+    }
+}
+
+/// The part of that name, and what it limits a gesture to.
+fn part_of(handle: GizmoHandle) -> (GizmoPart, Constraint) {
+    match handle {
+        GizmoHandle::X => (GizmoPart::Axis(0), Constraint::Axis(0)),
+        GizmoHandle::Y => (GizmoPart::Axis(1), Constraint::Axis(1)),
+        GizmoHandle::Z => (GizmoPart::Axis(2), Constraint::Axis(2)),
+        GizmoHandle::PlaneX => (GizmoPart::Plane(0), Constraint::Plane(0)),
+        GizmoHandle::PlaneY => (GizmoPart::Plane(1), Constraint::Plane(1)),
+        GizmoHandle::PlaneZ => (GizmoPart::Plane(2), Constraint::Plane(2)),
+        GizmoHandle::All => (GizmoPart::View, Constraint::Free),
     }
 }
 

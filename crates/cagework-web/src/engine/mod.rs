@@ -27,7 +27,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen_futures::spawn_local;
 use web_sys::HtmlCanvasElement;
 
-use crate::error::{Answer, Fault};
+use crate::error::{Answer, ErrorName, Fault};
 use crate::gpu::{Gpu, SharedGpu};
 use crate::incoming::{self, page_turn};
 use crate::loaded::Loaded;
@@ -60,6 +60,7 @@ impl Engine {
     ///
     /// # Errors
     /// When the GPU has no room for it, or draws too slowly for its many layers; what was open stays open.
+    #[wasm_bindgen(unchecked_return_type = "ModelInfo")]
     pub async fn open(&self, mut loaded: Loaded) -> Result<JsValue, JsValue> {
         let (camera, size) = self.read(|state| state.view_of(&loaded.model));
         let draw = loaded.draw_model();
@@ -162,7 +163,7 @@ impl Engine {
             let gpu = self.gpu.lock().await;
             gpu.as_ref().ok_or_else(lost)?.main.context().lost()
         };
-        Ok(receiver.await.map_err(|_| Fault::new("DeviceLost", "the GPU is gone"))?)
+        Ok(receiver.await.map_err(|_| Fault::new(ErrorName::DeviceLost, "the GPU is gone"))?)
     }
 
     /// Gives the device up, as a reset of the driver would; called too when the browser says that it took it away.
@@ -228,7 +229,7 @@ impl Engine {
         let gpu = self
             .gpu
             .try_lock()
-            .ok_or_else(|| Fault::new("Busy", "the GPU is busy: try again in a moment"))?;
+            .ok_or_else(|| Fault::new(ErrorName::Error, "the GPU is busy: try again in a moment"))?;
         read(&gpu.as_ref().ok_or_else(lost)?.main)
     }
 }
@@ -248,9 +249,9 @@ async fn upload_cage(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> {
 }
 
 fn overtaken() -> Fault {
-    Fault::new("Cancelled", "there is another cage by now")
+    Fault::new(ErrorName::Cancelled, "there is another cage by now")
 }
 
 fn lost() -> Fault {
-    Fault::new("DeviceLost", "the GPU is gone: reload the page")
+    Fault::new(ErrorName::DeviceLost, "the GPU is gone: reload the page")
 }

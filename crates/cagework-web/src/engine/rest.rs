@@ -9,8 +9,8 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
-use crate::error::{Answer, Fault};
-use crate::options::unknown;
+use crate::error::{Answer, ErrorName, Fault};
+use crate::options::{RestEdit, taken};
 use crate::problems::Faults;
 use crate::state::State;
 
@@ -61,8 +61,12 @@ impl Engine {
     ///
     /// # Errors
     /// When nothing fitting is selected, or the cage would break; nothing changes then.
-    #[wasm_bindgen(js_name = editRest)]
-    pub fn edit_rest(&self, edit: &str) -> Result<JsValue, JsValue> {
+    #[wasm_bindgen(js_name = editRest, unchecked_return_type = "CageState")]
+    pub fn edit_rest(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "RestEdit")] edit: JsValue,
+    ) -> Result<JsValue, JsValue> {
+        let edit = taken(edit)?;
         let edited = self.read(|state| state.edited(edit))?;
         let shown = self.put_cage(edited.mesh)?;
         self.change(|state| {
@@ -80,33 +84,32 @@ impl State {
         PolygonMesh { positions: positions.clone(), faces: self.rest.faces.clone() }
     }
 
-    fn edited(&self, edit: &str) -> Answer<Edited> {
+    fn edited(&self, edit: RestEdit) -> Answer<Edited> {
         let mesh = self.shown_mesh();
         let (edges, faces) = (self.selection.edges(&self.topology), self.selection.faces(&self.topology));
-        let nothing = |what: &str| Fault::new("Selection", format!("select {what} first"));
+        let nothing = |what: &str| Fault::new(ErrorName::Error, format!("select {what} first"));
         Ok(match edit {
-            "split_edge" => each(&mesh, &edges, |mesh, &edge| split_edge(mesh, edge, 0.5))?
+            RestEdit::SplitEdge => each(&mesh, &edges, |mesh, &edge| split_edge(mesh, edge, 0.5))?
                 .ok_or_else(|| nothing("an edge, or both its ends,"))?,
             // Merging moves vertices together: one edge at a time.
-            "collapse_edge" => match edges.first() {
+            RestEdit::CollapseEdge => match edges.first() {
                 Some(&edge) => collapse_edge(&mesh, edge, 0.5)?,
                 None => return Err(nothing("an edge, or both its ends,")),
             },
-            "extrude_face" => {
+            RestEdit::ExtrudeFace => {
                 let distance = EXTRUSION * self.bounds().map_or(1.0, |b| b.diagonal());
                 each(&mesh, &faces, |mesh, &face| extrude_face(mesh, face, distance))?
                     .ok_or_else(|| nothing("a face, or all its corners,"))?
             }
-            "delete_face" if faces.is_empty() => return Err(nothing("a face, or all its corners,")),
-            "delete_face" => delete_faces(&mesh, &faces)?,
-            "delete_vertex" if self.selection.is_empty() => return Err(nothing("a vertex")),
-            "delete_vertex" => {
+            RestEdit::DeleteFace if faces.is_empty() => return Err(nothing("a face, or all its corners,")),
+            RestEdit::DeleteFace => delete_faces(&mesh, &faces)?,
+            RestEdit::DeleteVertex if self.selection.is_empty() => return Err(nothing("a vertex")),
+            RestEdit::DeleteVertex => {
                 let around =
                     |f: &u32| self.topology.faces[*f as usize].iter().any(|&i| self.selection.contains(i));
                 let faces: Vec<u32> = (0..self.topology.faces.len() as u32).filter(around).collect();
                 delete_faces(&mesh, &faces)?
             }
-            other => return Err(unknown("edit", other)),
         })
     }
 }

@@ -7,8 +7,8 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::error::Fault;
-use crate::options::{SceneAsked, SliceShown};
-use crate::views::{Legend, object};
+use crate::options::{SceneAsked, SliceShown, taken};
+use crate::views::{ColorMap, Legend, object};
 
 #[wasm_bindgen]
 impl Engine {
@@ -17,8 +17,11 @@ impl Engine {
     /// # Errors
     /// When it is something else.
     #[wasm_bindgen(js_name = setScene)]
-    pub fn set_scene(&self, scene: JsValue) -> Result<(), JsValue> {
-        let asked: SceneAsked = serde_wasm_bindgen::from_value(scene).map_err(Fault::from)?;
+    pub fn set_scene(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "SceneOptions")] scene: JsValue,
+    ) -> Result<(), JsValue> {
+        let asked: SceneAsked = taken(scene)?;
         self.change(|state| {
             state.is_moved |= asked.original != state.view.original;
             state.view = asked;
@@ -32,19 +35,20 @@ impl Engine {
     ///
     /// # Errors
     /// Never.
+    #[wasm_bindgen(unchecked_return_type = "Legend | undefined")]
     pub fn legend(&self) -> Result<JsValue, JsValue> {
         let (slice, style) =
             self.read(|state| (state.slice.as_ref().map(|_| state.view.slice), state.mesh_style()));
-        let coordinate = |high| Legend { low: 0.0, high, logarithmic: false, map: "viridis" };
+        let coordinate = |high| Legend { low: 0.0, high, logarithmic: false, map: ColorMap::Viridis };
         let legend = match (slice, style) {
             (Some(SliceShown::Kinds), _) => {
-                Some(Legend { low: 0.0, high: 2.0, logarithmic: false, map: "kinds" })
+                Some(Legend { low: 0.0, high: 2.0, logarithmic: false, map: ColorMap::Kinds })
             }
             (Some(SliceShown::Value), _) => Some(coordinate(1.0)),
             (_, MeshStyle::Weights { column }) => Some(coordinate(self.largest_weight(column))),
             (_, MeshStyle::Errors) => {
                 let [low, high] = ERROR_RANGE.map(|e| 10.0_f32.powf(e));
-                Some(Legend { low, high, logarithmic: true, map: "error" })
+                Some(Legend { low, high, logarithmic: true, map: ColorMap::Error })
             }
             _ => None,
         };

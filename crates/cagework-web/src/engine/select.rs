@@ -6,7 +6,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
 use crate::arrays::flat;
-use crate::options::{element, select_mode};
+use crate::options::taken;
 use crate::state::State;
 
 #[wasm_bindgen]
@@ -16,8 +16,11 @@ impl Engine {
     /// # Errors
     /// When it is something else.
     #[wasm_bindgen(js_name = setElement)]
-    pub fn set_element(&self, name: &str) -> Result<(), JsValue> {
-        let element = element(name)?;
+    pub fn set_element(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "Element")] element: JsValue,
+    ) -> Result<(), JsValue> {
+        let element = taken(element)?;
         self.change(|state| {
             state.element = element;
             state.hovered.clear();
@@ -58,8 +61,12 @@ impl Engine {
     ///
     /// # Errors
     /// When the mode is another.
-    pub fn select(&self, vertices: &[u32], mode: &str) -> Result<(), JsValue> {
-        let mode = select_mode(mode)?;
+    pub fn select(
+        &self,
+        vertices: &[u32],
+        #[wasm_bindgen(unchecked_param_type = "SelectMode")] mode: JsValue,
+    ) -> Result<(), JsValue> {
+        let mode = taken(mode)?;
         self.change_selection(|state| state.selection.change(vertices, mode));
         Ok(())
     }
@@ -69,8 +76,15 @@ impl Engine {
     /// # Errors
     /// When the mode is another.
     #[wasm_bindgen(js_name = selectBox)]
-    pub fn select_box(&self, x0: f32, y0: f32, x1: f32, y1: f32, mode: &str) -> Result<(), JsValue> {
-        let mode = select_mode(mode)?;
+    pub fn select_box(
+        &self,
+        x0: f32,
+        y0: f32,
+        x1: f32,
+        y1: f32,
+        #[wasm_bindgen(unchecked_param_type = "SelectMode")] mode: JsValue,
+    ) -> Result<(), JsValue> {
+        let mode = taken(mode)?;
         self.change_selection(|state| {
             let corners = [state.pointer(x0, y0), state.pointer(x1, y1)];
             let vertices = vertices_in_box(&state.positions, &state.camera, corners);

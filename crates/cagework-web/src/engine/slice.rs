@@ -8,8 +8,8 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
-use crate::error::{Answer, Fault};
-use crate::options::BindAsked;
+use crate::error::Answer;
+use crate::options::{BindAsked, taken};
 
 #[wasm_bindgen]
 impl Engine {
@@ -23,12 +23,12 @@ impl Engine {
         &self,
         axis: usize,
         fraction: f32,
-        options: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         indptr: Vec<u32>,
         indices: Vec<u32>,
         data: Vec<f32>,
     ) -> Result<(), JsValue> {
-        let asked: BindAsked = serde_wasm_bindgen::from_value(options).map_err(Fault::from)?;
+        let asked: BindAsked = taken(options)?;
         let slice = self.read(|state| {
             let (_, cage) = state.parts()?;
             let mut slice = Slice::new(cage, &BindOptions::from(asked), axis.min(2), fraction);

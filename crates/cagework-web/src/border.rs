@@ -1,0 +1,124 @@
+//! TypeScript's types of what page and Rust say to each other, written from the serde types that are sent, and the page's
+//! defaults and ranges.
+
+use std::fmt::Write as _;
+use std::fs;
+
+use cagework_core::cage_check::{Code, Repair, Severity};
+use cagework_core::cage_gen::{
+    CageOptions, MAX_CLEARANCE, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Shape,
+};
+use cagework_core::edit::{Element, GestureKind, SelectMode};
+use cagework_core::options::{
+    Backend, CellShape, DeltaNorm, MAX_GRID, MIN_GRID, Method, OutsidePolicy, Preconditioner, Solver,
+};
+use cagework_core::report::{
+    BindReport, CellCounts, MeanMax, MemoryBytes, RawError, RestError, Timings, WeightStats,
+};
+use cagework_core::{BindOptions, Stage};
+use cagework_io::{ModelFormat, UpAxis};
+use serde::Serialize;
+use ts_rs::{Config, TS};
+
+use crate::clock::Event;
+use crate::error::ErrorName;
+use crate::options::{
+    BindAsked, CageAsked, Colour, GizmoAsked, GizmoHandle, RestEdit, SceneAsked, SliceShown, SymmetryAsked,
+    ThemeAsked,
+};
+use crate::settings::Settings;
+use crate::views::{BoundsView, CageInfo, CageState, ColorMap, Fix, Legend, Mend, ModelInfo, Problem};
+
+const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/src/contract/generated.ts");
+
+/// Bytes that a bind in a page may take unless asked: half of what a tab has.
+const PAGE_MEMORY: u64 = 2 << 30;
+
+/// Declarations of types, with their comments.
+macro_rules! declarations {
+    ($($type:ty),* $(,)?) => {{
+        // Numbers of 64 bits are sent as JavaScript's.
+        let config = Config::default().with_large_int("number");
+        [$((<$type>::docs().unwrap_or_default(), <$type>::decl(&config)),)*]
+    }};
+}
+
+/// A constant of a type. (Its own writer and not `json!`, which would make 64 bits of 32.)
+fn constant(name: &str, r#type: &str, value: &impl Serialize) -> String {
+    let json = serde_json::to_string(value).unwrap().replace("\"threads\":0,", "");
+    format!("export const {name}: {type} = {json};\n")
+}
+
+#[test]
+fn the_page_has_the_types_of_rust() {
+    let mut text =
+        "// Written by crates/cagework-web/src/border.rs from Rust's types. To change them, change those.\n\n"
+            .to_owned();
+    for (docs, declaration) in declarations![
+        ErrorName,
+        Method,
+        Solver,
+        Preconditioner,
+        Backend,
+        CellShape,
+        DeltaNorm,
+        OutsidePolicy,
+        BindAsked,
+        Stage,
+        Event,
+        BindReport,
+        CellCounts,
+        Timings,
+        MemoryBytes,
+        RestError,
+        RawError,
+        MeanMax,
+        WeightStats,
+        Shape,
+        SymmetryAsked,
+        CageAsked,
+        BoundsView,
+        CageInfo,
+        CageState,
+        Code,
+        Severity,
+        Repair,
+        Mend,
+        Fix,
+        Problem,
+        ModelFormat,
+        UpAxis,
+        ModelInfo,
+        Settings,
+        ThemeAsked,
+        Colour,
+        SliceShown,
+        GizmoAsked,
+        SceneAsked,
+        ColorMap,
+        Legend,
+        Element,
+        SelectMode,
+        GestureKind,
+        GizmoHandle,
+        RestEdit,
+    ] {
+        writeln!(text, "{docs}export {declaration}").unwrap();
+        text = text.replace(" \n", "\n");
+    }
+    let options = BindOptions { memory_limit: PAGE_MEMORY, ..BindOptions::default() };
+    text += &constant("BIND_DEFAULTS", "BindOptions", &BindAsked { backend: Backend::Gpu, options });
+    text += &constant("CAGE_DEFAULTS", "CageOptions", &CageAsked::from(CageOptions::default()));
+    text += &constant("SCENE_DEFAULTS", "SceneOptions", &SceneAsked::default());
+    writeln!(
+        text,
+        "/** Least and most of each option that is a number. */\nexport const RANGES = {{ grid: [{MIN_GRID}, {MAX_GRID}], \
+         vertices: [{MIN_TARGET}, {MAX_TARGET}], margin: [0, {MAX_CLEARANCE}], voxels: [{MIN_VOXELS}, {MAX_VOXELS}] }} \
+         as const;"
+    )
+    .unwrap();
+    if fs::read_to_string(FILE).unwrap_or_default() != text {
+        fs::write(FILE, text).unwrap();
+        panic!("web/src/contract/generated.ts was old; it has been written again: look at it and commit it");
+    }
+}

@@ -1,0 +1,462 @@
+// Written by crates/cagework-web/src/border.rs from Rust's types. To change them, change those.
+
+/**
+ * What kinds of errors the page tells apart.
+ */
+export type ErrorName = "Cancelled" | "Compressed" | "Format" | "Memory" | "Outside" | "NoneInside" | "NoAdapter" | "NoDevice" | "DeviceLost" | "Gpu" | "Canvas" | "Missing" | "Error";
+/**
+ * How the cage meets the grid.
+ */
+export type Method = "classic" | "embedded";
+/**
+ * How Laplace's equation is solved.
+ */
+export type Solver = "jacobi" | "multigrid" | "cg";
+/**
+ * What conjugate gradients are preconditioned by.
+ */
+export type Preconditioner = "none" | "v_cycle";
+/**
+ * Where a bind is computed.
+ */
+export type Backend = "cpu" | "gpu";
+/**
+ * Shape of the classic method's cells.
+ */
+export type CellShape = "box" | "cubic";
+/**
+ * How Eq. 2 is read.
+ */
+export type DeltaNorm = "euclidean" | "literal";
+/**
+ * What happens to a mesh vertex outside the cage.
+ */
+export type OutsidePolicy = "closest_point" | "refuse";
+/**
+ * `BindOptions`: those of the core, and where to compute.
+ */
+export type BindOptions = { backend: Backend,
+/**
+ * Cells along the longest side (each side for classic box cells), 8 to 512. Default 64.
+ */
+grid: number,
+/**
+ * Default embedded.
+ */
+method: Method,
+/**
+ * Default multigrid.
+ */
+solver: Solver,
+/**
+ * Default none; only conjugate gradients look at it.
+ */
+preconditioner: Preconditioner,
+/**
+ * Default box; only the classic method looks at it.
+ */
+cell_shape: CellShape,
+/**
+ * Default Euclidean; only Jacobi looks at it.
+ */
+delta_norm: DeltaNorm,
+/**
+ * Stop when delta falls below it. Default 1e-5.
+ */
+tau: number,
+/**
+ * Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. Default 20,000.
+ */
+max_iterations: number,
+/**
+ * Weights below it are dropped (then sum and rest pose are restored); 0 = keep all. Default 0.
+ */
+sparsify: number,
+/**
+ * Refuse to start above this many bytes of memory, `held` ones included. Default 4 GiB.
+ */
+memory_limit: number,
+/**
+ * Default closest point.
+ */
+outside: OutsidePolicy, };
+/**
+ * The stages of a bind, in order, and those of making a cage.
+ */
+export type Stage = "voxelize" | "solve" | "sample" | "simplify";
+/**
+ * A [`ProgressEvent`].
+ */
+export type Progress = { stage: Stage, fraction: number, iteration: number, delta: number | null, };
+/**
+ * Everything worth knowing about one bind.
+ */
+export type BindReport = {
+/**
+ * Classic (as published) or embedded.
+ */
+method: Method,
+/**
+ * Jacobi, multigrid, or conjugate gradients.
+ */
+solver: Solver,
+/**
+ * What conjugate gradients were preconditioned by.
+ */
+preconditioner: Preconditioner,
+/**
+ * Where it was computed.
+ */
+backend: Backend,
+/**
+ * Name of the GPU that solved.
+ */
+adapter?: string,
+/**
+ * Threads that solved.
+ */
+threads: number,
+/**
+ * Cells along the longest side, as asked for.
+ */
+grid: number,
+/**
+ * Cells along x, y, z of the grid that was built.
+ */
+dims: [number, number, number],
+/**
+ * Edge lengths of a cell, object units.
+ */
+cell_size: [number, number, number],
+/**
+ * Rectangular (as published) or cubic cells.
+ */
+cell_shape: CellShape,
+/**
+ * How Eq. 2 is read.
+ */
+delta_norm: DeltaNorm,
+/**
+ * Stop threshold for delta.
+ */
+tau: number,
+/**
+ * Cells of each kind on the finest grid.
+ */
+cells: CellCounts,
+/**
+ * Cells to be solved for on each level, finest first; one entry for Jacobi.
+ */
+levels: Array<number>,
+/**
+ * Jacobi sweeps, V-cycles on the finest level, or steps of conjugate gradients (the largest number over the batches).
+ */
+iterations: number,
+/**
+ * Whether delta fell below tau before the limit on iterations.
+ */
+converged: boolean,
+/**
+ * Whether f32 ended the solve, having no more digits to give, before delta met tau.
+ */
+at_round_off: boolean,
+/**
+ * Delta after every `delta_interval` iterations. Jacobi: Eq. 2, the sweep's average change of a cell. The others:
+ * the error that is expected to remain, root mean square over cells.
+ * `[iterations / delta_interval]`, rounded up.
+ */
+delta_history: Array<number>,
+/**
+ * Iterations between two entries of `delta_history`: 1, but for the GPU's Jacobi sweeps, which are checked now
+ * and then.
+ */
+delta_interval: number,
+/**
+ * Root mean square residual of the finest level before each iteration; empty for Jacobi. `[iterations]`
+ */
+residual_history: Array<number>,
+/**
+ * Wall-clock time of the stages, milliseconds.
+ */
+timings_ms: Timings,
+/**
+ * Bytes of working memory.
+ */
+memory_bytes: MemoryBytes,
+/**
+ * Distance between `sum_i w_i c_i` and the mesh vertex (Eq. 3), over vertices inside the cage.
+ */
+rest_error: RestError,
+/**
+ * The same and the rows' sums before rows were restored: the solver's doing alone.
+ */
+raw_error: RawError,
+/**
+ * Statistics of the stored weights.
+ */
+weights: WeightStats,
+/**
+ * Mesh vertices (rows).
+ */
+vertices: number,
+/**
+ * Cage vertices (columns).
+ */
+cage_vertices: number,
+/**
+ * Mesh vertices outside the cage.
+ */
+outside_vertices: number,
+/**
+ * Cells about which the three axes disagreed whether they are inside.
+ */
+ambiguous_cells: number,
+/**
+ * Remarks in whole sentences (cage was inside out, unused vertices, ...).
+ */
+notices: Array<string>, };
+/**
+ * Cells per kind.
+ */
+export type CellCounts = {
+/**
+ * Cells that are solved for.
+ */
+interior: number,
+/**
+ * Cells that the cage's surface passes through.
+ */
+boundary: number,
+/**
+ * Cells outside the cage.
+ */
+exterior: number, };
+/**
+ * Stage times in milliseconds.
+ */
+export type Timings = {
+/**
+ * Cage into grid, levels, transfer tables.
+ */
+voxelize: number,
+/**
+ * Laplace's equation for all columns.
+ */
+solve: number,
+/**
+ * Weights at the vertices, sparsification.
+ */
+sample: number,
+/**
+ * Whole bind.
+ */
+total: number, };
+/**
+ * Working memory, bytes.
+ */
+export type MemoryBytes = {
+/**
+ * Estimated before anything was allocated.
+ */
+estimated: number,
+/**
+ * Sum of the buffers that were alive together at the worst moment.
+ */
+peak: number, };
+/**
+ * Reconstruction error of the rest pose (Eq. 3).
+ */
+export type RestError = {
+/**
+ * Mean, object units.
+ */
+mean: number,
+/**
+ * 99th percentile, object units.
+ */
+p99: number,
+/**
+ * Largest, object units.
+ */
+max: number,
+/**
+ * Mean over the diagonal of the cage's bounding box.
+ */
+mean_rel: number,
+/**
+ * Largest over the diagonal of the cage's bounding box.
+ */
+max_rel: number, };
+/**
+ * What was off before rows were restored, over vertices inside the cage. The operator and the sampling reproduce linear
+ * functions exactly, so with the embedded method this is what the solver left.
+ */
+export type RawError = {
+/**
+ * `|sum_i w_i - 1|`.
+ */
+sum: MeanMax,
+/**
+ * Distance of `sum_i w_i c_i` from the vertex over the diagonal of the cage's bounding box.
+ */
+point_rel: MeanMax,
+/**
+ * Smallest value, before negative ones were taken for 0.
+ */
+min_weight: number, };
+/**
+ * Mean and largest of some numbers.
+ */
+export type MeanMax = {
+/**
+ * Mean.
+ */
+mean: number,
+/**
+ * Largest.
+ */
+max: number, };
+/**
+ * Statistics of the stored weights.
+ */
+export type WeightStats = {
+/**
+ * Smallest weight.
+ */
+min: number,
+/**
+ * Largest weight.
+ */
+max: number,
+/**
+ * Largest |sum of a row - 1|.
+ */
+max_sum_error: number,
+/**
+ * Stored weights.
+ */
+nonzeros: number, };
+/**
+ * What the cage follows.
+ */
+export type Shape = "follow" | "hull";
+export type CageSymmetry = "auto" | "on" | "off";
+/**
+ * `CageOptions`.
+ */
+export type CageOptions = { vertices: number, margin: number, symmetry: CageSymmetry, voxels: number, shape: Shape, per_component: boolean, };
+/**
+ * Corners of a box.
+ */
+export type Bounds = { min: [number, number, number], max: [number, number, number], };
+/**
+ * `CageInfo`.
+ */
+export type CageInfo = { vertices: number, edges: number, faces: number, triangles: number, bounds: Bounds, notices: Array<string>, };
+/**
+ * `CageState`.
+ */
+export type CageState = { usable: boolean, info: CageInfo, };
+/**
+ * What is wrong. The names are stable: programs may rely on them.
+ */
+export type Code = "empty" | "not_finite" | "bad_index" | "degenerate_face" | "duplicate_face" | "duplicate_vertex" | "open_edge" | "non_manifold_edge" | "non_manifold_vertex" | "flipped" | "one_sided" | "self_intersection" | "unused_vertex" | "model_outside" | "thin_part" | "not_a_cage";
+/**
+ * How bad it is.
+ */
+export type Severity = "error" | "warning" | "note";
+/**
+ * A repair.
+ */
+export type Repair = "weld" | "drop_degenerate" | "fill_holes" | "flip" | "grow";
+/**
+ * What a button beside a problem does.
+ */
+export type Mend = { "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" };
+/**
+ * What helps, and what its button says.
+ */
+export type Fix = { label: string, } & ({ "kind": "repair", repair: Repair, } | { "kind": "grid", cells: number, } | { "kind": "regenerate" });
+/**
+ * A kind of fault, as the page says it.
+ */
+export type Problem = { code: Code, severity: Severity,
+/**
+ * A whole sentence with numbers.
+ */
+message: string, count: number, fix: Fix | null, };
+/**
+ * Format of a model's file.
+ */
+export type ModelFormat = "obj" | "gltf";
+/**
+ * The axis that points up in a file. Everything that is not in a file has Y up: a file with Z up is turned by 90
+ * degrees about x when it is read, and back when it is written. Both are exact.
+ */
+export type UpAxis = "y" | "z";
+/**
+ * `ModelInfo`.
+ */
+export type ModelInfo = { name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number, skins: number, animations: number, morphTargets: number, bounds: Bounds, notices: Array<string>, };
+/**
+ * The page's part of a project, as far as it can be used.
+ */
+export type Settings = { bind?: BindOptions, cage?: CageOptions, sample?: string, symmetry?: boolean,
+/**
+ * `Engine.encodePose`, base 64.
+ */
+pose?: string,
+/**
+ * What was wrong, in whole sentences.
+ */
+notices: Array<string>, };
+export type Theme = "light" | "dark";
+/**
+ * What colours of the mesh mean.
+ */
+export type Colour = "material" | "clay" | "weight" | "error";
+/**
+ * What the slice shows.
+ */
+export type SliceShown = "off" | "kinds" | "value";
+/**
+ * The gizmo.
+ */
+export type Gizmo = "none" | "move" | "rotate" | "scale";
+/**
+ * `SceneOptions`.
+ */
+export type SceneOptions = { theme: Theme, model: boolean, base_wireframe: boolean, cage: boolean, floor: boolean, original: boolean, colour: Colour, slice: SliceShown, gizmo: Gizmo, compare: boolean, problems: boolean, };
+/**
+ * How colours of a legend follow each other.
+ */
+export type ColorMap = "viridis" | "error" | "kinds";
+/**
+ * `Legend`.
+ */
+export type Legend = { low: number, high: number, logarithmic: boolean, map: ColorMap, };
+/**
+ * What a click selects.
+ */
+export type Element = "vertex" | "edge" | "face";
+/**
+ * How new vertices join those that are selected.
+ */
+export type SelectMode = "replace" | "add" | "remove" | "toggle";
+/**
+ * What a gesture does.
+ */
+export type Gesture = "grab" | "rotate" | "scale";
+/**
+ * A part of the gizmo: an axis, the plane normal to it, or the whole.
+ */
+export type GizmoHandle = "x" | "y" | "z" | "plane_x" | "plane_y" | "plane_z" | "all";
+/**
+ * Edits of the rest cage, on the selection.
+ */
+export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
+export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"closest_point"};
+export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"margin":0.0,"symmetry":"auto","voxels":0,"shape":"follow","per_component":false};
+export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","slice":"off","gizmo":"none","compare":false,"problems":true};
+/** Least and most of each option that is a number. */
+export const RANGES = { grid: [8, 512], vertices: [12, 400], margin: [0, 0.25], voxels: [8, 128] } as const;
