@@ -82,7 +82,7 @@ fn triangles_over_each_other_are_counted() {
         sandbox.write("mesh.obj", corners.to_owned() + &"f 1 2 3\n".repeat(n));
         let drawn = sandbox.run("render mesh.obj --view front --size 640x480 -o p.png").code(code);
         if code == 1 {
-            drawn.stderr(contains("triangles over each pixel").and(contains("a smaller --size")));
+            drawn.stderr(contains("20000 triangles cover").and(contains("a smaller picture")));
         }
     }
 }
