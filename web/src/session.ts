@@ -16,7 +16,7 @@ import type {
 import { BIND_DEFAULTS } from "./defaults";
 import { findAdapter, hasWebGl2, lackOf } from "./session/adapter";
 import { type Artifact, compile } from "./session/artifact";
-import { requireCurrent, startBind } from "./session/bind";
+import { startBind } from "./session/bind";
 import { createClient } from "./session/client";
 import { createFrames } from "./session/frames";
 import { chain } from "./session/jobs";
@@ -138,6 +138,14 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   const checking = createApart(openApart);
   const mark = ({ vertices, edges, faces, points, outside }: Check) =>
     engine.showFaults(vertices, edges, faces, points, outside);
+  /** Drops the result if model or cage have changed meanwhile. */
+  const ofNow = <T>(job: Job<T>): Job<T> => {
+    const { revision } = engine;
+    return chain(job, (result) => {
+      engine.requireCurrent(revision);
+      return result;
+    });
+  };
   const takeCage = ({ positions, corners, check }: CheckedCage) => {
     const state = engine.setCage(positions, corners);
     if (check) mark(check);
@@ -181,19 +189,16 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     readCage: (files, hear) =>
       reading("readCage", { files, up: engine.up(), model: engine.modelPositions() }, hear),
     boxCage: (divisions) => polygons(engine.boxCage(divisions)),
-    checkCage() {
-      const asked = cage();
-      return chain(checking("check", { cage: asked, model: engine.modelPositions() }), (check) => {
-        requireCurrent(engine, asked);
+    checkCage: () =>
+      chain(ofNow(checking("check", { cage: cage(), model: engine.modelPositions() })), (check) => {
         mark(check);
         return check;
-      });
-    },
-    repair: (kind) => checking("repair", { kind, cage: cage(), model: engine.modelPositions() }),
+      }),
+    repair: (kind) => ofNow(checking("repair", { kind, cage: cage(), model: engine.modelPositions() })),
     takeCage,
     generateCage(options, onProgress) {
       const input = { positions: engine.modelPositions(), triangles: engine.modelTriangles(), options };
-      return client.run("cage", input, ({ fraction }) => onProgress(fraction));
+      return ofNow(client.run("cage", input, ({ fraction }) => onProgress(fraction)));
     },
     bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport> {
       bind?.cancel();
@@ -210,22 +215,16 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     estimateMemory: (options) => engine.estimateMemory(possible(options)),
     bindMeanValue() {
       meanValue?.cancel();
-      const bound = cage();
-      const job = client.run("meanValue", { positions: engine.modelPositions(), cage: bound });
-      meanValue = chain(job, ({ indptr, indices, data }) => {
-        requireCurrent(engine, bound);
-        return engine.adoptOther(indptr, indices, data);
-      });
+      const job = client.run("meanValue", { positions: engine.modelPositions(), cage: cage() });
+      meanValue = chain(ofNow(job), ({ indptr, indices, data }) => engine.adoptOther(indptr, indices, data));
       return meanValue;
     },
     loadSlice(axis, fraction, grid) {
       slice?.cancel();
       const options = possible({ ...BIND_DEFAULTS, grid });
-      const cut = cage();
-      const job = client.run("slice", { cage: cut, axis, fraction, options });
+      const job = client.run("slice", { cage: cage(), axis, fraction, options });
       const none = { indptr: new Uint32Array(), indices: new Uint32Array(), data: new Float32Array() };
-      slice = chain(job, (rows) => {
-        requireCurrent(engine, cut);
+      slice = chain(ofNow(job), (rows) => {
         const { indptr, indices, data } = rows ?? none;
         engine.takeSlice(axis, fraction, options, indptr, indices, data);
       });

@@ -11,7 +11,7 @@ use cagework_gpu::render::{Camera, GizmoPart};
 use cagework_io::{Model, UpAxis};
 use glam::{Vec2, Vec3};
 
-use crate::error::Fault;
+use crate::error::{Answer, ErrorName, Fault};
 use crate::options::SceneAsked;
 use crate::problems::Faults;
 use crate::views::{CageInfo, CageState};
@@ -51,9 +51,9 @@ pub(crate) struct State {
     pub(crate) size: Vec2,
     /// Pixels of a CSS pixel.
     pub(crate) scale: f32,
-    /// Counts the cages: work for one before is out of date.
-    pub(crate) generation: u32,
-    /// The generation of the cage that the GPU has.
+    /// Counts changes of model and rest cage: each job is for one of them.
+    pub(crate) revision: u32,
+    /// The revision of the cage that the GPU has.
     pub(crate) on_gpu: Option<u32>,
     pub(crate) is_moved: bool,
     pub(crate) is_changed: bool,
@@ -87,10 +87,21 @@ impl State {
         self.active_part = None;
         self.slice = None;
         (self.is_bound, self.has_other) = (false, false);
-        self.generation += 1;
+        self.revision += 1;
         self.is_moved = true;
         self.is_changed = true;
         self.fit_camera();
+    }
+
+    /// Drops what was computed for a model or cage of before.
+    ///
+    /// # Errors
+    /// `Cancelled` when there is another one by now.
+    pub(crate) fn require(&self, revision: u32) -> Answer<()> {
+        let is_current = self.revision == revision;
+        is_current
+            .then_some(())
+            .ok_or_else(|| Fault::new(ErrorName::Cancelled, "there is another model or cage by now"))
     }
 
     /// What points up in the model's file.
@@ -178,7 +189,7 @@ impl State {
 
     /// Whether the GPU has this cage.
     pub(crate) fn is_on_gpu(&self) -> bool {
-        self.cage.is_some() && self.on_gpu == Some(self.generation)
+        self.cage.is_some() && self.on_gpu == Some(self.revision)
     }
 
     /// Brings what changed to the GPU.

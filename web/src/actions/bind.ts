@@ -1,6 +1,6 @@
 /** Binding: starts, follows and cancels it, and knows what it will need. */
 
-import type { BindEvent, BindOptions, BindReport, CageState, Job } from "../contract";
+import type { BindEvent, BindOptions, BindReport, Job } from "../contract";
 import { createEta, type Eta } from "../eta";
 import { type BindRun, cageBroken } from "../state";
 import { sentence } from "../strings";
@@ -22,10 +22,8 @@ export interface BindActions {
 const EARLIER = 4;
 
 export function createBind(ctx: Context): BindActions {
-  let job: Job<BindReport> | undefined;
-  /** Counts binds: what an older one still says is not heard. */
-  let turn = 0;
-  let runningFor: CageState | null = null;
+  /** The bind that runs, and for which revision. */
+  let running: { readonly job: Job<BindReport>; readonly revision: number } | undefined;
   let compare: Promise<boolean> | undefined;
   const { store } = ctx;
 
@@ -63,14 +61,10 @@ export function createBind(ctx: Context): BindActions {
     async start(unasked = false) {
       if (!store.get().cage || cageBroken(store.get())) return false;
       if (!unasked) ctx.tell.clear();
-      turn += 1;
-      const mine = turn;
       let eta: Eta = createEta(performance.now());
       let run: BindRun = start("coarse");
       store.set({ bindRun: run });
-      runningFor = store.get().cage;
       const hear = (event: BindEvent) => {
-        if (mine !== turn) return;
         switch (event.kind) {
           case "progress": {
             if (event.pass !== run.pass) {
@@ -100,11 +94,11 @@ export function createBind(ctx: Context): BindActions {
             event satisfies never;
         }
       };
-      const running = ctx.session().bind(store.get().bindOptions, hear);
-      job = running;
+      const { revision } = ctx.session().engine;
+      const mine = { job: ctx.session().bind(store.get().bindOptions, hear), revision };
+      running = mine;
       const ok = await attempt(ctx, "The bind did not finish", async () => {
-        const report = await running.done;
-        if (mine !== turn) return;
+        const report = await mine.job.done;
         adopted(report, "fine");
         if (!report.converged) {
           ctx.tell.say(
@@ -112,26 +106,24 @@ export function createBind(ctx: Context): BindActions {
           );
         }
       });
-      if (mine === turn) {
-        job = undefined;
-        runningFor = null;
+      if (running === mine) {
+        running = undefined;
         store.set({ bindRun: null });
       }
       return ok && store.get().bound;
     },
     cancel() {
-      job?.cancel();
+      running?.job.cancel();
     },
-    covers: () => store.get().bound || (runningFor !== null && runningFor === store.get().cage),
+    covers: () => store.get().bound || running?.revision === ctx.session().engine.revision,
     setOptions(patch) {
       store.set({ bindOptions: { ...store.get().bindOptions, ...patch } });
     },
     prepareCompare() {
       if (store.get().meanValueReady) return Promise.resolve(true);
       compare ??= attempt(ctx, "Mean value coordinates could not be computed", async () => {
-        const cage = store.get().cage;
         await ctx.session().bindMeanValue().done;
-        if (store.get().cage === cage) store.set({ meanValueReady: true });
+        store.set({ meanValueReady: true });
       }).finally(() => {
         compare = undefined;
       });

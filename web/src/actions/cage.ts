@@ -26,13 +26,10 @@ const LOAD = "Load a cage";
 
 export function createCage(ctx: Context, after: () => void, refine: (grid: number) => void): CageActions {
   let job: Job<CheckedCage> | undefined;
-  /** Counts generations: what an older one still says is not heard. */
-  let turn = 0;
 
-  const look = (cage: CageState) =>
+  const look = () =>
     attempt(ctx, "The cage could not be checked", async () => {
-      const check = await ctx.session().checkCage().done;
-      if (ctx.store.get().cage === cage) ctx.store.set({ check });
+      ctx.store.set({ check: await ctx.session().checkCage().done });
     });
 
   const adopt = (state: CageState | null, check: Check | null) => {
@@ -46,7 +43,7 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
       meanValueReady: false,
       scene: { ...ctx.store.get().scene, compare: false, slice: "off" },
     });
-    if (state && !check) void look(state);
+    if (state && !check) void look();
     after();
   };
 
@@ -71,11 +68,9 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
     const { cageOptions } = ctx.store.get();
     const hull = { shape: "hull", vertices: HULL_VERTICES, voxels: 0 } as const;
     const options: CageOptions = source === "hull" ? { ...cageOptions, ...hull } : cageOptions;
-    turn += 1;
-    const mine = turn;
     ctx.store.set({ cageProgress: 0 });
     const running = ctx.session().generateCage(options, (fraction) => {
-      if (mine === turn) ctx.store.set({ cageProgress: fraction });
+      if (job === running) ctx.store.set({ cageProgress: fraction });
     });
     job = running;
     try {
@@ -86,7 +81,7 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
       }
       return made;
     } finally {
-      if (mine === turn) {
+      if (job === running) {
         job = undefined;
         ctx.store.set({ cageProgress: null });
       }

@@ -36,15 +36,11 @@ export interface Follow {
 
 export function createFiles(ctx: Context, follow: Follow): Files {
   const { store } = ctx;
-  /** Each opening has a number: a later one makes an earlier one's end meaningless. */
-  let turn = 0;
-  /** And each wait: the page waits until the last one ends. */
+  /** The page waits until the last of what it waits for ends. */
   let waits = 0;
   let replacing: Promise<unknown> = Promise.resolve();
 
   const take = async (opened: Opened, sample: string | null, cageFiles?: readonly NamedFile[]) => {
-    turn += 1;
-    const mine = turn;
     const settings = settingsOf(opened);
     const poses = opened.project?.poses ?? opened.poses ?? [];
     ctx.history.clear();
@@ -66,7 +62,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     follow.applyPose(settings);
     for (const notice of opened.model.notices) ctx.tell.say(sentence(notice));
     if (settings.notices.length > 0) ctx.tell.say(settings.notices.join(" "));
-    void prepare(mine, cageFiles, sample !== null || opened.project !== null);
+    void prepare(cageFiles, sample !== null || opened.project !== null);
   };
 
   const settingsOf = (opened: Opened): Settings => {
@@ -82,8 +78,9 @@ export function createFiles(ctx: Context, follow: Follow): Files {
   };
 
   /** Cage, bind, pose: as far as it goes without the user. */
-  const prepare = async (mine: number, cageFiles: readonly NamedFile[] | undefined, familiar: boolean) => {
-    const current = () => mine === turn;
+  const prepare = async (cageFiles: readonly NamedFile[] | undefined, familiar: boolean) => {
+    const { model } = store.get();
+    const current = () => store.get().model === model;
     if (cageFiles) {
       if (!(await follow.loadCage(cageFiles)) || !current()) return;
     } else if (!store.get().cage) {

@@ -42,6 +42,7 @@ export function startBind(start: BindStart): Job<BindReport> {
   let options = start.options;
   let job: Job<BoundArrays> | undefined;
   let isCancelled = false;
+  const { revision } = engine;
   const positions = engine.modelPositions();
 
   const step = (pass: Pass) => {
@@ -57,8 +58,9 @@ export function startBind(start: BindStart): Job<BindReport> {
     job = client.run("bind", { positions, cage, options: asked }, step(pass));
     const { indptr, indices, data, outside, offsets, report } = await job.done;
     if (isCancelled || !report) throw named("Cancelled", "cancelled");
-    requireCurrent(engine, cage);
+    engine.requireCurrent(revision);
     await engine.adopt(indptr, indices, data, outside, offsets);
+    if (isCancelled) throw named("Cancelled", "cancelled");
     const whole = report.backend === "gpu" ? { ...report, adapter } : report;
     listener({ kind: "adopted", pass, report: whole });
     return whole;
@@ -96,16 +98,4 @@ export function startBind(start: BindStart): Job<BindReport> {
 /** Quick, whatever was asked for. */
 function coarse(options: BindOptions): BindOptions {
   return { ...options, grid: COARSE, solver: "multigrid" };
-}
-
-/** Work for a cage that there is no more ends here: nothing of it is shown. */
-export function requireCurrent(engine: Engine, { positions, corners }: CageArrays): void {
-  const isCurrent = same(positions, engine.restPositions()) && same(corners, engine.cageCorners());
-  if (!isCurrent) throw named("Cancelled", "there is another cage by now");
-}
-
-function same(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
-  if (a.length !== b.length) return false;
-  for (let k = 0; k < a.length; k++) if (a[k] !== b[k]) return false;
-  return true;
 }

@@ -92,21 +92,17 @@ impl Engine {
         outside: Vec<u32>,
         offsets: Vec<f32>,
     ) -> Result<(), JsValue> {
-        let (generation, n_columns) =
-            self.read(|state| (state.generation, state.rest.positions.len() as u32));
+        let (revision, n_columns) = self.read(|state| (state.revision, state.rest.positions.len() as u32));
         let weights = incoming::weights(n_columns, &indptr, &indices, &data).await?;
         let outside = incoming::outside(&outside, &offsets);
-        let is_current = || self.read(|state| state.generation) == generation;
+        let is_current = || self.read(|state| state.require(revision));
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         // The cage may still be waiting for its turn, and would take the weights away again.
         upload_cage(&self.state, gpu).await?;
-        if is_current() {
-            gpu.main.adopt(weights, outside).await.map_err(Fault::from)?;
-        }
-        if !is_current() {
-            return Err(overtaken().into());
-        }
+        is_current()?;
+        gpu.main.adopt(weights, outside).await.map_err(Fault::from)?;
+        is_current()?;
         self.change(|state| {
             state.is_bound = true;
             (state.is_moved, state.is_changed) = (true, true);
@@ -125,19 +121,14 @@ impl Engine {
         indices: Uint32Array,
         data: Float32Array,
     ) -> Result<(), JsValue> {
-        let (generation, n_columns) =
-            self.read(|state| (state.generation, state.rest.positions.len() as u32));
+        let (revision, n_columns) = self.read(|state| (state.revision, state.rest.positions.len() as u32));
         let weights = incoming::weights(n_columns, &indptr, &indices, &data).await?;
-        if self.read(|state| state.generation) != generation {
-            return Err(overtaken().into());
-        }
+        self.read(|state| state.require(revision))?;
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         let mut other = gpu.main.twin().await.map_err(Fault::from)?;
         other.adopt(weights, Vec::new()).await.map_err(Fault::from)?;
-        if self.read(|state| state.generation) != generation {
-            return Err(overtaken().into());
-        }
+        self.read(|state| state.require(revision))?;
         gpu.other = Some(other);
         self.change(|state| {
             state.has_other = true;
@@ -145,6 +136,22 @@ impl Engine {
             state.place_viewport();
         });
         Ok(())
+    }
+
+    /// Counts up with each change of model or rest cage.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn revision(&self) -> u32 {
+        self.read(|state| state.revision)
+    }
+
+    /// What a job that was started at a revision results in is taken only if this passes.
+    ///
+    /// # Errors
+    /// `Cancelled` when there is another model or cage by now.
+    #[wasm_bindgen(js_name = requireCurrent)]
+    pub fn require_current(&self, revision: u32) -> Result<(), JsValue> {
+        Ok(self.read(|state| state.require(revision))?)
     }
 
     /// Whether the model follows the cage.
@@ -236,20 +243,16 @@ impl Engine {
 
 /// Sees to it that the GPU has the cage of the moment; weights for the one before are dropped.
 async fn upload_cage(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> {
-    let (generation, cage) = {
+    let (revision, cage) = {
         let state = state.borrow();
         let missing = state.cage.as_ref().filter(|_| !state.is_on_gpu());
-        (state.generation, missing.cloned())
+        (state.revision, missing.cloned())
     };
     let Some(cage) = cage else { return Ok(()) };
     gpu.other = None;
     gpu.main.set_cage(&cage).await?;
-    state.borrow_mut().on_gpu = Some(generation);
+    state.borrow_mut().on_gpu = Some(revision);
     Ok(())
-}
-
-fn overtaken() -> Fault {
-    Fault::new(ErrorName::Cancelled, "there is another cage by now")
 }
 
 fn lost() -> Fault {
