@@ -85,4 +85,15 @@ test("the bind panel compares the paper's method with ours", async ({ page }) =>
   await expect(page.locator(".curves li")).toHaveText(["Jacobi", "multigrid"]);
   await expect(page.locator(".plot polyline")).toHaveCount(2);
   await shoot(page, "bind-panel");
+
+  await test.step("a cancelled bind leaves the one before, and its settings", async () => {
+    const grid = (cells: string) => page.locator("#panel").getByRole("radio", { name: cells, exact: true });
+    await grid("128").check({ force: true });
+    await page.keyboard.press("Control+Enter");
+    await expect(page.locator(".plot polyline"), "its chart is its own").toHaveCount(1);
+    await page.getByRole("button", { name: "Cancel" }).click();
+    await expect(page.getByText("The bind from before is kept, and its settings.")).toBeVisible();
+    await expect(grid("64")).toBeChecked();
+    await bound(page);
+  });
 });

@@ -30,6 +30,26 @@ test("everything that a pose needs works without a pointer", async ({ page }) =>
 test("escape puts a gesture back, symmetry moves both sides", async ({ page }) => {
   await open(page);
   const before = await cagePositions(page);
+  await test.step("R rotates whatever gizmo shows, and Escape keeps the selection", async () => {
+    const selected = () => page.evaluate(() => globalThis.cagework?.engine.selection().length ?? 0);
+    for (let k = 0; k < 2; k++) {
+      await page.keyboard.press("r");
+      await expect(page.getByText("Select something first")).toHaveCount(1);
+    }
+    await page.keyboard.press("a");
+    await page.keyboard.press("w");
+    await page.keyboard.press("r");
+    await page.mouse.move(300, 300);
+    await page.mouse.move(400, 320);
+    await expect(page.locator("#status")).toHaveText(/Rotate/);
+    await page.keyboard.press("Escape");
+    await page.keyboard.press("Escape");
+    expect(largestMove(before, await cagePositions(page))).toBeLessThan(1e-6);
+    expect(await selected()).toBe(before.length / 3);
+    await page.keyboard.press("q");
+    await page.keyboard.press("Alt+a");
+    expect(await selected()).toBe(0);
+  });
   const vertex = await reachable(page);
   const { x, y } = await handle(page, vertex);
   await page.mouse.click(x, y);

@@ -56,7 +56,7 @@ test("the cage at rest is shaped, checked meanwhile and bound again", async ({ p
   const canvas = await page.locator("canvas").first().boundingBox();
   const outwards = { x: x - (canvas?.x ?? 0) - (middle[0] ?? 0), y: y - (canvas?.y ?? 0) - (middle[1] ?? 0) };
 
-  await test.step("Tab goes to the rest cage, and what the cage misses is said while it is dragged", async () => {
+  await test.step("Tab goes to reshaping, and what the cage misses is said while it is dragged", async () => {
     await page.mouse.click(x, y);
     await page.keyboard.press("Tab");
     await expect(page.locator("#stage")).toHaveAttribute("data-rest", "");

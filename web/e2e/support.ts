@@ -46,7 +46,7 @@ export async function bound(page: Page): Promise<void> {
   await page.waitForFunction(() => globalThis.cagework?.engine.bound === true, undefined, {
     timeout: 60_000,
   });
-  await expect(page.locator("#status")).toHaveText(/^(Ready|Shaping the cage.*|.*selected)$/, {
+  await expect(page.locator("#status")).toHaveText(/^(Ready|Reshaping the cage.*|.*selected)$/, {
     timeout: 60_000,
   });
 }

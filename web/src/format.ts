@@ -55,10 +55,9 @@ export function percent(share: number): string {
   return `${Math.round(Math.min(1, Math.max(0, share)) * 100)} %`;
 }
 
-/** A coordinate as a field shows it: at most four digits after the point, no trailing zeros, no minus zero. */
+/** A coordinate as a field shows it, at every scale: five significant digits, no trailing zeros, no minus zero. */
 export function coordinate(value: number): string {
-  const rounded = Number(value.toFixed(4));
-  return String(rounded === 0 ? 0 : rounded);
+  return String(value === 0 ? 0 : Number(value.toPrecision(5)));
 }
 
 /** A file's name without its extension, or both of a project's. */

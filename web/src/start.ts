@@ -53,6 +53,8 @@ export function startUp({ app, stage, crashes, theme, shared, product }: Start):
     },
   );
 
+  store.watch(["step"], () => app.view.scene({}));
+
   const stop = session.onFrame(() => {
     if (!store.get().bound) return;
     crashes.settled();

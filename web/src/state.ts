@@ -224,6 +224,12 @@ export function cageBroken(state: AppState): boolean {
   return state.cage !== null && !state.cage.usable;
 }
 
+/** What is drawn: faults are marked where they can be mended, or when they stop the bind. */
+export function drawn(state: AppState): SceneOptions {
+  const { scene, step } = state;
+  return { ...scene, problems: scene.problems && (step === "cage" || cageBroken(state)) };
+}
+
 /** Poses of the cage that is open; others wait for theirs to come back by undo. */
 export function fittingPoses(state: AppState): readonly Pose[] {
   const n = (state.cage?.info.vertices ?? 0) * 3;

@@ -56,15 +56,20 @@ export function hintFor(options: {
   touch: boolean;
   hasCage: boolean;
   bound: boolean;
+  binding: boolean;
   rest: boolean;
 }): string {
   if (!options.hasCage) return "A model needs a cage around it before it can be posed.";
   if (options.rest) {
     return options.touch
-      ? "Drag a handle to shape the cage at rest; the model stays still."
-      : "Drag a handle to shape the cage at rest; the model stays still. Tab goes back to posing.";
+      ? "Drag a handle to reshape the cage; the model stays still."
+      : "Drag a handle to reshape the cage; the model stays still. Tab goes back to posing.";
   }
-  if (!options.bound) return "Bind the model, then it follows its cage.";
+  if (!options.bound) {
+    return options.binding
+      ? "The model is being bound: posing waits until it is."
+      : "Bind the model, then it follows its cage.";
+  }
   return options.touch
     ? "Drag a handle to pose. One finger turns, two move and zoom."
     : "Drag a handle to pose · drag beside it to turn · right-drag to move · scroll to zoom · ? for keys";

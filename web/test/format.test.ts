@@ -45,9 +45,11 @@ describe("formats", () => {
     expect(percent(1.2)).toBe("100 %");
     expect(percent(-0.1)).toBe("0 %");
   });
-  it("show coordinates without minus zero", () => {
-    expect(coordinate(-0.00001)).toBe("0");
+  it("show coordinates with five digits at every scale, and without minus zero", () => {
+    expect(coordinate(-0)).toBe("0");
+    expect(coordinate(-0.0000123456)).toBe("-0.000012346");
     expect(coordinate(1.23456)).toBe("1.2346");
+    expect(coordinate(0.1 + 0.2)).toBe("0.3");
   });
   it("take folder and extension from a name", () => {
     expect(stem("models/horse.v2.glb")).toBe("horse.v2");

@@ -3,11 +3,12 @@ import { grown } from "../src/actions/bind";
 import { freshName } from "../src/actions/poses";
 import { poseOf } from "../src/actions/project";
 import { nextAmount } from "../src/amount";
-import type { BindReport } from "../src/contract";
+import type { BindReport, CageState } from "../src/contract";
 import { BIND_DEFAULTS } from "../src/defaults";
 import { rectangle } from "../src/input/pointer";
 import { pinch } from "../src/input/touch";
 import { isSoftware } from "../src/start";
+import { drawn, INITIAL, type StepName } from "../src/state";
 import { explain, isCancelled, sentence } from "../src/strings";
 import { curvesOf } from "../src/ui/curves";
 import { historyPoints, scaleOf } from "../src/ui/plot";
@@ -106,6 +107,15 @@ describe("the plot", () => {
     expect(curve.length).toBeLessThanOrEqual(601);
     expect(curve.at(-1)?.[0]).toBe(4999);
   });
+});
+
+it("faults are marked in the step where they can be mended, or when they stop the bind", () => {
+  const bounds = { min: [0, 0, 0], max: [1, 1, 1] } as CageState["info"]["bounds"];
+  const at = (step: StepName, usable: boolean) => {
+    const cage = { usable, info: { vertices: 8, edges: 12, faces: 6, triangles: 12, bounds, notices: [] } };
+    return drawn({ ...INITIAL, step, cage }).problems;
+  };
+  expect([at("pose", true), at("cage", true), at("pose", false)]).toEqual([false, true, true]);
 });
 
 describe("the verdict on a bind", () => {

@@ -63,7 +63,7 @@ describe("shortcuts", () => {
     expect(commandOf(press("Escape"), { gesture: true, rest: false })).toBe("cancel");
   });
 
-  it("edit the cage only while the rest cage is edited", () => {
+  it("reshape the cage only while it is reshaped", () => {
     expect(commandOf(press("E", { shiftKey: true }), page)).toBeUndefined();
     expect(commandOf(press("E", { shiftKey: true }), { gesture: false, rest: true })).toBe("extrude");
   });

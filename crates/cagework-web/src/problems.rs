@@ -130,7 +130,10 @@ impl Faults {
             marks.segments.extend((0..face.len()).map(|k| [at(face[k]), at(face[(k + 1) % face.len()])]));
         }
         marks.points.extend(vertices.iter().map(|&v| at(v)));
-        marks.points.extend(points.iter().copied().map(Vec3::from_array));
+        if positions == mesh.positions {
+            // Nothing says where they would be in a pose.
+            marks.points.extend(points.iter().copied().map(Vec3::from_array));
+        }
         marks
     }
 }

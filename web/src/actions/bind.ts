@@ -2,7 +2,7 @@
 
 import type { BindEvent, BindOptions, BindReport, Job } from "../contract";
 import { createEta, type Eta } from "../eta";
-import { type BindRun, cageBroken } from "../state";
+import { type BindRun, cageBroken, drawn } from "../state";
 import { sentence } from "../strings";
 import { attempt, type Context } from "./context";
 
@@ -24,6 +24,8 @@ const EARLIER = 4;
 export function createBind(ctx: Context): BindActions {
   /** The bind that runs, and for which revision. */
   let running: { readonly job: Job<BindReport>; readonly revision: number } | undefined;
+  /** Options of the last bind that ended. */
+  let kept: BindOptions | undefined;
   let compare: Promise<boolean> | undefined;
   const { store } = ctx;
 
@@ -53,7 +55,7 @@ export function createBind(ctx: Context): BindActions {
     if (scene.colour === "material" || scene.colour === "clay") return;
     // Colours were asked for before there were weights to show.
     const { engine } = ctx.session();
-    engine.setScene(scene);
+    engine.setScene(drawn(store.get()));
     store.set({ legend: engine.legend() ?? null });
   };
 
@@ -95,11 +97,13 @@ export function createBind(ctx: Context): BindActions {
         }
       };
       const { revision } = ctx.session().engine;
-      const mine = { job: ctx.session().bind(store.get().bindOptions, hear), revision };
+      const asked = store.get().bindOptions;
+      const mine = { job: ctx.session().bind(asked, hear), revision };
       running = mine;
       const ok = await attempt(ctx, "The bind did not finish", async () => {
         const report = await mine.job.done;
         adopted(report, "fine");
+        kept = asked;
         if (!report.converged) {
           ctx.tell.say(
             "The solver stopped at its iteration limit, before the change fell below the threshold.",
@@ -113,7 +117,11 @@ export function createBind(ctx: Context): BindActions {
       return ok && store.get().bound;
     },
     cancel() {
-      running?.job.cancel();
+      if (!running) return;
+      running.job.cancel();
+      if (!store.get().bound || !kept) return;
+      store.set({ bindOptions: kept });
+      ctx.tell.say("The bind from before is kept, and its settings.");
     },
     covers: () => store.get().bound || running?.revision === ctx.session().engine.revision,
     setOptions(patch) {

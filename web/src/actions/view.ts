@@ -1,7 +1,7 @@
 /** What is drawn and from where. */
 
 import type { Element as CageElement, Job, SceneOptions } from "../contract";
-import type { Slice } from "../state";
+import { drawn, type Slice } from "../state";
 import { saveTheme, type Theme } from "../store";
 import { attempt, type Context } from "./context";
 
@@ -45,7 +45,7 @@ export function createView(
   const scene = (patch: Partial<SceneOptions>) => {
     const next = { ...store.get().scene, ...patch };
     store.set({ scene: next });
-    engine().setScene(next);
+    engine().setScene(drawn(store.get()));
     store.set({ legend: engine().legend() ?? null });
   };
 

@@ -21,7 +21,7 @@ export function createCommands(app: App, showSheet: () => void): Record<Command,
     poses.stop();
     const { x, y } = app.pointer();
     if (!edit.begin(kind, x, y))
-      app.ctx.tell.say("Select a handle of the cage first: click one, or press A for all.");
+      app.ctx.tell.say("Select something first: click a handle of the cage, or press A for all.");
   };
   const select = (work: () => void) => () => {
     if (!hasCage()) return;
@@ -54,10 +54,7 @@ export function createCommands(app: App, showSheet: () => void): Record<Command,
 
   return {
     grab: gesture("grab"),
-    rotate: () => {
-      if (store.get().scene.gizmo !== "none" && !edit.active()) view.gizmo("scale");
-      else gesture("rotate")();
-    },
+    rotate: gesture("rotate"),
     scale: gesture("scale"),
     axisX: axis(0, false),
     axisY: axis(1, false),
@@ -71,7 +68,6 @@ export function createCommands(app: App, showSheet: () => void): Record<Command,
       else if (store.get().boxArmed) store.set({ boxArmed: false });
       else if (store.get().playing) poses.stop();
       else if (store.get().seeOpen) store.set({ seeOpen: false });
-      else select(() => engine().select(new Uint32Array(), "replace"))();
     },
     gizmoMove: () => view.gizmo("move"),
     gizmoRotate: () => view.gizmo("rotate"),

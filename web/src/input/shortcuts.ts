@@ -18,7 +18,7 @@ export type Group = (typeof GROUPS)[number];
 /** Keys are written as `keyOf` says them; `mod` is Ctrl, or Cmd on a Mac. */
 const TABLE = {
   grab: { keys: ["g"], label: "Move the selection", group: "Move" },
-  rotate: { keys: ["r"], label: "Rotate; after W or E, gizmo to scale", group: "Move" },
+  rotate: { keys: ["r"], label: "Rotate", group: "Move" },
   scale: { keys: ["s"], label: "Scale", group: "Move" },
   axisX: {
     keys: ["x"],
@@ -33,12 +33,12 @@ const TABLE = {
   planeY: { keys: ["shift+y"], label: "", group: "While moving", scope: "gesture" },
   planeZ: { keys: ["shift+z"], label: "", group: "While moving", scope: "gesture" },
   keep: { keys: ["enter"], label: "Keep it; a click does too", group: "While moving", scope: "gesture" },
-  cancel: { keys: ["escape"], label: "Put it back; otherwise: select nothing", group: "While moving" },
+  cancel: { keys: ["escape"], label: "Put it back; otherwise: close what is open", group: "While moving" },
   gizmoMove: { keys: ["w"], label: "Gizmo to move", group: "Move" },
   gizmoRotate: { keys: ["e"], label: "Gizmo to rotate", group: "Move" },
   toolSelect: { keys: ["q"], label: "No gizmo: select and drag", group: "Move" },
   symmetry: { keys: ["m"], label: "Mirror across X", group: "Move" },
-  proportional: { keys: ["o"], label: "Take neighbours along; wheel: how far", group: "Move" },
+  proportional: { keys: ["o"], label: "Proportional editing; wheel: how far", group: "Move" },
   nudgeLeft: {
     keys: ["arrowleft"],
     label: "Nudge; with Shift ten times as far",
@@ -79,7 +79,7 @@ const TABLE = {
   heatMap: { keys: ["k"], label: "Weights of the selected vertex", group: "Look" },
   see: { keys: ["n"], label: "The See panel", group: "Look" },
 
-  restMode: { keys: ["tab"], label: "Rest cage or pose", group: "Cage" },
+  restMode: { keys: ["tab"], label: "Reshape the cage, or pose", group: "Cage" },
   split: { keys: ["shift+s"], label: "Split an edge", group: "Cage", scope: "rest" },
   collapse: { keys: ["shift+c"], label: "Collapse an edge", group: "Cage", scope: "rest" },
   extrude: { keys: ["shift+e"], label: "Extrude a face", group: "Cage", scope: "rest" },

@@ -100,7 +100,7 @@ export function createCagePanel(app: App): HTMLElement {
   const result = h("div", { class: "stack" });
 
   const rest = toggle(
-    "Edit the rest cage",
+    "Reshape the cage",
     `Shape the cage itself; the model stays still and is bound again afterwards. ${app.key("restMode")} in the view.`,
     (on) => app.edit.setEditingRest(on),
   );

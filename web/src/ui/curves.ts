@@ -13,7 +13,8 @@ export function curvesOf({ bindRun, report, earlier, bindOptions }: CurveState):
     ? { name: bindRun.pass === "coarse" ? "coarse first" : solverName(bindOptions), points: bindRun.curve }
     : reports.slice(0, 1).map(pointsOf)[0];
   if (!now) return [];
-  const names = new Set(bindRun ? [] : [now.name]);
+  if (bindRun) return [{ ...now, kind: "now" }];
+  const names = new Set([now.name]);
   const others = reports.map(pointsOf).filter(({ name }) => !names.has(name) && names.add(name));
   const shown = [now, ...others].slice(0, KINDS.length);
   return shown.map((curve, k) => ({ ...curve, kind: KINDS[k] ?? "now" }));

@@ -33,7 +33,7 @@ const ITEMS: readonly Item[] = [
     kind: "poses",
     icon: "layers",
     title: "Poses as morph targets",
-    sentence: "GLB with one morph target a pose and an animation through them. Exact in every mix.",
+    sentence: "GLB with one morph target a pose and an animation through them. Exact in every blend.",
     missing: (state) =>
       needsBind(state) ??
       (fittingPoses(state).length === 0 ? "Save a pose first, in the step before." : null),

@@ -20,7 +20,7 @@ export function createPosePanel(app: App): HTMLElement {
   );
   const unmatched = h("p", { class: "hint warn-text" });
   const proportional = toggle(
-    "Take neighbours along",
+    "Proportional editing",
     "Vertices nearby follow, less the farther they are. While dragging, the wheel sets how far.",
     (on) => app.view.proportional(on),
   );
@@ -139,11 +139,11 @@ function axisField(app: App, axis: (typeof AXES)[number]): { element: HTMLElemen
 
 function poseRow(app: App, pose: Pose): { element: HTMLElement; set(share: number): void } {
   const share = slider(
-    "Share in the mix",
+    "Blend",
     { min: 0, max: 1, step: 0.01, format: percent, onCommit: (value) => app.poses.blend(pose, value, true) },
     (value) => app.poses.blend(pose, value, false),
   );
-  share.input.setAttribute("aria-label", `Share of ${pose.name} in the mix`);
+  share.input.setAttribute("aria-label", `Blend of ${pose.name}`);
   const name = h("input", {
     class: "pose-name",
     attrs: { type: "text", value: pose.name, "aria-label": `Name of ${pose.name}`, maxlength: "60" },

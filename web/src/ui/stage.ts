@@ -24,7 +24,7 @@ export function createOverlays(
     "What dragging changes",
     [
       { value: "pose", label: "Pose" },
-      { value: "rest", label: "Rest cage" },
+      { value: "rest", label: "Reshape the cage" },
     ],
     (value) => {
       app.edit.setEditingRest(value === "rest");
@@ -33,7 +33,7 @@ export function createOverlays(
     { hideLabel: true },
   );
   mode.element.classList.add("floating", "mode");
-  mode.element.title = `Pose the model, or shape its cage at rest (${app.key("restMode")})`;
+  mode.element.title = `Pose the model, or reshape its cage (${app.key("restMode")})`;
 
   const gizmos: [SceneOptions["gizmo"], IconName, string, string][] = [
     ["none", "select", "Select and drag", app.key("toolSelect")],
@@ -75,7 +75,7 @@ export function createOverlays(
     shortcut: app.key("symmetry"),
     pressed: false,
   });
-  const proportional = iconButton("proportional", "Take neighbours along", () => app.run("proportional"), {
+  const proportional = iconButton("proportional", "Proportional editing", () => app.run("proportional"), {
     shortcut: app.key("proportional"),
     pressed: false,
   });
@@ -178,6 +178,7 @@ export function createOverlays(
         touch: touch.matches,
         hasCage: state.cage !== null,
         bound: state.bound,
+        binding: state.bindRun !== null,
         rest: state.editingRest,
       }),
     );

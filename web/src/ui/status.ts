@@ -1,10 +1,10 @@
 /** The status line of the view, in words. */
 
-import { percent, plural } from "../format";
+import { plural } from "../format";
 import { type AppState, cageBroken } from "../state";
 import { STAGES } from "../strings";
 
-/** The status line: what is going on, said once; progress in steps of ten so that it is not read all the time. */
+/** The status line: what is going on, said once. How far it is the panel and the title say. */
 export function statusOf(state: AppState): string {
   return underWay(state) ?? settled(state);
 }
@@ -14,8 +14,8 @@ export function underWay(state: AppState): string | null {
   if (state.busy) return `${state.busy}…`;
   if (state.gesture) return state.gesture;
   if (state.scene.original) return "The original, while Space is held";
-  if (state.cageProgress !== null) return `Making a cage: ${percent(tenth(state.cageProgress))}`;
-  if (state.bindRun) return `${STAGES[state.bindRun.stage]}: ${percent(tenth(state.bindRun.fraction))}`;
+  if (state.cageProgress !== null) return STAGES.simplify;
+  if (state.bindRun) return STAGES[state.bindRun.stage];
   if (state.boxArmed) return "Drag a box around what you want to select";
   if (state.playing) return "Playing the poses";
   if (cageBroken(state)) return "The cage has faults; the Cage step says which";
@@ -26,11 +26,7 @@ function settled(state: AppState): string {
   const { count, last } = state.selected;
   if (count === 1) return `Cage vertex ${last} selected`;
   if (count > 1) return `${plural(count, "cage vertex", "cage vertices")} selected`;
-  if (state.editingRest) return "Shaping the cage at rest";
+  if (state.editingRest) return "Reshaping the cage";
   if (state.bound) return "Ready";
   return state.model ? "Not bound yet" : "";
-}
-
-function tenth(share: number): number {
-  return Math.floor(share * 10) / 10;
 }

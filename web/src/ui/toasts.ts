@@ -12,6 +12,14 @@ const SHOWN_WITH_BUTTON_MS = 12_000;
 /** More at a time would hide the model. */
 const MOST = 3;
 
+/** What is said again takes the place of what was said. */
+function once(list: HTMLElement, toast: HTMLElement): void {
+  const said = (one: Element) =>
+    Array.from(one.querySelectorAll("strong, p"), (part) => part.textContent).join("\n");
+  const text = said(toast);
+  for (const other of Array.from(list.children)) if (said(other) === text) other.remove();
+}
+
 export function createToasts(): { element: HTMLElement; tell: Tell } {
   const polite = h("div", { class: "toast-list", attrs: { role: "status", "aria-live": "polite" } });
   const alerts = h("div", { class: "toast-list", attrs: { role: "alert" } });
@@ -34,6 +42,7 @@ export function createToasts(): { element: HTMLElement; tell: Tell } {
       const toast = h("div", { class: "toast" });
       const close = () => toast.remove();
       toast.append(icon("info"), h("p", { text }));
+      once(polite, toast);
       const fixing = fixButton(fix, close);
       if (fixing) toast.append(fixing);
       toast.append(iconButton("close", "Close message", close, { kind: "small" }));
@@ -60,6 +69,7 @@ export function createToasts(): { element: HTMLElement; tell: Tell } {
         ),
         iconButton("close", "Close message", close, { kind: "small" }),
       );
+      once(alerts, toast);
       const fixing = fixButton(fix, close);
       if (fixing) toast.append(h("div", { class: "toast-fix" }, fixing));
       alerts.append(toast);

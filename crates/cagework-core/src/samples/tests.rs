@@ -1,3 +1,4 @@
+use crate::cage_check::{Severity, check};
 use glam::Vec3;
 
 use super::{all, build};
@@ -92,5 +93,16 @@ fn what_is_left_out_of_a_body_changes_no_distance_and_no_colour() {
                 assert_eq!(near.colour(p), body.colour(p), "at {p}");
             }
         }
+    }
+}
+
+/// The page opens with one of them: nothing of it may look broken.
+#[test]
+fn no_sample_has_a_fault() {
+    for info in all() {
+        let sample = build(info.id).unwrap();
+        let found = check(&sample.cage, Some(&sample.mesh.positions), Some(BindOptions::default().grid));
+        let faults: Vec<_> = found.problems.iter().filter(|p| p.severity != Severity::Note).collect();
+        assert!(faults.is_empty(), "{}: {:?}", info.id, faults.iter().map(|p| &p.message).collect::<Vec<_>>());
     }
 }
