@@ -20,6 +20,7 @@ import { attachDrop } from "./input/drop";
 import { attachKeyboard } from "./input/keyboard";
 import { attachPointer } from "./input/pointer";
 import { isMac, shortcutText } from "./input/shortcuts";
+import { createQueue } from "./queue";
 import { openSession } from "./session";
 import { lackOf } from "./session/adapter";
 import { decodeShare } from "./share";
@@ -75,7 +76,7 @@ async function main(): Promise<void> {
     label: FIX_LABELS[fix],
     run: () => fixes[fix](),
   });
-  const ctx: Context = { session: current, store, history, tell, fixFor };
+  const ctx: Context = { session: current, store, history, queue: createQueue(), tell, fixFor };
 
   const bind = createBind(ctx);
   const project = createProject(ctx);

@@ -1,9 +1,7 @@
 /** The one way from the page to Rust: the engine on this thread, the binder in a worker, files, frames. */
 
 import type {
-  BindEvent,
   BindOptions,
-  BindReport,
   Check,
   CheckedCage,
   Job,
@@ -129,9 +127,6 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   void watch();
 
   const cage = () => ({ positions: engine.restPositions(), corners: engine.cageCorners() });
-  let bind: Job<BindReport> | undefined;
-  let slice: Job<void> | undefined;
-  let meanValue: Job<void> | undefined;
 
   const openApart = () => createClient(module, openWorker);
   const reading = createApart(openApart);
@@ -156,7 +151,6 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     const loaded = await load(pkg, read);
     const { settings } = loaded;
     const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
-    bind?.cancel();
     const info: ModelInfo = await engine.open(loaded);
     const cage = read.cage ? takeCage(read.cage) : null;
     const model = { ...info, notices: [...info.notices, ...read.notices] };
@@ -200,35 +194,22 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       const input = { positions: engine.modelPositions(), triangles: engine.modelTriangles(), options };
       return ofNow(client.run("cage", input, ({ fraction }) => onProgress(fraction)));
     },
-    bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport> {
-      bind?.cancel();
-      bind = startBind({
-        client,
-        engine,
-        adapter,
-        options: possible(options),
-        listener,
-        cage: cage(),
-      });
-      return bind;
-    },
+    bind: (options, listener) =>
+      startBind({ client, engine, adapter, options: possible(options), listener, cage: cage() }),
     estimateMemory: (options) => engine.estimateMemory(possible(options)),
-    bindMeanValue() {
-      meanValue?.cancel();
-      const job = client.run("meanValue", { positions: engine.modelPositions(), cage: cage() });
-      meanValue = chain(ofNow(job), ({ indptr, indices, data }) => engine.adoptOther(indptr, indices, data));
-      return meanValue;
-    },
+    bindMeanValue: () =>
+      chain(
+        ofNow(client.run("meanValue", { positions: engine.modelPositions(), cage: cage() })),
+        ({ indptr, indices, data }) => engine.adoptOther(indptr, indices, data),
+      ),
     loadSlice(axis, fraction, grid) {
-      slice?.cancel();
       const options = possible({ ...BIND_DEFAULTS, grid });
       const job = client.run("slice", { cage: cage(), axis, fraction, options });
       const none = { indptr: new Uint32Array(), indices: new Uint32Array(), data: new Float32Array() };
-      slice = chain(ofNow(job), (rows) => {
+      return chain(ofNow(job), (rows) => {
         const { indptr, indices, data } = rows ?? none;
         engine.takeSlice(axis, fraction, options, indptr, indices, data);
       });
-      return slice;
     },
     draw: frames.ask,
     onFrame: frames.listen,

@@ -24,6 +24,8 @@ export type StepName = (typeof STEPS)[number];
 
 export interface BindRun {
   pass: "coarse" | "fine";
+  /** Of the engine: what the bind is for. */
+  revision: number;
   stage: Stage;
   /** Of the pass, 0 to 1. */
   fraction: number;

@@ -1,7 +1,8 @@
 /** Binding: starts, follows and cancels it, and knows what it will need. */
 
-import type { BindEvent, BindOptions, BindReport, Job } from "../contract";
+import type { BindEvent, BindOptions, BindReport } from "../contract";
 import { createEta, type Eta } from "../eta";
+import { follow } from "../queue";
 import { type BindRun, cageBroken, drawn } from "../state";
 import { sentence } from "../strings";
 import { attempt, type Context } from "./context";
@@ -22,12 +23,9 @@ export interface BindActions {
 const EARLIER = 4;
 
 export function createBind(ctx: Context): BindActions {
-  /** The bind that runs, and for which revision. */
-  let running: { readonly job: Job<BindReport>; readonly revision: number } | undefined;
+  const { store } = ctx;
   /** Options of the last bind that ended. */
   let kept: BindOptions | undefined;
-  let compare: Promise<boolean> | undefined;
-  const { store } = ctx;
 
   const estimate = () => {
     const { model, cage, bindOptions } = store.get();
@@ -59,89 +57,100 @@ export function createBind(ctx: Context): BindActions {
     store.set({ legend: engine.legend() ?? null });
   };
 
+  const bind = async (revision: number, signal: AbortSignal) => {
+    const session = ctx.session();
+    session.engine.requireCurrent(revision);
+    let eta: Eta = createEta(performance.now());
+    let run: BindRun = start("coarse", revision);
+    const hear = (event: BindEvent) => {
+      switch (event.kind) {
+        case "progress": {
+          if (event.pass !== run.pass) {
+            run = start(event.pass, revision);
+            eta = createEta(performance.now());
+          }
+          const own = eta.update(event.fraction, performance.now());
+          run = {
+            pass: event.pass,
+            revision,
+            stage: event.stage,
+            fraction: event.fraction,
+            etaMs: event.etaMs ?? own ?? null,
+            iteration: event.iteration,
+            delta: event.delta,
+            curve: grown(run.curve, event.iteration, event.delta),
+          };
+          store.set({ bindRun: run });
+          break;
+        }
+        case "adopted":
+          adopted(event.report, event.pass);
+          break;
+        case "fallback":
+          ctx.tell.say(sentence(event.reason));
+          break;
+        default:
+          event satisfies never;
+      }
+    };
+    const asked = store.get().bindOptions;
+    const report = await follow(signal, session.bind(asked, hear));
+    adopted(report, "fine");
+    kept = asked;
+    if (!report.converged) {
+      ctx.tell.say("The solver stopped at its iteration limit, before the change fell below the threshold.");
+    }
+  };
+
   return {
     async start(unasked = false) {
       if (!store.get().cage || cageBroken(store.get())) return false;
       if (!unasked) ctx.tell.clear();
-      let eta: Eta = createEta(performance.now());
-      let run: BindRun = start("coarse");
-      store.set({ bindRun: run });
-      const hear = (event: BindEvent) => {
-        switch (event.kind) {
-          case "progress": {
-            if (event.pass !== run.pass) {
-              run = start(event.pass);
-              eta = createEta(performance.now());
-            }
-            const own = eta.update(event.fraction, performance.now());
-            run = {
-              pass: event.pass,
-              stage: event.stage,
-              fraction: event.fraction,
-              etaMs: event.etaMs ?? own ?? null,
-              iteration: event.iteration,
-              delta: event.delta,
-              curve: grown(run.curve, event.iteration, event.delta),
-            };
-            store.set({ bindRun: run });
-            break;
-          }
-          case "adopted":
-            adopted(event.report, event.pass);
-            break;
-          case "fallback":
-            ctx.tell.say(sentence(event.reason));
-            break;
-          default:
-            event satisfies never;
-        }
-      };
       const { revision } = ctx.session().engine;
-      const asked = store.get().bindOptions;
-      const mine = { job: ctx.session().bind(asked, hear), revision };
-      running = mine;
-      const ok = await attempt(ctx, "The bind did not finish", async () => {
-        const report = await mine.job.done;
-        adopted(report, "fine");
-        kept = asked;
-        if (!report.converged) {
-          ctx.tell.say(
-            "The solver stopped at its iteration limit, before the change fell below the threshold.",
-          );
-        }
-      });
-      if (running === mine) {
-        running = undefined;
-        store.set({ bindRun: null });
-      }
+      store.set({ bindRun: start("coarse", revision) });
+      const ok = await attempt(ctx, "The bind did not finish", () =>
+        ctx.queue.replace("bind", (signal) => bind(revision, signal)),
+      );
+      // One for another cage may wait by now.
+      if (store.get().bindRun?.revision === revision) store.set({ bindRun: null });
       return ok && store.get().bound;
     },
     cancel() {
-      if (!running) return;
-      running.job.cancel();
-      if (!store.get().bound || !kept) return;
+      const { bindRun, bound } = store.get();
+      ctx.queue.cancel("bind");
+      if (!bindRun || !bound || !kept) return;
       store.set({ bindOptions: kept });
       ctx.tell.say("The bind from before is kept, and its settings.");
     },
-    covers: () => store.get().bound || running?.revision === ctx.session().engine.revision,
+    covers() {
+      const { bound, bindRun } = store.get();
+      return bound || bindRun?.revision === ctx.session().engine.revision;
+    },
     setOptions(patch) {
       store.set({ bindOptions: { ...store.get().bindOptions, ...patch } });
     },
-    prepareCompare() {
-      if (store.get().meanValueReady) return Promise.resolve(true);
-      compare ??= attempt(ctx, "Mean value coordinates could not be computed", async () => {
-        await ctx.session().bindMeanValue().done;
-        store.set({ meanValueReady: true });
-      }).finally(() => {
-        compare = undefined;
-      });
-      return compare;
-    },
+    prepareCompare: () =>
+      attempt(ctx, "Mean value coordinates could not be computed", () =>
+        ctx.queue.add("compare", async (signal) => {
+          if (store.get().meanValueReady) return;
+          await follow(signal, ctx.session().bindMeanValue());
+          store.set({ meanValueReady: true });
+        }),
+      ),
   };
 }
 
-function start(pass: BindRun["pass"]): BindRun {
-  return { pass, stage: "voxelize", fraction: 0, etaMs: null, iteration: 0, delta: null, curve: [] };
+function start(pass: BindRun["pass"], revision: number): BindRun {
+  return {
+    pass,
+    revision,
+    stage: "voxelize",
+    fraction: 0,
+    etaMs: null,
+    iteration: 0,
+    delta: null,
+    curve: [],
+  };
 }
 
 /** Whether two binds were done the same way, so that one report takes the other's place. */

@@ -1,6 +1,16 @@
 /** Getting a cage: made for the model, a box, or a file; and repairing it. */
 
-import type { CageOptions, CageState, Check, CheckedCage, Job, Mend, NamedFile, Repair } from "../contract";
+import type {
+  CageOptions,
+  CageState,
+  Check,
+  CheckedCage,
+  Mend,
+  NamedFile,
+  Reading,
+  Repair,
+} from "../contract";
+import { follow } from "../queue";
 import type { CageSource } from "../state";
 import { attempt, type Context, waitFor } from "./context";
 
@@ -25,12 +35,12 @@ const HULL_VERTICES = 24;
 const LOAD = "Load a cage";
 
 export function createCage(ctx: Context, after: () => void, refine: (grid: number) => void): CageActions {
-  let job: Job<CheckedCage> | undefined;
-
   const look = () =>
-    attempt(ctx, "The cage could not be checked", async () => {
-      ctx.store.set({ check: await ctx.session().checkCage().done });
-    });
+    attempt(ctx, "The cage could not be checked", () =>
+      ctx.queue.replace("check", async (signal) =>
+        ctx.store.set({ check: await follow(signal, ctx.session().checkCage()) }),
+      ),
+    );
 
   const adopt = (state: CageState | null, check: Check | null) => {
     ctx.store.set({
@@ -64,61 +74,58 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
     if (before && next) ctx.history.push({ label, undo: () => set(before), redo: () => set(next) });
   };
 
-  const generate = async (source: CageSource) => {
+  const generate = async (source: CageSource, signal: AbortSignal) => {
     const { cageOptions } = ctx.store.get();
     const hull = { shape: "hull", vertices: HULL_VERTICES, voxels: 0 } as const;
     const options: CageOptions = source === "hull" ? { ...cageOptions, ...hull } : cageOptions;
     ctx.store.set({ cageProgress: 0 });
-    const running = ctx.session().generateCage(options, (fraction) => {
-      if (job === running) ctx.store.set({ cageProgress: fraction });
-    });
-    job = running;
     try {
-      const made = await running.done;
+      const hear = (cageProgress: number) => ctx.store.set({ cageProgress });
+      const made = await follow(signal, ctx.session().generateCage(options, hear));
       const vertices = made.positions.length / 3;
       if (vertices > options.vertices) {
         ctx.tell.say(`The model's holes and gaps need ${vertices} vertices instead of ${options.vertices}.`);
       }
       return made;
     } finally {
-      if (job === running) {
-        job = undefined;
-        ctx.store.set({ cageProgress: null });
-      }
+      ctx.store.set({ cageProgress: null });
     }
   };
 
   return {
     make() {
-      const { cageSource, boxDivisions } = ctx.store.get();
-      const before = now();
-      job?.cancel();
       ctx.tell.clear();
-      return attempt(ctx, "No cage could be made", async () => {
-        const box = () => ({ ...ctx.session().boxCage(boxDivisions), check: null });
-        take("Make a cage", before, cageSource === "box" ? box() : await generate(cageSource));
-      });
+      return attempt(ctx, "No cage could be made", () =>
+        ctx.queue.replace("cage", async (signal) => {
+          const before = now();
+          const { cageSource, boxDivisions } = ctx.store.get();
+          const box = () => ({ ...ctx.session().boxCage(boxDivisions), check: null });
+          take("Make a cage", before, cageSource === "box" ? box() : await generate(cageSource, signal));
+        }),
+      );
     },
-    cancel: () => job?.cancel(),
+    cancel: () => ctx.queue.cancel("cage"),
     load(files) {
-      const before = now();
       ctx.tell.clear();
-      return attempt(ctx, "This cage cannot be used", async () => {
-        const name = files[0]?.name ?? "the cage";
-        const read = await waitFor(ctx, `Opening ${name}`, (hear) => ctx.session().readCage(files, hear));
-        ctx.store.set({ cageSource: "file" });
-        take(LOAD, before, read);
-      });
+      return attempt(ctx, "This cage cannot be used", () =>
+        ctx.queue.replace("open", async (signal) => {
+          const before = now();
+          const name = files[0]?.name ?? "the cage";
+          const read = (hear: (progress: Reading) => void) => ctx.session().readCage(files, hear);
+          const cage = await waitFor(ctx, signal, `Opening ${name}`, read);
+          ctx.store.set({ cageSource: "file" });
+          take(LOAD, before, cage);
+        }),
+      );
     },
     repair(kind) {
-      const before = now();
-      return attempt(ctx, "The repair did not work", async () => {
-        take(
-          "Repair the cage",
-          before,
-          await waitFor(ctx, "Repairing the cage", () => ctx.session().repair(kind)),
-        );
-      });
+      return attempt(ctx, "The repair did not work", () =>
+        ctx.queue.replace("open", async (signal) => {
+          const before = now();
+          const repair = () => ctx.session().repair(kind);
+          take("Repair the cage", before, await waitFor(ctx, signal, "Repairing the cage", repair));
+        }),
+      );
     },
     regenerate() {
       ctx.store.set({ cageSource: "auto" });

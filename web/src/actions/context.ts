@@ -4,6 +4,7 @@ import type { Job, ReadFile, Reading, Session } from "../contract";
 import { isFatal } from "../crash";
 import { duration } from "../format";
 import type { History } from "../history";
+import type { Queue } from "../queue";
 import type { Store } from "../state";
 import { type Explained, explain, isCancelled, sayReading } from "../strings";
 
@@ -25,6 +26,7 @@ export interface Context {
   readonly session: () => Session;
   readonly store: Store;
   readonly history: History;
+  readonly queue: Queue;
   readonly tell: Tell;
   /** The button for an error's fix, if the page has one. */
   readonly fixFor: (fix: NonNullable<Explained["fix"]>) => Fix;
@@ -51,11 +53,13 @@ const LONG_MS = 4000;
 /** While a file is read the page waits, says how far it is, and lets the user give it up. */
 export async function waitFor<T extends object>(
   ctx: Context,
+  signal: AbortSignal,
   what: string,
   work: (hear: (progress: Reading) => void) => Job<T>,
 ): Promise<T> {
   const { store } = ctx;
   const job = work(({ stage, fraction }) => store.set({ busyStep: sayReading(stage, fraction) }));
+  signal.addEventListener("abort", () => cancelBusy(), { once: true });
   let cancelBusy = job.cancel;
   store.set({ busy: what, busyStep: "", cancelBusy });
   try {
@@ -70,10 +74,7 @@ export async function waitFor<T extends object>(
     }
     return read;
   } finally {
-    // Another one may be waited for by now.
-    if (store.get().cancelBusy === cancelBusy) {
-      store.set({ busy: null, busyStep: "", cancelBusy: null, goOn: null });
-    }
+    store.set({ busy: null, busyStep: "", cancelBusy: null, goOn: null });
   }
 }
 

@@ -23,9 +23,9 @@ export interface Follow {
   loadCage(files: readonly NamedFile[]): Promise<boolean>;
   bind(): Promise<boolean>;
   /** Takes a project's settings, before the bind. */
-  applySettings(settings: Settings): void;
+  applySettings(settings: Partial<Settings>): void;
   /** And its pose. */
-  applyPose(settings: Settings): void;
+  applyPose(settings: Partial<Settings>): void;
   /** What is open, as a project. */
   writeProject(): Uint8Array;
   /** Keeps what is open: something else will be. */
@@ -36,11 +36,9 @@ export interface Follow {
 
 export function createFiles(ctx: Context, follow: Follow): Files {
   const { store } = ctx;
-  /** The page waits until the last of what it waits for ends. */
-  let waits = 0;
-  let replacing: Promise<unknown> = Promise.resolve();
-
   const take = async (opened: Opened, sample: string | null, cageFiles?: readonly NamedFile[]) => {
+    // Nobody needs the weights of what was open.
+    ctx.queue.cancel("bind");
     const settings = settingsOf(opened);
     const poses = opened.project?.poses ?? opened.poses ?? [];
     ctx.history.clear();
@@ -69,8 +67,9 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     // The memory limit is this computer's: no file says how much it has.
     const bind = { ...BIND_DEFAULTS, memory_limit: store.get().bindOptions.memory_limit };
     const { project } = opened;
-    if (!project) return { notices: [] };
-    return ctx.session().readSettings(project.settings, { bind, cage: CAGE_DEFAULTS });
+    return project
+      ? ctx.session().readSettings(project.settings, { bind, cage: CAGE_DEFAULTS })
+      : { notices: [] };
   };
 
   const goTo = (from: readonly StepName[], step: StepName) => {
@@ -79,42 +78,40 @@ export function createFiles(ctx: Context, follow: Follow): Files {
 
   /** Cage, bind, pose: as far as it goes without the user. */
   const prepare = async (cageFiles: readonly NamedFile[] | undefined, familiar: boolean) => {
-    const { model } = store.get();
-    const current = () => store.get().model === model;
     if (cageFiles) {
-      if (!(await follow.loadCage(cageFiles)) || !current()) return;
+      if (!(await follow.loadCage(cageFiles))) return;
     } else if (!store.get().cage) {
       if (!familiar) goTo(["model", "bind", "pose", "export"], "cage");
-      if (!(await follow.makeCage()) || !current()) return;
+      if (!(await follow.makeCage())) return;
     }
     if (!store.get().cage?.usable) {
       goTo(["model", "bind", "pose", "export"], "cage");
       return;
     }
     if (!familiar) goTo(["model", "cage"], "bind");
-    if ((await follow.bind()) && current() && !familiar) goTo(["bind"], "pose");
+    if ((await follow.bind()) && !familiar) goTo(["bind"], "pose");
   };
 
-  const busy = async (what: string, title: string, work: () => Promise<void>): Promise<boolean> => {
-    waits += 1;
-    const mine = waits;
-    store.set({ busy: what });
-    ctx.tell.clear();
-    const ok = await attempt(ctx, title, work);
-    if (mine === waits) store.set({ busy: null });
-    return ok;
-  };
-
-  /** Opens something else, one after the other in the order asked for; what is open until then stays kept. */
-  const replace = (open: () => Promise<Opened>, sample: string | null, cageFiles?: readonly NamedFile[]) => {
-    const result = replacing.then(async () => {
-      await follow.keep();
-      const opened = await open();
-      follow.leave();
-      await take(opened, sample, cageFiles);
+  /** In the order asked for; who asks for another one gives up the one before. */
+  const busy = (what: string, title: string, work: (signal: AbortSignal) => Promise<void>) =>
+    attempt(ctx, title, () => {
+      ctx.tell.clear();
+      return ctx.queue.replace("open", async (signal) => {
+        store.set({ busy: what });
+        await work(signal).finally(() => store.set({ busy: null }));
+      });
     });
-    replacing = result.catch(() => undefined);
-    return result;
+
+  /** Opens something else; what is open until then stays kept. */
+  const replace = async (
+    open: () => Promise<Opened>,
+    sample: string | null,
+    cageFiles?: readonly NamedFile[],
+  ) => {
+    await follow.keep();
+    const opened = await open();
+    follow.leave();
+    await take(opened, sample, cageFiles);
   };
 
   return {
@@ -146,8 +143,8 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       const title = `${main.name} could not be opened`;
       const cageFiles = second && [second];
       const own = [main, ...files.filter((file) => file !== second && file !== main)];
-      return busy(what, title, async () => {
-        const read = await waitFor(ctx, what, (hear) => ctx.session().readFiles(own, hear));
+      return busy(what, title, async (signal) => {
+        const read = await waitFor(ctx, signal, what, (hear) => ctx.session().readFiles(own, hear));
         store.set({ busy: what });
         await replace(() => ctx.session().open(read), null, cageFiles);
       });

@@ -1,6 +1,7 @@
 /** What is drawn and from where. */
 
-import type { Element as CageElement, Job, SceneOptions } from "../contract";
+import type { Element as CageElement, SceneOptions } from "../contract";
+import { follow } from "../queue";
 import { drawn, type Slice } from "../state";
 import { saveTheme, type Theme } from "../store";
 import { attempt, type Context } from "./context";
@@ -39,7 +40,6 @@ export function createView(
 ): View {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
-  let sliceJob: Job<void> | undefined;
   let sliceTimer: ReturnType<typeof setTimeout> | undefined;
 
   const scene = (patch: Partial<SceneOptions>) => {
@@ -63,18 +63,16 @@ export function createView(
     if (store.get().theme === "auto") scene({ theme: shown("auto") });
   });
 
-  const loadSlice = async () => {
-    const { slice, scene: now, bindOptions } = store.get();
-    if (now.slice === "off" || !store.get().cage?.usable) return;
-    sliceJob?.cancel();
-    const job = ctx.session().loadSlice(slice.axis, slice.position, bindOptions.grid);
-    sliceJob = job;
+  const loadSlice = async (signal: AbortSignal) => {
+    const { slice, scene: now, bindOptions, cage } = store.get();
+    if (now.slice === "off" || !cage?.usable) return;
     store.set({ slice: { ...slice, busy: true } });
-    await attempt(ctx, "The slice could not be computed", () => job.done);
-    if (sliceJob !== job) return;
-    sliceJob = undefined;
-    store.set({ slice: { ...store.get().slice, busy: false } });
-    scene({});
+    try {
+      await follow(signal, ctx.session().loadSlice(slice.axis, slice.position, bindOptions.grid));
+    } finally {
+      store.set({ slice: { ...store.get().slice, busy: false } });
+      scene({});
+    }
   };
 
   return {
@@ -84,7 +82,11 @@ export function createView(
       store.set({ slice: { ...store.get().slice, ...patch } });
       if (kind !== undefined) scene({ slice: kind });
       clearTimeout(sliceTimer);
-      sliceTimer = setTimeout(() => void loadSlice(), SLICE_PAUSE_MS);
+      const load = () => ctx.queue.replace("slice", loadSlice);
+      sliceTimer = setTimeout(
+        () => void attempt(ctx, "The slice could not be computed", load),
+        SLICE_PAUSE_MS,
+      );
     },
     async compare(on) {
       if (on && !(await prepareCompare())) {

@@ -61,7 +61,7 @@ export interface Session {
 
   /**
    * Binds in the worker: coarse (g = 32) first if that is less than asked, then as asked; each result is adopted as
-   * soon as it is there, the pose stays. Only one bind at a time: a second one cancels the first.
+   * soon as it is there, the pose stays.
    * `done` rejects with name "Cancelled" after `cancel()`, what was adopted before stays.
    */
   bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport>;

@@ -1,0 +1,49 @@
+/** Work in order, and what is given up. */
+
+import { describe, expect, it } from "vitest";
+import { createQueue, follow } from "../src/queue";
+
+/** Work that ends when it is told to. */
+function held() {
+  let end = () => {};
+  const done = new Promise<void>((resolve) => {
+    end = resolve;
+  });
+  return { done, end };
+}
+
+describe("the queue", () => {
+  it("runs work of a kind one after the other, also after one that failed", async () => {
+    const queue = createQueue();
+    const first = held();
+    const order: string[] = [];
+    const failed = queue.add("bind", async () => {
+      await first.done;
+      order.push("first");
+      throw new Error("no");
+    });
+    const second = queue.add("bind", async () => order.push("second"));
+    await queue.add("slice", async () => order.push("other kind"));
+    first.end();
+    await expect(failed).rejects.toThrow("no");
+    await second;
+    expect(order).toEqual(["other kind", "first", "second"]);
+  });
+
+  it("cancels what is under way and never starts what waits", async () => {
+    const queue = createQueue();
+    const first = held();
+    const cancelled: string[] = [];
+    const job = { done: first.done, cancel: () => void cancelled.push("first") };
+    const running = queue.add("bind", (signal) => follow(signal, job));
+    // It has to begin before it can be given up.
+    await Promise.resolve();
+    const waiting = queue.replace("bind", async () => cancelled.push("never"));
+    const last = queue.replace("bind", async () => "last");
+    first.end();
+    await running;
+    await expect(waiting).rejects.toMatchObject({ name: "Cancelled" });
+    expect(await last).toBe("last");
+    expect(cancelled).toEqual(["first"]);
+  });
+});
