@@ -46,8 +46,8 @@ interface Figure {
   readonly sample: string;
   readonly bind: Partial<BindOptions> | "mean value";
   readonly pose?: number;
-  /** The cage vertex that reaches farthest along this direction. */
-  readonly farthest?: Bounds["min"];
+  /** The cage vertex closest to this place is selected. */
+  readonly closest?: Bounds["min"];
   readonly slice?: 0 | 1 | 2;
   readonly scene: Partial<SceneOptions>;
 }
@@ -57,7 +57,8 @@ const FIGURES: readonly Figure[] = [
     name: "weights",
     sample: "humanoid",
     bind: {},
-    farthest: [1, -1, 0],
+    // A knee, from the front: what follows it, and that the other leg does not.
+    closest: [0.1, 0.5, 0.2],
     scene: { colour: "weight", problems: false },
   },
   { name: "slice-kinds", sample: "clamp", bind: {}, slice: 2, scene: { slice: "kinds", model: false } },
@@ -93,11 +94,12 @@ test("pictures of the documents", async ({ page }) => {
         const pose = opened.poses?.[figure.pose ?? -1];
         if (pose) engine.setCagePositions(pose.positions);
         const points = engine.restPositions();
-        const reach = (i: number) =>
-          (figure.farthest ?? []).reduce((sum, d, axis) => sum + d * (points[3 * i + axis] ?? 0), 0);
+        const { closest } = figure;
+        const away = (i: number) =>
+          Math.hypot(...(closest ?? []).map((at, axis) => at - (points[3 * i + axis] ?? 0)));
         const vertices = Array.from({ length: points.length / 3 }, (_, i) => i);
-        const best = vertices.reduce((a, b) => (reach(b) > reach(a) ? b : a), 0);
-        engine.select(figure.farthest ? Uint32Array.of(best) : new Uint32Array(), "replace");
+        const best = vertices.reduce((a, b) => (away(b) < away(a) ? b : a), 0);
+        engine.select(closest ? Uint32Array.of(best) : new Uint32Array(), "replace");
         engine.setScene({ ...plain, theme: "light", ...figure.scene });
         engine.frameAll();
         const view = document.querySelector("canvas");

@@ -24,7 +24,7 @@ export function createOverlays(
     "What dragging changes",
     [
       { value: "pose", label: "Pose" },
-      { value: "rest", label: "Reshape the cage" },
+      { value: "rest", label: "Reshape" },
     ],
     (value) => {
       app.edit.setEditingRest(value === "rest");
