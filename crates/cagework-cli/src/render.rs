@@ -10,6 +10,7 @@ use cagework_core::{BindOptions, Cage, Controls, Weights, mean_value_weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView, check_layers};
 use cagework_io::{Model, read_weights_npz, shown};
+use glam::Vec3;
 use serde::Serialize;
 
 use crate::args::{CageSource, RenderArgs, Show};
@@ -55,9 +56,10 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     pollster::block_on(session.set_model(drawn))?;
     let mut scene = scene_of(args);
     let mut other = None;
+    let mut points = model.positions.clone();
     if let Some(cage) = &cage {
         pollster::block_on(session.set_cage(&cage.cage))?;
-        prepare(args, &model, cage, &mut session, &mut scene)?;
+        points.extend(prepare(args, &model, cage, &mut session, &mut scene)?);
     }
     session.set_scene(scene);
     if let Some(cage) = cage.as_ref().filter(|_| args.compare) {
@@ -75,6 +77,7 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     }
     camera.set_viewport(glam::Vec2::from(part.map(|s| s as f32)));
     session.frame_all();
+    session.camera_mut().fit(&points);
     check_layers(session.context(), session.camera(), &model.positions, &model.triangles, part)?;
 
     let started = Instant::now();
@@ -158,14 +161,14 @@ fn scene_of(args: &RenderArgs) -> SceneOptions {
     }
 }
 
-/// Weights, pose and slice, as far as the picture needs them.
+/// Weights, pose and slice, as far as the picture needs them. Returns where the cage is, at rest and posed.
 fn prepare(
     args: &RenderArgs,
     model: &Model,
     cage: &LoadedCage,
     session: &mut Session,
     scene: &mut SceneOptions,
-) -> Result<(), CliError> {
+) -> Result<Vec<Vec3>, CliError> {
     let n_cage = Controls::from(&cage.cage).n_controls();
     if matches!(args.show, Show::Weights | Show::Slice) && args.column as usize >= n_cage {
         return Err(CliError::Mismatch {
@@ -194,13 +197,16 @@ fn prepare(
         };
         pollster::block_on(session.adopt(weights, outside))?;
     }
+    let mut places = cage.cage.positions().to_vec();
     if let Some(path) = &args.pose {
-        session.pose(&cage.load_pose(path)?);
+        let pose = cage.load_pose(path)?;
+        session.pose(&pose);
+        places.extend(pose);
     }
     if matches!(args.show, Show::Cells | Show::Slice) {
         scene.slice = Some(slice(args, &cage.cage)?);
     }
-    Ok(())
+    Ok(places)
 }
 
 fn slice(args: &RenderArgs, cage: &Cage) -> Result<SliceView, CliError> {

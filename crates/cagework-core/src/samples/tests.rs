@@ -103,6 +103,11 @@ fn no_sample_has_a_fault() {
         let sample = build(info.id).unwrap();
         let found = check(&sample.cage, Some(&sample.mesh.positions), Some(BindOptions::default().grid));
         let faults: Vec<_> = found.problems.iter().filter(|p| p.severity != Severity::Note).collect();
-        assert!(faults.is_empty(), "{}: {:?}", info.id, faults.iter().map(|p| &p.message).collect::<Vec<_>>());
+        assert!(
+            faults.is_empty(),
+            "{}: {:?}",
+            info.id,
+            faults.iter().map(|p| &p.message).collect::<Vec<_>>()
+        );
     }
 }

@@ -14,6 +14,9 @@ const FOV_Y: f32 = 35.0 * PI / 180.0;
 /// Room left around what is framed, as a factor.
 const FRAME_MARGIN: f32 = 1.12;
 
+/// The same around points that a picture is fitted to.
+const FIT_MARGIN: f32 = 1.06;
+
 /// Nearest and farthest the target may be, over the scene's radius.
 const DISTANCES: [f32; 2] = [1e-3, 1e3];
 
@@ -284,6 +287,33 @@ impl Camera {
             .fold(0.0, f32::max);
         // A single vertex has no size: come as near as a twentieth of the scene.
         self.distance = (FRAME_MARGIN * needed).max(0.05 * self.scene_radius);
+    }
+
+    /// Looks at points so that they just fill the picture, from where it looks now. Nearer than [`Self::frame`], and the
+    /// target is wherever that needs it: for pictures, not for hands that turn the view.
+    pub fn fit(&mut self, points: &[Vec3]) {
+        let tan_y = (0.5 * self.fov_y).tan();
+        let tans = [tan_y * self.viewport.x / self.viewport.y, tan_y];
+        let across = [self.right(), self.up()];
+        let depth = match self.projection {
+            Projection::Perspective => self.backward(),
+            Projection::Orthographic => Vec3::ZERO,
+        };
+        let mut needed = 0.0_f32;
+        for (tan, across) in tans.into_iter().zip(across) {
+            // The distance from which each side sees the outermost point; moved across, both see it from the same one.
+            let from_side = |sign: f32| {
+                let from =
+                    |p: &Vec3| sign * (*p - self.target).dot(across) / tan + (*p - self.target).dot(depth);
+                points.iter().map(from).fold(f32::NEG_INFINITY, f32::max)
+            };
+            let sides = [from_side(1.0), from_side(-1.0)];
+            if sides.iter().all(|side| side.is_finite()) {
+                needed = needed.max(0.5 * (sides[0] + sides[1]));
+                self.target += 0.5 * tan * (sides[0] - sides[1]) * across;
+            }
+        }
+        self.distance = (FIT_MARGIN * needed).max(0.05 * self.scene_radius);
     }
 
     /// Looks along an axis at the same target.

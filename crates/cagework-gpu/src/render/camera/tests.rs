@@ -202,3 +202,24 @@ fn depth_is_ordered_and_within_the_clip_volume() {
         assert!(((clip.z - 0.01 * camera.lift()) / clip.w - z(nearer)).abs() < 2e-5);
     }
 }
+
+/// A box seen from its corner left two thirds of a picture empty.
+#[test]
+fn fitted_points_fill_the_picture_and_no_more() {
+    let corners = [[0.0, 0.0, 0.0], [3.0, 0.2, 0.0], [0.5, 1.0, 0.4], [-0.3, 0.1, -2.0]].map(Vec3::from);
+    for mut camera in both() {
+        for size in [Vec2::new(800.0, 600.0), Vec2::new(300.0, 900.0)] {
+            camera.set_viewport(size);
+            camera.set_scene(Bounds::of(&corners).expect("there are some"));
+            camera.fit(&corners);
+            let places =
+                corners.map(|c| camera.project(c).expect("it is in front").position / size * 2.0 - 1.0);
+            let high = places.into_iter().fold(Vec2::MIN, Vec2::max);
+            let low = places.into_iter().fold(Vec2::MAX, Vec2::min);
+            let fill = high.max(-low);
+            assert!((0.9..0.99).contains(&fill.max_element()), "{size}: {low} to {high}");
+            let tight = if fill.x > fill.y { 0 } else { 1 };
+            assert!((high[tight] + low[tight]).abs() < 0.05, "in the middle: {low} to {high}");
+        }
+    }
+}
