@@ -15,8 +15,6 @@ use cagework_io::{GltfError, NpzError, PoseCodeError, ProjectError, ReadError, W
 use serde::Serialize;
 use wasm_bindgen::JsValue;
 
-use crate::views::object;
-
 /// What kinds of errors the page tells apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -79,7 +77,7 @@ impl Fault {
 impl From<Fault> for JsValue {
     fn from(fault: Fault) -> Self {
         let error = js_sys::Error::new(&fault.message);
-        let name = object(&fault.name).ok().and_then(|name| name.as_string());
+        let name = serde_wasm_bindgen::to_value(&fault.name).ok().and_then(|name| name.as_string());
         error.set_name(&name.unwrap_or_default());
         error.into()
     }

@@ -1,0 +1,96 @@
+import { expect, it } from "vitest";
+import { createBind } from "../../src/actions/bind";
+import { named } from "../../src/session/client";
+import { cageOf, createFake, MODEL, reportOf, settled } from "../fake";
+
+/** A page with a model in a cage. */
+function page() {
+  const fake = createFake();
+  const bind = createBind(fake.ctx);
+  const { positions, corners } = cageOf(8);
+  fake.store.set({ model: MODEL, cage: fake.engine.setCage(positions, corners) });
+  return { ...fake, bind };
+}
+
+it("a bind that ends leaves weights and a report, and covers the cage until there is another", async () => {
+  const { bind, asked, store, engine } = page();
+  const bound = bind.start();
+  await settled();
+  expect(store.get().bindRun).not.toBeNull();
+  expect(bind.covers(), "while it runs").toBe(true);
+  asked[0]?.resolve(reportOf());
+  expect(await bound).toBe(true);
+  expect(store.get()).toMatchObject({ bound: true, bindRun: null, report: { grid: 64 } });
+  const { positions, corners } = cageOf(8, 1);
+  store.set({ cage: engine.setCage(positions, corners), bound: false });
+  expect(bind.covers()).toBe(false);
+});
+
+it("a second bind ends the first, silently, and each solver's report is kept beside the last", async () => {
+  const { bind, asked, store, problems } = page();
+  const first = bind.start();
+  await settled();
+  const second = bind.start();
+  await settled();
+  expect(asked.map(({ cancelled }) => cancelled)).toEqual([true, false]);
+  asked[1]?.resolve(reportOf({ solver: "jacobi" }));
+  expect(await Promise.all([first, second])).toEqual([false, true]);
+  expect(problems).toEqual([]);
+  const third = bind.start();
+  await settled();
+  asked[2]?.resolve(reportOf());
+  await third;
+  expect([store.get().report, ...store.get().earlier].map((report) => report?.solver)).toEqual([
+    "multigrid",
+    "jacobi",
+  ]);
+});
+
+it("a cancelled bind says that the one before is kept, with its settings", async () => {
+  const { bind, asked, store, said, problems } = page();
+  const first = bind.start();
+  await settled();
+  asked[0]?.resolve(reportOf());
+  await first;
+  bind.setOptions({ grid: 256 });
+  const second = bind.start();
+  await settled();
+  bind.cancel();
+  await second;
+  expect(said).toEqual(["The bind from before is kept, and its settings."]);
+  expect(store.get()).toMatchObject({ bound: true, bindRun: null, bindOptions: { grid: 64 } });
+  expect(problems).toEqual([]);
+});
+
+it("an error is a problem with the fix that it has", async () => {
+  const { bind, asked, problems } = page();
+  const bound = bind.start();
+  await settled();
+  asked[0]?.reject(named("Memory", "binding needs 9 GiB"));
+  expect(await bound).toBe(false);
+  expect(problems).toMatchObject([
+    { title: "The bind did not finish", message: "Binding needs 9 GiB.", fix: "coarser" },
+  ]);
+});
+
+it("a solver that stopped early is said, and a cage with faults is not bound", async () => {
+  const { bind, asked, said, store } = page();
+  const bound = bind.start();
+  await settled();
+  asked[0]?.resolve(reportOf({ converged: false }));
+  await bound;
+  expect(said).toEqual([expect.stringContaining("iteration limit")]);
+  const { cage } = store.get();
+  store.set({ cage: cage && { ...cage, usable: false } });
+  expect(await bind.start()).toBe(false);
+  expect(asked.length).toBe(1);
+});
+
+it("mean value coordinates are computed once for who asks twice", async () => {
+  const { bind, asked, store } = page();
+  const both = [bind.prepareCompare(), bind.prepareCompare()];
+  await settled();
+  asked[0]?.resolve(undefined);
+  expect(await Promise.all(both)).toEqual([true, true]);
+  expect([asked.length, store.get().meanValueReady]).toEqual([1, true]);
+});

@@ -1,0 +1,116 @@
+import { expect, it } from "vitest";
+import { createCage } from "../../src/actions/cage";
+import { named } from "../../src/session/client";
+import { cageOf, createFake, settled } from "../fake";
+
+function page() {
+  const fake = createFake();
+  const grids: number[] = [];
+  let changes = 0;
+  const cage = createCage(
+    fake.ctx,
+    () => {
+      changes += 1;
+    },
+    (grid) => grids.push(grid),
+  );
+  const heights = () => fake.engine.restPositions()[0];
+  return { ...fake, cage, grids, changes: () => changes, height: heights };
+}
+
+it("a cage that is made replaces the one before, and undo brings that back with what was found wrong", async () => {
+  const { cage, asked, store, ctx, height } = page();
+  const first = cage.make();
+  await settled();
+  asked[0]?.resolve(cageOf(8, 1));
+  await first;
+  expect(ctx.history.undoLabel, "the first cage is no step").toBeUndefined();
+  const checked = store.get().check;
+  const second = cage.make();
+  await settled();
+  asked[1]?.resolve(cageOf(12, 2));
+  await second;
+  expect([height(), store.get().cage?.info.vertices]).toEqual([2, 12]);
+  await ctx.history.undo();
+  expect([height(), store.get().cage?.info.vertices, store.get().check]).toEqual([1, 8, checked]);
+  await ctx.history.redo();
+  expect(height()).toBe(2);
+  expect(asked.length, "nothing is checked again").toBe(2);
+});
+
+it("of two cages that are asked for only the later one comes", async () => {
+  const { cage, asked, problems, height, store } = page();
+  const both = [cage.make(), cage.make()];
+  await settled();
+  asked.at(-1)?.resolve(cageOf(8, 5));
+  expect(await Promise.all(both)).toEqual([false, true]);
+  expect([height(), problems.length, store.get().cageProgress]).toEqual([5, 0, null]);
+});
+
+it("cancel leaves the cage that is there", async () => {
+  const { cage, asked, store, problems } = page();
+  const made = cage.make();
+  await settled();
+  cage.cancel();
+  await made;
+  expect([asked[0]?.cancelled, store.get().cage, store.get().cageProgress, problems]).toEqual([
+    true,
+    null,
+    null,
+    [],
+  ]);
+});
+
+it("a box is checked once it is there, an older check is not shown", async () => {
+  const { cage, asked, store } = page();
+  store.set({ cageSource: "box", boxDivisions: 3 });
+  await cage.make();
+  expect([store.get().cage?.usable, store.get().check]).toEqual([true, null]);
+  await settled();
+  const { check } = cageOf(8);
+  asked[0]?.resolve(check);
+  await settled();
+  expect(store.get().check).toBe(check);
+});
+
+it("more vertices than wanted are said", async () => {
+  const { cage, asked, said } = page();
+  const made = cage.make();
+  await settled();
+  asked[0]?.resolve(cageOf(100));
+  await made;
+  expect(said).toEqual(["The model's holes and gaps need 100 vertices instead of 80."]);
+});
+
+it("a button beside a problem repairs, refines the grid, or makes another cage", async () => {
+  const { cage, asked, grids, problems, store, height } = page();
+  cage.mend({ kind: "grid", cells: 128 });
+  expect(grids).toEqual([128]);
+  cage.mend({ kind: "repair", repair: "grow" });
+  await settled();
+  expect([asked[0]?.input, store.get().busy]).toEqual(["grow", "Repairing the cage"]);
+  asked[0]?.reject(named("Error", "growing did not help"));
+  await settled();
+  expect(problems).toMatchObject([{ title: "The repair did not work", message: "Growing did not help." }]);
+  expect(store.get().busy).toBeNull();
+  cage.mend({ kind: "repair", repair: "weld" });
+  await settled();
+  asked[1]?.resolve(cageOf(8, 7));
+  await settled();
+  expect(height()).toBe(7);
+  store.set({ cageSource: "file" });
+  cage.mend({ kind: "regenerate" });
+  await settled();
+  expect([asked[2]?.kind, store.get().cageSource]).toEqual(["cage", "auto"]);
+});
+
+it("a file that is no cage leaves the one that is there, and its way of making", async () => {
+  const { cage, asked, problems, store, changes } = page();
+  const file = { name: "cage.obj", path: "cage.obj", file: new Blob() };
+  const loaded = cage.load([file]);
+  await settled();
+  asked[0]?.reject(named("Format", "cage.obj: no faces"));
+  expect(await loaded).toBe(false);
+  expect(problems).toMatchObject([{ title: "This cage cannot be used", fix: "file" }]);
+  expect([store.get().cageSource, changes()]).toEqual(["auto", 0]);
+});

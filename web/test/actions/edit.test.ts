@@ -1,0 +1,114 @@
+import { afterEach, beforeEach, expect, it, vi } from "vitest";
+import { createEdit } from "../../src/actions/edit";
+import { cageOf, createFake } from "../fake";
+
+beforeEach(() => {
+  vi.useFakeTimers();
+});
+afterEach(() => {
+  vi.useRealTimers();
+});
+
+/** A page with a cage of two vertices whose gestures move all by 1. */
+function page() {
+  const fake = createFake();
+  const changed: number[] = [];
+  const edit = createEdit(fake.ctx, {
+    changed: (state) => changed.push(state.info.vertices),
+    left: () => changed.push(-1),
+  });
+  const { positions, corners } = cageOf(2);
+  fake.store.set({ cage: fake.engine.setCage(positions, corners) });
+  const height = () => fake.engine.cagePositions()[0] ?? 0;
+  const up = () => fake.engine.setCagePositions(new Float32Array(6).fill(height() + 1));
+  fake.teach({
+    beginTransform: () => true,
+    dragTransform: up,
+    endTransform: (keep: boolean) => keep,
+    nudge: () => {
+      up();
+      return true;
+    },
+  });
+  return { ...fake, edit, changed, height };
+}
+
+it("a gesture is one step, and one that is given up is none", async () => {
+  const { edit, ctx, store, height } = page();
+  expect(edit.begin("grab", 0, 0)).toBe(true);
+  expect(edit.begin("rotate", 0, 0), "one at a time").toBe(false);
+  edit.drag(1, 1);
+  edit.drag(2, 2);
+  edit.end(true);
+  expect([height(), ctx.history.undoLabel, store.get().posed]).toEqual([2, "Move 1 vertex", true]);
+  await ctx.history.undo();
+  expect([height(), store.get().posed]).toEqual([0, false]);
+  await ctx.history.redo();
+  expect(height()).toBe(2);
+  edit.begin("scale", 0, 0);
+  edit.end(false);
+  expect([ctx.history.undoLabel, edit.active(), store.get().gesture]).toEqual(["Move 1 vertex", false, null]);
+});
+
+it("amounts are typed into a gesture", () => {
+  const { edit, teach, store } = page();
+  const amounts: (number | undefined)[] = [];
+  teach({ typeTransform: (amount) => amounts.push(amount ?? Number.NaN) });
+  edit.begin("grab", 0, 0);
+  expect([edit.type("1"), edit.type("."), edit.type("5"), edit.type("q")]).toEqual([true, true, true, false]);
+  expect([amounts.at(-1), store.get().gesture]).toEqual([1.5, "Move  [1.5]"]);
+});
+
+it("nudges that follow each other are one step once the keys rest", async () => {
+  const { edit, ctx, store, height } = page();
+  store.set({ selected: { count: 2, last: 0, center: null } });
+  edit.nudge(1, 0);
+  vi.advanceTimersByTime(300);
+  edit.nudge(1, 0);
+  expect(ctx.history.undoLabel).toBeUndefined();
+  vi.advanceTimersByTime(600);
+  expect(ctx.history.undoLabel).toMatch(/^Nudge/);
+  await ctx.history.undo();
+  expect(height()).toBe(0);
+});
+
+it("a reshaped cage is another cage; one that it cannot be stays as it was", async () => {
+  const { edit, ctx, teach, changed, problems, engine, height } = page();
+  edit.setEditingRest(true);
+  edit.begin("grab", 0, 0);
+  edit.drag(1, 1);
+  edit.end(true);
+  expect([changed, ctx.history.undoLabel, engine.restPositions()[0]]).toEqual([
+    [2],
+    "Move 1 vertex of the cage",
+    1,
+  ]);
+  await ctx.history.undo();
+  expect([changed, engine.restPositions()[0]]).toEqual([[2, 2], 0]);
+  teach({
+    commitRest: () => {
+      throw new Error("the cage has no inside");
+    },
+  });
+  edit.begin("grab", 0, 0);
+  edit.drag(1, 1);
+  edit.end(true);
+  expect([height(), problems[0]?.title, problems[0]?.message]).toEqual([
+    0,
+    "The cage cannot have this shape",
+    "The cage has no inside.",
+  ]);
+  edit.setEditingRest(false);
+  expect(changed.at(-1), "who waits for the end of it hears").toBe(-1);
+});
+
+it("an edit that is not possible is said, and changes nothing", () => {
+  const { edit, teach, problems, changed } = page();
+  teach({
+    editRest: () => {
+      throw new Error("select a face first");
+    },
+  });
+  edit.restEdit("extrude_face");
+  expect([problems[0]?.message, changed]).toEqual(["Select a face first.", []]);
+});

@@ -1,0 +1,122 @@
+import { afterEach, beforeEach, expect, it, vi } from "vitest";
+import { createExports } from "../../src/actions/exports";
+import { createProject } from "../../src/actions/project";
+import { cageOf, createFake, MODEL, settled } from "../fake";
+
+/** Names of downloads. */
+let downloads: string[] = [];
+let copied: string[] = [];
+
+beforeEach(() => {
+  downloads = [];
+  copied = [];
+  const link = {
+    href: "",
+    download: "",
+    click() {
+      downloads.push(this.download);
+    },
+  };
+  vi.stubGlobal("document", { createElement: () => ({ ...link }) });
+  vi.stubGlobal("location", { origin: "https://cagework.example", pathname: "/" });
+  vi.stubGlobal("navigator", { clipboard: { writeText: async (text: string) => copied.push(text) } });
+});
+afterEach(() => {
+  vi.unstubAllGlobals();
+});
+
+function page() {
+  const fake = createFake();
+  const project = createProject(fake.ctx);
+  const exports = createExports(fake.ctx, project, () => new DOMRectStub(800, 600));
+  const { positions, corners } = cageOf(2);
+  fake.store.set({ model: MODEL, cage: fake.engine.setCage(positions, corners) });
+  return { ...fake, exports, project };
+}
+
+class DOMRectStub implements DOMRect {
+  readonly x = 0;
+  readonly y = 0;
+  readonly top = 0;
+  readonly left = 0;
+  readonly right = 0;
+  readonly bottom = 0;
+  constructor(
+    readonly width: number,
+    readonly height: number,
+  ) {}
+  toJSON(): string {
+    return "";
+  }
+}
+
+it("each file has the model's name, and its size is said", async () => {
+  const { exports, teach, said } = page();
+  teach({ exportGlb: () => new Uint8Array(2000), exportCage: () => Uint8Array.of(1) });
+  await exports.save("glb");
+  await exports.save("cage");
+  expect(downloads).toEqual(["cube-posed.glb", "cube-cage.obj"]);
+  expect(said[0]).toBe("cube-posed.glb is in your downloads (2.0 KB).");
+});
+
+it("an export that fails is a problem, and no file", async () => {
+  const { exports, teach, problems, asked } = page();
+  teach({
+    exportWeights: () => {
+      throw Object.assign(new Error("there are no weights yet: bind the model first"), { name: "Missing" });
+    },
+  });
+  await exports.save("weights");
+  expect(problems).toMatchObject([{ title: "The file could not be written", fix: "file" }]);
+  const picture = exports.save("picture");
+  await settled();
+  asked[0]?.reject(new Error("the GPU is gone"));
+  await picture;
+  expect([problems.length, downloads]).toEqual([2, []]);
+});
+
+it("only poses of the cage that is open are exported", async () => {
+  const { exports, store, teach } = page();
+  const pose = (name: string, n: number) => ({ name, positions: new Float32Array(n) });
+  store.set({ poses: [pose("Fits", 6), pose("Of another cage", 9)] });
+  const names: (readonly string[])[] = [];
+  teach({
+    exportPoses: (given: readonly string[]) => {
+      names.push(given);
+      return Uint8Array.of(1);
+    },
+  });
+  await exports.save("poses");
+  expect(names).toEqual([["Fits"]]);
+});
+
+it("a project holds the page's settings", async () => {
+  const { project, store, teach } = page();
+  const written: string[] = [];
+  teach({
+    encodePose: () => Uint8Array.of(0, 1, 2),
+    writeProject: (_names: readonly string[], _poses: readonly Float32Array[], settings: string) => {
+      written.push(settings);
+      return Uint8Array.of(1);
+    },
+  });
+  store.set({ posed: true, sample: "rat", sampleCage: true, symmetry: true });
+  project.write();
+  expect(JSON.parse(written[0] ?? "")).toMatchObject({
+    bind: { grid: 64 },
+    cage: { vertices: 80 },
+    sample: "rat",
+    symmetry: true,
+    pose: "AAEC",
+  });
+  expect(project.fileName()).toBe("cube.cagework.glb");
+});
+
+it("a link is for samples in their own cage; others are told what to do instead", async () => {
+  const { exports, store, said } = page();
+  await exports.share();
+  expect([copied, said[0]]).toEqual([[], expect.stringContaining("Save a project file")]);
+  store.set({ sample: "rat", sampleCage: true });
+  await exports.share();
+  expect(copied).toEqual([expect.stringMatching(/^https:\/\/cagework\.example\/#.*rat/)]);
+});

@@ -1,0 +1,144 @@
+import { expect, it } from "vitest";
+import { createFiles } from "../../src/actions/files";
+import { named } from "../../src/session/client";
+import { cageOf, createFake, MODEL, OPENED, settled } from "../fake";
+
+const file = (name: string, content = "v") => ({ name, path: name, file: new Blob([content]) });
+
+function page() {
+  const fake = createFake();
+  const steps: string[] = [];
+  const files = createFiles(fake.ctx, {
+    adoptCage: ({ cage, check }) => fake.store.set({ cage, check }),
+    async makeCage() {
+      steps.push("make a cage");
+      const { positions, corners, check } = cageOf(8);
+      fake.store.set({ cage: fake.engine.setCage(positions, corners), check });
+      return true;
+    },
+    async loadCage(list) {
+      steps.push(`load ${list[0]?.name}`);
+      return true;
+    },
+    async bind() {
+      steps.push("bind");
+      return true;
+    },
+    applySettings: ({ bind }) => bind && fake.store.set({ bindOptions: bind }),
+    applyPose: ({ pose }) => steps.push(`pose ${pose}`),
+    writeProject: () => Uint8Array.of(1),
+    async keep() {
+      steps.push("keep");
+    },
+    leave: () => steps.push("leave"),
+  });
+  return { ...fake, files, steps };
+}
+
+it("a model that is dropped gets a cage and is bound; what was open is kept first", async () => {
+  const { files, asked, store, steps } = page();
+  const opened = files.openFiles([file("cube.obj")]);
+  await settled();
+  expect(store.get().busy).toBe("Opening cube.obj");
+  asked[0]?.resolve({ took: 10 });
+  await settled();
+  asked[1]?.resolve(OPENED);
+  expect(await opened).toBe(true);
+  await settled();
+  expect(steps).toEqual(["keep", "leave", "pose undefined", "make a cage", "bind"]);
+  expect(store.get()).toMatchObject({ model: { name: "cube.obj" }, sample: null, busy: null, step: "pose" });
+});
+
+it("a second file ends the reading of the first", async () => {
+  const { files, asked, store, problems, steps } = page();
+  const first = files.openFiles([file("a.obj")]);
+  await settled();
+  const second = files.openFiles([file("b.obj")]);
+  await settled();
+  expect(asked.map(({ cancelled }) => cancelled)).toEqual([true, false]);
+  asked[1]?.resolve({ took: 10 });
+  await settled();
+  asked[2]?.resolve({ ...OPENED, model: { ...MODEL, name: "b.obj" } });
+  expect(await Promise.all([first, second])).toEqual([false, true]);
+  expect([store.get().model?.name, problems, steps.filter((step) => step === "keep").length]).toEqual([
+    "b.obj",
+    [],
+    1,
+  ]);
+});
+
+it("a file that cannot be read is named, and what is open stays", async () => {
+  const { files, asked, store, problems, steps } = page();
+  store.set({ model: MODEL });
+  const opened = files.openFiles([file("bad.glb")]);
+  await settled();
+  asked[0]?.reject(named("Format", "bad.glb: not a GLB"));
+  expect(await opened).toBe(false);
+  expect(problems).toMatchObject([
+    { title: "bad.glb could not be opened", message: "bad.glb: not a GLB.", fix: "file" },
+  ]);
+  expect([store.get().model, store.get().busy, steps]).toEqual([MODEL, null, []]);
+});
+
+it("who would wait for seconds is asked, and may give it up", async () => {
+  const { files, asked, store, problems } = page();
+  const opened = files.openFiles([file("large.glb")]);
+  await settled();
+  asked[0]?.resolve({ took: 9000 });
+  await settled();
+  expect([store.get().busyStep, store.get().goOn]).toEqual([
+    "The page will not answer for 9.0 s",
+    expect.any(Function),
+  ]);
+  store.get().cancelBusy?.();
+  expect(await opened).toBe(false);
+  expect([store.get().busy, store.get().goOn, problems, asked.length]).toEqual([null, null, [], 1]);
+});
+
+it("a cage beside the model is loaded, an empty file and none at all are said", async () => {
+  const { files, asked, steps, problems } = page();
+  const opened = files.openFiles([file("cube.obj"), file("cube-cage.obj")]);
+  await settled();
+  asked[0]?.resolve({ took: 0 });
+  await settled();
+  asked[1]?.resolve(OPENED);
+  await opened;
+  await settled();
+  expect(steps).toContain("load cube-cage.obj");
+  expect(await files.openFiles([file("empty.obj", "")])).toBe(false);
+  expect(await files.openFiles([file("notes.txt")])).toBe(false);
+  expect(problems.map(({ title }) => title)).toEqual(["This file is empty", "Nothing to open"]);
+});
+
+it("a project brings its poses and settings; the memory limit stays this computer's", async () => {
+  const { files, asked, store, steps, ctx } = page();
+  ctx.history.push({ label: "Move", undo: () => undefined, redo: () => undefined });
+  store.set({ bindOptions: { ...store.get().bindOptions, memory_limit: 7 } });
+  const opened = files.openFiles([file("work.cagework.glb")]);
+  await settled();
+  asked[0]?.resolve({ took: 0 });
+  await settled();
+  const poses = [{ name: "Up", positions: new Float32Array(24) }];
+  const settings = JSON.stringify({
+    pose: "AAEC",
+    bind: { ...store.get().bindOptions, grid: 32, memory_limit: 99 },
+  });
+  asked[1]?.resolve({ ...OPENED, project: { poses, settings } });
+  await opened;
+  expect(store.get()).toMatchObject({ poses, shares: [0], bindOptions: { grid: 32, memory_limit: 7 } });
+  expect([steps.includes("pose AAEC"), ctx.history.undoLabel]).toEqual([true, undefined]);
+});
+
+it("a sample that cannot be built is said by its name", async () => {
+  const { files, asked, store, problems } = page();
+  store.set({ samples: [{ id: "rat", label: "Rat" }] });
+  const opened = files.openSample("rat");
+  await settled();
+  expect(store.get().busy).toBe("Opening Rat");
+  asked[0]?.reject(new Error("there is no sample"));
+  expect([await opened, problems[0]?.title, store.get().busy]).toEqual([
+    false,
+    "The sample could not be opened",
+    null,
+  ]);
+});

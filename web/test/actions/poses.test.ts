@@ -1,0 +1,84 @@
+import { expect, it } from "vitest";
+import { createEdit } from "../../src/actions/edit";
+import { createPoses, freshName } from "../../src/actions/poses";
+import { cageOf, createFake } from "../fake";
+
+/** A page with a cage of two vertices, posed at height 1. */
+function page() {
+  const fake = createFake();
+  const edit = createEdit(fake.ctx, { changed: () => undefined, left: () => undefined });
+  const poses = createPoses(fake.ctx, edit);
+  const { positions, corners } = cageOf(2);
+  fake.store.set({ cage: fake.engine.setCage(positions, corners) });
+  fake.engine.setCagePositions(positions.fill(1));
+  const height = () => fake.engine.cagePositions()[0];
+  return { ...fake, poses, height };
+}
+
+it("a pose is saved, renamed and deleted, each a step that undo takes back", async () => {
+  const { poses, store, ctx, said } = page();
+  poses.save();
+  const [pose] = store.get().poses;
+  if (!pose) throw new Error("no pose");
+  expect([pose.name, store.get().shares, said]).toEqual(["Pose 1", [0], ['Saved as "Pose 1".']]);
+  poses.rename(pose, " Wave ");
+  poses.rename(pose, "  ");
+  expect(store.get().poses.map(({ name }) => name)).toEqual(["Wave"]);
+  const [renamed] = store.get().poses;
+  if (renamed) poses.remove(renamed);
+  expect(store.get().poses).toEqual([]);
+  await ctx.history.undo();
+  await ctx.history.undo();
+  expect(store.get().poses).toEqual([pose]);
+  await ctx.history.undo();
+  expect(store.get().poses).toEqual([]);
+});
+
+it("a saved pose is shown, and undo goes back to the one before", async () => {
+  const { poses, store, ctx, engine, height } = page();
+  poses.save();
+  engine.setCagePositions(new Float32Array(6).fill(5));
+  const [pose] = store.get().poses;
+  if (pose) poses.apply(pose);
+  expect(height()).toBe(1);
+  await ctx.history.undo();
+  expect(height()).toBe(5);
+});
+
+it("one drag of a blend's slider is one step", async () => {
+  const { poses, store, ctx, teach, engine, height } = page();
+  poses.save();
+  const blended: number[][] = [];
+  teach({
+    blend(_: readonly Float32Array[], shares: Float32Array) {
+      blended.push([...shares]);
+      engine.setCagePositions(new Float32Array(6).fill(shares[0] ?? 0));
+    },
+  });
+  const [pose] = store.get().poses;
+  if (!pose) throw new Error("no pose");
+  for (const [share, done] of [
+    [0.25, false],
+    [0.5, false],
+    [0.75, true],
+  ] as const) {
+    poses.blend(pose, share, done);
+  }
+  expect([blended, store.get().shares, height()]).toEqual([[[0.25], [0.5], [0.75]], [0.75], 0.75]);
+  await ctx.history.undo();
+  expect([height(), ctx.history.undoLabel]).toEqual([1, "Save a pose"]);
+});
+
+it("reset goes back to rest, and what cannot be played is said", () => {
+  const { poses, store, height, said } = page();
+  store.set({ posed: true });
+  poses.reset();
+  expect(height()).toBe(0);
+  poses.togglePlay();
+  expect([store.get().playing, said]).toEqual([false, ["Save a pose first; then it can be played."]]);
+});
+
+it("a new pose has a name of its own", () => {
+  const positions = new Float32Array();
+  expect(freshName([{ name: "Pose 2", positions }])).toBe("Pose 3");
+});

@@ -1,0 +1,78 @@
+import { afterEach, beforeEach, expect, it, vi } from "vitest";
+import { createView } from "../../src/actions/view";
+import type { SceneOptions } from "../../src/contract";
+import { cageOf, createFake, settled } from "../fake";
+
+beforeEach(() => {
+  vi.stubGlobal("document", { documentElement: { dataset: {} } });
+  vi.stubGlobal("localStorage", { setItem: () => undefined, removeItem: () => undefined });
+});
+afterEach(() => {
+  vi.unstubAllGlobals();
+});
+
+function page(canCompare = true) {
+  const fake = createFake();
+  const dark = Object.assign(new EventTarget(), { matches: true }) as MediaQueryList;
+  const scenes: SceneOptions[] = [];
+  const zooms: number[] = [];
+  fake.teach({ setScene: (scene) => scenes.push(scene), zoomAt: (_x, _y, factor) => zooms.push(factor) });
+  const rectangle = () => ({ width: 400, height: 300 }) as DOMRect;
+  const view = createView(fake.ctx, async () => canCompare, dark, rectangle);
+  const { positions, corners } = cageOf(8);
+  fake.store.set({ cage: fake.engine.setCage(positions, corners) });
+  return { ...fake, view, scenes, zooms };
+}
+
+it("the theme follows the system unless it is chosen", () => {
+  const { view, scenes, store } = page();
+  view.theme("auto");
+  view.theme("light");
+  expect(scenes.map(({ theme }) => theme)).toEqual(["dark", "light"]);
+  expect(store.get().theme).toBe("light");
+});
+
+it("of slices that a slider asks for, the last one is computed", async () => {
+  vi.useFakeTimers();
+  const { view, asked, store } = page();
+  view.slice({}, "kinds");
+  view.slice({ position: 0.6 });
+  view.slice({ position: 0.7 });
+  await vi.advanceTimersByTimeAsync(100);
+  vi.useRealTimers();
+  expect([asked.length, asked[0]?.input]).toEqual([1, { axis: 2, position: 0.7 }]);
+  expect(store.get().slice.busy).toBe(true);
+  asked[0]?.resolve(undefined);
+  await settled();
+  expect(store.get().slice.busy).toBe(false);
+});
+
+it("a slice that fails is said, and waits for nothing", async () => {
+  vi.useFakeTimers();
+  const { view, asked, store, problems } = page();
+  view.slice({}, "value");
+  await vi.advanceTimersByTimeAsync(100);
+  vi.useRealTimers();
+  asked[0]?.reject(new Error("needs 9 GiB"));
+  await settled();
+  expect([store.get().slice.busy, problems[0]?.title]).toEqual([false, "The slice could not be computed"]);
+});
+
+it("two halves hold a smaller model each, and go when there is nothing to compare", async () => {
+  const { view, store, zooms } = page();
+  await view.compare(true);
+  await view.compare(true);
+  expect([store.get().scene.compare, zooms]).toEqual([true, [0.6]]);
+  await view.compare(false);
+  expect(zooms[1]).toBeCloseTo(1 / 0.6);
+  const other = page(false);
+  await other.view.compare(true);
+  expect(other.store.get().scene.compare).toBe(false);
+});
+
+it("proportional editing stays within its range and keeps its radius", () => {
+  const { view, store } = page();
+  view.proportional(true, 7);
+  view.proportional(false);
+  expect(store.get()).toMatchObject({ proportional: 1, proportionalOn: false });
+});

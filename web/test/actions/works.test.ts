@@ -1,0 +1,152 @@
+import { afterEach, beforeEach, expect, it, vi } from "vitest";
+import { createWorks } from "../../src/actions/works";
+import type { NamedFile } from "../../src/contract";
+import type { Entry } from "../../src/works/entry";
+import { cageOf, createFake, MODEL } from "../fake";
+
+/** What the browser keeps. */
+const kept = new Map<string, { entry: Entry; file: Uint8Array | undefined }>();
+const disk: { error: Error | undefined } = { error: undefined };
+let held: string[] = [];
+let own: string | null = null;
+
+vi.mock("../../src/works/database", () => ({
+  newId: () => `work${kept.size}`,
+  readEntries: async () => ({ entries: Array.from(kept.values(), ({ entry }) => entry), damaged: 0 }),
+  readFile: async (id: string) => kept.get(id)?.file,
+  async writeEntry(entry: Entry, file?: Uint8Array) {
+    if (disk.error) throw disk.error;
+    kept.set(entry.id, { entry, file: file ?? kept.get(entry.id)?.file });
+  },
+  deleteEntry: async (id: string) => void kept.delete(id),
+}));
+vi.mock("../../src/works/holds", () => ({
+  async hold(id: string) {
+    if (held.includes(id)) return undefined;
+    held.push(id);
+    return () => {
+      held = held.filter((other) => other !== id);
+    };
+  },
+  heldIds: async () => new Set(held),
+  rememberOwn(id: string | null) {
+    own = id;
+  },
+  ownId: () => own,
+}));
+
+beforeEach(() => {
+  vi.useFakeTimers();
+});
+afterEach(() => {
+  vi.useRealTimers();
+  kept.clear();
+  [disk.error, held, own] = [undefined, [], null];
+});
+
+function page() {
+  const fake = createFake();
+  const opened: string[] = [];
+  const works = createWorks(fake.ctx, {
+    write: () => new Uint8Array(10),
+    async openFiles(files: readonly NamedFile[]) {
+      opened.push(files[0]?.name ?? "");
+      return true;
+    },
+    startFresh: () => opened.push("fresh"),
+  });
+  const { positions, corners } = cageOf(8);
+  fake.store.set({ model: MODEL, cage: fake.engine.setCage(positions, corners) });
+  return { ...fake, works, opened };
+}
+
+const entryOf = (id: string, when = Date.now()): Entry => ({ id, name: `${id}.obj`, when, size: 10 });
+const keep = (id: string, when?: number) =>
+  kept.set(id, { entry: entryOf(id, when), file: Uint8Array.of(1) });
+
+it("work is kept once it rests, and not while something is under way", async () => {
+  const { works, store } = page();
+  store.set({ gesture: "Move" });
+  works.touch();
+  await vi.advanceTimersByTimeAsync(5000);
+  expect(kept.size).toBe(0);
+  store.set({ gesture: null });
+  await vi.advanceTimersByTimeAsync(2000);
+  expect([kept.size, kept.get("work0")?.entry.name, own]).toEqual([1, "cube.obj", "work0"]);
+  works.touch();
+  await vi.advanceTimersByTimeAsync(2000);
+  expect([kept.size, store.get().works[0]?.where]).toEqual([1, "here"]);
+});
+
+it("another model keeps the one before, one click away", async () => {
+  const { works, store, said } = page();
+  await works.flush();
+  works.leave();
+  await vi.advanceTimersByTimeAsync(0);
+  expect([kept.size, said, held, store.get().savedAt]).toEqual([
+    1,
+    ["Your work on cube.obj is kept in this browser."],
+    [],
+    null,
+  ]);
+});
+
+it("a full disk is said once, with what to do", async () => {
+  const { works, said } = page();
+  disk.error = new DOMException("full", "QuotaExceededError");
+  works.touch();
+  await vi.advanceTimersByTimeAsync(2000);
+  works.touch();
+  await vi.advanceTimersByTimeAsync(2000);
+  expect(said).toEqual([expect.stringMatching(/no room left .* Save a project file/)]);
+});
+
+it("what this tab had open comes back; of several others the visitor chooses", async () => {
+  const { works, opened, said, store } = page();
+  keep("a");
+  keep("b");
+  expect(await works.restore()).toBe(false);
+  own = "b";
+  expect(await works.restore()).toBe(true);
+  expect([opened, store.get().step, said.at(-1)]).toEqual([
+    ["b.cagework.glb"],
+    "pose",
+    expect.stringMatching(/^Your work on b\.obj is back/),
+  ]);
+});
+
+it("work that another tab has open is opened as a copy", async () => {
+  const { works, opened } = page();
+  keep("a");
+  held = ["a"];
+  expect(await works.open({ ...entryOf("a"), where: "elsewhere" })).toBe(true);
+  expect([opened, held, own]).toEqual([["a.cagework.glb"], ["a"], null]);
+});
+
+it("damaged work is deleted, and a sentence says so", async () => {
+  const { works, said, opened } = page();
+  kept.set("a", { entry: entryOf("a"), file: undefined });
+  expect(await works.open({ ...entryOf("a"), where: "nowhere" })).toBe(false);
+  expect([kept.size, opened, said[0]]).toEqual([
+    0,
+    [],
+    expect.stringContaining("was damaged, and is deleted"),
+  ]);
+});
+
+it("work of more than 30 days ago goes, unless a tab has it", async () => {
+  const { works, store } = page();
+  const old = Date.now() - 31 * 24 * 3600 * 1000;
+  keep("old", old);
+  keep("open elsewhere", old);
+  keep("new");
+  held = ["open elsewhere"];
+  await works.refresh();
+  expect(
+    store
+      .get()
+      .works.map(({ id }) => id)
+      .sort(),
+  ).toEqual(["new", "open elsewhere"]);
+  expect(kept.has("old")).toBe(false);
+});

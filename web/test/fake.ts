@@ -1,0 +1,232 @@
+/** A session without wasm, worker and GPU: jobs end when a test says so, a cage is two arrays. */
+
+import type { Context, Fix } from "../src/actions/context";
+import type {
+  BindReport,
+  CageState,
+  CheckedCage,
+  Engine,
+  Job,
+  ModelInfo,
+  Opened,
+  Session,
+} from "../src/contract";
+import { createHistory } from "../src/history";
+import { createQueue } from "../src/queue";
+import { named } from "../src/session/client";
+import { createStore, INITIAL, type Store } from "../src/state";
+import type { Explained } from "../src/strings";
+
+/** Work that was asked for. */
+export interface Asked {
+  readonly kind: string;
+  readonly input: unknown;
+  resolve(output: unknown): void;
+  reject(error: Error): void;
+  cancelled: boolean;
+}
+
+export interface Fake {
+  readonly ctx: Context;
+  readonly store: Store;
+  readonly engine: Engine;
+  readonly asked: Asked[];
+  readonly said: string[];
+  readonly problems: (Explained & { fix?: Fix["label"] })[];
+  /** Calls of the engine that keep nothing, by name. */
+  readonly calls: string[];
+  /** What the engine does in a test: replaces one of its functions. */
+  teach(functions: Partial<Engine>): void;
+}
+
+const BOUNDS: CageState["info"]["bounds"] = { min: [0, 0, 0], max: [1, 1, 1] };
+
+export const MODEL: ModelInfo = {
+  name: "cube.obj",
+  format: "obj",
+  up: "y",
+  vertices: 8,
+  triangles: 12,
+  faces: 6,
+  materials: 0,
+  textures: 0,
+  skins: 0,
+  animations: 0,
+  morphTargets: 0,
+  bounds: BOUNDS,
+  notices: [],
+};
+
+/** A cage of `n` vertices, all at one height. */
+export function cageOf(n: number, height = 0): CheckedCage {
+  const check = {
+    problems: [],
+    vertices: new Uint32Array(),
+    edges: new Uint32Array(),
+    faces: new Uint32Array(),
+    points: new Float32Array(),
+    outside: new Uint32Array(),
+  };
+  return { positions: new Float32Array(3 * n).fill(height), corners: Uint32Array.of(n), check };
+}
+
+export const OPENED: Opened = { model: MODEL, cage: null, check: null, project: null };
+
+/** What a bind of these options would say. */
+export function reportOf(patch: Partial<BindReport> = {}): BindReport {
+  const none = { mean: 0, max: 0 };
+  return {
+    method: "embedded",
+    solver: "multigrid",
+    preconditioner: "none",
+    backend: "cpu",
+    threads: 1,
+    grid: 64,
+    dims: [8, 8, 8],
+    cell_size: [1, 1, 1],
+    cell_shape: "box",
+    delta_norm: "euclidean",
+    tau: 1e-5,
+    cells: { interior: 1, boundary: 1, exterior: 1 },
+    levels: [1],
+    iterations: 3,
+    converged: true,
+    at_round_off: false,
+    delta_history: [],
+    delta_interval: 1,
+    residual_history: [],
+    timings_ms: { voxelize: 1, solve: 1, sample: 1, total: 3 },
+    memory_bytes: { estimated: 1, peak: 1 },
+    rest_error: { mean: 0, p99: 0, max: 0, mean_rel: 0, max_rel: 0 },
+    raw_error: { sum: none, point_rel: none, min_weight: 0 },
+    weights: { min: 0, max: 1, max_sum_error: 0, nonzeros: 1 },
+    vertices: 8,
+    cage_vertices: 8,
+    outside_vertices: 0,
+    ambiguous_cells: 0,
+    notices: [],
+    ...patch,
+  };
+}
+
+/** Lets promises that are done be heard. */
+export const settled = () => new Promise((resolve) => setTimeout(resolve));
+
+export function createFake(): Fake {
+  const asked: Asked[] = [];
+  const said: string[] = [];
+  const problems: Fake["problems"] = [];
+  const calls: string[] = [];
+  const store = createStore(INITIAL);
+  const history = createHistory(() => undefined);
+
+  function job<T>(kind: string, input: unknown): Job<T> {
+    let entry: Asked | undefined;
+    const done = new Promise<T>((resolve, reject) => {
+      entry = { kind, input, resolve: (output) => resolve(output as T), reject, cancelled: false };
+      asked.push(entry);
+    });
+    // Whoever waits for it hears of it.
+    done.catch(() => undefined);
+    const cancel = () => {
+      if (!entry || entry.cancelled) return;
+      entry.cancelled = true;
+      entry.reject(named("Cancelled", "cancelled"));
+    };
+    return { done, cancel };
+  }
+
+  let rest = cageOf(0);
+  let posed = rest.positions;
+  let revision = 0;
+  const stateOf = (): CageState => ({
+    usable: true,
+    info: {
+      vertices: rest.positions.length / 3,
+      edges: 0,
+      faces: 0,
+      triangles: 0,
+      bounds: BOUNDS,
+      notices: [],
+    },
+  });
+  const put = (positions: Float32Array, corners: Uint32Array) => {
+    rest = { positions: positions.slice(), corners, check: null };
+    posed = rest.positions.slice();
+    revision += 1;
+    return stateOf();
+  };
+  const known: Partial<Engine> = {
+    get revision() {
+      return revision;
+    },
+    requireCurrent(asked) {
+      if (asked !== revision) throw named("Cancelled", "there is another model or cage by now");
+    },
+    setCage: put,
+    commitRest: () => put(posed, rest.corners),
+    cageCorners: () => rest.corners,
+    restPositions: () => rest.positions.slice(),
+    cagePositions: () => posed.slice(),
+    setCagePositions(positions: Float32Array) {
+      posed = positions.slice();
+    },
+    selection: () => Uint32Array.of(0),
+    selectionCenter: () => Float32Array.of(0, 0, 0),
+    last: () => 0,
+    unmatched: () => new Uint32Array(),
+    legend: () => undefined,
+    strays: () => 0,
+    transformLabel: () => "Move",
+  };
+  const engine = new Proxy({} as Engine, {
+    get: (_, name: keyof Engine) => known[name] ?? (() => calls.push(String(name))),
+  });
+
+  const session: Partial<Session> = {
+    engine,
+    samples: [{ id: "rat", label: "Rat" }],
+    readFiles: (files) => job("read", files),
+    open: (read) => job<Opened>("open", read).done,
+    openSample: (id) => job<Opened>("sample", id).done,
+    turn: (project, up) => job<Opened>("turn", { project, up }).done,
+    readCage: (files) => job("readCage", files),
+    boxCage: (divisions) => cageOf(8, divisions),
+    generateCage: (options) => job("cage", options),
+    checkCage: () => job("check", null),
+    repair: (kind) => job("repair", kind),
+    takeCage: ({ positions, corners }) => put(positions, corners),
+    bind: (options, listener) => job("bind", { options, listener }),
+    estimateMemory: () => 1000,
+    bindMeanValue: () => job("meanValue", null),
+    loadSlice: (axis, position) => job("slice", { axis, position }),
+    picture: () => job<Blob>("picture", null).done,
+    readSettings(text, { bind }) {
+      const given = JSON.parse(text);
+      return { notices: [], ...given, bind: { ...given.bind, memory_limit: bind.memory_limit } };
+    },
+  };
+  const ctx: Context = {
+    session: () => session as Session,
+    store,
+    history,
+    queue: createQueue(),
+    tell: {
+      say: (text) => said.push(text),
+      problem: (explained, fix) =>
+        problems.push(fix ? ({ ...explained, fix: explained.fix } as never) : explained),
+      clear: () => problems.splice(0),
+    },
+    fixFor: (fix) => ({ label: fix, run: () => undefined }),
+  };
+  return {
+    ctx,
+    store,
+    engine,
+    asked,
+    said,
+    problems,
+    calls,
+    teach: (functions) => Object.assign(known, functions),
+  };
+}
