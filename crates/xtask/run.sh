@@ -18,8 +18,11 @@ done
 if [ "${1:-}" = test ] || [ "${1:-}" = page-test ]; then
   command -v chromium >/dev/null || missing+=(chromium)
 fi
-# The tests of the kernels need a Vulkan device: Mesa's software one where there is no other.
+# The tests of the kernels need a Vulkan device: Mesa's software one where there is no other. The second browser needs a
+# screen and OpenGL.
 if [ "${1:-}" = test ]; then
+  command -v firefox-esr >/dev/null || missing+=(firefox-esr libegl1 libgl1-mesa-dri)
+  command -v Xvfb >/dev/null || missing+=(xvfb)
   compgen -G "/usr/lib/*/libvulkan.so.1" >/dev/null || missing+=(libvulkan1)
   compgen -G "/usr/share/vulkan/icd.d/*.json" >/dev/null || missing+=(mesa-vulkan-drivers)
 fi

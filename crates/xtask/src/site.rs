@@ -62,6 +62,14 @@ pub(crate) fn test_page(args: &[&str]) -> Result<(), String> {
     exec(&[&["playwright", "test", "--config", "web/playwright.config.ts"], args].concat())
 }
 
+/// Tests the page as it was built last in a second browser, Firefox.
+///
+/// # Errors
+/// When something does not work there.
+pub(crate) fn test_firefox() -> Result<(), String> {
+    run("node", &["web/e2e/firefox.mjs"], &[])
+}
+
 /// Makes the pictures of the samples that the page shows, `web/public/samples`.
 ///
 /// # Errors

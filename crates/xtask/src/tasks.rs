@@ -28,7 +28,8 @@ pub(crate) fn test() -> Result<(), String> {
     fuzz(&["--minutes", "1", "--seed", "1"])?;
     validate_exports()?;
     site::test_scripts()?;
-    site::test_page(&[])
+    site::test_page(&[])?;
+    site::test_firefox()
 }
 
 /// Damaged files through everything that reads them. As tests are built: overflows and debug assertions count.
