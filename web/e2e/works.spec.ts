@@ -180,7 +180,7 @@ test("the one project that was kept before is an entry now", async ({ page }) =>
   await keepAsBefore(page, Uint8Array.from(project), "horse.glb", Date.now() - 120_000);
   await open(page);
   await expect(page.locator("#toasts")).toContainText(
-    "Your work on horse.glb is back, as you left it 2 minutes ago.",
+    "Your work on horse.glb is back, as you left it 2 minutes ago. Undo begins anew.",
   );
   await showList(page);
   await expect(listOf(page).getByRole("listitem")).toHaveText([/^horse\.glb.*open here/]);

@@ -24,7 +24,7 @@ export interface Edit {
   pose(label: string, positions: Float32Array): void;
   /** Remembers positions before something that ends with `posedSince`. */
   positions(): Float32Array;
-  posedSince(label: string, before: Float32Array): void;
+  posedSince(label: string, before: Float32Array, sharesBefore: readonly number[]): void;
   restEdit(edit: RestEdit): void;
   /** Refreshes what the page knows about selection and pose. */
   sync(): void;
@@ -92,9 +92,15 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
     if (shares.some((share) => share !== 0)) ctx.store.set({ shares: shares.map(() => 0) });
   };
 
-  const pushPose = (label: string, from: Float32Array) => {
+  /** A step from one pose, and the shares of its blend, to those of the moment. */
+  const pushPose = (label: string, from: Float32Array, sharesFrom: readonly number[]) => {
     const to = engine().cagePositions();
-    ctx.history.push({ label, undo: () => setPose(from), redo: () => setPose(to) });
+    const sharesTo = ctx.store.get().shares;
+    const set = (positions: Float32Array, shares: readonly number[]) => {
+      setPose(positions);
+      ctx.store.set({ shares });
+    };
+    ctx.history.push({ label, undo: () => set(from, sharesFrom), redo: () => set(to, sharesTo) });
     sync();
   };
 
@@ -113,8 +119,9 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
   /** What moved since `from` becomes a step. */
   const keep = (label: string, from: Float32Array, fromRest: CheckedCage) => {
     if (!ctx.store.get().editingRest) {
+      const { shares } = ctx.store.get();
       forgetShares();
-      pushPose(label, from);
+      pushPose(label, from, shares);
       return;
     }
     try {
@@ -227,11 +234,12 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
     pose(label, positions) {
       settle();
       const from = engine().cagePositions();
+      const { shares } = ctx.store.get();
       setPose(positions);
-      pushPose(label, from);
+      pushPose(label, from, shares);
     },
     positions: () => engine().cagePositions(),
-    posedSince: (label, from) => pushPose(label, from),
+    posedSince: pushPose,
     restEdit(edit) {
       settle();
       const from = restNow();

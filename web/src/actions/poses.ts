@@ -20,7 +20,7 @@ export interface PoseActions {
 export function createPoses(ctx: Context, edit: Edit): PoseActions {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
-  let beforeBlend: Float32Array | undefined;
+  let beforeBlend: { readonly positions: Float32Array; readonly shares: readonly number[] } | undefined;
   let playing: { frame: number; before: Float32Array } | undefined;
 
   const setPoses = (poses: readonly Pose[], shares: readonly number[]) => store.set({ poses, shares });
@@ -51,7 +51,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
       const { poses, shares } = store.get();
       const pose = { name: freshName(poses), positions: engine().cagePositions() };
       change("Save a pose", [...poses, pose], [...shares, 0]);
-      ctx.tell.say(`Saved as "${pose.name}".`);
+      ctx.tell.say(`Saved as "${pose.name}"${store.get().posed ? "" : ": it is the rest pose"}.`);
     },
     apply(pose) {
       stop();
@@ -79,7 +79,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
     blend(pose, share, done) {
       stop();
       edit.setEditingRest(false);
-      beforeBlend ??= edit.positions();
+      beforeBlend ??= { positions: edit.positions(), shares: store.get().shares };
       const { poses } = store.get();
       const shares = store.get().shares.map((old, i) => (poses[i] === pose ? share : old));
       const fitting = fittingPoses(store.get());
@@ -89,7 +89,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
       );
       store.set({ shares });
       if (done) {
-        edit.posedSince("Blend poses", beforeBlend);
+        edit.posedSince("Blend poses", beforeBlend.positions, beforeBlend.shares);
         beforeBlend = undefined;
       }
     },

@@ -209,7 +209,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       const { works } = store.get();
       const chosen = toOpen(works, ownId());
       if (!chosen || !(await open(chosen, true))) return false;
-      const text = `Your work on ${chosen.name} is back, as you left it ${ago(Date.now() - chosen.when)}.`;
+      const text = `Your work on ${chosen.name} is back, as you left it ${ago(Date.now() - chosen.when)}. Undo begins anew.`;
       const fresh = { label: "Start fresh", run: startFresh };
       ctx.tell.say(text, works.length > 1 ? showList : fresh);
       return true;

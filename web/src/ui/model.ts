@@ -30,7 +30,7 @@ export function createModelPanel(app: App): HTMLElement {
     { class: "stack loose" },
     head(
       "Choose a model",
-      "Drop a file anywhere on this page, or start from a sample. It gets a cage by itself.",
+      "A cage is a lattice that fits the shape of a model. What you see is already bound to its own: drag a round handle. Or drop a file anywhere on this page.",
     ),
     h(
       "div",

@@ -20,7 +20,11 @@ it("a pose is saved, renamed and deleted, each a step that undo takes back", asy
   poses.save();
   const [pose] = store.get().poses;
   if (!pose) throw new Error("no pose");
-  expect([pose.name, store.get().shares, said]).toEqual(["Pose 1", [0], ['Saved as "Pose 1".']]);
+  expect([pose.name, store.get().shares, said]).toEqual([
+    "Pose 1",
+    [0],
+    ['Saved as "Pose 1": it is the rest pose.'],
+  ]);
   poses.rename(pose, " Wave ");
   poses.rename(pose, "  ");
   expect(store.get().poses.map(({ name }) => name)).toEqual(["Wave"]);
@@ -66,7 +70,13 @@ it("one drag of a blend's slider is one step", async () => {
   }
   expect([blended, store.get().shares, height()]).toEqual([[[0.25], [0.5], [0.75]], [0.75], 0.75]);
   await ctx.history.undo();
-  expect([height(), ctx.history.undoLabel]).toEqual([1, "Save a pose"]);
+  expect([height(), store.get().shares, ctx.history.undoLabel]).toEqual([1, [0], "Save a pose"]);
+  await ctx.history.redo();
+  expect([height(), store.get().shares]).toEqual([0.75, [0.75]]);
+  poses.apply(pose);
+  expect(store.get().shares, "another pose is no blend").toEqual([0]);
+  await ctx.history.undo();
+  expect([height(), store.get().shares]).toEqual([0.75, [0.75]]);
 });
 
 it("reset goes back to rest, and what cannot be played is said", () => {
