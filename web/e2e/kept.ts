@@ -44,24 +44,20 @@ export const keepAsBefore = (page: Page, bytes: Uint8Array, name: string, when: 
     { bytes: Array.from(bytes), name, when },
   );
 
-/** Cuts kept files off, as a disk that failed might; or makes all that is kept 31 days older. */
-export const changeKept = (page: Page, how: "cut" | "age"): Promise<void> =>
+/** Cuts kept files off, as a disk that failed might. */
+export const cutKept = (page: Page): Promise<void> =>
   page.evaluate(
-    (how) =>
+    () =>
       new Promise<void>((done) => {
         const opened = indexedDB.open("cagework");
         opened.onsuccess = () => {
           const { result } = opened;
-          const table = how === "cut" ? "projects" : "entries";
-          const transaction = result.transaction(table, "readwrite");
-          const request = transaction.objectStore(table).openCursor();
+          const transaction = result.transaction("projects", "readwrite");
+          const request = transaction.objectStore("projects").openCursor();
           request.onsuccess = () => {
             const cursor = request.result;
             if (!cursor) return;
-            const { value } = cursor;
-            cursor.update(
-              how === "cut" ? value.slice(0, 1000) : { ...value, when: value.when - 31 * 86_400_000 },
-            );
+            cursor.update(cursor.value.slice(0, 1000));
             cursor.continue();
           };
           transaction.oncomplete = () => {
@@ -70,5 +66,4 @@ export const changeKept = (page: Page, how: "cut" | "age"): Promise<void> =>
           };
         };
       }),
-    how,
   );

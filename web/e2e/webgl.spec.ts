@@ -23,7 +23,9 @@ async function withoutWebGpu(page: Page): Promise<void> {
 
 test.beforeEach(async ({ page }) => withoutWebGpu(page));
 
-test("opens bound, dragging deforms, undo restores", async ({ page }) => {
+test("opens bound, follows a handle, shows colours, exports, and survives a lost context", async ({
+  page,
+}) => {
   const wasm: string[] = [];
   page.on("request", (request) => {
     if (request.url().endsWith(".wasm")) wasm.push(request.url().replace(/.*\//, ""));
@@ -35,6 +37,22 @@ test("opens bound, dragging deforms, undo restores", async ({ page }) => {
   ).toBe(true);
   await shoot(page, "webgl-opens");
   await followsAHandle(page, "webgl-posed");
+  await test.step("colours, slice and comparison are shown", () => showsColours(page, "webgl"));
+  await test.step("a dropped GLB is bound on the processor and exported", async () => {
+    await page.keyboard.press("n");
+    await exportsWhatIsShown(page, "webgl-export");
+    await exportsAPicture(page);
+  });
+  await test.step("a lost context comes back with model and pose", async () => {
+    // As the browser takes it away: the canvas's own context, not the page's way to give it up.
+    await survives(page, () =>
+      page.evaluate(() => {
+        const context = document.querySelector("canvas")?.getContext("webgl2");
+        context?.getExtension("WEBGL_lose_context")?.loseContext();
+      }),
+    );
+    await shoot(page, "webgl-recovered");
+  });
 });
 
 test("says once what is different, and how to get WebGPU", async ({ page }) => {
@@ -63,29 +81,6 @@ test("says once what is different, and how to get WebGPU", async ({ page }) => {
   await page.reload();
   await bound(page);
   await expect(notice).toHaveCount(0);
-});
-
-test("a dropped GLB is bound on the processor and exported", async ({ page }) => {
-  await open(page);
-  await exportsWhatIsShown(page, "webgl-export");
-  await exportsAPicture(page);
-});
-
-test("colours, slice and comparison are shown", async ({ page }) => {
-  await open(page);
-  await showsColours(page, "webgl");
-});
-
-test("a lost context comes back with model and pose", async ({ page }) => {
-  await open(page);
-  // As the browser takes it away: the canvas's own context, not the page's way to give it up.
-  await survives(page, () =>
-    page.evaluate(() => {
-      const context = document.querySelector("canvas")?.getContext("webgl2");
-      context?.getExtension("WEBGL_lose_context")?.loseContext();
-    }),
-  );
-  await shoot(page, "webgl-recovered");
 });
 
 test("without WebGL2 either the page says what to do", async ({ page }) => {

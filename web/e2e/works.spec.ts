@@ -1,7 +1,7 @@
 /** Work that the browser keeps: a piece for each model, one tab at a time. */
 
 import type { Page } from "@playwright/test";
-import { changeKept, keepAsBefore, savedSince } from "./kept";
+import { cutKept, keepAsBefore, savedSince } from "./kept";
 import { box } from "./models";
 import { complaintsOfAxe } from "./stories";
 import { bound, cagePositions, calm, drag, drop, expect, largestMove, open, shoot, test } from "./support";
@@ -146,22 +146,11 @@ test("Delete takes two clicks, and what is deleted is gone", async ({ page }) =>
   expect(await savedSince(page, 0, "workB")).toBe(true);
 });
 
-test("work of 31 days ago is deleted", async ({ page, context }) => {
-  await open(page);
-  await work(page, "workA");
-  await leave(page);
-  await changeKept(page, "age");
-  const next = await context.newPage();
-  await open(next);
-  await expect(next).toHaveTitle(/Rat/);
-  expect(await savedSince(next, 0)).toBe(false);
-});
-
 test("damaged work is deleted, and a sentence says so", async ({ page }) => {
   await open(page);
   await work(page, "workA");
   await leave(page);
-  await changeKept(page, "cut");
+  await cutKept(page);
   await open(page);
   await expect(page.locator("#toasts")).toContainText(
     "The work on workA.obj that this browser kept was damaged",
@@ -184,18 +173,4 @@ test("the one project that was kept before is an entry now", async ({ page }) =>
   );
   await showList(page);
   await expect(listOf(page).getByRole("listitem")).toHaveText([/^horse\.glb.*open here/]);
-});
-
-test("a full disk is said, with what to do", async ({ page }) => {
-  await open(page);
-  await page.evaluate(() => {
-    IDBObjectStore.prototype.put = () => {
-      throw new DOMException("full", "QuotaExceededError");
-    };
-  });
-  await drag(page, 30, 20);
-  const said = page.locator("#toasts");
-  await expect(said).toContainText("This browser has no room left to keep your work on Rat.");
-  await said.getByRole("button", { name: "Show kept work" }).click();
-  await expect(listOf(page)).toContainText("There is nothing yet.");
 });
