@@ -143,7 +143,7 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
   });
 
   await test.step("a box stretches along its axis", async () => {
-    await page.keyboard.press("r");
+    await page.keyboard.press("t");
     const scaled = await pull(page, "y", outwards);
     expect(largest([...along(0, scaled), ...along(2, scaled)])).toBeLessThan(ALIKE);
     const from = middle(scaled.before)[1] ?? 0;

@@ -71,6 +71,7 @@ export function createCommands(app: App, showSheet: () => void): Record<Command,
     },
     gizmoMove: () => view.gizmo("move"),
     gizmoRotate: () => view.gizmo("rotate"),
+    gizmoScale: () => view.gizmo("scale"),
     toolSelect: () => view.gizmo("none"),
     symmetry: () => view.symmetry(!store.get().symmetry),
     proportional: () => {

@@ -36,6 +36,7 @@ const TABLE = {
   cancel: { keys: ["escape"], label: "Put it back; otherwise: close what is open", group: "While moving" },
   gizmoMove: { keys: ["w"], label: "Gizmo to move", group: "Move" },
   gizmoRotate: { keys: ["e"], label: "Gizmo to rotate", group: "Move" },
+  gizmoScale: { keys: ["t"], label: "Gizmo to scale", group: "Move" },
   toolSelect: { keys: ["q"], label: "No gizmo: select and drag", group: "Move" },
   symmetry: { keys: ["m"], label: "Mirror across X", group: "Move" },
   proportional: { keys: ["o"], label: "Proportional editing; wheel: how far", group: "Move" },

@@ -39,7 +39,7 @@ export function createOverlays(
     ["none", "select", "Select and drag", app.key("toolSelect")],
     ["move", "move", "Move gizmo", app.key("gizmoMove")],
     ["rotate", "rotate", "Rotate gizmo", app.key("gizmoRotate")],
-    ["scale", "scale", "Scale gizmo", `${app.key("rotate")} with a gizmo shown`],
+    ["scale", "scale", "Scale gizmo", app.key("gizmoScale")],
   ];
   const elements: [CageElement, IconName, string][] = [
     ["vertex", "vertex", "Select vertices"],
