@@ -82,12 +82,12 @@ test("a gap that the vertices close stays open when asked for", async ({ page })
   expect(await isInside(page, IN_A_LEG)).toBe(true);
   expect(await isInside(page, IN_THE_GAP)).toBe(false);
   await shoot(page, "cage-gap");
-});
 
-test("a cage of more vertices than wanted says so", async ({ page }) => {
-  await open(page);
-  await drop(page, [{ name: "spring.obj", bytes: spring() }]);
-  await expect(page.getByText(/need \d+ vertices instead of 80/)).toBeVisible();
-  await bound(page);
-  await shoot(page, "cage-more");
+  await test.step("a cage of more vertices than wanted says so", async () => {
+    await gaps.fill("16");
+    await drop(page, [{ name: "spring.obj", bytes: spring() }]);
+    await expect(page.getByText(/need \d+ vertices instead of 80/)).toBeVisible();
+    await bound(page);
+    await shoot(page, "cage-more");
+  });
 });

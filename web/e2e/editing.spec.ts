@@ -3,84 +3,86 @@
 import { showsColours } from "./stories";
 import { cagePositions, drag, expect, handle, largestMove, open, reachable, shoot, test } from "./support";
 
-test("everything that a pose needs works without a pointer", async ({ page }) => {
+test("a visit that edits by keys and pointer", async ({ page }) => {
   await open(page);
-  const before = await cagePositions(page);
-  await page.locator("canvas").first().locator("xpath=ancestor-or-self::*[@tabindex]").first().focus();
-  await page.keyboard.press("]");
-  await page.keyboard.press("g");
-  await page.keyboard.press("x");
-  await page.keyboard.type("0.25");
-  await page.keyboard.press("Enter");
-  const after = await cagePositions(page);
-  expect(largestMove(before, after)).toBeCloseTo(0.25, 4);
-  const movedAlong = after.map((x, k) => x - (before[k] ?? 0)).filter((d) => Math.abs(d) > 1e-6);
-  expect(movedAlong.length, "along x only").toBe(1);
-  await page.keyboard.press("ArrowUp");
-  expect(largestMove(after, await cagePositions(page))).toBeGreaterThan(0);
-  await page.keyboard.press("Control+z");
-  await page.keyboard.press("Control+z");
-  expect(largestMove(before, await cagePositions(page))).toBeLessThan(1e-6);
-  await page.keyboard.press("?");
-  await expect(page.getByRole("dialog")).toBeVisible();
-  await shoot(page, "shortcuts");
-  await page.keyboard.press("Escape");
-});
 
-test("escape puts a gesture back, symmetry moves both sides", async ({ page }) => {
-  await open(page);
-  const before = await cagePositions(page);
-  await test.step("R rotates whatever gizmo shows, and Escape keeps the selection", async () => {
-    const selected = () => page.evaluate(() => globalThis.cagework?.engine.selection().length ?? 0);
-    for (let k = 0; k < 2; k++) {
-      await page.keyboard.press("r");
-      await expect(page.getByText("Select something first")).toHaveCount(1);
-    }
-    await page.keyboard.press("a");
-    await page.keyboard.press("w");
-    await page.keyboard.press("r");
-    await page.mouse.move(300, 300);
-    await page.mouse.move(400, 320);
-    await expect(page.locator("#status")).toHaveText(/Rotate/);
+  await test.step("everything that a pose needs works without a pointer", async () => {
+    const before = await cagePositions(page);
+    await page.locator("canvas").first().locator("xpath=ancestor-or-self::*[@tabindex]").first().focus();
+    await page.keyboard.press("]");
+    await page.keyboard.press("g");
+    await page.keyboard.press("x");
+    await page.keyboard.type("0.25");
+    await page.keyboard.press("Enter");
+    const after = await cagePositions(page);
+    expect(largestMove(before, after)).toBeCloseTo(0.25, 4);
+    const movedAlong = after.map((x, k) => x - (before[k] ?? 0)).filter((d) => Math.abs(d) > 1e-6);
+    expect(movedAlong.length, "along x only").toBe(1);
+    await page.keyboard.press("ArrowUp");
+    expect(largestMove(after, await cagePositions(page))).toBeGreaterThan(0);
+    await page.keyboard.press("Control+z");
+    await page.keyboard.press("Control+z");
+    expect(largestMove(before, await cagePositions(page))).toBeLessThan(1e-6);
+    await page.keyboard.press("?");
+    await expect(page.getByRole("dialog")).toBeVisible();
+    await shoot(page, "shortcuts");
     await page.keyboard.press("Escape");
+  });
+
+  await test.step("escape puts a gesture back, symmetry moves both sides", async () => {
+    await page.keyboard.press("Alt+a");
+    const before = await cagePositions(page);
+    await test.step("R rotates whatever gizmo shows, and Escape keeps the selection", async () => {
+      const selected = () => page.evaluate(() => globalThis.cagework?.engine.selection().length ?? 0);
+      for (let k = 0; k < 2; k++) {
+        await page.keyboard.press("r");
+        await expect(page.getByText("Select something first")).toHaveCount(1);
+      }
+      await page.keyboard.press("a");
+      await page.keyboard.press("w");
+      await page.keyboard.press("r");
+      await page.mouse.move(300, 300);
+      await page.mouse.move(400, 320);
+      await expect(page.locator("#status")).toHaveText(/Rotate/);
+      await page.keyboard.press("Escape");
+      await page.keyboard.press("Escape");
+      expect(largestMove(before, await cagePositions(page))).toBeLessThan(1e-6);
+      expect(await selected()).toBe(before.length / 3);
+      await page.keyboard.press("q");
+      await page.keyboard.press("Alt+a");
+      expect(await selected()).toBe(0);
+    });
+    const vertex = await reachable(page);
+    const { x, y } = await handle(page, vertex);
+    await page.mouse.click(x, y);
+    await page.keyboard.press("r");
+    await page.mouse.move(x + 80, y + 40);
     await page.keyboard.press("Escape");
     expect(largestMove(before, await cagePositions(page))).toBeLessThan(1e-6);
-    expect(await selected()).toBe(before.length / 3);
-    await page.keyboard.press("q");
-    await page.keyboard.press("Alt+a");
-    expect(await selected()).toBe(0);
+    await page.keyboard.press("m");
+    await drag(page, 30, 30);
+    const moved = (await cagePositions(page)).filter((value, k) => Math.abs(value - (before[k] ?? 0)) > 1e-6);
+    expect(moved.length, "a vertex and its mirror image").toBeGreaterThan(3);
   });
-  const vertex = await reachable(page);
-  const { x, y } = await handle(page, vertex);
-  await page.mouse.click(x, y);
-  await page.keyboard.press("r");
-  await page.mouse.move(x + 80, y + 40);
-  await page.keyboard.press("Escape");
-  expect(largestMove(before, await cagePositions(page))).toBeLessThan(1e-6);
-  await page.keyboard.press("m");
-  await drag(page, 30, 30);
-  const moved = (await cagePositions(page)).filter((value, k) => Math.abs(value - (before[k] ?? 0)) > 1e-6);
-  expect(moved.length, "a vertex and its mirror image").toBeGreaterThan(3);
-});
 
-test("turning, moving and zooming leave the model alone", async ({ page }) => {
-  await open(page);
-  const before = await cagePositions(page);
-  const first = await handle(page, 0);
-  await page.mouse.move(620, 180);
-  await page.mouse.down();
-  await page.mouse.move(700, 220, { steps: 4 });
-  await page.mouse.up();
-  await page.mouse.wheel(0, -300);
-  const turned = async () => {
-    const { x, y } = await handle(page, 0);
-    return Math.hypot(x - first.x, y - first.y);
-  };
-  await expect.poll(turned).toBeGreaterThan(2);
-  expect(await cagePositions(page)).toEqual(before);
-});
+  await test.step("turning, moving and zooming leave the model alone", async () => {
+    const before = await cagePositions(page);
+    const first = await handle(page, 0);
+    await page.mouse.move(620, 180);
+    await page.mouse.down();
+    await page.mouse.move(700, 220, { steps: 4 });
+    await page.mouse.up();
+    await page.mouse.wheel(0, -300);
+    const turned = async () => {
+      const { x, y } = await handle(page, 0);
+      return Math.hypot(x - first.x, y - first.y);
+    };
+    await expect.poll(turned).toBeGreaterThan(2);
+    expect(await cagePositions(page)).toEqual(before);
+  });
 
-test("colours, slice and comparison are shown", async ({ page }) => {
-  await open(page);
-  await showsColours(page, "see");
+  await test.step("colours, slice and comparison are shown", async () => {
+    await page.keyboard.press("m");
+    await showsColours(page, "see");
+  });
 });

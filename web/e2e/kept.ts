@@ -23,27 +23,6 @@ export const savedSince = (page: Page, moment: number, name = ""): Promise<boole
     { moment, name },
   );
 
-/** What the page kept before work had entries: one project. */
-export const keepAsBefore = (page: Page, bytes: Uint8Array, name: string, when: number): Promise<void> =>
-  page.evaluate(
-    ({ bytes, name, when }) =>
-      new Promise<void>((done, fail) => {
-        const opened = indexedDB.open("cagework", 1);
-        opened.onerror = () => fail(opened.error);
-        opened.onupgradeneeded = () => opened.result.createObjectStore("projects");
-        opened.onsuccess = () => {
-          const { result } = opened;
-          const transaction = result.transaction("projects", "readwrite");
-          transaction.objectStore("projects").put({ bytes: Uint8Array.from(bytes), name, when }, "autosave");
-          transaction.oncomplete = () => {
-            result.close();
-            done();
-          };
-        };
-      }),
-    { bytes: Array.from(bytes), name, when },
-  );
-
 /** Cuts kept files off, as a disk that failed might. */
 export const cutKept = (page: Page): Promise<void> =>
   page.evaluate(

@@ -4,9 +4,9 @@ import { complaintsOfAxe, survives } from "./stories";
 import { calm, expect, open, shoot, test } from "./support";
 
 test("nothing for axe to complain about, light and dark", async ({ page }) => {
+  await open(page);
   for (const scheme of ["light", "dark"] as const) {
     await page.emulateMedia({ colorScheme: scheme });
-    await open(page);
     for (const step of ["Model", "Cage", "Bind", "Pose", "Export"]) {
       await page.getByRole("button", { name: step, exact: false }).first().click();
       await calm(page);
@@ -31,14 +31,12 @@ test.describe("on a phone", () => {
   });
 });
 
-test("a lost device comes back with model and pose", async ({ page }) => {
+test("a lost device comes back with model and pose, ten models in turn leave no memory behind", async ({
+  page,
+}) => {
   await open(page);
   await survives(page, () => page.evaluate(() => globalThis.cagework?.loseDevice()));
   await shoot(page, "recovered");
-});
-
-test("ten models in turn leave no memory behind", async ({ page }) => {
-  await open(page);
   const bytes = await page.evaluate(async () => {
     const session = globalThis.cagework;
     if (!session) throw new Error("no session");

@@ -38,10 +38,27 @@ async function isAlive(page: Page, before: number[]): Promise<void> {
   expect(await cagePositions(page)).not.toEqual(before);
 }
 
-test("a file that breaks the worker that reads it costs a message", async ({ page, complaints }) => {
+test("a file that breaks the worker that reads it costs a message, as a model and as a cage", async ({
+  page,
+  complaints,
+}) => {
   await spoilReading(page, "trap");
   await open(page);
   const before = await cagePositions(page);
+  await test.step("as a cage", async () => {
+    await page.getByRole("button", { name: "Cage", exact: false }).first().click();
+    const chosen = page.waitForEvent("filechooser");
+    await page.locator("#panel").getByRole("radio", { name: "File", exact: true }).check();
+    await page.getByRole("button", { name: "Open a cage file" }).click();
+    await (await chosen).setFiles([
+      { ...hostile, mimeType: "model/gltf-binary", buffer: Buffer.from(hostile.bytes) },
+    ]);
+    const alert = page.locator("#toasts [role=alert]");
+    await expect(alert).toContainText("This cage cannot be used");
+    await expect(alert).toContainText("Reading it broke off");
+    await alert.getByRole("button", { name: /close/i }).click();
+    expect(await cagePositions(page)).toEqual(before);
+  });
   for (let k = 0; k < 3; k++) {
     await drop(page, [hostile]);
     const alert = page.locator("#toasts [role=alert]");
@@ -83,36 +100,12 @@ test("a file that takes for ever is given up by Cancel and by Escape", async ({ 
   await expect(busy).toBeHidden();
   await expect(page.locator("#toasts [role=alert]")).toBeEmpty();
   await isAlive(page, before);
-});
-
-test("another file ends the reading of one that takes for ever", async ({ page }) => {
-  await spoilReading(page, "hang");
-  await open(page);
-  await drop(page, [hostile]);
-  await expect(busyOf(page)).toBeVisible();
-  await dropBox(page, "good");
-  await expect(busyOf(page)).toBeHidden();
-});
-
-test("a cage that breaks the worker that reads it leaves the one that is there", async ({
-  page,
-  complaints,
-}) => {
-  await spoilReading(page, "trap");
-  await open(page);
-  const before = await cagePositions(page);
-  await page.getByRole("button", { name: "Cage", exact: false }).first().click();
-  const chosen = page.waitForEvent("filechooser");
-  await page.locator("#panel").getByRole("radio", { name: "File", exact: true }).check();
-  await page.getByRole("button", { name: "Open a cage file" }).click();
-  await (await chosen).setFiles([
-    { ...hostile, mimeType: "model/gltf-binary", buffer: Buffer.from(hostile.bytes) },
-  ]);
-  const alert = page.locator("#toasts [role=alert]");
-  await expect(alert).toContainText("This cage cannot be used");
-  await expect(alert).toContainText("Reading it broke off");
-  await isAlive(page, before);
-  complaints.length = 0;
+  await test.step("another file ends it as well", async () => {
+    await drop(page, [hostile]);
+    await expect(busy).toBeVisible();
+    await dropBox(page, "good");
+    await expect(busy).toBeHidden();
+  });
 });
 
 test("a cage with a vertex far away is a message or a draft, and the page goes on", async ({ page }) => {

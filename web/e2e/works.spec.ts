@@ -1,7 +1,7 @@
 /** Work that the browser keeps: a piece for each model, one tab at a time. */
 
 import type { Page } from "@playwright/test";
-import { cutKept, keepAsBefore, savedSince } from "./kept";
+import { cutKept, savedSince } from "./kept";
 import { box } from "./models";
 import { complaintsOfAxe } from "./stories";
 import { bound, cagePositions, calm, drag, drop, expect, largestMove, open, shoot, test } from "./support";
@@ -157,20 +157,4 @@ test("damaged work is deleted, and a sentence says so", async ({ page }) => {
   );
   await expect(page).toHaveTitle(/Rat/);
   expect(await savedSince(page, 0)).toBe(false);
-});
-
-test("the one project that was kept before is an entry now", async ({ page }) => {
-  await open(page);
-  const project = await page.evaluate(() =>
-    Array.from(globalThis.cagework?.engine.writeProject([], [], "{}") ?? []),
-  );
-  await leave(page);
-  await page.evaluate(() => new Promise((done) => (indexedDB.deleteDatabase("cagework").onsuccess = done)));
-  await keepAsBefore(page, Uint8Array.from(project), "horse.glb", Date.now() - 120_000);
-  await open(page);
-  await expect(page.locator("#toasts")).toContainText(
-    "Your work on horse.glb is back, as you left it 2 minutes ago. Undo begins anew.",
-  );
-  await showList(page);
-  await expect(listOf(page).getByRole("listitem")).toHaveText([/^horse\.glb.*open here/]);
 });

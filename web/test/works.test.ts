@@ -6,7 +6,6 @@ import {
   isExpired,
   isWhole,
   newestFirst,
-  takeOver,
   toOpen,
   type Work,
 } from "../src/works/entry";
@@ -60,21 +59,6 @@ describe("entries", () => {
     larger.set(glb(40), 8);
     expect(isWhole(larger.subarray(8, 48))).toBe(true);
   });
-});
-
-it("the one project of before becomes an entry, unless it is damaged", () => {
-  const saved = { bytes: glb(40), name: "horse.glb", when: 7 };
-  expect(takeOver(saved, "x")).toEqual({
-    entry: { id: "x", name: "horse.glb", when: 7, size: 40 },
-    bytes: saved.bytes,
-  });
-  const bad = [
-    undefined,
-    { ...saved, bytes: new Uint8Array(3) },
-    { ...saved, name: undefined },
-    { ...saved, when: "now" },
-  ];
-  expect(bad.map((value) => takeOver(value, "x"))).toEqual(bad.map(() => undefined));
 });
 
 describe("what a visit opens by itself", () => {

@@ -1,13 +1,11 @@
 /** Kept work in IndexedDB: entries and their project files apart, so that a list of entries reads no file. Nothing leaves it. */
 
-import { type Entry, isEntry, isWhole, takeOver } from "./entry";
+import { type Entry, isEntry, isWhole } from "./entry";
 
 const DATABASE = "cagework";
 const VERSION = 2;
 const ENTRIES = "entries";
 const FILES = "projects";
-/** Where version 1 had the one project that it kept. */
-const ONLY = "autosave";
 
 /** A name for new work; plain HTTP has no `randomUUID`. */
 export function newId(): string {
@@ -17,19 +15,10 @@ export function newId(): string {
 function open(): Promise<IDBDatabase> {
   return new Promise((resolve, reject) => {
     const request = indexedDB.open(DATABASE, VERSION);
-    request.onupgradeneeded = ({ oldVersion }) => {
-      const entries = request.result.createObjectStore(ENTRIES);
-      if (oldVersion === 0) request.result.createObjectStore(FILES);
-      const files = request.transaction?.objectStore(FILES);
-      if (oldVersion === 0 || !files) return;
-      const only = files.get(ONLY);
-      only.onsuccess = () => {
-        const taken = takeOver(only.result, newId());
-        files.delete(ONLY);
-        if (!taken) return;
-        entries.put(taken.entry, taken.entry.id);
-        files.put(taken.bytes, taken.entry.id);
-      };
+    request.onupgradeneeded = () => {
+      const { result } = request;
+      for (const table of [ENTRIES, FILES])
+        if (!result.objectStoreNames.contains(table)) result.createObjectStore(table);
     };
     request.onsuccess = () => resolve(request.result);
     request.onerror = () => reject(request.error);

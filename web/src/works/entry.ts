@@ -45,14 +45,6 @@ export function isWhole(file: unknown): file is Uint8Array {
   return view.getUint32(0, true) === GLB && view.getUint32(GLB_LENGTH_AT, true) === file.length;
 }
 
-/** The one project that the page kept for all visits, as an entry of its own; undefined when it is none. */
-export function takeOver(value: unknown, id: string): { entry: Entry; bytes: Uint8Array } | undefined {
-  const { bytes, name, when } = (value ?? {}) as Partial<Record<string, unknown>>;
-  if (!isWhole(bytes)) return undefined;
-  const entry = { id, name, when, size: bytes.length };
-  return isEntry(entry) ? { entry, bytes } : undefined;
-}
-
 export function isExpired({ when }: Entry, now: number): boolean {
   return now - when > KEPT_DAYS * DAY_MS;
 }
