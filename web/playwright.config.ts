@@ -4,12 +4,14 @@ import { WITH_WEBGPU } from "./e2e/browser";
 /** Where e2e/server.mjs serves the built page. */
 const BASE = `http://127.0.0.1:${process.env.E2E_PORT ?? 4179}/`;
 
+/** What measures time or memory runs after the others, alone. */
+const MEASURED = ["hostile.spec.ts", "long-tasks.spec.ts"];
+
 export default defineConfig({
   testDir: "e2e",
-  testMatch: process.env.PICTURES ? "pictures.ts" : "*.spec.ts",
   outputDir: "../target/e2e",
-  // One GPU made of processor cores: two pages at a time would only wait for each other.
-  workers: 1,
+  // Much of a visit is waiting: two at a time take two thirds of the time, although their GPU is made of processor cores.
+  workers: 2,
   fullyParallel: false,
   forbidOnly: true,
   // A machine under load takes several times as long as one of its own.
@@ -17,6 +19,12 @@ export default defineConfig({
   retries: 0,
   expect: { timeout: 20_000 },
   reporter: [["list"]],
+  projects: process.env.PICTURES
+    ? [{ name: "pictures", testMatch: "pictures.ts" }]
+    : [
+        { name: "page", testMatch: "*.spec.ts", testIgnore: MEASURED },
+        { name: "measured", testMatch: MEASURED, dependencies: ["page"], workers: 1 },
+      ],
   use: {
     baseURL: BASE,
     // Small: every pixel is computed by the processor.

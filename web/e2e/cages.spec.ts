@@ -76,7 +76,7 @@ test("a gap that the vertices close stays open when asked for", async ({ page })
   expect(await isInside(page, IN_A_LEG)).toBe(true);
   expect(await isInside(page, IN_THE_GAP)).toBe(true);
   await gaps.fill("128");
-  await expect(gaps).toHaveAttribute("aria-valuetext", "from 2.3 % of its size");
+  await expect(gaps).toHaveAttribute("aria-valuetext", "from 2.3% of its size");
   await page.getByRole("button", { name: "Make this cage" }).click();
   await bound(page);
   expect(await isInside(page, IN_A_LEG)).toBe(true);

@@ -1,17 +1,25 @@
-/** What panels and input may call; main.ts puts it together. */
+/** What panels and input may call, put together. */
 
-import type { BindActions } from "./actions/bind";
-import type { CageActions } from "./actions/cage";
-import type { Context } from "./actions/context";
-import type { Edit } from "./actions/edit";
-import type { Exports } from "./actions/exports";
-import type { Files } from "./actions/files";
-import type { PoseActions } from "./actions/poses";
-import type { Project } from "./actions/project";
-import type { View } from "./actions/view";
-import type { WorkActions } from "./actions/works";
-import type { Command } from "./input/shortcuts";
+import { type BindActions, createBind } from "./actions/bind";
+import { type CageActions, createCage } from "./actions/cage";
+import type { Context, Tell } from "./actions/context";
+import { createEdit, type Edit } from "./actions/edit";
+import { createExports, type Exports } from "./actions/exports";
+import { createFiles, type Files } from "./actions/files";
+import { followCage } from "./actions/follow";
+import { createPoses, type PoseActions } from "./actions/poses";
+import { createProject, type Project, poseOf } from "./actions/project";
+import { createView, type View } from "./actions/view";
+import { createWorks, type WorkActions } from "./actions/works";
+import type { Session } from "./contract";
+import { createHistory } from "./history";
+import { choose } from "./input/choose";
+import { createCommands } from "./input/commands";
+import { type Command, isMac, shortcutText } from "./input/shortcuts";
+import { createQueue } from "./queue";
 import type { StepName, Store } from "./state";
+import type { Explained } from "./strings";
+import { T } from "./words";
 
 export interface App {
   readonly ctx: Context;
@@ -42,4 +50,112 @@ export interface App {
   pointer: () => { x: number; y: number };
   /** "Ctrl+Z" */
   key(command: Command): string;
+}
+
+const MODELS = ".glb,.gltf,.obj,.bin,.png,.jpg,.jpeg,.webp,.ktx2,.mtl,model/gltf-binary,model/gltf+json";
+const CAGES = ".obj,.glb,.gltf,.bin";
+
+export interface Needs {
+  store: Store;
+  /** Fails while the page is still starting. */
+  session: () => Session;
+  tell: Tell;
+  /** The view's place in the window. */
+  viewport: () => DOMRect;
+}
+
+export function createApp({ store, session, tell, viewport }: Needs): App {
+  const history = createHistory(() => {
+    store.set({ undoLabel: history.undoLabel ?? null, redoLabel: history.redoLabel ?? null });
+  });
+  const fixFor = (fix: NonNullable<Explained["fix"]>) => ({ label: T.fixes[fix], run: () => fixes[fix]() });
+  const ctx: Context = { session, store, history, queue: createQueue(), tell, fixFor };
+  const bind = createBind(ctx);
+  const cage = createCage(ctx, (grid) => {
+    bind.setOptions({ grid });
+    void bind.start();
+  });
+  const edit = createEdit(ctx, cage.adopt);
+  const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"), viewport);
+  followCage(ctx, bind, edit, view);
+  const poses = createPoses(ctx, edit);
+  const project = createProject(ctx);
+  const exports = createExports(ctx, project, viewport);
+  const startFresh = () => void files.openSample(store.get().samples[0]?.id ?? "");
+  const works = createWorks(ctx, {
+    write: project.write,
+    openFiles: (list) => files.openFiles(list),
+    startFresh,
+  });
+  const files = createFiles(ctx, {
+    adoptCage: (opened) => cage.adopt(opened.cage, opened.check),
+    makeCage: () => cage.make(),
+    loadCage: (list) => cage.load(list),
+    bind: () => bind.start(),
+    applySettings(settings) {
+      store.set({
+        ...(settings.bind ? { bindOptions: settings.bind } : {}),
+        ...(settings.cage ? { cageOptions: settings.cage } : {}),
+      });
+      view.symmetry(settings.symmetry ?? store.get().symmetry);
+    },
+    applyPose(settings) {
+      const pose = poseOf(settings);
+      try {
+        if (pose) session().engine.decodePose(pose);
+      } catch {
+        tell.say(T.opening.damagedPose);
+      }
+      edit.sync();
+    },
+    writeProject: project.write,
+    keep() {
+      edit.setEditingRest(false);
+      return works.flush();
+    },
+    leave: works.leave,
+  });
+  const fixes: Record<NonNullable<Explained["fix"]>, () => void> = {
+    coarser() {
+      bind.setOptions({ grid: Math.max(16, store.get().bindOptions.grid / 2) });
+      void bind.start();
+    },
+    cpu() {
+      bind.setOptions({ backend: "cpu" });
+      void bind.start();
+    },
+    file: () => app.chooseModel(),
+    regenerate: () => void cage.regenerate(),
+    reload: () => location.reload(),
+  };
+  const mac = isMac(navigator.platform);
+  const app: App = {
+    ctx,
+    store,
+    edit,
+    cage,
+    bind,
+    poses,
+    view,
+    files,
+    project,
+    works,
+    exports,
+    mac,
+    run: (command) => commands[command](),
+    go(step) {
+      if (step === "pose" || step === "export") edit.setEditingRest(false);
+      store.set({ step });
+    },
+    chooseModel: () => choose(MODELS, false, (list) => void files.openFiles(list)),
+    chooseFolder: () => choose("", true, (list) => void files.openFiles(list)),
+    chooseCage: () => choose(CAGES, false, (list) => void cage.load(list)),
+    share: () => void exports.share(),
+    showWays: () => store.set({ waysOpen: true }),
+    startFresh,
+    pointer: () => ({ x: 0, y: 0 }),
+    key: (command) => shortcutText(command, mac),
+  };
+  const commands = createCommands(app);
+  return app;
 }

@@ -2,7 +2,7 @@
 
 import { type AppState, cageBroken, type Store } from "./state";
 import { forgetCrash, keepCrash, lastCrash } from "./store";
-import { PRODUCT } from "./strings";
+import { T } from "./words";
 
 /** What happened, for the page that comes after. */
 export interface Crash {
@@ -56,14 +56,14 @@ export function watchCrashes(store: Store, restart: () => void, ask: (crash: Cra
 
 /** What was going on. */
 export function sayDuring({ busy, model }: Pick<AppState, "busy" | "model">): string {
-  if (busy) return `It happened while ${busy.charAt(0).toLowerCase()}${busy.slice(1)}.`;
-  return model ? `It happened with ${model.name} open.` : "Nothing was open yet.";
+  if (busy) return T.crash.while(`${busy.charAt(0).toLowerCase()}${busy.slice(1)}`);
+  return model ? T.crash.with(model.name) : T.crash.nothing;
 }
 
 function reportOf(error: Error, during: string, state: AppState): string {
   const { model, cage, adapter, bindOptions } = state;
   return [
-    `${PRODUCT} stopped: ${error.message}`,
+    `${T.product} stopped: ${error.message}`,
     during,
     `When: ${new Date().toISOString()}`,
     `Browser: ${navigator.userAgent}`,

@@ -1,5 +1,7 @@
 /** What dropped files are, by their names: a model, a cage, a project, or what the page cannot open. */
 
+import { T } from "./words";
+
 export type DropKind = "model" | "project" | "textures" | "nothing" | "unknown";
 
 export interface DropPlan {
@@ -31,7 +33,7 @@ export function isModel(name: string): boolean {
 
 /** Says what opening these files means. Files named "...cage..." are cages when another model is among them. */
 export function planDrop(names: readonly string[]): DropPlan {
-  if (names.length === 0) return { kind: "nothing", sentence: "Nothing was dropped." };
+  if (names.length === 0) return { kind: "nothing", sentence: T.opening.dropped };
   const project = names.findIndex((name) => PROJECT_NAME.test(name));
   if (project >= 0) {
     return { kind: "project", main: project, sentence: `Opens the project ${base(names[project])}.` };
@@ -43,9 +45,9 @@ export function planDrop(names: readonly string[]): DropPlan {
     return companions
       ? {
           kind: "textures",
-          sentence: "These files belong to a .gltf or .obj file: drop that one together with them.",
+          sentence: T.opening.companions,
         }
-      : { kind: "unknown", sentence: "Cagework opens .glb, .gltf and .obj files." };
+      : { kind: "unknown", sentence: T.opening.kinds };
   }
   const second = models.find((other) => other !== model && CAGE_NAME.test(base(other.name)));
   const companions = names.length - models.length;
@@ -59,13 +61,10 @@ export function planDrop(names: readonly string[]): DropPlan {
 /** What the page can say while files hover over it: browsers tell how many there are, and types of some. */
 export function hoverSentence(files: number, hasModel: boolean, onCagePanel: boolean): string {
   if (files > 1) {
-    return "A model with its textures, or a model and its cage: drop them together.";
+    return T.opening.together;
   }
-  if (hasModel && onCagePanel)
-    return "It becomes the model; to use it as the cage, drop it on the Cage panel.";
-  return hasModel
-    ? "It takes the place of the model that is open."
-    : "It gets a cage and can be posed at once.";
+  if (hasModel && onCagePanel) return T.opening.onCageStep;
+  return hasModel ? T.opening.replaces : T.opening.getsCage;
 }
 
 function base(name: string | undefined): string {

@@ -1,5 +1,8 @@
 /** How long it will still take, from the share done so far. */
 
+import { inUnit } from "./format";
+import { T } from "./words";
+
 /** Share of each new estimate; stages differ in speed, so that old speed must be forgotten, but not at every step. */
 const SMOOTHING = 0.25;
 /** No estimate before this share: the first steps say little. */
@@ -31,4 +34,11 @@ export function createEta(start: number): Eta {
       return Math.max(0, (1 - share) / speed - (now - lastTime));
     },
   };
+}
+
+/** Time left, rounded as one would say it: never more exact than it can be. */
+export function timeLeft(ms: number): string {
+  if (ms < 1500) return T.eta.second;
+  const isShort = ms < 60_000;
+  return T.eta.left(inUnit(Math.round(ms / (isShort ? 1000 : 60_000)), isShort ? "second" : "minute"));
 }

@@ -1,6 +1,20 @@
-/** Numbers as people read them. */
+/** Numbers as people read them, in the language of the page. */
 
-const INTEGER = new Intl.NumberFormat("en", { maximumFractionDigits: 0 });
+/** Of the words in words/index.ts. */
+export const LOCALE = "en";
+
+const INTEGER = new Intl.NumberFormat(LOCALE, { maximumFractionDigits: 0 });
+const PLURAL = new Intl.PluralRules(LOCALE);
+
+/** 3 minutes: "3 min". */
+export function inUnit(value: number, unit: string, maximumFractionDigits = 0): string {
+  return new Intl.NumberFormat(LOCALE, {
+    style: "unit",
+    unit,
+    unitDisplay: "short",
+    maximumFractionDigits,
+  }).format(value);
+}
 
 /** 12345 -> "12,345". */
 export function count(value: number): string {
@@ -9,36 +23,23 @@ export function count(value: number): string {
 
 /** 1 vertex, 2 vertices. */
 export function plural(value: number, one: string, many = `${one}s`): string {
-  return `${count(value)} ${value === 1 ? one : many}`;
+  return `${count(value)} ${PLURAL.select(value) === "one" ? one : many}`;
 }
 
-/** Bytes in the unit that leaves one to three digits before the point: 1536 -> "1.5 KB". */
+/** Bytes in the unit that leaves one to three digits before the point: 1536 -> "1.5 kB". */
 export function bytes(value: number): string {
-  const units = ["B", "KB", "MB", "GB", "TB"] as const;
-  let scaled = value;
-  let unit = 0;
-  while (scaled >= 1000 && unit < units.length - 1) {
-    scaled /= 1000;
-    unit += 1;
-  }
-  const digits = unit === 0 || scaled >= 100 ? 0 : 1;
-  return `${scaled.toFixed(digits)} ${units[unit]}`;
+  const units = ["byte", "kilobyte", "megabyte", "gigabyte", "terabyte"] as const;
+  const power = Math.min(units.length - 1, Math.max(0, Math.floor(Math.log10(Math.max(1, value)) / 3)));
+  const scaled = value / 1000 ** power;
+  return inUnit(scaled, units[power] ?? "byte", power === 0 || scaled >= 100 ? 0 : 1);
 }
 
-/** Milliseconds as a duration: 45 -> "45 ms", 1234 -> "1.2 s", 90000 -> "1 min 30 s". */
+/** Milliseconds as a duration: 45 -> "45 ms", 1234 -> "1.2 sec", 90000 -> "1 min 30 sec". */
 export function duration(ms: number): string {
-  if (ms < 1) return `${ms.toFixed(2)} ms`;
-  if (ms < 999.5) return `${Math.round(ms)} ms`;
-  if (ms < 59_950) return `${(ms / 1000).toFixed(1)} s`;
+  if (ms < 999.5) return inUnit(ms, "millisecond", ms < 1 ? 2 : 0);
+  if (ms < 59_950) return inUnit(ms / 1000, "second", 1);
   const seconds = Math.round(ms / 1000);
-  return `${Math.floor(seconds / 60)} min ${seconds % 60} s`;
-}
-
-/** Time left, rounded as one would say it: never more exact than it can be. */
-export function timeLeft(ms: number): string {
-  if (ms < 1500) return "about a second left";
-  if (ms < 60_000) return `about ${Math.round(ms / 1000)} s left`;
-  return `about ${Math.round(ms / 60_000)} min left`;
+  return `${inUnit(Math.floor(seconds / 60), "minute")} ${inUnit(seconds % 60, "second")}`;
 }
 
 /** Small or large numbers with three digits: 0.000123 -> "1.23e-4", 0 -> "0". */
@@ -51,8 +52,9 @@ export function scientific(value: number): string {
 }
 
 /** A share of one as percent. */
-export function percent(share: number): string {
-  return `${Math.round(Math.min(1, Math.max(0, share)) * 100)} %`;
+export function percent(share: number, maximumFractionDigits = 0): string {
+  const clamped = Math.min(1, Math.max(0, share));
+  return new Intl.NumberFormat(LOCALE, { style: "percent", maximumFractionDigits }).format(clamped);
 }
 
 /** A coordinate as a field shows it, at every scale: five significant digits, no trailing zeros, no minus zero. */

@@ -1,13 +1,15 @@
 /** The first moments of a visit, and what goes on by itself: size, title, autosave, and what to open. */
 
+import { effect, untracked } from "@preact/signals";
 import { report } from "./actions/context";
 import type { App } from "./app";
 import type { Crash, Crashes } from "./crash";
 import { percent } from "./format";
-import type { Shared } from "./share";
-import type { Theme } from "./store";
-import { CRASHED, showReport } from "./ui/crashed";
+import { decodeShare } from "./share";
+import { loadTheme } from "./store";
+import { showReport } from "./ui/crashed";
 import type { Stage } from "./ui/viewport";
+import { T } from "./words";
 import { hasEntries } from "./works/database";
 
 /** Sharper than this nobody sees, and it costs four times the pixels. */
@@ -17,12 +19,9 @@ export interface Start {
   app: App;
   stage: Stage;
   crashes: Crashes;
-  theme: Theme;
-  shared: () => Promise<Shared | undefined>;
-  product: string;
 }
 
-export function startUp({ app, stage, crashes, theme, shared, product }: Start): void {
+export function startUp({ app, stage, crashes }: Start): void {
   const { store } = app;
   const session = app.ctx.session();
   store.set({ adapter: session.adapter, lack: session.lack, samples: session.samples, busy: null });
@@ -37,32 +36,34 @@ export function startUp({ app, stage, crashes, theme, shared, product }: Start):
   new ResizeObserver(resize).observe(stage.viewport);
   resize();
   app.view.resized = resize;
-  app.view.theme(theme);
+  app.view.theme(loadTheme());
 
-  store.watch(["bindRun", "cageProgress", "model"], ({ bindRun, cageProgress, model }) => {
+  effect(() => {
+    const { bindRun, cageProgress, model } = store.get();
     const share = bindRun?.fraction ?? cageProgress;
-    const name = model ? `${model.name} - ${product}` : product;
-    document.title = share === null || share === undefined ? name : `${percent(share)} - ${name}`;
+    const name = model ? `${model.name} - ${T.product}` : T.product;
+    document.title = share === null ? name : `${percent(share)} - ${name}`;
   });
-  store.watch(
-    ["cage", "poses", "posed", "selected", "bindOptions", "symmetry", "bound", "undoLabel"],
-    ({ bound, sampleCage, undoLabel }) => {
-      // A sample that nobody has touched is no work to come back to.
-      const untouched = sampleCage && undoLabel === null;
-      if (bound && !untouched) app.works.touch();
-    },
-  );
-
-  store.watch(["step"], () => app.view.scene({}));
+  effect(() => {
+    const { cage, poses, posed, selected, bindOptions, symmetry, bound, undoLabel, sampleCage } = store.get();
+    // A sample that nobody has touched is no work to come back to.
+    const isUntouched = sampleCage && undoLabel === null;
+    const isWork = bound && !isUntouched;
+    // Each of them is part of the work, or says that some of it has changed.
+    if (isWork && [cage, poses, posed, selected, bindOptions, symmetry]) untracked(() => app.works.touch());
+  });
+  effect(() => {
+    if (store.get().step) untracked(() => app.view.scene({}));
+  });
 
   const stop = session.onFrame(() => {
     if (!store.get().bound) return;
     crashes.settled();
     stop();
   });
-  void open(app, shared, crashes.before);
+  void open(app, crashes.before);
   window.addEventListener("hashchange", () => {
-    void openShared(app, shared).then(({ damage }) => sayDamage(app, damage));
+    void openShared(app).then(({ damage }) => sayDamage(app, damage));
   });
 }
 
@@ -72,19 +73,15 @@ export async function isFresh(): Promise<boolean> {
 }
 
 /** A link comes first, then the work of the last visit, then the first sample. */
-async function open(
-  app: App,
-  shared: () => Promise<Shared | undefined>,
-  crash: Crash | undefined,
-): Promise<void> {
-  const link = await openShared(app, shared);
+async function open(app: App, crash: Crash | undefined): Promise<void> {
+  const link = await openShared(app);
   if (!link.opened) await openFirst(app);
   else void app.works.refresh();
   // Last, because whatever is opened takes messages away.
   sayDamage(app, link.damage);
   if (crash) {
-    const report = { label: "Show the report", run: () => showReport(crash) };
-    app.ctx.tell.problem({ title: CRASHED, message: crash.during }, report);
+    const report = { label: T.crash.showReport, run: () => showReport(crash) };
+    app.ctx.tell.problem({ title: T.crash.title, message: crash.during }, report);
   }
 }
 
@@ -98,13 +95,10 @@ async function openFirst(app: App): Promise<void> {
 }
 
 /** Opens what a link shows. Says whether there is something open now, and what is wrong with the link. */
-async function openShared(
-  app: App,
-  shared: () => Promise<Shared | undefined>,
-): Promise<{ opened: boolean; damage?: unknown }> {
+async function openShared(app: App): Promise<{ opened: boolean; damage?: unknown }> {
   let opened = false;
   try {
-    const link = await shared();
+    const link = await decodeShare(location.hash);
     if (!link) return { opened };
     const { sample, pose } = link;
     if (!app.store.get().samples.some(({ id }) => id === sample)) {
@@ -122,7 +116,7 @@ async function openShared(
 }
 
 function sayDamage(app: App, damage: unknown): void {
-  if (damage !== undefined) report(app.ctx, "This link is damaged", damage);
+  if (damage !== undefined) report(app.ctx, T.failed.link, damage);
 }
 
 /** Whether a GPU is made of processor cores: then the processor itself binds faster, and drawing does not wait for it. */

@@ -1,5 +1,6 @@
-/** Everything the page shows, in one place; panels watch the keys they draw. */
+/** Everything the page shows, in one place, a signal a key: panels derive from it. */
 
+import { batch, signal } from "@preact/signals";
 import type {
   BindOptions,
   BindReport,
@@ -10,6 +11,7 @@ import type {
   Lack,
   Legend,
   ModelInfo,
+  Pivot,
   Pose,
   Sample,
   SceneOptions,
@@ -17,6 +19,7 @@ import type {
 } from "./contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
 import type { Theme } from "./store";
+import { T } from "./words";
 import type { Work } from "./works/entry";
 
 export const STEPS = ["model", "cage", "bind", "pose", "export"] as const;
@@ -103,6 +106,8 @@ export interface AppState {
   proportionalOn: boolean;
   /** Clicks and taps add to the selection. */
   additive: boolean;
+  /** What turns and scales go about. */
+  pivot: Pivot;
   boxArmed: boolean;
   ortho: boolean;
   /** What the gesture under way does, null without one. */
@@ -114,6 +119,8 @@ export interface AppState {
   /** Shares of `poses` in the blend. */
   shares: readonly number[];
   playing: boolean;
+  /** Name of the pose that is played towards, null for the rest pose. */
+  playingPose: string | null;
   undoLabel: string | null;
   redoLabel: string | null;
   theme: Theme;
@@ -123,6 +130,11 @@ export interface AppState {
   works: readonly Work[];
   /** Whether the list of it is shown. */
   worksOpen: boolean;
+  sheetOpen: boolean;
+  /** Whether the steps to switch WebGPU on are shown. */
+  waysOpen: boolean;
+  /** Files hover over the window; null when none do. */
+  hovering: { readonly files: number; readonly asCage: boolean } | null;
 }
 
 export const INITIAL: AppState = {
@@ -130,7 +142,7 @@ export const INITIAL: AppState = {
   adapter: "",
   lack: null,
   samples: [],
-  busy: "Starting",
+  busy: T.opening.starting,
   busyStep: "",
   cancelBusy: null,
   goOn: null,
@@ -162,6 +174,7 @@ export const INITIAL: AppState = {
   proportional: 0.2,
   proportionalOn: false,
   additive: false,
+  pivot: "middle",
   boxArmed: false,
   ortho: false,
   gesture: null,
@@ -170,54 +183,42 @@ export const INITIAL: AppState = {
   poses: [],
   shares: [],
   playing: false,
+  playingPose: null,
   undoLabel: null,
   redoLabel: null,
   theme: "auto",
   savedAt: null,
   works: [],
   worksOpen: false,
+  sheetOpen: false,
+  waysOpen: false,
+  hovering: null,
 };
 
 export interface Store {
+  /** The state of the moment; a panel or an effect that reads a key hears of its changes. */
   get(): AppState;
+  /** Changes some keys at once. */
   set(patch: Partial<AppState>): void;
-  /** Calls `listener` now, and after each change of one of the keys; all changes of a turn make one call. */
-  watch(keys: readonly (keyof AppState)[], listener: (state: AppState) => void): void;
 }
 
-/** A store; `schedule` decides when listeners hear of changes. */
-export function createStore(initial: AppState, schedule: (work: () => void) => void = queueMicrotask): Store {
-  let state = initial;
-  const changed = new Set<keyof AppState>();
-  const watchers: { keys: readonly (keyof AppState)[]; listener: (state: AppState) => void }[] = [];
-  let waiting = false;
-
-  const tell = () => {
-    waiting = false;
-    const keys = new Set(changed);
-    changed.clear();
-    for (const watcher of watchers) {
-      if (watcher.keys.some((key) => keys.has(key))) watcher.listener(state);
-    }
-  };
-
+/** A store with a signal a key. */
+export function createStore(initial: AppState): Store {
+  const entries = Object.entries(initial).map(([key, value]) => [key, signal<unknown>(value)] as const);
+  const signals = new Map(entries);
+  const state = Object.defineProperties(
+    {},
+    Object.fromEntries(entries.map(([key, own]) => [key, { enumerable: true, get: () => own.value }])),
+  ) as AppState;
   return {
     get: () => state,
-    set(patch) {
-      for (const key of Object.keys(patch) as (keyof AppState)[]) {
-        if (!Object.is(state[key], patch[key])) changed.add(key);
-      }
-      if (changed.size === 0) return;
-      state = { ...state, ...patch };
-      if (!waiting) {
-        waiting = true;
-        schedule(tell);
-      }
-    },
-    watch(keys, listener) {
-      watchers.push({ keys, listener });
-      listener(state);
-    },
+    set: (patch) =>
+      batch(() => {
+        for (const [key, value] of Object.entries(patch)) {
+          const own = signals.get(key);
+          if (own) own.value = value;
+        }
+      }),
   };
 }
 

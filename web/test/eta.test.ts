@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { createEta } from "../src/eta";
+import { createEta, timeLeft } from "../src/eta";
 
 describe("time left", () => {
   it("is unknown at first", () => {
@@ -33,4 +33,10 @@ describe("time left", () => {
     eta.update(0.9, 1000);
     expect(eta.update(0.9, 9000)).toBe(0);
   });
+});
+
+it("time left is rounded as one would say it", () => {
+  expect(timeLeft(300)).toBe("about a second left");
+  expect(timeLeft(8400)).toBe("about 8 sec left");
+  expect(timeLeft(150_000)).toBe("about 3 min left");
 });

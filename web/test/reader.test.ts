@@ -2,7 +2,7 @@ import { expect, it } from "vitest";
 import type { NamedFile } from "../src/contract";
 import { type Client, named } from "../src/session/client";
 import { createApart } from "../src/session/reader";
-import { sayReading } from "../src/strings";
+import { T } from "../src/words";
 
 const file = (name: string, size = 10): NamedFile => ({ name, path: name, file: { size } as Blob });
 
@@ -70,6 +70,7 @@ it("a file too large for a browser gets no worker", async () => {
 });
 
 it("how far reading is, is said with a share where there is one", () => {
-  expect(sayReading("geometry", 0)).toBe("Finding vertices and faces");
-  expect(sayReading("textures", 0.4)).toBe("Decoding textures, 40 %");
+  const { far, stages } = T.opening;
+  expect(far(stages.geometry, 0)).toBe("Finding vertices and faces");
+  expect(far(stages.textures, 0.4)).toBe("Decoding textures, 40%");
 });

@@ -1,34 +1,24 @@
+import { effect } from "@preact/signals";
 import { describe, expect, it } from "vitest";
 import { createStore, INITIAL } from "../src/state";
 
 describe("store", () => {
-  it("tells watchers of their keys, once a turn", () => {
-    const queue: (() => void)[] = [];
-    const store = createStore(INITIAL, (work) => queue.push(work));
+  it("tells who reads a key of its changes, and nobody else", () => {
+    const store = createStore(INITIAL);
     const heard: string[] = [];
-    store.watch(["step"], ({ step }) => heard.push(step));
-    store.watch(["busy"], ({ busy }) => heard.push(`busy ${busy}`));
+    effect(() => void heard.push(store.get().step));
+    effect(() => void heard.push(`busy ${store.get().busy}`));
     store.set({ step: "cage" });
-    store.set({ step: "bind" });
-    for (const work of queue.splice(0)) work();
-    expect(heard).toEqual(["model", "busy Starting", "bind"]);
+    store.set({ step: "cage", memory: 3 });
+    expect(heard).toEqual(["model", "busy Starting", "cage"]);
+    expect({ ...store.get() }).toMatchObject({ step: "cage", memory: 3 });
   });
 
-  it("says nothing when nothing changed", () => {
-    const queue: (() => void)[] = [];
-    const store = createStore(INITIAL, (work) => queue.push(work));
-    store.set({ step: "model" });
-    expect(queue).toHaveLength(0);
-  });
-
-  it("hears of what a watcher sets", () => {
-    const queue: (() => void)[] = [];
-    const store = createStore(INITIAL, (work) => queue.push(work));
-    const shares: (readonly number[])[] = [];
-    store.watch(["shares"], ({ shares: now }) => shares.push(now));
-    store.watch(["poses"], ({ poses }) => store.set({ shares: poses.map(() => 0) }));
-    store.set({ poses: [{ name: "a", positions: new Float32Array(3) }] });
-    while (queue.length > 0) queue.shift()?.();
-    expect(shares.at(-1)).toEqual([0]);
+  it("changes several keys at once", () => {
+    const store = createStore(INITIAL);
+    const heard: string[] = [];
+    effect(() => void heard.push(`${store.get().poses.length} ${store.get().shares.length}`));
+    store.set({ poses: [{ name: "a", positions: new Float32Array(3) }], shares: [0] });
+    expect(heard).toEqual(["0 0", "1 1"]);
   });
 });

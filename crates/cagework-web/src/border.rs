@@ -8,7 +8,7 @@ use cagework_core::cage_check::{Code, Repair, Severity};
 use cagework_core::cage_gen::{
     CageOptions, MAX_CLEARANCE, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Shape,
 };
-use cagework_core::edit::{Element, GestureKind, SelectMode};
+use cagework_core::edit::{Element, GestureKind, Pivot, SelectMode};
 use cagework_core::options::{
     Backend, CellShape, DeltaNorm, MAX_GRID, MIN_GRID, Method, OutsidePolicy, Preconditioner, Solver,
 };
@@ -27,7 +27,9 @@ use crate::options::{
     ThemeAsked,
 };
 use crate::settings::Settings;
-use crate::views::{BoundsView, CageInfo, CageState, ColorMap, Fix, Legend, Mend, ModelInfo, Problem};
+use crate::views::{
+    BoundsView, CageInfo, CageState, ColorMap, Fix, Largest, Legend, Mend, ModelInfo, Problem,
+};
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/src/contract/generated.ts");
 
@@ -96,8 +98,10 @@ fn the_page_has_the_types_of_rust() {
         GizmoAsked,
         SceneAsked,
         ColorMap,
+        Largest,
         Legend,
         Element,
+        Pivot,
         SelectMode,
         GestureKind,
         GizmoHandle,

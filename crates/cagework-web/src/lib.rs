@@ -37,7 +37,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
 import type { BindOptions, BindReport, CageOptions, CageState, Element, Gesture, GizmoHandle, Legend, ModelInfo,
-  Problem, Progress, Repair, RestEdit, SceneOptions, SelectMode, Settings, UpAxis } from "../contract/generated";
+  Pivot, Problem, Progress, Repair, RestEdit, SceneOptions, SelectMode, Settings, UpAxis } from "../contract/generated";
 "#;
 
 #[wasm_bindgen]

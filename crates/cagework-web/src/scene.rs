@@ -66,7 +66,7 @@ impl State {
         shown
     }
 
-    /// The gizmo in the middle of the selection.
+    /// The gizmo, where its turns and scales go about.
     pub(crate) fn gizmo(&self) -> Option<Gizmo> {
         let mode = match self.view.gizmo {
             GizmoAsked::None => return None,
@@ -74,7 +74,7 @@ impl State {
             GizmoAsked::Rotate => GizmoMode::Rotate,
             GizmoAsked::Scale => GizmoMode::Scale,
         };
-        let center = self.selection.center(&self.positions)?;
+        let center = self.selection.pivot(&self.positions, &self.topology, self.pivot)?;
         Some(Gizmo { mode, center, rotation: Quat::IDENTITY, active: self.active_part })
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cagework_core::edit::{Element, Gesture, Pull, Selection, SharedPull, Symmetry, Topology};
+use cagework_core::edit::{Element, Gesture, Pivot, Pull, Selection, SharedPull, Symmetry, Topology};
 use cagework_core::enclosure::Enclosure;
 use cagework_core::slice::Slice;
 use cagework_core::{Bounds, Cage, PolygonMesh};
@@ -39,6 +39,7 @@ pub(crate) struct State {
     pub(crate) element: Element,
     pub(crate) selection: Selection,
     pub(crate) hovered: Vec<u32>,
+    pub(crate) pivot: Pivot,
     pub(crate) is_mirrored: bool,
     /// Of proportional editing, fraction of the cage's diagonal.
     pub(crate) radius: f32,

@@ -145,6 +145,16 @@ pub(crate) struct Legend {
     pub(crate) high: f32,
     pub(crate) logarithmic: bool,
     pub(crate) map: ColorMap,
+    /// Of the weights that the model's colours show; none for other colours.
+    pub(crate) largest: Option<Largest>,
+}
+
+/// The largest value that colours show, and the vertex of the model that has it.
+#[derive(Clone, Copy, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) struct Largest {
+    pub(crate) value: f32,
+    pub(crate) vertex: u32,
 }
 
 /// How colours of a legend follow each other.

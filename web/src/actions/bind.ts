@@ -1,10 +1,12 @@
 /** Binding: starts, follows and cancels it, and knows what it will need. */
 
+import { effect } from "@preact/signals";
 import type { BindEvent, BindOptions, BindReport } from "../contract";
 import { createEta, type Eta } from "../eta";
 import { follow } from "../queue";
 import { type BindRun, cageBroken, drawn } from "../state";
 import { sentence } from "../strings";
+import { T } from "../words";
 import { attempt, type Context } from "./context";
 
 export interface BindActions {
@@ -36,7 +38,7 @@ export function createBind(ctx: Context): BindActions {
       store.set({ memory: sentence(error instanceof Error ? error.message : String(error)) });
     }
   };
-  store.watch(["model", "cage", "bindOptions"], estimate);
+  effect(estimate);
 
   /** The report that is shown is of a coarse pass, which nobody asked for and no bind is compared with. */
   let isCoarse = false;
@@ -98,7 +100,7 @@ export function createBind(ctx: Context): BindActions {
     adopted(report, "fine");
     kept = asked;
     if (!report.converged) {
-      ctx.tell.say("The solver stopped at its iteration limit, before the change fell below the threshold.");
+      ctx.tell.say(T.bind.stopped);
     }
   };
 
@@ -108,7 +110,7 @@ export function createBind(ctx: Context): BindActions {
       if (!unasked) ctx.tell.clear();
       const { revision } = ctx.session().engine;
       store.set({ bindRun: start("coarse", revision) });
-      const ok = await attempt(ctx, "The bind did not finish", () =>
+      const ok = await attempt(ctx, T.failed.bind, () =>
         ctx.queue.replace("bind", (signal) => bind(revision, signal)),
       );
       // One for another cage may wait by now.
@@ -120,7 +122,7 @@ export function createBind(ctx: Context): BindActions {
       ctx.queue.cancel("bind");
       if (!bindRun || !bound || !kept) return;
       store.set({ bindOptions: kept });
-      ctx.tell.say("The bind from before is kept, and its settings.");
+      ctx.tell.say(T.bind.cancelled);
     },
     covers() {
       const { bound, bindRun } = store.get();
@@ -130,7 +132,7 @@ export function createBind(ctx: Context): BindActions {
       store.set({ bindOptions: { ...store.get().bindOptions, ...patch } });
     },
     prepareCompare: () =>
-      attempt(ctx, "Mean value coordinates could not be computed", () =>
+      attempt(ctx, T.failed.meanValue, () =>
         ctx.queue.add("compare", async (signal) => {
           if (store.get().meanValueReady) return;
           await follow(signal, ctx.session().bindMeanValue());

@@ -12,6 +12,7 @@ import type {
 } from "../contract";
 import { follow } from "../queue";
 import type { CageSource } from "../state";
+import { T } from "../words";
 import { attempt, type Context, waitFor } from "./context";
 
 export interface CageActions {
@@ -31,12 +32,9 @@ export interface CageActions {
 /** A hull needs few vertices: it has no limbs to follow. */
 const HULL_VERTICES = 24;
 
-/** Name of the step that takes a cage from a file. */
-const LOAD = "Load a cage";
-
-export function createCage(ctx: Context, after: () => void, refine: (grid: number) => void): CageActions {
+export function createCage(ctx: Context, refine: (grid: number) => void): CageActions {
   const look = () =>
-    attempt(ctx, "The cage could not be checked", () =>
+    attempt(ctx, T.failed.check, () =>
       ctx.queue.replace("check", async (signal) =>
         ctx.store.set({ check: await follow(signal, ctx.session().checkCage()) }),
       ),
@@ -54,7 +52,6 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
       scene: { ...ctx.store.get().scene, compare: false, slice: "off" },
     });
     if (state && !check) void look();
-    after();
   };
 
   const now = (): CheckedCage | undefined => {
@@ -65,13 +62,35 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
 
   const set = (cage: CheckedCage) => adopt(ctx.session().takeCage(cage), cage.check);
 
+  /** A cage as it is posed, for a step of the history. */
+  interface Posed {
+    readonly cage: CheckedCage;
+    readonly positions: Float32Array;
+    readonly shares: readonly number[];
+  }
+  const posedNow = (): Posed | undefined => {
+    const cage = now();
+    const { shares } = ctx.store.get();
+    return cage && { cage, positions: ctx.session().engine.cagePositions(), shares };
+  };
+  const setPosed = ({ cage, positions, shares }: Posed) => {
+    set(cage);
+    ctx.session().engine.setCagePositions(positions);
+    ctx.store.set({ shares });
+  };
+
   /** Takes a new cage as a step of the history; the first cage of a model is none. */
-  const take = (label: string, before: CheckedCage | undefined, cage: CheckedCage) => {
+  const take = (label: string, before: Posed | undefined, cage: CheckedCage) => {
+    const { posed, poses } = ctx.store.get();
     set(cage);
     // A cage from elsewhere may reach beyond the view.
-    if (!before || label === LOAD) ctx.session().engine.frameAll();
-    const next = now();
-    if (before && next) ctx.history.push({ label, undo: () => set(before), redo: () => set(next) });
+    if (!before || label === T.did.loadCage) ctx.session().engine.frameAll();
+    const next = posedNow();
+    if (!before || !next) return;
+    ctx.history.push({ label, undo: () => setPosed(before), redo: () => setPosed(next) });
+    // What was posed belongs to the cage before.
+    const back = { label: T.pose.backToCage, run: () => void ctx.history.undo() };
+    if (posed || poses.length > 0) ctx.tell.say(T.cage.posesWait, back);
   };
 
   const generate = async (source: CageSource, signal: AbortSignal) => {
@@ -84,7 +103,7 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
       const made = await follow(signal, ctx.session().generateCage(options, hear));
       const vertices = made.positions.length / 3;
       if (vertices > options.vertices) {
-        ctx.tell.say(`The model's holes and gaps need ${vertices} vertices instead of ${options.vertices}.`);
+        ctx.tell.say(T.cage.more(vertices, options.vertices));
       }
       return made;
     } finally {
@@ -95,35 +114,35 @@ export function createCage(ctx: Context, after: () => void, refine: (grid: numbe
   return {
     make() {
       ctx.tell.clear();
-      return attempt(ctx, "No cage could be made", () =>
+      return attempt(ctx, T.failed.noCage, () =>
         ctx.queue.replace("cage", async (signal) => {
-          const before = now();
+          const before = posedNow();
           const { cageSource, boxDivisions } = ctx.store.get();
           const box = () => ({ ...ctx.session().boxCage(boxDivisions), check: null });
-          take("Make a cage", before, cageSource === "box" ? box() : await generate(cageSource, signal));
+          take(T.did.makeCage, before, cageSource === "box" ? box() : await generate(cageSource, signal));
         }),
       );
     },
     cancel: () => ctx.queue.cancel("cage"),
     load(files) {
       ctx.tell.clear();
-      return attempt(ctx, "This cage cannot be used", () =>
+      return attempt(ctx, T.failed.cageFile, () =>
         ctx.queue.replace("open", async (signal) => {
-          const before = now();
+          const before = posedNow();
           const name = files[0]?.name ?? "the cage";
           const read = (hear: (progress: Reading) => void) => ctx.session().readCage(files, hear);
-          const cage = await waitFor(ctx, signal, `Opening ${name}`, read);
+          const cage = await waitFor(ctx, signal, T.opening.file(name), read);
           ctx.store.set({ cageSource: "file" });
-          take(LOAD, before, cage);
+          take(T.did.loadCage, before, cage);
         }),
       );
     },
     repair(kind) {
-      return attempt(ctx, "The repair did not work", () =>
+      return attempt(ctx, T.failed.repair, () =>
         ctx.queue.replace("open", async (signal) => {
-          const before = now();
+          const before = posedNow();
           const repair = () => ctx.session().repair(kind);
-          take("Repair the cage", before, await waitFor(ctx, signal, "Repairing the cage", repair));
+          take(T.did.repairCage, before, await waitFor(ctx, signal, T.opening.repairing, repair));
         }),
       );
     },

@@ -2,11 +2,11 @@
 
 import type { Job, ReadFile, Reading, Session } from "../contract";
 import { isFatal } from "../crash";
-import { duration } from "../format";
 import type { History } from "../history";
 import type { Queue } from "../queue";
 import type { Store } from "../state";
-import { type Explained, explain, isCancelled, sayReading } from "../strings";
+import { type Explained, explain, isCancelled } from "../strings";
+import { T } from "../words";
 
 export interface Fix {
   label: string;
@@ -58,7 +58,9 @@ export async function waitFor<T extends object>(
   work: (hear: (progress: Reading) => void) => Job<T>,
 ): Promise<T> {
   const { store } = ctx;
-  const job = work(({ stage, fraction }) => store.set({ busyStep: sayReading(stage, fraction) }));
+  const job = work(({ stage, fraction }) =>
+    store.set({ busyStep: T.opening.far(T.opening.stages[stage], fraction) }),
+  );
   signal.addEventListener("abort", () => cancelBusy(), { once: true });
   let cancelBusy = job.cancel;
   store.set({ busy: what, busyStep: "", cancelBusy });
@@ -68,7 +70,7 @@ export async function waitFor<T extends object>(
     if (took > LONG_MS) {
       await new Promise<void>((goOn, giveUp) => {
         cancelBusy = () => giveUp(Object.assign(new Error("cancelled"), { name: "Cancelled" }));
-        const busyStep = `The page will not answer for ${duration(took)}`;
+        const busyStep = T.opening.noAnswer(took);
         store.set({ busyStep, goOn, cancelBusy });
       });
     }

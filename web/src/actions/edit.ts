@@ -2,8 +2,7 @@
 
 import { nextAmount } from "../amount";
 import type { CageState, Check, CheckedCage, Gesture, GizmoHandle, RestEdit } from "../contract";
-import { plural } from "../format";
-import { GESTURES, REST_EDITS } from "../strings";
+import { T } from "../words";
 import { type Context, report } from "./context";
 
 export interface Edit {
@@ -20,8 +19,8 @@ export interface Edit {
   /** Writes a nudge that is still open as a step. */
   settle(): void;
   moveTo(x: number, y: number, z: number): void;
-  /** Takes positions as one step. */
-  pose(label: string, positions: Float32Array): void;
+  /** Takes positions, and what they are a blend of, as one step. */
+  pose(label: string, positions: Float32Array, shares: readonly number[]): void;
   /** Remembers positions before something that ends with `posedSince`. */
   positions(): Float32Array;
   posedSince(label: string, before: Float32Array, sharesBefore: readonly number[]): void;
@@ -31,18 +30,14 @@ export interface Edit {
   setEditingRest(on: boolean): void;
 }
 
-/** What the rest of the page does when the cage at rest changed. */
-export interface RestListener {
-  changed(state: CageState, check: Check | null): void;
-  left(): void;
-}
-
 const NUDGE_PAUSE_MS = 600;
-export function createEdit(ctx: Context, rest: RestListener): Edit {
+
+/** `adopt` is the page's side of a cage whose shape at rest has changed. */
+export function createEdit(ctx: Context, adopt: (state: CageState, check: Check | null) => void): Edit {
   const engine = () => ctx.session().engine;
   let before: Float32Array | undefined;
   let beforeRest: CheckedCage | undefined;
-  let verb = "Move";
+  let verb: string = T.did.grab;
   let typed = "";
   let nudging:
     | { before: Float32Array; beforeRest: CheckedCage; timer: ReturnType<typeof setTimeout> }
@@ -77,19 +72,12 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
     engine().setEditingRest(on);
     ctx.store.set({ editingRest: on });
     sync();
-    if (!on) rest.left();
   };
 
   const setPose = (positions: Float32Array) => {
     setEditingRest(false);
     engine().setCagePositions(positions);
-    forgetShares();
     sync();
-  };
-
-  const forgetShares = () => {
-    const { shares } = ctx.store.get();
-    if (shares.some((share) => share !== 0)) ctx.store.set({ shares: shares.map(() => 0) });
   };
 
   /** A step from one pose, and the shares of its blend, to those of the moment. */
@@ -105,30 +93,29 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
   };
 
   const setRest = (shape: CheckedCage) => {
-    rest.changed(ctx.session().takeCage(shape), shape.check);
+    adopt(ctx.session().takeCage(shape), shape.check);
     sync();
   };
 
   const pushRest = (label: string, from: CheckedCage, state: CageState) => {
     const to = { ...restNow(), check: null };
     ctx.history.push({ label, undo: () => setRest(from), redo: () => setRest(to) });
-    rest.changed(state, null);
+    adopt(state, null);
     sync();
   };
 
   /** What moved since `from` becomes a step. */
   const keep = (label: string, from: Float32Array, fromRest: CheckedCage) => {
     if (!ctx.store.get().editingRest) {
-      const { shares } = ctx.store.get();
-      forgetShares();
-      pushPose(label, from, shares);
+      // The blend stays; what the hand has moved lies on top of it.
+      pushPose(label, from, ctx.store.get().shares);
       return;
     }
     try {
-      pushRest(`${label} of the cage`, fromRest, engine().commitRest());
+      pushRest(T.did.ofCage(label), fromRest, engine().commitRest());
     } catch (error) {
       engine().setCagePositions(from);
-      report(ctx, "The cage cannot have this shape", error);
+      report(ctx, T.failed.shape, error);
       sync();
     }
   };
@@ -138,11 +125,7 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
     clearTimeout(nudging.timer);
     const open = nudging;
     nudging = undefined;
-    keep(
-      `Nudge ${plural(ctx.store.get().selected.count, "vertex", "vertices")}`,
-      open.before,
-      open.beforeRest,
-    );
+    keep(T.did.vertices(T.did.nudge, ctx.store.get().selected.count), open.before, open.beforeRest);
   };
 
   const remember = () => {
@@ -170,7 +153,7 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
         before = undefined;
         return false;
       }
-      verb = GESTURES[gesture];
+      verb = T.did[gesture];
       showLabel();
       return true;
     },
@@ -182,7 +165,7 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
         return false;
       }
       const { gizmo } = ctx.store.get().scene;
-      verb = gizmo === "rotate" ? "Rotate" : gizmo === "scale" ? "Scale" : "Move";
+      verb = gizmo === "rotate" || gizmo === "scale" ? T.did[gizmo] : T.did.grab;
       showLabel();
       return true;
     },
@@ -212,7 +195,7 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
       const count = engine().selection().length;
       const moved = engine().endTransform(keepIt);
       ctx.store.set({ gesture: null, strays: 0 });
-      if (moved) keep(`${verb} ${plural(count, "vertex", "vertices")}`, from, fromRest);
+      if (moved) keep(T.did.vertices(verb, count), from, fromRest);
       else sync();
     },
     active: () => before !== undefined,
@@ -229,14 +212,15 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
       const from = before;
       const fromRest = beforeRest;
       before = undefined;
-      if (from && fromRest && engine().moveSelectionTo(x, y, z)) keep("Type a position", from, fromRest);
+      if (from && fromRest && engine().moveSelectionTo(x, y, z)) keep(T.did.type, from, fromRest);
     },
-    pose(label, positions) {
+    pose(label, positions, shares) {
       settle();
       const from = engine().cagePositions();
-      const { shares } = ctx.store.get();
+      const { shares: before } = ctx.store.get();
       setPose(positions);
-      pushPose(label, from, shares);
+      ctx.store.set({ shares });
+      pushPose(label, from, before);
     },
     positions: () => engine().cagePositions(),
     posedSince: pushPose,
@@ -244,9 +228,9 @@ export function createEdit(ctx: Context, rest: RestListener): Edit {
       settle();
       const from = restNow();
       try {
-        pushRest(REST_EDITS[edit], from, engine().editRest(edit));
+        pushRest(T.did.edits[edit], from, engine().editRest(edit));
       } catch (error) {
-        report(ctx, `${REST_EDITS[edit]}: not possible here`, error);
+        report(ctx, T.failed.edit(T.did.edits[edit]), error);
       }
     },
     sync,

@@ -1,8 +1,9 @@
 /** Files out of the page. */
 
 import type { NamedFile } from "../contract";
-import { bytes as size, stem } from "../format";
+import { stem } from "../format";
 import { fittingPoses } from "../state";
+import { T } from "../words";
 import { attempt, type Context } from "./context";
 import type { Project } from "./project";
 
@@ -53,29 +54,29 @@ export function createExports(ctx: Context, project: Project, viewport: () => DO
   const exports: Exports = {
     async save(kind) {
       const name = stem(ctx.store.get().model?.name ?? "model");
-      await attempt(ctx, "The file could not be written", async () => {
+      await attempt(ctx, T.failed.write, async () => {
         const blob = kind === "picture" ? await picture() : new Blob([new Uint8Array(bytesOf(kind))]);
         const file = kind === "project" ? project.fileName() : `${name}${SUFFIX[kind]}`;
         download(blob, file);
-        ctx.tell.say(`${file} is in your downloads (${size(blob.size)}).`);
+        ctx.tell.say(T.exports.saved(file, blob.size));
       });
     },
     async share() {
       const link = await project.link();
       if (!link) {
-        ctx.tell.say(
-          "A link can hold a sample in its own cage and pose, but no files of yours. Save a project file to pass this on.",
-          { label: "Save the project", run: () => void exports.save("project") },
-        );
+        ctx.tell.say(T.exports.noLink, {
+          label: T.exports.saveProject,
+          run: () => void exports.save("project"),
+        });
         return;
       }
       try {
         await navigator.clipboard.writeText(link);
-        ctx.tell.say("Link copied. Whoever opens it sees this sample in this pose.");
+        ctx.tell.say(T.exports.copied);
       } catch {
         // No access to the clipboard: the address bar can be copied by hand.
         window.history.replaceState(null, "", link);
-        ctx.tell.say("The link is in the address bar; copy it from there.");
+        ctx.tell.say(T.exports.inAddress);
       }
     },
     pictureSize(value) {

@@ -6,6 +6,7 @@ import { planDrop } from "../drop";
 import { stem } from "../format";
 import type { StepName } from "../state";
 import { sentence } from "../strings";
+import { T } from "../words";
 import { attempt, type Context, waitFor } from "./context";
 
 export interface Files {
@@ -117,7 +118,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
   return {
     openSample(id) {
       const label = store.get().samples.find((sample) => sample.id === id)?.label ?? id;
-      return busy(`Opening ${label}`, "The sample could not be opened", () =>
+      return busy(T.opening.file(label), T.failed.sample, () =>
         replace(() => ctx.session().openSample(id), id),
       );
     },
@@ -125,22 +126,22 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       const plan = planDrop(files.map((file) => file.path || file.name));
       const main = plan.main === undefined ? undefined : files[plan.main];
       if (!main) {
-        ctx.tell.problem({ title: "Nothing to open", message: plan.sentence }, ctx.fixFor("file"));
+        ctx.tell.problem({ title: T.opening.nothing, message: plan.sentence }, ctx.fixFor("file"));
         return Promise.resolve(false);
       }
       const second = plan.second === undefined ? undefined : files[plan.second];
       if (main.file.size === 0) {
         ctx.tell.problem(
           {
-            title: "This file is empty",
-            message: `${main.name} has no content. Export it again, or choose another file.`,
+            title: T.opening.empty,
+            message: T.opening.noContent(main.name),
           },
           ctx.fixFor("file"),
         );
         return Promise.resolve(false);
       }
-      const what = `Opening ${main.name}`;
-      const title = `${main.name} could not be opened`;
+      const what = T.opening.file(main.name);
+      const title = T.failed.open(main.name);
       const cageFiles = second && [second];
       const own = [main, ...files.filter((file) => file !== second && file !== main)];
       return busy(what, title, async (signal) => {
@@ -150,7 +151,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       });
     },
     turn(up) {
-      return busy("Turning the model", "The model could not be turned", async () => {
+      return busy(T.opening.turning, T.failed.turn, async () => {
         await take(await ctx.session().turn(follow.writeProject(), up), null);
       });
     },

@@ -2,6 +2,7 @@
 
 import type { Pose } from "../contract";
 import { fittingPoses } from "../state";
+import { T } from "../words";
 import type { Context } from "./context";
 import type { Edit } from "./edit";
 
@@ -41,7 +42,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
     cancelAnimationFrame(playing.frame);
     engine().setCagePositions(playing.before);
     playing = undefined;
-    store.set({ playing: false });
+    store.set({ playing: false, playingPose: null });
     edit.sync();
   };
 
@@ -50,19 +51,25 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
       if (!store.get().cage) return;
       const { poses, shares } = store.get();
       const pose = { name: freshName(poses), positions: engine().cagePositions() };
-      change("Save a pose", [...poses, pose], [...shares, 0]);
-      ctx.tell.say(`Saved as "${pose.name}"${store.get().posed ? "" : ": it is the rest pose"}.`);
+      // It is what is shown: its slider leads from here to rest.
+      change(T.did.save, [...poses, pose], [...shares.map(() => 0), 1]);
+      ctx.tell.say((store.get().posed ? T.pose.saved : T.pose.savedRest)(pose.name));
     },
     apply(pose) {
       stop();
-      edit.pose(`Pose "${pose.name}"`, pose.positions);
+      const { poses } = store.get();
+      edit.pose(
+        T.did.pose(pose.name),
+        pose.positions,
+        poses.map((other) => (other === pose ? 1 : 0)),
+      );
     },
     rename(pose, name) {
       const clean = name.trim();
       if (clean === "" || clean === pose.name) return;
       const { poses, shares } = store.get();
       change(
-        "Rename a pose",
+        T.did.rename,
         poses.map((other) => (other === pose ? { ...pose, name: clean } : other)),
         shares,
       );
@@ -71,7 +78,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
       const { poses, shares } = store.get();
       const index = poses.indexOf(pose);
       change(
-        "Delete a pose",
+        T.did.delete,
         poses.filter((other) => other !== pose),
         shares.filter((_, i) => i !== index),
       );
@@ -83,28 +90,38 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
       const { poses } = store.get();
       const shares = store.get().shares.map((old, i) => (poses[i] === pose ? share : old));
       const fitting = fittingPoses(store.get());
+      const ofFitting = (all: readonly number[]) =>
+        Float32Array.from(fitting, (p) => all[poses.indexOf(p)] ?? 0);
       engine().blend(
         fitting.map((p) => p.positions),
-        Float32Array.from(fitting, (p) => shares[poses.indexOf(p)] ?? 0),
+        beforeBlend.positions,
+        ofFitting(beforeBlend.shares),
+        ofFitting(shares),
       );
       store.set({ shares });
       if (done) {
-        edit.posedSince("Blend poses", beforeBlend.positions, beforeBlend.shares);
+        edit.posedSince(T.did.blend, beforeBlend.positions, beforeBlend.shares);
         beforeBlend = undefined;
       }
     },
     reset() {
       stop();
-      if (store.get().posed) edit.pose("Reset the pose", engine().restPositions());
+      if (store.get().posed)
+        edit.pose(
+          T.did.reset,
+          engine().restPositions(),
+          store.get().shares.map(() => 0),
+        );
     },
     togglePlay() {
       if (playing) {
         stop();
         return;
       }
-      const poses = fittingPoses(store.get()).map((pose) => pose.positions);
+      const fitting = fittingPoses(store.get());
+      const poses = fitting.map((pose) => pose.positions);
       if (poses.length === 0) {
-        ctx.tell.say("Save a pose first; then it can be played.");
+        ctx.tell.say(T.pose.saveFirst);
         return;
       }
       edit.setEditingRest(false);
@@ -112,7 +129,9 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
       const cycle = poses.length + 1;
       const step = (now: number) => {
         if (!playing) return;
-        engine().playAt(poses, ((now - start) / 1000) % cycle);
+        const time = ((now - start) / 1000) % cycle;
+        engine().playAt(poses, time);
+        store.set({ playingPose: fitting[Math.floor(time)]?.name ?? null });
         playing.frame = requestAnimationFrame(step);
       };
       playing = { before: edit.positions(), frame: requestAnimationFrame(step) };
@@ -126,6 +145,6 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
 export function freshName(poses: readonly Pose[]): string {
   const taken = new Set(poses.map((pose) => pose.name));
   let number = poses.length + 1;
-  while (taken.has(`Pose ${number}`)) number += 1;
-  return `Pose ${number}`;
+  while (taken.has(T.did.poseName(number))) number += 1;
+  return T.did.poseName(number);
 }

@@ -1,9 +1,10 @@
 /** What is drawn and from where. */
 
-import type { Element as CageElement, SceneOptions } from "../contract";
+import type { Element as CageElement, Pivot, SceneOptions } from "../contract";
 import { follow } from "../queue";
 import { drawn, type Slice } from "../state";
 import { saveTheme, type Theme } from "../store";
+import { T } from "../words";
 import { attempt, type Context } from "./context";
 
 export interface View {
@@ -18,6 +19,7 @@ export interface View {
   symmetry(on: boolean): void;
   proportional(on: boolean, radius?: number): void;
   element(element: CageElement): void;
+  pivot(pivot: Pivot): void;
   gizmo(gizmo: SceneOptions["gizmo"]): void;
   /** Space is held, or let go. */
   original(on: boolean): void;
@@ -83,10 +85,7 @@ export function createView(
       if (kind !== undefined) scene({ slice: kind });
       clearTimeout(sliceTimer);
       const load = () => ctx.queue.replace("slice", loadSlice);
-      sliceTimer = setTimeout(
-        () => void attempt(ctx, "The slice could not be computed", load),
-        SLICE_PAUSE_MS,
-      );
+      sliceTimer = setTimeout(() => void attempt(ctx, T.failed.slice, load), SLICE_PAUSE_MS);
     },
     async compare(on) {
       if (on && !(await prepareCompare())) {
@@ -117,6 +116,10 @@ export function createView(
     element(element) {
       engine().setElement(element);
       store.set({ element });
+    },
+    pivot(pivot) {
+      engine().setPivot(pivot);
+      store.set({ pivot });
     },
     gizmo: (gizmo) => scene({ gizmo }),
     original(on) {

@@ -2,7 +2,8 @@
 
 import type { NamedFile } from "../contract";
 import { isFatal } from "../crash";
-import { bytes as sizeOf, stem } from "../format";
+import { stem } from "../format";
+import { T } from "../words";
 import { deleteEntry, newId, readEntries, readFile, writeEntry } from "../works/database";
 import { ago, type Entry, isExpired, newestFirst, toOpen, type Work } from "../works/entry";
 import { heldIds, hold, ownId, rememberOwn } from "../works/holds";
@@ -29,8 +30,6 @@ export interface WorkActions {
 const PAUSE_MS = 1500;
 /** Larger projects are not kept by themselves, bytes: writing them would be felt with each change. */
 const LARGEST = 200 * 1024 ** 2;
-
-const SAVE_A_FILE = "Save a project file (step Export) before you close the page.";
 
 export interface WorkNeeds {
   /** The project file of what is open. */
@@ -59,9 +58,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     hasFailed = true;
     const isFull = error instanceof DOMException && error.name === "QuotaExceededError";
     // Private windows refuse as well: once is enough to say so.
-    const text = isFull
-      ? `This browser has no room left to keep your work on ${name}. ${SAVE_A_FILE}`
-      : `This browser does not let the page keep your work. ${SAVE_A_FILE}`;
+    const text = isFull ? T.works.full(name) : T.works.forbidden;
     ctx.tell.say(text, isFull ? showList : undefined);
   };
 
@@ -71,8 +68,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       const file = write();
       if (file.length > LARGEST) {
         hasFailed = true;
-        const size = `${sizeOf(file.length)}, of ${sizeOf(LARGEST)} at most`;
-        ctx.tell.say(`Your work on ${name} is too large to be kept by itself (${size}). ${SAVE_A_FILE}`);
+        ctx.tell.say(T.works.large(name, file.length, LARGEST));
         return;
       }
       if (!current) {
@@ -111,7 +107,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   const refresh = async () => {
     try {
       const [{ entries, damaged }, held] = [await readEntries(), await heldIds()];
-      if (damaged > 0) ctx.tell.say("Some of the work that this browser kept was damaged, and is deleted.");
+      if (damaged > 0) ctx.tell.say(T.works.damaged);
       const works = newestFirst(entries).map((entry): Work => {
         if (entry.id === current?.id) return { ...entry, where: "here" };
         return { ...entry, where: held.has(entry.id) ? "elsewhere" : "nowhere" };
@@ -137,7 +133,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     if (!file) {
       await deleteEntry(id);
       await refresh();
-      ctx.tell.say(`The work on ${name} that this browser kept was damaged, and is deleted.`);
+      ctx.tell.say(T.works.damagedOf(name));
       return undefined;
     }
     const path = `${stem(name)}.cagework.glb`;
@@ -151,7 +147,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     if (isFirst) rememberOwn(release ? work.id : null);
     if (!isCopy && !release) {
       await refresh();
-      ctx.tell.say(`${work.name} is open in another tab.`, showList);
+      ctx.tell.say(T.works.elsewhere(work.name), showList);
       return false;
     }
     const file = await fileOf(work).catch(() => undefined);
@@ -160,7 +156,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       release?.();
       if (isFirst) rememberOwn(null);
       if (isFirst && file) {
-        ctx.tell.say(`Your work on ${work.name} could not be opened. It stays kept.`, showList);
+        ctx.tell.say(T.works.notOpened(work.name), showList);
       }
     }
     if (isOpen && release) {
@@ -172,7 +168,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     return isOpen;
   };
 
-  const showList = { label: "Show kept work", run: () => store.set({ worksOpen: true }) };
+  const showList = { label: T.works.show, run: () => store.set({ worksOpen: true }) };
 
   return {
     touch,
@@ -189,8 +185,8 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       store.set({ savedAt: null });
       void refresh();
       if (!left) return;
-      const back = { label: "Go back to it", run: () => void open({ ...left, where: "nowhere" }) };
-      ctx.tell.say(`Your work on ${left.name} is kept in this browser.`, back);
+      const back = { label: T.works.back, run: () => void open({ ...left, where: "nowhere" }) };
+      ctx.tell.say(T.works.left(left.name), back);
     },
     refresh,
     open,
@@ -201,7 +197,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
         drop();
       }
       hasFailed = false;
-      await attempt(ctx, "The kept work could not be deleted", () => deleteEntry(id));
+      await attempt(ctx, T.failed.delete, () => deleteEntry(id));
       await refresh();
     },
     async restore() {
@@ -209,8 +205,8 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       const { works } = store.get();
       const chosen = toOpen(works, ownId());
       if (!chosen || !(await open(chosen, true))) return false;
-      const text = `Your work on ${chosen.name} is back, as you left it ${ago(Date.now() - chosen.when)}. Undo begins anew.`;
-      const fresh = { label: "Start fresh", run: startFresh };
+      const text = T.works.restored(chosen.name, ago(Date.now() - chosen.when));
+      const fresh = { label: T.works.fresh, run: startFresh };
       ctx.tell.say(text, works.length > 1 ? showList : fresh);
       return true;
     },

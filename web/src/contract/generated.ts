@@ -432,13 +432,25 @@ export type SceneOptions = { theme: Theme, model: boolean, base_wireframe: boole
  */
 export type ColorMap = "viridis" | "error" | "kinds";
 /**
+ * The largest value that colours show, and the vertex of the model that has it.
+ */
+export type Largest = { value: number, vertex: number, };
+/**
  * `Legend`.
  */
-export type Legend = { low: number, high: number, logarithmic: boolean, map: ColorMap, };
+export type Legend = { low: number, high: number, logarithmic: boolean, map: ColorMap,
+/**
+ * Of the weights that the model's colours show; none for other colours.
+ */
+largest: Largest | null, };
 /**
  * What a click selects.
  */
 export type Element = "vertex" | "edge" | "face";
+/**
+ * What turns and scales go about.
+ */
+export type Pivot = "middle" | "border" | "last";
 /**
  * How new vertices join those that are selected.
  */

@@ -3,6 +3,7 @@
 import { report } from "../actions/context";
 import type { App } from "../app";
 import type { Element as CageElement, Gesture } from "../contract";
+import { T } from "../words";
 import type { Command } from "./shortcuts";
 
 /** CSS pixels of an arrow key, and with Shift. */
@@ -10,7 +11,7 @@ const NUDGE = 2;
 const NUDGE_FAR = 20;
 const NEXT_ELEMENT: Record<CageElement, CageElement> = { vertex: "edge", edge: "face", face: "vertex" };
 
-export function createCommands(app: App, showSheet: () => void): Record<Command, () => void> {
+export function createCommands(app: App): Record<Command, () => void> {
   const { store, edit, view, poses, cage, bind, exports } = app;
   const engine = () => app.ctx.session().engine;
   const hasCage = () => store.get().cage !== null;
@@ -20,8 +21,7 @@ export function createCommands(app: App, showSheet: () => void): Record<Command,
     if (edit.active()) edit.end(false);
     poses.stop();
     const { x, y } = app.pointer();
-    if (!edit.begin(kind, x, y))
-      app.ctx.tell.say("Select something first: click a handle of the cage, or press A for all.");
+    if (!edit.begin(kind, x, y)) app.ctx.tell.say(T.pose.selectFirst);
   };
   const select = (work: () => void) => () => {
     if (!hasCage()) return;
@@ -39,9 +39,7 @@ export function createCommands(app: App, showSheet: () => void): Record<Command,
     }
     edit.settle();
     poses.stop();
-    app.ctx.history[way]().catch((error: unknown) =>
-      report(app.ctx, `${way === "undo" ? "Undo" : "Redo"} did not work`, error),
-    );
+    app.ctx.history[way]().catch((error: unknown) => report(app.ctx, T.failed[way], error));
   };
   const neighbour = (step: 1 | -1) =>
     select(() => {
@@ -139,6 +137,6 @@ export function createCommands(app: App, showSheet: () => void): Record<Command,
       if (!hasCage()) void cage.make().then((made) => made && bind.start());
       else void bind.start();
     },
-    sheet: showSheet,
+    sheet: () => store.set({ sheetOpen: true }),
   };
 }

@@ -2,48 +2,25 @@
 
 import type { App } from "../app";
 import type { NamedFile } from "../contract";
-import { hoverSentence } from "../drop";
-import { h, setText } from "../ui/dom";
-import { icon } from "../ui/icons";
 
 /** Files of a folder that are read at most: a drop of a whole disk must end. */
 const MOST_FILES = 2000;
 
-export function attachDrop(root: HTMLElement, panel: HTMLElement, app: App): void {
-  const title = h("strong");
-  const sentence = h("p");
-  const overlay = h(
-    "div",
-    { class: "drop-overlay", hidden: true, attrs: { "aria-hidden": "true" } },
-    h("div", { class: "drop-card" }, icon("upload"), title, sentence),
-  );
-  root.append(overlay);
-
+export function attachDrop(panel: HTMLElement, app: App): void {
+  const { store } = app;
   const onCagePanel = (event: DragEvent) =>
-    app.store.get().step === "cage" &&
-    app.store.get().model !== null &&
+    store.get().step === "cage" &&
+    store.get().model !== null &&
     event.target instanceof Node &&
     panel.contains(event.target);
-  const hide = () => {
-    overlay.hidden = true;
-  };
+  const hide = () => store.set({ hovering: null });
 
   window.addEventListener("dragover", (event) => {
     if (!event.dataTransfer?.types.includes("Files")) return;
     event.preventDefault();
     event.dataTransfer.dropEffect = "copy";
-    const asCage = onCagePanel(event);
     const files = [...event.dataTransfer.items].filter((item) => item.kind === "file").length;
-    setText(title, asCage ? "Drop to use it as the cage" : "Drop to open");
-    const cageStep = app.store.get().step === "cage";
-    setText(
-      sentence,
-      asCage
-        ? "A closed mesh around the model."
-        : hoverSentence(files, app.store.get().model !== null, cageStep),
-    );
-    overlay.toggleAttribute("data-panel", asCage);
-    overlay.hidden = false;
+    store.set({ hovering: { files, asCage: onCagePanel(event) } });
   });
   window.addEventListener("dragleave", (event) => {
     if (event.relatedTarget === null) hide();

@@ -2,7 +2,7 @@
 
 import type { BindReport } from "../contract";
 import type { AppState } from "../state";
-import { h } from "./dom";
+import { T } from "../words";
 import { type Curve, historyPoints, KINDS } from "./plot";
 import { solverName } from "./report";
 
@@ -10,7 +10,7 @@ import { solverName } from "./report";
 export function curvesOf({ bindRun, report, earlier, bindOptions }: CurveState): Curve[] {
   const reports = report ? [report, ...earlier] : [];
   const now = bindRun
-    ? { name: bindRun.pass === "coarse" ? "coarse first" : solverName(bindOptions), points: bindRun.curve }
+    ? { name: bindRun.pass === "coarse" ? T.bind.coarse : solverName(bindOptions), points: bindRun.curve }
     : reports.slice(0, 1).map(pointsOf)[0];
   if (!now) return [];
   if (bindRun) return [{ ...now, kind: "now" }];
@@ -27,12 +27,4 @@ function pointsOf(report: BindReport) {
     name: solverName(report),
     points: historyPoints(report.delta_history, report.delta_interval),
   };
-}
-
-/** What each colour stands for; nothing for a single curve. */
-export function legendOf(curves: readonly Curve[]): HTMLElement[] {
-  if (curves.length < 2) return [];
-  return curves.map(({ name, kind }, k) =>
-    h("li", { class: kind, text: k > 0 && name === curves[0]?.name ? `${name}, before` : name }),
-  );
 }

@@ -1,6 +1,6 @@
 /** The view: the canvas and what takes pointer and keys. */
 
-import { h } from "./dom";
+import { T } from "../words";
 
 export interface Stage {
   /** What takes the pointer and the keys; holds the canvas. */
@@ -14,32 +14,28 @@ export interface Stage {
 
 /** The view's element and canvas: made first, because the session opens on the canvas. */
 export function createStage(element: HTMLElement): Stage {
-  const make = () => h("canvas", { attrs: { "aria-hidden": "true" } });
+  const make = () => {
+    const made = document.createElement("canvas");
+    made.setAttribute("aria-hidden", "true");
+    return made;
+  };
   let canvas = make();
-  const rubber = h("div", { class: "band", hidden: true });
-  const viewport = h(
-    "div",
-    {
-      class: "viewport",
-      id: "viewport",
-      attrs: {
-        tabindex: "0",
-        role: "application",
-        "aria-label": "3-D view",
-        "aria-describedby": "view-help",
-      },
-    },
-    canvas,
-    rubber,
-  );
-  element.append(
-    viewport,
-    h("p", {
-      id: "view-help",
-      class: "visually-hidden",
-      text: "Square brackets go from one cage vertex to the next, arrow keys move it, question mark lists all keys. Tab leaves the view.",
-    }),
-  );
+  const rubber = document.createElement("div");
+  rubber.className = "band";
+  rubber.hidden = true;
+  const viewport = document.createElement("div");
+  viewport.className = "viewport";
+  viewport.id = "viewport";
+  viewport.tabIndex = 0;
+  viewport.role = "application";
+  viewport.ariaLabel = T.view.name;
+  viewport.setAttribute("aria-describedby", "view-help");
+  viewport.append(canvas, rubber);
+  const help = document.createElement("p");
+  help.id = "view-help";
+  help.className = "visually-hidden";
+  help.textContent = T.view.help;
+  element.append(viewport, help);
   return {
     viewport,
     canvas: () => canvas,

@@ -1,5 +1,8 @@
 /** Work that this browser keeps: what is known of each piece, besides its file. */
 
+import { LOCALE } from "../format";
+import { T } from "../words";
+
 export interface Entry {
   readonly id: string;
   /** The model's. */
@@ -66,10 +69,9 @@ export function toOpen(works: readonly Work[], own: string | null): Work | undef
 /** How long ago, in words. */
 export function ago(ms: number): string {
   const minutes = Math.round(ms / 60_000);
-  if (minutes < 1) return "a moment ago";
-  if (minutes < 60) return `${minutes} minute${minutes === 1 ? "" : "s"} ago`;
+  if (minutes < 1) return T.works.moment;
+  const say = new Intl.RelativeTimeFormat(LOCALE);
+  if (minutes < 60) return say.format(-minutes, "minute");
   const hours = Math.round(minutes / 60);
-  if (hours < 24) return `${hours} hour${hours === 1 ? "" : "s"} ago`;
-  const days = Math.round(hours / 24);
-  return `${days} day${days === 1 ? "" : "s"} ago`;
+  return hours < 24 ? say.format(-hours, "hour") : say.format(-Math.round(hours / 24), "day");
 }

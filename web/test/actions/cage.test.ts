@@ -1,3 +1,4 @@
+import { effect } from "@preact/signals";
 import { expect, it } from "vitest";
 import { createCage } from "../../src/actions/cage";
 import { named } from "../../src/session/client";
@@ -7,13 +8,10 @@ function page() {
   const fake = createFake();
   const grids: number[] = [];
   let changes = 0;
-  const cage = createCage(
-    fake.ctx,
-    () => {
-      changes += 1;
-    },
-    (grid) => grids.push(grid),
-  );
+  const cage = createCage(fake.ctx, (grid) => grids.push(grid));
+  effect(() => {
+    if (fake.store.get().cage) changes += 1;
+  });
   const heights = () => fake.engine.restPositions()[0];
   return { ...fake, cage, grids, changes: () => changes, height: heights };
 }
@@ -36,6 +34,24 @@ it("a cage that is made replaces the one before, and undo brings that back with 
   await ctx.history.redo();
   expect(height()).toBe(2);
   expect(asked.length, "nothing is checked again").toBe(2);
+});
+
+it("undo of another cage brings pose and blend back", async () => {
+  const { cage, asked, store, engine, said, ctx } = page();
+  const first = cage.make();
+  await settled();
+  asked[0]?.resolve(cageOf(8, 1));
+  await first;
+  engine.setCagePositions(new Float32Array(24).fill(7));
+  store.set({ posed: true, poses: [{ name: "a", positions: new Float32Array(24) }], shares: [0.5] });
+  const second = cage.make();
+  await settled();
+  asked[1]?.resolve(cageOf(12, 2));
+  await second;
+  expect(said).toEqual(["Pose and poses belong to the cage before, and are kept with it."]);
+  store.set({ shares: [0] });
+  await ctx.history.undo();
+  expect([engine.cagePositions()[0], engine.restPositions()[0], store.get().shares]).toEqual([7, 1, [0.5]]);
 });
 
 it("of two cages that are asked for only the later one comes", async () => {

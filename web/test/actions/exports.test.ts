@@ -56,7 +56,7 @@ it("each file has the model's name, and its size is said", async () => {
   await exports.save("glb");
   await exports.save("cage");
   expect(downloads).toEqual(["cube-posed.glb", "cube-cage.obj"]);
-  expect(said[0]).toBe("cube-posed.glb is in your downloads (2.0 KB).");
+  expect(said[0]).toBe("cube-posed.glb is in your downloads (2 kB).");
 });
 
 it("an export that fails is a problem, and no file", async () => {

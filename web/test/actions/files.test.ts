@@ -87,7 +87,7 @@ it("who would wait for seconds is asked, and may give it up", async () => {
   asked[0]?.resolve({ took: 9000 });
   await settled();
   expect([store.get().busyStep, store.get().goOn]).toEqual([
-    "The page will not answer for 9.0 s",
+    "The page will not answer for 9 sec",
     expect.any(Function),
   ]);
   store.get().cancelBusy?.();

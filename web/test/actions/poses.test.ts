@@ -6,7 +6,7 @@ import { cageOf, createFake } from "../fake";
 /** A page with a cage of two vertices, posed at height 1. */
 function page() {
   const fake = createFake();
-  const edit = createEdit(fake.ctx, { changed: () => undefined, left: () => undefined });
+  const edit = createEdit(fake.ctx, () => undefined);
   const poses = createPoses(fake.ctx, edit);
   const { positions, corners } = cageOf(2);
   fake.store.set({ cage: fake.engine.setCage(positions, corners) });
@@ -22,7 +22,7 @@ it("a pose is saved, renamed and deleted, each a step that undo takes back", asy
   if (!pose) throw new Error("no pose");
   expect([pose.name, store.get().shares, said]).toEqual([
     "Pose 1",
-    [0],
+    [1],
     ['Saved as "Pose 1": it is the rest pose.'],
   ]);
   poses.rename(pose, " Wave ");
@@ -54,8 +54,8 @@ it("one drag of a blend's slider is one step", async () => {
   poses.save();
   const blended: number[][] = [];
   teach({
-    blend(_: readonly Float32Array[], shares: Float32Array) {
-      blended.push([...shares]);
+    blend(_: readonly Float32Array[], from: Float32Array, before: Float32Array, shares: Float32Array) {
+      blended.push([from[0] ?? 0, ...before, ...shares]);
       engine.setCagePositions(new Float32Array(6).fill(shares[0] ?? 0));
     },
   });
@@ -68,13 +68,15 @@ it("one drag of a blend's slider is one step", async () => {
   ] as const) {
     poses.blend(pose, share, done);
   }
-  expect([blended, store.get().shares, height()]).toEqual([[[0.25], [0.5], [0.75]], [0.75], 0.75]);
+  // Each from where the drag began: what is saved is shown, a blend of all of it.
+  const [a, b, c] = [0.25, 0.5, 0.75].map((share) => [1, 1, share]);
+  expect([blended, store.get().shares, height()]).toEqual([[a, b, c], [0.75], 0.75]);
   await ctx.history.undo();
-  expect([height(), store.get().shares, ctx.history.undoLabel]).toEqual([1, [0], "Save a pose"]);
+  expect([height(), store.get().shares, ctx.history.undoLabel]).toEqual([1, [1], "Save a pose"]);
   await ctx.history.redo();
   expect([height(), store.get().shares]).toEqual([0.75, [0.75]]);
   poses.apply(pose);
-  expect(store.get().shares, "another pose is no blend").toEqual([0]);
+  expect(store.get().shares, "a pose is all of itself").toEqual([1]);
   await ctx.history.undo();
   expect([height(), store.get().shares]).toEqual([0.75, [0.75]]);
 });

@@ -13,9 +13,9 @@ mod view;
 
 pub use gesture::{Constraint, Gesture, GestureKind};
 pub use pick::{Element, Topology, pick_edge, pick_face, pick_vertex, vertices_in_box};
-pub use playback::{PoseError, blend, moment};
+pub use playback::{PoseError, blend, moment, reblend};
 pub use pull::{Pull, SharedPull};
-pub use selection::{SelectMode, Selection};
+pub use selection::{Pivot, SelectMode, Selection};
 pub use symmetry::Symmetry;
 pub use view::View;
 #[cfg(test)]

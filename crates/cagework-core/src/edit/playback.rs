@@ -32,6 +32,24 @@ pub fn blend(rest: &[Vec3], poses: &[Vec<Vec3>], shares: &[f32]) -> Result<Vec<V
     Ok(mixed)
 }
 
+/// The positions `from`, whose blend had the shares `before`, with other shares: `from + sum_k (share_k - before_k) (pose_k -
+/// rest)`. What a hand has moved since the poses were blended stays where it is beside them. `[n_cage]`
+///
+/// # Errors
+/// [`PoseError`] when a pose has not as many vertices as the cage.
+pub fn reblend(
+    rest: &[Vec3],
+    poses: &[Vec<Vec3>],
+    from: &[Vec3],
+    before: &[f32],
+    shares: &[f32],
+) -> Result<Vec<Vec3>, PoseError> {
+    let more = |(k, share): (usize, &f32)| share - before.get(k).copied().unwrap_or(0.0);
+    let change: Vec<f32> = shares.iter().enumerate().map(more).collect();
+    let moved = blend(rest, poses, &change)?;
+    Ok(from.iter().zip(&moved).zip(rest).map(|((&from, &moved), &rest)| from + (moved - rest)).collect())
+}
+
 /// A moment of the animation from rest through all poses back to rest, a second each, over and over: the same as an
 /// export plays. `[n_cage]`
 ///
@@ -64,6 +82,17 @@ mod tests {
         assert_eq!(mixed, Ok(vec![Vec3::new(2.0, 5.0, 1.0)]));
         assert_eq!(blend(&rest, &poses, &[]), Ok(rest.to_vec()));
         assert_eq!(blend(&rest, &[vec![Vec3::ZERO; 2]], &[1.0]), Err(PoseError { given: 2, expected: 1 }));
+    }
+
+    #[test]
+    fn other_shares_leave_what_a_hand_has_moved() {
+        let rest = [Vec3::ONE];
+        let poses = [vec![Vec3::new(3.0, 1.0, 1.0)], vec![Vec3::new(1.0, 5.0, 1.0)]];
+        let by_hand = Vec3::new(0.0, 0.0, 0.25);
+        let from = [blend(&rest, &poses, &[0.5, 1.0]).unwrap()[0] + by_hand];
+        let now = reblend(&rest, &poses, &from, &[0.5, 1.0], &[0.25, 0.5]);
+        assert_eq!(now, Ok(vec![blend(&rest, &poses, &[0.25, 0.5]).unwrap()[0] + by_hand]));
+        assert_eq!(reblend(&rest, &poses, &from, &[], &[0.0, 0.0]), Ok(from.to_vec()));
     }
 
     #[test]

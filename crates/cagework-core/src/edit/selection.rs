@@ -20,6 +20,20 @@ pub enum SelectMode {
     Toggle,
 }
 
+/// What turns and scales go about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub enum Pivot {
+    /// The middle of the selection.
+    #[default]
+    Middle,
+    /// The middle of those selected vertices that an edge joins with others: a knee turns about it.
+    Border,
+    /// The vertex selected last.
+    Last,
+}
+
 /// Selected vertices and the one selected last.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
@@ -127,6 +141,26 @@ impl Selection {
         let sum: Vec3 = vertices.iter().map(|&i| positions[i as usize]).sum();
         (!vertices.is_empty()).then(|| sum / vertices.len() as f32)
     }
+
+    /// What turns and scales go about. A selection without a border has its middle instead.
+    #[must_use]
+    pub fn pivot(&self, positions: &[Vec3], topology: &Topology, pivot: Pivot) -> Option<Vec3> {
+        let only = |vertices: &[u32]| {
+            let mut part = Self::new(self.selected.len());
+            part.change(vertices, SelectMode::Replace);
+            part.center(positions)
+        };
+        match pivot {
+            Pivot::Middle => None,
+            Pivot::Border => {
+                let joins = |edge: &&[u32; 2]| self.contains(edge[0]) != self.contains(edge[1]);
+                let inner = topology.edges.iter().filter(joins).flatten().filter(|&&i| self.contains(i));
+                only(&inner.copied().collect::<Vec<_>>())
+            }
+            Pivot::Last => self.last().and_then(|last| only(&[last])),
+        }
+        .or_else(|| self.center(positions))
+    }
 }
 
 #[cfg(test)]
@@ -174,5 +208,26 @@ mod tests {
         selection.change(&[6], SelectMode::Add);
         assert_eq!(selection.faces(&topology), [1]);
         assert_eq!(selection.center(&cube.positions), Some(Vec3::new(0.5, 0.5, 1.0)));
+    }
+
+    #[test]
+    fn pivots_are_the_middle_the_border_and_the_last() {
+        let cube = cube();
+        let topology = Topology::new(&cube.faces);
+        let mut selection = Selection::new(8);
+        let pivot = |s: &Selection, pivot| s.pivot(&cube.positions, &topology, pivot);
+        assert_eq!(pivot(&selection, Pivot::Border), None);
+        // One corner is left out: its three neighbours are the border.
+        selection.all();
+        selection.change(&[0], SelectMode::Remove);
+        let neighbours: Vec<u32> =
+            topology.edges.iter().filter(|e| e.contains(&0)).map(|e| e[0] + e[1]).collect();
+        let middle: Vec3 = neighbours.iter().map(|&i| cube.positions[i as usize]).sum::<Vec3>() / 3.0;
+        assert_eq!(pivot(&selection, Pivot::Border), Some(middle));
+        assert_eq!(pivot(&selection, Pivot::Middle), selection.center(&cube.positions));
+        selection.change(&[3], SelectMode::Add);
+        assert_eq!(pivot(&selection, Pivot::Last), Some(cube.positions[3]));
+        selection.all();
+        assert_eq!(pivot(&selection, Pivot::Border), selection.center(&cube.positions), "no border");
     }
 }

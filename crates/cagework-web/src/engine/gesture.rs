@@ -1,6 +1,6 @@
 //! Moving the cage: gestures, exact numbers, poses.
 
-use cagework_core::edit::{Constraint, Gesture, GestureKind, View as _, blend, moment};
+use cagework_core::edit::{Constraint, Gesture, GestureKind, View as _, moment, reblend};
 use cagework_gpu::render::{GizmoPart, pick_gizmo};
 use glam::{Vec2, Vec3};
 use js_sys::{Array, Float32Array};
@@ -160,17 +160,38 @@ impl Engine {
         })
     }
 
-    /// Mixes poses by their shares.
+    /// What turns and scales go about.
+    ///
+    /// # Errors
+    /// When it is something else.
+    #[wasm_bindgen(js_name = setPivot)]
+    pub fn set_pivot(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "Pivot")] pivot: JsValue,
+    ) -> Result<(), JsValue> {
+        let pivot = taken(pivot)?;
+        self.change(|state| {
+            state.pivot = pivot;
+            state.is_changed = true;
+        });
+        Ok(())
+    }
+
+    /// Mixes poses by their shares: `from` had the shares `before`, and keeps what a hand has moved since.
     ///
     /// # Errors
     /// When a pose belongs to another cage.
     pub fn blend(
         &self,
         #[wasm_bindgen(unchecked_param_type = "readonly Float32Array[]")] poses: &Array,
+        from: &[f32],
+        before: &[f32],
         shares: &[f32],
     ) -> Result<(), JsValue> {
         let poses = pose_list(poses);
-        let mixed = self.read(|state| blend(&state.rest.positions, &poses, shares)).map_err(Fault::from)?;
+        let mixed = self
+            .read(|state| reblend(&state.rest.positions, &poses, &points(from), before, shares))
+            .map_err(Fault::from)?;
         self.change(|state| state.move_to(mixed));
         Ok(())
     }
@@ -233,7 +254,8 @@ impl Engine {
 
 impl State {
     fn begin(&mut self, kind: GestureKind, x: f32, y: f32) -> bool {
-        let Some(pivot) = self.selection.center(&self.positions) else { return false };
+        let pivot = self.selection.pivot(&self.positions, &self.topology, self.pivot);
+        let Some(pivot) = pivot else { return false };
         let pull = self.pull(&self.positions);
         let at = self.pointer(x, y);
         self.gesture = Some(Gesture::new(kind, self.positions.clone(), pull, pivot, at));

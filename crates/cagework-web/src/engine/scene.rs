@@ -8,7 +8,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::Engine;
 use crate::error::Fault;
 use crate::options::{SceneAsked, SliceShown, taken};
-use crate::views::{ColorMap, Legend, object};
+use crate::views::{ColorMap, Largest, Legend, object};
 
 #[wasm_bindgen]
 impl Engine {
@@ -39,16 +39,18 @@ impl Engine {
     pub fn legend(&self) -> Result<JsValue, JsValue> {
         let (slice, style) =
             self.read(|state| (state.slice.as_ref().map(|_| state.view.slice), state.mesh_style()));
-        let coordinate = |high| Legend { low: 0.0, high, logarithmic: false, map: ColorMap::Viridis };
+        let plain = |low, high, map| Legend { low, high, logarithmic: false, map, largest: None };
         let legend = match (slice, style) {
-            (Some(SliceShown::Kinds), _) => {
-                Some(Legend { low: 0.0, high: 2.0, logarithmic: false, map: ColorMap::Kinds })
+            (Some(SliceShown::Kinds), _) => Some(plain(0.0, 2.0, ColorMap::Kinds)),
+            (Some(SliceShown::Value), _) => Some(plain(0.0, 1.0, ColorMap::Viridis)),
+            (_, MeshStyle::Weights { column }) => {
+                let largest = self.largest_weight(column);
+                let high = largest.map_or(1.0, |largest| largest.value.max(MIN_WEIGHT_RANGE));
+                Some(Legend { largest, ..plain(0.0, high, ColorMap::Viridis) })
             }
-            (Some(SliceShown::Value), _) => Some(coordinate(1.0)),
-            (_, MeshStyle::Weights { column }) => Some(coordinate(self.largest_weight(column))),
             (_, MeshStyle::Errors) => {
                 let [low, high] = ERROR_RANGE.map(|e| 10.0_f32.powf(e));
-                Some(Legend { low, high, logarithmic: true, map: ColorMap::Error })
+                Some(Legend { logarithmic: true, ..plain(low, high, ColorMap::Error) })
             }
             _ => None,
         };
@@ -57,14 +59,15 @@ impl Engine {
 }
 
 impl Engine {
-    /// The value that the last colour of a heat map of weights stands for.
-    fn largest_weight(&self, column: u32) -> f32 {
-        let largest = self.with_session(|session| {
+    /// The largest weight of a cage vertex; none while the GPU is busy with others: the page asks again when they are in.
+    fn largest_weight(&self, column: u32) -> Option<Largest> {
+        self.with_session(|session| {
             let weights =
                 session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
-            Ok(weights.column(column).fold(MIN_WEIGHT_RANGE, f32::max))
-        });
-        // The GPU is busy with other weights: the page asks again when they are in.
-        largest.unwrap_or(1.0)
+            let numbered = weights.column(column).zip(0..).map(|(value, vertex)| Largest { value, vertex });
+            Ok(numbered.max_by(|a, b| a.value.total_cmp(&b.value)))
+        })
+        .ok()
+        .flatten()
     }
 }

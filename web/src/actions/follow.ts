@@ -1,0 +1,45 @@
+/** What follows when the cage at rest has changed: the page looks again, and the model is bound again. */
+
+import { effect, untracked } from "@preact/signals";
+import type { BindActions } from "./bind";
+import type { Context } from "./context";
+import type { Edit } from "./edit";
+import type { View } from "./view";
+
+/** A hand that has not moved the cage for so long rests, ms. */
+const PAUSE_MS = 150;
+/** A finer grid waits for the user's word. */
+const FINEST = 128;
+
+export function followCage(
+  { store }: Context,
+  bind: Pick<BindActions, "covers" | "start">,
+  edit: Pick<Edit, "active" | "sync">,
+  view: Pick<View, "refresh">,
+): void {
+  let soon: ReturnType<typeof setTimeout> | undefined;
+  const bindSoon = (pause: number) => {
+    clearTimeout(soon);
+    soon = setTimeout(() => {
+      const { cage, bindOptions } = store.get();
+      // A gesture may end without a change, and then nobody else would ask for the bind.
+      if (edit.active()) bindSoon(PAUSE_MS);
+      else if (cage?.usable && !bind.covers() && bindOptions.grid <= FINEST) void bind.start(true);
+    }, pause);
+  };
+  let isFirst = true;
+  effect(() => {
+    store.get().cage;
+    if (!isFirst) {
+      untracked(() => {
+        edit.sync();
+        view.refresh();
+        bindSoon(PAUSE_MS);
+      });
+    }
+    isFirst = false;
+  });
+  effect(() => {
+    if (!store.get().editingRest) untracked(() => store.get().cage && bindSoon(0));
+  });
+}

@@ -1,0 +1,106 @@
+/** The bar on top: the product, the five steps, and what is always at hand. */
+
+import type { App } from "../app";
+import { type AppState, STEPS, type StepName } from "../state";
+import type { Theme } from "../store";
+import { T } from "../words";
+import { IconButton } from "./controls";
+import { Icon, Mark } from "./icons";
+
+const NEXT_THEME: Record<Theme, Theme> = { auto: "dark", dark: "light", light: "auto" };
+const THEME_ICON = { auto: "auto", dark: "moon", light: "sun" } as const;
+
+export function Bar({ app, showSheet }: { app: App; showSheet: () => void }) {
+  const { model, undoLabel, redoLabel, theme } = app.store.get();
+  return (
+    <>
+      <div class="brand">
+        <Mark />
+        <h1>{T.product}</h1>
+        <span class="doc">{model?.name}</span>
+      </div>
+      <nav class="steps" aria-label={T.bar.steps}>
+        <ol>
+          {STEPS.map((name, index) => (
+            <li key={name}>
+              <Step app={app} name={name} number={index + 1} />
+            </li>
+          ))}
+        </ol>
+      </nav>
+      <div class="bar-actions">
+        <IconButton
+          icon="undo"
+          label={T.bar.undo}
+          tip={T.bar.undoOf(undoLabel)}
+          shortcut={app.key("undo")}
+          disabled={undoLabel === null}
+          onClick={() => app.run("undo")}
+        />
+        <IconButton
+          icon="redo"
+          label={T.bar.redo}
+          tip={T.bar.redoOf(redoLabel)}
+          shortcut={app.key("redo")}
+          disabled={redoLabel === null}
+          onClick={() => app.run("redo")}
+        />
+        <span class="gap" />
+        <IconButton icon="share" label={T.bar.share} onClick={app.share} />
+        <IconButton
+          icon={THEME_ICON[theme]}
+          label={T.bar.theme[theme]}
+          onClick={() => app.view.theme(NEXT_THEME[theme])}
+        />
+        <IconButton icon="help" label={T.bar.sheet} shortcut="?" kind="wide-only" onClick={showSheet} />
+      </div>
+    </>
+  );
+}
+
+function Step({ app, name, number }: { app: App; name: StepName; number: number }) {
+  const state = app.store.get();
+  const turn = busyShare(name, state);
+  const isHere = state.step === name;
+  const isDone = turn === null && done(name, state);
+  return (
+    <button
+      type="button"
+      class="step"
+      data-step={name}
+      data-done={isDone && !isHere ? "" : undefined}
+      data-busy={turn === null ? undefined : ""}
+      aria-current={isHere ? "step" : undefined}
+      onClick={() => app.go(name)}
+    >
+      <span class="dot" aria-hidden="true" style={turn === null ? undefined : { "--turn": `${100 * turn}%` }}>
+        {isDone && !isHere ? <Icon name="check" /> : number}
+      </span>
+      <span>{T.bar.names[name]}</span>
+      <span class="visually-hidden">{turn !== null ? T.bar.running : isDone ? T.bar.done : ""}</span>
+    </button>
+  );
+}
+
+function busyShare(name: StepName, state: AppState): number | null {
+  if (name === "cage") return state.cageProgress;
+  if (name === "bind") return state.bindRun ? state.bindRun.fraction : null;
+  return null;
+}
+
+function done(name: StepName, state: AppState): boolean {
+  switch (name) {
+    case "model":
+      return state.model !== null;
+    case "cage":
+      return state.cage?.usable === true;
+    case "bind":
+      return state.bound;
+    case "pose":
+      return state.poses.length > 0;
+    case "export":
+      return false;
+    default:
+      return name satisfies never;
+  }
+}

@@ -1,0 +1,242 @@
+/** Step 3: how to bind, what it needs, how far it is, and what came out. */
+
+import type { App } from "../app";
+import type { BindOptions } from "../contract";
+import { BIND_DEFAULTS, PAPER_DEFAULTS } from "../defaults";
+import { timeLeft } from "../eta";
+import { percent } from "../format";
+import { type BindRun, cageBroken } from "../state";
+import { T } from "../words";
+import { Button, Fold, Head, NumberField, Section, Segments, Slider, Toggle } from "./controls";
+import { curvesOf } from "./curves";
+import { Icon } from "./icons";
+import { Plot } from "./plot";
+import { CompareTable, ReportCard } from "./report";
+
+const GRIDS = ["32", "64", "128", "256"] as const;
+const SPARSIFY = ["0", "0.00001", "0.001"] as const;
+
+export function BindPanel({ app }: { app: App }) {
+  const { bindRun, report, earlier, bound } = app.store.get();
+  return (
+    <div class="stack loose">
+      <Head title={T.bind.title} sentence={T.bind.sentence} />
+      {bindRun && <Running run={bindRun} />}
+      <div class="stack">
+        {report && bound && <ReportCard report={report} />}
+        {report && earlier.length > 0 && (
+          <div class="stack tight">
+            <h3 class="section-title">{T.bind.beside}</h3>
+            <CompareTable reports={[report, ...earlier]} />
+          </div>
+        )}
+      </div>
+      <Figure app={app} />
+      <Section title={T.bind.how}>
+        <Ways app={app} />
+        <Place app={app} />
+        <Memory app={app} />
+        <Advanced app={app} />
+      </Section>
+    </div>
+  );
+}
+
+function Running({ run }: { run: BindRun }) {
+  return (
+    <section class="card stack tight" aria-label={T.bind.underWay}>
+      <div class="row">
+        <strong class="grow">
+          {T.bind.stages[run.stage]}
+          {run.pass === "coarse" && T.bind.coarseFirst}
+        </strong>
+        <span class="number">{percent(run.fraction)}</span>
+      </div>
+      <progress max="1" value={run.fraction} aria-label={T.bind.progress} />
+      <p class="hint">{run.etaMs === null ? T.bind.working : timeLeft(run.etaMs)}</p>
+    </section>
+  );
+}
+
+/** The change per iteration, of this bind and of those by other solvers. */
+function Figure({ app }: { app: App }) {
+  const state = app.store.get();
+  const curves = curvesOf(state).filter((curve) => curve.points.length > 0);
+  const last = curves[0]?.points.at(-1);
+  if (!last) return null;
+  const tau = state.bindRun ? state.bindOptions.tau : (state.report?.tau ?? state.bindOptions.tau);
+  return (
+    <figure class="figure">
+      <figcaption class="section-title">{T.bind.change}</figcaption>
+      <Plot curves={curves} tau={tau} />
+      <ul class="curves">
+        {curves.length > 1 &&
+          curves.map(({ name, kind }, k) => (
+            <li class={kind} key={kind}>
+              {k > 0 && name === curves[0]?.name ? T.bind.before(name) : name}
+            </li>
+          ))}
+      </ul>
+      <p class="hint">{T.bind.reached(last[1], last[0])}</p>
+    </figure>
+  );
+}
+
+function Ways({ app }: { app: App }) {
+  const { bindOptions: options } = app.store.get();
+  const set = app.bind.setOptions;
+  const preset = ({ grid: _, backend: __, ...way }: BindOptions) => set(way);
+  return (
+    <>
+      <div class="row even">
+        <Button label={T.bind.ours} onClick={() => preset(BIND_DEFAULTS)} kind="small" tip={T.bind.oursTip} />
+        <Button
+          label={T.bind.papers}
+          onClick={() => preset(PAPER_DEFAULTS)}
+          kind="small"
+          tip={T.bind.papersTip}
+        />
+      </div>
+      <Segments
+        label={T.bind.grid}
+        choices={GRIDS.map((value) => ({ value, label: value }))}
+        value={String(options.grid) as (typeof GRIDS)[number]}
+        onChange={(value) => set({ grid: Number(value) })}
+      />
+      <Segments<BindOptions["method"]>
+        label={T.bind.method}
+        choices={(["embedded", "classic"] as const).map((value) => ({
+          value,
+          label: T.bind.methods[value],
+          tip: T.bind.methodTips[value],
+        }))}
+        value={options.method}
+        onChange={(method) => set({ method })}
+      />
+      <Segments<BindOptions["solver"]>
+        label={T.bind.solver}
+        choices={[
+          { value: "multigrid", label: T.bind.solvers.multigrid },
+          { value: "jacobi", label: T.bind.solvers.jacobi },
+          { value: "cg", label: T.bind.solvers.cg, tip: T.bind.cgTip },
+        ]}
+        value={options.solver}
+        onChange={(solver) => set({ solver })}
+      />
+      {options.solver === "cg" && (
+        <Toggle
+          label={T.bind.preconditioned}
+          sentence={T.bind.preconditionedSentence}
+          on={options.preconditioner === "v_cycle"}
+          onChange={(on) => set({ preconditioner: on ? "v_cycle" : "none" })}
+        />
+      )}
+      <p class="hint">{sayOptions(options)}</p>
+    </>
+  );
+}
+
+/** Where a bind is computed: graphics card or processor, and why not the former. */
+function Place({ app }: { app: App }) {
+  const { adapter, lack, bindOptions } = app.store.get();
+  const { backend, solver } = bindOptions;
+  const card = solver === "cg" ? T.bind.cgOnCpu : T.bind.card(adapter);
+  return (
+    <>
+      <Segments<BindOptions["backend"]>
+        label={T.bind.place}
+        choices={[
+          { value: "gpu", label: T.bind.places.gpu, disabled: lack !== null },
+          { value: "cpu", label: T.bind.places.cpu },
+        ]}
+        value={lack ? "cpu" : backend}
+        onChange={(value) => app.bind.setOptions({ backend: value })}
+      />
+      {lack && <p class="hint">{T.bind.noGpu}</p>}
+      {!lack && adapter !== "" && backend !== "cpu" && <p class="hint">{card}</p>}
+      {lack && (
+        <div class="row">
+          <Button label={T.without.title} onClick={app.showWays} kind="small" />
+        </div>
+      )}
+    </>
+  );
+}
+
+function Memory({ app }: { app: App }) {
+  const state = app.store.get();
+  const { memory } = state;
+  if (!state.cage || cageBroken(state)) return null;
+  const isWrong = typeof memory === "string";
+  return (
+    <p class={isWrong ? "memory bad" : "memory"}>
+      <Icon name={isWrong ? "warning" : "info"} />
+      {isWrong ? memory : T.bind.needs(memory)}
+    </p>
+  );
+}
+
+function Advanced({ app }: { app: App }) {
+  const { bindOptions: options } = app.store.get();
+  const set = app.bind.setOptions;
+  return (
+    <Fold title={T.bind.advanced}>
+      <Slider
+        label={T.bind.tau}
+        min={-8}
+        max={-2}
+        step={1}
+        format={(power) => `1e${power}`}
+        value={Math.round(Math.log10(options.tau))}
+        onInput={(power) => set({ tau: 10 ** power })}
+      />
+      <NumberField
+        label={T.bind.limit}
+        min={1}
+        max={1_000_000}
+        step="1"
+        value={options.max_iterations}
+        onCommit={(value) => set({ max_iterations: value })}
+      />
+      <Segments
+        label={T.bind.sparsify}
+        choices={SPARSIFY.map((value, k) => ({ value, label: T.bind.sparsifies[k] ?? value }))}
+        value={options.sparsify === 0 ? "0" : options.sparsify < 1e-4 ? "0.00001" : "0.001"}
+        onChange={(value) => set({ sparsify: Number(value) })}
+      />
+      {options.method === "classic" && (
+        <div class="stack">
+          <Segments<BindOptions["cell_shape"]>
+            label={T.bind.cells}
+            choices={(["box", "cubic"] as const).map((value) => ({ value, label: T.bind.cellShapes[value] }))}
+            value={options.cell_shape}
+            onChange={(cell_shape) => set({ cell_shape })}
+          />
+          <Segments<BindOptions["delta_norm"]>
+            label={T.bind.norm}
+            choices={(["euclidean", "literal"] as const).map((value) => ({
+              value,
+              label: T.bind.norms[value],
+            }))}
+            value={options.delta_norm}
+            onChange={(delta_norm) => set({ delta_norm })}
+          />
+        </div>
+      )}
+      <Toggle
+        label={T.bind.outside}
+        sentence={T.bind.outsideSentence}
+        on={options.outside === "closest_point"}
+        onChange={(on) => set({ outside: on ? "closest_point" : "refuse" })}
+      />
+    </Fold>
+  );
+}
+
+/** What the chosen combination is, as a sentence. */
+export function sayOptions({ method, solver, preconditioner }: BindOptions): string {
+  const say = T.bind.options;
+  if (solver === "cg") return preconditioner === "v_cycle" ? say.cgPreconditioned : say.cg;
+  if (method === "embedded") return solver === "multigrid" ? say.ours : say.oursJacobi;
+  return solver === "jacobi" ? say.papers : say.papersMultigrid;
+}

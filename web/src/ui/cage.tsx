@@ -1,0 +1,228 @@
+/** Step 2: where the cage comes from, what is wrong with it, and shaping it. */
+
+import type { App } from "../app";
+import type { Element as CageElement, CageOptions, CageState, Check, Problem, RestEdit } from "../contract";
+import { RANGES } from "../defaults";
+import { count, percent } from "../format";
+import type { CageSource } from "../state";
+import { sentence } from "../strings";
+import { T } from "../words";
+import { Badge, Button, Facts, Head, Section, Segments, Slider, Toggle } from "./controls";
+import { Icon, type IconName } from "./icons";
+
+/** Where the slider of voxels starts: it stands for none in particular. */
+const COARSEST = 16;
+/** Gaps narrower than so many voxels are closed. */
+const GAP_VOXELS = 3;
+
+const SOURCES = ["auto", "hull", "box", "file"] as const satisfies readonly CageSource[];
+
+export function CagePanel({ app }: { app: App }) {
+  const { cageSource, boxDivisions, cageProgress, model, cage, check } = app.store.get();
+  const { set } = app.store;
+  return (
+    <div class="stack loose">
+      <Head title={T.cage.title} sentence={T.cage.sentence} />
+      <div class="stack">
+        <Segments<CageSource>
+          label={T.cage.how}
+          hideLabel
+          choices={SOURCES.map((value) => ({ value, label: T.cage.sources[value] }))}
+          value={cageSource}
+          onChange={(value) => set({ cageSource: value })}
+        />
+        <p class="hint">{T.cage.about[cageSource]}</p>
+        {cageSource === "auto" && <Automatic app={app} />}
+        {cageSource === "box" && (
+          <Slider
+            label={T.cage.divisions}
+            min={1}
+            max={8}
+            step={1}
+            value={boxDivisions}
+            onInput={(value) => set({ boxDivisions: value })}
+          />
+        )}
+        {cageProgress !== null && (
+          <progress max="1" value={cageProgress} aria-label={T.cage.making}>
+            {percent(cageProgress)}
+          </progress>
+        )}
+        {cageSource === "file" ? (
+          <Button label={T.cage.load} onClick={app.chooseCage} icon="file" kind="block" disabled={!model} />
+        ) : (
+          <Button
+            label={T.cage.make}
+            onClick={() => void app.cage.make()}
+            icon="cage"
+            kind="block"
+            disabled={cageProgress !== null || !model}
+          />
+        )}
+      </div>
+      <Section title={T.cage.result}>
+        <div class="stack">
+          {cage ? <CageCard cage={cage} check={check} /> : <p class="empty">{T.cage.none}</p>}
+          {check?.problems.map((problem) => (
+            <ProblemCard key={problem.message} problem={problem} app={app} />
+          ))}
+        </div>
+      </Section>
+      <Section title={T.cage.shape}>{cage && <Reshape app={app} />}</Section>
+    </div>
+  );
+}
+
+/** How a cage is made for the model. */
+function Automatic({ app }: { app: App }) {
+  const { cageOptions: options } = app.store.get();
+  const change = (patch: Partial<CageOptions>) =>
+    app.store.set({ cageOptions: { ...app.store.get().cageOptions, ...patch } });
+  return (
+    <div class="stack">
+      <Slider
+        label={T.cage.wanted}
+        min={RANGES.vertices[0]}
+        max={RANGES.vertices[1]}
+        step={2}
+        format={count}
+        value={options.vertices}
+        onInput={(vertices) => change({ vertices })}
+      />
+      <Segments<CageOptions["symmetry"]>
+        label={T.cage.symmetry}
+        choices={(["auto", "on", "off"] as const).map((value) => ({
+          value,
+          label: T.cage.symmetries[value],
+        }))}
+        value={options.symmetry}
+        onChange={(symmetry) => change({ symmetry })}
+      />
+      <Slider
+        label={T.cage.margin}
+        min={0}
+        max={0.15}
+        step={0.005}
+        format={(value) => (value === 0 ? T.cage.tight : T.cage.ofSize(percent(value, 1)))}
+        value={options.margin}
+        onInput={(margin) => change({ margin })}
+      />
+      <Slider
+        label={T.cage.gaps}
+        min={COARSEST}
+        max={RANGES.voxels[1]}
+        step={8}
+        format={(value) =>
+          value === COARSEST ? T.cage.asVertices : T.cage.from(percent(GAP_VOXELS / value, 1))
+        }
+        value={options.voxels || COARSEST}
+        onInput={(voxels) => change({ voxels: voxels === COARSEST ? 0 : voxels })}
+      />
+      <Toggle
+        label={T.cage.perPart}
+        sentence={T.cage.perPartSentence}
+        on={options.per_component}
+        onChange={(on) => change({ per_component: on })}
+      />
+    </div>
+  );
+}
+
+const EDITS: readonly (readonly [RestEdit, IconName, "split" | "collapse" | "extrude" | "remove"])[] = [
+  ["split_edge", "split", "split"],
+  ["collapse_edge", "merge", "collapse"],
+  ["extrude_face", "extrude", "extrude"],
+  ["delete_vertex", "trash", "remove"],
+];
+
+function Reshape({ app }: { app: App }) {
+  const { editingRest, element, selected } = app.store.get();
+  return (
+    <div class="stack">
+      <Toggle
+        label={T.cage.reshape}
+        sentence={T.cage.reshapeSentence(app.key("restMode"))}
+        on={editingRest}
+        onChange={(on) => app.edit.setEditingRest(on)}
+      />
+      {editingRest && (
+        <div class="tool-grid">
+          {EDITS.map(([edit, icon, command]) => (
+            <Button
+              key={edit}
+              label={T.cage.edits[edit]}
+              icon={icon}
+              kind="small"
+              tip={`${T.cage.edits[edit]} (${app.key(command)})`}
+              disabled={selected.count < need(edit, element) || !suits(edit, element)}
+              onClick={() => app.edit.restEdit(deletion(edit, element))}
+            />
+          ))}
+        </div>
+      )}
+      {editingRest && <p class="hint">{T.cage.hints[element]}</p>}
+    </div>
+  );
+}
+
+function suits(edit: RestEdit, element: CageElement): boolean {
+  if (edit === "split_edge" || edit === "collapse_edge") return element === "edge";
+  if (edit === "extrude_face") return element === "face";
+  return element !== "edge";
+}
+
+function need(edit: RestEdit, element: CageElement): number {
+  if (edit === "extrude_face") return 3;
+  if (edit === "delete_vertex") return element === "face" ? 3 : 1;
+  return 2;
+}
+
+function deletion(edit: RestEdit, element: CageElement): RestEdit {
+  return edit === "delete_vertex" && element === "face" ? "delete_face" : edit;
+}
+
+function CageCard({ cage, check }: { cage: CageState; check: Check | null }) {
+  return (
+    <div class="card stack tight">
+      <div class="row">
+        <strong class="grow">{T.cage.vertices(cage.info.vertices)}</strong>
+        <CageBadge cage={cage} check={check} />
+      </div>
+      <Facts
+        rows={[
+          [T.cage.edges, count(cage.info.edges)],
+          [T.cage.faces, count(cage.info.faces)],
+        ]}
+      />
+      {cage.info.notices.map((notice) => (
+        <p class="hint" key={notice}>
+          {sentence(notice)}
+        </p>
+      ))}
+    </div>
+  );
+}
+
+function CageBadge({ cage, check }: { cage: CageState; check: Check | null }) {
+  if (!cage.usable) return <Badge kind="bad" icon="warning" text={T.cage.needsRepair} />;
+  if (!check) return <span class="badge">{T.cage.checking}</span>;
+  return check.problems.some((problem) => problem.code === "model_outside") ? (
+    <Badge kind="warn" icon="warning" text={T.cage.outside} />
+  ) : (
+    <Badge kind="good" icon="check" text={T.cage.encloses} />
+  );
+}
+
+function ProblemCard({ problem, app }: { problem: Problem; app: App }) {
+  const { fix } = problem;
+  // Once the grid is as fine as asked for, nothing is left to do.
+  const isDone = fix?.kind === "grid" && app.store.get().bindOptions.grid >= fix.cells;
+  return (
+    <div class={`problem-card ${problem.severity}`}>
+      <Icon name={problem.severity === "note" ? "info" : "warning"} />
+      <p class="grow">{sentence(problem.message)}</p>
+      {fix && !isDone && <Button label={fix.label} onClick={() => app.cage.mend(fix)} kind="small" />}
+      {isDone && <Badge kind="good" icon="check" text={T.cage.fineEnough} />}
+    </div>
+  );
+}

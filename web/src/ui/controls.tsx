@@ -1,0 +1,289 @@
+/** The page's controls: labelled and keyboard-ready. */
+
+import type { ComponentChildren } from "preact";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
+import { Icon, type IconName } from "./icons";
+
+interface ButtonProps {
+  label: string;
+  onClick: () => void;
+  icon?: IconName | undefined;
+  /** Class names of controls.css. */
+  kind?: string;
+  /** A tool tip, see tips.ts. */
+  tip?: string | undefined;
+  /** What screen readers say, where the label is not enough. */
+  name?: string;
+  disabled?: boolean;
+  pressed?: boolean;
+}
+
+/** A button with text and perhaps an icon. */
+export function Button({ label, onClick, icon, kind = "", tip, name, disabled, pressed }: ButtonProps) {
+  return (
+    <button
+      type="button"
+      class={`button ${kind}`.trim()}
+      onClick={onClick}
+      disabled={disabled}
+      aria-label={name}
+      aria-pressed={pressed}
+      data-tip={tip}
+    >
+      {icon && <Icon name={icon} />}
+      <span>{label}</span>
+    </button>
+  );
+}
+
+interface IconButtonProps extends Omit<ButtonProps, "icon" | "name"> {
+  icon: IconName;
+  shortcut?: string;
+}
+
+/** A button that shows only an icon; `label` is its name, and its tool tip with the shortcut. */
+export function IconButton({
+  icon,
+  label,
+  onClick,
+  shortcut,
+  kind = "",
+  tip = label,
+  disabled,
+  pressed,
+}: IconButtonProps) {
+  return (
+    <button
+      type="button"
+      class={`icon-button ${kind}`.trim()}
+      onClick={onClick}
+      disabled={disabled}
+      aria-label={label}
+      aria-pressed={pressed}
+      data-tip={shortcut ? `${tip} (${shortcut})` : tip}
+    >
+      <Icon name={icon} />
+    </button>
+  );
+}
+
+let next = 0;
+
+/** An id for label and input that nothing else on the page has. */
+export function useUid(): string {
+  return useState(() => `control-${++next}`)[0];
+}
+
+export interface Choice<T extends string> {
+  value: T;
+  label: string;
+  tip?: string;
+  disabled?: boolean;
+}
+
+interface SegmentsProps<T extends string> {
+  label: string;
+  choices: readonly Choice<T>[];
+  value: T;
+  onChange: (value: T) => void;
+  hideLabel?: boolean;
+}
+
+/** One of a few choices, side by side: radio buttons that look like segments. */
+export function Segments<T extends string>({ label, choices, value, onChange, hideLabel }: SegmentsProps<T>) {
+  const name = useUid();
+  return (
+    <fieldset class="field">
+      <legend class={hideLabel ? "visually-hidden" : "legend-text"}>{label}</legend>
+      <div class="segments">
+        {choices.map((choice) => (
+          <label key={choice.value} data-tip={choice.tip}>
+            <input
+              type="radio"
+              name={name}
+              value={choice.value}
+              checked={choice.value === value}
+              disabled={choice.disabled}
+              onChange={() => onChange(choice.value)}
+            />
+            <span>{choice.label}</span>
+          </label>
+        ))}
+      </div>
+    </fieldset>
+  );
+}
+
+/** A switch with a name and a sentence. */
+export function Toggle(props: {
+  label: string;
+  sentence?: string;
+  on: boolean;
+  onChange: (on: boolean) => void;
+}) {
+  const id = useUid();
+  const { label, sentence, on, onChange } = props;
+  return (
+    <label class="switch" for={id}>
+      <span class="text">
+        <span>{label}</span>
+        {sentence && <small id={`${id}-s`}>{sentence}</small>}
+      </span>
+      <input
+        type="checkbox"
+        role="switch"
+        id={id}
+        aria-checked={on}
+        aria-describedby={sentence ? `${id}-s` : undefined}
+        checked={on}
+        onChange={(event) => onChange(event.currentTarget.checked)}
+      />
+    </label>
+  );
+}
+
+interface SliderProps {
+  label: string;
+  min: number;
+  max: number;
+  step: number;
+  value: number;
+  onInput: (value: number) => void;
+  /** Called when the finger is lifted, after the last `onInput`. */
+  onCommit?: (value: number) => void;
+  /** How the value is shown and spoken. */
+  format?: (value: number) => string;
+  name?: string;
+}
+
+/** A slider with its value beside its name. */
+export function Slider({
+  label,
+  min,
+  max,
+  step,
+  value,
+  onInput,
+  onCommit,
+  format = String,
+  name,
+}: SliderProps) {
+  const id = useUid();
+  return (
+    <div class="field">
+      <label for={id}>
+        {label}
+        <output for={id}>{format(value)}</output>
+      </label>
+      <input
+        type="range"
+        id={id}
+        min={min}
+        max={max}
+        step={step}
+        value={value}
+        aria-label={name}
+        aria-valuetext={format(value)}
+        onInput={(event) => onInput(event.currentTarget.valueAsNumber)}
+        onChange={(event) => onCommit?.(event.currentTarget.valueAsNumber)}
+      />
+    </div>
+  );
+}
+
+interface NumberInputProps {
+  id?: string;
+  name?: string;
+  value: number | string;
+  onCommit: (value: number) => void;
+  min?: number;
+  max?: number;
+  step?: string;
+}
+
+/** A number that is typed; `onCommit` hears it on Enter or when the field is left, and only when it is valid. */
+export function NumberInput({ id, name, value, onCommit, min, max, step = "any" }: NumberInputProps) {
+  const input = useRef<HTMLInputElement>(null);
+  useLayoutEffect(() => {
+    // Nothing is changed under the hand that types.
+    const { current } = input;
+    if (current && document.activeElement !== current) current.value = String(value);
+  }, [value]);
+  return (
+    <input
+      ref={input}
+      type="number"
+      id={id}
+      aria-label={name}
+      inputMode="decimal"
+      min={min}
+      max={max}
+      step={step}
+      onChange={(event) => {
+        const { currentTarget: field } = event;
+        const isValid = field.value !== "" && field.validity.valid;
+        field.setAttribute("aria-invalid", String(!isValid));
+        if (isValid) onCommit(field.valueAsNumber);
+      }}
+    />
+  );
+}
+
+export function NumberField({ label, ...props }: Omit<NumberInputProps, "id" | "name"> & { label: string }) {
+  const id = useUid();
+  return (
+    <div class="field">
+      <label for={id}>{label}</label>
+      <NumberInput id={id} {...props} />
+    </div>
+  );
+}
+
+/** Name and value pairs. */
+export function Facts({ rows }: { rows: readonly (readonly [name: string, value: string])[] }) {
+  return (
+    <dl class="facts">
+      {rows.flatMap(([name, value]) => [<dt key={name}>{name}</dt>, <dd key={`${name} is`}>{value}</dd>])}
+    </dl>
+  );
+}
+
+/** A group with a heading. */
+export function Section({ title, children }: { title: string; children: ComponentChildren }) {
+  return (
+    <section class="section">
+      <h3>{title}</h3>
+      {children}
+    </section>
+  );
+}
+
+/** A panel's heading and the sentence under it. */
+export function Head({ title, sentence }: { title: string; sentence: string }) {
+  return (
+    <div class="head">
+      <h2>{title}</h2>
+      <p class="hint">{sentence}</p>
+    </div>
+  );
+}
+
+/** A word on how something stands. */
+export function Badge({ kind, icon, text }: { kind: "good" | "warn" | "bad"; icon: IconName; text: string }) {
+  return (
+    <span class={`badge ${kind}`}>
+      <Icon name={icon} />
+      {text}
+    </span>
+  );
+}
+
+/** Something that can be unfolded. */
+export function Fold({ title, children }: { title: string; children: ComponentChildren }) {
+  return (
+    <details class="fold">
+      <summary>{title}</summary>
+      <div class="stack">{children}</div>
+    </details>
+  );
+}

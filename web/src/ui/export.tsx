@@ -1,0 +1,87 @@
+/** Step 5: files to take along, each with a sentence on what it is good for. */
+
+import { useState } from "preact/hooks";
+import type { ExportKind } from "../actions/exports";
+import type { App } from "../app";
+import { type AppState, fittingPoses } from "../state";
+import { T } from "../words";
+import { Head, Segments } from "./controls";
+import { Icon, type IconName } from "./icons";
+import { Privacy } from "./model";
+
+const ITEMS: readonly (readonly [ExportKind, IconName])[] = [
+  ["glb", "model"],
+  ["poses", "layers"],
+  ["cage", "cage"],
+  ["weights", "table"],
+  ["picture", "image"],
+  ["project", "save"],
+];
+
+/** Why a file cannot be had now, or null. */
+function missing(kind: ExportKind, state: AppState): string | null {
+  const { bindFirst, cageFirst, poseFirst, modelFirst } = T.exports;
+  if (kind === "picture") return state.model ? null : modelFirst;
+  if (kind === "cage" || kind === "project") return state.cage ? null : cageFirst;
+  if (!state.bound) return bindFirst;
+  return kind === "poses" && fittingPoses(state).length === 0 ? poseFirst : null;
+}
+
+export function ExportPanel({ app }: { app: App }) {
+  return (
+    <div class="stack loose">
+      <Head title={T.exports.title} sentence={T.exports.sentence} />
+      <ul class="stack">
+        {ITEMS.map(([kind, icon]) => (
+          <Item key={kind} app={app} kind={kind} icon={icon} />
+        ))}
+      </ul>
+      <Privacy />
+    </div>
+  );
+}
+
+function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName }) {
+  const state = app.store.get();
+  const [title = "", sentence = ""] = T.exports.items[kind];
+  const reason = missing(kind, state);
+  const n = kind === "poses" ? fittingPoses(state).length : 0;
+  return (
+    <li>
+      <button
+        type="button"
+        class="export-card"
+        data-kind={kind}
+        disabled={reason !== null}
+        onClick={() => void app.exports.save(kind)}
+      >
+        <span class="tile">
+          <Icon name={icon} />
+        </span>
+        <span class="grow">
+          <strong>{title}</strong>
+          <span class="hint">{reason ?? (n > 0 ? T.exports.poses(n, sentence) : sentence)}</span>
+        </span>
+        <Icon name="download" />
+      </button>
+      {kind === "picture" && <PictureOptions app={app} />}
+    </li>
+  );
+}
+
+function PictureOptions({ app }: { app: App }) {
+  const [size, setSize] = useState("2");
+  return (
+    <div class="export-option">
+      <Segments
+        label={T.exports.size}
+        choices={["1", "2", "4"].map((value, k) => ({ value, label: T.exports.sizes[k] ?? value }))}
+        value={size}
+        onChange={(value) => {
+          setSize(value);
+          app.exports.pictureSize(Number(value));
+        }}
+      />
+    </div>
+  );
+}

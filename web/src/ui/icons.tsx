@@ -1,0 +1,141 @@
+/** The page's icons: Lucide's, 24 x 24, strokes only; and the product's mark. */
+
+import {
+  ArrowUpFromLine,
+  Bandage,
+  Box,
+  Check,
+  CircleDot,
+  CircleQuestionMark,
+  Download,
+  Eye,
+  File,
+  Focus,
+  FolderOpen,
+  Grid2x2,
+  Hexagon,
+  type IconNode,
+  Image,
+  Info,
+  Layers,
+  Link2,
+  Lock,
+  Merge,
+  MirrorRectangular,
+  Moon,
+  MousePointer2,
+  Move,
+  PersonStanding,
+  Play,
+  Plus,
+  Pyramid,
+  Redo2,
+  RotateCcw,
+  RotateCw,
+  Save,
+  Scaling,
+  Share2,
+  Slash,
+  Sparkles,
+  Square,
+  SquareDashed,
+  SquareSplitHorizontal,
+  Sun,
+  SunMoon,
+  Table,
+  Target,
+  Trash,
+  Triangle,
+  TriangleAlert,
+  Undo2,
+  Upload,
+  X,
+} from "lucide";
+import { h } from "preact";
+
+const ICONS = {
+  model: Box,
+  cage: Hexagon,
+  bind: Link2,
+  pose: PersonStanding,
+  export: Upload,
+  open: FolderOpen,
+  upload: Download,
+  download: Download,
+  undo: Undo2,
+  redo: Redo2,
+  eye: Eye,
+  share: Share2,
+  sun: Sun,
+  moon: Moon,
+  auto: SunMoon,
+  select: MousePointer2,
+  move: Move,
+  rotate: RotateCw,
+  scale: Scaling,
+  vertex: CircleDot,
+  edge: Slash,
+  face: Triangle,
+  symmetry: MirrorRectangular,
+  proportional: Target,
+  box: SquareDashed,
+  frame: Focus,
+  perspective: Grid2x2,
+  check: Check,
+  close: X,
+  warning: TriangleAlert,
+  info: Info,
+  lock: Lock,
+  play: Play,
+  stop: Square,
+  plus: Plus,
+  trash: Trash,
+  reset: RotateCcw,
+  spark: Sparkles,
+  clamp: Pyramid,
+  file: File,
+  image: Image,
+  layers: Layers,
+  table: Table,
+  save: Save,
+  help: CircleQuestionMark,
+  split: SquareSplitHorizontal,
+  merge: Merge,
+  extrude: ArrowUpFromLine,
+  patch: Bandage,
+} satisfies Record<string, IconNode>;
+
+export type IconName = keyof typeof ICONS;
+
+/** An icon; it says nothing to screen readers, the button around it does. */
+export function Icon({ name }: { name: IconName }) {
+  return (
+    <svg viewBox="0 0 24 24" class="icon" aria-hidden="true">
+      {ICONS[name].map(([tag, attributes]) => h(tag, attributes))}
+    </svg>
+  );
+}
+
+/** The product's mark: a cage. */
+export function Mark() {
+  const spots = [
+    [16, 3.2],
+    [27, 9.5],
+    [27, 22.5],
+    [16, 28.8],
+    [5, 22.5],
+    [5, 9.5],
+    [16, 16],
+  ];
+  return (
+    <svg viewBox="0 0 32 32" class="mark" aria-hidden="true">
+      <g fill="none" stroke="currentColor" stroke-width="2.2" stroke-linejoin="round">
+        <path d="M16 3 27 9.5v13L16 29 5 22.5v-13Z" />
+        <path d="M5 9.5 16 16l11-6.5M16 16v13" opacity="0.6" />
+      </g>
+      {spots.map(([cx, cy]) => (
+        <circle key={`${cx} ${cy}`} cx={cx} cy={cy} r="2.7" fill="currentColor" />
+      ))}
+    </svg>
+  );
+}

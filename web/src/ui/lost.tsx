@@ -1,0 +1,66 @@
+/** What the page shows when the graphics device is lost, and the way back. */
+
+import { signal } from "@preact/signals";
+import type { Session } from "../contract";
+import { sentence } from "../strings";
+import { T } from "../words";
+import { Button } from "./controls";
+import { Icon } from "./icons";
+
+/** Twice within this time, ms, and the page asks before it tries again: the device may be broken for good. */
+const AGAIN_MS = 10_000;
+
+interface Message {
+  readonly title: string;
+  readonly text: string;
+  readonly retry: boolean;
+}
+
+/** Watches for it; the component shows it. */
+export function createLost(freshCanvas: () => HTMLCanvasElement, recovered: () => void) {
+  const message = signal<Message | null>(null);
+  let recover = async () => {};
+
+  const watch = (session: Session) => {
+    let last = Number.NEGATIVE_INFINITY;
+    recover = async () => {
+      message.value = { title: T.lost.title, text: T.lost.back, retry: false };
+      try {
+        await session.recover(freshCanvas());
+        message.value = null;
+        recovered();
+      } catch (error) {
+        const reason = sentence(error instanceof Error ? error.message : String(error));
+        message.value = { title: T.lost.notBack, text: T.lost.kept(reason), retry: true };
+      }
+    };
+    session.onLost((reason) => {
+      const now = performance.now();
+      const isAgain = now - last < AGAIN_MS;
+      last = now;
+      if (isAgain) message.value = { title: T.lost.again, text: T.lost.others(sentence(reason)), retry: true };
+      else void recover();
+    });
+  };
+
+  const Lost = () => {
+    if (!message.value) return null;
+    const { title, text, retry } = message.value;
+    return (
+      <div class="lost" role="alert">
+        <div class="lost-card">
+          <Icon name="warning" />
+          <strong>{title}</strong>
+          <p>{text}</p>
+          {retry && (
+            <div class="row">
+              <Button label={T.tryAgain} onClick={() => void recover()} kind="primary" />
+              <Button label={T.reload} onClick={() => location.reload()} />
+            </div>
+          )}
+        </div>
+      </div>
+    );
+  };
+  return { Lost, watch };
+}

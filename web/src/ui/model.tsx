@@ -1,0 +1,149 @@
+/** Step 1: what is open, how to open something else, and samples. */
+
+import { useState } from "preact/hooks";
+import type { App } from "../app";
+import type { ModelInfo, Sample, UpAxis } from "../contract";
+import { count, scientific } from "../format";
+import { sentence } from "../strings";
+import { T } from "../words";
+import { Badge, Button, Facts, Head, Section, Segments } from "./controls";
+import { Icon, type IconName } from "./icons";
+
+/** Until a sample's picture is there. */
+const ICONS: Record<string, IconName> = { rat: "spark", humanoid: "pose", clamp: "bind" };
+
+export function ModelPanel({ app }: { app: App }) {
+  const { model, sample, samples, works } = app.store.get();
+  return (
+    <div class="stack loose">
+      <Head title={T.model.title} sentence={T.model.sentence} />
+      <div class="dropzone">
+        <Icon name="upload" />
+        <div class="grow">
+          <strong>{T.model.drop}</strong>
+          <p class="hint">{T.model.kinds}</p>
+        </div>
+        <div class="row wrap">
+          <Button label={T.panel.open} onClick={app.chooseModel} icon="file" kind="small" />
+          <Button label={T.model.openFolder} onClick={app.chooseFolder} icon="open" kind="small" />
+        </div>
+      </div>
+      {works.length > 0 && (
+        <div class="row">
+          <Button
+            label={T.model.kept(works.length)}
+            onClick={() => app.store.set({ worksOpen: true })}
+            icon="save"
+            kind="small"
+          />
+        </div>
+      )}
+      <Section title={T.model.samples}>
+        <ul class="gallery">
+          {samples.map((one) => (
+            <SampleCard key={one.id} app={app} sample={one} isOpen={one.id === sample} />
+          ))}
+        </ul>
+      </Section>
+      {model && <ModelCard model={model} about={samples.find(({ id }) => id === sample)?.sentence} />}
+      {model && (
+        <Segments<UpAxis>
+          label={T.model.up}
+          choices={[
+            { value: "y", label: "Y", tip: T.model.upY },
+            { value: "z", label: "Z", tip: T.model.upZ },
+          ]}
+          value={model.up}
+          onChange={(axis) => void app.files.turn(axis)}
+        />
+      )}
+      <Privacy />
+      <p class="hint">
+        <a href="./licences.txt" target="_blank" rel="noopener">
+          {T.model.licences}
+        </a>
+      </p>
+    </div>
+  );
+}
+
+export function Privacy() {
+  return (
+    <p class="privacy">
+      <Icon name="lock" />
+      <span>{T.privacy}</span>
+    </p>
+  );
+}
+
+function SampleCard({ app, sample: { id, label }, isOpen }: { app: App; sample: Sample; isOpen: boolean }) {
+  const [hasPicture, setHasPicture] = useState(true);
+  const about = T.model.tips[id];
+  return (
+    <li>
+      <button
+        type="button"
+        class="sample"
+        data-sample={id}
+        aria-current={isOpen ? "true" : undefined}
+        onClick={() => void app.files.openSample(id)}
+      >
+        <span class="thumb">
+          <Icon name={ICONS[id] ?? "model"} />
+          {hasPicture && (
+            <img
+              src={`./samples/${id}.webp`}
+              alt=""
+              width="72"
+              height="72"
+              loading="lazy"
+              onError={() => setHasPicture(false)}
+            />
+          )}
+        </span>
+        <span class="grow">
+          <strong>{label}</strong>
+          {about && <span class="hint">{about}</span>}
+        </span>
+      </button>
+    </li>
+  );
+}
+
+function ModelCard({ model, about }: { model: ModelInfo; about: string | undefined }) {
+  const { min, max } = model.bounds;
+  const size = max.map((value, i) => scientific(value - (min[i] ?? 0))).join(" × ");
+  const rows: [string, string][] = [
+    [T.model.vertices, count(model.vertices)],
+    [T.model.triangles, count(model.triangles)],
+    [T.model.size, size],
+  ];
+  if (model.materials > 0) rows.push([T.model.materials, count(model.materials)]);
+  if (model.textures > 0) rows.push([T.model.textures, count(model.textures)]);
+  const also = alsoThere(model);
+  if (also !== "") rows.push([T.model.also, also]);
+  return (
+    <section class="card stack tight" aria-label={T.model.isOpen}>
+      <div class="row">
+        <strong class="grow clip">{model.name}</strong>
+        <Badge kind="good" icon="check" text={T.model.open} />
+      </div>
+      {about && <p class="hint">{about}</p>}
+      <Facts rows={rows} />
+      {model.notices.map((notice) => (
+        <p class="hint" key={notice}>
+          {sentence(notice)}
+        </p>
+      ))}
+    </section>
+  );
+}
+
+function alsoThere({ skins, animations, morphTargets }: ModelInfo): string {
+  const parts = [
+    skins > 0 && T.model.skins(skins),
+    animations > 0 && T.model.animations(animations),
+    morphTargets > 0 && T.model.morphTargets(morphTargets),
+  ];
+  return parts.filter(Boolean).join(", ");
+}

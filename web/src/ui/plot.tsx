@@ -1,0 +1,131 @@
+/** The change per iteration, on a logarithmic scale: the paper's figure 7, drawn live. */
+
+import { count } from "../format";
+import { T } from "../words";
+
+export interface Curve {
+  name: string;
+  points: readonly (readonly [iteration: number, delta: number])[];
+  /** Class for the colour. */
+  kind: (typeof KINDS)[number];
+}
+
+/** The bind of the moment, and two to compare it with. */
+export const KINDS = ["now", "before", "earlier"] as const;
+
+/** From so many times as many iterations on, curves are drawn over their logarithm: the short one would be a stroke. */
+const FAR_APART = 20;
+
+const WIDTH = 328;
+const HEIGHT = 168;
+const LEFT = 38;
+const RIGHT = 8;
+const TOP = 8;
+const BOTTOM = 26;
+/** Height of a line of text. */
+const LABEL = 11;
+
+export interface Scale {
+  lowest: number;
+  highest: number;
+  last: number;
+  /** Whether iterations are on a logarithmic scale, too. */
+  logarithmic: boolean;
+}
+
+/** Powers of ten and iterations that hold all points and the threshold. */
+export function scaleOf(curves: readonly Curve[], tau: number): Scale {
+  const deltas = curves
+    .flatMap((curve) => curve.points.map(([, delta]) => delta))
+    .filter((delta) => delta > 0);
+  const lasts = curves.flatMap((curve) => curve.points.at(-1)?.[0] ?? []);
+  const last = Math.max(1, ...lasts);
+  const all = tau > 0 ? [...deltas, tau] : deltas;
+  const lowest = Math.floor(Math.log10(Math.min(...all, 1)));
+  const highest = Math.ceil(Math.log10(Math.max(...all, 1e-9)));
+  return {
+    lowest,
+    highest: Math.max(highest, lowest + 1),
+    last,
+    logarithmic: last > FAR_APART * Math.min(...lasts),
+  };
+}
+
+export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number }) {
+  const { lowest, highest, last, logarithmic } = scaleOf(curves, tau);
+  const along = (iteration: number) =>
+    logarithmic ? Math.log(Math.max(1, iteration)) / Math.log(last) : iteration / last;
+  const x = (iteration: number) => LEFT + along(iteration) * (WIDTH - LEFT - RIGHT);
+  const y = (delta: number) => {
+    const share = (Math.log10(Math.max(delta, 1e-30)) - lowest) / (highest - lowest);
+    return HEIGHT - BOTTOM - Math.min(1, Math.max(0, share)) * (HEIGHT - TOP - BOTTOM);
+  };
+  const stride = Math.ceil((highest - lowest) / 5);
+  const powers = Array.from({ length: Math.floor((highest - lowest) / stride) + 1 }, (_, k) => lowest + k * stride);
+  const now = curves.find((curve) => curve.kind === "now")?.points.at(-1);
+  const bottom = HEIGHT - 8;
+  const middle = (LEFT + WIDTH - RIGHT) / 2;
+  // Below its line where there is room, because curves come from above; on the side where they are still high.
+  const tauBelow = y(tau) <= HEIGHT - BOTTOM - LABEL;
+  const tauAt = logarithmic ? WIDTH - RIGHT - 4 : LEFT + 4;
+  return (
+    <svg
+      viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
+      class="plot"
+      role="img"
+      aria-label={T.bind.plot(now ? T.bind.reached(now[1], now[0]) : "")}
+    >
+      {powers.map((power) => (
+        <g key={power}>
+          <line x1={LEFT} x2={WIDTH - RIGHT} y1={y(10 ** power)} y2={y(10 ** power)} class="grid" />
+          <Label x={LEFT - 6} y={y(10 ** power) + 3.5} text={`1e${power}`} anchor="end" />
+        </g>
+      ))}
+      <Label x={LEFT} y={bottom} text={logarithmic ? "1" : "0"} anchor="middle" />
+      <Label x={WIDTH - RIGHT} y={bottom} text={count(last)} anchor="end" />
+      <Label
+        x={middle}
+        y={bottom}
+        text={logarithmic ? T.bind.iterationsLogarithmic : T.bind.iterations}
+        anchor="middle"
+      />
+      {tau > 0 && (
+        <>
+          <line x1={LEFT} x2={WIDTH - RIGHT} y1={y(tau)} y2={y(tau)} class="tau" />
+          <Label
+            x={tauAt}
+            y={y(tau) + (tauBelow ? LABEL : -4)}
+            text={T.bind.doneBelow}
+            anchor={logarithmic ? "end" : "start"}
+          />
+        </>
+      )}
+      {curves.map(({ kind, points }) => {
+        const end = points.at(-1);
+        if (!end) return null;
+        const line = points.map(([i, delta]) => `${x(i).toFixed(1)},${y(delta).toFixed(1)}`);
+        return (
+          <g key={kind}>
+            <polyline points={line.join(" ")} class={`curve ${kind}`} />
+            <circle cx={x(end[0])} cy={y(end[1])} r={3} class={`point ${kind}`} />
+          </g>
+        );
+      })}
+    </svg>
+  );
+}
+
+function Label({ x, y, text, anchor }: { x: number; y: number; text: string; anchor: "start" | "middle" | "end" }) {
+  return (
+    <text x={x} y={y} text-anchor={anchor}>
+      {text}
+    </text>
+  );
+}
+
+/** A report's history as points; `interval` iterations lie between two entries. */
+export function historyPoints(history: readonly number[], interval: number): Curve["points"] {
+  return history
+    .map((delta, index) => [(index + 1) * Math.max(1, interval), delta] as const)
+    .filter(([, delta]) => delta > 0);
+}

@@ -1,0 +1,183 @@
+/** Step 4: exact numbers for what is selected, help for moving, and poses. */
+
+import type { App } from "../app";
+import type { Pivot, Pose } from "../contract";
+import { coordinate, percent } from "../format";
+import { fittingPoses } from "../state";
+import { T } from "../words";
+import { Button, Head, IconButton, NumberInput, Section, Segments, Slider, Toggle } from "./controls";
+import { Icon } from "./icons";
+
+const PIVOTS = ["middle", "border", "last"] as const satisfies readonly Pivot[];
+
+export function PosePanel({ app }: { app: App }) {
+  return (
+    <div class="stack loose">
+      <Head title={T.pose.title} sentence={T.pose.sentence} />
+      <Selection app={app} />
+      <Section title={T.pose.help}>
+        <Help app={app} />
+      </Section>
+      <Section title={T.pose.poses}>
+        <Poses app={app} />
+      </Section>
+    </div>
+  );
+}
+
+/** Where what is selected is, in numbers that can be typed. */
+function Selection({ app }: { app: App }) {
+  const { selected, editingRest, pivot } = app.store.get();
+  const { count, last, center } = selected;
+  const one = editingRest ? T.pose.vertexAtRest : T.pose.vertex;
+  const move = (index: number, value: number) => {
+    const [x = 0, y = 0, z = 0] = (center ?? []).map((old, i) => (i === index ? value : old));
+    if (center) app.edit.moveTo(x, y, z);
+  };
+  return (
+    <div class="stack">
+      <p class="hint">{count === 0 ? T.pose.none : count === 1 ? one(last) : T.pose.middle(count)}</p>
+      {count > 1 && (
+        <Segments<Pivot>
+          label={T.pose.pivot}
+          choices={PIVOTS.map((value) => ({
+            value,
+            label: T.pose.pivots[value],
+            tip: T.pose.pivotTips[value],
+          }))}
+          value={pivot}
+          onChange={(value) => app.view.pivot(value)}
+        />
+      )}
+      {count > 0 && (
+        <div class="axis-fields">
+          {T.axes.map((axis, index) => (
+            <div class="axis-field" data-axis={"xyz"[index]} key={axis}>
+              <span aria-hidden="true">{axis}</span>
+              <NumberInput
+                name={T.pose.axis(axis)}
+                value={coordinate(center?.[index] ?? 0)}
+                onCommit={(value) => move(index, value)}
+              />
+            </div>
+          ))}
+        </div>
+      )}
+    </div>
+  );
+}
+
+function Help({ app }: { app: App }) {
+  const { symmetry, unmatched, proportionalOn, proportional } = app.store.get();
+  return (
+    <>
+      <Toggle
+        label={T.pose.mirror}
+        sentence={T.pose.mirrorSentence}
+        on={symmetry}
+        onChange={(on) => app.view.symmetry(on)}
+      />
+      {symmetry && unmatched > 0 && <p class="hint warn-text">{T.pose.unmatched(unmatched)}</p>}
+      <Toggle
+        label={T.pose.proportional}
+        sentence={T.pose.proportionalSentence}
+        on={proportionalOn}
+        onChange={(on) => app.view.proportional(on)}
+      />
+      {proportionalOn && (
+        <Slider
+          label={T.pose.far}
+          min={0.02}
+          max={1}
+          step={0.01}
+          format={(value) => T.pose.ofCage(percent(value))}
+          value={proportional}
+          onInput={(value) => app.view.proportional(true, value)}
+        />
+      )}
+    </>
+  );
+}
+
+function Poses({ app }: { app: App }) {
+  const state = app.store.get();
+  const { poses, shares, playing, posed } = state;
+  const fitting = fittingPoses(state);
+  const others = poses.length - fitting.length;
+  return (
+    <>
+      {poses.length === 0 && (
+        <div class="empty-state">
+          <Icon name="pose" />
+          <p>{T.pose.empty}</p>
+          <Button label={T.pose.save} onClick={() => app.run("savePose")} icon="plus" kind="small" />
+        </div>
+      )}
+      <ul class="poses">
+        {fitting.map((pose) => (
+          <PoseRow key={poses.indexOf(pose)} app={app} pose={pose} share={shares[poses.indexOf(pose)] ?? 0} />
+        ))}
+      </ul>
+      {others > 0 && <p class="hint">{T.pose.waiting(others)}</p>}
+      <div class="row">
+        <Button
+          label={playing ? T.pose.stop : T.pose.play}
+          onClick={() => app.run("play")}
+          icon={playing ? "stop" : "play"}
+          kind="small"
+          disabled={fitting.length === 0}
+        />
+        <Button
+          label={T.pose.reset}
+          onClick={() => app.run("resetPose")}
+          icon="reset"
+          kind="small"
+          tip={T.pose.resetTip(app.key("resetPose"))}
+          disabled={!posed}
+        />
+      </div>
+    </>
+  );
+}
+
+function PoseRow({ app, pose, share }: { app: App; pose: Pose; share: number }) {
+  const { name } = pose;
+  const isOn = app.store.get().playingPose === name;
+  return (
+    <li class="card pose" aria-current={isOn ? "true" : undefined}>
+      <div class="row">
+        <input
+          class="pose-name"
+          type="text"
+          value={name}
+          aria-label={T.pose.nameOf(name)}
+          maxLength={60}
+          onChange={(event) => app.poses.rename(pose, event.currentTarget.value)}
+        />
+        <Button
+          label={T.pose.show}
+          onClick={() => app.poses.apply(pose)}
+          kind="small"
+          tip={T.pose.showTip(name, app.key("undo"))}
+        />
+        <IconButton
+          icon="trash"
+          label={T.pose.delete(name)}
+          onClick={() => app.poses.remove(pose)}
+          kind="small"
+        />
+      </div>
+      <Slider
+        label={T.pose.blend}
+        name={T.pose.blendOf(name)}
+        min={0}
+        max={1}
+        step={0.01}
+        format={percent}
+        value={share}
+        onInput={(value) => app.poses.blend(pose, value, false)}
+        onCommit={(value) => app.poses.blend(pose, value, true)}
+      />
+    </li>
+  );
+}

@@ -1,0 +1,126 @@
+/** The result card: what a bind did and how exact it is, in words first. */
+
+import type { BindReport, MeanMax } from "../contract";
+import { bytes, count, duration, percent, scientific } from "../format";
+import { sentence } from "../strings";
+import { T } from "../words";
+import { Badge, Facts, Fold } from "./controls";
+
+/** A largest rest error below this share of the cage's diagonal cannot be seen: a tenth of a pixel of 4K. */
+const INVISIBLE = 2.5e-5;
+
+/** The verdict as one sentence. */
+export function verdict(report: Pick<BindReport, "converged" | "rest_error">): string {
+  const { stopped, invisible, off } = T.report.verdicts;
+  if (!report.converged) return stopped;
+  const { max_rel } = report.rest_error;
+  return max_rel < INVISIBLE ? invisible : off(scientific(max_rel * 100));
+}
+
+export function ReportCard({ report }: { report: BindReport }) {
+  const good = report.converged && report.outside_vertices === 0;
+  const { roundOff, converged, notConverged } = T.report;
+  return (
+    <section class="card stack" aria-label={T.report.name}>
+      <div class="row">
+        <strong class="grow">{T.report.boundIn(report.timings_ms.total)}</strong>
+        <Badge
+          kind={good ? "good" : "warn"}
+          icon={good ? "check" : "warning"}
+          text={report.at_round_off ? roundOff : report.converged ? converged : notConverged}
+        />
+      </div>
+      <p class="hint">{verdict(report)}</p>
+      <Facts
+        rows={[
+          [T.report.method, `${T.report.methods[report.method]}, ${solverName(report)}`],
+          [T.report.grid, T.report.cells(report.dims.join(" × "))],
+          [T.report.computedOn, report.backend === "gpu" ? T.report.gpu(report.adapter) : T.report.cpu],
+          [T.report.restMean, scientific(report.rest_error.mean_rel)],
+          [T.report.restLargest, scientific(report.rest_error.max_rel)],
+          ...rawFacts(T.report.solverError, report.raw_error.point_rel),
+          [T.report.weights, T.report.range(scientific(report.weights.min), scientific(report.weights.max))],
+        ]}
+      />
+      <Fold title={T.report.allNumbers}>
+        <Facts
+          rows={[
+            [T.report.iterations, count(report.iterations)],
+            [T.report.threshold, scientific(report.tau)],
+            [T.report.inside, count(report.cells.interior)],
+            [T.report.boundary, count(report.cells.boundary)],
+            [T.report.exterior, count(report.cells.exterior)],
+            [T.report.voxelize, duration(report.timings_ms.voxelize)],
+            [T.report.solve, duration(report.timings_ms.solve)],
+            [T.report.sample, duration(report.timings_ms.sample)],
+            [T.report.estimated, bytes(report.memory_bytes.estimated)],
+            [T.report.peak, bytes(report.memory_bytes.peak)],
+            ...rawFacts(T.report.sums, report.raw_error.sum),
+            [T.report.row, scientific(report.weights.max_sum_error)],
+            [T.report.stored, `${count(report.weights.nonzeros)} (${percent(density(report))})`],
+            [T.report.outside, T.report.vertices(report.outside_vertices)],
+            [T.report.ambiguous, count(report.ambiguous_cells)],
+          ]}
+        />
+      </Fold>
+      {report.notices.map((notice) => (
+        <p class="hint" key={notice}>
+          {sentence(notice)}
+        </p>
+      ))}
+    </section>
+  );
+}
+
+/** What the solver left of something. */
+function rawFacts(name: string, error: MeanMax): [string, string][] {
+  return [
+    [T.report.mean(name), scientific(error.mean)],
+    [T.report.largest(name), scientific(error.max)],
+  ];
+}
+
+/** Solver and preconditioner, in words. */
+export function solverName(by: Pick<BindReport, "solver" | "preconditioner">): string {
+  const isPreconditioned = by.solver === "cg" && by.preconditioner === "v_cycle";
+  return `${T.report.solvers[by.solver]}${isPreconditioned ? T.report.vCycles : ""}`;
+}
+
+/** Method, solver, grid and place of a bind, in short. */
+function wayOf(report: BindReport): string {
+  const { method, grid, backend } = report;
+  return `${T.report.short[method]}, ${solverName(report)}, ${grid}, ${backend.toUpperCase()}`;
+}
+
+/** Share of the weights that is stored. */
+export function density(report: BindReport): number {
+  const all = report.vertices * report.cage_vertices;
+  return all === 0 ? 0 : report.weights.nonzeros / all;
+}
+
+/** Binds of this cage side by side. */
+export function CompareTable({ reports }: { reports: readonly BindReport[] }) {
+  return (
+    <table class="compare">
+      <caption class="visually-hidden">{T.bind.all}</caption>
+      <thead>
+        <tr>
+          {T.bind.columns.map((name) => (
+            <th scope="col" key={name}>
+              {name}
+            </th>
+          ))}
+        </tr>
+      </thead>
+      <tbody>
+        {reports.map((report) => (
+          <tr key={wayOf(report)}>
+            <th scope="row">{wayOf(report)}</th>
+            <td>{duration(report.timings_ms.total)}</td>
+            <td>{scientific(report.rest_error.mean_rel)}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}

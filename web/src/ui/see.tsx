@@ -1,0 +1,148 @@
+/** The See panel: colours, wireframes, the grid, and harmonic beside mean value. */
+
+import type { App } from "../app";
+import type { SceneOptions } from "../contract";
+import { percent } from "../format";
+import type { Slice } from "../state";
+import { T } from "../words";
+import { Button, IconButton, Section, Segments, Slider, Toggle } from "./controls";
+
+const COLOURS = ["material", "clay", "weight", "error"] as const satisfies SceneOptions["colour"][];
+const SLICES = ["off", "kinds", "value"] as const satisfies SceneOptions["slice"][];
+const PARTS = ["model", "cage", "base_wireframe", "floor", "problems"] as const satisfies (keyof SceneOptions)[];
+
+export function See({ app }: { app: App }) {
+  const { seeOpen, ortho } = app.store.get();
+  if (!seeOpen) return null;
+  const views = [
+    [2, "viewFront"],
+    [0, "viewRight"],
+    [1, "viewTop"],
+  ] as const;
+  return (
+    <aside class="see" id="see" aria-label={T.see.title}>
+      <div class="row see-head">
+        <h2 class="grow">{T.see.title}</h2>
+        <IconButton
+          icon="close"
+          label={T.see.close}
+          shortcut={app.key("see")}
+          kind="small"
+          onClick={() => app.store.set({ seeOpen: false })}
+        />
+      </div>
+      <div class="see-body stack loose">
+        <Colours app={app} />
+        <Section title={T.see.grid}>
+          <Grid app={app} />
+        </Section>
+        <Section title={T.see.show}>
+          <Parts app={app} />
+        </Section>
+        <Section title={T.see.fromWhere}>
+          <div class="row even">
+            {views.map(([axis, command], k) => (
+              <Button
+                key={axis}
+                label={T.see.views[k] ?? ""}
+                onClick={() => app.view.axis(axis, false)}
+                kind="small"
+                tip={app.key(command)}
+              />
+            ))}
+          </div>
+          <Button
+            label={T.see.parallel}
+            onClick={() => app.view.ortho()}
+            kind="small"
+            tip={T.see.parallelTip(app.key("ortho"))}
+            pressed={ortho}
+          />
+        </Section>
+      </div>
+    </aside>
+  );
+}
+
+function Colours({ app }: { app: App }) {
+  const { scene, selected, bound } = app.store.get();
+  const needsVertex = scene.colour === "weight" && selected.last < 0;
+  return (
+    <div class="stack">
+      <Segments<SceneOptions["colour"]>
+        label={T.see.colour}
+        choices={COLOURS.map((value) => ({
+          value,
+          label: T.see.colours[value],
+          disabled: !bound && (value === "weight" || value === "error"),
+        }))}
+        value={scene.colour}
+        onChange={(colour) => app.view.scene({ colour })}
+      />
+      <p class="hint">{needsVertex ? T.see.selectForWeights : T.see.about[scene.colour]}</p>
+      <Toggle
+        label={T.see.compare}
+        sentence={T.see.compareSentence}
+        on={scene.compare}
+        onChange={(on) => void app.view.compare(on)}
+      />
+    </div>
+  );
+}
+
+function Grid({ app }: { app: App }) {
+  const { scene, slice, selected } = app.store.get();
+  const { cells, coordinate, selectForCoordinate } = T.see;
+  const about =
+    scene.slice !== "value" ? cells : selected.last < 0 ? selectForCoordinate : coordinate(selected.last);
+  return (
+    <>
+      <Segments<SceneOptions["slice"]>
+        label={T.see.slice}
+        choices={SLICES.map((value) => ({ value, label: T.see.slices[value] }))}
+        value={scene.slice}
+        onChange={(kind) => app.view.slice({}, kind)}
+      />
+      {scene.slice !== "off" && (
+        <div class="stack" data-busy={slice.busy ? "" : undefined}>
+          <Segments
+            label={T.see.across}
+            choices={T.axes.map((label, i) => ({ value: String(i), label }))}
+            value={String(slice.axis)}
+            onChange={(value) => app.view.slice({ axis: Number(value) as Slice["axis"] })}
+          />
+          <Slider
+            label={T.see.where}
+            min={0}
+            max={1}
+            step={0.005}
+            format={percent}
+            value={slice.position}
+            onInput={(position) => app.view.slice({ position })}
+          />
+          <p class="hint">{about}</p>
+        </div>
+      )}
+    </>
+  );
+}
+
+function Parts({ app }: { app: App }) {
+  const { scene } = app.store.get();
+  return (
+    <div class="stack tight">
+      {PARTS.map((part) => {
+        const [label = "", sentence = ""] = T.see.parts[part];
+        return (
+          <Toggle
+            key={part}
+            label={label}
+            sentence={sentence}
+            on={scene[part]}
+            onChange={(on) => app.view.scene({ [part]: on })}
+          />
+        );
+      })}
+    </div>
+  );
+}

@@ -1,0 +1,61 @@
+/** The sheet of shortcuts, from the same table as the keyboard handler. */
+
+import { caps, GROUPS, SHORTCUTS, type Shortcut } from "../input/shortcuts";
+import { T } from "../words";
+import { Dialog } from "./dialog";
+
+export function Sheet({ mac, isOpen, onClose }: { mac: boolean; isOpen: boolean; onClose: () => void }) {
+  const byItsKey = (event: KeyboardEvent) => {
+    if (event.key !== "?") return;
+    event.preventDefault();
+    onClose();
+  };
+  return (
+    <Dialog title={T.sheet.title} isOpen={isOpen} onClose={onClose} onKeyDown={byItsKey}>
+      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached by keys */}
+      <div class="sheet-body" tabIndex={0} role="group" aria-label={T.sheet.all}>
+        {GROUPS.map((group) => (
+          <section class="keys" key={group}>
+            <h3>{group}</h3>
+            <dl>
+              {SHORTCUTS.filter((s) => s.group === group && s.label !== "").map((shortcut) => (
+                <Row key={shortcut.command} shortcut={shortcut} mac={mac} />
+              ))}
+            </dl>
+          </section>
+        ))}
+        <section class="keys">
+          <h3>{T.sheet.pointer}</h3>
+          <dl>
+            {T.sheet.pointers.flatMap(([what, does]) => [
+              <dt key={what}>
+                <span>{what}</span>
+              </dt>,
+              <dd key={does}>{does}</dd>,
+            ])}
+          </dl>
+        </section>
+      </div>
+    </Dialog>
+  );
+}
+
+function Row({ shortcut, mac }: { shortcut: Shortcut; mac: boolean }) {
+  return (
+    <>
+      <dt>
+        {(shortcut.shown ?? shortcut.keys).map((combination, i) => (
+          <>
+            {i > 0 && !shortcut.shown && <span class="or">{T.sheet.or}</span>}
+            <span class="caps">
+              {caps(combination, mac).map((cap) => (
+                <kbd key={cap}>{cap}</kbd>
+              ))}
+            </span>
+          </>
+        ))}
+      </dt>
+      <dd>{shortcut.label}</dd>
+    </>
+  );
+}

@@ -1,0 +1,206 @@
+/** What lies on the view: tools, legend, status line. */
+
+import { useLayoutEffect, useState } from "preact/hooks";
+import type { App } from "../app";
+import type { Element as CageElement, SceneOptions } from "../contract";
+import type { Command } from "../input/shortcuts";
+import { sentence } from "../strings";
+import { T } from "../words";
+import { Button, IconButton, Segments } from "./controls";
+import { Icon, type IconName } from "./icons";
+import { LegendOfColours } from "./legend";
+import { hintOf, statusOf, underWay } from "./status";
+
+/** Everything that lies on the view; `stage` says by an attribute whether the cage at rest is shaped. */
+export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
+  const { cage, scene, editingRest } = app.store.get();
+  useLayoutEffect(() => {
+    stage.toggleAttribute("data-rest", editingRest);
+  }, [stage, editingRest]);
+  return (
+    <>
+      {cage && <Mode app={app} />}
+      {cage && editingRest && <Encloses app={app} />}
+      {cage && <Tools app={app} />}
+      <Looks app={app} />
+      <LegendOfColours app={app} />
+      {scene.compare && (
+        <div class="compare-labels" aria-hidden="true">
+          <span>{T.view.harmonic}</span>
+          <span>{T.view.meanValue}</span>
+        </div>
+      )}
+      <BottomLine app={app} />
+      <Busy app={app} />
+    </>
+  );
+}
+
+function Mode({ app }: { app: App }) {
+  return (
+    <div class="floating mode" data-tip={T.view.modeTip(app.key("restMode"))}>
+      <Segments
+        label={T.view.mode}
+        hideLabel
+        choices={(["pose", "rest"] as const).map((value) => ({ value, label: T.view.modes[value] }))}
+        value={app.store.get().editingRest ? "rest" : "pose"}
+        onChange={(value) => {
+          app.edit.setEditingRest(value === "rest");
+          app.go(value === "rest" ? "cage" : "pose");
+        }}
+      />
+    </div>
+  );
+}
+
+/** The live check while the cage is shaped. */
+function Encloses({ app }: { app: App }) {
+  const { cage, check, strays } = app.store.get();
+  const fault = check?.problems.find((problem) => problem.severity !== "note");
+  const message = strays > 0 ? T.cage.partOutside : fault && sentence(fault.message);
+  const kind = cage?.usable === false ? "bad" : message ? "warn" : check ? "good" : "";
+  return (
+    <span class={`floating badge encloses ${kind}`} role="status">
+      {(message || check) && <Icon name={message ? "warning" : "check"} />}
+      {message ?? (check ? T.cage.encloses : T.cage.checking)}
+    </span>
+  );
+}
+
+const GIZMOS: readonly (readonly [SceneOptions["gizmo"], IconName, Command])[] = [
+  ["none", "select", "toolSelect"],
+  ["move", "move", "gizmoMove"],
+  ["rotate", "rotate", "gizmoRotate"],
+  ["scale", "scale", "gizmoScale"],
+];
+const ELEMENTS: readonly CageElement[] = ["vertex", "edge", "face"];
+
+function Tools({ app }: { app: App }) {
+  const { scene, element, boxArmed, additive, symmetry, proportionalOn } = app.store.get();
+  const command = (icon: IconName, label: string, run: Command, pressed: boolean) => (
+    <IconButton
+      icon={icon}
+      label={label}
+      onClick={() => app.run(run)}
+      shortcut={app.key(run)}
+      pressed={pressed}
+    />
+  );
+  return (
+    <div class="floating tools" role="toolbar" aria-label={T.view.tools} aria-orientation="vertical">
+      {GIZMOS.map(([gizmo, icon, key]) => (
+        <IconButton
+          key={gizmo}
+          icon={icon}
+          label={T.view.gizmos[gizmo]}
+          onClick={() => app.view.gizmo(gizmo)}
+          shortcut={app.key(key)}
+          pressed={scene.gizmo === gizmo}
+        />
+      ))}
+      <span class="line" />
+      {ELEMENTS.map((one) => (
+        <IconButton
+          key={one}
+          icon={one}
+          label={T.view.elements[one]}
+          onClick={() => app.view.element(one)}
+          shortcut={app.key("elementMode")}
+          pressed={element === one}
+        />
+      ))}
+      <span class="line" />
+      {command("box", T.view.box, "boxSelect", boxArmed)}
+      <IconButton
+        icon="plus"
+        label={T.view.add}
+        onClick={() => app.store.set({ additive: !additive })}
+        shortcut={T.view.addKey}
+        kind="touch-only"
+        pressed={additive}
+      />
+      {command("symmetry", T.pose.mirror, "symmetry", symmetry)}
+      {command("proportional", T.pose.proportional, "proportional", proportionalOn)}
+    </div>
+  );
+}
+
+function Looks({ app }: { app: App }) {
+  const { seeOpen, ortho } = app.store.get();
+  return (
+    <div class="floating looks" role="toolbar" aria-label={T.view.looks}>
+      <IconButton
+        icon="eye"
+        label={T.view.see}
+        onClick={() => app.run("see")}
+        shortcut={app.key("see")}
+        pressed={seeOpen}
+      />
+      <IconButton
+        icon="frame"
+        label={T.view.frame}
+        onClick={app.view.frameAll}
+        shortcut={app.key("frameAll")}
+      />
+      <IconButton
+        icon="perspective"
+        label={T.see.parallel}
+        onClick={app.view.ortho}
+        shortcut={app.key("ortho")}
+        pressed={ortho}
+      />
+    </div>
+  );
+}
+
+/** Whether fingers do what a mouse does elsewhere; it can change while the page is open. */
+function useTouch(): boolean {
+  const [query] = useState(() => matchMedia("(pointer: coarse)"));
+  const [isTouch, setTouch] = useState(query.matches);
+  useLayoutEffect(() => {
+    const hear = () => setTouch(query.matches);
+    query.addEventListener("change", hear);
+    return () => query.removeEventListener("change", hear);
+  }, [query]);
+  return isTouch;
+}
+
+function BottomLine({ app }: { app: App }) {
+  const state = app.store.get();
+  const isTouch = useTouch();
+  const text = statusOf(state);
+  const isQuiet = state.gesture !== null || state.busy !== null;
+  return (
+    <div class="bottom-line">
+      <p
+        class="status"
+        id="status"
+        role="status"
+        aria-live="polite"
+        data-settled={underWay(state) === null ? "" : undefined}
+      >
+        {/* Another element, so that it stays for a while each time it says something else. */}
+        {text !== "" && <span key={text}>{text}</span>}
+      </p>
+      <p class="hint-line" hidden={isQuiet}>
+        {hintOf(state, isTouch)}
+      </p>
+    </div>
+  );
+}
+
+/** While the page waits for a file: how far it is, and the way out. */
+function Busy({ app }: { app: App }) {
+  const { busy, busyStep, cancelBusy, goOn } = app.store.get();
+  return (
+    <div class="busy" hidden={busy === null}>
+      {!goOn && <span class="spinner" />}
+      <p>{busy && `${busy}…`}</p>
+      <p class="hint">{busyStep}</p>
+      <div class="row">
+        {cancelBusy && <Button label={T.cancel} onClick={cancelBusy} icon="stop" kind="small" />}
+        {goOn && <Button label={T.opening.allTheSame} onClick={goOn} kind="small primary" />}
+      </div>
+    </div>
+  );
+}

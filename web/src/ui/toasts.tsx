@@ -1,0 +1,130 @@
+/** Messages: short ones go away, problems stay until they are closed or fixed. Both are read aloud. */
+
+import { signal } from "@preact/signals";
+import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
+import type { Fix, Tell } from "../actions/context";
+import { T } from "../words";
+import { Button, IconButton } from "./controls";
+import { Icon } from "./icons";
+
+/** Time to read a short message, ms, and more where it has a button. */
+const SHOWN_MS = 5000;
+const SHOWN_WITH_BUTTON_MS = 12_000;
+/** More at a time would hide the model. */
+const MOST = 3;
+
+interface Toast {
+  readonly id: number;
+  readonly title?: string;
+  readonly text: string;
+  readonly fix: Fix | undefined;
+}
+
+let next = 0;
+
+export function createToasts(): { Toasts: () => preact.JSX.Element; tell: Tell } {
+  const said = signal<readonly Toast[]>([]);
+  const problems = signal<readonly Toast[]>([]);
+
+  /** What is said again takes the place of what was said. */
+  const add = (list: typeof said, toast: Omit<Toast, "id">) => {
+    const others = list.value.filter(({ title, text }) => title !== toast.title || text !== toast.text);
+    next += 1;
+    list.value = [...others, { ...toast, id: next }].slice(-MOST);
+  };
+  const closing = (list: typeof said) => (id: number) => {
+    list.value = list.value.filter((toast) => toast.id !== id);
+  };
+
+  return {
+    Toasts: () => <Stack said={said.value} problems={problems.value} closeSaid={closing(said)} closeProblem={closing(problems)} />,
+    tell: {
+      say: (text, fix) => add(said, { text, fix }),
+      problem: ({ title, message }, fix) => add(problems, { title, text: message, fix }),
+      clear: () => {
+        problems.value = [];
+      },
+    },
+  };
+}
+
+interface StackProps {
+  said: readonly Toast[];
+  problems: readonly Toast[];
+  closeSaid: (id: number) => void;
+  closeProblem: (id: number) => void;
+}
+
+function Stack({ said, problems, closeSaid, closeProblem }: StackProps) {
+  const element = useRef<HTMLDivElement>(null);
+  const isEmpty = said.length + problems.length === 0;
+  useLayoutEffect(() => {
+    const { current } = element;
+    const isOpen = current?.matches(":popover-open");
+    // Shown anew, so that it lies above a dialog that was opened since.
+    if (isOpen && (isEmpty || document.querySelector("dialog[open]"))) current?.hidePopover();
+    if (!isEmpty && !current?.matches(":popover-open")) current?.showPopover();
+  }, [said, problems, isEmpty]);
+  return (
+    <div class="toasts" id="toasts" popover="manual" ref={element}>
+      <div class="toast-list" role="alert">
+        {problems.map((toast) => (
+          <Problem key={toast.id} toast={toast} close={() => closeProblem(toast.id)} />
+        ))}
+      </div>
+      <div class="toast-list" role="status" aria-live="polite">
+        {said.map((toast) => (
+          <Said key={toast.id} toast={toast} close={() => closeSaid(toast.id)} />
+        ))}
+      </div>
+    </div>
+  );
+}
+
+function FixButton({ fix, close }: { fix: Fix; close: () => void }) {
+  const run = () => {
+    close();
+    fix.run();
+  };
+  return <Button label={fix.label} onClick={run} kind="small" />;
+}
+
+function Said({ toast: { text, fix }, close }: { toast: Toast; close: () => void }) {
+  const timer = useRef<ReturnType<typeof setTimeout>>(undefined);
+  const leaveIn = (ms: number) => {
+    clearTimeout(timer.current);
+    timer.current = setTimeout(close, ms);
+  };
+  // Who reads or is about to click must not lose it.
+  const stay = () => clearTimeout(timer.current);
+  useEffect(() => {
+    leaveIn(fix ? SHOWN_WITH_BUTTON_MS : SHOWN_MS);
+    return stay;
+  }, []);
+  return (
+    <div class="toast" onPointerEnter={stay} onPointerLeave={() => leaveIn(SHOWN_MS)} onFocusIn={stay}>
+      <Icon name="info" />
+      <p>{text}</p>
+      {fix && <FixButton fix={fix} close={close} />}
+      <IconButton icon="close" label={T.toast.close} onClick={close} kind="small" />
+    </div>
+  );
+}
+
+function Problem({ toast: { title, text, fix }, close }: { toast: Toast; close: () => void }) {
+  return (
+    <div class="toast problem">
+      <Icon name="warning" />
+      <div class="grow">
+        <strong>{title}</strong>
+        <p>{text}</p>
+      </div>
+      <IconButton icon="close" label={T.toast.close} onClick={close} kind="small" />
+      {fix && (
+        <div class="toast-fix">
+          <FixButton fix={fix} close={close} />
+        </div>
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,74 @@
+import { afterEach, beforeEach, expect, it, vi } from "vitest";
+import { followCage } from "../../src/actions/follow";
+import { cageOf, createFake } from "../fake";
+
+beforeEach(() => {
+  vi.useFakeTimers();
+});
+afterEach(() => {
+  vi.useRealTimers();
+});
+
+/** A page that counts how often it looks again and binds. */
+function page() {
+  const fake = createFake();
+  const count = { looks: 0, binds: 0 };
+  const state = { isActive: false, covers: false };
+  const bind = {
+    covers: () => state.covers,
+    start: () => {
+      count.binds += 1;
+      return Promise.resolve(true);
+    },
+  };
+  const edit = { active: () => state.isActive, sync: () => (count.looks += 1) };
+  followCage(fake.ctx, bind, edit, { refresh: () => undefined });
+  const change = () => {
+    const { positions, corners } = cageOf(2);
+    fake.store.set({ cage: fake.engine.setCage(positions, corners) });
+  };
+  return { ...fake, count, state, change };
+}
+
+it("a changed cage is looked at at once and bound when the hand rests, however often it changed", () => {
+  const { count, change } = page();
+  for (let k = 0; k < 3; k++) {
+    change();
+    vi.advanceTimersByTime(100);
+  }
+  expect(count).toEqual({ looks: 3, binds: 0 });
+  vi.advanceTimersByTime(100);
+  expect(count.binds).toBe(1);
+});
+
+it("while a gesture goes on it waits, and what is bound already is left", () => {
+  const { count, state, change } = page();
+  state.isActive = true;
+  change();
+  vi.advanceTimersByTime(1000);
+  expect(count.binds).toBe(0);
+  state.isActive = false;
+  vi.advanceTimersByTime(200);
+  expect(count.binds).toBe(1);
+  state.covers = true;
+  change();
+  vi.advanceTimersByTime(1000);
+  expect(count.binds).toBe(1);
+});
+
+it("a fine grid waits for the user's word", () => {
+  const { count, store, change } = page();
+  store.set({ bindOptions: { ...store.get().bindOptions, grid: 256 } });
+  change();
+  vi.advanceTimersByTime(1000);
+  expect(count.binds).toBe(0);
+});
+
+it("who has ended reshaping waits no longer", () => {
+  const { count, store, change } = page();
+  store.set({ editingRest: true });
+  change();
+  store.set({ editingRest: false });
+  vi.advanceTimersByTime(1);
+  expect(count.binds).toBe(1);
+});
