@@ -71,9 +71,12 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
   const fixFor = (fix: NonNullable<Explained["fix"]>) => ({ label: T.fixes[fix], run: () => fixes[fix]() });
   const ctx: Context = { session, store, history, queue: createQueue(), tell, fixFor };
   const bind = createBind(ctx);
-  const cage = createCage(ctx, (grid) => {
-    bind.setOptions({ grid });
-    void bind.start();
+  const cage = createCage(ctx, {
+    refine(grid) {
+      bind.setOptions({ grid });
+      void bind.start();
+    },
+    carry: (before) => poses.carry(before),
   });
   const edit = createEdit(ctx, cage.adopt);
   const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"), viewport);

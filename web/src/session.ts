@@ -190,6 +190,13 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       }),
     repair: (kind) => ofNow(checking("repair", { kind, cage: cage(), model: engine.modelPositions() })),
     takeCage,
+    carryPoses: (old, poses) => {
+      const all = Float32Array.from(poses.flatMap((pose) => [...pose]));
+      const [model, rest] = [engine.modelPositions(), engine.restPositions()];
+      return chain(ofNow(client.run("carry", { model, cage: rest, old, poses: all })), (carried) =>
+        poses.map((_, k) => carried.slice(k * rest.length, (k + 1) * rest.length)),
+      );
+    },
     generateCage(options, onProgress) {
       const input = { positions: engine.modelPositions(), triangles: engine.modelTriangles(), options };
       return ofNow(client.run("cage", input, ({ fraction }) => onProgress(fraction)));
@@ -213,8 +220,8 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     },
     draw: frames.ask,
     onFrame: frames.listen,
-    async picture(width, height) {
-      const pixels = new Uint8ClampedArray(await engine.picture(width, height));
+    async picture(width, height, alone = false) {
+      const pixels = new Uint8ClampedArray(await engine.picture(width, height, alone));
       const canvas = new OffscreenCanvas(width, height);
       canvas.getContext("2d")?.putImageData(new ImageData(pixels, width, height), 0, 0);
       return canvas.convertToBlob({ type: "image/png" });

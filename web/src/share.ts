@@ -1,5 +1,14 @@
 /** Share links: what is open and how it is posed, in the part of the address that no server ever sees. */
 
+import type { CameraView, SceneOptions } from "./contract";
+
+/** What a view shows besides the model. */
+export interface Seen {
+  readonly camera: CameraView;
+  readonly selected: readonly number[];
+  readonly scene: Partial<SceneOptions>;
+}
+
 export interface Shared {
   /** Identifier of the sample; links hold no files, so only samples can be shared with their pose. */
   sample: string;
@@ -7,6 +16,7 @@ export interface Shared {
   cage?: string;
   /** The pose, as `Engine.encodePose` packs it. */
   pose?: Uint8Array;
+  seen?: Seen;
 }
 
 /** Longest fragment read; a pose of 400 cage vertices takes about 3 kB. */
@@ -17,6 +27,9 @@ export async function encodeShare(shared: Shared): Promise<string> {
   const fields = new URLSearchParams({ sample: shared.sample });
   if (shared.cage !== undefined) fields.set("cage", shared.cage);
   if (shared.pose && shared.pose.length > 0) fields.set("pose", toBase64Url(await pack(shared.pose)));
+  if (shared.seen) {
+    fields.set("seen", toBase64Url(await pack(new TextEncoder().encode(JSON.stringify(shared.seen)))));
+  }
   return `#${fields}`;
 }
 
@@ -26,22 +39,31 @@ export async function decodeShare(fragment: string): Promise<Shared | undefined>
   const sample = fields.get("sample");
   const cage = fields.get("cage");
   const pose = fields.get("pose");
+  const seen = fields.get("seen");
   if (sample === null && pose === null) return undefined;
   if (!sample) throw new Error("it does not say which sample it shows");
   if (fragment.length > LONGEST) throw new Error(`it is longer than ${LONGEST} letters`);
   return {
     sample,
     ...(cage === null ? {} : { cage }),
-    ...(pose === null ? {} : { pose: await readPose(pose) }),
+    ...(pose === null ? {} : { pose: await read("pose", pose) }),
+    ...(seen === null ? {} : { seen: parse(await read("view", seen)) }),
   };
 }
 
-async function readPose(text: string): Promise<Uint8Array> {
+async function read(what: string, text: string): Promise<Uint8Array> {
   try {
     return await unpack(fromBase64Url(text));
   } catch {
-    throw new Error("its pose cannot be read");
+    throw new Error(`its ${what} cannot be read`);
   }
+}
+
+/** Only the outside is looked at here: the engine refuses a camera or a scene that is none. */
+function parse(json: Uint8Array): Seen {
+  const seen: Partial<Seen> | null = JSON.parse(new TextDecoder().decode(json));
+  if (!seen?.camera || !Array.isArray(seen.selected)) throw new Error("its view cannot be read");
+  return { camera: seen.camera, selected: seen.selected, scene: { ...seen.scene } };
 }
 
 async function through(

@@ -100,7 +100,7 @@ async function openShared(app: App): Promise<{ opened: boolean; damage?: unknown
   try {
     const link = await decodeShare(location.hash);
     if (!link) return { opened };
-    const { sample, pose } = link;
+    const { sample, pose, seen } = link;
     if (!app.store.get().samples.some(({ id }) => id === sample)) {
       throw new Error(`there is no sample called "${sample.slice(0, 40)}" here`);
     }
@@ -108,6 +108,7 @@ async function openShared(app: App): Promise<{ opened: boolean; damage?: unknown
     if (!opened) return { opened };
     app.store.set({ step: "pose" });
     if (pose) app.ctx.session().engine.decodePose(pose);
+    if (seen) app.view.show(seen);
     app.edit.sync();
     return { opened };
   } catch (damage) {

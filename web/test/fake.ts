@@ -195,6 +195,7 @@ export function createFake(): Fake {
     generateCage: (options) => job("cage", options),
     checkCage: () => job("check", null),
     repair: (kind) => job("repair", kind),
+    carryPoses: (old, poses) => job<Float32Array[]>("carry", { old, poses }),
     takeCage: ({ positions, corners }) => put(positions, corners),
     bind: (options, listener) => job("bind", { options, listener }),
     estimateMemory: () => 1000,

@@ -230,7 +230,8 @@ impl Session {
 
     /// What is drawn from now on.
     pub fn set_scene(&mut self, scene: SceneOptions) {
-        let other_values = scene.mesh != self.scene.mesh;
+        let shown = |scene: &SceneOptions| (scene.mesh, scene.weights_to_one);
+        let other_values = shown(&scene) != shown(&self.scene);
         self.scene = scene;
         self.write_scene();
         if other_values {
@@ -270,6 +271,7 @@ impl Session {
     pub fn value_range(&self) -> Option<[f32; 2]> {
         let weights = self.weights()?;
         match self.scene.mesh {
+            MeshStyle::Weights { .. } if self.scene.weights_to_one => Some([0.0, 1.0]),
             MeshStyle::Weights { column } => {
                 Some([0.0, weights.column(column).fold(colormap::MIN_WEIGHT_RANGE, f32::max)])
             }

@@ -4,7 +4,8 @@
 
 use cagework_core::cage_check::repair;
 use cagework_core::cage_gen::{CageOptions, generate};
-use cagework_core::deform::OutsideVertex;
+use cagework_core::deform::{OutsideVertex, deform_bound};
+use cagework_core::progress::Silent;
 use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Binding, Cage, PolygonMesh, Weights, mean_value_weights, samples};
 use cagework_gpu::{ContextOptions, GpuContext, bind_on};
@@ -19,6 +20,9 @@ use crate::error::{Answer, ErrorName, Fault};
 use crate::options::{BindAsked, CageAsked, taken};
 use crate::problems::{self, Check};
 use crate::views::object;
+
+/// Vertices of the model that are bound along with a cage, so that some lie inside.
+const INSIDE: usize = 256;
 
 /// Binds, makes cages, cuts slices and builds samples.
 #[wasm_bindgen]
@@ -168,6 +172,33 @@ impl Binder {
         let listener = Listener::new(progress);
         let made = generate(&points(positions), &triangles, &CageOptions::from(asked), &listener);
         Ok(Polygons { mesh: made.map_err(Fault::from)?.cage.to_polygon_mesh() })
+    }
+
+    /// Poses of a cage for another one around the same model: where harmonic coordinates in the old cage bring the new one's
+    /// vertices. (The new one's coordinates at the old vertices would be equations to solve, and bend the new cage where
+    /// the old one reaches beyond it.) `poses` and what is returned: one pose after the other, `[n_cage, 3]` each.
+    ///
+    /// # Errors
+    /// When the arrays are no cages; those of a bind.
+    #[wasm_bindgen(js_name = carryPoses)]
+    pub fn carry_poses(
+        model: &[f32],
+        new: &[f32],
+        old: &[f32],
+        old_corners: &[u32],
+        poses: &[f32],
+    ) -> Result<Vec<f32>, JsValue> {
+        let Parts { positions: mut at, cage } = Parts::new(new, old, old_corners)?;
+        let (n_new, n_old) = (at.len(), cage.n_vertices());
+        // A cage that lies around the old one has no vertex inside of it: some of the model's are.
+        at.extend(points(model).into_iter().take(INSIDE));
+        let bound = cagework_core::bind(&at, &cage, &BindOptions::default(), &Silent).map_err(Fault::from)?;
+        let poses = points(poses);
+        let carried = poses.chunks_exact(n_old).flat_map(|pose| {
+            let moved = deform_bound(&bound.weights, &bound.outside, pose);
+            flat(&moved[..n_new])
+        });
+        Ok(carried.collect())
     }
 
     /// What is wrong with a cage for a model, `[n_vertices, 3]`; a cage's arrays are those of `bind`.

@@ -28,7 +28,7 @@ use crate::options::{
 };
 use crate::settings::Settings;
 use crate::views::{
-    BoundsView, CageInfo, CageState, ColorMap, Fix, Largest, Legend, Mend, ModelInfo, Problem,
+    BoundsView, CageInfo, CageState, CameraView, ColorMap, Fix, Largest, Legend, Mend, ModelInfo, Problem,
 };
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/src/contract/generated.ts");
@@ -97,6 +97,7 @@ fn the_page_has_the_types_of_rust() {
         SliceShown,
         GizmoAsked,
         SceneAsked,
+        CameraView,
         ColorMap,
         Largest,
         Legend,

@@ -103,6 +103,8 @@ pub(crate) struct SceneAsked {
     pub(crate) floor: bool,
     pub(crate) original: bool,
     pub(crate) colour: Colour,
+    /// Colours of weights span 0 to 1, not 0 to the largest.
+    pub(crate) weights_to_one: bool,
     pub(crate) slice: SliceShown,
     pub(crate) gizmo: GizmoAsked,
     pub(crate) compare: bool,
@@ -119,6 +121,7 @@ impl Default for SceneAsked {
             floor: true,
             original: false,
             colour: Colour::Material,
+            weights_to_one: false,
             slice: SliceShown::Off,
             gizmo: GizmoAsked::None,
             compare: false,

@@ -30,7 +30,9 @@ impl State {
         let cage = self.view.cage && self.is_on_gpu();
         SceneOptions {
             theme: self.view.theme(),
+            backdrop: true,
             mesh: self.mesh_style(),
+            weights_to_one: self.view.weights_to_one,
             mesh_edges: false,
             base_wireframe: self.view.base_wireframe,
             cage_lines: cage,
@@ -40,6 +42,23 @@ impl State {
             gizmo: self.gizmo().filter(|_| cage),
             slice: self.shown_slice(),
             marks: self.marks(),
+        }
+    }
+
+    /// The same for a picture: `alone` without anything but the model, transparent around it.
+    pub(crate) fn picture_scene(&self, alone: bool) -> SceneOptions {
+        if !alone {
+            return self.scene();
+        }
+        SceneOptions {
+            theme: self.view.theme(),
+            backdrop: false,
+            mesh: self.mesh_style(),
+            weights_to_one: self.view.weights_to_one,
+            cage_lines: false,
+            handles: false,
+            floor: false,
+            ..SceneOptions::default()
         }
     }
 

@@ -5,7 +5,7 @@ use cagework_core::cage_check::{Code, Repair, Severity};
 use cagework_core::edit::Topology;
 use cagework_core::{Bounds, Cage, PolygonMesh};
 use cagework_io::{Model, ModelFormat, UpAxis};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use wasm_bindgen::JsValue;
 
 use crate::error::Answer;
@@ -26,6 +26,20 @@ impl BoundsView {
         bounds
             .map_or(Self { min: zero, max: zero }, |b| Self { min: b.min.to_array(), max: b.max.to_array() })
     }
+}
+
+/// Where the camera is.
+#[derive(Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) struct CameraView {
+    /// What it turns around, object units.
+    pub(crate) target: [f32; 3],
+    /// Turn around y and height above the horizon, radians.
+    pub(crate) yaw: f32,
+    pub(crate) pitch: f32,
+    /// From the eye to the target, object units.
+    pub(crate) distance: f32,
+    pub(crate) parallel: bool,
 }
 
 /// `ModelInfo`.

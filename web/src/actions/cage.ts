@@ -32,7 +32,21 @@ export interface CageActions {
 /** A hull needs few vertices: it has no limbs to follow. */
 const HULL_VERTICES = 24;
 
-export function createCage(ctx: Context, refine: (grid: number) => void): CageActions {
+/** A cage as it is posed, for a step of the history. */
+export interface Posed {
+  readonly cage: CheckedCage;
+  readonly positions: Float32Array;
+  readonly shares: readonly number[];
+}
+
+export interface CageNeeds {
+  /** Binds with so many cells. */
+  refine(grid: number): void;
+  /** Brings pose and poses of another cage to the one that is open. */
+  carry(before: Posed): Promise<unknown>;
+}
+
+export function createCage(ctx: Context, does: CageNeeds): CageActions {
   const look = () =>
     attempt(ctx, T.failed.check, () =>
       ctx.queue.replace("check", async (signal) =>
@@ -62,12 +76,6 @@ export function createCage(ctx: Context, refine: (grid: number) => void): CageAc
 
   const set = (cage: CheckedCage) => adopt(ctx.session().takeCage(cage), cage.check);
 
-  /** A cage as it is posed, for a step of the history. */
-  interface Posed {
-    readonly cage: CheckedCage;
-    readonly positions: Float32Array;
-    readonly shares: readonly number[];
-  }
   const posedNow = (): Posed | undefined => {
     const cage = now();
     const { shares } = ctx.store.get();
@@ -90,7 +98,8 @@ export function createCage(ctx: Context, refine: (grid: number) => void): CageAc
     ctx.history.push({ label, undo: () => setPosed(before), redo: () => setPosed(next) });
     // What was posed belongs to the cage before.
     const back = { label: T.pose.backToCage, run: () => void ctx.history.undo() };
-    if (posed || poses.length > 0) ctx.tell.say(T.cage.posesWait, back);
+    const carry = { label: T.pose.carry, run: () => void does.carry(before) };
+    if (posed || poses.length > 0) ctx.tell.say(T.cage.posesWait, carry, back);
   };
 
   const generate = async (source: CageSource, signal: AbortSignal) => {
@@ -152,7 +161,7 @@ export function createCage(ctx: Context, refine: (grid: number) => void): CageAc
     },
     mend(fix) {
       if (fix.kind === "repair") void this.repair(fix.repair);
-      else if (fix.kind === "grid") refine(fix.cells);
+      else if (fix.kind === "grid") does.refine(fix.cells);
       else void this.regenerate();
     },
     adopt,

@@ -15,7 +15,7 @@ export interface Fix {
 
 export interface Tell {
   /** A short sentence that goes away by itself. */
-  say(text: string, fix?: Fix): void;
+  say(text: string, ...fixes: Fix[]): void;
   /** Something that did not work; stays until it is closed or fixed. */
   problem(explained: Explained, fix?: Fix): void;
   /** Takes back the problems that are shown: a new attempt began. */

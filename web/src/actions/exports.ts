@@ -13,7 +13,8 @@ export interface Exports {
   save(kind: ExportKind): Promise<void>;
   /** A link to what is open, on the clipboard if it may be. */
   share(): Promise<void>;
-  pictureSize(scale: number): void;
+  /** Pixels of the picture for each of the view, and whether it shows the model alone. */
+  pictureOf(scale: number, alone: boolean): void;
 }
 
 /** Largest side of a picture, pixels. */
@@ -21,6 +22,7 @@ const LONGEST_SIDE = 8192;
 
 export function createExports(ctx: Context, project: Project, viewport: () => DOMRect): Exports {
   let scale = 2;
+  let alone = false;
 
   const bytesOf = (kind: Exclude<ExportKind, "picture">): Uint8Array => {
     const { engine } = ctx.session();
@@ -48,7 +50,7 @@ export function createExports(ctx: Context, project: Project, viewport: () => DO
   const picture = () => {
     const { width, height } = viewport();
     const fit = Math.min(scale, LONGEST_SIDE / Math.max(width, height, 1));
-    return ctx.session().picture(Math.round(width * fit), Math.round(height * fit));
+    return ctx.session().picture(Math.round(width * fit), Math.round(height * fit), alone);
   };
 
   const exports: Exports = {
@@ -79,8 +81,8 @@ export function createExports(ctx: Context, project: Project, viewport: () => DO
         ctx.tell.say(T.exports.inAddress);
       }
     },
-    pictureSize(value) {
-      scale = value;
+    pictureOf(size, isAlone) {
+      [scale, alone] = [size, isAlone];
     },
   };
   return exports;

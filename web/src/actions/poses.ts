@@ -1,9 +1,11 @@
 /** Poses: saved, named, blended and played. */
 
 import type { Pose } from "../contract";
+import { follow } from "../queue";
 import { fittingPoses } from "../state";
 import { T } from "../words";
-import type { Context } from "./context";
+import type { Posed } from "./cage";
+import { attempt, type Context } from "./context";
 import type { Edit } from "./edit";
 
 export interface PoseActions {
@@ -13,6 +15,8 @@ export interface PoseActions {
   remove(pose: Pose): void;
   /** Sets one pose's share of the blend; `done` when the slider is let go, which makes it one step. */
   blend(pose: Pose, share: number, done: boolean): void;
+  /** The pose and the poses that a cage of before had, for the one that is open. */
+  carry(before: Posed): Promise<boolean>;
   reset(): void;
   togglePlay(): void;
   stop(): void;
@@ -103,6 +107,32 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
         edit.posedSince(T.did.blend, beforeBlend.positions, beforeBlend.shares);
         beforeBlend = undefined;
       }
+    },
+    carry(before) {
+      stop();
+      return attempt(ctx, T.failed.carry, () =>
+        ctx.queue.add("carry", async (signal) => {
+          const { poses, shares } = store.get();
+          const old = poses.filter((pose) => pose.positions.length === before.positions.length);
+          const all = [before.positions, ...old.map((pose) => pose.positions)];
+          const [positions, ...carried] = await follow(signal, ctx.session().carryPoses(before.cage, all));
+          if (!positions) return;
+          const set = (positions: Float32Array, poses: readonly Pose[], shares: readonly number[]) => {
+            edit.setEditingRest(false);
+            engine().setCagePositions(positions);
+            setPoses(poses, shares);
+            edit.sync();
+          };
+          const now = engine().cagePositions();
+          const next = poses.map((pose) => ({
+            ...pose,
+            positions: carried[old.indexOf(pose)] ?? pose.positions,
+          }));
+          const redo = () => set(positions, next, before.shares);
+          redo();
+          ctx.history.push({ label: T.did.carry, undo: () => set(now, poses, shares), redo });
+        }),
+      );
     },
     reset() {
       stop();

@@ -1,6 +1,6 @@
 /** What is open as a project file and as a link. */
 
-import type { Settings } from "../contract";
+import type { SceneOptions, Settings } from "../contract";
 import { stem } from "../format";
 import { encodeShare, fromBase64Url, toBase64Url } from "../share";
 import type { Context } from "./context";
@@ -46,13 +46,21 @@ export function createProject(ctx: Context): Project {
     write,
     fileName,
     async link() {
-      const { sample, sampleCage, posed } = store.get();
+      const { sample, sampleCage, posed, scene } = store.get();
       if (!sample || !sampleCage) return undefined;
-      const pose = posed ? ctx.session().engine.encodePose() : undefined;
-      const fragment = await encodeShare(pose ? { sample, pose } : { sample });
+      const { engine } = ctx.session();
+      const pose = posed ? engine.encodePose() : undefined;
+      const seen = { camera: engine.camera(), selected: [...engine.selection()], scene: ofLink(scene) };
+      const fragment = await encodeShare({ sample, seen, ...(pose ? { pose } : {}) });
       return `${location.origin}${location.pathname}${fragment}`;
     },
   };
+}
+
+/** What a link keeps of what is shown: nothing that belongs to the visitor or that must be computed first. */
+export function ofLink(scene: SceneOptions): Partial<SceneOptions> {
+  const { model, cage, floor, base_wireframe, colour, weights_to_one, problems } = scene;
+  return { model, cage, floor, base_wireframe, colour, weights_to_one, problems };
 }
 
 /** The pose of settings as bytes, if it has one that can be read. */

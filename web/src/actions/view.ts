@@ -1,14 +1,19 @@
 /** What is drawn and from where. */
 
 import type { Element as CageElement, Pivot, SceneOptions } from "../contract";
+import { SCENE_DEFAULTS } from "../defaults";
 import { follow } from "../queue";
+import type { Seen } from "../share";
 import { drawn, type Slice } from "../state";
 import { saveTheme, type Theme } from "../store";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
+import { ofLink } from "./project";
 
 export interface View {
   scene(patch: Partial<SceneOptions>): void;
+  /** What a link shows. */
+  show(seen: Seen): void;
   theme(theme: Theme): void;
   slice(patch: Partial<Omit<Slice, "busy">>, kind?: SceneOptions["slice"]): void;
   compare(on: boolean): Promise<void>;
@@ -79,6 +84,14 @@ export function createView(
 
   return {
     scene,
+    show(seen) {
+      const next = { ...store.get().scene, ...ofLink({ ...SCENE_DEFAULTS, ...seen.scene }) };
+      engine().setScene(next);
+      engine().setCamera(seen.camera);
+      engine().select(Uint32Array.from(seen.selected), "replace");
+      store.set({ ortho: seen.camera.parallel });
+      scene(next);
+    },
     theme,
     slice(patch, kind) {
       store.set({ slice: { ...store.get().slice, ...patch } });

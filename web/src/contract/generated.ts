@@ -426,7 +426,27 @@ export type Gizmo = "none" | "move" | "rotate" | "scale";
 /**
  * `SceneOptions`.
  */
-export type SceneOptions = { theme: Theme, model: boolean, base_wireframe: boolean, cage: boolean, floor: boolean, original: boolean, colour: Colour, slice: SliceShown, gizmo: Gizmo, compare: boolean, problems: boolean, };
+export type SceneOptions = { theme: Theme, model: boolean, base_wireframe: boolean, cage: boolean, floor: boolean, original: boolean, colour: Colour,
+/**
+ * Colours of weights span 0 to 1, not 0 to the largest.
+ */
+weights_to_one: boolean, slice: SliceShown, gizmo: Gizmo, compare: boolean, problems: boolean, };
+/**
+ * Where the camera is.
+ */
+export type CameraView = {
+/**
+ * What it turns around, object units.
+ */
+target: [number, number, number],
+/**
+ * Turn around y and height above the horizon, radians.
+ */
+yaw: number, pitch: number,
+/**
+ * From the eye to the target, object units.
+ */
+distance: number, parallel: boolean, };
 /**
  * How colours of a legend follow each other.
  */
@@ -469,6 +489,6 @@ export type GizmoHandle = "x" | "y" | "z" | "plane_x" | "plane_y" | "plane_z" | 
 export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"closest_point"};
 export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"margin":0.0,"symmetry":"auto","voxels":0,"shape":"follow","per_component":false};
-export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","slice":"off","gizmo":"none","compare":false,"problems":true};
+export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","compare":false,"problems":true};
 /** Least and most of each option that is a number. */
 export const RANGES = { grid: [8, 512], vertices: [12, 400], margin: [0, 0.25], voxels: [8, 128] } as const;

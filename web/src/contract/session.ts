@@ -56,6 +56,8 @@ export interface Session {
   checkCage(): Job<Check>;
   /** The cage at rest, repaired, in that worker too. */
   repair(kind: Repair): Job<CheckedCage>;
+  /** Poses of another cage of the model for the cage that is open, in the worker. */
+  carryPoses(old: CageArrays, poses: readonly Float32Array[]): Job<Float32Array[]>;
   /** Takes a cage, and marks what is wrong with it. A mesh that is no cage yet is kept as a draft: `usable` is false. */
   takeCage(cage: CheckedCage): CageState;
 
@@ -76,8 +78,8 @@ export interface Session {
   draw(): void;
   /** Called after each drawn frame with the milliseconds the main thread spent on it. Returns "stop listening". */
   onFrame(listener: (ms: number) => void): () => void;
-  /** PNG of the scene (without canvas borders), any size up to 8192. */
-  picture(width: number, height: number): Promise<Blob>;
+  /** PNG of the scene (without canvas borders), any size up to 8192; `alone`: of the model, transparent around it. */
+  picture(width: number, height: number, alone?: boolean): Promise<Blob>;
   /** Posed positions as they are drawn (tests, numbers panel). */
   readPositions(): Promise<Float32Array>;
 

@@ -86,6 +86,12 @@ export interface Jobs {
     step: never;
     output: CheckedCage;
   };
+  /** `cage`: the new one's vertices; `poses` of the old one, one after the other, become poses of the new one. */
+  carry: {
+    input: { model: Float32Array; cage: Float32Array; old: CageArrays; poses: Float32Array };
+    step: never;
+    output: Float32Array;
+  };
   sample: { input: { id: string }; step: never; output: SampleArrays };
 }
 

@@ -98,6 +98,8 @@ function createWork(pkg: Package): Work {
     async repair({ kind, cage, model }) {
       return checked(pkg, pkg.Binder.repairCage(kind, model, cage.positions, cage.corners), model);
     },
+    carry: async ({ model, cage, old, poses }) =>
+      pkg.Binder.carryPoses(model, cage, old.positions, old.corners, poses),
     async sample({ id }) {
       const sample = pkg.Binder.buildSample(id);
       const poses = sample.poseNames.map((name, k) => ({ name, positions: sample.posePositions(k) }));

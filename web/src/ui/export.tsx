@@ -1,11 +1,11 @@
 /** Step 5: files to take along, each with a sentence on what it is good for. */
 
-import { useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import type { ExportKind } from "../actions/exports";
 import type { App } from "../app";
 import { type AppState, fittingPoses } from "../state";
 import { T } from "../words";
-import { Head, Segments } from "./controls";
+import { Head, Segments, Toggle } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { Privacy } from "./model";
 
@@ -71,17 +71,17 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
 
 function PictureOptions({ app }: { app: App }) {
   const [size, setSize] = useState("2");
+  const [alone, setAlone] = useState(false);
+  useEffect(() => app.exports.pictureOf(Number(size), alone), [app, size, alone]);
   return (
-    <div class="export-option">
+    <div class="export-option stack tight">
       <Segments
         label={T.exports.size}
         choices={["1", "2", "4"].map((value, k) => ({ value, label: T.exports.sizes[k] ?? value }))}
         value={size}
-        onChange={(value) => {
-          setSize(value);
-          app.exports.pictureSize(Number(value));
-        }}
+        onChange={setSize}
       />
+      <Toggle label={T.exports.alone} sentence={T.exports.aloneSentence} on={alone} onChange={setAlone} />
     </div>
   );
 }

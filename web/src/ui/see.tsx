@@ -80,6 +80,14 @@ function Colours({ app }: { app: App }) {
         onChange={(colour) => app.view.scene({ colour })}
       />
       <p class="hint">{needsVertex ? T.see.selectForWeights : T.see.about[scene.colour]}</p>
+      {scene.colour === "weight" && (
+        <Toggle
+          label={T.see.toOne}
+          sentence={T.see.toOneSentence}
+          on={scene.weights_to_one}
+          onChange={(on) => app.view.scene({ weights_to_one: on })}
+        />
+      )}
       <Toggle
         label={T.see.compare}
         sentence={T.see.compareSentence}

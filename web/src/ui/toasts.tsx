@@ -17,7 +17,7 @@ interface Toast {
   readonly id: number;
   readonly title?: string;
   readonly text: string;
-  readonly fix: Fix | undefined;
+  readonly fixes: readonly Fix[];
 }
 
 let next = 0;
@@ -39,8 +39,8 @@ export function createToasts(): { Toasts: () => preact.JSX.Element; tell: Tell }
   return {
     Toasts: () => <Stack said={said.value} problems={problems.value} closeSaid={closing(said)} closeProblem={closing(problems)} />,
     tell: {
-      say: (text, fix) => add(said, { text, fix }),
-      problem: ({ title, message }, fix) => add(problems, { title, text: message, fix }),
+      say: (text, ...fixes) => add(said, { text, fixes }),
+      problem: ({ title, message }, fix) => add(problems, { title, text: message, fixes: fix ? [fix] : [] }),
       clear: () => {
         problems.value = [];
       },
@@ -81,15 +81,26 @@ function Stack({ said, problems, closeSaid, closeProblem }: StackProps) {
   );
 }
 
-function FixButton({ fix, close }: { fix: Fix; close: () => void }) {
-  const run = () => {
-    close();
-    fix.run();
-  };
-  return <Button label={fix.label} onClick={run} kind="small" />;
+function Fixes({ fixes, close }: { fixes: readonly Fix[]; close: () => void }) {
+  if (fixes.length === 0) return null;
+  return (
+    <div class="row wrap toast-fix">
+      {fixes.map(({ label, run }) => (
+        <Button
+          key={label}
+          label={label}
+          kind="small"
+          onClick={() => {
+            close();
+            run();
+          }}
+        />
+      ))}
+    </div>
+  );
 }
 
-function Said({ toast: { text, fix }, close }: { toast: Toast; close: () => void }) {
+function Said({ toast: { text, fixes }, close }: { toast: Toast; close: () => void }) {
   const timer = useRef<ReturnType<typeof setTimeout>>(undefined);
   const leaveIn = (ms: number) => {
     clearTimeout(timer.current);
@@ -98,20 +109,20 @@ function Said({ toast: { text, fix }, close }: { toast: Toast; close: () => void
   // Who reads or is about to click must not lose it.
   const stay = () => clearTimeout(timer.current);
   useEffect(() => {
-    leaveIn(fix ? SHOWN_WITH_BUTTON_MS : SHOWN_MS);
+    leaveIn(fixes.length > 0 ? SHOWN_WITH_BUTTON_MS : SHOWN_MS);
     return stay;
   }, []);
   return (
     <div class="toast" onPointerEnter={stay} onPointerLeave={() => leaveIn(SHOWN_MS)} onFocusIn={stay}>
       <Icon name="info" />
       <p>{text}</p>
-      {fix && <FixButton fix={fix} close={close} />}
+      <Fixes fixes={fixes} close={close} />
       <IconButton icon="close" label={T.toast.close} onClick={close} kind="small" />
     </div>
   );
 }
 
-function Problem({ toast: { title, text, fix }, close }: { toast: Toast; close: () => void }) {
+function Problem({ toast: { title, text, fixes }, close }: { toast: Toast; close: () => void }) {
   return (
     <div class="toast problem">
       <Icon name="warning" />
@@ -120,11 +131,7 @@ function Problem({ toast: { title, text, fix }, close }: { toast: Toast; close: 
         <p>{text}</p>
       </div>
       <IconButton icon="close" label={T.toast.close} onClick={close} kind="small" />
-      {fix && (
-        <div class="toast-fix">
-          <FixButton fix={fix} close={close} />
-        </div>
-      )}
+      <Fixes fixes={fixes} close={close} />
     </div>
   );
 }

@@ -26,6 +26,7 @@ export const EN = {
     start: "Cagework did not start",
     bind: "The bind did not finish",
     slice: "The slice could not be computed",
+    carry: "The poses could not be carried over",
     meanValue: "Mean value coordinates could not be computed",
     check: "The cage could not be checked",
     noCage: "No cage could be made",
@@ -480,6 +481,7 @@ export const EN = {
     waiting: (n: number) =>
       `${plural(n, "pose belongs", "poses belong")} to another cage and ${n === 1 ? "waits" : "wait"} for it.`,
     backToCage: "Back to that cage",
+    carry: "Carry over",
     saved: (name: string) => `Saved as "${name}".`,
     savedRest: (name: string) => `Saved as "${name}": it is the rest pose.`,
     saveFirst: "Save a pose first; then it can be played.",
@@ -487,6 +489,7 @@ export const EN = {
   },
   /** Steps of the history. */
   did: {
+    carry: "Carry the poses over",
     grab: "Move",
     rotate: "Rotate",
     scale: "Scale",
@@ -534,6 +537,8 @@ export const EN = {
     poses: (n: number, sentence: string) => `${plural(n, "pose")}. ${sentence}`,
     size: "Size of the picture",
     sizes: ["As shown", "Twice", "Four times"],
+    alone: "The model alone",
+    aloneSentence: "Without cage and floor, transparent around it.",
     saved: (file: string, size: number) => `${file} is in your downloads (${bytes(size)}).`,
     noLink:
       "A link can hold a sample in its own cage and pose, but no files of yours. Save a project file to pass this on.",
@@ -553,6 +558,8 @@ export const EN = {
       weight: "How much each point follows the vertex selected last. Select another one to see its share.",
       error: "Distance from where the model should be at rest, logarithmic. Our method leaves almost none.",
     },
+    toOne: "Colours from 0 to 1",
+    toOneSentence: "Otherwise from 0 to the vertex's largest weight.",
     selectForWeights: "Select a handle of the cage to see its weights.",
     compare: "Harmonic beside mean value",
     compareSentence: "Left harmonic, right mean value coordinates, same pose.",
@@ -585,7 +592,7 @@ export const EN = {
     weight: (i: number) => `Weight of vertex ${i}`,
     error: "Rest error",
     largest: (value: number, vertex: number) =>
-      `Colours span 0 to the largest: ${scientific(value)}, at vertex ${count(vertex)} of the model`,
+      `Largest: ${scientific(value)}, at vertex ${count(vertex)} of the model`,
     name: (title: string, low: string, high: string) => `${title}: ${low} to ${high}`,
   },
 

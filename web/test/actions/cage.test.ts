@@ -8,7 +8,7 @@ function page() {
   const fake = createFake();
   const grids: number[] = [];
   let changes = 0;
-  const cage = createCage(fake.ctx, (grid) => grids.push(grid));
+  const cage = createCage(fake.ctx, { refine: (grid) => grids.push(grid), carry: () => Promise.resolve() });
   effect(() => {
     if (fake.store.get().cage) changes += 1;
   });

@@ -49,6 +49,24 @@ it("a saved pose is shown, and undo goes back to the one before", async () => {
   expect(height()).toBe(5);
 });
 
+it("pose and poses of a cage of before are carried over, as one step", async () => {
+  const { poses, store, ctx, engine, asked, height } = page();
+  poses.save();
+  const before = { cage: cageOf(2), positions: engine.cagePositions(), shares: [1] };
+  const { positions, corners } = cageOf(3);
+  store.set({ cage: engine.setCage(positions, corners) });
+  const done = poses.carry(before);
+  await Promise.resolve();
+  const job = asked.at(-1);
+  // What is shown comes first, then the saved poses.
+  expect(job).toMatchObject({ kind: "carry", input: { poses: [before.positions, before.positions] } });
+  job?.resolve([new Float32Array(9).fill(7), new Float32Array(9).fill(8)]);
+  await done;
+  expect([height(), store.get().poses[0]?.positions[0], store.get().shares]).toEqual([7, 8, [1]]);
+  await ctx.history.undo();
+  expect([height(), store.get().poses[0]?.positions.length]).toEqual([positions[0], 6]);
+});
+
 it("one drag of a blend's slider is one step", async () => {
   const { poses, store, ctx, teach, engine, height } = page();
   poses.save();

@@ -44,16 +44,36 @@ impl Topology {
     }
 }
 
-/// The vertex within `radius` pixels of the pointer; of several, those in front hide those behind, and among those at
-/// one depth (up to the size of the radius) the nearest to the pointer counts.
+/// The vertex within `radius` pixels of the pointer; of several, those of faces turned to the viewer come first, those in
+/// front hide those behind, and among those at one depth (up to the size of the radius) the nearest to the pointer counts.
 #[must_use]
-pub fn pick_vertex(positions: &[Vec3], view: &dyn View, pointer: Vec2, radius: f32) -> Option<u32> {
+pub fn pick_vertex(
+    positions: &[Vec3],
+    topology: &Topology,
+    view: &dyn View,
+    pointer: Vec2,
+    radius: f32,
+) -> Option<u32> {
     let near = positions.iter().enumerate().filter_map(|(i, &p)| {
         let (pixel, depth) = view.project(p)?;
         let distance = pixel.distance(pointer);
         (distance <= radius).then(|| (i as u32, depth, distance, radius * view.units_per_pixel(p)))
     });
-    in_front(near)
+    let (seen, hidden): (Vec<_>, Vec<_>) = near.partition(|near| is_seen(near.0, positions, topology, view));
+    in_front(seen.into_iter()).or_else(|| in_front(hidden.into_iter()))
+}
+
+/// Whether a face at the vertex is turned to the viewer.
+fn is_seen(vertex: u32, positions: &[Vec3], topology: &Topology, view: &dyn View) -> bool {
+    topology.faces.iter().filter(|face| face.contains(&vertex)).any(|face| {
+        let pixels: Option<Vec<Vec2>> =
+            face.iter().map(|&i| view.project(positions[i as usize]).map(|(pixel, _)| pixel)).collect();
+        // Pixels count downwards: an outline that runs counter-clockwise has a negative area.
+        pixels.is_none_or(|pixels| {
+            let next = pixels.iter().cycle().skip(1);
+            pixels.iter().zip(next).map(|(a, b)| a.perp_dot(*b)).sum::<f32>() < 0.0
+        })
+    })
 }
 
 /// The edge within `radius` pixels of the pointer, an index into [`Topology::edges`]; of several the one whose nearest
@@ -148,12 +168,26 @@ mod tests {
     fn vertex_in_front_hides_the_one_behind_it() {
         // Cube: vertex x + 2 y + 4 z; 7 is in front of 3.
         let cube = cube();
+        let topology = Topology::new(&cube.faces);
         let at = pixel(1.0, 1.0) + Vec2::new(3.0, 4.0);
-        assert_eq!(pick_vertex(&cube.positions, &Flat, at, 5.0), Some(7));
-        assert_eq!(pick_vertex(&cube.positions, &Flat, at, 4.9), None);
+        assert_eq!(pick_vertex(&cube.positions, &topology, &Flat, at, 5.0), Some(7));
+        assert_eq!(pick_vertex(&cube.positions, &topology, &Flat, at, 4.9), None);
         // Of two at one depth the nearer to the pointer counts.
         let two = [Vec3::ZERO, Vec3::new(0.1, 0.0, 0.0)];
-        assert_eq!(pick_vertex(&two, &Flat, pixel(0.06, 0.0), 20.0), Some(1));
+        let none = Topology::default();
+        assert_eq!(pick_vertex(&two, &none, &Flat, pixel(0.06, 0.0), 20.0), Some(1));
+    }
+
+    #[test]
+    fn a_finger_takes_what_is_seen_before_what_is_hidden() {
+        // A thin plate: under a wide finger its back is as near as its front, and the back's corner is nearer to the pointer.
+        let mut plate = cube();
+        for p in &mut plate.positions {
+            p.z *= 0.05;
+        }
+        plate.positions[7].x -= 0.02;
+        let topology = Topology::new(&plate.faces);
+        assert_eq!(pick_vertex(&plate.positions, &topology, &Flat, pixel(1.0, 1.0), 24.0), Some(7));
     }
 
     #[test]

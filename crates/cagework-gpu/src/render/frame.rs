@@ -248,7 +248,7 @@ impl Renderer {
                 depth_slice: None,
                 resolve_target: Some(view),
                 ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
                     // Only the average of the samples is wanted.
                     store: wgpu::StoreOp::Discard,
                 },
@@ -276,8 +276,10 @@ impl Renderer {
 
     fn draw_model(&self, pass: &mut wgpu::RenderPass<'_>, pipelines: &Pipelines) {
         let scene = &self.scene;
-        pass.set_pipeline(pipelines.get(Kind::Background));
-        pass.draw(0..3, 0..1);
+        if scene.backdrop {
+            pass.set_pipeline(pipelines.get(Kind::Background));
+            pass.draw(0..3, 0..1);
+        }
         let mesh = self.mesh.as_ref().filter(|_| scene.mesh != MeshStyle::Hidden);
         if let Some(mesh) = mesh {
             pass.set_pipeline(pipelines.get(Kind::Mesh));

@@ -39,3 +39,4 @@ pub use layers::check_layers;
 pub use model::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
 pub use part::PartPainter;
 pub use scene::{Gizmo, GizmoMode, GizmoPart, Marks, MeshStyle, SceneOptions, Selection, SliceView, Theme};
+pub(crate) use theme::divide_by_alpha;

@@ -2,6 +2,7 @@
 
 use super::layout::{HIDDEN, STATE_SHIFT, Style};
 use super::pipelines::Layouts;
+use super::theme::state;
 use crate::device::GpuContext;
 use crate::table::{Entry, Table};
 
@@ -79,7 +80,11 @@ impl Overlay {
 
     /// What it looks like.
     pub(super) fn set_style(&self, context: &GpuContext, style: Style) {
-        let behind = Style { opacity: BEHIND_OPACITY * style.opacity, ..style };
+        let mut behind = Style { opacity: BEHIND_OPACITY * style.opacity, ..style };
+        // What is chosen is seen through everything.
+        for state in [state::SELECTED, state::BOTH] {
+            behind.colors[state as usize][3] /= BEHIND_OPACITY;
+        }
         for (buffer, style) in self.styles.iter().zip([style, behind]) {
             context.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&style));
         }

@@ -25,7 +25,7 @@ pub enum MeshStyle {
     Solid,
     /// One plain colour, whatever its materials.
     Clay,
-    /// Weights of one cage vertex, from 0 to the largest of the mesh, in the colours of [`super::colormap`]; negative
+    /// Weights of one cage vertex, from 0 to the largest of the mesh (or to 1), in the colours of [`super::colormap`]; negative
     /// ones in a warning colour. See [`crate::Session::value_range`] for a legend.
     Weights {
         /// The cage vertex.
@@ -41,8 +41,12 @@ pub enum MeshStyle {
 pub struct SceneOptions {
     /// Colours of the surroundings.
     pub theme: Theme,
+    /// Whether the gradient behind everything is drawn; without it the picture is transparent there.
+    pub backdrop: bool,
     /// How the mesh is drawn.
     pub mesh: MeshStyle,
+    /// Whether colours of weights span 0 to 1, not 0 to the largest.
+    pub weights_to_one: bool,
     /// Whether the mesh's edges are drawn on it.
     pub mesh_edges: bool,
     /// Whether the mesh in its rest pose is drawn as a wireframe over everything, as in the paper's figures 2 to 5.
@@ -67,7 +71,9 @@ impl Default for SceneOptions {
     fn default() -> Self {
         Self {
             theme: Theme::Dark,
+            backdrop: true,
             mesh: MeshStyle::Solid,
+            weights_to_one: false,
             mesh_edges: false,
             base_wireframe: false,
             cage_lines: true,

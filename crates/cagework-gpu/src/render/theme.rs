@@ -101,11 +101,29 @@ impl Theme {
 
 /// Linear from sRGB (IEC 61966-2-1), with alpha.
 pub(super) fn linear((rgb, alpha): Color) -> [f32; 4] {
-    let channel = |shift: u32| {
-        let c = f32::from((rgb >> shift & 0xff) as u8) / 255.0;
-        if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-    };
+    let channel = |shift: u32| linear_from_srgb((rgb >> shift & 0xff) as u8);
     [channel(16), channel(8), channel(0), alpha]
+}
+
+/// Linear, 0 to 1, from a byte of sRGB (IEC 61966-2-1).
+fn linear_from_srgb(byte: u8) -> f32 {
+    let c = f32::from(byte) / 255.0;
+    if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+}
+
+/// A byte of sRGB from linear, 0 to 1.
+fn srgb_from_linear(c: f32) -> u8 {
+    let srgb = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
+    (255.0 * srgb).round() as u8
+}
+
+/// Takes back that colours are blended multiplied by their alpha: files of pictures have them without. sRGB
+pub(crate) fn divide_by_alpha([rgb @ .., alpha]: &mut [u8; 4]) {
+    if (1..=254).contains(alpha) {
+        for value in rgb {
+            *value = srgb_from_linear(linear_from_srgb(*value) * 255.0 / f32::from(*alpha));
+        }
+    }
 }
 
 impl Palette {
@@ -197,6 +215,19 @@ mod tests {
     }
 
     /// WCAG 2.2, 1.4.11: graphics need 3 : 1 against what is next to them.
+    #[test]
+    fn a_colour_comes_back_from_its_product_with_alpha() {
+        for alpha in [40_u8, 128, 254, 255] {
+            let shown = 200_u8;
+            let product = srgb_from_linear(linear_from_srgb(shown) * f32::from(alpha) / 255.0);
+            let mut pixel = [product, 0, product, alpha];
+            divide_by_alpha(&mut pixel);
+            // The product was rounded to a byte.
+            assert!(pixel[0].abs_diff(shown) <= 2 && pixel[0] == pixel[2], "{pixel:?}");
+            assert_eq!([pixel[1], pixel[3]], [0, alpha]);
+        }
+    }
+
     #[test]
     fn cage_and_marks_stand_out_from_the_background() {
         for palette in [&DARK, &LIGHT] {

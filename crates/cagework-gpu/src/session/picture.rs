@@ -5,7 +5,7 @@ use glam::Vec2;
 use super::Session;
 use crate::buffers::Allocator;
 use crate::error::GpuError;
-use crate::render::Target;
+use crate::render::{Target, divide_by_alpha};
 
 /// Format of pictures that are read back.
 const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
@@ -14,8 +14,8 @@ const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 pub const MAX_PICTURE: u32 = 8192;
 
 impl Session {
-    /// A picture of `size` pixels, `scale` of them per CSS pixel, from where the camera is. RGBA, sRGB, opaque, rows
-    /// from the top: `[height, width, 4]`.
+    /// A picture of `size` pixels, `scale` of them per CSS pixel, from where the camera is. RGBA, sRGB, rows from
+    /// the top; opaque with a backdrop, else colours are not multiplied by alpha: `[height, width, 4]`.
     ///
     /// # Errors
     /// [`GpuError::Model`] for a size of 0 or above [`MAX_PICTURE`] or what the GPU can draw; [`GpuError::OutOfMemory`],
@@ -64,7 +64,7 @@ impl Session {
             texture.size(),
         );
         let submission = self.context.queue.submit([encoder.finish()]);
-        readback
+        let mut rgba: Vec<u8> = readback
             .read(&self.context, &submission, bytes, |bytes| {
                 bytes
                     .chunks_exact(stride as usize)
@@ -72,6 +72,8 @@ impl Session {
                     .copied()
                     .collect()
             })
-            .await
+            .await?;
+        rgba.as_chunks_mut().0.iter_mut().for_each(divide_by_alpha);
+        Ok(rgba)
     }
 }

@@ -1,19 +1,64 @@
 //! Looking around.
 
-use std::f32::consts::TAU;
+use std::f32::consts::{FRAC_PI_2, TAU};
 
 use cagework_core::Bounds;
 use cagework_gpu::render::{AxisView, Projection};
 use glam::{Vec2, Vec3};
+use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::Engine;
+use crate::error::{ErrorName, Fault};
+use crate::options::taken;
+use crate::views::{CameraView, object};
 
 /// Pixels of a whole turn: half a turn across half a screen.
 const PIXELS_PER_TURN: f32 = 900.0;
 
 #[wasm_bindgen]
 impl Engine {
+    /// Where the camera is.
+    ///
+    /// # Errors
+    /// Never.
+    #[wasm_bindgen(unchecked_return_type = "CameraView")]
+    pub fn camera(&self) -> Result<JsValue, JsValue> {
+        let camera = self.read(|state| state.camera);
+        Ok(object(&CameraView {
+            target: camera.target.to_array(),
+            yaw: camera.yaw,
+            pitch: camera.pitch,
+            distance: camera.distance,
+            parallel: camera.projection == Projection::Orthographic,
+        })?)
+    }
+
+    /// Puts the camera there.
+    ///
+    /// # Errors
+    /// When it is no such place.
+    #[wasm_bindgen(js_name = setCamera)]
+    pub fn set_camera(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "CameraView")] view: JsValue,
+    ) -> Result<(), JsValue> {
+        let view: CameraView = taken(view)?;
+        let is_finite = Vec3::from(view.target).is_finite() && view.yaw.is_finite();
+        if !is_finite || !(view.pitch.abs() <= FRAC_PI_2 && view.distance > 0.0 && view.distance.is_finite())
+        {
+            return Err(Fault::new(ErrorName::Error, "the view of the link is no place to look from").into());
+        }
+        self.change(|state| {
+            let camera = &mut state.camera;
+            camera.target = view.target.into();
+            (camera.yaw, camera.pitch, camera.distance) = (view.yaw, view.pitch, view.distance);
+            camera.projection =
+                if view.parallel { Projection::Orthographic } else { Projection::Perspective };
+        });
+        Ok(())
+    }
+
     /// Turns the camera, CSS pixels.
     pub fn orbit(&self, dx: f32, dy: f32) {
         self.change(|state| state.camera.orbit(Vec2::new(dx, dy) * (TAU / PIXELS_PER_TURN)));

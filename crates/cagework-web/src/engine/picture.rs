@@ -62,21 +62,24 @@ impl Engine {
         Ok(session.frame(&view, format, [SMALL; 2], 1.0).map_err(Fault::from)?)
     }
 
-    /// A picture, red, green, blue, alpha, rows from the top. `[height, width, 4]`
+    /// A picture, red, green, blue, alpha, rows from the top: of what is shown, or of the model `alone`, transparent around
+    /// it. `[height, width, 4]`
     ///
     /// # Errors
     /// When it is too large.
-    pub async fn picture(&self, width: u32, height: u32) -> Result<Vec<u8>, JsValue> {
+    pub async fn picture(&self, width: u32, height: u32, alone: bool) -> Result<Vec<u8>, JsValue> {
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         let scale = {
             let mut state = self.state.borrow_mut();
             state.write(&mut gpu.main, gpu.other.as_mut());
+            gpu.main.set_scene(state.picture_scene(alone));
             height as f32 / state.size.y
         };
-        let picture = gpu.main.picture([width, height], scale).await.map_err(Fault::from)?;
-        self.change(|_| ());
-        Ok(picture)
+        let picture = gpu.main.picture([width, height], scale).await.map_err(Fault::from);
+        // Back to the scene of the view.
+        self.change(|state| state.is_changed = true);
+        Ok(picture?)
     }
 
     /// The model's vertices as the GPU has them. `[n_vertices, 3]`

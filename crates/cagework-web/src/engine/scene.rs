@@ -45,7 +45,12 @@ impl Engine {
             (Some(SliceShown::Value), _) => Some(plain(0.0, 1.0, ColorMap::Viridis)),
             (_, MeshStyle::Weights { column }) => {
                 let largest = self.largest_weight(column);
-                let high = largest.map_or(1.0, |largest| largest.value.max(MIN_WEIGHT_RANGE));
+                let high = match largest {
+                    Some(largest) if !self.read(|state| state.view.weights_to_one) => {
+                        largest.value.max(MIN_WEIGHT_RANGE)
+                    }
+                    _ => 1.0,
+                };
                 Some(Legend { largest, ..plain(0.0, high, ColorMap::Viridis) })
             }
             (_, MeshStyle::Errors) => {
