@@ -59,7 +59,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     const isFull = error instanceof DOMException && error.name === "QuotaExceededError";
     // Private windows refuse as well: once is enough to say so.
     const text = isFull ? T.works.full(name) : T.works.forbidden;
-    ctx.tell.say(text, isFull ? showList : undefined);
+    ctx.tell.say(text, ...(isFull ? [showList] : []));
   };
 
   const put = async () => {
