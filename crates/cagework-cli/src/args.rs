@@ -48,6 +48,8 @@ pub(crate) enum Command {
     Bind(BindArgs),
     /// Move the cage, and the mesh with it.
     Deform(DeformArgs),
+    /// Take the model by the hand: points of it go where they are pulled to, and the cage is solved for.
+    Pull(PullArgs),
     /// Draw a picture of a model in its cage (needs a GPU, or the software one of mesa-vulkan-drivers).
     Render(RenderArgs),
     /// Make a cage for a model: one that follows it, its convex hull, or a subdivided box.
@@ -247,6 +249,40 @@ pub(crate) struct DeformArgs {
     /// File to write; the name's ending says the format.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,
+}
+
+/// `cagework pull`
+#[derive(Args, Debug)]
+#[command(
+    after_help = "JOB.json:\n  {\"grabs\": [{\"vertex\": 12, \"to\": [0.1, 2.0, 0.3]}],\n   \"pins\": [{\"vertex\": 5}, \
+    {\"triangle\": 7, \"bary\": [0.2, 0.3, 0.5]}, {\"cage\": 4}],\n   \"reach\": null, \"start\": \"pose.obj\", \
+    \"relax\": 0.5, \"frames\": 30}\n\n\
+    A grab or pin is a vertex of the model, a point of a triangle, or a vertex of the cage. Only \"grabs\" is \
+    required.\n\"reach\": how far along the surface the model follows: null for automatic, a share of its diagonal, or \
+    \"all\".\n\"start\": the pose to begin with, the cage at rest unless given. \"relax\": 0 keeps what was shaped by \
+    hand, 1 goes back to the shape at rest.\n\n\
+    Example:\n  cagework pull horse.glb --cage cage.obj --weights horse.npz --job rear.json -o rear.obj"
+)]
+pub(crate) struct PullArgs {
+    /// The mesh that was bound (.obj, .gltf, .glb).
+    pub(crate) mesh: PathBuf,
+    #[command(flatten)]
+    pub(crate) read: ReadArgs,
+    /// The cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
+    #[arg(long, value_name = "CAGE")]
+    pub(crate) cage: CageSource,
+    /// The weights that `cagework bind --weights` wrote.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) weights: PathBuf,
+    /// What is pulled where, as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) job: PathBuf,
+    /// The cage's pose to write; the name's ending says the format.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: ModelOutput,
+    /// Cells along the longest side of the cage, for the gradients of the weights.
+    #[arg(short, long, default_value_t = 64, value_parser = number::<u32>(options::GRID))]
+    pub(crate) grid: u32,
 }
 
 /// `cagework bench`

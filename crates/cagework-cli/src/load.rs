@@ -9,7 +9,8 @@ use cagework_core::{Bounds, Cage, CageError, CageOptions, PolygonMesh, TriMesh, 
 use cagework_io::{Model, UpAxis, write_cage_obj};
 use glam::Vec3;
 
-use crate::args::{CageSource, DEFAULT_MARGIN, MemoryArgs};
+use crate::args::{CageSource, DEFAULT_MARGIN, MemoryArgs, ModelOutput};
+use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{read, read_beside};
 use crate::progress::Bar;
@@ -145,6 +146,14 @@ pub(crate) fn box_mesh(positions: &[Vec3], divisions: u32, margin: f32) -> Resul
 }
 
 impl LoadedCage {
+    /// A pose of this cage, `[n_cage]`, as a file of it.
+    ///
+    /// # Errors
+    /// When it cannot be written in that format.
+    pub(crate) fn write_pose(&self, pose: &[Vec3], output: &ModelOutput) -> Result<Vec<u8>, CliError> {
+        export(&self.model, &self.model.posed_as_cage(pose), output)
+    }
+
     /// The positions of a pose of this cage, in the cage's own order. `[n_cage]`, object units.
     ///
     /// # Errors

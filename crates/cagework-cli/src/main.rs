@@ -17,6 +17,7 @@ mod gpu;
 mod info;
 mod load;
 mod progress;
+mod pull;
 mod render;
 mod signals;
 
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(args, cli.json),
         Command::Bind(args) => bind::run(args, cli.json),
         Command::Deform(args) => deform::run(args, cli.json),
+        Command::Pull(args) => pull::run(args, cli.json),
         Command::Render(args) => render::run(args, cli.json),
         Command::Cage(args) => cage::run(args, cli.json),
         Command::Check(args) => check::run(args, cli.json),

@@ -20,6 +20,7 @@ pub mod mean_value;
 pub mod mesh;
 pub mod options;
 pub mod progress;
+pub mod pull;
 pub mod report;
 pub mod rest_edit;
 pub mod sample;

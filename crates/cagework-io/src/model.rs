@@ -270,6 +270,16 @@ impl Model {
         })
     }
 
+    /// Positions of the file's vertices in a pose of the cage that it is, `[n_cage]`: the way back from
+    /// [`Self::pose_positions`].
+    #[must_use]
+    pub fn posed_as_cage(&self, pose: &[Vec3]) -> Vec<Vec3> {
+        match self.document {
+            Document::Obj(_) => pose.to_vec(),
+            Document::Gltf(_) => weld(&self.positions).unique_of.iter().map(|&u| pose[u as usize]).collect(),
+        }
+    }
+
     /// The model with new positions as a file of `format`.
     ///
     /// # Errors

@@ -11,6 +11,7 @@ mod deform;
 mod evaluate;
 #[cfg(unix)]
 mod outputs;
+mod pull;
 mod render;
 mod siblings;
 mod support;

@@ -1,0 +1,107 @@
+use predicates::prelude::*;
+use predicates::str::contains;
+
+use crate::support::{Sandbox, obj_positions};
+
+fn bound() -> Sandbox {
+    let sandbox = Sandbox::with_sphere_in_box();
+    sandbox.run("bind mesh.obj --cage cage.obj -g 16 --weights w.npz").success();
+    sandbox
+}
+
+const PULL: &str = "pull mesh.obj --cage cage.obj --weights w.npz --job job.json -o pose.obj";
+
+#[test]
+fn a_vertex_goes_where_it_is_pulled_to_and_a_pin_stays() {
+    let sandbox = bound();
+    let rest = obj_positions(&sandbox.read("mesh.obj"));
+    let farthest = |sign: f64| {
+        (0..rest.len()).max_by(|&a, &b| (sign * rest[a][1]).total_cmp(&(sign * rest[b][1]))).unwrap()
+    };
+    let (top, bottom) = (farthest(1.0), farthest(-1.0));
+    let [x, y, z] = rest[top];
+    sandbox.write(
+        "job.json",
+        format!(
+            r#"{{"grabs": [{{"vertex": {top}, "to": [{x}, {}, {z}]}}], "pins": [{{"vertex": {bottom}}}], "reach": "all"}}"#,
+            y + 0.4
+        ),
+    );
+    let done = sandbox.json(&format!("{PULL} --json"));
+    for field in [
+        "frame_ms",
+        "grab_ms",
+        "precompute_ms",
+        "error",
+        "lag",
+        "settle_frames",
+        "stretch_max",
+        "stretch_99",
+        "stretch_1",
+        "samples",
+        "groups",
+        "cage",
+    ] {
+        assert!(done[field].is_number(), "{field}: {done}");
+    }
+    assert!(done["reach"].is_null() && done["far_mean"].is_null(), "the whole model follows");
+    assert!(done["error"].as_f64().unwrap() < 1e-3);
+    sandbox.run("deform mesh.obj --cage cage.obj --weights w.npz --pose pose.obj -o out.obj").success();
+    let posed = obj_positions(&sandbox.read("out.obj"));
+    assert!((posed[top][1] - y - 0.4).abs() < 2e-3, "{:?}", posed[top]);
+    assert!((posed[bottom][1] - rest[bottom][1]).abs() < 2e-3);
+}
+
+#[test]
+fn a_job_that_cannot_be_done_says_what_is_wrong_and_writes_nothing() {
+    let sandbox = bound();
+    for (job, said) in [
+        ("grab it", "job.json: expected value"),
+        ("[]", "job.json: invalid"),
+        (r#"{"grabs": []}"#, "nothing is grabbed"),
+        (
+            r#"{"grabs": [{"vertex": 100000, "to": [0, 0, 0]}]}"#,
+            "no vertex of the model 100000: they count from 0 to 177",
+        ),
+        (r#"{"grabs": [{"vertex": -1, "to": [0, 0, 0]}]}"#, "-1"),
+        (
+            r#"{"grabs": [{"triangle": 5000, "bary": [1, 0, 0], "to": [0, 0, 0]}]}"#,
+            "no triangle of the model 5000",
+        ),
+        (r#"{"grabs": [{"triangle": 0, "bary": [1, 1, 0], "to": [0, 0, 0]}]}"#, "no point of a triangle"),
+        (r#"{"grabs": [{"cage": 8, "to": [0, 0, 0]}]}"#, "no vertex of the cage 8: they count from 0 to 7"),
+        (r#"{"grabs": [{"vertex": 0}]}"#, "grab 0 has no target"),
+        (r#"{"grabs": [{"to": [0, 0, 0]}]}"#, "one of vertex, triangle"),
+        (r#"{"grabs": [{"vertex": 0, "to": [0, 1e999, 0]}]}"#, "number out of range"),
+        (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "reach": -1}"#, "the reach is -1"),
+        (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "reach": "far"}"#, "the reach is \"far\""),
+        (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "relax": 3}"#, "relax is 3"),
+        (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "frames": 0}"#, "frames is 0"),
+        (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "start": "none.obj"}"#, "none.obj"),
+        (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "start": "mesh.obj"}"#, "178"),
+    ] {
+        sandbox.write("job.json", job);
+        sandbox.run(PULL).failure().code(1).stderr(contains("error:").and(contains(said)));
+        assert!(!sandbox.path("pose.obj").exists(), "{job}");
+    }
+    let pins: Vec<String> = (0..178).map(|v| format!(r#"{{"vertex": {v}}}"#)).collect();
+    let all = |n: usize| {
+        let pins = pins.iter().cycle().take(n).cloned().collect::<Vec<_>>().join(", ");
+        format!(r#"{{"grabs": [{{"vertex": 0, "to": [0, 5, 0]}}], "pins": [{pins}]}}"#)
+    };
+    sandbox.write("job.json", all(200));
+    sandbox.run(PULL).failure().stderr(contains("201 grabs and pins; at most 200"));
+    sandbox.write("job.json", all(178));
+    sandbox.run(PULL).success();
+    assert!(obj_positions(&sandbox.read("pose.obj")).iter().flatten().all(|x| x.is_finite()));
+}
+
+#[test]
+fn weights_of_another_model_are_refused() {
+    let sandbox = bound();
+    sandbox.write("job.json", r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}]}"#);
+    sandbox
+        .run("pull cage.obj --cage cage.obj --weights w.npz --job job.json -o pose.obj")
+        .failure()
+        .stderr(contains("178").and(contains("8")));
+}

@@ -1,0 +1,122 @@
+//! A frame of a drag: rotations of the groups, then the cage that fits them.
+
+use glam::{DMat3, DVec3};
+use nalgebra::{DMatrix, DVector};
+
+use super::drag::{Drag, smooth};
+use super::rotation::nearest_rotation;
+
+/// Steps of a frame.
+const STEPS: usize = 4;
+/// A target that moves by less, over the model's size, has not moved.
+const SAME: f64 = 1e-9;
+/// Length of a drag, over the model's size, at which parts within reach are as relaxed as asked for.
+const RELAXED: f64 = 0.1;
+
+impl Drag {
+    /// One frame: the grabs go towards `to` (`[n_grabs]`, object units). Targets that are not finite are ignored, and the pose
+    /// stays finite.
+    pub fn frame(&mut self, to: &[DVec3]) {
+        if to.len() != self.start.len() || !to.iter().all(|t| t.is_finite()) {
+            return;
+        }
+        if self.is_shift {
+            let row = self.handles.row(0).transpose();
+            for x in 0..3 {
+                let mut column = self.cage.rows_mut(x * self.n, self.n);
+                let shift = to[0][x] - row.dot(&column);
+                column.add_scalar_mut(shift);
+            }
+            self.targets.set_row(0, &nalgebra::RowVector3::from(to[0].to_array()));
+            return;
+        }
+        self.set_targets(to);
+        for _ in 0..STEPS {
+            let image = self.step();
+            if image.iter().any(|x| !x.is_finite()) {
+                self.anderson.forget();
+                return;
+            }
+            self.moved = (&image - &self.cage).amax() / self.size;
+            let mut next = self.anderson.next(&self.cage, image);
+            if let Some((plane, partners)) = &self.mirror {
+                average(&mut next, *plane, partners);
+            }
+            self.cage = next;
+        }
+    }
+
+    fn set_targets(&mut self, to: &[DVec3]) {
+        let is_same = |h: usize| (0..3).all(|x| (self.targets[(h, x)] - to[h][x]).abs() <= SAME * self.size);
+        if (0..to.len()).all(is_same) {
+            return;
+        }
+        for (h, target) in to.iter().enumerate() {
+            (0..3).for_each(|x| self.targets[(h, x)] = target[x]);
+        }
+        // Another map: what was learnt of the one before misleads.
+        self.anderson.forget();
+        let drag = to.iter().zip(&self.start).map(|(to, from)| to.distance(*from)).fold(0.0, f64::max);
+        let relax = self.relax * smooth(drag / (RELAXED * self.size));
+        let parts = self.posed.iter().zip(&self.relaxing);
+        self.moments.iter_mut().zip(parts).for_each(|(m, (posed, more))| *m = posed + relax * more);
+    }
+
+    /// One local step (rotations) and one global step (the cage that fits them).
+    fn step(&self) -> DVector<f64> {
+        let (n, width) = (self.n, 3 * self.n_groups);
+        let mut turned = vec![0.0; 3 * width];
+        for (r, matrix) in group_matrices(&self.moments, &self.cage, self.n_groups).into_iter().enumerate() {
+            let rotation = nearest_rotation(matrix);
+            for x in 0..3 {
+                turned[x * width + 3 * r..][..3].copy_from_slice(&rotation.row(x).to_array());
+            }
+        }
+        let rows: Vec<&[f64]> = self.moments.chunks_exact(width).collect();
+        let right =
+            DMatrix::from_fn(n, 3, |i, x| dot(rows[i], &turned[x * width..][..width])) + &self.constant;
+        let free = &self.inverse * right;
+        let pulled = &self.targets - &self.handles * &free;
+        let fitted = free + &self.spread * (&self.hold * pulled);
+        DVector::from_column_slice(fitted.as_slice())
+    }
+}
+
+/// `c^T B_r` of each group r: how its references lie to what they have become.
+pub(super) fn group_matrices(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> Vec<DMat3> {
+    let width = 3 * n_groups;
+    let n = moments.len() / width;
+    let mut sums = vec![0.0; 3 * width];
+    for (x, sums) in sums.chunks_exact_mut(width).enumerate() {
+        for (i, row) in moments.chunks_exact(width).enumerate() {
+            let c = cage[x * n + i];
+            sums.iter_mut().zip(row).for_each(|(sum, m)| *sum += c * m);
+        }
+    }
+    let column = |r: usize, k: usize| DVec3::from_array([0, 1, 2].map(|x| sums[x * width + 3 * r + k]));
+    (0..n_groups).map(|r| DMat3::from_cols(column(r, 0), column(r, 1), column(r, 2))).collect()
+}
+
+/// In eight sums, which a processor makes side by side.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
+    let mut sums = [0.0; 8];
+    for (a, b) in a.iter().zip(b) {
+        (0..8).for_each(|k| sums[k] += a[k] * b[k]);
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
+}
+
+/// The mean of a pose and its mirror image.
+fn average(cage: &mut DVector<f64>, plane: f64, partners: &[Option<u32>]) {
+    let n = partners.len();
+    let before = cage.clone();
+    for (i, partner) in partners.iter().enumerate() {
+        let Some(p) = partner.map(|p| p as usize) else { continue };
+        cage[i] = 0.5 * (before[i] + 2.0 * plane - before[p]);
+        for x in 1..3 {
+            cage[x * n + i] = 0.5 * (before[x * n + i] + before[x * n + p]);
+        }
+    }
+}
