@@ -180,14 +180,23 @@ mod tests {
 
     #[test]
     fn a_finger_takes_what_is_seen_before_what_is_hidden() {
-        // A thin plate: under a wide finger its back is as near as its front, and the back's corner is nearer to the pointer.
+        // A thin plate whose back is smaller than its front: under a wide finger the back is as near as the front, and its corner
+        // is where the finger is.
         let mut plate = cube();
-        for p in &mut plate.positions {
+        for (i, p) in plate.positions.iter_mut().enumerate() {
             p.z *= 0.05;
+            if i < 4 {
+                *p += 0.06 * (Vec3::new(0.5, 0.5, p.z) - *p);
+            }
         }
-        plate.positions[7].x -= 0.02;
         let topology = Topology::new(&plate.faces);
-        assert_eq!(pick_vertex(&plate.positions, &topology, &Flat, pixel(1.0, 1.0), 24.0), Some(7));
+        let at = pixel(plate.positions[3].x, plate.positions[3].y);
+        assert_eq!(pick_vertex(&plate.positions, &topology, &Flat, at, 24.0), Some(7));
+        assert_eq!(
+            pick_vertex(&plate.positions, &topology, &Flat, at, 1.0),
+            Some(3),
+            "where nothing else is"
+        );
     }
 
     #[test]

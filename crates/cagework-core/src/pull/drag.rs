@@ -289,7 +289,7 @@ fn check(
     if start.len() != pull.n_cage() {
         return Err(PullError::Start { given: start.len(), cage: pull.n_cage() });
     }
-    let not_finite = start.iter().flat_map(|p| p.to_array()).find(|x| !x.is_finite());
+    let not_finite = start.iter().flat_map(DVec3::to_array).find(|x| !x.is_finite());
     if let Some(value) = not_finite {
         return Err(PullError::Value { what: "a coordinate of the start", value, range: "finite" });
     }

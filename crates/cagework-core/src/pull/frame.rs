@@ -22,9 +22,9 @@ impl Drag {
         }
         if self.is_shift {
             let row = self.handles.row(0).transpose();
-            for x in 0..3 {
+            for (x, target) in to[0].to_array().into_iter().enumerate() {
                 let mut column = self.cage.rows_mut(x * self.n, self.n);
-                let shift = to[0][x] - row.dot(&column);
+                let shift = target - row.dot(&column);
                 column.add_scalar_mut(shift);
             }
             self.targets.set_row(0, &nalgebra::RowVector3::from(to[0].to_array()));

@@ -85,8 +85,8 @@ impl Probes {
             // Row x of the Jacobian: d/dx of the position.
             let jacobian = raw.each_ref().map(|g| g.iter().zip(cage).map(|(&w, &c)| w * c).sum::<DVec3>());
             let off = jacobian.iter().zip(DMat3::IDENTITY.to_cols_array_2d());
-            let is_off = off.into_iter().any(|(a, b)| !((*a - DVec3::from(b)).abs().max_element() <= OFF));
-            if is_off {
+            let is_near = |(a, b): (&DVec3, [f64; 3])| (*a - DVec3::from(b)).abs().max_element() <= OFF;
+            if !off.into_iter().all(is_near) {
                 self.shares[s] = 0.0;
                 all.extend([const { Vec::new() }; 3].map(|_: Vec<f64>| vec![0.0; n]));
                 continue;
