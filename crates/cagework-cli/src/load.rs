@@ -10,7 +10,6 @@ use cagework_io::{Model, UpAxis, write_cage_obj};
 use glam::Vec3;
 
 use crate::args::{CageSource, DEFAULT_MARGIN, MemoryArgs, ModelOutput};
-use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{read, read_beside};
 use crate::progress::Bar;
@@ -151,7 +150,8 @@ impl LoadedCage {
     /// # Errors
     /// When it cannot be written in that format.
     pub(crate) fn write_pose(&self, pose: &[Vec3], output: &ModelOutput) -> Result<Vec<u8>, CliError> {
-        export(&self.model, &self.model.posed_as_cage(pose), output)
+        let positions = self.model.posed_as_cage(pose);
+        self.model.write(output.format, &positions).map_err(|e| CliError::file(&output.path, e))
     }
 
     /// The positions of a pose of this cage, in the cage's own order. `[n_cage]`, object units.
