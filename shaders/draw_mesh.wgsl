@@ -8,7 +8,7 @@ struct Surface {
     mode: u32,
     /// Below this alpha nothing is drawn.
     alpha_cutoff: f32,
-    /// Values of the first and the last colour.
+    /// Values of the first and the last colour; of a material, `high` is how much of the value greys it.
     low: f32,
     high: f32,
 }
@@ -18,6 +18,9 @@ const WEIGHTS = 1u;
 const ERRORS = 2u;
 const CLAY = 3u;
 const BLENDED = 4u;
+
+/// Brightness that is left of what is greyed.
+const GREYED = 0.4;
 
 @group(2) @binding(0) var<uniform> surface: Surface;
 @group(2) @binding(1) var base_texture: texture_2d<f32>;
@@ -61,6 +64,10 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> @location(0) 
     if is_value { base = vec4f(value_color(in.value), 1.0); }
     if surface.mode == CLAY { base = surface.base_color; }
     if surface.mode == MATERIAL { base.a = 1.0; }
+    if !is_value {
+        let grey = dot(base.rgb, vec3f(0.2126, 0.7152, 0.0722));
+        base = vec4f(mix(base.rgb, vec3f(GREYED * grey), surface.high * clamp(in.value, 0.0, 1.0)), base.a);
+    }
     var normal = in.normal;
     // A vertex whose triangles have no area has no normal; the picture's own slope then does.
     // Either side of the surface is lit.

@@ -49,10 +49,15 @@ function spring(): Uint8Array {
 async function isInside(page: Page, [px, py, pz]: readonly [number, number, number]): Promise<boolean> {
   const cage = await cagePositions(page);
   const corners = await page.evaluate(() => Array.from(globalThis.cagework?.engine.cageCorners() ?? []));
+  // Faces as fans: of bent quads either diagonal is far enough from these points.
+  const triangles: number[][] = [];
+  for (let k = 0; k < corners.length; k += 1 + (corners[k] ?? 0)) {
+    const face = corners.slice(k + 1, k + 1 + (corners[k] ?? 0));
+    for (let i = 1; i + 1 < face.length; i++) triangles.push([face[0] ?? 0, face[i] ?? 0, face[i + 1] ?? 0]);
+  }
   let below = 0;
-  for (let k = 0; k < corners.length; k += 4) {
-    expect(corners[k], "triangles only").toBe(3);
-    const at = (corner: number, axis: number) => cage[3 * (corners[k + 1 + corner] ?? 0) + axis] ?? 0;
+  for (const triangle of triangles) {
+    const at = (corner: number, axis: number) => cage[3 * (triangle[corner] ?? 0) + axis] ?? 0;
     // Twice the signed area, seen from above, of the point and two corners; of each third corner by the other two.
     const [a = 0, b = 0, c = 0] = [0, 1, 2].map((i) => {
       const [j, l] = [(i + 1) % 3, (i + 2) % 3];

@@ -79,6 +79,9 @@ async function visit(name, display, preferences) {
     await page.mouse.move(place.x + 15, place.y + 10, { steps: 3 });
     await page.mouse.move(place.x + 30, place.y + 20, { steps: 3 });
     await page.mouse.up();
+    // A worker solves what the hand pulls, once it is ready.
+    const isMoved = () => /Undo: /.test(document.querySelector('#bar [data-tip^="Undo"]')?.dataset.tip ?? "");
+    await page.waitForFunction(isMoved, { timeout: PATIENCE });
     assert.notDeepEqual(await heights(page), before, "a drag moves the cage");
     await page.keyboard.down("Control");
     await page.keyboard.press("z");

@@ -37,7 +37,7 @@ test("a project whose settings no bind could have is opened with others, and say
     "grid is 64.5; it must be a whole number from 8 to 512: 64 is taken instead",
   );
   await expect(said).toContainText("tau is 0; it must be a number above 0");
-  await expect(said).toContainText("vertices is 9000000000; it must be a whole number from 12 to 400");
+  await expect(said).toContainText("vertices is 9000000000; it must be a whole number from 8 to 400");
   await expect(said).toContainText("The pose in this project is damaged");
   await bound(page);
   await drag(page, 30, 20);

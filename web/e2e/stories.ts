@@ -11,10 +11,14 @@ import {
   drawn,
   drop,
   expect,
+  grip,
   handle,
   largestMove,
   modelPositions,
+  placeOf,
+  pull,
   reachable,
+  rested,
   shoot,
 } from "./support";
 
@@ -45,6 +49,18 @@ export async function followsAHandle(page: Page, picture: string): Promise<void>
   expect(largestMove(before.model, await modelPositions(page)), "and the model").toBeLessThan(1e-6);
   await page.keyboard.press("Control+y");
   expect(largestMove(after.cage, await cagePositions(page)), "redo brings it back").toBeLessThan(1e-6);
+}
+
+/** A point of the model goes where it is pulled to; undo brings it back. */
+export async function pullsTheModel(page: Page): Promise<void> {
+  const before = await cagePositions(page);
+  const at = await grip(page, [0.35, 0.45]);
+  await pull(page, at, -30, -40);
+  await rested(page);
+  const now = await placeOf(page, at.point);
+  expect(Math.hypot(now.x - at.x + 30, now.y - at.y + 40), "below the pointer").toBeLessThan(4);
+  await page.keyboard.press("Control+z");
+  expect(largestMove(before, await cagePositions(page))).toBeLessThan(1e-6);
 }
 
 /** A heat map of a vertex, a slice through the grid, and harmonic beside mean value coordinates: each with its legend. */

@@ -3,7 +3,7 @@
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { test as base, expect, type JSHandle, type Page } from "@playwright/test";
-import type { Session } from "../src/contract";
+import type { Session, SurfacePoint } from "../src/contract";
 
 declare global {
   var cagework: Session | undefined;
@@ -131,16 +131,76 @@ export async function spot(
   return found;
 }
 
-/** Drags a cage vertex by pixels; returns the vertex. */
+/** Drags a cage vertex alone (with Alt) by pixels; returns the vertex. */
 export async function drag(page: Page, dx: number, dy: number): Promise<number> {
   const vertex = await reachable(page);
   const { x, y } = await handle(page, vertex);
   await page.mouse.move(x, y);
+  await page.keyboard.down("Alt");
   await page.mouse.down();
+  await page.keyboard.up("Alt");
   await page.mouse.move(x + dx / 2, y + dy / 2, { steps: 3 });
   await page.mouse.move(x + dx, y + dy, { steps: 3 });
   await page.mouse.up();
   return vertex;
+}
+
+/** A point of the model under the pointer, with no handle near it: the nearest to the middle of the view, or to a place of it. */
+export async function grip(
+  page: Page,
+  share: readonly [number, number] = [0.5, 0.5],
+): Promise<{ x: number; y: number; point: SurfacePoint }> {
+  await expect(page.getByRole("button", { name: "Pull the model" })).toBeVisible();
+  const found = await page.evaluate(([sx, sy]) => {
+    const engine = globalThis.cagework?.engine;
+    const canvas = document.querySelector("canvas");
+    if (!engine || !canvas) return null;
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    let best: { x: number; y: number; point: SurfacePoint; off: number } | null = null;
+    for (let x = 8; x < width; x += 8) {
+      for (let y = 8; y < height; y += 8) {
+        const off = Math.hypot(x - sx * width, y - sy * height);
+        if (best && off >= best.off) continue;
+        const element = document.elementFromPoint(left + x, top + y);
+        if (!element || !(element === canvas || element.contains(canvas))) continue;
+        if (engine.pick(x, y, 14).length > 0) continue;
+        const point = engine.surfaceAt(x, y);
+        if (point) best = { x: left + x, y: top + y, point, off };
+      }
+    }
+    return best;
+  }, share);
+  if (!found) throw new Error("no point of the model is within reach");
+  return found;
+}
+
+/** Where a point of the model is in the window. */
+export async function placeOf(page: Page, point: SurfacePoint): Promise<{ x: number; y: number }> {
+  return page.evaluate((point) => {
+    const engine = globalThis.cagework?.engine;
+    const { left = 0, top = 0 } = document.querySelector("canvas")?.getBoundingClientRect() ?? {};
+    const [x = 0, y = 0, z = 0] = engine?.placeOf(point) ?? [];
+    const [px = 0, py = 0] = engine?.project(x, y, z) ?? [];
+    return { x: left + px, y: top + py };
+  }, point);
+}
+
+/** Drags from one place to another, in steps. */
+export async function pull(
+  page: Page,
+  from: { x: number; y: number },
+  dx: number,
+  dy: number,
+): Promise<void> {
+  await page.mouse.move(from.x, from.y);
+  await page.mouse.down();
+  await page.mouse.move(from.x + dx, from.y + dy, { steps: 8 });
+  await page.mouse.up();
+}
+
+/** Waits until a pull has come to rest and is a step of the history. */
+export async function rested(page: Page): Promise<void> {
+  await expect(page.getByRole("button", { name: /^Undo/ })).toHaveAttribute("data-tip", /Pull/);
 }
 
 export function cagePositions(page: Page): Promise<number[]> {

@@ -1,7 +1,19 @@
 /** Fingers: two move and magnify the view, one drags a handle. */
 
 import type { CDPSession } from "@playwright/test";
-import { cagePositions, expect, handle, largestMove, open, reachable, shoot, test } from "./support";
+import {
+  cagePositions,
+  expect,
+  grip,
+  handle,
+  largestMove,
+  open,
+  placeOf,
+  reachable,
+  rested,
+  shoot,
+  test,
+} from "./support";
 
 type Spot = readonly [x: number, y: number];
 
@@ -97,10 +109,24 @@ test("two fingers look around, one finger poses", async ({ page }) => {
     await fingers(cdp, [[x, y]], [[x + 30, y - 20]]);
     const moved = await cagePositions(page);
     expect(largestMove(rest, moved)).toBeGreaterThan(0.02);
-    const others = moved.filter((value, k) => Math.floor(k / 3) !== vertex && value !== rest[k]);
-    expect(others, "only this one").toEqual([]);
     const now = await handle(page, vertex);
     expect(apart(now, { x: x + 30, y: y - 20 }), "it is below the finger").toBeLessThan(3);
     await shoot(page, "touched");
+  });
+
+  await test.step("one finger on the model pulls it, a long press pins it", async () => {
+    await page.keyboard.press("Alt+a");
+    const at = await grip(page, [0.4, 0.3]);
+    await fingers(cdp, [[at.x, at.y]], [[at.x + 25, at.y - 25]]);
+    await rested(page);
+    expect(apart(await placeOf(page, at.point), { x: at.x + 25, y: at.y - 25 })).toBeLessThan(4);
+    const pin = await grip(page, [0.6, 0.3]);
+    await cdp.send("Input.dispatchTouchEvent", {
+      type: "touchStart",
+      touchPoints: [{ x: pin.x, y: pin.y, id: 0 }],
+    });
+    await expect(page.getByRole("button", { name: /^Undo/ })).toHaveAttribute("data-tip", /Pin/);
+    await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+    await shoot(page, "touch-pulled");
   });
 });

@@ -7,6 +7,7 @@ import {
   exportsAPicture,
   exportsWhatIsShown,
   followsAHandle,
+  pullsTheModel,
   showsColours,
   survives,
 } from "./stories";
@@ -37,6 +38,7 @@ test("opens bound, follows a handle, shows colours, exports, and survives a lost
   ).toBe(true);
   await shoot(page, "webgl-opens");
   await followsAHandle(page, "webgl-posed");
+  await test.step("the model is pulled", () => pullsTheModel(page));
   await test.step("colours, slice and comparison are shown", () => showsColours(page, "webgl"));
   await test.step("a dropped GLB is bound on the processor and exported", async () => {
     await page.keyboard.press("n");

@@ -9,6 +9,7 @@ import { createFiles, type Files } from "./actions/files";
 import { followCage } from "./actions/follow";
 import { createPoses, type PoseActions } from "./actions/poses";
 import { createProject, type Project, poseOf } from "./actions/project";
+import { createPulling, type Pulling } from "./actions/pull";
 import { createView, type View } from "./actions/view";
 import { createWorks, type WorkActions } from "./actions/works";
 import type { Session } from "./contract";
@@ -25,6 +26,7 @@ export interface App {
   readonly ctx: Context;
   readonly store: Store;
   readonly edit: Edit;
+  readonly pull: Pulling;
   readonly cage: CageActions;
   readonly bind: BindActions;
   readonly poses: PoseActions;
@@ -69,7 +71,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     store.set({ undoLabel: history.undoLabel ?? null, redoLabel: history.redoLabel ?? null });
   });
   const fixFor = (fix: NonNullable<Explained["fix"]>) => ({ label: T.fixes[fix], run: () => fixes[fix]() });
-  const ctx: Context = { session, store, history, queue: createQueue(), tell, fixFor };
+  const ctx: Context = { session, store, history, queue: createQueue(), tell, fixFor, viewport };
   const bind = createBind(ctx);
   const cage = createCage(ctx, {
     refine(grid) {
@@ -79,11 +81,12 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     carry: (before) => poses.carry(before),
   });
   const edit = createEdit(ctx, cage.adopt);
-  const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"), viewport);
-  followCage(ctx, bind, edit, view);
+  const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"));
+  const pull = createPulling(ctx, edit);
+  followCage(ctx, { bind, edit, view, pull });
   const poses = createPoses(ctx, edit);
   const project = createProject(ctx);
-  const exports = createExports(ctx, project, viewport);
+  const exports = createExports(ctx, project);
   const startFresh = () => void files.openSample(store.get().samples[0]?.id ?? "");
   const works = createWorks(ctx, {
     write: project.write,
@@ -101,6 +104,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
         ...(settings.cage ? { cageOptions: settings.cage } : {}),
       });
       view.symmetry(settings.symmetry ?? store.get().symmetry);
+      store.set({ pins: settings.pins ?? [] });
     },
     applyPose(settings) {
       const pose = poseOf(settings);
@@ -136,6 +140,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     ctx,
     store,
     edit,
+    pull,
     cage,
     bind,
     poses,

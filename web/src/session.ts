@@ -15,7 +15,7 @@ import { BIND_DEFAULTS } from "./defaults";
 import { findAdapter, hasWebGl2, lackOf } from "./session/adapter";
 import { type Artifact, compile } from "./session/artifact";
 import { startBind } from "./session/bind";
-import { createClient } from "./session/client";
+import { type Client, createClient } from "./session/client";
 import { createFrames } from "./session/frames";
 import { chain } from "./session/jobs";
 import type { ReadModel } from "./session/messages";
@@ -131,6 +131,12 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   const openApart = () => createClient(module, openWorker);
   const reading = createApart(openApart);
   const checking = createApart(openApart);
+  /** Opened with the first bind: a bind or a long frame must not stop the hand. */
+  let puller: Client | undefined;
+  const pulling = () => {
+    puller ??= openApart();
+    return puller;
+  };
   const mark = ({ vertices, edges, faces, points, outside }: Check) =>
     engine.showFaults(vertices, edges, faces, points, outside);
   /** Drops the result if model or cage have changed meanwhile. */
@@ -218,6 +224,16 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
         engine.takeSlice(axis, fraction, options, indptr, indices, data);
       });
     },
+    preparePull: () =>
+      ofNow(
+        pulling().run("pullOpen", {
+          positions: engine.modelPositions(),
+          triangles: engine.modelTriangles(),
+          cage: cage(),
+        }),
+      ),
+    pullGrab: (grab) => ofNow(pulling().run("pullGrab", grab)),
+    pullFrame: (to) => ofNow(pulling().run("pullFrame", { to })),
     draw: frames.ask,
     onFrame: frames.listen,
     async picture(width, height, alone = false) {
@@ -241,6 +257,7 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     close() {
       frames.stop();
       client.close();
+      puller?.close();
       engine.free();
     },
   };

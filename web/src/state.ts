@@ -16,6 +16,7 @@ import type {
   Sample,
   SceneOptions,
   Stage,
+  SurfacePoint,
 } from "./contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
 import type { Theme } from "./store";
@@ -115,6 +116,12 @@ export interface AppState {
   /** Vertices of the model that the gesture under way leaves outside of the rest cage: of some that are watched. */
   strays: number;
   posed: boolean;
+  /** The model can be pulled: what is needed for it belongs to the cage as it is. */
+  pullReady: boolean;
+  /** Pulls move the whole model. */
+  pullWhole: boolean;
+  /** Points of the model that pulls leave where they are. */
+  pins: readonly SurfacePoint[];
   poses: readonly Pose[];
   /** Shares of `poses` in the blend. */
   shares: readonly number[];
@@ -180,6 +187,9 @@ export const INITIAL: AppState = {
   gesture: null,
   strays: 0,
   posed: false,
+  pullReady: false,
+  pullWhole: false,
+  pins: [],
   poses: [],
   shares: [],
   playing: false,

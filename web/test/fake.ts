@@ -144,6 +144,7 @@ export function createFake(): Fake {
     info: {
       vertices: rest.positions.length / 3,
       edges: 0,
+      quads: 0,
       faces: 0,
       triangles: 0,
       bounds: BOUNDS,
@@ -201,6 +202,9 @@ export function createFake(): Fake {
     estimateMemory: () => 1000,
     bindMeanValue: () => job("meanValue", null),
     loadSlice: (axis, position) => job("slice", { axis, position }),
+    preparePull: () => job<null>("pullOpen", null),
+    pullGrab: (grab) => job("pullGrab", grab),
+    pullFrame: (to) => job("pullFrame", to),
     picture: () => job<Blob>("picture", null).done,
     readSettings(text, { bind }) {
       const given = JSON.parse(text);
@@ -212,6 +216,7 @@ export function createFake(): Fake {
     store,
     history,
     queue: createQueue(),
+    viewport: () => ({ width: 400, height: 300 }) as DOMRect,
     tell: {
       say: (text) => said.push(text),
       problem: (explained, fix) =>

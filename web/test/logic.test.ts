@@ -112,7 +112,8 @@ describe("the plot", () => {
 it("faults are marked in the step where they can be mended, or when they stop the bind", () => {
   const bounds = { min: [0, 0, 0], max: [1, 1, 1] } as CageState["info"]["bounds"];
   const at = (step: StepName, usable: boolean) => {
-    const cage = { usable, info: { vertices: 8, edges: 12, faces: 6, triangles: 12, bounds, notices: [] } };
+    const info = { vertices: 8, edges: 12, faces: 6, quads: 6, triangles: 12, bounds, notices: [] };
+    const cage = { usable, info };
     return drawn({ ...INITIAL, step, cage }).problems;
   };
   expect([at("pose", true), at("cage", true), at("pose", false)]).toEqual([false, true, true]);

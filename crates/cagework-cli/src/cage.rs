@@ -91,10 +91,11 @@ fn text(made: &Made) -> String {
         );
     };
     let mut text = format!(
-        "wrote {}: {} vertices and {} triangles in {:.0} ms; it keeps {} from the model",
+        "wrote {}: {} vertices and {} faces ({:.0} % quads) in {:.0} ms; it keeps {} from the model",
         shown(&made.output),
         made.vertices,
         made.faces,
+        100.0 * f64::from(report.quads) / f64::from(report.faces.max(1)),
         report.elapsed_ms,
         three_digits(report.clearance)
     );

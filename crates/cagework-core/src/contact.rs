@@ -51,6 +51,17 @@ impl Corners {
         (self.at[1] - self.at[0]).cross(self.at[2] - self.at[0])
     }
 
+    /// The triangle with a vertex elsewhere.
+    pub(crate) fn with_corner(&self, vertex: u32, at: DVec3) -> Self {
+        let mut moved = *self;
+        for (i, p) in moved.index.iter().zip(&mut moved.at) {
+            if *i == vertex {
+                *p = at;
+            }
+        }
+        moved
+    }
+
     /// The triangle rotated so that corner `k` comes first.
     fn turned_to(&self, k: usize) -> [DVec3; 3] {
         [self.at[k], self.at[(k + 1) % 3], self.at[(k + 2) % 3]]

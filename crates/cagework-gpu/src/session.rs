@@ -230,8 +230,11 @@ impl Session {
 
     /// What is drawn from now on.
     pub fn set_scene(&mut self, scene: SceneOptions) {
-        let shown = |scene: &SceneOptions| (scene.mesh, scene.weights_to_one);
-        let other_values = shown(&scene) != shown(&self.scene);
+        let is_other = |a: &SceneOptions, b: &SceneOptions| {
+            (a.mesh, a.weights_to_one) != (b.mesh, b.weights_to_one)
+                || a.greyed.as_ref().map(Arc::as_ptr) != b.greyed.as_ref().map(Arc::as_ptr)
+        };
+        let other_values = is_other(&scene, &self.scene);
         self.scene = scene;
         self.write_scene();
         if other_values {
@@ -251,6 +254,13 @@ impl Session {
 
     /// Uploads what the scene's heat map shows; nothing without weights.
     fn write_values(&mut self) {
+        let is_plain = matches!(self.scene.mesh, MeshStyle::Solid | MeshStyle::Clay);
+        if let (true, Some(greyed), Some(model)) = (is_plain, &self.scene.greyed, &self.model) {
+            if greyed.len() == model.positions.len() {
+                self.renderer.set_values(&self.context, &model.with_copies(greyed), [0.0, 1.0]);
+            }
+            return;
+        }
         let Some(range) = self.value_range() else { return };
         let (Some(model), Some(bound), Some(cage)) = (&self.model, &self.bound, &self.cage) else { return };
         let values: Vec<f32> = match self.scene.mesh {

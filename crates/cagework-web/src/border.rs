@@ -6,7 +6,7 @@ use std::fs;
 
 use cagework_core::cage_check::{Code, Repair, Severity};
 use cagework_core::cage_gen::{
-    CageOptions, MAX_CLEARANCE, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Shape,
+    CageOptions, DETAILS, MAX_CLEARANCE, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Shape,
 };
 use cagework_core::edit::{Element, GestureKind, Pivot, SelectMode};
 use cagework_core::options::{
@@ -23,12 +23,13 @@ use ts_rs::{Config, TS};
 use crate::clock::Event;
 use crate::error::ErrorName;
 use crate::options::{
-    BindAsked, CageAsked, Colour, GizmoAsked, GizmoHandle, RestEdit, SceneAsked, SliceShown, SymmetryAsked,
-    ThemeAsked,
+    BindAsked, CageAsked, Colour, GizmoAsked, GizmoHandle, PullAsked, RestEdit, SceneAsked, SliceShown,
+    SymmetryAsked, ThemeAsked,
 };
 use crate::settings::Settings;
 use crate::views::{
-    BoundsView, CageInfo, CageState, CameraView, ColorMap, Fix, Largest, Legend, Mend, ModelInfo, Problem,
+    BoundsView, CageInfo, CageState, CameraView, ColorMap, Fix, Grip, Largest, Legend, Mend, ModelInfo,
+    Problem, SurfacePoint,
 };
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/src/contract/generated.ts");
@@ -98,6 +99,9 @@ fn the_page_has_the_types_of_rust() {
         GizmoAsked,
         SceneAsked,
         CameraView,
+        SurfacePoint,
+        Grip,
+        PullAsked,
         ColorMap,
         Largest,
         Legend,
@@ -118,8 +122,9 @@ fn the_page_has_the_types_of_rust() {
     writeln!(
         text,
         "/** Least and most of each option that is a number. */\nexport const RANGES = {{ grid: [{MIN_GRID}, {MAX_GRID}], \
-         vertices: [{MIN_TARGET}, {MAX_TARGET}], margin: [0, {MAX_CLEARANCE}], voxels: [{MIN_VOXELS}, {MAX_VOXELS}] }} \
-         as const;"
+         vertices: [{MIN_TARGET}, {MAX_TARGET}], detail: [{}, {}], margin: [0, {MAX_CLEARANCE}], voxels: [{MIN_VOXELS}, {MAX_VOXELS}] }} \
+         as const;",
+        DETAILS[0], DETAILS[1]
     )
     .unwrap();
     if fs::read_to_string(FILE).unwrap_or_default() != text {

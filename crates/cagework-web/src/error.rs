@@ -6,6 +6,7 @@ use cagework_core::cage::CageError;
 use cagework_core::cage_check::RepairError;
 use cagework_core::cage_gen::CageGenError;
 use cagework_core::edit::PoseError;
+use cagework_core::pull::PullError;
 use cagework_core::rest_edit::RestEditError;
 use cagework_core::slice::SliceError;
 use cagework_core::weights::WeightsError;
@@ -100,6 +101,7 @@ plain!(
     NpzError,
     PoseCodeError,
     PoseError,
+    PullError,
     RepairError,
     RestEditError,
     SliceError,

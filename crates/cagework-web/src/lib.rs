@@ -20,10 +20,12 @@ pub mod engine;
 mod error;
 #[cfg(target_family = "wasm")]
 mod gpu;
+mod held;
 mod incoming;
 pub mod loaded;
 mod options;
 mod problems;
+pub mod puller;
 mod scene;
 pub mod settings;
 mod state;
@@ -37,7 +39,8 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
 import type { BindOptions, BindReport, CageOptions, CageState, Element, Gesture, GizmoHandle, Legend, ModelInfo,
-  Pivot, Problem, Progress, Repair, RestEdit, SceneOptions, SelectMode, Settings, UpAxis } from "../contract/generated";
+  Grip, Pivot, Problem, Progress, PullOptions, Repair, RestEdit, SceneOptions, SelectMode, Settings, SurfacePoint,
+  CameraView, UpAxis } from "../contract/generated";
 "#;
 
 #[wasm_bindgen]

@@ -41,6 +41,8 @@ impl BindAsked {
 #[cfg_attr(test, ts(rename = "CageOptions"))]
 pub(crate) struct CageAsked {
     vertices: u32,
+    detail: f32,
+    quads: bool,
     margin: f32,
     symmetry: SymmetryAsked,
     voxels: u32,
@@ -63,14 +65,22 @@ pub(crate) enum SymmetryAsked {
 #[cfg(test)]
 impl From<CageOptions> for CageAsked {
     fn from(options: CageOptions) -> Self {
-        let CageOptions { target: vertices, clearance: margin, voxels, shape, per_component, symmetry } =
-            options;
+        let CageOptions {
+            target: vertices,
+            detail,
+            quads,
+            clearance: margin,
+            voxels,
+            shape,
+            per_component,
+            symmetry,
+        } = options;
         let symmetry = match symmetry {
             Symmetry::Auto => SymmetryAsked::Auto,
             Symmetry::None => SymmetryAsked::Off,
             _ => SymmetryAsked::On,
         };
-        Self { vertices, margin, symmetry, voxels, shape, per_component }
+        Self { vertices, detail, quads, margin, symmetry, voxels, shape, per_component }
     }
 }
 
@@ -78,6 +88,8 @@ impl From<CageAsked> for CageOptions {
     fn from(asked: CageAsked) -> Self {
         Self {
             target: asked.vertices,
+            detail: asked.detail,
+            quads: asked.quads,
             clearance: asked.margin,
             symmetry: match asked.symmetry {
                 SymmetryAsked::Auto => Symmetry::Auto,
@@ -107,6 +119,8 @@ pub(crate) struct SceneAsked {
     pub(crate) weights_to_one: bool,
     pub(crate) slice: SliceShown,
     pub(crate) gizmo: GizmoAsked,
+    /// The cage steps back: the model itself is pulled.
+    pub(crate) pull: bool,
     pub(crate) compare: bool,
     pub(crate) problems: bool,
 }
@@ -124,6 +138,7 @@ impl Default for SceneAsked {
             weights_to_one: false,
             slice: SliceShown::Off,
             gizmo: GizmoAsked::None,
+            pull: true,
             compare: false,
             problems: true,
         }
@@ -205,6 +220,19 @@ pub(crate) enum RestEdit {
     ExtrudeFace,
     DeleteVertex,
     DeleteFace,
+}
+
+/// How the model is pulled.
+#[derive(Clone, Copy, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[cfg_attr(test, ts(rename = "PullOptions"))]
+pub(crate) struct PullAsked {
+    /// How far along the surface, over the model's size; null for automatic.
+    pub(crate) reach: Option<f64>,
+    /// The whole model follows.
+    pub(crate) whole: bool,
+    /// Mirror images stay mirror images.
+    pub(crate) mirrored: bool,
 }
 
 /// A word or an object that JavaScript says, typed there as what it becomes here.

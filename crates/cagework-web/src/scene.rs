@@ -39,10 +39,23 @@ impl State {
             handles: cage,
             floor: self.view.floor,
             selection: self.shown_selection(),
+            cage_faint: self.pulls() && self.is_nothing_chosen(),
             gizmo: self.gizmo().filter(|_| cage),
             slice: self.shown_slice(),
             marks: self.marks(),
+            greyed: self.held.stays.clone(),
+            held: self.held_marks(),
         }
+    }
+
+    /// Whether the model itself can be pulled: then what it hides is not taken in its place.
+    pub(crate) fn pulls(&self) -> bool {
+        self.view.pull && self.is_bound && !self.editing_rest
+    }
+
+    /// Whether no part of the cage is chosen or pointed at.
+    fn is_nothing_chosen(&self) -> bool {
+        self.hovered.is_empty() && self.selection.vertices().is_empty() && self.gesture.is_none()
     }
 
     /// The same for a picture: `alone` without anything but the model, transparent around it.

@@ -3,7 +3,7 @@
 use std::mem::discriminant;
 
 use cagework_core::BindOptions;
-use cagework_core::cage_gen::{CLEARANCE, CageOptions, TARGET, VOXELS};
+use cagework_core::cage_gen::{CLEARANCE, CageOptions, DETAIL, TARGET, VOXELS};
 use cagework_core::options::{GRID, MAX_ITERATIONS, Number, SPARSIFY, TAU};
 use cagework_core::samples;
 use serde::Serialize;
@@ -13,18 +13,19 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::error::{ErrorName, Fault};
 use crate::options::{BindAsked, CageAsked};
-use crate::views::object;
+use crate::views::{SurfacePoint, object};
 
 /// Longest value that is repeated in a notice, characters.
 const SHOWN: usize = 40;
 
 /// Numbers of the page's settings, by their names there.
-const NUMBERS: [(&str, Number); 7] = [
+const NUMBERS: [(&str, Number); 8] = [
     ("grid", GRID),
     ("tau", TAU),
     ("max_iterations", MAX_ITERATIONS),
     ("sparsify", SPARSIFY),
     ("vertices", TARGET),
+    ("detail", DETAIL),
     ("margin", CLEARANCE),
     ("voxels", VOXELS),
 ];
@@ -49,6 +50,10 @@ pub(crate) struct Settings {
     /// `Engine.encodePose`, base 64.
     #[cfg_attr(test, ts(optional))]
     pose: Option<String>,
+    /// Points that pulls leave where they are.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(test, ts(optional, as = "Option<Vec<SurfacePoint>>"))]
+    pins: Vec<SurfacePoint>,
     /// What was wrong, in whole sentences.
     notices: Vec<String>,
 }
@@ -83,6 +88,8 @@ impl Settings {
         let word = |key: &str| given.get(key).and_then(Value::as_str).map(str::to_owned);
         settings.pose = word("pose");
         settings.sample = word("sample").filter(|id| samples::all().iter().any(|sample| sample.id == id));
+        settings.pins =
+            given.get("pins").and_then(|pins| serde_json::from_value(pins.clone()).ok()).unwrap_or_default();
         settings.symmetry = given.get("symmetry").and_then(Value::as_bool);
         settings
     }
@@ -149,6 +156,8 @@ mod tests {
             },
             "cage": {
                 "vertices": 80, "margin": 0, "symmetry": "auto", "voxels": 0, "shape": "follow",
+                "detail": 0.028,
+                "quads": true,
                 "per_component": false,
             },
         });
@@ -199,8 +208,8 @@ mod tests {
             ("bind", "sparsify", json!(0.5), "a threshold below 0.1"),
             ("bind", "solver", json!("gauss"), "expected one of `jacobi`"),
             ("bind", "backend", json!({ "gpu": null }), "is taken instead"),
-            ("cage", "vertices", json!(9_000_000_000_u64), "a whole number from 12 to 400"),
-            ("cage", "vertices", json!("many"), "a whole number from 12 to 400"),
+            ("cage", "vertices", json!(9_000_000_000_u64), "a whole number from 8 to 400"),
+            ("cage", "vertices", json!("many"), "a whole number from 8 to 400"),
             ("cage", "margin", json!(-0.1), "from 0 to 0.25"),
             ("cage", "voxels", json!(4), "8 to 128"),
         ] {

@@ -14,7 +14,7 @@ use glam::{Vec2, Vec3};
 use crate::error::{Answer, ErrorName, Fault};
 use crate::options::SceneAsked;
 use crate::problems::Faults;
-use crate::views::{CageInfo, CageState};
+use crate::views::{CageInfo, CageState, SurfacePoint};
 
 /// Model, cage, selection, gesture and camera of a page.
 #[derive(Default)]
@@ -46,6 +46,8 @@ pub(crate) struct State {
     pub(crate) gesture: Option<Gesture>,
     pub(crate) active_part: Option<GizmoPart>,
     pub(crate) slice: Option<Arc<Slice>>,
+    /// What a hand holds of the model.
+    pub(crate) held: Held,
     pub(crate) view: SceneAsked,
     pub(crate) camera: Camera,
     /// The viewport, CSS pixels.
@@ -60,6 +62,20 @@ pub(crate) struct State {
     pub(crate) is_changed: bool,
     /// What went wrong on the way to the GPU, for the next frame to tell.
     pub(crate) fault: Option<Fault>,
+}
+
+/// What is held, and what stays.
+#[derive(Default)]
+pub(crate) struct Held {
+    /// Points that are grabbed, pinned or pointed at.
+    pub(crate) points: Vec<SurfacePoint>,
+    /// Where the grab should be, where it cannot follow.
+    pub(crate) target: Option<Vec3>,
+    /// Of each vertex of the model how much it stays; none without a drag.
+    pub(crate) stays: Option<Arc<Vec<f32>>>,
+    /// The model where it was asked for last, and the cage for it.
+    pub(crate) posed: Vec<Vec3>,
+    pub(crate) posed_for: Vec<Vec3>,
 }
 
 impl State {
@@ -87,6 +103,7 @@ impl State {
         self.gesture = None;
         self.active_part = None;
         self.slice = None;
+        self.held = Held::default();
         (self.is_bound, self.has_other) = (false, false);
         self.revision += 1;
         self.is_moved = true;

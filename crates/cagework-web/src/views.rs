@@ -42,6 +42,25 @@ pub(crate) struct CameraView {
     pub(crate) parallel: bool,
 }
 
+/// A point of the model's surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) struct SurfacePoint {
+    pub(crate) triangle: u32,
+    /// Barycentric coordinates in it.
+    pub(crate) bary: [f32; 3],
+}
+
+/// How a point of the model follows the cage.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) struct Grip {
+    /// Its weights. `[n_cage]`
+    pub(crate) row: Vec<f64>,
+    /// The nearest vertex of the model.
+    pub(crate) seed: u32,
+}
+
 /// `ModelInfo`.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
@@ -90,6 +109,8 @@ pub(crate) struct CageInfo {
     vertices: usize,
     edges: usize,
     faces: usize,
+    /// Quads among the faces.
+    quads: usize,
     triangles: usize,
     bounds: BoundsView,
     notices: Vec<String>,
@@ -102,6 +123,7 @@ impl CageInfo {
             vertices: mesh.positions.len(),
             edges: Topology::new(&mesh.faces).edges.len(),
             faces: mesh.faces.len(),
+            quads: mesh.faces.iter().filter(|face| face.len() == 4).count(),
             triangles: cage.map_or(fan, |c| c.triangles().len()),
             bounds: BoundsView::of(Bounds::of(&mesh.positions)),
             notices: cage.map_or_else(Vec::new, |c| c.notices().iter().map(CageNotice::to_string).collect()),

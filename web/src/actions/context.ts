@@ -28,6 +28,8 @@ export interface Context {
   readonly history: History;
   readonly queue: Queue;
   readonly tell: Tell;
+  /** The view's place in the window. */
+  readonly viewport: () => DOMRect;
   /** The button for an error's fix, if the page has one. */
   readonly fixFor: (fix: NonNullable<Explained["fix"]>) => Fix;
 }

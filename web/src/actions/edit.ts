@@ -16,8 +16,10 @@ export interface Edit {
   end(keep: boolean): void;
   active(): boolean;
   nudge(right: number, up: number): void;
-  /** Writes a nudge that is still open as a step. */
+  /** Writes what is still open as a step: a nudge, a pull that comes to rest. */
   settle(): void;
+  /** Something else that may be open, and what writes it. */
+  alsoSettles(write: () => void): void;
   moveTo(x: number, y: number, z: number): void;
   /** Takes positions, and what they are a blend of, as one step. */
   pose(label: string, positions: Float32Array, shares: readonly number[]): void;
@@ -120,7 +122,9 @@ export function createEdit(ctx: Context, adopt: (state: CageState, check: Check 
     }
   };
 
+  const others: (() => void)[] = [];
   const settle = () => {
+    for (const write of others) write();
     if (!nudging) return;
     clearTimeout(nudging.timer);
     const open = nudging;
@@ -207,6 +211,7 @@ export function createEdit(ctx: Context, adopt: (state: CageState, check: Check 
       sync();
     },
     settle,
+    alsoSettles: (write) => others.push(write),
     moveTo(x, y, z) {
       remember();
       const from = before;

@@ -20,7 +20,7 @@ export interface Exports {
 /** Largest side of a picture, pixels. */
 const LONGEST_SIDE = 8192;
 
-export function createExports(ctx: Context, project: Project, viewport: () => DOMRect): Exports {
+export function createExports(ctx: Context, project: Project): Exports {
   let scale = 2;
   let alone = false;
 
@@ -48,7 +48,7 @@ export function createExports(ctx: Context, project: Project, viewport: () => DO
   };
 
   const picture = () => {
-    const { width, height } = viewport();
+    const { width, height } = ctx.viewport();
     const fit = Math.min(scale, LONGEST_SIDE / Math.max(width, height, 1));
     return ctx.session().picture(Math.round(width * fit), Math.round(height * fit), alone);
   };

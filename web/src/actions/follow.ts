@@ -4,6 +4,7 @@ import { effect, untracked } from "@preact/signals";
 import type { BindActions } from "./bind";
 import type { Context } from "./context";
 import type { Edit } from "./edit";
+import type { Pulling } from "./pull";
 import type { View } from "./view";
 
 /** A hand that has not moved the cage for so long rests, ms. */
@@ -11,12 +12,14 @@ const PAUSE_MS = 150;
 /** A finer grid waits for the user's word. */
 const FINEST = 128;
 
-export function followCage(
-  { store }: Context,
-  bind: Pick<BindActions, "covers" | "start">,
-  edit: Pick<Edit, "active" | "sync">,
-  view: Pick<View, "refresh">,
-): void {
+export interface Followers {
+  bind: Pick<BindActions, "covers" | "start">;
+  edit: Pick<Edit, "active" | "sync">;
+  view: Pick<View, "refresh">;
+  pull: Pick<Pulling, "prepare">;
+}
+
+export function followCage({ store }: Context, { bind, edit, view, pull }: Followers): void {
   let soon: ReturnType<typeof setTimeout> | undefined;
   const bindSoon = (pause: number) => {
     clearTimeout(soon);
@@ -38,6 +41,11 @@ export function followCage(
       });
     }
     isFirst = false;
+  });
+  effect(() => {
+    const { bound, bindRun } = store.get();
+    // After the last pass: the worker that solves pulls would take time from it.
+    if (bound && bindRun === null) untracked(() => pull.prepare());
   });
   effect(() => {
     if (!store.get().editingRest) untracked(() => store.get().cage && bindSoon(0));

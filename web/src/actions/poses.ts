@@ -53,6 +53,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
   return {
     save() {
       if (!store.get().cage) return;
+      edit.settle();
       const { poses, shares } = store.get();
       const pose = { name: freshName(poses), positions: engine().cagePositions() };
       // It is what is shown: its slider leads from here to rest.

@@ -23,6 +23,7 @@ export function createProject(ctx: Context): Project {
       bind: state.bindOptions,
       cage: state.cageOptions,
       symmetry: state.symmetry,
+      ...(state.pins.length > 0 ? { pins: [...state.pins] } : {}),
       ...(state.sample && state.sampleCage ? { sample: state.sample } : {}),
       ...(pose ? { pose } : {}),
     };

@@ -39,12 +39,7 @@ const SLICE_PAUSE_MS = 90;
 /** Half the width holds the model when it is this much smaller. */
 const HALF_ZOOM = 0.6;
 
-export function createView(
-  ctx: Context,
-  prepareCompare: () => Promise<boolean>,
-  dark: MediaQueryList,
-  viewport: () => DOMRect,
-): View {
+export function createView(ctx: Context, prepareCompare: () => Promise<boolean>, dark: MediaQueryList): View {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
   let sliceTimer: ReturnType<typeof setTimeout> | undefined;
@@ -106,7 +101,7 @@ export function createView(
         return;
       }
       if (store.get().scene.compare === on) return;
-      const { width, height } = viewport();
+      const { width, height } = ctx.viewport();
       // Both zooms while there are halves: the pointer's place counts within one of them.
       const zoom = (factor: number) => engine().zoomAt(width / 4, height / 2, factor);
       if (!on) zoom(1 / HALF_ZOOM);
@@ -134,7 +129,7 @@ export function createView(
       engine().setPivot(pivot);
       store.set({ pivot });
     },
-    gizmo: (gizmo) => scene({ gizmo }),
+    gizmo: (gizmo) => scene({ gizmo, pull: false }),
     original(on) {
       if (store.get().scene.original !== on) scene({ original: on });
     },

@@ -344,7 +344,7 @@ export type CageSymmetry = "auto" | "on" | "off";
 /**
  * `CageOptions`.
  */
-export type CageOptions = { vertices: number, margin: number, symmetry: CageSymmetry, voxels: number, shape: Shape, per_component: boolean, };
+export type CageOptions = { vertices: number, detail: number, quads: boolean, margin: number, symmetry: CageSymmetry, voxels: number, shape: Shape, per_component: boolean, };
 /**
  * Corners of a box.
  */
@@ -352,7 +352,11 @@ export type Bounds = { min: [number, number, number], max: [number, number, numb
 /**
  * `CageInfo`.
  */
-export type CageInfo = { vertices: number, edges: number, faces: number, triangles: number, bounds: Bounds, notices: Array<string>, };
+export type CageInfo = { vertices: number, edges: number, faces: number,
+/**
+ * Quads among the faces.
+ */
+quads: number, triangles: number, bounds: Bounds, notices: Array<string>, };
 /**
  * `CageState`.
  */
@@ -407,6 +411,10 @@ export type Settings = { bind?: BindOptions, cage?: CageOptions, sample?: string
  */
 pose?: string,
 /**
+ * Points that pulls leave where they are.
+ */
+pins?: Array<SurfacePoint>,
+/**
  * What was wrong, in whole sentences.
  */
 notices: Array<string>, };
@@ -430,7 +438,11 @@ export type SceneOptions = { theme: Theme, model: boolean, base_wireframe: boole
 /**
  * Colours of weights span 0 to 1, not 0 to the largest.
  */
-weights_to_one: boolean, slice: SliceShown, gizmo: Gizmo, compare: boolean, problems: boolean, };
+weights_to_one: boolean, slice: SliceShown, gizmo: Gizmo,
+/**
+ * The cage steps back: the model itself is pulled.
+ */
+pull: boolean, compare: boolean, problems: boolean, };
 /**
  * Where the camera is.
  */
@@ -447,6 +459,42 @@ yaw: number, pitch: number,
  * From the eye to the target, object units.
  */
 distance: number, parallel: boolean, };
+/**
+ * A point of the model's surface.
+ */
+export type SurfacePoint = { triangle: number,
+/**
+ * Barycentric coordinates in it.
+ */
+bary: [number, number, number], };
+/**
+ * How a point of the model follows the cage.
+ */
+export type Grip = {
+/**
+ * Its weights. `[n_cage]`
+ */
+row: Array<number>,
+/**
+ * The nearest vertex of the model.
+ */
+seed: number, };
+/**
+ * How the model is pulled.
+ */
+export type PullOptions = {
+/**
+ * How far along the surface, over the model's size; null for automatic.
+ */
+reach: number | null,
+/**
+ * The whole model follows.
+ */
+whole: boolean,
+/**
+ * Mirror images stay mirror images.
+ */
+mirrored: boolean, };
 /**
  * How colours of a legend follow each other.
  */
@@ -488,7 +536,7 @@ export type GizmoHandle = "x" | "y" | "z" | "plane_x" | "plane_y" | "plane_z" | 
  */
 export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"closest_point"};
-export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"margin":0.0,"symmetry":"auto","voxels":0,"shape":"follow","per_component":false};
-export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","compare":false,"problems":true};
+export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"detail":0.028,"quads":true,"margin":0.0,"symmetry":"auto","voxels":0,"shape":"follow","per_component":false};
+export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":false,"problems":true};
 /** Least and most of each option that is a number. */
-export const RANGES = { grid: [8, 512], vertices: [12, 400], margin: [0, 0.25], voxels: [8, 128] } as const;
+export const RANGES = { grid: [8, 512], vertices: [8, 400], detail: [0.005, 0.2], margin: [0, 0.25], voxels: [8, 128] } as const;

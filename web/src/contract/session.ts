@@ -10,6 +10,7 @@ import type {
   CageState,
   ErrorName,
   ModelInfo,
+  PullOptions,
   Repair,
   Settings,
   UpAxis,
@@ -18,6 +19,33 @@ import type {
 export interface Pose {
   readonly name: string;
   readonly positions: Float32Array;
+}
+
+/** What is taken hold of, in the pose `start` of the cage, `[n_cage, 3]`. */
+export interface GrabInput {
+  readonly start: Float32Array;
+  /** Weights of the grabs, then of the pins. `[n_grips, n_cage]` */
+  readonly rows: Float64Array;
+  /** The nearest vertex of the model of each. */
+  readonly seeds: Uint32Array;
+  readonly grabs: number;
+  readonly options: PullOptions;
+}
+export interface Grabbed {
+  /** Where the grabs are. `[n_grabs, 3]` */
+  readonly place: Float32Array;
+  /** How much each vertex of the model stays. `[n_vertices]` */
+  readonly stays: Float32Array;
+  /** Over the model's size. */
+  readonly reach: number;
+}
+export interface PullFrame {
+  /** `[n_cage, 3]` */
+  readonly cage: Float32Array;
+  /** Another frame would be the same. */
+  readonly settled: boolean;
+  /** How far grabs and pins are from where they should be, over the model's size. */
+  readonly error: number;
 }
 
 export interface Session {
@@ -73,6 +101,13 @@ export interface Session {
   bindMeanValue(): Job<void>;
   /** Cells and coordinates of one plane of the grid, in the worker; shown with `scene.slice` afterwards. */
   loadSlice(axis: 0 | 1 | 2, position: number, grid: number): Job<void>;
+
+  /** Makes ready to pull the model that is open, in a worker of its own. */
+  preparePull(): Job<null>;
+  /** Takes hold there. */
+  pullGrab(grab: GrabInput): Job<Grabbed>;
+  /** One frame towards targets, `[n_grabs, 3]`. */
+  pullFrame(to: Float32Array): Job<PullFrame>;
 
   /** Asks for a frame; many calls make one. Every change through `engine` asks by itself. */
   draw(): void;

@@ -12,7 +12,7 @@ const NUDGE_FAR = 20;
 const NEXT_ELEMENT: Record<CageElement, CageElement> = { vertex: "edge", edge: "face", face: "vertex" };
 
 export function createCommands(app: App): Record<Command, () => void> {
-  const { store, edit, view, poses, cage, bind, exports } = app;
+  const { store, edit, pull, view, poses, cage, bind, exports } = app;
   const engine = () => app.ctx.session().engine;
   const hasCage = () => store.get().cage !== null;
 
@@ -30,11 +30,14 @@ export function createCommands(app: App): Record<Command, () => void> {
   };
   const axis = (index: 0 | 1 | 2, plane: boolean) => () => edit.constrain(index, plane);
   const nudge = (right: number, up: number) => () => {
-    if (hasCage()) edit.nudge(right, up);
+    if (!hasCage()) return;
+    if (store.get().selected.count === 0 && store.get().scene.pull) pull.nudge(right, up);
+    else edit.nudge(right, up);
   };
   const turn = (way: "undo" | "redo") => () => {
-    if (edit.active()) {
+    if (edit.active() || pull.active()) {
       edit.end(false);
+      pull.end(false);
       return;
     }
     edit.settle();
@@ -63,6 +66,7 @@ export function createCommands(app: App): Record<Command, () => void> {
     keep: () => edit.end(true),
     cancel: () => {
       if (edit.active()) edit.end(false);
+      else if (pull.active()) pull.end(false);
       else if (store.get().boxArmed) store.set({ boxArmed: false });
       else if (store.get().playing) poses.stop();
       else if (store.get().seeOpen) store.set({ seeOpen: false });
@@ -70,7 +74,12 @@ export function createCommands(app: App): Record<Command, () => void> {
     gizmoMove: () => view.gizmo("move"),
     gizmoRotate: () => view.gizmo("rotate"),
     gizmoScale: () => view.gizmo("scale"),
-    toolSelect: () => view.gizmo("none"),
+    toolPull: () => view.scene({ gizmo: "none", pull: true }),
+    toolSelect: () => view.scene({ gizmo: "none", pull: false }),
+    pin: () => {
+      const { x, y } = app.pointer();
+      if (store.get().scene.pull) pull.pin(x, y);
+    },
     symmetry: () => view.symmetry(!store.get().symmetry),
     proportional: () => {
       view.proportional(!store.get().proportionalOn);

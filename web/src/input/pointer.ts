@@ -7,6 +7,8 @@ import { createTouch } from "./touch";
 
 /** Pixels that tell a drag from a click. */
 const SLOP = 4;
+/** A finger that rests so long pins, ms. */
+const LONG_PRESS_MS = 500;
 const MOUSE_RADIUS = 10;
 const TOUCH_RADIUS = 24;
 /** A wheel notch is about 100 units; this makes it a seventh nearer. */
@@ -16,13 +18,15 @@ const PINCH_RATE = 0.01;
 
 type Drag =
   | { kind: "orbit" | "pan" | "zoom" }
-  | { kind: "handle"; started: boolean; vertices: Uint32Array; mode: SelectMode; was: boolean }
+  | { kind: "handle"; started: boolean; vertices: Uint32Array; mode: SelectMode; was: boolean; bare: boolean }
+  | { kind: "pull"; started: boolean }
+  | { kind: "pin" }
   | { kind: "gizmo" }
   | { kind: "box"; mode: SelectMode };
 
 export function attachPointer(stage: Stage, app: App): void {
   const { viewport } = stage;
-  const { store, edit } = app;
+  const { store, edit, pull } = app;
   const engine = () => app.ctx.session().engine;
   const ready = () => store.get().busy === null && store.get().model !== null;
   let drag: Drag | undefined;
@@ -31,6 +35,7 @@ export function attachPointer(stage: Stage, app: App): void {
   let moved = false;
   let pointer: { x: number; y: number } = { x: 0, y: 0 };
   let hoverFrame = 0;
+  let longPress: ReturnType<typeof setTimeout> | undefined;
 
   const place = (event: { clientX: number; clientY: number }) => {
     const box = viewport.getBoundingClientRect();
@@ -40,8 +45,13 @@ export function attachPointer(stage: Stage, app: App): void {
 
   const press = (event: PointerEvent, at: { x: number; y: number }): Drag => {
     const mod = event.ctrlKey || event.metaKey;
-    if (event.altKey) return { kind: event.button === 0 ? "orbit" : event.button === 1 ? "pan" : "zoom" };
+    if (event.altKey && event.button !== 0) return { kind: event.button === 1 ? "pan" : "zoom" };
     if (event.button !== 0) return { kind: "pan" };
+    if (event.altKey) {
+      const vertices =
+        store.get().cage && store.get().scene.cage ? engine().pick(at.x, at.y, MOUSE_RADIUS) : [];
+      if (vertices.length === 0) return { kind: "orbit" };
+    }
     if (store.get().boxArmed)
       return {
         kind: "box",
@@ -52,14 +62,27 @@ export function attachPointer(stage: Stage, app: App): void {
       const isOnVertex = engine().pick(at.x, at.y, MOUSE_RADIUS).length > 0;
       const handle = engine().gizmoAt(at.x, at.y, isOnVertex ? MOUSE_RADIUS : radiusOf(event));
       if (handle !== undefined && edit.beginGizmo(handle, at.x, at.y)) return { kind: "gizmo" };
-      const vertices = engine().pick(at.x, at.y, radiusOf(event));
+      // On the model a finger takes the model, unless a handle is just there.
+      const isOnModel = store.get().scene.pull && pull.hover(at.x, at.y);
+      const vertices = engine().pick(at.x, at.y, isOnModel ? MOUSE_RADIUS : radiusOf(event));
       if (vertices.length > 0) {
         const selected = new Set(engine().selection());
         const was = vertices.every((vertex) => selected.has(vertex));
         const mode: SelectMode =
           event.shiftKey || store.get().additive ? "toggle" : mod ? "remove" : "replace";
-        return { kind: "handle", started: false, vertices, mode, was };
+        return { kind: "handle", started: false, vertices, mode, was, bare: event.altKey };
       }
+    }
+    if (!mod && store.get().scene.pull && pull.hover(at.x, at.y)) {
+      if (event.shiftKey) return { kind: "pin" };
+      if (event.pointerType === "touch") {
+        longPress = setTimeout(() => {
+          if (drag?.kind !== "pull" || moved) return;
+          drag = undefined;
+          pull.pin(start.x, start.y);
+        }, LONG_PRESS_MS);
+      }
+      return { kind: "pull", started: false };
     }
     if (mod) return { kind: "box", mode: event.shiftKey ? "add" : "replace" };
     return { kind: event.shiftKey ? "pan" : "orbit" };
@@ -91,13 +114,40 @@ export function attachPointer(stage: Stage, app: App): void {
           if (!drag.was || drag.mode === "replace") {
             if (!drag.was) engine().select(drag.vertices, drag.mode === "toggle" ? "add" : "replace");
           }
+          const [vertex = 0] = drag.vertices;
+          const { scene, proportionalOn, symmetry } = store.get();
+          const isOne = drag.vertices.length === 1 && engine().selection().length === 1;
+          // A handle is pulled as the model is, where nobody asked for something else.
+          if (scene.pull && isOne && !drag.bare && !proportionalOn && !symmetry) {
+            edit.sync();
+            if (pull.beginCage(vertex, start.x, start.y)) {
+              drag = { kind: "pull", started: true };
+              pull.drag(at.x, at.y);
+              break;
+            }
+          }
           drag.started = edit.begin("grab", start.x, start.y);
         }
         if (drag.started) edit.drag(at.x, at.y);
         break;
+      case "pull":
+        clearTimeout(longPress);
+        drag.started ||= pull.begin(start.x, start.y);
+        if (drag.started) pull.drag(at.x, at.y);
+        break;
+      case "pin":
+        engine().pan(dx, dy);
+        break;
       default:
         drag satisfies never;
     }
+  };
+
+  /** A click beside everything. */
+  const selectNothing = () => {
+    if (!store.get().cage) return;
+    engine().select(new Uint32Array(), "replace");
+    edit.sync();
   };
 
   const release = (at: { x: number; y: number }, keep: boolean) => {
@@ -115,6 +165,14 @@ export function attachPointer(stage: Stage, app: App): void {
           edit.sync();
         }
         break;
+      case "pull":
+        clearTimeout(longPress);
+        if (ended.started) pull.end(keep);
+        else if (keep) selectNothing();
+        break;
+      case "pin":
+        if (keep && !moved) pull.pin(start.x, start.y);
+        break;
       case "box": {
         stage.band(null);
         store.set({ boxArmed: false });
@@ -125,11 +183,7 @@ export function attachPointer(stage: Stage, app: App): void {
         break;
       }
       case "orbit":
-        // A click beside everything selects nothing.
-        if (keep && !moved && store.get().cage) {
-          engine().select(new Uint32Array(), "replace");
-          edit.sync();
-        }
+        if (keep && !moved) selectNothing();
         break;
       case "pan":
       case "zoom":
@@ -182,7 +236,10 @@ export function attachPointer(stage: Stage, app: App): void {
         if (!drag && ready() && store.get().cage) {
           const under = engine().pick(pointer.x, pointer.y, MOUSE_RADIUS);
           engine().hover(under);
-          viewport.toggleAttribute("data-over", under.length > 0);
+          const isOver = under.length > 0;
+          const { pull: canPull } = store.get().scene;
+          const isHeld = !isOver && canPull && !event.altKey && pull.hover(pointer.x, pointer.y);
+          viewport.toggleAttribute("data-over", isOver || isHeld);
         }
       });
     }
@@ -204,6 +261,10 @@ export function attachPointer(stage: Stage, app: App): void {
       event.preventDefault();
       if (!ready()) return;
       const step = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? event.deltaY * 33 : event.deltaY;
+      if (pull.active()) {
+        pull.reach(Math.exp(-step * WHEEL_RATE));
+        return;
+      }
       if (edit.active() && store.get().proportionalOn) {
         app.view.proportional(true, store.get().proportional * Math.exp(-step * WHEEL_RATE));
         edit.drag(pointer.x, pointer.y);

@@ -37,12 +37,14 @@ const TABLE = {
   gizmoMove: { keys: ["w"], label: "Gizmo to move", group: "Move" },
   gizmoRotate: { keys: ["e"], label: "Gizmo to rotate", group: "Move" },
   gizmoScale: { keys: ["t"], label: "Gizmo to scale", group: "Move" },
-  toolSelect: { keys: ["q"], label: "No gizmo: select and drag", group: "Move" },
+  toolPull: { keys: ["q"], label: "Pull the model", group: "Move" },
+  pin: { keys: ["p"], label: "Pin the point under the pointer, or free it", group: "Move" },
+  toolSelect: { keys: ["shift+q"], label: "Only the cage: select and drag", group: "Move" },
   symmetry: { keys: ["m"], label: "Mirror across X", group: "Move" },
   proportional: { keys: ["o"], label: "Proportional editing; wheel: how far", group: "Move" },
   nudgeLeft: {
     keys: ["arrowleft"],
-    label: "Nudge; with Shift ten times as far",
+    label: "Nudge the selection, or pull the point; with Shift ten times as far",
     group: "Move",
     shown: ["arrowleft", "arrowup", "arrowdown", "arrowright"],
   },
@@ -92,7 +94,7 @@ const TABLE = {
   },
 
   savePose: { keys: ["shift+p"], label: "Save this pose", group: "Poses" },
-  play: { keys: ["p"], label: "Play the poses, or stop", group: "Poses" },
+  play: { keys: ["j"], label: "Play the poses, or stop", group: "Poses" },
   resetPose: { keys: ["alt+g"], label: "Back to the rest pose", group: "Poses" },
 
   open: { keys: ["mod+o"], label: "Open a file", group: "File" },

@@ -7,8 +7,11 @@ import type {
   CageOptions,
   Check,
   CheckedCage,
+  Grabbed,
+  GrabInput,
   NamedFile,
   Progress,
+  PullFrame,
   Reading,
   Repair,
   UpAxis,
@@ -92,6 +95,14 @@ export interface Jobs {
     step: never;
     output: Float32Array;
   };
+  /** Makes ready to pull a model; what was being pulled is dropped. */
+  pullOpen: {
+    input: { positions: Float32Array; triangles: Uint32Array; cage: CageArrays };
+    step: never;
+    output: null;
+  };
+  pullGrab: { input: GrabInput; step: never; output: Grabbed };
+  pullFrame: { input: { to: Float32Array }; step: never; output: PullFrame };
   sample: { input: { id: string }; step: never; output: SampleArrays };
 }
 

@@ -1,6 +1,6 @@
 /** The worker: runs what takes longer than a frame, one job after the other. */
 
-import type { Binder, Bound } from "../pkg/cagework";
+import type { Binder, Bound, Puller } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import type { BoundArrays, FromWorker, JobKind, Jobs, Step, ToWorker } from "./messages";
 import { check, checked, readCage, readModel } from "./reading";
@@ -70,6 +70,11 @@ type Work = {
 
 function createWork(pkg: Package): Work {
   let shared: Binder | undefined;
+  let puller: Puller | undefined;
+  const opened = (): Puller => {
+    if (!puller) throw new Error("nothing is ready to be pulled: bind the model again");
+    return puller;
+  };
   const binder = async (needsGpu: boolean): Promise<Binder> => {
     shared ??= new pkg.Binder();
     if (needsGpu) await shared.openGpu();
@@ -100,6 +105,21 @@ function createWork(pkg: Package): Work {
     },
     carry: async ({ model, cage, old, poses }) =>
       pkg.Binder.carryPoses(model, cage, old.positions, old.corners, poses),
+    async pullOpen({ positions, triangles, cage }) {
+      puller?.free();
+      puller = undefined;
+      puller = new pkg.Puller(positions, triangles, cage.positions, cage.corners);
+      return null;
+    },
+    async pullGrab({ start, rows, seeds, grabs, options }) {
+      const by = opened();
+      const place = by.grab(start, rows, seeds, grabs, options);
+      return { place, stays: by.stays(), reach: by.reach };
+    },
+    async pullFrame({ to }) {
+      const by = opened();
+      return { cage: by.frame(to), settled: by.settled, error: by.error };
+    },
     async sample({ id }) {
       const sample = pkg.Binder.buildSample(id);
       const poses = sample.poseNames.map((name, k) => ({ name, positions: sample.posePositions(k) }));

@@ -73,6 +73,12 @@ export function CagePanel({ app }: { app: App }) {
   );
 }
 
+/** The slider of detail goes from coarse to fine, by factors: 0 is four times the usual distance, 1 a quarter of it. */
+const COARSE_DETAIL = 0.112;
+const FINER = 16;
+const detailOf = (fineness: number) => COARSE_DETAIL * FINER ** -fineness;
+const finenessOf = (detail: number) => Math.log(COARSE_DETAIL / detail) / Math.log(FINER);
+
 /** How a cage is made for the model. */
 function Automatic({ app }: { app: App }) {
   const { cageOptions: options } = app.store.get();
@@ -88,6 +94,21 @@ function Automatic({ app }: { app: App }) {
         format={count}
         value={options.vertices}
         onInput={(vertices) => change({ vertices })}
+      />
+      <Slider
+        label={T.cage.detail}
+        min={0}
+        max={1}
+        step={0.05}
+        format={() => T.cage.ofSize(percent(options.detail, 1))}
+        value={finenessOf(options.detail)}
+        onInput={(fineness) => change({ detail: detailOf(fineness) })}
+      />
+      <Toggle
+        label={T.cage.quads}
+        sentence={T.cage.quadsSentence}
+        on={options.quads}
+        onChange={(on) => change({ quads: on })}
       />
       <Segments<CageOptions["symmetry"]>
         label={T.cage.symmetry}
@@ -190,6 +211,7 @@ function CageCard({ cage, check }: { cage: CageState; check: Check | null }) {
       </div>
       <Facts
         rows={[
+          [T.cage.ofQuads, percent(cage.info.quads / Math.max(cage.info.faces, 1))],
           [T.cage.edges, count(cage.info.edges)],
           [T.cage.faces, count(cage.info.faces)],
         ]}

@@ -14,13 +14,34 @@ export function PosePanel({ app }: { app: App }) {
   return (
     <div class="stack loose">
       <Head title={T.pose.title} sentence={T.pose.sentence} />
-      <Selection app={app} />
+      <Section title={T.pull.title}>
+        <PullOptions app={app} />
+      </Section>
+      <Section title={T.pose.cage}>
+        <Selection app={app} />
+      </Section>
       <Section title={T.pose.help}>
         <Help app={app} />
       </Section>
       <Section title={T.pose.poses}>
         <Poses app={app} />
       </Section>
+    </div>
+  );
+}
+
+function PullOptions({ app }: { app: App }) {
+  const { pins, pullWhole } = app.store.get();
+  return (
+    <div class="stack">
+      <p class="hint">{T.pull.sentence(app.key("pin"))}</p>
+      <Toggle label={T.pull.whole} sentence={T.pull.wholeSentence} on={pullWhole} onChange={app.pull.whole} />
+      {pins.length > 0 && (
+        <div class="row">
+          <span class="grow">{T.pull.pins(pins.length)}</span>
+          <Button label={T.pull.unpinAll} onClick={app.pull.unpinAll} kind="small" />
+        </div>
+      )}
     </div>
   );
 }

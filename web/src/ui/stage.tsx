@@ -67,8 +67,7 @@ function Encloses({ app }: { app: App }) {
   );
 }
 
-const GIZMOS: readonly (readonly [SceneOptions["gizmo"], IconName, Command])[] = [
-  ["none", "select", "toolSelect"],
+const GIZMOS: readonly (readonly [Exclude<SceneOptions["gizmo"], "none">, IconName, Command])[] = [
   ["move", "move", "gizmoMove"],
   ["rotate", "rotate", "gizmoRotate"],
   ["scale", "scale", "gizmoScale"],
@@ -88,6 +87,8 @@ function Tools({ app }: { app: App }) {
   );
   return (
     <div class="floating tools" role="toolbar" aria-label={T.view.tools} aria-orientation="vertical">
+      {command("pull", T.pull.tool, "toolPull", scene.pull)}
+      {command("select", T.view.gizmos.none, "toolSelect", !scene.pull && scene.gizmo === "none")}
       {GIZMOS.map(([gizmo, icon, key]) => (
         <IconButton
           key={gizmo}

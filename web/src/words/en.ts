@@ -26,6 +26,7 @@ export const EN = {
     start: "Cagework did not start",
     bind: "The bind did not finish",
     slice: "The slice could not be computed",
+    pull: "The model cannot be pulled",
     carry: "The poses could not be carried over",
     meanValue: "Mean value coordinates could not be computed",
     check: "The cage could not be checked",
@@ -171,7 +172,7 @@ export const EN = {
   model: {
     title: "Choose a model",
     sentence:
-      "A cage is a lattice that fits the shape of a model. What you see is already bound to its own: drag a round handle. Or drop a file anywhere on this page.",
+      "A cage is a lattice that fits the shape of a model. What you see is already bound to its own: pull it anywhere, and the cage moves along. Or drop a file on this page.",
     drop: "Drop a model here",
     kinds: ".glb, .gltf with its files, or .obj; a folder works too",
     openFolder: "Open a folder",
@@ -193,10 +194,10 @@ export const EN = {
     animations: (n: number) => plural(n, "animation"),
     morphTargets: (n: number) => plural(n, "morph target"),
     tips: {
-      rat: "The paper's rat. Drag its tail, or turn its head: the feet stay.",
-      humanoid: "Lift one knee: the other leg, a hand's breadth away, stays.",
-      clamp: "Open the jaw, then compare with mean value coordinates.",
-      strider: "Legs as thin as a grid cell. Bend one, the others keep still.",
+      rat: "The paper's rat. Take it by the nose and turn its head: the feet stay.",
+      humanoid: "Take a knee and lift it: the other leg, a hand's breadth away, stays.",
+      clamp: "Pull the lower jaw open, then compare with mean value coordinates.",
+      strider: "Legs as thin as a grid cell. Take one by the foot: the others keep still.",
     } as Record<string, string>,
   },
   opening: {
@@ -270,7 +271,11 @@ export const EN = {
       box: "A box around the model, its sides cut into squares: free-form deformation, good for studying.",
       file: "A closed mesh that you modelled around it: .obj, .glb or .gltf.",
     },
-    wanted: "Vertices wanted",
+    wanted: "Vertices, at most",
+    detail: "Distance from the shape",
+    quads: "Quads",
+    quadsSentence: "Four-sided faces where two triangles make a good one.",
+    ofQuads: "Quads",
     margin: "Room around the model",
     tight: "as tight as it can be",
     ofSize: (share: string) => `${share} of its size`,
@@ -441,7 +446,8 @@ export const EN = {
 
   pose: {
     title: "Pose it",
-    sentence: "Drag the round handles of the cage. The model follows in the same frame.",
+    sentence: "Take the model by the hand, or drag the handles of its cage.",
+    cage: "The cage",
     none: "Nothing selected. Click a handle in the view, or press ] to go from one to the next.",
     vertex: (i: number) => `Vertex ${i} of the cage`,
     vertexAtRest: (i: number) => `Vertex ${i} of the cage at rest`,
@@ -487,9 +493,24 @@ export const EN = {
     saveFirst: "Save a pose first; then it can be played.",
     selectFirst: "Select something first: click a handle of the cage, or press A for all.",
   },
+  pull: {
+    title: "Pull the model",
+    tool: "Pull the model: take it by the hand",
+    sentence: (pin: string) =>
+      `Drag any point of the model. Parts in grey stay; the wheel sets how far the pull reaches. Shift-click, a long press or ${pin} pins a point.`,
+    whole: "The whole model follows",
+    wholeSentence: "Nothing stays but the pins: good for turning a body with its feet pinned.",
+    pins: (n: number) => `${plural(n, "pin")} on the model`,
+    unpinAll: "Take all pins away",
+    pulling: "Pulling; Esc puts it back",
+    nothingThere: "There is no model in the middle of the view: point at it and press an arrow key again.",
+  },
   /** Steps of the history. */
   did: {
     carry: "Carry the poses over",
+    pull: "Pull",
+    pin: "Pin",
+    unpin: "Take pins away",
     grab: "Move",
     rotate: "Rotate",
     scale: "Scale",
@@ -637,8 +658,8 @@ export const EN = {
     rest: "Drag a handle to reshape the cage; the model stays still. Tab goes back to posing.",
     binding: "The model is being bound: posing waits until it is.",
     unbound: "Bind the model, then it follows its cage.",
-    touch: "Drag a handle to pose. One finger turns, two move and zoom.",
-    pose: "Drag a handle to pose · drag beside it to turn · right-drag to move · scroll to zoom · ? for keys",
+    touch: "Pull the model with a finger. Beside it one finger turns, two move and zoom.",
+    pose: "Pull the model, or drag a handle · drag beside it to turn · right-drag to move · scroll to zoom · ? for keys",
   },
   toast: { close: "Close message" },
   eta: {

@@ -28,26 +28,10 @@ afterEach(() => {
 function page() {
   const fake = createFake();
   const project = createProject(fake.ctx);
-  const exports = createExports(fake.ctx, project, () => new DOMRectStub(800, 600));
+  const exports = createExports(fake.ctx, project);
   const { positions, corners } = cageOf(2);
   fake.store.set({ model: MODEL, cage: fake.engine.setCage(positions, corners) });
   return { ...fake, exports, project };
-}
-
-class DOMRectStub implements DOMRect {
-  readonly x = 0;
-  readonly y = 0;
-  readonly top = 0;
-  readonly left = 0;
-  readonly right = 0;
-  readonly bottom = 0;
-  constructor(
-    readonly width: number,
-    readonly height: number,
-  ) {}
-  toJSON(): string {
-    return "";
-  }
 }
 
 it("each file has the model's name, and its size is said", async () => {

@@ -22,7 +22,12 @@ function page() {
     },
   };
   const edit = { active: () => state.isActive, sync: () => (count.looks += 1) };
-  followCage(fake.ctx, bind, edit, { refresh: () => undefined });
+  followCage(fake.ctx, {
+    bind,
+    edit,
+    view: { refresh: () => undefined },
+    pull: { prepare: () => undefined },
+  });
   const change = () => {
     const { positions, corners } = cageOf(2);
     fake.store.set({ cage: fake.engine.setCage(positions, corners) });

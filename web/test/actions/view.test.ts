@@ -17,8 +17,7 @@ function page(canCompare = true) {
   const scenes: SceneOptions[] = [];
   const zooms: number[] = [];
   fake.teach({ setScene: (scene) => scenes.push(scene), zoomAt: (_x, _y, factor) => zooms.push(factor) });
-  const rectangle = () => ({ width: 400, height: 300 }) as DOMRect;
-  const view = createView(fake.ctx, async () => canCompare, dark, rectangle);
+  const view = createView(fake.ctx, async () => canCompare, dark);
   const { positions, corners } = cageOf(8);
   fake.store.set({ cage: fake.engine.setCage(positions, corners) });
   return { ...fake, view, scenes, zooms };

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use cagework_core::cage_check::Repair;
-use cagework_core::cage_gen::{CageOptions, MAX_TARGET, MIN_TARGET, Shape, Symmetry};
+use cagework_core::cage_gen::{CageOptions, DETAIL, MAX_TARGET, MIN_TARGET, Shape, Symmetry};
 use clap::{Args, ValueEnum};
 
 use super::{MemoryArgs, ModelOutput, ReadArgs, fraction, positive};
@@ -38,9 +38,15 @@ pub(crate) struct CageArgs {
     /// [default: auto; box if --divisions is given].
     #[arg(long, value_enum)]
     pub(crate) kind: Option<KindArg>,
-    /// Vertices that the cage should have, 12 to 400 [default: 80; 24 for a hull].
+    /// Most vertices of the cage, 8 to 400: a shape that needs fewer gets fewer [default: 80; 24 for a hull].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(i64::from(MIN_TARGET)..=i64::from(MAX_TARGET)))]
     pub(crate) vertices: Option<u32>,
+    /// How far the cage may be from the model's shape, as a fraction of its longest side, 0.005 to 0.2.
+    #[arg(long, default_value_t = CageOptions::default().detail, value_name = "FRACTION", value_parser = super::number::<f32>(DETAIL))]
+    pub(crate) detail: f32,
+    /// Triangles only, no quads.
+    #[arg(long)]
+    pub(crate) triangles: bool,
     /// Make the cage its own mirror image: if the model is (auto), never, or along an axis in any case.
     #[arg(long, default_value_t, value_parser = super::words::<Symmetry>())]
     pub(crate) symmetry: Symmetry,
@@ -73,6 +79,8 @@ impl CageArgs {
         let hull = self.kind() == KindArg::Hull;
         CageOptions {
             target: self.vertices.unwrap_or(if hull { DEFAULT_HULL } else { DEFAULT_TARGET }),
+            detail: self.detail,
+            quads: !self.triangles,
             shape: if hull { Shape::Hull } else { Shape::Follow },
             symmetry: self.symmetry,
             per_component: self.per_component,

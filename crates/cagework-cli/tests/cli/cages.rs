@@ -26,7 +26,7 @@ fn kinds_of_cages_can_be_named_wherever_a_cage_is() {
         assert_eq!(bound["outside_vertices"], 0, "{name}");
         sandbox.run("check c.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
     }
-    for (name, word) in [("auto:5", "from 12 to 400"), ("hull:x", "whole number"), ("box:99", "from 1 to 16")]
+    for (name, word) in [("auto:5", "from 8 to 400"), ("hull:x", "whole number"), ("box:99", "from 1 to 16")]
     {
         sandbox.run(&format!("bind mesh.obj --cage {name}")).code(2).stderr(contains(word));
     }

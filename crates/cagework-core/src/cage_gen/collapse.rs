@@ -62,6 +62,10 @@ impl Ord for Waiting {
 pub(super) struct Collapser<'g, 'a> {
     pub(super) surface: &'g mut Guarded<'a>,
     pub(super) quadrics: Vec<Quadric>,
+    /// The same of planes alone: how far a vertex is from the hull that it stands for.
+    planes: Vec<Quadric>,
+    /// Most of that, voxels; none for as far as need be.
+    pub(super) budget: Option<f64>,
     version: Vec<u32>,
     heap: BinaryHeap<Waiting>,
     /// Vertices of the whole surface, both halves.
@@ -91,12 +95,15 @@ impl<'g, 'a> Collapser<'g, 'a> {
     pub(super) fn new(surface: &'g mut Guarded<'a>) -> Self {
         let n = surface.positions.len();
         let mut quadrics = vec![Quadric::default(); n];
+        let mut planes = quadrics.clone();
         for t in 0..surface.triangles.len() as u32 {
             let corners = surface.corners(t);
             let normal = corners.normal();
             for (&i, &p) in corners.index.iter().zip(&corners.at) {
                 let quadric = &mut quadrics[i as usize];
                 *quadric = quadric.plus(&Quadric::of_corner(p, normal));
+                let plane = &mut planes[i as usize];
+                *plane = plane.plus(&Quadric::of_plane(p, normal));
             }
         }
         let on_mirror = surface.on_mirror.iter().filter(|&&on| on).count();
@@ -104,6 +111,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         Self {
             surface,
             quadrics,
+            planes,
+            budget: None,
             version: vec![0; n],
             heap: BinaryHeap::new(),
             count,
@@ -155,6 +164,9 @@ impl<'g, 'a> Collapser<'g, 'a> {
                 go_on((before - self.count) as f32 / (before - target) as f32)?;
             }
             let Some((at, cost)) = self.place_of(a, b) else { continue };
+            if self.is_over_budget(a, b, at) {
+                continue;
+            }
             let next = self.heap.peek().map_or(f64::INFINITY, |next| next.cost);
             if cost > MAX_COST_RATIO * waiting.cost + 1e-9 && cost > next {
                 self.heap.push(Waiting { cost, ..waiting });
@@ -320,8 +332,15 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.surface.may_stand(new, gone)
     }
 
+    /// Whether a vertex there would be farther from the hull than may be: root mean square to the planes, by area.
+    fn is_over_budget(&self, a: u32, b: u32, at: DVec3) -> bool {
+        let planes = self.planes[a as usize].plus(&self.planes[b as usize]);
+        self.budget.is_some_and(|budget| (planes.at(at) / planes.area.max(1e-12)).sqrt() > budget)
+    }
+
     fn collapse(&mut self, a: u32, b: u32, at: DVec3) {
         let (kept, gone) = self.ordered(a, b);
+        self.planes[kept as usize] = self.planes[a as usize].plus(&self.planes[b as usize]);
         let (axis, both) = (self.surface.mirror, self.surface.on_mirror[gone as usize]);
         self.count -= if axis.is_some() && !both { 2 } else { 1 };
         self.surface.merge(kept, gone, at);

@@ -16,7 +16,9 @@ pub(crate) mod footprint;
 mod guarded;
 mod lattice;
 mod options;
+mod pairing;
 mod quadric;
+mod quads;
 mod relax;
 mod shell;
 mod subdivided_box;
@@ -33,12 +35,13 @@ use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
 use collapse::Collapser;
 use guarded::Guarded;
 pub use options::{
-    CLEARANCE, CageGenError, CageOptions, CageReport, GeneratedCage, MAX_CLEARANCE, MAX_TARGET, MAX_VOXELS,
-    MIN_TARGET, MIN_VOXELS, Mirror, Shape, Symmetry, TARGET, VOXELS,
+    CLEARANCE, CageGenError, CageOptions, CageReport, DETAIL, DETAILS, GeneratedCage, MAX_CLEARANCE,
+    MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Mirror, Shape, Symmetry, TARGET, VOXELS,
 };
+use quads::Faces;
 use shell::Shell;
 pub use subdivided_box::subdivided_box;
-use verify::verified;
+use verify::{verified, verified_faces};
 
 /// Most lattices that are tried until the target is met.
 const MAX_LATTICES: usize = 4;
@@ -49,6 +52,12 @@ const MAX_TARGET_RATIO: f64 = 1.1;
 /// Layers of voxels around the hull in which the cage must stay, tried one after the other until the target is met:
 /// as far as possible it spans no gap. At last anywhere.
 const BAND_LAYERS: [Option<usize>; 5] = [Some(1), Some(2), Some(3), Some(5), None];
+
+/// Of these, those in which a cage takes the shape that the budget allows.
+const NARROW_BANDS: usize = 3;
+
+/// Rounds in which quads that break the promise become triangles again.
+const MAX_SPLITS: usize = 4;
 
 /// Makes a cage that encloses a model strictly.
 ///
@@ -80,11 +89,12 @@ pub fn generate(
             go_on(Stage::Voxelize, 0.4 * share)
         })?;
         let n_hull = shell.hull.n_whole();
-        let (cage, hull) = simplified(&shell, target, &|share| go_on(Stage::Simplify, 0.4 + 0.6 * share))?;
+        let (cage, hull) = simplified(&shell, options, &|share| go_on(Stage::Simplify, 0.4 + 0.6 * share))?;
         let report = CageReport {
             target: options.target,
             vertices: cage.n_vertices() as u32,
             faces: cage.faces().len() as u32,
+            quads: cage.faces().iter().filter(|face| face.len() == 4).count() as u32,
             target_met: cage.n_vertices() as f64 <= MAX_TARGET_RATIO * target as f64,
             voxels: voxels as u32,
             voxel_size: shell.lattice.cell as f32,
@@ -121,31 +131,40 @@ fn first_voxels(target: usize) -> usize {
     ((4.0 * (target as f64).sqrt()).round() as usize).clamp(MIN_VOXELS, MAX_VOXELS)
 }
 
-/// The verified cage with as few vertices as possible from `target` on, and whether it is the hull itself.
+/// The verified cage: as few vertices as its shape needs and at most as many as asked for, if that can be; and whether it is
+/// the hull itself.
 fn simplified(
     shell: &Shell,
-    target: usize,
+    options: &CageOptions,
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
 ) -> Result<(Cage, bool), CageGenError> {
     let n_hull = shell.hull.n_whole();
-    let mut aim = target;
-    while aim < n_hull {
+    let mut target = options.target as usize;
+    // The lattice may be coarser than the first one: the budget is the model's, not the lattice's.
+    let mut budget = Some(f64::from(options.detail) * shell.longest / shell.lattice.cell);
+    while target < n_hull {
         let mut guarded = Guarded::new(shell.hull.clone(), &shell.obstacle);
         let mut collapser = Collapser::new(&mut guarded);
         let mut left = n_hull;
-        for (k, layers) in BAND_LAYERS.iter().enumerate() {
-            collapser.surface.set_band(layers.map(|layers| shell.band(layers)));
-            let from = 0.7 * k as f32 / BAND_LAYERS.len() as f32;
-            left = collapser.run(aim, &|share| go_on(from + 0.7 * share / BAND_LAYERS.len() as f32))?;
-            if left <= aim {
-                break;
+        // First as far as the budget goes, in narrow bands; then on to the count, in any.
+        let narrow = BAND_LAYERS[..NARROW_BANDS].iter().map(|&layers| (layers, budget, MIN_TARGET as usize));
+        let wide = BAND_LAYERS.iter().map(|&layers| (layers, None, target));
+        let n_passes = (NARROW_BANDS + BAND_LAYERS.len()) as f32;
+        for (k, (layers, budget, aim)) in narrow.chain(wide).enumerate() {
+            if left <= aim || (budget.is_none() && left <= target) {
+                continue;
             }
+            collapser.surface.set_band(layers.map(|layers| shell.band(layers)));
+            collapser.budget = budget;
+            let from = 0.6 * k as f32 / n_passes;
+            left = collapser.run(aim, &|share| go_on(from + 0.6 * share / n_passes))?;
         }
         let quadrics = collapser.quadrics;
-        if let Some(cage) = relaxed(shell, guarded, &quadrics, go_on)? {
+        if let Some(cage) = relaxed(shell, guarded, &quadrics, options.quads, go_on)? {
             return Ok((cage, false));
         }
-        aim = left.max(aim) * 2;
+        target = left.max(target) * 2;
+        budget = budget.map(|budget| 0.5 * budget);
     }
     for surface in [&shell.hull, &shell.stairs] {
         if let Some(cage) = verified(shell, surface) {
@@ -155,16 +174,29 @@ fn simplified(
     Err(CageGenError::Unresolved)
 }
 
-/// The cage of a collapsed surface, relaxed if it then still keeps the promise.
+/// The cage of a collapsed surface, relaxed and of quads as far as it then still keeps the promise.
 fn relaxed(
     shell: &Shell,
     mut guarded: Guarded<'_>,
     quadrics: &[quadric::Quadric],
+    of_quads: bool,
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
 ) -> Result<Option<Cage>, Cancelled> {
-    let before = guarded.surface();
-    relax::relax(&mut guarded, quadrics, &|share| go_on(0.7 + 0.3 * share))?;
-    Ok(verified(shell, &guarded.surface()).or_else(|| verified(shell, &before)))
+    let collapsed = guarded.surface();
+    relax::relax(&mut guarded, quadrics, &|share| go_on(0.6 + 0.2 * share))?;
+    let triangles = guarded.surface();
+    if of_quads {
+        let mut pairing = quads::quads(&mut guarded, quadrics, &|share| go_on(0.8 + 0.2 * share))?;
+        for _ in 0..MAX_SPLITS {
+            let Faces { positions, faces, first } = quads::faces(&guarded, &pairing);
+            match verified_faces(shell, &positions, faces) {
+                Ok(cage) => return Ok(Some(cage)),
+                Err(wrong) if wrong.is_empty() => break,
+                Err(wrong) => wrong.iter().for_each(|&face| pairing.part(first[face as usize])),
+            }
+        }
+    }
+    Ok(verified(shell, &triangles).or_else(|| verified(shell, &collapsed)))
 }
 
 /// Closed parts of a cage.

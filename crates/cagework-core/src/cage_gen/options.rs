@@ -9,7 +9,7 @@ use crate::options::{Number, OutOfRange, choice};
 use crate::progress::Cancelled;
 
 /// Fewest vertices that can be asked for.
-pub const MIN_TARGET: u32 = 12;
+pub const MIN_TARGET: u32 = 8;
 /// Most vertices that can be asked for.
 pub const MAX_TARGET: u32 = 400;
 /// Coarsest and finest lattice.
@@ -21,8 +21,16 @@ pub const MAX_CLEARANCE: f32 = 0.25;
 /// Range of [`CageOptions::target`].
 pub const TARGET: Number = Number {
     name: "target",
-    allowed: "a whole number from 12 to 400",
+    allowed: "a whole number from 8 to 400",
     is_allowed: |n| n.fract() == 0.0 && (f64::from(MIN_TARGET)..=f64::from(MAX_TARGET)).contains(&n),
+};
+/// Finest and coarsest detail.
+pub const DETAILS: [f32; 2] = [0.005, 0.2];
+/// Range of [`CageOptions::detail`].
+pub const DETAIL: Number = Number {
+    name: "detail",
+    allowed: "a fraction of the longest side from 0.005 to 0.2",
+    is_allowed: |part| (f64::from(DETAILS[0])..=f64::from(DETAILS[1])).contains(&part),
 };
 /// Range of [`CageOptions::clearance`].
 pub const CLEARANCE: Number = Number {
@@ -86,8 +94,13 @@ impl Mirror {
 /// Options of [`super::generate`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CageOptions {
-    /// Vertices that the cage should have, 12 to 400. Default 80.
+    /// Vertices that the cage may have, 8 to 400. Default 80.
     pub target: u32,
+    /// How far the cage may be from what it follows, root mean square, as a fraction of the model's longest side, 0.005 to 0.2:
+    /// a shape that needs fewer vertices for it gets fewer. Default 0.028, a voxel of 36.
+    pub detail: f32,
+    /// Quads where two triangles make a good one. Default true.
+    pub quads: bool,
     /// Default follow.
     pub shape: Shape,
     /// Default auto.
@@ -107,6 +120,8 @@ impl Default for CageOptions {
     fn default() -> Self {
         Self {
             target: 80,
+            detail: 0.028,
+            quads: true,
             shape: Shape::default(),
             symmetry: Symmetry::default(),
             per_component: false,
@@ -123,6 +138,7 @@ impl CageOptions {
     /// [`OutOfRange`] names the first that is wrong.
     pub fn check(&self) -> Result<(), OutOfRange> {
         TARGET.check(self.target)?;
+        DETAIL.check(self.detail)?;
         CLEARANCE.check(self.clearance)?;
         VOXELS.check(self.voxels)
     }
@@ -131,7 +147,7 @@ impl CageOptions {
 /// A cage and how it came about.
 #[derive(Clone, Debug)]
 pub struct GeneratedCage {
-    /// The verified cage; its faces are triangles.
+    /// The verified cage; its faces are triangles and quads.
     pub cage: Cage,
     /// What was done.
     pub report: CageReport,
@@ -140,12 +156,14 @@ pub struct GeneratedCage {
 /// How a cage was made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CageReport {
-    /// Vertices asked for.
+    /// Most vertices asked for.
     pub target: u32,
     /// Vertices it has.
     pub vertices: u32,
-    /// Triangles it has.
+    /// Faces it has.
     pub faces: u32,
+    /// Quads among them.
+    pub quads: u32,
     /// Whether it has at most a tenth more vertices than asked for; if not, the model's holes and gaps need them.
     pub target_met: bool,
     /// Voxels along the model's longest side.

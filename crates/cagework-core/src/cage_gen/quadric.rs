@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 const POINT_WEIGHT: f64 = 0.004;
 
 /// `p . a p - 2 b . p + c`: squared distances weighted by area, voxel units.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Quadric {
     a: DMat3,
     b: DVec3,
@@ -17,9 +17,25 @@ pub(super) struct Quadric {
     pub(super) area: f64,
 }
 
+impl Default for Quadric {
+    /// Of nothing: zero everywhere. (glam's default matrix is the identity, which pulls everything to the origin.)
+    fn default() -> Self {
+        Self { a: DMat3::ZERO, b: DVec3::ZERO, c: 0.0, area: 0.0 }
+    }
+}
+
 impl Quadric {
+    /// Squared distance to a triangle's plane alone.
+    pub(super) fn of_plane(corner: DVec3, normal: DVec3) -> Self {
+        Self::weighted(corner, normal, 0.0)
+    }
+
     /// Squared distance to a triangle's plane, and a little to its corner, weighted by a third of its area.
     pub(super) fn of_corner(corner: DVec3, normal: DVec3) -> Self {
+        Self::weighted(corner, normal, POINT_WEIGHT)
+    }
+
+    fn weighted(corner: DVec3, normal: DVec3, point_weight: f64) -> Self {
         let length = normal.length();
         if length < 1e-30 {
             return Self::default();
@@ -29,9 +45,9 @@ impl Quadric {
         let d = n.dot(corner);
         let plane = DMat3::from_cols(n * n.x, n * n.y, n * n.z);
         Self {
-            a: area * (plane + POINT_WEIGHT * DMat3::IDENTITY),
-            b: area * (d * n + POINT_WEIGHT * corner),
-            c: area * (d * d + POINT_WEIGHT * corner.length_squared()),
+            a: area * (plane + point_weight * DMat3::IDENTITY),
+            b: area * (d * n + point_weight * corner),
+            c: area * (d * d + point_weight * corner.length_squared()),
             area,
         }
     }
@@ -65,5 +81,22 @@ impl Quadric {
         }
         let p = a.inverse() * b;
         p.is_finite().then_some(p)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_costs_nothing_and_a_plane_nothing_on_it() {
+        for p in [DVec3::ZERO, DVec3::new(3.0, -20.0, 7.0)] {
+            assert_eq!(Quadric::default().at(p), 0.0);
+        }
+        let (corner, normal) = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.0, 0.0, 5.0));
+        let plane = Quadric::of_plane(corner, normal);
+        assert!(plane.at(DVec3::new(-30.0, 8.0, 3.0)) < 1e-9);
+        // A sixth of the normal's length, times the squared distance.
+        assert!((plane.at(DVec3::new(4.0, 4.0, 5.0)) - 4.0 * 5.0 / 6.0).abs() < 1e-9);
     }
 }

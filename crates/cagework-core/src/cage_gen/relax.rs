@@ -85,7 +85,7 @@ fn slide(surface: &mut Guarded<'_>, quadrics: &[Quadric], v: u32) {
             if let Some(axis) = pinned {
                 q[axis] = 0.0;
             }
-            let moved: Vec<Corners> = star.iter().map(|t| with_corner(t, v, q)).collect();
+            let moved: Vec<Corners> = star.iter().map(|t| t.with_corner(v, q)).collect();
             if fit(quadric, q) + shape(moved.iter()) > energy - MIN_DECREASE {
                 continue;
             }
@@ -99,16 +99,6 @@ fn slide(surface: &mut Guarded<'_>, quadrics: &[Quadric], v: u32) {
             }
         }
     }
-}
-
-fn with_corner(t: &Corners, v: u32, at: DVec3) -> Corners {
-    let mut moved = *t;
-    for (i, p) in moved.index.iter().zip(&mut moved.at) {
-        if *i == v {
-            *p = at;
-        }
-    }
-    moved
 }
 
 /// Swaps the edge from corner `k` of a triangle if that makes better triangles.

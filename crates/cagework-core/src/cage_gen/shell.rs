@@ -31,6 +31,8 @@ const HULL_CLEARANCE: f64 = 1.0 - SMOOTHING_REACH - 1e-3;
 #[derive(Debug)]
 pub(super) struct Shell {
     pub(super) lattice: Lattice,
+    /// Longest side of the model's box, object units.
+    pub(super) longest: f64,
     /// What the cage must not meet.
     pub(super) obstacle: Obstacle,
     /// The hull as voxels.
@@ -94,7 +96,16 @@ impl Shell {
         let obstacle = Obstacle { voxels: keep_out, clearance: clearance - whole };
         let hull = smoothed(&stairs, &obstacle);
         let parts = solid.parts();
-        Ok(Self { clearance: clearance * lattice.cell, lattice, obstacle, filled, hull, stairs, parts })
+        Ok(Self {
+            clearance: clearance * lattice.cell,
+            longest: (max - min).max_element(),
+            lattice,
+            obstacle,
+            filled,
+            hull,
+            stairs,
+            parts,
+        })
     }
 }
 

@@ -45,7 +45,7 @@ impl Topology {
 }
 
 /// The vertex within `radius` pixels of the pointer; of several, those of faces turned to the viewer come first, those in
-/// front hide those behind, and among those at one depth (up to the size of the radius) the nearest to the pointer counts.
+/// front hide those behind, and among those at one depth (up to the size of the radius) the nearest to the pointer counts. Others come only `with_hidden`.
 #[must_use]
 pub fn pick_vertex(
     positions: &[Vec3],
@@ -53,6 +53,7 @@ pub fn pick_vertex(
     view: &dyn View,
     pointer: Vec2,
     radius: f32,
+    with_hidden: bool,
 ) -> Option<u32> {
     let near = positions.iter().enumerate().filter_map(|(i, &p)| {
         let (pixel, depth) = view.project(p)?;
@@ -60,7 +61,7 @@ pub fn pick_vertex(
         (distance <= radius).then(|| (i as u32, depth, distance, radius * view.units_per_pixel(p)))
     });
     let (seen, hidden): (Vec<_>, Vec<_>) = near.partition(|near| is_seen(near.0, positions, topology, view));
-    in_front(seen.into_iter()).or_else(|| in_front(hidden.into_iter()))
+    in_front(seen.into_iter()).or_else(|| in_front(hidden.into_iter()).filter(|_| with_hidden))
 }
 
 /// Whether a face at the vertex is turned to the viewer.
@@ -120,13 +121,34 @@ pub fn pick_face(positions: &[Vec3], topology: &Topology, view: &dyn View, point
         let middle = corners.iter().sum::<Vec3>() / corners.len().max(1) as f32;
         for (k, &a) in corners.iter().enumerate() {
             let b = corners[(k + 1) % corners.len()];
-            let Some(along) = ray_meets_triangle(origin, direction, [middle, a, b]) else { continue };
+            let Some((along, _)) = ray_meets_triangle(origin, direction, [middle, a, b]) else { continue };
             if best.is_none_or(|(nearest, _)| along < nearest) {
                 best = Some((along, f as u32));
             }
         }
     }
     best.map(|(_, f)| f)
+}
+
+/// The point of a model under the pointer that is nearest to the eye: triangle and barycentric coordinates.
+#[must_use]
+pub fn pick_surface(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    view: &dyn View,
+    pointer: Vec2,
+) -> Option<(u32, [f32; 3])> {
+    let (origin, direction) = view.ray(pointer);
+    let mut nearest = (f32::INFINITY, None);
+    for (t, corners) in triangles.iter().enumerate() {
+        let corners = corners.map(|v| positions[v as usize]);
+        if let Some((along, barycentric)) = ray_meets_triangle(origin, direction, corners)
+            && along < nearest.0
+        {
+            nearest = (along, Some((t as u32, barycentric)));
+        }
+    }
+    nearest.1
 }
 
 /// Vertices whose pixels lie in the rectangle between two corners, ascending; hidden ones too.
@@ -138,8 +160,8 @@ pub fn vertices_in_box(positions: &[Vec3], view: &dyn View, corners: [Vec2; 2]) 
     (0..positions.len() as u32).filter(|&i| inside(positions[i as usize])).collect()
 }
 
-/// Distance along a ray to a triangle, either side (Möller and Trumbore 1997).
-fn ray_meets_triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f32> {
+/// Distance along a ray to a triangle, either side, and barycentric coordinates there (Möller and Trumbore 1997).
+fn ray_meets_triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Option<(f32, [f32; 3])> {
     let (ab, ac) = (b - a, c - a);
     let p = direction.cross(ac);
     let det = ab.dot(p);
@@ -151,7 +173,7 @@ fn ray_meets_triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Op
     let q = s.cross(ab);
     let v = direction.dot(q) / det;
     let along = ac.dot(q) / det;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && along >= 0.0).then_some(along)
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && along >= 0.0).then_some((along, [1.0 - u - v, u, v]))
 }
 
 #[cfg(test)]
@@ -170,12 +192,12 @@ mod tests {
         let cube = cube();
         let topology = Topology::new(&cube.faces);
         let at = pixel(1.0, 1.0) + Vec2::new(3.0, 4.0);
-        assert_eq!(pick_vertex(&cube.positions, &topology, &Flat, at, 5.0), Some(7));
-        assert_eq!(pick_vertex(&cube.positions, &topology, &Flat, at, 4.9), None);
+        assert_eq!(pick_vertex(&cube.positions, &topology, &Flat, at, 5.0, true), Some(7));
+        assert_eq!(pick_vertex(&cube.positions, &topology, &Flat, at, 4.9, true), None);
         // Of two at one depth the nearer to the pointer counts.
         let two = [Vec3::ZERO, Vec3::new(0.1, 0.0, 0.0)];
         let none = Topology::default();
-        assert_eq!(pick_vertex(&two, &none, &Flat, pixel(0.06, 0.0), 20.0), Some(1));
+        assert_eq!(pick_vertex(&two, &none, &Flat, pixel(0.06, 0.0), 20.0, true), Some(1));
     }
 
     #[test]
@@ -191,12 +213,25 @@ mod tests {
         }
         let topology = Topology::new(&plate.faces);
         let at = pixel(plate.positions[3].x, plate.positions[3].y);
-        assert_eq!(pick_vertex(&plate.positions, &topology, &Flat, at, 24.0), Some(7));
+        assert_eq!(pick_vertex(&plate.positions, &topology, &Flat, at, 24.0, true), Some(7));
         assert_eq!(
-            pick_vertex(&plate.positions, &topology, &Flat, at, 1.0),
+            pick_vertex(&plate.positions, &topology, &Flat, at, 1.0, true),
             Some(3),
             "where nothing else is"
         );
+    }
+
+    #[test]
+    fn the_nearest_point_of_a_surface_is_picked() {
+        let positions = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::X + Vec3::Z, Vec3::Y + Vec3::Z];
+        let triangles = [[0, 1, 2], [3, 4, 5]];
+        let (triangle, barycentric) = pick_surface(&positions, &triangles, &Flat, pixel(0.25, 0.5)).unwrap();
+        assert_eq!(triangle, 1, "in front of the other one");
+        assert!(
+            barycentric.iter().zip([0.25, 0.25, 0.5]).all(|(a, b)| (a - b).abs() < 1e-5),
+            "{barycentric:?}"
+        );
+        assert_eq!(pick_surface(&positions, &triangles, &Flat, pixel(0.6, 0.6)), None);
     }
 
     #[test]

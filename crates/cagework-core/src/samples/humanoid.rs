@@ -46,7 +46,12 @@ pub(super) fn recipe() -> Recipe {
     Recipe {
         body: body(),
         cell: 0.0125,
-        cage: CageRecipe::Generate(CageOptions { target: 148, voxels: 72, ..CageOptions::default() }),
+        cage: CageRecipe::Generate(CageOptions {
+            target: 148,
+            voxels: 72,
+            detail: 0.014,
+            ..CageOptions::default()
+        }),
         poses: vec![("A step", Box::new(step)), ("Arms up", Box::new(arms_up))],
     }
 }

@@ -57,7 +57,12 @@ pub(super) fn recipe() -> Recipe {
     Recipe {
         body: body(),
         cell: 0.0165,
-        cage: CageRecipe::Generate(CageOptions { target: 120, voxels: 64, ..CageOptions::default() }),
+        cage: CageRecipe::Generate(CageOptions {
+            target: 120,
+            voxels: 64,
+            detail: 0.014,
+            ..CageOptions::default()
+        }),
         poses: vec![("Tail up, head turned", Box::new(curled)), ("Standing up", Box::new(standing))],
     }
 }

@@ -26,7 +26,12 @@ pub(super) fn recipe() -> Recipe {
     Recipe {
         body: body(),
         cell: 0.0145,
-        cage: CageRecipe::Generate(CageOptions { target: 208, voxels: 72, ..CageOptions::default() }),
+        cage: CageRecipe::Generate(CageOptions {
+            target: 208,
+            voxels: 72,
+            detail: 0.014,
+            ..CageOptions::default()
+        }),
         poses: vec![("Front legs raised", Box::new(raised)), ("Low on its legs", Box::new(crouched))],
     }
 }

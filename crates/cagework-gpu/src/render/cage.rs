@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use cagework_core::Cage;
 use glam::Vec3;
 
+use super::layout::STATE_SHIFT;
 use super::overlay::{Item, NOTHING, Overlay, item, unique_edges};
 use super::pipelines::Layouts;
 use super::scene::{Selection, Theme};
@@ -59,15 +60,26 @@ impl CageView {
     }
 
     /// Writes what is chosen and pointed at.
-    pub(super) fn select(&mut self, context: &GpuContext, layouts: &Layouts, selection: &Selection) {
-        self.handles.set_items(context, layouts, &self.handle_items(selection));
+    pub(super) fn select(
+        &mut self,
+        context: &GpuContext,
+        layouts: &Layouts,
+        selection: &Selection,
+        is_faint: bool,
+    ) {
+        let mut handles = self.handle_items(selection);
+        if is_faint {
+            handles.retain(|item| item[0] >> STATE_SHIFT != state::NORMAL);
+        }
+        self.handles.set_items(context, layouts, &handles);
         self.lines.set_items(context, layouts, &self.line_items(selection));
         self.faces.set_items(context, layouts, &self.face_items(selection));
     }
 
-    pub(super) fn set_theme(&self, context: &GpuContext, theme: Theme) {
+    pub(super) fn set_theme(&self, context: &GpuContext, theme: Theme, is_faint: bool) {
         let palette = theme.palette();
-        self.lines.set_style(context, palette.cage_lines());
+        let lines = if is_faint { palette.faint_lines() } else { palette.cage_lines() };
+        self.lines.set_style(context, lines);
         self.handles.set_style(context, palette.handles());
         self.faces.set_style(context, palette.faces());
     }

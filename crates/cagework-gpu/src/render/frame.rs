@@ -69,6 +69,7 @@ pub struct Renderer {
     cage: Option<CageView>,
     slice: Option<SlicePlane>,
     marks: Option<MarksView>,
+    held: Option<MarksView>,
     gizmo: GizmoShape,
     scene: SceneOptions,
     floor: Bounds,
@@ -102,6 +103,7 @@ impl Renderer {
             cage: None,
             slice: None,
             marks: None,
+            held: None,
             scene: SceneOptions::default(),
             floor: Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE },
             range: [0.0, 1.0],
@@ -155,7 +157,7 @@ impl Renderer {
         debug_assert_eq!(values.len(), mesh.n_vertices as usize, "one value per vertex");
         mesh.values.write(context, bytemuck::cast_slice(values));
         self.range = range;
-        mesh.set_style(context, self.scene.mesh, range);
+        mesh.set_style(context, self.scene.mesh, range, self.scene.greyed.is_some());
     }
 
     /// Where model and cage are at rest: the floor lies below.
@@ -174,16 +176,17 @@ impl Renderer {
         let scene = &self.scene;
         let theme_changed = before.is_none_or(|b| b.theme != scene.theme);
         if let Some(cage) = &mut self.cage {
-            if theme_changed {
-                cage.set_theme(context, scene.theme);
+            let steps = before.is_none_or(|b| b.cage_faint != scene.cage_faint);
+            if theme_changed || steps {
+                cage.set_theme(context, scene.theme, scene.cage_faint);
             }
-            if before.is_none_or(|b| b.selection != scene.selection) {
-                cage.select(context, &self.layouts, &scene.selection);
+            if steps || before.is_none_or(|b| b.selection != scene.selection) {
+                cage.select(context, &self.layouts, &scene.selection, scene.cage_faint);
             }
         }
         if let Some(mesh) = &self.mesh {
-            if before.is_none_or(|b| b.mesh != scene.mesh) {
-                mesh.set_style(context, scene.mesh, self.range);
+            if before.is_none_or(|b| b.mesh != scene.mesh || b.greyed.is_some() != scene.greyed.is_some()) {
+                mesh.set_style(context, scene.mesh, self.range, scene.greyed.is_some());
             }
             if (scene.base_wireframe || scene.mesh_edges)
                 && self.wires.is_none()
@@ -201,7 +204,7 @@ impl Renderer {
             self.slice =
                 scene.slice.as_ref().map(|s| SlicePlane::new(context, &self.layouts, s, scene.theme));
         }
-        if theme_changed || before.is_none_or(|b| b.marks != scene.marks) {
+        if theme_changed || before.is_none_or(|b| b.marks != scene.marks || b.held != scene.held) {
             self.make_marks(context);
         }
     }
@@ -209,9 +212,14 @@ impl Renderer {
     fn make_marks(&mut self, context: &GpuContext) {
         let mesh = self.mesh.as_ref().map(|m| &m.positions);
         let cage = self.cage.as_ref().map(|c| &c.positions);
-        let marks = MarksView::new(context, &self.layouts, &self.scene.marks, mesh, cage);
-        marks.set_theme(context, self.scene.theme);
-        self.marks = Some(marks);
+        let palette = self.scene.theme.palette();
+        let view = |marks, style| {
+            let view = MarksView::new(context, &self.layouts, marks, mesh, cage);
+            view.set_style(context, style);
+            Some(view)
+        };
+        self.marks = view(&self.scene.marks, palette.marks());
+        self.held = view(&self.scene.held, palette.held());
     }
 
     /// Records a picture.
@@ -325,7 +333,7 @@ impl Renderer {
                 cage.handles.draw(pass, false);
             }
         }
-        if let Some(marks) = &self.marks {
+        for marks in [&self.marks, &self.held].into_iter().flatten() {
             for (behind, [lines, points]) in
                 [(true, [Kind::LinesBehind, Kind::PointsBehind]), (false, [Kind::Lines, Kind::Points])]
             {

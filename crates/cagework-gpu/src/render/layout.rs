@@ -50,7 +50,7 @@ pub struct Surface {
     pub alpha_cutoff: f32,
     /// Value of the first colour.
     pub low: f32,
-    /// Value of the last colour.
+    /// Value of the last colour; of a material, how much of the vertices' values greys it.
     pub high: f32,
 }
 

@@ -1,7 +1,8 @@
-//! Places with a problem, and wireframes: overlays that come and go.
+//! Places with a problem, what is held, and wireframes: overlays that come and go.
 
 use glam::Vec3;
 
+use super::layout::Style;
 use super::mesh::Mesh;
 use super::model::DrawModel;
 use super::overlay::{Item, Overlay, item, unique_edges};
@@ -53,9 +54,9 @@ impl MarksView {
         view
     }
 
-    pub(super) fn set_theme(&self, context: &GpuContext, theme: Theme) {
+    pub(super) fn set_style(&self, context: &GpuContext, style: Style) {
         for overlay in self.segments.iter().chain(&self.points) {
-            overlay.set_style(context, theme.palette().marks());
+            overlay.set_style(context, style);
         }
     }
 }

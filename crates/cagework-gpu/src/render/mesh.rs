@@ -108,14 +108,23 @@ impl Mesh {
     }
 
     /// Writes what colours the surface, and the values of the first and the last colour.
-    pub(super) fn set_style(&self, context: &GpuContext, style: MeshStyle, [low, high]: [f32; 2]) {
+    /// Materials are greyed as the vertices' values say, if `is_greyed`.
+    pub(super) fn set_style(
+        &self,
+        context: &GpuContext,
+        style: MeshStyle,
+        [low, high]: [f32; 2],
+        is_greyed: bool,
+    ) {
+        let grey = f32::from(u8::from(is_greyed));
         for group in &self.groups {
             let surface = match style {
-                MeshStyle::Hidden | MeshStyle::Solid => group.surface,
+                MeshStyle::Hidden | MeshStyle::Solid => Surface { high: grey, ..group.surface },
                 MeshStyle::Clay => Surface {
                     mode: surface_mode::CLAY,
                     base_color: CLAY,
                     alpha_cutoff: 0.0,
+                    high: grey,
                     ..Surface::default()
                 },
                 MeshStyle::Weights { .. } => {
@@ -198,7 +207,7 @@ impl Group {
                 Alpha::Opaque | Alpha::Blend => 0.0,
             },
             low: 0.0,
-            high: 1.0,
+            high: 0.0,
         };
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let uniform = allocator.zeros("material", size_of::<Surface>() as u64, usage)?;

@@ -47,6 +47,9 @@ pub struct SceneOptions {
     pub mesh: MeshStyle,
     /// Whether colours of weights span 0 to 1, not 0 to the largest.
     pub weights_to_one: bool,
+    /// How much each vertex of the mesh is greyed where it shows its materials, 0 to 1: what stays where it is.
+    /// `[n_vertices]`
+    pub greyed: Option<Arc<Vec<f32>>>,
     /// Whether the mesh's edges are drawn on it.
     pub mesh_edges: bool,
     /// Whether the mesh in its rest pose is drawn as a wireframe over everything, as in the paper's figures 2 to 5.
@@ -55,6 +58,8 @@ pub struct SceneOptions {
     pub cage_lines: bool,
     /// Whether the cage's vertices are drawn as round handles.
     pub handles: bool,
+    /// Whether the cage steps back: fainter lines, and only handles that are chosen or pointed at.
+    pub cage_faint: bool,
     /// Whether a floor grid is drawn below the model.
     pub floor: bool,
     /// What of the cage is chosen or pointed at.
@@ -65,6 +70,8 @@ pub struct SceneOptions {
     pub slice: Option<SliceView>,
     /// Places with a problem.
     pub marks: Marks,
+    /// What a hand holds of the model: points, and a line to where it cannot follow.
+    pub held: Marks,
 }
 
 impl Default for SceneOptions {
@@ -74,15 +81,18 @@ impl Default for SceneOptions {
             backdrop: true,
             mesh: MeshStyle::Solid,
             weights_to_one: false,
+            greyed: None,
             mesh_edges: false,
             base_wireframe: false,
             cage_lines: true,
             handles: true,
+            cage_faint: false,
             floor: true,
             selection: Selection::default(),
             gizmo: None,
             slice: None,
             marks: Marks::default(),
+            held: Marks::default(),
         }
     }
 }
@@ -157,7 +167,7 @@ impl PartialEq for SliceView {
     }
 }
 
-/// Places with a problem, in a warning colour.
+/// Places on or beside the model: of a problem, or what is held.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Marks {
     /// Points, world space.

@@ -149,6 +149,11 @@ impl Palette {
         }
     }
 
+    /// The same where the cage steps back.
+    pub(super) fn faint_lines(&self) -> Style {
+        Style { opacity: 0.35, ..self.cage_lines() }
+    }
+
     /// Vertices of the cage.
     pub(super) fn handles(&self) -> Style {
         Style {
@@ -195,6 +200,11 @@ impl Palette {
             opacity: 1.0,
             size: 1.0,
         }
+    }
+
+    /// What a hand holds of the model.
+    pub(super) fn held(&self) -> Style {
+        Style { colors: [linear(self.selected); 8], widths: [[11.0; 4], [2.0; 4]], ..self.marks() }
     }
 }
 

@@ -44,9 +44,10 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "CameraView")] view: JsValue,
     ) -> Result<(), JsValue> {
         let view: CameraView = taken(view)?;
-        let is_finite = Vec3::from(view.target).is_finite() && view.yaw.is_finite();
-        if !is_finite || !(view.pitch.abs() <= FRAC_PI_2 && view.distance > 0.0 && view.distance.is_finite())
-        {
+        let is_finite =
+            Vec3::from(view.target).is_finite() && view.yaw.is_finite() && view.distance.is_finite();
+        let is_view = is_finite && view.pitch.abs() <= FRAC_PI_2 && view.distance > 0.0;
+        if !is_view {
             return Err(Fault::new(ErrorName::Error, "the view of the link is no place to look from").into());
         }
         self.change(|state| {

@@ -8,6 +8,7 @@ mod camera;
 mod export;
 mod gesture;
 mod picture;
+mod pull;
 mod rest;
 mod scene;
 mod select;

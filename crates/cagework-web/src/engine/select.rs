@@ -36,7 +36,9 @@ impl Engine {
             let (at, positions, topology, view) =
                 (state.pointer(x, y), &state.positions, &state.topology, &state.camera);
             match state.element {
-                Element::Vertex => pick_vertex(positions, topology, view, at, radius).into_iter().collect(),
+                Element::Vertex => {
+                    pick_vertex(positions, topology, view, at, radius, !state.pulls()).into_iter().collect()
+                }
                 Element::Edge => pick_edge(positions, topology, view, at, radius)
                     .map(|e| topology.edges[e as usize].to_vec())
                     .unwrap_or_default(),

@@ -1,0 +1,126 @@
+//! Taking hold of the model: what the page asks while a worker solves.
+
+use std::sync::Arc;
+
+use cagework_core::edit::View as _;
+use cagework_gpu::Session;
+use glam::{Vec2, Vec3};
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use super::Engine;
+use crate::error::{Answer, Fault};
+use crate::options::taken;
+use crate::state::State;
+use crate::views::{SurfacePoint, object};
+
+#[wasm_bindgen]
+impl Engine {
+    /// The point of the model under the pointer; undefined beside it, before there are weights, and while the GPU is busy.
+    ///
+    /// # Errors
+    /// Never.
+    #[wasm_bindgen(js_name = surfaceAt, unchecked_return_type = "SurfacePoint | undefined")]
+    pub fn surface_at(&self, x: f32, y: f32) -> Result<JsValue, JsValue> {
+        let found = self.posed(|state, _| Ok(state.surface_at(state.pointer(x, y)))).ok().flatten();
+        Ok(found.map_or(Ok(JsValue::UNDEFINED), |point| object(&point))?)
+    }
+
+    /// Where a point of the model is; empty if there is no such point. `[3]`
+    ///
+    /// # Errors
+    /// Without weights, or while the GPU is busy.
+    #[wasm_bindgen(js_name = placeOf)]
+    pub fn place_of(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "SurfacePoint")] point: JsValue,
+    ) -> Result<Vec<f32>, JsValue> {
+        let point = taken(point)?;
+        let place = self.posed(|state, _| Ok(state.place_of(point)))?;
+        Ok(place.map_or_else(Vec::new, |p| p.to_array().to_vec()))
+    }
+
+    /// How a point of the model follows the cage; undefined if there is no such point.
+    ///
+    /// # Errors
+    /// Without weights.
+    #[wasm_bindgen(js_name = gripOf, unchecked_return_type = "Grip | undefined")]
+    pub fn grip_of(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "SurfacePoint")] point: JsValue,
+    ) -> Result<JsValue, JsValue> {
+        let point: SurfacePoint = taken(point)?;
+        let grip = self.posed(|state, session| {
+            Ok(session.weights().and_then(|weights| state.grip_of(point, weights)))
+        })?;
+        Ok(grip.map_or(Ok(JsValue::UNDEFINED), |grip| object(&grip))?)
+    }
+
+    /// A point's mirror image on the model; undefined without one.
+    ///
+    /// # Errors
+    /// Never.
+    #[wasm_bindgen(js_name = imageOf, unchecked_return_type = "SurfacePoint | undefined")]
+    pub fn image_of(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "SurfacePoint")] point: JsValue,
+    ) -> Result<JsValue, JsValue> {
+        let point = taken(point)?;
+        let image = self.read(|state| state.image_of(point));
+        Ok(image.map_or(Ok(JsValue::UNDEFINED), |image| object(&image))?)
+    }
+
+    /// Where a point goes that follows the pointer from one place of the view to another, in the plane that faces the eye. `[3]`
+    #[wasm_bindgen(js_name = followed)]
+    #[must_use]
+    pub fn followed(&self, place: &[f32], dx: f32, dy: f32) -> Vec<f32> {
+        let [x, y, z] = place.first_chunk().copied().unwrap_or_default();
+        let place = Vec3::new(x, y, z);
+        let moved = self.read(|state| place + state.camera.in_view_plane(place, Vec2::new(dx, dy)));
+        moved.to_array().to_vec()
+    }
+
+    /// Shows what is held: points, the first of which the hand has, and where that should be if it cannot follow.
+    ///
+    /// # Errors
+    /// When these are no points.
+    #[wasm_bindgen(js_name = showHeld)]
+    pub fn show_held(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "readonly SurfacePoint[]")] points: JsValue,
+        target: Option<Vec<f32>>,
+    ) -> Result<(), JsValue> {
+        let points: Vec<SurfacePoint> = taken(points)?;
+        if self.read(|state| state.held.points == points && state.held.target.is_none()) && target.is_none() {
+            return Ok(());
+        }
+        self.change(|state| {
+            state.held.points = points;
+            state.held.target = target.filter(|t| t.len() == 3).map(|t| Vec3::from_slice(&t));
+            state.is_changed = true;
+        });
+        Ok(())
+    }
+
+    /// Greys what stays, `[n_vertices]`; undefined for nothing.
+    #[wasm_bindgen(js_name = showStays)]
+    pub fn show_stays(&self, stays: Option<Vec<f32>>) {
+        self.change(|state| {
+            state.held.stays = stays.map(Arc::new);
+            state.is_changed = true;
+        });
+    }
+}
+
+impl Engine {
+    /// Reads the state with the model where the cage is.
+    fn posed<T>(&self, read: impl FnOnce(&State, &Session) -> Answer<T>) -> Answer<T> {
+        self.with_session(|session| {
+            let weights =
+                session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
+            let mut state = self.state.borrow_mut();
+            state.pose_model(weights, session.outside());
+            read(&state, session)
+        })
+    }
+}

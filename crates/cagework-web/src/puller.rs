@@ -1,0 +1,171 @@
+//! The puller's half, in a worker of its own: a bind or a long frame of the page does not stop the hand.
+
+use cagework_core::edit::Symmetry;
+use cagework_core::progress::Silent;
+use cagework_core::pull::{Drag, DragOptions, Grip, Probes, Pull, Reach};
+use cagework_core::{BindOptions, Cage, TriMesh, bind};
+use glam::{DVec3, Vec3};
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use crate::arrays::{flat, points, polygon_mesh};
+use crate::error::{Answer, Fault};
+use crate::options::{PullAsked, taken};
+
+/// The seed of a grip on a vertex of the cage.
+const ON_CAGE: u32 = u32::MAX;
+
+/// A model and its cage, ready to be pulled, and the drag under way.
+#[wasm_bindgen]
+pub struct Puller {
+    pull: Pull,
+    symmetry: Symmetry,
+    drag: Option<Drag>,
+}
+
+#[wasm_bindgen]
+impl Puller {
+    /// Of a model, `[n_vertices, 3]` and `[n_triangles, 3]`, and its cage at rest, as `Binder.bind` takes it.
+    ///
+    /// # Errors
+    /// When the arrays are no cage, or there is nothing to pull.
+    #[wasm_bindgen(constructor)]
+    pub fn new(positions: &[f32], triangles: &[u32], cage: &[f32], corners: &[u32]) -> Result<Self, JsValue> {
+        let cage = Cage::new(&polygon_mesh(cage, corners)?).map_err(Fault::from)?;
+        let mesh = TriMesh { positions: points(positions), triangles: triangles.as_chunks().0.to_vec() };
+        Ok(Self::of(&mesh, &cage)?)
+    }
+
+    /// Takes hold of grabs and pins in the pose `start`, `[n_cage, 3]`. `rows`: their weights, one after the other,
+    /// `[n_grips, n_cage]`; `seeds`: the nearest vertex of the model, or 2^32 - 1 for a vertex of the cage. Returns where the
+    /// grabs are, `[n_grabs, 3]`.
+    ///
+    /// # Errors
+    /// Those of a drag.
+    pub fn grab(
+        &mut self,
+        start: &[f32],
+        rows: &[f64],
+        seeds: &[u32],
+        n_grabs: usize,
+        #[wasm_bindgen(unchecked_param_type = "PullOptions")] options: JsValue,
+    ) -> Result<Vec<f32>, JsValue> {
+        let asked = taken(options)?;
+        self.drag = None;
+        let drag = self.begin(start, rows, seeds, n_grabs, asked)?;
+        let at: Vec<Vec3> = drag.start().iter().map(|p| p.as_vec3()).collect();
+        self.drag = Some(drag);
+        Ok(flat(&at))
+    }
+
+    /// Of each vertex of the model how much it stays where it is, 0 to 1; empty without a drag. `[n_vertices]`
+    #[must_use]
+    pub fn stays(&self) -> Vec<f32> {
+        self.drag.as_ref().map_or_else(Vec::new, |drag| {
+            (0..drag.walks().len() as u32).map(|v| drag.stays(v) as f32).collect()
+        })
+    }
+
+    /// One frame towards targets, `[n_grabs, 3]`; of a grab and its mirror image the first is enough. The cage, `[n_cage, 3]`; empty without a drag.
+    #[must_use]
+    pub fn frame(&mut self, to: &[f32]) -> Vec<f32> {
+        let Some(drag) = &mut self.drag else { return Vec::new() };
+        let mut to: Vec<DVec3> = points(to).into_iter().map(Vec3::as_dvec3).collect();
+        if let (&[to_first], &[first, image]) = (&*to, drag.start()) {
+            // A grab and its mirror image: what the one does, the other does mirrored.
+            to.push(image + (to_first - first) * DVec3::new(-1.0, 1.0, 1.0));
+        }
+        drag.frame(&to);
+        flat(&drag.cage().iter().map(|p| p.as_vec3()).collect::<Vec<Vec3>>())
+    }
+
+    /// Whether the last frame was as good as the next one.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn settled(&self) -> bool {
+        self.drag.as_ref().is_none_or(Drag::is_settled)
+    }
+
+    /// How far the drag reaches, over the model's size; infinite for the whole model.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        self.drag.as_ref().map_or(0.0, Drag::reach)
+    }
+
+    /// How far grabs and pins are from where they should be, over the model's size.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn error(&self) -> f64 {
+        self.drag.as_ref().map_or(0.0, Drag::error)
+    }
+}
+
+impl Puller {
+    fn of(mesh: &TriMesh, cage: &Cage) -> Answer<Self> {
+        let probes = Probes::new(mesh, cage)?;
+        let weights = bind(probes.points(), cage, &BindOptions::default(), &Silent)?.weights;
+        let pull = Pull::new(mesh, cage, probes, &weights)?;
+        Ok(Self { pull, symmetry: Symmetry::new(cage.positions()), drag: None })
+    }
+
+    fn begin(
+        &self,
+        start: &[f32],
+        rows: &[f64],
+        seeds: &[u32],
+        n_grabs: usize,
+        asked: PullAsked,
+    ) -> Answer<Drag> {
+        let rows = rows.chunks_exact(self.pull.n_cage().max(1));
+        let grip = |(row, &seed): (&[f64], &u32)| {
+            if seed == ON_CAGE {
+                let vertex = row.iter().position(|&w| w == 1.0).unwrap_or(usize::MAX);
+                return self.pull.on_cage(vertex as u32);
+            }
+            Ok(Grip::of_row(row.to_vec(), seed))
+        };
+        let grips = rows.zip(seeds).map(grip).collect::<Result<Vec<_>, _>>()?;
+        let (grabs, pins) = grips.split_at(n_grabs.min(grips.len()));
+        let start: Vec<DVec3> = points(start).into_iter().map(Vec3::as_dvec3).collect();
+        let options = DragOptions {
+            reach: match asked.reach {
+                _ if asked.whole => Reach::Whole,
+                Some(reach) => Reach::Of(reach),
+                None => Reach::Automatic,
+            },
+            symmetry: asked.mirrored.then_some(&self.symmetry),
+            ..DragOptions::default()
+        };
+        Ok(Drag::new(&self.pull, &start, grabs, pins, options)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cagework_core::samples;
+
+    use super::*;
+
+    #[test]
+    fn a_vertex_of_the_cage_is_pulled_by_its_row_of_one() {
+        let sample = samples::build("clamp").unwrap();
+        let cage = Cage::new(&sample.cage).unwrap();
+        let mut puller = Puller::of(&sample.mesh, &cage).unwrap();
+        let n = cage.n_vertices();
+        let mut row = vec![0.0; n];
+        row[3] = 1.0;
+        let asked = PullAsked { reach: None, whole: false, mirrored: false };
+        let start = flat(cage.positions());
+        puller.drag = Some(puller.begin(&start, &row, &[ON_CAGE], 1, asked).unwrap());
+        let to = cage.positions()[3] + 0.1 * Vec3::Y;
+        let mut moved = Vec::new();
+        for _ in 0..20 {
+            moved = points(&puller.frame(&to.to_array()));
+        }
+        assert!(moved[3].distance(to) < 1e-2, "{} {to}", moved[3]);
+        assert_eq!(puller.stays().len(), sample.mesh.positions.len());
+        let none = puller.begin(&start, &vec![0.0; n], &[ON_CAGE], 1, asked).err();
+        assert!(none.is_some(), "no vertex of the cage");
+    }
+}

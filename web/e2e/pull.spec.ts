@@ -1,0 +1,107 @@
+/** The model is taken by the hand. */
+
+import {
+  cagePositions,
+  download,
+  drop,
+  expect,
+  grip,
+  largestMove,
+  modelPositions,
+  open,
+  placeOf,
+  pull,
+  rested,
+  shoot,
+  test,
+} from "./support";
+
+/** The panel says that the worker is ready by nothing: the first pull waits for it. */
+test("a visit that pulls the model", async ({ page }) => {
+  await open(page);
+  const rest = await cagePositions(page);
+  const modelAtRest = await modelPositions(page);
+
+  await test.step("a point goes where the pointer goes, as one step of the history", async () => {
+    const at = await grip(page, [0.35, 0.45]);
+    await page.mouse.move(at.x, at.y);
+    await shoot(page, "pull-hover");
+    await page.mouse.down();
+    await page.mouse.move(at.x - 30, at.y - 50, { steps: 8 });
+    await shoot(page, "pull-drag");
+    await page.mouse.up();
+    await rested(page);
+    const now = await placeOf(page, at.point);
+    expect(Math.hypot(now.x - at.x + 30, now.y - at.y + 50), "below the pointer").toBeLessThan(4);
+    const moved = await cagePositions(page);
+    expect(largestMove(rest, moved)).toBeGreaterThan(0.02);
+    const model = await modelPositions(page);
+    const least = 0.03 * largestMove(modelAtRest, model);
+    const still = model.filter((value, k) => Math.abs(value - (modelAtRest[k] ?? 0)) < least);
+    expect(still.length, "what is far stays").toBeGreaterThan(model.length / 3);
+    await page.keyboard.press("Control+z");
+    expect(largestMove(rest, await cagePositions(page))).toBeLessThan(1e-6);
+  });
+
+  await test.step("Esc puts it back", async () => {
+    const at = await grip(page, [0.35, 0.45]);
+    await page.mouse.move(at.x, at.y);
+    await page.mouse.down();
+    await page.mouse.move(at.x - 40, at.y, { steps: 6 });
+    await expect.poll(async () => largestMove(rest, await cagePositions(page))).toBeGreaterThan(0.01);
+    await page.keyboard.press("Escape");
+    expect(largestMove(rest, await cagePositions(page))).toBeLessThan(1e-6);
+    await page.mouse.up();
+    expect(largestMove(rest, await cagePositions(page))).toBeLessThan(1e-6);
+  });
+
+  await test.step("a pin holds its point, and the whole model follows if asked", async () => {
+    const pinned = await grip(page, [0.65, 0.6]);
+    await page.keyboard.down("Shift");
+    await page.mouse.click(pinned.x, pinned.y);
+    await page.keyboard.up("Shift");
+    await page.getByRole("button", { name: "Pose", exact: false }).first().click();
+    await expect(page.getByText("1 pin on the model")).toBeVisible();
+    await page.getByText("The whole model follows").click();
+    const at = await grip(page, [0.35, 0.45]);
+    await pull(page, at, -30, -40);
+    await rested(page);
+    const now = await placeOf(page, pinned.point);
+    expect(Math.hypot(now.x - pinned.x, now.y - pinned.y), "the pin").toBeLessThan(3);
+    const far = await cagePositions(page);
+    expect(largestMove(rest, far)).toBeGreaterThan(0.05);
+    await shoot(page, "pull-pinned");
+  });
+
+  await test.step("arrow keys pull as well", async () => {
+    await page.keyboard.press("Control+z");
+    await page.locator(".viewport").focus();
+    for (let k = 0; k < 3; k++) await page.keyboard.press("Shift+ArrowUp");
+    await rested(page);
+    expect(largestMove(rest, await cagePositions(page))).toBeGreaterThan(0.01);
+    await page.keyboard.press("Control+z");
+  });
+
+  await test.step("a handle is pulled by the same solver: its neighbours come along; with Alt it moves alone", async () => {
+    const changed = (cage: number[]) =>
+      new Set(cage.flatMap((x, k) => (Math.abs(x - (rest[k] ?? 0)) > 1e-5 ? [Math.floor(k / 3)] : []))).size;
+    const { handle, reachable, drag } = await import("./support");
+    await drag(page, 30, 0);
+    expect(changed(await cagePositions(page))).toBe(1);
+    await page.keyboard.press("Control+z");
+    await page.keyboard.press("Alt+a");
+    await pull(page, await handle(page, await reachable(page)), 30, 0);
+    await rested(page);
+    expect(changed(await cagePositions(page))).toBeGreaterThan(3);
+    await page.keyboard.press("Control+z");
+  });
+
+  await test.step("a project brings the pins back", async () => {
+    const project = await download(page, "project");
+    await page.getByRole("button", { name: "Pose", exact: false }).first().click();
+    await page.getByRole("button", { name: "Take all pins away" }).click();
+    await expect(page.getByText("1 pin on the model")).toHaveCount(0);
+    await drop(page, [project]);
+    await expect(page.getByText("1 pin on the model")).toBeVisible({ timeout: 60_000 });
+  });
+});

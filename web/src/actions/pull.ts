@@ -1,0 +1,286 @@
+/** Pulling the model by its own points: the page points, a worker solves, the cage follows. */
+
+import type { SurfacePoint } from "../contract";
+import { follow } from "../queue";
+import { T } from "../words";
+import { attempt, type Context } from "./context";
+import type { Edit } from "./edit";
+
+export interface Pulling {
+  /** Makes ready for the model and the cage that are bound. */
+  prepare(): void;
+  /** Shows the point under the pointer that would be grabbed; whether there is one. */
+  hover(x: number, y: number): boolean;
+  /** Takes hold of the model at a place of the view; false beside it. */
+  begin(x: number, y: number): boolean;
+  /** Takes hold of a vertex of the cage. */
+  beginCage(vertex: number, x: number, y: number): boolean;
+  drag(x: number, y: number): void;
+  /** Lets go, or puts back what was there before. */
+  end(keep: boolean): void;
+  active(): boolean;
+  /** Scales how far the drag reaches along the surface. */
+  reach(factor: number): void;
+  /** Moves the point that was held last, or the one in the middle of the view, by CSS pixels. */
+  nudge(right: number, up: number): void;
+  /** Pins the point there, or takes the pin there away; false beside the model. */
+  pin(x: number, y: number): boolean;
+  unpinAll(): void;
+  whole(on: boolean): void;
+}
+
+/** A grab and a pin that are nearer to each other are one, CSS pixels. */
+const SAME_PX = 14;
+/** Farther than this off its target, over the model's size, a grab cannot follow. */
+const OFF = 0.01;
+/** Frames for which a pull goes on after it was let go, at most. */
+const SETTLING = 30;
+/** A wider reach is the whole model. */
+const WIDEST = 1.2;
+/** Arrow keys that come one after the other are one pull, ms. */
+const NUDGE_PAUSE_MS = 600;
+/** The seed of a grip on a vertex of the cage: Puller's ON_CAGE. */
+const ON_CAGE = 0xffffffff;
+
+interface Drag {
+  readonly before: Float32Array;
+  readonly shares: readonly number[];
+  readonly grabs: readonly (SurfacePoint | number)[];
+  /** Where the pointer took hold. */
+  readonly from: { readonly x: number; readonly y: number };
+  /** Where the grab was, and where it is to be. */
+  place: Float32Array;
+  to: Float32Array;
+  /** Counts targets: the worker has answered which. */
+  wanted: number;
+  /** Over the model's size; null while the solver chooses it. */
+  reach: number | null;
+  letGo: boolean;
+  by: { right: number; up: number };
+}
+
+export function createPulling(ctx: Context, edit: Edit): Pulling {
+  const { store } = ctx;
+  const engine = () => ctx.session().engine;
+  let current: Drag | undefined;
+  let held: SurfacePoint | undefined;
+  let timer: ReturnType<typeof setTimeout> | undefined;
+
+  const isReady = () => {
+    const { bound, editingRest, playing, pullReady } = store.get();
+    return bound && pullReady && !editingRest && !playing;
+  };
+  const show = (first?: SurfacePoint, target?: Float32Array) =>
+    engine().showHeld([...(first ? [first] : []), ...store.get().pins], target);
+
+  /** Where a point of the model is in the view; undefined for one that is not there. */
+  const inView = (point: SurfacePoint) => {
+    const [x, y, z] = engine().placeOf(point);
+    if (x === undefined || y === undefined || z === undefined) return undefined;
+    const [px = 0, py = 0] = engine().project(x, y, z);
+    return { x: px, y: py };
+  };
+  const pinAt = (x: number, y: number) =>
+    store.get().pins.find((pin) => {
+      const at = inView(pin);
+      return at && Math.hypot(at.x - x, at.y - y) < SAME_PX;
+    });
+
+  /** Asks the worker to take hold, with the pins that are not grabbed. */
+  const grab = async (drag: Drag) => {
+    const { pins, pullWhole, symmetry, cage } = store.get();
+    const n = cage?.info.vertices ?? 0;
+    const free = pins.filter((pin) => pin !== pinAt(drag.from.x, drag.from.y));
+    const rows: number[] = [];
+    const seeds: number[] = [];
+    for (const handle of [...drag.grabs, ...free]) {
+      if (typeof handle === "number") {
+        rows.push(...Array.from({ length: n }, (_, i) => (i === handle ? 1 : 0)));
+        seeds.push(ON_CAGE);
+        continue;
+      }
+      const grip = engine().gripOf(handle);
+      if (!grip) continue;
+      rows.push(...grip.row);
+      seeds.push(grip.seed);
+    }
+    const { place, stays, reach } = await ctx.session().pullGrab({
+      start: drag.before,
+      rows: Float64Array.from(rows),
+      seeds: Uint32Array.from(seeds),
+      grabs: drag.grabs.length,
+      options: {
+        reach: drag.reach,
+        whole: pullWhole || (drag.reach ?? 0) > WIDEST,
+        mirrored: symmetry && drag.grabs.length > 1,
+      },
+    }).done;
+    if (current !== drag) return;
+    drag.place = place.slice(0, 3);
+    drag.reach ??= reach;
+    engine().showStays(stays.some((share) => share > 0) ? stays : undefined);
+    aim(drag);
+  };
+
+  const aim = (drag: Drag) => {
+    drag.to = engine().followed(drag.place, drag.by.right, drag.by.up);
+    drag.wanted += 1;
+  };
+
+  /** Frames as long as something moves: the worker solves the next one while this one is drawn. */
+  const run = async (drag: Drag) => {
+    await grab(drag);
+    let answered = -1;
+    let settling = 0;
+    while (current === drag) {
+      const asked = drag.wanted;
+      const { cage, settled, error } = await ctx.session().pullFrame(drag.to).done;
+      if (current !== drag) return;
+      engine().setCagePositions(cage);
+      const [first] = drag.grabs;
+      if (typeof first === "object") show(first, error > OFF ? drag.to : undefined);
+      answered = asked;
+      settling += drag.letGo ? 1 : 0;
+      const isDone = settled && answered === drag.wanted;
+      if (drag.letGo && (isDone || settling > SETTLING)) finish(drag);
+      await new Promise(requestAnimationFrame);
+      while (current === drag && !drag.letGo && settled && answered === drag.wanted) {
+        await new Promise(requestAnimationFrame);
+      }
+    }
+  };
+
+  const finish = (drag: Drag) => {
+    if (current !== drag) return;
+    current = undefined;
+    engine().showStays();
+    show();
+    store.set({ gesture: null });
+    edit.posedSince(T.did.pull, drag.before, drag.shares);
+  };
+
+  edit.alsoSettles(() => {
+    if (current?.letGo) finish(current);
+  });
+
+  const start = (grabs: Drag["grabs"], x: number, y: number) => {
+    if (current) finish(current);
+    edit.settle();
+    const place = new Float32Array(3);
+    const drag: Drag = {
+      before: edit.positions(),
+      shares: store.get().shares,
+      grabs,
+      from: { x, y },
+      place,
+      to: place,
+      wanted: 0,
+      reach: null,
+      letGo: false,
+      by: { right: 0, up: 0 },
+    };
+    current = drag;
+    store.set({ gesture: T.pull.pulling });
+    void attempt(ctx, T.failed.pull, () => run(drag)).then((went) => {
+      if (!went && current === drag) pulling.end(false);
+    });
+    return true;
+  };
+
+  const pulling: Pulling = {
+    prepare() {
+      store.set({ pullReady: false });
+      void attempt(ctx, T.failed.pull, () =>
+        ctx.queue.replace("pull", async (signal) => {
+          await follow(signal, ctx.session().preparePull());
+          store.set({ pullReady: true });
+          show();
+        }),
+      );
+    },
+    hover(x, y) {
+      const point = isReady() ? engine().surfaceAt(x, y) : undefined;
+      show(point);
+      return point !== undefined;
+    },
+    begin(x, y) {
+      const point = isReady() ? engine().surfaceAt(x, y) : undefined;
+      if (!point) return false;
+      held = point;
+      const image = store.get().symmetry ? engine().imageOf(point) : undefined;
+      show(point);
+      return start(image ? [point, image] : [point], x, y);
+    },
+    beginCage: (vertex, x, y) => isReady() && start([vertex], x, y),
+    drag(x, y) {
+      if (!current) return;
+      current.by = { right: x - current.from.x, up: y - current.from.y };
+      aim(current);
+    },
+    end(keep) {
+      const drag = current;
+      if (!drag) return;
+      if (keep) {
+        drag.letGo = true;
+        return;
+      }
+      current = undefined;
+      engine().setCagePositions(drag.before);
+      engine().showStays();
+      show();
+      store.set({ gesture: null });
+      edit.sync();
+    },
+    active: () => current !== undefined && !current.letGo,
+    reach(factor) {
+      const drag = current;
+      if (!drag || drag.reach === null) return;
+      drag.reach = Math.min(2 * WIDEST, Math.max(0.05, drag.reach * factor));
+      void attempt(ctx, T.failed.pull, () => grab(drag));
+    },
+    nudge(right, up) {
+      if (!current || current.letGo) {
+        const middle = { x: ctx.viewport().width / 2, y: ctx.viewport().height / 2 };
+        const at = (held && inView(held)) ?? middle;
+        if (!pulling.begin(at.x, at.y)) {
+          ctx.tell.say(T.pull.nothingThere);
+          return;
+        }
+      }
+      if (!current) return;
+      current.by = { right: current.by.right + right, up: current.by.up - up };
+      aim(current);
+      clearTimeout(timer);
+      timer = setTimeout(() => pulling.end(true), NUDGE_PAUSE_MS);
+    },
+    pin(x, y) {
+      const { pins } = store.get();
+      const there = pinAt(x, y);
+      const point = isReady() ? engine().surfaceAt(x, y) : undefined;
+      if (!there && !point) return false;
+      const next = there ? pins.filter((pin) => pin !== there) : [...pins, ...(point ? [point] : [])];
+      const set = (list: readonly SurfacePoint[]) => {
+        store.set({ pins: list });
+        show();
+      };
+      set(next);
+      ctx.history.push({
+        label: there ? T.did.unpin : T.did.pin,
+        undo: () => set(pins),
+        redo: () => set(next),
+      });
+      return true;
+    },
+    unpinAll() {
+      const { pins } = store.get();
+      const set = (list: readonly SurfacePoint[]) => {
+        store.set({ pins: list });
+        show();
+      };
+      set([]);
+      ctx.history.push({ label: T.did.unpin, undo: () => set(pins), redo: () => set([]) });
+    },
+    whole: (on) => store.set({ pullWhole: on }),
+  };
+  return pulling;
+}

@@ -1,0 +1,116 @@
+import { afterEach, beforeEach, expect, it, vi } from "vitest";
+import { createEdit } from "../../src/actions/edit";
+import { createPulling } from "../../src/actions/pull";
+import { cageOf, createFake, settled } from "../fake";
+
+/** Frames of the page, run by hand. */
+let frames: (() => void)[] = [];
+beforeEach(() => {
+  frames = [];
+  vi.stubGlobal("requestAnimationFrame", (run: () => void) => frames.push(run));
+});
+afterEach(() => {
+  vi.unstubAllGlobals();
+});
+
+const POINT = { triangle: 0, bary: [1, 0, 0] as [number, number, number] };
+
+/** A page whose model is under the pointer at (10, 10) only, ready to be pulled. */
+function page() {
+  const fake = createFake();
+  const shown: unknown[][] = [];
+  fake.teach({
+    surfaceAt: (x) => (x === 10 ? POINT : undefined),
+    gripOf: () => ({ row: [0.5, 0.5], seed: 3 }),
+    placeOf: () => Float32Array.of(0, 0, 0),
+    project: () => Float32Array.of(10, 10, 1),
+    followed: (place, dx, dy) => Float32Array.of((place[0] ?? 0) + dx, (place[1] ?? 0) + dy, 0),
+    showHeld: (points: readonly unknown[]) => {
+      shown.push([...points]);
+    },
+  });
+  const edit = createEdit(fake.ctx, () => undefined);
+  const pull = createPulling(fake.ctx, edit);
+  const { positions, corners } = cageOf(2);
+  fake.store.set({ cage: fake.engine.setCage(positions, corners), bound: true, pullReady: true });
+  const answer = async (output: unknown) => {
+    fake.asked.at(-1)?.resolve(output);
+    await settled();
+  };
+  const frame = async () => {
+    for (const run of frames.splice(0)) run();
+    await settled();
+  };
+  const took = { place: Float32Array.of(0, 0, 0), stays: new Float32Array(4), reach: 0.3 };
+  const cage = (height: number, isSettled: boolean) => ({
+    cage: new Float32Array(6).fill(height),
+    settled: isSettled,
+    error: 0,
+  });
+  return { ...fake, pull, answer, frame, took, cage, shown };
+}
+
+it("a pull moves the cage as the worker answers, and is one step of the history", async () => {
+  const { pull, answer, frame, took, cage, asked, engine, store, ctx } = page();
+  expect(pull.begin(50, 10)).toBe(false);
+  expect(pull.begin(10, 10)).toBe(true);
+  pull.drag(14, 10);
+  await answer(took);
+  expect(asked.at(-1)).toMatchObject({ kind: "pullFrame", input: Float32Array.of(4, 0, 0) });
+  await answer(cage(2, false));
+  expect(engine.cagePositions()[0]).toBe(2);
+  pull.end(true);
+  await frame();
+  await answer(cage(3, true));
+  expect([engine.cagePositions()[0], ctx.history.undoLabel, store.get().gesture]).toEqual([3, "Pull", null]);
+  await ctx.history.undo();
+  expect(engine.cagePositions()[0]).not.toBe(3);
+});
+
+it("Esc puts the cage back, and what the worker still answers is dropped", async () => {
+  const { pull, answer, took, cage, engine, ctx } = page();
+  const before = engine.cagePositions();
+  pull.begin(10, 10);
+  await answer(took);
+  await answer(cage(2, false));
+  pull.end(false);
+  await answer(cage(5, true));
+  expect([engine.cagePositions(), ctx.history.undoLabel, pull.active()]).toEqual([before, undefined, false]);
+});
+
+it("pins go with the grab, but not the one that is grabbed", async () => {
+  const { pull, asked, store, ctx, teach } = page();
+  expect(pull.pin(50, 10)).toBe(false);
+  pull.pin(10, 10);
+  expect(store.get().pins).toEqual([POINT]);
+  pull.begin(10, 10);
+  expect(asked.at(-1)).toMatchObject({ kind: "pullGrab", input: { grabs: 1, seeds: Uint32Array.of(3) } });
+  pull.end(false);
+  // Seen from elsewhere, the pin is not where the pointer is.
+  teach({ project: () => Float32Array.of(90, 90, 1) });
+  pull.begin(10, 10);
+  expect(asked.at(-1)).toMatchObject({ input: { grabs: 1, seeds: Uint32Array.of(3, 3) } });
+  pull.end(false);
+  await ctx.history.undo();
+  expect(store.get().pins).toEqual([]);
+});
+
+it("a wider reach takes hold anew, from the same pose", async () => {
+  const { pull, answer, took, asked } = page();
+  pull.begin(10, 10);
+  await answer(took);
+  pull.reach(2);
+  expect(asked.at(-1)).toMatchObject({ kind: "pullGrab", input: { options: { reach: 0.6, whole: false } } });
+  pull.reach(10);
+  expect(asked.at(-1)).toMatchObject({ input: { options: { whole: true } } });
+});
+
+it("a worker that fails leaves the cage as it was and says so", async () => {
+  const { pull, asked, problems, engine } = page();
+  const before = engine.cagePositions();
+  pull.begin(10, 10);
+  asked.at(-1)?.reject(new Error("nothing is ready to be pulled"));
+  await settled();
+  expect(problems).toMatchObject([{ title: "The model cannot be pulled" }]);
+  expect([engine.cagePositions(), pull.active()]).toEqual([before, false]);
+});
