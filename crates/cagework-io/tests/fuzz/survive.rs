@@ -85,7 +85,9 @@ fn as_pose(model: &Model) {
 fn as_model(model: &Model, choice: u32) {
     let flags = |bit: u32| choice >> bit & 1 == 1;
     let options = CageOptions {
-        target: 12 + choice % 40,
+        target: 8 + choice % 40,
+        detail: if flags(15) { 0.028 } else { 0.1 },
+        quads: flags(16),
         shape: if flags(8) { Shape::Hull } else { Shape::Follow },
         symmetry: [Symmetry::Auto, Symmetry::None, Symmetry::X, Symmetry::Z][choice as usize >> 9 & 3],
         per_component: flags(11),
