@@ -19,8 +19,9 @@ const ERRORS = 2u;
 const CLAY = 3u;
 const BLENDED = 4u;
 
-/// Brightness that is left of what is greyed.
-const GREYED = 0.4;
+/// Brightness that is left of what is greyed, and how much of its colour goes.
+const GREYED = 0.7;
+const FADED = 0.8;
 
 @group(2) @binding(0) var<uniform> surface: Surface;
 @group(2) @binding(1) var base_texture: texture_2d<f32>;
@@ -66,7 +67,7 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> @location(0) 
     if surface.mode == MATERIAL { base.a = 1.0; }
     if !is_value {
         let grey = dot(base.rgb, vec3f(0.2126, 0.7152, 0.0722));
-        base = vec4f(mix(base.rgb, vec3f(GREYED * grey), surface.high * clamp(in.value, 0.0, 1.0)), base.a);
+        base = vec4f(mix(base.rgb, vec3f(GREYED * grey), FADED * surface.high * clamp(in.value, 0.0, 1.0)), base.a);
     }
     var normal = in.normal;
     // A vertex whose triangles have no area has no normal; the picture's own slope then does.

@@ -57,8 +57,8 @@ const FIGURES: readonly Figure[] = [
     name: "weights",
     sample: "humanoid",
     bind: {},
-    // A knee, from the front: what follows it, and that the other leg does not.
-    closest: [0.1, 0.5, 0.2],
+    // A thigh: what follows it, and that the other leg does not.
+    closest: [0.22, 0.75, 0.05],
     scene: { colour: "weight", problems: false },
   },
   { name: "slice-kinds", sample: "clamp", bind: {}, slice: 2, scene: { slice: "kinds", model: false } },

@@ -72,9 +72,19 @@ impl State {
         Some(SurfacePoint { triangle: t, bary })
     }
 
-    /// What is held, as it is drawn.
-    pub(crate) fn held_marks(&self) -> Marks {
-        let points: Vec<Vec3> = self.held.points.iter().filter_map(|&p| self.place_of(p)).collect();
+    /// What is held, as it is drawn, where the cage is now; nothing before there are weights.
+    pub(crate) fn held_marks(&self, weights: Option<&Weights>) -> Marks {
+        let place = |point: &SurfacePoint| {
+            let corners = self.model.as_ref()?.triangles.get(point.triangle as usize)?;
+            let follow = |v: u32| {
+                let (columns, values) = weights?.row(v as usize);
+                let moved =
+                    columns.iter().zip(values).map(|(&c, &w)| Some(w * *self.positions.get(c as usize)?));
+                moved.sum::<Option<Vec3>>()
+            };
+            corners.iter().zip(point.bary).map(|(&v, share)| Some(share * follow(v)?)).sum::<Option<Vec3>>()
+        };
+        let points: Vec<Vec3> = self.held.points.iter().filter_map(place).collect();
         let line = self.held.target.zip(points.first()).map(|(to, from)| [*from, to]);
         Marks { points, segments: line.into_iter().collect(), ..Marks::default() }
     }

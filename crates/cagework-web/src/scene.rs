@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use cagework_core::Weights;
 use cagework_core::edit::Element;
 use cagework_gpu::render::{Gizmo, GizmoMode, Marks, MeshStyle, SceneOptions, Selection, SliceView};
 use glam::Quat;
@@ -25,8 +26,8 @@ impl State {
         }
     }
 
-    /// What the renderer draws.
-    pub(crate) fn scene(&self) -> SceneOptions {
+    /// What the renderer draws; `weights` are those it has.
+    pub(crate) fn scene(&self, weights: Option<&Weights>) -> SceneOptions {
         let cage = self.view.cage && self.is_on_gpu();
         SceneOptions {
             theme: self.view.theme(),
@@ -44,7 +45,7 @@ impl State {
             slice: self.shown_slice(),
             marks: self.marks(),
             greyed: self.held.stays.clone(),
-            held: self.held_marks(),
+            held: self.held_marks(weights),
         }
     }
 
@@ -59,9 +60,9 @@ impl State {
     }
 
     /// The same for a picture: `alone` without anything but the model, transparent around it.
-    pub(crate) fn picture_scene(&self, alone: bool) -> SceneOptions {
+    pub(crate) fn picture_scene(&self, alone: bool, weights: Option<&Weights>) -> SceneOptions {
         if !alone {
-            return self.scene();
+            return self.scene(weights);
         }
         SceneOptions {
             theme: self.view.theme(),

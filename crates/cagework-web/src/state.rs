@@ -212,7 +212,7 @@ impl State {
 
     /// Brings what changed to the GPU.
     pub(crate) fn write(&mut self, main: &mut Session, other: Option<&mut Session>) {
-        let scene = (self.is_changed).then(|| self.scene());
+        let scene = self.is_changed.then(|| self.scene(main.weights()));
         for session in [Some(main), other].into_iter().flatten() {
             *session.camera_mut() = self.camera;
             if self.is_moved && self.is_on_gpu() {

@@ -73,7 +73,8 @@ impl Engine {
         let scale = {
             let mut state = self.state.borrow_mut();
             state.write(&mut gpu.main, gpu.other.as_mut());
-            gpu.main.set_scene(state.picture_scene(alone));
+            let scene = state.picture_scene(alone, gpu.main.weights());
+            gpu.main.set_scene(scene);
             height as f32 / state.size.y
         };
         let picture = gpu.main.picture([width, height], scale).await.map_err(Fault::from);
