@@ -107,8 +107,8 @@ test("two fingers look around, one finger poses", async ({ page }) => {
   await test.step("one finger on a handle drags it", async () => {
     const { x, y } = await handle(page, vertex);
     await fingers(cdp, [[x, y]], [[x + 30, y - 20]]);
-    const moved = await cagePositions(page);
-    expect(largestMove(rest, moved)).toBeGreaterThan(0.02);
+    await rested(page);
+    expect(largestMove(rest, await cagePositions(page))).toBeGreaterThan(0.02);
     const now = await handle(page, vertex);
     expect(apart(now, { x: x + 30, y: y - 20 }), "it is below the finger").toBeLessThan(3);
     await shoot(page, "touched");

@@ -192,8 +192,15 @@ export function createPulling(ctx: Context, edit: Edit): Pulling {
       store.set({ pullReady: false });
       void attempt(ctx, T.failed.pull, () =>
         ctx.queue.replace("pull", async (signal) => {
-          await follow(signal, ctx.session().preparePull());
+          const job = ctx.session().preparePull();
+          // Who takes hold before the worker is ready waits there for it.
           store.set({ pullReady: true });
+          try {
+            await follow(signal, job);
+          } catch (error) {
+            store.set({ pullReady: false });
+            throw error;
+          }
           show();
         }),
       );
