@@ -150,7 +150,11 @@ impl LoadedCage {
     /// # Errors
     /// When it cannot be written in that format.
     pub(crate) fn write_pose(&self, pose: &[Vec3], output: &ModelOutput) -> Result<Vec<u8>, CliError> {
-        let positions = self.model.posed_as_cage(pose);
+        let mut positions = self.model.posed_as_cage(pose);
+        // A cage that was made has no file whose axes it would keep.
+        if self.model.up() != self.up {
+            positions = self.up.turned_back(&positions).into_owned();
+        }
         self.model.write(output.format, &positions).map_err(|e| CliError::file(&output.path, e))
     }
 

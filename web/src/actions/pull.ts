@@ -44,6 +44,8 @@ const ON_CAGE = 0xffffffff;
 
 interface Drag {
   readonly before: Float32Array;
+  /** Of the engine: what is held belongs to it. */
+  readonly revision: number;
   readonly shares: readonly number[];
   readonly grabs: readonly (SurfacePoint | number)[];
   /** Where the pointer took hold. */
@@ -150,12 +152,16 @@ export function createPulling(ctx: Context, edit: Edit): Pulling {
     }
   };
 
+  /** Another model or cage came while the hand was at it. */
+  const isStale = (drag: Drag) => drag.revision !== engine().revision;
+
   const finish = (drag: Drag) => {
     if (current !== drag) return;
     current = undefined;
     engine().showStays();
     show();
     store.set({ gesture: null });
+    if (isStale(drag)) return;
     edit.posedSince(T.did.pull, drag.before, drag.shares);
   };
 
@@ -169,6 +175,7 @@ export function createPulling(ctx: Context, edit: Edit): Pulling {
     const place = new Float32Array(3);
     const drag: Drag = {
       before: edit.positions(),
+      revision: engine().revision,
       shares: store.get().shares,
       grabs,
       from: { x, y },
@@ -232,7 +239,7 @@ export function createPulling(ctx: Context, edit: Edit): Pulling {
         return;
       }
       current = undefined;
-      engine().setCagePositions(drag.before);
+      if (!isStale(drag)) engine().setCagePositions(drag.before);
       engine().showStays();
       show();
       store.set({ gesture: null });

@@ -114,3 +114,14 @@ it("a worker that fails leaves the cage as it was and says so", async () => {
   expect(problems).toMatchObject([{ title: "The model cannot be pulled" }]);
   expect([engine.cagePositions(), pull.active()]).toEqual([before, false]);
 });
+
+it("a pull that another cage overtakes leaves that cage alone", async () => {
+  const { pull, asked, engine, ctx, problems } = page();
+  pull.begin(10, 10);
+  const { positions, corners } = cageOf(2, 9);
+  engine.setCage(positions, corners);
+  const other = engine.cagePositions();
+  asked.at(-1)?.reject(Object.assign(new Error("there is another cage by now"), { name: "Cancelled" }));
+  await settled();
+  expect([engine.cagePositions(), ctx.history.undoLabel, problems]).toEqual([other, undefined, []]);
+});

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use cagework_core::pull::{Handle, Reach};
-use glam::DVec3;
+use glam::Vec3;
 use serde::Deserialize;
 
 use crate::error::CliError;
@@ -35,7 +35,7 @@ struct HandleSaid {
     triangle: Option<u32>,
     bary: Option<[f64; 3]>,
     cage: Option<u32>,
-    to: Option<[f64; 3]>,
+    to: Option<[f32; 3]>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -56,8 +56,8 @@ fn thirty() -> u32 {
 /// A job.
 pub(super) struct Job {
     pub(super) grabs: Vec<Handle>,
-    /// Where each grab goes. `[n_grabs]`, object units
-    pub(super) to: Vec<DVec3>,
+    /// Where each grab goes, in the file's axes. `[n_grabs]`, object units
+    pub(super) to: Vec<Vec3>,
     pub(super) pins: Vec<Handle>,
     pub(super) reach: Reach,
     /// A pose of the cage to begin with.
@@ -104,9 +104,11 @@ impl Job {
         let mut to = Vec::with_capacity(said.grabs.len());
         for (k, grab) in said.grabs.iter().enumerate() {
             grabs.push(handle("grab", k, grab)?);
-            to.push(DVec3::from(
-                grab.to.ok_or_else(|| wrong(format!("grab {k} has no target \"to\": [x, y, z]")))?,
-            ));
+            let target = grab.to.ok_or_else(|| wrong(format!("grab {k} has no target \"to\": [x, y, z]")))?;
+            if let Some(x) = target.iter().find(|x| !x.is_finite()) {
+                return Err(wrong(format!("grab {k} goes to {x}: numbers of 32 bits end at {:e}", f32::MAX)));
+            }
+            to.push(Vec3::from_array(target));
         }
         let pins =
             said.pins.iter().enumerate().map(|(k, pin)| handle("pin", k, pin)).collect::<Result<_, _>>()?;

@@ -11,7 +11,7 @@ use cagework_core::mesh::TriMesh;
 use cagework_core::progress::Silent;
 use cagework_core::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
 use cagework_core::{BindOptions, Controls, bind};
-use cagework_io::{read_weights_npz, shown};
+use cagework_io::{UpAxis, read_weights_npz, shown};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
@@ -102,7 +102,7 @@ pub(crate) fn run(args: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let pose = |drag: &Drag| drag.cage().iter().map(|p| p.as_vec3()).collect::<Vec<Vec3>>();
     let deformed = |cage: &[Vec3]| deform_bound(&weights, &outside, cage);
     let before = deformed(&start);
-    let to = targets(&job, &drag, &before);
+    let to = targets(&job, model.up(), &drag, &before);
     let grabbed = drag.start().to_vec();
     let begun = Instant::now();
     for k in 1..=job.frames {
@@ -140,14 +140,15 @@ pub(crate) fn run(args: &PullArgs, as_json: bool) -> Result<(), CliError> {
     print(&if as_json { json(&done) } else { text(&done, output) })
 }
 
-/// Targets of the grabs. A vertex outside the cage is beside what its weights give: its target is moved by as much.
-fn targets(job: &Job, drag: &Drag, before: &[Vec3]) -> Vec<DVec3> {
+/// Targets of the grabs, which the job gives in the file's axes. A vertex outside the cage is beside what its weights give: its target is moved by as much.
+fn targets(job: &Job, up: UpAxis, drag: &Drag, before: &[Vec3]) -> Vec<DVec3> {
     let beside = |(grab, start): (&Handle, &DVec3)| match grab {
         Handle::Vertex(v) => before[*v as usize].as_dvec3() - *start,
         Handle::Triangle(..) | Handle::Cage(_) => DVec3::ZERO,
     };
     let beside = job.grabs.iter().zip(drag.start()).map(beside);
-    job.to.iter().zip(beside).map(|(to, beside)| *to - beside).collect()
+    let to = up.turned(&job.to);
+    to.iter().zip(beside).map(|(to, beside)| to.as_dvec3() - beside).collect()
 }
 
 fn since(begun: Instant) -> f64 {

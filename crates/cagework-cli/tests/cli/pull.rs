@@ -72,6 +72,7 @@ fn a_job_that_cannot_be_done_says_what_is_wrong_and_writes_nothing() {
         (r#"{"grabs": [{"cage": 8, "to": [0, 0, 0]}]}"#, "no vertex of the cage 8: they count from 0 to 7"),
         (r#"{"grabs": [{"vertex": 0}]}"#, "grab 0 has no target"),
         (r#"{"grabs": [{"to": [0, 0, 0]}]}"#, "one of vertex, triangle"),
+        (r#"{"grabs": [{"vertex": 0, "to": [0, 1e300, 0]}]}"#, "grab 0 goes to inf"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 1e999, 0]}]}"#, "number out of range"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "reach": -1}"#, "the reach is -1"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "reach": "far"}"#, "the reach is \"far\""),
@@ -104,4 +105,25 @@ fn weights_of_another_model_are_refused() {
         .run("pull cage.obj --cage cage.obj --weights w.npz --job job.json -o pose.obj")
         .failure()
         .stderr(contains("178").and(contains("8")));
+}
+
+#[test]
+fn targets_and_poses_have_the_axes_of_the_files() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    let rest = obj_positions(&sandbox.read("mesh.obj"));
+    let top = (0..rest.len()).max_by(|&a, &b| rest[a][2].total_cmp(&rest[b][2])).unwrap();
+    let [x, y, z] = rest[top];
+    sandbox.write(
+        "job.json",
+        format!(r#"{{"grabs": [{{"vertex": {top}, "to": [{x}, {y}, {}]}}], "reach": "all"}}"#, z + 0.3),
+    );
+    for cage in ["cage.obj", "box:1"] {
+        let files = format!("mesh.obj --up z --cage {cage}");
+        sandbox.run(&format!("bind {files} -g 16 --weights w.npz")).success();
+        sandbox.run(&format!("pull {files} --weights w.npz --job job.json -o pose.obj")).success();
+        sandbox.run(&format!("deform {files} --weights w.npz --pose pose.obj -o out.obj")).success();
+        let posed = obj_positions(&sandbox.read("out.obj"))[top];
+        let off = (posed[0] - x).abs() + (posed[1] - y).abs() + (posed[2] - z - 0.3).abs();
+        assert!(off < 2e-3, "{cage}: {posed:?} for {:?}", rest[top]);
+    }
 }
