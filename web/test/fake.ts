@@ -32,6 +32,8 @@ export interface Fake {
   readonly engine: Engine;
   readonly asked: Asked[];
   readonly said: string[];
+  /** What the last message offered. */
+  offered: readonly { readonly label: string; run(): void }[];
   readonly problems: (Explained & { fix?: Fix["label"] })[];
   /** Calls of the engine that keep nothing, by name. */
   readonly calls: string[];
@@ -218,21 +220,26 @@ export function createFake(): Fake {
     queue: createQueue(),
     viewport: () => ({ width: 400, height: 300 }) as DOMRect,
     tell: {
-      say: (text) => said.push(text),
+      say: (text, ...offered) => {
+        said.push(text);
+        fake.offered = offered;
+      },
       problem: (explained, fix) =>
         problems.push(fix ? ({ ...explained, fix: explained.fix } as never) : explained),
       clear: () => problems.splice(0),
     },
     fixFor: (fix) => ({ label: fix, run: () => undefined }),
   };
-  return {
+  const fake: Fake = {
     ctx,
     store,
     engine,
     asked,
     said,
+    offered: [],
     problems,
     calls,
     teach: (functions) => Object.assign(known, functions),
   };
+  return fake;
 }

@@ -3,7 +3,7 @@
 //! It has its own GPU device and reads nothing but arrays. Results are taken apart by the page's `Engine`.
 
 use cagework_core::cage_check::repair;
-use cagework_core::cage_gen::{CageOptions, generate};
+use cagework_core::cage_gen::{CageOptions, GeneratedCage, generate};
 use cagework_core::deform::{OutsideVertex, deform_bound};
 use cagework_core::progress::Silent;
 use cagework_core::slice::Slice;
@@ -42,6 +42,14 @@ pub struct Bound {
 #[wasm_bindgen]
 pub struct Polygons {
     pub(crate) mesh: PolygonMesh,
+    /// Separate parts of the model that one made cage joins; 0 if there is one, or no cage was made.
+    bridged: u32,
+}
+
+impl From<PolygonMesh> for Polygons {
+    fn from(mesh: PolygonMesh) -> Self {
+        Self { mesh, bridged: 0 }
+    }
 }
 
 /// A built sample.
@@ -171,7 +179,9 @@ impl Binder {
         let triangles: Vec<[u32; 3]> = triangles.as_chunks().0.to_vec();
         let listener = Listener::new(progress);
         let made = generate(&points(positions), &triangles, &CageOptions::from(asked), &listener);
-        Ok(Polygons { mesh: made.map_err(Fault::from)?.cage.to_polygon_mesh() })
+        let GeneratedCage { cage, report } = made.map_err(Fault::from)?;
+        let bridged = if report.separate > report.parts { report.separate } else { 0 };
+        Ok(Polygons { mesh: cage.to_polygon_mesh(), bridged })
     }
 
     /// Poses of a cage for another one around the same model: where harmonic coordinates in the old cage bring the new one's
@@ -225,7 +235,7 @@ impl Binder {
         let asked = taken(kind)?;
         let mesh = polygon_mesh(positions, corners)?;
         let repaired = repair(&mesh, &[asked], Some(&points(model))).map_err(Fault::from)?;
-        Ok(Polygons { mesh: repaired.mesh })
+        Ok(repaired.mesh.into())
     }
 
     /// Identifier, label and what there is to see of each sample, in turn.
@@ -330,6 +340,13 @@ impl Polygons {
     pub fn corners(&self) -> Vec<u32> {
         corners(&self.mesh.faces)
     }
+
+    /// Separate parts of the model that a made cage joins; 0 if none are joined.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn bridged(&self) -> u32 {
+        self.bridged
+    }
 }
 
 #[wasm_bindgen]
@@ -352,7 +369,7 @@ impl BuiltSample {
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn cage(&self) -> Polygons {
-        Polygons { mesh: self.cage.clone() }
+        self.cage.clone().into()
     }
 
     /// Names of the prepared poses.

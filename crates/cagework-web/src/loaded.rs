@@ -81,14 +81,14 @@ impl Loaded {
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn cage(&self) -> Option<Polygons> {
-        self.cage.clone().map(|mesh| Polygons { mesh })
+        self.cage.clone().map(Polygons::from)
     }
 
     /// The model itself as a cage.
     #[wasm_bindgen(js_name = asCage)]
     #[must_use]
     pub fn as_cage(&self) -> Polygons {
-        Polygons { mesh: self.model.cage_mesh() }
+        self.model.cage_mesh().into()
     }
 
     /// Textures to decode.

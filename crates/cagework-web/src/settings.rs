@@ -54,6 +54,10 @@ pub(crate) struct Settings {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[cfg_attr(test, ts(optional, as = "Option<Vec<SurfacePoint>>"))]
     pins: Vec<SurfacePoint>,
+    /// The same for each pose of the project, in turn.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(test, ts(optional, as = "Option<Vec<Vec<SurfacePoint>>>"))]
+    pose_pins: Vec<Vec<SurfacePoint>>,
     /// What was wrong, in whole sentences.
     notices: Vec<String>,
 }
@@ -69,6 +73,11 @@ pub fn read_settings(text: &str, defaults: &str) -> Result<JsValue, JsValue> {
     let defaults: Map<String, Value> =
         serde_json::from_str(defaults).map_err(|error| Fault::new(ErrorName::Error, error))?;
     Ok(object(&Settings::read(text, &defaults))?)
+}
+
+/// Points of the surface in settings; none if they cannot be read.
+fn points<T: serde::de::DeserializeOwned + Default>(given: &Map<String, Value>, key: &str) -> T {
+    given.get(key).and_then(|points| serde_json::from_value(points.clone()).ok()).unwrap_or_default()
 }
 
 impl Settings {
@@ -88,8 +97,8 @@ impl Settings {
         let word = |key: &str| given.get(key).and_then(Value::as_str).map(str::to_owned);
         settings.pose = word("pose");
         settings.sample = word("sample").filter(|id| samples::all().iter().any(|sample| sample.id == id));
-        settings.pins =
-            given.get("pins").and_then(|pins| serde_json::from_value(pins.clone()).ok()).unwrap_or_default();
+        settings.pins = points(&given, "pins");
+        settings.pose_pins = points(&given, "pose_pins");
         settings.symmetry = given.get("symmetry").and_then(Value::as_bool);
         settings
     }

@@ -114,13 +114,23 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
       if (vertices > options.vertices) {
         ctx.tell.say(T.cage.more(vertices, options.vertices));
       }
+      if (made.bridged) {
+        const each = { label: T.cage.perPart, run: () => makeForEachPart() };
+        ctx.tell.say(T.cage.bridged(made.bridged), each);
+      }
       return made;
     } finally {
       ctx.store.set({ cageProgress: null });
     }
   };
 
-  return {
+  const makeForEachPart = () => {
+    const { cageOptions } = ctx.store.get();
+    ctx.store.set({ cageOptions: { ...cageOptions, per_component: true } });
+    void actions.regenerate();
+  };
+
+  const actions: CageActions = {
     make() {
       ctx.tell.clear();
       return attempt(ctx, T.failed.noCage, () =>
@@ -157,13 +167,14 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
     },
     regenerate() {
       ctx.store.set({ cageSource: "auto" });
-      return this.make();
+      return actions.make();
     },
     mend(fix) {
-      if (fix.kind === "repair") void this.repair(fix.repair);
+      if (fix.kind === "repair") void actions.repair(fix.repair);
       else if (fix.kind === "grid") does.refine(fix.cells);
-      else void this.regenerate();
+      else void actions.regenerate();
     },
     adopt,
   };
+  return actions;
 }

@@ -1,7 +1,15 @@
 /** Moving the cage: gestures, fields, arrows, each one step of the history, in the pose or in the rest cage. */
 
 import { nextAmount } from "../amount";
-import type { CageState, Check, CheckedCage, Gesture, GizmoHandle, RestEdit } from "../contract";
+import type {
+  CageState,
+  Check,
+  CheckedCage,
+  Gesture,
+  GizmoHandle,
+  RestEdit,
+  SurfacePoint,
+} from "../contract";
 import { T } from "../words";
 import { type Context, report } from "./context";
 
@@ -22,7 +30,12 @@ export interface Edit {
   alsoSettles(write: () => void): void;
   moveTo(x: number, y: number, z: number): void;
   /** Takes positions, and what they are a blend of, as one step. */
-  pose(label: string, positions: Float32Array, shares: readonly number[]): void;
+  pose(
+    label: string,
+    positions: Float32Array,
+    shares: readonly number[],
+    pins?: readonly SurfacePoint[],
+  ): void;
   /** Remembers positions before something that ends with `posedSince`. */
   positions(): Float32Array;
   posedSince(label: string, before: Float32Array, sharesBefore: readonly number[]): void;
@@ -82,15 +95,28 @@ export function createEdit(ctx: Context, adopt: (state: CageState, check: Check 
     sync();
   };
 
-  /** A step from one pose, and the shares of its blend, to those of the moment. */
-  const pushPose = (label: string, from: Float32Array, sharesFrom: readonly number[]) => {
+  const setPins = (pins: readonly SurfacePoint[]) => {
+    if (pins === ctx.store.get().pins) return;
+    ctx.store.set({ pins });
+    engine().showHeld([...pins]);
+  };
+
+  /** A step from one pose, and the shares of its blend and its pins, to those of the moment. */
+  const pushPose = (
+    label: string,
+    from: Float32Array,
+    sharesFrom: readonly number[],
+    pinsFrom: readonly SurfacePoint[] = ctx.store.get().pins,
+  ) => {
     const to = engine().cagePositions();
-    const sharesTo = ctx.store.get().shares;
-    const set = (positions: Float32Array, shares: readonly number[]) => {
+    const { shares: sharesTo, pins: pinsTo } = ctx.store.get();
+    const set = (positions: Float32Array, shares: readonly number[], pins: readonly SurfacePoint[]) => {
       setPose(positions);
       ctx.store.set({ shares });
+      setPins(pins);
     };
-    ctx.history.push({ label, undo: () => set(from, sharesFrom), redo: () => set(to, sharesTo) });
+    const undo = () => set(from, sharesFrom, pinsFrom);
+    ctx.history.push({ label, undo, redo: () => set(to, sharesTo, pinsTo) });
     sync();
   };
 
@@ -219,13 +245,14 @@ export function createEdit(ctx: Context, adopt: (state: CageState, check: Check 
       before = undefined;
       if (from && fromRest && engine().moveSelectionTo(x, y, z)) keep(T.did.type, from, fromRest);
     },
-    pose(label, positions, shares) {
+    pose(label, positions, shares, pins) {
       settle();
       const from = engine().cagePositions();
-      const { shares: before } = ctx.store.get();
+      const { shares: before, pins: pinned } = ctx.store.get();
       setPose(positions);
       ctx.store.set({ shares });
-      pushPose(label, from, before);
+      setPins(pins ?? pinned);
+      pushPose(label, from, before, pinned);
     },
     positions: () => engine().cagePositions(),
     posedSince: pushPose,

@@ -41,7 +41,11 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     // Nobody needs the weights of what was open.
     ctx.queue.cancel("bind");
     const settings = settingsOf(opened);
-    const poses = opened.project?.poses ?? opened.poses ?? [];
+    const of = settings.pose_pins;
+    const poses =
+      opened.project?.poses.map((pose, k) => (of ? { ...pose, pins: of[k] ?? [] } : pose)) ??
+      opened.poses ??
+      [];
     ctx.history.clear();
     store.set({
       model: { ...opened.model, name: shownName(opened, sample, store.get().samples) },

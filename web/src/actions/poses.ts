@@ -54,8 +54,8 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
     save() {
       if (!store.get().cage) return;
       edit.settle();
-      const { poses, shares } = store.get();
-      const pose = { name: freshName(poses), positions: engine().cagePositions() };
+      const { poses, shares, pins } = store.get();
+      const pose = { name: freshName(poses), positions: engine().cagePositions(), pins };
       // It is what is shown: its slider leads from here to rest.
       change(T.did.save, [...poses, pose], [...shares.map(() => 0), 1]);
       ctx.tell.say((store.get().posed ? T.pose.saved : T.pose.savedRest)(pose.name));
@@ -67,6 +67,7 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
         T.did.pose(pose.name),
         pose.positions,
         poses.map((other) => (other === pose ? 1 : 0)),
+        pose.pins,
       );
     },
     rename(pose, name) {

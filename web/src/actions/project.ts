@@ -24,6 +24,9 @@ export function createProject(ctx: Context): Project {
       cage: state.cageOptions,
       symmetry: state.symmetry,
       ...(state.pins.length > 0 ? { pins: [...state.pins] } : {}),
+      ...(state.poses.some((pose) => pose.pins?.length)
+        ? { pose_pins: state.poses.map(({ pins }) => [...(pins ?? [])]) }
+        : {}),
       ...(state.sample && state.sampleCage ? { sample: state.sample } : {}),
       ...(pose ? { pose } : {}),
     };

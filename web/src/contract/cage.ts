@@ -21,4 +21,6 @@ export interface Check {
 /** A cage that a worker has looked at; null while it has not. */
 export interface CheckedCage extends CageArrays {
   readonly check: Check | null;
+  /** Separate parts of the model that it joins, if it was made so. */
+  readonly bridged?: number;
 }

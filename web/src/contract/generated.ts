@@ -415,6 +415,10 @@ pose?: string,
  */
 pins?: Array<SurfacePoint>,
 /**
+ * The same for each pose of the project, in turn.
+ */
+pose_pins?: Array<Array<SurfacePoint>>,
+/**
  * What was wrong, in whole sentences.
  */
 notices: Array<string>, };

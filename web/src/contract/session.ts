@@ -13,12 +13,15 @@ import type {
   PullOptions,
   Repair,
   Settings,
+  SurfacePoint,
   UpAxis,
 } from "./generated";
 
 export interface Pose {
   readonly name: string;
   readonly positions: Float32Array;
+  /** Points that pulls left where they were; none: not known, the pins of the moment stay. */
+  readonly pins?: readonly SurfacePoint[];
 }
 
 /** What is taken hold of, in the pose `start` of the cage, `[n_cage, 3]`. */

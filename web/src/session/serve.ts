@@ -95,7 +95,8 @@ function createWork(pkg: Package): Work {
     },
     async cage({ positions, triangles, options }, step) {
       const cage = (await binder(false)).generateCage(positions, triangles, options, step);
-      return checked(pkg, cage, positions);
+      const { bridged } = cage;
+      return { ...checked(pkg, cage, positions), bridged };
     },
     read: (input, step) => readModel(pkg, input, step),
     readCage: (input, step) => readCage(pkg, input, step),

@@ -317,6 +317,7 @@ export const EN = {
     edges: "Edges",
     faces: "Faces",
     posesWait: "Pose and poses belong to the cage before, and are kept with it.",
+    bridged: (parts: number) => `The model has ${count(parts)} separate parts; this cage joins them.`,
     fineEnough: "Fine enough",
     more: (made: number, wanted: number) =>
       `The model's holes and gaps need ${made} vertices instead of ${wanted}.`,

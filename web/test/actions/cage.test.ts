@@ -98,6 +98,21 @@ it("more vertices than wanted are said", async () => {
   expect(said).toEqual(["The model's holes and gaps need 100 vertices instead of 80."]);
 });
 
+it("a cage that joins separate parts offers one for each", async () => {
+  const fake = createFake();
+  const { asked, said, store } = fake;
+  const cage = createCage(fake.ctx, { refine: () => undefined, carry: () => Promise.resolve() });
+  const made = cage.make();
+  await settled();
+  asked[0]?.resolve({ ...cageOf(8), bridged: 3 });
+  await made;
+  expect(said).toEqual(["The model has 3 separate parts; this cage joins them."]);
+  fake.offered[0]?.run();
+  await settled();
+  expect(asked[1]?.input).toMatchObject({ per_component: true });
+  expect(store.get().cageOptions.per_component, "the switch shows it").toBe(true);
+});
+
 it("a button beside a problem repairs, refines the grid, or makes another cage", async () => {
   const { cage, asked, grids, problems, store, height } = page();
   cage.mend({ kind: "grid", cells: 128 });

@@ -49,6 +49,22 @@ it("a saved pose is shown, and undo goes back to the one before", async () => {
   expect(height()).toBe(5);
 });
 
+it("a pose brings its pins, and undo those of before", async () => {
+  const { poses, store, engine, ctx } = page();
+  const pin = { triangle: 3, weights: [1, 0, 0] } as never;
+  store.set({ pins: [pin] });
+  poses.save();
+  store.set({ pins: [] });
+  engine.setCagePositions(new Float32Array(6));
+  const [pose] = store.get().poses;
+  if (pose) poses.apply(pose);
+  expect(store.get().pins).toEqual([pin]);
+  await ctx.history.undo();
+  expect(store.get().pins).toEqual([]);
+  await ctx.history.redo();
+  expect(store.get().pins).toEqual([pin]);
+});
+
 it("pose and poses of a cage of before are carried over, as one step", async () => {
   const { poses, store, ctx, engine, asked, height } = page();
   poses.save();

@@ -5,7 +5,6 @@ use std::collections::HashMap;
 use super::{Code, Fix, Places, Problem, Repair, Severity, diagonal, problem};
 use crate::cage::{Side, sides_of};
 use crate::mesh::PolygonMesh;
-use crate::words::counted;
 
 /// Vertices nearer than this fraction of the diagonal are at one place: the rounding of six decimals in a file.
 pub(super) const WELD_DISTANCE: f64 = 2e-6;
@@ -48,15 +47,7 @@ impl Edges {
                     ..Places::default()
                 },
                 fixes: fixes.map(|repair| Fix::Repair { repair }).collect(),
-                ..problem(
-                    Code::OpenEdge,
-                    Severity::Error,
-                    open.len(),
-                    format!(
-                        "The cage is not closed: {} to one face only.",
-                        counted(open.len(), "edge belongs", "edges belong")
-                    ),
-                )
+                ..problem(Code::OpenEdge, Severity::Error, open.len())
             });
         }
         let crowded: Vec<&[Side]> = self.groups().filter(|g| g.len() > 2).collect();
@@ -70,15 +61,7 @@ impl Edges {
                     faces,
                     ..Places::default()
                 },
-                ..problem(
-                    Code::NonManifoldEdge,
-                    Severity::Error,
-                    crowded.len(),
-                    format!(
-                        "{} to more than two faces: remove inner faces there.",
-                        counted(crowded.len(), "edge belongs", "edges belong")
-                    ),
-                )
+                ..problem(Code::NonManifoldEdge, Severity::Error, crowded.len())
             });
         }
     }
@@ -127,15 +110,7 @@ pub(super) fn report_vertices(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec
         found.push(Problem {
             places: Places { vertices: vertices.collect(), ..Places::default() },
             fixes: vec![Fix::Repair { repair: Repair::Weld }],
-            ..problem(
-                Code::DuplicateVertex,
-                Severity::Note,
-                joined,
-                format!(
-                    "{} where another one is: on open edges they count as one, elsewhere as two handles.",
-                    counted(joined, "vertex is", "vertices are")
-                ),
-            )
+            ..problem(Code::DuplicateVertex, Severity::Note, joined)
         });
     }
     let mut used = vec![false; mesh.positions.len()];
@@ -150,15 +125,7 @@ pub(super) fn report_vertices(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec
         found.push(Problem {
             places: Places { vertices: unused, ..Places::default() },
             fixes: vec![Fix::Repair { repair: Repair::DropDegenerate }],
-            ..problem(
-                Code::UnusedVertex,
-                Severity::Note,
-                count,
-                format!(
-                    "{} to no face: moving it does nothing.",
-                    counted(count, "vertex belongs", "vertices belong")
-                ),
-            )
+            ..problem(Code::UnusedVertex, Severity::Note, count)
         });
     }
     let pinched = pinched(mesh, sound);
@@ -166,15 +133,7 @@ pub(super) fn report_vertices(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec
         let count = pinched.len();
         found.push(Problem {
             places: Places { vertices: pinched, ..Places::default() },
-            ..problem(
-                Code::NonManifoldVertex,
-                Severity::Note,
-                count,
-                format!(
-                    "Parts of the cage meet only in {}; this does no harm.",
-                    counted(count, "vertex", "vertices")
-                ),
-            )
+            ..problem(Code::NonManifoldVertex, Severity::Note, count)
         });
     }
 }

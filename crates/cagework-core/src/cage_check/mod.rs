@@ -8,6 +8,7 @@ mod fill;
 mod grow;
 mod orient;
 mod repair;
+mod sentences;
 mod shape;
 #[cfg(test)]
 mod tests;
@@ -18,7 +19,6 @@ use serde::{Deserialize, Serialize};
 use crate::cage::{Cage, CageError, MAX_FACES};
 use crate::enclosure::Enclosure;
 use crate::mesh::{Bounds, PolygonMesh};
-use crate::words::counted;
 
 pub(crate) use fill::{loops, triangulate};
 pub use repair::{Repair, RepairError, Repaired, repair};
@@ -160,7 +160,7 @@ pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> C
     let mut found = Vec::new();
     if mesh.faces.len() > MAX_FACES {
         let error = CageError::TooManyFaces { faces: mesh.faces.len() };
-        found.push(problem(Code::NotACage, Severity::Error, 1, error.to_string()));
+        found.push(Problem { message: error.to_string(), ..problem(Code::NotACage, Severity::Error, 1) });
         return CageCheck {
             valid: false,
             encloses: None,
@@ -181,7 +181,7 @@ pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> C
     if let Err(error) = &cage
         && !found.iter().any(|p| p.severity == Severity::Error)
     {
-        found.push(problem(Code::NotACage, Severity::Error, 1, error.to_string()));
+        found.push(Problem { message: error.to_string(), ..problem(Code::NotACage, Severity::Error, 1) });
     }
     let (mut encloses, mut thickness) = (None, None);
     if let Ok(cage) = &cage {
@@ -218,24 +218,19 @@ fn report_outside(cage: &Cage, model: &[Vec3], found: &mut Vec<Problem>) -> bool
         return true;
     }
     let n = outside.len();
-    let message = format!(
-        "{} of {} {} outside the cage: {} would follow its closest point rigidly.",
-        n,
-        counted(model.len(), "model vertex", "model vertices"),
-        if n == 1 { "is" } else { "are" },
-        if n == 1 { "it" } else { "they" },
-    );
     let points = outside.iter().take(MAX_PLACES).map(|&v| model[v as usize].to_array()).collect();
     found.push(Problem {
         places: Places { vertices: outside, points, ..Places::default() },
         fixes: vec![Fix::Repair { repair: Repair::Grow }],
-        ..problem(Code::ModelOutside, Severity::Warning, n, message)
+        message: sentences::outside(n, model.len()),
+        ..problem(Code::ModelOutside, Severity::Warning, n)
     });
     false
 }
 
 /// A problem without places and fixes.
-fn problem(code: Code, severity: Severity, count: usize, message: String) -> Problem {
+fn problem(code: Code, severity: Severity, count: usize) -> Problem {
+    let message = sentences::of(code, count);
     Problem { code, severity, count, places: Places::default(), message, fixes: Vec::new() }
 }
 

@@ -5,10 +5,9 @@ use std::collections::VecDeque;
 use glam::DVec3;
 
 use super::edges::Edges;
-use super::{Code, Fix, Places, Problem, Repair, Severity, problem};
+use super::{Code, Fix, Places, Problem, Repair, Severity, problem, sentences};
 use crate::enclosure::winding_number;
 use crate::mesh::PolygonMesh;
-use crate::words::counted;
 
 /// Faces of one part of the surface.
 #[derive(Clone, Debug)]
@@ -123,12 +122,8 @@ pub(super) fn report(mesh: &PolygonMesh, sound: &[u32], edges: &Edges, found: &m
         if let Some(edge) = component.one_sided {
             found.push(Problem {
                 places: Places { edges: vec![edge], ..Places::default() },
-                ..problem(
-                    Code::OneSided,
-                    Severity::Error,
-                    1,
-                    format!("Component {k} has no inside: its faces cannot be turned consistently."),
-                )
+                message: sentences::one_sided(k),
+                ..problem(Code::OneSided, Severity::Error, 1)
             });
             continue;
         }
@@ -138,18 +133,11 @@ pub(super) fn report(mesh: &PolygonMesh, sound: &[u32], edges: &Edges, found: &m
             continue;
         }
         let (count, all) = (turned.len(), component.faces.len());
-        let message = if count == all {
-            format!("Component {k} is inside out: all its {all} faces point into the solid.")
-        } else {
-            format!(
-                "In component {k} {} of {all} the wrong way.",
-                counted(count, "face points", "faces point")
-            )
-        };
         found.push(Problem {
             places: Places { faces: turned, ..Places::default() },
             fixes: vec![Fix::Repair { repair: Repair::Flip }],
-            ..problem(Code::Flipped, Severity::Note, count, message)
+            message: sentences::flipped(k, count, all),
+            ..problem(Code::Flipped, Severity::Note, count)
         });
     }
     components.len()

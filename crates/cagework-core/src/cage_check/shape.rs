@@ -5,12 +5,11 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 
-use super::{Code, Fix, MAX_PLACES, Places, Problem, Repair, Severity, diagonal, problem};
+use super::{Code, Fix, MAX_PLACES, Places, Problem, Repair, Severity, diagonal, problem, sentences};
 use crate::cage::{Cage, face_triangles};
 use crate::contact::{Corners, each_meeting};
 use crate::mesh::PolygonMesh;
 use crate::options::MAX_GRID;
-use crate::words::{counted, grouped};
 
 /// Triangles up to which the thickness is looked at everywhere; of more, every n-th is a place to measure from.
 const MEASURED: usize = 1500;
@@ -26,15 +25,14 @@ const OPPOSITE: f64 = 0.3;
 pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u32> {
     let n = mesh.positions.len();
     if mesh.faces.is_empty() || n == 0 {
-        found.push(problem(Code::Empty, Severity::Error, 1, "The cage has no faces.".into()));
+        found.push(problem(Code::Empty, Severity::Error, 1));
     }
     let broken: Vec<u32> = (0..n as u32).filter(|&v| !mesh.positions[v as usize].is_finite()).collect();
     if !broken.is_empty() {
         let count = broken.len();
-        let message = format!("{} no finite position.", counted(count, "vertex has", "vertices have"));
         found.push(Problem {
             places: Places { vertices: broken, ..Places::default() },
-            ..problem(Code::NotFinite, Severity::Error, count, message)
+            ..problem(Code::NotFinite, Severity::Error, count)
         });
     }
     let diagonal = diagonal(mesh);
@@ -63,36 +61,16 @@ pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u
         }
         sound.push(f);
     }
-    let mut report = |code, faces: Vec<u32>, one: &str, many: &str, fixes: Vec<Fix>| {
-        if !faces.is_empty() {
-            let count = faces.len();
-            let message = format!("{}.", counted(count, one, many));
-            let places = Places { faces, ..Places::default() };
-            found.push(Problem { places, fixes, ..problem(code, Severity::Error, count, message) });
+    let dropped = [(Code::BadIndex, bad), (Code::DegenerateFace, degenerate), (Code::DuplicateFace, twice)];
+    for (code, faces) in dropped.into_iter().filter(|(_, faces)| !faces.is_empty()) {
+        found.push(Problem {
+            fixes: vec![Fix::Repair { repair: Repair::DropDegenerate }],
+            ..problem(code, Severity::Error, faces.len())
+        });
+        if let Some(problem) = found.last_mut() {
+            problem.places.faces = faces;
         }
-    };
-    let drop = || vec![Fix::Repair { repair: Repair::DropDegenerate }];
-    report(
-        Code::BadIndex,
-        bad,
-        "face names a vertex that does not exist",
-        "faces name vertices that do not exist",
-        drop(),
-    );
-    report(
-        Code::DegenerateFace,
-        degenerate,
-        "face has no area, a corner twice, too many corners, or an outline that crosses itself",
-        "faces have no area, a corner twice, too many corners, or an outline that crosses itself",
-        drop(),
-    );
-    report(
-        Code::DuplicateFace,
-        twice,
-        "face has the same corners as another one",
-        "faces have the same corners as others",
-        drop(),
-    );
+    }
     sound
 }
 
@@ -158,23 +136,11 @@ pub(super) fn report_crossings(
     faces.dedup();
     let point =
         |&[a, b]: &[u32; 2]| between(&triangles[a as usize], &triangles[b as usize]).as_vec3().to_array();
-    let listed = counted(pairs.len(), "pair of triangles", "pairs of triangles");
-    let more = match (count - pairs.len(), complete) {
-        (0, true) => String::new(),
-        (n, true) => format!(", and {} more", grouped(n)),
-        (n, false) => format!(", and at least {} more", grouped(n)),
-    };
-    let (severity, message) = if of_parts {
-        let what = "Parts of the cage overlap or touch";
-        let then = "Where they overlap they are bound as one, without the walls inside.";
-        (Severity::Warning, format!("{what}: {listed} meet{more}. {then}"))
-    } else {
-        let what = "The cage goes through itself";
-        (Severity::Error, format!("{what}: {listed} meet{more}. Move their vertices apart."))
-    };
+    let severity = if of_parts { Severity::Warning } else { Severity::Error };
     found.push(Problem {
         places: Places { faces, points: pairs.iter().map(point).collect(), ..Places::default() },
-        ..problem(Code::SelfIntersection, severity, count, message)
+        message: sentences::crossing(pairs.len(), count - pairs.len(), complete, of_parts),
+        ..problem(Code::SelfIntersection, severity, count)
     });
 }
 
@@ -215,22 +181,13 @@ pub(super) fn report_thickness(cage: &Cage, grid: Option<u32>, found: &mut Vec<P
     faces.dedup();
     if let (Some(cell), Some(grid), false) = (cell, grid, points.is_empty()) {
         let cells = (f64::from(grid) * cell / thinnest.max(1e-30)).ceil() * ENOUGH_CELLS;
-        let fits = cells <= f64::from(MAX_GRID);
-        let advice =
-            if fits { format!("use a grid of {cells} cells") } else { "make the cage thicker".into() };
+        let cells = (cells <= f64::from(MAX_GRID)).then_some(cells as u32);
         let count = points.len();
         found.push(Problem {
             places: Places { faces, points, ..Places::default() },
-            fixes: if fits { vec![Fix::Grid { cells: cells as u32 }] } else { Vec::new() },
-            ..problem(
-                Code::ThinPart,
-                Severity::Warning,
-                count,
-                format!(
-                    "The cage is thinner than a cell of the grid in {}: {advice}.",
-                    counted(count, "place", "places")
-                ),
-            )
+            fixes: cells.map(|cells| Fix::Grid { cells }).into_iter().collect(),
+            message: sentences::thin(count, cells),
+            ..problem(Code::ThinPart, Severity::Warning, count)
         });
     }
     thinnest.is_finite().then_some(thinnest as f32)

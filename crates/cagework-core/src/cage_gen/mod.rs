@@ -101,6 +101,7 @@ pub fn generate(
             clearance: shell.clearance as f32,
             mirror: shell.hull.mirror.map(Mirror::of_axis),
             parts: n_parts(&cage),
+            separate: shell.separate as u32,
             hull_vertices: n_hull as u32,
             hull,
             attempts: attempt as u32 + 1,

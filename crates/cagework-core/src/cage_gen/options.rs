@@ -176,6 +176,8 @@ pub struct CageReport {
     pub mirror: Option<Mirror>,
     /// Closed parts.
     pub parts: u32,
+    /// Parts that the model's own gaps leave apart: more than `parts` if they were bridged.
+    pub separate: u32,
     /// Vertices of the hull before it was simplified.
     pub hull_vertices: u32,
     /// Whether nothing was simplified: the cage is the hull that is right by construction.

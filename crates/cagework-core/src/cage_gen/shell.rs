@@ -41,6 +41,8 @@ pub(super) struct Shell {
     pub(super) hull: Surface,
     /// The hull with its stairs: right by construction.
     pub(super) stairs: Surface,
+    /// Separate parts of the hull before they were bridged.
+    pub(super) separate: usize,
     /// One voxel of every part of the solid.
     pub(super) parts: Vec<[usize; 3]>,
     /// Distance that the hull keeps from the model along each axis, object units.
@@ -77,6 +79,7 @@ impl Shell {
         }
         go_on(0.6)?;
         let mut hull = grown(&solid, layers, mirror);
+        let separate = hull.parts().len();
         if !options.per_component {
             while bridge(&mut solid, &hull, layers, mirror) {
                 go_on(0.7)?;
@@ -104,6 +107,7 @@ impl Shell {
             filled,
             hull,
             stairs,
+            separate,
             parts,
         })
     }

@@ -3,7 +3,7 @@ use std::ops::ControlFlow;
 use glam::{Vec3, vec3};
 use proptest::prelude::*;
 
-use super::{CageGenError, CageOptions, GeneratedCage, Mirror, Shape, Symmetry, generate};
+use super::{CageGenError, CageOptions, CageReport, GeneratedCage, Mirror, Shape, Symmetry, generate};
 use crate::cage::Cage;
 use crate::contact::{Corners, meeting};
 use crate::geometry::winding_number;
@@ -157,7 +157,8 @@ fn lopsided_model_gets_no_mirror_unless_asked_for() {
 fn scattered_parts_get_one_cage_or_one_each() {
     let places = [vec3(0.0, 0.0, 0.0), vec3(3.0, 0.5, 0.0), vec3(1.0, 2.5, 1.0)];
     let soup = join(places.map(|p| tube(&segment(p, p + vec3(0.3, 0.0, 0.4)), 0.3, false)));
-    assert_eq!(make(&soup, &options(80)).report.parts, 1);
+    let CageReport { parts, separate, .. } = make(&soup, &options(80)).report;
+    assert_eq!((parts, separate), (1, 3), "bridged");
     let each = CageOptions { per_component: true, ..options(80) };
     assert_eq!(make(&soup, &each).report.parts, 3);
 }

@@ -3,14 +3,14 @@
 use glam::{Quat, Vec3, vec3};
 
 use super::sdf::{Body, Solid};
-use super::{CageRecipe, Recipe, SampleInfo};
+use super::{CageRecipe, Pulled, Recipe, SampleInfo};
 use crate::mesh::PolygonMesh;
 
 pub(super) const INFO: SampleInfo = SampleInfo {
     id: "clamp",
     label: "Clamp",
     sentence: "The lower jaw opens and the upper one, a finger's breadth away, keeps its place; with mean value \
-               coordinates, which look straight across the gap, it would be dragged along.",
+               coordinates, which look straight across the gap, it would be dragged along. Take hold of the tip of a jaw.",
 };
 
 const STEEL: [u8; 3] = [84, 104, 128];
@@ -27,7 +27,13 @@ pub(super) fn recipe() -> Recipe {
         body: body(),
         cell: 0.0135,
         cage: CageRecipe::Made(cage()),
-        poses: vec![("Lower jaw open", Box::new(open)), ("Lower jaw aside", Box::new(aside))],
+        poses: vec![("Lower jaw open", Box::new(open))],
+        pulled: Pulled {
+            name: "Lower jaw pulled down",
+            at: vec3(0.95, -0.3, 0.18),
+            by: vec3(-0.1, -0.4, 0.0),
+            bytes: include_bytes!("pulled/clamp.bin"),
+        },
     }
 }
 
@@ -116,8 +122,4 @@ fn share_of_jaw(p: Vec3) -> f32 {
 
 fn open(cage: &[Vec3]) -> Vec<Vec3> {
     cage.iter().map(|&p| HINGE + Quat::from_rotation_z(-0.5 * share_of_jaw(p)) * (p - HINGE)).collect()
-}
-
-fn aside(cage: &[Vec3]) -> Vec<Vec3> {
-    cage.iter().map(|&p| HINGE + Quat::from_rotation_y(-0.45 * share_of_jaw(p)) * (p - HINGE)).collect()
 }

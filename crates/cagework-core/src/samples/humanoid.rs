@@ -4,14 +4,14 @@ use glam::{Quat, Vec3, vec3};
 
 use super::sdf::{Body, Solid};
 use super::skeleton::Skeleton;
-use super::{CageRecipe, Recipe, SampleInfo};
+use super::{CageRecipe, Pulled, Recipe, SampleInfo};
 use crate::cage_gen::CageOptions;
 
 pub(super) const INFO: SampleInfo = SampleInfo {
     id: "humanoid",
     label: "Legs close together",
     sentence: "One leg steps forward and the other, a hand's breadth beside it, does not follow: harmonic \
-               coordinates go round the gap, not across it.",
+               coordinates go round the gap, not across it. Take hold of a knee and lift it.",
 };
 
 const SKIN: [u8; 3] = [224, 178, 148];
@@ -52,7 +52,13 @@ pub(super) fn recipe() -> Recipe {
             detail: 0.014,
             ..CageOptions::default()
         }),
-        poses: vec![("A step", Box::new(step)), ("Arms up", Box::new(arms_up))],
+        poses: vec![("A step", Box::new(step))],
+        pulled: Pulled {
+            name: "Knee up",
+            at: vec3(0.142, 0.5, 0.1),
+            by: vec3(0.03, 0.24, 0.26),
+            bytes: include_bytes!("pulled/humanoid.bin"),
+        },
     }
 }
 
@@ -102,19 +108,6 @@ fn step(cage: &[Vec3]) -> Vec<Vec3> {
         (arms[0][0], vec3(0.0, 0.0, -0.9)),
         (arms[1][0], vec3(0.0, 0.5, 0.9)),
         (arms[1][1], vec3(0.0, 0.6, 0.0)),
-    ];
-    skeleton.pose(cage, &turns)
-}
-
-fn arms_up(cage: &[Vec3]) -> Vec<Vec3> {
-    let (skeleton, arms, legs) = skeleton();
-    let turns = [
-        (arms[0][0], vec3(0.0, 0.0, 0.7)),
-        (arms[0][1], vec3(0.0, 0.0, 0.6)),
-        (arms[1][0], vec3(0.0, 0.0, -0.7)),
-        (arms[1][1], vec3(0.0, 0.0, -0.6)),
-        (legs[0][0], vec3(0.0, 0.0, 0.3)),
-        (legs[1][0], vec3(0.0, 0.0, -0.3)),
     ];
     skeleton.pose(cage, &turns)
 }

@@ -75,7 +75,9 @@ pub fn build(id: &str) -> Option<Sample> {
                 .to_polygon_mesh()
         }
     };
-    let poses = recipe.poses.iter().map(|(name, pose)| ((*name).to_owned(), pose(&cage.positions))).collect();
+    let posed = |(name, pose): &(&str, Pose)| ((*name).to_owned(), pose(&cage.positions));
+    let mut poses: Vec<_> = recipe.poses.iter().map(posed).collect();
+    poses.push((recipe.pulled.name.to_owned(), recipe.pulled.pose(&cage.positions)));
     Some(Sample { name: info.label.to_owned(), mesh, colours, cage, poses })
 }
 
@@ -94,6 +96,33 @@ struct Recipe {
     cell: f32,
     cage: CageRecipe,
     poses: Vec<(&'static str, Pose)>,
+    /// The last pose.
+    pulled: Pulled,
+}
+
+/// A pose made by one pull. It is kept as bytes: a pull needs a bind, which would keep a visitor waiting.
+struct Pulled {
+    name: &'static str,
+    /// The model's vertex nearest to this point is taken hold of, object units.
+    #[cfg_attr(not(test), expect(dead_code, reason = "the test that makes the bytes pulls"))]
+    at: Vec3,
+    /// How far it is pulled, object units.
+    #[cfg_attr(not(test), expect(dead_code, reason = "the test that makes the bytes pulls"))]
+    by: Vec3,
+    /// Offsets of the cage's vertices, i16, little endian, in [`PULLED_UNIT`]. `[n_cage, 3]`
+    bytes: &'static [u8],
+}
+
+/// Object units in a unit of stored poses.
+const PULLED_UNIT: f32 = 1e-4;
+
+impl Pulled {
+    fn pose(&self, rest: &[Vec3]) -> Vec<Vec3> {
+        let numbers =
+            self.bytes.as_chunks().0.iter().map(|&b| PULLED_UNIT * f32::from(i16::from_le_bytes(b)));
+        let numbers: Vec<f32> = numbers.collect();
+        rest.iter().zip(numbers.as_chunks().0).map(|(&p, &by)| p + Vec3::from_array(by)).collect()
+    }
 }
 
 /// From the rest positions of a cage to posed ones.

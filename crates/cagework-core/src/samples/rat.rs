@@ -4,13 +4,14 @@ use glam::{Quat, Vec3, vec3};
 
 use super::sdf::{Body, Solid};
 use super::skeleton::Skeleton;
-use super::{CageRecipe, Recipe, SampleInfo};
+use super::{CageRecipe, Pulled, Recipe, SampleInfo};
 use crate::cage_gen::CageOptions;
 
 pub(super) const INFO: SampleInfo = SampleInfo {
     id: "rat",
     label: "Rat",
-    sentence: "The paper's model: the tail curls and the head turns while the feet stay where they are.",
+    sentence: "The paper's model: the tail curls and the head turns while the feet stay where they are. \
+               Take hold of the nose and let the rat look round.",
 };
 
 const FUR: [u8; 3] = [142, 126, 116];
@@ -63,7 +64,13 @@ pub(super) fn recipe() -> Recipe {
             detail: 0.014,
             ..CageOptions::default()
         }),
-        poses: vec![("Tail up, head turned", Box::new(curled)), ("Standing up", Box::new(standing))],
+        poses: vec![("Tail up, head turned", Box::new(curled))],
+        pulled: Pulled {
+            name: "Looking round",
+            at: vec3(0.0, 0.47, 1.1),
+            by: vec3(0.32, 0.12, -0.14),
+            bytes: include_bytes!("pulled/rat.bin"),
+        },
     }
 }
 
@@ -131,17 +138,5 @@ fn curled(cage: &[Vec3]) -> Vec<Vec3> {
     let (skeleton, spine, tail, _) = skeleton();
     let mut turns = vec![(spine[2], vec3(-0.15, 0.35, 0.0)), (spine[3], vec3(-0.2, 0.45, 0.2))];
     turns.extend(tail.iter().map(|&bone| (bone, vec3(0.36, 0.14, 0.0))));
-    skeleton.pose(cage, &turns)
-}
-
-fn standing(cage: &[Vec3]) -> Vec<Vec3> {
-    let (skeleton, spine, tail, legs) = skeleton();
-    let mut turns = vec![(spine[0], vec3(-0.75, 0.0, 0.0)), (spine[1], vec3(-0.35, 0.0, 0.0))];
-    turns.extend([(spine[2], vec3(0.35, 0.0, 0.0)), (spine[3], vec3(0.35, 0.0, 0.0))]);
-    // Hind legs and tail hang on the hips: they stay on the ground.
-    turns.extend([(legs[2][0], vec3(0.75, 0.0, 0.0)), (legs[3][0], vec3(0.75, 0.0, 0.0))]);
-    turns.extend([(legs[0][0], vec3(0.5, 0.0, 0.0)), (legs[1][0], vec3(0.2, 0.0, 0.0))]);
-    turns.push((tail[0], vec3(0.75, 0.0, 0.0)));
-    turns.extend(tail[2..].iter().map(|&bone| (bone, vec3(0.0, 0.22, 0.0))));
     skeleton.pose(cage, &turns)
 }

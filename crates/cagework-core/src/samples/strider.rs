@@ -4,14 +4,14 @@ use glam::{Quat, Vec3, vec3};
 
 use super::sdf::{Body, Solid};
 use super::skeleton::Skeleton;
-use super::{CageRecipe, Recipe, SampleInfo};
+use super::{CageRecipe, Pulled, Recipe, SampleInfo};
 use crate::cage_gen::CageOptions;
 
 pub(super) const INFO: SampleInfo = SampleInfo {
     id: "strider",
     label: "Strider",
     sentence: "Legs as thin as a cell of the grid: each bends by its own part of the cage, and the rest pose stays \
-               exact.",
+               exact. Take hold of a foot and lift it.",
 };
 
 const SHELL: [u8; 3] = [176, 84, 52];
@@ -32,7 +32,13 @@ pub(super) fn recipe() -> Recipe {
             detail: 0.014,
             ..CageOptions::default()
         }),
-        poses: vec![("Front legs raised", Box::new(raised)), ("Low on its legs", Box::new(crouched))],
+        poses: vec![("Front legs raised", Box::new(raised))],
+        pulled: Pulled {
+            name: "One leg up",
+            at: vec3(0.617, 0.03, 1.13),
+            by: vec3(0.1, 0.45, 0.1),
+            bytes: include_bytes!("pulled/strider.bin"),
+        },
     }
 }
 
@@ -84,20 +90,6 @@ fn raised(cage: &[Vec3]) -> Vec<Vec3> {
     }
     for leg in legs[1..4].iter().chain(&legs[5..]) {
         turns.push((leg[0], vec3(0.18, 0.0, 0.0)));
-    }
-    skeleton.pose(cage, &turns)
-}
-
-fn crouched(cage: &[Vec3]) -> Vec<Vec3> {
-    let (skeleton, legs) = skeleton();
-    let mut turns = Vec::new();
-    for (k, leg) in legs.iter().enumerate() {
-        let side = if k < 4 { 1.0 } else { -1.0 };
-        let (angle, _) = LEGS[k % 4];
-        // Turns about the axis across the leg lift it; the knee turns the other way.
-        let across = vec3(angle.cos(), 0.0, -angle.sin() * side);
-        turns.push((leg[0], across * -0.35));
-        turns.push((leg[1], across * 0.55));
     }
     skeleton.pose(cage, &turns)
 }

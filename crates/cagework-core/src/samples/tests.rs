@@ -1,15 +1,20 @@
 use crate::cage_check::{Severity, check};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
-use super::{all, build};
+use super::{PULLED_UNIT, Recipe, Sample, all, build};
 use crate::bind::bind;
 use crate::cage::Cage;
 use crate::geometry::winding_number;
 use crate::options::BindOptions;
 use crate::progress::Silent;
+use crate::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
 
 /// Mean distance between rest pose and reconstruction over the diagonal: f32 round-off of the corrected rows.
 const REST_ERROR: f64 = 2e-6;
+
+fn recipes() -> [Recipe; 4] {
+    [super::rat::recipe(), super::humanoid::recipe(), super::clamp::recipe(), super::strider::recipe()]
+}
 
 #[test]
 fn every_sample_is_enclosed_by_its_cage_and_bound_exactly() {
@@ -47,6 +52,40 @@ fn poses_move_some_of_the_cage_and_keep_its_vertices() {
     }
 }
 
+/// Where stored poses are made: when a sample's model, cage or pull has changed, this writes them anew and fails once.
+#[test]
+fn the_last_pose_of_each_sample_is_what_one_pull_makes() {
+    for (info, recipe) in all().iter().zip(recipes()) {
+        let Sample { mesh, cage, poses, .. } = build(info.id).unwrap();
+        let (rest, pulled) = (cage.positions.clone(), recipe.pulled);
+        let cage = Cage::new(&cage).unwrap();
+        let weights =
+            |points: &[Vec3]| bind(points, &cage, &BindOptions::default(), &Silent).unwrap().weights;
+        let probes = Probes::new(&mesh, &cage).unwrap();
+        let of_probes = weights(probes.points());
+        let pull = Pull::new(&mesh, &cage, probes, &of_probes).unwrap();
+        let nearest = |v: &u32| mesh.positions[*v as usize].distance(pulled.at);
+        let held = (0..mesh.positions.len() as u32).min_by(|a, b| nearest(a).total_cmp(&nearest(b))).unwrap();
+        let grip =
+            Grip::new(Handle::Vertex(held), &pull, &mesh.triangles, &weights(&mesh.positions)).unwrap();
+        let start: Vec<DVec3> = rest.iter().map(|p| p.as_dvec3()).collect();
+        let mut drag = Drag::new(&pull, &start, &[grip], &[], DragOptions::default()).unwrap();
+        for _ in 0..30 {
+            drag.frame(&[(mesh.positions[held as usize] + pulled.by).as_dvec3()]);
+        }
+        let made: Vec<Vec3> = drag.cage().iter().map(|p| p.as_vec3()).collect();
+        let stored = &poses.last().unwrap().1;
+        let off = made.iter().zip(stored).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+        if stored.len() != made.len() || off > 1e-3 {
+            let number = |x: f32| ((x / PULLED_UNIT).round() as i16).to_le_bytes();
+            let offsets = made.iter().zip(&rest).flat_map(|(p, r)| (*p - *r).to_array());
+            let path = format!("{}/src/samples/pulled/{}.bin", env!("CARGO_MANIFEST_DIR"), info.id);
+            std::fs::write(&path, offsets.flat_map(number).collect::<Vec<u8>>()).unwrap();
+            panic!("{path} was {off} off and has been written anew: run again");
+        }
+    }
+}
+
 #[test]
 fn samples_are_closed_surfaces_that_face_outward() {
     for info in all() {
@@ -75,9 +114,7 @@ fn unknown_samples_are_none() {
 #[test]
 fn what_is_left_out_of_a_body_changes_no_distance_and_no_colour() {
     let reach = 0.1;
-    for recipe in
-        [super::rat::recipe(), super::humanoid::recipe(), super::clamp::recipe(), super::strider::recipe()]
-    {
+    for recipe in recipes() {
         let body = recipe.body;
         let [min, max] = body.bounds();
         let steps = |n: u32| (0..=n).map(move |k| k as f32 / n as f32);

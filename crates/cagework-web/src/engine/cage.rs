@@ -34,7 +34,7 @@ impl Engine {
             let cut = |side: f32| (side / longest * divisions as f32).round().max(1.0) as u32;
             Answer::Ok(subdivided_box(bounds, BOX_MARGIN, bounds.extent().to_array().map(cut)))
         })?;
-        Ok(Polygons { mesh })
+        Ok(mesh.into())
     }
 
     /// Takes a cage given as arrays; `corners`: for each face their number, then them. A mesh that is no cage yet becomes
