@@ -1,17 +1,20 @@
 //! A frame: the cage moves, the mesh and its normals follow, and it is drawn. On whatever adapter there is; the
 //! environment's `CAGEWORK_ADAPTER` names another.
 //!
-//! `deform` waits until positions and normals are there, `frame` until the picture is.
+//! `pull` is what the processor solves for a frame of a pull; `deform` waits until positions and normals are there, `frame` until
+//! the picture is.
 
+use std::slice;
 use std::time::Instant;
 
 use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
-use cagework_core::{Cage, bind};
+use cagework_core::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
+use cagework_core::{Cage, TriMesh, bind};
 use cagework_gpu::render::DrawModel;
 use cagework_gpu::{ContextOptions, Deformer, GpuContext, GpuWeights, Session};
 use cagework_tests::creature::{creature, creature_cage};
-use glam::{Quat, Vec3};
+use glam::{DVec3, Quat, Vec3};
 use pollster::block_on;
 
 /// Frames that are timed.
@@ -49,6 +52,35 @@ fn summary(mut times: Vec<f64>) -> String {
     format!("median {:.1} ms, fastest {:.1} ms", times[times.len() / 2], times[0])
 }
 
+/// A grab made ready and frames of a pull: the animal's first vertex goes round.
+fn pull(positions: &[Vec3], triangles: &[[u32; 3]], cage: &Cage, options: &BindOptions) {
+    let mesh = TriMesh { positions: positions.to_vec(), triangles: triangles.to_vec() };
+    let weights = |points: &[Vec3]| bind(points, cage, options, &Silent).expect("it binds").weights;
+    let probes = Probes::new(&mesh, cage).expect("it has a surface");
+    let of_probes = weights(probes.points());
+    let began = Instant::now();
+    let pull = Pull::new(&mesh, cage, probes, &of_probes).expect("they belong together");
+    let once = began.elapsed().as_secs_f64() * 1e3;
+    let grip = Grip::new(Handle::Vertex(0), &pull, triangles, &weights(positions)).expect("there is one");
+    let rest: Vec<DVec3> = cage.positions().iter().map(|p| p.as_dvec3()).collect();
+    let grab = || {
+        let began = Instant::now();
+        let drag = Drag::new(&pull, &rest, slice::from_ref(&grip), &[], DragOptions::default());
+        (drag.expect("it can be held"), began.elapsed().as_secs_f64() * 1e3)
+    };
+    println!("pull, {} cage vertices: once {once:.1} ms", cage.n_vertices());
+    println!("  a grab: {}", summary((0..FRAMES / 4).map(|_| grab().1).collect()));
+    let mut drag = grab().0;
+    let frame = (0..FRAMES).map(|frame| {
+        let to = positions[0].as_dvec3()
+            + 0.2 * DVec3::new((0.1 * frame as f64).cos(), (0.1 * frame as f64).sin(), 0.0);
+        let began = Instant::now();
+        drag.frame(&[to]);
+        began.elapsed().as_secs_f64() * 1e3
+    });
+    println!("  a frame: {}", summary(frame.collect()));
+}
+
 fn main() {
     // `cargo test --benches` runs this too, and wants to know only that it compiles.
     if !std::env::args().any(|argument| argument == "--bench") {
@@ -58,6 +90,7 @@ fn main() {
     let (positions, triangles) = mesh();
     let cage = Cage::new(&creature_cage()).expect("it is a cage");
     let options = BindOptions { grid: 32, ..BindOptions::default() };
+    pull(&positions, &triangles, &cage, &options);
     let binding = bind(&positions, &cage, &options, &Silent).expect("it binds");
     let gpu = context();
     println!(
