@@ -27,10 +27,11 @@ async function fingers(cdp: CDPSession, from: readonly Spot[], to: readonly Spot
       y: y + share * ((to[id]?.[1] ?? y) - y),
       id,
     }));
-  await cdp.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: at(0) });
-  for (const share of [0.25, 0.5, 0.75, 1])
-    await cdp.send("Input.dispatchTouchEvent", { type: "touchMove", touchPoints: at(share) });
-  await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+  const send = (type: "touchStart" | "touchMove" | "touchEnd", share?: number) =>
+    cdp.send("Input.dispatchTouchEvent", { type, touchPoints: share === undefined ? [] : at(share) });
+  // At once: were each waited for, a busy page would take the time in between for a long press.
+  await Promise.all([send("touchStart", 0), ...[0.25, 0.5, 0.75, 1].map((share) => send("touchMove", share))]);
+  await send("touchEnd");
 }
 
 test("two fingers look around, one finger poses", async ({ page }) => {

@@ -2,6 +2,7 @@
 
 mod cages;
 mod render;
+mod rig;
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -17,12 +18,13 @@ use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, Type
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use render::{RenderArgs, Show};
+pub(crate) use rig::RigArgs;
 
 /// Bind a 3-D model to a cage by harmonic coordinates, then deform it by moving the cage.
 #[derive(Debug, Parser)]
 #[command(name = "cagework", version, propagate_version = true, max_term_width = 100)]
 #[command(
-    after_help = "Models and cages are read from .obj, .gltf and .glb files. Errors go to stderr; the exit \
+    after_help = "Models and cages are read from .obj, .gltf, .glb and .vrm files. Errors go to stderr; the exit \
     code is 1 after an error and 2 after a wrong command line.\n\n\
     Examples:\n  \
     cagework demo\n  \
@@ -249,6 +251,8 @@ pub(crate) struct DeformArgs {
     /// File to write; the name's ending says the format.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,
+    #[command(flatten)]
+    pub(crate) rig: RigArgs,
 }
 
 /// `cagework pull`

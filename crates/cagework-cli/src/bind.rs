@@ -17,6 +17,7 @@ use crate::files::{check_outputs, json, print, refuse_files_read, write};
 use crate::gpu;
 use crate::load::{load_cage, load_model};
 use crate::progress::Bar;
+use crate::rig;
 
 /// Runs `cagework bind`.
 ///
@@ -39,20 +40,24 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
     let cage = load_cage(&args.cage, &model, args.read.memory)?.cage;
     refuse_files_read(&outputs)?;
-    let options = BindOptions { held: model.bytes(), ..args.solve.options(args.grid, args.read.memory) };
+    let (points, extra_points) = rig::points(&model, &args.mesh)?;
+    let options =
+        BindOptions { held: model.bytes(), extra_points, ..args.solve.options(args.grid, args.read.memory) };
     let to_write = memory_to_write(args, &model, &cage, options.sparsify);
     if to_write > options.memory_limit {
         return Err(BindError::Memory { needed: to_write, limit: options.memory_limit }.into());
     }
-    let mut binding = bind_positions(&model.positions, &cage, args.solve.on_gpu(), &options)?;
+    let mut binding = bind_positions(&points, &cage, args.solve.on_gpu(), &options)?;
     let memory = &mut binding.report.memory_bytes;
     memory.estimated = memory.estimated.max(to_write);
 
     if let Some(path) = &args.weights {
-        write(path, &write_weights_npz(&binding.weights, &binding.outside))?;
+        let extra_points = &points[model.positions.len()..];
+        write(path, &write_weights_npz(&binding.weights, &binding.outside, extra_points))?;
     }
     if let Some(output) = &args.output {
-        write(&output.path, &export(&model, &deform(&binding, cage.positions()), output)?)?;
+        let rest = deform(&binding, cage.positions());
+        write(&output.path, &export(&model, &rest[..model.positions.len()], output)?)?;
     }
     if let Some(path) = &args.save_cage {
         write(path, &write_cage_obj(&model.up().mesh_turned_back(&cage.to_polygon_mesh())))?;

@@ -3,17 +3,18 @@
 use std::path::Path;
 use std::time::Instant;
 
-use cagework_core::deform::deform_bound;
-use cagework_core::{Controls, Weights};
-use cagework_io::{read_weights_npz, shown};
-use glam::Vec3;
+use cagework_core::deform::{deform_bound, displacements};
+use cagework_core::{Cage, Controls};
+use cagework_io::{Model, ModelFormat, ReshapeReport, SavedWeights, read_weights_npz, shown};
+use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use crate::args::{CageSource, DeformArgs};
+use crate::args::{CageSource, DeformArgs, MemoryArgs};
 use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, read, shown_path, write};
 use crate::load::{load_cage, load_model};
+use crate::rig;
 
 /// What was done; its JSON is the output of `--json`.
 #[derive(Debug, Serialize)]
@@ -23,6 +24,9 @@ struct Deformed {
     cage_vertices: usize,
     outside_vertices: usize,
     poses: Vec<String>,
+    /// What became of skeleton, morph targets and animations, if there are any and they are kept.
+    #[serde(flatten)]
+    rig: Option<ReshapeReport>,
     /// Computing all poses, without reading and writing files.
     deform_ms: f64,
     notices: Vec<String>,
@@ -55,23 +59,35 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
 
     let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
     let cage = load_cage(&args.cage, &model, args.read.memory)?;
-    let (weights, outside) = read_weights_npz(&read(&args.weights)?, args.read.memory.bytes())
-        .map_err(|e| CliError::file(&args.weights, e))?;
+    let saved = load_weights(&args.weights, &model, &cage.cage, args.read.memory)?;
     let n_vertices = model.positions.len();
-    let n_cage = Controls::from(&cage.cage).n_controls();
-    check_weights(&args.weights, &weights, n_vertices, n_cage)?;
+    let n_cage = saved.weights.n_columns();
     let poses = args.pose.iter().map(|path| cage.load_pose(path)).collect::<Result<Vec<_>, _>>()?;
+    let names: Vec<String> = args.pose.iter().map(|path| pose_name(path)).collect();
+    let outside_vertices = saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices).count();
 
     let started = Instant::now();
-    let deformed: Vec<Vec<Vec3>> = poses.iter().map(|pose| deform_bound(&weights, &outside, pose)).collect();
-    let deform_ms = started.elapsed().as_secs_f64() * 1e3;
-
-    let names: Vec<String> = args.pose.iter().map(|path| pose_name(path)).collect();
-    let bytes = if let [only] = deformed.as_slice() {
-        export(&model, only, &args.output)?
+    let mut notices = model.notices.clone();
+    let (bytes, rig, deform_ms) = if format == ModelFormat::Gltf && model.is_rigged() && !args.rig.plain {
+        let by =
+            |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.outside, cage.cage.positions(), pose);
+        let by: Vec<Vec<DVec3>> = poses.iter().map(by).collect();
+        let deform_ms = started.elapsed().as_secs_f64() * 1e3;
+        let (bytes, report) = rig::write(&model, &saved, &names, by, args)?;
+        notices.extend(rig::notices(&report));
+        (bytes, Some(report), deform_ms)
     } else {
-        let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(deformed).collect();
-        model.write_glb_poses(&model.positions, &named).map_err(|e| CliError::file(output, e))?
+        let saved = saved.of_vertices();
+        let deformed: Vec<Vec<Vec3>> =
+            poses.iter().map(|pose| deform_bound(&saved.weights, &saved.outside, pose)).collect();
+        let deform_ms = started.elapsed().as_secs_f64() * 1e3;
+        let bytes = if let [only] = deformed.as_slice() {
+            export(&model, only, &args.output)?
+        } else {
+            let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(deformed).collect();
+            model.write_glb_poses(&model.positions, &named).map_err(|e| CliError::file(output, e))?
+        };
+        (bytes, None, deform_ms)
     };
     write(output, &bytes)?;
 
@@ -79,34 +95,37 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         output: output.display().to_string(),
         vertices: n_vertices,
         cage_vertices: n_cage,
-        outside_vertices: outside.len(),
+        outside_vertices,
         poses: names,
+        rig,
         deform_ms,
-        notices: model.notices,
+        notices,
     };
     print(&if as_json { json(&done) } else { text(&done) })
 }
 
-/// Checks that weights belong to a mesh and a cage.
+/// Reads weights and checks that they belong to a mesh and a cage.
 ///
 /// # Errors
-/// With both numbers.
-pub(crate) fn check_weights(
+/// When the file cannot be read; with both numbers when they do not agree.
+pub(crate) fn load_weights(
     path: &Path,
-    weights: &Weights,
-    n_vertices: usize,
-    n_cage: usize,
-) -> Result<(), CliError> {
-    if (weights.n_rows(), weights.n_columns()) == (n_vertices, n_cage) {
-        return Ok(());
+    model: &Model,
+    cage: &Cage,
+    memory: MemoryArgs,
+) -> Result<SavedWeights, CliError> {
+    let saved = read_weights_npz(&read(path)?, memory.bytes()).map_err(|e| CliError::file(path, e))?;
+    let (n_vertices, n_cage) = (model.positions.len(), Controls::from(cage).n_controls());
+    if (saved.n_vertices(), saved.weights.n_columns()) == (n_vertices, n_cage) {
+        return Ok(saved);
     }
     Err(CliError::Mismatch {
         message: format!(
             "{}: holds weights of {} mesh vertices for {} cage vertices, but the mesh has {n_vertices} vertices and \
              the cage {n_cage}",
             shown_path(path),
-            weights.n_rows(),
-            weights.n_columns(),
+            saved.n_vertices(),
+            saved.weights.n_columns(),
         ),
         hint: "use the mesh and the cage that were bound, or bind these two",
     })

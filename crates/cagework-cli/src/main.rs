@@ -19,6 +19,7 @@ mod load;
 mod progress;
 mod pull;
 mod render;
+mod rig;
 mod signals;
 
 use std::io::Write as _;

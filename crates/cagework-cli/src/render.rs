@@ -9,15 +9,15 @@ use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Cage, Controls, Weights, mean_value_weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView, check_layers};
-use cagework_io::{Model, read_weights_npz, shown};
+use cagework_io::{Model, shown};
 use glam::Vec3;
 use serde::Serialize;
 
 use crate::args::{CageSource, RenderArgs, Show};
 use crate::bind::bind_positions;
-use crate::deform::check_weights;
+use crate::deform::load_weights;
 use crate::error::CliError;
-use crate::files::{check_outputs, json, print, read, write};
+use crate::files::{check_outputs, json, print, write};
 use crate::gpu;
 use crate::load::{LoadedCage, load_cage, load_model};
 
@@ -182,10 +182,8 @@ fn prepare(
     if needs_weights {
         let (weights, outside) = match &args.weights {
             Some(path) => {
-                let (weights, outside) = read_weights_npz(&read(path)?, args.read.memory.bytes())
-                    .map_err(|e| CliError::file(path, e))?;
-                check_weights(path, &weights, model.positions.len(), n_cage)?;
-                (weights, outside)
+                let saved = load_weights(path, model, &cage.cage, args.read.memory)?.of_vertices();
+                (saved.weights, saved.outside)
             }
             None => {
                 let held = model.bytes();

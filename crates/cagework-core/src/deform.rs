@@ -1,6 +1,6 @@
 //! Deformation: `v' = sum_i w_i(v) c_i'`, and normals of the result.
 
-use glam::{Mat3, Vec3};
+use glam::{DVec3, Mat3, Vec3};
 
 use crate::weights::Weights;
 
@@ -27,7 +27,7 @@ pub fn deform_vertices(weights: &Weights, cage_positions: &[Vec3]) -> Vec<Vec3> 
     weights
         .rows()
         .map(|(indices, data)| {
-            let sum = indices.iter().zip(data).fold(glam::DVec3::ZERO, |sum, (&i, &w)| {
+            let sum = indices.iter().zip(data).fold(DVec3::ZERO, |sum, (&i, &w)| {
                 sum + f64::from(w) * cage_positions[i as usize].as_dvec3()
             });
             sum.as_vec3()
@@ -47,6 +47,35 @@ pub fn deform_bound(weights: &Weights, outside: &[OutsideVertex], cage_positions
         positions[o.vertex as usize] += frame * o.offset;
     }
     positions
+}
+
+/// How far each bound point moves with the cage: `sum_i w_i (c_i' - c_i)`, and of points outside what their offset turns. Exactly
+/// zero where nothing near has moved, which the difference of two deformed shapes is not.
+///
+/// `rest`, `posed`: `[n_cage]`, object units. Returns `[n_rows]`.
+///
+/// # Panics
+/// As [`deform_bound`].
+#[must_use]
+pub fn displacements(
+    weights: &Weights,
+    outside: &[OutsideVertex],
+    rest: &[Vec3],
+    posed: &[Vec3],
+) -> Vec<DVec3> {
+    assert_eq!(posed.len(), weights.n_columns(), "one position per column");
+    let by: Vec<DVec3> = posed.iter().zip(rest).map(|(p, r)| p.as_dvec3() - r.as_dvec3()).collect();
+    let of_row = |(indices, data): (&[u32], &[f32])| {
+        indices.iter().zip(data).map(|(&i, &w)| f64::from(w) * by[i as usize]).sum()
+    };
+    let mut all: Vec<DVec3> = weights.rows().map(of_row).collect();
+    for o in outside {
+        let [before, after] = [rest, posed].map(|at| triangle_frame(o.corners.map(|i| at[i as usize])));
+        if before != after {
+            all[o.vertex as usize] += (after * o.offset).as_dvec3() - (before * o.offset).as_dvec3();
+        }
+    }
+    all
 }
 
 /// Orthonormal frame of a triangle: first edge, in-plane normal to it, triangle normal, as columns. A triangle without

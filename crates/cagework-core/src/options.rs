@@ -246,6 +246,11 @@ pub struct BindOptions {
     #[serde(skip)]
     #[cfg_attr(feature = "typescript", ts(skip))]
     pub held: u64,
+    /// So many points at the end are no vertices of the mesh: they are bound, but nobody sees whether they are outside.
+    /// Default 0.
+    #[serde(skip)]
+    #[cfg_attr(feature = "typescript", ts(skip))]
+    pub extra_points: usize,
 }
 
 impl Default for BindOptions {
@@ -264,6 +269,7 @@ impl Default for BindOptions {
             memory_limit: 4 << 30,
             outside: OutsidePolicy::default(),
             held: 0,
+            extra_points: 0,
         }
     }
 }

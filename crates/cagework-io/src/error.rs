@@ -24,6 +24,9 @@ pub enum WriteError {
     /// A GLB needs triangles.
     #[error("the model has no faces, and a GLB needs some: write an OBJ instead")]
     NoFaces,
+    /// Only glTF has rigs.
+    #[error("the model is no glTF: it has no rig to keep")]
+    NoRig,
     /// A GLB holds at most 4 GiB.
     #[error("the model needs {bytes} bytes, more than the 4 GiB that a GLB can hold: write an OBJ instead")]
     TooLarge {

@@ -61,7 +61,11 @@ impl ModelFormat {
     /// The format that the name of a file to be written asks for by its ending.
     #[must_use]
     pub fn of_export(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|format| extension(name) == format.export_extension())
+        match extension(name).as_str() {
+            // A VRM is a GLB.
+            "vrm" => Some(Self::Gltf),
+            extension => Self::ALL.into_iter().find(|format| extension == format.export_extension()),
+        }
     }
 
     /// The format of a file to be read, by its content.

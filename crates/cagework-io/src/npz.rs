@@ -2,7 +2,8 @@
 //!
 //! Arrays: `format` (`b"csr"`), `shape` (int64), `indptr`, `indices` (int32), `data` (float32); with vertices outside
 //! the cage also `outside_vertex` (int32), `outside_corners` (int32, [n, 3]) and `outside_offset` (float32, [n, 3]),
-//! which SciPy ignores. Written uncompressed, as `numpy.savez` does, with one fixed time stamp: the same weights give
+//! which SciPy ignores; of a rigged model also `extra_points` (float32, [n, 3]): the last n rows are theirs.
+//! Written uncompressed, as `numpy.savez` does, with one fixed time stamp: the same weights give
 //! the same bytes. Reading takes what SciPy writes too: deflated, 32- or 64-bit indices, 32- or 64-bit floats.
 //!
 //! The array headers are read here and not by a library: `npyz` parses any Python literal, recursively, and a header
@@ -60,9 +61,40 @@ const MAX_HEADER: u64 = 1 << 16;
 const NPY_ALIGN: usize = 64;
 const NPY_MAGIC: &[u8; 6] = b"\x93NUMPY";
 
-/// Weights and the vertices outside the cage as an `.npz` file.
+/// What a weights file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SavedWeights {
+    /// A row for each vertex, then one for each extra point.
+    pub weights: Weights,
+    /// Rows outside the cage.
+    pub outside: Vec<OutsideVertex>,
+    /// Points of the model's rig that were bound with it, object units.
+    pub extra_points: Vec<Vec3>,
+}
+
+impl SavedWeights {
+    /// Rows of the model's vertices.
+    #[must_use]
+    pub fn n_vertices(&self) -> usize {
+        self.weights.n_rows().saturating_sub(self.extra_points.len())
+    }
+
+    /// The same without the rig's points.
+    #[must_use]
+    pub fn of_vertices(mut self) -> Self {
+        let n = self.n_vertices() as u32;
+        if !self.extra_points.is_empty() {
+            self.weights = self.weights.with_rows(&(0..n).collect::<Vec<_>>());
+            self.outside.retain(|o| o.vertex < n);
+            self.extra_points.clear();
+        }
+        self
+    }
+}
+
+/// Weights and the rows outside the cage as an `.npz` file; the last rows are those of `extra_points`.
 #[must_use]
-pub fn write_weights_npz(weights: &Weights, outside: &[OutsideVertex]) -> Vec<u8> {
+pub fn write_weights_npz(weights: &Weights, outside: &[OutsideVertex], extra_points: &[Vec3]) -> Vec<u8> {
     let n = outside.len();
     let shape = [weights.n_rows() as i64, weights.n_columns() as i64];
     let bytes = weights.bytes() + size_of_val(outside) + ROOM_FOR_HEADERS;
@@ -85,6 +117,10 @@ pub fn write_weights_npz(weights: &Weights, outside: &[OutsideVertex]) -> Vec<u8
         zip.put("outside_corners", "<i4", &[n, 3], corners);
         let offsets = outside.iter().flat_map(|o| o.offset.to_array()).map(f32::to_le_bytes);
         zip.put("outside_offset", "<f4", &[n, 3], offsets);
+    }
+    if !extra_points.is_empty() {
+        let points = extra_points.iter().flat_map(Vec3::to_array).map(f32::to_le_bytes);
+        zip.put("extra_points", "<f4", &[extra_points.len(), 3], points);
     }
     zip.zip.finish().expect("writing to memory does not fail").into_inner()
 }
@@ -140,7 +176,7 @@ fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
 /// # Errors
 /// [`NpzError`] when the file is no archive, an array is missing, of a wrong type or too large, or the arrays are no CSR
 /// matrix.
-pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<(Weights, Vec<OutsideVertex>), NpzError> {
+pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<SavedWeights, NpzError> {
     let mut zip = Archive { zip: ZipArchive::new(Cursor::new(bytes))?, unpacked: 0, memory_limit };
     let format = required(&mut zip, "format")?;
     if format.data != b"csr" {
@@ -165,7 +201,15 @@ pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<(Weights, Vec
     let data = required(&mut zip, "data")?.rows_of(&[])?.floats()?;
     let weights = Weights::new(columns, indptr, indices, data)?;
     let outside = read_outside(&mut zip, rows, columns)?;
-    Ok((weights, outside))
+    let extra_points = match array(&mut zip, "extra_points")? {
+        None => Vec::new(),
+        Some(points) => points.rows_of(&[3])?.floats()?.chunks_exact(3).map(Vec3::from_slice).collect(),
+    };
+    if extra_points.len() > rows as usize {
+        let problem = format!("has {} points, but there are {rows} rows", extra_points.len());
+        return Err(NpzError::Array { array: "extra_points", problem });
+    }
+    Ok(SavedWeights { weights, outside, extra_points })
 }
 
 fn read_outside(zip: &mut Archive<'_>, rows: u32, columns: u32) -> Result<Vec<OutsideVertex>, NpzError> {

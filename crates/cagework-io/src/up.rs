@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use cagework_core::PolygonMesh;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// The axis that points up in a file. Everything that is not in a file has Y up: a file with Z up is turned by 90
 /// degrees about x when it is read, and back when it is written. Both are exact.
@@ -49,6 +49,14 @@ impl UpAxis {
         match self {
             Self::Y => positions.into(),
             Self::Z => positions.iter().map(|p| Vec3::new(p.x, -p.z, p.y)).collect(),
+        }
+    }
+
+    /// A vector with Y up as it is in a file.
+    pub(crate) fn vector_turned_back(self, v: DVec3) -> DVec3 {
+        match self {
+            Self::Y => v,
+            Self::Z => DVec3::new(v.x, -v.z, v.y),
         }
     }
 

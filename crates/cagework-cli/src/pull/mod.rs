@@ -10,15 +10,15 @@ use cagework_core::deform::deform_bound;
 use cagework_core::mesh::TriMesh;
 use cagework_core::progress::Silent;
 use cagework_core::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
-use cagework_core::{BindOptions, Controls, bind};
-use cagework_io::{UpAxis, read_weights_npz, shown};
+use cagework_core::{BindOptions, bind};
+use cagework_io::{SavedWeights, UpAxis, shown};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::args::{CageSource, PullArgs};
-use crate::deform::check_weights;
+use crate::deform::load_weights;
 use crate::error::CliError;
-use crate::files::{check_outputs, json, print, read, write};
+use crate::files::{check_outputs, json, print, write};
 use crate::load::{load_cage, load_model};
 use job::Job;
 use measure::{Stretches, far_mean, stretches};
@@ -69,10 +69,8 @@ pub(crate) fn run(args: &PullArgs, as_json: bool) -> Result<(), CliError> {
     check_outputs(&[output], &inputs)?;
     let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
     let cage = load_cage(&args.cage, &model, args.read.memory)?;
-    let (weights, outside) = read_weights_npz(&read(&args.weights)?, args.read.memory.bytes())
-        .map_err(|e| CliError::file(&args.weights, e))?;
-    let n_cage = Controls::from(&cage.cage).n_controls();
-    check_weights(&args.weights, &weights, model.positions.len(), n_cage)?;
+    let SavedWeights { weights, outside, .. } =
+        load_weights(&args.weights, &model, &cage.cage, args.read.memory)?.of_vertices();
     let start = match &job.start {
         Some(path) => cage.load_pose(path)?,
         None => cage.cage.positions().to_vec(),

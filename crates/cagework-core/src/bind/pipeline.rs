@@ -189,6 +189,7 @@ impl<'a> Prepared<'a> {
         watch.report(Stage::Sample, 1.0, solved.iterations, None)?;
         let ended = watch.now_ms();
 
+        let n_vertices = positions.len().saturating_sub(options.extra_points);
         let solve_ms = (sampled - stencils_made) * solved.solve_share;
         let level = &voxels.hierarchy.levels[0];
         let mut notices: Vec<String> = cage.notices().iter().map(ToString::to_string).collect();
@@ -225,9 +226,9 @@ impl<'a> Prepared<'a> {
             rest_error,
             raw_error,
             weights: WeightStats { nonzeros: weights.data().len() as u64, ..weight_stats },
-            vertices: positions.len() as u64,
+            vertices: n_vertices as u64,
             cage_vertices: controls.n_controls() as u64,
-            outside_vertices: outside.len() as u64,
+            outside_vertices: outside.iter().filter(|o| (o.vertex as usize) < n_vertices).count() as u64,
             ambiguous_cells: voxels.ambiguous,
             notices,
         };
@@ -270,11 +271,13 @@ fn refuse_outside(
     welded: &Weld,
 ) -> Result<(), BindError> {
     refuse_unless_any_is_inside(cage, positions, stencils)?;
-    match (options.outside, stencils.outside.first()) {
-        (OutsidePolicy::Refuse, Some(first)) => Err(BindError::Outside {
-            count: stencils.outside.len() as u32,
-            first: welded.first[first.vertex as usize],
-        }),
+    let n_vertices = positions.len().saturating_sub(options.extra_points);
+    let vertices = stencils.outside.iter().map(|o| welded.first[o.vertex as usize]);
+    let mut vertices = vertices.filter(|&v| (v as usize) < n_vertices);
+    match (options.outside, vertices.next()) {
+        (OutsidePolicy::Refuse, Some(first)) => {
+            Err(BindError::Outside { count: 1 + vertices.count() as u32, first })
+        }
         _ => Ok(()),
     }
 }

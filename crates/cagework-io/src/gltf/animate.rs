@@ -8,7 +8,7 @@ use super::pack::{Pack, push};
 use super::patch::{Place, Pose};
 
 /// Seconds from one pose to the next.
-const SECONDS_PER_POSE: f32 = 1.0;
+pub(super) const SECONDS_PER_POSE: f32 = 1.0;
 
 /// Removes all that drove the original's morph targets: weights, their names, their animation.
 pub(crate) fn forget_morphs(json: &mut Value, places: &[Place]) {

@@ -29,6 +29,8 @@ const NOT_GEOMETRY: [&str; 8] =
 
 pub(crate) struct Loaded {
     pub(crate) json: Value,
+    /// The JSON chunk of a GLB with one buffer.
+    pub(crate) text: Option<Vec<u8>>,
     pub(crate) root: Root,
     pub(crate) buffers: Vec<Arc<Vec<u8>>>,
     pub(crate) images: Vec<Option<Image>>,
@@ -50,6 +52,7 @@ pub(crate) fn load(
     let (json, bin) = split(bytes)?;
     let of_json = bytes_of_json(&json);
     MemoryError::check(of_json + bytes.len() as u64, memory_limit)?;
+    let text = bin.is_some().then(|| json.to_vec());
     let mut json: Value = serde_json::from_slice(&json).map_err(|e| GltfError::Json(e.to_string()))?;
     check_version(&json)?;
     let nodes = json["nodes"].as_array().map_or(0, Vec::len) as u64;
@@ -69,6 +72,7 @@ pub(crate) fn load(
         buffers
     };
     drop_missing(&mut json, notices);
+    let text = text.filter(|_| buffers.len() == 1);
     let root = typed(&json)?;
     let images = load_images(&json, &root, &buffers, &mut siblings, notices);
     // The caller still holds the file itself; buffers and images of one file share its bytes.
@@ -77,7 +81,7 @@ pub(crate) fn load(
     let loaded = loaded.filter(|bytes| seen.insert(Arc::as_ptr(bytes))).map(|bytes| bytes.len() as u64);
     let held = of_json + bytes.len() as u64 + loaded.sum::<u64>();
     MemoryError::check(held, memory_limit)?;
-    Ok(Loaded { json, root, buffers, images, bytes: held })
+    Ok(Loaded { json, text, root, buffers, images, bytes: held })
 }
 
 /// Takes out attributes that only pictures need and whose accessor is not there. Accessors that are written later would take

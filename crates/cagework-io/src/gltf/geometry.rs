@@ -22,6 +22,12 @@ impl GltfDocument {
         Source { root: &self.root, buffers: &self.buffers }
     }
 
+    /// Default weights of an instance's morph targets.
+    pub(super) fn default_weights(&self, instance: &Instance) -> Option<&[f32]> {
+        let node = instance.node.and_then(|n| self.root.nodes[n as usize].weights.as_ref());
+        node.or(self.root.meshes[instance.mesh as usize].weights.as_ref()).map(Vec::as_slice)
+    }
+
     pub(super) fn primitive(&self, slot: &Slot) -> (&Instance, &Primitive) {
         let instance = &self.instances[slot.instance as usize];
         (instance, &self.root.meshes[instance.mesh as usize].primitives[slot.primitive as usize])
@@ -148,7 +154,10 @@ impl Frame {
     ) -> Result<Self, GltfError> {
         Ok(match instance.skin {
             None => Self::Rigid(instance.world),
-            Some(skin) => Self::Skinned(skin::matrices(document, instance, skin, primitive, count)?),
+            Some(skin) => {
+                let joints = (skin, document.joints[skin as usize].as_slice());
+                Self::Skinned(skin::matrices(document.source(), joints, instance.world, primitive, count)?)
+            }
         })
     }
 
@@ -175,7 +184,7 @@ fn positions(
     Ok((local, primitive.targets.as_ref().map_or(0, Vec::len)))
 }
 
-fn vectors(document: &GltfDocument, accessor: u32, what: &str) -> Result<Vec<DVec3>, GltfError> {
+pub(super) fn vectors(document: &GltfDocument, accessor: u32, what: &str) -> Result<Vec<DVec3>, GltfError> {
     let values = document.source().floats::<3>(accessor, what)?;
     Ok(values.into_iter().map(|p| Vec3::from_array(p).as_dvec3()).collect())
 }
@@ -188,8 +197,7 @@ fn add_morphs(
     of: impl Fn(&MorphTarget) -> Option<Index<Accessor>>,
     values: &mut [DVec3],
 ) -> Result<(), GltfError> {
-    let node = instance.node.and_then(|n| document.root.nodes[n as usize].weights.as_ref());
-    let weights = node.or(document.root.meshes[instance.mesh as usize].weights.as_ref());
+    let weights = document.default_weights(instance);
     for (target, &weight) in primitive.targets.iter().flatten().zip(weights.into_iter().flatten()) {
         let Some(accessor) = of(target).filter(|_| weight != 0.0) else { continue };
         let deltas = vectors(document, accessor.value() as u32, what)?;

@@ -17,6 +17,7 @@ mod geometry;
 mod look;
 mod pack;
 mod patch;
+mod rig;
 mod scene;
 mod size;
 mod skin;
@@ -42,6 +43,8 @@ pub(crate) use look::look;
 pub use pack::PROJECT_EXTENSION;
 pub(crate) use pack::{Pack, push};
 pub(crate) use patch::{Pose, Rest, embed_images, patch};
+pub use rig::{Joints, ReshapeOptions, ReshapeReport};
+pub(crate) use rig::{Named, Rig, reshape};
 
 /// Why a glTF file could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -169,8 +172,12 @@ pub(crate) struct GltfDocument {
     pub(crate) buffers: Vec<Arc<Vec<u8>>>,
     /// Images that came by URI and were found.
     pub(crate) images: Vec<Option<Image>>,
+    /// The JSON chunk of a GLB with one buffer, as it was.
+    pub(crate) text: Option<Vec<u8>>,
     /// Meshes shown, in vertex order.
     instances: Vec<Instance>,
+    /// Meshes that are not shown: levels of detail, other scenes.
+    elsewhere: Vec<Instance>,
     /// World from bind space for each joint of the skins that are shown. `[n_skins][n_joints]`
     joints: Vec<Vec<DMat4>>,
     /// Bytes that it and its geometry take, about.
@@ -208,13 +215,15 @@ pub(crate) fn read(
     let mut notices = Vec::new();
     let loaded = container::load(name, bytes, resolve, memory_limit, &mut notices)?;
     let worlds = Worlds::new(&loaded.root)?;
-    let instances = scene::instances(&loaded.root, &worlds, &mut notices)?;
+    let [instances, elsewhere] = scene::instances(&loaded.root, &worlds, &mut notices)?;
     let mut document = GltfDocument {
         json: loaded.json,
         root: loaded.root,
         buffers: loaded.buffers,
         images: loaded.images,
+        text: loaded.text,
         instances,
+        elsewhere,
         joints: Vec::new(),
         bytes: loaded.bytes,
         slots: Vec::new(),
@@ -222,7 +231,7 @@ pub(crate) fn read(
     // The file is the caller's, and gone when it has been read.
     let model = size::check(&document, loaded.bytes, memory_limit)?;
     document.bytes = loaded.bytes - bytes.len() as u64 + model;
-    document.joints = skin::joints(&document, &worlds)?;
+    document.joints = skin::shown_joints(&document, &worlds)?;
     let geometry = geometry::read(&document, &mut notices)?;
     document.slots = geometry.slots;
     let counts = scene::counts(&document);

@@ -10,7 +10,7 @@ use super::GltfDocument;
 use super::container::view_bytes;
 use crate::error::WriteError;
 
-const F32: u32 = 5126;
+pub(super) const F32: u32 = 5126;
 const U32: u32 = 5125;
 const U16: u32 = 5123;
 /// Buffer view targets.
@@ -195,7 +195,7 @@ fn only_known_extensions(json: &Value) -> bool {
         .all(|e| e.as_str().is_some_and(|e| KNOWN_EXTENSIONS.iter().any(|known| e.starts_with(known))))
 }
 
-type Visit<'v> = &'v mut dyn FnMut(&mut Value);
+pub(super) type Visit<'v> = &'v mut dyn FnMut(&mut Value);
 
 /// Removes the items of `list` that `each` finds no reference to, and renumbers the references. Returns what was kept.
 fn drop_unused(json: &mut Value, list: &str, each: fn(&mut Value, Visit<'_>)) -> Vec<bool> {
@@ -227,7 +227,7 @@ fn drop_unused(json: &mut Value, list: &str, each: fn(&mut Value, Visit<'_>)) ->
 }
 
 /// Visits every reference to an accessor.
-fn each_accessor(json: &mut Value, visit: Visit<'_>) {
+pub(super) fn each_accessor(json: &mut Value, visit: Visit<'_>) {
     fn items<'v>(value: &'v mut Value, key: &str) -> impl Iterator<Item = &'v mut Value> {
         value.get_mut(key).and_then(Value::as_array_mut).into_iter().flatten()
     }

@@ -299,13 +299,21 @@ fn patch_primitive(
 
 /// Moves images that came by URI into the file: a GLB travels alone.
 pub(crate) fn embed_images(document: &GltfDocument, json: &mut Value, pack: &mut Pack<'_>) {
+    embed_images_by(document, json, &mut |json, bytes| pack.push_view(json, bytes, None));
+}
+
+/// The same with another way to make a buffer view.
+pub(crate) fn embed_images_by(
+    document: &GltfDocument,
+    json: &mut Value,
+    push_view: &mut dyn FnMut(&mut Value, Vec<u8>) -> usize,
+) {
     // Images of one file share its bytes.
     let mut views = HashMap::new();
     for (number, image) in document.images.iter().enumerate() {
         let Some(image) = image else { continue };
-        let view = *views
-            .entry(Arc::as_ptr(&image.bytes))
-            .or_insert_with(|| pack.push_view(json, image.bytes.to_vec(), None));
+        let view =
+            *views.entry(Arc::as_ptr(&image.bytes)).or_insert_with(|| push_view(json, image.bytes.to_vec()));
         let Some(object) = json["images"][number].as_object_mut() else { continue };
         object.shift_remove("uri");
         object.insert("mimeType".into(), image.mime.into());

@@ -13,7 +13,7 @@ use crate::counts::Counts;
 pub(crate) struct Worlds {
     pub(crate) world: Vec<DMat4>,
     /// Every node after its parent, with its parent.
-    order: Vec<(u32, Option<u32>)>,
+    pub(super) order: Vec<(u32, Option<u32>)>,
 }
 
 /// One mesh shown by one node.
@@ -75,14 +75,14 @@ impl Worlds {
     }
 
     /// Marks what hangs below marked nodes (a flag for each node).
-    fn mark_below(&self, nodes: &mut [bool]) {
+    pub(super) fn mark_below(&self, nodes: &mut [bool]) {
         for &(node, parent) in &self.order {
             nodes[node as usize] |= parent.is_some_and(|p| nodes[p as usize]);
         }
     }
 }
 
-fn local(node: &Node) -> DMat4 {
+pub(super) fn local(node: &Node) -> DMat4 {
     if let Some(m) = node.matrix {
         return Mat4::from_cols_array(&m).as_dmat4();
     }
@@ -98,7 +98,8 @@ fn local(node: &Node) -> DMat4 {
     )
 }
 
-/// Meshes of the default scene: by ascending mesh, then by ascending node.
+/// Meshes of the default scene, and those that only other scenes show, or none; both by ascending mesh, then by ascending
+/// node.
 ///
 /// This is the order of the file's meshes, not of a walk through the tree: for a file that shows each mesh once it is
 /// the order of its primitives, which other programs see too.
@@ -106,7 +107,7 @@ pub(crate) fn instances(
     root: &Root,
     worlds: &Worlds,
     notices: &mut Vec<String>,
-) -> Result<Vec<Instance>, GltfError> {
+) -> Result<[Vec<Instance>; 2], GltfError> {
     for (s, scene) in root.scenes.iter().enumerate() {
         for node in &scene.nodes {
             get(&root.nodes, node.value(), "node", || format!("scene {s}"))?;
@@ -114,9 +115,8 @@ pub(crate) fn instances(
     }
     if root.nodes.is_empty() {
         let all = 0..root.meshes.len() as u32;
-        return Ok(all
-            .map(|mesh| Instance { node: None, mesh, skin: None, world: DMat4::IDENTITY })
-            .collect());
+        let whole = |mesh| Instance { node: None, mesh, skin: None, world: DMat4::IDENTITY };
+        return Ok([all.map(whole).collect(), Vec::new()]);
     }
     let mut in_scene = vec![root.scenes.is_empty(); root.nodes.len()];
     let scene = root.scene.map_or(0, |s| s.value());
@@ -154,9 +154,11 @@ pub(crate) fn instances(
     }
     // By numbers, which are sorted elsewhere too: another sort makes the page's module larger.
     let key = |(k, i): (u32, &Instance)| [i.mesh, i.node.map_or(0, |node| node + 1), k];
-    let mut order: Vec<[u32; 3]> = (0u32..).zip(&shown).map(key).collect();
-    order.sort_unstable();
-    Ok(order.into_iter().map(|[.., k]| shown[k as usize].clone()).collect())
+    Ok([shown, elsewhere].map(|list| {
+        let mut order: Vec<[u32; 3]> = (0u32..).zip(&list).map(key).collect();
+        order.sort_unstable();
+        order.into_iter().map(|[.., k]| list[k as usize].clone()).collect()
+    }))
 }
 
 /// What the document has of everything.

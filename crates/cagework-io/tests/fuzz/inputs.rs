@@ -55,7 +55,7 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     samples.push(
         write_project(&model, &model.cage_mesh(), &[("bent".into(), bent.clone())], "{}").expect("it fits"),
     );
-    samples.push(write_weights_npz(&weights.expect("they are"), &[outside]));
+    samples.push(write_weights_npz(&weights.expect("they are"), &[outside], &[Vec3::ONE]));
     samples.push(encode_pose(&cube(), &bent));
     samples.extend(cages().iter().map(write_cage_obj));
     samples

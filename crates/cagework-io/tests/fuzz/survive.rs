@@ -40,10 +40,10 @@ const LIMIT: u64 = 1 << 28;
 
 /// Reads `bytes` as each kind of file, and goes on with whatever comes of it.
 pub(crate) fn survive(bytes: &[u8]) {
-    if let Ok((weights, outside)) = read_weights_npz(bytes, LIMIT) {
-        let again = read_weights_npz(&write_weights_npz(&weights, &outside), LIMIT)
-            .expect("what was written can be read");
-        assert_eq!((again.0.n_rows(), again.1.len()), (weights.n_rows(), outside.len()));
+    if let Ok(saved) = read_weights_npz(bytes, LIMIT) {
+        let written = write_weights_npz(&saved.weights, &saved.outside, &saved.extra_points);
+        let again = read_weights_npz(&written, LIMIT).expect("what was written can be read");
+        assert_eq!((again.n_vertices(), again.outside.len()), (saved.n_vertices(), saved.outside.len()));
     }
     if let Ok(pose) = decode_pose(&cube(), bytes) {
         let _ = encode_pose(&cube(), &pose);

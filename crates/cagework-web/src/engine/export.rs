@@ -71,7 +71,7 @@ impl Engine {
         Ok(self.with_session(|session| {
             let weights =
                 session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
-            Ok(write_weights_npz(weights, session.outside()))
+            Ok(write_weights_npz(weights, session.outside(), &[]))
         })?)
     }
 

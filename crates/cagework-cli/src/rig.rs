@@ -1,0 +1,80 @@
+//! Rigged models: what is bound with them, and what a reshape says.
+
+use cagework_io::{Model, ReshapeReport, SavedWeights};
+use glam::{DVec3, Vec3};
+
+use crate::args::DeformArgs;
+use crate::error::CliError;
+
+/// Writes a rigged model deformed by one pose, or at rest with all poses as morph targets. `by`: displacements of all bound
+/// points for each pose.
+///
+/// # Errors
+/// When the weights lack the rig's points, or the model cannot be written.
+pub(crate) fn write(
+    model: &Model,
+    saved: &SavedWeights,
+    names: &[String],
+    mut by: Vec<Vec<DVec3>>,
+    args: &DeformArgs,
+) -> Result<(Vec<u8>, ReshapeReport), CliError> {
+    let wrong = |e| CliError::file(&args.output.path, e);
+    let (found, needed) = (saved.extra_points.len(), model.extra_points().map_err(wrong)?.len());
+    if found != needed {
+        return Err(CliError::Mismatch {
+            message: format!("the weights have {found} points of the model's rig, but it has {needed}"),
+            hint: "bind the model again, or export it without its rig (--static)",
+        });
+    }
+    let outside: Vec<u32> = saved.outside.iter().map(|o| o.vertex).collect();
+    let options = args.rig.options();
+    if by.len() == 1 {
+        return model.write_reshaped(&by.remove(0), &outside, &[], &options).map_err(wrong);
+    }
+    let rest = vec![DVec3::ZERO; saved.weights.n_rows()];
+    let poses: Vec<_> = names.iter().cloned().zip(by).collect();
+    model.write_reshaped(&rest, &outside, &poses, &options).map_err(wrong)
+}
+
+/// What a user should know of a reshape.
+pub(crate) fn notices(report: &ReshapeReport) -> Vec<String> {
+    let mut notices = Vec::new();
+    if report.joints > 0 {
+        let ReshapeReport { joints, joints_moved, tracks, .. } = report;
+        notices.push(format!("{joints_moved} of {joints} joints moved, {tracks} animation tracks with them"));
+    }
+    if report.joints_outside > 0 {
+        let n = report.joints_outside;
+        notices.push(format!(
+            "{n} joints that hold vertices are outside the cage: they follow its closest point"
+        ));
+    }
+    if report.morph_ends_outside > 0 {
+        let ReshapeReport { morph_ends, morph_ends_outside, .. } = report;
+        notices.push(format!(
+            "{morph_ends_outside} of {morph_ends} vertices of morph targets leave the cage: they follow its closest \
+             point; make a cage around them (cagework cage)"
+        ));
+    }
+    if report.singular_vertices > 0 {
+        let n = report.singular_vertices;
+        notices.push(format!("{n} vertices are flattened by their skin: they go with their neighbours"));
+    }
+    if report.tracks_unread > 0 {
+        let n = report.tracks_unread;
+        notices.push(format!("{n} animation tracks cannot be read: they stay as they are"));
+    }
+    notices
+}
+
+/// The points to bind: vertices, then those of the rig; and how many the latter are.
+///
+/// # Errors
+/// When the rig cannot be read.
+pub(crate) fn points(model: &Model, name: &std::path::Path) -> Result<(Vec<Vec3>, usize), CliError> {
+    let extra = model.extra_points().map_err(|e| CliError::file(name, e))?;
+    let n = extra.len();
+    let mut all = model.positions.clone();
+    all.extend(extra);
+    Ok((all, n))
+}

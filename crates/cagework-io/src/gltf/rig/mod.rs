@@ -1,0 +1,293 @@
+//! What moves besides the vertices when a rigged or morphed document is reshaped, and the document with all of it moved.
+//!
+//! The cage comes first and the skeleton on top: with `M` the skinning matrix of a vertex at rest (the node's world
+//! transform without a skin) and `f(x) = x + by(x)` the deformation, a vertex p becomes `M'^-1 f(M p)`. Joints follow the cage and
+//! their inverse bind matrices change so that `G' B' = G B`: then `M' = M`, and whatever the file's bind pose is survives.
+//!
+//! [`Rig`] lists the points that must be bound: vertices, ends of morph targets, nodes that follow, offsets of VRM.
+//! [`reshape`] writes.
+
+mod edit;
+mod nodes;
+mod poses;
+mod reshape;
+mod shape;
+mod surface;
+mod tracks;
+mod vrm;
+
+use std::collections::HashMap;
+
+use ::gltf::json::mesh::{Primitive, Semantic};
+use cagework_core::Bounds;
+use glam::{DMat4, DVec3, Vec3};
+
+use super::geometry::{Frame, attribute, vectors};
+use super::scene::{Instance, Worlds};
+use super::{GltfDocument, GltfError, skin};
+
+pub use nodes::Joints;
+pub(crate) use reshape::{Named, reshape};
+pub use reshape::{ReshapeOptions, ReshapeReport};
+use vrm::Spot;
+
+/// Half of the distance over which the gradient of the deformation at a node is measured, over the model's diagonal.
+const STEP: f64 = 0.02;
+
+/// Directions of the points around an anchor.
+const AROUND: [DVec3; 6] = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
+
+/// A document's points. A point's number counts the model's vertices first, then [`Self::extras`].
+pub(crate) struct Rig<'a> {
+    document: &'a GltfDocument,
+    worlds: Worlds,
+    /// Inverse bind matrices of the skins in use.
+    binds: HashMap<u32, Vec<DMat4>>,
+    parts: Vec<Part>,
+    /// Nodes that follow the cage, each after its parent, with the first of its seven points: the origin, then those around it.
+    follows: Vec<(u32, usize)>,
+    /// Sum of the weights that each node has as a joint. `[n_nodes]`
+    held: Vec<f64>,
+    spots: Vec<Spot>,
+    n_vertices: usize,
+    /// Diagonal of the box of all states, object units.
+    diagonal: f64,
+    /// World space, as the file has it.
+    pub(crate) extras: Vec<DVec3>,
+    n_ends: usize,
+}
+
+/// A primitive of a mesh under one skin or node.
+struct Part {
+    instance: Instance,
+    primitive: u32,
+    /// Point of its first vertex.
+    first: usize,
+    /// Of the document's slots, if it has triangles.
+    slot: Option<usize>,
+    frame: Frame,
+    /// As the file has them, in the mesh's space.
+    local: Vec<DVec3>,
+    targets: Vec<Target>,
+}
+
+/// A morph target of a part.
+struct Target {
+    default: f64,
+    /// Vertices that it moves, ascending, and by how much, in the mesh's space.
+    moved: Vec<u32>,
+    deltas: Vec<DVec3>,
+    /// First of the points of those vertices with the target at 0, and at 1, the others at their defaults; none where that is
+    /// the rest shape.
+    ends: [Option<usize>; 2],
+}
+
+impl Part {
+    fn primitive<'a>(&self, document: &'a GltfDocument) -> &'a Primitive {
+        &document.root.meshes[self.instance.mesh as usize].primitives[self.primitive as usize]
+    }
+
+    /// Where its vertices are at rest, world space.
+    fn rest(&self) -> Vec<DVec3> {
+        let mut local = self.local.clone();
+        for target in &self.targets {
+            for (&v, &delta) in target.moved.iter().zip(&target.deltas) {
+                local[v as usize] += target.default * delta;
+            }
+        }
+        local.iter().enumerate().map(|(v, &p)| self.frame.world(v).transform_point3(p)).collect()
+    }
+}
+
+impl<'a> Rig<'a> {
+    /// # Errors
+    /// A part that cannot be read; those that the model shows were read before.
+    pub(crate) fn new(document: &'a GltfDocument, rest: &[Vec3]) -> Result<Self, GltfError> {
+        let worlds = Worlds::new(&document.root)?;
+        let mut rig = Self {
+            document,
+            binds: HashMap::new(),
+            parts: Vec::new(),
+            follows: Vec::new(),
+            held: vec![0.0; document.root.nodes.len()],
+            spots: Vec::new(),
+            n_vertices: rest.len(),
+            diagonal: 0.0,
+            extras: Vec::new(),
+            n_ends: 0,
+            worlds,
+        };
+        let mut seen = Vec::new();
+        let shown = document.instances.iter().enumerate().map(|(k, i)| (Some(k), i));
+        for (shown, instance) in shown.chain(document.elsewhere.iter().map(|i| (None, i))) {
+            let key = key_of(instance);
+            if seen.contains(&key) {
+                continue;
+            }
+            let added = rig.add_instance(shown, instance);
+            if shown.is_some() {
+                added?;
+            } else if added.is_err() {
+                // Nobody sees it: it stays as it is.
+                continue;
+            }
+            seen.push(key);
+        }
+        let states: Vec<Vec3> = rest.iter().copied().chain(rig.extras.iter().map(|p| p.as_vec3())).collect();
+        rig.diagonal = Bounds::of(&states).map_or(0.0, |b| f64::from(b.diagonal()));
+        rig.add_nodes();
+        rig.spots = vrm::spots(document, &rig.worlds);
+        for k in 0..rig.spots.len() {
+            rig.spots[k].point = rig.n_vertices + rig.extras.len();
+            rig.anchor(rig.spots[k].at);
+        }
+        Ok(rig)
+    }
+
+    /// Whether the document has more than the plain export can keep.
+    pub(crate) fn is_needed(document: &GltfDocument) -> bool {
+        let morphs = |mesh: u32| {
+            let primitives = &document.root.meshes[mesh as usize].primitives;
+            primitives.iter().any(|p| p.targets.as_ref().is_some_and(|t| !t.is_empty()))
+        };
+        document.instances.iter().any(|i| i.skin.is_some() || morphs(i.mesh))
+    }
+
+    fn add_instance(&mut self, shown: Option<usize>, instance: &Instance) -> Result<(), GltfError> {
+        let document = self.document;
+        let mut joints = Vec::new();
+        if let Some(number) = instance.skin {
+            let skin = &document.root.skins[number as usize];
+            let binds = skin::inverse_binds(document, number)?;
+            joints = skin::joints(document, number, &self.worlds, &binds)?;
+            self.binds.insert(number, binds);
+            for primitive in &document.root.meshes[instance.mesh as usize].primitives {
+                let Some(positions) = attribute(primitive, Semantic::Positions) else { continue };
+                let count = document.source().count(positions)? as usize;
+                skin::each_influence(document.source(), primitive, count, |_, joint, weight| {
+                    if let Some(node) = skin.joints.get(joint as usize) {
+                        self.held[node.value()] += weight;
+                    }
+                })?;
+            }
+        }
+        let mut parts = Vec::new();
+        let (before, n_ends) = (self.extras.len(), self.n_ends);
+        let primitives = &document.root.meshes[instance.mesh as usize].primitives;
+        for (number, primitive) in primitives.iter().enumerate() {
+            let slot = document
+                .slots
+                .iter()
+                .position(|slot| Some(slot.instance as usize) == shown && slot.primitive as usize == number);
+            match self.part(instance, primitive, number as u32, slot, &joints) {
+                Ok(Some(part)) => parts.push(part),
+                Ok(None) => {}
+                Err(error) => {
+                    self.extras.truncate(before);
+                    self.n_ends = n_ends;
+                    return Err(error);
+                }
+            }
+        }
+        self.parts.append(&mut parts);
+        Ok(())
+    }
+
+    fn part(
+        &mut self,
+        instance: &Instance,
+        primitive: &Primitive,
+        number: u32,
+        slot: Option<usize>,
+        joints: &[DMat4],
+    ) -> Result<Option<Part>, GltfError> {
+        let document = self.document;
+        let Some(positions) = attribute(primitive, Semantic::Positions) else { return Ok(None) };
+        let local = vectors(document, positions, "POSITION")?;
+        let frame = match instance.skin {
+            None => Frame::Rigid(instance.world),
+            Some(skin) => Frame::Skinned(skin::matrices(
+                document.source(),
+                (skin, joints),
+                instance.world,
+                primitive,
+                local.len(),
+            )?),
+        };
+        let first = slot.map(|slot| document.slots[slot].start as usize);
+        let mut part = Part {
+            instance: instance.clone(),
+            primitive: number,
+            first: first.unwrap_or(self.n_vertices + self.extras.len()),
+            slot,
+            frame,
+            local,
+            targets: Vec::new(),
+        };
+        let defaults = document.default_weights(instance);
+        for (k, target) in primitive.targets.iter().flatten().enumerate() {
+            let default = defaults.and_then(|w| w.get(k)).map_or(0.0, |&w| f64::from(w));
+            let mut of = Target { default, moved: Vec::new(), deltas: Vec::new(), ends: [None; 2] };
+            if let Some(accessor) = target.positions {
+                let deltas = vectors(document, accessor.value() as u32, "POSITION")?;
+                for (v, delta) in deltas.into_iter().enumerate().take(part.local.len()) {
+                    if !delta.is_finite() {
+                        return Err(GltfError::NotFinite { accessor: accessor.value() as u32, vertex: v });
+                    }
+                    if delta != DVec3::ZERO {
+                        of.moved.push(v as u32);
+                        of.deltas.push(delta);
+                    }
+                }
+            }
+            part.targets.push(of);
+        }
+        let rest = part.rest();
+        if slot.is_none() {
+            self.extras.extend(rest.iter().map(|&p| if p.is_finite() { p } else { DVec3::ZERO }));
+        }
+        for target in &mut part.targets {
+            for (end, at) in target.ends.iter_mut().zip([0.0, 1.0]) {
+                let share = at - target.default;
+                if share == 0.0 || target.moved.is_empty() {
+                    continue;
+                }
+                *end = Some(self.n_vertices + self.extras.len());
+                self.n_ends += target.moved.len();
+                let ends = target.moved.iter().zip(&target.deltas).map(|(&v, &delta)| {
+                    rest[v as usize] + part.frame.world(v as usize).transform_vector3(share * delta)
+                });
+                self.extras.extend(ends);
+            }
+        }
+        Ok(Some(part))
+    }
+
+    /// Joints of all skins and what hangs below them, but for nodes whose own transform has no effect.
+    fn add_nodes(&mut self) {
+        let nodes = &self.document.root.nodes;
+        let mut below = vec![false; nodes.len()];
+        for joint in self.document.root.skins.iter().flat_map(|skin| &skin.joints) {
+            if let Some(below) = below.get_mut(joint.value()) {
+                *below = true;
+            }
+        }
+        self.worlds.mark_below(&mut below);
+        for (node, _) in self.worlds.order.clone() {
+            if below[node as usize] && nodes[node as usize].skin.is_none() {
+                self.follows.push((node, self.n_vertices + self.extras.len()));
+                self.anchor(self.worlds.world[node as usize].w_axis.truncate());
+            }
+        }
+    }
+
+    fn anchor(&mut self, at: DVec3) {
+        self.extras.push(at);
+        self.extras.extend(AROUND.map(|way| at + STEP * self.diagonal * way));
+    }
+}
+
+/// What makes two nodes that show a mesh one shape.
+fn key_of(instance: &Instance) -> (u32, Option<u32>, Option<u32>) {
+    (instance.mesh, instance.skin, instance.skin.is_none().then_some(instance.node).flatten())
+}

@@ -1,0 +1,227 @@
+//! Nodes that follow the cage: joints and what hangs on them.
+
+use ::gltf::json::scene::{Node, UnitQuaternion};
+use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
+use serde_json::{Value, json};
+
+use super::surface::rotation;
+use super::{AROUND, Rig, STEP};
+use crate::gltf::scene::{Worlds, local};
+
+/// What becomes of the skeleton.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Joints {
+    /// Joints go where the cage takes them and keep their direction: rotation and scale tracks stay as they are.
+    #[default]
+    Follow,
+    /// Nothing of the skeleton changes: for skeletons that other files share.
+    Stay,
+    /// Joints turn with the shape, too.
+    Turn,
+}
+
+/// Displacements below this, over the model's diagonal, are none.
+const SMALL: f64 = 1e-6;
+/// Bones shorter than this, over the diagonal, have no direction.
+const SHORT: f64 = 1e-4;
+/// Joints lower than this above the lowest one, over the diagonal, have no height to compare.
+const LOW: f64 = 0.02;
+/// Bounds of the ratio of heights.
+const RATIOS: (f64, f64) = (0.2, 5.0);
+
+/// How a node has changed, for its animations.
+pub(super) struct Change {
+    pub(super) from: DVec3,
+    pub(super) to: DVec3,
+    /// What the linear part of translations becomes in a track that stands still, and in one that moves.
+    pub(super) still: DMat3,
+    pub(super) moving: DMat3,
+    /// What rotations are turned by, from the left.
+    pub(super) turn: Option<DQuat>,
+}
+
+/// All nodes after the cage has moved.
+pub(super) struct Moved {
+    /// By node.
+    pub(super) changes: Vec<Option<Change>>,
+    pub(super) nodes: Vec<Node>,
+    /// Of the numbers as they are written, in f32.
+    pub(super) world: Vec<DMat4>,
+    pub(super) n_moved: usize,
+    /// Joints outside the cage: those that hold vertices, and those that hold none and go with their parent.
+    pub(super) n_outside: usize,
+    pub(super) n_loose: usize,
+}
+
+/// What nodes are moved with.
+pub(super) struct Given<'a> {
+    pub(super) by: &'a [DVec3],
+    pub(super) is_outside: &'a [bool],
+    pub(super) joints: Joints,
+    pub(super) keep_travel: bool,
+    /// Nodes whose meshes stay rigid.
+    pub(super) rigid: &'a [u32],
+    /// The file's axis that points up.
+    pub(super) up: DVec3,
+}
+
+impl Given<'_> {
+    /// Gradient of the deformation at an anchor, by central differences.
+    pub(super) fn gradient(&self, anchor: usize, diagonal: f64) -> DMat3 {
+        let column = |axis: usize| {
+            let [plus, minus] = [1 + axis, 1 + axis + AROUND.len() / 2].map(|k| self.by[anchor + k]);
+            DMat3::IDENTITY.col(axis) + (plus - minus) / (2.0 * STEP * diagonal)
+        };
+        DMat3::from_cols(column(0), column(1), column(2))
+    }
+}
+
+impl Rig<'_> {
+    /// Moves the nodes that follow, in `json` and as what they are now.
+    pub(super) fn moved(&self, given: &Given<'_>, json: &mut Value) -> Moved {
+        let root = &self.document.root;
+        let n = root.nodes.len();
+        let mut moved = Moved {
+            changes: (0..n).map(|_| None).collect(),
+            nodes: root.nodes.clone(),
+            world: self.worlds.world.clone(),
+            n_moved: 0,
+            n_outside: 0,
+            n_loose: 0,
+        };
+        if given.joints == Joints::Stay {
+            return moved;
+        }
+        let mut anchor = vec![None; n];
+        self.follows.iter().for_each(|&(node, at)| anchor[node as usize] = Some(at));
+        let old = &self.worlds.world;
+        let mut delta = vec![DVec3::ZERO; n];
+        let mut new: Vec<DMat4> = Vec::from(old.as_slice());
+        for &(node, parent) in &self.worlds.order {
+            let i = node as usize;
+            let Some(at) = anchor[i] else {
+                if let Some(parent) = parent {
+                    let parent = parent as usize;
+                    if new[parent] != old[parent] {
+                        new[i] = new[parent] * local(&root.nodes[i]);
+                    }
+                }
+                continue;
+            };
+            let is_outside = given.is_outside[at];
+            let is_loose = is_outside && self.held[i] <= 0.0;
+            moved.n_outside += usize::from(is_outside && !is_loose);
+            moved.n_loose += usize::from(is_loose);
+            // It holds nothing: a root on the floor, a control, the end of a chain.
+            let by = if is_loose { parent.map_or(DVec3::ZERO, |p| delta[p as usize]) } else { given.by[at] };
+            delta[i] = if by.length() <= SMALL * self.diagonal { DVec3::ZERO } else { by };
+            let is_rigid = given.rigid.contains(&node);
+            let turn = given.joints == Joints::Turn || is_rigid;
+            let turn = turn.then(|| rotation(given.gradient(at, self.diagonal))).flatten();
+            if delta[i] == DVec3::ZERO && turn.is_none_or(|t| t == DMat3::IDENTITY) {
+                continue;
+            }
+            let linear = turn.unwrap_or(DMat3::IDENTITY) * DMat3::from_mat4(old[i]);
+            new[i] = DMat4::from_mat3_translation(linear, old[i].w_axis.truncate() + delta[i]);
+        }
+        let heights = self.heights(given, &delta);
+        for &(node, parent) in &self.worlds.order {
+            let i = node as usize;
+            let [above, above_new] =
+                [old, &new].map(|world| parent.map_or(DMat4::IDENTITY, |p| world[p as usize]));
+            if anchor[i].is_none() || (new[i] == old[i] && above == above_new) {
+                continue;
+            }
+            let to = above_new.inverse() * new[i];
+            if !to.is_finite() {
+                continue;
+            }
+            let from = local(&root.nodes[i]);
+            let [t0, t1] = [from, to].map(|m| m.w_axis.truncate());
+            moved.n_moved += 1;
+            let of_json = &mut json["nodes"][i];
+            let node = &mut moved.nodes[i];
+            let mut turn = None;
+            if node.matrix.is_some() {
+                let matrix = to.as_mat4().to_cols_array();
+                of_json["matrix"] = json!(matrix);
+                node.matrix = Some(matrix);
+            } else {
+                let translation = t1.as_vec3().to_array();
+                of_json["translation"] = json!(translation);
+                node.translation = Some(translation);
+                let turned = DMat3::from_mat4(new[i]) != DMat3::from_mat4(old[i])
+                    || DMat3::from_mat4(above) != DMat3::from_mat4(above_new);
+                if let Some(m) = rotation(DMat3::from_mat4(to)).filter(|_| turned) {
+                    let before = node
+                        .rotation
+                        .as_ref()
+                        .map_or(DQuat::IDENTITY, |r| DQuat::from_array(r.0.map(f64::from)).normalize());
+                    let after = DQuat::from_mat3(&m);
+                    let rotation = after.as_quat().to_array();
+                    of_json["rotation"] = json!(rotation);
+                    node.rotation = Some(UnitQuaternion(rotation));
+                    turn = Some(after * before.inverse());
+                }
+            }
+            // Where the parent scales, short is relative to it.
+            let scale = DMat3::from_mat4(above).determinant().abs().cbrt().max(1e-12);
+            let short = SHORT * self.diagonal / scale;
+            let still = if t0.length().min(t1.length()) > short {
+                let turn = DQuat::from_rotation_arc(t0.normalize(), t1.normalize());
+                DMat3::from_quat(turn) * (t1.length() / t0.length())
+            } else {
+                DMat3::IDENTITY
+            };
+            let ratio = if given.keep_travel { 1.0 } else { heights(old[i], new[i]) };
+            let moving = DMat3::from_diagonal(DVec3::splat(ratio));
+            moved.changes[i] = Some(Change { from: t0, to: t1, still, moving, turn });
+        }
+        if moved.n_moved > 0 {
+            let mut root = root.clone();
+            root.nodes = std::mem::take(&mut moved.nodes);
+            // They were a tree before.
+            if let Ok(worlds) = Worlds::new(&root) {
+                moved.world = worlds.world;
+            }
+            moved.nodes = root.nodes;
+        }
+        moved
+    }
+
+    /// From a joint's old and new world to the ratio of its heights above the lowest joint that holds something.
+    fn heights<'g>(&self, given: &'g Given<'_>, delta: &[DVec3]) -> impl Fn(DMat4, DMat4) -> f64 + use<'g> {
+        let is_firm = |node: &u32| self.held[*node as usize] > 0.0;
+        let mut firm: Vec<u32> = self.follows.iter().map(|(node, _)| *node).filter(is_firm).collect();
+        if firm.is_empty() {
+            firm = self.follows.iter().map(|(node, _)| *node).collect();
+        }
+        let height = |at: DVec3| at.dot(given.up);
+        let lowest = |is_new: bool| {
+            let at = |&node: &u32| {
+                let i = node as usize;
+                let by = if is_new { delta[i] } else { DVec3::ZERO };
+                height(self.worlds.world[i].w_axis.truncate() + by)
+            };
+            firm.iter().map(at).fold(f64::INFINITY, f64::min)
+        };
+        let (old_lowest, new_lowest, low) = (lowest(false), lowest(true), LOW * self.diagonal);
+        let up = given.up;
+        move |old, new| {
+            let [before, after] = [(old, old_lowest), (new, new_lowest)]
+                .map(|(world, lowest)| world.w_axis.truncate().dot(up) - lowest);
+            if before > low { (after / before).clamp(RATIOS.0, RATIOS.1) } else { 1.0 }
+        }
+    }
+}
+
+/// The number of a node that has a name, or of the nodes that have it.
+pub(super) fn named(nodes: &Value, name: &str) -> Vec<u32> {
+    let list = nodes.as_array().into_iter().flatten();
+    (0u32..).zip(list).filter(|(_, node)| node["name"] == name).map(|(k, _)| k).collect()
+}
+
+/// f32 as JSON.
+pub(super) fn vector(v: Vec3) -> Value {
+    json!(v.to_array())
+}

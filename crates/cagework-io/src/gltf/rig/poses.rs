@@ -1,0 +1,158 @@
+//! Poses of the cage as morph targets after those that a document has.
+
+use glam::{DMat3, DVec3};
+use serde_json::{Value, json};
+
+use super::edit::Edit;
+use super::reshape::Named;
+use super::tracks::{Driven, driven, output, own_sampler};
+use super::{Rig, key_of};
+use crate::error::WriteError;
+use crate::gltf::animate::SECONDS_PER_POSE;
+use crate::gltf::pack::push;
+
+/// Appends a morph target for each pose to every mesh, and an animation that plays them.
+pub(super) fn append(
+    rig: &Rig<'_>,
+    edit: &mut Edit<'_>,
+    triangles: &[[u32; 3]],
+    poses: &[Named<'_>],
+) -> Result<(), WriteError> {
+    if poses.is_empty() {
+        return Ok(());
+    }
+    let mut meshes: Vec<(usize, usize)> = Vec::new();
+    for part in &rig.parts {
+        let mesh = part.instance.mesh as usize;
+        let (number, n_before) = (part.primitive as usize, part.targets.len());
+        if !meshes.contains(&(mesh, n_before)) {
+            meshes.push((mesh, n_before));
+        }
+        for pose in poses {
+            // Only the rest shape moves: existing targets add to it as before.
+            let mut by = pose.by.to_vec();
+            for target in &part.targets {
+                for first in target.ends.iter().flatten() {
+                    for (k, &v) in target.moved.iter().enumerate() {
+                        by[first + k] = by[part.first + v as usize];
+                    }
+                }
+            }
+            let own = || rig.triangles(part, triangles);
+            let shape = rig.shape(part, &by, &part.frame, own)?;
+            let inverse = |v: usize| DMat3::from_mat4(part.frame.world(v)).inverse();
+            let positions: Vec<[f32; 3]> = (0..part.local.len())
+                .map(|v| {
+                    let delta = inverse(v) * by[part.first + v];
+                    if delta.is_finite() { delta.as_vec3().to_array() } else { [0.0; 3] }
+                })
+                .collect();
+            let mut target = json!({ "POSITION": edit.write(None, &positions, true, true) });
+            let before = rig.normals(part)?;
+            if let (Some(shape), Some(before)) = (shape.and_then(|shape| shape.normals), before) {
+                let deltas: Vec<[f32; 3]> = shape
+                    .iter()
+                    .zip(before)
+                    .map(|(a, b): (&DVec3, DVec3)| (*a - b).as_vec3().to_array())
+                    .collect();
+                target["NORMAL"] = edit.write(None, &deltas, true, false).into();
+            }
+            push(&mut edit.json["meshes"][mesh]["primitives"][number], "targets", target);
+        }
+    }
+    let names: Vec<&str> = poses.iter().map(|pose| pose.name).collect();
+    for &(mesh, n_before) in &meshes {
+        pad(&mut edit.json["meshes"][mesh]["weights"], n_before, poses.len());
+        let extras = &mut edit.json["meshes"][mesh]["extras"];
+        if !extras.is_object() {
+            *extras = json!({});
+        }
+        let mut all: Vec<Value> = extras["targetNames"].as_array().cloned().unwrap_or_default();
+        all.extend((all.len()..n_before).map(|k| json!(format!("target {k}"))));
+        all.truncate(n_before);
+        all.extend(names.iter().map(|&name| json!(name)));
+        extras["targetNames"] = all.into();
+    }
+    let targets_of = |json: &Value, node: usize| {
+        let mesh = json["nodes"][node]["mesh"].as_u64()? as usize;
+        meshes.iter().find(|(m, _)| *m == mesh).map(|&(_, n_before)| n_before)
+    };
+    for node in 0..rig.document.root.nodes.len() {
+        let Some(n_before) = targets_of(&edit.json, node) else { continue };
+        let weights = &mut edit.json["nodes"][node]["weights"];
+        if weights.is_array() {
+            pad(weights, n_before, poses.len());
+        } else if let Some(node) = edit.json["nodes"][node].as_object_mut() {
+            // Asking for it has made it null.
+            node.shift_remove("weights");
+        }
+    }
+    for a in 0..edit.json["animations"].as_array().map_or(0, Vec::len) {
+        for c in 0..edit.json["animations"][a]["channels"].as_array().map_or(0, Vec::len) {
+            let n_before = match driven(&edit.json["animations"][a]["channels"][c]) {
+                Some(Driven::Weights(node)) => targets_of(&edit.json, node),
+                Some(Driven::MeshWeights(mesh)) => meshes.iter().find(|(m, _)| *m == mesh).map(|m| m.1),
+                _ => None,
+            };
+            let Some(n_before) = n_before.filter(|&n| n > 0) else { continue };
+            let Some(sampler) = own_sampler(&mut edit.json["animations"][a], c) else { continue };
+            let sampler_json = &edit.json["animations"][a]["samplers"][sampler];
+            let Some(output) = output(edit, sampler_json) else { continue };
+            let Ok(values) = rig.document.source().floats::<1>(output.accessor, "weights") else { continue };
+            let padded: Vec<[f32; 1]> = values
+                .chunks(n_before)
+                .flat_map(|key| key.iter().copied().chain((0..poses.len()).map(|_| [0.0])))
+                .collect();
+            let accessor = edit.write(None, &padded, false, false);
+            edit.json["animations"][a]["samplers"][sampler]["output"] = accessor.into();
+        }
+    }
+    play(rig, edit, &meshes, poses.len());
+    Ok(())
+}
+
+/// Extends weights to those of the poses.
+fn pad(weights: &mut Value, n_before: usize, n_poses: usize) {
+    let mut all = weights.as_array().cloned().unwrap_or_default();
+    all.resize(n_before, json!(0.0));
+    all.extend((0..n_poses).map(|_| json!(0.0)));
+    *weights = all.into();
+}
+
+/// An animation from rest through all poses back to rest. Targets that were there keep their defaults.
+fn play(rig: &Rig<'_>, edit: &mut Edit<'_>, meshes: &[(usize, usize)], n_poses: usize) {
+    let n_keys = n_poses + 2;
+    let times: Vec<[f32; 1]> = (0..n_keys).map(|k| [k as f32 * SECONDS_PER_POSE]).collect();
+    let input = edit.write(None, &times, false, true);
+    let (mut samplers, mut channels) = (Vec::new(), Vec::new());
+    let mut seen = Vec::new();
+    for instance in rig.document.instances.iter().chain(&rig.document.elsewhere) {
+        let Some(&(_, n_before)) = meshes.iter().find(|(mesh, _)| *mesh == instance.mesh as usize) else {
+            continue;
+        };
+        let Some(node) =
+            instance.node.filter(|_| rig.parts.iter().any(|p| key_of(&p.instance) == key_of(instance)))
+        else {
+            continue;
+        };
+        if std::mem::replace(&mut seen, vec![node]) == [node] {
+            continue;
+        }
+        let defaults = rig.document.default_weights(instance);
+        let default = |k: usize| defaults.and_then(|w| w.get(k)).copied().unwrap_or(0.0);
+        let values: Vec<[f32; 1]> = (0..n_keys)
+            .flat_map(|key| {
+                let of_poses = (0..n_poses).map(move |pose| if key == pose + 1 { 1.0 } else { 0.0 });
+                (0..n_before).map(default).chain(of_poses).map(|w| [w])
+            })
+            .collect();
+        let output = edit.write(None, &values, false, false);
+        channels.push(json!({ "sampler": samplers.len(), "target": { "node": node, "path": "weights" } }));
+        samplers.push(json!({ "input": input, "output": output, "interpolation": "LINEAR" }));
+    }
+    push(
+        &mut edit.json,
+        "animations",
+        json!({ "name": "poses", "samplers": samplers, "channels": channels }),
+    );
+}

@@ -1,0 +1,106 @@
+//! How a deformation turns and stretches a surface: its gradient at every vertex.
+
+use glam::{DMat3, DVec3, Vec3};
+
+use cagework_core::mesh::weld;
+
+/// Below this a gradient counts as flat, and nothing turns.
+const FLAT: f64 = 1e-9;
+
+/// Triangles of a part, for gradients by least squares over the edges at a vertex.
+pub(super) struct Surface {
+    triangles: Vec<[u32; 3]>,
+    /// Vertices at one place are one. `[n]`
+    unique_of: Vec<u32>,
+    n_unique: usize,
+}
+
+impl Surface {
+    /// `rest`: vertices; `triangles` of them.
+    pub(super) fn new(rest: &[DVec3], triangles: Vec<[u32; 3]>) -> Self {
+        let places: Vec<Vec3> = rest.iter().map(|p| p.as_vec3()).collect();
+        let welded = weld(&places);
+        Self { triangles, n_unique: welded.first.len(), unique_of: welded.unique_of }
+    }
+
+    /// Gradient at each vertex of the map from `from` to `to`: least squares over the edges, and the unit normal goes to the
+    /// unit normal. None where nothing near the vertex has moved. `[n]`
+    pub(super) fn gradients(&self, from: &[DVec3], to: &[DVec3]) -> Vec<Option<DMat3>> {
+        let mut normals = vec![[DVec3::ZERO; 2]; self.n_unique];
+        let mut sums = vec![(DMat3::ZERO, DMat3::ZERO, 0.0_f64); self.n_unique];
+        let mut moved = vec![false; self.n_unique];
+        for triangle in &self.triangles {
+            let corners = triangle.map(|v| v as usize);
+            let [p, q] = [from, to].map(|at| corners.map(|v| at[v]));
+            let areas = [p, q].map(|[a, b, c]| (b - a).cross(c - a));
+            let has_moved = corners.iter().any(|&v| from[v] != to[v]);
+            for k in 0..3 {
+                let unique = self.unique_of[corners[k]] as usize;
+                moved[unique] |= has_moved;
+                for (normal, area) in normals[unique].iter_mut().zip(areas) {
+                    *normal += area;
+                }
+                let (both, one, length) = &mut sums[unique];
+                for other in [(k + 1) % 3, (k + 2) % 3] {
+                    let [e, f] = [p, q].map(|at| at[other] - at[k]);
+                    *both += outer(f, e);
+                    *one += outer(e, e);
+                    *length += e.length_squared();
+                }
+            }
+        }
+        let gradients: Vec<Option<DMat3>> = (0..self.n_unique)
+            .map(|v| {
+                let (both, one, length) = sums[v];
+                let [n, m] = normals[v].map(DVec3::normalize_or_zero);
+                let scale = 1.0 / length.max(1e-30);
+                let one = scale * one + outer(n, n) + DMat3::from_diagonal(DVec3::splat(FLAT));
+                let gradient = (scale * both + outer(m, n)) * one.inverse();
+                moved[v].then_some(if gradient.determinant() > FLAT { gradient } else { DMat3::IDENTITY })
+            })
+            .collect();
+        self.unique_of.iter().map(|&v| gradients[v as usize]).collect()
+    }
+
+    /// Mean of a value over the neighbours of each vertex where `is_known`, for those where it is not.
+    pub(super) fn from_neighbours(&self, values: &mut [DVec3], is_known: &[bool]) {
+        let mut sums = vec![(DVec3::ZERO, 0.0); values.len()];
+        for triangle in &self.triangles {
+            for &v in triangle {
+                for &other in triangle.iter().filter(|&&other| is_known[other as usize]) {
+                    sums[v as usize].0 += values[other as usize];
+                    sums[v as usize].1 += 1.0;
+                }
+            }
+        }
+        for ((value, known), (sum, n)) in values.iter_mut().zip(is_known).zip(sums) {
+            if !known {
+                *value = if n > 0.0 { sum / n } else { DVec3::ZERO };
+            }
+        }
+    }
+}
+
+fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(b.x * a, b.y * a, b.z * a)
+}
+
+/// The cofactor matrix, which normals follow; of a mirrored one its negative, so that they stay outside.
+pub(super) fn cofactor(m: DMat3) -> DMat3 {
+    let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
+    sign * DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
+}
+
+/// The rotation nearest to a matrix: Higham, Noferini 2016 by Newton's iteration, enough for what is far from flat.
+pub(super) fn rotation(m: DMat3) -> Option<DMat3> {
+    let mut turn = m * (1.0 / m.determinant().abs().cbrt());
+    for _ in 0..30 {
+        let next = 0.5 * (turn + turn.inverse().transpose());
+        let change = (next - turn).to_cols_array().into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        turn = next;
+        if change < 1e-14 {
+            break;
+        }
+    }
+    (turn.is_finite() && turn.determinant() > 0.0).then_some(turn)
+}

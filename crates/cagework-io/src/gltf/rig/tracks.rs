@@ -1,0 +1,149 @@
+//! Animation tracks of nodes that have moved.
+
+use glam::{DMat3, DQuat, DVec3, Vec3};
+use serde_json::Value;
+
+use super::edit::Edit;
+use super::nodes::Change;
+use super::reshape::ReshapeReport;
+use crate::gltf::GltfDocument;
+use crate::gltf::pack::push;
+
+/// A translation that moves by less than this, over the node's own, stands still: it is a bone's length.
+const STILL: f64 = 1e-3;
+
+/// What a channel drives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Driven {
+    Translation(usize),
+    Rotation(usize),
+    /// Morph weights of a node, or of a mesh.
+    Weights(usize),
+    MeshWeights(usize),
+}
+
+/// What a channel drives, if it is of those that a reshape knows; by `path` and node, or by a pointer
+/// (KHR_animation_pointer).
+pub(super) fn driven(channel: &Value) -> Option<Driven> {
+    let target = &channel["target"];
+    if let Some(pointer) = target.pointer("/extensions/KHR_animation_pointer/pointer").and_then(Value::as_str)
+    {
+        let mut words = pointer.strip_prefix('/')?.split('/');
+        let (list, index, what) = (words.next()?, words.next()?.parse().ok()?, words.next()?);
+        return match (list, what, words.next()) {
+            ("nodes", "translation", None) => Some(Driven::Translation(index)),
+            ("nodes", "rotation", None) => Some(Driven::Rotation(index)),
+            ("nodes", "weights", None) => Some(Driven::Weights(index)),
+            ("meshes", "weights", None) => Some(Driven::MeshWeights(index)),
+            _ => None,
+        };
+    }
+    let node = target["node"].as_u64()? as usize;
+    match target["path"].as_str()? {
+        "translation" => Some(Driven::Translation(node)),
+        "rotation" => Some(Driven::Rotation(node)),
+        "weights" => Some(Driven::Weights(node)),
+        _ => None,
+    }
+}
+
+/// Values of a sampler: its accessor, and whether only every third one is a value, between tangents.
+pub(super) struct Output {
+    pub(super) accessor: u32,
+    pub(super) is_cubic: bool,
+    /// Keys.
+    pub(super) n_keys: usize,
+}
+
+pub(super) fn output(edit: &Edit<'_>, sampler: &Value) -> Option<Output> {
+    let count = |key: &str| {
+        let accessor = sampler[key].as_u64()?;
+        Some((accessor as u32, edit.json["accessors"][accessor as usize]["count"].as_u64()? as usize))
+    };
+    let ((_, n_keys), (accessor, _)) = (count("input")?, count("output")?);
+    Some(Output { accessor, is_cubic: sampler["interpolation"] == "CUBICSPLINE", n_keys })
+}
+
+/// Makes a sampler the channel's own if others use it; returns its number.
+pub(super) fn own_sampler(animation: &mut Value, channel: usize) -> Option<usize> {
+    let sampler = animation["channels"][channel]["sampler"].as_u64()?;
+    let users = animation["channels"].as_array()?.iter().filter(|c| c["sampler"] == sampler).count();
+    if users < 2 {
+        return Some(sampler as usize);
+    }
+    let copy = animation["samplers"][sampler as usize].clone();
+    let number = push(animation, "samplers", copy);
+    animation["channels"][channel]["sampler"] = number.into();
+    Some(number)
+}
+
+/// Brings translations, and rotations where bones turn, to nodes that have moved.
+pub(super) fn rescale(
+    document: &GltfDocument,
+    edit: &mut Edit<'_>,
+    changes: &[Option<Change>],
+    report: &mut ReshapeReport,
+) {
+    let n_animations = edit.json["animations"].as_array().map_or(0, Vec::len);
+    for a in 0..n_animations {
+        let n_channels = edit.json["animations"][a]["channels"].as_array().map_or(0, Vec::len);
+        for c in 0..n_channels {
+            let change = |node: usize| changes.get(node).and_then(Option::as_ref);
+            let (node, is_rotation) = match driven(&edit.json["animations"][a]["channels"][c]) {
+                Some(Driven::Translation(node)) => (node, false),
+                Some(Driven::Rotation(node)) => (node, true),
+                _ => continue,
+            };
+            let Some(change) = change(node).filter(|change| !is_rotation || change.turn.is_some()) else {
+                continue;
+            };
+            let Some(sampler) = own_sampler(&mut edit.json["animations"][a], c) else { continue };
+            edit.count_uses();
+            let found = output(edit, &edit.json["animations"][a]["samplers"][sampler]);
+            let written = found.and_then(|output| {
+                let per_key = if output.is_cubic { 3 } else { 1 };
+                let accessor = Some(output.accessor as usize);
+                if is_rotation {
+                    let values = document.source().floats::<4>(output.accessor, "a rotation").ok()?;
+                    let values =
+                        (values.len() == per_key * output.n_keys).then(|| turned(&values, change))?;
+                    Some(edit.write(accessor, &values, false, false))
+                } else {
+                    let values = document.source().floats::<3>(output.accessor, "a translation").ok()?;
+                    let values = (values.len() == per_key * output.n_keys)
+                        .then(|| moved(&values, change, output.is_cubic))?;
+                    Some(edit.write(accessor, &values, false, false))
+                }
+            });
+            match written {
+                Some(accessor) => {
+                    edit.json["animations"][a]["samplers"][sampler]["output"] = accessor.into();
+                    report.tracks += 1;
+                }
+                None => report.tracks_unread += 1,
+            }
+        }
+    }
+}
+
+/// `t' + S (t(t) - t)`; tangents take the linear part only.
+fn moved(values: &[[f32; 3]], change: &Change, is_cubic: bool) -> Vec<[f32; 3]> {
+    let is_value = |k: usize| !is_cubic || k % 3 == 1;
+    let all: Vec<DVec3> = values.iter().map(|&v| Vec3::from_array(v).as_dvec3()).collect();
+    let keys = || all.iter().enumerate().filter(|(k, _)| is_value(*k)).map(|(_, v)| *v);
+    let range = keys().fold(DVec3::NEG_INFINITY, DVec3::max) - keys().fold(DVec3::INFINITY, DVec3::min);
+    let moves = range.max_element() > STILL * change.from.length();
+    let linear: DMat3 = if moves { change.moving } else { change.still };
+    let value = |(k, &v): (usize, &DVec3)| {
+        let v = if is_value(k) { change.to + linear * (v - change.from) } else { linear * v };
+        v.as_vec3().to_array()
+    };
+    all.iter().enumerate().map(value).collect()
+}
+
+fn turned(values: &[[f32; 4]], change: &Change) -> Vec<[f32; 4]> {
+    let turn = change.turn.unwrap_or(DQuat::IDENTITY);
+    // Tangents are no unit quaternions: the product is linear in them all the same.
+    let value = |q: &[f32; 4]| (turn * DQuat::from_array(q.map(f64::from))).as_quat().to_array();
+    values.iter().map(value).collect()
+}
