@@ -47,11 +47,13 @@ pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
         KindArg::Box => {
             let divisions = args.divisions.unwrap_or(DEFAULT_DIVISIONS);
             (made.divisions, made.margin) = (Some(divisions), Some(args.margin));
-            box_mesh(&model.positions, divisions, args.margin)?
+            let states = model.states(args.around_clip.as_deref());
+            let (positions, _) = states.map_err(|e| CliError::file(&args.model, e))?;
+            box_mesh(&positions, divisions, args.margin)?
         }
         kind => {
             made.kind = if kind == KindArg::Hull { "hull" } else { "auto" };
-            let (cage, report) = generate_for(&model, &args.options())?;
+            let (cage, report) = generate_for(&model, args.around_clip.as_deref(), &args.options())?;
             made.report = Some(report);
             cage
         }

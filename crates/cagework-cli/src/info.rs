@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use cagework_core::mesh::weld;
 use cagework_core::{Bounds, Cage};
-use cagework_io::{Model, shown};
+use cagework_io::{Clip, Model, shown};
 use serde::Serialize;
 
 use crate::args::InfoArgs;
@@ -24,6 +24,10 @@ struct Info {
     nodes: usize,
     primitives: usize,
     materials: usize,
+    skins: usize,
+    joints: usize,
+    morph_targets: usize,
+    clips: Vec<Clip>,
     bounds: BoundsInfo,
     /// Every edge belongs to two triangles, once equal positions are welded.
     closed: bool,
@@ -80,6 +84,10 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
         nodes: counts.nodes,
         primitives: counts.primitives,
         materials: counts.materials,
+        skins: counts.skins,
+        joints: counts.joints,
+        morph_targets: counts.morph_targets,
+        clips: model.clips(),
         bounds: BoundsInfo {
             min: bounds.min.to_array(),
             max: bounds.max.to_array(),
@@ -117,6 +125,16 @@ fn text(info: &Info) -> String {
         "document",
         format!("{} nodes, {} primitives, {} materials", info.nodes, info.primitives, info.materials),
     );
+    if info.skins + info.morph_targets + info.clips.len() > 0 {
+        row(
+            "rig",
+            format!("{} skins, {} joints, {} morph targets", info.skins, info.joints, info.morph_targets),
+        );
+    }
+    for clip in &info.clips {
+        let name = clip.name.as_deref().map_or_else(|| "(no name)".into(), shown);
+        row("clip", format!("{name}, {} s, {} channels, {} keys", clip.seconds, clip.channels, clip.keys));
+    }
     let [min, max] = [info.bounds.min, info.bounds.max];
     row("bounds", format!("{min:?} to {max:?}, diagonal {}", info.bounds.diagonal));
     row("surface", if info.closed { "closed".into() } else { "open".into() });

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use cagework_core::cage::MAX_FACES;
-use cagework_core::cage_gen::{CageGenError, CageReport, generate};
+use cagework_core::cage_gen::{CageReport, generate};
 use cagework_core::samples::{self, Sample};
 use cagework_core::{Bounds, Cage, CageError, CageOptions, PolygonMesh, TriMesh, subdivided_box};
 use cagework_io::{Model, UpAxis, write_cage_obj};
@@ -108,7 +108,9 @@ pub(crate) fn load_cage(
         CageSource::Box { divisions } => {
             generated_model("box cage", &box_mesh(&around.positions, *divisions, DEFAULT_MARGIN)?)?
         }
-        CageSource::Auto(options) => generated_model("generated cage", &generate_for(around, options)?.0)?,
+        CageSource::Auto(options) => {
+            generated_model("generated cage", &generate_for(around, None, options)?.0)?
+        }
     };
     let cage = cage_mesh(&model)
         .and_then(|mesh| Cage::new(&mesh))
@@ -116,16 +118,18 @@ pub(crate) fn load_cage(
     Ok(LoadedCage { cage, model, up: around.up(), memory })
 }
 
-/// A generated cage around a model, with progress on the terminal.
+/// A generated cage around a model, its morph targets and a clip, with progress on the terminal.
 ///
 /// # Errors
-/// Those of [`generate`].
+/// Those of [`generate`]; a clip that is not there.
 pub(crate) fn generate_for(
     model: &Model,
+    clip: Option<&str>,
     options: &CageOptions,
-) -> Result<(PolygonMesh, CageReport), CageGenError> {
+) -> Result<(PolygonMesh, CageReport), CliError> {
+    let (positions, triangles) = model.states(clip).map_err(|e| CliError::file(model.name.as_ref(), e))?;
     let bar = Bar::start();
-    let made = generate(&model.positions, &model.triangles, options, &bar)?;
+    let made = generate(&positions, &triangles, options, &bar)?;
     Ok((made.cage.to_polygon_mesh(), made.report))
 }
 

@@ -26,6 +26,7 @@ pub mod rest_edit;
 pub mod sample;
 pub mod samples;
 mod simd;
+pub mod skin;
 pub mod slice;
 pub mod solve;
 pub mod stencil;

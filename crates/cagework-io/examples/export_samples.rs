@@ -7,7 +7,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use cagework_io::Model;
-use common::{CUBE_OBJ, PNG, instanced, plain_cube, quantized, skinned, textured_square, twist};
+use common::{CUBE_OBJ, PNG, instanced, plain_cube, quantized, rigged, skinned, textured_square, twist};
 use glam::Vec3;
 use serde_json::json;
 
@@ -27,6 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("textured.glb", textured_square().glb()),
         ("instanced.glb", instanced().glb()),
         ("skinned.glb", skinned().glb()),
+        ("rigged.glb", rigged().glb()),
         ("mirrored-skin.glb", mirrored_skin.glb()),
         ("quantized.glb", quantized().glb()),
         ("flattened.glb", flat.glb()),
@@ -53,6 +54,17 @@ fn main() -> Result<(), Box<dyn Error>> {
             directory.join(format!("{stem}-poses.glb")),
             model.write_glb_poses(&model.positions, &poses)?,
         )?;
+        if model.is_rigged() {
+            let extra = model.extra_points()?;
+            let by = model.positions.iter().chain(&extra).map(|&p| twist(p).as_dvec3() - p.as_dvec3());
+            let by: Vec<_> = by.collect();
+            let still = vec![glam::DVec3::ZERO; by.len()];
+            let options = cagework_io::ReshapeOptions::default();
+            let (reshaped, _) = model.write_reshaped(&by, &[], &[], &options)?;
+            std::fs::write(directory.join(format!("{stem}-reshaped.glb")), reshaped)?;
+            let (posed, _) = model.write_reshaped(&still, &[], &[("twisted".to_owned(), by)], &options)?;
+            std::fs::write(directory.join(format!("{stem}-posed.glb")), posed)?;
+        }
         let bounds = cagework_core::Bounds::of(&model.positions).ok_or("the model has vertices")?;
         let cage = cagework_core::subdivided_box(bounds, 0.1, [2, 2, 2]);
         let cage_poses = [("raised".to_owned(), cage.positions.iter().map(|&p| p + Vec3::Y).collect())];

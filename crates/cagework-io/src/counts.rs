@@ -17,6 +17,8 @@ pub struct Counts {
     pub textures: usize,
     /// Skins.
     pub skins: usize,
+    /// Joints of all skins; one of several skins counts once.
+    pub joints: usize,
     /// Animations.
     pub animations: usize,
     /// Morph targets of all meshes.

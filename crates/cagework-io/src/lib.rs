@@ -20,6 +20,7 @@ mod npz;
 mod obj;
 mod pose_code;
 mod project;
+mod rigged;
 mod shown;
 mod siblings;
 mod up;
@@ -27,7 +28,9 @@ mod up;
 pub use counts::Counts;
 pub use error::{PoseError, WriteError};
 pub use format::{FormatError, ModelFormat};
-pub use gltf::{GltfError, Joints, PROJECT_EXTENSION, ReshapeOptions, ReshapeReport, write_mesh_glb};
+pub use gltf::{
+    Clip, GltfError, Joints, PROJECT_EXTENSION, Player, Posed, ReshapeOptions, ReshapeReport, write_mesh_glb,
+};
 pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
 pub use memory::MemoryError;
 pub use model::{Model, ReadError};
@@ -35,6 +38,7 @@ pub use npz::{NpzError, SavedWeights, read_weights_npz, write_weights_npz};
 pub use obj::{ObjError, write_cage_obj};
 pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
 pub use project::{Project, ProjectError, read_project, write_project};
+pub use rigged::NoClip;
 pub use shown::shown;
 pub use siblings::Resolve;
 pub use up::UpAxis;

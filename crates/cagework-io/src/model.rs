@@ -4,13 +4,13 @@ use std::borrow::Cow;
 
 use cagework_core::mesh::weld;
 use cagework_core::{PolygonMesh, TriMesh};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use thiserror::Error;
 
 use crate::counts::Counts;
 use crate::error::{PoseError, WriteError};
 use crate::format::{FormatError, ModelFormat};
-use crate::gltf::{self, GltfDocument, GltfError, Named, Pose, ReshapeOptions, ReshapeReport, Rest, Rig};
+use crate::gltf::{self, GltfDocument, GltfError, Pose, Rest};
 use crate::look::Look;
 use crate::obj::{self, ObjDocument, ObjError};
 use crate::shown::shown;
@@ -66,7 +66,7 @@ pub struct Model {
     /// What the user should know: each a sentence.
     pub notices: Vec<String>,
     /// What points up in the document.
-    up: UpAxis,
+    pub(crate) up: UpAxis,
     bytes: u64,
     pub(crate) document: Document,
 }
@@ -360,67 +360,6 @@ impl Model {
         let spread_poses: Vec<_> = turned.iter().map(|positions| spread(positions).into()).collect();
         let rest = Rest { positions: &built.positions, triangles: &built.triangles };
         gltf::patch(&built.document, rest, &spread(&base), &named(poses, &spread_poses))
-    }
-
-    /// Whether it has a skin or morph targets: what [`Self::write_glb`] leaves out and [`Self::write_reshaped`] keeps.
-    #[must_use]
-    pub fn is_rigged(&self) -> bool {
-        matches!(&self.document, Document::Gltf(document) if Rig::is_needed(document))
-    }
-
-    /// Points that move besides the vertices when a rigged model is reshaped: ends of morph targets, joints, offsets of a VRM.
-    /// They are bound after the vertices. Empty without a rig.
-    ///
-    /// # Errors
-    /// [`WriteError`] when a part of the rig cannot be read.
-    pub fn extra_points(&self) -> Result<Vec<Vec3>, WriteError> {
-        let Document::Gltf(document) = &self.document else { return Ok(Vec::new()) };
-        if !Rig::is_needed(document) {
-            return Ok(Vec::new());
-        }
-        let extras = Rig::new(document, &self.positions_in_file())?.extras;
-        let extras: Vec<Vec3> = extras.iter().map(|p| p.as_vec3()).collect();
-        Ok(self.up.turned(&extras).into_owned())
-    }
-
-    /// A rigged model reshaped, with its skeleton, morph targets and animations; or, with `poses`, the model at rest with a
-    /// morph target more for each.
-    ///
-    /// `by`: how far each vertex, then each of [`Self::extra_points`], moves. `outside`: those of them outside the cage.
-    ///
-    /// # Errors
-    /// [`WriteError`] when there is not one finite displacement for each point, or the document cannot be written.
-    pub fn write_reshaped(
-        &self,
-        by: &[DVec3],
-        outside: &[u32],
-        poses: &[(String, Vec<DVec3>)],
-        options: &ReshapeOptions,
-    ) -> Result<(Vec<u8>, ReshapeReport), WriteError> {
-        let Document::Gltf(document) = &self.document else { return Err(WriteError::NoRig) };
-        let rig = Rig::new(document, &self.positions_in_file())?;
-        let n = self.positions.len() + rig.extras.len();
-        let turned = |by: &[DVec3]| -> Result<Vec<DVec3>, WriteError> {
-            if by.len() != n {
-                return Err(WriteError::Count { given: by.len(), expected: n });
-            }
-            if let Some(vertex) = by.iter().position(|by| !by.is_finite()) {
-                return Err(WriteError::NotFinite { vertex });
-            }
-            Ok(by.iter().map(|&by| self.up.vector_turned_back(by)).collect())
-        };
-        let by = turned(by)?;
-        let by_poses = poses.iter().map(|(_, by)| turned(by)).collect::<Result<Vec<_>, _>>()?;
-        let poses: Vec<Named<'_>> =
-            poses.iter().zip(&by_poses).map(|((name, _), by)| Named { name, by }).collect();
-        let mut is_outside = vec![false; n];
-        for &point in outside {
-            if let Some(is_outside) = is_outside.get_mut(point as usize) {
-                *is_outside = true;
-            }
-        }
-        let up = self.up.vector_turned_back(DVec3::Y);
-        gltf::reshape(document, &rig, &self.triangles, (&by, &is_outside), &poses, (options, up))
     }
 
     fn check(&self, positions: &[Vec3]) -> Result<(), WriteError> {

@@ -59,6 +59,9 @@ pub(crate) struct CageArgs {
     /// Voxels along the model's longest side, 8 to 128; gaps below three of them are closed. 0: by the vertices.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub(crate) voxels: u32,
+    /// Name of a clip of which the cage encloses every frame, too.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) around_clip: Option<String>,
     /// Quads along each edge of a box.
     #[arg(long, value_name = "N", value_parser = divisions)]
     pub(crate) divisions: Option<u32>,

@@ -83,8 +83,7 @@ pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result
         let name = first.map_or_else(String::new, |n| name_of(&document.json, "nodes", n, "node"));
         let name = shown_start(&name, MAX_NAME_CHARS);
         let others = others(skinned.len());
-        notices
-            .push(format!("'{name}'{others} is skinned: bound in its rest pose, exported without its skin"));
+        notices.push(format!("'{name}'{others} is skinned: bound in its rest pose"));
     }
     if let Some(node) = repeated.first() {
         let others = others(repeated.len());
@@ -99,8 +98,7 @@ pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result
         notices.push(format!("{skipped} primitives are points or lines: left as they are"));
     }
     if morphed > 0 {
-        notices
-            .push(format!("{morphed} morph targets: bound at their default weights, exported without them"));
+        notices.push(format!("{morphed} morph targets: bound at their default weights"));
     }
     if ragged > 0 {
         notices.push(format!("{ragged} indices are left over after the last whole triangle: ignored"));

@@ -1,5 +1,7 @@
 //! The node tree: world transforms, and which mesh is shown where.
 
+use std::collections::HashSet;
+
 use ::gltf::json::Root;
 use ::gltf::json::scene::Node;
 use glam::{DMat4, DQuat, DVec3, Mat4};
@@ -167,6 +169,8 @@ pub(crate) fn counts(document: &GltfDocument) -> Counts {
     let targets = document.root.meshes.iter().map(|mesh| {
         mesh.primitives.iter().map(|p| p.targets.as_ref().map_or(0, Vec::len)).max().unwrap_or(0)
     });
+    let joints: HashSet<usize> =
+        document.root.skins.iter().flat_map(|skin| &skin.joints).map(::gltf::json::Index::value).collect();
     Counts {
         scenes: count("scenes"),
         nodes: count("nodes"),
@@ -175,6 +179,7 @@ pub(crate) fn counts(document: &GltfDocument) -> Counts {
         materials: count("materials"),
         textures: count("textures"),
         skins: count("skins"),
+        joints: joints.len(),
         animations: count("animations"),
         morph_targets: targets.sum(),
     }

@@ -3,7 +3,7 @@
 #![allow(dead_code, clippy::unwrap_used, reason = "each test file uses its own part, and this is test code")]
 
 use cagework_io::{Model, ReadError};
-use glam::Vec3;
+use glam::{Mat4, Vec3};
 use serde_json::{Value, json};
 
 pub(crate) const F32: u32 = 5126;
@@ -301,4 +301,91 @@ pub(crate) fn relative_error(a: &[Vec3], b: &[Vec3]) -> f32 {
 pub(crate) fn volume(model: &Model) -> f32 {
     let p = |i: u32| model.positions[i as usize];
     model.triangles.iter().map(|&[a, b, c]| p(a).dot(p(b).cross(p(c))) / 6.0).sum()
+}
+
+/// A bar of three joints under an armature that moves and doubles: its bind space is four units beside its rest pose. Two targets with
+/// default weights [0.25, 0], and a clip: the root moves, a bone's length is a track, the tip turns, a target changes.
+pub(crate) fn rigged() -> Builder {
+    let mut rig = Builder::new();
+    // A column of five squares, 0 to 2 high in the world.
+    let (mut at, mut triangles) = (Vec::new(), Vec::new());
+    for k in 0..5_u32 {
+        let y = 0.5 * k as f32;
+        at.extend([[-0.2, y, -0.2], [0.2, y, -0.2], [0.2, y, 0.2], [-0.2, y, 0.2]]);
+        for side in (0..4).filter(|_| k < 4) {
+            let [a, b] = [4 * k + side, 4 * k + (side + 1) % 4];
+            triangles.extend([a, a + 4, b, b, a + 4, b + 4]);
+        }
+    }
+    triangles.extend([0, 1, 2, 0, 2, 3, 16, 18, 17, 16, 19, 18]);
+    // In the mesh's own space, half as large and four units to the right.
+    let local: Vec<[f32; 3]> =
+        at.iter().map(|p: &[f32; 3]| [4.0 + 0.5 * p[0], 0.5 * p[1], 0.5 * p[2]]).collect();
+    let delta = |d: [f32; 3], from: f32| -> Vec<[f32; 3]> {
+        at.iter()
+            .map(|p| if p[1] >= from { [p[0].signum() * d[0], d[1], p[2].signum() * d[2]] } else { [0.0; 3] })
+            .collect()
+    };
+    let position = rig.vec3(&local);
+    let normals: Vec<[f32; 3]> =
+        at.iter().map(|p| Vec3::new(p[0], 0.0, p[2]).normalize().to_array()).collect();
+    let normal = rig.vec3(&normals);
+    let indices = rig.indices(&triangles);
+    let targets = [delta([0.3, 0.0, 0.0], 0.9), delta([0.0, 0.2, 0.0], 1.4)]
+        .map(|d| json!({ "POSITION": rig.vec3(&d) }));
+    let joints: Vec<u8> =
+        at.iter().flat_map(|p| if p[1] < 0.9 { [0, 1, 0, 0] } else { [1, 2, 0, 0] }).collect();
+    let weights: Vec<u8> = at
+        .iter()
+        .flat_map(|p| {
+            let share = (p[1] / 2.0 * 2.0).fract();
+            [1.0 - share, share, 0.0, 0.0_f32].map(f32::to_le_bytes).concat()
+        })
+        .collect();
+    let joints = rig.accessor(&joints, U8, at.len(), "VEC4");
+    let weights = rig.accessor(&weights, F32, at.len(), "VEC4");
+    let attributes =
+        json!({ "POSITION": position, "NORMAL": normal, "JOINTS_0": joints, "WEIGHTS_0": weights });
+    let primitive = json!({ "attributes": attributes, "indices": indices, "targets": targets });
+    let mesh = json!({ "primitives": [primitive], "weights": [0.25, 0.0], "extras": { "targetNames": ["wide", "tall"] } });
+    rig.push("meshes", mesh);
+    rig.json["nodes"] = json!([
+        { "name": "armature", "translation": [0.0, 0.0, 0.0], "scale": [2.0, 2.0, 2.0], "children": [1] },
+        { "name": "root", "translation": [0.0, 0.0, 0.0], "children": [2] },
+        { "name": "middle", "translation": [0.0, 0.5, 0.0], "children": [3] },
+        { "name": "tip", "translation": [0.0, 0.5, 0.0] },
+        { "name": "bar", "mesh": 0, "skin": 0, "translation": [7.0, 7.0, 7.0] },
+    ]);
+    rig.json["scenes"] = json!([{ "nodes": [0, 4] }]);
+    // World from bind: twice as large, and back by eight units. The joints' worlds double, too.
+    let binds: Vec<u8> = [0.0_f32, 0.5, 1.0]
+        .iter()
+        .flat_map(|y| Mat4::from_translation(Vec3::new(-4.0, -y, 0.0)).to_cols_array())
+        .flat_map(f32::to_le_bytes)
+        .collect();
+    let binds = rig.accessor(&binds, F32, 3, "MAT4");
+    rig.push("skins", json!({ "joints": [1, 2, 3], "inverseBindMatrices": binds }));
+    let floats = |rig: &mut Builder, values: &[f32], count: usize, kind: &str| {
+        let bytes: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let accessor = rig.accessor(&bytes, F32, count, kind);
+        if kind == "SCALAR" {
+            rig.json["accessors"][accessor]["min"] =
+                json!([values.iter().copied().fold(f32::INFINITY, f32::min)]);
+            rig.json["accessors"][accessor]["max"] = json!([values.iter().copied().fold(0.0, f32::max)]);
+        }
+        accessor
+    };
+    let times = floats(&mut rig, &[0.0, 1.0], 2, "SCALAR");
+    let root = floats(&mut rig, &[0.0, 0.0, 0.0, 0.0, 0.1, 0.6], 2, "VEC3");
+    let bone = floats(&mut rig, &[0.0, 0.5, 0.0, 0.0, 0.5, 0.0], 2, "VEC3");
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let turn = floats(&mut rig, &[0.0, 0.0, 0.0, 1.0, half, 0.0, 0.0, half], 2, "VEC4");
+    let weights = floats(&mut rig, &[0.25, 0.0, 1.0, 0.5], 4, "SCALAR");
+    let channels = [(1, "translation"), (2, "translation"), (3, "rotation"), (4, "weights")];
+    let samplers = [root, bone, turn, weights].map(|output| json!({ "input": times, "output": output }));
+    let channels: Vec<Value> = (0..4)
+        .map(|k| json!({ "sampler": k, "target": { "node": channels[k].0, "path": channels[k].1 } }))
+        .collect();
+    rig.push("animations", json!({ "name": "walk", "samplers": samplers, "channels": channels }));
+    rig
 }

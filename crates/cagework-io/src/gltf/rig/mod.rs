@@ -7,8 +7,10 @@
 //! [`Rig`] lists the points that must be bound: vertices, ends of morph targets, nodes that follow, offsets of VRM.
 //! [`reshape`] writes.
 
+mod clip;
 mod edit;
 mod nodes;
+mod play;
 mod poses;
 mod reshape;
 mod shape;
@@ -26,7 +28,10 @@ use super::geometry::{Frame, attribute, vectors};
 use super::scene::{Instance, Worlds};
 use super::{GltfDocument, GltfError, skin};
 
+pub use clip::Clip;
+pub(crate) use clip::clips;
 pub use nodes::Joints;
+pub use play::{Player, Posed};
 pub(crate) use reshape::{Named, reshape};
 pub use reshape::{ReshapeOptions, ReshapeReport};
 use vrm::Spot;

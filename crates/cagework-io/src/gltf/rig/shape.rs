@@ -117,7 +117,7 @@ impl Rig<'_> {
         let surface = Surface::new(&base.from, triangles());
         if n_singular > 0 {
             let mut offsets: Vec<DVec3> = positions.iter().zip(&part.local).map(|(a, b)| *a - *b).collect();
-            surface.from_neighbours(&mut offsets, &is_known);
+            surface.fill_from_neighbours(&mut offsets, &is_known);
             for v in (0..n).filter(|&v| !is_known[v]) {
                 positions[v] = part.local[v] + offsets[v];
             }

@@ -63,7 +63,7 @@ impl Surface {
     }
 
     /// Mean of a value over the neighbours of each vertex where `is_known`, for those where it is not.
-    pub(super) fn from_neighbours(&self, values: &mut [DVec3], is_known: &[bool]) {
+    pub(super) fn fill_from_neighbours(&self, values: &mut [DVec3], is_known: &[bool]) {
         let mut sums = vec![(DVec3::ZERO, 0.0); values.len()];
         for triangle in &self.triangles {
             for &v in triangle {

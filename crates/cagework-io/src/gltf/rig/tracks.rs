@@ -17,6 +17,7 @@ const STILL: f64 = 1e-3;
 pub(super) enum Driven {
     Translation(usize),
     Rotation(usize),
+    Scale(usize),
     /// Morph weights of a node, or of a mesh.
     Weights(usize),
     MeshWeights(usize),
@@ -33,6 +34,7 @@ pub(super) fn driven(channel: &Value) -> Option<Driven> {
         return match (list, what, words.next()) {
             ("nodes", "translation", None) => Some(Driven::Translation(index)),
             ("nodes", "rotation", None) => Some(Driven::Rotation(index)),
+            ("nodes", "scale", None) => Some(Driven::Scale(index)),
             ("nodes", "weights", None) => Some(Driven::Weights(index)),
             ("meshes", "weights", None) => Some(Driven::MeshWeights(index)),
             _ => None,
@@ -42,6 +44,7 @@ pub(super) fn driven(channel: &Value) -> Option<Driven> {
     match target["path"].as_str()? {
         "translation" => Some(Driven::Translation(node)),
         "rotation" => Some(Driven::Rotation(node)),
+        "scale" => Some(Driven::Scale(node)),
         "weights" => Some(Driven::Weights(node)),
         _ => None,
     }

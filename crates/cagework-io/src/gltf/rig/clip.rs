@@ -1,0 +1,144 @@
+//! Animation clips: values of nodes at a time.
+
+use glam::{DQuat, DVec3};
+use serde_json::Value;
+
+use super::tracks::{Driven, driven};
+use crate::gltf::GltfDocument;
+
+/// An animation of a document.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Clip {
+    /// Its name, if it has one.
+    pub name: Option<String>,
+    /// From 0 to its last key, seconds.
+    pub seconds: f32,
+    /// Channels of nodes and morph weights that can be played.
+    pub channels: usize,
+    /// Keys of all of them.
+    pub keys: usize,
+    #[serde(skip)]
+    tracks: Vec<(Driven, Track)>,
+}
+
+/// One channel.
+#[derive(Clone, Debug, PartialEq)]
+struct Track {
+    times: Vec<f32>,
+    /// `[n_keys, width]`, or `[n_keys, 3, width]` with tangents.
+    values: Vec<f32>,
+    width: usize,
+    interpolation: Interpolation,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Interpolation {
+    Linear,
+    Step,
+    Cubic,
+}
+
+/// The clips of a document; channels that cannot be read are left out.
+pub(crate) fn clips(document: &GltfDocument) -> Vec<Clip> {
+    let animations = document.json["animations"].as_array().into_iter().flatten();
+    animations
+        .map(|animation| {
+            let mut clip = Clip { name: animation["name"].as_str().map(str::to_owned), ..Clip::default() };
+            for channel in animation["channels"].as_array().into_iter().flatten() {
+                let read = driven(channel).and_then(|driven| {
+                    let sampler = animation["samplers"].get(channel["sampler"].as_u64()? as usize)?;
+                    Some((driven, Track::read(document, sampler, driven)?))
+                });
+                clip.tracks.extend(read);
+            }
+            clip.channels = clip.tracks.len();
+            clip.keys = clip.tracks.iter().map(|(_, track)| track.times.len()).sum();
+            let last = clip.tracks.iter().filter_map(|(_, track)| track.times.last().copied());
+            clip.seconds = last.fold(0.0, f32::max);
+            clip
+        })
+        .collect()
+}
+
+impl Clip {
+    /// What each channel gives at a time, seconds.
+    pub(super) fn at(&self, time: f32) -> impl Iterator<Item = (Driven, Vec<f64>)> {
+        self.tracks.iter().map(move |(driven, track)| (*driven, track.at(time, *driven)))
+    }
+}
+
+impl Track {
+    fn read(document: &GltfDocument, sampler: &Value, driven: Driven) -> Option<Self> {
+        let accessor = |key: &str| sampler[key].as_u64().map(|a| a as u32);
+        let (input, output) = (accessor("input")?, accessor("output")?);
+        let source = document.source();
+        let times: Vec<f32> = source.floats::<1>(input, "times").ok()?.into_iter().flatten().collect();
+        let flat = |all: Vec<[f32; 3]>| all.into_iter().flatten().collect::<Vec<f32>>();
+        let values: Vec<f32> = match driven {
+            Driven::Translation(_) | Driven::Scale(_) => flat(source.floats(output, "a vector").ok()?),
+            Driven::Rotation(_) => {
+                source.floats::<4>(output, "a rotation").ok()?.into_iter().flatten().collect()
+            }
+            _ => source.floats::<1>(output, "weights").ok()?.into_iter().flatten().collect(),
+        };
+        let interpolation = match sampler["interpolation"].as_str() {
+            Some("STEP") => Interpolation::Step,
+            Some("CUBICSPLINE") => Interpolation::Cubic,
+            _ => Interpolation::Linear,
+        };
+        let per_key = if interpolation == Interpolation::Cubic { 3 } else { 1 };
+        let width = values.len() / (per_key * times.len()).max(1);
+        let is_right = !times.is_empty()
+            && width > 0
+            && values.len() == width * per_key * times.len()
+            && times.is_sorted()
+            && values.iter().chain(&times).all(|x| x.is_finite());
+        is_right.then_some(Self { times, values, width, interpolation })
+    }
+
+    /// glTF 2.0, appendix C.
+    fn at(&self, time: f32, driven: Driven) -> Vec<f64> {
+        let n = self.times.len();
+        let time = time.clamp(self.times[0], self.times[n - 1]);
+        let next = self.times.partition_point(|&t| t <= time).clamp(1, n.max(2) - 1).min(n - 1);
+        let last = next.saturating_sub(1);
+        let gap = f64::from(self.times[next]) - f64::from(self.times[last]);
+        let share = if gap > 0.0 { (f64::from(time) - f64::from(self.times[last])) / gap } else { 1.0 };
+        let is_rotation = matches!(driven, Driven::Rotation(_));
+        let w = self.width;
+        let of = |at: usize| self.values[at * w..(at + 1) * w].iter().map(|&x| f64::from(x));
+        match self.interpolation {
+            Interpolation::Step => of(if share >= 1.0 { next } else { last }).collect(),
+            Interpolation::Cubic => {
+                let u = share;
+                let [a, b, c, d] = [
+                    2.0 * u.powi(3) - 3.0 * u * u + 1.0,
+                    gap * (u.powi(3) - 2.0 * u * u + u),
+                    3.0 * u * u - 2.0 * u.powi(3),
+                    gap * (u.powi(3) - u * u),
+                ];
+                let (p, m) = (of(3 * last + 1), of(3 * last + 2));
+                let (q, n) = (of(3 * next + 1), of(3 * next));
+                p.zip(m).zip(q.zip(n)).map(|((p, m), (q, n))| a * p + b * m + c * q + d * n).collect()
+            }
+            Interpolation::Linear if is_rotation => {
+                let [from, to] = [last, next].map(|k| quaternion(&of(k).collect::<Vec<_>>()));
+                // Along the shorter way.
+                let to = if from.dot(to) < 0.0 { -to } else { to };
+                from.slerp(to, share).to_array().to_vec()
+            }
+            Interpolation::Linear => of(last).zip(of(next)).map(|(a, b)| a + share * (b - a)).collect(),
+        }
+    }
+}
+
+/// The rotation of four numbers; none for zeros.
+pub(super) fn quaternion(q: &[f64]) -> DQuat {
+    let q = DQuat::from_xyzw(q[0], q[1], q[2], q[3]);
+    if q.length_squared() > 0.0 { q.normalize() } else { DQuat::IDENTITY }
+}
+
+/// The vector of three numbers.
+pub(super) fn vector(v: &[f64]) -> DVec3 {
+    DVec3::new(v[0], v[1], v[2])
+}

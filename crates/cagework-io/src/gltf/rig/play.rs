@@ -1,0 +1,186 @@
+//! A document that plays its clips.
+
+use std::collections::HashMap;
+
+use ::gltf::json::scene::{Node, UnitQuaternion};
+use cagework_core::skin::Skin;
+use glam::{DMat4, Mat4};
+
+use super::clip::{Clip, clips, quaternion, vector};
+use super::tracks::Driven;
+use crate::gltf::geometry::{attribute, vectors};
+use crate::gltf::scene::{Worlds, local};
+use crate::gltf::{GltfDocument, GltfError, skin};
+use ::gltf::json::mesh::Semantic;
+
+/// A model with its skeleton, morph targets and clips.
+#[derive(Clone, Debug)]
+pub struct Player {
+    /// The model's vertices.
+    pub skin: Skin,
+    clips: Vec<Clip>,
+    nodes: Vec<Node>,
+    /// Every node after its parent.
+    order: Vec<(u32, Option<u32>)>,
+    /// What each matrix of the palette is made of: a node and a bind matrix.
+    palette: Vec<(Option<u32>, DMat4)>,
+    /// Default weights of all morph targets, and where those of each node and mesh begin.
+    defaults: Vec<f32>,
+    of_nodes: HashMap<usize, usize>,
+    of_meshes: HashMap<usize, Vec<usize>>,
+    names: Vec<String>,
+}
+
+/// What the vertices are posed by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Posed {
+    /// World from mesh space. `[n_palette]`
+    pub palette: Vec<Mat4>,
+    /// Weights of the morph targets. `[n_targets]`
+    pub targets: Vec<f32>,
+}
+
+impl Player {
+    pub(crate) fn new(document: &GltfDocument) -> Result<Self, GltfError> {
+        let worlds = Worlds::new(&document.root)?;
+        let mut player = Self {
+            skin: Skin { joint_starts: vec![0], delta_starts: vec![0], ..Skin::default() },
+            clips: clips(document),
+            nodes: document.root.nodes.clone(),
+            order: worlds.order,
+            palette: Vec::new(),
+            defaults: Vec::new(),
+            of_nodes: HashMap::new(),
+            of_meshes: HashMap::new(),
+            names: Vec::new(),
+        };
+        let mut of_skins: HashMap<u32, usize> = HashMap::new();
+        let mut first_targets = Vec::new();
+        for instance in &document.instances {
+            let mesh = instance.mesh as usize;
+            let primitives = &document.root.meshes[mesh].primitives;
+            let n = primitives.iter().map(|p| p.targets.as_ref().map_or(0, Vec::len)).max().unwrap_or(0);
+            let first = player.defaults.len();
+            first_targets.push(first);
+            instance.node.map(|node| player.of_nodes.insert(node as usize, first));
+            player.of_meshes.entry(mesh).or_default().push(first);
+            let defaults = document.default_weights(instance);
+            player.defaults.extend((0..n).map(|k| defaults.and_then(|w| w.get(k)).copied().unwrap_or(0.0)));
+            let named = &document.json["meshes"][mesh]["extras"]["targetNames"];
+            player.names.extend((0..n).map(|k| match named[k].as_str() {
+                Some(name) => name.to_owned(),
+                None => format!("target {k}"),
+            }));
+        }
+        for slot in &document.slots {
+            let (instance, primitive) = document.primitive(slot);
+            let own = player.palette.len() as u32;
+            // Of a mesh without a node the world is all there is.
+            player.palette.push((instance.node, DMat4::IDENTITY));
+            let first_joint = match instance.skin {
+                None => 0,
+                Some(number) => match of_skins.get(&number) {
+                    Some(&first) => first,
+                    None => {
+                        let first = player.palette.len();
+                        let binds = skin::inverse_binds(document, number)?;
+                        let joints = document.root.skins[number as usize].joints.iter().zip(binds);
+                        player.palette.extend(joints.map(|(j, bind)| (Some(j.value() as u32), bind)));
+                        of_skins.insert(number, first);
+                        first
+                    }
+                },
+            };
+            let Some(accessor) = attribute(primitive, Semantic::Positions) else { continue };
+            let local = vectors(document, accessor, "POSITION")?;
+            let mut joints = vec![Vec::new(); local.len()];
+            if instance.skin.is_some() {
+                skin::each_influence(document.source(), primitive, local.len(), |v, joint, weight| {
+                    joints[v].push((first_joint as u32 + joint, weight));
+                })?;
+            }
+            let mut deltas = vec![Vec::new(); local.len()];
+            for (k, target) in primitive.targets.iter().flatten().enumerate() {
+                let Some(accessor) = target.positions else { continue };
+                let number = (first_targets[slot.instance as usize] + k) as u32;
+                let all = vectors(document, accessor.value() as u32, "POSITION")?;
+                for (of_vertex, delta) in deltas.iter_mut().zip(all) {
+                    if delta != glam::DVec3::ZERO {
+                        of_vertex.push((number, delta.as_vec3()));
+                    }
+                }
+            }
+            let Skin { positions, joint_starts, joints: all_joints, delta_starts, deltas: all_deltas } =
+                &mut player.skin;
+            for ((position, joints), deltas) in local.iter().zip(joints).zip(deltas) {
+                positions.push(position.as_vec3());
+                let total: f64 = joints.iter().map(|(_, weight)| weight).sum();
+                if total > 0.0 {
+                    all_joints.extend(joints.iter().map(|&(j, weight)| (j, (weight / total) as f32)));
+                } else {
+                    all_joints.push((own, 1.0));
+                }
+                joint_starts.push(all_joints.len() as u32);
+                all_deltas.extend(deltas);
+                delta_starts.push(all_deltas.len() as u32);
+            }
+        }
+        Ok(player)
+    }
+
+    /// The clips.
+    #[must_use]
+    pub fn clips(&self) -> &[Clip] {
+        &self.clips
+    }
+
+    /// Names of the morph targets, of each shown mesh in turn, and their weights at rest.
+    #[must_use]
+    pub fn targets(&self) -> (&[String], &[f32]) {
+        (&self.names, &self.defaults)
+    }
+
+    /// Matrices and weights at a time of a clip, seconds; at rest without one. `targets` are the weights where no clip says
+    /// otherwise. `[n_targets]`, or empty for those of the file.
+    #[must_use]
+    pub fn at(&self, clip: Option<usize>, seconds: f32, targets: &[f32]) -> Posed {
+        let mut nodes = self.nodes.clone();
+        let mut weights = if targets.is_empty() { self.defaults.clone() } else { targets.to_vec() };
+        weights.resize(self.defaults.len(), 0.0);
+        let put = |weights: &mut [f32], first: usize, values: &[f64]| {
+            weights.iter_mut().skip(first).zip(values).for_each(|(w, &value)| *w = value as f32);
+        };
+        for (driven, value) in self.clips.get(clip.unwrap_or(usize::MAX)).iter().flat_map(|c| c.at(seconds)) {
+            let node = |number: usize| nodes.get(number).is_some();
+            match driven {
+                Driven::Translation(n) if node(n) => {
+                    nodes[n].translation = Some(vector(&value).as_vec3().to_array());
+                }
+                Driven::Rotation(n) if node(n) => {
+                    nodes[n].rotation = Some(UnitQuaternion(quaternion(&value).as_quat().to_array()));
+                }
+                Driven::Scale(n) if node(n) => nodes[n].scale = Some(vector(&value).as_vec3().to_array()),
+                Driven::Weights(n) => {
+                    if let Some(&first) = self.of_nodes.get(&n) {
+                        put(&mut weights, first, &value);
+                    }
+                }
+                Driven::MeshWeights(n) => {
+                    for &first in self.of_meshes.get(&n).into_iter().flatten() {
+                        put(&mut weights, first, &value);
+                    }
+                }
+                _ => {}
+            }
+        }
+        let mut world = vec![DMat4::IDENTITY; nodes.len()];
+        for &(node, parent) in &self.order {
+            let above = parent.map_or(DMat4::IDENTITY, |p| world[p as usize]);
+            world[node as usize] = above * local(&nodes[node as usize]);
+        }
+        let matrix = |&(node, bind): &(Option<u32>, DMat4)| {
+            node.map_or(DMat4::IDENTITY, |n| world[n as usize] * bind).as_mat4()
+        };
+        Posed { palette: self.palette.iter().map(matrix).collect(), targets: weights }
+    }
+}

@@ -1,0 +1,215 @@
+//! Rigged models reshaped: the rules of `docs/rigs.md`, on a model whose bind pose is not its rest pose.
+//!
+//! What is expected is written down from the definition of skinning: `sum_j w_j G_j B_j (p + sum_k t_k d_k)`.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
+
+mod common;
+
+use cagework_core::skin::skin_vertices;
+use cagework_io::{Joints, Model, Player, ReshapeOptions, ReshapeReport};
+use common::{json_of, rigged};
+use glam::{DVec3, Vec3, vec3};
+
+/// Rounding of f32 positions of size 2, there and back.
+const ROUNDED: f32 = 2e-6;
+
+fn read(bytes: &[u8]) -> Model {
+    Model::read("rigged.glb", bytes, &mut |_| None).unwrap()
+}
+
+fn player(model: &Model) -> Player {
+    model.player().unwrap().unwrap()
+}
+
+fn shown(player: &Player, clip: Option<usize>, seconds: f32, targets: &[f32]) -> Vec<Vec3> {
+    let posed = player.at(clip, seconds, targets);
+    skin_vertices(&player.skin, &posed.palette, &posed.targets)
+}
+
+/// A deformation that is no affine map.
+fn f(p: Vec3) -> Vec3 {
+    p + vec3(0.1 + 0.1 * p.y * p.y, 0.05 + 0.2 * p.y, 0.05 * p.x * p.y)
+}
+
+/// All points of a model, and how far `f` moves them.
+fn by(model: &Model) -> Vec<DVec3> {
+    let extra = model.extra_points().unwrap();
+    model.positions.iter().chain(&extra).map(|&p| f(p).as_dvec3() - p.as_dvec3()).collect()
+}
+
+fn reshaped(model: &Model, joints: Joints) -> (Vec<u8>, ReshapeReport) {
+    let options = ReshapeOptions { joints, ..ReshapeOptions::default() };
+    model.write_reshaped(&by(model), &[], &[], &options).unwrap()
+}
+
+fn assert_near(found: &[Vec3], expected: &[Vec3], within: f32, what: &str) {
+    assert_eq!(found.len(), expected.len());
+    let off = found.iter().zip(expected).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+    assert!(off <= within, "{what}: {off:e}");
+}
+
+#[test]
+fn player_shows_at_rest_what_is_read() {
+    let model = read(&rigged().glb());
+    assert_near(&shown(&player(&model), None, 0.0, &[]), &model.positions, ROUNDED, "rest");
+}
+
+#[test]
+fn unmoved_cage_gives_the_bytes_of_the_input() {
+    let bytes = rigged().glb();
+    let model = read(&bytes);
+    let still = vec![DVec3::ZERO; model.positions.len() + model.extra_points().unwrap().len()];
+    for joints in [Joints::Follow, Joints::Stay, Joints::Turn] {
+        let options = ReshapeOptions { joints, ..ReshapeOptions::default() };
+        assert!(model.write_reshaped(&still, &[], &[], &options).unwrap().0 == bytes, "{joints:?}");
+    }
+}
+
+#[test]
+fn rest_and_every_target_alone_are_where_the_cage_brings_them() {
+    let model = read(&rigged().glb());
+    let before = player(&model);
+    for joints in [Joints::Follow, Joints::Stay, Joints::Turn] {
+        let (bytes, report) = reshaped(&model, joints);
+        let after = player(&read(&bytes));
+        let moved = |at: &[Vec3]| at.iter().map(|&p| f(p)).collect::<Vec<_>>();
+        let rest = shown(&before, None, 0.0, &[]);
+        assert_near(&shown(&after, None, 0.0, &[]), &moved(&rest), ROUNDED, "at rest");
+        let (names, defaults) = before.targets();
+        assert_eq!((names.len(), after.targets()), (2, (names, defaults)));
+        for k in 0..names.len() {
+            for share in [0.0, 1.0] {
+                let mut targets = defaults.to_vec();
+                targets[k] = share;
+                let state = moved(&shown(&before, None, 0.0, &targets));
+                assert_near(&shown(&after, None, 0.0, &targets), &state, ROUNDED, &format!("{k} at {share}"));
+            }
+        }
+        assert_eq!(report.joints_moved, if joints == Joints::Stay { 0 } else { 3 });
+        assert!(report.max_condition < 2.0);
+    }
+}
+
+#[test]
+fn joints_go_with_the_cage_and_hold_their_vertices_as_before() {
+    let model = read(&rigged().glb());
+    let (bytes, _) = reshaped(&model, Joints::Follow);
+    let (before, after) = (player(&model), player(&read(&bytes)));
+    // `G B` of every joint.
+    let [old, new] = [&before, &after].map(|player| player.at(None, 0.0, &[]).palette);
+    for (a, b) in old.iter().zip(&new) {
+        assert!(a.abs_diff_eq(*b, ROUNDED), "{a} {b}");
+    }
+    let json = json_of(&bytes);
+    let world = |node: usize| {
+        let at = |n: usize| {
+            Vec3::from_array([0, 1, 2].map(|k| json["nodes"][n]["translation"][k].as_f64().unwrap() as f32))
+        };
+        // The armature doubles, joints do not turn.
+        at(0) + 2.0 * (1..=node).map(at).sum::<Vec3>()
+    };
+    for (node, y) in [(1, 0.0), (2, 1.0), (3, 2.0)] {
+        assert!(world(node).distance(f(vec3(0.0, y, 0.0))) <= ROUNDED, "joint {node} at {}", world(node));
+    }
+}
+
+#[test]
+fn rotations_scales_and_weights_of_clips_keep_their_bytes_and_translations_grow_with_bones() {
+    let model = read(&rigged().glb());
+    let (bytes, report) = reshaped(&model, Joints::Follow);
+    let [old, new] = [rigged().glb(), bytes].map(|bytes| player(&read(&bytes)));
+    assert_eq!(report.tracks, 2, "of the root, which moves, and of a bone, which stands still");
+    let json = json_of(&reshaped(&model, Joints::Follow).0);
+    let before = json_of(&rigged().glb());
+    for k in 0..4 {
+        let output = |json: &serde_json::Value| json["animations"][0]["samplers"][k]["output"].clone();
+        assert_eq!(output(&json), output(&before), "in place");
+    }
+    // The tip turns about its joint, which has moved: the clip's end is the same turn about another place.
+    for seconds in [0.0, 0.4, 1.0] {
+        let [a, b] = [&old, &new].map(|player| player.at(Some(0), seconds, &[]));
+        let linear = |m: &glam::Mat4| glam::Mat3::from_mat4(*m);
+        for (a, b) in a.palette.iter().zip(&b.palette) {
+            assert!(linear(a).abs_diff_eq(linear(b), ROUNDED), "at {seconds} s");
+        }
+        assert_eq!(a.targets, b.targets);
+    }
+    let (stay, _) = reshaped(&model, Joints::Stay);
+    assert_eq!(json_of(&stay)["nodes"], before["nodes"]);
+}
+
+#[test]
+fn poses_are_targets_after_those_there_are() {
+    let model = read(&rigged().glb());
+    let by = by(&model);
+    let still = vec![DVec3::ZERO; by.len()];
+    let (bytes, _) =
+        model.write_reshaped(&still, &[], &[("bent".into(), by)], &ReshapeOptions::default()).unwrap();
+    let after = player(&read(&bytes));
+    assert_eq!(after.targets().0, ["wide", "tall", "bent"]);
+    let rest = shown(&after, None, 0.0, &[]);
+    assert_near(&rest, &model.positions, ROUNDED, "rest");
+    let mut targets = after.targets().1.to_vec();
+    assert_eq!(targets, [0.25, 0.0, 0.0]);
+    targets[2] = 1.0;
+    let bent: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
+    assert_near(&shown(&after, None, 0.0, &targets), &bent, ROUNDED, "bent");
+    // Old clips have weights for all three, the new one plays the pose.
+    assert_near(&shown(&after, Some(1), 1.0, &[]), &bent, ROUNDED, "played");
+    let old = player(&model);
+    assert_near(&shown(&after, Some(0), 0.7, &[]), &shown(&old, Some(0), 0.7, &[]), ROUNDED, "the old clip");
+}
+
+#[test]
+fn what_is_wrong_with_a_rig_is_said_or_left_alone() {
+    let fault = |change: &dyn Fn(&mut common::Builder)| {
+        let mut rig = rigged();
+        change(&mut rig);
+        Model::read("rigged.glb", &rig.glb(), &mut |_| None).map(|m| m.extra_points().map(|p| p.len()))
+    };
+    let message = |change: &dyn Fn(&mut common::Builder)| fault(change).unwrap_err().to_string();
+    assert_eq!(
+        message(&|rig| rig.json["skins"][0]["joints"][1] = 99.into()),
+        "rigged.glb: skin 0 names joint node 99, but there are 5"
+    );
+    assert_eq!(
+        message(&|rig| {
+            let binds = rig.json["skins"][0]["inverseBindMatrices"].as_u64().unwrap() as usize;
+            rig.json["accessors"][binds]["count"] = 2.into();
+        }),
+        "rigged.glb: skin 0 names inverse bind matrix 2, but there are 2"
+    );
+    assert_eq!(
+        message(&|rig| rig.json["nodes"][3]["children"] = serde_json::json!([1])),
+        "rigged.glb: node 1 has two parents: the nodes must be a tree"
+    );
+    // Viewers show these; the clip only stays as it is.
+    let mut rig = rigged();
+    let output = rig.json["animations"][0]["samplers"][0]["output"].as_u64().unwrap() as usize;
+    rig.json["accessors"][output]["count"] = 1.into();
+    let model = read(&rig.glb());
+    assert_eq!(reshaped(&model, Joints::Follow).1.tracks_unread, 1);
+    for (key, value) in [("channels", serde_json::json!([])), ("samplers", serde_json::json!([]))] {
+        let mut rig = rigged();
+        rig.json["animations"][0][key] = value;
+        let model = read(&rig.glb());
+        assert_eq!(player(&model).clips().len(), 1);
+        reshaped(&model, Joints::Turn);
+    }
+}
+
+#[test]
+fn cage_of_a_model_encloses_targets_and_a_clip() {
+    let model = read(&rigged().glb());
+    let rest = model.positions.len();
+    let (positions, triangles) = model.states(None).unwrap();
+    assert!(positions.len() > rest && triangles == model.triangles);
+    let widest = positions.iter().map(|p| p.x).fold(0.0, f32::max);
+    assert!(widest > model.positions.iter().map(|p| p.x).fold(0.0, f32::max), "the target 'wide' is at 1");
+    let (frames, of_frames) = model.states(Some("walk")).unwrap();
+    assert_eq!(of_frames.len(), 33 * model.triangles.len());
+    assert!(frames.len() > positions.len());
+    let message = model.states(Some("run")).unwrap_err().to_string();
+    assert_eq!(message, "there is no clip 'run'; the model has walk");
+}
