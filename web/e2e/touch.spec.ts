@@ -30,7 +30,10 @@ async function fingers(cdp: CDPSession, from: readonly Spot[], to: readonly Spot
   const send = (type: "touchStart" | "touchMove" | "touchEnd", share?: number) =>
     cdp.send("Input.dispatchTouchEvent", { type, touchPoints: share === undefined ? [] : at(share) });
   // At once: were each waited for, a busy page would take the time in between for a long press.
-  await Promise.all([send("touchStart", 0), ...[0.25, 0.5, 0.75, 1].map((share) => send("touchMove", share))]);
+  await Promise.all([
+    send("touchStart", 0),
+    ...[0.25, 0.5, 0.75, 1].map((share) => send("touchMove", share)),
+  ]);
   await send("touchEnd");
 }
 

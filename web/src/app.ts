@@ -2,6 +2,7 @@
 
 import { type BindActions, createBind } from "./actions/bind";
 import { type CageActions, createCage } from "./actions/cage";
+import { type ClipActions, createClips } from "./actions/clips";
 import type { Context, Tell } from "./actions/context";
 import { createEdit, type Edit } from "./actions/edit";
 import { createExports, type Exports } from "./actions/exports";
@@ -30,6 +31,7 @@ export interface App {
   readonly cage: CageActions;
   readonly bind: BindActions;
   readonly poses: PoseActions;
+  readonly clips: ClipActions;
   readonly view: View;
   readonly files: Files;
   readonly project: Project;
@@ -85,6 +87,11 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
   const pull = createPulling(ctx, edit);
   followCage(ctx, { bind, edit, view, pull });
   const poses = createPoses(ctx, edit);
+  const clips = createClips(ctx, () => {
+    poses.stop();
+    edit.settle();
+    edit.setEditingRest(false);
+  });
   const project = createProject(ctx);
   const exports = createExports(ctx, project);
   const startFresh = () => void files.openSample(store.get().samples[0]?.id ?? "");
@@ -144,6 +151,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     cage,
     bind,
     poses,
+    clips,
     view,
     files,
     project,

@@ -2,7 +2,7 @@
 
 import { BIND_DEFAULTS, type BindOptions } from "./contract/generated";
 
-export { BIND_DEFAULTS, CAGE_DEFAULTS, RANGES, SCENE_DEFAULTS } from "./contract/generated";
+export { BIND_DEFAULTS, CAGE_DEFAULTS, RANGES, RIG_DEFAULTS, SCENE_DEFAULTS } from "./contract/generated";
 
 /** What the paper did. */
 export const PAPER_DEFAULTS: BindOptions = { ...BIND_DEFAULTS, method: "classic", solver: "jacobi" };

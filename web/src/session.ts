@@ -203,8 +203,10 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
         poses.map((_, k) => carried.slice(k * rest.length, (k + 1) * rest.length)),
       );
     },
-    generateCage(options, onProgress) {
-      const input = { positions: engine.modelPositions(), triangles: engine.modelTriangles(), options };
+    generateCage(options, onProgress, clip) {
+      const [positions, triangles] = engine.modelStates(clip);
+      const model = engine.modelPositions();
+      const input = { positions, triangles, model, options };
       return ofNow(client.run("cage", input, ({ fraction }) => onProgress(fraction)));
     },
     bind: (options, listener) =>

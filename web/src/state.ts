@@ -13,12 +13,13 @@ import type {
   ModelInfo,
   Pivot,
   Pose,
+  RigOptions,
   Sample,
   SceneOptions,
   Stage,
   SurfacePoint,
 } from "./contract";
-import { BIND_DEFAULTS, CAGE_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
+import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS, SCENE_DEFAULTS } from "./defaults";
 import type { Theme } from "./store";
 import { T } from "./words";
 import type { Work } from "./works/entry";
@@ -80,6 +81,8 @@ export interface AppState {
   /** The cage is the one that the sample came with, so that a link can refer to it. */
   sampleCage: boolean;
   cageOptions: CageOptions;
+  /** Name of a clip that generated cages enclose as well. */
+  cageClip: string | null;
   boxDivisions: number;
   /** Share of the cage generation done; null when none runs. */
   cageProgress: number | null;
@@ -126,6 +129,10 @@ export interface AppState {
   /** Shares of `poses` in the blend. */
   shares: readonly number[];
   playing: boolean;
+  /** The clip that is shown in place of the cage's pose. */
+  clip: ClipState;
+  /** What becomes of the model's skeleton. */
+  rigOptions: RigOptions;
   /** Name of the pose that is played towards, null for the rest pose. */
   playingPose: string | null;
   undoLabel: string | null;
@@ -144,6 +151,15 @@ export interface AppState {
   hovering: { readonly files: number; readonly asCage: boolean } | null;
 }
 
+export const NO_CLIP: ClipState = {
+  clip: null,
+  seconds: 0,
+  playing: false,
+  speed: 1,
+  loop: true,
+  targets: [],
+};
+
 export const INITIAL: AppState = {
   step: "model",
   adapter: "",
@@ -160,6 +176,7 @@ export const INITIAL: AppState = {
   cageSource: "auto",
   sampleCage: false,
   cageOptions: CAGE_DEFAULTS,
+  cageClip: null,
   boxDivisions: 2,
   cageProgress: null,
   bindOptions: BIND_DEFAULTS,
@@ -193,6 +210,8 @@ export const INITIAL: AppState = {
   poses: [],
   shares: [],
   playing: false,
+  clip: NO_CLIP,
+  rigOptions: RIG_DEFAULTS,
   playingPose: null,
   undoLabel: null,
   redoLabel: null,
@@ -204,6 +223,18 @@ export const INITIAL: AppState = {
   waysOpen: false,
   hovering: null,
 };
+
+/** A clip and the time in it. */
+export interface ClipState {
+  /** Its number; null at rest. */
+  readonly clip: number | null;
+  readonly seconds: number;
+  readonly playing: boolean;
+  readonly speed: number;
+  readonly loop: boolean;
+  /** Weights of the morph targets; none for those of the file. */
+  readonly targets: readonly number[];
+}
 
 export interface Store {
   /** The state of the moment; a panel or an effect that reads a key hears of its changes. */

@@ -53,8 +53,10 @@ export const MODEL: ModelInfo = {
   materials: 0,
   textures: 0,
   skins: 0,
-  animations: 0,
-  morphTargets: 0,
+  joints: 0,
+  clips: [],
+  targets: [],
+  rigged: false,
   bounds: BOUNDS,
   notices: [],
 };

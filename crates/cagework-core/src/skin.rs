@@ -17,6 +17,25 @@ pub struct Skin {
     pub deltas: Vec<(u32, Vec3)>,
 }
 
+impl Skin {
+    /// The same with copies of vertices after them.
+    #[must_use]
+    pub fn with_copies(&self, copies: &[u32]) -> Self {
+        let mut all = self.clone();
+        for &v in copies {
+            let v = v as usize;
+            let [joints, deltas] = [&self.joint_starts, &self.delta_starts]
+                .map(|starts| starts[v] as usize..starts[v + 1] as usize);
+            all.positions.push(self.positions[v]);
+            all.joints.extend_from_slice(&self.joints[joints]);
+            all.deltas.extend_from_slice(&self.deltas[deltas]);
+            all.joint_starts.push(all.joints.len() as u32);
+            all.delta_starts.push(all.deltas.len() as u32);
+        }
+        all
+    }
+}
+
 /// Positions of all vertices: `sum_j w_j M_j (p + sum_k t_k d_k)` (glTF 2.0, sections 3.7.2.2 and 3.7.3.3).
 ///
 /// `palette`: world from mesh space for each joint. `targets`: weights of the morph targets. Returns `[n_vertices]`.
@@ -56,6 +75,8 @@ mod tests {
         let palette = [Mat4::from_translation(Vec3::splat(4.0)), turn];
         let posed = skin_vertices(&skin, &palette, &[0.5, 1.0]);
         // (2, 0, 0.5) turned by 90 degrees about z; a quarter of (4, 5, 4) and three of (-1, 0, 0).
+        let copied = skin_vertices(&skin.with_copies(&[1, 0]), &palette, &[0.5, 1.0]);
+        assert_eq!(copied, [posed[0], posed[1], posed[1], posed[0]]);
         assert!(posed[0].distance(Vec3::new(0.0, 2.0, 0.5)) < 1e-6, "{}", posed[0]);
         assert!(posed[1].distance(Vec3::new(0.25, 1.25, 1.0)) < 1e-6, "{}", posed[1]);
     }

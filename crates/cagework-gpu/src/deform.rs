@@ -14,12 +14,10 @@ use crate::error::GpuError;
 use crate::kernels;
 use crate::layout::Work;
 use crate::pipelines::Launch;
+use crate::skin::Skinner;
 
 /// Distance of two dispatches' parameters, the baseline's alignment of dynamic offsets, bytes.
 const WORK_STRIDE: u64 = 256;
-
-/// Workgroups along an axis, the baseline's limit.
-const MAX_GROUPS: u32 = 65_535;
 
 /// Weights that are uploaded at once, but for what fills the last slice: about 10 ms of a page's main thread.
 const PART: u32 = 1 << 19;
@@ -170,10 +168,8 @@ impl Deformer {
         first_row: u32,
         count: u32,
     ) {
-        let groups = count.div_ceil(launch.workgroup);
-        let rows = groups.div_ceil(MAX_GROUPS).max(1);
-        let groups = [groups.div_ceil(rows), rows];
-        let work = Work { count, stride: groups[0] * launch.workgroup, first_row, ..Work::default() };
+        let (groups, stride) = launch.groups(count);
+        let work = Work { count, stride, first_row, ..Work::default() };
         let offset = self.steps.len() as u64 * WORK_STRIDE;
         context.queue.write_buffer(works, offset, bytemuck::bytes_of(&work));
         self.steps.push((launch, offset as u32, groups));
@@ -191,11 +187,27 @@ impl Deformer {
 
     /// Records the deformation: positions and normals are up to date for what comes after it.
     pub fn encode(&self, encoder: &mut wgpu::CommandEncoder) {
+        self.encode_steps(encoder, &self.steps, |_| {});
+    }
+
+    /// The same for a clip: positions by a skin, then normals.
+    pub(crate) fn encode_skinned(&self, encoder: &mut wgpu::CommandEncoder, skinner: &Skinner) {
+        let normals = &self.steps[self.steps.len() - 1..];
+        self.encode_steps(encoder, normals, |pass| skinner.encode(pass));
+    }
+
+    fn encode_steps(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        steps: &[(Launch, u32, [u32; 2])],
+        first: impl FnOnce(&mut wgpu::ComputePass<'_>),
+    ) {
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("deform"),
             ..wgpu::ComputePassDescriptor::default()
         });
-        for (launch, offset, groups) in &self.steps {
+        first(&mut pass);
+        for (launch, offset, groups) in steps {
             pass.set_pipeline(&launch.pipeline);
             pass.set_bind_group(0, &launch.bind_group, &[*offset]);
             pass.dispatch_workgroups(groups[0], groups[1], 1);

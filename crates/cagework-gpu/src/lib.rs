@@ -20,6 +20,7 @@ pub mod plan;
 pub mod render;
 pub mod sample;
 pub mod session;
+pub mod skin;
 pub mod stream;
 pub mod table;
 
@@ -29,3 +30,4 @@ pub use device::{ContextOptions, GpuContext};
 pub use error::GpuError;
 pub use plan::{Plan, PlanError};
 pub use session::Session;
+pub use skin::Skinner;

@@ -26,6 +26,18 @@ pub struct Launch {
     pub(crate) cost: u32,
 }
 
+impl Launch {
+    /// Workgroups for so many invocations, and the invocations of a row of them: an axis has a limit.
+    pub(crate) fn groups(&self, count: u32) -> ([u32; 2], u32) {
+        /// The baseline's limit.
+        const MAX_GROUPS: u32 = 65_535;
+        let groups = count.div_ceil(self.workgroup);
+        let rows = groups.div_ceil(MAX_GROUPS).max(1);
+        let groups = [groups.div_ceil(rows), rows];
+        (groups, groups[0] * self.workgroup)
+    }
+}
+
 impl Pipelines {
     /// Makes all of them.
     pub(crate) fn make_all(&self, device: &wgpu::Device) {

@@ -12,14 +12,16 @@ use std::sync::Arc;
 use cagework_core::deform::OutsideVertex;
 use cagework_core::deform::{deform_bound, vertex_normals};
 use cagework_core::options::BindOptions;
+use cagework_core::skin::Skin;
 use cagework_core::{BindReport, Bounds, Cage, Progress, Weights};
-use glam::{Vec2, Vec3};
+use glam::{Mat4, Vec2, Vec3};
 
 use crate::bind::bind_gpu;
 use crate::deform::GpuWeights;
 use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::render::{Camera, DrawModel, MeshStyle, Renderer, SceneOptions, Target, colormap};
+use crate::skin::Skinner;
 
 pub use picture::MAX_PICTURE;
 
@@ -36,6 +38,8 @@ pub struct Session {
     cage: Option<Cage>,
     pose: Vec<Vec3>,
     bound: Option<Bound>,
+    /// What the mesh follows while a clip plays.
+    playing: Option<Skinner>,
     /// Whether the cage moved since the mesh was deformed last.
     moved: bool,
 }
@@ -61,6 +65,7 @@ impl Session {
             cage: None,
             pose: Vec::new(),
             bound: None,
+            playing: None,
             moved: false,
         }
     }
@@ -176,13 +181,46 @@ impl Session {
         let mover = Mover::new(&self.context, model, &weights, &outside, on_gpu).await?;
         mover.pose(&self.context, &self.pose);
         self.renderer.set_vertices(&self.context, Some(mover.tables()));
+        self.playing = None;
         self.bound = Some(Bound { weights, outside, mover });
         self.moved = true;
         self.write_values();
         Ok(())
     }
 
+    /// Lets the mesh follow a skin instead of the cage, until [`Self::stop_playing`]; [`Self::play`] says where it is. `skin` of
+    /// the model's vertices.
+    ///
+    /// # Errors
+    /// [`GpuError::NotReady`] before a bind, [`GpuError::Model`] for another model's skin; otherwise as
+    /// [`crate::buffers::Allocator::zeros`].
+    pub async fn start_playing(&mut self, skin: &Skin) -> Result<(), GpuError> {
+        let (model, _) = self.parts()?;
+        let Some(bound) = &self.bound else { return Err(GpuError::NotReady { missing: "bind" }) };
+        if skin.positions.len() != model.positions.len() {
+            let (given, n) = (skin.positions.len(), model.positions.len());
+            return Err(GpuError::Model { reason: format!("a skin of {given} vertices for a model of {n}") });
+        }
+        self.playing = Some(bound.mover.skinner(&self.context, model, skin).await?);
+        self.moved = true;
+        Ok(())
+    }
+
+    /// Matrices of the joints and weights of the morph targets; the next frame shows them.
+    pub fn play(&mut self, palette: &[Mat4], targets: &[f32]) {
+        if let Some(skinner) = &mut self.playing {
+            skinner.pose(&self.context, palette, targets);
+            self.moved = true;
+        }
+    }
+
+    /// The mesh follows the cage again.
+    pub fn stop_playing(&mut self) {
+        self.moved |= self.playing.take().is_some();
+    }
+
     fn drop_weights(&mut self) {
+        self.playing = None;
         self.bound = None;
         self.renderer.set_vertices(&self.context, None);
     }
@@ -364,7 +402,10 @@ impl Session {
 
     fn encode_deformation(&mut self, encoder: &mut wgpu::CommandEncoder) {
         if let Some(Bound { weights, outside, mover }) = self.bound.as_ref().filter(|_| self.moved) {
-            mover.encode(&self.context, encoder, weights, outside, &self.pose);
+            match &self.playing {
+                Some(skinner) => mover.encode_skinned(&self.context, encoder, skinner),
+                None => mover.encode(&self.context, encoder, weights, outside, &self.pose),
+            }
             self.moved = false;
         }
     }

@@ -51,8 +51,21 @@ impl Model {
     /// [`WriteError`] when a part of them cannot be read.
     pub fn player(&self) -> Result<Option<Player>, WriteError> {
         match &self.document {
-            Document::Gltf(document) => Ok(Some(Player::new(document)?)),
+            Document::Gltf(document) => Ok(Some(Player::new(document, document)?)),
             Document::Obj(_) => Ok(None),
+        }
+    }
+
+    /// A player of an export of this model, with the vertices in this model's order.
+    ///
+    /// # Errors
+    /// [`WriteError`] when it is none.
+    pub fn player_of(&self, export: &[u8]) -> Result<Player, WriteError> {
+        let wrong = |e: String| WriteError::Document(e);
+        let read = Self::read("export.glb", export, &mut |_| None).map_err(|e| wrong(e.to_string()))?;
+        match (&read.document, &self.document) {
+            (Document::Gltf(of), Document::Gltf(like)) => Ok(Player::new(of, like)?),
+            _ => Err(WriteError::NoRig),
         }
     }
 

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use cagework_core::PolygonMesh;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Mat4, Vec3, Vec4};
 
 /// The axis that points up in a file. Everything that is not in a file has Y up: a file with Z up is turned by 90
 /// degrees about x when it is read, and back when it is written. Both are exact.
@@ -57,6 +57,15 @@ impl UpAxis {
         match self {
             Self::Y => v,
             Self::Z => DVec3::new(v.x, -v.z, v.y),
+        }
+    }
+
+    /// From a file's axes to Y up.
+    #[must_use]
+    pub fn turn(self) -> Mat4 {
+        match self {
+            Self::Y => Mat4::IDENTITY,
+            Self::Z => Mat4::from_cols(Vec4::X, Vec4::NEG_Z, Vec4::Y, Vec4::W),
         }
     }
 

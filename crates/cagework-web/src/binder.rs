@@ -95,7 +95,7 @@ impl Binder {
         Ok(())
     }
 
-    /// Harmonic coordinates. `positions` `[n_vertices, 3]`, `cage` `[n_cage, 3]`; `corners`: for each face their number,
+    /// Harmonic coordinates. `positions` `[n_points, 3]`, of which the last `extra_points` are no vertices, `cage` `[n_cage, 3]`; `corners`: for each face their number,
     /// then them. `progress` is called with every step and stops the bind by returning false.
     ///
     /// # Errors
@@ -103,12 +103,14 @@ impl Binder {
     pub async fn bind(
         &self,
         positions: Vec<f32>,
+        extra_points: usize,
         cage: Vec<f32>,
         corners: Vec<u32>,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Bound, JsValue> {
-        let asked: BindAsked = taken(options)?;
+        let mut asked: BindAsked = taken(options)?;
+        asked.options.extra_points = extra_points;
         let parts = Parts::new(&positions, &cage, &corners)?;
         drop(positions);
         let binding = self.run(&parts.positions, &parts.cage, asked, progress).await?;
@@ -253,7 +255,8 @@ impl Binder {
         let unknown = || Fault::new(ErrorName::Error, format!("there is no sample called {id:?}"));
         let sample = samples::build(id).ok_or_else(unknown)?;
         let glb =
-            cagework_io::write_mesh_glb(&sample.name, &sample.mesh, &sample.colours).map_err(Fault::from)?;
+            cagework_io::write_mesh_glb(&sample.name, &sample.mesh, &sample.colours, sample.rig.as_ref())
+                .map_err(Fault::from)?;
         let positions = sample.mesh.positions;
         Ok(BuiltSample { glb, positions, cage: sample.cage, poses: sample.poses })
     }

@@ -23,13 +23,13 @@ use ts_rs::{Config, TS};
 use crate::clock::Event;
 use crate::error::ErrorName;
 use crate::options::{
-    BindAsked, CageAsked, Colour, GizmoAsked, GizmoHandle, PullAsked, RestEdit, SceneAsked, SliceShown,
-    SymmetryAsked, ThemeAsked,
+    BindAsked, CageAsked, Colour, GizmoAsked, GizmoHandle, JointsAsked, PullAsked, RestEdit, RigAsked,
+    SceneAsked, SliceShown, SymmetryAsked, ThemeAsked,
 };
 use crate::settings::Settings;
 use crate::views::{
-    BoundsView, CageInfo, CageState, CameraView, ColorMap, Fix, Grip, Largest, Legend, Mend, ModelInfo,
-    Problem, SurfacePoint,
+    BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, Fix, Grip, Largest, Legend, Mend,
+    ModelInfo, Problem, SurfacePoint, TargetView,
 };
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/src/contract/generated.ts");
@@ -102,6 +102,10 @@ fn the_page_has_the_types_of_rust() {
         SurfacePoint,
         Grip,
         PullAsked,
+        JointsAsked,
+        RigAsked,
+        ClipView,
+        TargetView,
         ColorMap,
         Largest,
         Legend,
@@ -118,6 +122,7 @@ fn the_page_has_the_types_of_rust() {
     let options = BindOptions { memory_limit: PAGE_MEMORY, ..BindOptions::default() };
     text += &constant("BIND_DEFAULTS", "BindOptions", &BindAsked { backend: Backend::Gpu, options });
     text += &constant("CAGE_DEFAULTS", "CageOptions", &CageAsked::from(CageOptions::default()));
+    text += &constant("RIG_DEFAULTS", "RigOptions", &RigAsked::default());
     text += &constant("SCENE_DEFAULTS", "SceneOptions", &SceneAsked::default());
     writeln!(
         text,

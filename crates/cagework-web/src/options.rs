@@ -4,6 +4,7 @@ use cagework_core::BindOptions;
 use cagework_core::cage_gen::{CageOptions, Shape, Symmetry};
 use cagework_core::options::{Backend, Solver};
 use cagework_gpu::render::Theme;
+use cagework_io::{Joints, ReshapeOptions};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::JsValue;
@@ -233,6 +234,46 @@ pub(crate) struct PullAsked {
     pub(crate) whole: bool,
     /// Mirror images stay mirror images.
     pub(crate) mirrored: bool,
+}
+
+/// What becomes of a rig.
+#[derive(Clone, Copy, Deserialize)]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[cfg_attr(test, ts(rename = "RigOptions"))]
+pub(crate) struct RigAsked {
+    joints: JointsAsked,
+    /// Clips travel as far as they did.
+    keep_travel: bool,
+    /// The shape alone.
+    pub(crate) plain: bool,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+#[cfg_attr(test, ts(rename = "Joints"))]
+pub(crate) enum JointsAsked {
+    Follow,
+    Stay,
+    Turn,
+}
+
+impl RigAsked {
+    pub(crate) fn options(&self) -> ReshapeOptions {
+        let joints = match self.joints {
+            JointsAsked::Follow => Joints::Follow,
+            JointsAsked::Stay => Joints::Stay,
+            JointsAsked::Turn => Joints::Turn,
+        };
+        ReshapeOptions { joints, keep_travel: self.keep_travel, rigid: Vec::new() }
+    }
+}
+
+#[cfg(test)]
+impl Default for RigAsked {
+    fn default() -> Self {
+        Self { joints: JointsAsked::Follow, keep_travel: false, plain: false }
+    }
 }
 
 /// A word or an object that JavaScript says, typed there as what it becomes here.

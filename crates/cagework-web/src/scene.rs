@@ -28,7 +28,8 @@ impl State {
 
     /// What the renderer draws; `weights` are those it has.
     pub(crate) fn scene(&self, weights: Option<&Weights>) -> SceneOptions {
-        let cage = self.view.cage && self.is_on_gpu();
+        // It fits the shape at rest.
+        let cage = self.view.cage && self.is_on_gpu() && self.playing.is_none();
         SceneOptions {
             theme: self.view.theme(),
             backdrop: true,

@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
+use cagework_core::deform::OutsideVertex;
 use cagework_core::edit::{Element, Gesture, Pivot, Pull, Selection, SharedPull, Symmetry, Topology};
 use cagework_core::enclosure::Enclosure;
 use cagework_core::slice::Slice;
-use cagework_core::{Bounds, Cage, PolygonMesh};
+use cagework_core::{Bounds, Cage, PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, GizmoPart};
-use cagework_io::{Model, UpAxis};
-use glam::{Vec2, Vec3};
+use cagework_io::{Model, Player, Posed, UpAxis};
+use glam::{Mat4, Vec2, Vec3};
 
 use crate::error::{Answer, ErrorName, Fault};
 use crate::options::SceneAsked;
@@ -34,6 +35,10 @@ pub(crate) struct State {
     pub(crate) positions: Vec<Vec3>,
     pub(crate) editing_rest: bool,
     pub(crate) is_bound: bool,
+    /// The clip that plays, in place of the cage.
+    pub(crate) playing: Option<Playing>,
+    /// Weights of the points of the model's rig, and those of them outside the cage.
+    pub(crate) rig: Option<(Weights, Vec<OutsideVertex>)>,
     /// Whether there are other weights to compare with.
     pub(crate) has_other: bool,
     pub(crate) element: Element,
@@ -78,6 +83,23 @@ pub(crate) struct Held {
     pub(crate) posed_for: Vec<Vec3>,
 }
 
+/// A model that plays.
+pub(crate) struct Playing {
+    pub(crate) player: Player,
+    /// From the file's axes to those that are drawn.
+    pub(crate) up: Mat4,
+    pub(crate) posed: Posed,
+    /// Whether the GPU does not have it yet.
+    pub(crate) is_new: bool,
+}
+
+impl Playing {
+    /// Matrices of the joints, in the axes that are drawn.
+    pub(crate) fn palette(&self) -> Vec<Mat4> {
+        self.posed.palette.iter().map(|&m| self.up * m).collect()
+    }
+}
+
 impl State {
     /// Another model, without a cage.
     pub(crate) fn set_model(&mut self, model: Model) {
@@ -104,7 +126,8 @@ impl State {
         self.active_part = None;
         self.slice = None;
         self.held = Held::default();
-        (self.is_bound, self.has_other) = (false, false);
+        self.playing = None;
+        (self.is_bound, self.has_other, self.rig) = (false, false, None);
         self.revision += 1;
         self.is_moved = true;
         self.is_changed = true;
@@ -199,6 +222,7 @@ impl State {
     pub(crate) fn move_to(&mut self, positions: Vec<Vec3>) {
         if positions.len() == self.positions.len() && positions.iter().all(|p| p.is_finite()) {
             self.positions = positions;
+            self.playing = None;
             self.is_moved = true;
             // The gizmo sits in the middle of the selection.
             self.is_changed = true;
@@ -213,6 +237,14 @@ impl State {
     /// Brings what changed to the GPU.
     pub(crate) fn write(&mut self, main: &mut Session, other: Option<&mut Session>) {
         let scene = self.is_changed.then(|| self.scene(main.weights()));
+        match &mut self.playing {
+            Some(playing) if playing.is_new => {
+                main.play(&playing.palette(), &playing.posed.targets);
+                playing.is_new = false;
+            }
+            Some(_) => {}
+            None => main.stop_playing(),
+        }
         for session in [Some(main), other].into_iter().flatten() {
             *session.camera_mut() = self.camera;
             if self.is_moved && self.is_on_gpu() {

@@ -4,7 +4,7 @@ use cagework_core::cage::CageNotice;
 use cagework_core::cage_check::{Code, Repair, Severity};
 use cagework_core::edit::Topology;
 use cagework_core::{Bounds, Cage, PolygonMesh};
-use cagework_io::{Model, ModelFormat, UpAxis};
+use cagework_io::{Clip, Model, ModelFormat, UpAxis};
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::JsValue;
 
@@ -75,8 +75,12 @@ pub(crate) struct ModelInfo {
     materials: usize,
     textures: usize,
     skins: usize,
-    animations: usize,
-    morph_targets: usize,
+    joints: usize,
+    clips: Vec<ClipView>,
+    /// Morph targets of all that is shown, and their weights at rest.
+    targets: Vec<TargetView>,
+    /// Whether exports keep more than the shape.
+    rigged: bool,
     bounds: BoundsView,
     notices: Vec<String>,
 }
@@ -94,11 +98,47 @@ impl ModelInfo {
             materials: counts.materials,
             textures: counts.textures,
             skins: counts.skins,
-            animations: counts.animations,
-            morph_targets: counts.morph_targets,
+            joints: counts.joints,
+            clips: model.clips().iter().map(ClipView::of).collect(),
+            targets: TargetView::all(model),
+            rigged: model.is_rigged(),
             bounds: BoundsView::of(Bounds::of(&model.positions)),
             notices: model.notices.clone(),
         }
+    }
+}
+
+/// A clip.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) struct ClipView {
+    /// Its name; empty if it has none.
+    name: String,
+    seconds: f32,
+}
+
+impl ClipView {
+    fn of(clip: &Clip) -> Self {
+        Self { name: clip.name.clone().unwrap_or_default(), seconds: clip.seconds }
+    }
+}
+
+/// A morph target.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) struct TargetView {
+    name: String,
+    default: f32,
+}
+
+impl TargetView {
+    fn all(model: &Model) -> Vec<Self> {
+        if !model.is_rigged() {
+            return Vec::new();
+        }
+        let Ok(Some(player)) = model.player() else { return Vec::new() };
+        let (names, defaults) = player.targets();
+        names.iter().zip(defaults).map(|(name, &default)| Self { name: name.clone(), default }).collect()
     }
 }
 

@@ -103,13 +103,13 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
   };
 
   const generate = async (source: CageSource, signal: AbortSignal) => {
-    const { cageOptions } = ctx.store.get();
+    const { cageOptions, cageClip } = ctx.store.get();
     const hull = { shape: "hull", vertices: HULL_VERTICES, voxels: 0 } as const;
     const options: CageOptions = source === "hull" ? { ...cageOptions, ...hull } : cageOptions;
     ctx.store.set({ cageProgress: 0 });
     try {
       const hear = (cageProgress: number) => ctx.store.set({ cageProgress });
-      const made = await follow(signal, ctx.session().generateCage(options, hear));
+      const made = await follow(signal, ctx.session().generateCage(options, hear, cageClip ?? undefined));
       const vertices = made.positions.length / 3;
       if (vertices > options.vertices) {
         ctx.tell.say(T.cage.more(vertices, options.vertices));

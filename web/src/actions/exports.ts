@@ -28,12 +28,13 @@ export function createExports(ctx: Context, project: Project): Exports {
     const { engine } = ctx.session();
     switch (kind) {
       case "glb":
-        return engine.exportGlb();
+        return engine.exportGlb(ctx.store.get().rigOptions);
       case "poses": {
         const poses = fittingPoses(ctx.store.get());
         return engine.exportPoses(
           poses.map((pose) => pose.name),
           poses.map((pose) => pose.positions),
+          ctx.store.get().rigOptions,
         );
       }
       case "cage":

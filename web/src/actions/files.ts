@@ -5,6 +5,7 @@ import { BIND_DEFAULTS, CAGE_DEFAULTS } from "../defaults";
 import { planDrop } from "../drop";
 import { stem } from "../format";
 import type { StepName } from "../state";
+import { NO_CLIP } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
 import { attempt, type Context, waitFor } from "./context";
@@ -55,6 +56,8 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       editingRest: false,
       cageSource: "auto",
       playing: false,
+      clip: NO_CLIP,
+      cageClip: null,
       gesture: null,
       busy: null,
     });

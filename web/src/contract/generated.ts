@@ -401,7 +401,15 @@ export type UpAxis = "y" | "z";
 /**
  * `ModelInfo`.
  */
-export type ModelInfo = { name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number, skins: number, animations: number, morphTargets: number, bounds: Bounds, notices: Array<string>, };
+export type ModelInfo = { name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number, skins: number, joints: number, clips: Array<ClipView>,
+/**
+ * Morph targets of all that is shown, and their weights at rest.
+ */
+targets: Array<TargetView>,
+/**
+ * Whether exports keep more than the shape.
+ */
+rigged: boolean, bounds: Bounds, notices: Array<string>, };
 /**
  * The page's part of a project, as far as it can be used.
  */
@@ -499,6 +507,31 @@ whole: boolean,
  * Mirror images stay mirror images.
  */
 mirrored: boolean, };
+export type Joints = "follow" | "stay" | "turn";
+/**
+ * What becomes of a rig.
+ */
+export type RigOptions = { joints: Joints,
+/**
+ * Clips travel as far as they did.
+ */
+keep_travel: boolean,
+/**
+ * The shape alone.
+ */
+plain: boolean, };
+/**
+ * A clip.
+ */
+export type ClipView = {
+/**
+ * Its name; empty if it has none.
+ */
+name: string, seconds: number, };
+/**
+ * A morph target.
+ */
+export type TargetView = { name: string, default: number, };
 /**
  * How colours of a legend follow each other.
  */
@@ -541,6 +574,7 @@ export type GizmoHandle = "x" | "y" | "z" | "plane_x" | "plane_y" | "plane_z" | 
 export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"closest_point"};
 export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"detail":0.028,"quads":true,"margin":0.0,"symmetry":"auto","voxels":0,"shape":"follow","per_component":false};
+export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"plain":false};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":false,"problems":true};
 /** Least and most of each option that is a number. */
 export const RANGES = { grid: [8, 512], vertices: [8, 400], detail: [0.005, 0.2], margin: [0, 0.25], voxels: [8, 128] } as const;

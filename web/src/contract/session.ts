@@ -82,7 +82,8 @@ export interface Session {
   /** A box around the model, its longest side cut into `divisions`. */
   boxCage(divisions: number): CageArrays;
   /** Makes a cage for the model, in the worker. */
-  generateCage(options: CageOptions, onProgress: (fraction: number) => void): Job<CheckedCage>;
+  /** `clip`: the name of one that the cage encloses as well. */
+  generateCage(options: CageOptions, onProgress: (fraction: number) => void, clip?: string): Job<CheckedCage>;
   /** Checks the cage at rest as it is, in a worker of its own, and marks what is wrong. */
   checkCage(): Job<Check>;
   /** The cage at rest, repaired, in that worker too. */

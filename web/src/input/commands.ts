@@ -136,6 +136,7 @@ export function createCommands(app: App): Record<Command, () => void> {
 
     savePose: () => poses.save(),
     play: () => poses.togglePlay(),
+    playClip: () => void app.clips.toggle(),
     resetPose: () => poses.reset(),
 
     open: () => app.chooseModel(),

@@ -95,6 +95,7 @@ const TABLE = {
 
   savePose: { keys: ["shift+p"], label: "Save this pose", group: "Poses" },
   play: { keys: ["j"], label: "Play the poses, or stop", group: "Poses" },
+  playClip: { keys: ["shift+j"], label: "Play the model's clip, or pause", group: "Poses" },
   resetPose: { keys: ["alt+g"], label: "Back to the rest pose", group: "Poses" },
 
   open: { keys: ["mod+o"], label: "Open a file", group: "File" },

@@ -43,7 +43,8 @@ export function startBind(start: BindStart): Job<BindReport> {
   let job: Job<BoundArrays> | undefined;
   let isCancelled = false;
   const { revision } = engine;
-  const positions = engine.modelPositions();
+  const positions = engine.boundPoints();
+  const extra = (positions.length - engine.modelPositions().length) / 3;
 
   const step = (pass: Pass) => {
     const eta = createEta(performance.now());
@@ -55,7 +56,7 @@ export function startBind(start: BindStart): Job<BindReport> {
   };
 
   async function once(pass: Pass, asked: BindOptions): Promise<BindReport> {
-    job = client.run("bind", { positions, cage, options: asked }, step(pass));
+    job = client.run("bind", { positions, extra, cage, options: asked }, step(pass));
     const { indptr, indices, data, outside, offsets, report } = await job.done;
     if (isCancelled || !report) throw named("Cancelled", "cancelled");
     engine.requireCurrent(revision);

@@ -57,7 +57,8 @@ export interface SampleArrays {
 /** A job's name, what it needs, its steps, and what it results in. */
 export interface Jobs {
   bind: {
-    input: { positions: Float32Array; cage: CageArrays; options: BindOptions };
+    /** The last `extra` positions are no vertices. */
+    input: { positions: Float32Array; extra: number; cage: CageArrays; options: BindOptions };
     step: Progress;
     output: BoundArrays;
   };
@@ -68,7 +69,8 @@ export interface Jobs {
     output: BoundArrays | undefined;
   };
   cage: {
-    input: { positions: Float32Array; triangles: Uint32Array; options: CageOptions };
+    /** All that is to be enclosed, and the model at rest, which it is checked for. */
+    input: { positions: Float32Array; triangles: Uint32Array; model: Float32Array; options: CageOptions };
     step: Progress;
     output: CheckedCage;
   };

@@ -81,9 +81,9 @@ function createWork(pkg: Package): Work {
     return shared;
   };
   return {
-    async bind({ positions, cage, options }, step) {
+    async bind({ positions, extra, cage, options }, step) {
       const by = await binder(options.backend === "gpu");
-      return taken(await by.bind(positions, cage.positions, cage.corners, options, step));
+      return taken(await by.bind(positions, extra, cage.positions, cage.corners, options, step));
     },
     async meanValue({ positions, cage }) {
       return taken((await binder(false)).bindMeanValue(positions, cage.positions, cage.corners));
@@ -93,10 +93,10 @@ function createWork(pkg: Package): Work {
       const bound = await by.bindSlice(cage.positions, cage.corners, axis, fraction, options, step);
       return bound && taken(bound);
     },
-    async cage({ positions, triangles, options }, step) {
+    async cage({ positions, triangles, model, options }, step) {
       const cage = (await binder(false)).generateCage(positions, triangles, options, step);
       const { bridged } = cage;
-      return { ...checked(pkg, cage, positions), bridged };
+      return { ...checked(pkg, cage, model), bridged };
     },
     read: (input, step) => readModel(pkg, input, step),
     readCage: (input, step) => readCage(pkg, input, step),

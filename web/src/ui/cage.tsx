@@ -81,7 +81,8 @@ const finenessOf = (detail: number) => Math.log(COARSE_DETAIL / detail) / Math.l
 
 /** How a cage is made for the model. */
 function Automatic({ app }: { app: App }) {
-  const { cageOptions: options } = app.store.get();
+  const { cageOptions: options, cageClip, model } = app.store.get();
+  const named = [...new Set(model?.clips.map((clip) => clip.name).filter(Boolean))];
   const change = (patch: Partial<CageOptions>) =>
     app.store.set({ cageOptions: { ...app.store.get().cageOptions, ...patch } });
   return (
@@ -139,6 +140,22 @@ function Automatic({ app }: { app: App }) {
         value={options.voxels || COARSEST}
         onInput={(voxels) => change({ voxels: voxels === COARSEST ? 0 : voxels })}
       />
+      {named.length > 0 && (
+        <label class="stack tight">
+          <span>{T.cage.around}</span>
+          <select
+            value={cageClip ?? ""}
+            onChange={({ currentTarget: { value } }) => app.store.set({ cageClip: value || null })}
+          >
+            <option value="">{T.cage.aroundRest}</option>
+            {named.map((name) => (
+              <option key={name} value={name}>
+                {name}
+              </option>
+            ))}
+          </select>
+        </label>
+      )}
       <Toggle
         label={T.cage.perPart}
         sentence={T.cage.perPartSentence}

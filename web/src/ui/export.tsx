@@ -5,6 +5,7 @@ import type { ExportKind } from "../actions/exports";
 import type { App } from "../app";
 import { type AppState, fittingPoses } from "../state";
 import { T } from "../words";
+import { RigChoices } from "./clips";
 import { Head, Segments, Toggle } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { Privacy } from "./model";
@@ -65,7 +66,25 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
         <Icon name="download" />
       </button>
       {kind === "picture" && <PictureOptions app={app} />}
+      {kind === "glb" && <RigExport app={app} />}
     </li>
+  );
+}
+
+/** Skeleton, morph targets and clips stay, unless the shape alone is wanted. */
+function RigExport({ app }: { app: App }) {
+  const { model, rigOptions } = app.store.get();
+  if (!model?.rigged) return null;
+  return (
+    <div class="export-option stack tight">
+      <Toggle
+        label={T.clips.keep}
+        sentence={T.clips.keepSentence(model.joints, model.targets.length, model.clips.length)}
+        on={!rigOptions.plain}
+        onChange={(on) => app.clips.rig({ plain: !on })}
+      />
+      {!rigOptions.plain && <RigChoices app={app} />}
+    </div>
   );
 }
 

@@ -139,11 +139,11 @@ function ModelCard({ model, about }: { model: ModelInfo; about: string | undefin
   );
 }
 
-function alsoThere({ skins, animations, morphTargets }: ModelInfo): string {
+function alsoThere({ joints, clips, targets }: ModelInfo): string {
   const parts = [
-    skins > 0 && T.model.skins(skins),
-    animations > 0 && T.model.animations(animations),
-    morphTargets > 0 && T.model.morphTargets(morphTargets),
+    joints > 0 && T.model.joints(joints),
+    clips.length > 0 && T.model.clips(clips.length),
+    targets.length > 0 && T.model.morphTargets(targets.length),
   ];
   return parts.filter(Boolean).join(", ");
 }

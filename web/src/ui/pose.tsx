@@ -5,15 +5,22 @@ import type { Pivot, Pose } from "../contract";
 import { coordinate, percent } from "../format";
 import { fittingPoses } from "../state";
 import { T } from "../words";
+import { Clips } from "./clips";
 import { Button, Head, IconButton, NumberInput, Section, Segments, Slider, Toggle } from "./controls";
 import { Icon } from "./icons";
 
 const PIVOTS = ["middle", "border", "last"] as const satisfies readonly Pivot[];
 
 export function PosePanel({ app }: { app: App }) {
+  const { model } = app.store.get();
   return (
     <div class="stack loose">
       <Head title={T.pose.title} sentence={T.pose.sentence} />
+      {model && (model.clips.length > 0 || model.rigged) && (
+        <Section title={T.clips.title}>
+          <Clips app={app} />
+        </Section>
+      )}
       <Section title={T.pull.title}>
         <PullOptions app={app} />
       </Section>

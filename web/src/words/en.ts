@@ -30,6 +30,7 @@ export const EN = {
     carry: "The poses could not be carried over",
     meanValue: "Mean value coordinates could not be computed",
     check: "The cage could not be checked",
+    clip: "The clip cannot be played",
     noCage: "No cage could be made",
     cageFile: "This cage cannot be used",
     repair: "The repair did not work",
@@ -190,8 +191,8 @@ export const EN = {
     materials: "Materials",
     textures: "Textures",
     also: "Also in the file",
-    skins: (n: number) => plural(n, "skin"),
-    animations: (n: number) => plural(n, "animation"),
+    joints: (n: number) => plural(n, "joint"),
+    clips: (n: number) => plural(n, "clip"),
     morphTargets: (n: number) => plural(n, "morph target"),
     tips: {
       rat: "The paper's rat. Take it by the nose and turn its head: the feet stay.",
@@ -284,6 +285,8 @@ export const EN = {
     from: (share: string) => `from ${share} of its size`,
     symmetry: "Left and right alike",
     symmetries: { auto: "If the model is", on: "Yes", off: "No" },
+    around: "Around",
+    aroundRest: "The model at rest, and its morph targets",
     perPart: "A cage for each part",
     perPartSentence: "For models of separate parts. Off: one cage around all.",
     divisions: "Squares along each side",
@@ -443,6 +446,37 @@ export const EN = {
     outside: "Outside the cage",
     vertices: (n: number) => plural(n, "vertex", "vertices"),
     ambiguous: "Ambiguous cells",
+  },
+
+  clips: {
+    title: "Its own movement",
+    clip: "Clip",
+    rest: "None: the cage poses it",
+    named: (name: string, number: number, length: string) => `${name || `Clip ${number + 1}`}, ${length}`,
+    play: "Play",
+    pause: "Pause",
+    time: "Time",
+    seconds: (seconds: number) => `${seconds.toFixed(2)} s`,
+    speed: "Speed",
+    loop: "Again and again",
+    targets: (n: number) => plural(n, "morph target"),
+    follow: "Joints follow the cage",
+    followSentence: "Off keeps the skeleton as it is, for clips and files that share it.",
+    advanced: "More about joints",
+    turn: "Bones turn with the shape",
+    turnSentence: "For shapes that are poses. Rotations of clips are written anew.",
+    travel: "Keep how far it travels",
+    travelSentence: "Off: longer legs go further.",
+    keep: "Keep skeleton, targets and clips",
+    keepSentence: (joints: number, targets: number, clips: number) =>
+      [
+        joints > 0 && plural(joints, "joint"),
+        targets > 0 && plural(targets, "morph target"),
+        clips > 0 && plural(clips, "clip"),
+      ]
+        .filter(Boolean)
+        .join(", "),
+    bindFirst: "Bind the model first: what plays is the shape that the cage gives it.",
   },
 
   pose: {

@@ -34,6 +34,7 @@ pub(super) fn recipe() -> Recipe {
             by: vec3(-0.1, -0.4, 0.0),
             bytes: include_bytes!("pulled/clamp.bin"),
         },
+        rig: None,
     }
 }
 

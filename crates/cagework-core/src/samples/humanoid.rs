@@ -1,10 +1,12 @@
 //! A person whose legs stand close together.
 
+use std::f32::consts::{PI, TAU};
+
 use glam::{Quat, Vec3, vec3};
 
 use super::sdf::{Body, Solid};
 use super::skeleton::Skeleton;
-use super::{CageRecipe, Pulled, Recipe, SampleInfo};
+use super::{CageRecipe, Pulled, Recipe, Rig, SampleInfo};
 use crate::cage_gen::CageOptions;
 
 pub(super) const INFO: SampleInfo = SampleInfo {
@@ -59,6 +61,7 @@ pub(super) fn recipe() -> Recipe {
             by: vec3(0.03, 0.24, 0.26),
             bytes: include_bytes!("pulled/humanoid.bin"),
         },
+        rig: Some(walk),
     }
 }
 
@@ -98,6 +101,53 @@ fn skeleton() -> (Skeleton, [Vec<usize>; 2], [Vec<usize>; 2]) {
     let arms = [ARM, mirrored(ARM)].map(|arm| skeleton.add_chain(&arm, trunk[1]));
     let legs = [LEG, mirrored(LEG)].map(|leg| skeleton.add_chain(&leg, 0));
     (skeleton, arms, legs)
+}
+
+/// Of the skeleton's bones, in turn.
+const NAMES: [&str; 16] = [
+    "hips",
+    "spine",
+    "neck",
+    "head",
+    "arm.L",
+    "forearm.L",
+    "hand.L",
+    "arm.R",
+    "forearm.R",
+    "hand.R",
+    "thigh.L",
+    "shin.L",
+    "foot.L",
+    "thigh.R",
+    "shin.R",
+    "foot.R",
+];
+
+/// The skeleton, and a walk on the spot: two steps in two seconds, after which it begins again.
+fn walk(vertices: &[Vec3]) -> Rig {
+    const SECONDS: f32 = 2.0;
+    const KEYS: usize = 17;
+    let times: Vec<f32> = (0..KEYS).map(|k| SECONDS * k as f32 / (KEYS - 1) as f32).collect();
+    let turn = |bone: usize, t: f32| {
+        let phase = TAU * t / SECONDS;
+        // Left and right are half a round apart.
+        let (side, own) = if matches!(bone, 7..=9 | 13..=15) { (-1.0, phase + PI) } else { (1.0, phase) };
+        match bone {
+            0 => vec3(0.0, -0.08 * phase.sin(), 0.0),
+            2 => vec3(0.0, 0.10 * phase.sin(), 0.0),
+            // Arms hang, and swing against the legs.
+            4 | 7 => vec3(0.35 * own.sin(), 0.0, -1.1 * side),
+            5 | 8 => vec3(0.0, -0.25 * side, 0.0),
+            10 | 13 => vec3(-0.42 * own.sin(), 0.0, 0.0),
+            // A knee bends while its leg swings forward.
+            11 | 14 => vec3(0.08 + 0.75 * own.cos().max(0.0).powi(2), 0.0, 0.0),
+            12 | 15 => vec3(0.12 * own.sin(), 0.0, 0.0),
+            _ => Vec3::ZERO,
+        }
+    };
+    let hips = TRUNK[0].0;
+    let lift = |t: f32| hips + vec3(0.0, 0.012 * (2.0 * TAU * t / SECONDS).cos() - 0.02, 0.0);
+    skeleton().0.rig(&NAMES, vertices, ("Walk", times), turn, lift)
 }
 
 fn step(cage: &[Vec3]) -> Vec<Vec3> {

@@ -11,7 +11,7 @@ mod sdf;
 mod skeleton;
 mod strider;
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use serde::Serialize;
 
 use crate::cage_gen::{CageOptions, generate};
@@ -44,6 +44,36 @@ pub struct Sample {
     pub cage: PolygonMesh,
     /// Prepared poses: name and positions of the cage's vertices. `[n_cage]` each
     pub poses: Vec<(String, Vec<Vec3>)>,
+    /// Its skeleton, if it has one, with a clip.
+    pub rig: Option<Rig>,
+}
+
+/// A skeleton with a clip, its joints turned as the world at rest.
+#[derive(Clone, Debug)]
+pub struct Rig {
+    /// Parents before children, the root first.
+    pub joints: Vec<Joint>,
+    /// Joints of each vertex, and their weights. `[n_vertices]`
+    pub influences: Vec<[(u32, f32); 4]>,
+    /// Name of the clip.
+    pub clip: &'static str,
+    /// Of the keys, seconds.
+    pub times: Vec<f32>,
+    /// Rotation of each joint against its rest. `[n_joints, n_keys]`
+    pub turns: Vec<Vec<Quat>>,
+    /// Place of the root, object units. `[n_keys]`
+    pub root: Vec<Vec3>,
+}
+
+/// A joint.
+#[derive(Clone, Copy, Debug)]
+pub struct Joint {
+    /// Its name.
+    pub name: &'static str,
+    /// Where it is at rest, object units.
+    pub at: Vec3,
+    /// The joint it hangs on.
+    pub parent: Option<usize>,
 }
 
 const SAMPLES: [SampleInfo; 4] = [rat::INFO, humanoid::INFO, clamp::INFO, strider::INFO];
@@ -78,7 +108,8 @@ pub fn build(id: &str) -> Option<Sample> {
     let posed = |(name, pose): &(&str, Pose)| ((*name).to_owned(), pose(&cage.positions));
     let mut poses: Vec<_> = recipe.poses.iter().map(posed).collect();
     poses.push((recipe.pulled.name.to_owned(), recipe.pulled.pose(&cage.positions)));
-    Some(Sample { name: info.label.to_owned(), mesh, colours, cage, poses })
+    let rig = recipe.rig.map(|rig| rig(&mesh.positions));
+    Some(Sample { name: info.label.to_owned(), mesh, colours, cage, poses, rig })
 }
 
 /// How a cage comes about.
@@ -98,6 +129,8 @@ struct Recipe {
     poses: Vec<(&'static str, Pose)>,
     /// The last pose.
     pulled: Pulled,
+    /// A rig for the mesh's vertices.
+    rig: Option<fn(&[Vec3]) -> Rig>,
 }
 
 /// A pose made by one pull. It is kept as bytes: a pull needs a bind, which would keep a visitor waiting.

@@ -71,6 +71,7 @@ pub(super) fn recipe() -> Recipe {
             by: vec3(0.32, 0.12, -0.14),
             bytes: include_bytes!("pulled/rat.bin"),
         },
+        rig: None,
     }
 }
 

@@ -2,6 +2,8 @@
 
 use glam::{Affine3A, Quat, Vec3};
 
+use super::{Joint, Rig};
+
 /// How fast a bone's say falls off with distance.
 const SHARPNESS: i32 = 6;
 
@@ -60,6 +62,15 @@ impl Skeleton {
 
     /// The mean of where the bones would take a point, the nearest ones first of all.
     fn moved(&self, p: Vec3, motion: &[Affine3A]) -> Vec3 {
+        let mut sum = Vec3::ZERO;
+        for (weight, m) in self.weights(p).into_iter().zip(motion) {
+            sum += weight * m.transform_point3(p);
+        }
+        sum
+    }
+
+    /// The say that each bone has at a point; they sum to 1.
+    fn weights(&self, p: Vec3) -> Vec<f32> {
         let distances = self.bones.iter().map(|bone| {
             let axis = bone.to - bone.from;
             let share = ((p - bone.from).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
@@ -67,12 +78,44 @@ impl Skeleton {
         });
         let distances: Vec<f32> = distances.collect();
         let nearest = distances.iter().copied().fold(f32::MAX, f32::min).max(1e-3);
-        let (mut sum, mut total) = (Vec3::ZERO, 0.0);
-        for (d, m) in distances.iter().zip(motion) {
-            let weight = (nearest / d.max(1e-3)).powi(SHARPNESS);
-            sum += weight * m.transform_point3(p);
-            total += weight;
+        let weights: Vec<f32> = distances.iter().map(|d| (nearest / d.max(1e-3)).powi(SHARPNESS)).collect();
+        let total: f32 = weights.iter().sum();
+        weights.into_iter().map(|weight| weight / total).collect()
+    }
+
+    /// A rig of the bones: a joint where each begins, and the four that have most say at each vertex. `names`: of the bones;
+    /// `turns`: of each bone at each key, rotation vectors in radians; `lift`: of the root at each key.
+    pub(super) fn rig(
+        &self,
+        names: &[&'static str],
+        vertices: &[Vec3],
+        clip: (&'static str, Vec<f32>),
+        turns: impl Fn(usize, f32) -> Vec3,
+        lift: impl Fn(f32) -> Vec3,
+    ) -> Rig {
+        let joint = |(k, bone): (usize, &Bone)| Joint {
+            name: names.get(k).copied().unwrap_or_default(),
+            at: bone.from,
+            parent: (bone.parent != k).then_some(bone.parent),
+        };
+        let influences = |&p: &Vec3| {
+            let mut all: Vec<(u32, f32)> = (0u32..).zip(self.weights(p)).collect();
+            all.sort_by(|a, b| b.1.total_cmp(&a.1));
+            all.truncate(4);
+            all.resize(4, (0, 0.0));
+            let total: f32 = all.iter().map(|(_, w)| w).sum();
+            [0, 1, 2, 3].map(|k| (all[k].0, all[k].1 / total))
+        };
+        let (name, times) = clip;
+        Rig {
+            joints: self.bones.iter().enumerate().map(joint).collect(),
+            influences: vertices.iter().map(influences).collect(),
+            turns: (0..self.bones.len())
+                .map(|bone| times.iter().map(|&t| Quat::from_scaled_axis(turns(bone, t))).collect())
+                .collect(),
+            root: times.iter().map(|&t| lift(t)).collect(),
+            clip: name,
+            times,
         }
-        sum / total
     }
 }

@@ -39,6 +39,7 @@ pub(super) fn recipe() -> Recipe {
             by: vec3(0.1, 0.45, 0.1),
             bytes: include_bytes!("pulled/strider.bin"),
         },
+        rig: None,
     }
 }
 

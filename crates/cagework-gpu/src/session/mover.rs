@@ -7,6 +7,7 @@ use std::sync::Arc;
 use cagework_core::Weights;
 use cagework_core::deform::OutsideVertex;
 use cagework_core::deform::{deform_bound, vertex_normals};
+use cagework_core::skin::Skin;
 use glam::{Vec3, Vec4};
 
 use crate::buffers::Allocator;
@@ -14,6 +15,7 @@ use crate::deform::{Deformer, GpuWeights};
 use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::render::DrawModel;
+use crate::skin::Skinner;
 use crate::table::{Entry, Table};
 
 /// Deforms one mesh, frame after frame; `[positions, normals]` are what is drawn.
@@ -79,15 +81,46 @@ impl Mover {
         match self {
             Self::Kernels { deformer, .. } => deformer.encode(encoder),
             // There is none elsewhere; the condition leaves this out of the page's main artifact.
-            Self::Processor { model, triangles, tables: [positions, normals] } if context.draws_only() => {
-                let deformed = model.with_copies(&deform_bound(weights, outside, cage_positions));
-                let shading = vertex_normals(&deformed, triangles);
-                for (table, points) in [(positions, deformed), (normals, shading)] {
-                    let padded: Vec<Vec4> = points.into_iter().map(|p| p.extend(1.0)).collect();
-                    table.write(context, bytemuck::cast_slice(&padded));
-                }
+            Self::Processor { model, .. } if context.draws_only() => {
+                self.show(context, model.with_copies(&deform_bound(weights, outside, cage_positions)));
             }
             Self::Processor { .. } => {}
+        }
+    }
+
+    /// The same where a clip has it.
+    pub(super) fn encode_skinned(
+        &self,
+        context: &GpuContext,
+        encoder: &mut wgpu::CommandEncoder,
+        skinner: &Skinner,
+    ) {
+        match self {
+            Self::Kernels { deformer, .. } => deformer.encode_skinned(encoder, skinner),
+            Self::Processor { .. } if context.draws_only() => self.show(context, skinner.positions()),
+            Self::Processor { .. } => {}
+        }
+    }
+
+    /// What skins in its place while a clip plays. `skin` of the model's vertices.
+    pub(super) async fn skinner(
+        &self,
+        context: &GpuContext,
+        model: &DrawModel,
+        skin: &Skin,
+    ) -> Result<Skinner, GpuError> {
+        let skin = skin.with_copies(&model.copies);
+        let deformer = if let Self::Kernels { deformer, .. } = self { Some(deformer) } else { None };
+        Skinner::new(context, skin, deformer).await
+    }
+
+    /// Uploads vertices and their normals.
+    fn show(&self, context: &GpuContext, at: Vec<Vec3>) {
+        let Self::Processor { triangles, tables: [positions, normals], .. } = self else { return };
+        let shading = vertex_normals(&at, triangles);
+        for (table, points) in [(positions, at), (normals, shading)] {
+            let padded: Vec<Vec4> = points.into_iter().map(|p| p.extend(1.0)).collect();
+            table.write(context, bytemuck::cast_slice(&padded));
         }
     }
 

@@ -1,10 +1,12 @@
 //! What is done for each frame: vertices follow the cage, those outside it too, and normals follow vertices.
 
 use cagework_core::deform::OutsideVertex;
+use cagework_core::skin::{Skin, skin_vertices};
 use cagework_core::stencil::tables::{BUNDLE, NormalTable, OutsideTable, SlicedWeights};
 use cagework_core::{Weights, stencil};
 use cagework_gpu::kernels;
-use glam::{Vec3, Vec4};
+use cagework_gpu::skin::SkinTables;
+use glam::{Mat4, Quat, Vec3, Vec4};
 
 use super::support::{Seeded, assert_close, egg, flat};
 use super::{ROWS, bytes, run};
@@ -58,6 +60,47 @@ fn deform_vertices_matches_cpu() {
     assert_close(&unpadded(&result), &flat(&expected), POINT_TOLERANCE);
     let double = cagework_core::deform::deform_vertices(&weights, &posed);
     assert_close(&unpadded(&result), &flat(&double), POINT_TOLERANCE);
+}
+
+#[test]
+fn skin_vertices_matches_cpu() {
+    let mut seeded = Seeded(15);
+    let (n, n_joints, n_targets) = (131, 9, 4);
+    let mut skin = Skin { joint_starts: vec![0], delta_starts: vec![0], ..Skin::default() };
+    for v in 0..n {
+        skin.positions.push(seeded.point());
+        // One to five joints; every third vertex has targets.
+        let weights: Vec<f32> = seeded.values(1 + v % 5).iter().map(|w| w.abs() + 0.1).collect();
+        let total: f32 = weights.iter().sum();
+        skin.joints.extend((0..).zip(weights).map(|(k, w)| ((v as u32 + 3 * k) % n_joints, w / total)));
+        skin.joint_starts.push(skin.joints.len() as u32);
+        if v % 3 == 0 {
+            skin.deltas.extend((0..n_targets).map(|target| (target, seeded.point())));
+        }
+        skin.delta_starts.push(skin.deltas.len() as u32);
+    }
+    let palette: Vec<Mat4> = (0..n_joints)
+        .map(|_| {
+            let turn = Quat::from_axis_angle(seeded.point().normalize_or(Vec3::Y), 2.0);
+            Mat4::from_scale_rotation_translation(Vec3::ONE + 0.2 * seeded.point(), turn, seeded.point())
+        })
+        .collect();
+    let targets = seeded.values(n_targets as usize);
+    let tables = SkinTables::new(&skin);
+    let matrices: Vec<[f32; 16]> = palette.iter().map(Mat4::to_cols_array).collect();
+    let inputs = [
+        bytes(&tables.rest).to_vec(),
+        bytes(&tables.starts).to_vec(),
+        bytes(&tables.influences).to_vec(),
+        bytes(&tables.deltas).to_vec(),
+        bytes(&matrices).to_vec(),
+        bytes(&targets).to_vec(),
+        bytes(&padded(&skin.positions, 0.0)).to_vec(),
+    ];
+    let inputs: Vec<&[u8]> = inputs.iter().map(Vec::as_slice).collect();
+    let result = run(&kernels::SKIN_VERTICES, ROWS, n as u32, &inputs);
+    let expected = skin_vertices(&skin, &palette, &targets);
+    assert_close(&unpadded(&result), &flat(&expected), 4.0 * POINT_TOLERANCE);
 }
 
 #[test]

@@ -4,10 +4,11 @@ use std::collections::HashMap;
 
 use cagework_core::TriMesh;
 use cagework_core::deform::vertex_normals;
-use glam::Vec3;
+use cagework_core::samples::Rig;
+use glam::{Mat4, Quat, Vec3};
 use serde_json::{Value, json};
 
-use super::pack::{Pack, push};
+use super::pack::{Pack, VERTICES, push};
 use crate::error::WriteError;
 use crate::obj::{NONE, ObjDocument};
 
@@ -65,11 +66,16 @@ pub(crate) fn build_from_obj(
     Ok((pack.finish(json)?, sources))
 }
 
-/// A GLB of one mesh with colours: sRGB and opacity for each vertex, 0 to 255, or none at all.
+/// A GLB of one mesh with colours (sRGB and opacity for each vertex, 0 to 255, or none at all) and a rig.
 ///
 /// # Errors
 /// [`WriteError::NoFaces`] without triangles, [`WriteError::TooLarge`].
-pub fn write_mesh_glb(name: &str, mesh: &TriMesh, colours: &[[u8; 4]]) -> Result<Vec<u8>, WriteError> {
+pub fn write_mesh_glb(
+    name: &str,
+    mesh: &TriMesh,
+    colours: &[[u8; 4]],
+    rig: Option<&Rig>,
+) -> Result<Vec<u8>, WriteError> {
     if mesh.triangles.is_empty() {
         return Err(WriteError::NoFaces);
     }
@@ -94,10 +100,63 @@ pub fn write_mesh_glb(name: &str, mesh: &TriMesh, colours: &[[u8; 4]]) -> Result
             .collect();
         attributes["COLOR_0"] = pack.push_floats(&mut json, &linear, 4, true, false).into();
     }
+    if let Some(rig) = rig {
+        add_rig(rig, &mut json, &mut pack, &mut attributes);
+    }
     let indices = pack.push_indices(&mut json, mesh.triangles.as_flattened().iter().copied());
     let primitive = json!({ "attributes": attributes, "indices": indices, "material": 0 });
     json["meshes"] = json!([{ "name": name, "primitives": [primitive] }]);
     pack.finish(json)
+}
+
+/// Skeleton, skin and clip; `attributes` get the vertices' joints.
+fn add_rig(rig: &Rig, json: &mut Value, pack: &mut Pack<'_>, attributes: &mut Value) {
+    const U16: u32 = 5123;
+    let first = json["nodes"].as_array().map_or(0, Vec::len);
+    let at = |k: usize| rig.joints[k].at;
+    for (k, joint) in rig.joints.iter().enumerate() {
+        let from_parent = at(k) - joint.parent.map_or(Vec3::ZERO, at);
+        let children: Vec<usize> =
+            (0..rig.joints.len()).filter(|&c| rig.joints[c].parent == Some(k)).map(|c| first + c).collect();
+        let mut node = json!({ "name": joint.name, "translation": from_parent.to_array() });
+        if !children.is_empty() {
+            node["children"] = json!(children);
+        }
+        push(json, "nodes", node);
+        if joint.parent.is_none() {
+            push(&mut json["scenes"][0], "nodes", (first + k).into());
+        }
+    }
+    let binds: Vec<f32> =
+        (0..rig.joints.len()).flat_map(|k| Mat4::from_translation(-at(k)).to_cols_array()).collect();
+    let bind = pack.push_floats(json, &binds, 16, false, false);
+    let joints: Vec<usize> = (first..first + rig.joints.len()).collect();
+    push(json, "skins", json!({ "joints": joints, "inverseBindMatrices": bind }));
+    json["nodes"][0]["skin"] = 0.into();
+
+    // A joint of no weight is joint 0, as validators want it.
+    let of_vertex = |all: &[(u32, f32); 4]| all.map(|(j, w)| if w > 0.0 { j as u16 } else { 0 });
+    let bytes = rig.influences.iter().flat_map(of_vertex).flat_map(u16::to_le_bytes).collect();
+    let view = pack.push_view(json, bytes, Some(VERTICES));
+    let count = rig.influences.len();
+    let accessor = json!({ "bufferView": view, "componentType": U16, "count": count, "type": "VEC4" });
+    attributes["JOINTS_0"] = push(json, "accessors", accessor).into();
+    let weights: Vec<f32> = rig.influences.iter().flatten().map(|(_, w)| *w).collect();
+    attributes["WEIGHTS_0"] = pack.push_floats(json, &weights, 4, true, false).into();
+
+    let input = pack.push_floats(json, &rig.times, 1, false, true);
+    let (mut samplers, mut channels) = (Vec::new(), Vec::new());
+    let mut add = |output: usize, node: usize, path: &str| {
+        channels.push(json!({ "sampler": samplers.len(), "target": { "node": node, "path": path } }));
+        samplers.push(json!({ "input": input, "output": output, "interpolation": "LINEAR" }));
+    };
+    for (k, turns) in rig.turns.iter().enumerate().filter(|(_, t)| t.iter().any(|&q| q != Quat::IDENTITY)) {
+        let flat: Vec<f32> = turns.iter().flat_map(Quat::to_array).collect();
+        add(pack.push_floats(json, &flat, 4, false, false), first + k, "rotation");
+    }
+    let root: Vec<f32> = rig.root.iter().flat_map(Vec3::to_array).collect();
+    add(pack.push_floats(json, &root, 3, false, false), first, "translation");
+    push(json, "animations", json!({ "name": rig.clip, "samplers": samplers, "channels": channels }));
 }
 
 /// Linear light of an sRGB value (IEC 61966-2-1).

@@ -14,7 +14,7 @@ pub(super) const F32: u32 = 5126;
 const U32: u32 = 5125;
 const U16: u32 = 5123;
 /// Buffer view targets.
-const VERTICES: u32 = 34962;
+pub(super) const VERTICES: u32 = 34962;
 const INDICES: u32 = 34963;
 /// Every component type's size divides it.
 const ALIGN: usize = 4;
@@ -79,7 +79,7 @@ impl<'a> Pack<'a> {
     ) -> usize {
         let bytes = values.iter().flat_map(|x| x.to_le_bytes()).collect();
         let view = self.push_view(json, bytes, attribute.then_some(VERTICES));
-        let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][components - 1];
+        let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"].get(components - 1).unwrap_or(&"MAT4");
         let count = values.len() / components;
         let mut accessor = json!({ "bufferView": view, "componentType": F32, "count": count, "type": kind });
         if bounds {

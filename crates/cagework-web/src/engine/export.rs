@@ -1,10 +1,10 @@
 //! Files.
 
-use cagework_core::deform::deform_bound;
+use cagework_core::deform::{OutsideVertex, deform_bound, displacements};
 use cagework_core::{Cage, PolygonMesh};
-use cagework_io::{Model, write_cage_obj, write_project, write_weights_npz};
-use glam::Vec3;
-use js_sys::Array;
+use cagework_io::{Model, ReshapeReport, write_cage_obj, write_project, write_weights_npz};
+use glam::{DVec3, Vec3};
+use js_sys::{Array, Float32Array, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -12,18 +12,25 @@ use super::Engine;
 use super::gesture::pose_list;
 use crate::arrays::flat;
 use crate::error::{Answer, ErrorName, Fault};
+use crate::options::{RigAsked, taken};
 use crate::state::State;
 use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
-    /// The model as GLB, as posed.
+    /// The model as GLB, as posed; a rigged one with its skeleton, morph targets and clips.
     ///
     /// # Errors
     /// When it cannot be written.
     #[wasm_bindgen(js_name = exportGlb)]
-    pub fn export_glb(&self) -> Result<Vec<u8>, JsValue> {
+    pub fn export_glb(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
+    ) -> Result<Vec<u8>, JsValue> {
         let pose = self.read(|state| state.positions.clone());
+        if let Some((bytes, _)) = self.reshaped(&pose, &[], &taken(options)?)? {
+            return Ok(bytes);
+        }
         let mut posed = self.deformed(&[pose])?;
         Ok(self.read(|state| Answer::Ok(state.the_model()?.write_glb(&posed.pop().unwrap_or_default())?))?)
     }
@@ -37,8 +44,15 @@ impl Engine {
         &self,
         #[wasm_bindgen(unchecked_param_type = "readonly string[]")] names: Vec<String>,
         #[wasm_bindgen(unchecked_param_type = "readonly Float32Array[]")] poses: &Array,
+        #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
     ) -> Result<Vec<u8>, JsValue> {
-        let posed = self.deformed(&pose_list(poses))?;
+        let poses = pose_list(poses);
+        let rest = self.read(|state| state.rest.positions.clone());
+        let pairs: Vec<_> = names.iter().cloned().zip(poses.iter().cloned()).collect();
+        if let Some((bytes, _)) = self.reshaped(&rest, &pairs, &taken(options)?)? {
+            return Ok(bytes);
+        }
+        let posed = self.deformed(&poses)?;
         let named: Vec<(String, Vec<Vec3>)> = names.into_iter().zip(posed).collect();
         Ok(self.read(|state| {
             let model = state.the_model()?;
@@ -71,7 +85,16 @@ impl Engine {
         Ok(self.with_session(|session| {
             let weights =
                 session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
-            Ok(write_weights_npz(weights, session.outside(), &[]))
+            self.read(|state| {
+                let Some((rows, of_rig)) = &state.rig else {
+                    return Ok(write_weights_npz(weights, session.outside(), &[]));
+                };
+                let (mut all, mut outside) = (weights.clone(), session.outside().to_vec());
+                all.append(rows);
+                let n = weights.n_rows() as u32;
+                outside.extend(of_rig.iter().map(|&o| OutsideVertex { vertex: o.vertex + n, ..o }));
+                Ok(write_weights_npz(&all, &outside, &state.the_model()?.extra_points()?))
+            })
         })?)
     }
 
@@ -106,6 +129,36 @@ impl Engine {
         self.read(|state| state.model.as_ref().map(|m| flat(&m.positions)).unwrap_or_default())
     }
 
+    /// All that is bound: the model's vertices, then the points of its rig. `[n_points, 3]`
+    ///
+    /// # Errors
+    /// When the rig cannot be read.
+    #[wasm_bindgen(js_name = boundPoints)]
+    pub fn bound_points(&self) -> Result<Vec<f32>, JsValue> {
+        Ok(self.read(|state| {
+            let Some(model) = &state.model else { return Ok(Vec::new()) };
+            let mut points = flat(&model.positions);
+            points.extend(flat(&model.extra_points()?));
+            Answer::Ok(points)
+        })?)
+    }
+
+    /// What a cage should enclose: positions and triangles of the model at rest, of its morph targets, and of a clip if one is
+    /// named. `[n, 3]` each
+    ///
+    /// # Errors
+    /// When there is no such clip.
+    #[wasm_bindgen(js_name = modelStates, unchecked_return_type = "[Float32Array, Uint32Array]")]
+    pub fn model_states(&self, clip: Option<String>) -> Result<JsValue, JsValue> {
+        let (positions, triangles) = self.read(|state| {
+            let states = state.the_model()?.states(clip.as_deref());
+            states.map_err(|e| Fault::new(ErrorName::Error, e))
+        })?;
+        let positions = Float32Array::from(flat(&positions).as_slice());
+        let triangles = Uint32Array::from(triangles.as_flattened());
+        Ok(Array::of2(&positions, &triangles).into())
+    }
+
     /// The model's triangles. `[n_triangles, 3]`
     #[wasm_bindgen(js_name = modelTriangles)]
     #[must_use]
@@ -117,8 +170,44 @@ impl Engine {
 }
 
 impl Engine {
+    /// A rigged model in a pose of the cage, or at rest with poses as morph targets; none if it has no rig, or is to be written
+    /// without it.
+    pub(super) fn reshaped(
+        &self,
+        pose: &[Vec3],
+        poses: &[(String, Vec<Vec3>)],
+        asked: &RigAsked,
+    ) -> Answer<Option<(Vec<u8>, ReshapeReport)>> {
+        if asked.plain || !self.read(|state| state.model.as_ref().is_some_and(Model::is_rigged)) {
+            return Ok(None);
+        }
+        self.with_session(|session| {
+            self.read(|state| {
+                let (model, rest) = (state.the_model()?, &state.rest.positions);
+                let by = |pose: &[Vec3]| match (session.weights(), &state.rig) {
+                    (Some(weights), Some((rows, of_rig))) if pose.len() == rest.len() => {
+                        let mut by = displacements(weights, session.outside(), rest, pose);
+                        by.extend(displacements(rows, of_rig, rest, pose));
+                        Ok(by)
+                    }
+                    (Some(_), _) => Err(Fault::new(ErrorName::Error, "a pose belongs to another cage")),
+                    (None, _) => Ok(vec![DVec3::ZERO; model.positions.len() + model.extra_points()?.len()]),
+                };
+                let n = model.positions.len() as u32;
+                let of_rig = state.rig.iter().flat_map(|(_, of_rig)| of_rig).map(|o| o.vertex + n);
+                let outside: Vec<u32> = session.outside().iter().map(|o| o.vertex).chain(of_rig).collect();
+                let by_poses = poses
+                    .iter()
+                    .map(|(name, pose)| Ok((name.clone(), by(pose)?)))
+                    .collect::<Answer<Vec<_>>>()?;
+                let options = asked.options();
+                Ok(Some(model.write_reshaped(&by(pose)?, &outside, &by_poses, &options)?))
+            })
+        })
+    }
+
     /// The model in poses of the cage; at rest while it is not bound.
-    fn deformed(&self, poses: &[Vec<Vec3>]) -> Answer<Vec<Vec<Vec3>>> {
+    pub(super) fn deformed(&self, poses: &[Vec<Vec3>]) -> Answer<Vec<Vec<Vec3>>> {
         let rest = self.read(|state| Answer::Ok(state.the_model()?.positions.clone()))?;
         self.with_session(|session| {
             let Some(weights) = session.weights() else { return Ok(vec![rest; poses.len()]) };

@@ -8,6 +8,7 @@ mod camera;
 mod export;
 mod gesture;
 mod picture;
+mod play;
 mod pull;
 mod rest;
 mod scene;
@@ -18,7 +19,8 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use async_lock::Mutex;
-use cagework_core::PolygonMesh;
+use cagework_core::deform::OutsideVertex;
+use cagework_core::{PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::check_layers;
 use cagework_io::Model;
@@ -94,8 +96,9 @@ impl Engine {
         offsets: Vec<f32>,
     ) -> Result<(), JsValue> {
         let (revision, n_columns) = self.read(|state| (state.revision, state.rest.positions.len() as u32));
-        let weights = incoming::weights(n_columns, &indptr, &indices, &data).await?;
-        let outside = incoming::outside(&outside, &offsets);
+        let n_vertices = self.read(|state| state.model.as_ref().map_or(0, |m| m.positions.len()));
+        let all = incoming::weights(n_columns, &indptr, &indices, &data).await?;
+        let (weights, outside, rig) = split(all, incoming::outside(&outside, &offsets), n_vertices);
         let is_current = || self.read(|state| state.require(revision));
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
@@ -106,6 +109,8 @@ impl Engine {
         is_current()?;
         self.change(|state| {
             state.is_bound = true;
+            state.rig = rig;
+            state.playing = None;
             (state.is_moved, state.is_changed) = (true, true);
         });
         Ok(())
@@ -240,6 +245,27 @@ impl Engine {
             .ok_or_else(|| Fault::new(ErrorName::Error, "the GPU is busy: try again in a moment"))?;
         read(&gpu.as_ref().ok_or_else(lost)?.main)
     }
+}
+
+/// Weights with the rows outside the cage.
+type Rows = (Weights, Vec<OutsideVertex>);
+
+/// Weights of the vertices, and apart from them those of the rig's points, if there are any.
+fn split(
+    weights: Weights,
+    outside: Vec<OutsideVertex>,
+    n_vertices: usize,
+) -> (Weights, Vec<OutsideVertex>, Option<Rows>) {
+    let n = weights.n_rows();
+    if n <= n_vertices {
+        return (weights, outside, None);
+    }
+    let rows =
+        |range: std::ops::Range<usize>| weights.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>());
+    let (of_vertices, of_rig) = outside.into_iter().partition(|o| (o.vertex as usize) < n_vertices);
+    let moved = |o: OutsideVertex| OutsideVertex { vertex: o.vertex - n_vertices as u32, ..o };
+    let of_rig = Vec::into_iter(of_rig).map(moved).collect();
+    (rows(0..n_vertices), of_vertices, Some((rows(n_vertices..n), of_rig)))
 }
 
 /// Sees to it that the GPU has the cage of the moment; weights for the one before are dropped.

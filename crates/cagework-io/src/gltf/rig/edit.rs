@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::error::WriteError;
 use crate::gltf::GltfDocument;
-use crate::gltf::pack::{F32, each_accessor, push};
+use crate::gltf::pack::{F32, VERTICES, each_accessor, push};
 use crate::gltf::patch::embed_images_by;
 
 /// All accessors are aligned to it.
@@ -107,8 +107,6 @@ impl<'a> Edit<'a> {
     }
 
     fn append<const N: usize>(&mut self, values: &[[f32; N]], attribute: bool) -> usize {
-        /// A buffer view of vertices.
-        const VERTICES: u32 = 34962;
         let bytes = values.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
         let view = Self::push_view(&mut self.bin, &mut self.json, bytes);
         if attribute {

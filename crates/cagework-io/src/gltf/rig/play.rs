@@ -10,7 +10,7 @@ use super::clip::{Clip, clips, quaternion, vector};
 use super::tracks::Driven;
 use crate::gltf::geometry::{attribute, vectors};
 use crate::gltf::scene::{Worlds, local};
-use crate::gltf::{GltfDocument, GltfError, skin};
+use crate::gltf::{GltfDocument, GltfError, Slot, skin};
 use ::gltf::json::mesh::Semantic;
 
 /// A model with its skeleton, morph targets and clips.
@@ -41,7 +41,8 @@ pub struct Posed {
 }
 
 impl Player {
-    pub(crate) fn new(document: &GltfDocument) -> Result<Self, GltfError> {
+    /// `like`: the document in whose order the vertices are; the same, or the one that this is an export of.
+    pub(crate) fn new(document: &GltfDocument, like: &GltfDocument) -> Result<Self, GltfError> {
         let worlds = Worlds::new(&document.root)?;
         let mut player = Self {
             skin: Skin { joint_starts: vec![0], delta_starts: vec![0], ..Skin::default() },
@@ -72,7 +73,15 @@ impl Player {
                 None => format!("target {k}"),
             }));
         }
-        for slot in &document.slots {
+        for wanted in &like.slots {
+            let node = like.instances[wanted.instance as usize].node;
+            let is_same = |slot: &&Slot| {
+                slot.primitive == wanted.primitive && document.instances[slot.instance as usize].node == node
+            };
+            // Exports keep nodes and primitives; without nodes there is one instance of each mesh, in order.
+            let own = || document.slots.get(like.slots.iter().position(|s| std::ptr::eq(s, wanted))?);
+            let slot = document.slots.iter().find(is_same).filter(|_| node.is_some()).or_else(own);
+            let Some(slot) = slot else { continue };
             let (instance, primitive) = document.primitive(slot);
             let own = player.palette.len() as u32;
             // Of a mesh without a node the world is all there is.

@@ -1,0 +1,120 @@
+//! Playing a clip: skinning on the GPU, into the vertex buffers that a [`Deformer`] fills while nothing plays.
+
+use cagework_core::skin::{Skin, skin_vertices};
+use glam::{Mat4, Vec3};
+
+use crate::buffers::Allocator;
+use crate::deform::Deformer;
+use crate::device::GpuContext;
+use crate::error::GpuError;
+use crate::kernels;
+use crate::layout::Work;
+use crate::pipelines::Launch;
+
+/// A model that plays. Where the device only draws, the processor skins.
+#[derive(Debug)]
+pub struct Skinner {
+    skin: Skin,
+    palette: Vec<Mat4>,
+    targets: Vec<f32>,
+    kernel: Option<OnGpu>,
+}
+
+#[derive(Debug)]
+struct OnGpu {
+    palette: wgpu::Buffer,
+    targets: wgpu::Buffer,
+    launch: Launch,
+    groups: [u32; 2],
+}
+
+/// A skin as the kernel reads it; floats beside integers as their bits.
+#[derive(Debug)]
+pub struct SkinTables {
+    /// `[n_vertices]`
+    pub rest: Vec<[f32; 4]>,
+    /// Where influences and deltas begin. `[n_vertices + 1]`
+    pub starts: Vec<[u32; 2]>,
+    /// Matrix and weight.
+    pub influences: Vec<[u32; 2]>,
+    /// Target and what it adds.
+    pub deltas: Vec<[u32; 4]>,
+}
+
+impl SkinTables {
+    /// The tables of a skin.
+    #[must_use]
+    pub fn new(skin: &Skin) -> Self {
+        let starts = skin.joint_starts.iter().zip(&skin.delta_starts);
+        let delta = |&(t, d): &(u32, Vec3)| [t, d.x.to_bits(), d.y.to_bits(), d.z.to_bits()];
+        Self {
+            rest: skin.positions.iter().map(|p| p.extend(1.0).to_array()).collect(),
+            starts: starts.map(|(&joints, &deltas)| [joints, deltas]).collect(),
+            influences: skin.joints.iter().map(|&(joint, weight)| [joint, weight.to_bits()]).collect(),
+            deltas: skin.deltas.iter().map(delta).collect(),
+        }
+    }
+}
+
+impl Skinner {
+    /// `deformer` whose buffers it fills, if there is one.
+    ///
+    /// # Errors
+    /// As [`Allocator::zeros`] and [`Allocator::settle`].
+    pub(crate) async fn new(
+        context: &GpuContext,
+        skin: Skin,
+        deformer: Option<&Deformer>,
+    ) -> Result<Self, GpuError> {
+        let n_palette = skin.joints.iter().map(|(joint, _)| joint + 1).max().unwrap_or(1);
+        let n_targets = skin.deltas.iter().map(|(target, _)| target + 1).max().unwrap_or(1);
+        let (palette, targets) = (vec![Mat4::IDENTITY; n_palette as usize], vec![0.0; n_targets as usize]);
+        let mut skinner = Self { skin, palette, targets, kernel: None };
+        let Some(deformer) = deformer else { return Ok(skinner) };
+        let skin = &skinner.skin;
+        let mut allocator = Allocator::new(context, "the skin");
+        let tables = SkinTables::new(skin);
+        let rest = allocator.table("vertices to skin", &tables.rest)?;
+        let starts = allocator.table("starts of influences", &tables.starts)?;
+        let influences = allocator.table("influences", &tables.influences)?;
+        let deltas = allocator.table("deltas of morph targets", &tables.deltas)?;
+        let palette = allocator.storage("joints", u64::from(n_palette) * size_of::<Mat4>() as u64)?;
+        let targets = allocator.storage("weights of morph targets", u64::from(n_targets) * 4)?;
+        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let work = allocator.zeros("work parameters", size_of::<Work>() as u64, usage)?;
+        let buffers = [&rest, &starts, &influences, &deltas, &palette, &targets, deformer.positions()];
+        let launch = context.pipelines.launch(&context.device, &kernels::SKIN_VERTICES, &work, &buffers);
+        let count = skin.positions.len() as u32;
+        let (groups, stride) = launch.groups(count);
+        let of_work = Work { count, stride, ..Work::default() };
+        context.queue.write_buffer(&work, 0, bytemuck::bytes_of(&of_work));
+        allocator.settle().await?;
+        skinner.kernel = Some(OnGpu { palette, targets, launch, groups });
+        Ok(skinner)
+    }
+
+    /// Takes matrices and weights of targets; what is missing stays as it was.
+    pub(crate) fn pose(&mut self, context: &GpuContext, palette: &[Mat4], targets: &[f32]) {
+        self.palette.iter_mut().zip(palette).for_each(|(to, from)| *to = *from);
+        self.targets.iter_mut().zip(targets).for_each(|(to, from)| *to = *from);
+        if let Some(kernel) = &self.kernel {
+            let matrices: Vec<[f32; 16]> = self.palette.iter().map(Mat4::to_cols_array).collect();
+            context.queue.write_buffer(&kernel.palette, 0, bytemuck::cast_slice(&matrices));
+            context.queue.write_buffer(&kernel.targets, 0, bytemuck::cast_slice(&self.targets));
+        }
+    }
+
+    /// Records the skinning, without normals.
+    pub(crate) fn encode(&self, pass: &mut wgpu::ComputePass<'_>) {
+        if let Some(OnGpu { launch, groups, .. }) = &self.kernel {
+            pass.set_pipeline(&launch.pipeline);
+            pass.set_bind_group(0, &launch.bind_group, &[0]);
+            pass.dispatch_workgroups(groups[0], groups[1], 1);
+        }
+    }
+
+    /// Where the vertices are, by the processor.
+    pub(crate) fn positions(&self) -> Vec<Vec3> {
+        skin_vertices(&self.skin, &self.palette, &self.targets)
+    }
+}

@@ -1,0 +1,130 @@
+/** Clips of a rigged model: what plays is the model as it would be exported. */
+
+import type { RigOptions } from "../contract";
+import type { ClipState } from "../state";
+import { T } from "../words";
+import { attempt, type Context } from "./context";
+
+export interface ClipActions {
+  /** Shows a clip, by its number; null for the rest pose. */
+  choose(clip: number | null): Promise<void>;
+  toggle(): Promise<void>;
+  /** Goes to a time, seconds, and stays there. */
+  scrub(seconds: number): Promise<void>;
+  speed(factor: number): void;
+  loop(on: boolean): void;
+  /** Weight of a morph target that no clip drives. */
+  target(index: number, weight: number): Promise<void>;
+  rig(patch: Partial<RigOptions>): void;
+  /** The cage poses the model again. */
+  stop(): void;
+}
+
+export function createClips(ctx: Context, settle: () => void): ClipActions {
+  const { store } = ctx;
+  const engine = () => ctx.session().engine;
+  let frame = 0;
+  let last = 0;
+
+  const set = (patch: Partial<ClipState>) => store.set({ clip: { ...store.get().clip, ...patch } });
+
+  const show = () => {
+    const { clip, seconds, targets } = store.get().clip;
+    engine().showClip(clip ?? undefined, seconds, Float32Array.from(targets));
+  };
+
+  const pause = () => {
+    cancelAnimationFrame(frame);
+    if (store.get().clip.playing) set({ playing: false });
+  };
+
+  const stop = () => {
+    pause();
+    if (engine().showsClip) engine().stopClip();
+    if (store.get().clip.clip !== null || store.get().clip.targets.length > 0)
+      set({ clip: null, seconds: 0, targets: [] });
+  };
+
+  /** The model as it is posed now, ready to be played; false if it cannot be. */
+  const ready = async (): Promise<boolean> => {
+    if (engine().showsClip) return true;
+    settle();
+    const { bound, rigOptions } = store.get();
+    if (!bound) {
+      ctx.tell.say(T.clips.bindFirst);
+      return false;
+    }
+    return attempt(ctx, T.failed.clip, () => engine().startClip(rigOptions));
+  };
+
+  const step = (now: number) => {
+    const { clip, seconds, speed, loop } = store.get().clip;
+    const length = store.get().model?.clips[clip ?? -1]?.seconds ?? 0;
+    // Another pose of the cage has ended it.
+    if (!engine().showsClip || length <= 0) {
+      stop();
+      return;
+    }
+    const next = seconds + ((now - last) / 1000) * speed;
+    last = now;
+    if (next >= length && !loop) {
+      set({ seconds: length });
+      show();
+      pause();
+      return;
+    }
+    set({ seconds: next % length });
+    show();
+    frame = requestAnimationFrame(step);
+  };
+
+  const play = async () => {
+    const first = store.get().model?.clips.length ? 0 : null;
+    const clip = store.get().clip.clip ?? first;
+    if (clip === null || !(await ready())) return;
+    const length = store.get().model?.clips[clip]?.seconds ?? 0;
+    const { seconds } = store.get().clip;
+    set({ clip, seconds: seconds >= length ? 0 : seconds, playing: true });
+    last = performance.now();
+    frame = requestAnimationFrame(step);
+  };
+
+  return {
+    async choose(clip) {
+      pause();
+      if (clip === null) {
+        stop();
+        return;
+      }
+      if (!(await ready())) return;
+      set({ clip, seconds: 0 });
+      show();
+      if (!matchMedia("(prefers-reduced-motion: reduce)").matches) await play();
+    },
+    async toggle() {
+      if (store.get().clip.playing) pause();
+      else await play();
+    },
+    async scrub(seconds) {
+      pause();
+      if (store.get().clip.clip === null || !(await ready())) return;
+      set({ seconds });
+      show();
+    },
+    speed: (speed) => set({ speed }),
+    loop: (loop) => set({ loop }),
+    async target(index, weight) {
+      if (!(await ready())) return;
+      const defaults = store.get().model?.targets.map((target) => target.default) ?? [];
+      const targets = [...(store.get().clip.targets.length > 0 ? store.get().clip.targets : defaults)];
+      targets[index] = weight;
+      set({ targets });
+      show();
+    },
+    rig(patch) {
+      stop();
+      store.set({ rigOptions: { ...store.get().rigOptions, ...patch } });
+    },
+    stop,
+  };
+}

@@ -1,0 +1,125 @@
+/** Clips and morph targets of a rigged model, and what becomes of its skeleton. */
+
+import type { App } from "../app";
+import { duration, percent } from "../format";
+import { T } from "../words";
+import { Fold, IconButton, Segments, Slider, Toggle } from "./controls";
+
+const SPEEDS = ["0.25", "0.5", "1"] as const;
+
+export function Clips({ app }: { app: App }) {
+  const { model, clip, bound } = app.store.get();
+  if (!model) return null;
+  const { clips } = model;
+  const length = clips[clip.clip ?? -1]?.seconds ?? 0;
+  return (
+    <div class="stack">
+      {clips.length > 0 && (
+        <label class="stack tight">
+          <span>{T.clips.clip}</span>
+          <select
+            value={clip.clip ?? ""}
+            disabled={!bound}
+            onChange={({ currentTarget: { value } }) =>
+              void app.clips.choose(value === "" ? null : Number(value))
+            }
+          >
+            <option value="">{T.clips.rest}</option>
+            {clips.map(({ name, seconds }, k) => (
+              // biome-ignore lint/suspicious/noArrayIndexKey: clips have no other identity, and never change places
+              <option key={k} value={k}>
+                {T.clips.named(name, k, duration(1000 * seconds))}
+              </option>
+            ))}
+          </select>
+        </label>
+      )}
+      {clip.clip !== null && (
+        <div class="row">
+          <IconButton
+            icon={clip.playing ? "pause" : "play"}
+            label={clip.playing ? T.clips.pause : T.clips.play}
+            tip={`${clip.playing ? T.clips.pause : T.clips.play} (${app.key("playClip")})`}
+            onClick={() => void app.clips.toggle()}
+          />
+          <div class="grow">
+            <Slider
+              label={T.clips.time}
+              min={0}
+              max={length}
+              step={length / 200}
+              format={(seconds) => T.clips.seconds(seconds)}
+              value={clip.seconds}
+              onInput={(seconds) => void app.clips.scrub(seconds)}
+            />
+          </div>
+        </div>
+      )}
+      {clip.clip !== null && (
+        <Segments
+          label={T.clips.speed}
+          choices={SPEEDS.map((value) => ({ value, label: percent(Number(value)) }))}
+          value={String(clip.speed)}
+          onChange={(value) => app.clips.speed(Number(value))}
+        />
+      )}
+      {clip.clip !== null && (
+        <Toggle label={T.clips.loop} on={clip.loop} onChange={(on) => app.clips.loop(on)} />
+      )}
+      {model.targets.length > 0 && (
+        <Fold title={T.clips.targets(model.targets.length)}>
+          <div class="stack">
+            {model.targets.map(({ name, default: atRest }, k) => (
+              <Slider
+                // biome-ignore lint/suspicious/noArrayIndexKey: names may repeat, and never change places
+                key={k}
+                label={name}
+                min={0}
+                max={1}
+                step={0.01}
+                format={percent}
+                value={clip.targets[k] ?? atRest}
+                onInput={(weight) => void app.clips.target(k, weight)}
+              />
+            ))}
+          </div>
+        </Fold>
+      )}
+      {model.rigged && <RigChoices app={app} />}
+    </div>
+  );
+}
+
+export function RigChoices({ app }: { app: App }) {
+  const { rigOptions, model } = app.store.get();
+  if (!model?.joints) return null;
+  const { joints, keep_travel } = rigOptions;
+  return (
+    <>
+      <Toggle
+        label={T.clips.follow}
+        sentence={T.clips.followSentence}
+        on={joints !== "stay"}
+        onChange={(on) => app.clips.rig({ joints: on ? "follow" : "stay" })}
+      />
+      {joints !== "stay" && (
+        <Fold title={T.clips.advanced}>
+          <div class="stack">
+            <Toggle
+              label={T.clips.turn}
+              sentence={T.clips.turnSentence}
+              on={joints === "turn"}
+              onChange={(on) => app.clips.rig({ joints: on ? "turn" : "follow" })}
+            />
+            <Toggle
+              label={T.clips.travel}
+              sentence={T.clips.travelSentence}
+              on={keep_travel}
+              onChange={(on) => app.clips.rig({ keep_travel: on })}
+            />
+          </div>
+        </Fold>
+      )}
+    </>
+  );
+}

@@ -1,0 +1,115 @@
+import { afterEach, beforeEach, expect, it, vi } from "vitest";
+import { createClips } from "../../src/actions/clips";
+import { createFake, MODEL, settled } from "../fake";
+
+const frames: ((now: number) => void)[] = [];
+
+beforeEach(() => {
+  frames.length = 0;
+  vi.stubGlobal("requestAnimationFrame", (run: (now: number) => void) => frames.push(run));
+  vi.stubGlobal("cancelAnimationFrame", () => frames.splice(0));
+  vi.stubGlobal("matchMedia", () => ({ matches: false }));
+  vi.spyOn(performance, "now").mockReturnValue(1000);
+});
+afterEach(() => {
+  vi.unstubAllGlobals();
+  vi.restoreAllMocks();
+});
+
+/** A bound model with a clip of two seconds and two morph targets. */
+function page() {
+  const fake = createFake();
+  const shown: [clip: number | undefined, seconds: number, targets: number[]][] = [];
+  let starts = 0;
+  fake.teach({
+    showsClip: false,
+    startClip: () => {
+      fake.teach({ showsClip: true });
+      starts += 1;
+      return Promise.resolve();
+    },
+    stopClip: () => fake.teach({ showsClip: false }),
+    showClip: (clip, seconds, targets) => {
+      shown.push([clip ?? undefined, seconds, [...targets]]);
+    },
+  });
+  const targets = [
+    { name: "wide", default: 0.25 },
+    { name: "tall", default: 0 },
+  ];
+  fake.store.set({
+    bound: true,
+    model: { ...MODEL, rigged: true, clips: [{ name: "Walk", seconds: 2 }], targets },
+  });
+  const clips = createClips(fake.ctx, () => undefined);
+  /** The next frame, at a time, ms. */
+  const frame = (now: number) => frames.shift()?.(now);
+  return { ...fake, clips, shown, frame, starts: () => starts, end: () => fake.teach({ showsClip: false }) };
+}
+
+it("a clip that is chosen plays, again and again, and pauses where it is", async () => {
+  const { clips, shown, frame, store, starts } = page();
+  await clips.choose(0);
+  frame(1500);
+  frame(3250);
+  expect(shown.map(([clip, seconds]) => [clip, seconds])).toEqual([
+    [0, 0],
+    [0, 0.5],
+    [0, 0.25],
+  ]);
+  await clips.toggle();
+  expect([store.get().clip.playing, frames.length, starts()]).toEqual([false, 0, 1]);
+  await clips.scrub(1.5);
+  expect(shown.at(-1)).toEqual([0, 1.5, []]);
+});
+
+it("once through it stays at the end, and half the speed takes twice the time", async () => {
+  const { clips, shown, frame, store } = page();
+  clips.loop(false);
+  clips.speed(0.5);
+  await clips.choose(0);
+  frame(3000);
+  expect(shown.at(-1)?.[1]).toBe(1);
+  frame(9000);
+  expect([shown.at(-1)?.[1], store.get().clip.playing]).toEqual([2, false]);
+});
+
+it("who wants no motion gets the clip paused", async () => {
+  vi.stubGlobal("matchMedia", () => ({ matches: true }));
+  const { clips, shown, store } = page();
+  await clips.choose(0);
+  expect([shown.length, store.get().clip.playing]).toEqual([1, false]);
+});
+
+it("a morph target changes beside the others' defaults", async () => {
+  const { clips, shown } = page();
+  await clips.target(1, 0.8);
+  expect(shown.at(-1)).toEqual([undefined, 0, [0.25, expect.closeTo(0.8)]]);
+});
+
+it("another pose of the cage ends it", async () => {
+  const { clips, frame, store, end } = page();
+  await clips.choose(0);
+  end();
+  frame(1100);
+  expect(store.get().clip).toMatchObject({ clip: null, playing: false, seconds: 0 });
+});
+
+it("before a bind it says what to do; what cannot be played is told", async () => {
+  const { clips, store, said, problems, teach } = page();
+  store.set({ bound: false });
+  await clips.choose(0);
+  expect(said[0]).toContain("Bind the model first");
+  store.set({ bound: true });
+  teach({ startClip: () => Promise.reject(new Error("no room")) });
+  await clips.choose(0);
+  await settled();
+  expect(problems).toMatchObject([{ title: "The clip cannot be played" }]);
+});
+
+it("another choice for the joints shows the cage's pose again", async () => {
+  const { clips, store } = page();
+  await clips.choose(0);
+  clips.rig({ joints: "stay" });
+  expect([store.get().clip.clip, store.get().rigOptions.joints]).toEqual([null, "stay"]);
+});
