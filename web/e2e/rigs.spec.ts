@@ -1,0 +1,81 @@
+/** A rigged model is shaped, plays its clip, and leaves with both. */
+
+import type { Page } from "@playwright/test";
+import { validationErrors } from "./models";
+import {
+  bound,
+  cagePositions,
+  download,
+  drop,
+  expect,
+  grip,
+  largestMove,
+  open,
+  pull,
+  rested,
+  shoot,
+  test,
+} from "./support";
+
+const TIMES = [0, 0.6, 1.3];
+
+/** Where the vertices are at times of the clip. */
+async function played(page: Page): Promise<number[][]> {
+  return page.evaluate(async (times) => {
+    const session = globalThis.cagework;
+    if (!session) throw new Error("no session");
+    await session.engine.startClip({ joints: "follow", keep_travel: false, plain: false });
+    const at = times.map((time) => {
+      session.engine.showClip(0, time, new Float32Array());
+      return [...session.engine.clipPositions()];
+    });
+    session.engine.stopClip();
+    return at;
+  }, TIMES);
+}
+
+test("a visit that shapes somebody who walks", async ({ page }) => {
+  await open(page);
+  await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  await page.getByRole("button", { name: /Legs close together/ }).click();
+  await expect(page).toHaveTitle(/Legs close together/);
+  await bound(page);
+  const rest = await played(page);
+
+  await test.step("the clip is chosen, plays, and pauses where it is put", async () => {
+    await page.getByRole("button", { name: "Pose", exact: false }).first().click();
+    await page.getByRole("combobox", { name: "Clip" }).selectOption("0");
+    await expect(page.getByRole("button", { name: "Pause the clip" })).toBeVisible();
+    await shoot(page, "clip");
+    await page.keyboard.press("Shift+J");
+    await expect(page.getByRole("button", { name: "Play the clip" })).toBeVisible();
+    await page.getByRole("slider", { name: "Time" }).fill("0.6");
+    const at = await page.evaluate(() => [...(globalThis.cagework?.engine.clipPositions() ?? [])]);
+    expect(largestMove(at, rest[1] ?? [])).toBeLessThan(1e-5);
+    expect(largestMove(at, rest[0] ?? []), "the legs swing").toBeGreaterThan(0.1);
+  });
+
+  await test.step("taking hold of the model goes back to the pose", async () => {
+    await page.getByRole("combobox", { name: "Clip" }).selectOption("");
+    const before = await cagePositions(page);
+    const at = await grip(page, [0.5, 0.2]);
+    await pull(page, at, 0, -50);
+    await rested(page);
+    expect(largestMove(before, await cagePositions(page))).toBeGreaterThan(0.01);
+    await expect(page.getByRole("combobox", { name: "Clip" })).toHaveValue("");
+  });
+
+  await test.step("what is exported plays as it did here", async () => {
+    const shaped = await played(page);
+    expect(largestMove(shaped[1] ?? [], rest[1] ?? []), "the shape is in it").toBeGreaterThan(0.01);
+    const file = await download(page, "glb");
+    expect(await validationErrors(file.bytes)).toEqual([]);
+    await drop(page, [file]);
+    await bound(page);
+    await page.getByRole("button", { name: "Model", exact: false }).first().click();
+    await expect(page.getByText("16 joints, 1 clip")).toBeVisible();
+    const again = await played(page);
+    for (const [k, time] of TIMES.entries())
+      expect(largestMove(shaped[k] ?? [], again[k] ?? []), `at ${time} s`).toBeLessThan(2e-5);
+  });
+});
