@@ -45,6 +45,25 @@ test("opens bound, follows a handle, shows colours, exports, and survives a lost
     await exportsWhatIsShown(page, "webgl-export");
     await exportsAPicture(page);
   });
+  await test.step("a clip plays", async () => {
+    await page.getByRole("button", { name: "Model", exact: false }).first().click();
+    await page.getByRole("button", { name: /Legs close together/ }).click();
+    await bound(page);
+    const pictures = await page.evaluate(async () => {
+      const session = globalThis.cagework;
+      if (!session) throw new Error("no session");
+      await session.engine.startClip({ joints: "follow", keep_travel: false, plain: false });
+      const all: string[] = [];
+      for (const seconds of [0.5, 1.5, 0.5]) {
+        session.engine.showClip(0, seconds, new Float32Array());
+        all.push(new Uint8Array(await (await session.picture(160, 120, true)).arrayBuffer()).join());
+      }
+      session.engine.stopClip();
+      return all;
+    });
+    expect(pictures[0], "the same time looks the same").toBe(pictures[2]);
+    expect(pictures[0], "another one does not").not.toBe(pictures[1]);
+  });
   await test.step("a lost context comes back with model and pose", async () => {
     // As the browser takes it away: the canvas's own context, not the page's way to give it up.
     await survives(page, () =>

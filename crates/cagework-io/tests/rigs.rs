@@ -213,3 +213,95 @@ fn cage_of_a_model_encloses_targets_and_a_clip() {
     let message = model.states(Some("run")).unwrap_err().to_string();
     assert_eq!(message, "there is no clip 'run'; the model has walk");
 }
+
+/// Offsets of VRM 0, whose z is turned round, and VRM 1: they stay on the same flesh.
+#[test]
+fn offsets_of_a_vrm_move_with_the_shape() {
+    let mut rig = rigged();
+    let offset = [0.1, 0.2, 0.05];
+    rig.json["extensionsUsed"] = serde_json::json!(["VRM", "VRMC_vrm", "VRMC_springBone"]);
+    rig.json["extensions"] = serde_json::json!({
+        "VRM": {
+            "firstPerson": { "firstPersonBone": 3, "firstPersonBoneOffset": { "x": 0.1, "y": 0.2, "z": -0.05 } },
+            "secondaryAnimation": {
+                "colliderGroups": [{ "node": 2, "colliders": [{ "offset": { "x": 0.1, "y": 0.2, "z": -0.05 }, "radius": 0.1 }] }],
+                "boneGroups": [{ "bones": [3], "hitRadius": 0.02 }],
+            },
+        },
+        "VRMC_vrm": {
+            "humanoid": { "humanBones": { "head": { "node": 3 } } },
+            "lookAt": { "offsetFromHeadBone": offset },
+        },
+        "VRMC_springBone": {
+            "colliders": [{ "node": 2, "shape": { "capsule": { "offset": offset, "tail": [0.0, 0.4, 0.0], "radius": 0.1 } } }],
+            "springs": [{ "joints": [{ "node": 3, "hitRadius": 0.02 }] }],
+        },
+    });
+    let model = read(&rig.glb());
+    let json = json_of(&reshaped(&model, Joints::Follow).0)["extensions"].clone();
+    let number = |v: &serde_json::Value| v.as_f64().unwrap() as f32;
+    let array = |v: &serde_json::Value| vec3(number(&v[0]), number(&v[1]), number(&v[2]));
+    let object = |v: &serde_json::Value| vec3(number(&v["x"]), number(&v["y"]), -number(&v["z"]));
+    // Joints are one and two up; the armature doubles and nothing turns.
+    let expected = |y: f32, offset: Vec3| {
+        let joint = vec3(0.0, y, 0.0);
+        (f(joint + 2.0 * offset) - f(joint)) / 2.0
+    };
+    let offset = Vec3::from_array(offset);
+    let springs = &json["VRM"]["secondaryAnimation"]["colliderGroups"][0]["colliders"][0];
+    let capsule = &json["VRMC_springBone"]["colliders"][0]["shape"]["capsule"];
+    for (what, found, expected) in [
+        ("first person", object(&json["VRM"]["firstPerson"]["firstPersonBoneOffset"]), expected(2.0, offset)),
+        ("collider of VRM 0", object(&springs["offset"]), expected(1.0, offset)),
+        ("look at", array(&json["VRMC_vrm"]["lookAt"]["offsetFromHeadBone"]), expected(2.0, offset)),
+        ("capsule", array(&capsule["offset"]), expected(1.0, offset)),
+        ("its tail", array(&capsule["tail"]), expected(1.0, vec3(0.0, 0.4, 0.0))),
+    ] {
+        assert!(found.distance(expected) <= ROUNDED, "{what}: {found} instead of {expected}");
+    }
+    // `f` grows y by 1.2, and nothing else at first order but shears, which keep a volume.
+    for (radius, before) in [(&springs["radius"], 0.1), (&capsule["radius"], 0.1)] {
+        assert!((number(radius) / before - 1.2_f32.cbrt()).abs() < 1e-3, "{radius}");
+    }
+}
+
+/// A face with as many targets as some have: the export is a matter of a second or two.
+#[test]
+fn ninety_three_targets_are_exported() {
+    let n = 4_000;
+    let mut rig = common::Builder::new();
+    let at: Vec<[f32; 3]> = (0..n)
+        .map(|k| {
+            let (u, v) = ((k % 63) as f32 / 62.0, (k / 63) as f32 / 63.0);
+            [u, v, 0.2 * (3.0 * u).sin()]
+        })
+        .collect();
+    let indices: Vec<u32> =
+        (0..n as u32 - 64).filter(|k| k % 63 < 62).flat_map(|k| [k, k + 1, k + 63]).collect();
+    let (position, indices) = (rig.vec3(&at), rig.indices(&indices));
+    let normal = rig.vec3(&vec![[0.0, 0.0, 1.0]; n]);
+    let targets: Vec<serde_json::Value> = (0..93)
+        .map(|k| {
+            let delta: Vec<[f32; 3]> =
+                (0..n).map(|v| if v % 93 == k { [0.0, 0.0, 0.1] } else { [0.0; 3] }).collect();
+            serde_json::json!({ "POSITION": rig.vec3(&delta), "NORMAL": rig.vec3(&vec![[0.0; 3]; n]) })
+        })
+        .collect();
+    let attributes = serde_json::json!({ "POSITION": position, "NORMAL": normal });
+    rig.push(
+        "meshes",
+        serde_json::json!({ "primitives": [{ "attributes": attributes, "indices": indices, "targets": targets }] }),
+    );
+    rig.json["nodes"] = serde_json::json!([{ "mesh": 0 }]);
+    let model = read(&rig.glb());
+    assert_eq!(model.extra_points().unwrap().len(), n, "each moved vertex once");
+    let (bytes, report) = reshaped(&model, Joints::Follow);
+    let (before, after) = (player(&model), player(&read(&bytes)));
+    assert_eq!(report.morph_ends, n);
+    for k in [0, 46, 92] {
+        let mut targets = vec![0.0; 93];
+        targets[k] = 1.0;
+        let moved: Vec<Vec3> = shown(&before, None, 0.0, &targets).into_iter().map(f).collect();
+        assert_near(&shown(&after, None, 0.0, &targets), &moved, ROUNDED, "a target");
+    }
+}

@@ -13,6 +13,7 @@ mod evaluate;
 mod outputs;
 mod pull;
 mod render;
+mod rigs;
 mod siblings;
 mod support;
 mod usage;

@@ -12,12 +12,12 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use serde_json::{Value, json};
 
 use crate::common::{
-    Builder, CUBE_OBJ, cube, glb, instanced, json_of, plain_cube, quantized, read, skinned, textured_square,
-    twist,
+    Builder, CUBE_OBJ, cube, glb, instanced, json_of, plain_cube, quantized, read, rigged, skinned,
+    textured_square, twist,
 };
 
 /// Samples that are GLBs come first.
-const N_GLB: usize = 5;
+const N_GLB: usize = 6;
 
 /// All inputs of a seed.
 pub(crate) struct Inputs {
@@ -43,10 +43,8 @@ impl Inputs {
 
 /// What is damaged: small files of every kind, so that every byte has its turn.
 pub(crate) fn samples() -> Vec<Vec<u8>> {
-    let mut samples: Vec<Vec<u8>> = [plain_cube(), textured_square(), instanced(), skinned(), quantized()]
-        .iter()
-        .map(Builder::glb)
-        .collect();
+    let builders = [plain_cube(), textured_square(), instanced(), skinned(), quantized(), rigged()];
+    let mut samples: Vec<Vec<u8>> = builders.iter().map(Builder::glb).collect();
     let model = read("cube.obj", CUBE_OBJ.as_bytes()).expect("it is one");
     let bent: Vec<Vec3> = cube().into_iter().map(twist).collect();
     let weights = Weights::new(5, vec![0, 2, 2, 5], vec![0, 4, 1, 2, 3], vec![0.25, 0.75, 0.5, 0.375, 0.125]);

@@ -8,9 +8,13 @@ use cagework_core::deform::deform_bound;
 use cagework_core::mesh::Bounds;
 use cagework_core::options::{BindOptions, Method, OutsidePolicy, Solver};
 use cagework_core::progress::Silent;
+use cagework_core::skin::skin_vertices;
 use cagework_core::{Binding, Cage, PolygonMesh, bind};
-use cagework_io::{Model, decode_pose, encode_pose, read_project, read_weights_npz, write_weights_npz};
-use glam::Vec3;
+use cagework_io::{
+    Joints, Model, ReshapeOptions, decode_pose, encode_pose, read_project, read_weights_npz,
+    write_weights_npz,
+};
+use glam::{DVec3, Vec3};
 
 use crate::common::{CUBE_OBJ, cube, read, twist};
 use crate::inputs;
@@ -56,6 +60,7 @@ pub(crate) fn survive(bytes: &[u8]) {
     let read = Model::read_within("x", bytes, &mut |name| inputs::beside(&REST.samples, name).map(Ok), LIMIT);
     if let Ok(model) = read {
         as_file(&model);
+        as_rig(&model, choice);
         as_pose(&model);
         as_model(&model, choice);
         as_cage(&model.cage_mesh(), choice);
@@ -72,6 +77,32 @@ fn as_file(model: &Model) {
     if let Ok(glb) = model.write_glb_poses(&model.positions, &[("moved".into(), moved)]) {
         let again = Model::read("y.glb", &glb, &mut |_| None);
         assert!(again.is_ok(), "{}", again.err().map(|e| e.to_string()).unwrap_or_default());
+    }
+}
+
+/// Reshaped with its rig it can be read, and plays.
+fn as_rig(model: &Model, choice: u32) {
+    if let Ok(Some(player)) = model.player() {
+        for clip in 0..player.clips().len().min(2) {
+            let posed = player.at(Some(clip), 0.4, &[]);
+            let _ = skin_vertices(&player.skin, &posed.palette, &posed.targets);
+        }
+    }
+    let _ = model.states(None);
+    let Ok(extra) = model.extra_points() else { return };
+    assert!(extra.iter().all(|p| p.is_finite()));
+    let moved = |p: &Vec3| {
+        let p = p.clamp_length_max(1e6);
+        twist(p).as_dvec3() - p.as_dvec3()
+    };
+    let by: Vec<DVec3> = model.positions.iter().chain(&extra).map(moved).collect();
+    let joints = [Joints::Follow, Joints::Stay, Joints::Turn][choice as usize % 3];
+    let options = ReshapeOptions { joints, ..ReshapeOptions::default() };
+    let poses = if choice & 8 == 0 { vec![] } else { vec![("moved".to_owned(), by.clone())] };
+    if let Ok((glb, _)) = model.write_reshaped(&by, &[choice % 7], &poses, &options) {
+        let again = Model::read("z.glb", &glb, &mut |_| None);
+        assert!(again.is_ok(), "{}", again.err().map(|e| e.to_string()).unwrap_or_default());
+        let _ = model.player_of(&glb);
     }
 }
 

@@ -146,6 +146,12 @@ impl<'a> Rig<'a> {
             rig.spots[k].point = rig.n_vertices + rig.extras.len();
             rig.anchor(rig.spots[k].at);
         }
+        // Nothing can be bound that is no number: such a point stays where it is.
+        for point in &mut rig.extras {
+            if !point.as_vec3().is_finite() {
+                *point = DVec3::ZERO;
+            }
+        }
         Ok(rig)
     }
 
@@ -249,7 +255,7 @@ impl<'a> Rig<'a> {
         }
         let rest = part.rest();
         if slot.is_none() {
-            self.extras.extend(rest.iter().map(|&p| if p.is_finite() { p } else { DVec3::ZERO }));
+            self.extras.extend(&rest);
         }
         for target in &mut part.targets {
             for (end, at) in target.ends.iter_mut().zip([0.0, 1.0]) {

@@ -125,8 +125,8 @@ impl Rig<'_> {
 
         let mut shape = Shape { positions, normals: None, tangents: None, targets, condition, n_singular };
         if let Some(directions) = Directions::of(self, part)? {
-            let turn = |state: &State, at: &dyn Fn(usize, usize) -> DVec3| {
-                let gradients = surface.gradients(&state.from, &state.to);
+            let at_base = surface.gradients(&base.from, &base.to);
+            let turn = |gradients: &[Option<DMat3>], at: &dyn Fn(usize, usize) -> DVec3| {
                 (0..n)
                     .map(|v| {
                         let known = gradients[v].or((!is_framed(v)).then_some(DMat3::IDENTITY));
@@ -145,7 +145,7 @@ impl Rig<'_> {
             };
             directions.turned(part, &mut shape, |target| {
                 let Some((k, end, share)) = target else {
-                    return turn(&base, &|kind, v| directions.at_rest(part, kind, v));
+                    return turn(&at_base, &|kind, v| directions.at_rest(part, kind, v));
                 };
                 let of = &part.targets[k];
                 let mut state = State { from: base.from.clone(), to: base.to.clone() };
@@ -156,7 +156,8 @@ impl Rig<'_> {
                         state.to[v] = state.from[v] + by[first + i];
                     }
                 }
-                turn(&state, &|kind, v| {
+                let near = surface.gradients_near(&state.from, &state.to, &of.moved, &at_base);
+                turn(&near, &|kind, v| {
                     directions.at_rest(part, kind, v) + share * directions.added(k, kind, v)
                 })
             });
@@ -224,13 +225,18 @@ impl Directions {
         shape: &mut Shape,
         turn: impl Fn(Option<(usize, usize, f64)>) -> Vec<[DVec3; 2]>,
     ) {
-        let mut base = turn(None);
+        let at_rest = turn(None);
+        let mut base = at_rest.clone();
         for (k, of) in self.of_targets.iter().enumerate() {
             if of.iter().all(Option::is_none) {
                 continue;
             }
             let default = part.targets[k].default;
-            let [off, on] = [0, 1].map(|end| turn(Some((k, end, end as f64 - default))));
+            // A target that is at rest in one of its ends is what the base is there.
+            let [off, on] = [0, 1].map(|end| {
+                let share = end as f64 - default;
+                if share == 0.0 { at_rest.clone() } else { turn(Some((k, end, share))) }
+            });
             for kind in [0, 1] {
                 if of[kind].is_none() {
                     continue;

@@ -26,11 +26,42 @@ impl Surface {
     /// Gradient at each vertex of the map from `from` to `to`: least squares over the edges, and the unit normal goes to the
     /// unit normal. None where nothing near the vertex has moved. `[n]`
     pub(super) fn gradients(&self, from: &[DVec3], to: &[DVec3]) -> Vec<Option<DMat3>> {
+        self.gradients_where(from, to, &vec![true; self.n_unique], &[])
+    }
+
+    /// The same for another state in which only the vertices `changed` are elsewhere than in the one of `others`, its gradients.
+    pub(super) fn gradients_near(
+        &self,
+        from: &[DVec3],
+        to: &[DVec3],
+        changed: &[u32],
+        others: &[Option<DMat3>],
+    ) -> Vec<Option<DMat3>> {
+        let mut has_changed = vec![false; self.n_unique];
+        changed.iter().for_each(|&v| has_changed[self.unique_of[v as usize] as usize] = true);
+        let mut is_near = has_changed.clone();
+        let unique = |v: &u32| self.unique_of[*v as usize] as usize;
+        for triangle in self.triangles.iter().filter(|t| t.iter().any(|v| has_changed[unique(v)])) {
+            triangle.iter().for_each(|v| is_near[unique(v)] = true);
+        }
+        self.gradients_where(from, to, &is_near, others)
+    }
+
+    fn gradients_where(
+        &self,
+        from: &[DVec3],
+        to: &[DVec3],
+        is_wanted: &[bool],
+        others: &[Option<DMat3>],
+    ) -> Vec<Option<DMat3>> {
         let mut normals = vec![[DVec3::ZERO; 2]; self.n_unique];
         let mut sums = vec![(DMat3::ZERO, DMat3::ZERO, 0.0_f64); self.n_unique];
         let mut moved = vec![false; self.n_unique];
         for triangle in &self.triangles {
             let corners = triangle.map(|v| v as usize);
+            if !corners.iter().any(|&v| is_wanted[self.unique_of[v] as usize]) {
+                continue;
+            }
             let [p, q] = [from, to].map(|at| corners.map(|v| at[v]));
             let areas = [p, q].map(|[a, b, c]| (b - a).cross(c - a));
             let has_moved = corners.iter().any(|&v| from[v] != to[v]);
@@ -51,6 +82,9 @@ impl Surface {
         }
         let gradients: Vec<Option<DMat3>> = (0..self.n_unique)
             .map(|v| {
+                if !is_wanted[v] {
+                    return None;
+                }
                 let (both, one, length) = sums[v];
                 let [n, m] = normals[v].map(DVec3::normalize_or_zero);
                 let scale = 1.0 / length.max(1e-30);
@@ -59,7 +93,11 @@ impl Surface {
                 moved[v].then_some(if gradient.determinant() > FLAT { gradient } else { DMat3::IDENTITY })
             })
             .collect();
-        self.unique_of.iter().map(|&v| gradients[v as usize]).collect()
+        let of = |(v, &unique): (usize, &u32)| {
+            let unique = unique as usize;
+            if is_wanted[unique] { gradients[unique] } else { others[v] }
+        };
+        self.unique_of.iter().enumerate().map(of).collect()
     }
 
     /// Mean of a value over the neighbours of each vertex where `is_known`, for those where it is not.

@@ -1,0 +1,79 @@
+//! A rigged model through the commands: the humanoid, who walks.
+
+use cagework_core::samples;
+use cagework_io::{Model, write_mesh_glb};
+use predicates::str::contains;
+
+use crate::support::Sandbox;
+
+/// The humanoid and a cage of it, bound, and the cage with everything above the hips wider.
+fn bound() -> Sandbox {
+    let sandbox = Sandbox::new();
+    let sample = samples::build("humanoid").unwrap();
+    let glb = write_mesh_glb("humanoid", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap();
+    sandbox.write("humanoid.glb", &glb);
+    sandbox.run("cage humanoid.glb -o cage.obj").success();
+    sandbox.run("bind humanoid.glb --cage cage.obj -g 24 --weights w.npz").success();
+    let wider = |line: &str| {
+        let Some(xyz) = line.strip_prefix("v ") else { return line.to_owned() };
+        let [x, y, z] = [0, 1, 2].map(|k| xyz.split(' ').nth(k).unwrap().parse::<f64>().unwrap());
+        format!("v {} {y} {z}", if y > 1.0 { 1.3 * x } else { x })
+    };
+    let cage = String::from_utf8(sandbox.read("cage.obj")).unwrap();
+    sandbox.write("wide.obj", cage.lines().map(wider).collect::<Vec<_>>().join("\n"));
+    sandbox
+}
+
+const DEFORM: &str = "deform humanoid.glb --cage cage.obj --weights w.npz";
+
+#[test]
+fn a_rigged_model_keeps_its_rig_and_an_unmoved_one_its_bytes() {
+    let sandbox = bound();
+    let info = sandbox.json("info humanoid.glb --json");
+    assert_eq!((&info["joints"], &info["clips"][0]["name"]), (&16.into(), &"Walk".into()));
+    assert_eq!(info["clips"][0]["seconds"], 2.0);
+
+    sandbox.run(&format!("{DEFORM} --pose cage.obj -o same.glb")).success();
+    assert!(sandbox.read("same.glb") == sandbox.read("humanoid.glb"));
+
+    let done = sandbox.json(&format!("{DEFORM} --pose wide.obj -o wide.vrm --json"));
+    assert_eq!(done["joints"], 16);
+    assert!(done["joints_moved"].as_u64().unwrap() >= 6, "{done}");
+    assert!(done["tracks"].as_u64().unwrap() <= 1, "rotations stay: {done}");
+    let wide = sandbox.read("wide.vrm");
+    let read = |bytes: &[u8]| Model::read("model.glb", bytes, &mut |_| None).unwrap();
+    assert_eq!((read(&wide).counts.skins, read(&wide).clips().len()), (1, 1));
+
+    let stay = sandbox.json(&format!("{DEFORM} --pose wide.obj --joints stay -o stay.glb --json"));
+    assert_eq!((&stay["joints_moved"], &stay["tracks"]), (&0.into(), &0.into()));
+    let plain = sandbox.json(&format!("{DEFORM} --pose wide.obj --static -o plain.glb --json"));
+    assert!(plain.get("joints").is_none());
+    // At rest all three are the same shape.
+    let shapes = [wide, sandbox.read("stay.glb"), sandbox.read("plain.glb")].map(|bytes| read(&bytes));
+    for other in &shapes[1..] {
+        let pairs = shapes[0].positions.iter().zip(&other.positions);
+        let off = pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+        assert!(off < 2e-6, "{off:e}");
+    }
+}
+
+#[test]
+fn what_a_rig_needs_is_said() {
+    let sandbox = bound();
+    sandbox.run(&format!("{DEFORM} --pose wide.obj --rigid hat -o out.glb")).failure().stderr(contains(
+        "there is no node 'hat' below a joint to keep rigid: see the names with cagework info",
+    ));
+    sandbox
+        .run("cage humanoid.glb --around-clip Run -o run.obj")
+        .failure()
+        .stderr(contains("there is no clip 'Run'; the model has Walk"));
+    sandbox.run("cage humanoid.glb --around-clip Walk -o walk.obj").success();
+    // Weights of the shape alone.
+    sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
+    sandbox.run("bind shape.obj --cage cage.obj -g 24 --weights w.npz").success();
+    sandbox
+        .run(&format!("{DEFORM} --pose wide.obj -o out.glb"))
+        .failure()
+        .stderr(contains("the weights have 0 points of the model's rig, but it has 112"));
+    sandbox.run(&format!("{DEFORM} --pose wide.obj --static -o out.glb")).success();
+}
