@@ -1,10 +1,9 @@
-//! Playing a clip: skinning on the GPU, into the vertex buffers that a [`Deformer`] fills while nothing plays.
+//! Playing a clip: skinning on the GPU, into the vertex buffer that [`crate::Deformer`] fills while nothing plays.
 
 use cagework_core::skin::{Skin, skin_vertices};
 use glam::{Mat4, Vec3};
 
 use crate::buffers::Allocator;
-use crate::deform::Deformer;
 use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::kernels;
@@ -57,20 +56,20 @@ impl SkinTables {
 }
 
 impl Skinner {
-    /// `deformer` whose buffers it fills, if there is one.
+    /// `positions`: the vertex buffer that it fills, where kernels can.
     ///
     /// # Errors
     /// As [`Allocator::zeros`] and [`Allocator::settle`].
     pub(crate) async fn new(
         context: &GpuContext,
         skin: Skin,
-        deformer: Option<&Deformer>,
+        positions: Option<&wgpu::Buffer>,
     ) -> Result<Self, GpuError> {
         let n_palette = skin.joints.iter().map(|(joint, _)| joint + 1).max().unwrap_or(1);
         let n_targets = skin.deltas.iter().map(|(target, _)| target + 1).max().unwrap_or(1);
         let (palette, targets) = (vec![Mat4::IDENTITY; n_palette as usize], vec![0.0; n_targets as usize]);
         let mut skinner = Self { skin, palette, targets, kernel: None };
-        let Some(deformer) = deformer else { return Ok(skinner) };
+        let Some(positions) = positions else { return Ok(skinner) };
         let skin = &skinner.skin;
         let mut allocator = Allocator::new(context, "the skin");
         let tables = SkinTables::new(skin);
@@ -82,7 +81,7 @@ impl Skinner {
         let targets = allocator.storage("weights of morph targets", u64::from(n_targets) * 4)?;
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let work = allocator.zeros("work parameters", size_of::<Work>() as u64, usage)?;
-        let buffers = [&rest, &starts, &influences, &deltas, &palette, &targets, deformer.positions()];
+        let buffers = [&rest, &starts, &influences, &deltas, &palette, &targets, positions];
         let launch = context.pipelines.launch(&context.device, &kernels::SKIN_VERTICES, &work, &buffers);
         let count = skin.positions.len() as u32;
         let (groups, stride) = launch.groups(count);

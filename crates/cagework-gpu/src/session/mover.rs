@@ -110,8 +110,9 @@ impl Mover {
         skin: &Skin,
     ) -> Result<Skinner, GpuError> {
         let skin = skin.with_copies(&model.copies);
-        let deformer = if let Self::Kernels { deformer, .. } = self { Some(deformer) } else { None };
-        Skinner::new(context, skin, deformer).await
+        let positions =
+            if let Self::Kernels { deformer, .. } = self { Some(deformer.positions()) } else { None };
+        Skinner::new(context, skin, positions).await
     }
 
     /// Uploads vertices and their normals.
