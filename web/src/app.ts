@@ -56,7 +56,7 @@ export interface App {
   key(command: Command): string;
 }
 
-const MODELS = ".glb,.gltf,.obj,.bin,.png,.jpg,.jpeg,.webp,.ktx2,.mtl,model/gltf-binary,model/gltf+json";
+const MODELS = ".glb,.vrm,.gltf,.obj,.bin,.png,.jpg,.jpeg,.webp,.ktx2,.mtl,model/gltf-binary,model/gltf+json";
 const CAGES = ".obj,.glb,.gltf,.bin";
 
 export interface Needs {

@@ -40,7 +40,7 @@ describe("dropped files", () => {
   it("say what can be opened when nothing fits", () => {
     expect(planDrop(["notes.txt"])).toEqual({
       kind: "unknown",
-      sentence: "Cagework opens .glb, .gltf and .obj files.",
+      sentence: "Cagework opens .glb, .vrm, .gltf and .obj files.",
     });
     expect(planDrop([]).kind).toBe("nothing");
   });

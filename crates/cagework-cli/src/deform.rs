@@ -74,7 +74,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         let by: Vec<Vec<DVec3>> = poses.iter().map(by).collect();
         let deform_ms = started.elapsed().as_secs_f64() * 1e3;
         let (bytes, report) = rig::write(&model, &saved, &names, by, args)?;
-        notices.extend(rig::notices(&report));
+        notices.extend(report.notices());
         (bytes, Some(report), deform_ms)
     } else {
         let saved = saved.of_vertices();

@@ -36,37 +36,6 @@ pub(crate) fn write(
     model.write_reshaped(&rest, &outside, &poses, &options).map_err(wrong)
 }
 
-/// What a user should know of a reshape.
-pub(crate) fn notices(report: &ReshapeReport) -> Vec<String> {
-    let mut notices = Vec::new();
-    if report.joints > 0 {
-        let ReshapeReport { joints, joints_moved, tracks, .. } = report;
-        notices.push(format!("{joints_moved} of {joints} joints moved, {tracks} animation tracks with them"));
-    }
-    if report.joints_outside > 0 {
-        let n = report.joints_outside;
-        notices.push(format!(
-            "{n} joints that hold vertices are outside the cage: they follow its closest point"
-        ));
-    }
-    if report.morph_ends_outside > 0 {
-        let ReshapeReport { morph_ends, morph_ends_outside, .. } = report;
-        notices.push(format!(
-            "{morph_ends_outside} of {morph_ends} vertices of morph targets leave the cage: they follow its closest \
-             point; make a cage around them (cagework cage)"
-        ));
-    }
-    if report.singular_vertices > 0 {
-        let n = report.singular_vertices;
-        notices.push(format!("{n} vertices are flattened by their skin: they go with their neighbours"));
-    }
-    if report.tracks_unread > 0 {
-        let n = report.tracks_unread;
-        notices.push(format!("{n} animation tracks cannot be read: they stay as they are"));
-    }
-    notices
-}
-
 /// The points to bind: vertices, then those of the rig; and how many the latter are.
 ///
 /// # Errors

@@ -6,6 +6,7 @@ mod common;
 use std::error::Error;
 use std::path::PathBuf;
 
+use cagework_core::skin::skin_vertices;
 use cagework_io::Model;
 use common::{CUBE_OBJ, PNG, instanced, plain_cube, quantized, rigged, skinned, textured_square, twist};
 use glam::Vec3;
@@ -61,6 +62,19 @@ fn main() -> Result<(), Box<dyn Error>> {
             let still = vec![glam::DVec3::ZERO; by.len()];
             let options = cagework_io::ReshapeOptions::default();
             let (reshaped, _) = model.write_reshaped(&by, &[], &[], &options)?;
+            if let Some(player) = model.player_of(&reshaped).ok().filter(|p| !p.clips().is_empty()) {
+                let played: Vec<_> = (0..10)
+                    .map(|k| {
+                        let seconds = 0.099 * k as f32;
+                        let posed = player.at(Some(0), seconds, &[]);
+                        let at = skin_vertices(&player.skin, &posed.palette, &posed.targets);
+                        let positions: Vec<f32> = at.iter().flat_map(Vec3::to_array).collect();
+                        json!({ "seconds": seconds, "positions": positions })
+                    })
+                    .collect();
+                let name = format!("{stem}-reshaped.played.json");
+                std::fs::write(directory.join(name), serde_json::to_vec(&played)?)?;
+            }
             std::fs::write(directory.join(format!("{stem}-reshaped.glb")), reshaped)?;
             let (posed, _) = model.write_reshaped(&still, &[], &[("twisted".to_owned(), by)], &options)?;
             std::fs::write(directory.join(format!("{stem}-posed.glb")), posed)?;

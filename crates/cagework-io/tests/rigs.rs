@@ -140,6 +140,22 @@ fn rotations_scales_and_weights_of_clips_keep_their_bytes_and_translations_grow_
 }
 
 #[test]
+fn pointers_to_nodes_are_tracks_as_well() {
+    let mut rig = rigged();
+    for (k, pointer) in [(0, "/nodes/1/translation"), (1, "/nodes/2/translation"), (3, "/nodes/4/weights")] {
+        rig.json["animations"][0]["channels"][k]["target"] = serde_json::json!({
+            "path": "pointer", "extensions": { "KHR_animation_pointer": { "pointer": pointer } }
+        });
+    }
+    rig.json["extensionsUsed"] = serde_json::json!(["KHR_animation_pointer"]);
+    let [plain, pointed] = [rigged().glb(), rig.glb()].map(|bytes| read(&bytes));
+    let [(a, of_plain), (b, of_pointed)] = [&plain, &pointed].map(|model| reshaped(model, Joints::Follow));
+    assert_eq!(of_plain, of_pointed);
+    let [a, b] = [a, b].map(|bytes| shown(&player(&read(&bytes)), Some(0), 0.6, &[]));
+    assert_eq!(a, b);
+}
+
+#[test]
 fn poses_are_targets_after_those_there_are() {
     let model = read(&rigged().glb());
     let by = by(&model);

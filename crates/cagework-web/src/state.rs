@@ -35,6 +35,8 @@ pub(crate) struct State {
     pub(crate) positions: Vec<Vec3>,
     pub(crate) editing_rest: bool,
     pub(crate) is_bound: bool,
+    /// What the last export did to the rig.
+    pub(crate) rig_notices: Vec<String>,
     /// The clip that plays, in place of the cage.
     pub(crate) playing: Option<Playing>,
     /// Weights of the points of the model's rig, and those of them outside the cage.

@@ -56,7 +56,7 @@ pub(crate) fn check() -> Result<(), String> {
     exec(&["biome", "ci", "--error-on-warnings"])
 }
 
-/// Exported GLBs must pass the Khronos glTF validator.
+/// Exported GLBs must pass the Khronos glTF validator, and play in three.js as they do here.
 fn validate_exports() -> Result<(), String> {
     let folder = root().join("target/exported-samples");
     let folder = folder.to_str().ok_or("the repository's path is not UTF-8")?;
@@ -69,5 +69,7 @@ fn validate_exports() -> Result<(), String> {
     )?;
     let export = wasm::target_folder()?.join("debug/examples/export_samples");
     run(export.to_str().ok_or("the target folder's path is not UTF-8")?, &[folder], &[])?;
-    run("node", &["crates/cagework-io/tests/validate.mjs", folder], &[])
+    run("node", &["crates/cagework-io/tests/validate.mjs", folder], &[])?;
+    // What plays a clip here must be what others show.
+    run("node", &["crates/cagework-io/tests/three.mjs", folder], &[])
 }

@@ -3,6 +3,7 @@
 import type { NamedFile } from "../contract";
 import { stem } from "../format";
 import { fittingPoses } from "../state";
+import { sentence } from "../strings";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 import type { Project } from "./project";
@@ -59,9 +60,15 @@ export function createExports(ctx: Context, project: Project): Exports {
       const name = stem(ctx.store.get().model?.name ?? "model");
       await attempt(ctx, T.failed.write, async () => {
         const blob = kind === "picture" ? await picture() : new Blob([new Uint8Array(bytesOf(kind))]);
-        const file = kind === "project" ? project.fileName() : `${name}${SUFFIX[kind]}`;
+        const full = kind === "project" ? project.fileName() : `${name}${SUFFIX[kind]}`;
+        // A VRM stays one.
+        const isVrm =
+          /\.vrm$/i.test(ctx.store.get().model?.name ?? "") && (kind === "glb" || kind === "poses");
+        const file = isVrm ? full.replace(/glb$/, "vrm") : full;
         download(blob, file);
         ctx.tell.say(T.exports.saved(file, blob.size));
+        if (kind === "glb")
+          for (const notice of ctx.session().engine.rigNotices()) ctx.tell.say(sentence(notice));
       });
     },
     async share() {

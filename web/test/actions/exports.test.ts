@@ -35,12 +35,19 @@ function page() {
 }
 
 it("each file has the model's name, and its size is said", async () => {
-  const { exports, teach, said } = page();
-  teach({ exportGlb: () => new Uint8Array(2000), exportCage: () => Uint8Array.of(1) });
+  const { exports, teach, said, store } = page();
+  teach({
+    exportGlb: () => new Uint8Array(2000),
+    rigNotices: () => ["3 of 4 joints moved"],
+    exportCage: () => Uint8Array.of(1),
+  });
   await exports.save("glb");
   await exports.save("cage");
   expect(downloads).toEqual(["cube-posed.glb", "cube-cage.obj"]);
-  expect(said[0]).toBe("cube-posed.glb is in your downloads (2 kB).");
+  expect(said.slice(0, 2)).toEqual(["cube-posed.glb is in your downloads (2 kB).", "3 of 4 joints moved."]);
+  store.set({ model: { ...MODEL, name: "someone.vrm" } });
+  await exports.save("glb");
+  expect(downloads.at(-1), "a VRM stays one").toBe("someone-posed.vrm");
 });
 
 it("an export that fails is a problem, and no file", async () => {

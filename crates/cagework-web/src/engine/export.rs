@@ -28,11 +28,19 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
     ) -> Result<Vec<u8>, JsValue> {
         let pose = self.read(|state| state.positions.clone());
-        if let Some((bytes, _)) = self.reshaped(&pose, &[], &taken(options)?)? {
+        if let Some((bytes, report)) = self.reshaped(&pose, &[], &taken(options)?)? {
+            self.state.borrow_mut().rig_notices = report.notices();
             return Ok(bytes);
         }
         let mut posed = self.deformed(&[pose])?;
         Ok(self.read(|state| Answer::Ok(state.the_model()?.write_glb(&posed.pop().unwrap_or_default())?))?)
+    }
+
+    /// What the last export did to the rig, each a sentence; they are told once.
+    #[wasm_bindgen(js_name = rigNotices)]
+    #[must_use]
+    pub fn rig_notices(&self) -> Vec<String> {
+        std::mem::take(&mut self.state.borrow_mut().rig_notices)
     }
 
     /// The model as GLB with a morph target for each pose and an animation through all of them.

@@ -52,6 +52,35 @@ pub struct ReshapeReport {
     pub singular_vertices: usize,
 }
 
+impl ReshapeReport {
+    /// What a user should know of it, each a sentence.
+    #[must_use]
+    pub fn notices(&self) -> Vec<String> {
+        let Self { joints, joints_moved, joints_outside, morph_ends, morph_ends_outside, tracks, .. } = self;
+        let mut notices = Vec::new();
+        let mut say = |n: usize, sentence: String| notices.extend((n > 0).then_some(sentence));
+        say(*joints, format!("{joints_moved} of {joints} joints moved, {tracks} animation tracks with them"));
+        say(
+            *joints_outside,
+            format!(
+                "{joints_outside} joints that hold vertices are outside the cage: they follow its closest point"
+            ),
+        );
+        say(
+            *morph_ends_outside,
+            format!(
+                "{morph_ends_outside} of {morph_ends} vertices of morph targets leave the cage: they follow its closest \
+                 point; make a cage around them"
+            ),
+        );
+        let n = self.singular_vertices;
+        say(n, format!("{n} vertices are flattened by their skin: they go with their neighbours"));
+        let n = self.tracks_unread;
+        say(n, format!("{n} animation tracks cannot be read: they stay as they are"));
+        notices
+    }
+}
+
 /// A pose by name: how far each point moves. `[n_points]`, world space as the file has it.
 pub(crate) struct Named<'a> {
     pub(crate) name: &'a str,
