@@ -177,6 +177,32 @@ fn poses_are_targets_after_those_there_are() {
     assert_near(&shown(&after, Some(0), 0.7, &[]), &shown(&old, Some(0), 0.7, &[]), ROUNDED, "the old clip");
 }
 
+/// One mesh by two skins is two shapes: each gets its own, and its own targets.
+#[test]
+fn a_mesh_of_two_skins_is_reshaped_twice() {
+    let mut rig = rigged();
+    let skin = rig.json["skins"][0].clone();
+    let joints = serde_json::json!([3, 2, 1]);
+    rig.push("skins", skin);
+    rig.json["skins"][1]["joints"] = joints;
+    rig.push("nodes", serde_json::json!({ "name": "other", "mesh": 0, "skin": 1 }));
+    rig.json["scenes"][0]["nodes"] = serde_json::json!([0, 4, 5]);
+    let model = read(&rig.glb());
+    let (bytes, _) = reshaped(&model, Joints::Follow);
+    let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
+    let again = model.player_of(&bytes).unwrap();
+    assert_near(&shown(&again, None, 0.0, &[]), &moved, 4.0 * ROUNDED, "both");
+    let by = by(&model);
+    let still = vec![DVec3::ZERO; by.len()];
+    let poses = [("bent".to_owned(), by)];
+    let (bytes, _) = model.write_reshaped(&still, &[], &poses, &ReshapeOptions::default()).unwrap();
+    let again = model.player_of(&bytes).unwrap();
+    assert_eq!(again.targets().0, ["wide", "tall", "bent", "wide", "tall", "bent"]);
+    let mut targets = again.targets().1.to_vec();
+    (targets[2], targets[5]) = (1.0, 1.0);
+    assert_near(&shown(&again, None, 0.0, &targets), &moved, 4.0 * ROUNDED, "as a pose");
+}
+
 #[test]
 fn what_is_wrong_with_a_rig_is_said_or_left_alone() {
     let fault = |change: &dyn Fn(&mut common::Builder)| {

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use serde_json::{Value, json};
 
 use super::edit::Edit;
-use super::reshape::Named;
+use super::reshape::{Named, mesh_of};
 use super::tracks::{Driven, driven, output, own_sampler};
 use super::{Rig, key_of};
 use crate::error::WriteError;
@@ -23,7 +23,7 @@ pub(super) fn append(
     }
     let mut meshes: Vec<(usize, usize)> = Vec::new();
     for part in &rig.parts {
-        let mesh = part.instance.mesh as usize;
+        let mesh = mesh_of(edit, &part.instance);
         let (number, n_before) = (part.primitive as usize, part.targets.len());
         if !meshes.contains(&(mesh, n_before)) {
             meshes.push((mesh, n_before));
@@ -125,9 +125,8 @@ fn play(rig: &Rig<'_>, edit: &mut Edit<'_>, meshes: &[(usize, usize)], n_poses: 
     let times: Vec<[f32; 1]> = (0..n_keys).map(|k| [k as f32 * SECONDS_PER_POSE]).collect();
     let input = edit.write(None, &times, false, true);
     let (mut samplers, mut channels) = (Vec::new(), Vec::new());
-    let mut seen = Vec::new();
     for instance in rig.document.instances.iter().chain(&rig.document.elsewhere) {
-        let Some(&(_, n_before)) = meshes.iter().find(|(mesh, _)| *mesh == instance.mesh as usize) else {
+        let Some(&(_, n_before)) = meshes.iter().find(|(mesh, _)| *mesh == mesh_of(edit, instance)) else {
             continue;
         };
         let Some(node) =
@@ -135,9 +134,6 @@ fn play(rig: &Rig<'_>, edit: &mut Edit<'_>, meshes: &[(usize, usize)], n_poses: 
         else {
             continue;
         };
-        if std::mem::replace(&mut seen, vec![node]) == [node] {
-            continue;
-        }
         let defaults = rig.document.default_weights(instance);
         let default = |k: usize| defaults.and_then(|w| w.get(k)).copied().unwrap_or(0.0);
         let values: Vec<[f32; 1]> = (0..n_keys)

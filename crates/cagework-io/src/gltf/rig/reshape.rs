@@ -13,6 +13,7 @@ use super::{Part, Rig, key_of, poses, tracks, vrm};
 use crate::error::WriteError;
 use crate::gltf::geometry::Frame;
 use crate::gltf::pack::push;
+use crate::gltf::scene::Instance;
 use crate::gltf::{GltfDocument, skin};
 use crate::shown::shown;
 
@@ -116,10 +117,13 @@ pub(crate) fn reshape(
         morph_ends_outside: rig.ends_outside(is_outside),
         ..ReshapeReport::default()
     };
-    if by.iter().any(|&by| by != DVec3::ZERO) {
+    let has_moved = by.iter().any(|&by| by != DVec3::ZERO);
+    if has_moved || !poses.is_empty() {
+        separate(rig, &mut edit);
+    }
+    if has_moved {
         let (joints, keep_travel) = (options.joints, options.keep_travel);
         let given = Given { by, is_outside, joints, keep_travel, rigid: &rigid, up };
-        separate(rig, &mut edit);
         let moved = rig.moved(&given, &mut edit.json);
         report.joints_moved = moved.n_moved;
         report.joints_outside = moved.n_outside;
@@ -227,12 +231,14 @@ fn write_binds(rig: &Rig<'_>, edit: &mut Edit<'_>, world: &[DMat4]) -> HashMap<u
     all
 }
 
+/// The mesh that an instance has by now.
+pub(super) fn mesh_of(edit: &Edit<'_>, instance: &Instance) -> usize {
+    let of_node = |node: u32| edit.json["nodes"][node as usize]["mesh"].as_u64();
+    instance.node.and_then(of_node).map_or(instance.mesh as usize, |mesh| mesh as usize)
+}
+
 fn write_part(rig: &Rig<'_>, edit: &mut Edit<'_>, part: &Part, shape: &Shape) {
-    let instance = &part.instance;
-    let mesh = match instance.node {
-        Some(node) => edit.json["nodes"][node as usize]["mesh"].as_u64().map_or(0, |m| m as usize),
-        None => instance.mesh as usize,
-    };
+    let mesh = mesh_of(edit, &part.instance);
     let number = part.primitive as usize;
     let before = part.primitive(rig.document);
     let path = |rest: &str| format!("/meshes/{mesh}/primitives/{number}/{rest}");
