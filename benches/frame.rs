@@ -10,11 +10,13 @@ use std::time::Instant;
 use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
 use cagework_core::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
-use cagework_core::{Cage, TriMesh, bind};
+use cagework_core::skin::Skin;
+use cagework_core::{Cage, TriMesh, bind, samples};
 use cagework_gpu::render::DrawModel;
 use cagework_gpu::{ContextOptions, Deformer, GpuContext, GpuWeights, Session};
+use cagework_io::{Model, write_mesh_glb};
 use cagework_tests::creature::{creature, creature_cage};
-use glam::{DVec3, Quat, Vec3};
+use glam::{DVec3, Mat4, Quat, Vec3};
 use pollster::block_on;
 
 /// Frames that are timed.
@@ -49,7 +51,7 @@ fn posed(cage: &Cage, frame: usize) -> Vec<Vec3> {
 /// Median and fastest of many, milliseconds.
 fn summary(mut times: Vec<f64>) -> String {
     times.sort_by(f64::total_cmp);
-    format!("median {:.1} ms, fastest {:.1} ms", times[times.len() / 2], times[0])
+    format!("median {:.2} ms, fastest {:.2} ms", times[times.len() / 2], times[0])
 }
 
 /// A grab made ready and frames of a pull: the animal's first vertex goes round.
@@ -79,6 +81,40 @@ fn pull(positions: &[Vec3], triangles: &[[u32; 3]], cage: &Cage, options: &BindO
         began.elapsed().as_secs_f64() * 1e3
     });
     println!("  a frame: {}", summary(frame.collect()));
+}
+
+/// What a frame of a clip costs the processor, not the GPU: the vertices of the mesh, 60 joints and 8 morph targets, as a page hands them over; and
+/// the humanoid's joints at a time.
+fn play(session: &mut Session) {
+    const N: usize = VERTICES;
+    let joints = (0..N as u32).flat_map(|v| (0..4).map(move |k| ((v + 15 * k) % 60, 0.25)));
+    let moved = N / 2;
+    let skin = Skin {
+        positions: (0..N).map(|v| Vec3::splat(v as f32 / N as f32)).collect(),
+        joint_starts: (0..=N as u32).map(|v| 4 * v).collect(),
+        joints: joints.collect(),
+        delta_starts: (0..=N).map(|v| 8 * v.min(moved) as u32).collect(),
+        deltas: (0..8 * moved as u32).map(|k| (k % 8, Vec3::X)).collect(),
+    };
+    block_on(session.start_playing(&skin)).expect("it fits");
+    let palette = [Mat4::IDENTITY; 60];
+    let hand_over = (0..FRAMES).map(|frame| {
+        let began = Instant::now();
+        session.play(&palette, &[frame as f32; 8]);
+        began.elapsed().as_secs_f64() * 1e3
+    });
+    println!("play, {N} vertices, handed over: {}", summary(hand_over.collect()));
+    session.stop_playing();
+    let sample = samples::build("humanoid").expect("there is one");
+    let glb = write_mesh_glb("humanoid", &sample.mesh, &sample.colours, sample.rig.as_ref());
+    let model = Model::read("humanoid.glb", &glb.expect("it fits"), &mut |_| None).expect("it is one");
+    let player = model.player().expect("it plays").expect("it is a glTF");
+    let at = (0..FRAMES).map(|frame| {
+        let began = Instant::now();
+        std::hint::black_box(player.at(Some(0), 0.02 * frame as f32, &[]));
+        began.elapsed().as_secs_f64() * 1e3
+    });
+    println!("play, joints of the humanoid: {}", summary(at.collect()));
 }
 
 fn main() {
@@ -125,4 +161,5 @@ fn main() {
         began.elapsed().as_secs_f64() * 1e3
     });
     println!("frame of {} x {}, read back: {}", SIZE[0], SIZE[1], summary(frame.collect()));
+    play(&mut session);
 }

@@ -43,7 +43,7 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     let (points, extra_points) = rig::points(&model, &args.mesh)?;
     let options =
         BindOptions { held: model.bytes(), extra_points, ..args.solve.options(args.grid, args.read.memory) };
-    let to_write = memory_to_write(args, &model, &cage, options.sparsify);
+    let to_write = memory_to_write(args, &model, points.len(), &cage, options.sparsify);
     if to_write > options.memory_limit {
         return Err(BindError::Memory { needed: to_write, limit: options.memory_limit }.into());
     }
@@ -83,8 +83,8 @@ pub(crate) fn bind_model(model: &Model, cage: &Cage, options: &BindOptions) -> R
 }
 
 /// Bytes that are in use at once while the outputs are written: the model, its weights, and a file.
-fn memory_to_write(args: &BindArgs, model: &Model, cage: &Cage, sparsify: f32) -> u64 {
-    let weights = weights_bytes(model.positions.len(), Controls::from(cage).n_controls(), sparsify);
+fn memory_to_write(args: &BindArgs, model: &Model, n_points: usize, cage: &Cage, sparsify: f32) -> u64 {
+    let weights = weights_bytes(n_points, Controls::from(cage).n_controls(), sparsify);
     let npz = if args.weights.is_some() { weights } else { 0 };
     let output = args.output.as_ref().map_or(0, |output| model.bytes_to_write(output.format));
     model.bytes() + weights + npz.max(output)
