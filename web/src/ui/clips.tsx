@@ -34,6 +34,7 @@ export function Clips({ app }: { app: App }) {
           </select>
         </label>
       )}
+      {clip.clip !== null && <p class="hint">{T.clips.posing}</p>}
       {clip.clip !== null && (
         <div class="row">
           <IconButton

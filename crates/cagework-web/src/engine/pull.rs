@@ -22,6 +22,10 @@ impl Engine {
     /// Never.
     #[wasm_bindgen(js_name = surfaceAt, unchecked_return_type = "SurfacePoint | undefined")]
     pub fn surface_at(&self, x: f32, y: f32) -> Result<JsValue, JsValue> {
+        if self.read(|state| state.playing.is_some()) {
+            // It is shown elsewhere than where the cage has it.
+            return Ok(JsValue::UNDEFINED);
+        }
         let found = self.posed(|state, _| Ok(state.surface_at(state.pointer(x, y)))).ok().flatten();
         Ok(found.map_or(Ok(JsValue::UNDEFINED), |point| object(&point))?)
     }

@@ -33,6 +33,10 @@ impl Engine {
     #[must_use]
     pub fn pick(&self, x: f32, y: f32, radius: f32) -> Vec<u32> {
         self.read(|state| {
+            if state.playing.is_some() {
+                // The cage is not where the model is shown.
+                return Vec::new();
+            }
             let (at, positions, topology, view) =
                 (state.pointer(x, y), &state.positions, &state.topology, &state.camera);
             match state.element {
