@@ -347,3 +347,107 @@ fn ninety_three_targets_are_exported() {
         assert_near(&shown(&after, None, 0.0, &targets), &moved, ROUNDED, "a target");
     }
 }
+
+/// Floats of an accessor of the builder, which lie in a view of their own.
+fn floats(rig: &common::Builder, accessor: u64) -> Vec<f32> {
+    let view = rig.json["accessors"][accessor as usize]["bufferView"].as_u64().unwrap() as usize;
+    let [start, length] =
+        ["byteOffset", "byteLength"].map(|key| rig.json["bufferViews"][view][key].as_u64().unwrap() as usize);
+    let (numbers, _) = rig.bin[start..start + length].as_chunks();
+    numbers.iter().map(|&b| f32::from_le_bytes(b)).collect()
+}
+
+/// KHR_mesh_quantization, the scale in the inverse bind matrices; one target sparse.
+#[test]
+fn quantised_and_sparse_data_is_reshaped_as_plain_data() {
+    const UNIT: f32 = 1.0 / 1024.0;
+    let mut rig = rigged();
+    let attribute =
+        |rig: &mut common::Builder, key: &str| rig.primitive(0)["attributes"][key].as_u64().unwrap();
+    let position = attribute(&mut rig, "POSITION");
+    let short: Vec<u8> = floats(&rig, position)
+        .chunks(3)
+        .flat_map(|p| [p[0], p[1], p[2], 0.0])
+        .flat_map(|x| ((x / UNIT).round() as i16).to_le_bytes())
+        .collect();
+    let n = short.len() / 8;
+    let quantised = rig.accessor(&short, common::I16, n, "VEC3");
+    let view = rig.json["accessors"][quantised]["bufferView"].as_u64().unwrap() as usize;
+    rig.json["bufferViews"][view]["byteStride"] = 8.into();
+    rig.primitive(0)["attributes"]["POSITION"] = quantised.into();
+    let binds = rig.json["skins"][0]["inverseBindMatrices"].as_u64().unwrap();
+    let scaled: Vec<u8> = floats(&rig, binds)
+        .chunks(16)
+        .flat_map(|m| {
+            let bind = glam::Mat4::from_cols_slice(m) * glam::Mat4::from_scale(Vec3::splat(UNIT));
+            bind.to_cols_array().map(f32::to_le_bytes).concat()
+        })
+        .collect();
+    rig.json["skins"][0]["inverseBindMatrices"] = rig.accessor(&scaled, common::F32, 3, "MAT4").into();
+    for k in 0..2 {
+        let target = rig.primitive(0)["targets"][k]["POSITION"].as_u64().unwrap();
+        let deltas = floats(&rig, target);
+        let moved: Vec<usize> = (0..n).filter(|v| deltas[3 * v..3 * v + 3] != [0.0; 3]).collect();
+        let places: Vec<u8> = moved.iter().flat_map(|&v| (v as u16).to_le_bytes()).collect();
+        let values: Vec<u8> = moved
+            .iter()
+            .flat_map(|&v| {
+                deltas[3 * v..3 * v + 3].iter().flat_map(|x| (x / UNIT).to_le_bytes()).collect::<Vec<_>>()
+            })
+            .collect();
+        let (places, values) = (rig.view(&places), rig.view(&values));
+        let sparse = serde_json::json!({
+            "componentType": common::F32, "count": n, "type": "VEC3",
+            "sparse": {
+                "count": moved.len(),
+                "indices": { "bufferView": places, "componentType": common::U16 },
+                "values": { "bufferView": values },
+            },
+        });
+        let accessor = rig.push("accessors", sparse);
+        rig.primitive(0)["targets"][k]["POSITION"] = accessor.into();
+    }
+    rig.json["extensionsUsed"] = serde_json::json!(["KHR_mesh_quantization"]);
+    let model = read(&rig.glb());
+    assert_near(&model.positions, &read(&rigged().glb()).positions, 2.0 * UNIT, "half a step, doubled");
+    let after = player(&read(&reshaped(&model, Joints::Follow).0));
+    let before = player(&model);
+    for targets in [[0.25, 0.0], [1.0, 0.0], [0.25, 1.0]] {
+        let moved: Vec<Vec3> = shown(&before, None, 0.0, &targets).into_iter().map(f).collect();
+        assert_near(&shown(&after, None, 0.0, &targets), &moved, ROUNDED, &format!("{targets:?}"));
+    }
+}
+
+#[test]
+fn clips_do_not_change_what_becomes_of_the_shape() {
+    let mut still = rigged();
+    still.json.as_object_mut().unwrap().shift_remove("animations");
+    let [with, without] = [rigged().glb(), still.glb()].map(|bytes| {
+        let (bytes, _) = reshaped(&read(&bytes), Joints::Follow);
+        read(&bytes).positions
+    });
+    assert_eq!(with, without);
+}
+
+/// Between keys a spline is the rule's, too: its tangents take the linear part.
+#[test]
+fn splines_follow_the_rule_between_their_keys() {
+    let mut rig = rigged();
+    let values: [f32; 18] = [0., 0., 0., 0., 0., 0., 0.3, 0., 1., 0.2, -1., 0., 0., 0.1, 0.6, 0., 0., 0.];
+    let bytes: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let output = rig.accessor(&bytes, common::F32, 6, "VEC3");
+    rig.json["animations"][0]["samplers"][0]["output"] = output.into();
+    rig.json["animations"][0]["samplers"][0]["interpolation"] = "CUBICSPLINE".into();
+    let model = read(&rig.glb());
+    let (before, after) = (player(&model), player(&read(&reshaped(&model, Joints::Follow).0)));
+    // The root is the lowest joint: it travels as far as before.
+    let root = |player: &Player, seconds: f32| {
+        let at = player.at(Some(0), seconds, &[]).palette[1];
+        at.transform_point3(vec3(4.0, 0.0, 0.0))
+    };
+    for seconds in [0.0, 0.3, 0.7, 1.0] {
+        let [old, new] = [&before, &after].map(|player| root(player, seconds));
+        // `G' B' = G B` at rest, and the same way from there.
+        assert!(new.distance(old) <= 2.0 * ROUNDED, "{new} instead of {old} at {seconds} s");
+    }
+}
