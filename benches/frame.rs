@@ -96,7 +96,7 @@ fn play(session: &mut Session) {
         delta_starts: (0..=N).map(|v| 8 * v.min(moved) as u32).collect(),
         deltas: (0..8 * moved as u32).map(|k| (k % 8, Vec3::X)).collect(),
     };
-    block_on(session.start_playing(&skin)).expect("it fits");
+    block_on(session.start_playing(&skin, None)).expect("it fits");
     let palette = [Mat4::IDENTITY; 60];
     let hand_over = (0..FRAMES).map(|frame| {
         let began = Instant::now();

@@ -197,3 +197,22 @@ export async function validationErrors(bytes: Uint8Array): Promise<string[]> {
     .filter(({ severity }) => severity === ERROR)
     .map(({ code, pointer, message }) => `${code} at ${pointer}: ${message}`);
 }
+
+/** Where the vertices of a file's one mesh are at a key of its one animation of morph targets. */
+export async function shownAt(bytes: Uint8Array, seconds: number): Promise<number[]> {
+  const root = (await new NodeIO().readBinary(bytes)).getRoot();
+  const [primitive] = root.listMeshes().flatMap((mesh) => mesh.listPrimitives());
+  const [sampler] = root.listAnimations().flatMap((animation) => animation.listSamplers());
+  const times = [...(sampler?.getInput()?.getArray() ?? [])];
+  const key = times.findIndex((time) => Math.abs(time - seconds) < 1e-4);
+  const targets = primitive?.listTargets() ?? [];
+  const weights = sampler?.getOutput()?.getArray() ?? [];
+  const positions = [...(primitive?.getAttribute("POSITION")?.getArray() ?? [])];
+  for (const [k, target] of targets.entries()) {
+    const weight = weights[key * targets.length + k] ?? Number.NaN;
+    if (weight === 0) continue;
+    const deltas = target.getAttribute("POSITION")?.getArray() ?? [];
+    for (const [i, delta] of deltas.entries()) positions[i] = (positions[i] ?? 0) + weight * delta;
+  }
+  return positions;
+}

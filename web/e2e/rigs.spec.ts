@@ -1,7 +1,7 @@
 /** A rigged model is shaped, plays its clip, and leaves with both. */
 
 import type { Page } from "@playwright/test";
-import { validationErrors } from "./models";
+import { shownAt, validationErrors } from "./models";
 import {
   bound,
   cagePositions,
@@ -24,7 +24,7 @@ async function played(page: Page): Promise<number[][]> {
   return page.evaluate(async (times) => {
     const session = globalThis.cagework;
     if (!session) throw new Error("no session");
-    await session.engine.startClip({ joints: "follow", keep_travel: false, plain: false });
+    await session.engine.startClip({ joints: "follow", keep_travel: false, plain: false, dynamic: false });
     const at = times.map((time) => {
       session.engine.showClip(0, time, new Float32Array());
       return [...session.engine.clipPositions()];
@@ -77,5 +77,25 @@ test("a visit that shapes somebody who walks", async ({ page }) => {
     const again = await played(page);
     for (const [k, time] of TIMES.entries())
       expect(largestMove(shaped[k] ?? [], again[k] ?? []), `at ${time} s`).toBeLessThan(2e-5);
+  });
+
+  await test.step("the cage bends the moving model, and that is exported as frames", async () => {
+    await page.getByRole("button", { name: "Pose", exact: false }).first().click();
+    const before = await cagePositions(page);
+    const at = await grip(page, [0.5, 0.2]);
+    await pull(page, at, 0, -50);
+    await rested(page);
+    expect(largestMove(before, await cagePositions(page))).toBeGreaterThan(0.01);
+    await page.getByRole("switch", { name: "The cage bends the moving model" }).click();
+    await page.getByRole("combobox", { name: "Clip" }).selectOption("0");
+    await expect(page.getByRole("button", { name: "Pause the clip" })).toBeVisible();
+    await shoot(page, "clip-bent");
+    await page.getByRole("slider", { name: "Time" }).fill("1");
+    const shown = await page.evaluate(() => [...(globalThis.cagework?.engine.clipPositions() ?? [])]);
+    expect(largestMove(shown, (await played(page))[1] ?? [])).toBeGreaterThan(0.01);
+    const file = await download(page, "glb");
+    expect(await validationErrors(file.bytes)).toEqual([]);
+    const baked = await shownAt(file.bytes, 1);
+    expect(largestMove(shown, baked), "at one second").toBeLessThan(2e-5);
   });
 });

@@ -2,7 +2,7 @@
 
 import type { Job } from "./contract";
 
-export type Kind = "open" | "cage" | "check" | "bind" | "carry" | "compare" | "pull" | "slice";
+export type Kind = "open" | "cage" | "check" | "bind" | "carry" | "compare" | "pull" | "slice" | "lattice";
 
 export interface Queue {
   /** Runs `work` when the work of its kind that was asked for before has ended. */

@@ -226,6 +226,17 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
         engine.takeSlice(axis, fraction, options, indptr, indices, data);
       });
     },
+    loadLattice(grid) {
+      const { revision } = engine;
+      const options = possible({ ...BIND_DEFAULTS, grid });
+      return chain(
+        ofNow(client.run("lattice", { cage: cage(), options })),
+        ({ indptr, indices, data, outside, offsets }) => {
+          engine.requireCurrent(revision);
+          engine.takeLattice(indptr, indices, data, outside, offsets);
+        },
+      );
+    },
     preparePull: () =>
       ofNow(
         pulling().run("pullOpen", {

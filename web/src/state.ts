@@ -236,6 +236,11 @@ export interface ClipState {
   readonly targets: readonly number[];
 }
 
+/** What becomes of the rig of the model that is open. */
+export function rigOf({ model, rigOptions }: AppState): RigOptions {
+  return { ...rigOptions, dynamic: rigOptions.dynamic && (model?.clips.length ?? 0) > 0 };
+}
+
 export interface Store {
   /** The state of the moment; a panel or an effect that reads a key hears of its changes. */
   get(): AppState;

@@ -206,6 +206,7 @@ export function createFake(): Fake {
     estimateMemory: () => 1000,
     bindMeanValue: () => job("meanValue", null),
     loadSlice: (axis, position) => job("slice", { axis, position }),
+    loadLattice: (grid) => job("lattice", { grid }),
     preparePull: () => job<null>("pullOpen", null),
     pullGrab: (grab) => job("pullGrab", grab),
     pullFrame: (to) => job("pullFrame", to),

@@ -242,9 +242,9 @@ pub(crate) struct DeformArgs {
     /// The cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
-    /// The weights that `cagework bind --weights` wrote.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) weights: PathBuf,
+    /// The weights that `cagework bind --weights` wrote; not needed with --dynamic.
+    #[arg(long, value_name = "FILE", required_unless_present = "dynamic")]
+    pub(crate) weights: Option<PathBuf>,
     /// The cage, moved: same vertices in the same order. May be given several times.
     #[arg(long, value_name = "FILE", required = true)]
     pub(crate) pose: Vec<PathBuf>,

@@ -14,7 +14,7 @@ use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, read, shown_path, write};
 use crate::load::{load_cage, load_model};
-use crate::rig;
+use crate::{dynamic, rig};
 
 /// What was done; its JSON is the output of `--json`.
 #[derive(Debug, Serialize)]
@@ -37,7 +37,13 @@ struct Deformed {
 /// # Errors
 /// When a file cannot be read or written, or files do not belong together.
 pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
-    let mut inputs = vec![args.mesh.as_path(), args.weights.as_path()];
+    let weights = match (&args.weights, &args.rig.dynamic) {
+        (_, Some(clip)) => return dynamic::run(args, clip, as_json),
+        (Some(weights), None) => weights,
+        // The command line's own rules leave no such case.
+        (None, None) => return Ok(()),
+    };
+    let mut inputs = vec![args.mesh.as_path(), weights.as_path()];
     inputs.extend(args.pose.iter().map(AsRef::<Path>::as_ref));
     if let CageSource::File(path) = &args.cage {
         inputs.push(path);
@@ -59,7 +65,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
 
     let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
     let cage = load_cage(&args.cage, &model, args.read.memory)?;
-    let saved = load_weights(&args.weights, &model, &cage.cage, args.read.memory)?;
+    let saved = load_weights(weights, &model, &cage.cage, args.read.memory)?;
     let n_vertices = model.positions.len();
     let n_cage = saved.weights.n_columns();
     let poses = args.pose.iter().map(|path| cage.load_pose(path)).collect::<Result<Vec<_>, _>>()?;

@@ -10,6 +10,7 @@ mod card;
 mod check;
 mod deform;
 mod demo;
+mod dynamic;
 mod error;
 mod evaluate;
 mod files;

@@ -11,6 +11,7 @@ pub mod cage_gen;
 mod contact;
 pub mod controls;
 pub mod deform;
+pub mod dynamic;
 pub mod edit;
 pub mod enclosure;
 pub mod geometry;

@@ -16,7 +16,7 @@ pub enum Binding {
 /// One compute shader.
 #[derive(Debug)]
 pub struct Kernel {
-    /// Name of the file, the entry point, and the CPU twin in `cagework_core::stencil` or `skin`.
+    /// Name of the file, the entry point, and the CPU twin in `cagework_core::stencil`, `skin` or `dynamic`.
     pub name: &'static str,
     /// The whole source.
     pub wgsl: &'static str,
@@ -76,6 +76,8 @@ kernels! {
     OFFSET_OUTSIDE = "offset_outside" + ["work"], 64, 24, &[Uniform, Read, Read, Read, ReadWrite];
     /// Positions of a clip.
     SKIN_VERTICES = "skin_vertices" + ["work"], 64, 60, &[Uniform, Read, Read, Read, Read, Read, Read, ReadWrite];
+    /// Positions of a clip, bent by the cage.
+    BEND_VERTICES = "bend_vertices" + ["work"], 64, 12, &[Uniform, Read, ReadWrite];
     /// Normals of the deformed mesh.
     VERTEX_NORMALS = "vertex_normals" + ["work"], 64, 50, &[Uniform, Read, Read, Read, ReadWrite];
 }

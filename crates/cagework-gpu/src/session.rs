@@ -6,15 +6,15 @@
 mod again;
 mod mover;
 mod picture;
+mod playing;
 
 use std::sync::Arc;
 
 use cagework_core::deform::OutsideVertex;
 use cagework_core::deform::{deform_bound, vertex_normals};
 use cagework_core::options::BindOptions;
-use cagework_core::skin::Skin;
 use cagework_core::{BindReport, Bounds, Cage, Progress, Weights};
-use glam::{Mat4, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 use crate::bind::bind_gpu;
 use crate::deform::GpuWeights;
@@ -186,37 +186,6 @@ impl Session {
         self.moved = true;
         self.write_values();
         Ok(())
-    }
-
-    /// Lets the mesh follow a skin instead of the cage, until [`Self::stop_playing`]; [`Self::play`] says where it is. `skin` of
-    /// the model's vertices.
-    ///
-    /// # Errors
-    /// [`GpuError::NotReady`] before a bind, [`GpuError::Model`] for another model's skin; otherwise as
-    /// [`crate::buffers::Allocator::zeros`].
-    pub async fn start_playing(&mut self, skin: &Skin) -> Result<(), GpuError> {
-        let (model, _) = self.parts()?;
-        let Some(bound) = &self.bound else { return Err(GpuError::NotReady { missing: "bind" }) };
-        if skin.positions.len() != model.positions.len() {
-            let (given, n) = (skin.positions.len(), model.positions.len());
-            return Err(GpuError::Model { reason: format!("a skin of {given} vertices for a model of {n}") });
-        }
-        self.playing = Some(bound.mover.skinner(&self.context, model, skin).await?);
-        self.moved = true;
-        Ok(())
-    }
-
-    /// Matrices of the joints and weights of the morph targets; the next frame shows them.
-    pub fn play(&mut self, palette: &[Mat4], targets: &[f32]) {
-        if let Some(skinner) = &mut self.playing {
-            skinner.pose(&self.context, palette, targets);
-            self.moved = true;
-        }
-    }
-
-    /// The mesh follows the cage again.
-    pub fn stop_playing(&mut self) {
-        self.moved |= self.playing.take().is_some();
     }
 
     fn drop_weights(&mut self) {

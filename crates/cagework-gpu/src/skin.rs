@@ -1,5 +1,6 @@
 //! Playing a clip: skinning on the GPU, into the vertex buffer that [`crate::Deformer`] fills while nothing plays.
 
+use cagework_core::dynamic::{DisplacementField, bend_vertices};
 use cagework_core::skin::{Skin, skin_vertices};
 use glam::{Mat4, Vec3};
 
@@ -16,6 +17,8 @@ pub struct Skinner {
     skin: Skin,
     palette: Vec<Mat4>,
     targets: Vec<f32>,
+    /// What bends the model after its skin.
+    field: Option<DisplacementField>,
     kernel: Option<OnGpu>,
 }
 
@@ -23,7 +26,8 @@ pub struct Skinner {
 struct OnGpu {
     palette: wgpu::Buffer,
     targets: wgpu::Buffer,
-    launch: Launch,
+    /// Skinning, then bending.
+    launches: Vec<Launch>,
     groups: [u32; 2],
 }
 
@@ -55,6 +59,15 @@ impl SkinTables {
     }
 }
 
+/// A field as the kernel reads it, with its lattice before its values; floats as their bits. `[2 + n_nodes]`
+#[must_use]
+pub fn field_table(field: &DisplacementField) -> Vec<[u32; 4]> {
+    let lattice = &field.lattice;
+    let origin = lattice.origin.extend(lattice.cell).to_array().map(f32::to_bits);
+    let values = field.values.iter().map(|value| value.to_array().map(f32::to_bits));
+    [origin, lattice.dims.extend(0).to_array()].into_iter().chain(values).collect()
+}
+
 impl Skinner {
     /// `positions`: the vertex buffer that it fills, where kernels can.
     ///
@@ -63,12 +76,13 @@ impl Skinner {
     pub(crate) async fn new(
         context: &GpuContext,
         skin: Skin,
+        field: Option<DisplacementField>,
         positions: Option<&wgpu::Buffer>,
     ) -> Result<Self, GpuError> {
         let n_palette = skin.joints.iter().map(|(joint, _)| joint + 1).max().unwrap_or(1);
         let n_targets = skin.deltas.iter().map(|(target, _)| target + 1).max().unwrap_or(1);
         let (palette, targets) = (vec![Mat4::IDENTITY; n_palette as usize], vec![0.0; n_targets as usize]);
-        let mut skinner = Self { skin, palette, targets, kernel: None };
+        let mut skinner = Self { skin, palette, targets, field, kernel: None };
         let Some(positions) = positions else { return Ok(skinner) };
         let skin = &skinner.skin;
         let mut allocator = Allocator::new(context, "the skin");
@@ -82,13 +96,20 @@ impl Skinner {
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let work = allocator.zeros("work parameters", size_of::<Work>() as u64, usage)?;
         let buffers = [&rest, &starts, &influences, &deltas, &palette, &targets, positions];
-        let launch = context.pipelines.launch(&context.device, &kernels::SKIN_VERTICES, &work, &buffers);
+        let launch = |kernel, buffers: &[&wgpu::Buffer]| {
+            context.pipelines.launch(&context.device, kernel, &work, buffers)
+        };
+        let mut launches = vec![launch(&kernels::SKIN_VERTICES, &buffers)];
+        if let Some(field) = &skinner.field {
+            let field = allocator.table("displacements", &field_table(field))?;
+            launches.push(launch(&kernels::BEND_VERTICES, &[&field, positions]));
+        }
         let count = skin.positions.len() as u32;
-        let (groups, stride) = launch.groups(count);
+        let (groups, stride) = launches[0].groups(count);
         let of_work = Work { count, stride, ..Work::default() };
         context.queue.write_buffer(&work, 0, bytemuck::bytes_of(&of_work));
         allocator.settle().await?;
-        skinner.kernel = Some(OnGpu { palette, targets, launch, groups });
+        skinner.kernel = Some(OnGpu { palette, targets, launches, groups });
         Ok(skinner)
     }
 
@@ -103,9 +124,10 @@ impl Skinner {
         }
     }
 
-    /// Records the skinning, without normals.
+    /// Records where the vertices go, without normals.
     pub(crate) fn encode(&self, pass: &mut wgpu::ComputePass<'_>) {
-        if let Some(OnGpu { launch, groups, .. }) = &self.kernel {
+        let Some(OnGpu { launches, groups, .. }) = &self.kernel else { return };
+        for launch in launches {
             pass.set_pipeline(&launch.pipeline);
             pass.set_bind_group(0, &launch.bind_group, &[0]);
             pass.dispatch_workgroups(groups[0], groups[1], 1);
@@ -114,6 +136,10 @@ impl Skinner {
 
     /// Where the vertices are, by the processor.
     pub(crate) fn positions(&self) -> Vec<Vec3> {
-        skin_vertices(&self.skin, &self.palette, &self.targets)
+        let mut positions = skin_vertices(&self.skin, &self.palette, &self.targets);
+        if let Some(field) = &self.field {
+            bend_vertices(field, &mut positions);
+        }
+        positions
     }
 }

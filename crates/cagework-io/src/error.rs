@@ -27,6 +27,9 @@ pub enum WriteError {
     /// Only glTF has rigs.
     #[error("the model is no glTF: it has no rig to keep")]
     NoRig,
+    /// There is no clip of this number.
+    #[error("the model has no clip {0}")]
+    NoClip(usize),
     /// A GLB holds at most 4 GiB.
     #[error("the model needs {bytes} bytes, more than the 4 GiB that a GLB can hold: write an OBJ instead")]
     TooLarge {

@@ -10,7 +10,7 @@ use thiserror::Error;
 use crate::counts::Counts;
 use crate::error::{PoseError, WriteError};
 use crate::format::{FormatError, ModelFormat};
-use crate::gltf::{self, GltfDocument, GltfError, Pose, Rest};
+use crate::gltf::{self, GltfDocument, GltfError, Played, Pose, Rest};
 use crate::look::Look;
 use crate::obj::{self, ObjDocument, ObjError};
 use crate::shown::shown;
@@ -320,7 +320,7 @@ impl Model {
     /// [`WriteError`] when there is not one finite position for each vertex, there are no triangles, or the file would
     /// be too large.
     pub fn write_glb(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
-        self.glb(positions, &[])
+        self.glb(positions, &[], Played::InTurn)
     }
 
     /// The model with `rest` as its shape and one morph target for each pose, with an animation that goes from rest
@@ -333,10 +333,15 @@ impl Model {
         rest: &[Vec3],
         poses: &[(String, Vec<Vec3>)],
     ) -> Result<Vec<u8>, WriteError> {
-        self.glb(rest, poses)
+        self.glb(rest, poses, Played::InTurn)
     }
 
-    fn glb(&self, base: &[Vec3], poses: &[(String, Vec<Vec3>)]) -> Result<Vec<u8>, WriteError> {
+    pub(crate) fn glb(
+        &self,
+        base: &[Vec3],
+        poses: &[(String, Vec<Vec3>)],
+        played: Played<'_>,
+    ) -> Result<Vec<u8>, WriteError> {
         self.check(base)?;
         poses.iter().try_for_each(|(_, positions)| self.check(positions))?;
         if self.triangles.is_empty() {
@@ -348,7 +353,7 @@ impl Model {
         let document = match &self.document {
             Document::Gltf(document) => {
                 let rest = Rest { positions: &at_rest, triangles: &self.triangles };
-                return gltf::patch(document, rest, &base, &named(poses, &turned));
+                return gltf::patch(document, rest, &base, &named(poses, &turned), played);
             }
             Document::Obj(document) => document,
         };
@@ -359,7 +364,7 @@ impl Model {
         let spread = |positions: &[Vec3]| source.iter().map(|&v| positions[v as usize]).collect::<Vec<_>>();
         let spread_poses: Vec<_> = turned.iter().map(|positions| spread(positions).into()).collect();
         let rest = Rest { positions: &built.positions, triangles: &built.triangles };
-        gltf::patch(&built.document, rest, &spread(&base), &named(poses, &spread_poses))
+        gltf::patch(&built.document, rest, &spread(&base), &named(poses, &spread_poses), played)
     }
 
     fn check(&self, positions: &[Vec3]) -> Result<(), WriteError> {

@@ -5,12 +5,18 @@ use glam::{DVec3, Vec3};
 use thiserror::Error;
 
 use crate::error::WriteError;
-use crate::gltf::{self, Clip, Named, Player, ReshapeOptions, ReshapeReport, Rig};
+use crate::gltf::{self, Clip, Named, Played, Player, ReshapeOptions, ReshapeReport, Rig};
 use crate::model::{Document, Model};
 use crate::shown::shown;
 
 /// Frames of a clip that a cage is made around.
 const FRAMES: usize = 32;
+
+/// Frames of a clip that are baked: for each second, and at most; engines struggle with more morph targets.
+const BAKED_PER_SECOND: f32 = 30.0;
+const MOST_BAKED: f32 = 60.0;
+/// Bytes of all frames of a baked clip.
+const MOST_BAKED_BYTES: u64 = 512 << 20;
 
 /// There is no clip of a name.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -131,16 +137,11 @@ impl Model {
             no_clip(Vec::new())?;
             return Ok((positions, triangles));
         };
-        let shown_at = |clip, seconds, targets: &[f32]| {
-            let posed = player.at(clip, seconds, targets);
-            let at = skin_vertices(&player.skin, &posed.palette, &posed.targets);
-            self.up().turned(&at).into_owned()
-        };
         let (_, defaults) = player.targets();
         for k in 0..defaults.len() {
             let mut targets = defaults.to_vec();
             targets[k] = 1.0;
-            let at = shown_at(None, 0.0, &targets);
+            let at = self.shown_at(&player, None, 0.0, &targets);
             let moved = at.iter().zip(&self.positions).filter(|(p, rest)| p.is_finite() && p != rest);
             positions.extend(moved.map(|(p, _)| *p));
         }
@@ -150,9 +151,7 @@ impl Model {
             no_clip(clips.iter().filter_map(|c| c.name.clone()).collect())?;
             return Ok((positions, triangles));
         };
-        for frame in 0..FRAMES {
-            let seconds = clips[number].seconds * frame as f32 / (FRAMES - 1) as f32;
-            let at = shown_at(Some(number), seconds, &[]);
+        for at in self.frames_of(&player, number, FRAMES) {
             if at.iter().all(|p| p.is_finite()) {
                 let first = positions.len() as u32;
                 triangles.extend(self.triangles.iter().map(|t| t.map(|v| first + v)));
@@ -160,5 +159,57 @@ impl Model {
             }
         }
         Ok((positions, triangles))
+    }
+
+    fn shown_at(&self, player: &Player, clip: Option<usize>, seconds: f32, targets: &[f32]) -> Vec<Vec3> {
+        let posed = player.at(clip, seconds, targets);
+        self.up().turned(&skin_vertices(&player.skin, &posed.palette, &posed.targets)).into_owned()
+    }
+
+    fn frames_of(&self, player: &Player, clip: usize, n: usize) -> impl Iterator<Item = Vec<Vec3>> {
+        let step = player.clips()[clip].seconds / (n.max(2) - 1) as f32;
+        (0..n).map(move |frame| self.shown_at(player, Some(clip), frame as f32 * step, &[]))
+    }
+
+    /// The vertices at equal distances of time, from a clip's beginning to its end: as many frames as [`Self::write_baked`] bakes.
+    ///
+    /// # Errors
+    /// [`WriteError`] when there is none of this number, or it cannot be played or is too large to be baked.
+    pub fn frames(&self, clip: usize) -> Result<Vec<Vec<Vec3>>, WriteError> {
+        let player = self.player()?.ok_or(WriteError::NoRig)?;
+        let found = player.clips().get(clip).ok_or(WriteError::NoClip(clip))?;
+        let n = (found.seconds * BAKED_PER_SECOND).ceil().clamp(1.0, MOST_BAKED) as usize + 1;
+        // Positions and normals of each frame.
+        let needed = (n * self.positions.len() * 24) as u64;
+        if needed > MOST_BAKED_BYTES {
+            return Err(WriteError::Document(format!(
+                "{n} frames of {} vertices are {} MB, above the limit of {} MB for a baked clip: export it without the cage \
+                 bending the moving model",
+                self.positions.len(),
+                needed >> 20,
+                MOST_BAKED_BYTES >> 20
+            )));
+        }
+        Ok(self.frames_of(&player, clip, n).collect())
+    }
+
+    /// A clip as morph targets, one for each of its frames, without skeleton: what moves in a way that no skeleton can. `rest` and
+    /// each frame: `[n_vertices]`.
+    ///
+    /// # Errors
+    /// As [`Self::write_glb`], and [`WriteError::NoClip`].
+    pub fn write_baked(
+        &self,
+        clip: usize,
+        rest: &[Vec3],
+        frames: Vec<Vec<Vec3>>,
+    ) -> Result<Vec<u8>, WriteError> {
+        let clips = self.clips();
+        let Clip { name, seconds, .. } = clips.get(clip).ok_or(WriteError::NoClip(clip))?;
+        let clip = name.as_deref().unwrap_or("clip");
+        let step = seconds / (frames.len().max(2) - 1) as f32;
+        let named = |(k, at)| (format!("{:.3} s", k as f32 * step), at);
+        let frames: Vec<(String, Vec<Vec3>)> = frames.into_iter().enumerate().map(named).collect();
+        self.glb(rest, &frames, Played::Frames { clip, seconds: *seconds })
     }
 }

@@ -5,6 +5,8 @@
 use cagework_core::cage_check::repair;
 use cagework_core::cage_gen::{CageOptions, GeneratedCage, generate};
 use cagework_core::deform::{OutsideVertex, deform_bound};
+use cagework_core::dynamic::Lattice;
+use cagework_core::options::OutsidePolicy;
 use cagework_core::progress::Silent;
 use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Binding, Cage, PolygonMesh, Weights, mean_value_weights, samples};
@@ -163,6 +165,26 @@ impl Binder {
         };
         let (weights, outside) = (binding.weights, Vec::new());
         Ok(Some(Bound { weights, outside, report: JsValue::UNDEFINED }))
+    }
+
+    /// Coordinates of a lattice around a cage, for `Engine.takeLattice`; arguments as for `bind`.
+    ///
+    /// # Errors
+    /// Those of a bind.
+    #[wasm_bindgen(js_name = bindLattice)]
+    pub async fn bind_lattice(
+        &self,
+        cage: Vec<f32>,
+        corners: Vec<u32>,
+        #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
+        #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
+    ) -> Result<Bound, JsValue> {
+        let mut asked: BindAsked = taken(options)?;
+        asked.options.outside = OutsidePolicy::ClosestPoint;
+        let parts = Parts::new(&[], &cage, &corners)?;
+        let binding = self.run(&Lattice::new(&parts.cage).points(), &parts.cage, asked, progress).await?;
+        let (weights, outside) = (binding.weights, binding.outside);
+        Ok(Bound { weights, outside, report: JsValue::UNDEFINED })
     }
 
     /// A cage for a model: `CageOptions` of contract.ts. `progress` as for `bind`.

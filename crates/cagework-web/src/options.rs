@@ -246,6 +246,8 @@ pub(crate) struct RigAsked {
     keep_travel: bool,
     /// The shape alone.
     pub(crate) plain: bool,
+    /// The cage bends the model while a clip moves it.
+    pub(crate) dynamic: bool,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -272,7 +274,7 @@ impl RigAsked {
 #[cfg(test)]
 impl Default for RigAsked {
     fn default() -> Self {
-        Self { joints: JointsAsked::Follow, keep_travel: false, plain: false }
+        Self { joints: JointsAsked::Follow, keep_travel: false, plain: false, dynamic: false }
     }
 }
 

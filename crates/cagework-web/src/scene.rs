@@ -29,7 +29,9 @@ impl State {
     /// What the renderer draws; `weights` are those it has.
     pub(crate) fn scene(&self, weights: Option<&Weights>) -> SceneOptions {
         // It fits the shape at rest.
-        let cage = self.view.cage && self.is_on_gpu() && self.playing.is_none();
+        let cage = self.view.cage
+            && self.is_on_gpu()
+            && self.playing.as_ref().is_none_or(|playing| playing.field.is_some());
         SceneOptions {
             theme: self.view.theme(),
             backdrop: true,

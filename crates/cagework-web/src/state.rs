@@ -3,8 +3,10 @@
 use std::sync::Arc;
 
 use cagework_core::deform::OutsideVertex;
+use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
 use cagework_core::edit::{Element, Gesture, Pivot, Pull, Selection, SharedPull, Symmetry, Topology};
 use cagework_core::enclosure::Enclosure;
+use cagework_core::skin::skin_vertices;
 use cagework_core::slice::Slice;
 use cagework_core::{Bounds, Cage, PolygonMesh, Weights};
 use cagework_gpu::Session;
@@ -39,6 +41,8 @@ pub(crate) struct State {
     pub(crate) rig_notices: Vec<String>,
     /// The clip that plays, in place of the cage.
     pub(crate) playing: Option<Playing>,
+    /// What is needed for the cage to bend the moving model: a lattice around it, weights of its points, those outside.
+    pub(crate) lattice: Option<(Lattice, Weights, Vec<OutsideVertex>)>,
     /// Weights of the points of the model's rig, and those of them outside the cage.
     pub(crate) rig: Option<(Weights, Vec<OutsideVertex>)>,
     /// Whether there are other weights to compare with.
@@ -91,6 +95,8 @@ pub(crate) struct Playing {
     /// From the file's axes to those that are drawn.
     pub(crate) up: Mat4,
     pub(crate) posed: Posed,
+    /// What bends it.
+    pub(crate) field: Option<DisplacementField>,
     /// Whether the GPU does not have it yet.
     pub(crate) is_new: bool,
 }
@@ -99,6 +105,15 @@ impl Playing {
     /// Matrices of the joints, in the axes that are drawn.
     pub(crate) fn palette(&self) -> Vec<Mat4> {
         self.posed.palette.iter().map(|&m| self.up * m).collect()
+    }
+
+    /// Where the vertices are, by the processor. `[n_vertices]`
+    pub(crate) fn positions(&self) -> Vec<Vec3> {
+        let mut positions = skin_vertices(&self.player.skin, &self.palette(), &self.posed.targets);
+        if let Some(field) = &self.field {
+            bend_vertices(field, &mut positions);
+        }
+        positions
     }
 }
 
@@ -129,6 +144,7 @@ impl State {
         self.slice = None;
         self.held = Held::default();
         self.playing = None;
+        self.lattice = None;
         (self.is_bound, self.has_other, self.rig) = (false, false, None);
         self.revision += 1;
         self.is_moved = true;

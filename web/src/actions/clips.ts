@@ -1,7 +1,8 @@
 /** Clips of a rigged model: what plays is the model as it would be exported. */
 
 import type { RigOptions } from "../contract";
-import type { ClipState } from "../state";
+import { follow } from "../queue";
+import { type ClipState, rigOf } from "../state";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 
@@ -18,6 +19,15 @@ export interface ClipActions {
   rig(patch: Partial<RigOptions>): void;
   /** The cage poses the model again. */
   stop(): void;
+}
+
+/** What the cage needs to bend the moving model, if it is to. */
+export async function loadLattice(ctx: Context): Promise<void> {
+  const { engine } = ctx.session();
+  if (!rigOf(ctx.store.get()).dynamic || engine.hasLattice) return;
+  ctx.tell.say(T.clips.preparing);
+  const { grid } = ctx.store.get().bindOptions;
+  await ctx.queue.add("lattice", (signal) => follow(signal, ctx.session().loadLattice(grid)));
 }
 
 export function createClips(ctx: Context, settle: () => void): ClipActions {
@@ -49,12 +59,14 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
   const ready = async (): Promise<boolean> => {
     if (engine().showsClip) return true;
     settle();
-    const { bound, rigOptions } = store.get();
-    if (!bound) {
+    if (!store.get().bound) {
       ctx.tell.say(T.clips.bindFirst);
       return false;
     }
-    return attempt(ctx, T.failed.clip, () => engine().startClip(rigOptions));
+    return attempt(ctx, T.failed.clip, async () => {
+      await loadLattice(ctx);
+      await engine().startClip(rigOf(store.get()));
+    });
   };
 
   const step = (now: number) => {

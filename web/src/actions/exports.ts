@@ -2,9 +2,10 @@
 
 import type { NamedFile } from "../contract";
 import { stem } from "../format";
-import { fittingPoses } from "../state";
+import { fittingPoses, rigOf } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
+import { loadLattice } from "./clips";
 import { attempt, type Context } from "./context";
 import type { Project } from "./project";
 
@@ -29,7 +30,7 @@ export function createExports(ctx: Context, project: Project): Exports {
     const { engine } = ctx.session();
     switch (kind) {
       case "glb":
-        return engine.exportGlb(ctx.store.get().rigOptions);
+        return engine.exportGlb(rigOf(ctx.store.get()), ctx.store.get().clip.clip ?? 0);
       case "poses": {
         const poses = fittingPoses(ctx.store.get());
         return engine.exportPoses(
@@ -59,6 +60,7 @@ export function createExports(ctx: Context, project: Project): Exports {
     async save(kind) {
       const name = stem(ctx.store.get().model?.name ?? "model");
       await attempt(ctx, T.failed.write, async () => {
+        if (kind === "glb") await loadLattice(ctx);
         const blob = kind === "picture" ? await picture() : new Blob([new Uint8Array(bytesOf(kind))]);
         const full = kind === "project" ? project.fileName() : `${name}${SUFFIX[kind]}`;
         // A VRM stays one.

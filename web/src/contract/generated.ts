@@ -519,7 +519,11 @@ keep_travel: boolean,
 /**
  * The shape alone.
  */
-plain: boolean, };
+plain: boolean,
+/**
+ * The cage bends the model while a clip moves it.
+ */
+dynamic: boolean, };
 /**
  * A clip.
  */
@@ -574,7 +578,7 @@ export type GizmoHandle = "x" | "y" | "z" | "plane_x" | "plane_y" | "plane_z" | 
 export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"closest_point"};
 export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"detail":0.028,"quads":true,"margin":0.0,"symmetry":"auto","voxels":0,"shape":"follow","per_component":false};
-export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"plain":false};
+export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"plain":false,"dynamic":false};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":false,"problems":true};
 /** Least and most of each option that is a number. */
 export const RANGES = { grid: [8, 512], vertices: [8, 400], detail: [0.005, 0.2], margin: [0, 0.25], voxels: [8, 128] } as const;

@@ -105,6 +105,8 @@ export interface Session {
   bindMeanValue(): Job<void>;
   /** Cells and coordinates of one plane of the grid, in the worker; shown with `scene.slice` afterwards. */
   loadSlice(axis: 0 | 1 | 2, position: number, grid: number): Job<void>;
+  /** What the cage needs to bend a moving model (`RigOptions.dynamic`), in the worker; once per cage. */
+  loadLattice(grid: number): Job<void>;
 
   /** Makes ready to pull the model that is open, in a worker of its own. */
   preparePull(): Job<null>;

@@ -68,6 +68,7 @@ export interface Jobs {
     step: Progress;
     output: BoundArrays | undefined;
   };
+  lattice: { input: { cage: CageArrays; options: BindOptions }; step: Progress; output: BoundArrays };
   cage: {
     /** All that is to be enclosed, and the model at rest, which it is checked for. */
     input: { positions: Float32Array; triangles: Uint32Array; model: Float32Array; options: CageOptions };

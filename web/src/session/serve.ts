@@ -93,6 +93,10 @@ function createWork(pkg: Package): Work {
       const bound = await by.bindSlice(cage.positions, cage.corners, axis, fraction, options, step);
       return bound && taken(bound);
     },
+    async lattice({ cage, options }, step) {
+      const by = await binder(options.backend === "gpu");
+      return taken(await by.bindLattice(cage.positions, cage.corners, options, step));
+    },
     async cage({ positions, triangles, model, options }, step) {
       const cage = (await binder(false)).generateCage(positions, triangles, options, step);
       const { bridged } = cage;

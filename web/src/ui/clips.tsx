@@ -8,7 +8,7 @@ import { Fold, IconButton, Segments, Slider, Toggle } from "./controls";
 const SPEEDS = ["0.25", "0.5", "1"] as const;
 
 export function Clips({ app }: { app: App }) {
-  const { model, clip, bound } = app.store.get();
+  const { model, clip, bound, rigOptions } = app.store.get();
   if (!model) return null;
   const { clips } = model;
   const length = clips[clip.clip ?? -1]?.seconds ?? 0;
@@ -67,6 +67,14 @@ export function Clips({ app }: { app: App }) {
       {clip.clip !== null && (
         <Toggle label={T.clips.loop} on={clip.loop} onChange={(on) => app.clips.loop(on)} />
       )}
+      {clips.length > 0 && (
+        <Toggle
+          label={T.clips.dynamic}
+          sentence={T.clips.dynamicSentence}
+          on={rigOptions.dynamic}
+          onChange={(dynamic) => app.clips.rig({ dynamic })}
+        />
+      )}
       {model.targets.length > 0 && (
         <Fold title={T.clips.targets(model.targets.length)}>
           <div class="stack">
@@ -86,7 +94,7 @@ export function Clips({ app }: { app: App }) {
           </div>
         </Fold>
       )}
-      {model.rigged && <RigChoices app={app} />}
+      {model.rigged && !rigOptions.dynamic && <RigChoices app={app} />}
     </div>
   );
 }

@@ -3,7 +3,7 @@
 import { useEffect, useState } from "preact/hooks";
 import type { ExportKind } from "../actions/exports";
 import type { App } from "../app";
-import { type AppState, fittingPoses } from "../state";
+import { type AppState, fittingPoses, rigOf } from "../state";
 import { T } from "../words";
 import { RigChoices } from "./clips";
 import { Head, Segments, Toggle } from "./controls";
@@ -73,7 +73,9 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
 
 /** Skeleton, morph targets and clips stay, unless the shape alone is wanted. */
 function RigExport({ app }: { app: App }) {
-  const { model, rigOptions } = app.store.get();
+  const { model, rigOptions, clip } = app.store.get();
+  if (rigOf(app.store.get()).dynamic)
+    return <p class="export-option hint">{T.clips.baked(model?.clips[clip.clip ?? 0]?.name ?? "")}</p>;
   if (!model?.rigged) return null;
   return (
     <div class="export-option stack tight">

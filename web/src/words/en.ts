@@ -477,6 +477,11 @@ export const EN = {
       ]
         .filter(Boolean)
         .join(", "),
+    dynamic: "The cage bends the moving model",
+    dynamicSentence: "Experimental. Best with a cage made around the clip.",
+    preparing: "Getting the space around the cage ready",
+    baked: (name: string) =>
+      `The cage bends the moving model: the frames of ${name ? `“${name}”` : "its clip"} become morph targets, without skeleton.`,
     bindFirst: "Bind the model first: what plays is the shape that the cage gives it.",
   },
 

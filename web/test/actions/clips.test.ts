@@ -113,3 +113,19 @@ it("another choice for the joints shows the cage's pose again", async () => {
   clips.rig({ joints: "stay" });
   expect([store.get().clip.clip, store.get().rigOptions.joints]).toEqual([null, "stay"]);
 });
+
+it("the cage bends the moving model once the space around it is ready, which is asked for once", async () => {
+  const { clips, asked, starts, teach, said } = page();
+  clips.rig({ dynamic: true });
+  teach({ hasLattice: false });
+  const chosen = clips.choose(0);
+  await settled();
+  expect([starts(), said.at(-1)]).toEqual([0, "Getting the space around the cage ready"]);
+  asked.at(-1)?.resolve(undefined);
+  teach({ hasLattice: true });
+  await chosen;
+  expect(starts()).toBe(1);
+  await clips.choose(null);
+  await clips.choose(0);
+  expect(asked.filter(({ kind }) => kind === "lattice")).toHaveLength(1);
+});

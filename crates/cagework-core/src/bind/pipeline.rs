@@ -225,7 +225,7 @@ impl<'a> Prepared<'a> {
             memory_bytes: MemoryBytes { estimated: self.estimated + solved.planned_bytes, peak: peak as u64 },
             rest_error,
             raw_error,
-            weights: WeightStats { nonzeros: weights.data().len() as u64, ..weight_stats },
+            weights: WeightStats { nonzeros: weights.indptr()[n_vertices] as u64, ..weight_stats },
             vertices: n_vertices as u64,
             cage_vertices: controls.n_controls() as u64,
             outside_vertices: outside.iter().filter(|o| (o.vertex as usize) < n_vertices).count() as u64,

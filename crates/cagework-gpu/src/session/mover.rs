@@ -7,6 +7,7 @@ use std::sync::Arc;
 use cagework_core::Weights;
 use cagework_core::deform::OutsideVertex;
 use cagework_core::deform::{deform_bound, vertex_normals};
+use cagework_core::dynamic::DisplacementField;
 use cagework_core::skin::Skin;
 use glam::{Vec3, Vec4};
 
@@ -108,11 +109,12 @@ impl Mover {
         context: &GpuContext,
         model: &DrawModel,
         skin: &Skin,
+        field: Option<DisplacementField>,
     ) -> Result<Skinner, GpuError> {
         let skin = skin.with_copies(&model.copies);
         let positions =
             if let Self::Kernels { deformer, .. } = self { Some(deformer.positions()) } else { None };
-        Skinner::new(context, skin, positions).await
+        Skinner::new(context, skin, field, positions).await
     }
 
     /// Uploads vertices and their normals.

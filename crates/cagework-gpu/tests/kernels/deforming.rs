@@ -1,11 +1,12 @@
 //! What is done for each frame: vertices follow the cage, those outside it too, and normals follow vertices.
 
 use cagework_core::deform::OutsideVertex;
+use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
 use cagework_core::skin::{Skin, skin_vertices};
 use cagework_core::stencil::tables::{BUNDLE, NormalTable, OutsideTable, SlicedWeights};
-use cagework_core::{Weights, stencil};
+use cagework_core::{Cage, PolygonMesh, TriMesh, Weights, stencil};
 use cagework_gpu::kernels;
-use cagework_gpu::skin::SkinTables;
+use cagework_gpu::skin::{SkinTables, field_table};
 use glam::{Mat4, Quat, Vec3, Vec4};
 
 use super::support::{Seeded, assert_close, egg, flat};
@@ -101,6 +102,28 @@ fn skin_vertices_matches_cpu() {
     let result = run(&kernels::SKIN_VERTICES, ROWS, n as u32, &inputs);
     let expected = skin_vertices(&skin, &palette, &targets);
     assert_close(&unpadded(&result), &flat(&expected), 4.0 * POINT_TOLERANCE);
+}
+
+#[test]
+fn bend_vertices_matches_cpu() {
+    let mut seeded = Seeded(16);
+    let TriMesh { positions, triangles } = egg(5, 6);
+    let faces = triangles.iter().map(|t| t.to_vec()).collect();
+    let lattice = Lattice::new(&Cage::new(&PolygonMesh { positions, faces }).unwrap());
+    let n = lattice.dims.element_product() as usize;
+    let values = (0..n).map(|_| seeded.point().extend(0.0)).collect();
+    let size = lattice.cell * lattice.dims.as_vec3();
+    // In the lattice, on its edge and beyond it.
+    let mut points: Vec<Vec3> = (0..131)
+        .map(|_| lattice.origin + 0.5 * size + 0.7 * size * seeded.point())
+        .chain([lattice.origin, lattice.origin + size])
+        .collect();
+    let field = DisplacementField { lattice, values };
+    let (table, moved) = (field_table(&field), padded(&points, 1.0));
+    let result = run(&kernels::BEND_VERTICES, ROWS, points.len() as u32, &[bytes(&table), bytes(&moved)]);
+    bend_vertices(&field, &mut points);
+    // Values jump from node to node, so that rounding of where a vertex is counts a hundredfold.
+    assert_close(&unpadded(&result), &flat(&points), 100.0 * POINT_TOLERANCE);
 }
 
 #[test]

@@ -42,8 +42,23 @@ pub(crate) fn forget_morphs(json: &mut Value, places: &[Place]) {
     }
 }
 
-/// Names the targets and plays them: rest, each pose in turn, rest.
-pub(crate) fn play_poses(json: &mut Value, pack: &mut Pack<'_>, places: &[Place], poses: &[Pose<'_>]) {
+/// When poses are shown.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Played<'a> {
+    /// Rest, each in turn, rest; beside the animations that there are.
+    InTurn,
+    /// The frames of a clip, which lasts so many seconds, instead of all animations that there are.
+    Frames { clip: &'a str, seconds: f32 },
+}
+
+/// Names the targets and plays them.
+pub(crate) fn play_poses(
+    json: &mut Value,
+    pack: &mut Pack<'_>,
+    places: &[Place],
+    poses: &[Pose<'_>],
+    played: Played<'_>,
+) {
     let names: Vec<&str> = poses.iter().map(|p| p.name).collect();
     for place in places {
         let mesh = &mut json["meshes"][place.mesh];
@@ -53,10 +68,17 @@ pub(crate) fn play_poses(json: &mut Value, pack: &mut Pack<'_>, places: &[Place]
         }
         mesh["extras"]["targetNames"] = json!(names);
     }
-    let keys = poses.len() + 2;
-    let times: Vec<f32> = (0..keys).map(|k| k as f32 * SECONDS_PER_POSE).collect();
+    // Keys, those before the first pose, and seconds from one to the next.
+    let (name, keys, before, step) = match played {
+        Played::InTurn => ("poses", poses.len() + 2, 1, SECONDS_PER_POSE),
+        Played::Frames { clip, seconds } => {
+            json["animations"] = json!([]);
+            (clip, poses.len(), 0, seconds / (poses.len().max(2) - 1) as f32)
+        }
+    };
+    let times: Vec<f32> = (0..keys).map(|k| k as f32 * step).collect();
     let weights: Vec<f32> = (0..keys)
-        .flat_map(|key| (0..poses.len()).map(move |pose| if key == pose + 1 { 1.0 } else { 0.0 }))
+        .flat_map(|key| (0..poses.len()).map(move |pose| if key == pose + before { 1.0 } else { 0.0 }))
         .collect();
     let input = pack.push_floats(json, &times, 1, false, true);
     let output = pack.push_floats(json, &weights, 1, false, false);
@@ -65,5 +87,5 @@ pub(crate) fn play_poses(json: &mut Value, pack: &mut Pack<'_>, places: &[Place]
         .map(|place| json!({ "sampler": 0, "target": { "node": place.node, "path": "weights" } }))
         .collect();
     let sampler = json!({ "input": input, "output": output, "interpolation": "LINEAR" });
-    push(json, "animations", json!({ "name": "poses", "samplers": [sampler], "channels": channels }));
+    push(json, "animations", json!({ "name": name, "samplers": [sampler], "channels": channels }));
 }

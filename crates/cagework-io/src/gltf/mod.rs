@@ -35,6 +35,7 @@ use crate::shown::shown;
 use crate::siblings::{Image, Resolve};
 use scene::{Instance, Worlds};
 
+pub(crate) use animate::Played;
 pub(crate) use build::build_from_obj;
 pub use build::write_mesh_glb;
 pub(crate) use container::{glb_of, glb_parts};

@@ -14,10 +14,11 @@ use std::sync::Arc;
 use glam::{DMat3, DMat4, DVec3, Quat, Vec3};
 use serde_json::{Value, json};
 
+use super::animate::{self, Played};
 use super::geometry::{Frame, world_normals, world_tangents};
 use super::pack::{Pack, push};
 use super::scene::{Instance, name_of};
-use super::{GltfDocument, GltfError, Slot, animate};
+use super::{GltfDocument, GltfError, Slot};
 use crate::error::WriteError;
 use crate::normals::Shading;
 
@@ -52,6 +53,7 @@ pub(crate) fn patch(
     rest: Rest<'_>,
     base: &[Vec3],
     poses: &[Pose<'_>],
+    played: Played<'_>,
 ) -> Result<Vec<u8>, WriteError> {
     let mut json = document.json.clone();
     let mut pack = Pack::of(document);
@@ -94,7 +96,7 @@ pub(crate) fn patch(
     }
     animate::forget_morphs(&mut json, &places);
     if !poses.is_empty() {
-        animate::play_poses(&mut json, &mut pack, &places, poses);
+        animate::play_poses(&mut json, &mut pack, &places, poses, played);
     }
     pack.finish(json)
 }

@@ -1,6 +1,7 @@
 //! Files.
 
 use cagework_core::deform::{OutsideVertex, deform_bound, displacements};
+use cagework_core::dynamic::bend_vertices;
 use cagework_core::{Cage, PolygonMesh};
 use cagework_io::{Model, ReshapeReport, write_cage_obj, write_project, write_weights_npz};
 use glam::{DVec3, Vec3};
@@ -18,7 +19,8 @@ use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
-    /// The model as GLB, as posed; a rigged one with its skeleton, morph targets and clips.
+    /// The model as GLB, as posed; a rigged one with its skeleton, morph targets and clips. Where the cage bends the moving model,
+    /// frames of `clip` instead.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -26,14 +28,13 @@ impl Engine {
     pub fn export_glb(
         &self,
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
+        clip: u32,
     ) -> Result<Vec<u8>, JsValue> {
-        let pose = self.read(|state| state.positions.clone());
-        if let Some((bytes, report)) = self.reshaped(&pose, &[], &taken(options)?)? {
-            self.state.borrow_mut().rig_notices = report.notices();
-            return Ok(bytes);
-        }
-        let mut posed = self.deformed(&[pose])?;
-        Ok(self.read(|state| Answer::Ok(state.the_model()?.write_glb(&posed.pop().unwrap_or_default())?))?)
+        let asked: RigAsked = taken(options)?;
+        let (bytes, notices) =
+            if asked.dynamic { self.baked(clip as usize)? } else { self.posed_glb(&asked)? };
+        self.state.borrow_mut().rig_notices = notices;
+        Ok(bytes)
     }
 
     /// What the last export did to the rig, each a sentence; they are told once.
@@ -178,6 +179,28 @@ impl Engine {
 }
 
 impl Engine {
+    /// The model as posed, and what became of its rig.
+    pub(super) fn posed_glb(&self, asked: &RigAsked) -> Answer<(Vec<u8>, Vec<String>)> {
+        let pose = self.read(|state| state.positions.clone());
+        if let Some((bytes, report)) = self.reshaped(&pose, &[], asked)? {
+            return Ok((bytes, report.notices()));
+        }
+        let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
+        Ok((self.read(|state| Answer::Ok(state.the_model()?.write_glb(&posed)?))?, Vec::new()))
+    }
+
+    /// Frames of a clip, each bent by the cage.
+    fn baked(&self, clip: usize) -> Answer<(Vec<u8>, Vec<String>)> {
+        let field = self.field()?;
+        self.read(|state| {
+            let model = state.the_model()?;
+            let (mut frames, mut rest) = (model.frames(clip)?, model.positions.clone());
+            frames.iter_mut().chain([&mut rest]).for_each(|frame| bend_vertices(&field, frame));
+            let told = format!("{} frames became morph targets; the skeleton is left out", frames.len());
+            Ok((model.write_baked(clip, &rest, frames)?, vec![told]))
+        })
+    }
+
     /// A rigged model in a pose of the cage, or at rest with poses as morph targets; none if it has no rig, or is to be written
     /// without it.
     pub(super) fn reshaped(

@@ -1,12 +1,16 @@
 //! Clips: what plays is the model as it would be exported.
 
+use cagework_core::Weights;
+use cagework_core::dynamic::{DisplacementField, Lattice};
+use cagework_io::WriteError;
 use js_sys::Float32Array;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{Engine, lost};
-use crate::error::{Answer, Fault};
-use crate::options::taken;
+use crate::error::{Answer, ErrorName, Fault};
+use crate::incoming;
+use crate::options::{RigAsked, taken};
 use crate::state::Playing;
 
 #[wasm_bindgen]
@@ -21,27 +25,22 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
     ) -> Result<(), JsValue> {
         let revision = self.revision();
-        let pose = self.read(|state| state.positions.clone());
-        let bytes = match self.reshaped(&pose, &[], &taken(options)?)? {
-            Some((bytes, _)) => bytes,
-            None => {
-                let mut posed = self.deformed(&[pose])?;
-                self.read(|state| {
-                    Answer::Ok(state.the_model()?.write_glb(&posed.pop().unwrap_or_default())?)
-                })?
-            }
+        let asked: RigAsked = taken(options)?;
+        let (player, field) = if asked.dynamic {
+            let player = self.read(|state| Answer::Ok(state.the_model()?.player()?))?;
+            (player.ok_or_else(|| Fault::from(WriteError::NoRig))?, Some(self.field()?))
+        } else {
+            let bytes = self.posed_glb(&asked)?.0;
+            (self.read(|state| Answer::Ok(state.the_model()?.player_of(&bytes)?))?, None)
         };
-        let (player, up) = self.read(|state| {
-            let model = state.the_model()?;
-            Answer::Ok((model.player_of(&bytes)?, model.up().turn()))
-        })?;
+        let up = self.read(|state| Answer::Ok(state.the_model()?.up().turn()))?;
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
-        gpu.main.start_playing(&player.skin).await.map_err(Fault::from)?;
+        gpu.main.start_playing(&player.skin, field.clone()).await.map_err(Fault::from)?;
         self.read(|state| state.require(revision))?;
         let posed = player.at(None, 0.0, &[]);
         self.change(|state| {
-            state.playing = Some(Playing { player, up, posed, is_new: true });
+            state.playing = Some(Playing { player, up, posed, field, is_new: true });
             state.is_changed = true;
         });
         Ok(())
@@ -80,16 +79,64 @@ impl Engine {
         });
     }
 
+    /// Whether [`Self::take_lattice`] has been called for this cage.
+    #[wasm_bindgen(getter, js_name = hasLattice)]
+    #[must_use]
+    pub fn has_lattice(&self) -> bool {
+        self.read(|state| state.lattice.is_some())
+    }
+
+    /// Takes what the cage needs to bend a moving model, as `Binder.bindLattice` bound it; the arrays are those of `adopt`.
+    ///
+    /// # Errors
+    /// When there is no cage or the arrays are another one's.
+    #[wasm_bindgen(js_name = takeLattice)]
+    pub fn take_lattice(
+        &self,
+        indptr: Vec<u32>,
+        indices: Vec<u32>,
+        data: Vec<f32>,
+        outside: &[u32],
+        offsets: &[f32],
+    ) -> Result<(), JsValue> {
+        let lattice = self.read(|state| {
+            let (_, cage) = state.parts()?;
+            let lattice = Lattice::new(cage);
+            let weights = Weights::new(cage.n_vertices() as u32, indptr, indices, data)?;
+            let outside = incoming::outside(outside, offsets);
+            let n = weights.n_rows();
+            if n != lattice.points().len() || outside.iter().any(|o| o.vertex as usize >= n) {
+                return Err(Fault::new(ErrorName::Error, "the weights are those of another cage's lattice"));
+            }
+            Answer::Ok((lattice, weights, outside))
+        })?;
+        self.state.borrow_mut().lattice = Some(lattice);
+        Ok(())
+    }
+
     /// Where the vertices are while a clip plays, by the processor; for tests and pictures. `[n_vertices, 3]`
     #[wasm_bindgen(js_name = clipPositions)]
     #[must_use]
     pub fn clip_positions(&self) -> Vec<f32> {
         self.read(|state| {
-            let at = state.playing.as_ref().map(|playing| {
-                let palette = playing.palette();
-                cagework_core::skin::skin_vertices(&playing.player.skin, &palette, &playing.posed.targets)
-            });
+            let at = state.playing.as_ref().map(Playing::positions);
             crate::arrays::flat(&at.unwrap_or_default())
+        })
+    }
+}
+
+impl Engine {
+    /// How far the cage as posed moves each place.
+    ///
+    /// # Errors
+    /// When no lattice has come.
+    pub(super) fn field(&self) -> Answer<DisplacementField> {
+        self.read(|state| {
+            let Some((lattice, weights, outside)) = &state.lattice else {
+                return Err(Fault::missing("lattice", "bind it first"));
+            };
+            let (rest, posed) = (&state.rest.positions, &state.positions);
+            Ok(DisplacementField::new(lattice.clone(), weights, outside, rest, posed))
         })
     }
 }

@@ -1,0 +1,88 @@
+//! `cagework deform --dynamic`: the cage bends the model while a clip moves it.
+
+use cagework_core::BindOptions;
+use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
+use cagework_io::{ModelFormat, NoClip, shown};
+use serde::Serialize;
+
+use crate::args::{CageSource, DeformArgs};
+use crate::bind::bind_positions;
+use crate::error::CliError;
+use crate::files::{check_outputs, json, print, shown_path, write};
+use crate::load::{load_cage, load_model};
+
+/// What was done; its JSON is the output of `--json`.
+#[derive(Debug, Serialize)]
+struct Baked {
+    output: String,
+    clip: String,
+    frames: usize,
+    seconds: f32,
+    vertices: usize,
+    notices: Vec<String>,
+}
+
+/// Writes the frames of a clip, each bent by the posed cage.
+///
+/// # Errors
+/// When a file cannot be read or written, there is no such clip, or files do not belong together.
+pub(crate) fn run(args: &DeformArgs, clip: &str, as_json: bool) -> Result<(), CliError> {
+    let output = &args.output.path;
+    let [pose] = args.pose.as_slice() else {
+        return Err(CliError::Mismatch {
+            message: format!("--dynamic bends by one pose, but {} were given", args.pose.len()),
+            hint: "run the command once per pose",
+        });
+    };
+    let mut inputs = vec![args.mesh.as_path(), pose.as_path()];
+    if let CageSource::File(path) = &args.cage {
+        inputs.push(path);
+    }
+    check_outputs(&[output], &inputs)?;
+    if args.output.format != ModelFormat::Gltf {
+        return Err(CliError::Mismatch {
+            message: format!(
+                "{}: a file of format {} holds no clip",
+                shown_path(output),
+                args.output.format.name()
+            ),
+            hint: "write a .glb",
+        });
+    }
+    let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
+    let wrong = |e| CliError::file(&args.mesh, e);
+    let clips = model.clips();
+    let number = clips.iter().position(|c| c.name.as_deref() == Some(clip)).ok_or_else(|| {
+        let names = clips.iter().filter_map(|c| c.name.clone()).collect();
+        CliError::file(&args.mesh, NoClip { asked: clip.to_owned(), names })
+    })?;
+    let mut frames = model.frames(number).map_err(wrong)?;
+    let cage = load_cage(&args.cage, &model, args.read.memory)?;
+    let posed = cage.load_pose(pose)?;
+    let lattice = Lattice::new(&cage.cage);
+    let options =
+        BindOptions { held: model.bytes(), memory_limit: args.read.memory.bytes(), ..BindOptions::default() };
+    let binding = bind_positions(&lattice.points(), &cage.cage, false, &options)?;
+    let rest = cage.cage.positions();
+    let field = DisplacementField::new(lattice, &binding.weights, &binding.outside, rest, &posed);
+    let mut at_rest = model.positions.clone();
+    frames.iter_mut().chain([&mut at_rest]).for_each(|frame| bend_vertices(&field, frame));
+    let n = frames.len();
+    let bytes = model.write_baked(number, &at_rest, frames).map_err(|e| CliError::file(output, e))?;
+    write(output, &bytes)?;
+    let done = Baked {
+        output: output.display().to_string(),
+        clip: clip.to_owned(),
+        frames: n,
+        seconds: clips[number].seconds,
+        vertices: model.positions.len(),
+        notices: model.notices.clone(),
+    };
+    let text = format!(
+        "bent {n} frames of clip {} ({:.2} s)\nwrote {}: its frames as morph targets and an animation, without skeleton\n",
+        shown(clip),
+        done.seconds,
+        shown(&done.output)
+    );
+    print(&if as_json { json(&done) } else { text })
+}

@@ -1,0 +1,45 @@
+//! Clips: the mesh follows a skin.
+
+use cagework_core::dynamic::DisplacementField;
+use cagework_core::skin::Skin;
+use glam::Mat4;
+
+use super::Session;
+use crate::error::GpuError;
+
+impl Session {
+    /// Lets the mesh follow a skin instead of the cage, until [`Self::stop_playing`]; [`Self::play`] says where it is. `skin` of
+    /// the model's vertices; `field` bends what it has moved.
+    ///
+    /// # Errors
+    /// [`GpuError::NotReady`] before a bind, [`GpuError::Model`] for another model's skin; otherwise as
+    /// [`crate::buffers::Allocator::zeros`].
+    pub async fn start_playing(
+        &mut self,
+        skin: &Skin,
+        field: Option<DisplacementField>,
+    ) -> Result<(), GpuError> {
+        let (model, _) = self.parts()?;
+        let Some(bound) = &self.bound else { return Err(GpuError::NotReady { missing: "bind" }) };
+        if skin.positions.len() != model.positions.len() {
+            let (given, n) = (skin.positions.len(), model.positions.len());
+            return Err(GpuError::Model { reason: format!("a skin of {given} vertices for a model of {n}") });
+        }
+        self.playing = Some(bound.mover.skinner(&self.context, model, skin, field).await?);
+        self.moved = true;
+        Ok(())
+    }
+
+    /// Matrices of the joints and weights of the morph targets; the next frame shows them.
+    pub fn play(&mut self, palette: &[Mat4], targets: &[f32]) {
+        if let Some(skinner) = &mut self.playing {
+            skinner.pose(&self.context, palette, targets);
+            self.moved = true;
+        }
+    }
+
+    /// The mesh follows the cage again.
+    pub fn stop_playing(&mut self) {
+        self.moved |= self.playing.take().is_some();
+    }
+}

@@ -1,0 +1,39 @@
+// Dynamic binding (Joshi et al. 2007): x += u(x), where u is how far a pose of the cage moves each place, kept at the nodes of a
+// lattice and interpolated linearly. One invocation per vertex, in place, after skin_vertices. A table instead of a texture: sixteen
+// bits are too few, and thirty-two are not filtered everywhere. Twin: cagework_core::dynamic::bend_vertices.
+
+struct Field {
+    /// First node, object units.
+    origin: vec3f,
+    /// Edge of a cell, object units.
+    cell: f32,
+    /// Nodes along each axis, x fastest.
+    dims: vec3u,
+    values: array<vec4f>,
+}
+
+@group(0) @binding(0) var<uniform> work: Work;
+@group(0) @binding(1) var<storage, read> field: Field;
+@group(0) @binding(2) var<storage, read_write> positions: array<vec4f>;
+
+fn along_x(corner: vec3u, share: f32) -> vec3f {
+    let k = corner.x + field.dims.x * (corner.y + field.dims.y * corner.z);
+    return mix(field.values[k].xyz, field.values[k + 1u].xyz, share);
+}
+
+fn along_y(corner: vec3u, share: vec3f) -> vec3f {
+    return mix(along_x(corner, share.x), along_x(corner + vec3u(0u, 1u, 0u), share.x), share.y);
+}
+
+@compute @workgroup_size(64)
+fn bend_vertices(@builtin(global_invocation_id) id: vec3u) {
+    let v = invocation(id, work.stride);
+    if v >= work.count { return; }
+    let at = (positions[v].xyz - field.origin) / field.cell;
+    let first = clamp(floor(at), vec3f(0.0), vec3f(field.dims - 2u));
+    // Beyond the lattice its edge counts, where nothing moves.
+    let share = clamp(at - first, vec3f(0.0), vec3f(1.0));
+    let corner = vec3u(first);
+    let by = mix(along_y(corner, share), along_y(corner + vec3u(0u, 0u, 1u), share), share.z);
+    positions[v] += vec4f(by, 0.0);
+}
