@@ -7,8 +7,8 @@ use cagework_core::deform::deform_bound;
 use cagework_core::options::BindOptions;
 use cagework_core::{Cage, Controls, bind};
 use cagework_gpu::{GpuContext, bind_on as bind_on_gpu};
-use cagework_io::{Model, write_cage_obj, write_weights_npz};
-use glam::Vec3;
+use cagework_io::{Model, ModelFormat, ReshapeOptions, write_cage_obj, write_weights_npz};
+use glam::{DVec3, Vec3};
 
 use crate::args::{BindArgs, CageSource, ModelOutput};
 use crate::card;
@@ -57,7 +57,15 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     }
     if let Some(output) = &args.output {
         let rest = deform(&binding, cage.positions());
-        write(&output.path, &export(&model, &rest[..model.positions.len()], output)?)?;
+        let bytes = if output.format == ModelFormat::Gltf && model.is_rigged() {
+            let by: Vec<DVec3> = rest.iter().zip(&points).map(|(a, b)| a.as_dvec3() - b.as_dvec3()).collect();
+            let outside: Vec<u32> = binding.outside.iter().map(|o| o.vertex).collect();
+            let written = model.write_reshaped(&by, &outside, &[], &ReshapeOptions::default());
+            written.map_err(|e| CliError::file(&output.path, e))?.0
+        } else {
+            export(&model, &rest[..model.positions.len()], output)?
+        };
+        write(&output.path, &bytes)?;
     }
     if let Some(path) = &args.save_cage {
         write(path, &write_cage_obj(&model.up().mesh_turned_back(&cage.to_polygon_mesh())))?;

@@ -23,6 +23,8 @@ use crate::views::{CageInfo, CageState, SurfacePoint};
 #[derive(Default)]
 pub(crate) struct State {
     pub(crate) model: Option<Model>,
+    /// How many points its rig has, once they were counted.
+    pub(crate) n_rig: Option<usize>,
     /// The cage at rest; none while there is only a draft of one.
     pub(crate) cage: Option<Cage>,
     /// The cage's positions at rest and faces, or the draft's.
@@ -121,6 +123,7 @@ impl State {
     /// Another model, without a cage.
     pub(crate) fn set_model(&mut self, model: Model) {
         self.model = Some(model);
+        self.n_rig = None;
         self.set_cage(PolygonMesh::default());
         self.camera = Camera::default();
         self.fit_camera();

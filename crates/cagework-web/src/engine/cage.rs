@@ -124,9 +124,14 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
     ) -> Result<f64, JsValue> {
         let asked: BindAsked = taken(options)?;
+        if self.read(|state| state.n_rig.is_none()) {
+            let n = self.read(|state| Answer::Ok(state.the_model()?.extra_points()?.len()))?;
+            self.state.borrow_mut().n_rig = Some(n);
+        }
         let bytes = self.read(|state| {
             let (model, cage) = state.parts()?;
-            Answer::Ok(estimate_memory(cage, model.positions.len(), &asked.into())?)
+            let n = model.positions.len() + state.n_rig.unwrap_or(0);
+            Answer::Ok(estimate_memory(cage, n, &asked.into())?)
         })?;
         Ok(bytes as f64)
     }
