@@ -198,6 +198,91 @@ export async function validationErrors(bytes: Uint8Array): Promise<string[]> {
     .map(({ code, pointer, message }) => `${code} at ${pointer}: ${message}`);
 }
 
+/** A body and a hat on one skeleton of two joints: keys with defaults 0 and 1, and a clip of turns, a way and keys. */
+export async function dancer(): Promise<Uint8Array> {
+  const document = new Document();
+  const buffer = document.createBuffer();
+  const array = (type: "SCALAR" | "VEC3" | "VEC4" | "MAT4", values: Float32Array | Uint16Array) =>
+    document.createAccessor().setType(type).setArray(values).setBuffer(buffer);
+  const floats = (type: "SCALAR" | "VEC3" | "VEC4" | "MAT4", values: readonly number[]) =>
+    array(type, Float32Array.from(values));
+  const bone = document.createNode("chest").setTranslation([0, 1, 0]);
+  const hips = document.createNode("hips").addChild(bone);
+  const bind = (y: number) => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -y, 0, 1];
+  const skin = document
+    .createSkin()
+    .addJoint(hips)
+    .addJoint(bone)
+    .setInverseBindMatrices(floats("MAT4", [...bind(0), ...bind(1)]));
+  const scene = document.createScene().addChild(hips);
+  const SIDES = 16;
+  const RINGS = 13;
+
+  /** A closed tube; `bulge` of each key at a height, 0 to 1. */
+  const tube = (
+    name: string,
+    [from, to]: [number, number],
+    radius: number,
+    keys: ((t: number) => number)[],
+  ) => {
+    const rings = Array.from({ length: RINGS * SIDES }, (_, k) => {
+      const [ring, angle] = [Math.floor(k / SIDES), (2 * Math.PI * (k % SIDES)) / SIDES];
+      return { t: ring / (RINGS - 1), x: Math.cos(angle), z: Math.sin(angle) };
+    });
+    const ends = [0, 1].map((t) => ({ t, x: 0, z: 0 }));
+    const places = [...rings, ...ends];
+    const height = (t: number) => from + (to - from) * t;
+    const positions = places.flatMap(({ t, x, z }) => [radius * x, height(t), radius * z]);
+    const corners: number[] = [];
+    for (let i = 0; i < SIDES; i++) {
+      const j = (i + 1) % SIDES;
+      const top = (RINGS - 1) * SIDES;
+      corners.push(RINGS * SIDES, i, j, RINGS * SIDES + 1, top + j, top + i);
+      for (let ring = 0; ring < top; ring += SIDES)
+        corners.push(ring + i, ring + SIDES + i, ring + j, ring + j, ring + SIDES + i, ring + SIDES + j);
+    }
+    const share = (t: number) => Math.min(Math.max(height(t) - 0.5, 0), 1);
+    const primitive = document
+      .createPrimitive()
+      .setIndices(array("SCALAR", Uint16Array.from(corners)))
+      .setAttribute("POSITION", floats("VEC3", positions))
+      .setAttribute("JOINTS_0", array("VEC4", Uint16Array.from(places.flatMap(() => [0, 1, 0, 0]))))
+      .setAttribute(
+        "WEIGHTS_0",
+        floats(
+          "VEC4",
+          places.flatMap(({ t }) => [1 - share(t), share(t), 0, 0]),
+        ),
+      );
+    for (const key of keys) {
+      const deltas = places.flatMap(({ t, x, z }) => [key(t) * x, 0, key(t) * z]);
+      primitive.addTarget(document.createPrimitiveTarget().setAttribute("POSITION", floats("VEC3", deltas)));
+    }
+    const mesh = document.createMesh(name).addPrimitive(primitive);
+    if (keys.length > 0) mesh.setWeights([0, 1]).setExtras({ targetNames: ["belly", "chest"] });
+    const node = document.createNode(name).setMesh(mesh).setSkin(skin);
+    scene.addChild(node);
+    return node;
+  };
+  const bump = (middle: number) => (t: number) => 0.1 * Math.max(0, 1 - ((t - middle) / 0.3) ** 2);
+  const body = tube("body", [0, 1.8], 0.3, [bump(0.3), bump(0.7)]);
+  tube("hat", [1.85, 2.1], 0.4, []);
+
+  const times = floats("SCALAR", [0, 0.5, 1]);
+  const dance = document.createAnimation("dance");
+  const move = (node: Node, path: "translation" | "rotation" | "weights", values: number[]) => {
+    const type = path === "weights" ? "SCALAR" : path === "rotation" ? "VEC4" : "VEC3";
+    const sampler = document.createAnimationSampler().setInput(times).setOutput(floats(type, values));
+    const channel = document.createAnimationChannel().setTargetNode(node).setTargetPath(path);
+    dance.addSampler(sampler).addChannel(channel.setSampler(sampler));
+  };
+  const [sine, cosine] = [Math.sin(0.3), Math.cos(0.3)];
+  move(bone, "rotation", [0, 0, 0, 1, 0, 0, sine, cosine, 0, 0, 0, 1]);
+  move(hips, "translation", [0, 0, 0, 0.2, 0.1, 0, 0, 0, 0]);
+  move(body, "weights", [0, 1, 1, 0, 0, 1]);
+  return new NodeIO().writeBinary(document);
+}
+
 /** Where the vertices of a file's one mesh are at a key of its one animation of morph targets. */
 export async function shownAt(bytes: Uint8Array, seconds: number): Promise<number[]> {
   const root = (await new NodeIO().readBinary(bytes)).getRoot();

@@ -1,7 +1,7 @@
 /** A rigged model is shaped, plays its clip, and leaves with both. */
 
 import type { Page } from "@playwright/test";
-import { shownAt, validationErrors } from "./models";
+import { dancer, shownAt, validationErrors } from "./models";
 import {
   bound,
   cagePositions,
@@ -20,18 +20,18 @@ import {
 const TIMES = [0, 0.6, 1.3];
 
 /** Where the vertices are at times of the clip. */
-async function played(page: Page): Promise<number[][]> {
+async function played(page: Page, at: readonly number[] = TIMES): Promise<number[][]> {
   return page.evaluate(async (times) => {
     const session = globalThis.cagework;
     if (!session) throw new Error("no session");
     await session.engine.startClip({ joints: "follow", keep_travel: false, plain: false, dynamic: false });
-    const at = times.map((time) => {
+    const found = times.map((time) => {
       session.engine.showClip(0, time, new Float32Array());
       return [...session.engine.clipPositions()];
     });
     session.engine.stopClip();
-    return at;
-  }, TIMES);
+    return found;
+  }, at);
 }
 
 test("a visit that shapes somebody who walks", async ({ page }) => {
@@ -98,4 +98,36 @@ test("a visit that shapes somebody who walks", async ({ page }) => {
     const baked = await shownAt(file.bytes, 1);
     expect(largestMove(shown, baked), "at one second").toBeLessThan(2e-5);
   });
+});
+
+test("a model of several meshes with keys and a clip is dropped, shaped, exported, and dropped again", async ({
+  page,
+}) => {
+  await open(page);
+  const dropped = { name: "dancer.glb", bytes: await dancer() };
+  expect(await validationErrors(dropped.bytes)).toEqual([]);
+  await drop(page, [dropped]);
+  await expect(page).toHaveTitle(/dancer/);
+  await bound(page);
+  const before = await played(page, [0, 0.3, 0.5]);
+  const cage = await cagePositions(page);
+  const at = await grip(page, [0.5, 0.3]);
+  await pull(page, at, 60, -30);
+  await rested(page);
+  expect(largestMove(cage, await cagePositions(page))).toBeGreaterThan(0.01);
+  const shaped = await played(page, [0, 0.3, 0.5]);
+  expect(largestMove(shaped[1] ?? [], before[1] ?? [])).toBeGreaterThan(0.01);
+  await page.getByRole("button", { name: "Pose", exact: false }).first().click();
+  await page.getByRole("combobox", { name: "Clip" }).selectOption("0");
+  await shoot(page, "dancer");
+  const file = await download(page, "glb");
+  expect(await validationErrors(file.bytes)).toEqual([]);
+  await drop(page, [file]);
+  await expect(page).toHaveTitle(/dancer-posed/);
+  await bound(page);
+  await page.getByRole("button", { name: "Model", exact: false }).first().click();
+  await expect(page.getByText("2 joints, 1 clip, 2 morph targets")).toBeVisible();
+  const again = await played(page, [0, 0.3, 0.5]);
+  for (const [k, positions] of shaped.entries())
+    expect(largestMove(positions, again[k] ?? []), `time ${k}`).toBeLessThan(2e-5);
 });

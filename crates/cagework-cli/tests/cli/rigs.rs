@@ -77,3 +77,36 @@ fn what_a_rig_needs_is_said() {
         .stderr(contains("the weights have 0 points of the model's rig, but it has 112"));
     sandbox.run(&format!("{DEFORM} --pose wide.obj --static -o out.glb")).success();
 }
+
+#[test]
+fn the_cage_bends_the_moving_model_into_frames() {
+    let sandbox = bound();
+    const DYNAMIC: &str = "deform humanoid.glb --cage cage.obj --dynamic";
+    let done = sandbox.json(&format!("{DYNAMIC} Walk --pose wide.obj -o bent.glb --json"));
+    // Thirty a second, at most sixty, and the last.
+    assert_eq!((&done["frames"], &done["clip"]), (&61.into(), &"Walk".into()));
+    let read = |name: &str| Model::read("model.glb", &sandbox.read(name), &mut |_| None).unwrap();
+    let (model, bent) = (read("humanoid.glb"), read("bent.glb"));
+    assert_eq!((bent.clips().len(), bent.clips()[0].seconds), (1, 2.0));
+    let (before, after) = (model.frames(0).unwrap(), bent.frames(0).unwrap());
+    // Above the hips and inside the cage everything is 1.3 times as wide, wherever it has walked to.
+    let chest = |p: &&glam::Vec3| p.y > 1.2 && p.y < 1.4 && p.x.abs() > 0.05 && p.x.abs() < 0.12;
+    for (old, new) in before.iter().zip(&after).step_by(20) {
+        let pairs = old.iter().zip(new).filter(|(old, _)| chest(old));
+        let wider: Vec<f32> = pairs.map(|(old, new)| new.x / old.x).collect();
+        let mean = wider.iter().sum::<f32>() / wider.len() as f32;
+        assert!(wider.len() > 50 && (mean - 1.3).abs() < 0.05, "{mean} of {}", wider.len());
+    }
+    sandbox
+        .run(&format!("{DYNAMIC} Run --pose wide.obj -o bent.glb"))
+        .failure()
+        .stderr(contains("there is no clip 'Run'; the model has Walk"));
+    sandbox
+        .run(&format!("{DYNAMIC} Walk --pose wide.obj --pose cage.obj -o bent.glb"))
+        .failure()
+        .stderr(contains("--dynamic bends by one pose, but 2 were given"));
+    sandbox
+        .run(&format!("{DYNAMIC} Walk --pose wide.obj -o bent.obj"))
+        .failure()
+        .stderr(contains("holds no clip"));
+}
