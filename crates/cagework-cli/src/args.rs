@@ -17,7 +17,7 @@ use cagework_io::{ModelFormat, UpAxis};
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-pub(crate) use render::{RenderArgs, Show};
+pub(crate) use render::{Compared, RenderArgs, Show};
 pub(crate) use rig::RigArgs;
 
 /// Bind a 3-D model to a cage by harmonic coordinates, then deform it by moving the cage.

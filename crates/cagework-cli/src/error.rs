@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use cagework_core::MeanValueError;
+use cagework_core::ClosedFormError;
 use cagework_core::bind::BindError;
 use cagework_core::cage::CageError;
 use cagework_core::cage_check::RepairError;
@@ -54,9 +54,9 @@ pub(crate) enum CliError {
     /// The cage could not be mended.
     #[error(transparent)]
     Repair(#[from] RepairError),
-    /// There are no mean value coordinates to compare with.
+    /// There are no coordinates by formula to compare with.
     #[error(transparent)]
-    MeanValue(#[from] MeanValueError),
+    ClosedForm(#[from] ClosedFormError),
     /// A plot could not be drawn.
     #[error("a plot cannot be drawn: {message}")]
     Plot {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cagework_core::bind::Binding;
+use cagework_core::green::green_weights;
 use cagework_core::slice::Slice;
 use cagework_core::{BindOptions, Cage, Controls, Weights, mean_value_weights};
 use cagework_gpu::Session;
@@ -13,7 +14,7 @@ use cagework_io::{Model, shown};
 use glam::Vec3;
 use serde::Serialize;
 
-use crate::args::{CageSource, RenderArgs, Show};
+use crate::args::{CageSource, Compared, RenderArgs, Show};
 use crate::bind::bind_positions;
 use crate::deform::load_weights;
 use crate::error::CliError;
@@ -62,9 +63,12 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
         points.extend(prepare(args, &model, cage, &mut session, &mut scene)?);
     }
     session.set_scene(scene);
-    if let Some(cage) = cage.as_ref().filter(|_| args.compare) {
+    if let (Some(cage), Some(compared)) = (&cage, args.compare) {
         let mut twin = pollster::block_on(session.twin())?;
-        let weights = mean_value_weights(&model.positions, &cage.cage)?;
+        let weights = match compared {
+            Compared::MeanValue => mean_value_weights(&model.positions, &cage.cage)?,
+            Compared::Green => green_weights(&model.positions, &cage.cage)?,
+        };
         pollster::block_on(twin.adopt(weights, Vec::new()))?;
         other = Some(twin);
     }
@@ -82,7 +86,10 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
 
     let started = Instant::now();
     let mut rgba = pollster::block_on(session.picture(part, args.scale))?;
-    let compared = other.is_some().then_some(["harmonic coordinates", "mean value coordinates"]);
+    let compared = args.compare.map(|compared| match compared {
+        Compared::MeanValue => ["harmonic coordinates", "mean value coordinates"],
+        Compared::Green => ["harmonic coordinates", "Green coordinates"],
+    });
     if let Some(mut other) = other {
         *other.camera_mut() = *session.camera();
         let right = pollster::block_on(other.picture(part, args.scale))?;
@@ -104,11 +111,11 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
 /// Refuses a comparison of what no weights move.
 fn check_compared(args: &RenderArgs) -> Result<(), CliError> {
     let hint = "leave out --compare, or --show the model";
-    if args.compare && matches!(args.show, Show::Cells | Show::Slice) {
+    if args.compare.is_some() && matches!(args.show, Show::Cells | Show::Slice) {
         let message = "--compare needs a model that moves, but a slice of the grid is asked for".to_owned();
         return Err(CliError::Mismatch { message, hint });
     }
-    if args.compare && args.size.0[0] < NARROWEST_PAIR {
+    if args.compare.is_some() && args.size.0[0] < NARROWEST_PAIR {
         let message = format!("--compare needs a picture at least {NARROWEST_PAIR} pixels wide");
         return Err(CliError::Mismatch { message, hint: "give a larger --size" });
     }
@@ -176,7 +183,7 @@ fn prepare(
             hint: "cage vertices are counted from 0",
         });
     }
-    let needs_weights = args.compare
+    let needs_weights = args.compare.is_some()
         || args.pose.is_some()
         || matches!(args.show, Show::Wireframe | Show::Weights | Show::Error);
     if needs_weights {

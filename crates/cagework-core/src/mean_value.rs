@@ -10,9 +10,9 @@
 //! the plane of a triangle. Polygons are taken as the triangles that [`Cage::triangles`] cuts them into.
 
 use glam::{DVec3, Vec3};
-use thiserror::Error;
 
 use crate::cage::Cage;
+use crate::closed_form::{ClosedFormError, dense};
 use crate::weights::Weights;
 
 /// Sine below which directions count as in one plane or along one line, and fraction of the cage's diagonal below
@@ -24,59 +24,13 @@ const ON_SURFACE: f64 = 1e-8;
 /// [`ON_SURFACE`] leaves open, because the nearness of an edge magnifies it.
 const ALL_AROUND: f64 = 1e-7;
 
-/// Why there are no mean value coordinates.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum MeanValueError {
-    /// A point is not a finite number.
-    #[error("mesh vertex {vertex} is not a finite number")]
-    NotFinite {
-        /// The point.
-        vertex: u32,
-    },
-    /// The weights of a point outside cancel out.
-    #[error(
-        "mean value coordinates are not defined at mesh vertex {vertex}, outside of the cage: enlarge the cage"
-    )]
-    Undefined {
-        /// The point.
-        vertex: u32,
-    },
-    /// There would be more weights than row pointers can count.
-    #[error("{rows} vertices times {columns} cage vertices are more than {} weights: use fewer", u32::MAX)]
-    TooMany {
-        /// Points.
-        rows: usize,
-        /// Cage vertices.
-        columns: usize,
-    },
-}
-
 /// Mean value coordinates of all cage vertices at `points` (`[n_vertices]`, object units, inside or outside of the
 /// cage). Dense: every row has all columns. `[n_vertices, n_cage]`
 ///
 /// # Errors
-/// [`MeanValueError`]: a point is not finite, has no coordinates, or there are too many weights.
-pub fn mean_value_weights(points: &[Vec3], cage: &Cage) -> Result<Weights, MeanValueError> {
-    let (rows, columns) = (points.len(), cage.n_vertices());
-    if let Some(vertex) = points.iter().position(|p| !p.is_finite()) {
-        return Err(MeanValueError::NotFinite { vertex: vertex as u32 });
-    }
-    if rows.checked_mul(columns).is_none_or(|n| u32::try_from(n).is_err()) {
-        return Err(MeanValueError::TooMany { rows, columns });
-    }
-    let dense = crate::team::map_indices(rows, |v| {
-        let mut row = vec![0.0; columns];
-        let defined = coordinates(points[v].as_dvec3(), cage, &mut row);
-        defined.then(|| row.into_iter().map(|w| w as f32).collect::<Vec<f32>>())
-    });
-    let mut data = Vec::with_capacity(rows * columns);
-    for (v, row) in dense.into_iter().enumerate() {
-        data.extend(row.ok_or(MeanValueError::Undefined { vertex: v as u32 })?);
-    }
-    let indptr = (0..=rows).map(|v| (v * columns) as u32).collect();
-    let indices = (0..rows).flat_map(|_| 0..columns as u32).collect();
-    Ok(Weights::new(columns as u32, indptr, indices, data)
-        .expect("full rows of finite numbers are a CSR matrix"))
+/// [`ClosedFormError`]: a point is not finite, has no coordinates, or there are too many weights.
+pub fn mean_value_weights(points: &[Vec3], cage: &Cage) -> Result<Weights, ClosedFormError> {
+    dense("mean value", points, cage.n_vertices(), |point, row| coordinates(point, cage, row))
 }
 
 /// Mean value coordinates at one point; `row` must be zero. `[n_cage]`. Whether they are defined there.
@@ -194,7 +148,7 @@ mod tests {
     fn point_that_is_not_finite_is_named() {
         let cage = Cage::new(&shapes::cube()).unwrap();
         let points = [Vec3::ONE, Vec3::NAN];
-        assert_eq!(mean_value_weights(&points, &cage), Err(MeanValueError::NotFinite { vertex: 1 }));
+        assert_eq!(mean_value_weights(&points, &cage), Err(ClosedFormError::NotFinite { vertex: 1 }));
     }
 
     proptest! {

@@ -8,10 +8,12 @@ mod mover;
 mod picture;
 mod playing;
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use cagework_core::deform::OutsideVertex;
 use cagework_core::deform::{deform_bound, vertex_normals};
+use cagework_core::green::green_controls;
 use cagework_core::options::BindOptions;
 use cagework_core::{BindReport, Bounds, Cage, Progress, Weights};
 use glam::{Vec2, Vec3};
@@ -146,7 +148,9 @@ impl Session {
     pub async fn adopt(&mut self, weights: Weights, outside: Vec<OutsideVertex>) -> Result<(), GpuError> {
         let (model, cage) = self.parts()?;
         let (rows, columns) = (model.positions.len(), cage.n_vertices());
-        if (weights.n_rows(), weights.n_columns()) != (rows, columns) {
+        // Green coordinates have a column for each triangle as well.
+        let is_columns = [columns, columns + cage.triangles().len()].contains(&weights.n_columns());
+        if weights.n_rows() != rows || !is_columns {
             let reason = format!(
                 "weights are of {} vertices and {} cage vertices, but there are {rows} and {columns}",
                 weights.n_rows(),
@@ -179,13 +183,22 @@ impl Session {
     ) -> Result<(), GpuError> {
         let (model, _) = self.parts()?;
         let mover = Mover::new(&self.context, model, &weights, &outside, on_gpu).await?;
-        mover.pose(&self.context, &self.pose);
+        mover.pose(&self.context, &self.controls(&weights, &self.pose));
         self.renderer.set_vertices(&self.context, Some(mover.tables()));
         self.playing = None;
         self.bound = Some(Bound { weights, outside, mover });
         self.moved = true;
         self.write_values();
         Ok(())
+    }
+
+    /// What the columns of weights stand for where the cage's vertices are at `positions`: them, and for Green coordinates its
+    /// triangles.
+    fn controls<'a>(&self, weights: &Weights, positions: &'a [Vec3]) -> Cow<'a, [Vec3]> {
+        match &self.cage {
+            Some(cage) if weights.n_columns() > positions.len() => green_controls(cage, positions).into(),
+            _ => positions.into(),
+        }
     }
 
     fn drop_weights(&mut self) {
@@ -215,7 +228,7 @@ impl Session {
         self.pose.copy_from_slice(cage_positions);
         self.renderer.pose(&self.context, cage_positions);
         if let Some(bound) = &self.bound {
-            bound.mover.pose(&self.context, cage_positions);
+            bound.mover.pose(&self.context, &self.controls(&bound.weights, cage_positions));
             self.moved = true;
         }
     }
@@ -273,7 +286,8 @@ impl Session {
         let values: Vec<f32> = match self.scene.mesh {
             MeshStyle::Weights { column } => bound.weights.column(column).collect(),
             MeshStyle::Errors => {
-                let rebuilt = deform_bound(&bound.weights, &bound.outside, cage.positions());
+                let controls = self.controls(&bound.weights, cage.positions());
+                let rebuilt = deform_bound(&bound.weights, &bound.outside, &controls);
                 let scale = 1.0 / cage.diagonal();
                 rebuilt.iter().zip(&model.positions).map(|(a, b)| scale * a.distance(*b)).collect()
             }
@@ -373,7 +387,13 @@ impl Session {
         if let Some(Bound { weights, outside, mover }) = self.bound.as_ref().filter(|_| self.moved) {
             match &self.playing {
                 Some(skinner) => mover.encode_skinned(&self.context, encoder, skinner),
-                None => mover.encode(&self.context, encoder, weights, outside, &self.pose),
+                None => mover.encode(
+                    &self.context,
+                    encoder,
+                    weights,
+                    outside,
+                    &self.controls(weights, &self.pose),
+                ),
             }
             self.moved = false;
         }
@@ -388,7 +408,8 @@ impl Session {
         let Some(model) = &self.model else { return Err(GpuError::NotReady { missing: "model" }) };
         match &self.bound {
             Some(Bound { weights, outside, mover }) => {
-                let mut positions = mover.read_positions(&self.context, weights, outside, &self.pose).await?;
+                let controls = self.controls(weights, &self.pose);
+                let mut positions = mover.read_positions(&self.context, weights, outside, &controls).await?;
                 // Copies of vertices come last.
                 positions.truncate(model.positions.len());
                 Ok(positions)

@@ -10,7 +10,7 @@ use cagework_core::pull::PullError;
 use cagework_core::rest_edit::RestEditError;
 use cagework_core::slice::SliceError;
 use cagework_core::weights::WeightsError;
-use cagework_core::{BindError, MeanValueError};
+use cagework_core::{BindError, ClosedFormError};
 use cagework_gpu::GpuError;
 use cagework_io::{GltfError, NpzError, PoseCodeError, ProjectError, ReadError, WriteError};
 use serde::Serialize;
@@ -97,7 +97,7 @@ macro_rules! plain {
 
 plain!(
     CageError,
-    MeanValueError,
+    ClosedFormError,
     NpzError,
     PoseCodeError,
     PoseError,

@@ -35,9 +35,9 @@ pub(crate) struct RenderArgs {
     /// Weights that `cagework bind --weights` wrote, instead of binding here.
     #[arg(long, value_name = "FILE", requires = "cage")]
     pub(crate) weights: Option<PathBuf>,
-    /// Draw two pictures side by side: on the left as always, on the right moved by mean value coordinates.
-    #[arg(long, requires = "cage")]
-    pub(crate) compare: bool,
+    /// Draw two pictures side by side: on the left as always, on the right moved by other coordinates.
+    #[arg(long, value_enum, num_args = 0..=1, default_missing_value = "mean-value", requires = "cage")]
+    pub(crate) compare: Option<Compared>,
     /// What to draw.
     #[arg(long, value_enum, default_value_t = Show::Solid)]
     pub(crate) show: Show,
@@ -82,6 +82,15 @@ pub(crate) struct RenderArgs {
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) solve: SolveArgs,
+}
+
+/// Coordinates by formula, to compare harmonic ones with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Compared {
+    /// Mean value coordinates, which see through the cage's walls.
+    MeanValue,
+    /// Green coordinates, which keep the shape of details and are not held inside the cage.
+    Green,
 }
 
 /// What is drawn.

@@ -148,6 +148,11 @@ fn comparison_draws_both_ways_side_by_side() {
     // The lower arm stays where it is by harmonic coordinates; mean value coordinates see across the gap.
     let (posed, _) = picture("--compare --pose pose.obj");
     assert!(differing(&posed) > 10 * ROUND_OFF, "{} pixels differ", differing(&posed));
+    let (rest, done) = picture("--compare green");
+    assert_eq!(done["compared"], serde_json::json!(["harmonic coordinates", "Green coordinates"]));
+    assert!(differing(&rest) <= ROUND_OFF, "{} pixels differ at rest", differing(&rest));
+    let (green, _) = picture("--compare green --pose pose.obj");
+    assert!(differing(&green) > 10 * ROUND_OFF && green != posed);
     let (alone, done) = picture("--pose pose.obj");
     assert!(done.get("compared").is_none());
     assert_ne!(alone, posed);

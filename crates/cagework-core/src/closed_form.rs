@@ -1,0 +1,64 @@
+//! Coordinates by formula, to compare harmonic ones with: what mean value and Green coordinates share.
+
+use glam::{DVec3, Vec3};
+use thiserror::Error;
+
+use crate::weights::Weights;
+
+/// Why there are no coordinates by formula.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum ClosedFormError {
+    /// A point is not a finite number.
+    #[error("mesh vertex {vertex} is not a finite number")]
+    NotFinite {
+        /// The point.
+        vertex: u32,
+    },
+    /// A point outside the cage has none.
+    #[error(
+        "{kind} coordinates are not defined at mesh vertex {vertex}, outside of the cage: enlarge the cage"
+    )]
+    Undefined {
+        /// Mean value or Green.
+        kind: &'static str,
+        /// The point.
+        vertex: u32,
+    },
+    /// There would be more weights than row pointers can count.
+    #[error("{rows} vertices times {columns} controls are more than {} weights: use fewer", u32::MAX)]
+    TooMany {
+        /// Points.
+        rows: usize,
+        /// Controls.
+        columns: usize,
+    },
+}
+
+/// Rows that have all columns. `coordinates` of a point go into a row of zeros, `[columns]`; whether they are defined there.
+pub(crate) fn dense(
+    kind: &'static str,
+    points: &[Vec3],
+    columns: usize,
+    coordinates: impl Fn(DVec3, &mut [f64]) -> bool + Sync,
+) -> Result<Weights, ClosedFormError> {
+    let rows = points.len();
+    if let Some(vertex) = points.iter().position(|p| !p.is_finite()) {
+        return Err(ClosedFormError::NotFinite { vertex: vertex as u32 });
+    }
+    if rows.checked_mul(columns).is_none_or(|n| u32::try_from(n).is_err()) {
+        return Err(ClosedFormError::TooMany { rows, columns });
+    }
+    let found = crate::team::map_indices(rows, |v| {
+        let mut row = vec![0.0; columns];
+        let defined = coordinates(points[v].as_dvec3(), &mut row);
+        defined.then(|| row.into_iter().map(|w| w as f32).collect::<Vec<f32>>())
+    });
+    let mut data = Vec::with_capacity(rows * columns);
+    for (v, row) in found.into_iter().enumerate() {
+        data.extend(row.ok_or(ClosedFormError::Undefined { kind, vertex: v as u32 })?);
+    }
+    let indptr = (0..=rows).map(|v| (v * columns) as u32).collect();
+    let indices = (0..rows).flat_map(|_| 0..columns as u32).collect();
+    Ok(Weights::new(columns as u32, indptr, indices, data)
+        .expect("full rows of finite numbers are a CSR matrix"))
+}

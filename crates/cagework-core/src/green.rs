@@ -1,0 +1,223 @@
+//! Green coordinates: the closed form that keeps the shape of details, beside harmonic and mean value coordinates to compare.
+//!
+//! A point is a combination of the cage's vertices and of its faces' normals. The columns of the weights are therefore the cage's
+//! vertices, then its triangles; a triangle's control is its normal times how much the pose has stretched it, so that a pose is the
+//! same product as for other coordinates. What moves is not held inside the cage.
+//!
+//! Source: Lipman, Levin, Cohen-Or 2008, "Green coordinates"; integrals over triangles as in its appendix, angles by arctangent.
+
+use std::f64::consts::PI;
+
+use glam::{DVec3, Vec3};
+
+use crate::cage::Cage;
+use crate::closed_form::{ClosedFormError, dense};
+use crate::weights::Weights;
+
+/// Sine, or fraction of the cage's diagonal, below which directions count as in one plane: the root of the rounding of f64.
+const FLAT: f64 = 1e-8;
+
+/// Weights of the vertices sum to 1 inside the cage, to 0 outside, and to the share of a small ball that is inside on the surface.
+const LEAST_SUM: f64 = 0.99;
+
+/// Green coordinates at `points` (`[n_vertices]`, object units, inside the cage). Dense. `[n_vertices, n_cage + n_triangles]`
+///
+/// # Errors
+/// [`ClosedFormError`]: a point is not finite or not inside, or there are too many weights.
+pub fn green_weights(points: &[Vec3], cage: &Cage) -> Result<Weights, ClosedFormError> {
+    let columns = cage.n_vertices() + cage.triangles().len();
+    dense("Green", points, columns, |point, row| coordinates(point, cage, row))
+}
+
+/// What the columns of [`green_weights`] are for a posed cage: its vertices, then `s n` of its triangles (the paper's section 3.1).
+/// `positions`: `[n_cage]`, object units. Returns `[n_cage + n_triangles]`.
+///
+/// # Panics
+/// If there are fewer positions than cage vertices.
+#[must_use]
+pub fn green_controls(cage: &Cage, positions: &[Vec3]) -> Vec<Vec3> {
+    let sides = |[a, b, c]: [DVec3; 3]| [b - a, c - a];
+    let of_triangle = |(t, triangle): (usize, &[u32; 3])| {
+        let [u, v] = sides(cage.triangle_corners(t as u32));
+        let [x, y] = sides(triangle.map(|i| positions[i as usize].as_dvec3()));
+        let squares = x.length_squared() * v.length_squared() - 2.0 * x.dot(y) * u.dot(v)
+            + y.length_squared() * u.length_squared();
+        // Over the root of 8 times the area, which is half the length of the sides' product.
+        let stretch = squares.max(0.0).sqrt() / (2.0_f64.sqrt() * u.cross(v).length());
+        (stretch * x.cross(y).normalize_or_zero()).as_vec3()
+    };
+    let of_triangles = cage.triangles().iter().enumerate().map(of_triangle);
+    positions[..cage.n_vertices()].iter().copied().chain(of_triangles).collect()
+}
+
+/// Coordinates at one point; `row` must be zero. `[n_cage + n_triangles]`. Whether it is inside.
+fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
+    let near = FLAT * f64::from(cage.diagonal());
+    let (of_vertices, of_triangles) = row.split_at_mut(cage.n_vertices());
+    for (t, triangle) in cage.triangles().iter().enumerate() {
+        let v = cage.triangle_corners(t as u32).map(|p| p - point);
+        let normal = (v[1] - v[0]).cross(v[2] - v[0]).normalize_or_zero();
+        let foot = v[0].dot(normal) * normal;
+        let next = |k: usize| (k + 1) % 3;
+        let signed = |k: usize| {
+            let side = (v[k] - foot).cross(v[next(k)] - foot).dot(normal);
+            if side == 0.0 { 0.0 } else { side.signum() * over_triangle(foot, v[k], v[next(k)]) }
+        };
+        let potential = -(0..3).map(signed).sum::<f64>().abs();
+        of_triangles[t] = -potential;
+        // Seen edge-on: its solid angle is zero.
+        if foot.length() <= near {
+            continue;
+        }
+        let planes = [0, 1, 2].map(|k| v[next(k)].cross(v[k]).normalize_or_zero());
+        let edges = (0..3).map(|k| over_triangle(DVec3::ZERO, v[next(k)], v[k]) * planes[k]);
+        let mean = potential * normal + edges.sum::<DVec3>();
+        for k in 0..3 {
+            let plane = planes[next(k)];
+            of_vertices[triangle[k] as usize] += plane.dot(mean) / plane.dot(v[k]);
+        }
+    }
+    of_vertices.iter().sum::<f64>() >= LEAST_SUM
+}
+
+/// Integral of `-1 / (4 pi r)`, the potential of the origin, over the triangle of `foot`, the origin's projection to its plane, `a`
+/// and `b`; or, with the origin as `foot`, over the part of a plane through the origin that the formula's second call stands for.
+/// Not above 0.
+fn over_triangle(foot: DVec3, a: DVec3, b: DVec3) -> f64 {
+    let (edge, to_a, to_b) = (b - a, foot - a, foot - b);
+    let product = edge.cross(to_a).length();
+    if product <= FLAT * edge.length() * to_a.length().max(to_b.length()) {
+        return 0.0;
+    }
+    let at_a = product.atan2(edge.dot(to_a));
+    let at_foot = to_a.cross(to_b).length().atan2(to_a.dot(to_b));
+    // Squared distances of the foot from the edge, and from the origin.
+    let (lambda, c) = (product * product / edge.length_squared(), foot.length_squared());
+    let (root_lambda, root_c) = (lambda.sqrt(), c.sqrt());
+    let antiderivative = |angle: f64| {
+        let (sine, cosine) = angle.sin_cos();
+        let inner = (lambda * lambda + lambda * c * sine * sine).sqrt();
+        let share = 1.0 - 2.0 * c * cosine / (c * (1.0 + cosine) + lambda + inner);
+        let turned = (root_c * cosine / (lambda + sine * sine * c).sqrt()).atan();
+        let logarithm = (2.0 * root_lambda * (1.0 + cosine) / (1.0 - cosine) * share).ln();
+        -0.5 * (2.0 * root_c * turned + root_lambda * logarithm)
+    };
+    let integral = antiderivative(PI - at_a) - antiderivative(PI - at_a - at_foot) - root_c * at_foot;
+    -integral.abs() / (4.0 * PI)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::cage::shapes;
+    use crate::deform::deform_vertices;
+
+    fn at(cage: &Cage, point: DVec3) -> Vec<f64> {
+        let mut row = vec![0.0; cage.n_vertices() + cage.triangles().len()];
+        assert!(coordinates(point, cage, &mut row), "{point}");
+        row
+    }
+
+    fn assert_reproduced(cage: &Cage, point: DVec3, within: f64) {
+        let row = at(cage, point);
+        let sum: f64 = row[..cage.n_vertices()].iter().sum();
+        let controls = green_controls(cage, cage.positions());
+        let combined: DVec3 = row.iter().zip(&controls).map(|(&w, p)| w * p.as_dvec3()).sum();
+        assert!((sum - 1.0).abs() <= within, "weights sum to {sum} at {point}");
+        assert!(combined.distance(point) <= within, "{combined} is not {point}");
+    }
+
+    /// The definition (the paper's equations 4 and 5) by the midpoints of many small triangles.
+    #[test]
+    fn coordinates_are_the_integrals_that_define_them() {
+        const STEPS: usize = 200;
+        let cage = Cage::new(&shapes::octahedron()).unwrap();
+        let point = cage.bounds().center().as_dvec3() + DVec3::new(0.15, -0.1, 0.2);
+        let mut expected = vec![0.0; cage.n_vertices() + cage.triangles().len()];
+        for (t, triangle) in cage.triangles().iter().enumerate() {
+            let [a, b, c] = cage.triangle_corners(t as u32);
+            let area = 0.5 * (b - a).cross(c - a);
+            let small = area.length() / (STEPS * STEPS) as f64;
+            for i in 0..STEPS {
+                for j in 0..STEPS - i {
+                    // Upright, and upside down.
+                    for third in
+                        [1.0 / 3.0, 2.0 / 3.0].into_iter().take(if i + j + 1 < STEPS { 2 } else { 1 })
+                    {
+                        let (v, w) = ((i as f64 + third) / STEPS as f64, (j as f64 + third) / STEPS as f64);
+                        let to = (1.0 - v - w) * a + v * b + w * c - point;
+                        let flux = to.dot(area.normalize()) / (4.0 * PI * to.length().powi(3));
+                        for (&corner, hat) in triangle.iter().zip([1.0 - v - w, v, w]) {
+                            expected[corner as usize] += small * hat * flux;
+                        }
+                        expected[cage.n_vertices() + t] += small / (4.0 * PI * to.length());
+                    }
+                }
+            }
+        }
+        for (found, expected) in at(&cage, point).iter().zip(&expected) {
+            assert!((found - expected).abs() <= 1e-5, "{found} instead of {expected}");
+        }
+    }
+
+    /// Similarities of the cage are similarities of what is inside: the paper's section 3.
+    #[test]
+    fn a_cage_that_is_turned_and_scaled_does_so_to_what_is_inside() {
+        let cage = Cage::new(&shapes::c_shape()).unwrap();
+        let points = [Vec3::new(0.5, 1.5, 0.5), Vec3::new(2.5, 0.5, 0.3), Vec3::new(0.1, 2.8, 0.9)];
+        let turn = Quat::from_axis_angle(Vec3::new(1.0, -2.0, 0.5).normalize(), 2.2);
+        let similar = |p: Vec3| 1.7 * (turn * p) + Vec3::new(3.0, -1.0, 2.0);
+        let posed: Vec<Vec3> = cage.positions().iter().map(|&p| similar(p)).collect();
+        let weights = green_weights(&points, &cage).unwrap();
+        let moved = deform_vertices(&weights, &green_controls(&cage, &posed));
+        for (moved, point) in moved.iter().zip(points) {
+            assert!(moved.distance(similar(point)) <= 4e-6, "{moved} instead of {}", similar(point));
+        }
+    }
+
+    #[test]
+    fn point_outside_or_not_finite_is_named() {
+        let cage = Cage::new(&shapes::cube()).unwrap();
+        let inside = cage.bounds().center();
+        let outside = green_weights(&[inside, inside + 9.0], &cage).unwrap_err();
+        assert_eq!(
+            outside.to_string(),
+            "Green coordinates are not defined at mesh vertex 1, outside of the cage: enlarge the cage"
+        );
+        let not_finite = green_weights(&[Vec3::NAN], &cage).unwrap_err();
+        assert_eq!(not_finite, ClosedFormError::NotFinite { vertex: 0 });
+    }
+
+    #[test]
+    fn points_in_the_planes_of_faces_and_on_lines_through_edges_are_reproduced() {
+        // The inner edge of the L continues into both of its arms.
+        let cage = Cage::new(&shapes::l_shape()).unwrap();
+        let positions: Vec<DVec3> = cage.positions().iter().map(|p| p.as_dvec3()).collect();
+        let centre = cage.bounds().center().as_dvec3();
+        let mut n = 0;
+        for a in &positions {
+            for b in &positions {
+                let middle = a.midpoint(*b).lerp(centre, 1e-12);
+                let mut row = vec![0.0; cage.n_vertices() + cage.triangles().len()];
+                if coordinates(middle, &cage, &mut row) {
+                    assert_reproduced(&cage, middle, 1e-6);
+                    n += 1;
+                }
+            }
+        }
+        assert!(n > 4, "{n}");
+    }
+
+    proptest! {
+        #[test]
+        fn points_inside_are_reproduced(
+            x in 0.001..0.999f64, y in 0.001..2.999f64, z in 0.001..0.999f64,
+        ) {
+            // The back of the C.
+            assert_reproduced(&Cage::new(&shapes::c_shape()).unwrap(), DVec3::new(x, y, z), 1e-6);
+        }
+    }
+}
