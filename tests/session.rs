@@ -3,10 +3,11 @@
 use std::ops::ControlFlow;
 
 use cagework_core::bind::BindError;
-use cagework_core::deform::deform_bound;
+use cagework_core::deform::{deform_bound, deform_vertices};
+use cagework_core::green::{green_controls, green_weights};
 use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::progress::{ProgressEvent, Silent};
-use cagework_core::{Binding, Cage, Weights};
+use cagework_core::{Binding, Bounds, Cage, Weights, subdivided_box};
 use cagework_gpu::render::{DrawModel, DrawVertex, MeshStyle, SceneOptions};
 use cagework_gpu::{ContextOptions, GpuContext, GpuError, PlanError, Session};
 use cagework_tests::cages::cage;
@@ -103,6 +104,28 @@ fn adopted_weights_move_the_mesh_as_on_the_cpu() {
     assert_close(&flat(&positions), &flat(&expected), 2e-5);
 }
 
+/// Columns are the cage's vertices and its triangles, whose controls follow from the pose.
+#[test]
+fn green_coordinates_move_the_mesh_as_on_the_cpu() {
+    let (positions, _) = input();
+    let bounds = Bounds::of(&positions).expect("there are some");
+    // Green coordinates are defined inside alone.
+    let cage = cage(&subdivided_box(bounds, 0.1, [2, 1, 3]));
+    let green = green_weights(&positions, &cage).expect("all are inside");
+    let pose = posed(cage.positions());
+    let expected = flat(&deform_vertices(&green, &green_controls(&cage, &pose)));
+    for draws_only in [false, true] {
+        let mut session = session_with(&ContextOptions { draws_only, ..ContextOptions::default() });
+        block_on(session.set_cage(&cage)).expect("the cage is good");
+        let error = block_on(session.adopt(green.clone(), Vec::new())).unwrap_err().to_string();
+        assert!(error.contains("controls"), "{error}");
+        block_on(session.adopt_green(green.clone())).expect("they belong to it");
+        session.pose(&pose);
+        let found = flat(&block_on(session.read_positions()).expect("they come back"));
+        assert_close(&found, &expected, 2e-5);
+    }
+}
+
 /// As in a browser without WebGPU: the processor binds and deforms, and a lost device comes back.
 #[test]
 fn session_that_only_draws_equals_the_cpu() {
@@ -149,8 +172,11 @@ fn what_does_not_fit_is_an_error_and_the_session_goes_on() {
     let mut session = session();
     let small = BindOptions { memory_limit: 6 << 20, ..options(Method::Embedded, Solver::Jacobi) };
     let error = block_on(session.bind(&small, &Silent)).unwrap_err();
-    let is_memory =
-        matches!(error, GpuError::Plan(PlanError::Memory { .. }) | GpuError::Bind(BindError::Memory { .. }));
+    let is_memory = matches!(
+        error,
+        GpuError::Plan(PlanError::Memory { .. })
+            | GpuError::Bind(BindError::Memory { .. } | BindError::WeightsMemory { .. })
+    );
     assert!(is_memory, "{error}");
     block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &Silent)).expect("it binds");
 }
@@ -213,7 +239,7 @@ fn what_does_not_belong_together_is_named() {
     let mut session = session();
     let few = Weights::new(2, vec![0, 1], vec![0], vec![1.0]).expect("one row");
     let error = block_on(session.adopt(few, Vec::new())).unwrap_err().to_string();
-    assert!(error.contains("1 vertices and 2 cage vertices"), "{error}");
+    assert!(error.contains("1 vertices and 2 controls"), "{error}");
     let mut model = DrawModel::plain(vec![Vec3::ZERO], Vec::new());
     model.vertices.push(DrawVertex::plain(9));
     let error = block_on(session.set_model(model)).unwrap_err().to_string();

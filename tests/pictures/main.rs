@@ -189,6 +189,7 @@ fn problems_are_marked() {
             segments: vec![[corners[0], corners[1]], [corners[1], corners[2]]],
             mesh_vertices: (0..40).collect(),
             cage_vertices: vec![5, 60],
+            rings: Vec::new(),
         };
         session.set_scene(SceneOptions { marks, theme: Theme::Light, ..SceneOptions::default() });
         assert_picture(&mut session, "marks");

@@ -168,10 +168,8 @@ test("arrows, rings and boxes move along their own axis only", async ({ page }) 
 
   await test.step("the split view shows harmonic and mean value coordinates in one pose", async () => {
     await page.keyboard.press("n");
-    await page.getByText("Harmonic beside mean value").click();
-    await page.waitForFunction(
-      () => document.querySelector<HTMLElement>(".compare-labels")?.hidden === false,
-    );
+    await page.getByRole("checkbox", { name: "Mean value" }).check({ force: true });
+    await expect(page.locator(".compare-labels")).toBeVisible();
     await page.keyboard.press("n");
     // At rest both give the model back; lines and edges are smoothed, so that a few pixels may differ.
     const alike = await difference(page);

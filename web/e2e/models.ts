@@ -268,6 +268,18 @@ export async function dancer(): Promise<Uint8Array> {
   const body = tube("body", [0, 1.8], 0.3, [bump(0.3), bump(0.7)]);
   tube("hat", [1.85, 2.1], 0.4, []);
 
+  const corners = Array.from({ length: 8 }, (_, k) => [k & 1, (k >> 1) & 1, k >> 2].map((b) => 0.1 * b));
+  const sides = [
+    0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7,
+    5,
+  ];
+  const box = document
+    .createPrimitive()
+    .setIndices(array("SCALAR", Uint16Array.from(sides)))
+    .setAttribute("POSITION", floats("VEC3", corners.flat()));
+  const buckle = document.createMesh("buckle").addPrimitive(box);
+  bone.addChild(document.createNode("buckle").setMesh(buckle).setTranslation([-0.05, 0, 0.25]));
+
   const times = floats("SCALAR", [0, 0.5, 1]);
   const dance = document.createAnimation("dance");
   const move = (node: Node, path: "translation" | "rotation" | "weights", values: number[]) => {
@@ -281,6 +293,13 @@ export async function dancer(): Promise<Uint8Array> {
   move(hips, "translation", [0, 0, 0, 0.2, 0.1, 0, 0, 0, 0]);
   move(body, "weights", [0, 1, 1, 0, 0, 1]);
   return new NodeIO().writeBinary(document);
+}
+
+/** Positions of a mesh as a file has them. */
+export async function positionsOf(bytes: Uint8Array, name: string): Promise<number[]> {
+  const root = (await new NodeIO().readBinary(bytes)).getRoot();
+  const mesh = root.listMeshes().find((mesh) => mesh.getName() === name);
+  return [...(mesh?.listPrimitives()[0]?.getAttribute("POSITION")?.getArray() ?? [])];
 }
 
 /** Where the vertices of a file's one mesh are at a key of its one animation of morph targets. */

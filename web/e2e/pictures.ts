@@ -3,8 +3,7 @@
 import { mkdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
-import type { BindOptions, Bounds, SceneOptions } from "../src/contract";
-import { BIND_DEFAULTS, PAPER_DEFAULTS, SCENE_DEFAULTS } from "../src/defaults";
+import { SCENE_DEFAULTS } from "../src/defaults";
 import { bound, drawn, grip, open } from "./support";
 
 const FOLDER = join(import.meta.dirname, "../public/samples");
@@ -40,35 +39,15 @@ test("pictures of the samples", async ({ page }) => {
 
 const DOCUMENTS = join(import.meta.dirname, "../../docs/pictures");
 
-/** What a picture of the documents shows: a sample, how it is bound, one of its poses, a vertex, the scene. */
-interface Figure {
-  readonly name: string;
-  readonly sample: string;
-  readonly bind: Partial<BindOptions> | "mean value";
-  readonly pose?: number;
-  /** The cage vertex closest to this place is selected. */
-  readonly closest?: Bounds["min"];
-  readonly slice?: 0 | 1 | 2;
-  readonly scene: Partial<SceneOptions>;
-}
-
-const FIGURES: readonly Figure[] = [
-  {
-    name: "weights",
-    sample: "humanoid",
-    bind: {},
-    // A thigh: what follows it, and that the other leg does not.
-    closest: [0.22, 0.75, 0.05],
-    scene: { colour: "weight", problems: false },
-  },
-  { name: "slice-kinds", sample: "clamp", bind: {}, slice: 2, scene: { slice: "kinds", model: false } },
-  {
-    name: "classic-rest",
-    sample: "rat",
-    bind: { ...PAPER_DEFAULTS, grid: 32 },
-    scene: { base_wireframe: true, cage: false, colour: "clay" },
-  },
-  { name: "clamp", sample: "clamp", bind: "mean value", pose: 0, scene: { compare: true } },
+/** Pictures of stops of the tour, which the documents repeat: the stop's number, from 1, and what is changed there. */
+const FIGURES: readonly { readonly name: string; readonly stop: number; readonly choose?: string }[] = [
+  { name: "cage", stop: 1 },
+  { name: "weights", stop: 2 },
+  { name: "coordinate", stop: 3 },
+  { name: "cells", stop: 3, choose: "Cells" },
+  { name: "paper-16", stop: 4 },
+  { name: "too-little-smoothing", stop: 5 },
+  { name: "enough-smoothing", stop: 5, choose: "1e-5" },
 ];
 
 /** The picture of the README: a hand has the knee, the other leg stays. */
@@ -88,8 +67,22 @@ async function liftsAKnee(page: Page): Promise<void> {
   await page.mouse.move(knee.x - 70, knee.y - 110, { steps: 20 });
   // The worker follows the hand.
   await page.waitForTimeout(2000);
-  await page.screenshot({ path: join(DOCUMENTS, "page.jpg"), quality: 90 });
+  await page.screenshot({ path: join(DOCUMENTS, "page.jpg"), quality: 70 });
   await page.mouse.up();
+}
+
+/** Begins the tour at a stop, and chooses what its card offers. */
+async function visit(page: Page, stop: number, choice?: string): Promise<void> {
+  await page.evaluate((stop) => {
+    location.hash = `tour=${stop}`;
+  }, stop);
+  const card = page.getByRole("region", { name: "Tour" });
+  await expect(card).toContainText(`${stop} of 10`);
+  await expect(card).toHaveAttribute("aria-busy", "false", { timeout: 120_000 });
+  if (choice) await card.getByRole("radio", { name: choice, exact: true }).check({ force: true });
+  await expect(card).toHaveAttribute("aria-busy", "false", { timeout: 120_000 });
+  // A slice is computed a moment after it was asked for.
+  await expect(page.locator("[data-busy]")).toHaveCount(0);
 }
 
 test("pictures of the documents", async ({ page }) => {
@@ -97,54 +90,27 @@ test("pictures of the documents", async ({ page }) => {
   await page.setViewportSize({ width: 1440, height: 900 });
   await open(page);
   await liftsAKnee(page);
-  for (const figure of FIGURES) {
-    const data = await page.evaluate(
-      async ([figure, defaults, plain]) => {
-        const session = globalThis.cagework;
-        if (!session) throw new Error("no session");
-        const { engine } = session;
-        const opened = await session.openSample(figure.sample);
-        const mean = figure.bind === "mean value";
-        const options = { ...defaults, backend: "cpu", ...(mean ? {} : (figure.bind as object)) } as const;
-        await session.bind(options, () => {}).done;
-        if (mean) await session.bindMeanValue().done;
-        if (figure.slice !== undefined) await session.loadSlice(figure.slice, 0.5, options.grid / 2).done;
-        const pose = opened.poses?.[figure.pose ?? -1];
-        if (pose) engine.setCagePositions(pose.positions);
-        const points = engine.restPositions();
-        const { closest } = figure;
-        const away = (i: number) =>
-          Math.hypot(...(closest ?? []).map((at, axis) => at - (points[3 * i + axis] ?? 0)));
-        const vertices = Array.from({ length: points.length / 3 }, (_, i) => i);
-        const best = vertices.reduce((a, b) => (away(b) < away(a) ? b : a), 0);
-        engine.select(closest ? Uint32Array.of(best) : new Uint32Array(), "replace");
-        engine.setScene({ ...plain, theme: "light", pull: false, ...figure.scene });
-        engine.frameAll();
-        const view = document.querySelector("canvas");
-        if (!view) throw new Error("no view");
-        const closer = figure.scene.compare ? 1 : 1.35;
-        engine.zoomAt(view.clientWidth / 2, view.clientHeight / 2, closer);
-        if (figure.scene.compare) {
-          session.draw();
-          return undefined;
-        }
-        const picture = await createImageBitmap(await session.picture(1200, 800));
-        const canvas = new OffscreenCanvas(picture.width, picture.height);
-        canvas.getContext("2d")?.drawImage(picture, 0, 0);
-        const file = await canvas.convertToBlob({ type: "image/webp", quality: 0.9 });
-        return Array.from(new Uint8Array(await file.arrayBuffer()));
-      },
-      [figure, BIND_DEFAULTS, SCENE_DEFAULTS] as const,
-    );
-    if (data) {
-      writeFileSync(join(DOCUMENTS, `${figure.name}.webp`), Uint8Array.from(data));
-    } else {
-      // Two halves are drawn on the page only, under its tools.
-      await drawn(page);
-      const view = await page.locator("canvas").first().boundingBox();
-      if (!view) throw new Error("no view");
-      const clip = { x: view.x, y: view.y + 0.2 * view.height, width: view.width, height: 0.7 * view.height };
-      await page.screenshot({ path: join(DOCUMENTS, `${figure.name}.jpg`), quality: 90, clip });
-    }
+  for (const { name, stop, choose } of FIGURES) {
+    await visit(page, stop, choose);
+    await drawn(page);
+    const data = await page.evaluate(async () => {
+      const session = globalThis.cagework;
+      if (!session) throw new Error("no session");
+      const view = document.querySelector("canvas");
+      session.engine.zoomAt((view?.clientWidth ?? 0) / 2, (view?.clientHeight ?? 0) / 2, 1.35);
+      const picture = await createImageBitmap(await session.picture(1080, 560));
+      const canvas = new OffscreenCanvas(picture.width, picture.height);
+      canvas.getContext("2d")?.drawImage(picture, 0, 0);
+      const file = await canvas.convertToBlob({ type: "image/webp", quality: 0.8 });
+      return Array.from(new Uint8Array(await file.arrayBuffer()));
+    });
+    writeFileSync(join(DOCUMENTS, `${name}.webp`), Uint8Array.from(data));
   }
+  // Pictures side by side are drawn on the page only, under its tools.
+  await visit(page, 9);
+  await page.evaluate(() => {
+    for (const tool of document.querySelectorAll<HTMLElement>(".floating, .bottom-line")) tool.hidden = true;
+  });
+  await drawn(page);
+  await page.locator("#stage").screenshot({ path: join(DOCUMENTS, "coordinates.jpg"), quality: 80 });
 });

@@ -215,7 +215,7 @@ test("a bind that an edit has overtaken never lands", async ({ page }) => {
     const before = { positions: engine.restPositions(), corners: engine.cageCorners() };
     const edited = before.positions.map((x, k) => (k === 1 ? x + 0.01 : x));
     const asked: string[] = [];
-    const overtaken = [session.bind(options, ({ kind }) => asked.push(kind)), session.bindMeanValue()];
+    const overtaken = [session.bind(options, ({ kind }) => asked.push(kind)), session.bindByFormula("green")];
     engine.setCage(edited, before.corners);
     const names = overtaken.map(({ done }) =>
       done.then(

@@ -1,7 +1,7 @@
 /** A rigged model is shaped, plays its clip, and leaves with both. */
 
 import type { Page } from "@playwright/test";
-import { dancer, shownAt, validationErrors } from "./models";
+import { dancer, positionsOf, shownAt, validationErrors } from "./models";
 import {
   bound,
   cagePositions,
@@ -9,9 +9,11 @@ import {
   drop,
   expect,
   grip,
+  handle,
   largestMove,
   open,
   pull,
+  reachable,
   rested,
   shoot,
   test,
@@ -24,7 +26,13 @@ async function played(page: Page, at: readonly number[] = TIMES): Promise<number
   return page.evaluate(async (times) => {
     const session = globalThis.cagework;
     if (!session) throw new Error("no session");
-    await session.engine.startClip({ joints: "follow", keep_travel: false, plain: false, dynamic: false });
+    await session.engine.startClip({
+      joints: "follow",
+      keep_travel: false,
+      rigid: [],
+      plain: false,
+      dynamic: false,
+    });
     const found = times.map((time) => {
       session.engine.showClip(0, time, new Float32Array());
       return [...session.engine.clipPositions()];
@@ -53,6 +61,17 @@ test("a visit that shapes somebody who walks", async ({ page }) => {
     const at = await page.evaluate(() => [...(globalThis.cagework?.engine.clipPositions() ?? [])]);
     expect(largestMove(at, rest[1] ?? [])).toBeLessThan(1e-5);
     expect(largestMove(at, rest[0] ?? []), "the legs swing").toBeGreaterThan(0.1);
+  });
+
+  await test.step("joints are shown where the clip has them", async () => {
+    const picture = () => page.locator("canvas").first().screenshot();
+    const without = await picture();
+    const joints = page.getByRole("switch", { name: "Show joints" });
+    await joints.click();
+    await expect.poll(async () => without.equals(await picture())).toBe(false);
+    await shoot(page, "joints");
+    await joints.click();
+    await expect.poll(async () => without.equals(await picture())).toBe(true);
   });
 
   await test.step("taking hold of the model goes back to the pose", async () => {
@@ -98,6 +117,19 @@ test("a visit that shapes somebody who walks", async ({ page }) => {
     const baked = await shownAt(file.bytes, 1);
     expect(largestMove(shown, baked), "at one second").toBeLessThan(2e-5);
   });
+
+  await test.step("dragging the cage goes back to rest", async () => {
+    await page.getByRole("button", { name: "Pose", exact: false }).first().click();
+    const before = await cagePositions(page);
+    const { x, y } = await handle(page, await reachable(page));
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await page.mouse.move(x + 40, y, { steps: 4 });
+    await page.mouse.up();
+    await rested(page);
+    expect(largestMove(before, await cagePositions(page))).toBeGreaterThan(0.01);
+    await expect(page.getByRole("combobox", { name: "Clip" })).toHaveValue("");
+  });
 });
 
 test("a model of several meshes with keys and a clip is dropped, shaped, exported, and dropped again", async ({
@@ -118,9 +150,19 @@ test("a model of several meshes with keys and a clip is dropped, shaped, exporte
   const shaped = await played(page, [0, 0.3, 0.5]);
   expect(largestMove(shaped[1] ?? [], before[1] ?? [])).toBeGreaterThan(0.01);
   await page.getByRole("button", { name: "Pose", exact: false }).first().click();
+  await page.getByText("Parts that keep their shape (0 of 1)").click();
+  await page.getByRole("switch", { name: "buckle" }).click();
+  const rigid = await download(page, "glb");
+  expect(await validationErrors(rigid.bytes)).toEqual([]);
+  const buckle = await positionsOf(dropped.bytes, "buckle");
+  expect(await positionsOf(rigid.bytes, "buckle"), "as it was, in its own space").toEqual(buckle);
+  await page.getByRole("button", { name: "Pose", exact: false }).first().click();
+  await page.getByText("Parts that keep their shape (1 of 1)").click();
+  await page.getByRole("switch", { name: "buckle" }).click();
   await page.getByRole("combobox", { name: "Clip" }).selectOption("0");
   await shoot(page, "dancer");
   const file = await download(page, "glb");
+  expect(await positionsOf(file.bytes, "buckle"), "bent").not.toEqual(buckle);
   expect(await validationErrors(file.bytes)).toEqual([]);
   await drop(page, [file]);
   await expect(page).toHaveTitle(/dancer-posed/);

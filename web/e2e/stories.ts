@@ -89,10 +89,51 @@ export async function showsColours(page: Page, picture: string): Promise<void> {
   expect((await pixels()).equals(plain), "cells of the grid are shown").toBe(false);
   await shoot(page, `${picture}-slice`);
   await slice.getByRole("radio", { name: "Off" }).check({ force: true });
-  await page.getByRole("switch", { name: "Harmonic beside mean value" }).check();
-  await expect(page.getByText("Mean value", { exact: true })).toBeVisible();
-  await drawn(page);
+  await comparesAll(page);
   await shoot(page, `${picture}-compare`);
+}
+
+/** All three kinds of coordinates side by side: alike at rest, and each its own way in a pose. */
+async function comparesAll(page: Page): Promise<void> {
+  const choices = page.getByRole("group", { name: "Coordinates side by side" });
+  const choice = (name: string) => choices.getByRole("checkbox", { name });
+  await expect(choice("Harmonic"), "there is nothing else to show").toBeDisabled();
+  for (const name of ["Mean value", "Green"]) {
+    await choice(name).check({ force: true });
+    await expect(page.locator(".compare-labels")).toContainText(name);
+  }
+  await expect(choice("Harmonic")).toBeEnabled();
+  await drawn(page);
+  const apart = () =>
+    page.evaluate(async () => {
+      const session = globalThis.cagework;
+      const found = await Promise.all(
+        (["harmonic", "mean_value", "green"] as const).map(async (kind) =>
+          Array.from((await session?.readPositions(kind)) ?? []),
+        ),
+      );
+      const most = (a: number[], b: number[]) => Math.max(...a.map((x, k) => Math.abs(x - (b[k] ?? 0))));
+      const [harmonic = [], mean = [], green = []] = found;
+      return [most(harmonic, mean), most(harmonic, green), most(mean, green)];
+    });
+  const size = await page.evaluate(() => {
+    const at = globalThis.cagework?.engine.modelPositions() ?? [];
+    return Math.max(...at) - Math.min(...at);
+  });
+  await page.evaluate(() => {
+    const engine = globalThis.cagework?.engine;
+    engine?.setCagePositions(engine.restPositions());
+  });
+  for (const gap of await apart()) expect(gap, "at rest").toBeLessThan(1e-5 * size);
+  await page.evaluate(() => {
+    const engine = globalThis.cagework?.engine;
+    const at = engine?.cagePositions();
+    // Half of it to the side.
+    engine?.setCagePositions(
+      (at ?? new Float32Array()).map((x, k, all) => (k % 3 === 0 && (all[k + 1] ?? 0) > 0 ? 1.3 * x : x)),
+    );
+  });
+  for (const gap of await apart()) expect(gap, "posed").toBeGreaterThan(1e-3 * size);
 }
 
 /** Drops a model and poses it. */

@@ -31,6 +31,8 @@ export const test = base.extend<{ complaints: string[] }>({
         if (response.status() >= 400) complaints.push(`${response.status()} ${response.url()}`);
       });
       await use(complaints);
+      // A script that a test answers for may still be on its way; a page that the test closed waits for none.
+      if (!page.isClosed()) await page.unrouteAll({ behavior: "wait" });
       expect(complaints, "the console is clean").toEqual([]);
     },
     { auto: true },

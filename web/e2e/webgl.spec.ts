@@ -11,7 +11,7 @@ import {
   showsColours,
   survives,
 } from "./stories";
-import { bound, calm, expect, open, shoot, test } from "./support";
+import { bound, calm, expect, grip, open, shoot, test } from "./support";
 
 test.use({ launchOptions: WITH_WEBGL });
 
@@ -63,6 +63,23 @@ test("opens bound, follows a handle, shows colours, exports, and survives a lost
     });
     expect(pictures[0], "the same time looks the same").toBe(pictures[2]);
     expect(pictures[0], "another one does not").not.toBe(pictures[1]);
+  });
+  await test.step("a smooth cage with a point inside is bound on the processor", async () => {
+    await page.getByRole("button", { name: "Cage", exact: false }).first().click();
+    const { x, y } = await grip(page);
+    await page.getByRole("switch", { name: /Round its surface/ }).click();
+    await page.getByRole("button", { name: "Point", exact: true }).click();
+    await page.mouse.click(x, y);
+    await expect
+      .poll(() => page.evaluate(() => globalThis.cagework?.engine.cageControls()))
+      .toMatchObject({ smooth: 2, inner: 1, elements: [{ point: 0 }] });
+    await bound(page);
+    await shoot(page, "webgl-controls");
+    for (const _ of [1, 2]) await page.keyboard.press("Control+z");
+    await expect
+      .poll(() => page.evaluate(() => globalThis.cagework?.engine.cageControls()))
+      .toMatchObject({ smooth: 0, inner: 0 });
+    await bound(page);
   });
   await test.step("a lost context comes back with model and pose", async () => {
     // As the browser takes it away: the canvas's own context, not the page's way to give it up.

@@ -4,16 +4,19 @@ import { type BindActions, createBind } from "./actions/bind";
 import { type CageActions, createCage } from "./actions/cage";
 import { type ClipActions, createClips } from "./actions/clips";
 import type { Context, Tell } from "./actions/context";
+import { type ControlActions, createControls } from "./actions/controls";
 import { createEdit, type Edit } from "./actions/edit";
-import { createExports, type Exports } from "./actions/exports";
+import { copyLink, createExports, type Exports } from "./actions/exports";
 import { createFiles, type Files } from "./actions/files";
 import { followCage } from "./actions/follow";
 import { createPoses, type PoseActions } from "./actions/poses";
 import { createProject, type Project, poseOf } from "./actions/project";
 import { createPulling, type Pulling } from "./actions/pull";
+import { createTour, type TourActions } from "./actions/tour";
 import { createView, type View } from "./actions/view";
 import { createWorks, type WorkActions } from "./actions/works";
 import type { Session } from "./contract";
+import { RANGES } from "./defaults";
 import { createHistory } from "./history";
 import { choose } from "./input/choose";
 import { createCommands } from "./input/commands";
@@ -29,6 +32,7 @@ export interface App {
   readonly edit: Edit;
   readonly pull: Pulling;
   readonly cage: CageActions;
+  readonly controls: ControlActions;
   readonly bind: BindActions;
   readonly poses: PoseActions;
   readonly clips: ClipActions;
@@ -37,6 +41,7 @@ export interface App {
   readonly project: Project;
   readonly works: WorkActions;
   readonly exports: Exports;
+  readonly tour: TourActions;
   readonly mac: boolean;
   /** Runs what a shortcut stands for. */
   run(command: Command): void;
@@ -45,7 +50,11 @@ export interface App {
   chooseModel(): void;
   chooseFolder(): void;
   chooseCage(): void;
+  /** Controls inside, of a file. */
+  chooseControls(): void;
   share(): void;
+  /** Puts a link to the tour's stop in the clipboard. */
+  shareStop(): void;
   /** How to switch WebGPU on, where it is missing. */
   showWays(): void;
   /** Begins with the first sample; what is open stays kept. */
@@ -81,8 +90,10 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
       void bind.start();
     },
     carry: (before) => poses.carry(before),
+    carryAlong: (before) => poses.carryAlong(before),
   });
   const edit = createEdit(ctx, cage.adopt);
+  const controls = createControls(ctx, cage, edit);
   const view = createView(ctx, bind.prepareCompare, matchMedia("(prefers-color-scheme: dark)"));
   const pull = createPulling(ctx, edit);
   followCage(ctx, { bind, edit, view, pull });
@@ -92,7 +103,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     edit.settle();
     edit.setEditingRest(false);
   });
-  const project = createProject(ctx);
+  const project = createProject(ctx, controls.shared);
   const exports = createExports(ctx, project);
   const startFresh = () => void files.openSample(store.get().samples[0]?.id ?? "");
   const works = createWorks(ctx, {
@@ -104,11 +115,13 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     adoptCage: (opened) => cage.adopt(opened.cage, opened.check),
     makeCage: () => cage.make(),
     loadCage: (list) => cage.load(list),
+    loadControls: (list) => controls.load(list),
     bind: () => bind.start(),
     applySettings(settings) {
       store.set({
         ...(settings.bind ? { bindOptions: settings.bind } : {}),
         ...(settings.cage ? { cageOptions: settings.cage } : {}),
+        ...(settings.rig ? { rigOptions: settings.rig } : {}),
       });
       view.symmetry(settings.symmetry ?? store.get().symmetry);
       store.set({ pins: settings.pins ?? [] });
@@ -123,16 +136,26 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
       edit.sync();
     },
     writeProject: project.write,
-    keep() {
+    keep(sample) {
       edit.setEditingRest(false);
+      tour.guide()?.overtaken(sample);
       return works.flush();
     },
     leave: works.leave,
   });
+  const tour = createTour(ctx, { bind, edit, poses, view, files, works });
   const fixes: Record<NonNullable<Explained["fix"]>, () => void> = {
     coarser() {
       bind.setOptions({ grid: Math.max(16, store.get().bindOptions.grid / 2) });
       void bind.start();
+    },
+    fewer() {
+      const { cage: found, cageOptions } = store.get();
+      const vertices = Math.min(cageOptions.vertices, found?.info.vertices ?? cageOptions.vertices);
+      store.set({
+        cageOptions: { ...cageOptions, vertices: Math.max(RANGES.vertices[0], Math.floor(vertices / 2)) },
+      });
+      void cage.regenerate().then((made) => made && bind.start());
     },
     cpu() {
       bind.setOptions({ backend: "cpu" });
@@ -149,6 +172,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     edit,
     pull,
     cage,
+    controls,
     bind,
     poses,
     clips,
@@ -157,16 +181,20 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     project,
     works,
     exports,
+    tour,
     mac,
     run: (command) => commands[command](),
     go(step) {
+      if (step !== "cage" && store.get().placing) controls.arm(null);
       if (step === "pose" || step === "export") edit.setEditingRest(false);
       store.set({ step });
     },
     chooseModel: () => choose(MODELS, false, (list) => void files.openFiles(list)),
     chooseFolder: () => choose("", true, (list) => void files.openFiles(list)),
     chooseCage: () => choose(CAGES, false, (list) => void cage.load(list)),
+    chooseControls: () => choose(".obj", false, (list) => void controls.load(list)),
     share: () => void exports.share(),
+    shareStop: () => void copyLink(ctx, location.href, T.tour.copied),
     showWays: () => store.set({ waysOpen: true }),
     startFresh,
     pointer: () => ({ x: 0, y: 0 }),

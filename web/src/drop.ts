@@ -2,7 +2,7 @@
 
 import { T } from "./words";
 
-export type DropKind = "model" | "project" | "textures" | "nothing" | "unknown";
+export type DropKind = "model" | "controls" | "project" | "textures" | "nothing" | "unknown";
 
 export interface DropPlan {
   kind: DropKind;
@@ -17,6 +17,7 @@ export interface DropPlan {
 const MODELS = ["glb", "vrm", "gltf", "obj"] as const;
 const COMPANIONS = ["bin", "png", "jpg", "jpeg", "webp", "avif", "ktx2", "mtl"] as const;
 const CAGE_NAME = /(^|[^a-z])cage([^a-z]|$)/i;
+const CONTROLS_NAME = /(^|[^a-z])controls?([^a-z].*)?\.obj$/i;
 const PROJECT_NAME = /\.cagework\.glb$/i;
 
 /** Lower-case extension without the dot, or "". */
@@ -37,6 +38,10 @@ export function planDrop(names: readonly string[]): DropPlan {
   const project = names.findIndex((name) => PROJECT_NAME.test(name));
   if (project >= 0) {
     return { kind: "project", main: project, sentence: `Opens the project ${base(names[project])}.` };
+  }
+  const [only] = names;
+  if (only !== undefined && names.length === 1 && CONTROLS_NAME.test(base(only))) {
+    return { kind: "controls", main: 0, sentence: T.opening.asControls(base(only)) };
   }
   const models = names.map((name, index) => ({ name, index })).filter(({ name }) => isModel(name));
   const model = models.find(({ name }) => !CAGE_NAME.test(base(name))) ?? models[0];

@@ -51,7 +51,10 @@ async function main(): Promise<void> {
       void app.works.distrust().finally(restart);
     });
   });
-  const lost = createLost(stage.freshCanvas, () => app.view.resized());
+  const lost = createLost(stage.freshCanvas, () => {
+    app.view.resized();
+    void app.bind.prepareCompare(store.get().scene.compare);
+  });
   mount({ app, Toasts, Lost: lost.Lost, byId });
   try {
     session = await openSession(stage, isFresh());

@@ -126,7 +126,11 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   };
   void watch();
 
-  const cage = () => ({ positions: engine.restPositions(), corners: engine.cageCorners() });
+  const cage = () => ({
+    positions: engine.restPositions(),
+    corners: engine.cageCorners(),
+    controls: engine.cageControls(),
+  });
 
   const openApart = () => createClient(module, openWorker);
   const reading = createApart(openApart);
@@ -147,8 +151,8 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       return result;
     });
   };
-  const takeCage = ({ positions, corners, check }: CheckedCage) => {
-    const state = engine.setCage(positions, corners);
+  const takeCage = ({ positions, corners, controls, check }: CheckedCage) => {
+    const state = engine.setCage(positions, corners, controls);
     if (check) mark(check);
     return state;
   };
@@ -186,8 +190,11 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       return openRead(await reading("read", { files: [{ name, path: name, file }], up }).done);
     },
     readSettings: (text, defaults) => pkg.readSettings(text, JSON.stringify(defaults)),
-    readCage: (files, hear) =>
-      reading("readCage", { files, up: engine.up(), model: engine.modelPositions() }, hear),
+    readCage(files, hear) {
+      const { smooth } = engine.cageControls();
+      const input = { files, up: engine.up(), model: engine.modelPositions(), smooth };
+      return reading("readCage", input, hear);
+    },
     boxCage: (divisions) => polygons(engine.boxCage(divisions)),
     checkCage: () =>
       chain(ofNow(checking("check", { cage: cage(), model: engine.modelPositions() })), (check) => {
@@ -206,16 +213,17 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     generateCage(options, onProgress, clip) {
       const [positions, triangles] = engine.modelStates(clip);
       const model = engine.modelPositions();
-      const input = { positions, triangles, model, options };
+      const { smooth } = engine.cageControls();
+      const input = { positions, triangles, model, options, smooth };
       return ofNow(client.run("cage", input, ({ fraction }) => onProgress(fraction)));
     },
     bind: (options, listener) =>
       startBind({ client, engine, adapter, options: possible(options), listener, cage: cage() }),
     estimateMemory: (options) => engine.estimateMemory(possible(options)),
-    bindMeanValue: () =>
+    bindByFormula: (kind) =>
       chain(
-        ofNow(client.run("meanValue", { positions: engine.modelPositions(), cage: cage() })),
-        ({ indptr, indices, data }) => engine.adoptOther(indptr, indices, data),
+        ofNow(client.run("formula", { kind, positions: engine.modelPositions(), cage: cage() })),
+        ({ indptr, indices, data }) => engine.adoptOther(kind, indptr, indices, data),
       ),
     loadSlice(axis, fraction, grid) {
       const options = possible({ ...BIND_DEFAULTS, grid });
@@ -255,7 +263,7 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       canvas.getContext("2d")?.putImageData(new ImageData(pixels, width, height), 0, 0);
       return canvas.convertToBlob({ type: "image/png" });
     },
-    readPositions: () => engine.readPositions(),
+    readPositions: (kind = "harmonic") => engine.readPositions(kind),
     onLost(listener) {
       losses.add(listener);
       return () => losses.delete(listener);

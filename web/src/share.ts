@@ -1,12 +1,19 @@
 /** Share links: what is open and how it is posed, in the part of the address that no server ever sees. */
 
-import type { CameraView, SceneOptions } from "./contract";
+import type { CageControls, CameraView, SceneOptions } from "./contract";
 
 /** What a view shows besides the model. */
 export interface Seen {
   readonly camera: CameraView;
   readonly selected: readonly number[];
   readonly scene: Partial<SceneOptions>;
+}
+
+/** What a link says of a cage: its controls, and where those inside are. */
+export interface SharedControls {
+  readonly controls: CageControls;
+  /** `[n_inner, 3]` */
+  readonly inner: readonly number[];
 }
 
 export interface Shared {
@@ -17,6 +24,8 @@ export interface Shared {
   /** The pose, as `Engine.encodePose` packs it. */
   pose?: Uint8Array;
   seen?: Seen;
+  /** A smooth surface, and controls inside. */
+  controls?: SharedControls;
 }
 
 /** Longest fragment read; a pose of 400 cage vertices takes about 3 kB. */
@@ -27,8 +36,9 @@ export async function encodeShare(shared: Shared): Promise<string> {
   const fields = new URLSearchParams({ sample: shared.sample });
   if (shared.cage !== undefined) fields.set("cage", shared.cage);
   if (shared.pose && shared.pose.length > 0) fields.set("pose", toBase64Url(await pack(shared.pose)));
-  if (shared.seen) {
-    fields.set("seen", toBase64Url(await pack(new TextEncoder().encode(JSON.stringify(shared.seen)))));
+  for (const key of ["seen", "controls"] as const) {
+    const value = shared[key];
+    if (value) fields.set(key, toBase64Url(await pack(new TextEncoder().encode(JSON.stringify(value)))));
   }
   return `#${fields}`;
 }
@@ -40,6 +50,7 @@ export async function decodeShare(fragment: string): Promise<Shared | undefined>
   const cage = fields.get("cage");
   const pose = fields.get("pose");
   const seen = fields.get("seen");
+  const controls = fields.get("controls");
   if (sample === null && pose === null) return undefined;
   if (!sample) throw new Error("it does not say which sample it shows");
   if (fragment.length > LONGEST) throw new Error(`it is longer than ${LONGEST} letters`);
@@ -48,6 +59,7 @@ export async function decodeShare(fragment: string): Promise<Shared | undefined>
     ...(cage === null ? {} : { cage }),
     ...(pose === null ? {} : { pose: await read("pose", pose) }),
     ...(seen === null ? {} : { seen: parse(await read("view", seen)) }),
+    ...(controls === null ? {} : { controls: parseControls(await read("controls", controls)) }),
   };
 }
 
@@ -64,6 +76,13 @@ function parse(json: Uint8Array): Seen {
   const seen: Partial<Seen> | null = JSON.parse(new TextDecoder().decode(json));
   if (!seen?.camera || !Array.isArray(seen.selected)) throw new Error("its view cannot be read");
   return { camera: seen.camera, selected: seen.selected, scene: { ...seen.scene } };
+}
+
+/** Only the outside is looked at here too. */
+function parseControls(json: Uint8Array): SharedControls {
+  const said: Partial<SharedControls> | null = JSON.parse(new TextDecoder().decode(json));
+  if (!said?.controls || !Array.isArray(said.inner)) throw new Error("its controls cannot be read");
+  return { controls: said.controls, inner: said.inner };
 }
 
 async function through(

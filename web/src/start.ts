@@ -2,6 +2,7 @@
 
 import { effect, untracked } from "@preact/signals";
 import { report } from "./actions/context";
+import { stopOf } from "./actions/tour";
 import type { App } from "./app";
 import type { Crash, Crashes } from "./crash";
 import { percent } from "./format";
@@ -45,10 +46,11 @@ export function startUp({ app, stage, crashes }: Start): void {
     document.title = share === null ? name : `${percent(share)} - ${name}`;
   });
   effect(() => {
-    const { cage, poses, posed, selected, bindOptions, symmetry, bound, undoLabel, sampleCage } = store.get();
+    const { cage, poses, posed, selected, bindOptions, symmetry, bound, undoLabel, sampleCage, tour } =
+      store.get();
     // A sample that nobody has touched is no work to come back to.
     const isUntouched = sampleCage && undoLabel === null;
-    const isWork = bound && !isUntouched;
+    const isWork = bound && !isUntouched && tour === null;
     // Each of them is part of the work, or says that some of it has changed.
     if (isWork && [cage, poses, posed, selected, bindOptions, symmetry]) untracked(() => app.works.touch());
   });
@@ -63,7 +65,9 @@ export function startUp({ app, stage, crashes }: Start): void {
   });
   void open(app, crashes.before);
   window.addEventListener("hashchange", () => {
-    void openShared(app).then(({ damage }) => sayDamage(app, damage));
+    const stop = stopOf(location.hash);
+    if (stop !== undefined) void app.tour.start(stop);
+    else void openShared(app).then(({ damage }) => sayDamage(app, damage));
   });
 }
 
@@ -74,8 +78,10 @@ export async function isFresh(): Promise<boolean> {
 
 /** A link comes first, then the work of the last visit, then the first sample. */
 async function open(app: App, crash: Crash | undefined): Promise<void> {
-  const link = await openShared(app);
-  if (!link.opened) await openFirst(app);
+  const stop = stopOf(location.hash);
+  const link: Link = stop === undefined ? await openShared(app) : { opened: true };
+  if (stop !== undefined) await app.tour.start(stop);
+  else if (!link.opened) await openFirst(app);
   else void app.works.refresh();
   // Last, because whatever is opened takes messages away.
   sayDamage(app, link.damage);
@@ -94,19 +100,25 @@ async function openFirst(app: App): Promise<void> {
   if (first) await app.files.openSample(first.id);
 }
 
+interface Link {
+  readonly opened: boolean;
+  readonly damage?: unknown;
+}
+
 /** Opens what a link shows. Says whether there is something open now, and what is wrong with the link. */
-async function openShared(app: App): Promise<{ opened: boolean; damage?: unknown }> {
+async function openShared(app: App): Promise<Link> {
   let opened = false;
   try {
     const link = await decodeShare(location.hash);
     if (!link) return { opened };
-    const { sample, pose, seen } = link;
+    const { sample, pose, seen, controls } = link;
     if (!app.store.get().samples.some(({ id }) => id === sample)) {
       throw new Error(`there is no sample called "${sample.slice(0, 40)}" here`);
     }
     opened = await app.files.openSample(sample);
     if (!opened) return { opened };
     app.store.set({ step: "pose" });
+    if (controls) app.controls.takeShared(controls);
     if (pose) app.ctx.session().engine.decodePose(pose);
     if (seen) app.view.show(seen);
     app.edit.sync();

@@ -8,6 +8,7 @@ import type {
   CageOptions,
   CageState,
   Check,
+  InnerKind,
   Lack,
   Legend,
   ModelInfo,
@@ -99,7 +100,6 @@ export interface AppState {
   seeOpen: boolean;
   legend: Legend | null;
   slice: Slice;
-  meanValueReady: boolean;
   editingRest: boolean;
   element: CageElement;
   selected: Selected;
@@ -113,6 +113,8 @@ export interface AppState {
   /** What turns and scales go about. */
   pivot: Pivot;
   boxArmed: boolean;
+  /** What clicks put inside the cage; null for nothing. */
+  placing: InnerKind | null;
   ortho: boolean;
   /** What the gesture under way does, null without one. */
   gesture: string | null;
@@ -144,6 +146,8 @@ export interface AppState {
   works: readonly Work[];
   /** Whether the list of it is shown. */
   worksOpen: boolean;
+  /** Where the tour is; null without one. */
+  tour: TourState | null;
   sheetOpen: boolean;
   /** Whether the steps to switch WebGPU on are shown. */
   waysOpen: boolean;
@@ -189,7 +193,6 @@ export const INITIAL: AppState = {
   seeOpen: false,
   legend: null,
   slice: { axis: 2, position: 0.5, busy: false },
-  meanValueReady: false,
   editingRest: false,
   element: "vertex",
   selected: { count: 0, last: -1, center: null },
@@ -200,6 +203,7 @@ export const INITIAL: AppState = {
   additive: false,
   pivot: "middle",
   boxArmed: false,
+  placing: null,
   ortho: false,
   gesture: null,
   strays: 0,
@@ -219,10 +223,21 @@ export const INITIAL: AppState = {
   savedAt: null,
   works: [],
   worksOpen: false,
+  tour: null,
   sheetOpen: false,
   waysOpen: false,
   hovering: null,
 };
+
+/** A stop of the tour. */
+export interface TourState {
+  /** Its number, from 0. */
+  readonly stop: number;
+  /** Binds of this stop, as they were done. */
+  readonly reports: readonly BindReport[];
+  /** Which bind of how many it is at; null when it is ready. */
+  readonly doing: readonly [bind: number, all: number] | null;
+}
 
 /** A clip and the time in it. */
 export interface ClipState {
@@ -238,7 +253,9 @@ export interface ClipState {
 
 /** What becomes of the rig of the model that is open. */
 export function rigOf({ model, rigOptions }: AppState): RigOptions {
-  return { ...rigOptions, dynamic: rigOptions.dynamic && (model?.clips.length ?? 0) > 0 };
+  // A project may be of another model by now.
+  const rigid = rigOptions.rigid.filter((name) => model?.props.includes(name));
+  return { ...rigOptions, rigid, dynamic: rigOptions.dynamic && (model?.clips.length ?? 0) > 0 };
 }
 
 export interface Store {
@@ -275,12 +292,21 @@ export function cageBroken(state: AppState): boolean {
 
 /** What is drawn: faults are marked where they can be mended, or when they stop the bind. */
 export function drawn(state: AppState): SceneOptions {
-  const { scene, step } = state;
-  return { ...scene, problems: scene.problems && (step === "cage" || cageBroken(state)) };
+  const { scene, step, rigOptions } = state;
+  return {
+    ...scene,
+    problems: scene.problems && (step === "cage" || cageBroken(state)),
+    joints: scene.joints && rigOptions.joints,
+  };
+}
+
+/** Vertices of the cage and controls inside. */
+export function controlCount({ cage }: Pick<AppState, "cage">): number {
+  return cage ? cage.info.vertices + cage.controls.inner : 0;
 }
 
 /** Poses of the cage that is open; others wait for theirs to come back by undo. */
 export function fittingPoses(state: AppState): readonly Pose[] {
-  const n = (state.cage?.info.vertices ?? 0) * 3;
+  const n = controlCount(state) * 3;
   return state.poses.filter((pose) => pose.positions.length === n);
 }

@@ -4,6 +4,7 @@ import type { Crash } from "./crash";
 
 const THEME = "cagework.theme";
 const SEEN = "cagework.seen.";
+const TOUR = "cagework.tour";
 
 const CRASH = "cagework.crash";
 
@@ -54,6 +55,15 @@ export function hasSeen(notice: string): boolean {
 
 export function markSeen(notice: string): void {
   writeItem(SEEN + notice, "yes");
+}
+
+/** The stop of the tour that was open last, from 0. */
+export function loadStop(): number {
+  return Number(readItem(TOUR)) || 0;
+}
+
+export function saveStop(stop: number): void {
+  writeItem(TOUR, String(stop));
 }
 
 function writeItem(key: string, value: string): void {

@@ -18,11 +18,12 @@ export interface Explained {
   title: string;
   message: string;
   /** What the page can do about it. */
-  fix?: "coarser" | "cpu" | "file" | "regenerate" | "reload";
+  fix?: "coarser" | "fewer" | "cpu" | "file" | "regenerate" | "reload";
 }
 
 const FIXES: Readonly<Partial<Record<ErrorName | "Empty", NonNullable<Explained["fix"]>>>> = {
   Memory: "coarser",
+  WeightsMemory: "fewer",
   Gpu: "cpu",
   NoAdapter: "cpu",
   Format: "file",

@@ -23,6 +23,12 @@ describe("dropped files", () => {
 
   it("open a lone cage as a model", () => expect(planDrop(["cage.obj"]).main).toBe(0));
 
+  it("take a lone file of controls for what it is, beside a model for nothing", () => {
+    expect(planDrop(["a/horse-controls.obj"])).toMatchObject({ kind: "controls", main: 0 });
+    expect(planDrop(["controlsystem.obj"]).kind).toBe("model");
+    expect(planDrop(["horse.glb", "controls.obj"])).toMatchObject({ kind: "model", main: 0 });
+  });
+
   it("find a .gltf among its files", () => {
     const plan = planDrop(["scene/scene.bin", "scene/textures/a.png", "scene/scene.gltf"]);
     expect(plan.main).toBe(2);

@@ -3,6 +3,7 @@
 import type { Context, Fix } from "../src/actions/context";
 import type {
   BindReport,
+  CageControls,
   CageState,
   CheckedCage,
   Engine,
@@ -35,6 +36,8 @@ export interface Fake {
   /** What the last message offered. */
   offered: readonly { readonly label: string; run(): void }[];
   readonly problems: (Explained & { fix?: Fix["label"] })[];
+  /** Coordinates by formula that the engine has. */
+  readonly others: string[];
   /** Calls of the engine that keep nothing, by name. */
   readonly calls: string[];
   /** What the engine does in a test: replaces one of its functions. */
@@ -56,6 +59,7 @@ export const MODEL: ModelInfo = {
   joints: 0,
   clips: [],
   targets: [],
+  props: [],
   rigged: false,
   bounds: BOUNDS,
   notices: [],
@@ -73,6 +77,9 @@ export function cageOf(n: number, height = 0): CheckedCage {
   };
   return { positions: new Float32Array(3 * n).fill(height), corners: Uint32Array.of(n), check };
 }
+
+/** A plain cage's. */
+export const PLAIN: CageControls = { smooth: 0, inner: 0, elements: [], radius: null };
 
 export const OPENED: Opened = { model: MODEL, cage: null, check: null, project: null };
 
@@ -106,6 +113,9 @@ export function reportOf(patch: Partial<BindReport> = {}): BindReport {
     weights: { min: 0, max: 1, max_sum_error: 0, nonzeros: 1 },
     vertices: 8,
     cage_vertices: 8,
+    inner_controls: 0,
+    smooth: 0,
+    held_vertices: 0,
     outside_vertices: 0,
     ambiguous_cells: 0,
     notices: [],
@@ -143,10 +153,13 @@ export function createFake(): Fake {
   let rest = cageOf(0);
   let posed = rest.positions;
   let revision = 0;
+  const controlsNow = () => rest.controls ?? PLAIN;
   const stateOf = (): CageState => ({
     usable: true,
+    controls: controlsNow(),
+    radius: 0.1,
     info: {
-      vertices: rest.positions.length / 3,
+      vertices: rest.positions.length / 3 - controlsNow().inner,
       edges: 0,
       quads: 0,
       faces: 0,
@@ -155,8 +168,8 @@ export function createFake(): Fake {
       notices: [],
     },
   });
-  const put = (positions: Float32Array, corners: Uint32Array) => {
-    rest = { positions: positions.slice(), corners, check: null };
+  const put = (positions: Float32Array, corners: Uint32Array, controls?: CageControls) => {
+    rest = { positions: positions.slice(), corners, controls, check: null };
     posed = rest.positions.slice();
     revision += 1;
     return stateOf();
@@ -169,7 +182,24 @@ export function createFake(): Fake {
       if (asked !== revision) throw named("Cancelled", "there is another model or cage by now");
     },
     setCage: put,
-    commitRest: () => put(posed, rest.corners),
+    commitRest: () => put(posed, rest.corners, rest.controls),
+    cageControls: controlsNow,
+    setSmooth(smooth) {
+      const pose = posed;
+      const state = put(rest.positions, rest.corners, { ...controlsNow(), smooth });
+      posed = pose;
+      return state;
+    },
+    addControl(kind, places) {
+      const { inner, elements, ...others } = controlsNow();
+      const corners = Array.from(places.slice(0, places.length / 3), (_, k) => inner + k);
+      const element =
+        kind === "point" ? { point: inner } : kind === "line" ? { line: corners } : { face: corners };
+      const positions = Float32Array.of(...rest.positions, ...places);
+      const controls = { ...others, inner: inner + corners.length, elements: [...elements, element] };
+      return put(positions, rest.corners, controls);
+    },
+    middleAt: (x, y) => Float32Array.of(x, y, 0),
     cageCorners: () => rest.corners,
     restPositions: () => rest.positions.slice(),
     cagePositions: () => posed.slice(),
@@ -181,6 +211,7 @@ export function createFake(): Fake {
     last: () => 0,
     unmatched: () => new Uint32Array(),
     legend: () => undefined,
+    hasOther: (kind) => fake.others.includes(kind),
     strays: () => 0,
     transformLabel: () => "Move",
   };
@@ -201,10 +232,10 @@ export function createFake(): Fake {
     checkCage: () => job("check", null),
     repair: (kind) => job("repair", kind),
     carryPoses: (old, poses) => job<Float32Array[]>("carry", { old, poses }),
-    takeCage: ({ positions, corners }) => put(positions, corners),
+    takeCage: ({ positions, corners, controls }) => put(positions, corners, controls),
     bind: (options, listener) => job("bind", { options, listener }),
     estimateMemory: () => 1000,
-    bindMeanValue: () => job("meanValue", null),
+    bindByFormula: (kind) => job("formula", kind),
     loadSlice: (axis, position) => job("slice", { axis, position }),
     loadLattice: (grid) => job("lattice", { grid }),
     preparePull: () => job<null>("pullOpen", null),
@@ -241,6 +272,7 @@ export function createFake(): Fake {
     said,
     offered: [],
     problems,
+    others: [],
     calls,
     teach: (functions) => Object.assign(known, functions),
   };

@@ -14,6 +14,7 @@ import { curvesOf } from "../src/ui/curves";
 import { historyPoints, scaleOf } from "../src/ui/plot";
 import { verdict } from "../src/ui/report";
 import { recognise } from "../src/ui/unsupported";
+import { PLAIN } from "./fake";
 
 describe("typed amounts", () => {
   const type = (keys: string) => [...keys].reduce((typed, key) => nextAmount(typed, key) ?? typed, "");
@@ -113,7 +114,7 @@ it("faults are marked in the step where they can be mended, or when they stop th
   const bounds = { min: [0, 0, 0], max: [1, 1, 1] } as CageState["info"]["bounds"];
   const at = (step: StepName, usable: boolean) => {
     const info = { vertices: 8, edges: 12, faces: 6, quads: 6, triangles: 12, bounds, notices: [] };
-    const cage = { usable, info };
+    const cage = { usable, info, controls: PLAIN, radius: 0 };
     return drawn({ ...INITIAL, step, cage }).problems;
   };
   expect([at("pose", true), at("cage", true), at("pose", false)]).toEqual([false, true, true]);
@@ -142,6 +143,8 @@ describe("words", () => {
     const error = new Error("needs 3 GB");
     error.name = "Memory";
     expect(explain(error, "No bind").fix).toBe("coarser");
+    error.name = "WeightsMemory";
+    expect(explain(error, "No bind").fix).toBe("fewer");
     error.name = "NoneInside";
     expect(explain(error, "No bind").fix).toBe("regenerate");
     expect(explain("plain", "No bind")).toEqual({ title: "No bind", message: "Plain." });

@@ -9,6 +9,18 @@ describe("share links", () => {
     expect(await decodeShare(link)).toEqual({ sample: "rat", pose });
   });
 
+  it("bring a smooth surface and controls inside back", async () => {
+    const controls = {
+      controls: { smooth: 2, inner: 2, elements: [{ line: [0, 1] }], radius: null },
+      inner: [0, 0.5, 0, 0, 1, 0],
+    };
+    expect(await decodeShare(await encodeShare({ sample: "rat", controls }))).toEqual({
+      sample: "rat",
+      controls,
+    });
+    await expect(decodeShare("#sample=rat&controls=****")).rejects.toThrow("its controls cannot be read");
+  });
+
   it("use only letters that an address allows", async () => {
     expect(await encodeShare({ sample: "rat", pose })).toMatch(/^#sample=rat&pose=[A-Za-z0-9_-]+$/);
   });

@@ -1,6 +1,7 @@
 //! The command line: what can be said, and what is refused before any work starts (exit code 2).
 
 mod cages;
+mod controls;
 mod render;
 mod rig;
 
@@ -17,6 +18,7 @@ use cagework_io::{ModelFormat, UpAxis};
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+pub(crate) use controls::{ControlArgs, SmoothArgs};
 pub(crate) use render::{Compared, RenderArgs, Show};
 pub(crate) use rig::RigArgs;
 
@@ -82,6 +84,7 @@ pub(crate) struct InfoArgs {
     cagework bind horse.glb --cage cage.obj --weights horse.npz\n  \
     cagework bind horse.glb --cage cage.obj -g 128 --sparsify 1e-5 --report horse.json\n  \
     cagework bind horse.obj --cage auto:80 --save-cage cage.obj -o rest.glb\n  \
+    cagework bind horse.glb --cage cage.obj --smooth 2 --controls spine.obj --weights horse.npz\n  \
     cagework bind horse.obj --cage cage.obj --method classic --threads 1   (the paper's way)")]
 pub(crate) struct BindArgs {
     /// Mesh to bind (.obj, .gltf, .glb).
@@ -98,15 +101,20 @@ pub(crate) struct BindArgs {
     /// Write the rest pose as the weights reconstruct it; the name's ending says the format.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<ModelOutput>,
-    /// Write the weights (.npz; one row per vertex of the mesh file, one column per cage vertex).
+    /// Write the weights (.npz; one row per vertex of the mesh file, one column per cage vertex, then one per control inside).
     #[arg(long, value_name = "FILE", value_parser = npz_output)]
     pub(crate) weights: Option<PathBuf>,
+    /// Of a rigged model, bind and write the shape alone, without joints and morph targets; then deform needs --static as well.
+    #[arg(long = "static")]
+    pub(crate) plain: bool,
     /// Write the report as JSON; - for stdout.
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
     /// Write the cage that was used (.obj).
     #[arg(long, value_name = "FILE", value_parser = obj_output)]
     pub(crate) save_cage: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) controls: ControlArgs,
     #[command(flatten)]
     pub(crate) solve: SolveArgs,
 }
@@ -248,11 +256,17 @@ pub(crate) struct DeformArgs {
     /// The cage, moved: same vertices in the same order. May be given several times.
     #[arg(long, value_name = "FILE", required = true)]
     pub(crate) pose: Vec<PathBuf>,
+    /// The controls inside, moved (.obj): same vertices in the same order; one for each --pose, or none if they stay.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) pose_controls: Vec<PathBuf>,
     /// File to write; the name's ending says the format.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
+    /// With --dynamic: smooth the cage by so many steps, as for `bind`.
+    #[arg(long, default_value_t = 0, value_name = "STEPS", requires = "dynamic", value_parser = number::<u32>(options::SMOOTH))]
+    pub(crate) smooth: u32,
 }
 
 /// `cagework pull`
@@ -287,6 +301,11 @@ pub(crate) struct PullArgs {
     /// Cells along the longest side of the cage, for the gradients of the weights.
     #[arg(short, long, default_value_t = 64, value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: u32,
+    #[command(flatten)]
+    pub(crate) controls: ControlArgs,
+    /// The pose of the controls inside to write (.obj).
+    #[arg(long, value_name = "FILE", requires = "controls", value_parser = obj_output)]
+    pub(crate) save_controls: Option<PathBuf>,
 }
 
 /// `cagework bench`

@@ -8,7 +8,7 @@ use cagework_core::{BindReport, Cage};
 use cagework_io::{Model, UpAxis, shown};
 use serde::Serialize;
 
-use crate::args::{BenchArgs, MemoryArgs};
+use crate::args::{BenchArgs, ControlArgs, MemoryArgs};
 use crate::bind::bind_model;
 use crate::card::duration;
 use crate::error::CliError;
@@ -79,7 +79,7 @@ pub(crate) fn run(args: &BenchArgs, as_json: bool) -> Result<(), CliError> {
     let (name, model, cage) = match (&args.mesh, &args.cage) {
         (Some(mesh), Some(cage)) => {
             let model = load_model(mesh, UpAxis::Y, MemoryArgs::default())?;
-            let cage = load_cage(cage, &model, MemoryArgs::default())?.cage;
+            let cage = load_cage(cage, &model, MemoryArgs::default(), &ControlArgs::default())?.cage;
             (mesh.display().to_string(), model, cage)
         }
         _ => {

@@ -35,33 +35,41 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     if let CageSource::File(path) = &args.cage {
         inputs.push(path);
     }
+    inputs.extend(args.controls.controls.as_deref());
     check_outputs(&outputs, &inputs)?;
 
     let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
-    let cage = load_cage(&args.cage, &model, args.read.memory)?.cage;
+    let loaded = load_cage(&args.cage, &model, args.read.memory, &args.controls)?;
+    let (cage, controls) = (&loaded.cage, loaded.controls());
     refuse_files_read(&outputs)?;
-    let (points, extra_points) = rig::points(&model, &args.mesh)?;
+    let (points, extra_points) =
+        if args.plain { (model.positions.clone(), 0) } else { rig::points(&model, &args.mesh)? };
     let options =
         BindOptions { held: model.bytes(), extra_points, ..args.solve.options(args.grid, args.read.memory) };
-    let to_write = memory_to_write(args, &model, points.len(), &cage, options.sparsify);
+    let to_write = memory_to_write(args, &model, points.len(), controls, options.sparsify);
     if to_write > options.memory_limit {
-        return Err(BindError::Memory { needed: to_write, limit: options.memory_limit }.into());
+        let (needed, limit) = (to_write, options.memory_limit);
+        let columns = controls.n_controls();
+        return Err(BindError::WeightsMemory { needed, limit, points: points.len(), columns }.into());
     }
-    let mut binding = bind_positions(&points, &cage, args.solve.on_gpu(), &options)?;
+    let mut binding = bind_positions(&points, controls, args.solve.on_gpu(), &options)?;
     let memory = &mut binding.report.memory_bytes;
     memory.estimated = memory.estimated.max(to_write);
 
     if let Some(path) = &args.weights {
         let extra_points = &points[model.positions.len()..];
-        write(path, &write_weights_npz(&binding.weights, &binding.outside, extra_points))?;
+        let inner = &controls.rest()[cage.n_vertices()..];
+        write(path, &write_weights_npz(&binding.weights, &binding.outside, extra_points, inner))?;
     }
     if let Some(output) = &args.output {
-        let rest = deform(&binding, cage.positions());
-        let bytes = if output.format == ModelFormat::Gltf && model.is_rigged() {
+        let rest = deform(&binding, controls.rest());
+        let bytes = if output.format == ModelFormat::Gltf && model.is_rigged() && !args.plain {
             let by: Vec<DVec3> = rest.iter().zip(&points).map(|(a, b)| a.as_dvec3() - b.as_dvec3()).collect();
             let outside: Vec<u32> = binding.outside.iter().map(|o| o.vertex).collect();
             let written = model.write_reshaped(&by, &outside, &[], &ReshapeOptions::default());
-            written.map_err(|e| CliError::file(&output.path, e))?.0
+            let (bytes, report) = written.map_err(|e| CliError::file(&output.path, e))?;
+            binding.report.notices.extend(report.notices());
+            bytes
         } else {
             export(&model, &rest[..model.positions.len()], output)?
         };
@@ -91,8 +99,14 @@ pub(crate) fn bind_model(model: &Model, cage: &Cage, options: &BindOptions) -> R
 }
 
 /// Bytes that are in use at once while the outputs are written: the model, its weights, and a file.
-fn memory_to_write(args: &BindArgs, model: &Model, n_points: usize, cage: &Cage, sparsify: f32) -> u64 {
-    let weights = weights_bytes(n_points, Controls::from(cage).n_controls(), sparsify);
+fn memory_to_write(
+    args: &BindArgs,
+    model: &Model,
+    n_points: usize,
+    controls: Controls<'_>,
+    sparsify: f32,
+) -> u64 {
+    let weights = weights_bytes(n_points, controls.n_controls(), sparsify);
     let npz = if args.weights.is_some() { weights } else { 0 };
     let output = args.output.as_ref().map_or(0, |output| model.bytes_to_write(output.format));
     model.bytes() + weights + npz.max(output)
@@ -104,16 +118,16 @@ fn memory_to_write(args: &BindArgs, model: &Model, n_points: usize, cage: &Cage,
 /// When the bind fails or is cancelled, or there is no GPU.
 pub(crate) fn bind_positions(
     positions: &[Vec3],
-    cage: &Cage,
+    controls: Controls<'_>,
     on_gpu: bool,
     options: &BindOptions,
 ) -> Result<Binding, CliError> {
     if on_gpu {
         let context = gpu::open()?;
-        return bind_on(&context, positions, cage, options);
+        return bind_on(&context, positions, controls, options);
     }
     let bar = Bar::start();
-    Ok(bind(positions, cage, options, &bar)?)
+    Ok(bind(positions, controls, options, &bar)?)
 }
 
 /// Binds positions on a GPU, with progress on the terminal.
@@ -123,14 +137,14 @@ pub(crate) fn bind_positions(
 pub(crate) fn bind_on(
     context: &GpuContext,
     positions: &[Vec3],
-    cage: &Cage,
+    controls: Controls<'_>,
     options: &BindOptions,
 ) -> Result<Binding, CliError> {
     let bar = Bar::start();
-    Ok(pollster::block_on(bind_on_gpu(positions, cage, options, &bar, context))?)
+    Ok(pollster::block_on(bind_on_gpu(positions, controls, options, &bar, context))?)
 }
 
-/// Where the bound vertices go for a posed cage. `[n_vertices]`, object units.
+/// Where the bound vertices go for posed controls. `[n_vertices]`, object units.
 pub(crate) fn deform(binding: &Binding, cage_positions: &[Vec3]) -> Vec<Vec3> {
     deform_bound(&binding.weights, &binding.outside, cage_positions)
 }

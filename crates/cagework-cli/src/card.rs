@@ -6,11 +6,17 @@ use std::path::PathBuf;
 use cagework_core::BindReport;
 use cagework_core::options::{CellShape, Method, Preconditioner, Solver};
 
+use crate::controls::inner_controls;
 use crate::files::shown_path;
 
 /// Lines on one bind. `model_notices`: what reading the mesh had to say; `written`: files that were written.
 pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathBuf]) -> String {
-    let mut out = format!("bound {} vertices to {} cage vertices\n", report.vertices, report.cage_vertices);
+    let mut out = format!(
+        "bound {} vertices to {} cage vertices{}\n",
+        report.vertices,
+        report.cage_vertices,
+        inner_controls(report.inner_controls as usize)
+    );
     let mut row = |name: &str, value: String| {
         let _ = writeln!(out, "  {name:<14}{value}");
     };
@@ -74,6 +80,12 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
         ),
     );
     row("outside", format!("{} vertices outside the cage", report.outside_vertices));
+    if report.smooth > 0 {
+        row("smooth", format!("{} steps of subdivision", report.smooth));
+    }
+    if report.held_vertices > 0 {
+        row("held", format!("{} vertices inside of controls or next to one", report.held_vertices));
+    }
 
     if !report.converged {
         let _ = writeln!(

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use cagework_core::cage_check::{CageCheck, Fix, Repair, Severity, check, repair};
+use cagework_core::cage_check::{CageCheck, Fix, Repair, Severity, check_smooth, repair_smooth};
 use cagework_io::{UpAxis, shown};
 use serde::Serialize;
 
@@ -40,20 +40,21 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
     let mut cage = cage_mesh(&load(&args.cage)?).map_err(refused)?;
     let model = args.mesh.as_deref().map(load).transpose()?;
     let inside = model.as_ref().map(|m| m.positions.as_slice());
+    let smooth = args.smooth.smooth;
     let mut checked = Checked {
         file: args.cage.display().to_string(),
         repaired: Vec::new(),
         output: None,
-        check: check(&cage, inside, Some(args.grid)),
+        check: check_smooth(&cage, inside, Some(args.grid), smooth),
     };
     if let Some(output) = &args.output {
         let repairs: Vec<Repair> = args.repair.iter().map(|&r| r.into()).collect();
-        let mended = repair(&cage, &repairs, inside)?;
+        let mended = repair_smooth(&cage, &repairs, inside, smooth)?;
         cage = mended.mesh;
         write_cage(output, &cage)?;
         checked.repaired = mended.done;
         checked.output = Some(output.path.display().to_string());
-        checked.check = check(&cage, inside, Some(args.grid));
+        checked.check = check_smooth(&cage, inside, Some(args.grid), smooth);
     }
     print(&if as_json { json(&checked) } else { text(&checked) })?;
     if checked.check.valid {

@@ -3,14 +3,15 @@
 use std::path::Path;
 use std::time::Instant;
 
+use cagework_core::Cage;
 use cagework_core::deform::{deform_bound, displacements};
-use cagework_core::{Cage, Controls};
 use cagework_io::{Model, ModelFormat, ReshapeReport, SavedWeights, read_weights_npz, shown};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use crate::args::{CageSource, DeformArgs, MemoryArgs};
+use crate::args::{CageSource, ControlArgs, DeformArgs, MemoryArgs};
 use crate::bind::export;
+use crate::controls::{inner_controls, rest_of, with_inner};
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, read, shown_path, write};
 use crate::load::{load_cage, load_model};
@@ -22,6 +23,8 @@ struct Deformed {
     output: String,
     vertices: usize,
     cage_vertices: usize,
+    /// Controls inside the cage.
+    inner_controls: usize,
     outside_vertices: usize,
     poses: Vec<String>,
     /// What became of skeleton, morph targets and animations, if there are any and they are kept.
@@ -44,7 +47,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         (None, None) => return Ok(()),
     };
     let mut inputs = vec![args.mesh.as_path(), weights.as_path()];
-    inputs.extend(args.pose.iter().map(AsRef::<Path>::as_ref));
+    inputs.extend(args.pose.iter().chain(&args.pose_controls).map(AsRef::<Path>::as_ref));
     if let CageSource::File(path) = &args.cage {
         inputs.push(path);
     }
@@ -64,19 +67,20 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     }
 
     let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
-    let cage = load_cage(&args.cage, &model, args.read.memory)?;
+    let cage = load_cage(&args.cage, &model, args.read.memory, &ControlArgs::default())?;
     let saved = load_weights(weights, &model, &cage.cage, args.read.memory)?;
     let n_vertices = model.positions.len();
-    let n_cage = saved.weights.n_columns();
+    let (n_cage, n_inner) = (cage.cage.n_vertices(), saved.inner_controls.len());
     let poses = args.pose.iter().map(|path| cage.load_pose(path)).collect::<Result<Vec<_>, _>>()?;
+    let poses = with_inner(poses, &args.pose_controls, &saved.inner_controls, model.up(), args.read.memory)?;
+    let rest = rest_of(&cage.cage, &saved);
     let names: Vec<String> = args.pose.iter().map(|path| pose_name(path)).collect();
     let outside_vertices = saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices).count();
 
     let started = Instant::now();
     let mut notices = model.notices.clone();
     let (bytes, rig, deform_ms) = if format == ModelFormat::Gltf && model.is_rigged() && !args.rig.plain {
-        let by =
-            |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.outside, cage.cage.positions(), pose);
+        let by = |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.outside, &rest, pose);
         let by: Vec<Vec<DVec3>> = poses.iter().map(by).collect();
         let deform_ms = started.elapsed().as_secs_f64() * 1e3;
         let (bytes, report) = rig::write(&model, &saved, &names, by, args)?;
@@ -101,6 +105,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         output: output.display().to_string(),
         vertices: n_vertices,
         cage_vertices: n_cage,
+        inner_controls: n_inner,
         outside_vertices,
         poses: names,
         rig,
@@ -121,8 +126,9 @@ pub(crate) fn load_weights(
     memory: MemoryArgs,
 ) -> Result<SavedWeights, CliError> {
     let saved = read_weights_npz(&read(path)?, memory.bytes()).map_err(|e| CliError::file(path, e))?;
-    let (n_vertices, n_cage) = (model.positions.len(), Controls::from(cage).n_controls());
-    if (saved.n_vertices(), saved.weights.n_columns()) == (n_vertices, n_cage) {
+    let (n_vertices, n_cage) = (model.positions.len(), cage.n_vertices());
+    let n_bound = saved.weights.n_columns() - saved.inner_controls.len();
+    if (saved.n_vertices(), n_bound) == (n_vertices, n_cage) {
         return Ok(saved);
     }
     Err(CliError::Mismatch {
@@ -131,7 +137,7 @@ pub(crate) fn load_weights(
              the cage {n_cage}",
             shown_path(path),
             saved.n_vertices(),
-            saved.weights.n_columns(),
+            n_bound,
         ),
         hint: "use the mesh and the cage that were bound, or bind these two",
     })
@@ -153,9 +159,10 @@ fn text(done: &Deformed) -> String {
         )
     };
     let mut out = format!(
-        "deformed {} vertices by {} cage vertices in {:.1} ms\nwrote {}: {poses}\n",
+        "deformed {} vertices by {} cage vertices{} in {:.1} ms\nwrote {}: {poses}\n",
         done.vertices,
         done.cage_vertices,
+        inner_controls(done.inner_controls),
         done.deform_ms,
         shown(&done.output)
     );

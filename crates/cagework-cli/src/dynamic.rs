@@ -5,7 +5,7 @@ use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
 use cagework_io::{ModelFormat, NoClip, shown};
 use serde::Serialize;
 
-use crate::args::{CageSource, DeformArgs};
+use crate::args::{CageSource, ControlArgs, DeformArgs, SmoothArgs};
 use crate::bind::bind_positions;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, shown_path, write};
@@ -57,12 +57,13 @@ pub(crate) fn run(args: &DeformArgs, clip: &str, as_json: bool) -> Result<(), Cl
         CliError::file(&args.mesh, NoClip { asked: clip.to_owned(), names })
     })?;
     let mut frames = model.frames(number).map_err(wrong)?;
-    let cage = load_cage(&args.cage, &model, args.read.memory)?;
+    let controls = ControlArgs { smooth: SmoothArgs { smooth: args.smooth }, ..ControlArgs::default() };
+    let cage = load_cage(&args.cage, &model, args.read.memory, &controls)?;
     let posed = cage.load_pose(pose)?;
-    let lattice = Lattice::new(&cage.cage);
+    let lattice = Lattice::new(cage.controls().surface());
     let options =
         BindOptions { held: model.bytes(), memory_limit: args.read.memory.bytes(), ..BindOptions::default() };
-    let binding = bind_positions(&lattice.points(), &cage.cage, false, &options)?;
+    let binding = bind_positions(&lattice.points(), cage.controls(), false, &options)?;
     let rest = cage.cage.positions();
     let field = DisplacementField::new(lattice, &binding.weights, &binding.outside, rest, &posed);
     let mut at_rest = model.positions.clone();

@@ -3,11 +3,11 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use cagework_core::ClosedFormError;
 use cagework_core::bind::BindError;
 use cagework_core::cage::CageError;
 use cagework_core::cage_check::RepairError;
 use cagework_core::cage_gen::CageGenError;
+use cagework_core::{ClosedFormError, ControlError};
 use cagework_gpu::GpuError;
 use cagework_io::{GltfError, ObjError, ReadError, shown};
 use thiserror::Error;
@@ -51,6 +51,9 @@ pub(crate) enum CliError {
     /// No cage was generated.
     #[error(transparent)]
     CageGen(#[from] CageGenError),
+    /// The cage has no smooth surface.
+    #[error(transparent)]
+    Controls(#[from] ControlError),
     /// The cage could not be mended.
     #[error(transparent)]
     Repair(#[from] RepairError),
@@ -114,6 +117,11 @@ impl CliError {
             Self::Bind(BindError::Memory { .. }) | Self::Gpu(GpuError::Bind(BindError::Memory { .. })) => {
                 Some("the limit is set by --memory-limit, in MiB")
             }
+            Self::Bind(BindError::WeightsMemory { .. })
+            | Self::Gpu(GpuError::Bind(BindError::WeightsMemory { .. })) => Some(
+                "the limit is set by --memory-limit, in MiB; of a rigged model `bind --static` binds the shape alone, without \
+                 joints and morph targets",
+            ),
             Self::Read(
                 ReadError::Obj { source: ObjError::Memory(_), .. }
                 | ReadError::Gltf { source: GltfError::Memory(_), .. },

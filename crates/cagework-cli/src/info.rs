@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 
 use cagework_core::mesh::weld;
 use cagework_core::{Bounds, Cage};
-use cagework_io::{Clip, Model, shown};
+use cagework_io::{Clip, Model, ModelFormat, read_inner_controls, shown};
 use serde::Serialize;
 
 use crate::args::InfoArgs;
 use crate::error::CliError;
-use crate::files::{json, print};
+use crate::files::{json, print, read};
 use crate::load::{cage_mesh, load_model};
 
 /// What `info` says; its JSON is the output of `--json`.
@@ -28,6 +28,8 @@ struct Info {
     joints: usize,
     morph_targets: usize,
     clips: Vec<Clip>,
+    /// Names of what hangs on joints without a skin: `--rigid` takes them.
+    props: Vec<String>,
     bounds: BoundsInfo,
     /// Every edge belongs to two triangles, once equal positions are welded.
     closed: bool,
@@ -57,9 +59,48 @@ struct CageInfo {
 /// # Errors
 /// When the model cannot be read.
 pub(crate) fn run(args: &InfoArgs, as_json: bool) -> Result<(), CliError> {
-    let model = load_model(&args.model, args.read.axis(), args.read.memory)?;
+    let inner = inner_info(args)?;
+    let model = match (load_model(&args.model, args.read.axis(), args.read.memory), &inner) {
+        // A file of controls need not have faces.
+        (Err(_), Some(inner)) => return print(&if as_json { json(inner) } else { inner.to_string() }),
+        (model, _) => model?,
+    };
     let info = inspect(&args.model.display().to_string(), &model)?;
     print(&if as_json { json(&info) } else { text(&info) })
+}
+
+/// Controls inside a cage, as an OBJ file names them.
+#[derive(Debug, Serialize)]
+struct InnerInfo {
+    file: String,
+    format: &'static str,
+    /// Columns of the weights.
+    vertices: usize,
+    points: usize,
+    lines: usize,
+    faces: usize,
+}
+
+impl std::fmt::Display for InnerInfo {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { file, vertices, points, lines, faces, .. } = self;
+        writeln!(f, "{} (OBJ), controls inside a cage: `cagework bind --controls`", shown(file))?;
+        writeln!(f, "  vertices    {vertices}\n  elements    {points} points, {lines} lines, {faces} faces")
+    }
+}
+
+/// What an OBJ file says of controls, if it has points or lines.
+fn inner_info(args: &InfoArgs) -> Result<Option<InnerInfo>, CliError> {
+    if ModelFormat::of_export(&args.model.to_string_lossy()) != Some(ModelFormat::Obj) {
+        return Ok(None);
+    }
+    let Ok(inner) = read_inner_controls(&read(&args.model)?, args.read.memory.bytes()) else {
+        return Ok(None);
+    };
+    let count = |name| inner.elements.iter().filter(|element| element.name() == name).count();
+    let [points, lines, faces] = ["point", "line", "face"].map(count);
+    let (file, vertices) = (args.model.display().to_string(), inner.positions.len());
+    Ok((points + lines > 0).then_some(InnerInfo { file, format: "obj", vertices, points, lines, faces }))
 }
 
 fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
@@ -88,6 +129,8 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
         joints: counts.joints,
         morph_targets: counts.morph_targets,
         clips: model.clips(),
+        // What is wrong with a rig is said where it is used.
+        props: model.props().unwrap_or_default(),
         bounds: BoundsInfo {
             min: bounds.min.to_array(),
             max: bounds.max.to_array(),
@@ -134,6 +177,9 @@ fn text(info: &Info) -> String {
     for clip in &info.clips {
         let name = clip.name.as_deref().map_or_else(|| "(no name)".into(), shown);
         row("clip", format!("{name}, {} s, {} channels, {} keys", clip.seconds, clip.channels, clip.keys));
+    }
+    if !info.props.is_empty() {
+        row("on joints", shown(&info.props.join(", ")));
     }
     let [min, max] = [info.bounds.min, info.bounds.max];
     row("bounds", format!("{min:?} to {max:?}, diagonal {}", info.bounds.diagonal));

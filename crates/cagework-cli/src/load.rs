@@ -5,11 +5,15 @@ use std::path::Path;
 use cagework_core::cage::MAX_FACES;
 use cagework_core::cage_gen::{CageReport, generate};
 use cagework_core::samples::{self, Sample};
-use cagework_core::{Bounds, Cage, CageError, CageOptions, PolygonMesh, TriMesh, subdivided_box};
+use cagework_core::{
+    Bounds, Cage, CageError, CageOptions, ControlSet, Controls, InnerControls, PolygonMesh, TriMesh,
+    subdivided_box,
+};
 use cagework_io::{Model, UpAxis, write_cage_obj};
 use glam::Vec3;
 
-use crate::args::{CageSource, DEFAULT_MARGIN, MemoryArgs, ModelOutput};
+use crate::args::{CageSource, ControlArgs, DEFAULT_MARGIN, MemoryArgs, ModelOutput};
+use crate::controls::load_controls;
 use crate::error::CliError;
 use crate::files::{read, read_beside};
 use crate::progress::Bar;
@@ -24,6 +28,8 @@ pub(crate) struct LoadedCage {
     up: UpAxis,
     /// Memory that a pose may take.
     memory: MemoryArgs,
+    /// Controls that are not the plain cage's, if the arguments ask for some.
+    set: Option<ControlSet>,
 }
 
 /// Reads a model with faces. `up`: what points up in the file.
@@ -102,6 +108,7 @@ pub(crate) fn load_cage(
     source: &CageSource,
     around: &Model,
     memory: MemoryArgs,
+    controls: &ControlArgs,
 ) -> Result<LoadedCage, CliError> {
     let model = match source {
         CageSource::File(path) => load_model(path, around.up(), memory)?,
@@ -109,13 +116,15 @@ pub(crate) fn load_cage(
             generated_model("box cage", &box_mesh(&around.positions, *divisions, DEFAULT_MARGIN)?)?
         }
         CageSource::Auto(options) => {
-            generated_model("generated cage", &generate_for(around, None, options)?.0)?
+            let options = CageOptions { smooth: controls.smooth.smooth, ..*options };
+            generated_model("generated cage", &generate_for(around, None, &options)?.0)?
         }
     };
     let cage = cage_mesh(&model)
         .and_then(|mesh| Cage::new(&mesh))
         .map_err(|source| CliError::Cage { name: model.name.clone(), source })?;
-    Ok(LoadedCage { cage, model, up: around.up(), memory })
+    let set = load_controls(&cage, controls, around.up(), memory)?;
+    Ok(LoadedCage { cage, model, up: around.up(), memory, set })
 }
 
 /// A generated cage around a model, its morph targets and a clip, with progress on the terminal.
@@ -149,6 +158,16 @@ pub(crate) fn box_mesh(positions: &[Vec3], divisions: u32, margin: f32) -> Resul
 }
 
 impl LoadedCage {
+    /// What a model is bound to.
+    pub(crate) fn controls(&self) -> Controls<'_> {
+        self.set.as_ref().map_or_else(|| Controls::from(&self.cage), Controls::from)
+    }
+
+    /// Controls inside, if there are any.
+    pub(crate) fn inner(&self) -> Option<&InnerControls> {
+        self.controls().inner()
+    }
+
     /// A pose of this cage, `[n_cage]`, as a file of it.
     ///
     /// # Errors

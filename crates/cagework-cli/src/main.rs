@@ -8,6 +8,7 @@ mod bind;
 mod cage;
 mod card;
 mod check;
+mod controls;
 mod deform;
 mod demo;
 mod dynamic;

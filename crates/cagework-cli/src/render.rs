@@ -7,7 +7,7 @@ use std::time::Instant;
 use cagework_core::bind::Binding;
 use cagework_core::green::green_weights;
 use cagework_core::slice::Slice;
-use cagework_core::{BindOptions, Cage, Controls, Weights, mean_value_weights};
+use cagework_core::{BindOptions, Controls, Weights, mean_value_weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView, check_layers};
 use cagework_io::{Model, shown};
@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use crate::args::{CageSource, Compared, RenderArgs, Show};
 use crate::bind::bind_positions;
+use crate::controls::with_inner;
 use crate::deform::load_weights;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, write};
@@ -44,13 +45,19 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     let mut inputs = vec![args.model.as_path()];
     inputs.extend(args.pose.as_deref());
     inputs.extend(args.weights.as_deref());
+    inputs.extend(args.pose_controls.as_deref());
+    inputs.extend(args.controls.controls.as_deref());
     if let Some(CageSource::File(path)) = &args.cage {
         inputs.push(path);
     }
     check_outputs(&[&args.output], &inputs)?;
     check_compared(args)?;
     let model = load_model(&args.model, args.read.axis(), args.read.memory)?;
-    let cage = args.cage.as_ref().map(|source| load_cage(source, &model, args.read.memory)).transpose()?;
+    let cage = args
+        .cage
+        .as_ref()
+        .map(|source| load_cage(source, &model, args.read.memory, &args.controls))
+        .transpose()?;
     let (drawn, mut notices) = gpu::draw_model(&model);
     notices.splice(0..0, model.notices.iter().cloned());
     let mut session = Session::new(gpu::open()?);
@@ -59,17 +66,29 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     let mut other = None;
     let mut points = model.positions.clone();
     if let Some(cage) = &cage {
-        pollster::block_on(session.set_cage(&cage.cage))?;
+        pollster::block_on(session.set_cage(cage.controls()))?;
         points.extend(prepare(args, &model, cage, &mut session, &mut scene)?);
     }
     session.set_scene(scene);
     if let (Some(cage), Some(compared)) = (&cage, args.compare) {
         let mut twin = pollster::block_on(session.twin())?;
-        let weights = match compared {
-            Compared::MeanValue => mean_value_weights(&model.positions, &cage.cage)?,
-            Compared::Green => green_weights(&model.positions, &cage.cage)?,
-        };
-        pollster::block_on(twin.adopt(weights, Vec::new()))?;
+        let n_controls = cage.controls().n_controls();
+        match compared {
+            Compared::MeanValue => {
+                let weights = mean_value_weights(&model.positions, &cage.cage)?.widened(n_controls);
+                pollster::block_on(twin.adopt(weights, Vec::new()))?;
+            }
+            Compared::Plain => {
+                let options = args.solve.options(args.grid, args.read.memory);
+                let Binding { weights, outside, .. } =
+                    bind_positions(&model.positions, (&cage.cage).into(), args.solve.on_gpu(), &options)?;
+                pollster::block_on(twin.adopt(weights.widened(n_controls), outside))?;
+            }
+            Compared::Green => {
+                let weights = green_weights(&model.positions, &cage.cage)?;
+                pollster::block_on(twin.adopt_green(weights))?;
+            }
+        }
         other = Some(twin);
     }
     let size = args.size.0;
@@ -89,6 +108,7 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     let compared = args.compare.map(|compared| match compared {
         Compared::MeanValue => ["harmonic coordinates", "mean value coordinates"],
         Compared::Green => ["harmonic coordinates", "Green coordinates"],
+        Compared::Plain => ["harmonic coordinates", "harmonic coordinates of the plain cage"],
     });
     if let Some(mut other) = other {
         *other.camera_mut() = *session.camera();
@@ -114,6 +134,13 @@ fn check_compared(args: &RenderArgs) -> Result<(), CliError> {
     if args.compare.is_some() && matches!(args.show, Show::Cells | Show::Slice) {
         let message = "--compare needs a model that moves, but a slice of the grid is asked for".to_owned();
         return Err(CliError::Mismatch { message, hint });
+    }
+    if args.compare == Some(Compared::Green) && args.controls.controls.is_some() {
+        let message = "Green coordinates have no controls inside the cage".to_owned();
+        return Err(CliError::Mismatch {
+            message,
+            hint: "compare with mean-value or plain, or leave out --controls",
+        });
     }
     if args.compare.is_some() && args.size.0[0] < NARROWEST_PAIR {
         let message = format!("--compare needs a picture at least {NARROWEST_PAIR} pixels wide");
@@ -176,7 +203,8 @@ fn prepare(
     session: &mut Session,
     scene: &mut SceneOptions,
 ) -> Result<Vec<Vec3>, CliError> {
-    let n_cage = Controls::from(&cage.cage).n_controls();
+    let controls = cage.controls();
+    let n_cage = controls.n_controls();
     if matches!(args.show, Show::Weights | Show::Slice) && args.column as usize >= n_cage {
         return Err(CliError::Mismatch {
             message: format!("--column is {}, but the cage has {n_cage} vertices", args.column),
@@ -196,30 +224,34 @@ fn prepare(
                 let held = model.bytes();
                 let options = BindOptions { held, ..args.solve.options(args.grid, args.read.memory) };
                 let Binding { weights, outside, .. } =
-                    bind_positions(&model.positions, &cage.cage, args.solve.on_gpu(), &options)?;
+                    bind_positions(&model.positions, controls, args.solve.on_gpu(), &options)?;
                 (weights, outside)
             }
         };
         pollster::block_on(session.adopt(weights, outside))?;
     }
-    let mut places = cage.cage.positions().to_vec();
+    let mut places = controls.rest().to_vec();
     if let Some(path) = &args.pose {
-        let pose = cage.load_pose(path)?;
+        let files: Vec<_> = args.pose_controls.iter().cloned().collect();
+        let inner = &controls.rest()[cage.cage.n_vertices()..];
+        let poses = with_inner(vec![cage.load_pose(path)?], &files, inner, model.up(), args.read.memory)?;
+        let pose = poses.into_iter().flatten().collect::<Vec<_>>();
         session.pose(&pose);
         places.extend(pose);
     }
     if matches!(args.show, Show::Cells | Show::Slice) {
-        scene.slice = Some(slice(args, &cage.cage)?);
+        scene.slice = Some(slice(args, controls)?);
     }
     Ok(places)
 }
 
-fn slice(args: &RenderArgs, cage: &Cage) -> Result<SliceView, CliError> {
+fn slice(args: &RenderArgs, controls: Controls<'_>) -> Result<SliceView, CliError> {
     let options = args.solve.options(args.grid, args.read.memory);
-    let mut slice = Slice::new(cage, &options, args.axis as usize, args.at);
+    let mut slice = Slice::new(controls, &options, args.axis as usize, args.at);
     let mut column = None;
     if args.show == Show::Slice && !slice.cells.is_empty() {
-        let weights: Weights = bind_positions(&slice.centers(), cage, args.solve.on_gpu(), &options)?.weights;
+        let weights: Weights =
+            bind_positions(&slice.centers(), controls, args.solve.on_gpu(), &options)?.weights;
         slice.set_weights(weights).map_err(|e| CliError::file(Path::new("slice"), e))?;
         column = Some(args.column);
     }

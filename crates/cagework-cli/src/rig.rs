@@ -1,6 +1,6 @@
 //! Rigged models: what is bound with them, and what a reshape says.
 
-use cagework_io::{Model, ReshapeReport, SavedWeights};
+use cagework_io::{Model, ReshapeReport, SavedWeights, WriteError};
 use glam::{DVec3, Vec3};
 
 use crate::args::DeformArgs;
@@ -18,14 +18,18 @@ pub(crate) fn write(
     mut by: Vec<Vec<DVec3>>,
     args: &DeformArgs,
 ) -> Result<(Vec<u8>, ReshapeReport), CliError> {
-    let wrong = |e| CliError::file(&args.output.path, e);
-    let (found, needed) = (saved.extra_points.len(), model.extra_points().map_err(wrong)?.len());
-    if found != needed {
-        return Err(CliError::Mismatch {
-            message: format!("the weights have {found} points of the model's rig, but it has {needed}"),
+    let n = model.positions.len();
+    let wrong = |e| match e {
+        WriteError::Count { given, expected } => CliError::Mismatch {
+            message: format!(
+                "the weights have {} points of the model's rig, but it has {}",
+                given.saturating_sub(n),
+                expected - n
+            ),
             hint: "bind the model again, or export it without its rig (--static)",
-        });
-    }
+        },
+        e => CliError::file(&args.output.path, e),
+    };
     let outside: Vec<u32> = saved.outside.iter().map(|o| o.vertex).collect();
     let options = args.rig.options();
     if by.len() == 1 {

@@ -31,6 +31,7 @@ use crate::mesh::{Bounds, PolygonMesh};
 
 pub use defects::{CageError, CageNotice, FaceDefect};
 use polygon::{Hats, Polygon};
+use topology::Surface;
 
 /// Smallest diagonal of a cage, object units: squares and cubes of lengths stay far from the end of f32 and f64.
 pub const MIN_DIAGONAL: f64 = 1e-12;
@@ -82,12 +83,56 @@ impl Cage {
         let polygons = orient::orient(&mesh.positions, &mut surface, diagonal, &mut notices)?;
         topology::note_vertices(mesh, &surface, &mut notices);
 
-        let faces = surface.faces;
+        let Surface { faces, component, .. } = surface;
+        Ok(Self::assembled(mesh.positions.clone(), faces, polygons, component, bounds, notices))
+    }
+
+    /// This cage with more faces, which are taken as they are: walls inside it whose sides need not enclose anything. A wall of
+    /// which both sides are faces, back to back, is one that the model does not see through from either side.
+    ///
+    /// `positions`, `faces`: vertices after the cage's own, and what they are corners of; `parts`: a number for each face, the
+    /// same for those that hang together.
+    ///
+    /// # Errors
+    /// [`CageError`] when there are too many faces, or one has no area.
+    pub(crate) fn with_walls(
+        &self,
+        positions: &[Vec3],
+        faces: &[Vec<u32>],
+        parts: &[u32],
+    ) -> Result<Self, CageError> {
+        let n_faces = self.faces.len() + faces.len();
+        if n_faces > MAX_FACES {
+            return Err(CageError::TooManyFaces { faces: n_faces });
+        }
+        let all = [self.positions.as_slice(), positions].concat();
+        let mut polygons = self.polygons.clone();
+        for (f, face) in (self.faces.len() as u32..).zip(faces) {
+            let corners: Vec<DVec3> = face.iter().map(|&i| all[i as usize].as_dvec3()).collect();
+            let polygon = Polygon::new(&corners, f64::from(self.diagonal()));
+            polygons.push(polygon.map_err(|why| CageError::DegenerateFace { face: f, why })?);
+        }
+        let first = self.component_of_face.iter().max().map_or(0, |last| last + 1);
+        let parts =
+            self.component_of_face.iter().copied().chain(parts.iter().map(|part| first + part)).collect();
+        let faces = self.faces.iter().chain(faces).cloned().collect();
+        Ok(Self::assembled(all, faces, polygons, parts, self.bounds, self.notices.clone()))
+    }
+
+    /// A cage of faces that are right.
+    fn assembled(
+        positions: Vec<Vec3>,
+        faces: Vec<Vec<u32>>,
+        polygons: Vec<Polygon>,
+        component_of_face: Vec<u32>,
+        bounds: Bounds,
+        notices: Vec<CageNotice>,
+    ) -> Self {
         let mut cage = Self {
-            positions: mesh.positions.clone(),
+            positions,
             triangles: Vec::new(),
             face_of_triangle: Vec::new(),
-            component_of_face: surface.component,
+            component_of_face,
             facets: Vec::new(),
             facet_points: Vec::new(),
             face_of_facet: Vec::new(),
@@ -111,7 +156,7 @@ impl Cage {
             n_points += polygon.inner.len();
         }
         cage.facet_points = cage.facet_points_at(&cage.positions);
-        Ok(cage)
+        cage
     }
 
     /// Vertex positions, the input's order. `[n_cage]`, object units.

@@ -6,41 +6,52 @@
 //! the surface, where `hat_k` are the values of [`Cage::hats_at`]. Weights reproduce a place, `sum_j w_j c_j = x`, wherever
 //! `s_k = sum_j B_kj c_j`. For a plain cage the controls are the surface's vertices and B is the identity.
 
+mod inner;
+mod set;
+mod shapes;
+
 use glam::Vec3;
 
 use crate::cage::Cage;
 use crate::weights::Weights;
 
+pub use inner::{ControlError, InnerControls, InnerElement, MAX_RADIUS};
+pub use set::ControlSet;
+
+/// Where a face of the surface comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Origin {
+    /// The face of the cage that it is part of; none for a wall inside.
+    pub(crate) cage_face: Option<u32>,
+    /// Three controls in whose frame points near it are kept.
+    pub(crate) frame: [u32; 3],
+}
+
 /// The controls of a bind.
 #[derive(Clone, Copy, Debug)]
 pub struct Controls<'a> {
+    cage: &'a Cage,
     rest: &'a [Vec3],
     surface: &'a Cage,
     /// None for the identity.
     rows: Option<&'a Weights>,
+    /// Of each face of the surface; none where it is the cage's own.
+    origins: Option<&'a [Origin]>,
+    set: Option<&'a ControlSet>,
 }
 
 impl<'a> From<&'a Cage> for Controls<'a> {
     /// A plain cage: each of its vertices is a control.
     fn from(cage: &'a Cage) -> Self {
-        Self { rest: cage.positions(), surface: cage, rows: None }
+        Self { cage, rest: cage.positions(), surface: cage, rows: None, origins: None, set: None }
     }
 }
 
 impl<'a> Controls<'a> {
-    /// Controls at `rest` (`[n_controls]`, object units) whose values on `surface` are mixed by `rows`,
-    /// `[n_surface, n_controls]`: not negative, each summing to 1.
-    ///
-    /// # Panics
-    /// If the matrix has another shape.
+    /// The same, to be kept.
     #[must_use]
-    pub fn new(rest: &'a [Vec3], surface: &'a Cage, rows: &'a Weights) -> Self {
-        assert_eq!(
-            (rows.n_rows(), rows.n_columns()),
-            (surface.n_vertices(), rest.len()),
-            "shape of the rows"
-        );
-        Self { rest, surface, rows: Some(rows) }
+    pub fn to_set(&self) -> ControlSet {
+        self.set.cloned().unwrap_or_else(|| ControlSet::plain(self.cage))
     }
 
     /// Number of controls: columns of the weights.
@@ -49,16 +60,68 @@ impl<'a> Controls<'a> {
         self.rest.len()
     }
 
-    /// Rest positions. `[n_controls]`, object units.
+    /// Rest positions: the cage's vertices, then controls inside. `[n_controls]`, object units.
     #[must_use]
     pub fn rest(&self) -> &'a [Vec3] {
         self.rest
+    }
+
+    /// The cage whose vertices are the first controls.
+    #[must_use]
+    pub fn cage(&self) -> &'a Cage {
+        self.cage
     }
 
     /// The surface on which values are prescribed.
     #[must_use]
     pub fn surface(&self) -> &'a Cage {
         self.surface
+    }
+
+    /// Steps of subdivision from the cage to the surface.
+    #[must_use]
+    pub fn smooth(&self) -> u32 {
+        self.set.map_or(0, ControlSet::smooth)
+    }
+
+    /// Controls inside, if there are any.
+    #[must_use]
+    pub fn inner(&self) -> Option<&'a InnerControls> {
+        self.set.map(ControlSet::inner).filter(|inner| !inner.positions.is_empty())
+    }
+
+    /// Edges of the controls inside, and three from each of them to the cage beside it, so that none is alone.
+    pub(crate) fn inner_edges(&self) -> Vec<[u32; 2]> {
+        let Some(inner) = self.inner() else { return Vec::new() };
+        let first = self.cage.n_vertices() as u32;
+        let mut edges: Vec<[u32; 2]> = inner
+            .elements
+            .iter()
+            .flat_map(|e| e.corners().windows(2))
+            .map(|w| [first + w[0], first + w[1]])
+            .collect();
+        for (number, p) in (first..).zip(&inner.positions) {
+            edges.extend(set::nearest_triangle(self.cage, p.as_dvec3()).map(|i| [number, i]));
+        }
+        edges
+    }
+
+    /// The face of the cage that a face of the surface is part of; none for a wall inside.
+    #[must_use]
+    pub fn cage_face(&self, face: u32) -> Option<u32> {
+        self.origins.map_or(Some(face), |origins| origins[face as usize].cage_face)
+    }
+
+    /// Three controls in whose frame points near a facet of the surface are kept.
+    ///
+    /// # Panics
+    /// If there is no such facet.
+    #[must_use]
+    pub fn frame_near(&self, facet: u32) -> [u32; 3] {
+        match self.origins {
+            None => self.surface.triangle_near(facet),
+            Some(origins) => origins[self.surface.face_of_facet()[facet as usize] as usize].frame,
+        }
     }
 
     /// Dirichlet values at a point of the surface, given by one of its triangles and barycentric coordinates in it. Calls
@@ -109,7 +172,16 @@ mod tests {
         let indptr = (0..=n).map(|row| 8 * row).collect();
         let data = surface.positions().iter().flat_map(|&p| trilinear(p)).collect();
         let rows = Weights::new(8, indptr, (0..n).flat_map(|_| 0..8).collect(), data).unwrap();
-        let controls = Controls::new(&rest, &surface, &rows);
+        let cage = Cage::new(&subdivided_box(bounds, 0.0, [1, 1, 1])).unwrap();
+        let origins = vec![Origin { cage_face: Some(0), frame: [0, 1, 2] }; surface.faces().len()];
+        let controls = Controls {
+            cage: &cage,
+            rest: &rest,
+            surface: &surface,
+            rows: Some(&rows),
+            origins: Some(&origins),
+            set: None,
+        };
 
         let points: Vec<Vec3> = (1..60)
             .map(|k| {

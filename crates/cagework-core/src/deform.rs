@@ -4,12 +4,12 @@ use glam::{DVec3, Mat3, Vec3};
 
 use crate::weights::Weights;
 
-/// A mesh vertex outside the cage: it follows the closest point of the cage, offset rigidly in that triangle's frame.
+/// A mesh vertex outside the cage, inside of a control or next to it: where its weights put it, offset rigidly in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutsideVertex {
     /// Mesh vertex.
     pub vertex: u32,
-    /// Corners of the cage triangle with the closest point: the frame's corners, as vertices of the surface.
+    /// The frame's corners, three controls: of a plain cage the triangle with the closest point.
     pub corners: [u32; 3],
     /// Offset from the closest point in the frame (edge, in-plane normal to it, triangle normal), object units.
     pub offset: Vec3,

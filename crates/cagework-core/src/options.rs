@@ -188,6 +188,13 @@ pub const SPARSIFY: Number = Number {
     is_allowed: |w| (0.0..0.1).contains(&w),
 };
 
+/// Steps of subdivision of a smooth cage.
+pub const SMOOTH: Number = Number {
+    name: "smooth",
+    allowed: "a whole number from 0 to 3",
+    is_allowed: |n| n.fract() == 0.0 && (0.0..=3.0).contains(&n),
+};
+
 impl Number {
     /// Checks a value.
     ///

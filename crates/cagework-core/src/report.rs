@@ -68,10 +68,19 @@ pub struct BindReport {
     pub weights: WeightStats,
     /// Mesh vertices (rows).
     pub vertices: u64,
-    /// Cage vertices (columns).
+    /// Cage vertices (the first columns).
     pub cage_vertices: u64,
+    /// Controls inside the cage (the columns after them).
+    #[serde(default)]
+    pub inner_controls: u64,
+    /// Steps of subdivision between the cage and its smooth surface.
+    #[serde(default)]
+    pub smooth: u32,
     /// Mesh vertices outside the cage.
     pub outside_vertices: u64,
+    /// Mesh vertices inside of controls, or so close to one that an offset keeps them in place.
+    #[serde(default)]
+    pub held_vertices: u64,
     /// Cells about which the three axes disagreed whether they are inside.
     pub ambiguous_cells: u64,
     /// Remarks in whole sentences (cage was inside out, unused vertices, ...).

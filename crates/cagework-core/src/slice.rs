@@ -6,7 +6,7 @@
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
-use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::grid::Grid;
 use crate::levels::Boundary as _;
 use crate::options::{BindOptions, Method};
@@ -54,13 +54,20 @@ impl Slice {
     /// # Panics
     /// If there is no such axis.
     #[must_use]
-    pub fn new(cage: &Cage, options: &BindOptions, axis: usize, fraction: f32) -> Self {
+    pub fn new<'a>(
+        controls: impl Into<Controls<'a>>,
+        options: &BindOptions,
+        axis: usize,
+        fraction: f32,
+    ) -> Self {
+        let controls = controls.into();
+        let cage = controls.surface();
         match options.method {
             Method::Embedded => {
                 let grid = Grid::cubic(cage.bounds(), options.grid);
                 let lines = shoot_lines(cage, &grid);
                 let cells = Cells::finest(&lines, grid, &votes(&lines, &grid));
-                let cells = cells.with(cage.into(), &lines);
+                let cells = cells.with(controls, &lines);
                 Self::of(&grid, axis, fraction, |cell| match cells.unknowns()[grid.index(cell)] {
                     false => CellKind::Exterior,
                     true if cells.cut_arms()[grid.index(cell)] != 0 => CellKind::Boundary,
@@ -70,7 +77,7 @@ impl Slice {
             Method::Classic => {
                 let (dims, origin, cell) = place_grid(cage, options.grid, options.cell_shape);
                 let grid = Grid { dims: dims.to_array(), origin, cell };
-                let cells = voxelize_classic(cage.into(), options.grid, options.cell_shape);
+                let cells = voxelize_classic(controls, options.grid, options.cell_shape);
                 Self::of(&grid, axis, fraction, |cell| cells.kinds[grid.index(cell)])
             }
         }
@@ -143,6 +150,7 @@ impl Slice {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cage::Cage;
     use crate::cage_gen::subdivided_box;
     use crate::mesh::Bounds;
     use crate::progress::Silent;

@@ -126,6 +126,12 @@ impl Weights {
         Self::from_parts(n_columns, indptr, Vec::with_capacity(n_nonzeros), Vec::with_capacity(n_nonzeros))
     }
 
+    /// The same matrix with columns of zeros after its own, `n_columns` in all.
+    #[must_use]
+    pub fn widened(self, n_columns: usize) -> Self {
+        Self { n_columns: self.n_columns.max(n_columns as u32), ..self }
+    }
+
     /// Adds the rows of another matrix after its own.
     ///
     /// # Panics

@@ -4,18 +4,17 @@
 //! binds in a worker and hands over weights ([`Session::bind`] there, [`Session::adopt`] here).
 
 mod again;
+mod green;
 mod mover;
 mod picture;
 mod playing;
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use cagework_core::deform::OutsideVertex;
 use cagework_core::deform::{deform_bound, vertex_normals};
-use cagework_core::green::green_controls;
 use cagework_core::options::BindOptions;
-use cagework_core::{BindReport, Bounds, Cage, Progress, Weights};
+use cagework_core::{BindReport, Bounds, Cage, ControlSet, Controls, Progress, Weights};
 use glam::{Vec2, Vec3};
 
 use crate::bind::bind_gpu;
@@ -27,6 +26,7 @@ use crate::skin::Skinner;
 
 pub use picture::MAX_PICTURE;
 
+use green::check_size;
 use mover::Mover;
 
 /// Everything about one model on one GPU.
@@ -37,7 +37,7 @@ pub struct Session {
     camera: Camera,
     scene: SceneOptions,
     model: Option<Arc<DrawModel>>,
-    cage: Option<Cage>,
+    controls: Option<ControlSet>,
     pose: Vec<Vec3>,
     bound: Option<Bound>,
     /// What the mesh follows while a clip plays.
@@ -51,6 +51,8 @@ pub struct Session {
 struct Bound {
     weights: Weights,
     outside: Vec<OutsideVertex>,
+    /// Columns are the cage's triangles, too.
+    is_green: bool,
     mover: Mover,
 }
 
@@ -64,7 +66,7 @@ impl Session {
             camera: Camera::default(),
             scene: SceneOptions::default(),
             model: None,
-            cage: None,
+            controls: None,
             pose: Vec::new(),
             bound: None,
             playing: None,
@@ -101,15 +103,16 @@ impl Session {
         Ok(())
     }
 
-    /// Another cage, at rest; weights for the one before are dropped.
+    /// Another cage, or other controls, at rest; weights for those before are dropped.
     ///
     /// # Errors
     /// As [`crate::buffers::Allocator::zeros`].
-    pub async fn set_cage(&mut self, cage: &Cage) -> Result<(), GpuError> {
+    pub async fn set_cage<'a>(&mut self, controls: impl Into<Controls<'a>>) -> Result<(), GpuError> {
+        let controls = controls.into();
         self.drop_weights();
-        self.renderer.set_cage(&self.context, cage).await?;
-        self.pose = cage.positions().to_vec();
-        self.cage = Some(cage.clone());
+        self.renderer.set_cage(&self.context, controls).await?;
+        self.pose = controls.rest().to_vec();
+        self.controls = Some(controls.to_set());
         self.update_bounds();
         Ok(())
     }
@@ -117,7 +120,7 @@ impl Session {
     /// The cage at rest.
     #[must_use]
     pub fn cage(&self) -> Option<&Cage> {
-        self.cage.as_ref()
+        self.controls.as_ref().map(ControlSet::cage)
     }
 
     /// Binds the model to the cage: on this GPU, or on the processor where it only draws.
@@ -129,14 +132,15 @@ impl Session {
         options: &BindOptions,
         progress: &dyn Progress,
     ) -> Result<BindReport, GpuError> {
-        let (model, cage) = self.parts()?;
+        let (model, controls) = self.parts()?;
         if self.context.draws_only() {
-            let binding = cagework_core::bind(&model.positions, cage, options, progress)?;
-            self.bound(binding.weights, binding.outside, None).await?;
+            let binding = cagework_core::bind(&model.positions, controls, options, progress)?;
+            self.bound(binding.weights, binding.outside, false, None).await?;
             return Ok(binding.report);
         }
-        let (binding, weights) = bind_gpu(&model.positions, cage, options, progress, &self.context).await?;
-        self.bound(binding.weights, binding.outside, Some(weights)).await?;
+        let (binding, weights) =
+            bind_gpu(&model.positions, controls, options, progress, &self.context).await?;
+        self.bound(binding.weights, binding.outside, false, Some(weights)).await?;
         Ok(binding.report)
     }
 
@@ -146,30 +150,21 @@ impl Session {
     /// [`GpuError::NotReady`] without model or cage, [`GpuError::Model`] if the weights belong to others; otherwise as
     /// [`crate::buffers::Allocator::zeros`].
     pub async fn adopt(&mut self, weights: Weights, outside: Vec<OutsideVertex>) -> Result<(), GpuError> {
-        let (model, cage) = self.parts()?;
-        let (rows, columns) = (model.positions.len(), cage.n_vertices());
-        // Green coordinates have a column for each triangle as well.
-        let is_columns = [columns, columns + cage.triangles().len()].contains(&weights.n_columns());
-        if weights.n_rows() != rows || !is_columns {
-            let reason = format!(
-                "weights are of {} vertices and {} cage vertices, but there are {rows} and {columns}",
-                weights.n_rows(),
-                weights.n_columns()
-            );
-            return Err(GpuError::Model { reason });
-        }
+        let (model, controls) = self.parts()?;
+        let (rows, columns) = (model.positions.len(), controls.n_controls());
+        check_size(&weights, rows, columns)?;
         let astray =
             |o: &OutsideVertex| o.vertex as usize >= rows || o.corners.iter().any(|&c| c as usize >= columns);
         if outside.iter().any(astray) {
             let reason = "a vertex outside the cage, or its triangle, does not exist".to_owned();
             return Err(GpuError::Model { reason });
         }
-        self.bound(weights, outside, None).await
+        self.bound(weights, outside, false, None).await
     }
 
-    fn parts(&self) -> Result<(&Arc<DrawModel>, &Cage), GpuError> {
-        match (&self.model, &self.cage) {
-            (Some(model), Some(cage)) => Ok((model, cage)),
+    fn parts(&self) -> Result<(&Arc<DrawModel>, Controls<'_>), GpuError> {
+        match (&self.model, &self.controls) {
+            (Some(model), Some(controls)) => Ok((model, controls.into())),
             (None, _) => Err(GpuError::NotReady { missing: "model" }),
             (_, None) => Err(GpuError::NotReady { missing: "cage" }),
         }
@@ -179,26 +174,18 @@ impl Session {
         &mut self,
         weights: Weights,
         outside: Vec<OutsideVertex>,
+        is_green: bool,
         on_gpu: Option<GpuWeights>,
     ) -> Result<(), GpuError> {
         let (model, _) = self.parts()?;
         let mover = Mover::new(&self.context, model, &weights, &outside, on_gpu).await?;
-        mover.pose(&self.context, &self.controls(&weights, &self.pose));
+        mover.pose(&self.context, &self.columns(is_green, &self.pose));
         self.renderer.set_vertices(&self.context, Some(mover.tables()));
         self.playing = None;
-        self.bound = Some(Bound { weights, outside, mover });
+        self.bound = Some(Bound { weights, outside, is_green, mover });
         self.moved = true;
         self.write_values();
         Ok(())
-    }
-
-    /// What the columns of weights stand for where the cage's vertices are at `positions`: them, and for Green coordinates its
-    /// triangles.
-    fn controls<'a>(&self, weights: &Weights, positions: &'a [Vec3]) -> Cow<'a, [Vec3]> {
-        match &self.cage {
-            Some(cage) if weights.n_columns() > positions.len() => green_controls(cage, positions).into(),
-            _ => positions.into(),
-        }
     }
 
     fn drop_weights(&mut self) {
@@ -222,13 +209,13 @@ impl Session {
     /// Moves the cage; the next frame shows it and the mesh that follows. Uploads the cage and nothing else.
     ///
     /// # Panics
-    /// If there is not one position per cage vertex.
+    /// If there is not one position per control.
     pub fn pose(&mut self, cage_positions: &[Vec3]) {
-        assert_eq!(cage_positions.len(), self.pose.len(), "one position per cage vertex");
+        assert_eq!(cage_positions.len(), self.pose.len(), "one position per control");
         self.pose.copy_from_slice(cage_positions);
         self.renderer.pose(&self.context, cage_positions);
         if let Some(bound) = &self.bound {
-            bound.mover.pose(&self.context, &self.controls(&bound.weights, cage_positions));
+            bound.mover.pose(&self.context, &self.columns(bound.is_green, cage_positions));
             self.moved = true;
         }
     }
@@ -236,13 +223,13 @@ impl Session {
     /// Draws the cage somewhere else; the mesh stays where it is. For editing the cage itself.
     ///
     /// # Panics
-    /// If there is not one position per cage vertex.
+    /// If there is not one position per control.
     pub fn show_cage(&mut self, cage_positions: &[Vec3]) {
-        assert_eq!(cage_positions.len(), self.pose.len(), "one position per cage vertex");
+        assert_eq!(cage_positions.len(), self.pose.len(), "one position per control");
         self.renderer.pose(&self.context, cage_positions);
     }
 
-    /// Where the cage is. `[n_cage]`, object units.
+    /// Where the controls are. `[n_controls]`, object units.
     #[must_use]
     pub fn cage_positions(&self) -> &[Vec3] {
         &self.pose
@@ -282,13 +269,15 @@ impl Session {
             return;
         }
         let Some(range) = self.value_range() else { return };
-        let (Some(model), Some(bound), Some(cage)) = (&self.model, &self.bound, &self.cage) else { return };
+        let (Some(model), Some(bound), Some(set)) = (&self.model, &self.bound, &self.controls) else {
+            return;
+        };
         let values: Vec<f32> = match self.scene.mesh {
             MeshStyle::Weights { column } => bound.weights.column(column).collect(),
             MeshStyle::Errors => {
-                let controls = self.controls(&bound.weights, cage.positions());
-                let rebuilt = deform_bound(&bound.weights, &bound.outside, &controls);
-                let scale = 1.0 / cage.diagonal();
+                let at_rest = self.columns(bound.is_green, Controls::from(set).rest());
+                let rebuilt = deform_bound(&bound.weights, &bound.outside, &at_rest);
+                let scale = 1.0 / set.cage().diagonal();
                 rebuilt.iter().zip(&model.positions).map(|(a, b)| scale * a.distance(*b)).collect()
             }
             MeshStyle::Hidden | MeshStyle::Solid | MeshStyle::Clay => return,
@@ -326,7 +315,7 @@ impl Session {
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
         let model = self.model.as_ref().and_then(|m| Bounds::of(&m.positions));
-        let cage = self.cage.as_ref().map(Cage::bounds);
+        let cage = self.cage().map(Cage::bounds);
         match (model, cage) {
             (Some(a), Some(b)) => Some(Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }),
             (one, other) => one.or(other),
@@ -384,7 +373,8 @@ impl Session {
     }
 
     fn encode_deformation(&mut self, encoder: &mut wgpu::CommandEncoder) {
-        if let Some(Bound { weights, outside, mover }) = self.bound.as_ref().filter(|_| self.moved) {
+        if let Some(Bound { weights, outside, is_green, mover }) = self.bound.as_ref().filter(|_| self.moved)
+        {
             match &self.playing {
                 Some(skinner) => mover.encode_skinned(&self.context, encoder, skinner),
                 None => mover.encode(
@@ -392,7 +382,7 @@ impl Session {
                     encoder,
                     weights,
                     outside,
-                    &self.controls(weights, &self.pose),
+                    &self.columns(*is_green, &self.pose),
                 ),
             }
             self.moved = false;
@@ -407,9 +397,9 @@ impl Session {
     pub async fn read_positions(&self) -> Result<Vec<Vec3>, GpuError> {
         let Some(model) = &self.model else { return Err(GpuError::NotReady { missing: "model" }) };
         match &self.bound {
-            Some(Bound { weights, outside, mover }) => {
-                let controls = self.controls(weights, &self.pose);
-                let mut positions = mover.read_positions(&self.context, weights, outside, &controls).await?;
+            Some(Bound { weights, outside, is_green, mover }) => {
+                let columns = self.columns(*is_green, &self.pose);
+                let mut positions = mover.read_positions(&self.context, weights, outside, &columns).await?;
                 // Copies of vertices come last.
                 positions.truncate(model.positions.len());
                 Ok(positions)

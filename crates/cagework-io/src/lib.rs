@@ -29,13 +29,14 @@ pub use counts::Counts;
 pub use error::{PoseError, WriteError};
 pub use format::{FormatError, ModelFormat};
 pub use gltf::{
-    Clip, GltfError, Joints, PROJECT_EXTENSION, Player, Posed, ReshapeOptions, ReshapeReport, write_mesh_glb,
+    Clip, GltfError, JointPoint, Joints, PROJECT_EXTENSION, Player, Posed, ReshapeOptions, ReshapeReport,
+    write_mesh_glb,
 };
 pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
 pub use memory::MemoryError;
 pub use model::{Model, ReadError};
 pub use npz::{NpzError, SavedWeights, read_weights_npz, write_weights_npz};
-pub use obj::{ObjError, write_cage_obj};
+pub use obj::{ObjError, read_inner_controls, write_cage_obj, write_inner_controls};
 pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
 pub use project::{Project, ProjectError, read_project, write_project};
 pub use rigged::NoClip;

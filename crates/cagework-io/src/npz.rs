@@ -2,7 +2,8 @@
 //!
 //! Arrays: `format` (`b"csr"`), `shape` (int64), `indptr`, `indices` (int32), `data` (float32); with vertices outside
 //! the cage also `outside_vertex` (int32), `outside_corners` (int32, [n, 3]) and `outside_offset` (float32, [n, 3]),
-//! which SciPy ignores; of a rigged model also `extra_points` (float32, [n, 3]): the last n rows are theirs.
+//! which SciPy ignores; of a rigged model also `extra_points` (float32, [n, 3]): the last n rows are theirs; with controls inside
+//! the cage also `inner_controls` (float32, [n, 3]): the last n columns are theirs.
 //! Written uncompressed, as `numpy.savez` does, with one fixed time stamp: the same weights give
 //! the same bytes. Reading takes what SciPy writes too: deflated, 32- or 64-bit indices, 32- or 64-bit floats.
 //!
@@ -70,6 +71,8 @@ pub struct SavedWeights {
     pub outside: Vec<OutsideVertex>,
     /// Points of the model's rig that were bound with it, object units.
     pub extra_points: Vec<Vec3>,
+    /// Where the controls inside the cage rest, object units: the last columns.
+    pub inner_controls: Vec<Vec3>,
 }
 
 impl SavedWeights {
@@ -92,9 +95,15 @@ impl SavedWeights {
     }
 }
 
-/// Weights and the rows outside the cage as an `.npz` file; the last rows are those of `extra_points`.
+/// Weights and the rows outside the cage as an `.npz` file; the last rows are those of `extra_points`, the last columns those of
+/// `inner_controls`.
 #[must_use]
-pub fn write_weights_npz(weights: &Weights, outside: &[OutsideVertex], extra_points: &[Vec3]) -> Vec<u8> {
+pub fn write_weights_npz(
+    weights: &Weights,
+    outside: &[OutsideVertex],
+    extra_points: &[Vec3],
+    inner_controls: &[Vec3],
+) -> Vec<u8> {
     let n = outside.len();
     let shape = [weights.n_rows() as i64, weights.n_columns() as i64];
     let bytes = weights.bytes() + size_of_val(outside) + ROOM_FOR_HEADERS;
@@ -118,9 +127,11 @@ pub fn write_weights_npz(weights: &Weights, outside: &[OutsideVertex], extra_poi
         let offsets = outside.iter().flat_map(|o| o.offset.to_array()).map(f32::to_le_bytes);
         zip.put("outside_offset", "<f4", &[n, 3], offsets);
     }
-    if !extra_points.is_empty() {
-        let points = extra_points.iter().flat_map(Vec3::to_array).map(f32::to_le_bytes);
-        zip.put("extra_points", "<f4", &[extra_points.len(), 3], points);
+    for (name, points) in [("extra_points", extra_points), ("inner_controls", inner_controls)] {
+        if !points.is_empty() {
+            let values = points.iter().flat_map(Vec3::to_array).map(f32::to_le_bytes);
+            zip.put(name, "<f4", &[points.len(), 3], values);
+        }
     }
     zip.zip.finish().expect("writing to memory does not fail").into_inner()
 }
@@ -201,15 +212,24 @@ pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<SavedWeights,
     let data = required(&mut zip, "data")?.rows_of(&[])?.floats()?;
     let weights = Weights::new(columns, indptr, indices, data)?;
     let outside = read_outside(&mut zip, rows, columns)?;
-    let extra_points = match array(&mut zip, "extra_points")? {
-        None => Vec::new(),
-        Some(points) => points.rows_of(&[3])?.floats()?.chunks_exact(3).map(Vec3::from_slice).collect(),
-    };
-    if extra_points.len() > rows as usize {
-        let problem = format!("has {} points, but there are {rows} rows", extra_points.len());
-        return Err(NpzError::Array { array: "extra_points", problem });
+    let extra_points = read_points(&mut zip, "extra_points", (rows, "rows"))?;
+    let inner_controls = read_points(&mut zip, "inner_controls", (columns, "columns"))?;
+    Ok(SavedWeights { weights, outside, extra_points, inner_controls })
+}
+
+/// An array of points, of which there are at most so many of something; empty if it is not there.
+fn read_points(
+    zip: &mut Archive<'_>,
+    array: &'static str,
+    (most, what): (u32, &str),
+) -> Result<Vec<Vec3>, NpzError> {
+    let Some(points) = self::array(zip, array)? else { return Ok(Vec::new()) };
+    let points: Vec<Vec3> = points.rows_of(&[3])?.floats()?.chunks_exact(3).map(Vec3::from_slice).collect();
+    if points.len() <= most as usize {
+        return Ok(points);
     }
-    Ok(SavedWeights { weights, outside, extra_points })
+    let problem = format!("has {} points, but there are {most} {what}", points.len());
+    Err(NpzError::Array { array, problem })
 }
 
 fn read_outside(zip: &mut Archive<'_>, rows: u32, columns: u32) -> Result<Vec<OutsideVertex>, NpzError> {

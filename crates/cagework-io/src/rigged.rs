@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use thiserror::Error;
 
 use crate::error::WriteError;
-use crate::gltf::{self, Clip, Named, Played, Player, ReshapeOptions, ReshapeReport, Rig};
+use crate::gltf::{self, Clip, JointPoint, Named, Played, Player, ReshapeOptions, ReshapeReport, Rig};
 use crate::model::{Document, Model};
 use crate::shown::shown;
 
@@ -41,13 +41,34 @@ impl Model {
     /// # Errors
     /// [`WriteError`] when a part of the rig cannot be read.
     pub fn extra_points(&self) -> Result<Vec<Vec3>, WriteError> {
-        let Document::Gltf(document) = &self.document else { return Ok(Vec::new()) };
-        if !Rig::is_needed(document) {
-            return Ok(Vec::new());
-        }
-        let extras = Rig::new(document, &self.positions_in_file())?.extras;
-        let extras: Vec<Vec3> = extras.iter().map(|p| p.as_vec3()).collect();
+        let bound = self.rig()?.map_or_else(Vec::new, |rig| rig.bound());
+        let extras: Vec<Vec3> = bound.iter().map(|p| p.as_vec3()).collect();
         Ok(self.up.turned(&extras).into_owned())
+    }
+
+    /// Joints and nodes below them: what a picture shows of the skeleton.
+    ///
+    /// # Errors
+    /// [`WriteError`] when a part of the rig cannot be read.
+    pub fn joints(&self) -> Result<Vec<JointPoint>, WriteError> {
+        Ok(self.rig()?.map_or_else(Vec::new, |rig| rig.joints()))
+    }
+
+    /// Names of what hangs below joints without a skin and can be kept rigid: buckles, eyes, weapons.
+    ///
+    /// # Errors
+    /// [`WriteError`] when a part of the rig cannot be read.
+    pub fn props(&self) -> Result<Vec<String>, WriteError> {
+        Ok(self.rig()?.map_or_else(Vec::new, |rig| rig.props()))
+    }
+
+    fn rig(&self) -> Result<Option<Rig<'_>>, WriteError> {
+        match &self.document {
+            Document::Gltf(document) if Rig::is_needed(document) => {
+                Ok(Some(Rig::new(document, &self.positions_in_file())?))
+            }
+            _ => Ok(None),
+        }
     }
 
     /// The model with its skeleton, morph targets and clips, to be played; its vertices have the file's axes. None of a format
@@ -100,7 +121,7 @@ impl Model {
     ) -> Result<(Vec<u8>, ReshapeReport), WriteError> {
         let Document::Gltf(document) = &self.document else { return Err(WriteError::NoRig) };
         let rig = Rig::new(document, &self.positions_in_file())?;
-        let n = self.positions.len() + rig.extras.len();
+        let n = self.positions.len() + rig.bound().len();
         let turned = |by: &[DVec3]| -> Result<Vec<DVec3>, WriteError> {
             if by.len() != n {
                 return Err(WriteError::Count { given: by.len(), expected: n });
@@ -110,8 +131,9 @@ impl Model {
             }
             Ok(by.iter().map(|&by| self.up.vector_turned_back(by)).collect())
         };
-        let by = turned(by)?;
-        let by_poses = poses.iter().map(|(_, by)| turned(by)).collect::<Result<Vec<_>, _>>()?;
+        let by = rig.all_moved(turned(by)?);
+        let all_moved = |(_, by): &(String, Vec<DVec3>)| Ok(rig.all_moved(turned(by)?));
+        let by_poses = poses.iter().map(all_moved).collect::<Result<Vec<_>, WriteError>>()?;
         let poses: Vec<Named<'_>> =
             poses.iter().zip(&by_poses).map(|((name, _), by)| Named { name, by }).collect();
         let mut is_outside = vec![false; n];
@@ -120,6 +142,7 @@ impl Model {
                 *is_outside = true;
             }
         }
+        let is_outside = rig.all_outside(is_outside);
         let up = self.up.vector_turned_back(DVec3::Y);
         gltf::reshape(document, &rig, &self.triangles, (&by, &is_outside), &poses, (options, up))
     }

@@ -22,28 +22,28 @@ fn sample() -> (Weights, Vec<OutsideVertex>) {
 }
 
 fn saved((weights, outside): (Weights, Vec<OutsideVertex>)) -> SavedWeights {
-    SavedWeights { weights, outside, extra_points: vec![] }
+    SavedWeights { weights, outside, extra_points: vec![], inner_controls: vec![] }
 }
 
 #[test]
 fn points_of_a_rig_are_the_last_rows() {
     let (weights, outside) = sample();
     let points = [Vec3::X, Vec3::new(0.5, -2.0, 8.0)];
-    let read = read_weights_npz(&write_weights_npz(&weights, &outside, &points), LIMIT).unwrap();
+    let read = read_weights_npz(&write_weights_npz(&weights, &outside, &points, &points), LIMIT).unwrap();
     assert_eq!((read.n_vertices(), read.extra_points.as_slice()), (1, points.as_slice()));
     let of_vertices = read.of_vertices();
     assert_eq!(of_vertices.weights, weights.with_rows(&[0]));
     assert!(of_vertices.outside.is_empty() && of_vertices.extra_points.is_empty());
     let too_many = [Vec3::X; 4];
     let message =
-        read_weights_npz(&write_weights_npz(&weights, &[], &too_many), LIMIT).unwrap_err().to_string();
+        read_weights_npz(&write_weights_npz(&weights, &[], &too_many, &[]), LIMIT).unwrap_err().to_string();
     assert_eq!(message, "array 'extra_points': has 4 points, but there are 3 rows");
 }
 
 /// The file with each array passed through `change`; deflated, as SciPy writes it.
 fn rewritten(change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) -> Vec<u8> {
     let (weights, outside) = sample();
-    let bytes = write_weights_npz(&weights, &outside, &[]);
+    let bytes = write_weights_npz(&weights, &outside, &[], &[]);
     let mut from = ZipArchive::new(Cursor::new(bytes.as_slice())).unwrap();
     let mut to = ZipWriter::new(Cursor::new(Vec::new()));
     for i in 0..from.len() {
@@ -62,17 +62,17 @@ fn rewritten(change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) -> Vec<u8> {
 #[test]
 fn weights_survive_and_bytes_repeat() {
     let (weights, outside) = sample();
-    let bytes = write_weights_npz(&weights, &outside, &[]);
-    assert_eq!(bytes, write_weights_npz(&weights, &outside, &[]));
+    let bytes = write_weights_npz(&weights, &outside, &[], &[]);
+    assert_eq!(bytes, write_weights_npz(&weights, &outside, &[], &[]));
     assert_eq!(read_weights_npz(&bytes, LIMIT).unwrap(), saved((weights.clone(), outside)));
-    let bytes = write_weights_npz(&weights, &[], &[]);
+    let bytes = write_weights_npz(&weights, &[], &[], &[]);
     assert_eq!(read_weights_npz(&bytes, LIMIT).unwrap(), saved((weights, vec![])));
 }
 
 #[test]
 fn headers_are_what_numpy_writes() {
     let (weights, _) = sample();
-    let bytes = write_weights_npz(&weights, &[], &[]);
+    let bytes = write_weights_npz(&weights, &[], &[], &[]);
     let mut zip = ZipArchive::new(Cursor::new(bytes.as_slice())).unwrap();
     let mut data = Vec::new();
     zip.by_name("indptr.npy").unwrap().read_to_end(&mut data).unwrap();

@@ -79,12 +79,12 @@ fn pose_without_faces_is_read_and_is_no_mesh() {
 #[test]
 fn errors_name_the_line() {
     let cases = [
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99", "line 4: face names vertex 99, but there are 3"),
-        ("v 0 0 0\nv 1 0 0\nf 1 2 -3\nv 0 1 0", "line 3: face names vertex -3, but there are 2"),
-        ("v 0 0 0\nf 0 1 1", "line 2: face names vertex 0, but there are 1"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99", "line 4: names vertex 99, but there are 3"),
+        ("v 0 0 0\nv 1 0 0\nf 1 2 -3\nv 0 1 0", "line 3: names vertex -3, but there are 2"),
+        ("v 0 0 0\nf 0 1 1", "line 2: names vertex 0, but there are 1"),
         ("v 0 0 0\nf 1 1", "line 2: face has 2 corners; it needs at least 3"),
-        ("v 0 0 0\nf 1 x 1", "line 2: face corner 'x' is not an index"),
-        ("v 0 0 0\nf 1/1/1/1 1 1", "line 2: face corner '1/1/1/1'"),
+        ("v 0 0 0\nf 1 x 1", "line 2: corner 'x' is not an index"),
+        ("v 0 0 0\nf 1/1/1/1 1 1", "line 2: corner '1/1/1/1'"),
         ("# c\nv 0 nan 0", "line 2: y coordinate is 'nan'"),
         ("v 0 0 1e99", "line 1: z coordinate is '1e99'"),
         ("v 1,5 0 0", "line 1: x coordinate is '1,5'"),

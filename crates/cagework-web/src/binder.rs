@@ -2,14 +2,17 @@
 //!
 //! It has its own GPU device and reads nothing but arrays. Results are taken apart by the page's `Engine`.
 
-use cagework_core::cage_check::repair;
+use cagework_core::cage_check::repair_smooth;
 use cagework_core::cage_gen::{CageOptions, GeneratedCage, generate};
 use cagework_core::deform::{OutsideVertex, deform_bound};
 use cagework_core::dynamic::Lattice;
+use cagework_core::green::green_weights;
 use cagework_core::options::OutsidePolicy;
 use cagework_core::progress::Silent;
 use cagework_core::slice::Slice;
-use cagework_core::{BindOptions, Binding, Cage, PolygonMesh, Weights, mean_value_weights, samples};
+use cagework_core::{
+    BindOptions, Binding, ControlSet, Controls, PolygonMesh, Weights, mean_value_weights, samples,
+};
 use cagework_gpu::{ContextOptions, GpuContext, bind_on};
 use glam::Vec3;
 use js_sys::Function;
@@ -18,8 +21,9 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::arrays::{corners, flat, points, polygon_mesh};
 use crate::clock::Listener;
+use crate::controls::{CageControls, control_set, said};
 use crate::error::{Answer, ErrorName, Fault};
-use crate::options::{BindAsked, CageAsked, taken};
+use crate::options::{BindAsked, CageAsked, Coordinates, taken};
 use crate::problems::{self, Check};
 use crate::views::object;
 
@@ -45,12 +49,14 @@ pub struct Bound {
 pub struct Polygons {
     pub(crate) mesh: PolygonMesh,
     /// Separate parts of the model that one made cage joins; 0 if there is one, or no cage was made.
-    bridged: u32,
+    pub(crate) bridged: u32,
+    /// A project's.
+    pub(crate) controls: Option<CageControls>,
 }
 
 impl From<PolygonMesh> for Polygons {
     fn from(mesh: PolygonMesh) -> Self {
-        Self { mesh, bridged: 0 }
+        Self { mesh, bridged: 0, controls: None }
     }
 }
 
@@ -61,18 +67,6 @@ pub struct BuiltSample {
     positions: Vec<Vec3>,
     cage: PolygonMesh,
     poses: Vec<(String, Vec<Vec3>)>,
-}
-
-/// Model and cage as arrays.
-struct Parts {
-    positions: Vec<Vec3>,
-    cage: Cage,
-}
-
-impl Parts {
-    fn new(positions: &[f32], cage: &[f32], corners: &[u32]) -> Answer<Self> {
-        Ok(Self { positions: points(positions), cage: Cage::new(&polygon_mesh(cage, corners)?)? })
-    }
 }
 
 #[wasm_bindgen]
@@ -97,42 +91,56 @@ impl Binder {
         Ok(())
     }
 
-    /// Harmonic coordinates. `positions` `[n_points, 3]`, of which the last `extra_points` are no vertices, `cage` `[n_cage, 3]`; `corners`: for each face their number,
-    /// then them. `progress` is called with every step and stops the bind by returning false.
+    /// Harmonic coordinates. `positions` `[n_points, 3]`, of which the last `extra_points` are no vertices, `cage` `[n_controls, 3]`; `corners`: for each face their number,
+    /// then them; `controls` as `Engine.setCage` takes them. `progress` is called with every step and stops the bind by returning false.
     ///
     /// # Errors
     /// Those of a bind; when the arrays are no cage; `Missing` when the GPU is asked for and not open.
+    #[allow(clippy::too_many_arguments, reason = "arrays cross the border one by one")]
     pub async fn bind(
         &self,
         positions: Vec<f32>,
         extra_points: usize,
         cage: Vec<f32>,
         corners: Vec<u32>,
+        #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Bound, JsValue> {
         let mut asked: BindAsked = taken(options)?;
         asked.options.extra_points = extra_points;
-        let parts = Parts::new(&positions, &cage, &corners)?;
+        let set = control_set(&cage, &corners, controls)?;
+        let at = points(&positions);
         drop(positions);
-        let binding = self.run(&parts.positions, &parts.cage, asked, progress).await?;
+        let binding = self.run(&at, &set, asked, progress).await?;
         let report = object(&binding.report)?;
         Ok(Bound { weights: binding.weights, outside: binding.outside, report })
     }
 
-    /// Mean value coordinates, by formula; the arrays are those of `bind`.
+    /// Coordinates by formula, mean value or Green, of the cage alone; the arrays are those of `bind`.
     ///
     /// # Errors
     /// When they are not defined somewhere, or the arrays are no cage.
-    #[wasm_bindgen(js_name = bindMeanValue)]
-    pub fn bind_mean_value(
+    #[wasm_bindgen(js_name = bindByFormula)]
+    pub fn bind_by_formula(
         &self,
+        #[wasm_bindgen(unchecked_param_type = "Coordinates")] kind: JsValue,
         positions: &[f32],
         cage: &[f32],
         corners: &[u32],
+        #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
     ) -> Result<Bound, JsValue> {
-        let parts = Parts::new(positions, cage, corners)?;
-        let weights = mean_value_weights(&parts.positions, &parts.cage).map_err(Fault::from)?;
+        let set = control_set(cage, corners, controls)?;
+        let by_formula = match taken(kind)? {
+            Coordinates::MeanValue => mean_value_weights,
+            Coordinates::Green => green_weights,
+            Coordinates::Harmonic => {
+                return Err(
+                    Fault::new(ErrorName::Error, "there is no formula for harmonic coordinates").into()
+                );
+            }
+        };
+        let weights = by_formula(&points(positions), set.cage()).map_err(Fault::from)?;
         Ok(Bound { weights, outside: Vec::new(), report: JsValue::UNDEFINED })
     }
 
@@ -147,18 +155,19 @@ impl Binder {
         &self,
         cage: Vec<f32>,
         corners: Vec<u32>,
+        #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
         axis: usize,
         fraction: f32,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Option<Bound>, JsValue> {
         let asked: BindAsked = taken(options)?;
-        let parts = Parts::new(&[], &cage, &corners)?;
-        let centers = Slice::new(&parts.cage, &asked.into(), axis.min(2), fraction).centers();
+        let set = control_set(&cage, &corners, controls)?;
+        let centers = Slice::new(&set, &asked.into(), axis.min(2), fraction).centers();
         if centers.is_empty() {
             return Ok(None);
         }
-        let binding = match self.run(&centers, &parts.cage, asked, progress).await {
+        let binding = match self.run(&centers, &set, asked, progress).await {
             // Rounding may put all of a layer that only grazes the cage outside.
             Err(fault) if fault.is(ErrorName::NoneInside) => return Ok(None),
             ran => ran?,
@@ -176,18 +185,21 @@ impl Binder {
         &self,
         cage: Vec<f32>,
         corners: Vec<u32>,
+        #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
         #[wasm_bindgen(unchecked_param_type = "BindOptions")] options: JsValue,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Bound, JsValue> {
         let mut asked: BindAsked = taken(options)?;
         asked.options.outside = OutsidePolicy::ClosestPoint;
-        let parts = Parts::new(&[], &cage, &corners)?;
-        let binding = self.run(&Lattice::new(&parts.cage).points(), &parts.cage, asked, progress).await?;
+        let set = control_set(&cage, &corners, controls)?;
+        let lattice = Lattice::new(Controls::from(&set).surface());
+        let binding = self.run(&lattice.points(), &set, asked, progress).await?;
         let (weights, outside) = (binding.weights, binding.outside);
         Ok(Bound { weights, outside, report: JsValue::UNDEFINED })
     }
 
-    /// A cage for a model: `CageOptions` of contract.ts. `progress` as for `bind`.
+    /// A cage for a model: `CageOptions` of contract.ts, and after how many steps of subdivision it encloses the model. `progress`
+    /// as for `bind`.
     ///
     /// # Errors
     /// When there is nothing to enclose or an option is out of range.
@@ -197,20 +209,23 @@ impl Binder {
         positions: &[f32],
         triangles: &[u32],
         #[wasm_bindgen(unchecked_param_type = "CageOptions")] options: JsValue,
+        smooth: u32,
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Polygons, JsValue> {
         let asked: CageAsked = taken(options)?;
+        let options = CageOptions { smooth, ..asked.into() };
         let triangles: Vec<[u32; 3]> = triangles.as_chunks().0.to_vec();
         let listener = Listener::new(progress);
-        let made = generate(&points(positions), &triangles, &CageOptions::from(asked), &listener);
+        let made = generate(&points(positions), &triangles, &options, &listener);
         let GeneratedCage { cage, report } = made.map_err(Fault::from)?;
         let bridged = if report.separate > report.parts { report.separate } else { 0 };
-        Ok(Polygons { mesh: cage.to_polygon_mesh(), bridged })
+        Ok(Polygons { mesh: cage.to_polygon_mesh(), bridged, controls: None })
     }
 
     /// Poses of a cage for another one around the same model: where harmonic coordinates in the old cage bring the new one's
     /// vertices. (The new one's coordinates at the old vertices would be equations to solve, and bend the new cage where
-    /// the old one reaches beyond it.) `poses` and what is returned: one pose after the other, `[n_cage, 3]` each.
+    /// the old one reaches beyond it.) Controls inside are carried as vertices are. `poses` and what is returned: one pose after
+    /// the other, `[n_controls, 3]` each.
     ///
     /// # Errors
     /// When the arrays are no cages; those of a bind.
@@ -220,13 +235,14 @@ impl Binder {
         new: &[f32],
         old: &[f32],
         old_corners: &[u32],
+        #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] old_controls: JsValue,
         poses: &[f32],
     ) -> Result<Vec<f32>, JsValue> {
-        let Parts { positions: mut at, cage } = Parts::new(new, old, old_corners)?;
-        let (n_new, n_old) = (at.len(), cage.n_vertices());
+        let (mut at, set) = (points(new), control_set(old, old_corners, old_controls)?);
+        let (n_new, n_old) = (at.len(), Controls::from(&set).n_controls());
         // A cage that lies around the old one has no vertex inside of it: some of the model's are.
         at.extend(points(model).into_iter().take(INSIDE));
-        let bound = cagework_core::bind(&at, &cage, &BindOptions::default(), &Silent).map_err(Fault::from)?;
+        let bound = cagework_core::bind(&at, &set, &BindOptions::default(), &Silent).map_err(Fault::from)?;
         let poses = points(poses);
         let carried = poses.chunks_exact(n_old).flat_map(|pose| {
             let moved = deform_bound(&bound.weights, &bound.outside, pose);
@@ -240,12 +256,17 @@ impl Binder {
     /// # Errors
     /// When the arrays are no mesh.
     #[wasm_bindgen(js_name = checkCage)]
-    pub fn check_cage(model: &[f32], positions: &[f32], corners: &[u32]) -> Result<Check, JsValue> {
-        let mesh = polygon_mesh(positions, corners)?;
-        Ok(Check { check: problems::find(&mesh, Some(&points(model))) })
+    pub fn check_cage(
+        model: &[f32],
+        positions: &[f32],
+        corners: &[u32],
+        #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
+    ) -> Result<Check, JsValue> {
+        let (mesh, smooth) = cage_alone(positions, corners, controls)?;
+        Ok(Check { check: problems::find(&mesh, &points(model), smooth) })
     }
 
-    /// A repaired cage, from the arrays of `checkCage`.
+    /// A repaired cage, from the arrays of `checkCage`; without controls inside.
     ///
     /// # Errors
     /// When growing did not help.
@@ -255,10 +276,11 @@ impl Binder {
         model: &[f32],
         positions: &[f32],
         corners: &[u32],
+        #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
     ) -> Result<Polygons, JsValue> {
         let asked = taken(kind)?;
-        let mesh = polygon_mesh(positions, corners)?;
-        let repaired = repair(&mesh, &[asked], Some(&points(model))).map_err(Fault::from)?;
+        let (mesh, smooth) = cage_alone(positions, corners, controls)?;
+        let repaired = repair_smooth(&mesh, &[asked], Some(&points(model)), smooth).map_err(Fault::from)?;
         Ok(repaired.mesh.into())
     }
 
@@ -284,6 +306,14 @@ impl Binder {
     }
 }
 
+/// A cage's mesh without the controls inside it, and its steps of subdivision.
+fn cage_alone(positions: &[f32], corners: &[u32], controls: JsValue) -> Answer<(PolygonMesh, u32)> {
+    let mut mesh = polygon_mesh(positions, corners)?;
+    let CageControls { smooth, inner, .. } = said(controls)?.unwrap_or_default();
+    mesh.positions.truncate(mesh.positions.len().saturating_sub(inner));
+    Ok((mesh, smooth))
+}
+
 impl Binder {
     fn open(&self) -> Answer<&GpuContext> {
         self.gpu.as_ref().ok_or_else(|| Fault::missing("GPU", "open one first"))
@@ -292,16 +322,16 @@ impl Binder {
     async fn run(
         &self,
         positions: &[Vec3],
-        cage: &Cage,
+        set: &ControlSet,
         asked: BindAsked,
         progress: Function,
     ) -> Answer<Binding> {
         let options = BindOptions::from(asked);
         let listener = Listener::new(progress);
         if asked.is_on_cpu() {
-            return Ok(cagework_core::bind(positions, cage, &options, &listener)?);
+            return Ok(cagework_core::bind(positions, set, &options, &listener)?);
         }
-        Ok(bind_on(positions, cage, &options, &listener, self.open()?).await?)
+        Ok(bind_on(positions, set, &options, &listener, self.open()?).await?)
     }
 }
 
@@ -342,7 +372,7 @@ impl Bound {
         self.outside.iter().flat_map(|o| o.offset.to_array()).collect()
     }
 
-    /// The bind report; undefined for mean value coordinates and slices.
+    /// The bind report; undefined for coordinates by formula and slices.
     #[wasm_bindgen(getter, unchecked_return_type = "BindReport | undefined")]
     #[must_use]
     pub fn report(&self) -> JsValue {
@@ -364,6 +394,15 @@ impl Polygons {
     #[must_use]
     pub fn corners(&self) -> Vec<u32> {
         corners(&self.mesh.faces)
+    }
+
+    /// A project's controls, whose positions stand at the end; undefined for others.
+    ///
+    /// # Errors
+    /// Never.
+    #[wasm_bindgen(getter, unchecked_return_type = "CageControls | undefined")]
+    pub fn controls(&self) -> Result<JsValue, JsValue> {
+        Ok(self.controls.as_ref().map_or(Ok(JsValue::UNDEFINED), object)?)
     }
 
     /// Separate parts of the model that a made cage joins; 0 if none are joined.

@@ -15,16 +15,17 @@ use cagework_core::options::{
 use cagework_core::report::{
     BindReport, CellCounts, MeanMax, MemoryBytes, RawError, RestError, Timings, WeightStats,
 };
-use cagework_core::{BindOptions, Stage};
+use cagework_core::{BindOptions, InnerElement, Stage};
 use cagework_io::{ModelFormat, UpAxis};
 use serde::Serialize;
 use ts_rs::{Config, TS};
 
 use crate::clock::Event;
+use crate::controls::{CageControls, InnerKind};
 use crate::error::ErrorName;
 use crate::options::{
-    BindAsked, CageAsked, Colour, GizmoAsked, GizmoHandle, JointsAsked, PullAsked, RestEdit, RigAsked,
-    SceneAsked, SliceShown, SymmetryAsked, ThemeAsked,
+    BindAsked, CageAsked, Colour, Coordinates, GizmoAsked, GizmoHandle, JointsAsked, PullAsked, RestEdit,
+    RigAsked, SceneAsked, SliceShown, SymmetryAsked, ThemeAsked,
 };
 use crate::settings::Settings;
 use crate::views::{
@@ -81,6 +82,9 @@ fn the_page_has_the_types_of_rust() {
         SymmetryAsked,
         CageAsked,
         BoundsView,
+        InnerElement,
+        InnerKind,
+        CageControls,
         CageInfo,
         CageState,
         Code,
@@ -95,6 +99,7 @@ fn the_page_has_the_types_of_rust() {
         Settings,
         ThemeAsked,
         Colour,
+        Coordinates,
         SliceShown,
         GizmoAsked,
         SceneAsked,

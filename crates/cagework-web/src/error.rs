@@ -10,9 +10,9 @@ use cagework_core::pull::PullError;
 use cagework_core::rest_edit::RestEditError;
 use cagework_core::slice::SliceError;
 use cagework_core::weights::WeightsError;
-use cagework_core::{BindError, ClosedFormError};
+use cagework_core::{BindError, ClosedFormError, ControlError};
 use cagework_gpu::GpuError;
-use cagework_io::{GltfError, NpzError, PoseCodeError, ProjectError, ReadError, WriteError};
+use cagework_io::{GltfError, NpzError, ObjError, PoseCodeError, ProjectError, ReadError, WriteError};
 use serde::Serialize;
 use wasm_bindgen::JsValue;
 
@@ -28,6 +28,8 @@ pub(crate) enum ErrorName {
     Format,
     /// A bind needs more memory than it may take.
     Memory,
+    /// The same, and most of it for the weights.
+    WeightsMemory,
     /// Vertices of the model are outside the cage.
     Outside,
     /// All of them are.
@@ -69,6 +71,11 @@ impl Fault {
         self.name == name
     }
 
+    /// Its sentence.
+    pub(crate) fn message(&self) -> &str {
+        &self.message
+    }
+
     /// There is none of what is needed.
     pub(crate) fn missing(what: &str, how: &str) -> Self {
         Self::new(ErrorName::Missing, format!("there is no {what} yet: {how}"))
@@ -98,7 +105,9 @@ macro_rules! plain {
 plain!(
     CageError,
     ClosedFormError,
+    ControlError,
     NpzError,
+    ObjError,
     PoseCodeError,
     PoseError,
     PullError,
@@ -115,6 +124,7 @@ impl From<BindError> for Fault {
         let name = match error {
             BindError::Cancelled(_) => ErrorName::Cancelled,
             BindError::Memory { .. } => ErrorName::Memory,
+            BindError::WeightsMemory { .. } => ErrorName::WeightsMemory,
             BindError::Outside { .. } => ErrorName::Outside,
             BindError::NoneInside { .. } => ErrorName::NoneInside,
             _ => ErrorName::Error,

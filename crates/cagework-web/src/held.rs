@@ -84,8 +84,11 @@ impl State {
             };
             corners.iter().zip(point.bary).map(|(&v, share)| Some(share * follow(v)?)).sum::<Option<Vec3>>()
         };
-        let points: Vec<Vec3> = self.held.points.iter().filter_map(place).collect();
+        let mut points: Vec<Vec3> = self.held.points.iter().filter_map(place).collect();
         let line = self.held.target.zip(points.first()).map(|(to, from)| [*from, to]);
-        Marks { points, segments: line.into_iter().collect(), ..Marks::default() }
+        let placed = self.held.placed.windows(2).map(|pair| [pair[0], pair[1]]);
+        let segments = line.into_iter().chain(placed).collect();
+        points.extend(&self.held.placed);
+        Marks { points, segments, ..Marks::default() }
     }
 }

@@ -15,6 +15,7 @@ pub mod binder;
 #[cfg(test)]
 mod border;
 mod clock;
+mod controls;
 #[cfg(target_family = "wasm")]
 pub mod engine;
 mod error;
@@ -22,6 +23,7 @@ mod error;
 mod gpu;
 mod held;
 mod incoming;
+mod joints;
 pub mod loaded;
 mod options;
 mod problems;

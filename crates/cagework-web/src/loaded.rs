@@ -12,6 +12,7 @@ use crate::arrays::flat;
 use crate::binder::Polygons;
 use crate::error::Answer;
 use crate::options::taken;
+use crate::settings::{controls_of, has_controls};
 
 /// A model with its looks, and what else was in its file.
 #[wasm_bindgen]
@@ -81,7 +82,10 @@ impl Loaded {
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn cage(&self) -> Option<Polygons> {
-        self.cage.clone().map(Polygons::from)
+        self.cage.clone().map(|mesh| {
+            let controls = controls_of(self.settings.as_deref(), &mesh);
+            Polygons { controls, ..mesh.into() }
+        })
     }
 
     /// The model itself as a cage.
@@ -153,6 +157,13 @@ impl Loaded {
             loaded.cage = Some(project.cage);
             loaded.poses = project.poses;
             loaded.settings = Some(project.settings);
+            let settings = loaded.settings.as_deref();
+            if has_controls(settings) && loaded.cage.as_ref().and_then(|c| controls_of(settings, c)).is_none()
+            {
+                loaded.model.notices.push(
+                    "The smooth surface or the controls inside of this project's cage cannot be used: they are left out.".into(),
+                );
+            }
             return Ok(loaded);
         }
         let mut resolve = |path: &str| {

@@ -75,6 +75,7 @@ impl From<CageOptions> for CageAsked {
             shape,
             per_component,
             symmetry,
+            smooth: _,
         } = options;
         let symmetry = match symmetry {
             Symmetry::Auto => SymmetryAsked::Auto,
@@ -100,12 +101,13 @@ impl From<CageAsked> for CageOptions {
             shape: asked.shape,
             per_component: asked.per_component,
             voxels: asked.voxels,
+            smooth: 0,
         }
     }
 }
 
 /// `SceneOptions`.
-#[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Deserialize, PartialEq, Eq)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "SceneOptions"))]
 pub(crate) struct SceneAsked {
@@ -122,8 +124,11 @@ pub(crate) struct SceneAsked {
     pub(crate) gizmo: GizmoAsked,
     /// The cage steps back: the model itself is pulled.
     pub(crate) pull: bool,
-    pub(crate) compare: bool,
+    /// Side by side, from the left. Those by formula only once they are there; harmonic ones alone are no comparison.
+    pub(crate) compare: Vec<Coordinates>,
     pub(crate) problems: bool,
+    /// Joints are shown as they will be exported; null for none.
+    pub(crate) joints: Option<JointsAsked>,
 }
 
 impl Default for SceneAsked {
@@ -140,8 +145,9 @@ impl Default for SceneAsked {
             slice: SliceShown::Off,
             gizmo: GizmoAsked::None,
             pull: true,
-            compare: false,
+            compare: vec![Coordinates::Harmonic],
             problems: true,
+            joints: None,
         }
     }
 }
@@ -173,6 +179,16 @@ pub(crate) enum Colour {
     Clay,
     Weight,
     Error,
+}
+
+/// How the model follows the cage.
+#[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
+pub(crate) enum Coordinates {
+    Harmonic,
+    MeanValue,
+    Green,
 }
 
 /// What the slice shows.
@@ -237,20 +253,23 @@ pub(crate) struct PullAsked {
 }
 
 /// What becomes of a rig.
-#[derive(Clone, Copy, Deserialize)]
+#[derive(Clone, Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "RigOptions"))]
 pub(crate) struct RigAsked {
     joints: JointsAsked,
     /// Clips travel as far as they did.
     keep_travel: bool,
+    /// Names of what hangs on the skeleton and keeps its shape.
+    #[serde(default)]
+    rigid: Vec<String>,
     /// The shape alone.
     pub(crate) plain: bool,
     /// The cage bends the model while a clip moves it.
     pub(crate) dynamic: bool,
 }
 
-#[derive(Clone, Copy, Deserialize)]
+#[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]
 #[cfg_attr(test, ts(rename = "Joints"))]
@@ -267,14 +286,20 @@ impl RigAsked {
             JointsAsked::Stay => Joints::Stay,
             JointsAsked::Turn => Joints::Turn,
         };
-        ReshapeOptions { joints, keep_travel: self.keep_travel, rigid: Vec::new() }
+        ReshapeOptions { joints, keep_travel: self.keep_travel, rigid: self.rigid.clone() }
     }
 }
 
 #[cfg(test)]
 impl Default for RigAsked {
     fn default() -> Self {
-        Self { joints: JointsAsked::Follow, keep_travel: false, plain: false, dynamic: false }
+        Self {
+            joints: JointsAsked::Follow,
+            keep_travel: false,
+            rigid: Vec::new(),
+            plain: false,
+            dynamic: false,
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! What is wrong with a cage, as the page lists it and draws it.
 
 use cagework_core::PolygonMesh;
-use cagework_core::cage_check::{CageCheck, Code, Fix, Places, Problem, Repair, Severity, check};
+use cagework_core::cage_check::{CageCheck, Code, Fix, Places, Problem, Repair, Severity, check_smooth};
 use cagework_gpu::render::Marks;
 use glam::Vec3;
 use wasm_bindgen::JsValue;
@@ -12,9 +12,9 @@ use crate::views::{self, Mend};
 /// Cells along the longest side that parts of a cage should be thicker than: the default of a bind.
 const USUAL_GRID: u32 = 64;
 
-/// Everything that is wrong with a cage for a model.
-pub(crate) fn find(mesh: &PolygonMesh, model: Option<&[Vec3]>) -> CageCheck {
-    check(mesh, model, Some(USUAL_GRID))
+/// Everything that is wrong with a cage for a model, subdivided so often.
+pub(crate) fn find(mesh: &PolygonMesh, model: &[Vec3], smooth: u32) -> CageCheck {
+    check_smooth(mesh, Some(model), Some(USUAL_GRID), smooth)
 }
 
 /// A problem as the page says it.

@@ -3,13 +3,14 @@
 use cagework_core::edit::Symmetry;
 use cagework_core::progress::Silent;
 use cagework_core::pull::{Drag, DragOptions, Grip, Probes, Pull, Reach};
-use cagework_core::{BindOptions, Cage, TriMesh, bind};
+use cagework_core::{BindOptions, ControlSet, Controls, TriMesh, bind};
 use glam::{DVec3, Vec3};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use crate::arrays::{flat, points, polygon_mesh};
-use crate::error::{Answer, Fault};
+use crate::arrays::{flat, points};
+use crate::controls::control_set;
+use crate::error::Answer;
 use crate::options::{PullAsked, taken};
 
 /// The seed of a grip on a vertex of the cage.
@@ -30,10 +31,16 @@ impl Puller {
     /// # Errors
     /// When the arrays are no cage, or there is nothing to pull.
     #[wasm_bindgen(constructor)]
-    pub fn new(positions: &[f32], triangles: &[u32], cage: &[f32], corners: &[u32]) -> Result<Self, JsValue> {
-        let cage = Cage::new(&polygon_mesh(cage, corners)?).map_err(Fault::from)?;
+    pub fn new(
+        positions: &[f32],
+        triangles: &[u32],
+        cage: &[f32],
+        corners: &[u32],
+        #[wasm_bindgen(unchecked_param_type = "CageControls | undefined")] controls: JsValue,
+    ) -> Result<Self, JsValue> {
+        let set = control_set(cage, corners, controls)?;
         let mesh = TriMesh { positions: points(positions), triangles: triangles.as_chunks().0.to_vec() };
-        Ok(Self::of(&mesh, &cage)?)
+        Ok(Self::of(&mesh, &set)?)
     }
 
     /// Takes hold of grabs and pins in the pose `start`, `[n_cage, 3]`. `rows`: their weights, one after the other,
@@ -102,11 +109,11 @@ impl Puller {
 }
 
 impl Puller {
-    fn of(mesh: &TriMesh, cage: &Cage) -> Answer<Self> {
-        let probes = Probes::new(mesh, cage)?;
-        let weights = bind(probes.points(), cage, &BindOptions::default(), &Silent)?.weights;
-        let pull = Pull::new(mesh, cage, probes, &weights)?;
-        Ok(Self { pull, symmetry: Symmetry::new(cage.positions()), drag: None })
+    fn of(mesh: &TriMesh, set: &ControlSet) -> Answer<Self> {
+        let probes = Probes::new(mesh, set)?;
+        let weights = bind(probes.points(), set, &BindOptions::default(), &Silent)?.weights;
+        let pull = Pull::new(mesh, set, probes, &weights)?;
+        Ok(Self { pull, symmetry: Symmetry::new(Controls::from(set).rest()), drag: None })
     }
 
     fn begin(
@@ -143,7 +150,7 @@ impl Puller {
 
 #[cfg(test)]
 mod tests {
-    use cagework_core::samples;
+    use cagework_core::{Cage, samples};
 
     use super::*;
 
@@ -151,7 +158,7 @@ mod tests {
     fn a_vertex_of_the_cage_is_pulled_by_its_row_of_one() {
         let sample = samples::build("clamp").unwrap();
         let cage = Cage::new(&sample.cage).unwrap();
-        let mut puller = Puller::of(&sample.mesh, &cage).unwrap();
+        let mut puller = Puller::of(&sample.mesh, &ControlSet::plain(&cage)).unwrap();
         let n = cage.n_vertices();
         let mut row = vec![0.0; n];
         row[3] = 1.0;

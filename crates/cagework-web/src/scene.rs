@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use cagework_core::Weights;
+use cagework_core::dynamic::bend_vertices;
 use cagework_core::edit::Element;
 use cagework_gpu::render::{Gizmo, GizmoMode, Marks, MeshStyle, SceneOptions, Selection, SliceView};
-use glam::Quat;
+use cagework_io::JointPoint;
+use glam::{Quat, Vec3};
 
-use crate::options::{Colour, GizmoAsked, SliceShown};
+use crate::options::{Colour, GizmoAsked, JointsAsked, SliceShown};
 use crate::state::State;
 
 impl State {
@@ -28,10 +30,7 @@ impl State {
 
     /// What the renderer draws; `weights` are those it has.
     pub(crate) fn scene(&self, weights: Option<&Weights>) -> SceneOptions {
-        // It fits the shape at rest.
-        let cage = self.view.cage
-            && self.is_on_gpu()
-            && self.playing.as_ref().is_none_or(|playing| playing.field.is_some());
+        let cage = self.view.cage && self.is_on_gpu() && self.has_cage_in_view();
         SceneOptions {
             theme: self.view.theme(),
             backdrop: true,
@@ -49,7 +48,13 @@ impl State {
             marks: self.marks(),
             greyed: self.held.stays.clone(),
             held: self.held_marks(weights),
+            joints: self.joint_marks(),
         }
+    }
+
+    /// Whether the cage is where the model is shown: it fits the shape at rest, or bends the clip that plays.
+    pub(crate) fn has_cage_in_view(&self) -> bool {
+        self.playing.as_ref().is_none_or(|playing| playing.field.is_some())
     }
 
     /// Whether the model itself can be pulled: then what it hides is not taken in its place.
@@ -125,6 +130,29 @@ impl State {
         if !self.view.problems {
             return Marks::default();
         }
-        self.faults.marks(&self.rest, &self.positions, self.cage.is_none())
+        self.faults.marks(self.rest(), &self.positions, self.set().is_none())
+    }
+
+    /// The joints as they are drawn: dots, and rings outside the cage; nothing before the model is bound.
+    fn joint_marks(&self) -> Marks {
+        let (Some(asked), Some(dots)) = (self.view.joints, &self.joints) else { return Marks::default() };
+        let at = match &self.playing {
+            Some(playing) => {
+                let of = |joint: &JointPoint| playing.posed.origins.get(joint.node as usize);
+                let origins = dots.joints.iter().filter_map(of);
+                let mut at: Vec<Vec3> = origins.map(|&p| playing.up.transform_point3(p)).collect();
+                if let Some(field) = &playing.field {
+                    bend_vertices(field, &mut at);
+                }
+                at
+            }
+            None if asked == JointsAsked::Stay || self.view.original || self.editing_rest => dots.at.clone(),
+            None => dots.posed(&self.rest().positions, &self.positions),
+        };
+        let mut marks = Marks::default();
+        for (k, at) in at.into_iter().enumerate() {
+            if dots.is_outside(k) { &mut marks.rings } else { &mut marks.points }.push(at);
+        }
+        marks
     }
 }

@@ -5,14 +5,15 @@ use std::mem::discriminant;
 use cagework_core::BindOptions;
 use cagework_core::cage_gen::{CLEARANCE, CageOptions, DETAIL, TARGET, VOXELS};
 use cagework_core::options::{GRID, MAX_ITERATIONS, Number, SPARSIFY, TAU};
-use cagework_core::samples;
+use cagework_core::{PolygonMesh, samples};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
+use crate::controls::{CageControls, MadeCage};
 use crate::error::{ErrorName, Fault};
-use crate::options::{BindAsked, CageAsked};
+use crate::options::{BindAsked, CageAsked, RigAsked};
 use crate::views::{SurfacePoint, object};
 
 /// Longest value that is repeated in a notice, characters.
@@ -41,11 +42,18 @@ pub(crate) struct Settings {
     #[cfg_attr(test, ts(optional, as = "Option<CageAsked>"))]
     cage: Option<Map<String, Value>>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional, as = "Option<RigAsked>"))]
+    rig: Option<Map<String, Value>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, ts(optional))]
     sample: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, ts(optional))]
     symmetry: Option<bool>,
+    /// Read with the cage, whose last positions they are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
+    controls: Option<CageControls>,
     #[serde(skip_serializing_if = "Option::is_none")]
     /// `Engine.encodePose`, base 64.
     #[cfg_attr(test, ts(optional))]
@@ -63,7 +71,7 @@ pub(crate) struct Settings {
 }
 
 /// Settings of a project as far as they can be used, and what was wrong with the rest. `text` is their JSON; `defaults`
-/// the JSON of an object with `bind` and `cage`, for what is missing or wrong. The memory limit is always that of
+/// the JSON of an object with `bind`, `cage` and `rig`, for what is missing or wrong. The memory limit is always that of
 /// `defaults`: it belongs to the computer, not to the project.
 ///
 /// # Errors
@@ -73,6 +81,20 @@ pub fn read_settings(text: &str, defaults: &str) -> Result<JsValue, JsValue> {
     let defaults: Map<String, Value> =
         serde_json::from_str(defaults).map_err(|error| Fault::new(ErrorName::Error, error))?;
     Ok(object(&Settings::read(text, &defaults))?)
+}
+
+/// Whether a project says what its controls are.
+pub(crate) fn has_controls(settings: Option<&str>) -> bool {
+    let given = settings.and_then(|text| serde_json::from_str::<Map<String, Value>>(text).ok());
+    given.is_some_and(|given| given.contains_key("controls"))
+}
+
+/// Controls of a project's cage; none if it has none, or they do not fit it: then the last positions are vertices of no face,
+/// which a cage may have.
+pub(crate) fn controls_of(settings: Option<&str>, cage: &PolygonMesh) -> Option<CageControls> {
+    let given: Map<String, Value> = serde_json::from_str(settings?).ok()?;
+    let controls: CageControls = serde_json::from_value(given.get("controls")?.clone()).ok()?;
+    MadeCage::new(cage.clone(), controls.clone()).is_ok().then_some(controls)
 }
 
 /// Points of the surface in settings; none if they cannot be read.
@@ -94,6 +116,7 @@ impl Settings {
         settings.cage = settings.group("cage", &mut given, defaults, |asked: CageAsked| {
             CageOptions::from(asked).check().map_err(|wrong| wrong.allowed)
         });
+        settings.rig = settings.group("rig", &mut given, defaults, |_: RigAsked| Ok(()));
         let word = |key: &str| given.get(key).and_then(Value::as_str).map(str::to_owned);
         settings.pose = word("pose");
         settings.sample = word("sample").filter(|id| samples::all().iter().any(|sample| sample.id == id));
@@ -169,6 +192,7 @@ mod tests {
                 "quads": true,
                 "per_component": false,
             },
+            "rig": { "joints": "follow", "keep_travel": false, "rigid": [], "plain": false, "dynamic": false },
         });
         all.as_object().cloned().unwrap()
     }
@@ -183,6 +207,7 @@ mod tests {
         saved["bind"]["grid"] = json!(128);
         saved["bind"]["tau"] = json!(0.001);
         saved["cage"]["vertices"] = json!(120);
+        saved["rig"] = json!({ "joints": "stay", "keep_travel": true, "rigid": ["hat"], "plain": false, "dynamic": true });
         let rest = json!({ "symmetry": true, "pose": "AAEC", "sample": "rat" });
         saved.extend(rest.as_object().cloned().unwrap());
         let settings = read(&Value::Object(saved.clone()));
@@ -196,6 +221,7 @@ mod tests {
     #[test]
     fn what_older_projects_do_not_say_is_the_default() {
         let settings = read(&json!({ "bind": { "grid": 32 }, "cage": { "vertices": 120 } }));
+        assert_eq!(settings.rig, None);
         let bind = settings.bind.unwrap();
         assert_eq!((&bind["grid"], &bind["preconditioner"]), (&json!(32), &json!("none")));
         let cage = settings.cage.unwrap();
@@ -221,8 +247,10 @@ mod tests {
             ("cage", "vertices", json!("many"), "a whole number from 8 to 400"),
             ("cage", "margin", json!(-0.1), "from 0 to 0.25"),
             ("cage", "voxels", json!(4), "8 to 128"),
+            ("rig", "joints", json!("dance"), "expected one of `follow`"),
+            ("rig", "rigid", json!([7]), "is taken instead"),
         ] {
-            let mut given = json!({ "bind": { "grid": 32 }, "cage": { "vertices": 100 } });
+            let mut given = json!({ "bind": { "grid": 32 }, "cage": { "vertices": 100 }, "rig": {} });
             given[group][key] = value.clone();
             let settings = serde_json::to_value(read(&given)).unwrap();
             assert_eq!(settings[group][key], defaults()[group][key], "{key} {value}");

@@ -8,14 +8,16 @@ use cagework_core::edit::{Element, Gesture, Pivot, Pull, Selection, SharedPull, 
 use cagework_core::enclosure::Enclosure;
 use cagework_core::skin::skin_vertices;
 use cagework_core::slice::Slice;
-use cagework_core::{Bounds, Cage, PolygonMesh, Weights};
+use cagework_core::{Bounds, ControlSet, PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, GizmoPart};
 use cagework_io::{Model, Player, Posed, UpAxis};
 use glam::{Mat4, Vec2, Vec3};
 
+use crate::controls::MadeCage;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::options::SceneAsked;
+use crate::joints::JointDots;
+use crate::options::{Coordinates, SceneAsked};
 use crate::problems::Faults;
 use crate::views::{CageInfo, CageState, SurfacePoint};
 
@@ -25,17 +27,15 @@ pub(crate) struct State {
     pub(crate) model: Option<Model>,
     /// How many points its rig has, once they were counted.
     pub(crate) n_rig: Option<usize>,
-    /// The cage at rest; none while there is only a draft of one.
-    pub(crate) cage: Option<Cage>,
-    /// The cage's positions at rest and faces, or the draft's.
-    pub(crate) rest: PolygonMesh,
+    /// The cage at rest, or a draft of one, with the controls inside.
+    pub(crate) made: MadeCage,
     pub(crate) topology: Topology,
     pub(crate) symmetry: Symmetry,
     /// Where something is wrong with the cage, once it was checked.
     pub(crate) faults: Faults,
     /// Some vertices of the model, to be watched while the rest cage is dragged; made when first asked.
-    pub(crate) watched: Option<Enclosure>,
-    /// Where the cage is. `[n_cage]`
+    pub(crate) watched: Option<(ControlSet, Enclosure)>,
+    /// Where the cage and controls inside are. `[n_controls]`
     pub(crate) positions: Vec<Vec3>,
     pub(crate) editing_rest: bool,
     pub(crate) is_bound: bool,
@@ -47,8 +47,10 @@ pub(crate) struct State {
     pub(crate) lattice: Option<(Lattice, Weights, Vec<OutsideVertex>)>,
     /// Weights of the points of the model's rig, and those of them outside the cage.
     pub(crate) rig: Option<(Weights, Vec<OutsideVertex>)>,
-    /// Whether there are other weights to compare with.
-    pub(crate) has_other: bool,
+    /// The joints among them; none before the model is bound.
+    pub(crate) joints: Option<JointDots>,
+    /// What there are weights of to compare with.
+    pub(crate) others: Vec<Coordinates>,
     pub(crate) element: Element,
     pub(crate) selection: Selection,
     pub(crate) hovered: Vec<u32>,
@@ -86,6 +88,8 @@ pub(crate) struct Held {
     pub(crate) target: Option<Vec3>,
     /// Of each vertex of the model how much it stays; none without a drag.
     pub(crate) stays: Option<Arc<Vec<f32>>>,
+    /// Places of a control inside that is being put in.
+    pub(crate) placed: Vec<Vec3>,
     /// The model where it was asked for last, and the cage for it.
     pub(crate) posed: Vec<Vec3>,
     pub(crate) posed_for: Vec<Vec3>,
@@ -124,21 +128,20 @@ impl State {
     pub(crate) fn set_model(&mut self, model: Model) {
         self.model = Some(model);
         self.n_rig = None;
-        self.set_cage(PolygonMesh::default());
+        self.set_cage(MadeCage::default());
         self.camera = Camera::default();
         self.fit_camera();
         self.frame_all();
     }
 
     /// Another cage, or a draft of one.
-    pub(crate) fn set_cage(&mut self, mesh: PolygonMesh) {
+    pub(crate) fn set_cage(&mut self, made: MadeCage) {
         self.faults = Faults::default();
-        self.cage = Cage::new(&mesh).ok();
-        // Turned outward, seams closed.
-        self.rest = self.cage.as_ref().map_or(mesh, Cage::to_polygon_mesh);
-        self.topology = Topology::new(&self.rest.faces);
-        self.symmetry = Symmetry::new(&self.rest.positions);
-        self.positions.clone_from(&self.rest.positions);
+        self.made = made;
+        self.topology = Topology::new(&self.rest().faces);
+        self.topology.edges.extend(self.made.inner_edges());
+        self.symmetry = Symmetry::new(&self.rest().positions);
+        self.positions.clone_from(&self.made.mesh.positions);
         self.watched = None;
         self.selection = Selection::new(self.positions.len());
         self.hovered.clear();
@@ -148,11 +151,22 @@ impl State {
         self.held = Held::default();
         self.playing = None;
         self.lattice = None;
-        (self.is_bound, self.has_other, self.rig) = (false, false, None);
+        (self.is_bound, self.rig, self.joints) = (false, None, None);
+        self.others.clear();
         self.revision += 1;
         self.is_moved = true;
         self.is_changed = true;
         self.fit_camera();
+    }
+
+    /// The cage at rest; none while there is only a draft of one.
+    pub(crate) fn set(&self) -> Option<&ControlSet> {
+        self.made.set.as_ref().ok()
+    }
+
+    /// Positions of cage and controls inside at rest, and the cage's faces; or the draft's.
+    pub(crate) fn rest(&self) -> &PolygonMesh {
+        &self.made.mesh
     }
 
     /// Drops what was computed for a model or cage of before.
@@ -179,21 +193,27 @@ impl State {
         }
     }
 
-    /// Tells the camera how large the picture is: half of it when two are compared.
+    /// Tells the camera how large the picture is: a part of the view when several are compared.
     pub(crate) fn place_viewport(&mut self) {
-        let width = if self.is_split() { 0.5 * self.size.x } else { self.size.x };
-        self.camera.set_viewport(Vec2::new(width, self.size.y));
+        self.camera.set_viewport(Vec2::new(self.part_width(), self.size.y));
     }
 
-    /// Whether two pictures are shown side by side.
-    pub(crate) fn is_split(&self) -> bool {
-        self.view.compare && self.has_other
+    /// What is shown side by side.
+    pub(crate) fn shown(&self) -> Vec<Coordinates> {
+        let is_there = |one: &Coordinates| *one == Coordinates::Harmonic || self.others.contains(one);
+        let shown: Vec<_> = self.view.compare.iter().copied().filter(is_there).collect();
+        if shown.is_empty() { vec![Coordinates::Harmonic] } else { shown }
+    }
+
+    fn part_width(&self) -> f32 {
+        self.size.x / self.shown().len() as f32
     }
 
     /// A pointer's place in the picture it is over.
     pub(crate) fn pointer(&self, x: f32, y: f32) -> Vec2 {
-        let half = 0.5 * self.size.x;
-        Vec2::new(if self.is_split() && x >= half { x - half } else { x }, y)
+        let width = self.part_width();
+        let last = self.shown().len() as f32 - 1.0;
+        Vec2::new(x - width * (x / width).floor().clamp(0.0, last), y)
     }
 
     /// Where a model will be seen from when it opens, and the pixels of its picture.
@@ -211,7 +231,7 @@ impl State {
     /// Where model and cage are at rest.
     pub(crate) fn bounds(&self) -> Option<Bounds> {
         let model = self.model.as_ref().and_then(|m| Bounds::of(&m.positions));
-        match (model, Bounds::of(&self.rest.positions)) {
+        match (model, Bounds::of(&self.rest().positions)) {
             (Some(a), Some(b)) => Some(Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }),
             (one, other) => one.or(other),
         }
@@ -225,18 +245,20 @@ impl State {
 
     /// What JavaScript is told about the cage; nothing without one.
     pub(crate) fn cage_state(&self) -> Option<CageState> {
-        (!self.rest.faces.is_empty()).then(|| CageState {
-            usable: self.cage.is_some(),
-            info: CageInfo::of(&self.rest, self.cage.as_ref()),
+        (!self.rest().faces.is_empty()).then(|| CageState {
+            usable: self.set().is_some(),
+            info: CageInfo::of(&self.made),
+            controls: self.made.controls.clone(),
+            radius: self.made.radius(),
         })
     }
 
     /// How the selection of the moment pulls the others along.
     pub(crate) fn pull(&self, positions: &[Vec3]) -> Pull {
-        let diagonal = Bounds::of(&self.rest.positions).map_or(0.0, |b| b.diagonal());
+        let diagonal = Bounds::of(&self.rest().positions).map_or(0.0, |b| b.diagonal());
         let symmetry = self.is_mirrored.then_some(&self.symmetry);
         let shared = SharedPull { radius: self.radius * diagonal, symmetry };
-        Pull::new(&self.selection, positions, &self.rest.positions, shared)
+        Pull::new(&self.selection, positions, &self.rest().positions, shared)
     }
 
     /// Moves the cage.
@@ -252,11 +274,11 @@ impl State {
 
     /// Whether the GPU has this cage.
     pub(crate) fn is_on_gpu(&self) -> bool {
-        self.cage.is_some() && self.on_gpu == Some(self.revision)
+        self.set().is_some() && self.on_gpu == Some(self.revision)
     }
 
     /// Brings what changed to the GPU.
-    pub(crate) fn write(&mut self, main: &mut Session, other: Option<&mut Session>) {
+    pub(crate) fn write<'a>(&mut self, main: &'a mut Session, others: impl Iterator<Item = &'a mut Session>) {
         let scene = self.is_changed.then(|| self.scene(main.weights()));
         match &mut self.playing {
             Some(playing) if playing.is_new => {
@@ -266,20 +288,22 @@ impl State {
             Some(_) => {}
             None => main.stop_playing(),
         }
-        for session in [Some(main), other].into_iter().flatten() {
+        for session in std::iter::once(main).chain(others) {
             *session.camera_mut() = self.camera;
             if self.is_moved && self.is_on_gpu() {
                 let at_rest = self.view.original || self.editing_rest;
-                session.pose(if at_rest { &self.rest.positions } else { &self.positions });
+                // Closed forms, of the other one, know the plain cage alone.
+                let n = session.cage_positions().len();
+                session.pose(if at_rest { &self.made.mesh.positions[..n] } else { &self.positions[..n] });
                 if self.editing_rest && !self.view.original {
-                    session.show_cage(&self.positions);
+                    session.show_cage(&self.positions[..n]);
                 }
             }
             if let Some(scene) = &scene {
                 session.set_scene(scene.clone());
             }
         }
-        self.is_moved &= !self.is_on_gpu() && self.cage.is_some();
+        self.is_moved &= !self.is_on_gpu() && self.set().is_some();
         self.is_changed = false;
     }
 }

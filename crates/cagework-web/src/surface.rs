@@ -33,12 +33,12 @@ pub(crate) struct Surface {
     config: wgpu::SurfaceConfiguration,
     /// Format that is drawn in: the canvas's, with sRGB encoding.
     format: wgpu::TextureFormat,
-    /// What is drawn into and then copied to the canvas: the whole picture, or two halves.
+    /// What is drawn into and then copied to the canvas: the whole picture, or parts side by side.
     ///
     /// Not the canvas itself seen as sRGB: SwiftShader forgets to encode where multisampling resolves into such a view
     /// (a clear of 0.2 arrives as 51, not 124).
     parts: Vec<wgpu::Texture>,
-    /// Draws the halves where they cannot be copied.
+    /// Draws the parts where they cannot be copied.
     painter: Option<PartPainter>,
     /// Frames that were handed to the GPU and are not finished.
     in_flight: Arc<AtomicU32>,
@@ -117,19 +117,20 @@ impl Surface {
         self.surface.configure(&context.device, &self.config);
     }
 
-    /// Draws a session, or two side by side, into `size` pixels, `scale` for each of CSS, or fewer, and shows the picture.
+    /// Draws sessions side by side, at least one, into `size` pixels, `scale` for each of CSS, or fewer, and shows the picture.
     ///
     /// # Errors
     /// The GPU was lost or refused something.
     pub(crate) fn draw(
         &mut self,
-        session: &mut Session,
-        other: Option<&mut Session>,
+        mut sessions: Vec<&mut Session>,
         size: [u32; 2],
         scale: f32,
         wanted: Wanted,
     ) -> Answer<Drawn> {
-        let context = session.context().clone();
+        let Some(context) = sessions.first().map(|session| session.context().clone()) else {
+            return Ok(Drawn::NotNow);
+        };
         context.check()?;
         let is_slow = self.is_slow.load(Ordering::Relaxed);
         if self.in_flight.load(Ordering::Relaxed) >= if is_slow { 1 } else { MOST_IN_FLIGHT } {
@@ -152,14 +153,14 @@ impl Surface {
             | wgpu::CurrentSurfaceTexture::Validation => return Ok(Drawn::NotNow),
         };
         let [width, height] = [self.config.width, self.config.height];
-        let other = other.filter(|_| width > 1);
-        let size = if other.is_some() { [width / 2, height] } else { [width, height] };
-        let n_parts = 1 + usize::from(other.is_some());
+        sessions.truncate(width as usize);
+        let n_parts = sessions.len();
+        let size = [width / n_parts as u32, height];
         if self.parts.len() != n_parts {
             self.drop_parts();
             self.parts = (0..n_parts).map(|_| self.make_part(&context, size)).collect();
         }
-        for (texture, session) in self.parts.iter().zip([Some(session), other].into_iter().flatten()) {
+        for (texture, session) in self.parts.iter().zip(sessions) {
             let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
             session.frame(&view, self.format, size, scale)?;
         }
@@ -176,12 +177,11 @@ impl Surface {
         Ok(if is_rough { Drawn::Roughly } else { Drawn::Sharply })
     }
 
-    /// Brings the parts to the canvas. An odd column between the halves stays clear: the divider.
+    /// Brings the parts to the canvas. Columns between them that no part has stay clear: the dividers.
     fn put_together(&self, context: &GpuContext, canvas: &wgpu::Texture) {
-        let parts: Vec<_> = (0u32..)
-            .zip(&self.parts)
-            .map(|(k, part)| (k * (self.config.width - part.width()), part))
-            .collect();
+        let between = (self.parts.len() as u32 - 1).max(1);
+        let left = |k: u32, part: &wgpu::Texture| k * (self.config.width - part.width()) / between;
+        let parts: Vec<_> = (0u32..).zip(&self.parts).map(|(k, part)| (left(k, part), part)).collect();
         let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         // Asked of the device as well, which a compiler knows the answer of: the other artifact has no use for this.
         if let Some(painter) = self.painter.as_ref().filter(|_| context.draws_only()) {

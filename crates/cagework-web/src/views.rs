@@ -3,11 +3,12 @@
 use cagework_core::cage::CageNotice;
 use cagework_core::cage_check::{Code, Repair, Severity};
 use cagework_core::edit::Topology;
-use cagework_core::{Bounds, Cage, PolygonMesh};
+use cagework_core::{Bounds, ControlSet};
 use cagework_io::{Clip, Model, ModelFormat, UpAxis};
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::JsValue;
 
+use crate::controls::{CageControls, MadeCage};
 use crate::error::Answer;
 
 /// Corners of a box.
@@ -79,6 +80,8 @@ pub(crate) struct ModelInfo {
     clips: Vec<ClipView>,
     /// Morph targets of all that is shown, and their weights at rest.
     targets: Vec<TargetView>,
+    /// Names of what hangs on the skeleton without a skin: it can be kept rigid.
+    props: Vec<String>,
     /// Whether exports keep more than the shape.
     rigged: bool,
     bounds: BoundsView,
@@ -101,6 +104,8 @@ impl ModelInfo {
             joints: counts.joints,
             clips: model.clips().iter().map(ClipView::of).collect(),
             targets: TargetView::all(model),
+            // What is wrong with a rig is said where it is used.
+            props: model.props().unwrap_or_default(),
             rigged: model.is_rigged(),
             bounds: BoundsView::of(Bounds::of(&model.positions)),
             notices: model.notices.clone(),
@@ -157,16 +162,18 @@ pub(crate) struct CageInfo {
 }
 
 impl CageInfo {
-    pub(crate) fn of(mesh: &PolygonMesh, cage: Option<&Cage>) -> Self {
+    pub(crate) fn of(made: &MadeCage) -> Self {
+        let (mesh, cage) = (&made.mesh, made.set.as_ref().ok().map(ControlSet::cage));
+        let notices = cage.into_iter().flat_map(|c| c.notices().iter().map(CageNotice::to_string));
         let fan: usize = mesh.faces.iter().map(|f| f.len().saturating_sub(2)).sum();
         Self {
-            vertices: mesh.positions.len(),
+            vertices: made.n_cage(),
             edges: Topology::new(&mesh.faces).edges.len(),
             faces: mesh.faces.len(),
             quads: mesh.faces.iter().filter(|face| face.len() == 4).count(),
             triangles: cage.map_or(fan, |c| c.triangles().len()),
             bounds: BoundsView::of(Bounds::of(&mesh.positions)),
-            notices: cage.map_or_else(Vec::new, |c| c.notices().iter().map(CageNotice::to_string).collect()),
+            notices: notices.chain(made.notice.clone()).collect(),
         }
     }
 }
@@ -177,6 +184,9 @@ impl CageInfo {
 pub(crate) struct CageState {
     pub(crate) usable: bool,
     pub(crate) info: CageInfo,
+    pub(crate) controls: CageControls,
+    /// Radius of points and lines inside, object units.
+    pub(crate) radius: f32,
 }
 
 /// A kind of fault, as the page says it.

@@ -6,11 +6,11 @@ use crate::npm::{self, exec};
 use crate::wasm::{self, Profile};
 
 /// Largest wasm file, gzip-compressed: what a visitor waits for. Two per cent above what it is.
-const MAX_WASM_BYTES: usize = 905_000;
+const MAX_WASM_BYTES: usize = 996_000;
 /// Largest wasm file of visitors without WebGPU, gzip-compressed: it carries its own translator of shaders.
-const MAX_WEBGL_BYTES: usize = 1_545_000;
+const MAX_WEBGL_BYTES: usize = 1_637_000;
 /// Largest script that a visitor waits for, gzip-compressed.
-const MAX_SCRIPT_BYTES: usize = 80_000;
+const MAX_SCRIPT_BYTES: usize = 86_400;
 
 /// Fewest `f32x4.add` in a wasm file whose loops are vectors: it has 596, and had 261 (of libraries, and written by
 /// hand) when the core's loops were not.

@@ -1,7 +1,7 @@
 /** Binding: starts, follows and cancels it, and knows what it will need. */
 
 import { effect } from "@preact/signals";
-import type { BindEvent, BindOptions, BindReport } from "../contract";
+import type { BindEvent, BindOptions, BindReport, Coordinates } from "../contract";
 import { createEta, type Eta } from "../eta";
 import { follow } from "../queue";
 import { type BindRun, cageBroken, drawn } from "../state";
@@ -17,8 +17,8 @@ export interface BindActions {
   /** Whether the cage that is open is bound or about to be. */
   covers(): boolean;
   setOptions(patch: Partial<BindOptions>): void;
-  /** Mean value coordinates, once per cage; true when they are there. */
-  prepareCompare(): Promise<boolean>;
+  /** Coordinates to compare with, each once per cage; true when they are there. */
+  prepareCompare(kinds: readonly Coordinates[]): Promise<boolean>;
 }
 
 /** Reports kept to compare methods with. */
@@ -131,14 +131,19 @@ export function createBind(ctx: Context): BindActions {
     setOptions(patch) {
       store.set({ bindOptions: { ...store.get().bindOptions, ...patch } });
     },
-    prepareCompare: () =>
-      attempt(ctx, T.failed.meanValue, () =>
-        ctx.queue.add("compare", async (signal) => {
-          if (store.get().meanValueReady) return;
-          await follow(signal, ctx.session().bindMeanValue());
-          store.set({ meanValueReady: true });
-        }),
-      ),
+    async prepareCompare(kinds) {
+      for (const kind of kinds) {
+        if (kind === "harmonic") continue;
+        const isThere = await attempt(ctx, T.failed.formula[kind], () =>
+          ctx.queue.add("compare", async (signal) => {
+            const session = ctx.session();
+            if (!session.engine.hasOther(kind)) await follow(signal, session.bindByFormula(kind));
+          }),
+        );
+        if (!isThere) return false;
+      }
+      return true;
+    },
   };
 }
 

@@ -10,12 +10,17 @@ import type {
   Reading,
   Repair,
 } from "../contract";
+import { SCENE_DEFAULTS } from "../defaults";
 import { follow } from "../queue";
 import type { CageSource } from "../state";
 import { T } from "../words";
-import { attempt, type Context, waitFor } from "./context";
+import { attempt, type Context, report, waitFor } from "./context";
 
 export interface CageActions {
+  /** Subdivides the cage so often (0 to 3) for a smooth surface; false when that is not possible. */
+  setSmooth(steps: number): boolean;
+  /** Another value beside the same cage, as a step of the history; false when it does not fit. */
+  change(label: string, work: () => CageState, failed?: string): boolean;
   /** Makes a cage the way the Cage panel says. True when there is a new one. */
   make(): Promise<boolean>;
   cancel(): void;
@@ -37,6 +42,7 @@ export interface Posed {
   readonly cage: CheckedCage;
   readonly positions: Float32Array;
   readonly shares: readonly number[];
+  readonly sampleCage: boolean;
 }
 
 export interface CageNeeds {
@@ -44,6 +50,8 @@ export interface CageNeeds {
   refine(grid: number): void;
   /** Brings pose and poses of another cage to the one that is open. */
   carry(before: Posed): Promise<unknown>;
+  /** Brings poses along to a cage with other controls, as part of a step that there is. */
+  carryAlong(before: Posed): Promise<unknown>;
 }
 
 export function createCage(ctx: Context, does: CageNeeds): CageActions {
@@ -62,8 +70,7 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
       bound: false,
       report: null,
       earlier: [],
-      meanValueReady: false,
-      scene: { ...ctx.store.get().scene, compare: false, slice: "off" },
+      scene: { ...ctx.store.get().scene, compare: SCENE_DEFAULTS.compare, slice: "off" },
     });
     if (state && !check) void look();
   };
@@ -71,20 +78,56 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
   const now = (): CheckedCage | undefined => {
     const { engine } = ctx.session();
     const { cage, check } = ctx.store.get();
-    return cage ? { positions: engine.restPositions(), corners: engine.cageCorners(), check } : undefined;
+    if (!cage) return undefined;
+    const controls = engine.cageControls();
+    return { positions: engine.restPositions(), corners: engine.cageCorners(), controls, check };
   };
 
   const set = (cage: CheckedCage) => adopt(ctx.session().takeCage(cage), cage.check);
 
   const posedNow = (): Posed | undefined => {
     const cage = now();
-    const { shares } = ctx.store.get();
-    return cage && { cage, positions: ctx.session().engine.cagePositions(), shares };
+    const { shares, sampleCage } = ctx.store.get();
+    return cage && { cage, positions: ctx.session().engine.cagePositions(), shares, sampleCage };
   };
-  const setPosed = ({ cage, positions, shares }: Posed) => {
+  const setPosed = ({ cage, positions, shares, sampleCage }: Posed) => {
     set(cage);
     ctx.session().engine.setCagePositions(positions);
-    ctx.store.set({ shares });
+    ctx.store.set({ shares, sampleCage });
+  };
+
+  const change = (label: string, work: () => CageState, failed: string = T.failed.controls): boolean => {
+    const before = posedNow();
+    if (!before) return false;
+    try {
+      adopt(work(), null);
+    } catch (error) {
+      report(ctx, failed, error);
+      return false;
+    }
+    // The sample's cage is still the same.
+    ctx.store.set({ sampleCage: before.sampleCage });
+    const { poses } = ctx.store.get();
+    let next = posedNow();
+    let carried = poses;
+    ctx.history.push({
+      label,
+      undo() {
+        setPosed(before);
+        ctx.store.set({ poses });
+      },
+      redo() {
+        if (next) setPosed(next);
+        ctx.store.set({ poses: carried });
+      },
+    });
+    if (next?.positions.length !== before.positions.length) {
+      void does.carryAlong(before).then(() => {
+        next = posedNow();
+        carried = ctx.store.get().poses;
+      });
+    }
+    return true;
   };
 
   /** Takes a new cage as a step of the history; the first cage of a model is none. */
@@ -131,6 +174,8 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
   };
 
   const actions: CageActions = {
+    change,
+    setSmooth: (steps) => change(T.did.smooth(steps), () => ctx.session().engine.setSmooth(steps)),
     make() {
       ctx.tell.clear();
       return attempt(ctx, T.failed.noCage, () =>

@@ -1,8 +1,9 @@
 /** Clips of a rigged model: what plays is the model as it would be exported. */
 
+import { effect, untracked } from "@preact/signals";
 import type { RigOptions } from "../contract";
 import { follow } from "../queue";
-import { type ClipState, rigOf } from "../state";
+import { type ClipState, drawn, rigOf } from "../state";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 
@@ -54,6 +55,17 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
     if (store.get().clip.clip !== null || store.get().clip.targets.length > 0)
       set({ clip: null, seconds: 0, targets: [] });
   };
+
+  // A step of the history, a gesture, a blend: another pose of the cage has ended a clip that was paused.
+  effect(() => {
+    store.get().undoLabel;
+    store.get().redoLabel;
+    store.get().gesture;
+    store.get().shares;
+    untracked(() => {
+      if (store.get().clip.clip !== null && !engine().showsClip) stop();
+    });
+  });
 
   /** The model as it is posed now, ready to be played; false if it cannot be. */
   const ready = async (): Promise<boolean> => {
@@ -136,6 +148,7 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
     rig(patch) {
       stop();
       store.set({ rigOptions: { ...store.get().rigOptions, ...patch } });
+      engine().setScene(drawn(store.get()));
     },
     stop,
   };

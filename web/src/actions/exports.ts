@@ -9,7 +9,7 @@ import { loadLattice } from "./clips";
 import { attempt, type Context } from "./context";
 import type { Project } from "./project";
 
-export type ExportKind = "glb" | "poses" | "cage" | "weights" | "picture" | "project";
+export type ExportKind = "glb" | "poses" | "cage" | "controls" | "weights" | "picture" | "project";
 
 export interface Exports {
   save(kind: ExportKind): Promise<void>;
@@ -36,11 +36,13 @@ export function createExports(ctx: Context, project: Project): Exports {
         return engine.exportPoses(
           poses.map((pose) => pose.name),
           poses.map((pose) => pose.positions),
-          ctx.store.get().rigOptions,
+          rigOf(ctx.store.get()),
         );
       }
       case "cage":
         return engine.exportCage();
+      case "controls":
+        return engine.exportControls();
       case "weights":
         return engine.exportWeights();
       case "project":
@@ -82,14 +84,7 @@ export function createExports(ctx: Context, project: Project): Exports {
         });
         return;
       }
-      try {
-        await navigator.clipboard.writeText(link);
-        ctx.tell.say(T.exports.copied);
-      } catch {
-        // No access to the clipboard: the address bar can be copied by hand.
-        window.history.replaceState(null, "", link);
-        ctx.tell.say(T.exports.inAddress);
-      }
+      await copyLink(ctx, link, T.exports.copied);
     },
     pictureOf(size, isAlone) {
       [scale, alone] = [size, isAlone];
@@ -98,10 +93,23 @@ export function createExports(ctx: Context, project: Project): Exports {
   return exports;
 }
 
+/** Puts a link in the clipboard. */
+export async function copyLink(ctx: Context, link: string, done: string): Promise<void> {
+  try {
+    await navigator.clipboard.writeText(link);
+    ctx.tell.say(done);
+  } catch {
+    // No access to the clipboard: the address bar can be copied by hand.
+    window.history.replaceState(null, "", link);
+    ctx.tell.say(T.exports.inAddress);
+  }
+}
+
 const SUFFIX: Record<Exclude<ExportKind, "project">, string> = {
   glb: "-posed.glb",
   poses: "-poses.glb",
   cage: "-cage.obj",
+  controls: "-controls.obj",
   weights: "-weights.npz",
   picture: ".png",
 };

@@ -1,7 +1,7 @@
 /** Opening: samples, files and projects. What is opened gets a cage and is bound without further questions. */
 
 import type { NamedFile, Opened, Sample, Settings, UpAxis } from "../contract";
-import { BIND_DEFAULTS, CAGE_DEFAULTS } from "../defaults";
+import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS } from "../defaults";
 import { planDrop } from "../drop";
 import { stem } from "../format";
 import type { StepName } from "../state";
@@ -23,6 +23,7 @@ export interface Follow {
   adoptCage(opened: Opened): void;
   makeCage(): Promise<boolean>;
   loadCage(files: readonly NamedFile[]): Promise<boolean>;
+  loadControls(files: readonly NamedFile[]): Promise<boolean>;
   bind(): Promise<boolean>;
   /** Takes a project's settings, before the bind. */
   applySettings(settings: Partial<Settings>): void;
@@ -30,8 +31,8 @@ export interface Follow {
   applyPose(settings: Partial<Settings>): void;
   /** What is open, as a project. */
   writeProject(): Uint8Array;
-  /** Keeps what is open: something else will be. */
-  keep(): Promise<void>;
+  /** Keeps what is open: something else will be, a sample or a file (null). */
+  keep(sample: string | null): Promise<void>;
   /** Something else is open. */
   leave(): void;
 }
@@ -57,6 +58,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       cageSource: "auto",
       playing: false,
       clip: NO_CLIP,
+      rigOptions: RIG_DEFAULTS,
       cageClip: null,
       gesture: null,
       busy: null,
@@ -76,7 +78,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     const bind = { ...BIND_DEFAULTS, memory_limit: store.get().bindOptions.memory_limit };
     const { project } = opened;
     return project
-      ? ctx.session().readSettings(project.settings, { bind, cage: CAGE_DEFAULTS })
+      ? ctx.session().readSettings(project.settings, { bind, cage: CAGE_DEFAULTS, rig: RIG_DEFAULTS })
       : { notices: [] };
   };
 
@@ -116,7 +118,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     sample: string | null,
     cageFiles?: readonly NamedFile[],
   ) => {
-    await follow.keep();
+    await follow.keep(sample);
     const opened = await open();
     follow.leave();
     await take(opened, sample, cageFiles);
@@ -136,6 +138,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
         ctx.tell.problem({ title: T.opening.nothing, message: plan.sentence }, ctx.fixFor("file"));
         return Promise.resolve(false);
       }
+      if (plan.kind === "controls" && store.get().cage) return follow.loadControls([main]);
       const second = plan.second === undefined ? undefined : files[plan.second];
       if (main.file.size === 0) {
         ctx.tell.problem(

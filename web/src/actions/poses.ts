@@ -17,6 +17,8 @@ export interface PoseActions {
   blend(pose: Pose, share: number, done: boolean): void;
   /** The pose and the poses that a cage of before had, for the one that is open. */
   carry(before: Posed): Promise<boolean>;
+  /** The same as part of a step that there is already. */
+  carryAlong(before: Posed): Promise<boolean>;
   reset(): void;
   togglePlay(): void;
   stop(): void;
@@ -48,6 +50,35 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
     playing = undefined;
     store.set({ playing: false, playingPose: null });
     edit.sync();
+  };
+
+  const carry = (before: Posed, isStep: boolean): Promise<boolean> => {
+    stop();
+    return attempt(ctx, T.failed.carry, () =>
+      ctx.queue.add("carry", async (signal) => {
+        const { poses, shares } = store.get();
+        const old = poses.filter((pose) => pose.positions.length === before.positions.length);
+        const rested = before.cage.positions.every((x, i) => x === before.positions[i]);
+        if (!isStep && rested && old.length === 0) return;
+        const all = [before.positions, ...old.map((pose) => pose.positions)];
+        const [positions, ...carried] = await follow(signal, ctx.session().carryPoses(before.cage, all));
+        if (!positions) return;
+        const set = (positions: Float32Array, poses: readonly Pose[], shares: readonly number[]) => {
+          if (isStep) edit.setEditingRest(false);
+          if (!store.get().editingRest) engine().setCagePositions(positions);
+          setPoses(poses, shares);
+          edit.sync();
+        };
+        const now = engine().cagePositions();
+        const next = poses.map((pose) => ({
+          ...pose,
+          positions: carried[old.indexOf(pose)] ?? pose.positions,
+        }));
+        const redo = () => set(rested && !isStep ? now : positions, next, before.shares);
+        redo();
+        if (isStep) ctx.history.push({ label: T.did.carry, undo: () => set(now, poses, shares), redo });
+      }),
+    );
   };
 
   return {
@@ -110,32 +141,8 @@ export function createPoses(ctx: Context, edit: Edit): PoseActions {
         beforeBlend = undefined;
       }
     },
-    carry(before) {
-      stop();
-      return attempt(ctx, T.failed.carry, () =>
-        ctx.queue.add("carry", async (signal) => {
-          const { poses, shares } = store.get();
-          const old = poses.filter((pose) => pose.positions.length === before.positions.length);
-          const all = [before.positions, ...old.map((pose) => pose.positions)];
-          const [positions, ...carried] = await follow(signal, ctx.session().carryPoses(before.cage, all));
-          if (!positions) return;
-          const set = (positions: Float32Array, poses: readonly Pose[], shares: readonly number[]) => {
-            edit.setEditingRest(false);
-            engine().setCagePositions(positions);
-            setPoses(poses, shares);
-            edit.sync();
-          };
-          const now = engine().cagePositions();
-          const next = poses.map((pose) => ({
-            ...pose,
-            positions: carried[old.indexOf(pose)] ?? pose.positions,
-          }));
-          const redo = () => set(positions, next, before.shares);
-          redo();
-          ctx.history.push({ label: T.did.carry, undo: () => set(now, poses, shares), redo });
-        }),
-      );
-    },
+    carry: (before) => carry(before, true),
+    carryAlong: (before) => carry(before, false),
     reset() {
       stop();
       if (store.get().posed)

@@ -4,6 +4,7 @@ import type { SceneOptions, Settings } from "../contract";
 import { stem } from "../format";
 import { encodeShare, fromBase64Url, toBase64Url } from "../share";
 import type { Context } from "./context";
+import type { ControlActions } from "./controls";
 
 export interface Project {
   /** The project file's bytes. */
@@ -13,15 +14,17 @@ export interface Project {
   link(): Promise<string | undefined>;
 }
 
-export function createProject(ctx: Context): Project {
+export function createProject(ctx: Context, shared: ControlActions["shared"]): Project {
   const { store } = ctx;
 
   const settings = (): string => {
     const state = store.get();
+    const controls = shared()?.controls;
     const pose = state.posed ? toBase64Url(ctx.session().engine.encodePose()) : undefined;
     const all: Omit<Settings, "notices"> = {
       bind: state.bindOptions,
       cage: state.cageOptions,
+      ...(state.model?.rigged ? { rig: state.rigOptions } : {}),
       symmetry: state.symmetry,
       ...(state.pins.length > 0 ? { pins: [...state.pins] } : {}),
       ...(state.poses.some((pose) => pose.pins?.length)
@@ -29,6 +32,7 @@ export function createProject(ctx: Context): Project {
         : {}),
       ...(state.sample && state.sampleCage ? { sample: state.sample } : {}),
       ...(pose ? { pose } : {}),
+      ...(controls ? { controls } : {}),
     };
     return JSON.stringify(all);
   };
@@ -55,7 +59,9 @@ export function createProject(ctx: Context): Project {
       const { engine } = ctx.session();
       const pose = posed ? engine.encodePose() : undefined;
       const seen = { camera: engine.camera(), selected: [...engine.selection()], scene: ofLink(scene) };
-      const fragment = await encodeShare({ sample, seen, ...(pose ? { pose } : {}) });
+      const controls = shared();
+      const link = { sample, seen, ...(pose ? { pose } : {}), ...(controls ? { controls } : {}) };
+      const fragment = await encodeShare(link);
       return `${location.origin}${location.pathname}${fragment}`;
     },
   };

@@ -2,6 +2,7 @@
 
 import type { SurfacePoint } from "../contract";
 import { follow } from "../queue";
+import { controlCount } from "../state";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 import type { Edit } from "./edit";
@@ -90,8 +91,8 @@ export function createPulling(ctx: Context, edit: Edit): Pulling {
 
   /** Asks the worker to take hold, with the pins that are not grabbed. */
   const grab = async (drag: Drag) => {
-    const { pins, pullWhole, symmetry, cage } = store.get();
-    const n = cage?.info.vertices ?? 0;
+    const { pins, pullWhole, symmetry } = store.get();
+    const n = controlCount(store.get());
     const free = pins.filter((pin) => pin !== pinAt(drag.from.x, drag.from.y));
     const rows: number[] = [];
     const seeds: number[] = [];

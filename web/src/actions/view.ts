@@ -1,12 +1,13 @@
 /** What is drawn and from where. */
 
-import type { Element as CageElement, Pivot, SceneOptions } from "../contract";
+import type { Element as CageElement, Coordinates, Pivot, SceneOptions } from "../contract";
 import { SCENE_DEFAULTS } from "../defaults";
 import { follow } from "../queue";
 import type { Seen } from "../share";
 import { drawn, type Slice } from "../state";
 import { saveTheme, type Theme } from "../store";
 import { T } from "../words";
+import type { BindActions } from "./bind";
 import { attempt, type Context } from "./context";
 import { ofLink } from "./project";
 
@@ -16,7 +17,8 @@ export interface View {
   show(seen: Seen): void;
   theme(theme: Theme): void;
   slice(patch: Partial<Omit<Slice, "busy">>, kind?: SceneOptions["slice"]): void;
-  compare(on: boolean): Promise<void>;
+  /** Shows these side by side; one alone ends the comparison. */
+  compare(kinds: readonly Coordinates[]): Promise<void>;
   frameAll(): void;
   frameSelection(): void;
   axis(axis: 0 | 1 | 2, negative: boolean): void;
@@ -36,10 +38,22 @@ export interface View {
 
 /** Pause before a moved slice is computed, ms: a slider sends many positions. */
 const SLICE_PAUSE_MS = 90;
-/** Half the width holds the model when it is this much smaller. */
-const HALF_ZOOM = 0.6;
+/** What there is to compare, in the order in which it is shown. */
+export const COORDINATES = ["harmonic", "mean_value", "green"] as const satisfies Coordinates[];
 
-export function createView(ctx: Context, prepareCompare: () => Promise<boolean>, dark: MediaQueryList): View {
+/** Harmonic coordinates alone are what is shown anyway; others alone would not be what the hand takes hold of. */
+export function isComparison(kinds: readonly Coordinates[]): boolean {
+  return kinds.length > 1;
+}
+
+/** A part of the width holds the model when it is so much smaller. */
+const partZoom = (parts: number) => (parts > 2 ? 0.45 : parts > 1 ? 0.6 : 1);
+
+export function createView(
+  ctx: Context,
+  prepareCompare: BindActions["prepareCompare"],
+  dark: MediaQueryList,
+): View {
   const { store } = ctx;
   const engine = () => ctx.session().engine;
   let sliceTimer: ReturnType<typeof setTimeout> | undefined;
@@ -95,18 +109,14 @@ export function createView(ctx: Context, prepareCompare: () => Promise<boolean>,
       const load = () => ctx.queue.replace("slice", loadSlice);
       sliceTimer = setTimeout(() => void attempt(ctx, T.failed.slice, load), SLICE_PAUSE_MS);
     },
-    async compare(on) {
-      if (on && !(await prepareCompare())) {
-        scene({ compare: false });
-        return;
-      }
-      if (store.get().scene.compare === on) return;
+    async compare(kinds) {
+      const next = isComparison(kinds) && (await prepareCompare(kinds)) ? kinds : SCENE_DEFAULTS.compare;
+      const { compare } = store.get().scene;
+      if (String(compare) === String(next)) return;
+      scene({ compare: [...next] });
       const { width, height } = ctx.viewport();
-      // Both zooms while there are halves: the pointer's place counts within one of them.
-      const zoom = (factor: number) => engine().zoomAt(width / 4, height / 2, factor);
-      if (!on) zoom(1 / HALF_ZOOM);
-      scene({ compare: on });
-      if (on) zoom(HALF_ZOOM);
+      const zoom = partZoom(next.length) / partZoom(compare.length);
+      engine().zoomAt(width / next.length / 2, height / 2, zoom);
     },
     frameAll: () => engine().frameAll(),
     frameSelection: () => engine().frameSelection(),

@@ -1,11 +1,13 @@
 /** A cage as arrays, and what is wrong with it. */
 
-import type { Problem } from "./generated";
+import type { CageControls, Problem } from "./generated";
 
-/** Positions `[n_cage, 3]`; for each face the number of its corners, then them. */
+/** Positions `[n_controls, 3]`: the cage's, then those of controls inside; for each face the number of its corners, then them. */
 export interface CageArrays {
   readonly positions: Float32Array;
   readonly corners: Uint32Array;
+  /** Undefined for a cage that was just made: it takes those there are. */
+  readonly controls?: CageControls | undefined;
 }
 
 /** What is wrong with a cage, and where: in it, or in the model (`outside`). */

@@ -3,7 +3,7 @@
 /**
  * What kinds of errors the page tells apart.
  */
-export type ErrorName = "Cancelled" | "Compressed" | "Format" | "Memory" | "Outside" | "NoneInside" | "NoAdapter" | "NoDevice" | "DeviceLost" | "Gpu" | "Canvas" | "Missing" | "Error";
+export type ErrorName = "Cancelled" | "Compressed" | "Format" | "Memory" | "WeightsMemory" | "Outside" | "NoneInside" | "NoAdapter" | "NoDevice" | "DeviceLost" | "Gpu" | "Canvas" | "Missing" | "Error";
 /**
  * How the cage meets the grid.
  */
@@ -200,13 +200,25 @@ weights: WeightStats,
  */
 vertices: number,
 /**
- * Cage vertices (columns).
+ * Cage vertices (the first columns).
  */
 cage_vertices: number,
+/**
+ * Controls inside the cage (the columns after them).
+ */
+inner_controls: number,
+/**
+ * Steps of subdivision between the cage and its smooth surface.
+ */
+smooth: number,
 /**
  * Mesh vertices outside the cage.
  */
 outside_vertices: number,
+/**
+ * Mesh vertices inside of controls, or so close to one that an offset keeps them in place.
+ */
+held_vertices: number,
 /**
  * Cells about which the three axes disagreed whether they are inside.
  */
@@ -350,6 +362,34 @@ export type CageOptions = { vertices: number, detail: number, quads: boolean, ma
  */
 export type Bounds = { min: [number, number, number], max: [number, number, number], };
 /**
+ * One element: indices into [`InnerControls::positions`].
+ */
+export type InnerElement = { "point": number } | { "line": Array<number> } | { "face": Array<number> };
+/**
+ * A kind of control inside.
+ */
+export type InnerKind = "point" | "line" | "face";
+/**
+ * What is said of a cage besides its positions and faces.
+ */
+export type CageControls = {
+/**
+ * Steps of subdivision.
+ */
+smooth: number,
+/**
+ * So many of the positions, the last ones, are controls inside.
+ */
+inner: number,
+/**
+ * What they are corners of; counted from the first of them.
+ */
+elements: Array<InnerElement>,
+/**
+ * Radius of points and lines, object units; null for a share of the cage.
+ */
+radius: number | null, };
+/**
  * `CageInfo`.
  */
 export type CageInfo = { vertices: number, edges: number, faces: number,
@@ -360,7 +400,11 @@ quads: number, triangles: number, bounds: Bounds, notices: Array<string>, };
 /**
  * `CageState`.
  */
-export type CageState = { usable: boolean, info: CageInfo, };
+export type CageState = { usable: boolean, info: CageInfo, controls: CageControls,
+/**
+ * Radius of points and lines inside, object units.
+ */
+radius: number, };
 /**
  * What is wrong. The names are stable: programs may rely on them.
  */
@@ -407,13 +451,21 @@ export type ModelInfo = { name: string, format: ModelFormat, up: UpAxis, vertice
  */
 targets: Array<TargetView>,
 /**
+ * Names of what hangs on the skeleton without a skin: it can be kept rigid.
+ */
+props: Array<string>,
+/**
  * Whether exports keep more than the shape.
  */
 rigged: boolean, bounds: Bounds, notices: Array<string>, };
 /**
  * The page's part of a project, as far as it can be used.
  */
-export type Settings = { bind?: BindOptions, cage?: CageOptions, sample?: string, symmetry?: boolean,
+export type Settings = { bind?: BindOptions, cage?: CageOptions, rig?: RigOptions, sample?: string, symmetry?: boolean,
+/**
+ * Read with the cage, whose last positions they are.
+ */
+controls?: CageControls,
 /**
  * `Engine.encodePose`, base 64.
  */
@@ -436,6 +488,10 @@ export type Theme = "light" | "dark";
  */
 export type Colour = "material" | "clay" | "weight" | "error";
 /**
+ * How the model follows the cage.
+ */
+export type Coordinates = "harmonic" | "mean_value" | "green";
+/**
  * What the slice shows.
  */
 export type SliceShown = "off" | "kinds" | "value";
@@ -454,7 +510,15 @@ weights_to_one: boolean, slice: SliceShown, gizmo: Gizmo,
 /**
  * The cage steps back: the model itself is pulled.
  */
-pull: boolean, compare: boolean, problems: boolean, };
+pull: boolean,
+/**
+ * Side by side, from the left. Those by formula only once they are there; harmonic ones alone are no comparison.
+ */
+compare: Array<Coordinates>, problems: boolean,
+/**
+ * Joints are shown as they will be exported; null for none.
+ */
+joints: Joints | null, };
 /**
  * Where the camera is.
  */
@@ -517,6 +581,10 @@ export type RigOptions = { joints: Joints,
  */
 keep_travel: boolean,
 /**
+ * Names of what hangs on the skeleton and keeps its shape.
+ */
+rigid: Array<string>,
+/**
  * The shape alone.
  */
 plain: boolean,
@@ -578,7 +646,7 @@ export type GizmoHandle = "x" | "y" | "z" | "plane_x" | "plane_y" | "plane_z" | 
 export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
 export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"closest_point"};
 export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"detail":0.028,"quads":true,"margin":0.0,"symmetry":"auto","voxels":0,"shape":"follow","per_component":false};
-export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"plain":false,"dynamic":false};
-export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":false,"problems":true};
+export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"plain":false,"dynamic":false};
+export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":["harmonic"],"problems":true,"joints":null};
 /** Least and most of each option that is a number. */
 export const RANGES = { grid: [8, 512], vertices: [8, 400], detail: [0.005, 0.2], margin: [0, 0.25], voxels: [8, 128] } as const;

@@ -8,10 +8,12 @@ import type {
   BindReport,
   CageOptions,
   CageState,
+  Coordinates,
   ErrorName,
   ModelInfo,
   PullOptions,
   Repair,
+  RigOptions,
   Settings,
   SurfacePoint,
   UpAxis,
@@ -24,10 +26,10 @@ export interface Pose {
   readonly pins?: readonly SurfacePoint[];
 }
 
-/** What is taken hold of, in the pose `start` of the cage, `[n_cage, 3]`. */
+/** What is taken hold of, in the pose `start` of the cage and controls inside, `[n_controls, 3]`. */
 export interface GrabInput {
   readonly start: Float32Array;
-  /** Weights of the grabs, then of the pins. `[n_grips, n_cage]` */
+  /** Weights of the grabs, then of the pins. `[n_grips, n_controls]` */
   readonly rows: Float64Array;
   /** The nearest vertex of the model of each. */
   readonly seeds: Uint32Array;
@@ -43,7 +45,7 @@ export interface Grabbed {
   readonly reach: number;
 }
 export interface PullFrame {
-  /** `[n_cage, 3]` */
+  /** `[n_controls, 3]` */
   readonly cage: Float32Array;
   /** Another frame would be the same. */
   readonly settled: boolean;
@@ -101,8 +103,8 @@ export interface Session {
   bind(options: BindOptions, listener: (event: BindEvent) => void): Job<BindReport>;
   /** Bytes that this bind would need, or the Error that it would end in. Cheap: call on every change. */
   estimateMemory(options: BindOptions): number;
-  /** Mean value coordinates for the split view; needed once per cage before `compare`. Runs in the worker. */
-  bindMeanValue(): Job<void>;
+  /** Coordinates by formula to compare with; needed once per cage before `scene.compare` shows them. Runs in the worker. */
+  bindByFormula(kind: Coordinates): Job<void>;
   /** Cells and coordinates of one plane of the grid, in the worker; shown with `scene.slice` afterwards. */
   loadSlice(axis: 0 | 1 | 2, position: number, grid: number): Job<void>;
   /** What the cage needs to bend a moving model (`RigOptions.dynamic`), in the worker; once per cage. */
@@ -121,8 +123,8 @@ export interface Session {
   onFrame(listener: (ms: number) => void): () => void;
   /** PNG of the scene (without canvas borders), any size up to 8192; `alone`: of the model, transparent around it. */
   picture(width: number, height: number, alone?: boolean): Promise<Blob>;
-  /** Posed positions as they are drawn (tests, numbers panel). */
-  readPositions(): Promise<Float32Array>;
+  /** Posed positions as they are drawn, harmonic unless told (tests, numbers panel). */
+  readPositions(kind?: Coordinates): Promise<Float32Array>;
 
   /** The device was lost (or `loseDevice()` was called): the page says so and calls `recover()`. */
   onLost(listener: (reason: string) => void): () => void;
@@ -182,4 +184,5 @@ export interface Opened {
 export interface Defaults {
   readonly bind: BindOptions;
   readonly cage: CageOptions;
+  readonly rig: RigOptions;
 }

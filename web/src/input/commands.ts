@@ -3,6 +3,7 @@
 import { report } from "../actions/context";
 import type { App } from "../app";
 import type { Element as CageElement, Gesture } from "../contract";
+import { controlCount } from "../state";
 import { T } from "../words";
 import type { Command } from "./shortcuts";
 
@@ -12,7 +13,7 @@ const NUDGE_FAR = 20;
 const NEXT_ELEMENT: Record<CageElement, CageElement> = { vertex: "edge", edge: "face", face: "vertex" };
 
 export function createCommands(app: App): Record<Command, () => void> {
-  const { store, edit, pull, view, poses, cage, bind, exports } = app;
+  const { store, edit, pull, view, poses, cage, bind, exports, tour } = app;
   const engine = () => app.ctx.session().engine;
   const hasCage = () => store.get().cage !== null;
 
@@ -46,12 +47,14 @@ export function createCommands(app: App): Record<Command, () => void> {
   };
   const neighbour = (step: 1 | -1) =>
     select(() => {
-      const n = store.get().cage?.info.vertices ?? 0;
+      const n = controlCount(store.get());
       if (n === 0) return;
       const last = engine().last();
       const next = last < 0 ? (step === 1 ? 0 : n - 1) : (last + step + n) % n;
       engine().select(Uint32Array.of(next), "replace");
     });
+
+  const stop = (by: 1 | -1) => void tour.guide()?.go(Math.max(0, (store.get().tour?.stop ?? 0) + by));
 
   return {
     grab: gesture("grab"),
@@ -65,11 +68,13 @@ export function createCommands(app: App): Record<Command, () => void> {
     planeZ: axis(2, true),
     keep: () => edit.end(true),
     cancel: () => {
-      if (edit.active()) edit.end(false);
+      if (store.get().placing) app.controls.finish();
+      else if (edit.active()) edit.end(false);
       else if (pull.active()) pull.end(false);
       else if (store.get().boxArmed) store.set({ boxArmed: false });
       else if (store.get().playing) poses.stop();
       else if (store.get().seeOpen) store.set({ seeOpen: false });
+      else void tour.guide()?.end();
     },
     gizmoMove: () => view.gizmo("move"),
     gizmoRotate: () => view.gizmo("rotate"),
@@ -100,7 +105,7 @@ export function createCommands(app: App): Record<Command, () => void> {
     selectNone: select(() => engine().select(new Uint32Array(), "replace")),
     selectLinked: select(() => engine().selectLinked()),
     selectInvert: select(() => {
-      const all = Uint32Array.from({ length: store.get().cage?.info.vertices ?? 0 }, (_, i) => i);
+      const all = Uint32Array.from({ length: controlCount(store.get()) }, (_, i) => i);
       engine().select(all, "toggle");
     }),
     boxSelect: () => {
@@ -147,6 +152,9 @@ export function createCommands(app: App): Record<Command, () => void> {
       if (!hasCage()) void cage.make().then((made) => made && bind.start());
       else void bind.start();
     },
+    tour: () => void tour.start(),
+    nextStop: () => stop(1),
+    previousStop: () => stop(-1),
     sheet: () => store.set({ sheetOpen: true }),
   };
 }

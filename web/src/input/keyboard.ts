@@ -38,7 +38,7 @@ export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions
     const mod = event.ctrlKey || event.metaKey;
     if (!gesture && !mod && isControlKey(event.target, event.key)) return;
     if (mod && event.target instanceof HTMLElement && event.target.closest("dialog")) return;
-    const { editingRest, busy, cancelBusy, model } = app.store.get();
+    const { editingRest, busy, cancelBusy, model, tour } = app.store.get();
     if (event.key === "Escape" && cancelBusy && !document.querySelector("dialog[open]")) {
       cancelBusy();
       return;
@@ -47,7 +47,12 @@ export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions
       event.preventDefault();
       return;
     }
-    const command = commandOf(event, { gesture, rest: editingRest });
+    if (event.key === "Enter" && !mod && app.store.get().placing) {
+      event.preventDefault();
+      app.controls.finish();
+      return;
+    }
+    const command = commandOf(event, { gesture, rest: editingRest, tour: tour !== null });
     if (!command) return;
     // Tab moves between modes only after a click into the view; who arrived by Tab leaves by it.
     if (command === "restMode") {

@@ -1,7 +1,7 @@
 /** Mouse and pen on the view, and which touches they share with: what a press means is decided here. */
 
 import type { App } from "../app";
-import type { SelectMode } from "../contract";
+import type { GizmoHandle, SelectMode } from "../contract";
 import type { Stage } from "../ui/viewport";
 import { createTouch } from "./touch";
 
@@ -21,12 +21,13 @@ type Drag =
   | { kind: "handle"; started: boolean; vertices: Uint32Array; mode: SelectMode; was: boolean; bare: boolean }
   | { kind: "pull"; started: boolean }
   | { kind: "pin" }
+  | { kind: "place" }
   | { kind: "gizmo" }
   | { kind: "box"; mode: SelectMode };
 
 export function attachPointer(stage: Stage, app: App): void {
   const { viewport } = stage;
-  const { store, edit, pull } = app;
+  const { store, edit, pull, controls } = app;
   const engine = () => app.ctx.session().engine;
   const ready = () => store.get().busy === null && store.get().model !== null;
   let drag: Drag | undefined;
@@ -43,10 +44,16 @@ export function attachPointer(stage: Stage, app: App): void {
   };
   const radiusOf = (event: PointerEvent) => (event.pointerType === "touch" ? TOUCH_RADIUS : MOUSE_RADIUS);
 
+  const takeGizmo = (handle: GizmoHandle, at: { x: number; y: number }) => {
+    app.clips.stop();
+    return edit.beginGizmo(handle, at.x, at.y);
+  };
+
   const press = (event: PointerEvent, at: { x: number; y: number }): Drag => {
     const mod = event.ctrlKey || event.metaKey;
     if (event.altKey && event.button !== 0) return { kind: event.button === 1 ? "pan" : "zoom" };
     if (event.button !== 0) return { kind: "pan" };
+    if (store.get().placing) return { kind: "place" };
     if (event.altKey) {
       const vertices =
         store.get().cage && store.get().scene.cage ? engine().pick(at.x, at.y, MOUSE_RADIUS) : [];
@@ -61,7 +68,7 @@ export function attachPointer(stage: Stage, app: App): void {
       // A vertex below a finger comes before a gizmo beside it.
       const isOnVertex = engine().pick(at.x, at.y, MOUSE_RADIUS).length > 0;
       const handle = engine().gizmoAt(at.x, at.y, isOnVertex ? MOUSE_RADIUS : radiusOf(event));
-      if (handle !== undefined && edit.beginGizmo(handle, at.x, at.y)) return { kind: "gizmo" };
+      if (handle !== undefined && takeGizmo(handle, at)) return { kind: "gizmo" };
       // On the model a finger takes the model, unless a handle is just there.
       const isOnModel = store.get().scene.pull && pull.hover(at.x, at.y);
       const vertices = engine().pick(at.x, at.y, isOnModel ? MOUSE_RADIUS : radiusOf(event));
@@ -95,6 +102,7 @@ export function attachPointer(stage: Stage, app: App): void {
     if (!drag) return;
     switch (drag.kind) {
       case "orbit":
+      case "place":
         engine().orbit(dx, dy);
         break;
       case "pan":
@@ -111,6 +119,8 @@ export function attachPointer(stage: Stage, app: App): void {
         break;
       case "handle":
         if (!drag.started && moved) {
+          // Where the cage bends a moving model: what is posed is the shape at rest.
+          app.clips.stop();
           if (!drag.was || drag.mode === "replace") {
             if (!drag.was) engine().select(drag.vertices, drag.mode === "toggle" ? "add" : "replace");
           }
@@ -173,6 +183,9 @@ export function attachPointer(stage: Stage, app: App): void {
       case "pin":
         if (keep && !moved) pull.pin(start.x, start.y);
         break;
+      case "place":
+        if (keep && !moved) controls.place(start.x, start.y);
+        break;
       case "box": {
         stage.band(null);
         store.set({ boxArmed: false });
@@ -233,7 +246,9 @@ export function attachPointer(stage: Stage, app: App): void {
     } else if (event.pointerType !== "touch" && hoverFrame === 0 && store.get().cage) {
       hoverFrame = requestAnimationFrame(() => {
         hoverFrame = 0;
-        if (!drag && ready() && store.get().cage) {
+        if (!drag && ready() && store.get().placing) {
+          controls.hover(pointer.x, pointer.y);
+        } else if (!drag && ready() && store.get().cage) {
           const under = engine().pick(pointer.x, pointer.y, MOUSE_RADIUS);
           engine().hover(under);
           const isOver = under.length > 0;

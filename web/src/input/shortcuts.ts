@@ -1,7 +1,7 @@
 /** The one table of shortcuts: the keyboard handler, the tool tips and the `?` sheet all read it. */
 
-/** Where a shortcut works: anywhere, while vertices are moved with G, R or S, or while the rest cage is edited. */
-export type Scope = "page" | "gesture" | "rest";
+/** Where a shortcut works: anywhere, while vertices are moved with G, R or S, while the rest cage is edited, or on the tour. */
+export type Scope = "page" | "gesture" | "rest" | "tour";
 
 interface Entry {
   readonly keys: readonly string[];
@@ -82,6 +82,16 @@ const TABLE = {
   heatMap: { keys: ["k"], label: "Weights of the selected vertex", group: "Look" },
   see: { keys: ["n"], label: "The See panel", group: "Look" },
 
+  tour: { keys: ["shift+t"], label: "The tour, ten stops", group: "Look" },
+  nextStop: {
+    keys: ["pagedown", "."],
+    label: "Next stop of the tour, or the one before",
+    group: "Look",
+    scope: "tour",
+    shown: ["pagedown", "pageup", ".", ","],
+  },
+  previousStop: { keys: ["pageup", ","], label: "", group: "Look", scope: "tour" },
+
   restMode: { keys: ["tab"], label: "Reshape the cage, or pose", group: "Cage" },
   split: { keys: ["shift+s"], label: "Split an edge", group: "Cage", scope: "rest" },
   collapse: { keys: ["shift+c"], label: "Collapse an edge", group: "Cage", scope: "rest" },
@@ -137,7 +147,10 @@ export function keyOf(event: KeyPress): string {
 }
 
 /** The command of a key press. In a gesture its own keys come first, and nothing else but these. */
-export function commandOf(event: KeyPress, scopes: { gesture: boolean; rest: boolean }): Command | undefined {
+export function commandOf(
+  event: KeyPress,
+  scopes: Partial<Record<Exclude<Scope, "page">, boolean>>,
+): Command | undefined {
   const key = keyOf(event);
   const matches = SHORTCUTS.filter((shortcut) => shortcut.keys.includes(key));
   const of = (scope: Scope) => matches.find((shortcut) => (shortcut.scope ?? "page") === scope)?.command;
@@ -151,7 +164,7 @@ export function commandOf(event: KeyPress, scopes: { gesture: boolean; rest: boo
       page === "proportional";
     return of("gesture") ?? (allowed ? page : undefined);
   }
-  return (scopes.rest ? of("rest") : undefined) ?? of("page");
+  return (scopes.rest ? of("rest") : undefined) ?? (scopes.tour ? of("tour") : undefined) ?? of("page");
 }
 
 const NAMES: Record<string, string> = {
@@ -162,6 +175,8 @@ const NAMES: Record<string, string> = {
   " ": "Space",
   escape: "Esc",
   delete: "Del",
+  pagedown: "PgDn",
+  pageup: "PgUp",
 };
 
 /** The caps of a combination: "shift+mod+z" -> ["Shift", "Ctrl", "Z"], or with Cmd on a Mac. */

@@ -7,6 +7,7 @@ import type {
   CageOptions,
   Check,
   CheckedCage,
+  Coordinates,
   Grabbed,
   GrabInput,
   NamedFile,
@@ -62,7 +63,11 @@ export interface Jobs {
     step: Progress;
     output: BoundArrays;
   };
-  meanValue: { input: { positions: Float32Array; cage: CageArrays }; step: never; output: BoundArrays };
+  formula: {
+    input: { kind: Coordinates; positions: Float32Array; cage: CageArrays };
+    step: never;
+    output: BoundArrays;
+  };
   slice: {
     input: { cage: CageArrays; axis: number; fraction: number; options: BindOptions };
     step: Progress;
@@ -71,7 +76,13 @@ export interface Jobs {
   lattice: { input: { cage: CageArrays; options: BindOptions }; step: Progress; output: BoundArrays };
   cage: {
     /** All that is to be enclosed, and the model at rest, which it is checked for. */
-    input: { positions: Float32Array; triangles: Uint32Array; model: Float32Array; options: CageOptions };
+    input: {
+      positions: Float32Array;
+      triangles: Uint32Array;
+      model: Float32Array;
+      options: CageOptions;
+      smooth: number;
+    };
     step: Progress;
     output: CheckedCage;
   };
@@ -82,7 +93,7 @@ export interface Jobs {
   };
   /** `model`: the vertices to be enclosed, `[n_vertices, 3]`. */
   readCage: {
-    input: { files: readonly NamedFile[]; up: UpAxis; model: Float32Array };
+    input: { files: readonly NamedFile[]; up: UpAxis; model: Float32Array; smooth: number };
     step: Reading;
     output: CheckedCage;
   };

@@ -34,24 +34,29 @@ export async function readModel(
 /** Reads a file as a cage and checks it. */
 export async function readCage(
   pkg: Package,
-  { files, up, model }: Jobs["readCage"]["input"],
+  { files, up, model, smooth }: Jobs["readCage"]["input"],
   tell: Tell,
 ): Promise<CheckedCage> {
   const { loaded } = await read(pkg, files, tell);
   loaded.setUp(up);
   say(tell, "check");
-  return checked(pkg, loaded.asCage(), model);
+  return checked(pkg, loaded.asCage(), model, smooth);
 }
 
-/** A cage as arrays, and what is wrong with it for the model's vertices. */
-export function checked(pkg: Package, cage: Polygons, model: Float32Array): CheckedCage {
+/** A cage as arrays, and what is wrong with it for the model's vertices where it will be subdivided so often. */
+export function checked(pkg: Package, cage: Polygons, model: Float32Array, smooth = 0): CheckedCage {
   const arrays = polygons(cage);
-  return { ...arrays, check: check(pkg, arrays, model) };
+  const controls = arrays.controls ?? { smooth, inner: 0, elements: [], radius: null };
+  return { ...arrays, check: check(pkg, { ...arrays, controls }, model) };
 }
 
 /** What is wrong with a cage for the model's vertices. */
-export function check(pkg: Package, { positions, corners }: CageArrays, model: Float32Array): Check {
-  const found = pkg.Binder.checkCage(model, positions, corners);
+export function check(
+  pkg: Package,
+  { positions, corners, controls }: CageArrays,
+  model: Float32Array,
+): Check {
+  const found = pkg.Binder.checkCage(model, positions, corners, controls);
   const { problems, vertices, edges, faces, points, outside } = found;
   found.free();
   return { problems, vertices, edges, faces, points, outside };
@@ -59,9 +64,9 @@ export function check(pkg: Package, { positions, corners }: CageArrays, model: F
 
 /** Arrays of a mesh; its memory in the module is given back. */
 export function polygons(mesh: Polygons): CageArrays {
-  const { positions, corners } = mesh;
+  const { positions, corners, controls } = mesh;
   mesh.free();
-  return { positions, corners };
+  return { positions, corners, controls };
 }
 
 async function read(

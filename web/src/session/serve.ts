@@ -83,37 +83,47 @@ function createWork(pkg: Package): Work {
   return {
     async bind({ positions, extra, cage, options }, step) {
       const by = await binder(options.backend === "gpu");
-      return taken(await by.bind(positions, extra, cage.positions, cage.corners, options, step));
+      return taken(
+        await by.bind(positions, extra, cage.positions, cage.corners, cage.controls, options, step),
+      );
     },
-    async meanValue({ positions, cage }) {
-      return taken((await binder(false)).bindMeanValue(positions, cage.positions, cage.corners));
+    async formula({ kind, positions, cage }) {
+      const by = await binder(false);
+      return taken(by.bindByFormula(kind, positions, cage.positions, cage.corners, cage.controls));
     },
     async slice({ cage, axis, fraction, options }, step) {
       const by = await binder(options.backend === "gpu");
-      const bound = await by.bindSlice(cage.positions, cage.corners, axis, fraction, options, step);
+      const { positions, corners, controls } = cage;
+      const bound = await by.bindSlice(positions, corners, controls, axis, fraction, options, step);
       return bound && taken(bound);
     },
     async lattice({ cage, options }, step) {
       const by = await binder(options.backend === "gpu");
-      return taken(await by.bindLattice(cage.positions, cage.corners, options, step));
+      return taken(await by.bindLattice(cage.positions, cage.corners, cage.controls, options, step));
     },
-    async cage({ positions, triangles, model, options }, step) {
-      const cage = (await binder(false)).generateCage(positions, triangles, options, step);
+    async cage({ positions, triangles, model, options, smooth }, step) {
+      const cage = (await binder(false)).generateCage(positions, triangles, options, smooth, step);
       const { bridged } = cage;
-      return { ...checked(pkg, cage, model), bridged };
+      return { ...checked(pkg, cage, model, smooth), bridged };
     },
     read: (input, step) => readModel(pkg, input, step),
     readCage: (input, step) => readCage(pkg, input, step),
     check: async ({ cage, model }) => check(pkg, cage, model),
     async repair({ kind, cage, model }) {
-      return checked(pkg, pkg.Binder.repairCage(kind, model, cage.positions, cage.corners), model);
+      const { positions, corners, controls } = cage;
+      return checked(
+        pkg,
+        pkg.Binder.repairCage(kind, model, positions, corners, controls),
+        model,
+        controls?.smooth,
+      );
     },
     carry: async ({ model, cage, old, poses }) =>
-      pkg.Binder.carryPoses(model, cage, old.positions, old.corners, poses),
+      pkg.Binder.carryPoses(model, cage, old.positions, old.corners, old.controls, poses),
     async pullOpen({ positions, triangles, cage }) {
       puller?.free();
       puller = undefined;
-      puller = new pkg.Puller(positions, triangles, cage.positions, cage.corners);
+      puller = new pkg.Puller(positions, triangles, cage.positions, cage.corners, cage.controls);
       return null;
     },
     async pullGrab({ start, rows, seeds, grabs, options }) {

@@ -9,6 +9,7 @@ import { sentence } from "../strings";
 import { T } from "../words";
 import { Badge, Button, Facts, Head, Section, Segments, Slider, Toggle } from "./controls";
 import { Icon, type IconName } from "./icons";
+import { Inside, Smooth } from "./inside";
 
 /** Where the slider of voxels starts: it stands for none in particular. */
 const COARSEST = 16;
@@ -68,6 +69,12 @@ export function CagePanel({ app }: { app: App }) {
           ))}
         </div>
       </Section>
+      {cage && (
+        <Section title={T.cage.smooth}>
+          <Smooth app={app} cage={cage} />
+        </Section>
+      )}
+      {cage && <Inside app={app} cage={cage} />}
       <Section title={T.cage.shape}>{cage && <Reshape app={app} />}</Section>
     </div>
   );

@@ -8,7 +8,7 @@ import { Fold, IconButton, Segments, Slider, Toggle } from "./controls";
 const SPEEDS = ["0.25", "0.5", "1"] as const;
 
 export function Clips({ app }: { app: App }) {
-  const { model, clip, bound, rigOptions } = app.store.get();
+  const { model, clip, bound, rigOptions, scene } = app.store.get();
   if (!model) return null;
   const { clips } = model;
   const length = clips[clip.clip ?? -1]?.seconds ?? 0;
@@ -16,7 +16,7 @@ export function Clips({ app }: { app: App }) {
     <div class="stack">
       {clips.length > 0 && (
         <label class="stack tight">
-          <span>{T.clips.clip}</span>
+          <span class="legend-text">{T.clips.clip}</span>
           <select
             value={clip.clip ?? ""}
             disabled={!bound}
@@ -94,6 +94,14 @@ export function Clips({ app }: { app: App }) {
           </div>
         </Fold>
       )}
+      {model.joints > 0 && (
+        <Toggle
+          label={T.clips.joints}
+          sentence={T.clips.jointsSentence}
+          on={scene.joints !== null}
+          onChange={(on) => app.view.scene({ joints: on ? "follow" : null })}
+        />
+      )}
       {model.rigged && !rigOptions.dynamic && <RigChoices app={app} />}
     </div>
   );
@@ -102,7 +110,7 @@ export function Clips({ app }: { app: App }) {
 export function RigChoices({ app }: { app: App }) {
   const { rigOptions, model } = app.store.get();
   if (!model?.joints) return null;
-  const { joints, keep_travel } = rigOptions;
+  const { joints, keep_travel, rigid } = rigOptions;
   return (
     <>
       <Toggle
@@ -111,6 +119,23 @@ export function RigChoices({ app }: { app: App }) {
         on={joints !== "stay"}
         onChange={(on) => app.clips.rig({ joints: on ? "follow" : "stay" })}
       />
+      {joints !== "stay" && model.props.length > 0 && (
+        <Fold title={T.clips.rigid(rigid.length, model.props.length)}>
+          <div class="stack">
+            <p class="hint">{T.clips.rigidSentence}</p>
+            {[...new Set(model.props)].map((name) => (
+              <Toggle
+                key={name}
+                label={name}
+                on={rigid.includes(name)}
+                onChange={(on) =>
+                  app.clips.rig({ rigid: on ? [...rigid, name] : rigid.filter((other) => other !== name) })
+                }
+              />
+            ))}
+          </div>
+        </Fold>
+      )}
       {joints !== "stay" && (
         <Fold title={T.clips.advanced}>
           <div class="stack">

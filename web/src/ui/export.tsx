@@ -14,6 +14,7 @@ const ITEMS: readonly (readonly [ExportKind, IconName])[] = [
   ["glb", "model"],
   ["poses", "layers"],
   ["cage", "cage"],
+  ["controls", "bone"],
   ["weights", "table"],
   ["picture", "image"],
   ["project", "save"],
@@ -23,17 +24,18 @@ const ITEMS: readonly (readonly [ExportKind, IconName])[] = [
 function missing(kind: ExportKind, state: AppState): string | null {
   const { bindFirst, cageFirst, poseFirst, modelFirst } = T.exports;
   if (kind === "picture") return state.model ? null : modelFirst;
-  if (kind === "cage" || kind === "project") return state.cage ? null : cageFirst;
+  if (kind === "cage" || kind === "controls" || kind === "project") return state.cage ? null : cageFirst;
   if (!state.bound) return bindFirst;
   return kind === "poses" && fittingPoses(state).length === 0 ? poseFirst : null;
 }
 
 export function ExportPanel({ app }: { app: App }) {
+  const hasInside = (app.store.get().cage?.controls.inner ?? 0) > 0;
   return (
     <div class="stack loose">
       <Head title={T.exports.title} sentence={T.exports.sentence} />
       <ul class="stack">
-        {ITEMS.map(([kind, icon]) => (
+        {ITEMS.filter(([kind]) => kind !== "controls" || hasInside).map(([kind, icon]) => (
           <Item key={kind} app={app} kind={kind} icon={icon} />
         ))}
       </ul>

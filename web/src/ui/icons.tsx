@@ -3,6 +3,7 @@
 import {
   ArrowUpFromLine,
   Bandage,
+  Bone,
   Box,
   Check,
   CircleDot,
@@ -37,6 +38,7 @@ import {
   Save,
   Scaling,
   Share2,
+  Signpost,
   Slash,
   Sparkles,
   Square,
@@ -103,10 +105,12 @@ const ICONS = {
   table: Table,
   save: Save,
   help: CircleQuestionMark,
+  tour: Signpost,
   split: SquareSplitHorizontal,
   merge: Merge,
   extrude: ArrowUpFromLine,
   patch: Bandage,
+  bone: Bone,
 } satisfies Record<string, IconNode>;
 
 export type IconName = keyof typeof ICONS;

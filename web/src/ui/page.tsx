@@ -42,6 +42,7 @@ export function mount({ app, Toasts, Lost, byId }: Parts): void {
     <>
       <Notice app={app} />
       <See app={app} />
+      <Tour app={app} />
       <Dialogs app={app} />
       <Hover app={app} />
       <Toasts />
@@ -51,11 +52,18 @@ export function mount({ app, Toasts, Lost, byId }: Parts): void {
   attachTips();
 }
 
+/** The card of the tour, where it is on. */
+function Tour({ app }: { app: App }) {
+  const { tour } = app.store.get();
+  const loaded = app.tour.loaded();
+  return tour && loaded ? <loaded.Card app={app} tour={tour} guide={loaded.guide} /> : null;
+}
+
 function Dialogs({ app }: { app: App }) {
   const { sheetOpen } = app.store.get();
   return (
     <>
-      <Sheet mac={app.mac} isOpen={sheetOpen} onClose={() => app.store.set({ sheetOpen: false })} />
+      <Sheet app={app} isOpen={sheetOpen} onClose={() => app.store.set({ sheetOpen: false })} />
       <WaysDialog app={app} />
       <WorksList app={app} />
     </>

@@ -55,8 +55,9 @@ function PullOptions({ app }: { app: App }) {
 
 /** Where what is selected is, in numbers that can be typed. */
 function Selection({ app }: { app: App }) {
-  const { selected, editingRest, pivot } = app.store.get();
+  const { cage, selected, editingRest, pivot } = app.store.get();
   const { count, last, center } = selected;
+  const inner = last - (cage?.info.vertices ?? 0);
   const one = editingRest ? T.pose.vertexAtRest : T.pose.vertex;
   const move = (index: number, value: number) => {
     const [x = 0, y = 0, z = 0] = (center ?? []).map((old, i) => (i === index ? value : old));
@@ -64,7 +65,7 @@ function Selection({ app }: { app: App }) {
   };
   return (
     <div class="stack">
-      <p class="hint">{count === 0 ? T.pose.none : count === 1 ? one(last) : T.pose.middle(count)}</p>
+      <p class="hint">{count === 0 ? T.pose.none : count === 1 ? (inner < 0 ? one(last) : T.pose.inner(inner + 1)) : T.pose.middle(count)}</p>
       {count > 1 && (
         <Segments<Pivot>
           label={T.pose.pivot}

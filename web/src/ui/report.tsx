@@ -58,6 +58,13 @@ export function ReportCard({ report }: { report: BindReport }) {
             ...rawFacts(T.report.sums, report.raw_error.sum),
             [T.report.row, scientific(report.weights.max_sum_error)],
             [T.report.stored, `${count(report.weights.nonzeros)} (${percent(density(report))})`],
+            ...(report.smooth > 0 ? [[T.report.smooth, count(report.smooth)] as const] : []),
+            ...(report.inner_controls > 0
+              ? [
+                  [T.report.innerControls, count(report.inner_controls)] as const,
+                  [T.report.held, T.report.vertices(report.held_vertices)] as const,
+                ]
+              : []),
             [T.report.outside, T.report.vertices(report.outside_vertices)],
             [T.report.ambiguous, count(report.ambiguous_cells)],
           ]}
@@ -94,7 +101,7 @@ function wayOf(report: BindReport): string {
 
 /** Share of the weights that is stored. */
 export function density(report: BindReport): number {
-  const all = report.vertices * report.cage_vertices;
+  const all = report.vertices * (report.cage_vertices + report.inner_controls);
   return all === 0 ? 0 : report.weights.nonzeros / all;
 }
 

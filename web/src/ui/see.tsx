@@ -1,7 +1,8 @@
-/** The See panel: colours, wireframes, the grid, and harmonic beside mean value. */
+/** The See panel: colours, wireframes, the grid, and coordinates side by side. */
 
+import { COORDINATES, isComparison } from "../actions/view";
 import type { App } from "../app";
-import type { SceneOptions } from "../contract";
+import type { Coordinates, SceneOptions } from "../contract";
 import { percent } from "../format";
 import type { Slice } from "../state";
 import { T } from "../words";
@@ -88,13 +89,36 @@ function Colours({ app }: { app: App }) {
           onChange={(on) => app.view.scene({ weights_to_one: on })}
         />
       )}
-      <Toggle
-        label={T.see.compare}
-        sentence={T.see.compareSentence}
-        on={scene.compare}
-        onChange={(on) => void app.view.compare(on)}
-      />
+      <Comparison app={app} />
     </div>
+  );
+}
+
+/** Which coordinates stand side by side: any two, or all three. */
+export function Comparison({ app }: { app: App }) {
+  const { compare } = app.store.get().scene;
+  const without = (kind: Coordinates) => compare.filter((other) => other !== kind);
+  const toggled = (kind: Coordinates) =>
+    COORDINATES.filter((other) => (other === kind) !== compare.includes(other));
+  return (
+    <fieldset class="field">
+      <legend class="legend-text">{T.see.compare}</legend>
+      <div class="segments">
+        {COORDINATES.map((kind) => (
+          <label key={kind}>
+            <input
+              type="checkbox"
+              checked={compare.includes(kind)}
+              // What would be left alone are harmonic ones, or nothing that could be pulled.
+              disabled={compare.includes(kind) && String(without(kind)) !== "harmonic" && !isComparison(without(kind))}
+              onChange={() => void app.view.compare(toggled(kind))}
+            />
+            <span>{T.coordinates[kind]}</span>
+          </label>
+        ))}
+      </div>
+      <p class="hint">{T.see.compareSentence}</p>
+    </fieldset>
   );
 }
 

@@ -1,10 +1,13 @@
 /** The sheet of shortcuts, from the same table as the keyboard handler. */
 
+import type { App } from "../app";
 import { caps, GROUPS, SHORTCUTS, type Shortcut } from "../input/shortcuts";
 import { T } from "../words";
+import { Button } from "./controls";
 import { Dialog } from "./dialog";
 
-export function Sheet({ mac, isOpen, onClose }: { mac: boolean; isOpen: boolean; onClose: () => void }) {
+export function Sheet({ app, isOpen, onClose }: { app: App; isOpen: boolean; onClose: () => void }) {
+  const { mac } = app;
   const byItsKey = (event: KeyboardEvent) => {
     if (event.key !== "?") return;
     event.preventDefault();
@@ -14,6 +17,17 @@ export function Sheet({ mac, isOpen, onClose }: { mac: boolean; isOpen: boolean;
     <Dialog title={T.sheet.title} isOpen={isOpen} onClose={onClose} onKeyDown={byItsKey}>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached by keys */}
       <div class="sheet-body" tabIndex={0} role="group" aria-label={T.sheet.all}>
+        <section class="keys">
+          <Button
+            label={T.tour.begin}
+            icon="tour"
+            kind="small"
+            onClick={() => {
+              onClose();
+              app.run("tour");
+            }}
+          />
+        </section>
         {GROUPS.map((group) => (
           <section class="keys" key={group}>
             <h3>{group}</h3>

@@ -1,8 +1,9 @@
 /** What lies on the view: tools, legend, status line. */
 
 import { useLayoutEffect, useState } from "preact/hooks";
+import { isComparison } from "../actions/view";
 import type { App } from "../app";
-import type { Element as CageElement, SceneOptions } from "../contract";
+import type { CageState, Element as CageElement, SceneOptions } from "../contract";
 import type { Command } from "../input/shortcuts";
 import { sentence } from "../strings";
 import { T } from "../words";
@@ -21,13 +22,17 @@ export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
     <>
       {cage && <Mode app={app} />}
       {cage && editingRest && <Encloses app={app} />}
+      <Placing app={app} />
       {cage && <Tools app={app} />}
       <Looks app={app} />
       <LegendOfColours app={app} />
-      {scene.compare && (
+      {isComparison(scene.compare) && (
         <div class="compare-labels" aria-hidden="true">
-          <span>{T.view.harmonic}</span>
-          <span>{T.view.meanValue}</span>
+          {scene.compare.map((kind) => (
+            <span key={kind}>
+              {kind === "harmonic" || isPlain(cage) ? T.coordinates[kind] : T.view.ofPlain(T.coordinates[kind])}
+            </span>
+          ))}
         </div>
       )}
       <BottomLine app={app} />
@@ -50,6 +55,24 @@ function Mode({ app }: { app: App }) {
         }}
       />
     </div>
+  );
+}
+
+/** Whether the cage's own faces are the surface, and nothing is inside. */
+function isPlain(cage: CageState | null): boolean {
+  return !cage || (cage.controls.smooth === 0 && cage.controls.inner === 0);
+}
+
+/** Ends what clicks put inside: fingers have no Enter. */
+function Placing({ app }: { app: App }) {
+  const { placing } = app.store.get();
+  const label = placing === "line" ? T.view.done : T.view.cancel;
+  return (
+    placing && (
+      <div class="floating placing">
+        <Button label={label} kind="small" onClick={app.controls.finish} />
+      </div>
+    )
   );
 }
 

@@ -15,6 +15,7 @@ export function underWay(state: AppState): string | null {
   if (state.scene.original) return T.status.original;
   if (state.cageProgress !== null) return T.bind.stages.simplify;
   if (state.bindRun) return T.bind.stages[state.bindRun.stage];
+  if (state.placing) return T.status.placing[state.placing];
   if (state.boxArmed) return T.status.boxArmed;
   if (state.playing) return T.status.playing(state.playingPose ?? T.status.rest);
   if (cageBroken(state)) return T.status.broken;
@@ -23,7 +24,8 @@ export function underWay(state: AppState): string | null {
 
 function settled(state: AppState): string {
   const { count, last } = state.selected;
-  if (count === 1) return T.status.selected(last);
+  const inner = last - (state.cage?.info.vertices ?? 0);
+  if (count === 1) return inner < 0 ? T.status.selected(last) : T.status.innerSelected(inner + 1);
   if (count > 1) return T.status.manySelected(count);
   if (state.editingRest) return T.status.reshaping;
   if (state.bound) return T.status.ready;
@@ -31,8 +33,11 @@ function settled(state: AppState): string {
 }
 
 /** What the status line suggests when nothing else is going on. */
-export function hintOf({ cage, bound, bindRun, editingRest }: AppState, isTouch: boolean): string {
+export function hintOf(state: AppState, isTouch: boolean): string {
+  const { cage, bound, bindRun, editingRest, clip, placing } = state;
+  if (placing) return T.hints.placing;
   if (!cage) return T.hints.noCage;
+  if (clip.clip !== null) return T.hints.clip;
   if (editingRest) return isTouch ? T.hints.restTouch : T.hints.rest;
   if (!bound) return bindRun ? T.hints.binding : T.hints.unbound;
   return isTouch ? T.hints.touch : T.hints.pose;

@@ -8,7 +8,11 @@ function page() {
   const fake = createFake();
   const grids: number[] = [];
   let changes = 0;
-  const cage = createCage(fake.ctx, { refine: (grid) => grids.push(grid), carry: () => Promise.resolve() });
+  const cage = createCage(fake.ctx, {
+    refine: (grid) => grids.push(grid),
+    carry: () => Promise.resolve(),
+    carryAlong: () => Promise.resolve(),
+  });
   effect(() => {
     if (fake.store.get().cage) changes += 1;
   });
@@ -101,7 +105,11 @@ it("more vertices than wanted are said", async () => {
 it("a cage that joins separate parts offers one for each", async () => {
   const fake = createFake();
   const { asked, said, store } = fake;
-  const cage = createCage(fake.ctx, { refine: () => undefined, carry: () => Promise.resolve() });
+  const cage = createCage(fake.ctx, {
+    refine: () => undefined,
+    carry: () => Promise.resolve(),
+    carryAlong: () => Promise.resolve(),
+  });
   const made = cage.make();
   await settled();
   asked[0]?.resolve({ ...cageOf(8), bridged: 3 });

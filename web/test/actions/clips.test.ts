@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import { createClips } from "../../src/actions/clips";
+import { rigOf } from "../../src/state";
 import { createFake, MODEL, settled } from "../fake";
 
 const frames: ((now: number) => void)[] = [];
@@ -105,6 +106,25 @@ it("before a bind it says what to do; what cannot be played is told", async () =
   await clips.choose(0);
   await settled();
   expect(problems).toMatchObject([{ title: "The clip cannot be played" }]);
+});
+
+it("a clip that is paused ends when the cage is posed otherwise", async () => {
+  const { clips, store, end } = page();
+  await clips.choose(0);
+  await clips.scrub(0.5);
+  store.set({ undoLabel: "Move" });
+  expect(store.get().clip).toMatchObject({ clip: 0, seconds: 0.5 });
+  end();
+  store.set({ gesture: "Move" });
+  expect(store.get().clip).toMatchObject({ clip: null, seconds: 0 });
+});
+
+it("parts that are kept rigid are those of the model that is open", () => {
+  const { clips, store } = page();
+  clips.rig({ rigid: ["hat", "sword"] });
+  expect(rigOf(store.get()).rigid).toEqual([]);
+  store.set({ model: { ...MODEL, rigged: true, props: ["sword"] } });
+  expect(rigOf(store.get()).rigid).toEqual(["sword"]);
 });
 
 it("another choice for the joints shows the cage's pose again", async () => {

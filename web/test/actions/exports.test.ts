@@ -27,7 +27,7 @@ afterEach(() => {
 
 function page() {
   const fake = createFake();
-  const project = createProject(fake.ctx);
+  const project = createProject(fake.ctx, () => undefined);
   const exports = createExports(fake.ctx, project);
   const { positions, corners } = cageOf(2);
   fake.store.set({ model: MODEL, cage: fake.engine.setCage(positions, corners) });

@@ -16,6 +16,10 @@ function page() {
       fake.store.set({ cage: fake.engine.setCage(positions, corners), check });
       return true;
     },
+    async loadControls(list) {
+      steps.push(`controls ${list[0]?.name}`);
+      return true;
+    },
     async loadCage(list) {
       steps.push(`load ${list[0]?.name}`);
       return true;

@@ -68,7 +68,7 @@ it("a pose brings its pins, and undo those of before", async () => {
 it("pose and poses of a cage of before are carried over, as one step", async () => {
   const { poses, store, ctx, engine, asked, height } = page();
   poses.save();
-  const before = { cage: cageOf(2), positions: engine.cagePositions(), shares: [1] };
+  const before = { cage: cageOf(2), positions: engine.cagePositions(), shares: [1], sampleCage: false };
   const { positions, corners } = cageOf(3);
   store.set({ cage: engine.setCage(positions, corners) });
   const done = poses.carry(before);

@@ -57,16 +57,18 @@ it("a slice that fails is said, and waits for nothing", async () => {
   expect([store.get().slice.busy, problems[0]?.title]).toEqual([false, "The slice could not be computed"]);
 });
 
-it("two halves hold a smaller model each, and go when there is nothing to compare", async () => {
+it("pictures side by side hold a smaller model each, and go when there is nothing to compare", async () => {
   const { view, store, zooms } = page();
-  await view.compare(true);
-  await view.compare(true);
-  expect([store.get().scene.compare, zooms]).toEqual([true, [0.6]]);
-  await view.compare(false);
-  expect(zooms[1]).toBeCloseTo(1 / 0.6);
+  await view.compare(["harmonic", "green"]);
+  await view.compare(["harmonic", "green"]);
+  expect([store.get().scene.compare, zooms]).toEqual([["harmonic", "green"], [0.6]]);
+  await view.compare(["harmonic", "mean_value", "green"]);
+  await view.compare(["green"]);
+  expect(store.get().scene.compare, "one alone is no comparison").toEqual(["harmonic"]);
+  expect(zooms.reduce((all, zoom) => all * zoom)).toBeCloseTo(1);
   const other = page(false);
-  await other.view.compare(true);
-  expect(other.store.get().scene.compare).toBe(false);
+  await other.view.compare(["harmonic", "green"]);
+  expect(other.store.get().scene.compare).toEqual(["harmonic"]);
 });
 
 it("proportional editing stays within its range and keeps its radius", () => {

@@ -7,7 +7,7 @@ use cagework_core::cage_check::Repair;
 use cagework_core::cage_gen::{CageOptions, DETAIL, MAX_TARGET, MIN_TARGET, Shape, Symmetry};
 use clap::{Args, ValueEnum};
 
-use super::{MemoryArgs, ModelOutput, ReadArgs, fraction, positive};
+use super::{MemoryArgs, ModelOutput, ReadArgs, SmoothArgs, fraction, positive};
 
 /// Quads along each edge of a box cage unless said otherwise.
 pub(crate) const DEFAULT_DIVISIONS: u32 = 2;
@@ -59,6 +59,8 @@ pub(crate) struct CageArgs {
     /// Voxels along the model's longest side, 8 to 128; gaps below three of them are closed. 0: by the vertices.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub(crate) voxels: u32,
+    #[command(flatten)]
+    pub(crate) smooth: SmoothArgs,
     /// Name of a clip of which the cage encloses every frame, too.
     #[arg(long, value_name = "NAME")]
     pub(crate) around_clip: Option<String>,
@@ -89,6 +91,7 @@ impl CageArgs {
             per_component: self.per_component,
             clearance: self.clearance,
             voxels: self.voxels,
+            smooth: self.smooth.smooth,
         }
     }
 }
@@ -116,6 +119,8 @@ pub(crate) struct CheckArgs {
     /// Write the mended cage; the name's ending says the format.
     #[arg(short, long, value_name = "FILE", requires = "repair")]
     pub(crate) output: Option<ModelOutput>,
+    #[command(flatten)]
+    pub(crate) smooth: SmoothArgs,
     #[command(flatten)]
     pub(crate) memory: MemoryArgs,
 }

@@ -7,7 +7,7 @@ use cagework_gpu::render::{AxisView, Camera, Theme};
 use cagework_gpu::session::MAX_PICTURE;
 use clap::{Args, ValueEnum};
 
-use super::{CageSource, ReadArgs, SolveArgs, output};
+use super::{CageSource, ControlArgs, ReadArgs, SolveArgs, output};
 
 /// `cagework render`
 #[derive(Args, Debug)]
@@ -32,6 +32,11 @@ pub(crate) struct RenderArgs {
     /// The cage, moved: the model follows.
     #[arg(long, value_name = "FILE", requires = "cage")]
     pub(crate) pose: Option<PathBuf>,
+    /// The controls inside, moved (.obj).
+    #[arg(long, value_name = "FILE", requires_all = ["pose", "controls"])]
+    pub(crate) pose_controls: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) controls: ControlArgs,
     /// Weights that `cagework bind --weights` wrote, instead of binding here.
     #[arg(long, value_name = "FILE", requires = "cage")]
     pub(crate) weights: Option<PathBuf>,
@@ -91,6 +96,8 @@ pub(crate) enum Compared {
     MeanValue,
     /// Green coordinates, which keep the shape of details and are not held inside the cage.
     Green,
+    /// Harmonic coordinates of the plain cage, beside those of --smooth and --controls.
+    Plain,
 }
 
 /// What is drawn.

@@ -24,6 +24,10 @@ pub(super) enum Way {
     PaperThreads,
     /// The same on the GPU.
     PaperGpu,
+    /// Embedded conjugate gradients on one thread.
+    CgOneThread,
+    /// The same on all threads.
+    CgThreads,
     /// Embedded multigrid on one thread.
     MultigridOneThread,
     /// Embedded multigrid on all threads.
@@ -34,10 +38,12 @@ pub(super) enum Way {
 
 impl Way {
     /// In the order of the plots.
-    pub(super) const ALL: [Self; 6] = [
+    pub(super) const ALL: [Self; 8] = [
         Self::PaperOneThread,
         Self::PaperThreads,
         Self::PaperGpu,
+        Self::CgOneThread,
+        Self::CgThreads,
         Self::MultigridOneThread,
         Self::MultigridThreads,
         Self::MultigridGpu,
@@ -49,6 +55,8 @@ impl Way {
             Self::PaperOneThread => "paper, one thread",
             Self::PaperThreads => "paper, all threads",
             Self::PaperGpu => "paper, GPU",
+            Self::CgOneThread => "conjugate gradients, one thread",
+            Self::CgThreads => "conjugate gradients, all threads",
             Self::MultigridOneThread => "multigrid, one thread",
             Self::MultigridThreads => "multigrid, all threads",
             Self::MultigridGpu => "multigrid, GPU",
@@ -61,15 +69,21 @@ impl Way {
             Self::PaperOneThread => "paper-one-thread",
             Self::PaperThreads => "paper-threads",
             Self::PaperGpu => "paper-gpu",
+            Self::CgOneThread => "cg-one-thread",
+            Self::CgThreads => "cg-threads",
             Self::MultigridOneThread => "multigrid-one-thread",
             Self::MultigridThreads => "multigrid-threads",
             Self::MultigridGpu => "multigrid-gpu",
         }
     }
 
-    /// Whether it is the paper's method.
-    pub(super) fn is_paper(self) -> bool {
-        matches!(self, Self::PaperOneThread | Self::PaperThreads | Self::PaperGpu)
+    /// What an iteration of it is called.
+    pub(super) fn iterations(self) -> &'static str {
+        match self {
+            Self::PaperOneThread | Self::PaperThreads | Self::PaperGpu => "sweeps",
+            Self::CgOneThread | Self::CgThreads => "steps",
+            Self::MultigridOneThread | Self::MultigridThreads | Self::MultigridGpu => "cycles",
+        }
     }
 
     /// Whether the GPU solves.
@@ -79,13 +93,13 @@ impl Way {
 
     fn options(self, grid: u32, tau: f32) -> BindOptions {
         let threads = match self {
-            Self::PaperOneThread | Self::MultigridOneThread => 1,
+            Self::PaperOneThread | Self::CgOneThread | Self::MultigridOneThread => 1,
             _ => 0,
         };
-        let (method, solver) = if self.is_paper() {
-            (Method::Classic, Solver::Jacobi)
-        } else {
-            (Method::Embedded, Solver::Multigrid)
+        let (method, solver) = match self {
+            Self::PaperOneThread | Self::PaperThreads | Self::PaperGpu => (Method::Classic, Solver::Jacobi),
+            Self::CgOneThread | Self::CgThreads => (Method::Embedded, Solver::ConjugateGradient),
+            _ => (Method::Embedded, Solver::Multigrid),
         };
         BindOptions { grid, tau, method, solver, threads, ..BindOptions::default() }
     }
@@ -204,7 +218,7 @@ impl Evaluation {
             eprintln!("{}, g = {grid}, tau = {tau:e}", way.name());
             let options = way.options(grid, tau);
             match gpu {
-                Ok(context) if way.is_gpu() => bind_on(context, &model.positions, cage, &options),
+                Ok(context) if way.is_gpu() => bind_on(context, &model.positions, cage.into(), &options),
                 _ => bind_model(model, cage, &options),
             }
         };

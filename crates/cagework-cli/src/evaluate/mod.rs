@@ -14,7 +14,7 @@ use std::path::Path;
 use cagework_core::Cage;
 use cagework_io::{Model, UpAxis};
 
-use crate::args::{EvaluateArgs, MemoryArgs};
+use crate::args::{ControlArgs, EvaluateArgs, MemoryArgs};
 use crate::error::CliError;
 use crate::files::{json, make_folder, print, shown_path, write};
 use crate::gpu;
@@ -56,12 +56,12 @@ pub(crate) fn run(args: &EvaluateArgs, as_json: bool) -> Result<(), CliError> {
 fn input(args: &EvaluateArgs) -> Result<(String, Model, Cage), CliError> {
     if let (Some(mesh), Some(cage)) = (&args.mesh, &args.cage) {
         let model = load_model(mesh, UpAxis::Y, MemoryArgs::default())?;
-        let cage = load_cage(cage, &model, MemoryArgs::default())?.cage;
+        let cage = load_cage(cage, &model, MemoryArgs::default(), &ControlArgs::default())?.cage;
         return Ok((mesh.display().to_string(), model, cage));
     }
     let BuiltIn { name, model, cage: own, .. } = built_in()?;
     let cage = match &args.cage {
-        Some(source) => load_cage(source, &model, MemoryArgs::default())?.cage,
+        Some(source) => load_cage(source, &model, MemoryArgs::default(), &ControlArgs::default())?.cage,
         None => own,
     };
     Ok((format!("built-in sample, {name}"), model, cage))
@@ -127,7 +127,7 @@ fn error_csv(evaluation: &Evaluation) -> String {
 
 fn delta_csv(evaluation: &Evaluation) -> String {
     let mut csv = String::from("way,iteration,time_ms,delta\n");
-    for way in [Way::PaperOneThread, Way::PaperGpu, Way::MultigridThreads] {
+    for way in [Way::PaperOneThread, Way::PaperGpu, Way::CgThreads, Way::MultigridThreads] {
         if let Some(run) = evaluation.delta_run(way) {
             for (k, (time, delta)) in run.delta_over_time().enumerate() {
                 let iteration = (k as u32 + 1) * run.report.delta_interval;

@@ -7,16 +7,18 @@ use crate::error::CliError;
 use super::cases::{ERROR_TAUS, Evaluation, TIMED_TAUS, Way};
 
 /// Width and height of a plot.
-const SIZE: (u32, u32) = (820, 460);
+const SIZE: (u32, u32) = (960, 460);
 
 /// Distinguishable without colour vision (Okabe and Ito 2008).
-const COLOURS: [RGBColor; 6] = [
+const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(213, 94, 0),
     RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+    RGBColor(240, 228, 66),
 ];
 
 const FONT: (&str, u32) = ("sans-serif", 15);
@@ -58,7 +60,7 @@ fn times(evaluation: &Evaluation, grid: u32, tau: f32) -> Plot {
         let mut chart = ChartBuilder::on(&root)
             .caption(format!("Time to completion, g = {grid}, tau = {tau:e}"), ("sans-serif", 20))
             .margin(12)
-            .x_label_area_size(52)
+            .x_label_area_size(64)
             .y_label_area_size(70)
             .build_cartesian_2d(0.0..n as f64, (low..high).log_scale())?;
         chart
@@ -77,8 +79,9 @@ fn times(evaluation: &Evaluation, grid: u32, tau: f32) -> Plot {
             chart.draw_series([Text::new(label, (left, time * 1.45), ("sans-serif", 15))])?;
             // What stands left of the plot, and its share of the rest.
             let (edge, width) = (12 + 70, (SIZE.0 as i32 - 94) / n.max(1) as i32);
-            for (line, part) in (0..).zip(way.name().split(", ")) {
-                let place = (edge + width * k as i32 + width / 7, SIZE.1 as i32 - 52 + 17 * line);
+            let name = way.name().replace("conjugate gradients", "conjugate, gradients");
+            for (line, part) in (0..).zip(name.split(", ")) {
+                let place = (edge + width * k as i32 + width / 7, SIZE.1 as i32 - 66 + 17 * line);
                 root.draw(&Text::new(part, place, ("sans-serif", 14)))?;
             }
         }
@@ -89,17 +92,14 @@ fn times(evaluation: &Evaluation, grid: u32, tau: f32) -> Plot {
 
 /// Figure 7: delta over time, both axes logarithmic.
 fn delta(evaluation: &Evaluation) -> Plot {
-    let series: Vec<(Way, Vec<(f64, f64)>)> =
-        [Way::PaperOneThread, Way::PaperThreads, Way::PaperGpu, Way::MultigridThreads, Way::MultigridGpu]
-            .into_iter()
-            .filter_map(|way| {
-                let run = evaluation.delta_run(way)?;
-                Some((
-                    way,
-                    run.delta_over_time().map(|(t, d)| (t.max(1e-3), f64::from(d).max(1e-12))).collect(),
-                ))
-            })
-            .collect();
+    let series: Vec<(Way, Vec<(f64, f64)>)> = Way::ALL
+        .into_iter()
+        .filter(|way| *way != Way::MultigridOneThread)
+        .filter_map(|way| {
+            let run = evaluation.delta_run(way)?;
+            Some((way, run.delta_over_time().map(|(t, d)| (t.max(1e-3), f64::from(d).max(1e-12))).collect()))
+        })
+        .collect();
     let (left, right) = decades(series.iter().flat_map(|s| s.1.iter().map(|p| p.0)));
     let (low, high) = decades(series.iter().flat_map(|s| s.1.iter().map(|p| p.1)));
     lines(

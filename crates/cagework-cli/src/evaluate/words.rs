@@ -21,6 +21,21 @@ pub(super) fn verdicts(evaluation: &Evaluation) -> String {
                 factors(all, one)
             );
         }
+        let beside = (run(Way::PaperOneThread), run(Way::CgOneThread), run(Way::MultigridOneThread));
+        if let (Some(paper), Some(cg), Some(multigrid)) = beside {
+            let needs = |run: &Run| format!("{} {}", run.report.iterations, run.way.iterations());
+            let _ = writeln!(
+                out,
+                "- At g = {grid} the paper's algorithm needs {}, conjugate gradients in our cells {}, multigrid {}; on one thread \
+                 they take {}, {} and {}.",
+                needs(paper),
+                needs(cg),
+                needs(multigrid),
+                times(paper),
+                times(cg),
+                times(multigrid)
+            );
+        }
         if let (Some(paper), Some(ours)) = (run(Way::PaperOneThread), run(Way::MultigridThreads)) {
             let _ = writeln!(
                 out,
@@ -164,7 +179,10 @@ pub(super) fn report(evaluation: &Evaluation) -> String {
         verdicts(evaluation)
     );
     time_table(evaluation, &mut out);
-    out.push_str("## Delta over time (figure 7)\n\n![delta over time](figure-7.svg)\n\n");
+    out.push_str(
+        "## Delta over time (figure 7)\n\nWhat is left to do while each solver runs: for the paper's the change of the last sweep, for the others \
+         the error that is expected to remain.\n\n![delta over time](figure-7.svg)\n\n",
+    );
     error_table(evaluation, &mut out);
     out.push_str(
         "## Reconstructions (figures 2 to 5)\n\n| file | what | mean error | largest |\n|---|---|---|---|\n",
@@ -197,7 +215,11 @@ fn measured(runs: u32) -> String {
 }
 
 fn time_table(evaluation: &Evaluation, out: &mut String) {
-    out.push_str("## Time to completion (figures 8 to 11)\n\n| g | tau |");
+    out.push_str(
+        "## Time to completion (figures 8 to 11)\n\nA row is a grid of g cells along the cage and the threshold tau below which a solver \
+         stops; a column is a way to the weights. In it: how long a whole bind takes, and how many iterations of the solver. \
+         Conjugate gradients and multigrid solve our cells.\n\n| g | tau |",
+    );
     for way in Way::ALL {
         let _ = write!(out, " {} |", way.name());
     }
@@ -209,8 +231,7 @@ fn time_table(evaluation: &Evaluation, out: &mut String) {
                 match evaluation.timed(way, grid, tau) {
                     Some(run) => {
                         let r = &run.report;
-                        let unit = if way.is_paper() { "sweeps" } else { "cycles" };
-                        let _ = write!(out, " {}, {} {unit} |", times(run), r.iterations);
+                        let _ = write!(out, " {}, {} {} |", times(run), r.iterations, way.iterations());
                     }
                     None => out.push_str(" - |"),
                 }
@@ -225,7 +246,10 @@ fn time_table(evaluation: &Evaluation, out: &mut String) {
 }
 
 fn error_table(evaluation: &Evaluation, out: &mut String) {
-    out.push_str("## Mean reconstruction error (figure 12)\n\n| g |");
+    out.push_str(
+        "## Mean reconstruction error (figure 12)\n\nHow far the weights put a point of the model from where it is at rest, on average: 1e-2 \
+         is a hundredth of the cage's diagonal.\n\n| g |",
+    );
     for tau in ERROR_TAUS {
         let _ = write!(out, " paper, tau = {tau:e} |");
     }

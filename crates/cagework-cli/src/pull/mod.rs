@@ -10,15 +10,15 @@ use cagework_core::deform::deform_bound;
 use cagework_core::mesh::TriMesh;
 use cagework_core::progress::Silent;
 use cagework_core::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
-use cagework_core::{BindOptions, bind};
-use cagework_io::{SavedWeights, UpAxis, shown};
+use cagework_core::{BindOptions, InnerControls, bind};
+use cagework_io::{SavedWeights, UpAxis, shown, write_inner_controls};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::args::{CageSource, PullArgs};
 use crate::deform::load_weights;
 use crate::error::CliError;
-use crate::files::{check_outputs, json, print, write};
+use crate::files::{check_outputs, json, print, shown_path, write};
 use crate::load::{load_cage, load_model};
 use job::Job;
 use measure::{Stretches, far_mean, stretches};
@@ -65,25 +65,41 @@ pub(crate) fn run(args: &PullArgs, as_json: bool) -> Result<(), CliError> {
     if let CageSource::File(path) = &args.cage {
         inputs.push(path);
     }
+    inputs.extend(args.controls.controls.as_deref());
     let output = &args.output.path;
-    check_outputs(&[output], &inputs)?;
+    let outputs: Vec<&Path> =
+        std::iter::once(output).chain(&args.save_controls).map(std::path::PathBuf::as_path).collect();
+    check_outputs(&outputs, &inputs)?;
     let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
-    let cage = load_cage(&args.cage, &model, args.read.memory)?;
-    let SavedWeights { weights, outside, .. } =
+    let cage = load_cage(&args.cage, &model, args.read.memory, &args.controls)?;
+    let controls = cage.controls();
+    let SavedWeights { weights, outside, inner_controls, .. } =
         load_weights(&args.weights, &model, &cage.cage, args.read.memory)?.of_vertices();
+    let inner = &controls.rest()[cage.cage.n_vertices()..];
+    if inner_controls != inner {
+        return Err(CliError::Mismatch {
+            message: format!(
+                "{}: was bound with {} controls inside the cage, but {} are given, or they are elsewhere",
+                shown_path(&args.weights),
+                inner_controls.len(),
+                inner.len()
+            ),
+            hint: "give the --controls and --smooth of `cagework bind`",
+        });
+    }
     let start = match &job.start {
-        Some(path) => cage.load_pose(path)?,
-        None => cage.cage.positions().to_vec(),
+        Some(path) => [cage.load_pose(path)?.as_slice(), inner].concat(),
+        None => controls.rest().to_vec(),
     };
     let wrong = |e| CliError::file(&args.job, e);
 
     let begun = Instant::now();
     let mesh = TriMesh { positions: model.positions.clone(), triangles: model.triangles.clone() };
-    let probes = Probes::new(&mesh, &cage.cage).map_err(wrong)?;
+    let probes = Probes::new(&mesh, controls).map_err(wrong)?;
     let options =
         BindOptions { grid: args.grid, memory_limit: args.read.memory.bytes(), ..BindOptions::default() };
-    let of_probes = bind(probes.points(), &cage.cage, &options, &Silent)?.weights;
-    let pull = Pull::new(&mesh, &cage.cage, probes, &of_probes).map_err(wrong)?;
+    let of_probes = bind(probes.points(), controls, &options, &Silent)?.weights;
+    let pull = Pull::new(&mesh, controls, probes, &of_probes).map_err(wrong)?;
     let precompute_ms = since(begun);
 
     let begun = Instant::now();
@@ -118,7 +134,12 @@ pub(crate) fn run(args: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let after = deformed(&cage_pose);
     let way = grabbed.iter().zip(&to).map(|(a, b)| a.distance(*b)).fold(f64::MIN_POSITIVE, f64::max);
     let apart = |(a, b): (&Vec3, &Vec3)| f64::from(a.distance(*b));
-    write(output, &cage.write_pose(&cage_pose, &args.output)?)?;
+    let (of_cage, of_inner) = cage_pose.split_at(cage.cage.n_vertices());
+    write(output, &cage.write_pose(of_cage, &args.output)?)?;
+    if let (Some(path), Some(inner)) = (&args.save_controls, cage.inner()) {
+        let positions = model.up().turned_back(of_inner).into_owned();
+        write(path, &write_inner_controls(&InnerControls { positions, ..inner.clone() }))?;
+    }
     let done = Pulled {
         output: output.display().to_string(),
         samples: pull.n_samples(),

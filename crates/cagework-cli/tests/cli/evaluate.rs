@@ -98,7 +98,14 @@ fn evaluation_writes_what_it_names_and_claims_what_it_measured() {
 fn claims_follow_from_times(report: &str, table: &Table) {
     for g in &GRIDS[1..] {
         for tau in ["1e-4", "1e-5"] {
-            for way in ["paper-one-thread", "paper-threads", "multigrid-one-thread", "multigrid-threads"] {
+            for way in [
+                "paper-one-thread",
+                "paper-threads",
+                "cg-one-thread",
+                "cg-threads",
+                "multigrid-one-thread",
+                "multigrid-threads",
+            ] {
                 let row = row(table, way, *g, tau);
                 assert_eq!(row["runs"], "3");
                 assert_eq!(row["converged"], "true", "{way}, g = {g}, tau = {tau}");
@@ -124,6 +131,13 @@ fn claims_follow_from_times(report: &str, table: &Table) {
             assert_eq!(threaded.contains(verdict), k == expected, "{one:?} {all:?}: {threaded}");
         }
         assert_eq!(threaded.contains("within the spread"), expected == 2, "{threaded}");
+        let needs = line(report, "conjugate gradients in our cells", &format!("At g = {g} "));
+        for (way, unit) in
+            [("paper-one-thread", "sweeps"), ("cg-one-thread", "steps"), ("multigrid-one-thread", "cycles")]
+        {
+            let n = &row(table, way, *g, "1e-5")["iterations"];
+            assert!(needs.contains(&format!("{n} {unit}")), "{way} needs {n}: {needs}");
+        }
         let ours = times("multigrid-threads");
         let factor = line(report, "Embedded multigrid on all threads", &format!("g = {g},"));
         assert_eq!(factor.contains("times as fast"), ours.1 < one.0, "{one:?} {ours:?}: {factor}");

@@ -7,6 +7,7 @@ mod bench_and_demo;
 mod bind;
 mod cage_and_info;
 mod cages;
+mod controls;
 mod deform;
 mod evaluate;
 #[cfg(unix)]

@@ -46,6 +46,9 @@ pub struct RowOptions {
     pub threshold: f32,
     /// Restore sum and rest position of every row. Off for the classic method, which shows its errors.
     pub preserve_affine: bool,
+    /// Rows that cannot be restored without negative weights only get their sum back: next to a ball or tube, which has one
+    /// value all around, no weights have a point's place. An offset keeps it.
+    pub may_miss: bool,
 }
 
 /// A matrix of weights and what was found out about its rows.
@@ -244,7 +247,7 @@ impl Run<'_> {
             let target = columns.scale(point.as_dvec3());
             let outside = is_outside(self.first + v);
             let lowest = self.load(v, 0.0, &mut row);
-            let (raw, stored) = if options.preserve_affine && !outside {
+            let (raw, mut stored) = if options.preserve_affine && !outside {
                 self.restore_row(v, columns, options.threshold, &mut row, target)
             } else if options.threshold > 0.0 {
                 // Errors, and the place of a vertex outside, are not sparsification's to change.
@@ -256,7 +259,17 @@ impl Run<'_> {
                 let raw = columns.sums(&row, target);
                 (raw, raw)
             };
-            self.facts.push(RowFacts::of(&row, stored, (!outside).then_some(RawRow { sums: raw, lowest })));
+            let misses = options.may_miss
+                && !outside
+                && (stored.miss > NOT_RESTORED || row.iter().flatten().any(|&w| w < 0.0));
+            if misses {
+                self.load(v, 0.0, &mut row);
+                let sum = columns.sums(&row, target).sum as f32;
+                row.iter_mut().flatten().for_each(|w| *w /= sum);
+                stored = columns.sums(&row, target);
+            }
+            let raw = (!outside && !misses).then_some(RawRow { sums: raw, lowest });
+            self.facts.push(RowFacts::of(&row, stored, raw));
             take(self, v, &row);
         }
     }

@@ -6,6 +6,7 @@
 
 use glam::DVec3;
 
+use super::BindError;
 use crate::cage::Cage;
 use crate::controls::Controls;
 use crate::grid::Grid;
@@ -52,6 +53,29 @@ pub(super) struct Vertices {
     pub(super) points: usize,
 }
 
+/// Bytes that a bind will need at once.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Needed {
+    pub(super) bytes: u64,
+    /// What of them grows with the points, not with the grid.
+    of_points: u64,
+}
+
+impl Needed {
+    /// # Errors
+    /// [`BindError`] that says what the memory is for, if it is more than the limit.
+    pub(super) fn check(self, vertices: Vertices, n_columns: usize, limit: u64) -> Result<(), BindError> {
+        let needed = self.bytes;
+        if needed <= limit {
+            Ok(())
+        } else if 2 * self.of_points > needed {
+            Err(BindError::WeightsMemory { needed, limit, points: vertices.points, columns: n_columns })
+        } else {
+            Err(BindError::Memory { needed, limit })
+        }
+    }
+}
+
 /// Bytes that a bind will need at once. `threads` 0: fields are kept elsewhere.
 pub(super) fn estimate(
     controls: Controls<'_>,
@@ -59,7 +83,7 @@ pub(super) fn estimate(
     vertices: Vertices,
     threads: usize,
     options: &BindOptions,
-) -> u64 {
+) -> Needed {
     let (volume, area) = volume_and_area(controls.surface());
     let cell = grid.cell;
     let n_cells = grid.n_cells() as f64;
@@ -97,9 +121,12 @@ pub(super) fn estimate(
     let blocks = points as f64 * n_batches * row;
     // Rows of points that several vertices share are copied once all of them are there.
     let copies = if rows > points { bytes_of(rows) } else { blocks };
-    let weights = (blocks + fields).max(bytes_of(points) + copies.max(blocks));
-    let held = options.held as f64 + ROW_BYTES * rows as f64 + POINT_BYTES * points as f64;
-    (held + voxels * (1.0 + COARSER) + lines + stencils * (1.0 + 2.0 * COARSER) + weights) as u64
+    let assembled = bytes_of(points) + copies.max(blocks);
+    let (weights, fields) = if blocks + fields > assembled { (blocks, fields) } else { (assembled, 0.0) };
+    let of_points = ROW_BYTES * rows as f64 + POINT_BYTES * points as f64 + weights;
+    let of_grid = voxels * (1.0 + COARSER) + lines + stencils * (1.0 + 2.0 * COARSER) + fields;
+    let bytes = options.held as f64 + of_points + of_grid;
+    Needed { bytes: bytes as u64, of_points: of_points as u64 }
 }
 
 /// Volume enclosed (divergence theorem) and area of the cage.

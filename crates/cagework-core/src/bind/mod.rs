@@ -28,7 +28,7 @@ pub struct Binding {
     /// One row per mesh vertex in the caller's order, one column per control. A row of a vertex outside the cage
     /// holds the weights of the closest point on the cage.
     pub weights: Weights,
-    /// Vertices outside the cage, ascending.
+    /// Vertices that an offset keeps in place, ascending: those outside the cage, and those inside of a control or next to one.
     pub outside: Vec<OutsideVertex>,
     /// What was measured.
     pub report: BindReport,
@@ -59,6 +59,22 @@ pub enum BindError {
         needed: u64,
         /// Bytes allowed.
         limit: u64,
+    },
+    /// More memory would be needed than allowed, and most of it for the weights, whatever the grid.
+    #[error(
+        "binding needs about {} MiB, more than the limit of {} MiB, most of it for the weights of {} points, one for each of \
+         {columns} cage vertices: use a cage with fewer vertices or raise the limit",
+        needed >> 20, limit >> 20, grouped(*points)
+    )]
+    WeightsMemory {
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes allowed.
+        limit: u64,
+        /// Different points to be bound.
+        points: usize,
+        /// Cage vertices.
+        columns: usize,
     },
     /// No cell centre lies inside the cage.
     #[error("no cell of the {grid}-cell grid lies inside the cage: use a finer grid")]
@@ -116,5 +132,5 @@ pub fn estimate_memory<'a>(
     let controls = controls.into();
     let grid = voxels::Voxels::grid(controls.surface(), options);
     let vertices = memory::Vertices { rows: n_points, points: n_points };
-    Ok(memory::estimate(controls, &grid, vertices, options.threads.max(1), options))
+    Ok(memory::estimate(controls, &grid, vertices, options.threads.max(1), options).bytes)
 }

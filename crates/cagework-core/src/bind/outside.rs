@@ -7,7 +7,6 @@ use glam::{DVec3, Vec3};
 use super::BindError;
 use crate::cage::Cage;
 use crate::mesh::Bounds;
-use crate::sample::Stencils;
 
 /// Cage and model that differ in size by this factor or more are taken to be in different units, of which feet and metres differ
 /// least; a cage is seldom twice as large as its model.
@@ -62,20 +61,11 @@ fn about(x: f64) -> String {
     if (0.01..1e4).contains(&rounded) { rounded.to_string() } else { format!("{rounded:e}") }
 }
 
-/// [`BindError::NoneInside`] if the cage holds none of the model: nothing would follow it but by its closest point.
-/// `positions` of the file, `stencils` of those that differ.
-pub(super) fn refuse_unless_any_is_inside(
-    cage: &Cage,
-    positions: &[Vec3],
-    stencils: &Stencils,
-) -> Result<(), BindError> {
-    match Bounds::of(positions) {
-        Some(model) if stencils.outside.len() == stencils.len() => {
-            let misfit = Misfit::of(cage.bounds(), model);
-            Err(BindError::NoneInside { vertices: positions.len(), misfit })
-        }
-        _ => Ok(()),
-    }
+/// [`BindError::NoneInside`]: the cage holds none of the model, and nothing would follow it but by its closest point. `positions`,
+/// of which there are some: of the file.
+pub(super) fn none_inside(cage: &Cage, positions: &[Vec3]) -> BindError {
+    let model = Bounds::of(positions).unwrap_or(cage.bounds());
+    BindError::NoneInside { vertices: positions.len(), misfit: Misfit::of(cage.bounds(), model) }
 }
 
 #[cfg(test)]

@@ -3,23 +3,25 @@
 //! Everything but the middle is the same for every back end: [`Prepared::new`], then whoever solves makes a
 //! [`Solved`], then [`Prepared::finish`].
 
+use std::cell::LazyCell;
+
 use glam::{DVec3, Vec3};
 
 use crate::assemble::{Assembled, RowOptions, assemble};
-use crate::cage::Cage;
 use crate::controls::Controls;
 use crate::deform::{OutsideVertex, triangle_frame};
+use crate::grid::Grid;
 use crate::mesh::{Weld, weld};
 use crate::options::{Backend, BindOptions, Method, OutsidePolicy};
 use crate::progress::{Progress, Stage};
 use crate::report::{BindReport, MemoryBytes, Timings, WeightStats};
-use crate::sample::{Outside, Stencils};
+use crate::sample::{ClosestOnCage, Outside, Stencils};
 use crate::solve::hierarchy::Hierarchy;
 use crate::solve::rows::Row;
 use crate::solve::stop::SolveReport;
 use crate::team::{Team, VERTEX_RUN};
 
-use super::outside::refuse_unless_any_is_inside;
+use super::outside::none_inside;
 use super::solving::solve_and_sample;
 use super::voxels::Voxels;
 use super::watch::Watch;
@@ -110,16 +112,10 @@ impl<'a> Prepared<'a> {
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
         let grid = Voxels::grid(controls.surface(), options);
         let field_threads = if fields == FieldsOn::Host { team.n_threads() } else { 0 };
-        let estimated = memory::estimate(
-            controls,
-            &grid,
-            memory::Vertices { rows: positions.len(), points: points.len() },
-            field_threads,
-            options,
-        );
-        if estimated > options.memory_limit {
-            return Err(BindError::Memory { needed: estimated, limit: options.memory_limit });
-        }
+        let vertices = memory::Vertices { rows: positions.len(), points: points.len() };
+        let needed = memory::estimate(controls, &grid, vertices, field_threads, options);
+        needed.check(vertices, controls.n_controls(), options.memory_limit)?;
+        let estimated = needed.bytes;
         let voxels = team.install(|| Voxels::new(controls, grid, options));
         watch.report(Stage::Voxelize, 1.0, 0, None)?;
         if voxels.hierarchy.levels[0].n_unknowns() == 0 && options.method == Method::Classic {
@@ -128,7 +124,7 @@ impl<'a> Prepared<'a> {
         let voxelized = watch.now_ms();
 
         let stencils = sampling_stencils(controls, &voxels, &points, &team, watch)?;
-        refuse_outside(controls.surface(), positions, &stencils, options, &welded)?;
+        refuse_outside(controls, positions, &stencils, options, &welded)?;
         let times_ms = [began, voxelized, watch.now_ms()];
         Ok(Self { positions, controls, options, welded, points, team, voxels, stencils, estimated, times_ms })
     }
@@ -155,6 +151,7 @@ impl<'a> Prepared<'a> {
         let row_options = RowOptions {
             threshold: self.options.sparsify,
             preserve_affine: self.options.method == Method::Embedded,
+            may_miss: self.options.method == Method::Embedded && self.controls.inner().is_some(),
         };
         let is_outside = |vertex| self.stencils.is_outside(vertex);
         let blocks_bytes: usize = solved.blocks.iter().map(|b| size_of_val(b.as_slice())).sum();
@@ -177,6 +174,7 @@ impl<'a> Prepared<'a> {
         let [began, voxelized, stencils_made] = self.times_ms;
         let cage = controls.surface();
         let (rest_error, raw_error, weight_stats) = rows.statistics(f64::from(cage.diagonal()));
+        let kept = at_vertices(&kept_by_offsets(controls, &stencils.outside, &rows, &points), &welded);
         let held =
             options.held as usize + size_of_val(welded.unique_of.as_slice()) + size_of_val(points.as_slice());
         let held = held + voxels.bytes + stencils.bytes();
@@ -185,15 +183,24 @@ impl<'a> Prepared<'a> {
         let weights = if all_differ { rows.weights } else { rows.weights.with_rows(&welded.unique_of) };
         let copies = if all_differ { 0 } else { weights.bytes() };
         let peak = held + (blocks_bytes + solved.field_bytes).max(of_points + blocks_bytes.max(copies));
-        let outside = outside_vertices(cage, &stencils.outside, positions, &welded);
         watch.report(Stage::Sample, 1.0, solved.iterations, None)?;
         let ended = watch.now_ms();
 
         let n_vertices = positions.len().saturating_sub(options.extra_points);
         let solve_ms = (sampled - stencils_made) * solved.solve_share;
         let level = &voxels.hierarchy.levels[0];
-        let mut notices: Vec<String> = cage.notices().iter().map(ToString::to_string).collect();
+        let mut notices: Vec<String> = controls.cage().notices().iter().map(ToString::to_string).collect();
         notices.extend(team.notice(options.threads).into_iter().chain(voxels.notices));
+        notices.extend(notices_of(controls, &level.grid, options.grid));
+        let is_vertex = |o: &&(u32, OutsideVertex)| (o.1.vertex as usize) < n_vertices;
+        // Vertices inside of a control, or next to one, are not outside.
+        let near_cage = |facet: u32| controls.cage_face(cage.face_of_facet()[facet as usize]).is_some();
+        let near_cage = |o: &&(u32, OutsideVertex)| {
+            let point = welded.unique_of[o.1.vertex as usize];
+            near_cage(o.0) && stencils.is_outside(point as usize)
+        };
+        let held_vertices = kept.iter().filter(is_vertex).count();
+        let outside_vertices = kept.iter().filter(is_vertex).filter(near_cage).count();
         let narrow = |history: Vec<f64>| history.into_iter().map(|x| x as f32).collect();
         let report = BindReport {
             method: options.method,
@@ -227,11 +234,15 @@ impl<'a> Prepared<'a> {
             raw_error,
             weights: WeightStats { nonzeros: weights.indptr()[n_vertices] as u64, ..weight_stats },
             vertices: n_vertices as u64,
-            cage_vertices: controls.n_controls() as u64,
-            outside_vertices: outside.iter().filter(|o| (o.vertex as usize) < n_vertices).count() as u64,
+            cage_vertices: controls.cage().n_vertices() as u64,
+            inner_controls: (controls.n_controls() - controls.cage().n_vertices()) as u64,
+            smooth: controls.smooth(),
+            outside_vertices: outside_vertices as u64,
+            held_vertices: (held_vertices - outside_vertices) as u64,
             ambiguous_cells: voxels.ambiguous,
             notices,
         };
+        let outside = kept.into_iter().map(|(_, o)| o).collect();
         Ok(Binding { weights, outside, report })
     }
 }
@@ -264,15 +275,20 @@ fn sampling_stencils(
 }
 
 fn refuse_outside(
-    cage: &Cage,
+    controls: Controls<'_>,
     positions: &[Vec3],
     stencils: &Stencils,
     options: &BindOptions,
     welded: &Weld,
 ) -> Result<(), BindError> {
-    refuse_unless_any_is_inside(cage, positions, stencils)?;
+    let cage = controls.surface();
+    let near_cage = |o: &&Outside| controls.cage_face(cage.face_of_facet()[o.triangle as usize]).is_some();
+    let outside = stencils.outside.iter().filter(near_cage);
+    if outside.clone().count() == stencils.len() {
+        return Err(none_inside(cage, positions));
+    }
     let n_vertices = positions.len().saturating_sub(options.extra_points);
-    let vertices = stencils.outside.iter().map(|o| welded.first[o.vertex as usize]);
+    let vertices = outside.map(|o| welded.first[o.vertex as usize]);
     let mut vertices = vertices.filter(|&v| (v as usize) < n_vertices);
     match (options.outside, vertices.next()) {
         (OutsidePolicy::Refuse, Some(first)) => {
@@ -282,28 +298,70 @@ fn refuse_outside(
     }
 }
 
-/// Every input vertex outside the cage with its offset from the closest point, in that triangle's frame.
-fn outside_vertices(
-    cage: &Cage,
+/// Points that an offset keeps in place, ascending, and the facet near each: those outside the cage or inside of a control, and
+/// those next to a ball or tube whose rows could not be restored. Their `vertex` is a row of `rows`.
+fn kept_by_offsets(
+    controls: Controls<'_>,
     outside: &[Outside],
-    positions: &[Vec3],
-    welded: &Weld,
-) -> Vec<OutsideVertex> {
-    let found = |unique: u32| outside.binary_search_by_key(&unique, |o| o.vertex).ok().map(|k| outside[k]);
-    if outside.is_empty() {
+    rows: &Assembled,
+    points: &[Vec3],
+) -> Vec<(u32, OutsideVertex)> {
+    let is_outside = |point: u32| outside.binary_search_by_key(&point, |o| o.vertex).is_ok();
+    let closest = LazyCell::new(|| ClosestOnCage::new(controls.surface()));
+    let near = |point: u32| closest.find(points[point as usize].as_dvec3()).triangle;
+    let mut near: Vec<(u32, u32)> = (0u32..)
+        .zip(&rows.facts)
+        .filter(|(point, facts)| facts.error.is_none() && !is_outside(*point))
+        .map(|(point, _)| (point, near(point)))
+        .chain(outside.iter().map(|o| (o.vertex, o.triangle)))
+        .collect();
+    near.sort_unstable();
+    let kept = near.into_iter().map(|(point, facet)| {
+        let (columns, weights) = rows.weights.row(point as usize);
+        let place: DVec3 = columns
+            .iter()
+            .zip(weights)
+            .map(|(&c, &w)| f64::from(w) * controls.rest()[c as usize].as_dvec3())
+            .sum();
+        let corners = controls.frame_near(facet);
+        let frame = triangle_frame(corners.map(|c| controls.rest()[c as usize]));
+        let offset = frame.transpose() * (points[point as usize].as_dvec3() - place).as_vec3();
+        (facet, OutsideVertex { vertex: point, corners, offset })
+    });
+    kept.collect()
+}
+
+/// Every input vertex at one of some points. `[n_kept]`, ascending.
+fn at_vertices(kept: &[(u32, OutsideVertex)], welded: &Weld) -> Vec<(u32, OutsideVertex)> {
+    if kept.is_empty() {
         return Vec::new();
     }
+    let of_point = |point: u32| kept.binary_search_by_key(&point, |(_, o)| o.vertex).ok().map(|k| kept[k]);
     (0u32..)
         .zip(&welded.unique_of)
-        .filter_map(|(vertex, &unique)| {
-            let o = found(unique)?;
-            let corners = cage.triangle_near(o.triangle);
-            let rest = corners.map(|i| cage.positions()[i as usize]);
-            let facet = cage.facet_corners(o.triangle);
-            let closest: DVec3 = facet.iter().zip(o.barycentric).map(|(&c, b)| b * c).sum();
-            let offset = positions[vertex as usize] - closest.as_vec3();
-            let offset = triangle_frame(rest).transpose() * offset;
-            Some(OutsideVertex { vertex, corners, offset })
+        .filter_map(|(vertex, &point)| {
+            of_point(point).map(|(facet, o)| (facet, OutsideVertex { vertex, ..o }))
         })
         .collect()
+}
+
+/// What a user should know about controls inside in a grid of `cells` along the longest side.
+fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
+    let Some(inner) = controls.inner() else { return Vec::new() };
+    let mut notices = Vec::new();
+    let (radius, cell) =
+        (inner.radius_in(controls.surface().bounds().extent().max_element()), grid.cell.max_element() as f32);
+    if inner.has_radius() && radius < cell {
+        let finer = (f64::from(cells) * f64::from(cell / radius)).ceil();
+        notices.push(format!(
+            "The radius of the controls inside, {radius:.3e}, is below a cell of this grid, {cell:.3e}: how far they reach \
+             depends on how they lie in it. Use a grid of {finer} cells, or a larger radius."
+        ));
+    }
+    if let (n @ 1.., Some(first)) = (inner.unused().len(), inner.unused().first()) {
+        notices.push(format!(
+            "{n} of the controls inside (from {first} on) belong to no point, line or face: they move nothing."
+        ));
+    }
+    notices
 }

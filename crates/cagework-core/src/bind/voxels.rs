@@ -36,7 +36,7 @@ pub(super) struct Voxels {
 /// A sampler of either method.
 pub(super) enum AnySampler<'a> {
     Classic(Controls<'a>, &'a ClassicCells, &'a Level),
-    Embedded(Sampler<'a>),
+    Embedded(Box<Sampler<'a>>),
 }
 
 impl Voxels {
@@ -104,7 +104,7 @@ impl Voxels {
             hierarchy,
             counts,
             ambiguous: embedding.ambiguous,
-            notices: embedding.notices(controls.surface(), options.grid),
+            notices: embedding.notices(controls, options.grid),
             overlaps: embedding.overlaps(),
             bytes,
             classic: None,
@@ -115,7 +115,7 @@ impl Voxels {
         let level = &self.hierarchy.levels[0];
         match &self.classic {
             Some(cells) => AnySampler::Classic(controls, cells, level),
-            None => AnySampler::Embedded(Sampler::new(controls, level, &self.overlaps)),
+            None => AnySampler::Embedded(Box::new(Sampler::new(controls, level, &self.overlaps))),
         }
     }
 }

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::RepairError;
 use crate::cage::Cage;
+use crate::controls::{ControlSet, Controls, InnerControls};
 use crate::enclosure::Enclosure;
 use crate::geometry::closest_point_on_triangle;
 use crate::mesh::{Bounds, PolygonMesh};
@@ -14,30 +15,43 @@ const MAX_ROUNDS: usize = 40;
 /// Room left beyond the model, as a fraction of the cage's diagonal.
 const MARGIN: f64 = 0.004;
 
-/// Moves vertices outward; returns how many have moved.
-pub(super) fn grow(mesh: &mut PolygonMesh, model: &[Vec3]) -> Result<usize, RepairError> {
+/// The cage and its smooth surface.
+fn smoothed(mesh: &PolygonMesh, smooth: u32) -> Result<ControlSet, RepairError> {
+    Ok(ControlSet::new(&Cage::new(mesh)?, smooth, InnerControls::default())?)
+}
+
+/// Which points are outside of the smooth surface.
+fn outside(mesh: &PolygonMesh, smooth: u32, model: &[Vec3]) -> Result<Vec<u32>, RepairError> {
+    Ok(Enclosure::new(Controls::from(&smoothed(mesh, smooth)?).surface(), model).outside())
+}
+
+/// Moves vertices outward until the surface, subdivided `smooth` times, holds the model; returns how many have moved.
+pub(crate) fn grow(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Result<usize, RepairError> {
     let before = mesh.positions.clone();
     let mut left = 0;
     for _ in 0..MAX_ROUNDS {
-        let cage = Cage::new(mesh)?;
-        let outside = Enclosure::new(&cage, model).outside();
+        let set = smoothed(mesh, smooth)?;
+        let controls = Controls::from(&set);
+        let outside = Enclosure::new(controls.surface(), model).outside();
         left = outside.len();
         if left == 0 {
             return Ok(before.iter().zip(&mesh.positions).filter(|(a, b)| a != b).count());
         }
-        push(mesh, &cage, outside.iter().map(|&v| model[v as usize].as_dvec3()));
+        push(mesh, controls, outside.iter().map(|&v| model[v as usize].as_dvec3()));
     }
     // Whatever stands out of a cage of this shape is inside it when it is scaled up about the model's middle.
-    scale(mesh, model)?;
-    let left_now = Enclosure::new(&Cage::new(mesh)?, model).outside().len();
+    scale(mesh, model, smooth)?;
+    let left_now = outside(mesh, smooth, model)?.len();
     if left_now > 0 {
         return Err(RepairError::StillOutside { left: left.min(left_now) });
     }
     Ok(before.iter().zip(&mesh.positions).filter(|(a, b)| a != b).count())
 }
 
-/// Moves the corners of the triangle nearest to each point outward by its distance and a margin.
-fn push(mesh: &mut PolygonMesh, cage: &Cage, points: impl Iterator<Item = DVec3>) {
+/// Moves the corners of the triangle nearest to each point outward by its distance and a margin; of a smooth surface those of
+/// the cage's face that the triangle is part of.
+fn push(mesh: &mut PolygonMesh, controls: Controls<'_>, points: impl Iterator<Item = DVec3>) {
+    let (cage, is_smooth) = (controls.surface(), controls.smooth() > 0);
     let margin = MARGIN * f64::from(cage.diagonal());
     let mut offset = vec![DVec3::ZERO; mesh.positions.len()];
     for p in points {
@@ -50,7 +64,12 @@ fn push(mesh: &mut PolygonMesh, cage: &Cage, points: impl Iterator<Item = DVec3>
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let direction = way.try_normalize().unwrap_or(normal);
         let needed = direction * (way.length() + margin);
-        for &i in &cage.triangles()[t as usize] {
+        let face = cage.face_of_triangle()[t as usize];
+        let corners = match controls.cage_face(face) {
+            Some(face) if is_smooth => &controls.cage().faces()[face as usize][..],
+            _ => &cage.triangles()[t as usize],
+        };
+        for &i in corners {
             let so_far = &mut offset[i as usize];
             // Only what is still missing along this direction.
             let missing = needed.length() - so_far.dot(direction);
@@ -65,7 +84,7 @@ fn push(mesh: &mut PolygonMesh, cage: &Cage, points: impl Iterator<Item = DVec3>
 }
 
 /// Scales a mesh about the middle of the model in small steps until its box has room for the model's box.
-fn scale(mesh: &mut PolygonMesh, model: &[Vec3]) -> Result<(), RepairError> {
+fn scale(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Result<(), RepairError> {
     const STEPS: usize = 24;
     const STEP: f32 = 1.08;
     let Some(bounds) = Bounds::of(model) else { return Ok(()) };
@@ -74,7 +93,7 @@ fn scale(mesh: &mut PolygonMesh, model: &[Vec3]) -> Result<(), RepairError> {
         for p in &mut mesh.positions {
             *p = center + STEP * (*p - center);
         }
-        if Enclosure::new(&Cage::new(mesh)?, model).outside().is_empty() {
+        if outside(mesh, smooth, model)?.is_empty() {
             break;
         }
     }

@@ -17,11 +17,13 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::cage::{Cage, CageError, MAX_FACES};
+use crate::controls::{ControlSet, Controls, InnerControls};
 use crate::enclosure::Enclosure;
 use crate::mesh::{Bounds, PolygonMesh};
 
 pub(crate) use fill::{loops, triangulate};
-pub use repair::{Repair, RepairError, Repaired, repair};
+pub(crate) use grow::grow;
+pub use repair::{Repair, RepairError, Repaired, repair, repair_smooth};
 
 /// Most places that a problem lists of each kind; `count` is the full number.
 pub const MAX_PLACES: usize = 2000;
@@ -157,6 +159,13 @@ impl CageCheck {
 /// look for parts thinner than a cell.
 #[must_use]
 pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> CageCheck {
+    check_smooth(mesh, model, grid, 0)
+}
+
+/// [`check`] of a cage that is subdivided `smooth` times: what should be inside, and how thick it is, is asked of the smooth
+/// surface.
+#[must_use]
+pub fn check_smooth(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>, smooth: u32) -> CageCheck {
     let mut found = Vec::new();
     if mesh.faces.len() > MAX_FACES {
         let error = CageError::TooManyFaces { faces: mesh.faces.len() };
@@ -184,9 +193,15 @@ pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> C
         found.push(Problem { message: error.to_string(), ..problem(Code::NotACage, Severity::Error, 1) });
     }
     let (mut encloses, mut thickness) = (None, None);
-    if let Ok(cage) = &cage {
-        thickness = shape::report_thickness(cage, grid, &mut found);
-        encloses = model.map(|model| report_outside(cage, model, &mut found));
+    match cage.ok().map(|cage| ControlSet::new(&cage, smooth, InnerControls::default())) {
+        Some(Ok(set)) => {
+            let controls = Controls::from(&set);
+            thickness = shape::report_thickness(controls, grid, &mut found);
+            encloses = model.map(|model| report_outside(controls.surface(), model, &mut found));
+        }
+        Some(Err(error)) => found
+            .push(Problem { message: format!("{error}."), ..problem(Code::NotACage, Severity::Error, 1) }),
+        None => {}
     }
     for p in &mut found {
         p.places.vertices.truncate(MAX_PLACES);

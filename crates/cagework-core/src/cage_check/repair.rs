@@ -7,8 +7,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::edges::{Edges, same_places};
-use super::{fill, grow, orient, shape};
+use super::grow;
+use super::{fill, orient, shape};
 use crate::cage::CageError;
+use crate::controls::ControlError;
 use crate::mesh::PolygonMesh;
 
 /// A repair.
@@ -48,6 +50,9 @@ pub enum RepairError {
     /// Growing needs a cage.
     #[error("the cage cannot grow before it is one: {0}")]
     NotACage(#[from] CageError),
+    /// Nor before its smooth surface is one.
+    #[error(transparent)]
+    NotSmooth(#[from] ControlError),
     /// Growing did not help.
     #[error("{left} model vertices are still outside after growing: make a new cage")]
     StillOutside {
@@ -64,6 +69,19 @@ pub fn repair(
     mesh: &PolygonMesh,
     repairs: &[Repair],
     model: Option<&[Vec3]>,
+) -> Result<Repaired, RepairError> {
+    repair_smooth(mesh, repairs, model, 0)
+}
+
+/// [`repair`] of a cage that is subdivided `smooth` times: it grows until the model is inside its smooth surface.
+///
+/// # Errors
+/// As [`repair`].
+pub fn repair_smooth(
+    mesh: &PolygonMesh,
+    repairs: &[Repair],
+    model: Option<&[Vec3]>,
+    smooth: u32,
 ) -> Result<Repaired, RepairError> {
     let mut repaired = Repaired {
         mesh: mesh.clone(),
@@ -84,7 +102,7 @@ pub fn repair(
         flip(&mut repaired);
     }
     if asked(Repair::Grow) {
-        let moved = grow::grow(&mut repaired.mesh, model.ok_or(RepairError::NoModel)?)?;
+        let moved = grow(&mut repaired.mesh, model.ok_or(RepairError::NoModel)?, smooth)?;
         if moved > 0 {
             repaired.done.push(format!("Moved {moved} vertices outward."));
         }

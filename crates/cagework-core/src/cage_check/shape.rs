@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::{Code, Fix, MAX_PLACES, Places, Problem, Repair, Severity, diagonal, problem, sentences};
 use crate::cage::{Cage, face_triangles};
 use crate::contact::{Corners, each_meeting};
+use crate::controls::Controls;
 use crate::mesh::PolygonMesh;
 use crate::options::MAX_GRID;
 
@@ -151,7 +152,12 @@ fn between(a: &Corners, b: &Corners) -> DVec3 {
 
 /// Measures from the middle of faces straight inwards, to faces about opposite; reports where that is less than a cell of the
 /// grid.
-pub(super) fn report_thickness(cage: &Cage, grid: Option<u32>, found: &mut Vec<Problem>) -> Option<f32> {
+pub(super) fn report_thickness(
+    controls: Controls<'_>,
+    grid: Option<u32>,
+    found: &mut Vec<Problem>,
+) -> Option<f32> {
+    let cage = controls.surface();
     let n = cage.triangles().len();
     let triangles: Vec<[DVec3; 3]> = (0..n as u32).map(|t| cage.triangle_corners(t)).collect();
     let cell = grid.map(|g| f64::from(cage.bounds().extent().max_element()) / f64::from(g.max(1)));
@@ -174,7 +180,7 @@ pub(super) fn report_thickness(cage: &Cage, grid: Option<u32>, found: &mut Vec<P
         }
         thinnest = thinnest.min(way);
         if cell.is_some_and(|cell| way < ENOUGH_CELLS * cell) {
-            faces.push(cage.face_of_triangle()[t]);
+            faces.extend(controls.cage_face(cage.face_of_triangle()[t]));
             points.push((middle - 0.5 * way * normal).as_vec3().to_array());
         }
     }

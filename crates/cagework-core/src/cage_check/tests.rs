@@ -1,7 +1,7 @@
 use glam::{Vec3, vec3};
 use proptest::prelude::*;
 
-use super::{Code, Fix, MAX_PLACES, Repair, Severity, check, repair};
+use super::{Code, Fix, MAX_PLACES, Repair, Severity, check, check_smooth, repair, repair_smooth};
 use crate::cage::Cage;
 use crate::cage_gen::subdivided_box;
 use crate::mesh::{Bounds, PolygonMesh};
@@ -164,6 +164,19 @@ fn vertices_outside_are_listed_and_growing_takes_them_in() {
     let grown = repair(&mesh, &[Repair::Grow], Some(&model)).unwrap().mesh;
     assert_eq!(check(&grown, Some(&model), None).encloses, Some(true));
     assert_eq!(grown.faces, mesh.faces);
+}
+
+/// Two steps round the box's corners off: (0.9, 0.9, 0.9) sticks out of the surface, though not out of the box.
+#[test]
+fn smooth_surface_is_what_a_smooth_cage_is_checked_for() {
+    let (mesh, model) = (box_mesh(2), [Vec3::ZERO, Vec3::splat(0.9)]);
+    assert_eq!(check(&mesh, Some(&model), None).encloses, Some(true));
+    let found = check_smooth(&mesh, Some(&model), None, 2);
+    assert_eq!(found.problem(Code::ModelOutside).unwrap().places.vertices, [1]);
+    let grown = repair_smooth(&mesh, &[Repair::Grow], Some(&model), 2).unwrap().mesh;
+    assert_eq!(check_smooth(&grown, Some(&model), None, 2).encloses, Some(true));
+    let unsmooth = check_smooth(&mesh, None, None, 4);
+    assert!(!unsmooth.valid && unsmooth.problems[0].message.contains("from 0 to 3"));
 }
 
 #[test]

@@ -21,6 +21,7 @@ mod quadric;
 mod quads;
 mod relax;
 mod shell;
+mod smooth;
 mod subdivided_box;
 mod surface;
 #[cfg(test)]
@@ -67,6 +68,19 @@ const MAX_SPLITS: usize = 4;
 /// # Errors
 /// [`CageGenError`]: nothing to enclose, numbers or options out of range, cancelled.
 pub fn generate(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    options: &CageOptions,
+    progress: &dyn Progress,
+) -> Result<GeneratedCage, CageGenError> {
+    if options.smooth > 0 {
+        return smooth::generate(positions, triangles, options, progress);
+    }
+    generate_plain(positions, triangles, options, progress)
+}
+
+/// A cage whose faces enclose the model as they are.
+fn generate_plain(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
     options: &CageOptions,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::cage::{Cage, MAX_DIAGONAL};
-use crate::options::{Number, OutOfRange, choice};
+use crate::options::{Number, OutOfRange, SMOOTH, choice};
 use crate::progress::Cancelled;
 
 /// Fewest vertices that can be asked for.
@@ -114,6 +114,8 @@ pub struct CageOptions {
     /// Voxels along the model's longest side, 8 to 128: gaps narrower than three of them are closed, detail thinner than one is
     /// lost. 0 ties them to the target. Default 0.
     pub voxels: u32,
+    /// Steps of subdivision after which the cage's surface encloses the model, 0 to 3. Default 0.
+    pub smooth: u32,
 }
 
 impl Default for CageOptions {
@@ -127,6 +129,7 @@ impl Default for CageOptions {
             per_component: false,
             clearance: 0.0,
             voxels: 0,
+            smooth: 0,
         }
     }
 }
@@ -140,6 +143,7 @@ impl CageOptions {
         TARGET.check(self.target)?;
         DETAIL.check(self.detail)?;
         CLEARANCE.check(self.clearance)?;
+        SMOOTH.check(self.smooth)?;
         VOXELS.check(self.voxels)
     }
 }
@@ -224,6 +228,11 @@ pub enum CageGenError {
         "no cage passes the check: the model is too small for its distance from the origin; move it there"
     )]
     Unresolved,
+    /// No cage's smooth surface holds the model.
+    #[error(
+        "no cage was found whose smooth surface holds the model: take fewer steps (--smooth), or more vertices"
+    )]
+    Unsmooth,
     /// Cancelled by the caller.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

@@ -9,6 +9,7 @@ use crate::contact::{Corners, meeting};
 use crate::geometry::winding_number;
 use crate::options::OutOfRange;
 use crate::progress::{ProgressEvent, Silent};
+use crate::smooth::subdivide;
 
 /// Positions of the order of 1, rounded to f32 and mirrored.
 const ROUNDING: f32 = 1e-6;
@@ -261,5 +262,21 @@ proptest! {
             picks.iter().map(|t| t.map(|i| (i % positions.len()) as u32)).collect();
         let soup = (positions, triangles);
         make(&soup, &CageOptions { target, symmetry, per_component, ..CageOptions::default() });
+    }
+}
+
+/// The promise of a smooth cage, of its surface and by winding numbers; the cage itself need only be one.
+#[test]
+fn smooth_surface_of_a_cage_holds_the_model() {
+    for (soup, smooth) in [(trousers(), 1), (trousers(), 2), (ring(), 2)] {
+        for symmetry in [Symmetry::Auto, Symmetry::None] {
+            let options = CageOptions { smooth, symmetry, ..options(80) };
+            let made = generate(&soup.0, &soup.1, &options, &Silent).unwrap();
+            let fine = subdivide(&made.cage.to_polygon_mesh(), smooth).mesh;
+            let surface = Cage::new(&fine).unwrap();
+            let outside = soup.0.iter().filter(|&&p| winding(&surface, p) < 0.5).count();
+            assert_eq!(outside, 0, "{} vertices, {symmetry:?}", made.report.vertices);
+            assert_eq!(made.report.mirror.is_some(), symmetry == Symmetry::Auto);
+        }
     }
 }

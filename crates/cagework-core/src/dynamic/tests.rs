@@ -5,7 +5,7 @@ use crate::bind::bind;
 use crate::deform::deform_bound;
 use crate::options::BindOptions;
 use crate::progress::Silent;
-use crate::sample::closest_on_cage;
+use crate::sample::ClosestOnCage;
 use crate::samples;
 
 /// A sample's model and cage, and the field of a pose of it.
@@ -22,7 +22,7 @@ fn field_of(id: &str, posed: impl Fn(&samples::Sample) -> Vec<Vec3>) -> (Vec<Vec
 /// Vertices that are some cells away from the cage.
 fn deep(positions: &[Vec3], cage: &Cage, field: &DisplacementField, cells: f32) -> Vec<usize> {
     let reach = f64::from(cells * field.lattice.cell);
-    let is_deep = |&v: &usize| closest_on_cage(cage, positions[v].as_dvec3()).distance >= reach;
+    let is_deep = |&v: &usize| ClosestOnCage::new(cage).find(positions[v].as_dvec3()).distance >= reach;
     (0..positions.len()).step_by(7).filter(is_deep).collect()
 }
 

@@ -12,7 +12,9 @@ mod symmetry;
 mod view;
 
 pub use gesture::{Constraint, Gesture, GestureKind};
-pub use pick::{Element, Topology, pick_edge, pick_face, pick_surface, pick_vertex, vertices_in_box};
+pub use pick::{
+    Element, Topology, pick_edge, pick_face, pick_middle, pick_surface, pick_vertex, vertices_in_box,
+};
 pub use playback::{PoseError, blend, moment, reblend};
 pub use pull::{Pull, SharedPull};
 pub use selection::{Pivot, SelectMode, Selection};

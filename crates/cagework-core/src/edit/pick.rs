@@ -4,6 +4,9 @@ use glam::{Vec2, Vec3};
 
 use super::view::View;
 
+/// Hits of a ray that are nearer to each other, over the distance from the eye, are one.
+const SAME_HIT: f32 = 1e-5;
+
 /// What a click selects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -60,8 +63,21 @@ pub fn pick_vertex(
         let distance = pixel.distance(pointer);
         (distance <= radius).then(|| (i as u32, depth, distance, radius * view.units_per_pixel(p)))
     });
-    let (seen, hidden): (Vec<_>, Vec<_>) = near.partition(|near| is_seen(near.0, positions, topology, view));
-    in_front(seen.into_iter()).or_else(|| in_front(hidden.into_iter()).filter(|_| with_hidden))
+    // Controls inside, which belong to no face, are drawn through everything: nothing hides them, and the pointer decides.
+    let (of_faces, inside): (Vec<_>, Vec<_>) =
+        near.partition(|near| topology.faces.iter().any(|face| face.contains(&near.0)));
+    let inside = inside.into_iter().min_by(|a, b| a.2.total_cmp(&b.2));
+    let distances: Vec<(u32, f32)> = of_faces.iter().map(|near| (near.0, near.2)).collect();
+    let (seen, hidden): (Vec<_>, Vec<_>) =
+        of_faces.into_iter().partition(|near| is_seen(near.0, positions, topology, view));
+    let of_faces =
+        in_front(seen.into_iter()).or_else(|| in_front(hidden.into_iter()).filter(|_| with_hidden));
+    let distance = |vertex| distances.iter().find(|(v, _)| *v == vertex).map_or(f32::INFINITY, |(_, d)| *d);
+    match (inside, of_faces) {
+        (Some(inside), Some(vertex)) if distance(vertex) < inside.2 => Some(vertex),
+        (Some(inside), _) => Some(inside.0),
+        (None, of_faces) => of_faces,
+    }
 }
 
 /// Whether a face at the vertex is turned to the viewer.
@@ -75,6 +91,29 @@ fn is_seen(vertex: u32, positions: &[Vec3], topology: &Topology, view: &dyn View
             pixels.iter().zip(next).map(|(a, b)| a.perp_dot(*b)).sum::<f32>() < 0.0
         })
     })
+}
+
+/// A place within the model under the pointer: half way between where the ray enters it and where it leaves it again; beside
+/// the model, where the ray passes nearest to `center`.
+#[must_use]
+pub fn pick_middle(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    view: &dyn View,
+    pointer: Vec2,
+    center: Vec3,
+) -> Vec3 {
+    let (origin, direction) = view.ray(pointer);
+    let meets = |t: &[u32; 3]| ray_meets_triangle(origin, direction, t.map(|v| positions[v as usize]));
+    let mut hits: Vec<f32> = triangles.iter().filter_map(meets).map(|(along, _)| along).collect();
+    hits.sort_unstable_by(f32::total_cmp);
+    // An edge that the ray hits belongs to two triangles.
+    hits.dedup_by(|b, a| *b - *a <= SAME_HIT * *a);
+    let along = match hits[..] {
+        [enters, leaves, ..] => f32::midpoint(enters, leaves),
+        _ => (center - origin).dot(direction),
+    };
+    origin + along * direction
 }
 
 /// The edge within `radius` pixels of the pointer, an index into [`Topology::edges`]; of several the one whose nearest
@@ -184,6 +223,35 @@ mod tests {
 
     fn pixel(x: f32, y: f32) -> Vec2 {
         Vec2::new(200.0 + 100.0 * x, 100.0 - 100.0 * y)
+    }
+
+    #[test]
+    fn control_inside_is_taken_through_the_faces_before_it() {
+        // Seen along -z, the faces at the cube's vertex 0 are turned away or on edge.
+        let mut cube = cube();
+        let topology = Topology::new(&cube.faces);
+        cube.positions.push(Vec3::splat(0.5));
+        let pick = |at, with_hidden| pick_vertex(&cube.positions, &topology, &Flat, at, 5.0, with_hidden);
+        assert_eq!(pick(pixel(0.5, 0.5), false), Some(8));
+        assert_eq!(pick(pixel(0.5, 0.5), true), Some(8));
+        // Beside a vertex in front of it the nearer to the pointer counts.
+        cube.positions[8] = Vec3::new(0.97, 1.0, 0.5);
+        let pick = |x| pick_vertex(&cube.positions, &topology, &Flat, pixel(x, 1.0), 5.0, false);
+        assert_eq!((pick(0.975), pick(0.995)), (Some(8), Some(7)));
+    }
+
+    #[test]
+    fn middle_of_the_model_is_between_its_two_sides_and_beside_it_level_with_its_centre() {
+        let cube = cube();
+        let triangles: Vec<[u32; 3]> =
+            cube.faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
+        let middle =
+            |x, y| pick_middle(&cube.positions, &triangles, &Flat, pixel(x, y), Vec3::new(0.5, 0.5, 0.25));
+        // On a diagonal, whose two triangles are one hit, and off it.
+        for (x, y) in [(0.5, 0.5), (0.25, 0.75), (0.3, 0.8)] {
+            assert!(middle(x, y).abs_diff_eq(Vec3::new(x, y, 0.5), 1e-5), "{}", middle(x, y));
+        }
+        assert!(middle(2.0, 0.5).abs_diff_eq(Vec3::new(2.0, 0.5, 0.25), 1e-5));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::PullError;
 use super::geodesic::Geodesic;
 use super::grip::{Grip, check};
 use super::samples::Probes;
-use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::mesh::{Bounds, TriMesh};
 use crate::weights::Weights;
 
@@ -24,7 +24,7 @@ pub struct Pull {
     pub(super) sample_rows: DMatrix<f64>,
     /// Gradients of the weights at the samples: row `3 s + x`. `[3 n_samples, n]`
     gradients: DMatrix<f64>,
-    /// Each edge of the cage in both directions.
+    /// Each edge of the cage, and of controls inside, in both directions.
     edges: Vec<[u32; 2]>,
     /// Weight of each of them: together they are as heavy as the model's part.
     edge_weight: f64,
@@ -34,17 +34,18 @@ pub struct Pull {
 }
 
 impl Pull {
-    /// `weights`: of [`Probes::points`], bound to the cage.
+    /// `weights`: of [`Probes::points`], bound to the controls.
     ///
     /// # Errors
     /// [`PullError::Shape`] when they do not belong together.
-    pub fn new(
+    pub fn new<'a>(
         mesh: &TriMesh,
-        cage: &Cage,
+        controls: impl Into<Controls<'a>>,
         mut probes: Probes,
         weights: &Weights,
     ) -> Result<Self, PullError> {
-        let n = cage.n_vertices();
+        let controls = controls.into();
+        let (n, cage) = (controls.n_controls(), controls.cage());
         let (rows, columns, vertices) = (weights.n_rows(), weights.n_columns(), probes.points().len());
         if (rows, columns) != (vertices, n) {
             return Err(PullError::Shape { rows, columns, vertices, cage: n });
@@ -52,12 +53,13 @@ impl Pull {
         let size = Bounds::of(&mesh.positions).ok_or(PullError::Empty)?.diagonal();
         // A model of one point has no size of its own.
         let size = if size > 0.0 { size } else { cage.diagonal() };
-        let rest: Vec<DVec3> = cage.positions().iter().copied().map(Vec3::as_dvec3).collect();
+        let rest: Vec<DVec3> = controls.rest().iter().copied().map(Vec3::as_dvec3).collect();
         let sample_rows = probes.rows(weights);
         let rows = probes.gradients(weights, &rest);
         let gradients = DMatrix::from_fn(rows.len(), n, |e, i| rows[e][i]);
         let mut edges: Vec<[u32; 2]> =
             cage.triangles().iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+        edges.extend(controls.inner_edges());
         edges.extend(edges.clone().into_iter().map(|[a, b]| [b, a]));
         edges.sort_unstable();
         edges.dedup();
@@ -90,7 +92,7 @@ impl Pull {
         })
     }
 
-    /// Cage vertices.
+    /// Cage vertices and controls inside.
     #[must_use]
     pub fn n_cage(&self) -> usize {
         self.cage.len()

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3, Vec3};
 use nalgebra::DMatrix;
 
 use super::{MAX_CAGE, PullError};
-use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::mesh::{Bounds, TriMesh};
 use crate::weights::Weights;
 
@@ -36,14 +36,16 @@ pub struct Probes {
 }
 
 impl Probes {
-    /// Of a model and its cage at rest.
+    /// Of a model and the controls at rest.
     ///
     /// # Errors
     /// [`PullError::Empty`], [`PullError::Cage`].
-    pub fn new(mesh: &TriMesh, cage: &Cage) -> Result<Self, PullError> {
-        if cage.n_vertices() > MAX_CAGE {
-            return Err(PullError::Cage { cage: cage.n_vertices() });
+    pub fn new<'a>(mesh: &TriMesh, controls: impl Into<Controls<'a>>) -> Result<Self, PullError> {
+        let controls = controls.into();
+        if controls.n_controls() > MAX_CAGE {
+            return Err(PullError::Cage { cage: controls.n_controls() });
         }
+        let cage = controls.cage();
         let positions = &mesh.positions;
         let areas = areas(mesh);
         let (samples, nearest) = farthest_points(positions).ok_or(PullError::Empty)?;

@@ -2,13 +2,15 @@
 //!
 //! Where the paper is silent: a vertex in an exterior cell, which has no weights, counts as outside the cage.
 
+use std::cell::LazyCell;
+
 use glam::DVec3;
 
 use crate::controls::Controls;
 use crate::levels::Level;
 use crate::voxelize::classic::{CellKind, ClassicCells};
 
-use super::{Stencils, closest_on_cage};
+use super::{ClosestOnCage, Stencils};
 
 /// Stencils of points (object units): one cell each.
 #[must_use]
@@ -20,6 +22,7 @@ pub fn stencils(
 ) -> Stencils {
     let mut stencils = Stencils::new();
     let mut stencil = super::Stencil::default();
+    let closest = LazyCell::new(|| ClosestOnCage::new(controls.surface()));
     for point in points {
         stencil.clear();
         let p = level.grid.to_grid(point).round();
@@ -34,7 +37,7 @@ pub fn stencils(
                     stencil.add_hat(column, f64::from(value));
                 }
             }
-            _ => stencils.push_outside(controls, closest_on_cage(controls.surface(), point), &mut stencil),
+            _ => stencils.push_outside(controls, closest.find(point), &mut stencil),
         }
         stencils.push(&stencil);
     }

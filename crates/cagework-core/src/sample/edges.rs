@@ -79,8 +79,11 @@ impl EdgeLists {
         let edges: Vec<Edge> = sides
             .chunk_by(|a, b| a[..2] == b[..2])
             .filter_map(|pair| match pair {
-                [a, b] => edge_between(lists, [a[2], b[2]].map(|side| (side >> 2, side as usize & 3))),
-                _ => None,
+                [a, b] if !is_sheet(cage, a[2] >> 2, b[2] >> 2) => {
+                    edge_between(lists, [a[2], b[2]].map(|side| (side >> 2, side as usize & 3)))
+                }
+                [a, ..] => Some(edge_of_sheet(lists, a[2] >> 2, a[2] as usize & 3)),
+                [] => None,
             })
             .collect();
         let boxes =
@@ -155,6 +158,20 @@ impl EdgeLists {
     }
 }
 
+/// Whether two facets are the sides of one sheet inside the cage.
+fn is_sheet(cage: &Cage, f: u32, g: u32) -> bool {
+    cage.facets()[g as usize].iter().all(|i| cage.facets()[f as usize].contains(i))
+}
+
+/// An edge of a sheet inside the cage, around which there is room on all sides.
+fn edge_of_sheet(lists: &TriangleLists, f: u32, k: usize) -> Edge {
+    let corners = [k, (k + 1) % 3];
+    let triangle = lists.triangle(f);
+    let ends = corners.map(|k| triangle.corners[k]);
+    let normal = triangle.unit_normal();
+    Edge { ends, facet: f, corners, across: across(ends, [normal, -normal]) }
+}
+
 /// The edge between two facets, each with the corner from which it runs along it, if the cage turns inwards there.
 fn edge_between(lists: &TriangleLists, [(f, k), (g, l)]: [(u32, usize); 2]) -> Option<Edge> {
     let corners = [k, (k + 1) % 3];
@@ -167,11 +184,16 @@ fn edge_between(lists: &TriangleLists, [(f, k), (g, l)]: [(u32, usize); 2]) -> O
     if sine < SHARP && (sine <= 0.0 || normals[0].dot(normals[1]) > 0.0) {
         return None;
     }
-    let across = [0, 1, 2].map(|axis| {
+    Some(Edge { ends, facet: f, corners, across: across(ends, normals) })
+}
+
+/// See [`Edge::across`].
+fn across(ends: [DVec3; 2], normals: [DVec3; 2]) -> [Option<usize>; 3] {
+    let way = (ends[1] - ends[0]).normalize_or_zero();
+    [0, 1, 2].map(|axis| {
         let [a, b] = normals.map(|n| if n[axis].abs() < PARALLEL { 0.0 } else { n[axis] });
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         // Rays along the axis see the edge as a line, to which the axis less along it is closer to a right angle.
         (a * b <= 0.0 && (a, b) != (0.0, 0.0)).then_some(if way[u].abs() < way[v].abs() { u } else { v })
-    });
-    Some(Edge { ends, facet: f, corners, across })
+    })
 }

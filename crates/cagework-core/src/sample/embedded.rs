@@ -8,6 +8,8 @@
 //! cube that the cage does not meet it is trilinear interpolation. The three cyclic orders of the axes are averaged.
 //! Next to re-entrant edges rays are split, see `edges.rs`.
 
+use std::sync::OnceLock;
+
 use glam::DVec3;
 
 use crate::cage::ON_CAGE;
@@ -19,7 +21,7 @@ use crate::voxelize::lines::Overlaps;
 
 use super::edges::{EdgeLists, ON_EDGE, Passage};
 use super::triangles::TriangleLists;
-use super::{Stencil, Stencils, closest_on_cage};
+use super::{ClosestOnCage, Stencil, Stencils};
 
 /// Orders of the axes; their mean has no preferred direction. All six orders cost twice as much and change the error
 /// against finite elements by less than 1 % (Armadillo, g = 32, 64, 128).
@@ -44,6 +46,8 @@ pub struct Sampler<'a> {
     lists: TriangleLists,
     edges: EdgeLists,
     overlaps: &'a Overlaps,
+    /// Made for the first point outside.
+    closest: OnceLock<ClosestOnCage<'a>>,
     /// Faces no further apart than this, in cells, are in one place.
     same: f64,
 }
@@ -99,7 +103,7 @@ impl<'a> Sampler<'a> {
         let lists = TriangleLists::new(surface, grid);
         let edges = EdgeLists::new(surface, grid, &lists);
         let same = ON_CAGE * f64::from(surface.diagonal()) / grid.cell.max_element();
-        Self { controls, level, lists, edges, overlaps, same }
+        Self { controls, level, lists, edges, overlaps, closest: OnceLock::new(), same }
     }
 
     /// Stencils of points (object units). Points outside the cage are listed in `outside`.
@@ -109,8 +113,8 @@ impl<'a> Sampler<'a> {
         let mut scratch = Scratch::default();
         for p in points {
             if !self.stencil(p, &mut scratch) {
-                let closest = closest_on_cage(self.controls.surface(), p);
-                stencils.push_outside(self.controls, closest, &mut scratch.stencil);
+                let closest = self.closest.get_or_init(|| ClosestOnCage::new(self.controls.surface()));
+                stencils.push_outside(self.controls, closest.find(p), &mut scratch.stencil);
             }
             stencils.push(&scratch.stencil);
         }

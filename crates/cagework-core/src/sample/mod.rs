@@ -4,17 +4,17 @@
 //! it is computed once per bind and applied to every batch of columns.
 
 pub mod classic;
+mod closest;
 mod edges;
 pub mod embedded;
 pub mod triangles;
 
-use glam::DVec3;
-
-use crate::cage::{Cage, ON_CAGE};
+use crate::cage::ON_CAGE;
 use crate::controls::Controls;
-use crate::geometry::closest_point_on_triangle;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
+
+pub use closest::ClosestOnCage;
 
 /// A vertex outside the cage and the point of the cage closest to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,20 +27,6 @@ pub struct Outside {
     pub barycentric: [f64; 3],
     /// Distance, object units.
     pub distance: f64,
-}
-
-/// The point of the cage closest to `point`; `vertex` is left 0.
-#[must_use]
-pub fn closest_on_cage(cage: &Cage, point: DVec3) -> Outside {
-    let mut best = Outside { vertex: 0, triangle: 0, barycentric: [1.0, 0.0, 0.0], distance: f64::INFINITY };
-    for triangle in 0..cage.facets().len() as u32 {
-        let closest = closest_point_on_triangle(point, cage.facet_corners(triangle));
-        let distance = closest.point.distance(point);
-        if distance < best.distance {
-            best = Outside { vertex: 0, triangle, barycentric: closest.barycentric, distance };
-        }
-    }
-    best
 }
 
 /// Sampling stencils of all vertices. The weights of a stencil are positive and sum to 1.

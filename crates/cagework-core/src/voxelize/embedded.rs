@@ -65,9 +65,9 @@ impl Embedding {
 
     /// What a user should know about the cage in this grid. `cells`: along the cage's longest side.
     #[must_use]
-    pub fn notices(&self, cage: &Cage, cells: u32) -> Vec<String> {
+    pub fn notices(&self, controls: Controls<'_>, cells: u32) -> Vec<String> {
         let grid = &self.levels[0].grid;
-        let unresolved = resolution::notice(cage, grid, &self.lines, cells);
+        let unresolved = resolution::notice(controls, grid, &self.lines, cells);
         self.overlaps().notice().into_iter().chain(unresolved).collect()
     }
 

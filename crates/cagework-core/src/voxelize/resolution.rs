@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::grid::Grid;
 use crate::options::MAX_GRID;
 
@@ -30,11 +30,19 @@ struct Thin {
     thickness: f64,
 }
 
-/// What a user should know about it, if anything. `cells`: along the cage's longest side.
+/// What a user should know about it, if anything. `cells`: along the cage's longest side. A face of a smooth cage is met where
+/// one of its parts is; walls inside are not looked at.
 #[must_use]
-pub fn notice(cage: &Cage, grid: &Grid, lines: &[Lines; 3], cells: u32) -> Option<String> {
-    let mut unresolved: Vec<bool> =
-        (0..cage.faces().len()).map(|f| !lines.iter().any(|lines| lines.meets_face(f))).collect();
+pub fn notice(controls: Controls<'_>, grid: &Grid, lines: &[Lines; 3], cells: u32) -> Option<String> {
+    let (cage, surface) = (controls.cage(), controls.surface());
+    let mut unresolved = vec![true; cage.faces().len()];
+    for part in 0..surface.faces().len() {
+        if let Some(face) = controls.cage_face(part as u32)
+            && lines.iter().any(|lines| lines.meets_face(part))
+        {
+            unresolved[face as usize] = false;
+        }
+    }
     let mut moves = vec![false; cage.n_vertices()];
     let mut finer = 1.0_f64;
     for (face, &is_small) in cage.faces().iter().zip(&unresolved) {
@@ -52,9 +60,9 @@ pub fn notice(cage: &Cage, grid: &Grid, lines: &[Lines; 3], cells: u32) -> Optio
     let mut still: Vec<u32> = used.copied().filter(|&i| !moves[i as usize]).collect();
     still.sort_unstable();
     still.dedup();
-    let normals: Vec<DVec3> = (0..cage.facets().len() as u32)
+    let normals: Vec<DVec3> = (0..surface.facets().len() as u32)
         .map(|facet| {
-            let [a, b, c] = cage.facet_corners(facet);
+            let [a, b, c] = surface.facet_corners(facet);
             (b - a).cross(c - a).normalize_or_zero()
         })
         .collect();
@@ -65,7 +73,9 @@ pub fn notice(cage: &Cage, grid: &Grid, lines: &[Lines; 3], cells: u32) -> Optio
             let thickness = (pair[1].t - pair[0].t) * enters[axis].abs().min(leaves[axis].abs());
             let is_thin = thickness < ENOUGH_CELLS && enters.dot(leaves) < OPPOSITE;
             for hit in pair {
-                let face = &mut faces[cage.face_of_facet()[hit.triangle as usize] as usize];
+                let part = surface.face_of_facet()[hit.triangle as usize];
+                let Some(face) = controls.cage_face(part) else { continue };
+                let face = &mut faces[face as usize];
                 face.lines += 1;
                 if is_thin {
                     face.thin += 1;

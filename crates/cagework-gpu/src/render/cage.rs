@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 
-use cagework_core::Cage;
+use cagework_core::Controls;
 use glam::Vec3;
 
+use super::controls::{SurfaceView, bones, lines};
 use super::layout::STATE_SHIFT;
 use super::overlay::{Item, NOTHING, Overlay, item, unique_edges};
 use super::pipelines::Layouts;
@@ -15,11 +16,13 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 use crate::table::{Entry, Table};
 
-/// The cage as it is drawn.
+/// The cage as it is drawn, and controls inside.
 #[derive(Debug)]
 pub(super) struct CageView {
     pub(super) positions: Table,
-    pub(super) n_vertices: usize,
+    /// Of the cage; positions of controls inside come after them.
+    n_vertices: usize,
+    n_controls: usize,
     edges: Vec<[u32; 2]>,
     edge_numbers: HashMap<[u32; 2], usize>,
     triangles: Vec<[u32; 3]>,
@@ -27,36 +30,58 @@ pub(super) struct CageView {
     pub(super) lines: Overlay,
     pub(super) handles: Overlay,
     pub(super) faces: Overlay,
+    /// Lines and handles of controls inside.
+    pub(super) bones: Overlay,
+    pub(super) inner: Overlay,
+    pub(super) surface: Option<SurfaceView>,
 }
 
 impl CageView {
-    pub(super) async fn new(context: &GpuContext, layouts: &Layouts, cage: &Cage) -> Result<Self, GpuError> {
-        let n_vertices = cage.n_vertices();
+    pub(super) async fn new(
+        context: &GpuContext,
+        layouts: &Layouts,
+        controls: Controls<'_>,
+    ) -> Result<Self, GpuError> {
+        let cage = controls.cage();
+        let (n_vertices, n_controls) = (cage.n_vertices(), controls.n_controls());
         let mut allocator = Allocator::new(context, "the cage");
-        let positions = Table::new(context, &mut allocator, "cage vertices", Entry::Point, n_vertices)?;
+        let positions = Table::new(context, &mut allocator, "cage vertices", Entry::Point, n_controls)?;
         let edges = unique_edges(cage.faces().iter().map(Vec::as_slice));
         let edge_numbers = edges.iter().enumerate().map(|(k, &e)| (e, k)).collect();
         let overlay = |items: &[Item]| Overlay::new(context, layouts, &positions, items);
         let view = Self {
-            lines: overlay(&edges.iter().map(|&[a, b]| item(state::NORMAL, a, b)).collect::<Vec<_>>()),
-            handles: overlay(&(0..n_vertices as u32).map(|i| item(state::NORMAL, i, 0)).collect::<Vec<_>>()),
+            lines: overlay(&lines(&edges)),
+            handles: overlay(&vec![NOTHING; n_vertices]),
+            bones: overlay(&lines(&bones(controls))),
+            inner: overlay(&vec![NOTHING; n_controls - n_vertices]),
+            surface: SurfaceView::new(context, layouts, &mut allocator, controls)?,
             faces: overlay(&vec![NOTHING; 2 * cage.triangles().len()]),
             positions,
             n_vertices,
+            n_controls,
             edges,
             edge_numbers,
             triangles: cage.triangles().to_vec(),
             face_of_triangle: cage.face_of_triangle().to_vec(),
         };
-        view.pose(context, cage.positions());
+        view.pose(context, controls.rest());
         allocator.settle().await?;
         Ok(view)
     }
 
-    /// Uploads where the cage is.
-    pub(super) fn pose(&self, context: &GpuContext, cage_positions: &[Vec3]) {
-        let padded: Vec<[f32; 4]> = cage_positions.iter().map(|p| p.extend(1.0).to_array()).collect();
+    /// Uploads where the controls are.
+    pub(super) fn pose(&self, context: &GpuContext, positions: &[Vec3]) {
+        if let Some(surface) = &self.surface {
+            surface.pose(context, positions);
+        }
+        let padded: Vec<[f32; 4]> = positions.iter().map(|p| p.extend(1.0).to_array()).collect();
         self.positions.write(context, bytemuck::cast_slice(&padded));
+    }
+
+    /// All lines, those on top last.
+    pub(super) fn all_lines(&self) -> impl Iterator<Item = &Overlay> {
+        let surface = self.surface.iter().flat_map(|surface| [&surface.shells, &surface.curves]);
+        surface.chain([&self.bones, &self.lines])
     }
 
     /// Writes what is chosen and pointed at.
@@ -68,6 +93,8 @@ impl CageView {
         is_faint: bool,
     ) {
         let mut handles = self.handle_items(selection);
+        let inner = handles.split_off(self.n_vertices);
+        self.inner.set_items(context, layouts, &inner);
         if is_faint {
             handles.retain(|item| item[0] >> STATE_SHIFT != state::NORMAL);
         }
@@ -82,10 +109,15 @@ impl CageView {
         self.lines.set_style(context, lines);
         self.handles.set_style(context, palette.handles());
         self.faces.set_style(context, palette.faces());
+        self.bones.set_style_of_both(context, palette.bones());
+        self.inner.set_style_of_both(context, palette.inner());
+        if let Some(surface) = &self.surface {
+            surface.set_theme(context, theme, is_faint);
+        }
     }
 
     fn handle_items(&self, selection: &Selection) -> Vec<Item> {
-        let mut states = vec![state::NORMAL; self.n_vertices];
+        let mut states = vec![state::NORMAL; self.n_controls];
         mark(&mut states, &selection.unmatched, state::UNMATCHED);
         mark(&mut states, &selection.vertices, state::SELECTED);
         hover(&mut states, selection.hovered_vertex.map(|v| v as usize));

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cagework_core::{Bounds, Cage as CoreCage};
+use cagework_core::{Bounds, Controls};
 use glam::Vec3;
 
 use super::cage::CageView;
@@ -68,8 +68,8 @@ pub struct Renderer {
     wires: Option<Wires>,
     cage: Option<CageView>,
     slice: Option<SlicePlane>,
-    marks: Option<MarksView>,
-    held: Option<MarksView>,
+    /// Of problems, of what is held, of joints.
+    marks: Vec<MarksView>,
     gizmo: GizmoShape,
     scene: SceneOptions,
     floor: Bounds,
@@ -102,8 +102,7 @@ impl Renderer {
             wires: None,
             cage: None,
             slice: None,
-            marks: None,
-            held: None,
+            marks: Vec::new(),
             scene: SceneOptions::default(),
             floor: Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE },
             range: [0.0, 1.0],
@@ -125,8 +124,12 @@ impl Renderer {
     }
 
     /// Another cage, at rest.
-    pub(crate) async fn set_cage(&mut self, context: &GpuContext, cage: &CoreCage) -> Result<(), GpuError> {
-        self.cage = Some(CageView::new(context, &self.layouts, cage).await?);
+    pub(crate) async fn set_cage(
+        &mut self,
+        context: &GpuContext,
+        controls: Controls<'_>,
+    ) -> Result<(), GpuError> {
+        self.cage = Some(CageView::new(context, &self.layouts, controls).await?);
         self.apply(context, None, None);
         Ok(())
     }
@@ -144,10 +147,10 @@ impl Renderer {
         self.make_marks(context);
     }
 
-    /// Where the cage is. Nothing happens without a cage.
-    pub(crate) fn pose(&self, context: &GpuContext, cage_positions: &[Vec3]) {
+    /// Where the controls are. Nothing happens without a cage.
+    pub(crate) fn pose(&self, context: &GpuContext, positions: &[Vec3]) {
         if let Some(cage) = &self.cage {
-            cage.pose(context, cage_positions);
+            cage.pose(context, positions);
         }
     }
 
@@ -204,7 +207,9 @@ impl Renderer {
             self.slice =
                 scene.slice.as_ref().map(|s| SlicePlane::new(context, &self.layouts, s, scene.theme));
         }
-        if theme_changed || before.is_none_or(|b| b.marks != scene.marks || b.held != scene.held) {
+        let is_same =
+            |b: &SceneOptions| (&b.marks, &b.held, &b.joints) == (&scene.marks, &scene.held, &scene.joints);
+        if theme_changed || !before.is_some_and(is_same) {
             self.make_marks(context);
         }
     }
@@ -212,14 +217,7 @@ impl Renderer {
     fn make_marks(&mut self, context: &GpuContext) {
         let mesh = self.mesh.as_ref().map(|m| &m.positions);
         let cage = self.cage.as_ref().map(|c| &c.positions);
-        let palette = self.scene.theme.palette();
-        let view = |marks, style| {
-            let view = MarksView::new(context, &self.layouts, marks, mesh, cage);
-            view.set_style(context, style);
-            Some(view)
-        };
-        self.marks = view(&self.scene.marks, palette.marks());
-        self.held = view(&self.scene.held, palette.held());
+        self.marks = MarksView::all(context, &self.layouts, &self.scene, mesh, cage);
     }
 
     /// Records a picture.
@@ -321,19 +319,22 @@ impl Renderer {
             if self.scene.cage_lines {
                 pass.set_pipeline(pipelines.get(Kind::Faces));
                 cage.faces.draw_faces(pass);
-                pass.set_pipeline(pipelines.get(Kind::LinesBehind));
-                cage.lines.draw(pass, true);
-                pass.set_pipeline(pipelines.get(Kind::Lines));
-                cage.lines.draw(pass, false);
+                for (behind, kind) in [(true, Kind::LinesBehind), (false, Kind::Lines)] {
+                    pass.set_pipeline(pipelines.get(kind));
+                    for lines in cage.all_lines() {
+                        lines.draw(pass, behind);
+                    }
+                }
             }
             if self.scene.handles {
-                pass.set_pipeline(pipelines.get(Kind::PointsBehind));
-                cage.handles.draw(pass, true);
-                pass.set_pipeline(pipelines.get(Kind::Points));
-                cage.handles.draw(pass, false);
+                for (behind, kind) in [(true, Kind::PointsBehind), (false, Kind::Points)] {
+                    pass.set_pipeline(pipelines.get(kind));
+                    cage.inner.draw(pass, behind);
+                    cage.handles.draw(pass, behind);
+                }
             }
         }
-        for marks in [&self.marks, &self.held].into_iter().flatten() {
+        for marks in &self.marks {
             for (behind, [lines, points]) in
                 [(true, [Kind::LinesBehind, Kind::PointsBehind]), (false, [Kind::Lines, Kind::Points])]
             {

@@ -5,14 +5,17 @@ use glam::Vec3;
 use super::layout::Style;
 use super::mesh::Mesh;
 use super::model::DrawModel;
-use super::overlay::{Item, Overlay, item, unique_edges};
+use super::overlay::{Item, Overlay, item, unique_edges, with_behind};
 use super::pipelines::Layouts;
-use super::scene::{Marks, Theme};
+use super::scene::{Marks, SceneOptions, Theme};
 use crate::device::GpuContext;
 use crate::table::{Entry, Table};
 
 /// The state whose width is that of a line rather than a point.
 const SEGMENT: u32 = 4;
+
+/// The state of a point without a filling.
+pub(super) const RING: u32 = 1;
 
 /// Marks as they are drawn.
 #[derive(Debug)]
@@ -22,7 +25,27 @@ pub(super) struct MarksView {
 }
 
 impl MarksView {
-    pub(super) fn new(
+    /// Problems, what is held, joints: as they are drawn, the last on top.
+    pub(super) fn all(
+        context: &GpuContext,
+        layouts: &Layouts,
+        scene: &SceneOptions,
+        mesh: Option<&Table>,
+        cage: Option<&Table>,
+    ) -> Vec<Self> {
+        let palette = scene.theme.palette();
+        let view = |(marks, styles): (&Marks, [Style; 2])| {
+            let view = Self::new(context, layouts, marks, mesh, cage);
+            view.segments.iter().chain(&view.points).for_each(|o| o.set_styles(context, styles));
+            view
+        };
+        let SceneOptions { marks, held, joints, .. } = scene;
+        // Joints are inside the model, and seen through it.
+        let joints = (joints, [palette.joints(); 2]);
+        [(marks, with_behind(palette.marks())), (held, with_behind(palette.held())), joints].map(view).into()
+    }
+
+    fn new(
         context: &GpuContext,
         layouts: &Layouts,
         marks: &Marks,
@@ -42,9 +65,11 @@ impl MarksView {
             let positions = upload(context, &ends);
             view.segments = Some(Overlay::new(context, layouts, &positions, &items));
         }
-        if !marks.points.is_empty() {
-            let all: Vec<u32> = (0..marks.points.len() as u32).collect();
-            view.points.push(points(&all, &upload(context, &marks.points)));
+        if !marks.points.is_empty() || !marks.rings.is_empty() {
+            let all = [&marks.points[..], &marks.rings].concat();
+            let state = |k: u32| if (k as usize) < marks.points.len() { 0 } else { RING };
+            let items: Vec<Item> = (0..all.len() as u32).map(|k| item(state(k), k, 0)).collect();
+            view.points.push(Overlay::new(context, layouts, &upload(context, &all), &items));
         }
         for (indices, positions) in [(&marks.mesh_vertices, mesh), (&marks.cage_vertices, cage)] {
             if let Some(positions) = positions.filter(|_| !indices.is_empty()) {
@@ -52,12 +77,6 @@ impl MarksView {
             }
         }
         view
-    }
-
-    pub(super) fn set_style(&self, context: &GpuContext, style: Style) {
-        for overlay in self.segments.iter().chain(&self.points) {
-            overlay.set_style(context, style);
-        }
     }
 }
 

@@ -5,7 +5,7 @@
 //! pixel and a depth buffer. What changes rarely (chosen vertices, styles, a heat map) is written when it changes.
 //!
 //! Order: background, opaque mesh, slice, translucent mesh, floor, edges, cage (first what is behind the mesh, fainter),
-//! handles, marks, gizmo.
+//! controls inside, handles, marks, gizmo.
 //!
 //! **Format of the target.** sRGB formats (`rgba8unorm-srgb`) are written in linear light and encoded by the GPU. A
 //! canvas has none: configure it with its preferred format and the sRGB one among `view_formats`, and draw into a view
@@ -15,6 +15,7 @@
 mod cage;
 pub mod camera;
 pub mod colormap;
+mod controls;
 mod eye;
 mod frame;
 mod gizmo;

@@ -80,12 +80,19 @@ impl Overlay {
 
     /// What it looks like.
     pub(super) fn set_style(&self, context: &GpuContext, style: Style) {
-        let mut behind = Style { opacity: BEHIND_OPACITY * style.opacity, ..style };
-        // What is chosen is seen through everything.
-        for state in [state::SELECTED, state::BOTH] {
-            behind.colors[state as usize][3] /= BEHIND_OPACITY;
+        self.set_styles(context, with_behind(style));
+    }
+
+    /// What it looks like in front of and behind something.
+    pub(super) fn set_styles(&self, context: &GpuContext, styles: [Style; 2]) {
+        for (buffer, style) in self.styles.iter().zip(styles) {
+            context.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&style));
         }
-        for (buffer, style) in self.styles.iter().zip([style, behind]) {
+    }
+
+    /// The same in front and behind something: of what is always inside the model.
+    pub(super) fn set_style_of_both(&self, context: &GpuContext, style: Style) {
+        for buffer in &self.styles {
             context.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&style));
         }
     }
@@ -106,6 +113,16 @@ impl Overlay {
             pass.draw(0..vertices, 0..count);
         }
     }
+}
+
+/// A style, and it behind something.
+pub(super) fn with_behind(style: Style) -> [Style; 2] {
+    let mut behind = Style { opacity: BEHIND_OPACITY * style.opacity, ..style };
+    // What is chosen is seen through everything.
+    for state in [state::SELECTED, state::BOTH] {
+        behind.colors[state as usize][3] /= BEHIND_OPACITY;
+    }
+    [style, behind]
 }
 
 fn bind(

@@ -72,6 +72,8 @@ pub struct SceneOptions {
     pub marks: Marks,
     /// What a hand holds of the model: points, and a line to where it cannot follow.
     pub held: Marks,
+    /// Joints of a skeleton, seen through everything.
+    pub joints: Marks,
 }
 
 impl Default for SceneOptions {
@@ -93,6 +95,7 @@ impl Default for SceneOptions {
             slice: None,
             marks: Marks::default(),
             held: Marks::default(),
+            joints: Marks::default(),
         }
     }
 }
@@ -172,6 +175,8 @@ impl PartialEq for SliceView {
 pub struct Marks {
     /// Points, world space.
     pub points: Vec<Vec3>,
+    /// Points drawn as rings, world space.
+    pub rings: Vec<Vec3>,
     /// Segments, world space.
     pub segments: Vec<[Vec3; 2]>,
     /// Vertices of the mesh, where they are now.

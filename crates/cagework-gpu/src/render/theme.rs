@@ -1,6 +1,7 @@
 //! Colours: one table per theme, in sRGB as designers write them.
 
 use super::layout::Style;
+use super::marks::RING;
 use super::scene::Theme;
 
 /// States of handles, edges and faces; numbers of [`Style::colors`].
@@ -30,6 +31,10 @@ pub(super) struct Palette {
     pub(super) selected: Color,
     pub(super) both: Color,
     pub(super) unmatched: Color,
+    /// Its smooth surface.
+    pub(super) curves: Color,
+    /// Controls inside.
+    pub(super) inner: Color,
     pub(super) wire: Color,
     pub(super) mesh_edges: Color,
     pub(super) warning: Color,
@@ -61,6 +66,8 @@ const DARK: Palette = Palette {
     selected: (0xffa629, 1.0),
     both: (0xffd27a, 1.0),
     unmatched: (0xff5c9a, 1.0),
+    curves: (0xf3f6fc, 0.8),
+    inner: (0x7fe3c4, 1.0),
     wire: (0x7fe3c4, 0.55),
     mesh_edges: (0x0b0d10, 0.42),
     warning: (0xff4d4f, 1.0),
@@ -81,6 +88,8 @@ const LIGHT: Palette = Palette {
     selected: (0xcf4708, 1.0),
     both: (0xa83800, 1.0),
     unmatched: (0xc2255c, 1.0),
+    curves: (0x1a2740, 0.8),
+    inner: (0x00875f, 1.0),
     wire: (0x1b4b8f, 0.5),
     mesh_edges: (0x10151c, 0.38),
     warning: (0xd6293e, 1.0),
@@ -154,6 +163,28 @@ impl Palette {
         Style { opacity: 0.35, ..self.cage_lines() }
     }
 
+    /// Where faces of the cage meet on its smooth surface.
+    pub(super) fn curves(&self, is_faint: bool) -> Style {
+        let opacity = if is_faint { 0.75 } else { 1.0 };
+        Style { colors: [linear(self.curves); 8], widths: [[1.25; 4]; 2], opacity, ..self.cage_lines() }
+    }
+
+    /// Balls and tubes around controls inside.
+    pub(super) fn shells(&self) -> Style {
+        Style { colors: self.states(self.inner), widths: [[0.9; 4]; 2], opacity: 0.6, ..self.cage_lines() }
+    }
+
+    /// Lines between controls inside.
+    pub(super) fn bones(&self) -> Style {
+        Style { colors: self.states(self.inner), widths: [[2.0; 4]; 2], ..self.cage_lines() }
+    }
+
+    /// Controls inside.
+    pub(super) fn inner(&self) -> Style {
+        // It lies on the model, whatever its colour, and not on the background.
+        Style { colors: self.states(self.inner), rim_color: [1.0, 1.0, 1.0, 0.9], ..self.handles() }
+    }
+
     /// Vertices of the cage.
     pub(super) fn handles(&self) -> Style {
         Style {
@@ -206,6 +237,14 @@ impl Palette {
     pub(super) fn held(&self) -> Style {
         Style { colors: [linear(self.selected); 8], widths: [[11.0; 4], [2.0; 4]], ..self.marks() }
     }
+
+    /// Joints: dots, and rings of the same colour.
+    pub(super) fn joints(&self) -> Style {
+        let color = linear((self.wire.0, 1.0));
+        let mut colors = [color; 8];
+        colors[RING as usize][3] = 0.0;
+        Style { colors, widths: [[8.0, 9.0, 8.0, 8.0], [2.0; 4]], rim_color: color, rim: 2.0, ..self.marks() }
+    }
 }
 
 #[cfg(test)]
@@ -241,8 +280,14 @@ mod tests {
     #[test]
     fn cage_and_marks_stand_out_from_the_background() {
         for palette in [&DARK, &LIGHT] {
-            for color in [palette.cage, palette.selected, palette.warning, palette.unmatched, palette.hovered]
-            {
+            for color in [
+                palette.cage,
+                palette.selected,
+                palette.warning,
+                palette.unmatched,
+                palette.hovered,
+                palette.inner,
+            ] {
                 for background in [palette.background_top, palette.background_bottom] {
                     let contrast = contrast(color, background);
                     assert!(contrast >= 3.0, "{:06x} on {:06x}: {contrast}", color.0, background.0);

@@ -7,18 +7,20 @@ use crate::device::GpuContext;
 use crate::error::GpuError;
 
 impl Session {
-    /// Another session on the same GPU with the same model, cage and pose, for other weights to compare with.
+    /// Another session on the same GPU with the same model, cage and pose, for other weights to compare with: those of closed
+    /// forms, which know the plain cage alone.
     ///
     /// # Errors
     /// [`GpuError::NotReady`] without model or cage; otherwise as the calls that set them.
     pub async fn twin(&self) -> Result<Self, GpuError> {
-        let (_, cage) = self.parts()?;
+        let (_, controls) = self.parts()?;
+        let cage = controls.cage();
         let mut twin = Self::new(self.context.clone());
         if let Some(model) = &self.model {
             twin.set_shared_model(Arc::clone(model)).await?;
         }
         twin.set_cage(cage).await?;
-        twin.pose(&self.pose);
+        twin.pose(&self.pose[..cage.n_vertices()]);
         twin.set_scene(self.scene.clone());
         Ok(twin)
     }
@@ -33,11 +35,15 @@ impl Session {
         if let Some(model) = self.model {
             session.set_shared_model(model).await?;
         }
-        if let Some(cage) = &self.cage {
-            session.set_cage(cage).await?;
+        if let Some(controls) = &self.controls {
+            session.set_cage(controls).await?;
         }
         if let Some(bound) = self.bound {
-            session.adopt(bound.weights, bound.outside).await?;
+            if bound.is_green {
+                session.adopt_green(bound.weights).await?;
+            } else {
+                session.adopt(bound.weights, bound.outside).await?;
+            }
         }
         if !self.pose.is_empty() {
             session.pose(&self.pose);

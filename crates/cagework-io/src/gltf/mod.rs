@@ -44,7 +44,7 @@ pub(crate) use look::look;
 pub use pack::PROJECT_EXTENSION;
 pub(crate) use pack::{Pack, push};
 pub(crate) use patch::{Pose, Rest, embed_images, patch};
-pub use rig::{Clip, Joints, Player, Posed, ReshapeOptions, ReshapeReport};
+pub use rig::{Clip, JointPoint, Joints, Player, Posed, ReshapeOptions, ReshapeReport};
 pub(crate) use rig::{Named, Rig, clips, reshape};
 
 /// Why a glTF file could not be read.

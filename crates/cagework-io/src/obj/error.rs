@@ -17,16 +17,16 @@ pub enum ObjError {
         /// What stands there.
         found: String,
     },
-    /// A corner of a face is no index.
-    #[error("line {line}: face corner '{found}' is not an index such as 7, 7/2, 7//3 or -1")]
+    /// A corner of a face, line or point is no index.
+    #[error("line {line}: corner '{found}' is not an index such as 7, 7/2, 7//3 or -1")]
     Corner {
         /// Line, from 1.
         line: usize,
         /// What stands there.
         found: String,
     },
-    /// A face names a vertex that does not exist.
-    #[error("line {line}: face names vertex {index}, but there are {vertices}")]
+    /// A face, line or point names a vertex that does not exist.
+    #[error("line {line}: names vertex {index}, but there are {vertices}")]
     Vertex {
         /// Line, from 1.
         line: usize,

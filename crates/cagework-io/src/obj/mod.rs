@@ -5,6 +5,7 @@
 //! their polygons, errors name a line, and an export is the user's file with other numbers in it.
 
 mod error;
+mod inner;
 mod lex;
 mod look;
 mod read;
@@ -12,6 +13,7 @@ mod triangulate;
 mod write;
 
 pub use error::ObjError;
+pub use inner::{read_inner_controls, write_inner_controls};
 pub(crate) use look::look;
 pub(crate) use read::{NONE, ObjDocument, read};
 pub use write::write_cage_obj;

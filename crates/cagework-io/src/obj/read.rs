@@ -368,16 +368,16 @@ impl<'a> Reader<'a> {
     }
 }
 
-fn check_count(count: usize, line: usize) -> Result<(), ObjError> {
+pub(super) fn check_count(count: usize, line: usize) -> Result<(), ObjError> {
     if count >= NONE as usize { Err(ObjError::TooLarge { line, limit: NONE - 1 }) } else { Ok(()) }
 }
 
 /// A finite number, or nothing.
-fn number(token: &[u8]) -> Option<f32> {
+pub(super) fn number(token: &[u8]) -> Option<f32> {
     std::str::from_utf8(token).ok()?.parse::<f32>().ok().filter(|x| x.is_finite())
 }
 
-fn integer(token: &[u8]) -> Option<i64> {
+pub(super) fn integer(token: &[u8]) -> Option<i64> {
     std::str::from_utf8(token).ok()?.parse().ok()
 }
 
@@ -387,7 +387,7 @@ fn smoothing_group(word: &[u8]) -> Option<u32> {
 }
 
 /// Index from 0 of an index as written: from 1, or negative, counted back from the `count` elements so far.
-fn resolve(index: i64, count: usize) -> Option<u32> {
+pub(super) fn resolve(index: i64, count: usize) -> Option<u32> {
     let from_zero = if index < 0 { i64::try_from(count).ok()?.checked_add(index)? } else { index - 1 };
     u32::try_from(from_zero).ok().filter(|&i| i != NONE)
 }

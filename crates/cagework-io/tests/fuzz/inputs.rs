@@ -53,8 +53,13 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     samples.push(
         write_project(&model, &model.cage_mesh(), &[("bent".into(), bent.clone())], "{}").expect("it fits"),
     );
-    samples.push(write_weights_npz(&weights.expect("they are"), &[outside], &[Vec3::ONE]));
+    samples.push(write_weights_npz(&weights.expect("they are"), &[outside], &[Vec3::ONE], &[Vec3::ONE]));
     samples.push(encode_pose(&cube(), &bent));
+    // Controls inside of that cube.
+    samples.push(
+        b"v .2 .2 .2\nv .5 .4 .5\nv .8 .2 .2\nv .3 .7 .5\nv .6 .7 .4\nv .5 .9 .6\nl 1 2 3\np -3\nf 4 5 6\n"
+            .to_vec(),
+    );
     samples.extend(cages().iter().map(write_cage_obj));
     samples
 }

@@ -9,10 +9,10 @@ use cagework_core::mesh::Bounds;
 use cagework_core::options::{BindOptions, Method, OutsidePolicy, Solver};
 use cagework_core::progress::Silent;
 use cagework_core::skin::skin_vertices;
-use cagework_core::{Binding, Cage, PolygonMesh, bind};
+use cagework_core::{Binding, Cage, ControlSet, Controls, InnerControls, PolygonMesh, bind};
 use cagework_io::{
-    Joints, Model, ReshapeOptions, decode_pose, encode_pose, read_project, read_weights_npz,
-    write_weights_npz,
+    Joints, Model, ReshapeOptions, decode_pose, encode_pose, read_inner_controls, read_project,
+    read_weights_npz, write_inner_controls, write_weights_npz,
 };
 use glam::{DVec3, Vec3};
 
@@ -26,7 +26,9 @@ struct Rest {
     samples: Vec<Vec<u8>>,
     /// A cage that poses are for.
     cage: Model,
+    closed: Cage,
     /// Points inside it.
+    points: Vec<Vec3>,
     binding: Binding,
 }
 
@@ -35,8 +37,9 @@ static REST: LazyLock<Rest> = LazyLock::new(|| {
     let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
     let closed = Cage::new(&cage.cage_mesh()).expect("it is closed");
     let options = BindOptions { grid: GRID, ..BindOptions::default() };
-    let binding = bind(&lattice(bounds), &closed, &options, &Silent).expect("points are inside");
-    Rest { samples: inputs::samples(), cage, binding }
+    let points = lattice(bounds);
+    let binding = bind(&points, &closed, &options, &Silent).expect("points are inside");
+    Rest { samples: inputs::samples(), cage, closed, points, binding }
 });
 
 /// Of memory, bytes, for each thing that is read.
@@ -45,7 +48,8 @@ const LIMIT: u64 = 1 << 28;
 /// Reads `bytes` as each kind of file, and goes on with whatever comes of it.
 pub(crate) fn survive(bytes: &[u8]) {
     if let Ok(saved) = read_weights_npz(bytes, LIMIT) {
-        let written = write_weights_npz(&saved.weights, &saved.outside, &saved.extra_points);
+        let written =
+            write_weights_npz(&saved.weights, &saved.outside, &saved.extra_points, &saved.inner_controls);
         let again = read_weights_npz(&written, LIMIT).expect("what was written can be read");
         assert_eq!((again.n_vertices(), again.outside.len()), (saved.n_vertices(), saved.outside.len()));
     }
@@ -54,6 +58,11 @@ pub(crate) fn survive(bytes: &[u8]) {
         let _ = deform_bound(&REST.binding.weights, &REST.binding.outside, &pose);
     }
     let choice = bytes.iter().fold(0_u32, |h, &b| h.wrapping_mul(31).wrapping_add(b.into())) >> 7;
+    if let Ok(inner) = read_inner_controls(bytes, LIMIT) {
+        let written = read_inner_controls(&write_inner_controls(&inner), LIMIT);
+        assert!(written.is_ok(), "{written:?}");
+        as_controls(inner, choice);
+    }
     if let Ok(Some(project)) = read_project("x", bytes, LIMIT) {
         as_cage(&project.cage, choice);
     }
@@ -64,6 +73,17 @@ pub(crate) fn survive(bytes: &[u8]) {
         as_pose(&model);
         as_model(&model, choice);
         as_cage(&model.cage_mesh(), choice);
+    }
+}
+
+/// Points are bound to controls inside of the cube, and stay where they are at rest.
+fn as_controls(inner: InnerControls, choice: u32) {
+    let Ok(set) = ControlSet::new(&REST.closed, choice % 3, inner) else { return };
+    let options = BindOptions { grid: GRID, tau: 1e-3, ..BindOptions::default() };
+    let Ok(binding) = bind(&REST.points, &set, &options, &Silent) else { return };
+    let rest = deform_bound(&binding.weights, &binding.outside, Controls::from(&set).rest());
+    for (p, at) in REST.points.iter().zip(rest) {
+        assert!(p.distance(at) < 1e-4, "{p} is put at {at}");
     }
 }
 
@@ -125,6 +145,7 @@ fn as_model(model: &Model, choice: u32) {
         clearance: if flags(12) { 0.25 } else { 0.0 },
         // Coarse mostly: the finer, the fewer inputs.
         voxels: if choice >> 13 & 3 == 0 { 0 } else { 8 },
+        smooth: choice >> 9 & 1,
     };
     if let Ok(made) = generate(&model.positions, &model.triangles, &options, &Silent) {
         assert_eq!(made.cage.notices(), []);

@@ -7,6 +7,7 @@
 mod clips;
 #[path = "../common/mod.rs"]
 mod common;
+mod features;
 mod people;
 
 use cagework_core::skin::skin_vertices;
@@ -269,9 +270,8 @@ fn offsets_of_a_vrm_move_with_the_shape() {
     }
 }
 
-/// A face with as many targets as some have: the export is a matter of a second or two.
-#[test]
-fn ninety_three_targets_are_exported() {
+/// A sheet of 4,000 vertices with targets: what each adds to a vertex along z, and half of it along y.
+fn sheet(n_targets: usize, added: impl Fn(usize, usize) -> f32) -> common::Builder {
     let n = 4_000;
     let mut rig = common::Builder::new();
     let at: Vec<[f32; 3]> = (0..n)
@@ -284,10 +284,10 @@ fn ninety_three_targets_are_exported() {
         (0..n as u32 - 64).filter(|k| k % 63 < 62).flat_map(|k| [k, k + 1, k + 63]).collect();
     let (position, indices) = (rig.vec3(&at), rig.indices(&indices));
     let normal = rig.vec3(&vec![[0.0, 0.0, 1.0]; n]);
-    let targets: Vec<serde_json::Value> = (0..93)
+    let targets: Vec<serde_json::Value> = (0..n_targets)
         .map(|k| {
             let delta: Vec<[f32; 3]> =
-                (0..n).map(|v| if v % 93 == k { [0.0, 0.0, 0.1] } else { [0.0; 3] }).collect();
+                (0..n).map(|v| [0.0, 0.5, 1.0].map(|share| share * added(k, v))).collect();
             serde_json::json!({ "POSITION": rig.vec3(&delta), "NORMAL": rig.vec3(&vec![[0.0; 3]; n]) })
         })
         .collect();
@@ -297,17 +297,66 @@ fn ninety_three_targets_are_exported() {
         serde_json::json!({ "primitives": [{ "attributes": attributes, "indices": indices, "targets": targets }] }),
     );
     rig.json["nodes"] = serde_json::json!([{ "mesh": 0 }]);
-    let model = read(&rig.glb());
+    rig
+}
+
+/// Each of some targets alone, before and after a model is reshaped: how far it is from where `f` brings it.
+fn assert_targets(model: &Model, bytes: &[u8], numbers: &[usize], within: f32) {
+    let (before, after) = (player(model), player(&read(bytes)));
+    for (&k, share) in numbers.iter().flat_map(|k| [(k, 0.0), (k, 1.0)]) {
+        let mut targets = before.targets().1.to_vec();
+        targets[k] = share;
+        let moved: Vec<Vec3> = shown(&before, None, 0.0, &targets).into_iter().map(f).collect();
+        assert_near(&shown(&after, None, 0.0, &targets), &moved, within, &format!("target {k} at {share}"));
+    }
+}
+
+/// A face with as many targets as some have.
+#[test]
+fn ninety_three_targets_are_exported() {
+    let model = read(&sheet(93, |k, v| if v % 93 == k { 0.1 } else { 0.0 }).glb());
+    let n = model.positions.len();
     assert_eq!(model.extra_points().unwrap().len(), n, "each moved vertex once");
     let (bytes, report) = reshaped(&model, Joints::Follow);
-    let (before, after) = (player(&model), player(&read(&bytes)));
-    assert_eq!(report.morph_ends, n);
-    for k in [0, 46, 92] {
-        let mut targets = vec![0.0; 93];
-        targets[k] = 1.0;
-        let moved: Vec<Vec3> = shown(&before, None, 0.0, &targets).into_iter().map(f).collect();
-        assert_near(&shown(&after, None, 0.0, &targets), &moved, ROUNDED, "a target");
-    }
+    assert_eq!((report.morph_ends, report.lattice_points), (n, 0));
+    assert_targets(&model, &bytes, &[0, 46, 92], ROUNDED);
+}
+
+/// As in a baked clip: 216,000 ends.
+#[test]
+fn targets_that_all_move_every_vertex_are_read_from_a_lattice() {
+    let mut rig = sheet(54, |k, v| 0.02 + 0.4 * (k as f32 + (v % 63) as f32 / 20.0).sin().abs());
+    let mut weights = vec![0.0; 54];
+    weights[7] = 1.0;
+    rig.json["meshes"][0]["weights"] = serde_json::json!(weights);
+    let bytes = rig.glb();
+    let model = read(&bytes);
+    let (out, report) = reshaped(&model, Joints::Follow);
+    assert_eq!(report.morph_ends, 54 * 4_000);
+    assert_eq!(report.lattice_points, model.extra_points().unwrap().len());
+    assert!((1..=60_000).contains(&report.lattice_points), "{report:?}");
+    assert!(report.notices()[0].contains("read between"), "{:?}", report.notices());
+
+    let [before, after] = [&bytes, &out].map(|b| shown(&player(&read(b)), None, 0.0, &[]));
+    let rest: Vec<Vec3> = before.into_iter().map(f).collect();
+    assert_near(&after, &rest, 4.0 * ROUNDED, "the rest shape does not know of the lattice");
+    // Linear between nodes, `f` is off by at most an eighth of its second derivative (0.2, along y) times the cell squared, always to
+    // the same side.
+    let diagonal = {
+        let all = model.extra_points().unwrap();
+        let bounds = cagework_core::Bounds::of(&[&model.positions[..], &all].concat()).unwrap();
+        bounds.diagonal() as f64
+    };
+    let cell = report.lattice_cell * diagonal;
+    // A box of 1 x 1.2 x 0.7 holds 60,000 cells of 0.0241.
+    assert!(cell < 0.026, "{cell}");
+    assert_targets(&model, &out, &[0, 7, 30, 53], 4.0 * ROUNDED + (0.2 / 8.0 * cell * cell) as f32);
+
+    let still = vec![DVec3::ZERO; model.positions.len() + model.extra_points().unwrap().len()];
+    assert!(model.write_reshaped(&still, &[], &[], &ReshapeOptions::default()).unwrap().0 == bytes);
+    let all: Vec<u32> = (0..still.len() as u32).collect();
+    let far = model.write_reshaped(&by(&model), &all, &[], &ReshapeOptions::default()).unwrap().1;
+    assert_eq!(far.morph_ends_outside, report.morph_ends, "ends whose whole cell is outside");
 }
 
 /// Floats of an accessor of the builder, which lie in a view of their own.

@@ -1,7 +1,7 @@
 //! The cage: made, read, edited at rest, posed.
 
 use cagework_core::bind::estimate_memory;
-use cagework_core::{Cage, PolygonMesh, subdivided_box};
+use cagework_core::{PolygonMesh, subdivided_box};
 use cagework_io::{decode_pose, encode_pose};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -9,6 +9,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::Engine;
 use crate::arrays::{corners, flat, points, polygon_mesh};
 use crate::binder::Polygons;
+use crate::controls::{self, MadeCage};
 use crate::error::{Answer, Fault};
 use crate::options::{BindAsked, taken};
 use crate::views::object;
@@ -38,13 +39,23 @@ impl Engine {
     }
 
     /// Takes a cage given as arrays; `corners`: for each face their number, then them. A mesh that is no cage yet becomes
-    /// a draft. What is wrong with it the worker's `Binder.checkCage` finds.
+    /// a draft. What is wrong with it the worker's `Binder.checkCage` finds. Without `controls` those that there are stay as far
+    /// as they fit into it.
     ///
     /// # Errors
-    /// When the arrays are no mesh.
+    /// When the arrays are no mesh, or the controls do not fit; nothing changes then.
     #[wasm_bindgen(js_name = setCage, unchecked_return_type = "CageState")]
-    pub fn set_cage(&self, positions: &[f32], corners: &[u32]) -> Result<JsValue, JsValue> {
-        Ok(self.put_cage(polygon_mesh(positions, corners)?)?)
+    pub fn set_cage(
+        &self,
+        positions: &[f32],
+        corners: &[u32],
+        #[wasm_bindgen(unchecked_optional_param_type = "CageControls")] controls: JsValue,
+    ) -> Result<JsValue, JsValue> {
+        let mesh = polygon_mesh(positions, corners)?;
+        match controls::said(controls)? {
+            Some(controls) => Ok(self.put_made(MadeCage::new(mesh, controls)?)?),
+            None => Ok(self.put_cage(mesh)?),
+        }
     }
 
     /// The cage, or undefined without one.
@@ -60,17 +71,17 @@ impl Engine {
     #[wasm_bindgen(js_name = cageCorners)]
     #[must_use]
     pub fn cage_corners(&self) -> Vec<u32> {
-        self.read(|state| corners(&state.rest.faces))
+        self.read(|state| corners(&state.rest().faces))
     }
 
-    /// Cage vertices at rest. `[n_cage, 3]`
+    /// Cage vertices and controls inside at rest. `[n_controls, 3]`
     #[wasm_bindgen(js_name = restPositions)]
     #[must_use]
     pub fn rest_positions(&self) -> Vec<f32> {
-        self.read(|state| flat(&state.rest.positions))
+        self.read(|state| flat(&state.rest().positions))
     }
 
-    /// Cage vertices of the moment. `[n_cage, 3]`
+    /// Cage vertices and controls inside of the moment. `[n_controls, 3]`
     #[wasm_bindgen(js_name = cagePositions)]
     #[must_use]
     pub fn cage_positions(&self) -> Vec<f32> {
@@ -90,7 +101,7 @@ impl Engine {
             if state.editing_rest != editing {
                 state.editing_rest = editing;
                 state.gesture = None;
-                state.positions.clone_from(&state.rest.positions);
+                state.positions.clone_from(&state.made.mesh.positions);
                 (state.is_moved, state.is_changed) = (true, true);
             }
         });
@@ -102,14 +113,15 @@ impl Engine {
     /// When the positions are no cage; nothing changes then.
     #[wasm_bindgen(js_name = commitRest, unchecked_return_type = "CageState")]
     pub fn commit_rest(&self) -> Result<JsValue, JsValue> {
-        let (mesh, selection, last) = self.read(|state| {
-            let mesh = PolygonMesh { positions: state.positions.clone(), faces: state.rest.faces.clone() };
-            (mesh, state.selection.clone(), state.cage.is_some())
+        let (mesh, controls, selection, last) = self.read(|state| {
+            let mesh = PolygonMesh { positions: state.positions.clone(), faces: state.rest().faces.clone() };
+            (mesh, state.made.controls.clone(), state.selection.clone(), state.set().is_some())
         });
-        if last {
-            Cage::new(&mesh).map_err(Fault::from)?;
+        let made = MadeCage::new(mesh, controls)?;
+        if last && let Err(fault) = made.set {
+            return Err(Fault::from(fault).into());
         }
-        let shown = self.put_cage(mesh)?;
+        let shown = self.put_made(made)?;
         self.change(|state| state.selection = selection);
         Ok(shown)
     }
@@ -129,9 +141,9 @@ impl Engine {
             self.state.borrow_mut().n_rig = Some(n);
         }
         let bytes = self.read(|state| {
-            let (model, cage) = state.parts()?;
+            let (model, set) = state.parts()?;
             let n = model.positions.len() + state.n_rig.unwrap_or(0);
-            Answer::Ok(estimate_memory(cage, n, &asked.into())?)
+            Answer::Ok(estimate_memory(set, n, &asked.into())?)
         })?;
         Ok(bytes as f64)
     }
@@ -142,7 +154,7 @@ impl Engine {
     pub fn encode_pose(&self) -> Vec<u8> {
         self.read(|state| {
             let in_file = |positions| state.up().turned_back(positions);
-            encode_pose(&in_file(&state.rest.positions), &in_file(&state.positions))
+            encode_pose(&in_file(&state.rest().positions), &in_file(&state.positions))
         })
     }
 
@@ -152,7 +164,7 @@ impl Engine {
     /// When it is damaged or belongs to another cage.
     #[wasm_bindgen(js_name = decodePose)]
     pub fn decode_pose(&self, bytes: &[u8]) -> Result<(), JsValue> {
-        let pose = self.read(|state| decode_pose(&state.up().turned_back(&state.rest.positions), bytes));
+        let pose = self.read(|state| decode_pose(&state.up().turned_back(&state.rest().positions), bytes));
         let pose = pose.map_err(Fault::from)?;
         self.change(|state| state.move_to(state.up().turned(&pose).into_owned()));
         Ok(())
@@ -160,9 +172,14 @@ impl Engine {
 }
 
 impl Engine {
-    /// Another cage or draft, and what the page is told about it.
+    /// Another cage or draft with the controls there are, and what the page is told about it.
     pub(super) fn put_cage(&self, mesh: PolygonMesh) -> Answer<JsValue> {
-        self.take_cage(mesh);
+        let made = self.read(|state| state.made.replaced(&mesh));
+        self.put_made(made)
+    }
+
+    pub(super) fn put_made(&self, made: MadeCage) -> Answer<JsValue> {
+        self.take_cage(made);
         self.state_object()
     }
 

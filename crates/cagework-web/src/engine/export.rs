@@ -2,8 +2,10 @@
 
 use cagework_core::deform::{OutsideVertex, deform_bound, displacements};
 use cagework_core::dynamic::bend_vertices;
-use cagework_core::{Cage, PolygonMesh};
-use cagework_io::{Model, ReshapeReport, write_cage_obj, write_project, write_weights_npz};
+use cagework_core::{ControlSet, InnerControls, PolygonMesh};
+use cagework_io::{
+    Model, ReshapeReport, write_cage_obj, write_inner_controls, write_project, write_weights_npz,
+};
 use glam::{DVec3, Vec3};
 use js_sys::{Array, Float32Array, Uint32Array};
 use wasm_bindgen::JsValue;
@@ -56,7 +58,7 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
     ) -> Result<Vec<u8>, JsValue> {
         let poses = pose_list(poses);
-        let rest = self.read(|state| state.rest.positions.clone());
+        let rest = self.read(|state| state.rest().positions.clone());
         let pairs: Vec<_> = names.iter().cloned().zip(poses.iter().cloned()).collect();
         if let Some((bytes, _)) = self.reshaped(&rest, &pairs, &taken(options)?)? {
             return Ok(bytes);
@@ -76,13 +78,29 @@ impl Engine {
     #[wasm_bindgen(js_name = exportCage)]
     pub fn export_cage(&self) -> Result<Vec<u8>, JsValue> {
         let mesh = self.read(|state| PolygonMesh {
-            positions: state.positions.clone(),
-            faces: state.rest.faces.clone(),
+            positions: state.positions[..state.made.n_cage()].to_vec(),
+            faces: state.rest().faces.clone(),
         });
         if mesh.faces.is_empty() {
             return Err(Fault::missing("cage", "make one first").into());
         }
         Ok(write_cage_obj(&self.read(State::up).mesh_turned_back(&mesh)))
+    }
+
+    /// Controls inside as OBJ, in the pose of the moment.
+    ///
+    /// # Errors
+    /// When there are none.
+    #[wasm_bindgen(js_name = exportControls)]
+    pub fn export_controls(&self) -> Result<Vec<u8>, JsValue> {
+        Ok(self.read(|state| {
+            if state.made.controls.inner == 0 {
+                return Err(Fault::missing("control inside", "put one there first"));
+            }
+            let positions = state.up().turned_back(&state.positions[state.made.n_cage()..]).into_owned();
+            let elements = state.made.controls.elements.clone();
+            Ok(write_inner_controls(&InnerControls { positions, elements, radius: None }))
+        })?)
     }
 
     /// Weights as NPZ, which SciPy loads.
@@ -95,14 +113,16 @@ impl Engine {
             let weights =
                 session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
             self.read(|state| {
+                let up = state.up();
+                let inner = up.turned_back(state.made.inner_positions());
                 let Some((rows, of_rig)) = &state.rig else {
-                    return Ok(write_weights_npz(weights, session.outside(), &[]));
+                    return Ok(write_weights_npz(weights, session.outside(), &[], &inner));
                 };
                 let (mut all, mut outside) = (weights.clone(), session.outside().to_vec());
                 all.append(rows);
                 let n = weights.n_rows() as u32;
                 outside.extend(of_rig.iter().map(|&o| OutsideVertex { vertex: o.vertex + n, ..o }));
-                Ok(write_weights_npz(&all, &outside, &state.the_model()?.extra_points()?))
+                Ok(write_weights_npz(&all, &outside, &state.the_model()?.extra_points()?, &inner))
             })
         })?)
     }
@@ -119,7 +139,8 @@ impl Engine {
         settings: &str,
     ) -> Result<Vec<u8>, JsValue> {
         let poses: Vec<(String, Vec<Vec3>)> = names.into_iter().zip(pose_list(poses)).collect();
-        Ok(self.read(|state| Answer::Ok(write_project(state.the_model()?, &state.rest, &poses, settings)?))?)
+        Ok(self
+            .read(|state| Answer::Ok(write_project(state.the_model()?, state.rest(), &poses, settings)?))?)
     }
 
     /// What points up in the model's file.
@@ -214,7 +235,7 @@ impl Engine {
         }
         self.with_session(|session| {
             self.read(|state| {
-                let (model, rest) = (state.the_model()?, &state.rest.positions);
+                let (model, rest) = (state.the_model()?, &state.rest().positions);
                 let by = |pose: &[Vec3]| match (session.weights(), &state.rig) {
                     (Some(weights), Some((rows, of_rig))) if pose.len() == rest.len() => {
                         let mut by = displacements(weights, session.outside(), rest, pose);
@@ -262,8 +283,8 @@ impl State {
     }
 
     /// Model and cage, which a bind needs.
-    pub(crate) fn parts(&self) -> Answer<(&Model, &Cage)> {
-        let cage = self.cage.as_ref().ok_or_else(|| Fault::missing("cage", "make or open one first"))?;
-        Ok((self.the_model()?, cage))
+    pub(crate) fn parts(&self) -> Answer<(&Model, &ControlSet)> {
+        let set = self.set().ok_or_else(|| Fault::missing("cage", "make or open one first"))?;
+        Ok((self.the_model()?, set))
     }
 }

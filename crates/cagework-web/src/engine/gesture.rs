@@ -41,7 +41,7 @@ impl Engine {
     #[wasm_bindgen(js_name = gizmoAt, unchecked_return_type = "GizmoHandle | undefined")]
     pub fn gizmo_at(&self, x: f32, y: f32, radius: f32) -> Result<JsValue, JsValue> {
         let part = self.read(|state| {
-            let gizmo = state.gizmo()?;
+            let gizmo = state.gizmo().filter(|_| state.has_cage_in_view())?;
             pick_gizmo(&state.camera, &gizmo, state.pointer(x, y), radius)
         });
         if self.read(|state| state.gesture.is_none() && state.active_part != part) {
@@ -190,7 +190,7 @@ impl Engine {
     ) -> Result<(), JsValue> {
         let poses = pose_list(poses);
         let mixed = self
-            .read(|state| reblend(&state.rest.positions, &poses, &points(from), before, shares))
+            .read(|state| reblend(&state.rest().positions, &poses, &points(from), before, shares))
             .map_err(Fault::from)?;
         self.change(|state| state.move_to(mixed));
         Ok(())
@@ -207,7 +207,7 @@ impl Engine {
         seconds: f32,
     ) -> Result<(), JsValue> {
         let poses = pose_list(poses);
-        let now = self.read(|state| moment(&state.rest.positions, &poses, seconds)).map_err(Fault::from)?;
+        let now = self.read(|state| moment(&state.rest().positions, &poses, seconds)).map_err(Fault::from)?;
         self.change(|state| state.move_to(now));
         Ok(())
     }

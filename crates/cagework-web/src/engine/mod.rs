@@ -5,6 +5,7 @@
 
 mod cage;
 mod camera;
+mod controls;
 mod export;
 mod gesture;
 mod picture;
@@ -19,8 +20,8 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use async_lock::Mutex;
+use cagework_core::Weights;
 use cagework_core::deform::OutsideVertex;
-use cagework_core::{PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::check_layers;
 use cagework_io::Model;
@@ -30,10 +31,13 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen_futures::spawn_local;
 use web_sys::HtmlCanvasElement;
 
+use crate::controls::MadeCage;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::gpu::{Gpu, SharedGpu};
 use crate::incoming::{self, page_turn};
+use crate::joints::JointDots;
 use crate::loaded::Loaded;
+use crate::options::{Coordinates, taken};
 use crate::state::State;
 use crate::surface::Surface;
 use crate::views::{ModelInfo, object};
@@ -55,7 +59,7 @@ impl Engine {
     /// `NoAdapter`, `NoDevice`.
     pub async fn create(canvas: HtmlCanvasElement, invalidate: Function) -> Result<Engine, JsValue> {
         let (surface, context) = Surface::open(canvas).await?;
-        let gpu = Gpu { main: Session::new(context), other: None, surface };
+        let gpu = Gpu { main: Session::new(context), others: Vec::new(), surface };
         Ok(Self { state: Rc::default(), gpu: Rc::new(Mutex::new(Some(gpu))), invalidate })
     }
 
@@ -74,7 +78,7 @@ impl Engine {
             let Model { positions, triangles, .. } = &loaded.model;
             check_layers(gpu.main.context(), &camera, positions, triangles, size).map_err(Fault::from)?;
             gpu.main.set_model(draw).await.map_err(Fault::from)?;
-            gpu.other = None;
+            gpu.others.clear();
         }
         page_turn().await;
         let info = ModelInfo::of(&loaded.model);
@@ -95,7 +99,7 @@ impl Engine {
         outside: Vec<u32>,
         offsets: Vec<f32>,
     ) -> Result<(), JsValue> {
-        let (revision, n_columns) = self.read(|state| (state.revision, state.rest.positions.len() as u32));
+        let (revision, n_columns) = self.read(|state| (state.revision, state.rest().positions.len() as u32));
         let n_vertices = self.read(|state| state.model.as_ref().map_or(0, |m| m.positions.len()));
         let all = incoming::weights(n_columns, &indptr, &indices, &data).await?;
         let (weights, outside, rig) = split(all, incoming::outside(&outside, &offsets), n_vertices);
@@ -109,6 +113,10 @@ impl Engine {
         is_current()?;
         self.change(|state| {
             state.is_bound = true;
+            state.joints = rig.as_ref().zip(state.model.as_ref()).and_then(|((weights, outside), model)| {
+                // What is wrong with a rig is said when it is exported.
+                JointDots::new(model, weights, outside).ok()
+            });
             state.rig = rig;
             state.playing = None;
             (state.is_moved, state.is_changed) = (true, true);
@@ -116,32 +124,57 @@ impl Engine {
         Ok(())
     }
 
-    /// Takes mean value coordinates for the right half of the split view; the arrays are those of `adopt`.
+    /// Takes coordinates by formula to compare with; the arrays are those of `adopt`.
     ///
     /// # Errors
     /// As `adopt`.
     #[wasm_bindgen(js_name = adoptOther)]
     pub async fn adopt_other(
         &self,
+        #[wasm_bindgen(unchecked_param_type = "Coordinates")] kind: JsValue,
         indptr: Vec<u32>,
         indices: Uint32Array,
         data: Float32Array,
     ) -> Result<(), JsValue> {
-        let (revision, n_columns) = self.read(|state| (state.revision, state.rest.positions.len() as u32));
+        let kind: Coordinates = taken(kind)?;
+        let (revision, n_columns) = self.read(|state| {
+            // Closed forms know the plain cage alone.
+            let n_faces = state.set().map_or(0, |set| set.cage().triangles().len());
+            let n_more = if kind == Coordinates::Green { n_faces } else { 0 };
+            (state.revision, (state.made.n_cage() + n_more) as u32)
+        });
         let weights = incoming::weights(n_columns, &indptr, &indices, &data).await?;
         self.read(|state| state.require(revision))?;
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         let mut other = gpu.main.twin().await.map_err(Fault::from)?;
-        other.adopt(weights, Vec::new()).await.map_err(Fault::from)?;
+        match kind {
+            Coordinates::Green => other.adopt_green(weights).await,
+            _ => other.adopt(weights, Vec::new()).await,
+        }
+        .map_err(Fault::from)?;
         self.read(|state| state.require(revision))?;
-        gpu.other = Some(other);
+        gpu.others.retain(|(before, _)| *before != kind);
+        gpu.others.push((kind, other));
         self.change(|state| {
-            state.has_other = true;
+            state.others = gpu.others.iter().map(|(kind, _)| *kind).collect();
             (state.is_moved, state.is_changed) = (true, true);
             state.place_viewport();
         });
         Ok(())
+    }
+
+    /// Whether there are coordinates of a kind, to compare with.
+    ///
+    /// # Errors
+    /// When it is no kind.
+    #[wasm_bindgen(js_name = hasOther)]
+    pub fn has_other(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "Coordinates")] kind: JsValue,
+    ) -> Result<bool, JsValue> {
+        let kind = taken(kind)?;
+        Ok(self.read(|state| state.others.contains(&kind)))
     }
 
     /// Counts up with each change of model or rest cage.
@@ -196,10 +229,10 @@ impl Engine {
             let mut shared = self.gpu.lock().await;
             let Gpu { main, .. } = shared.take().ok_or_else(lost)?;
             let main = main.recover(context).await.map_err(Fault::from)?;
-            *shared = Some(Gpu { main, other: None, surface });
+            *shared = Some(Gpu { main, others: Vec::new(), surface });
         }
         self.change(|state| {
-            state.has_other = false;
+            state.others.clear();
             (state.is_moved, state.is_changed) = (true, true);
             state.place_viewport();
         });
@@ -221,8 +254,8 @@ impl Engine {
     }
 
     /// Another cage, here at once and on the GPU when it has answered.
-    fn take_cage(&self, mesh: PolygonMesh) {
-        self.change(|state| state.set_cage(mesh));
+    fn take_cage(&self, made: MadeCage) {
+        self.change(|state| state.set_cage(made));
         let (state, gpu, invalidate) =
             (Rc::clone(&self.state), Rc::clone(&self.gpu), self.invalidate.clone());
         spawn_local(async move {
@@ -270,14 +303,14 @@ fn split(
 
 /// Sees to it that the GPU has the cage of the moment; weights for the one before are dropped.
 async fn upload_cage(state: &RefCell<State>, gpu: &mut Gpu) -> Answer<()> {
-    let (revision, cage) = {
+    let (revision, set) = {
         let state = state.borrow();
-        let missing = state.cage.as_ref().filter(|_| !state.is_on_gpu());
+        let missing = state.set().filter(|_| !state.is_on_gpu());
         (state.revision, missing.cloned())
     };
-    let Some(cage) = cage else { return Ok(()) };
-    gpu.other = None;
-    gpu.main.set_cage(&cage).await?;
+    let Some(set) = set else { return Ok(()) };
+    gpu.others.clear();
+    gpu.main.set_cage(&set).await?;
     state.borrow_mut().on_gpu = Some(revision);
     Ok(())
 }

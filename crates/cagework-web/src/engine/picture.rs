@@ -10,6 +10,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use super::{Engine, lost};
 use crate::arrays::flat;
 use crate::error::{Answer, Fault};
+use crate::options::taken;
 use crate::surface::{Drawn, SMALL, Wanted};
 
 #[wasm_bindgen]
@@ -72,7 +73,7 @@ impl Engine {
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         let scale = {
             let mut state = self.state.borrow_mut();
-            state.write(&mut gpu.main, gpu.other.as_mut());
+            gpu.take(&mut state);
             let scene = state.picture_scene(alone, gpu.main.weights());
             gpu.main.set_scene(scene);
             height as f32 / state.size.y
@@ -83,16 +84,22 @@ impl Engine {
         Ok(picture?)
     }
 
-    /// The model's vertices as the GPU has them. `[n_vertices, 3]`
+    /// The model's vertices as the GPU has them, by coordinates of some kind. `[n_vertices, 3]`
     ///
     /// # Errors
-    /// When there is no model.
+    /// When there is no model; `Missing` when there are no such coordinates.
     #[wasm_bindgen(js_name = readPositions)]
-    pub async fn read_positions(&self) -> Result<Vec<f32>, JsValue> {
+    pub async fn read_positions(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "Coordinates")] kind: JsValue,
+    ) -> Result<Vec<f32>, JsValue> {
+        let kind = taken(kind)?;
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
-        self.state.borrow_mut().write(&mut gpu.main, gpu.other.as_mut());
-        let positions = gpu.main.read_positions().await.map_err(Fault::from)?;
+        gpu.take(&mut self.state.borrow_mut());
+        let none = || Fault::missing("such coordinates", "compare with them first");
+        let session = gpu.shown(&[kind]).1.pop().ok_or_else(none)?;
+        let positions = session.read_positions().await.map_err(Fault::from)?;
         self.change(|_| ());
         Ok(flat(&positions))
     }
@@ -106,10 +113,10 @@ impl Engine {
         if let Some(fault) = state.fault.take() {
             return Err(fault);
         }
-        state.write(&mut gpu.main, gpu.other.as_mut());
+        gpu.take(&mut state);
         let pixels = (state.size * state.scale).round();
         let (size, scale) = ([pixels.x as u32, pixels.y as u32], state.scale);
-        let other = gpu.other.as_mut().filter(|_| state.is_split());
-        gpu.surface.draw(&mut gpu.main, other, size, scale, wanted)
+        let (surface, sessions) = gpu.shown(&state.shown());
+        surface.draw(sessions, size, scale, wanted)
     }
 }

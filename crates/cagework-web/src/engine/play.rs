@@ -1,7 +1,7 @@
 //! Clips: what plays is the model as it would be exported.
 
-use cagework_core::Weights;
 use cagework_core::dynamic::{DisplacementField, Lattice};
+use cagework_core::{Controls, Weights};
 use cagework_io::WriteError;
 use js_sys::Float32Array;
 use wasm_bindgen::JsValue;
@@ -59,6 +59,8 @@ impl Engine {
                 let clip = clip.map(|clip| clip as usize);
                 playing.posed = playing.player.at(clip, seconds, &targets.to_vec());
                 playing.is_new = true;
+                // Joints are part of the scene.
+                state.is_changed |= state.view.joints.is_some();
             }
         });
     }
@@ -100,9 +102,9 @@ impl Engine {
         offsets: &[f32],
     ) -> Result<(), JsValue> {
         let lattice = self.read(|state| {
-            let (_, cage) = state.parts()?;
-            let lattice = Lattice::new(cage);
-            let weights = Weights::new(cage.n_vertices() as u32, indptr, indices, data)?;
+            let controls = Controls::from(state.parts()?.1);
+            let lattice = Lattice::new(controls.surface());
+            let weights = Weights::new(controls.n_controls() as u32, indptr, indices, data)?;
             let outside = incoming::outside(outside, offsets);
             let n = weights.n_rows();
             if n != lattice.points().len() || outside.iter().any(|o| o.vertex as usize >= n) {
@@ -135,7 +137,7 @@ impl Engine {
             let Some((lattice, weights, outside)) = &state.lattice else {
                 return Err(Fault::missing("lattice", "bind it first"));
             };
-            let (rest, posed) = (&state.rest.positions, &state.positions);
+            let (rest, posed) = (&state.rest().positions, &state.positions);
             Ok(DisplacementField::new(lattice.clone(), weights, outside, rest, posed))
         })
     }

@@ -1,10 +1,10 @@
 //! Editing the cage itself: faults, repairs, and its edges and faces.
 
-use cagework_core::PolygonMesh;
 use cagework_core::cage_check::Places;
 use cagework_core::edit::SelectMode;
 use cagework_core::enclosure::Enclosure;
 use cagework_core::rest_edit::{Edited, collapse_edge, delete_faces, extrude_face, split_edge};
+use cagework_core::{ControlSet, Controls, InnerControls, PolygonMesh};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -46,14 +46,20 @@ impl Engine {
         // What nobody sees does not change: no frame is asked for.
         let mut state = self.state.borrow_mut();
         let state = &mut *state;
-        let (Some(model), Some(cage)) = (&state.model, &state.cage) else { return 0 };
-        let watched = state.watched.get_or_insert_with(|| {
-            let pairs = model.positions.len() * cage.triangles().len();
+        let (Some(model), Ok(set)) = (&state.model, &state.made.set) else { return 0 };
+        let (plain, watched) = state.watched.get_or_insert_with(|| {
+            // Without balls and tubes, which are holes in the surface. It could be made before.
+            let plain = ControlSet::new(set.cage(), set.smooth(), InnerControls::default())
+                .unwrap_or_else(|_| ControlSet::plain(set.cage()));
+            let surface = Controls::from(&plain).surface();
+            let pairs = model.positions.len() * surface.triangles().len();
             let some: Vec<_> =
                 model.positions.iter().copied().step_by(pairs.div_ceil(WATCHED_PAIRS).max(1)).collect();
-            Enclosure::new(cage, &some)
+            let watched = Enclosure::new(surface, &some);
+            (plain, watched)
         });
-        watched.outside_of(&state.positions).len() as u32
+        let n_cage = plain.cage().n_vertices();
+        watched.outside_of(&plain.surface_at(&state.positions[..n_cage])).len() as u32
     }
 
     /// Edits the rest cage where it is selected: split_edge, collapse_edge, extrude_face, delete_vertex, delete_face.
@@ -67,6 +73,11 @@ impl Engine {
         #[wasm_bindgen(unchecked_param_type = "RestEdit")] edit: JsValue,
     ) -> Result<JsValue, JsValue> {
         let edit = taken(edit)?;
+        let inner = self.read(|state| state.selected_inner());
+        if matches!(edit, RestEdit::DeleteVertex) && !inner.is_empty() {
+            let made = self.read(|state| state.made.without(&inner))?;
+            return Ok(self.put_made(made)?);
+        }
         let edited = self.read(|state| state.edited(edit))?;
         let shown = self.put_cage(edited.mesh)?;
         self.change(|state| {
@@ -80,13 +91,19 @@ impl Engine {
 impl State {
     /// The cage as it is shown.
     fn shown_mesh(&self) -> PolygonMesh {
-        let positions = if self.editing_rest { &self.positions } else { &self.rest.positions };
-        PolygonMesh { positions: positions.clone(), faces: self.rest.faces.clone() }
+        let positions = if self.editing_rest { &self.positions } else { &self.rest().positions };
+        PolygonMesh { positions: positions[..self.made.n_cage()].to_vec(), faces: self.rest().faces.clone() }
+    }
+
+    /// Selected controls inside.
+    fn selected_inner(&self) -> Vec<u32> {
+        self.selection.vertices().into_iter().filter(|&v| v as usize >= self.made.n_cage()).collect()
     }
 
     fn edited(&self, edit: RestEdit) -> Answer<Edited> {
         let mesh = self.shown_mesh();
-        let (edges, faces) = (self.selection.edges(&self.topology), self.selection.faces(&self.topology));
+        let (mut edges, faces) = (self.selection.edges(&self.topology), self.selection.faces(&self.topology));
+        edges.retain(|edge| edge.iter().all(|&i| (i as usize) < mesh.positions.len()));
         let nothing = |what: &str| Fault::new(ErrorName::Error, format!("select {what} first"));
         Ok(match edit {
             RestEdit::SplitEdge => each(&mesh, &edges, |mesh, &edge| split_edge(mesh, edge, 0.5))?

@@ -33,8 +33,7 @@ impl Engine {
     #[must_use]
     pub fn pick(&self, x: f32, y: f32, radius: f32) -> Vec<u32> {
         self.read(|state| {
-            if state.playing.is_some() {
-                // The cage is not where the model is shown.
+            if !state.has_cage_in_view() {
                 return Vec::new();
             }
             let (at, positions, topology, view) =

@@ -30,11 +30,11 @@ impl Engine {
     ) -> Result<(), JsValue> {
         let asked: BindAsked = taken(options)?;
         let slice = self.read(|state| {
-            let (_, cage) = state.parts()?;
-            let mut slice = Slice::new(cage, &BindOptions::from(asked), axis.min(2), fraction);
+            let (_, set) = state.parts()?;
+            let mut slice = Slice::new(set, &BindOptions::from(asked), axis.min(2), fraction);
             if !data.is_empty() {
                 slice.set_weights(Weights::new(
-                    Controls::from(cage).n_controls() as u32,
+                    Controls::from(set).n_controls() as u32,
                     indptr,
                     indices,
                     data,

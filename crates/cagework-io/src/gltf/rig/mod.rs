@@ -4,11 +4,13 @@
 //! transform without a skin) and `f(x) = x + by(x)` the deformation, a vertex p becomes `M'^-1 f(M p)`. Joints follow the cage and
 //! their inverse bind matrices change so that `G' B' = G B`: then `M' = M`, and whatever the file's bind pose is survives.
 //!
-//! [`Rig`] lists the points that must be bound: vertices, ends of morph targets, nodes that follow, offsets of VRM.
+//! [`Rig`] lists the points that must be bound: vertices, ends of morph targets (or a lattice around them, if they are very
+//! many), nodes that follow, offsets of VRM.
 //! [`reshape`] writes.
 
 mod clip;
 mod edit;
+mod lattice;
 mod nodes;
 mod play;
 mod poses;
@@ -30,7 +32,8 @@ use super::{GltfDocument, GltfError, skin};
 
 pub use clip::Clip;
 pub(crate) use clip::clips;
-pub use nodes::Joints;
+use lattice::Lattice;
+pub use nodes::{JointPoint, Joints};
 pub use play::{Player, Posed};
 pub(crate) use reshape::{Named, reshape};
 pub use reshape::{ReshapeOptions, ReshapeReport};
@@ -58,8 +61,10 @@ pub(crate) struct Rig<'a> {
     /// Diagonal of the box of all states, object units.
     diagonal: f64,
     /// World space, as the file has it.
-    pub(crate) extras: Vec<DVec3>,
+    extras: Vec<DVec3>,
     n_ends: usize,
+    /// What is bound instead of the ends.
+    lattice: Option<Lattice>,
 }
 
 /// A primitive of a mesh under one skin or node.
@@ -120,6 +125,7 @@ impl<'a> Rig<'a> {
             diagonal: 0.0,
             extras: Vec::new(),
             n_ends: 0,
+            lattice: None,
             worlds,
         };
         let mut seen = Vec::new();
@@ -152,6 +158,7 @@ impl<'a> Rig<'a> {
                 *point = DVec3::ZERO;
             }
         }
+        rig.lattice = rig.lattice();
         Ok(rig)
     }
 

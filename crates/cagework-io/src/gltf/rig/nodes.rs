@@ -1,12 +1,14 @@
 //! Nodes that follow the cage: joints and what hangs on them.
 
+use std::collections::HashMap;
+
 use ::gltf::json::scene::{Node, UnitQuaternion};
 use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 
 use super::surface::rotation;
 use super::{AROUND, Rig, STEP};
-use crate::gltf::scene::{Worlds, local};
+use crate::gltf::scene::{Worlds, local, name_of};
 
 /// What becomes of the skeleton.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -76,7 +78,47 @@ impl Given<'_> {
     }
 }
 
+/// A joint, or a node below one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JointPoint {
+    /// Its number in the file.
+    pub node: u32,
+    /// Which of the points that are bound besides the vertices is its origin.
+    pub point: usize,
+    /// What it hangs on, by its number among the joints; none for a root. It comes before.
+    pub parent: Option<usize>,
+    /// Whether vertices hang on it: one that holds none and is outside the cage goes with its parent.
+    pub holds: bool,
+}
+
 impl Rig<'_> {
+    /// The nodes that follow, each after its parent.
+    pub(crate) fn joints(&self) -> Vec<JointPoint> {
+        let mut numbers = vec![None; self.held.len()];
+        let parents: HashMap<u32, Option<u32>> = self.worlds.order.iter().copied().collect();
+        let of_ends = if self.lattice.is_some() { self.n_ends } else { 0 };
+        let mut joints = Vec::with_capacity(self.follows.len());
+        for (k, &(node, at)) in self.follows.iter().enumerate() {
+            numbers[node as usize] = Some(k);
+            let above = parents.get(&node).copied().flatten();
+            joints.push(JointPoint {
+                node,
+                // Behind all ends.
+                point: at - self.n_vertices - of_ends,
+                parent: above.and_then(|above| numbers[above as usize]),
+                holds: self.held[node as usize] > 0.0,
+            });
+        }
+        joints
+    }
+
+    /// Names of the nodes below joints that show a mesh without a skin.
+    pub(crate) fn props(&self) -> Vec<String> {
+        let has_mesh = |node: u32| self.document.root.nodes[node as usize].mesh.is_some();
+        let name = |node| name_of(&self.document.json, "nodes", node, "node");
+        self.follows.iter().map(|&(node, _)| node).filter(|&node| has_mesh(node)).map(name).collect()
+    }
+
     /// Moves the nodes that follow, in `json` and as what they are now.
     pub(super) fn moved(&self, given: &Given<'_>, json: &mut Value) -> Moved {
         let root = &self.document.root;
@@ -215,10 +257,10 @@ impl Rig<'_> {
     }
 }
 
-/// The number of a node that has a name, or of the nodes that have it.
-pub(super) fn named(nodes: &Value, name: &str) -> Vec<u32> {
-    let list = nodes.as_array().into_iter().flatten();
-    (0u32..).zip(list).filter(|(_, node)| node["name"] == name).map(|(k, _)| k).collect()
+/// The number of a node that has a name, or of the nodes that have it; "node 7" where the file has none.
+pub(super) fn named(json: &Value, name: &str) -> Vec<u32> {
+    let n = json["nodes"].as_array().map_or(0, Vec::len) as u32;
+    (0..n).filter(|&node| name_of(json, "nodes", node, "node") == name).collect()
 }
 
 /// f32 as JSON.

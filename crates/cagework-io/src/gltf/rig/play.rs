@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use ::gltf::json::scene::{Node, UnitQuaternion};
 use cagework_core::skin::Skin;
-use glam::{DMat4, Mat4};
+use glam::{DMat4, Mat4, Vec3};
 
 use super::clip::{Clip, clips, quaternion, vector};
 use super::tracks::Driven;
@@ -38,6 +38,8 @@ pub struct Posed {
     pub palette: Vec<Mat4>,
     /// Weights of the morph targets. `[n_targets]`
     pub targets: Vec<f32>,
+    /// Where the nodes are. `[n_nodes]`, world space
+    pub origins: Vec<Vec3>,
 }
 
 impl Player {
@@ -190,6 +192,7 @@ impl Player {
         let matrix = |&(node, bind): &(Option<u32>, DMat4)| {
             node.map_or(DMat4::IDENTITY, |n| world[n as usize] * bind).as_mat4()
         };
-        Posed { palette: self.palette.iter().map(matrix).collect(), targets: weights }
+        let origins = world.iter().map(|w| w.w_axis.truncate().as_vec3()).collect();
+        Posed { palette: self.palette.iter().map(matrix).collect(), targets: weights, origins }
     }
 }

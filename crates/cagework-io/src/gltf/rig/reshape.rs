@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::edit::Edit;
+use super::lattice::MAX_ENDS;
 use super::nodes::{Given, Joints, named};
 use super::shape::Shape;
 use super::{Part, Rig, key_of, poses, tracks, vrm};
@@ -39,10 +40,14 @@ pub struct ReshapeReport {
     pub joints_outside: usize,
     /// Outside the cage and without vertices: they go with their parent.
     pub joints_loose: usize,
-    /// Vertices in states of morph targets that were bound besides the rest shape.
+    /// Vertices in states of morph targets, besides the rest shape.
     pub morph_ends: usize,
     /// Of them, those outside the cage: they follow its closest point.
     pub morph_ends_outside: usize,
+    /// Points of the lattice that they are read from where they are too many to be bound one by one; otherwise 0.
+    pub lattice_points: usize,
+    /// Distance of two of these, over the model's diagonal.
+    pub lattice_cell: f64,
     /// Animation tracks that were written anew.
     pub tracks: usize,
     /// Animation tracks that could not be read, and stay as they are.
@@ -74,6 +79,14 @@ impl ReshapeReport {
                  point; make a cage around them"
             ),
         );
+        let (n, cell) = (self.lattice_points, 100.0 * self.lattice_cell);
+        say(
+            n,
+            format!(
+                "the morph targets move {morph_ends} vertices, more than the {MAX_ENDS} that are bound one by one: what they \
+                 add is read between {n} points, {cell:.1} % of the model's size apart"
+            ),
+        );
         let n = self.singular_vertices;
         say(n, format!("{n} vertices are flattened by their skin: they go with their neighbours"));
         let n = self.tracks_unread;
@@ -102,7 +115,7 @@ pub(crate) fn reshape(
     let mut edit = Edit::new(document);
     let mut rigid = Vec::new();
     for name in &options.rigid {
-        let found = named(&edit.json["nodes"], name);
+        let found = named(&edit.json, name);
         if !found.iter().any(|node| rig.follows.iter().any(|(follows, _)| follows == node)) {
             let name = shown(name);
             return Err(WriteError::Document(format!(
@@ -115,6 +128,8 @@ pub(crate) fn reshape(
         joints: rig.follows.len(),
         morph_ends: rig.n_ends,
         morph_ends_outside: rig.ends_outside(is_outside),
+        lattice_points: rig.lattice.as_ref().map_or(0, |lattice| lattice.nodes.len()),
+        lattice_cell: rig.lattice.as_ref().map_or(0.0, |lattice| lattice.cell / rig.diagonal),
         ..ReshapeReport::default()
     };
     let has_moved = by.iter().any(|&by| by != DVec3::ZERO);
@@ -136,6 +151,14 @@ pub(crate) fn reshape(
             let frame = rig.frame(part, &moved.world, &binds)?;
             let own = || rig.triangles(part, triangles);
             let Some(shape) = rig.shape(part, by, &frame, own)? else { continue };
+            let states = shape.targets.iter().map(|target| &target.positions).chain([&shape.positions]);
+            if states.flatten().any(|p| !p.as_vec3().is_finite()) {
+                return Err(WriteError::Document(format!(
+                    "mesh {}: its skin shrinks vertices so much that their new places are beyond numbers of 32 bits; write it \
+                     without its rig (--static)",
+                    part.instance.mesh
+                )));
+            }
             report.max_condition = report.max_condition.max(shape.condition);
             report.singular_vertices += shape.n_singular;
             write_part(rig, &mut edit, part, &shape);

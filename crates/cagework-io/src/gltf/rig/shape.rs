@@ -126,6 +126,8 @@ impl Rig<'_> {
         let mut shape = Shape { positions, normals: None, tangents: None, targets, condition, n_singular };
         if let Some(directions) = Directions::of(self, part)? {
             let at_base = surface.gradients(&base.from, &base.to);
+            let resting =
+                [0, 1].map(|kind| (0..n).map(|v| directions.at_rest(part, kind, v)).collect::<Vec<DVec3>>());
             let turn = |gradients: &[Option<DMat3>], at: &dyn Fn(usize, usize) -> DVec3| {
                 (0..n)
                     .map(|v| {
@@ -145,7 +147,7 @@ impl Rig<'_> {
             };
             directions.turned(part, &mut shape, |target| {
                 let Some((k, end, share)) = target else {
-                    return turn(&at_base, &|kind, v| directions.at_rest(part, kind, v));
+                    return turn(&at_base, &|kind, v| resting[kind][v]);
                 };
                 let of = &part.targets[k];
                 let mut state = State { from: base.from.clone(), to: base.to.clone() };
@@ -157,9 +159,7 @@ impl Rig<'_> {
                     }
                 }
                 let near = surface.gradients_near(&state.from, &state.to, &of.moved, &at_base);
-                turn(&near, &|kind, v| {
-                    directions.at_rest(part, kind, v) + share * directions.added(k, kind, v)
-                })
+                turn(&near, &|kind, v| resting[kind][v] + share * directions.added(k, kind, v))
             });
         }
         Ok(Some(shape))

@@ -1,0 +1,338 @@
+//! Controls with a surface of their own: a smooth cage, and controls inside.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+
+use glam::{DVec3, Vec3};
+
+use super::inner::{ControlError, InnerControls, InnerElement};
+use super::shapes::{self, Shape};
+use super::{Controls, Origin};
+use crate::cage::{Cage, MAX_FACES};
+use crate::contact::{Corners, each_meeting};
+use crate::deform::deform_vertices;
+use crate::enclosure::Enclosure;
+use crate::geometry::closest_point_on_triangle;
+use crate::options::SMOOTH;
+use crate::smooth::subdivide;
+use crate::weights::Weights;
+
+/// How far a corner of a sheet may stick out of the cage, as a share of its diagonal: a sheet that ends at the cage's walls
+/// closes well if it is drawn a little beyond them.
+const STICKS_OUT: f64 = 0.02;
+
+/// What [`Controls`] of a smooth cage, or with controls inside, are made of.
+#[derive(Clone, Debug)]
+pub struct ControlSet {
+    cage: Cage,
+    smooth: u32,
+    inner: InnerControls,
+    /// `[n_controls]`
+    rest: Vec<Vec3>,
+    surface: Cage,
+    /// `[n_surface, n_controls]`; none for the identity.
+    rows: Option<Weights>,
+    /// `[n_surface_faces]`
+    origins: Vec<Origin>,
+}
+
+impl<'a> From<&'a ControlSet> for Controls<'a> {
+    fn from(set: &'a ControlSet) -> Self {
+        if set.rows.is_none() {
+            return Self::from(&set.cage);
+        }
+        let ControlSet { cage, rest, surface, rows, origins, .. } = set;
+        Self { cage, rest, surface, rows: rows.as_ref(), origins: Some(origins), set: Some(set) }
+    }
+}
+
+impl ControlSet {
+    /// Those of a plain cage.
+    #[must_use]
+    pub fn plain(cage: &Cage) -> Self {
+        Self {
+            cage: cage.clone(),
+            smooth: 0,
+            inner: InnerControls::default(),
+            rest: cage.positions().to_vec(),
+            surface: cage.clone(),
+            rows: None,
+            origins: (0..cage.faces().len() as u32).map(|f| origin(cage, f)).collect(),
+        }
+    }
+
+    /// The controls of a cage whose surface is subdivided `smooth` times (0 to 3), with controls inside, if any.
+    ///
+    /// # Errors
+    /// [`ControlError`]: too many steps, controls that are not inside, overlap, name what is not there, or are too many.
+    pub fn new(cage: &Cage, smooth: u32, inner: InnerControls) -> Result<Self, ControlError> {
+        SMOOTH.check(smooth)?;
+        let mut set = Self::plain(cage);
+        if smooth > 0 {
+            let made = subdivide(&cage.to_polygon_mesh(), smooth);
+            set.smooth = smooth;
+            set.surface = Cage::new(&made.mesh).map_err(ControlError::Smooth)?;
+            set.origins = made.face_of.iter().map(|&f| set.origins[f as usize]).collect();
+            set.rows = Some(made.rows);
+        }
+        if inner != InnerControls::default() {
+            set.add(inner)?;
+        }
+        Ok(set)
+    }
+
+    /// The cage.
+    #[must_use]
+    pub fn cage(&self) -> &Cage {
+        &self.cage
+    }
+
+    /// Steps of subdivision.
+    #[must_use]
+    pub fn smooth(&self) -> u32 {
+        self.smooth
+    }
+
+    /// The controls inside.
+    #[must_use]
+    pub fn inner(&self) -> &InnerControls {
+        &self.inner
+    }
+
+    /// Where the surface is drawn with the controls at `positions` (`[n_controls]`, object units): balls and tubes keep their
+    /// radius and do not turn. `[n_surface]`
+    ///
+    /// # Panics
+    /// If there is not one position per control.
+    #[must_use]
+    pub fn surface_at(&self, positions: &[Vec3]) -> Vec<Vec3> {
+        let Some(rows) = &self.rows else { return positions.to_vec() };
+        let by: Vec<Vec3> = positions.iter().zip(&self.rest).map(|(p, rest)| p - rest).collect();
+        let moved = deform_vertices(rows, &by);
+        self.surface.positions().iter().zip(moved).map(|(rest, by)| rest + by).collect()
+    }
+
+    fn add(&mut self, inner: InnerControls) -> Result<(), ControlError> {
+        let extent = self.surface.bounds().extent();
+        inner.check(extent.max_element())?;
+        let n_faces = self.surface.faces().len() + inner.elements.iter().map(faces_of).sum::<usize>();
+        if n_faces > MAX_FACES {
+            return Err(ControlError::TooMany { elements: inner.elements.len(), faces: n_faces });
+        }
+        self.check_inside(&inner)?;
+        let walls = Walls::new(&inner, &self.cage, f64::from(inner.radius_in(extent.max_element())))?;
+        walls.check_apart(&inner)?;
+
+        let n_cage = self.rest.len() as u32;
+        let first = self.surface.n_vertices() as u32;
+        let faces: Vec<Vec<u32>> =
+            walls.faces.iter().map(|face| face.iter().map(|&i| first + i).collect()).collect();
+        let positions: Vec<Vec3> = walls.points.iter().map(|(p, _)| p.as_vec3()).collect();
+        let surface =
+            self.surface.with_walls(&positions, &faces, &walls.part_of).map_err(ControlError::Smooth)?;
+        let (mut indptr, mut indices, mut data) = match &self.rows {
+            Some(rows) => (rows.indptr().to_vec(), rows.indices().to_vec(), rows.data().to_vec()),
+            None => ((0..=n_cage).collect(), (0..n_cage).collect(), vec![1.0; n_cage as usize]),
+        };
+        for (_, [(a, of_a), (b, of_b)]) in &walls.points {
+            for (control, share) in [(*a, *of_a), (*b, *of_b)].into_iter().filter(|(_, share)| *share > 0.0) {
+                indices.push(n_cage + control);
+                data.push(share as f32);
+            }
+            indptr.push(indices.len() as u32);
+        }
+        let n_columns = n_cage + inner.positions.len() as u32;
+        self.rows = Some(Weights::from_parts(n_columns, indptr, indices, data));
+        self.origins.extend(walls.frames.iter().map(|&frame| Origin { cage_face: None, frame }));
+        self.rest.extend(&inner.positions);
+        self.surface = surface;
+        self.inner = inner;
+        Ok(())
+    }
+
+    /// Whether all corners are inside; those of sheets nearly.
+    fn check_inside(&self, inner: &InnerControls) -> Result<(), ControlError> {
+        let near = STICKS_OUT * f64::from(self.surface.diagonal());
+        let mut may_stick_out = vec![true; inner.positions.len()];
+        for element in inner.elements.iter().filter(|element| !matches!(element, InnerElement::Face(_))) {
+            element.corners().iter().for_each(|&i| may_stick_out[i as usize] = false);
+        }
+        let outside = Enclosure::new(&self.surface, &inner.positions).outside();
+        let is_far = |v: &u32| {
+            let p = inner.positions[*v as usize].as_dvec3();
+            let facets = 0..self.surface.facets().len() as u32;
+            !may_stick_out[*v as usize]
+                || facets.into_iter().all(|f| {
+                    closest_point_on_triangle(p, self.surface.facet_corners(f)).point.distance(p) > near
+                })
+        };
+        match outside.into_iter().find(is_far) {
+            Some(vertex) => Err(ControlError::Outside { vertex, smooth: self.smooth > 0 }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A face of the cage as an origin: the frame is that of its first triangle.
+fn origin(cage: &Cage, face: u32) -> Origin {
+    let first = cage.face_of_triangle().partition_point(|&f| f < face);
+    Origin { cage_face: Some(face), frame: cage.triangles()[first] }
+}
+
+/// Faces that an element needs; of a face inside, its triangles from both sides.
+fn faces_of(element: &InnerElement) -> usize {
+    match element {
+        InnerElement::Point(_) => shapes::BALL_FACES,
+        InnerElement::Line(corners) => (corners.len() - 1) * shapes::TUBE_FACES,
+        InnerElement::Face(corners) => 2 * (corners.len() - 2),
+    }
+}
+
+/// Two controls and their shares of a point's value.
+type Mixed = [(u32, f64); 2];
+
+/// The meshes of controls inside.
+#[derive(Default)]
+struct Walls {
+    points: Vec<(DVec3, Mixed)>,
+    faces: Vec<Vec<u32>>,
+    /// Element, and part of elements that hang together, of each face.
+    element_of: Vec<u32>,
+    part_of: Vec<u32>,
+    /// As in [`Origin`].
+    frames: Vec<[u32; 3]>,
+    /// Corners of sheets: vertices of the surface by control.
+    corners: BTreeMap<u32, u32>,
+}
+
+impl Walls {
+    fn new(inner: &InnerControls, cage: &Cage, radius: f64) -> Result<Self, ControlError> {
+        let mut walls = Self::default();
+        let at = |i: u32| inner.positions[i as usize].as_dvec3();
+        let n_cage = cage.n_vertices() as u32;
+        let parts = parts(inner);
+        for (number, element) in (0u32..).zip(&inner.elements) {
+            let part = parts[number as usize];
+            match element {
+                // A ball alone does not tell how it is turned: the cage beside it does.
+                InnerElement::Point(i) => {
+                    walls.add(
+                        shapes::ball(at(*i), radius),
+                        [*i, *i],
+                        number,
+                        part,
+                        nearest_triangle(cage, at(*i)),
+                    );
+                }
+                InnerElement::Line(corners) => {
+                    for pair in corners.windows(2) {
+                        let [a, b] = [at(pair[0]), at(pair[1])];
+                        let off_line = |i: &u32| {
+                            let p = cage.positions()[*i as usize].as_dvec3() - a;
+                            p.reject_from((b - a).normalize()).length()
+                        };
+                        let beside = nearest_triangle(cage, a.midpoint(b));
+                        let third = beside.into_iter().max_by(|i, j| off_line(i).total_cmp(&off_line(j)));
+                        let frame = [n_cage + pair[0], n_cage + pair[1], third.unwrap_or(0)];
+                        walls.add(shapes::tube(a, b, radius), [pair[0], pair[1]], number, part, frame);
+                    }
+                }
+                InnerElement::Face(corners) => {
+                    let outline: Vec<DVec3> = corners.iter().map(|&i| at(i)).collect();
+                    let triangles = crate::cage::face_triangles(&outline, f64::from(cage.diagonal()));
+                    let flat = |_| ControlError::Degenerate { what: "face", element: number, why: "no area" };
+                    let points: Vec<u32> = corners.iter().map(|&i| walls.corner(i, at(i))).collect();
+                    for [a, b, c] in triangles.map_err(flat)? {
+                        let frame = [a, b, c].map(|k| n_cage + corners[k as usize]);
+                        for side in [[a, b, c], [c, b, a]] {
+                            walls.face(side.map(|k| points[k as usize]).to_vec(), number, part, frame);
+                        }
+                    }
+                }
+            }
+        }
+        Ok(walls)
+    }
+
+    /// The surface's vertex at a corner of a sheet: one for all faces there.
+    fn corner(&mut self, control: u32, at: DVec3) -> u32 {
+        *self.corners.entry(control).or_insert_with(|| {
+            self.points.push((at, [(control, 1.0), (control, 0.0)]));
+            self.points.len() as u32 - 1
+        })
+    }
+
+    fn add(&mut self, shape: Shape, [a, b]: [u32; 2], element: u32, part: u32, frame: [u32; 3]) {
+        let first = self.points.len() as u32;
+        self.points.extend(shape.points.into_iter().map(|(p, share)| (p, [(a, 1.0 - share), (b, share)])));
+        for face in shape.faces {
+            self.face(face.into_iter().map(|i| first + i).collect(), element, part, frame);
+        }
+    }
+
+    fn face(&mut self, face: Vec<u32>, element: u32, part: u32, frame: [u32; 3]) {
+        self.faces.push(face);
+        self.element_of.push(element);
+        self.part_of.push(part);
+        self.frames.push(frame);
+    }
+
+    /// Whether elements that do not hang together keep apart.
+    fn check_apart(&self, inner: &InnerControls) -> Result<(), ControlError> {
+        let (mut triangles, mut element_of) = (Vec::new(), Vec::new());
+        for (face, &element) in self.faces.iter().zip(&self.element_of) {
+            for k in 2..face.len() {
+                let index = [face[0], face[k - 1], face[k]];
+                triangles.push(Corners { index, at: index.map(|i| self.points[i as usize].0) });
+                element_of.push(element);
+            }
+        }
+        let parts = parts(inner);
+        let mut wrong = None;
+        each_meeting(&triangles, |pair| {
+            let elements = pair.map(|t| element_of[t as usize]);
+            let [a, b] = elements.map(|element| parts[element as usize]);
+            if a == b {
+                return ControlFlow::Continue(());
+            }
+            let [low, high] = [elements[0].min(elements[1]), elements[0].max(elements[1])];
+            wrong = Some([low, high]);
+            ControlFlow::Break(())
+        });
+        match wrong {
+            Some(elements) => {
+                let what = elements.map(|element| inner.elements[element as usize].name());
+                Err(ControlError::Overlap { what, elements })
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// For each element the first one that it hangs together with, by shared vertices.
+fn parts(inner: &InnerControls) -> Vec<u32> {
+    let mut part_of_vertex = vec![u32::MAX; inner.positions.len()];
+    let mut parts: Vec<u32> = (0..inner.elements.len() as u32).collect();
+    // Until nothing changes: elements are few, and chains of them are mostly in order.
+    loop {
+        let before = parts.clone();
+        for (part, element) in parts.iter_mut().zip(&inner.elements) {
+            let of_corners = element.corners().iter().map(|&i| part_of_vertex[i as usize]);
+            *part = of_corners.fold(*part, u32::min);
+            element.corners().iter().for_each(|&i| part_of_vertex[i as usize] = *part);
+        }
+        if parts == before {
+            return parts;
+        }
+    }
+}
+
+/// The cage's triangle closest to a point.
+pub(super) fn nearest_triangle(cage: &Cage, p: DVec3) -> [u32; 3] {
+    let distance = |t: u32| closest_point_on_triangle(p, cage.triangle_corners(t)).point.distance(p);
+    let nearest = (0..cage.triangles().len() as u32).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+    cage.triangles()[nearest.unwrap_or(0) as usize]
+}
+
+#[cfg(test)]
+mod tests;

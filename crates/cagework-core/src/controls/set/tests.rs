@@ -1,0 +1,91 @@
+use super::*;
+use crate::cage::shapes::{cube, cuboid};
+
+fn inner(positions: &[[f32; 3]], elements: Vec<InnerElement>) -> InnerControls {
+    InnerControls { positions: positions.iter().map(|&p| p.into()).collect(), elements, radius: None }
+}
+
+fn said(smooth: u32, inner: InnerControls) -> String {
+    ControlSet::new(&Cage::new(&cube()).unwrap(), smooth, inner).unwrap_err().to_string()
+}
+
+#[test]
+fn controls_that_cannot_be_used_are_refused_with_what_to_do() {
+    use InnerElement::{Face, Line, Point};
+    let middle = [[0.5; 3]];
+    let cases = [
+        (inner(&middle, vec![]), "there is no control inside: give points (p)"),
+        (
+            inner(&middle, vec![Point(1)]),
+            "point 0 inside the cage names vertex 1, but there are only 1 (0 to 0)",
+        ),
+        (
+            inner(&[[f32::NAN; 3]], vec![Point(0)]),
+            "control 0 inside the cage has a coordinate that is not a finite number",
+        ),
+        (inner(&middle, vec![Line(vec![0])]), "line 0 inside the cage has fewer than two corners"),
+        (
+            inner(&middle, vec![Line(vec![0, 0])]),
+            "line 0 inside the cage has two corners after each other at one place",
+        ),
+        (inner(&middle, vec![Face(vec![0, 0])]), "face 0 inside the cage has fewer than three corners"),
+        (
+            inner(&[[0.4; 3], [0.5; 3], [0.6, 0.4, 0.4]], vec![Face(vec![0, 1, 1, 2])]),
+            "face 0 inside the cage has a corner more than once",
+        ),
+        (
+            inner(&[[0.4; 3], [0.5; 3], [0.6; 3]], vec![Face(vec![0, 1, 2])]),
+            "face 0 inside the cage has no area",
+        ),
+        (inner(&[[0.5; 3], [1.5; 3]], vec![Point(0), Point(1)]), "control 1 is outside the cage: move it in"),
+        (
+            inner(&[[0.5; 3], [0.51; 3]], vec![Point(0), Point(1)]),
+            "point 0 and point 1 inside the cage overlap: move them apart, join them at a vertex, or use a smaller radius",
+        ),
+        (
+            inner(&[[0.2, 0.5, 0.5], [0.8, 0.5, 0.5], [0.5; 3]], vec![Line(vec![0, 1]), Point(2)]),
+            "line 0 and point 1 inside the cage overlap",
+        ),
+        (
+            InnerControls { radius: Some(0.3), ..inner(&middle, vec![Point(0)]) },
+            "the radius of controls inside is 0.3; it must be above 0 and at most 0.25",
+        ),
+        (
+            inner(&[[0.5; 3]; 10_000], (0..10_000).map(Point).collect()),
+            "10,000 points, lines and faces inside need 800,006 faces, more than 100,000: use fewer",
+        ),
+    ];
+    for (inner, expected) in cases {
+        let said = said(0, inner);
+        assert!(said.starts_with(expected), "{said}");
+    }
+    // The cube's corner at (0.1, 0.1, 0.1) is outside once it is rounded.
+    assert!(said(2, inner(&[[0.1; 3]], vec![Point(0)])).contains("outside the cage's smooth surface"));
+    assert_eq!(said(4, InnerControls::default()), "smooth is 4; it must be a whole number from 0 to 3");
+}
+
+/// Elements that share a vertex may meet there: a spine with a rib.
+#[test]
+fn elements_that_share_a_vertex_hang_together() {
+    let at = [[0.2, 0.5, 0.5], [0.5, 0.5, 0.5], [0.8, 0.5, 0.5], [0.5, 0.8, 0.5]];
+    let lines = vec![InnerElement::Line(vec![0, 1, 2]), InnerElement::Line(vec![3, 1])];
+    let set = ControlSet::new(&Cage::new(&cube()).unwrap(), 0, inner(&at, lines)).unwrap();
+    assert_eq!(Controls::from(&set).n_controls(), 12);
+}
+
+#[test]
+fn surface_follows_its_controls() {
+    let cage = Cage::new(&cuboid(Vec3::NEG_ONE, Vec3::ONE)).unwrap();
+    let set = ControlSet::new(&cage, 2, inner(&[[0.0; 3]], vec![InnerElement::Point(0)])).unwrap();
+    let controls = Controls::from(&set);
+    let by = Vec3::new(0.5, -1.0, 2.0);
+    let moved: Vec<Vec3> = controls.rest().iter().map(|&p| p + by).collect();
+    let (rest, posed) = (set.surface_at(controls.rest()), set.surface_at(&moved));
+    assert_eq!(rest.len(), controls.surface().n_vertices());
+    for (a, b) in rest.iter().zip(&posed) {
+        assert!((*b - *a - by).length() < 1e-6, "{a} {b}");
+    }
+    // A ball's vertices stay around its control, by 1/32 of the smooth cage's side.
+    let radius = set.inner().radius_in(controls.surface().bounds().extent().max_element());
+    assert!(posed[posed.len() - 42..].iter().all(|p| (p.distance(by) / radius - 1.0).abs() < 0.1));
+}

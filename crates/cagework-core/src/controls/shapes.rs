@@ -1,0 +1,129 @@
+//! Meshes of balls and tubes. Their faces look inwards: to the space between them and the cage, they are its border.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DQuat, DVec3};
+
+/// Sides of a tube.
+const SIDES: usize = 8;
+/// Rings of a tube's rounded end, without the one where the tube begins and the tip.
+const RINGS: usize = 2;
+
+/// Faces of a ball, and of a piece of a tube with its ends.
+pub(super) const BALL_FACES: usize = 80;
+pub(super) const TUBE_FACES: usize = SIDES * (1 + 2 * (RINGS + 1));
+
+/// Points around a control and faces between them.
+pub(super) struct Shape {
+    /// Places, and how far along the tube their foot is: 0 to 1.
+    pub(super) points: Vec<(DVec3, f64)>,
+    pub(super) faces: Vec<Vec<u32>>,
+}
+
+/// A ball: an icosahedron whose faces are cut into four, with the ball's volume.
+pub(super) fn ball(center: DVec3, radius: f64) -> Shape {
+    let golden = f64::midpoint(1.0, 5.0_f64.sqrt());
+    let corner = |k: usize| {
+        let sign = |bit: usize| if k >> bit & 1 == 0 { 1.0 } else { -1.0 };
+        let mut at = [0.0, sign(0), sign(1) * golden];
+        at.rotate_right(k / 4);
+        DVec3::from(at).normalize()
+    };
+    let mut points: Vec<DVec3> = (0..12).map(corner).collect();
+    // Corners of an edge are the nearest ones.
+    let is_edge = |a: usize, b: usize| points[a].distance(points[b]) < 1.2;
+    let mut triangles = Vec::new();
+    for a in 0..12 {
+        for b in a + 1..12 {
+            triangles.extend((b + 1..12).filter(|&c| is_edge(a, b) && is_edge(b, c) && is_edge(a, c)).map(
+                |c| {
+                    let outward = points[a].dot(points[b].cross(points[c])) > 0.0;
+                    if outward { [a, c, b] } else { [a, b, c] }
+                },
+            ));
+        }
+    }
+    let mut middles = std::collections::BTreeMap::new();
+    let mut faces = Vec::new();
+    for [a, b, c] in triangles {
+        let mut middle = |a: usize, b: usize| {
+            *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                points.push((points[a] + points[b]).normalize());
+                points.len() - 1
+            })
+        };
+        let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+        faces.extend(
+            [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]].map(|t| t.map(|i| i as u32).to_vec()),
+        );
+    }
+    let volume: f64 = faces
+        .iter()
+        .map(|t| {
+            let [a, b, c] = [0, 1, 2].map(|k| points[t[k] as usize]);
+            a.dot(c.cross(b)) / 6.0
+        })
+        .sum();
+    let size = radius * (4.0 / 3.0 * PI / volume).cbrt();
+    Shape { points: points.into_iter().map(|p| (center + size * p, 0.0)).collect(), faces }
+}
+
+/// A tube from `a` to `b` with rounded ends; its cross-section has a circle's area.
+pub(super) fn tube(a: DVec3, b: DVec3, radius: f64) -> Shape {
+    let turn = DQuat::from_rotation_arc(DVec3::Z, (b - a).normalize());
+    let size = radius * (TAU / (SIDES as f64 * (TAU / SIDES as f64).sin())).sqrt();
+    // From the tip at a to the tip at b: height over the end, radius, end.
+    let rings = (0..=RINGS).rev().map(|k| (k, a, -1.0, 0.0)).chain((0..=RINGS).map(|k| (k, b, 1.0, 1.0)));
+    let mut points = vec![(a - turn * (size * DVec3::Z), 0.0)];
+    for (k, end, side, share) in rings {
+        let (sin, cos) = (0.5 * PI * k as f64 / (RINGS + 1) as f64).sin_cos();
+        points.extend((0..SIDES).map(|s| {
+            let (y, x) = (TAU * s as f64 / SIDES as f64).sin_cos();
+            (end + turn * (size * DVec3::new(cos * x, cos * y, side * sin)), share)
+        }));
+    }
+    points.push((b + turn * (size * DVec3::Z), 1.0));
+    let (n, last) = (SIDES as u32, points.len() as u32 - 1);
+    let mut faces = Vec::with_capacity(TUBE_FACES);
+    for s in 0..n {
+        let next = (s + 1) % n;
+        faces.push(vec![0, 1 + s, 1 + next]);
+        for ring in 0..2 * RINGS as u32 + 1 {
+            let (low, high) = (1 + ring * n, 1 + (ring + 1) * n);
+            faces.push(vec![low + s, high + s, high + next, low + next]);
+        }
+        faces.push(vec![last, last - n + next, last - n + s]);
+    }
+    Shape { points, faces }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn volume(shape: &Shape) -> f64 {
+        let at = |i: u32| shape.points[i as usize].0;
+        let of_face = |face: &Vec<u32>| -> f64 {
+            (2..face.len()).map(|k| at(face[0]).dot(at(face[k - 1]).cross(at(face[k]))) / 6.0).sum()
+        };
+        shape.faces.iter().map(of_face).sum()
+    }
+
+    /// A ball has 4/3 pi r^3; a tube of length l has l pi r^2 and, at its ends, a ball or a little less.
+    #[test]
+    fn balls_and_tubes_look_inwards_and_have_their_volumes() {
+        let ball = ball(DVec3::new(3.0, 2.0, 1.0), 0.5);
+        assert_eq!((ball.points.len(), ball.faces.len()), (42, BALL_FACES));
+        assert!((volume(&ball) + 4.0 / 3.0 * PI * 0.125).abs() < 1e-9, "{}", volume(&ball));
+        let (a, b) = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(2.0, 4.0, 5.0));
+        let tube = tube(a, b, 0.5);
+        assert_eq!(tube.faces.len(), TUBE_FACES);
+        let side = 3.0 * PI * 0.25;
+        let excess = (-volume(&tube) - side) / (4.0 / 3.0 * PI * 0.125);
+        assert!((0.9..1.1).contains(&excess), "{excess}");
+        for (p, share) in &tube.points {
+            let foot = a.lerp(b, *share);
+            assert!((p.distance(foot) / 0.5 - 1.054).abs() < 1e-3, "{p}");
+        }
+    }
+}

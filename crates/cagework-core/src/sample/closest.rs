@@ -1,0 +1,57 @@
+//! The point of a cage that is closest to a place outside it.
+
+use glam::DVec3;
+
+use super::Outside;
+use crate::cage::Cage;
+use crate::geometry::closest_point_on_triangle;
+
+/// Boxes around the faces of a cage: of most faces the box alone tells that another one is closer.
+#[derive(Clone, Debug)]
+pub struct ClosestOnCage<'a> {
+    cage: &'a Cage,
+    /// Facets and box of each face.
+    faces: Vec<(std::ops::Range<u32>, [DVec3; 2])>,
+}
+
+impl<'a> ClosestOnCage<'a> {
+    /// Of a cage at rest.
+    #[must_use]
+    pub fn new(cage: &'a Cage) -> Self {
+        let mut first = 0;
+        let of_face = |facets: &[u32]| {
+            let range = first..first + facets.len() as u32;
+            first = range.end;
+            let corners = || range.clone().flat_map(|facet| cage.facet_corners(facet));
+            let low = corners().fold(DVec3::INFINITY, DVec3::min);
+            let high = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
+            (range, [low, high])
+        };
+        let faces = cage.face_of_facet().chunk_by(|a, b| a == b).map(of_face).collect();
+        Self { cage, faces }
+    }
+
+    /// The point closest to `point`, on the facet of lowest number if there are several; `vertex` is left 0.
+    #[must_use]
+    pub fn find(&self, point: DVec3) -> Outside {
+        let mut best =
+            Outside { vertex: 0, triangle: 0, barycentric: [1.0, 0.0, 0.0], distance: f64::INFINITY };
+        let to_box = |[low, high]: &[DVec3; 2]| point.distance(point.clamp(*low, *high));
+        let mut distances: Vec<f64> = self.faces.iter().map(|(_, bounds)| to_box(bounds)).collect();
+        loop {
+            let nearest = (0..distances.len()).min_by(|&a, &b| distances[a].total_cmp(&distances[b]));
+            let Some(face) = nearest.filter(|&face| distances[face] <= best.distance) else { return best };
+            if distances[face].is_infinite() {
+                return best;
+            }
+            distances[face] = f64::INFINITY;
+            for triangle in self.faces[face].0.clone() {
+                let closest = closest_point_on_triangle(point, self.cage.facet_corners(triangle));
+                let distance = closest.point.distance(point);
+                if distance < best.distance || distance == best.distance && triangle < best.triangle {
+                    best = Outside { vertex: 0, triangle, barycentric: closest.barycentric, distance };
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! Controls inside a cage, from the elements of an OBJ file: `p` points, `l` polylines, `f` faces of sheets.
+
+use cagework_core::{InnerControls, InnerElement};
+use glam::Vec3;
+
+use super::error::ObjError;
+use super::lex::{lines, shown, tokens};
+use super::read::{check_count, integer, number, resolve};
+use crate::memory::MemoryError;
+
+/// Bytes that a vertex and an element with its corners take, at most and about.
+const VERTEX_BYTES: u64 = 24;
+const ELEMENT_BYTES: u64 = 80;
+
+/// Reads controls inside a cage: every `v` line a control, in the file's own axes; other lines than `v`, `p`, `l` and `f` are
+/// left out. A `p` line may name several points. The radius is left open.
+///
+/// # Errors
+/// [`ObjError`] when a line cannot be read or names a vertex that does not exist, or the memory does not suffice.
+pub fn read_inner_controls(bytes: &[u8], memory_limit: u64) -> Result<InnerControls, ObjError> {
+    let mut inner = InnerControls::default();
+    let mut lines_of = Vec::new();
+    let mut n_corners = 0;
+    for line in lines(bytes) {
+        let mut words = tokens(bytes, line.range.clone());
+        let Some(keyword) = words.next() else { continue };
+        let needed = VERTEX_BYTES * inner.positions.len() as u64
+            + ELEMENT_BYTES * inner.elements.len() as u64
+            + 8 * n_corners as u64;
+        MemoryError::check(bytes.len() as u64 + needed, memory_limit)?;
+        match &bytes[keyword] {
+            b"v" => {
+                let mut p = [0.0; 3];
+                for (value, axis) in p.iter_mut().zip(['x', 'y', 'z']) {
+                    let token = words.next();
+                    *value = token.clone().and_then(|t| number(&bytes[t])).ok_or_else(|| {
+                        let found = token.map_or("missing".into(), |t| format!("'{}'", shown(&bytes[t])));
+                        ObjError::Coordinate { line: line.number, axis, found }
+                    })?;
+                }
+                inner.positions.push(Vec3::from_array(p));
+                check_count(inner.positions.len(), line.number)?;
+            }
+            kind @ (b"p" | b"l" | b"f") => {
+                let corner = |token: std::ops::Range<usize>| {
+                    let token = &bytes[token];
+                    let bad = || ObjError::Corner { line: line.number, found: shown(token) };
+                    // What follows a slash is a texture coordinate or a normal.
+                    let index = token.split(|&b| b == b'/').next().and_then(integer).ok_or_else(bad)?;
+                    let vertices = inner.positions.len();
+                    resolve(index, vertices).ok_or(ObjError::Vertex { line: line.number, index, vertices })
+                };
+                let corners = words.map(corner).collect::<Result<Vec<u32>, _>>()?;
+                n_corners += corners.len();
+                check_count(n_corners, line.number)?;
+                let before = inner.elements.len();
+                match kind {
+                    b"p" => inner.elements.extend(corners.into_iter().map(InnerElement::Point)),
+                    b"l" => inner.elements.push(InnerElement::Line(corners)),
+                    _ => inner.elements.push(InnerElement::Face(corners)),
+                }
+                lines_of.resize(inner.elements.len(), line.number);
+                if before == inner.elements.len() {
+                    return Err(ObjError::Corner { line: line.number, found: String::new() });
+                }
+            }
+            _ => {}
+        }
+    }
+    let vertices = inner.positions.len();
+    if vertices == 0 {
+        return Err(ObjError::Empty);
+    }
+    // A face may come before its vertices.
+    for (element, line) in inner.elements.iter().zip(lines_of) {
+        if let Some(&v) = element.corners().iter().find(|&&v| v as usize >= vertices) {
+            return Err(ObjError::Vertex { line, index: i64::from(v) + 1, vertices });
+        }
+    }
+    Ok(inner)
+}
+
+/// Controls inside a cage as an OBJ file: what [`read_inner_controls`] reads.
+#[must_use]
+pub fn write_inner_controls(inner: &InnerControls) -> Vec<u8> {
+    let vertices = inner.positions.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
+    let elements = inner.elements.iter().map(|element| {
+        let kind = &element.name()[..1];
+        let corners = element.corners().iter().map(|&i| format!(" {}", u64::from(i) + 1));
+        format!("{kind}{}\n", corners.collect::<String>())
+    });
+    vertices.chain(elements).collect::<String>().into_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMIT: u64 = 1 << 20;
+
+    #[test]
+    fn elements_of_all_kinds_are_read_with_any_indices() {
+        let text = b"# controls\nv 0 0 0\nv 1 0 0\nv 1 1 0\np 1 -1\nl 1 2 3\nf 1/1 2//2 3\nusemtl red\n";
+        let inner = read_inner_controls(text, LIMIT).unwrap();
+        assert_eq!(inner.positions.len(), 3);
+        let expected = [
+            InnerElement::Point(0),
+            InnerElement::Point(2),
+            InnerElement::Line(vec![0, 1, 2]),
+            InnerElement::Face(vec![0, 1, 2]),
+        ];
+        assert_eq!((inner.elements.as_slice(), inner.radius), (&expected[..], None));
+        assert_eq!(read_inner_controls(&write_inner_controls(&inner), LIMIT).unwrap(), inner);
+    }
+
+    #[test]
+    fn files_that_cannot_be_read_end_in_a_sentence() {
+        for (text, expected) in [
+            ("", "no vertices: an OBJ file has lines such as 'v 0 1 0'"),
+            ("v 0 0\n", "line 1: z coordinate is missing"),
+            ("v 0 0 0\np 2\n", "line 2: names vertex 2, but there are 1"),
+            ("v 0 0 0\nl 1 x\n", "line 2: corner 'x' is not an index"),
+            ("v 0 0 0\np\n", "line 2: corner '' is not an index"),
+        ] {
+            let said = read_inner_controls(text.as_bytes(), LIMIT).unwrap_err().to_string();
+            assert!(said.starts_with(expected), "{said}");
+        }
+        let many = "v 0 0 0\n".repeat(10_000);
+        assert!(read_inner_controls(many.as_bytes(), 100_000).unwrap_err().to_string().contains("memory"));
+    }
+}

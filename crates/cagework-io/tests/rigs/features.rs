@@ -1,0 +1,203 @@
+//! What files have besides a skin and a clip: props, several sets of joints, instances, other scenes, flattened skins.
+
+use cagework_io::{Joints, Model, ReshapeOptions};
+use glam::{DVec3, Mat4, Vec3, vec3};
+use serde_json::json;
+
+use super::common::{self, Builder, F32, U8, floats, json_of, rigged};
+use super::{ROUNDED, assert_near, assert_targets, by, f, player, read, reshaped, shown};
+
+/// The column with a cube on its tip, placed by a matrix.
+fn with_hat() -> Builder {
+    let mut rig = rigged();
+    let cube = rig.cube_mesh("cube");
+    let placed = Mat4::from_translation(vec3(0.05, 0.1, 0.0)) * Mat4::from_scale(Vec3::splat(0.1));
+    rig.push("nodes", json!({ "name": "hat", "mesh": cube, "matrix": placed.to_cols_array() }));
+    rig.json["nodes"][3]["children"] = json!([5]);
+    rig
+}
+
+/// The last `n` vertices: those of what was added.
+fn last(model: &Model, n: usize) -> Vec<Vec3> {
+    model.positions[model.positions.len() - n..].to_vec()
+}
+
+#[test]
+fn what_hangs_on_a_bone_bends_or_stays_rigid() {
+    let model = read(&with_hat().glb());
+    assert_eq!(model.props().unwrap(), ["hat"]);
+    let moved: Vec<Vec3> = last(&model, 8).iter().map(|&p| f(p)).collect();
+    let bent = read(&reshaped(&model, Joints::Follow).0);
+    assert_near(&last(&bent, 8), &moved, ROUNDED, "it bends");
+
+    let options = ReshapeOptions { rigid: vec!["hat".into()], ..ReshapeOptions::default() };
+    let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &options).unwrap();
+    let rigid = last(&read(&bytes), 8);
+    // Its first corner is the node's origin.
+    assert!(rigid[0].distance(moved[0]) <= ROUNDED, "{} {}", rigid[0], moved[0]);
+    for (a, b) in [(0, 7), (1, 6), (2, 4)] {
+        let [before, after] = [&last(&model, 8), &rigid].map(|at| at[a].distance(at[b]));
+        assert!((before - after).abs() <= ROUNDED, "{before} {after}");
+        assert!((before - moved[a].distance(moved[b])).abs() > 1e-3, "otherwise it is stretched");
+    }
+
+    let mut nameless = with_hat();
+    nameless.json["nodes"][5].as_object_mut().unwrap().shift_remove("name");
+    let model = read(&nameless.glb());
+    assert_eq!(model.props().unwrap(), ["node 5"]);
+    let options = ReshapeOptions { rigid: vec!["node 5".into()], ..ReshapeOptions::default() };
+    let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &options).unwrap();
+    assert_eq!(last(&read(&bytes), 8), rigid);
+}
+
+/// The second influence of each vertex in a set of its own.
+#[test]
+fn several_sets_of_joints_are_one() {
+    let mut rig = rigged();
+    let n = 20;
+    let mut sets = [(Vec::new(), Vec::new()), (Vec::new(), Vec::new())];
+    for v in 0..n {
+        let y = 0.5 * (v / 4) as f32;
+        let (joints, share) = (if y < 0.9 { [0, 1] } else { [1, 2] }, y.fract());
+        for ((of_set, weights), (joint, weight)) in
+            sets.iter_mut().zip([(joints[0], 1.0 - share), (joints[1], share)])
+        {
+            of_set.extend([joint, 0, 0, 0_u8]);
+            weights.extend([weight, 0.0, 0.0, 0.0_f32]);
+        }
+    }
+    for (k, (joints, weights)) in sets.iter().enumerate() {
+        let joints = rig.accessor(joints, U8, n, "VEC4");
+        let weights = rig.accessor(&floats(weights), F32, n, "VEC4");
+        rig.primitive(0)["attributes"][format!("JOINTS_{k}")] = joints.into();
+        rig.primitive(0)["attributes"][format!("WEIGHTS_{k}")] = weights.into();
+    }
+    let [plain, split] = [rigged().glb(), rig.glb()].map(|bytes| {
+        let model = read(&bytes);
+        let after = player(&read(&reshaped(&model, Joints::Follow).0));
+        shown(&after, Some(0), 0.6, &[])
+    });
+    assert_near(&split, &plain, ROUNDED, "at 0.6 s");
+}
+
+#[test]
+fn instances_keep_their_places_and_it_is_said() {
+    let mut rig = with_hat();
+    let places = rig.accessor(&floats(&[0.0; 6]), F32, 2, "VEC3");
+    rig.json["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+    let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": places } } });
+    rig.json["nodes"][5]["extensions"] = instancing.clone();
+    let model = read(&rig.glb());
+    let told = "draws its mesh many times over: only the one at the node is bound";
+    assert!(model.notices.iter().any(|notice| notice.contains(told)), "{:?}", model.notices);
+    let moved: Vec<Vec3> = last(&model, 8).iter().map(|&p| f(p)).collect();
+    let (bytes, _) = reshaped(&model, Joints::Follow);
+    assert_near(&last(&read(&bytes), 8), &moved, ROUNDED, "the one at the node");
+    assert_eq!(json_of(&bytes)["nodes"][5]["extensions"], instancing);
+}
+
+/// A level of detail that no scene shows: it must go on to match.
+#[test]
+fn meshes_in_no_scene_move_along() {
+    let mut rig = rigged();
+    let coarse = rig.cube_mesh("coarse");
+    rig.push("nodes", json!({ "name": "coarse", "mesh": coarse }));
+    rig.json["extensionsUsed"] = json!(["MSFT_lod"]);
+    rig.json["nodes"][4]["extensions"] = json!({ "MSFT_lod": { "ids": [5] } });
+    let model = read(&rig.glb());
+    let (bytes, _) = reshaped(&model, Joints::Follow);
+    let mut json = json_of(&bytes);
+    json["scenes"][0]["nodes"] = json!([5]);
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let shown = read(&common::glb(&json, Some(&bytes[28 + length..])));
+    let moved: Vec<Vec3> = common::cube().iter().map(|&p| f(p)).collect();
+    assert_near(&shown.positions, &moved, ROUNDED, "the level of detail");
+}
+
+/// A joint outside the cage that holds no vertex: the end of a chain.
+#[test]
+fn loose_joints_go_with_their_parents() {
+    let mut rig = rigged();
+    rig.push("nodes", json!({ "name": "end", "translation": [0.0, 0.5, 0.3] }));
+    rig.json["nodes"][3]["children"] = json!([5]);
+    let model = read(&rig.glb());
+    let joints = model.joints().unwrap();
+    assert_eq!(
+        joints.iter().map(|j| (j.node, j.parent, j.holds)).collect::<Vec<_>>(),
+        [(1, None, true), (2, Some(0), true), (3, Some(1), true), (5, Some(2), false)]
+    );
+    let end = (model.positions.len() + joints[3].point) as u32;
+    let (bytes, report) = model.write_reshaped(&by(&model), &[end], &[], &ReshapeOptions::default()).unwrap();
+    assert_eq!((report.joints_outside, report.joints_loose), (0, 1));
+    let [loose, inside] = [bytes, reshaped(&model, Joints::Follow).0].map(|bytes| {
+        let at = json_of(&bytes)["nodes"][5]["translation"].clone();
+        vec3(0.0, 0.5, 0.3).distance(Vec3::from_array([0, 1, 2].map(|k| at[k].as_f64().unwrap() as f32)))
+    });
+    assert!(loose <= ROUNDED && inside > 0.05, "{loose} and {inside} from where it was below its parent");
+}
+
+/// A skin that presses the column's upper half flat cannot be undone there.
+#[test]
+fn flattened_vertices_go_with_their_neighbours_and_are_counted() {
+    let mut rig = rigged();
+    let binds = rig.json["skins"][0]["inverseBindMatrices"].as_u64().unwrap();
+    let mut values = super::floats(&rig, binds);
+    // Of the middle and the tip: nothing is left of x.
+    for column in 4..12 {
+        values[4 * column] = 0.0;
+    }
+    rig.json["skins"][0]["inverseBindMatrices"] = rig.accessor(&floats(&values), F32, 3, "MAT4").into();
+    let model = read(&rig.glb());
+    let (bytes, report) = reshaped(&model, Joints::Follow);
+    assert_eq!(report.singular_vertices, 12, "three of five rings: {report:?}");
+    assert!(report.notices().iter().any(|n| n.contains("flattened by their skin")), "{:?}", report.notices());
+    assert!(read(&bytes).positions.iter().all(|p| p.is_finite()));
+    let still = vec![DVec3::ZERO; by(&model).len()];
+    assert!(model.write_reshaped(&still, &[], &[], &ReshapeOptions::default()).unwrap().0 == rig.glb());
+}
+
+/// Values of a STEP track follow the same rule as those of a linear one.
+#[test]
+fn steps_are_rescaled_as_lines_are() {
+    let mut steps = rigged();
+    steps.json["animations"][0]["samplers"][0]["interpolation"] = "STEP".into();
+    let [linear, step] =
+        [rigged().glb(), steps.glb()].map(|bytes| player(&read(&reshaped(&read(&bytes), Joints::Follow).0)));
+    for at in [0.0, 1.0] {
+        assert_eq!(shown(&linear, Some(0), at, &[]), shown(&step, Some(0), at, &[]), "at a key");
+    }
+    let [root, key] = [0.9, 0.0].map(|at| step.at(Some(0), at, &[]).origins[1]);
+    assert_eq!(root, key, "it holds until the next key");
+}
+
+/// The column bent by 60 degrees in its middle: what the joints hold it by is the straight one.
+#[test]
+fn a_rest_pose_far_from_the_bind_pose_survives() {
+    let mut rig = rigged();
+    let (sine, cosine) = 30.0_f32.to_radians().sin_cos();
+    rig.json["nodes"][2]["rotation"] = json!([0.0, 0.0, sine, cosine]);
+    let model = read(&rig.glb());
+    let straight = read(&rigged().glb());
+    let top = |model: &Model| model.positions[16];
+    assert!(top(&model).distance(top(&straight)) > 0.9, "it is bent at rest");
+    for joints in [Joints::Follow, Joints::Stay] {
+        let bytes = reshaped(&model, joints).0;
+        // The target without a default, and both at rest.
+        assert_targets(&model, &bytes, &[1], 2.0 * ROUNDED);
+        let [before, after] = [&model, &read(&bytes)].map(|m| player(m).at(None, 0.0, &[]).palette);
+        for (a, b) in before.iter().zip(&after) {
+            assert!(a.abs_diff_eq(*b, 2.0 * ROUNDED), "{a} {b}");
+        }
+    }
+}
+
+/// Found by damaged files: what a skin shrinks to nothing was written as infinite, and the file could not be opened any more.
+#[test]
+fn skin_that_shrinks_beyond_32_bits_is_refused() {
+    let mut rig = rigged();
+    rig.json["nodes"][0]["scale"] = json!([1e-39, 1e-39, 1e-39]);
+    let model = read(&rig.glb());
+    let by = vec![DVec3::ONE; model.positions.len() + model.extra_points().unwrap().len()];
+    let refused = model.write_reshaped(&by, &[], &[], &ReshapeOptions::default()).unwrap_err().to_string();
+    assert!(refused.contains("beyond numbers of 32 bits"), "{refused}");
+}

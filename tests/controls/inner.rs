@@ -1,0 +1,232 @@
+use cagework_core::deform::deform_bound;
+use cagework_core::options::{Method, Solver};
+use cagework_core::{BindOptions, Binding, ControlSet, Controls, InnerControls, InnerElement};
+use cagework_gpu::{ContextOptions, GpuContext, bind_on};
+use cagework_tests::cages::{blocks, cage, cuboid, icosphere};
+use glam::{Quat, Vec3, Vec3Swizzles as _};
+use pollster::block_on;
+
+use crate::support::{bound, scattered};
+
+/// Weights of one control. `[n_points]`
+fn column(binding: &Binding, control: usize) -> Vec<f64> {
+    binding.weights.column(control as u32).map(f64::from).collect()
+}
+
+fn points_at(positions: &[Vec3], radius: f32) -> InnerControls {
+    let elements = (0..positions.len() as u32).map(InnerElement::Point).collect();
+    InnerControls { positions: positions.to_vec(), elements, radius: Some(radius) }
+}
+
+/// A ball of radius 1/4 in a sphere of radius 1.
+fn ball_in_sphere() -> ControlSet {
+    ControlSet::new(&cage(&icosphere(3)), 0, points_at(&[Vec3::ZERO], 0.25)).unwrap()
+}
+
+/// Between concentric spheres the harmonic function that is 1 on the inner and 0 on the outer one is (1/r - 1) / (1/R - 1), with
+/// R = 1/4 the third of 1/r - 1.
+#[test]
+fn weight_of_a_ball_in_a_sphere_is_that_of_concentric_spheres() {
+    let set = ball_in_sphere();
+    let radii = [0.35_f32, 0.5, 0.65, 0.8];
+    let directions = scattered(40, Vec3::NEG_ONE, Vec3::ONE);
+    let points: Vec<Vec3> =
+        directions.iter().flat_map(|d| radii.map(|r| r * d.normalize_or(Vec3::X))).collect();
+    for (grid, most) in [(64, 0.03), (128, 0.025)] {
+        let binding = bound(&points, &set, |options| options.grid = grid);
+        let weights = column(&binding, set.cage().n_vertices());
+        for (k, r) in radii.iter().enumerate() {
+            let mean = weights.iter().skip(k).step_by(radii.len()).sum::<f64>() / directions.len() as f64;
+            let expected = (1.0 / f64::from(*r) - 1.0) / 3.0;
+            let error = (mean / expected - 1.0).abs();
+            assert!(error < most, "g = {grid}, r = {r}: {mean}, not {expected}");
+        }
+    }
+}
+
+/// A sheet across two boxes, where they meet: what is on one side of it does not feel the vertices on the other.
+#[test]
+fn sheet_across_a_box_parts_its_halves() {
+    let corners = [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [1.0, 0.0, 1.0]];
+    let inner = InnerControls {
+        positions: corners.map(Vec3::from).to_vec(),
+        elements: vec![InnerElement::Face(vec![0, 1, 2, 3])],
+        radius: None,
+    };
+    let set = ControlSet::new(&cage(&blocks(&[[0, 0, 0], [1, 0, 0]])), 0, inner).unwrap();
+    let points = scattered(400, Vec3::splat(0.01), Vec3::new(1.99, 0.99, 0.99));
+    let binding = bound(&points, &set, |options| options.grid = 33);
+    let at = set.cage().positions();
+    for (v, p) in points.iter().enumerate() {
+        let (columns, weights) = binding.weights.row(v);
+        let is_beyond = |c: usize| c < at.len() && at[c].x != 1.0 && (at[c].x > 1.0) != (p.x > 1.0);
+        let beyond = columns.iter().zip(weights).filter(|(c, _)| is_beyond(**c as usize));
+        let most = beyond.map(|(_, w)| *w).fold(0.0, f32::max);
+        assert!(most < 1e-6, "{p}: {most}");
+        let of_sheet: f32 =
+            columns.iter().zip(weights).filter(|(c, _)| **c as usize >= at.len()).map(|(_, w)| w).sum();
+        // In the middle, next to it, it has nearly all; at the walls the cage has its own.
+        let is_close = (p.x - 1.0).abs() < 0.05 && (p.yz() - 0.5).abs().max_element() < 0.3;
+        assert!(of_sheet > 0.0 && (!is_close || of_sheet > 0.8), "{p}: {of_sheet}");
+    }
+    assert!(binding.outside.is_empty());
+}
+
+/// Values on a tube are those of the foot on its line.
+#[test]
+fn weights_are_linear_along_a_tube() {
+    let (a, b, radius) = (Vec3::new(-0.6, 0.1, 0.0), Vec3::new(0.5, -0.2, 0.1), 0.1);
+    let inner = InnerControls {
+        positions: vec![a, b],
+        elements: vec![InnerElement::Line(vec![0, 1])],
+        radius: Some(radius),
+    };
+    let set = ControlSet::new(&cage(&cuboid(Vec3::NEG_ONE, Vec3::ONE)), 0, inner).unwrap();
+    let way = (b - a).normalize();
+    let side = way.any_orthonormal_vector();
+    let shares: Vec<f32> = (1..20).map(|k| k as f32 / 20.0).collect();
+    // Around the line, inside of the tube and just off its surface.
+    for (distance, most) in [(0.5 * radius, 1e-4), (1.06 * radius, 0.02)] {
+        let around = |s: f32| {
+            (0..6).map(move |k| a.lerp(b, s) + Quat::from_axis_angle(way, k as f32) * (distance * side))
+        };
+        let points: Vec<Vec3> = shares.iter().flat_map(|&s| around(s)).collect();
+        let binding = bound(&points, &set, |options| options.grid = 64);
+        let [of_a, of_b] = [8, 9].map(|control| column(&binding, control));
+        for (v, s) in shares.iter().flat_map(|&s| [f64::from(s); 6]).enumerate() {
+            let both = of_a[v] + of_b[v];
+            assert!(both > 0.9 && (of_b[v] / both - s).abs() < most, "{}: {} of {both}", points[v], of_b[v]);
+        }
+    }
+}
+
+/// A cage with a ball, a bent bone and a sheet in it.
+fn all_kinds() -> ControlSet {
+    let inner = InnerControls {
+        positions: [
+            [-0.5, 0.5, 0.2],
+            [-0.6, -0.5, 0.0],
+            [0.0, -0.4, 0.1],
+            [0.5, -0.6, 0.3],
+            [0.3, 0.2, -0.4],
+            [0.7, 0.3, -0.5],
+            [0.6, 0.7, -0.4],
+        ]
+        .map(Vec3::from)
+        .to_vec(),
+        elements: vec![
+            InnerElement::Point(0),
+            InnerElement::Line(vec![1, 2, 3]),
+            InnerElement::Face(vec![4, 5, 6]),
+        ],
+        radius: Some(0.08),
+    };
+    ControlSet::new(&cage(&cuboid(Vec3::NEG_ONE, Vec3::ONE)), 0, inner).unwrap()
+}
+
+/// Points all over that cage: also inside of controls and next to them.
+fn everywhere() -> Vec<Vec3> {
+    let mut points = scattered(1500, Vec3::splat(-0.99), Vec3::splat(0.99));
+    for center in [Vec3::new(-0.5, 0.5, 0.2), Vec3::new(0.0, -0.4, 0.1)] {
+        points.extend(scattered(300, center - 0.1, center + 0.1));
+    }
+    points
+}
+
+/// The radius is a length, not a number of cells: finer grids agree better and better.
+#[test]
+fn refinement_converges_with_the_radius_fixed() {
+    let set = all_kinds();
+    let points = scattered(600, Vec3::splat(-0.95), Vec3::splat(0.95));
+    let [coarse, middle, fine] =
+        [32, 64, 128].map(|grid| bound(&points, &set, |options| options.grid = grid));
+    let difference = |a: &Binding, b: &Binding| {
+        let n = set.cage().n_vertices() + set.inner().positions.len();
+        let of_column =
+            |c: usize| column(a, c).iter().zip(column(b, c)).map(|(a, b)| (a - b).abs()).sum::<f64>();
+        (0..n).map(of_column).sum::<f64>() / points.len() as f64
+    };
+    let (first, second) = (difference(&coarse, &middle), difference(&middle, &fine));
+    assert!(second < 0.6 * first && second < 5e-3, "{first}, then {second}");
+}
+
+/// As a whole the model is reproduced, also inside of controls and next to them, where offsets keep it.
+#[test]
+fn rest_pose_and_rigid_motions_of_all_controls_are_followed() {
+    let set = all_kinds();
+    let points = everywhere();
+    for method in [Method::Embedded, Method::Classic] {
+        let binding = bound(&points, &set, |options| {
+            (options.grid, options.method, options.tau) = (32, method, 1e-5);
+        });
+        let report = &binding.report;
+        assert_eq!((report.outside_vertices, report.cage_vertices, report.inner_controls), (0, 8, 7));
+        // The classic method shows its errors.
+        if method == Method::Classic {
+            continue;
+        }
+        assert!(report.held_vertices > 50, "{}", report.held_vertices);
+        assert!(binding.weights.data().iter().all(|&w| w >= 0.0));
+        let turn = Quat::from_euler(glam::EulerRot::XYZ, 0.4, -0.9, 1.3);
+        for motion in [|_: Quat, p: Vec3| p, |turn: Quat, p: Vec3| turn * p + Vec3::new(3.0, 2.0, 1.0)] {
+            let controls: Vec<Vec3> = Controls::from(&set).rest().iter().map(|&p| motion(turn, p)).collect();
+            let posed = deform_bound(&binding.weights, &binding.outside, &controls);
+            for (p, at) in points.iter().zip(posed) {
+                // 1e-6 of the diagonal, and rounding of the turned f32 positions.
+                assert!(at.distance(motion(turn, *p)) < 5e-6, "{p}: {at}");
+            }
+        }
+    }
+}
+
+/// What is inside of a ball goes where the ball goes, and does not turn.
+#[test]
+fn points_inside_a_ball_follow_it() {
+    let set = all_kinds();
+    let center = set.inner().positions[0];
+    let points = scattered(50, center - 0.04, center + 0.04);
+    let binding = bound(&points, &set, |options| options.grid = 32);
+    let by = Vec3::new(0.1, -0.05, 0.2);
+    let mut controls = Controls::from(&set).rest().to_vec();
+    controls[8] += by;
+    let posed = deform_bound(&binding.weights, &binding.outside, &controls);
+    for (p, at) in points.iter().zip(posed) {
+        assert!(at.distance(*p + by) < 1e-6, "{p}: {at}");
+    }
+}
+
+/// The same weights on one thread and on all to the bit, on the GPU to 1e-4, by the classic method to a cell.
+#[test]
+fn back_ends_and_methods_agree_about_controls_inside() {
+    let set = all_kinds();
+    let points = everywhere();
+    let options = BindOptions { grid: 48, threads: 1, ..BindOptions::default() };
+    let edit = |threads: usize| move |o: &mut BindOptions| *o = BindOptions { threads, ..options };
+    let (one, all) = (bound(&points, &set, edit(1)), bound(&points, &set, edit(0)));
+    assert_eq!((&one.weights, &one.outside), (&all.weights, &all.outside));
+    let context = block_on(GpuContext::new(&ContextOptions::default())).expect("a Vulkan adapter");
+    let gpu = block_on(bind_on(&points, &set, &options, &cagework_core::progress::Silent, &context))
+        .expect("points inside are bound");
+    let classic = bound(&points, &set, |o| {
+        *o = BindOptions { method: Method::Classic, solver: Solver::Multigrid, ..options };
+    });
+    let n = Controls::from(&set).n_controls();
+    let (mut sum, mut count) = (0.0, 0);
+    for c in 0..n {
+        for ((a, b), published) in column(&one, c).iter().zip(column(&gpu, c)).zip(column(&classic, c)) {
+            assert!((a - b).abs() < 1e-4, "control {c}: {a} and {b}");
+            sum += (a - published).abs();
+            count += 1;
+        }
+    }
+    // Classic weights are constant in a cell: off by half a cell's change on average, of 15 columns.
+    let mean = sum / f64::from(count);
+    assert!(mean < 0.01, "{mean}");
+    let deformed = |b: &Binding| {
+        let mut controls = Controls::from(&set).rest().to_vec();
+        controls[9] += Vec3::new(0.0, 0.2, 0.1);
+        deform_bound(&b.weights, &b.outside, &controls)
+    };
+    let apart = deformed(&one).iter().zip(deformed(&gpu)).map(|(a, b)| a.distance(b)).fold(0.0, f32::max);
+    assert!(apart < 1e-4, "{apart}");
+}

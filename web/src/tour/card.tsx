@@ -1,0 +1,81 @@
+/** The tour's card: where one is, what is said there, one thing to do, and what was measured. Below the view, so that it hides nothing. */
+
+import { useLayoutEffect, useRef } from "preact/hooks";
+import type { App } from "../app";
+import type { TourState } from "../state";
+import { Button, IconButton } from "../ui/controls";
+import { TOUR } from "../words/tour";
+import { TourFigure } from "./figures";
+import type { Guide } from "./guide";
+import { STOPS, type StopName } from "./stops";
+
+export function Card({ app, tour, guide }: { app: App; tour: TourState; guide: Guide }) {
+  const { stop, reports, doing } = tour;
+  const card = useRef<HTMLElement>(null);
+  useLayoutEffect(() => {
+    // Who came by keys goes on by them.
+    card.current?.querySelector<HTMLElement>(".primary")?.focus();
+  }, []);
+  const name: StopName = STOPS[stop] ?? "cage";
+  const { title, claim, task } = TOUR.stops[name];
+  const go = (to: number) => void guide.go(to);
+  const isLast = stop === STOPS.length - 1;
+  return (
+    <section class="tour" aria-label={TOUR.name} aria-busy={doing !== null} ref={card}>
+      <div class="tour-head">
+        <span class="tour-count">{TOUR.of(stop + 1, STOPS.length)}</span>
+        <h2>{title}</h2>
+        <Stops now={stop} go={go} />
+        <div class="tour-ways">
+          <Button
+            label={TOUR.back}
+            onClick={() => go(stop - 1)}
+            kind="small"
+            disabled={stop === 0}
+          />
+          <Button
+            label={isLast ? TOUR.finish : TOUR.next}
+            onClick={() => go(stop + 1)}
+            kind="small primary"
+          />
+          <IconButton icon="share" label={TOUR.link} onClick={app.shareStop} kind="small" />
+          <IconButton
+            icon="close"
+            label={TOUR.leave}
+            shortcut={app.key("cancel")}
+            onClick={() => void guide.end()}
+            kind="small"
+          />
+        </div>
+      </div>
+      <div class="tour-body">
+        <div class="tour-text" aria-live="polite">
+          <p>{claim(reports)}</p>
+          <p class="task">
+            <strong>{TOUR.task}</strong> {task}
+          </p>
+          {doing && doing[0] > 0 && <p class="hint">{TOUR.doing(...doing)}</p>}
+        </div>
+        <TourFigure app={app} name={name} tour={tour} guide={guide} />
+      </div>
+    </section>
+  );
+}
+
+/** One dot a stop. */
+function Stops({ now, go }: { now: number; go: (stop: number) => void }) {
+  return (
+    <nav class="tour-stops" aria-label={TOUR.all}>
+      {STOPS.map((name, k) => (
+        <button
+          key={name}
+          type="button"
+          aria-label={TOUR.stop(k + 1, TOUR.stops[name].title)}
+          data-tip={TOUR.stops[name].title}
+          aria-current={k === now ? "step" : undefined}
+          onClick={() => go(k)}
+        />
+      ))}
+    </nav>
+  );
+}

@@ -1,0 +1,232 @@
+/** What the tour's stops measure, in numbers that the binds report, and the one thing to change there. */
+
+import type { App } from "../app";
+import type { BindReport } from "../contract";
+import { percent, scientific } from "../format";
+import type { TourState } from "../state";
+import { Button, Facts, Segments, Slider } from "../ui/controls";
+import { curvesOf } from "../ui/curves";
+import { Plot } from "../ui/plot";
+import { CompareTable, solverName } from "../ui/report";
+import { Comparison } from "../ui/see";
+import { T } from "../words";
+import { TOUR } from "../words/tour";
+import type { Guide } from "./guide";
+import { BONE, GRIDS, isOf, ofPaper, type StopName, solvers, STEPS, stopsOf, TAUS } from "./stops";
+
+interface Figure {
+  app: App;
+  guide: Guide;
+  reports: readonly BindReport[];
+}
+
+export function TourFigure({
+  app,
+  guide,
+  name,
+  tour,
+}: Pick<Figure, "app" | "guide"> & { name: StopName; tour: TourState }) {
+  const One = FIGURES[name];
+  return One ? (
+    <div class="tour-figure">
+      <One app={app} guide={guide} reports={tour.reports} />
+    </div>
+  ) : null;
+}
+
+const FIGURES: Partial<Record<StopName, (figure: Figure) => preact.JSX.Element>> = {
+  grid: Grid,
+  paper: ByGrid,
+  smoothing: ByTau,
+  delta: Delta,
+  times: Times,
+  error: Errors,
+  coordinates: Comparison,
+  smooth: Smooth,
+};
+
+function Grid({ app }: Figure) {
+  const { scene, slice } = app.store.get();
+  return (
+    <>
+      <Segments
+        label={T.see.slice}
+        choices={(["value", "kinds"] as const).map((value) => ({ value, label: T.see.slices[value] }))}
+        value={scene.slice === "kinds" ? "kinds" : "value"}
+        onChange={(kind) => app.view.slice({}, kind)}
+      />
+      <Slider
+        label={T.see.where}
+        min={0}
+        max={1}
+        step={0.005}
+        format={percent}
+        value={slice.position}
+        onInput={(position) => app.view.slice({ position })}
+      />
+    </>
+  );
+}
+
+/** Mean rest errors of what was bound here, one a row. */
+function RestErrors({ reports, name }: { reports: readonly BindReport[]; name: (report: BindReport) => string }) {
+  return <Facts rows={reports.map((report) => [name(report), scientific(report.rest_error.mean_rel)] as const)} />;
+}
+
+function ByGrid({ app, guide, reports }: Figure) {
+  const { bindOptions } = app.store.get();
+  return (
+    <>
+      <Choice
+        label={TOUR.cells}
+        values={GRIDS}
+        now={bindOptions.grid}
+        choose={(grid) => void guide.show(ofPaper(grid, 1e-5)[0] ?? {})}
+      />
+      <RestErrors reports={reports} name={({ grid }) => TOUR.errorOf(TOUR.ofCells(grid))} />
+    </>
+  );
+}
+
+function ByTau({ app, guide, reports }: Figure) {
+  const { bindOptions } = app.store.get();
+  return (
+    <>
+      <Choice
+        label={TOUR.tau}
+        values={TAUS}
+        now={bindOptions.tau}
+        choose={(tau) => void guide.show(ofPaper(32, tau)[0] ?? {})}
+      />
+      <RestErrors reports={reports} name={({ tau }) => TOUR.errorOf(TOUR.ofTau(tau))} />
+    </>
+  );
+}
+
+function Choice({
+  label,
+  values,
+  now,
+  choose,
+}: {
+  label: string;
+  values: readonly number[];
+  now: number;
+  choose: (value: number) => void;
+}) {
+  return (
+    <Segments
+      label={label}
+      choices={values.map((value) => ({ value: String(value), label: scientific(value) }))}
+      value={String(now)}
+      onChange={(value) => choose(Number(value))}
+    />
+  );
+}
+
+function Delta({ app, guide, reports }: Figure) {
+  const { bindOptions } = app.store.get();
+  const [report = null, ...earlier] = [...reports].reverse();
+  const curves = curvesOf({ bindRun: null, report, earlier, bindOptions });
+  const iterations = (name: string) => reports.find((one) => solverName(one) === name)?.iterations ?? 0;
+  return (
+    <>
+      <Choice
+        label={TOUR.cells}
+        values={GRIDS}
+        now={bindOptions.grid}
+        choose={(grid) => void guide.measure(solvers(grid))}
+      />
+      {report && <Plot curves={curves} tau={report.tau} />}
+      <ul class="curves">
+        {curves.map(({ name, kind }) => (
+          <li class={kind} key={kind}>
+            {TOUR.iterations(name, iterations(name))}
+          </li>
+        ))}
+      </ul>
+    </>
+  );
+}
+
+function Times({ guide, reports }: Figure) {
+  const isOnCard = reports.some(({ backend }) => backend === "gpu");
+  return (
+    <>
+      <CompareTable reports={reports} />
+      <Button
+        label={TOUR.again}
+        icon="reset"
+        kind="small"
+        onClick={() => void guide.measure(stopsOf(isOnCard).times.binds)}
+      />
+    </>
+  );
+}
+
+/** Mean rest errors of the paper's method; each number is a button that shows what it stands for. */
+function Errors({ app, guide, reports }: Figure) {
+  const { grid: gridNow, tau: tauNow } = app.store.get().bindOptions;
+  return (
+    <table class="compare errors">
+      <caption>{TOUR.meanError}</caption>
+      <thead>
+        <tr>
+          <th scope="col">{TOUR.cells}</th>
+          {TAUS.map((tau) => (
+            <th scope="col" key={tau}>
+              {TOUR.ofTau(tau)}
+            </th>
+          ))}
+        </tr>
+      </thead>
+      <tbody>
+        {GRIDS.map((grid) => (
+          <tr key={grid}>
+            <th scope="row">{grid}</th>
+            {TAUS.map((tau) => {
+              const report = reports.find((report) => isOf(report, { grid, tau }));
+              return (
+                <td key={tau}>
+                  {report && (
+                    <Button
+                      label={scientific(report.rest_error.mean_rel)}
+                      name={TOUR.showError(grid, tau, report.rest_error.mean_rel)}
+                      pressed={grid === gridNow && tau === tauNow}
+                      kind="small"
+                      onClick={() => void guide.show(ofPaper(grid, tau)[0] ?? {})}
+                    />
+                  )}
+                </td>
+              );
+            })}
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+/** Steps of subdivision, and a bone inside; both are the page's own actions. */
+function Smooth({ app }: Figure) {
+  const { cage } = app.store.get();
+  if (!cage) return <></>;
+  const { smooth, inner } = cage.controls;
+  return (
+    <>
+      <Choice
+        label={T.cage.steps}
+        values={STEPS}
+        now={smooth}
+        choose={(steps) => void app.cage.setSmooth(steps)}
+      />
+      <Button
+        label={TOUR.bone}
+        icon="bone"
+        kind="small"
+        disabled={inner > 0}
+        onClick={() => void app.controls.add("line", BONE)}
+      />
+    </>
+  );
+}

@@ -1,0 +1,236 @@
+/** The tour: ten stops that the page drives itself. What a stop does is undone when one leaves it. */
+
+import type { BindActions } from "../actions/bind";
+import type { Context } from "../actions/context";
+import type { Edit } from "../actions/edit";
+import type { Files } from "../actions/files";
+import type { PoseActions } from "../actions/poses";
+import { linkOf } from "../actions/tour";
+import type { View } from "../actions/view";
+import type { WorkActions } from "../actions/works";
+import type { BindOptions } from "../contract";
+import { BIND_DEFAULTS, SCENE_DEFAULTS } from "../defaults";
+import type { AppState } from "../state";
+import { loadStop, saveStop } from "../store";
+import { isOf, STOPS, type Stop, type StopName, stopsOf } from "./stops";
+
+export interface Guide {
+  /** Begins at a stop, or where it was left. */
+  start(stop?: number): Promise<void>;
+  /** Goes to a stop; past the last one the tour is over. */
+  go(stop: number): Promise<void>;
+  /** Binds in other ways, in place of those of the stop that is open. */
+  measure(binds: readonly Partial<BindOptions>[]): Promise<void>;
+  /** Binds in one more way, to look at it; what was measured at this stop stays. */
+  show(way: Partial<BindOptions>): Promise<void>;
+  /** What was open before, and its settings, come back. */
+  end(): Promise<void>;
+  /** A sample or a file is being opened: if not by the tour itself, the settings come back for it. */
+  overtaken(sample: string | null): void;
+}
+
+export interface GuideNeeds {
+  readonly bind: Pick<BindActions, "start">;
+  readonly edit: Pick<Edit, "settle" | "setEditingRest" | "sync">;
+  readonly poses: Pick<PoseActions, "stop">;
+  readonly view: View;
+  readonly files: Pick<Files, "openSample">;
+  readonly works: Pick<WorkActions, "flush" | "open" | "restore">;
+}
+
+/** Settings that come back. */
+const KEPT = ["step", "bindOptions", "seeOpen", "slice"] as const;
+
+interface Before {
+  readonly settings: Pick<AppState, (typeof KEPT)[number]>;
+  readonly scene: AppState["scene"];
+  readonly work: AppState["works"][number] | undefined;
+  readonly sample: string | null;
+  /** The fragment of the link that the page was opened by. */
+  readonly link: string;
+}
+
+export function createGuide(ctx: Context, { bind, edit, poses, view, files, works }: GuideNeeds): Guide {
+  const { store } = ctx;
+  let before: Before | undefined;
+  /** Counts up with each stop: what one of before still waits for is dropped. */
+  let turn = 0;
+  /** The sample that is open as it came, and its poses. */
+  let opened: { readonly sample: string; readonly poses: AppState["poses"] } | undefined;
+  /** The sample that the tour itself is opening. */
+  let opening: string | null = null;
+
+  const set = (patch: Partial<NonNullable<AppState["tour"]>>) => {
+    const { tour } = store.get();
+    if (tour) store.set({ tour: { ...tour, ...patch } });
+  };
+
+  const putBack = ({ settings, scene }: Before) => {
+    const { theme } = store.get().scene;
+    store.set(settings);
+    view.scene({ ...scene, theme, compare: SCENE_DEFAULTS.compare, slice: "off" });
+  };
+
+  const isOpened = (sample: string) => {
+    const { sampleCage, cage } = store.get();
+    const isPlain = cage?.controls.smooth === 0 && cage.controls.inner === 0;
+    return opened?.sample === sample && sampleCage && isPlain;
+  };
+
+  const open = async (sample: string, mine: number) => {
+    edit.setEditingRest(false);
+    poses.stop();
+    edit.settle();
+    if (isOpened(sample)) return true;
+    opening = sample;
+    const isOpen = await files.openSample(sample);
+    if (mine !== turn) return false;
+    opening = null;
+    opened = isOpen ? { sample, poses: store.get().poses } : undefined;
+    return isOpen;
+  };
+
+  /** Takes back what a hand has done at the stop before. */
+  const rest = (pose: number | undefined) => {
+    const { engine } = ctx.session();
+    const all = opened?.poses ?? [];
+    ctx.history.clear();
+    engine.setCagePositions(all[pose ?? -1]?.positions ?? engine.restPositions());
+    engine.select(new Uint32Array(), "replace");
+    engine.showHeld([]);
+    store.set({ pins: [], poses: all, shares: all.map(() => 0) });
+    edit.sync();
+  };
+
+  const optionsOf = (way: Partial<BindOptions>): BindOptions => {
+    const { backend, memory_limit } = before?.settings.bindOptions ?? BIND_DEFAULTS;
+    return { ...BIND_DEFAULTS, backend, memory_limit, ...way };
+  };
+
+  /** Binds in each way, and keeps what is measured. */
+  const run = async (binds: readonly Partial<BindOptions>[], mine: number) => {
+    for (const [k, way] of binds.entries()) {
+      set({ doing: [k + 1, binds.length] });
+      store.set({ bindOptions: optionsOf(way) });
+      const isBound = await bind.start(true);
+      const { report, tour } = store.get();
+      if (mine !== turn || !isBound || !report) return;
+      const others = tour?.reports.filter((other) => !isOf(other, report)) ?? [];
+      set({ reports: [...others, report] });
+    }
+  };
+
+  const visit = async (stop: Stop, mine: number) => {
+    const ours = optionsOf(stop.binds[0] ?? {});
+    store.set({ bindOptions: ours });
+    const wasOpen = isOpened(stop.sample);
+    if (!(await open(stop.sample, mine)) || mine !== turn) return;
+    rest(stop.pose);
+    const { turn: by } = stop;
+    const { engine } = ctx.session();
+    engine.axisView(0, false);
+    if (by) engine.orbit(by[0], by[1]);
+    const { theme } = store.get().scene;
+    view.scene({ ...SCENE_DEFAULTS, theme });
+    store.set({ step: stop.step, seeOpen: false });
+    const { report, bound } = store.get();
+    const isBound = wasOpen && bound && report && stop.binds.length === 1 && isOf(report, ours);
+    if (isBound) set({ reports: [report] });
+    else await run(stop.binds, mine);
+    if (mine !== turn) return;
+    view.scene({ ...stop.scene, slice: "off" });
+    if (stop.vertex !== undefined) engine.select(Uint32Array.of(stop.vertex), "replace");
+    edit.sync();
+    if (stop.slice) view.slice(stop.slice, stop.scene?.slice);
+    await view.compare(stop.compare ?? SCENE_DEFAULTS.compare);
+    engine.frameAll();
+    if (stop.pose === undefined) return;
+    // The posed cage is elsewhere.
+    engine.selectAll();
+    engine.frameSelection();
+    engine.select(new Uint32Array(), "replace");
+    edit.sync();
+  };
+
+  const guide: Guide = {
+    async start(stop = loadStop()) {
+      if (!before) {
+        // What has not been kept yet is.
+        await works.flush();
+        const state = store.get();
+        const settings = Object.fromEntries(KEPT.map((key) => [key, state[key]])) as Before["settings"];
+        const work = state.works.find(({ where }) => where === "here");
+        before = { settings, scene: state.scene, work, sample: state.sample, link: location.hash };
+        const { sample, poses } = state;
+        const isUntouched = state.sampleCage && !state.posed && state.undoLabel === null && !work;
+        opened = sample && isUntouched ? { sample, poses } : undefined;
+      }
+      await guide.go(Math.min(stop, STOPS.length - 1));
+    },
+    async go(stop) {
+      const name: StopName | undefined = STOPS[stop];
+      if (!before) return;
+      if (!name) {
+        saveStop(0);
+        await guide.end();
+        return;
+      }
+      turn += 1;
+      const mine = turn;
+      saveStop(stop);
+      window.history.replaceState(null, "", linkOf(stop));
+      ctx.tell.clear();
+      store.set({ tour: { stop, reports: [], doing: [0, 1] } });
+      const gpu = before.settings.bindOptions.backend === "gpu";
+      await visit(stopsOf(gpu)[name], mine);
+      if (mine === turn) set({ doing: null });
+    },
+    async measure(binds) {
+      turn += 1;
+      const mine = turn;
+      set({ reports: [] });
+      await run(binds, mine);
+      if (mine === turn) set({ doing: null });
+    },
+    async show(way) {
+      turn += 1;
+      const mine = turn;
+      await run([way], mine);
+      if (mine === turn) set({ doing: null });
+    },
+    async end() {
+      const was = before;
+      if (!was) return;
+      const sample = was.sample ?? store.get().samples[0]?.id ?? "";
+      const isStill = isOpened(sample);
+      if (isStill) rest(undefined);
+      guide.overtaken(null);
+      if (was.link.includes("sample=") && !was.work) {
+        // Opened again as it was shared.
+        location.hash = was.link;
+        return;
+      }
+      if (was.work) await works.open({ ...was.work, where: "nowhere" });
+      else if (was.sample !== null || !(await works.restore())) {
+        if (isStill) await bind.start(true);
+        else await files.openSample(sample);
+      }
+      store.set({ step: was.settings.step });
+      ctx.session().engine.frameAll();
+    },
+    overtaken(sample) {
+      if (!before || (sample !== null && sample === opening)) return;
+      turn += 1;
+      ctx.queue.cancel("bind");
+      // What was done on the way is no work to be kept.
+      ctx.history.clear();
+      store.set({ tour: null });
+      putBack(before);
+      before = undefined;
+      opened = undefined;
+      opening = null;
+      window.history.replaceState(null, "", location.pathname + location.search);
+    },
+  };
+  return guide;
+}

@@ -1,0 +1,19 @@
+/** The tour: what drives it, and its card. */
+
+import type { FunctionComponent } from "preact";
+import type { Context } from "../actions/context";
+import type { App } from "../app";
+import type { TourState } from "../state";
+import { Card } from "./card";
+import { createGuide, type Guide, type GuideNeeds } from "./guide";
+
+export type { Guide, GuideNeeds } from "./guide";
+
+export interface Loaded {
+  readonly guide: Guide;
+  readonly Card: FunctionComponent<{ app: App; tour: TourState; guide: Guide }>;
+}
+
+export function load(ctx: Context, needs: GuideNeeds): Loaded {
+  return { guide: createGuide(ctx, needs), Card };
+}

@@ -1,0 +1,119 @@
+/** The stops of the tour: what is open at each, how it is bound, and what is shown of it. Its words are in words/en.ts. */
+
+import type { BindOptions, BindReport, Coordinates, SceneOptions } from "../contract";
+import { PAPER_DEFAULTS } from "../defaults";
+import type { Slice, StepName } from "../state";
+
+export const STOPS = [
+  "cage",
+  "weight",
+  "grid",
+  "paper",
+  "smoothing",
+  "delta",
+  "times",
+  "error",
+  "coordinates",
+  "smooth",
+] as const;
+export type StopName = (typeof STOPS)[number];
+
+export interface Stop {
+  readonly sample: string;
+  /** The pose of the sample that is shown; at rest without. */
+  readonly pose?: number;
+  readonly step: StepName;
+  /** Binds, one after the other, where they differ from ours; the last one stays. */
+  readonly binds: readonly Partial<BindOptions>[];
+  readonly scene?: Partial<SceneOptions>;
+  /** The cage vertex that is selected. */
+  readonly vertex?: number;
+  readonly slice?: Partial<Slice>;
+  readonly compare?: readonly Coordinates[];
+  /** From the right side, turned by so many CSS pixels. */
+  readonly turn?: readonly [x: number, y: number];
+}
+
+/** Grids and thresholds of the table of errors: what takes a second altogether. */
+export const GRIDS = [16, 32] as const;
+export const TAUS = [1e-3, 1e-4, 1e-5] as const;
+
+const paper = (grid: number, tau: number): Partial<BindOptions> => {
+  const { backend: _, memory_limit: __, ...way } = PAPER_DEFAULTS;
+  return { ...way, grid, tau };
+};
+/** As the paper's figures: the model as wires, what the weights make of it as a solid. */
+const FIGURE: Partial<SceneOptions> = { base_wireframe: true, cage: false, colour: "clay" };
+
+/** The paper's equations by each solver. */
+export const solvers = (grid: number): Partial<BindOptions>[] =>
+  (["jacobi", "cg", "multigrid"] as const).map((solver) => ({ ...paper(grid, 1e-5), solver }));
+export const ofPaper = (grid: number, tau: number) => [paper(grid, tau)];
+
+/** `gpu`: whether there is a graphics card to bind on. */
+export function stopsOf(gpu: boolean): Readonly<Record<StopName, Stop>> {
+  const rat = { sample: "rat", turn: [90, 30] } as const;
+  return {
+    cage: { ...rat, step: "pose", binds: [{}] },
+    weight: { ...rat, step: "pose", binds: [{}], scene: { colour: "weight" }, vertex: 55 },
+    grid: {
+      ...rat,
+      step: "bind",
+      binds: [{}],
+      scene: { slice: "value", model: false },
+      slice: { axis: 0, position: 0.5 },
+      vertex: 57,
+    },
+    paper: { ...rat, step: "bind", binds: ofPaper(16, 1e-5), scene: FIGURE },
+    smoothing: { ...rat, step: "bind", binds: ofPaper(32, 1e-3), scene: FIGURE },
+    delta: { ...rat, step: "bind", binds: solvers(32) },
+    times: {
+      ...rat,
+      step: "bind",
+      binds: [
+        paper(32, 1e-5),
+        { grid: 32 },
+        ...(gpu ? [{ grid: 64, backend: "gpu" } as const] : []),
+        { grid: 64 },
+      ],
+    },
+    error: {
+      ...rat,
+      step: "bind",
+      binds: GRIDS.flatMap((grid) => TAUS.map((tau) => paper(grid, tau))).reverse(),
+      scene: FIGURE,
+    },
+    coordinates: {
+      sample: "clamp",
+      pose: 0,
+      step: "pose",
+      binds: [{}],
+      compare: ["harmonic", "mean_value", "green"],
+      turn: [-90, 0],
+    },
+    smooth: {
+      sample: "clamp",
+      pose: 0,
+      step: "pose",
+      binds: [{}],
+      scene: { colour: "clay" },
+      turn: [-90, 0],
+    },
+  };
+}
+
+/** Steps of subdivision to choose from, and where the bone goes: along the clamp's lower jaw, object units. */
+export const STEPS = [0, 1, 2] as const;
+export const BONE = [
+  [-0.15, -0.3, 0],
+  [0.85, -0.3, 0],
+] as const;
+
+/** What tells binds apart at a stop. */
+const WAY = ["grid", "tau", "method", "solver", "backend"] as const;
+
+/** Whether a report is of a bind in this way, as far as the way is said. Rust's tau has 24 bits. */
+export function isOf(report: BindReport, way: Partial<Pick<BindOptions, (typeof WAY)[number]>>): boolean {
+  const bits = (value: string | number) => (typeof value === "number" ? Math.fround(value) : value);
+  return WAY.every((key) => way[key] === undefined || bits(way[key]) === bits(report[key]));
+}

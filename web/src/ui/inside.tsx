@@ -1,0 +1,112 @@
+/** A cage's smooth surface, and controls inside it. */
+
+import { useState } from "preact/hooks";
+import type { App } from "../app";
+import type { CageState, InnerKind } from "../contract";
+import { percent } from "../format";
+import { T } from "../words";
+import { Button, Section, Segments, Slider, Toggle } from "./controls";
+import type { IconName } from "./icons";
+
+/** Steps when it is switched on: more of them change little. */
+const USUAL_STEPS = 2;
+const STEPS = ["1", "2", "3"] as const;
+const KINDS: readonly (readonly [InnerKind, IconName])[] = [
+  ["point", "vertex"],
+  ["line", "bone"],
+  ["face", "face"],
+];
+/** Radii of the slider, over the cage's longest side. */
+const THINNEST = 0.005;
+const THICKEST = 0.12;
+
+export function Smooth({ app, cage }: { app: App; cage: CageState }) {
+  const { smooth } = cage.controls;
+  return (
+    <div class="stack">
+      <Toggle
+        label={T.cage.smoothOn}
+        sentence={T.cage.smoothSentence}
+        on={smooth > 0}
+        onChange={(on) => app.cage.setSmooth(on ? USUAL_STEPS : 0)}
+      />
+      {smooth > 0 && (
+        <Segments
+          label={T.cage.steps}
+          choices={STEPS.map((value) => ({ value, label: value }))}
+          value={STEPS[smooth - 1] ?? "1"}
+          onChange={(steps) => app.cage.setSmooth(Number(steps))}
+        />
+      )}
+    </div>
+  );
+}
+
+export function Inside({ app, cage }: { app: App; cage: CageState }) {
+  const { placing, selected } = app.store.get();
+  const { inner, elements } = cage.controls;
+  const many = (kind: InnerKind) => elements.filter((element) => kind in element).length;
+  const isSelected = selected.last >= cage.info.vertices;
+  return (
+    <Section title={T.cage.inside}>
+      <div class="stack">
+        <p class="hint">{T.cage.insideSentence}</p>
+        <div class="tool-grid">
+          {KINDS.map(([kind, icon]) => (
+            <Button
+              key={kind}
+              label={T.cage.kinds[kind]}
+              icon={icon}
+              kind="small"
+              tip={T.cage.kindTips[kind]}
+              pressed={placing === kind}
+              disabled={!cage.usable}
+              onClick={() => app.controls.arm(placing === kind ? null : kind)}
+            />
+          ))}
+          <Button label={T.cage.openControls} icon="file" kind="small" onClick={app.chooseControls} />
+        </div>
+        {placing && <p class="hint">{T.cage.kindTips[placing]}</p>}
+        {inner > 0 && (
+          <>
+            <p>{T.cage.count(many("point"), many("line"), many("face"))}</p>
+            {many("point") + many("line") > 0 && <Radius app={app} cage={cage} />}
+            <div class="tool-grid">
+              <Button
+                label={T.cage.removeSelected}
+                icon="trash"
+                kind="small"
+                disabled={!isSelected}
+                onClick={app.controls.remove}
+              />
+              <Button label={T.cage.clear} icon="close" kind="small" onClick={app.controls.clear} />
+            </div>
+            <p class="hint">{T.cage.moveThem(app.key("restMode"))}</p>
+          </>
+        )}
+      </div>
+    </Section>
+  );
+}
+
+function Radius({ app, cage }: { app: App; cage: CageState }) {
+  /** Under the hand; bound again when it lets go. */
+  const [held, setHeld] = useState<number | null>(null);
+  const { min, max } = cage.info.bounds;
+  const longest = Math.max(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
+  return (
+    <Slider
+      label={T.cage.radius}
+      min={THINNEST}
+      max={THICKEST}
+      step={0.0025}
+      format={(share) => T.cage.ofSize(percent(share, 1))}
+      value={held ?? cage.radius / longest}
+      onInput={setHeld}
+      onCommit={(share) => {
+        app.controls.setRadius(share * longest);
+        setHeld(null);
+      }}
+    />
+  );
+}

@@ -1,0 +1,95 @@
+/** Step Cage. */
+
+import { count, plural } from "../../format";
+
+export const cage = {
+  title: "Put a cage around it",
+  sentence: "A coarse closed mesh. You move its few vertices, the model follows smoothly.",
+  how: "How",
+  sources: { auto: "Automatic", hull: "Hull", box: "Box", file: "File" },
+  about: {
+    auto: "Follows the limbs of the model, closed and around every vertex; checked before you see it.",
+    hull: "A rough hull of two dozen vertices: good for bodies without limbs, and quick to pose.",
+    box: "A box around the model, its sides cut into squares: free-form deformation, good for studying.",
+    file: "A closed mesh that you modelled around it: .obj, .glb or .gltf.",
+  },
+  wanted: "Vertices, at most",
+  detail: "Distance from the shape",
+  quads: "Quads",
+  quadsSentence: "Four-sided faces where two triangles make a good one.",
+  ofQuads: "Quads",
+  margin: "Room around the model",
+  tight: "as tight as it can be",
+  ofSize: (share: string) => `${share} of its size`,
+  gaps: "Gaps that stay open",
+  asVertices: "as the vertices allow",
+  from: (share: string) => `from ${share} of its size`,
+  symmetry: "Left and right alike",
+  symmetries: { auto: "If the model is", on: "Yes", off: "No" },
+  around: "Around",
+  aroundRest: "The model at rest, and its morph targets",
+  perPart: "A cage for each part",
+  perPartSentence: "For models of separate parts. Off: one cage around all.",
+  divisions: "Squares along each side",
+  make: "Make this cage",
+  load: "Open a cage file",
+  making: "Making the cage",
+  result: "The cage",
+  smooth: "Smooth cage",
+  smoothOn: "Round its surface",
+  smoothSentence:
+    "Binds to the rounded surface of the cage: edges of the cage no longer show on the model. Its vertices stay the handles.",
+  steps: "Steps of subdivision",
+  inside: "Controls inside",
+  insideSentence: "Handles within the model, for what a cage cannot reach: each moves what is around it.",
+  kinds: { point: "Point", line: "Bone", face: "Sheet" },
+  kindTips: {
+    point: "A ball that what is around it follows. Click where it should be.",
+    line: "A line that bends at its corners. Click each of them; Done, Enter or a second click there ends it.",
+    face: "A wall between two sides, which do not feel each other. Click where its middle should be.",
+  },
+  radius: "Radius",
+  count: (points: number, lines: number, faces: number) =>
+    [
+      points > 0 ? plural(points, "point") : "",
+      lines > 0 ? plural(lines, "bone") : "",
+      faces > 0 ? plural(faces, "sheet") : "",
+    ]
+      .filter(Boolean)
+      .join(", "),
+  removeSelected: "Delete",
+  clear: "Delete all",
+  openControls: "From a file",
+  moveThem: (key: string) =>
+    `They are dragged as vertices of the cage are: to other places while the cage is reshaped (${key} in the view), else to pose.`,
+  shape: "Shape it",
+  reshape: "Reshape the cage",
+  reshapeSentence: (key: string) =>
+    `Shape the cage itself; the model stays still and is bound again afterwards. ${key} in the view.`,
+  edits: {
+    split_edge: "Split edge",
+    collapse_edge: "Collapse edge",
+    extrude_face: "Extrude face",
+    delete_vertex: "Delete and fill",
+    delete_face: "Delete and fill",
+  },
+  hints: {
+    vertex: "Vertices are selected. To split or collapse, choose edges on the left; to extrude, faces.",
+    edge: "Click an edge to split it in the middle or to collapse it into one vertex.",
+    face: "Click a face to extrude or delete it. A gap that is left is filled.",
+  },
+  none: "No cage yet. Make one: it takes less than a second.",
+  needsRepair: "Needs repair",
+  checking: "Checking…",
+  outside: "Vertices outside",
+  encloses: "Encloses the model",
+  partOutside: "Part of the model is outside.",
+  vertices: (n: number) => plural(n, "vertex", "vertices"),
+  edges: "Edges",
+  faces: "Faces",
+  posesWait: "Pose and poses belong to the cage before, and are kept with it.",
+  bridged: (parts: number) => `The model has ${count(parts)} separate parts; this cage joins them.`,
+  fineEnough: "Fine enough",
+  more: (made: number, wanted: number) =>
+    `The model's holes and gaps need ${made} vertices instead of ${wanted}.`,
+};

@@ -1,0 +1,61 @@
+/** Errors, and what can be done about them. */
+
+export const fixes = {
+  coarser: "Use a coarser grid",
+  cpu: "Use the processor",
+  fewer: "Make a cage of fewer vertices",
+  file: "Choose another file",
+  regenerate: "Make a new cage",
+  reload: "Reload the page",
+};
+
+export const failed = {
+  start: "Cagework did not start",
+  bind: "The bind did not finish",
+  slice: "The slice could not be computed",
+  pull: "The model cannot be pulled",
+  carry: "The poses could not be carried over",
+  formula: {
+    mean_value: "Mean value coordinates could not be computed",
+    green: "Green coordinates could not be computed",
+  },
+  check: "The cage could not be checked",
+  clip: "The clip cannot be played",
+  noCage: "No cage could be made",
+  cageFile: "This cage cannot be used",
+  repair: "The repair did not work",
+  shape: "The cage cannot have this shape",
+  controls: "This does not fit",
+  controlsFile: "These controls cannot be used",
+  edit: (what: string) => `${what}: not possible here`,
+  write: "The file could not be written",
+  delete: "The kept work could not be deleted",
+  sample: "The sample could not be opened",
+  open: (name: string) => `${name} could not be opened`,
+  turn: "The model could not be turned",
+  link: "This link is damaged",
+  tour: "The tour could not be begun",
+  undo: "Undo did not work",
+  redo: "Redo did not work",
+};
+
+export const lost = {
+  title: "The graphics device was lost",
+  back: "Bringing everything back…",
+  notBack: "The graphics device did not come back",
+  kept: (reason: string) => `${reason} Your work is kept in this browser.`,
+  again: "The graphics device was lost again",
+  others: (reason: string) => `${reason} Close other programs that use it, then try again.`,
+};
+
+export const crash = {
+  title: "Cagework stopped, and was begun anew",
+  again: "Cagework stopped again",
+  second: (during: string) => `${during} It was the second time, so nothing is opened again by itself.`,
+  fresh: "Start fresh begins with a sample. The work stays kept, and opens only when you ask for it.",
+  report: "Report",
+  showReport: "Show the report",
+  while: (busy: string) => `It happened while ${busy}.`,
+  with: (name: string) => `It happened with ${name} open.`,
+  nothing: "Nothing was open yet.",
+};

@@ -1,0 +1,35 @@
+/** Step Export. */
+
+import { bytes, plural } from "../../format";
+
+export const exports = {
+  title: "Take it along",
+  sentence: "Files for Blender, Unity, Unreal, three.js, Python, and for this page.",
+  items: {
+    glb: ["Posed model", "GLB as you see it. Materials, textures and parts are those of your file."],
+    poses: [
+      "Poses as morph targets",
+      "GLB with one morph target a pose and an animation through them. Exact in every blend.",
+    ],
+    cage: ["Cage", "OBJ of the cage in this pose, for any modelling program."],
+    controls: ["Controls inside", "OBJ of points (p), bones (l) and sheets (f) in this pose."],
+    weights: ["Weights", "NPZ, which scipy.sparse.load_npz reads: one row a vertex of your file."],
+    picture: ["Picture", "PNG of the view."],
+    project: ["Project", "Model, cage, poses and settings in one GLB that Cagework opens again."],
+  },
+  bindFirst: "Bind the model first.",
+  cageFirst: "Make a cage first.",
+  poseFirst: "Save a pose first, in the step before.",
+  modelFirst: "Open a model first.",
+  poses: (n: number, sentence: string) => `${plural(n, "pose")}. ${sentence}`,
+  size: "Size of the picture",
+  sizes: ["As shown", "Twice", "Four times"],
+  alone: "The model alone",
+  aloneSentence: "Without cage and floor, transparent around it.",
+  saved: (file: string, size: number) => `${file} is in your downloads (${bytes(size)}).`,
+  noLink:
+    "A link can hold a sample in its own cage and pose, but no files of yours. Save a project file to pass this on.",
+  saveProject: "Save the project",
+  copied: "Link copied. Whoever opens it sees this sample in this pose, as you see it.",
+  inAddress: "The link is in the address bar; copy it from there.",
+};

@@ -1,0 +1,67 @@
+/** Step Model, and how a file is opened. */
+
+import { duration, percent, plural } from "../../format";
+
+export const model = {
+  title: "Choose a model",
+  sentence:
+    "A cage is a lattice that fits the shape of a model. What you see is already bound to its own: pull it anywhere, and the cage moves along. Or drop a file on this page.",
+  drop: "Drop a model here",
+  kinds: ".glb, .vrm, .gltf with its files, or .obj; a folder works too",
+  openFolder: "Open a folder",
+  kept: (n: number) => `Kept in this browser (${n})`,
+  samples: "Samples",
+  up: "Up in the file",
+  upY: "As glTF prescribes",
+  upZ: "Turn a model that lies on its back",
+  licences: "Licences",
+  isOpen: "The model that is open",
+  open: "Open",
+  vertices: "Vertices",
+  triangles: "Triangles",
+  size: "Size",
+  materials: "Materials",
+  textures: "Textures",
+  also: "Also in the file",
+  joints: (n: number) => plural(n, "joint"),
+  clips: (n: number) => plural(n, "clip"),
+  morphTargets: (n: number) => plural(n, "morph target"),
+  tips: {
+    rat: "The paper's rat. Take it by the nose and turn its head: the feet stay.",
+    humanoid: "Take a knee and lift it: the other leg, a hand's breadth away, stays.",
+    clamp: "Pull the lower jaw open, then compare with mean value and Green coordinates.",
+    strider: "Legs as thin as a grid cell. Take one by the foot: the others keep still.",
+  } as Record<string, string>,
+};
+
+export const opening = {
+  starting: "Starting",
+  file: (name: string) => `Opening ${name}`,
+  turning: "Turning the model",
+  repairing: "Repairing the cage",
+  stages: {
+    bytes: "Reading the file",
+    decompress: "Decompressing it",
+    geometry: "Finding vertices and faces",
+    textures: "Decoding textures",
+    check: "Checking the cage",
+  },
+  far: (stage: string, fraction: number) => (fraction > 0 ? `${stage}, ${percent(fraction)}` : stage),
+  allTheSame: "Open it all the same",
+  noAnswer: (ms: number) => `The page will not answer for ${duration(ms)}`,
+  nothing: "Nothing to open",
+  empty: "This file is empty",
+  noContent: (name: string) => `${name} has no content. Export it again, or choose another file.`,
+  dropped: "Nothing was dropped.",
+  kinds: "Cagework opens .glb, .vrm, .gltf and .obj files.",
+  companions: "These files belong to a .gltf or .obj file: drop that one together with them.",
+  damagedPose: "The pose in this project is damaged; it opens at rest.",
+  dropAsCage: "Drop to use it as the cage",
+  dropToOpen: "Drop to open",
+  asCage: "A closed mesh around the model.",
+  asControls: (name: string) => `Puts the controls of ${name} inside the cage.`,
+  together: "A model with its textures, or a model and its cage: drop them together.",
+  onCageStep: "It becomes the model; to use it as the cage, drop it on the Cage panel.",
+  replaces: "It takes the place of the model that is open.",
+  getsCage: "It gets a cage and can be posed at once.",
+};

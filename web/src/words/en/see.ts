@@ -1,0 +1,53 @@
+/** The See panel and its legends. */
+
+import { count, scientific } from "../../format";
+
+export const see = {
+  title: "See",
+  close: "Close the See panel",
+  colour: "Colour",
+  colours: { material: "Material", clay: "Clay", weight: "Weight", error: "Error" },
+  about: {
+    material: "The model's own materials and textures.",
+    clay: "One even colour: the shape is easier to judge.",
+    weight: "How much each point follows the vertex selected last. Select another one to see its share.",
+    error: "Distance from where the model should be at rest, logarithmic. Our method leaves almost none.",
+  },
+  toOne: "Colours from 0 to 1",
+  toOneSentence: "Otherwise from 0 to the vertex's largest weight.",
+  selectForWeights: "Select a handle of the cage to see its weights.",
+  compare: "Coordinates side by side",
+  compareSentence: "Two or three kinds of them, in the same pose.",
+  grid: "Grid",
+  slice: "Slice through the grid",
+  slices: { off: "Off", kinds: "Cells", value: "Coordinate" },
+  across: "Across",
+  where: "Where",
+  selectForCoordinate: "Select a handle of the cage to see its coordinate.",
+  coordinate: (i: number) =>
+    `Coordinate of cage vertex ${i}: 1 there, 0 at the others, as smooth as can be between.`,
+  cells: "Cells inside, on and outside the cage.",
+  show: "Show",
+  parts: {
+    model: ["Model", ""],
+    cage: ["Cage and handles", ""],
+    base_wireframe: ["Model at rest, as wires", "The paper's way to show what moved."],
+    floor: ["Floor", ""],
+    problems: ["Marks of the cage's faults", ""],
+  },
+  fromWhere: "From where",
+  views: ["Front", "Right", "Top"],
+  parallel: "Parallel projection",
+  parallelTip: (key: string) => `Perspective or parallel (${key})`,
+};
+
+export const legend = {
+  cells: "Cells",
+  kinds: ["inside", "on the cage", "outside"],
+  coordinate: (i: number) => `Coordinate of vertex ${i}`,
+  weight: (i: number) => `Weight of vertex ${i}`,
+  error: "Rest error",
+  largest: (value: number, vertex: number) =>
+    `Largest: ${scientific(value)}, at vertex ${count(vertex)} of the model`,
+  name: (title: string, low: string, high: string) => `${title}: ${low} to ${high}`,
+};

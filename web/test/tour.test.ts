@@ -1,0 +1,99 @@
+import { expect, it, vi } from "vitest";
+import { stopOf } from "../src/actions/tour";
+import type { View } from "../src/actions/view";
+import type { BindOptions } from "../src/contract";
+import { createGuide } from "../src/tour/guide";
+import { isOf, STOPS } from "../src/tour/stops";
+import { cageOf, createFake, MODEL, reportOf } from "./fake";
+
+/** A page with the rat as it came, and a tour that binds at once. */
+function page() {
+  const fake = createFake();
+  const { store, engine } = fake;
+  const { positions, corners } = cageOf(8);
+  store.set({
+    model: MODEL,
+    cage: engine.setCage(positions, corners),
+    sample: "rat",
+    sampleCage: true,
+    bound: true,
+  });
+  const opened: string[] = [];
+  const binds: BindOptions[] = [];
+  vi.stubGlobal("location", { hash: "", pathname: "/", search: "" });
+  vi.stubGlobal("window", { history: { replaceState: () => undefined } });
+  const view: Partial<View> = {
+    scene: (patch) => store.set({ scene: { ...store.get().scene, ...patch } }),
+    slice: () => undefined,
+    compare: async () => undefined,
+  };
+  const guide = createGuide(fake.ctx, {
+    bind: {
+      async start() {
+        const { bindOptions } = store.get();
+        binds.push(bindOptions);
+        store.set({ report: reportOf(bindOptions) });
+        return true;
+      },
+    },
+    edit: { settle: () => undefined, setEditingRest: () => undefined, sync: () => undefined },
+    poses: { stop: () => undefined },
+    view: view as View,
+    files: {
+      async openSample(id) {
+        guide.overtaken(id);
+        opened.push(id);
+        store.set({ sample: id, sampleCage: true });
+        return true;
+      },
+    },
+    works: { flush: async () => undefined, open: async () => true, restore: async () => false },
+  });
+  return { ...fake, guide, opened, binds };
+}
+
+it("what the user had set comes back, and the sample that was open", async () => {
+  const { guide, store, opened, binds } = page();
+  const own: BindOptions = { ...store.get().bindOptions, grid: 128, tau: 1e-7 };
+  store.set({ bindOptions: own, step: "cage", seeOpen: true });
+  await guide.start(STOPS.indexOf("coordinates"));
+  expect(opened).toEqual(["clamp"]);
+  await guide.go(STOPS.indexOf("paper"));
+  expect(store.get()).toMatchObject({
+    bindOptions: { grid: 16, method: "classic" },
+    seeOpen: false,
+    step: "bind",
+  });
+  expect(store.get().tour?.reports.map(({ grid }) => grid)).toEqual([16]);
+  await guide.end();
+  expect(store.get()).toMatchObject({ tour: null, bindOptions: own, step: "cage", seeOpen: true });
+  expect(store.get().scene.colour, "as it was").toBe("material");
+  expect(opened.at(-1)).toBe("rat");
+  expect(binds.every(({ memory_limit }) => memory_limit === own.memory_limit)).toBe(true);
+});
+
+it("a file that is opened on the way ends it with the user's own settings", async () => {
+  const { guide, store, opened } = page();
+  const own = store.get().bindOptions;
+  await guide.start(STOPS.indexOf("smoothing"));
+  guide.overtaken(null);
+  expect(store.get()).toMatchObject({ tour: null, bindOptions: own });
+  await guide.end();
+  expect(opened, "nothing else is opened").toEqual([]);
+});
+
+it("links count stops from 1, and a bad number is the first one", () => {
+  expect(["#tour=1", "#tour=10", "#tour=x", "#tour=-4", "#sample=rat"].map(stopOf)).toEqual([
+    0,
+    9,
+    0,
+    0,
+    undefined,
+  ]);
+});
+
+it("a report is of the bind that was asked for, although Rust's tau has fewer digits", () => {
+  const report = reportOf({ grid: 32, tau: Math.fround(1e-3) });
+  expect(isOf(report, { grid: 32, tau: 1e-3 })).toBe(true);
+  expect(isOf(report, { grid: 32, tau: 1e-4 })).toBe(false);
+});
