@@ -75,6 +75,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     let poses = with_inner(poses, &args.pose_controls, &saved.inner_controls, model.up(), args.read.memory)?;
     let rest = rest_of(&cage.cage, &saved);
     let names: Vec<String> = args.pose.iter().map(|path| pose_name(path)).collect();
+    let options = args.rig.options(&model, &args.mesh)?;
     let outside_vertices = saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices).count();
 
     let started = Instant::now();
@@ -83,13 +84,16 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         let by = |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.outside, &rest, pose);
         let by: Vec<Vec<DVec3>> = poses.iter().map(by).collect();
         let deform_ms = started.elapsed().as_secs_f64() * 1e3;
-        let (bytes, report) = rig::write(&model, &saved, &names, by, args)?;
+        let (bytes, report) = rig::write(&model, &saved, &names, by, (output, &options))?;
         notices.extend(report.notices());
         (bytes, Some(report), deform_ms)
     } else {
         let saved = saved.of_vertices();
         let deformed: Vec<Vec<Vec3>> =
             poses.iter().map(|pose| deform_bound(&saved.weights, &saved.outside, pose)).collect();
+        let hold = |deformed: Vec<Vec3>| options.parts.hold(&model.positions, &deformed);
+        let deformed =
+            if options.parts.is_empty() { deformed } else { deformed.into_iter().map(hold).collect() };
         let deform_ms = started.elapsed().as_secs_f64() * 1e3;
         let bytes = if let [only] = deformed.as_slice() {
             export(&model, only, &args.output)?
