@@ -15,9 +15,11 @@ mod dynamic;
 mod error;
 mod evaluate;
 mod files;
+mod fit;
 mod gpu;
 mod info;
 mod load;
+mod pose;
 mod progress;
 mod pull;
 mod render;
@@ -43,6 +45,7 @@ fn main() -> ExitCode {
         Command::Bind(args) => bind::run(args, cli.json),
         Command::Deform(args) => deform::run(args, cli.json),
         Command::Pull(args) => pull::run(args, cli.json),
+        Command::Fit(args) => fit::run(args, cli.json),
         Command::Render(args) => render::run(args, cli.json),
         Command::Cage(args) => cage::run(args, cli.json),
         Command::Check(args) => check::run(args, cli.json),

@@ -10,6 +10,7 @@ mod cages;
 mod controls;
 mod deform;
 mod evaluate;
+mod fit;
 #[cfg(unix)]
 mod outputs;
 mod pull;
