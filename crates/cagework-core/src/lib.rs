@@ -54,3 +54,8 @@ pub use parts::Parts;
 pub use progress::{Cancelled, Progress, ProgressEvent, Stage};
 pub use report::BindReport;
 pub use weights::Weights;
+
+/// The example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

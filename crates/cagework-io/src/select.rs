@@ -6,38 +6,11 @@ use thiserror::Error;
 use crate::error::WriteError;
 use crate::gltf::GltfError;
 use crate::model::{Document, Model};
+use crate::part_kind::PartKind;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
 /// Names that an error lists.
 const LISTED: usize = 20;
-
-/// What a name can be the name of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum PartKind {
-    /// A material.
-    Material,
-    /// A node of a glTF, with all that hangs below it.
-    Node,
-    /// A joint of a glTF: the vertices that it holds more than any other does. A vertex group, elsewhere.
-    Joint,
-    /// An `o` or `g` line of an OBJ.
-    Group,
-}
-
-impl PartKind {
-    const ALL: [Self; 4] = [Self::Material, Self::Node, Self::Joint, Self::Group];
-
-    /// The word before a name, as in `material:skin`.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Material => "material",
-            Self::Node => "node",
-            Self::Joint => "joint",
-            Self::Group => "group",
-        }
-    }
-}
 
 /// Why a name selects nothing.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]

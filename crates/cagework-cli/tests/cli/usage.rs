@@ -37,7 +37,7 @@ fn wrong_command_line_exits_with_2() {
         "bind mesh.obj --cage cage.obj -o out.fbx",
         "bind mesh.obj --cage cage.obj --weights out.txt",
         "deform mesh.obj --cage cage.obj --weights w.npz -o out.glb",
-        "cage mesh.obj -o cage2.stl",
+        "cage mesh.obj -o cage2.fbx",
         "bench mesh.obj",
     ] {
         sandbox.run(args).code(2).stdout("").stderr(contains("Usage").or(contains("--help")));

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use super::scene::{Worlds, name_of};
 use super::skin::each_influence;
 use super::{GltfDocument, GltfError, Slot};
-use crate::select::PartKind;
+use crate::part_kind::PartKind;
 
 impl GltfDocument {
     /// Things that have a name and vertices.

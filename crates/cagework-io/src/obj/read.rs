@@ -41,7 +41,7 @@ pub(crate) struct ObjDocument {
     /// Material of each face, an index into `materials`, or [`NONE`].
     pub(crate) face_materials: Vec<u32>,
     /// Smoothing group of each face, 0 for none; empty if the file has no `s` line.
-    face_smoothing: Vec<u32>,
+    pub(crate) face_smoothing: Vec<u32>,
     /// Names after `usemtl`, in order of first use.
     pub(crate) materials: Vec<String>,
     /// `o` and `g` lines, but for those that say the same as the one before.
@@ -75,6 +75,18 @@ impl ObjDocument {
             }
         }
         surfaces
+    }
+
+    /// Cuts all faces into triangles.
+    pub(crate) fn triangulate(&mut self, positions: &[Vec3]) {
+        let mut triangulator = Triangulator::new();
+        let mut polygon = Vec::new();
+        for face in self.face_starts.windows(2) {
+            let corners = &self.corners[face[0] as usize..face[1] as usize];
+            polygon.clear();
+            polygon.extend(corners.iter().map(|c| positions[c.v as usize]));
+            triangulator.triangulate(&polygon, face[0], &mut self.triangles);
+        }
     }
 
     /// Triangles (of corners) of each material, in order of first use.
@@ -348,7 +360,7 @@ impl<'a> Reader<'a> {
                 }
             }
         }
-        self.triangulate();
+        self.document.triangulate(&self.positions);
         if !self.has_smoothing {
             self.document.face_smoothing.clear();
         }
@@ -372,18 +384,6 @@ impl<'a> Reader<'a> {
             bytes,
             notices,
         })
-    }
-
-    fn triangulate(&mut self) {
-        let document = &mut self.document;
-        let mut triangulator = Triangulator::new();
-        let mut polygon = Vec::new();
-        for face in document.face_starts.windows(2) {
-            let corners = &document.corners[face[0] as usize..face[1] as usize];
-            polygon.clear();
-            polygon.extend(corners.iter().map(|c| self.positions[c.v as usize]));
-            triangulator.triangulate(&polygon, face[0], &mut document.triangles);
-        }
     }
 }
 

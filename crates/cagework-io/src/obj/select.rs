@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::read::ObjDocument;
-use crate::select::PartKind;
+use crate::part_kind::PartKind;
 
 /// An `o` or `g` line.
 #[derive(Clone, Debug)]

@@ -61,6 +61,16 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
             .to_vec(),
     );
     samples.extend(cages().iter().map(write_cage_obj));
+    let text = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
+        property uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_index\nend_header\n\
+        0 0 0 9 9 9\n1 0 0 9 9 9\n0 1 0 255 0 9\n3 0 1 2\n";
+    samples.push(text.to_vec());
+    samples.push(
+        b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n"
+            .to_vec(),
+    );
+    samples.push(model.write_ply(&model.positions).expect("it fits"));
+    samples.push(model.write_stl(&model.positions).expect("it has triangles"));
     samples
 }
 

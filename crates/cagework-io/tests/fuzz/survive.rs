@@ -11,7 +11,7 @@ use cagework_core::progress::Silent;
 use cagework_core::skin::skin_vertices;
 use cagework_core::{Binding, Cage, ControlSet, Controls, InnerControls, PolygonMesh, bind};
 use cagework_io::{
-    Joints, Model, ReshapeOptions, decode_pose, encode_pose, read_inner_controls, read_project,
+    Joints, Model, ModelFormat, ReshapeOptions, decode_pose, encode_pose, read_inner_controls, read_project,
     read_weights_npz, write_inner_controls, write_weights_npz,
 };
 use glam::{DVec3, Vec3};
@@ -94,6 +94,12 @@ fn as_file(model: &Model) {
     let moved: Vec<Vec3> = model.positions.iter().map(|&p| twist(p.clamp_length_max(1e6))).collect();
     let _ = model.look();
     let _ = model.write_obj(&moved);
+    for format in [ModelFormat::Ply, ModelFormat::Stl] {
+        if let Ok(bytes) = model.write(format, &model.positions) {
+            let again = Model::read("y", &bytes, &mut |_| None);
+            assert!(again.is_ok(), "{}", again.err().map(|e| e.to_string()).unwrap_or_default());
+        }
+    }
     if let Ok(glb) = model.write_glb_poses(&model.positions, &[("moved".into(), moved)]) {
         let again = Model::read("y.glb", &glb, &mut |_| None);
         assert!(again.is_ok(), "{}", again.err().map(|e| e.to_string()).unwrap_or_default());
