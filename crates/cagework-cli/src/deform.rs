@@ -9,7 +9,7 @@ use cagework_io::{Model, ModelFormat, ReshapeReport, SavedWeights, read_weights_
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use crate::args::{CageSource, ControlArgs, DeformArgs, MemoryArgs};
+use crate::args::{CageSource, ControlArgs, DeformArgs, MemoryArgs, ModelOutput, RigArgs};
 use crate::bind::export;
 use crate::controls::{inner_controls, rest_of, with_inner};
 use crate::error::CliError;
@@ -40,7 +40,7 @@ struct Deformed {
 /// # Errors
 /// When a file cannot be read or written, or files do not belong together.
 pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
-    let weights = match (&args.weights, &args.rig.dynamic) {
+    let weights = match (&args.weights, &args.dynamic) {
         (_, Some(clip)) => return dynamic::run(args, clip, as_json),
         (Some(weights), None) => weights,
         // The command line's own rules leave no such case.
@@ -76,29 +76,10 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     let rest = rest_of(&cage.cage, &saved);
     let names: Vec<String> = args.pose.iter().map(|path| pose_name(path)).collect();
     let outside_vertices = saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices).count();
-
-    let started = Instant::now();
+    let poses = Poses { names, rest, positions: poses };
+    let (bytes, rig, deform_ms) = follow(&model, saved, &poses, &args.output, &args.rig)?;
     let mut notices = model.notices.clone();
-    let (bytes, rig, deform_ms) = if format == ModelFormat::Gltf && model.is_rigged() && !args.rig.plain {
-        let by = |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.outside, &rest, pose);
-        let by: Vec<Vec<DVec3>> = poses.iter().map(by).collect();
-        let deform_ms = started.elapsed().as_secs_f64() * 1e3;
-        let (bytes, report) = rig::write(&model, &saved, &names, by, args)?;
-        notices.extend(report.notices());
-        (bytes, Some(report), deform_ms)
-    } else {
-        let saved = saved.of_vertices();
-        let deformed: Vec<Vec<Vec3>> =
-            poses.iter().map(|pose| deform_bound(&saved.weights, &saved.outside, pose)).collect();
-        let deform_ms = started.elapsed().as_secs_f64() * 1e3;
-        let bytes = if let [only] = deformed.as_slice() {
-            export(&model, only, &args.output)?
-        } else {
-            let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(deformed).collect();
-            model.write_glb_poses(&model.positions, &named).map_err(|e| CliError::file(output, e))?
-        };
-        (bytes, None, deform_ms)
-    };
+    notices.extend(rig.iter().flat_map(ReshapeReport::notices));
     write(output, &bytes)?;
 
     let done = Deformed {
@@ -107,12 +88,57 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         cage_vertices: n_cage,
         inner_controls: n_inner,
         outside_vertices,
-        poses: names,
+        poses: poses.names,
         rig,
         deform_ms,
         notices,
     };
     print(&if as_json { json(&done) } else { text(&done) })
+}
+
+/// Poses of a cage and the controls inside.
+pub(crate) struct Poses {
+    /// What they are called.
+    pub(crate) names: Vec<String>,
+    /// All controls at rest. `[n_controls]`, object units
+    pub(crate) rest: Vec<Vec3>,
+    /// All controls in each pose. `[n_poses][n_controls]`, object units
+    pub(crate) positions: Vec<Vec<Vec3>>,
+}
+
+/// A model that follows one pose, or that has several as morph targets, as the bytes of a file; what became of its rig; and
+/// how long it took to compute, milliseconds.
+///
+/// # Errors
+/// When the weights lack the rig's points, or the model cannot be written in that format.
+pub(crate) fn follow(
+    model: &Model,
+    saved: SavedWeights,
+    poses: &Poses,
+    output: &ModelOutput,
+    rig: &RigArgs,
+) -> Result<(Vec<u8>, Option<ReshapeReport>, f64), CliError> {
+    let Poses { names, rest, positions } = poses;
+    let started = Instant::now();
+    let elapsed_ms = || started.elapsed().as_secs_f64() * 1e3;
+    if output.format == ModelFormat::Gltf && model.is_rigged() && !rig.plain {
+        let by = |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.outside, rest, pose);
+        let by: Vec<Vec<DVec3>> = positions.iter().map(by).collect();
+        let deform_ms = elapsed_ms();
+        let (bytes, report) = rig::write(model, &saved, names, by, &output.path, rig)?;
+        return Ok((bytes, Some(report), deform_ms));
+    }
+    let saved = saved.of_vertices();
+    let deformed: Vec<Vec<Vec3>> =
+        positions.iter().map(|pose| deform_bound(&saved.weights, &saved.outside, pose)).collect();
+    let deform_ms = elapsed_ms();
+    let bytes = if let [only] = deformed.as_slice() {
+        export(model, only, output)?
+    } else {
+        let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(deformed).collect();
+        model.write_glb_poses(&model.positions, &named).map_err(|e| CliError::file(&output.path, e))?
+    };
+    Ok((bytes, None, deform_ms))
 }
 
 /// Reads weights and checks that they belong to a mesh and a cage.
@@ -144,7 +170,7 @@ pub(crate) fn load_weights(
 }
 
 /// A pose is called as its file is, without folder and ending.
-fn pose_name(path: &Path) -> String {
+pub(crate) fn pose_name(path: &Path) -> String {
     path.file_stem().map_or_else(|| "pose".into(), |stem| stem.to_string_lossy().into_owned())
 }
 

@@ -8,6 +8,7 @@ mod bind;
 mod cage;
 mod card;
 mod check;
+mod columns;
 mod controls;
 mod deform;
 mod demo;
@@ -20,6 +21,7 @@ mod info;
 mod load;
 mod progress;
 mod pull;
+mod refit;
 mod render;
 mod rig;
 mod signals;
@@ -42,6 +44,8 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(args, cli.json),
         Command::Bind(args) => bind::run(args, cli.json),
         Command::Deform(args) => deform::run(args, cli.json),
+        Command::Refit(args) => refit::run(args, cli.json),
+        Command::Merge(args) => columns::merge(args, cli.json),
         Command::Pull(args) => pull::run(args, cli.json),
         Command::Render(args) => render::run(args, cli.json),
         Command::Cage(args) => cage::run(args, cli.json),
@@ -53,10 +57,15 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let hint = error.hint().map_or_else(String::new, |hint| format!("hint: {hint}\n"));
-            // A closed stderr leaves nobody to tell.
-            let _ = write!(std::io::stderr(), "error: {}\n{hint}", error.message());
+            say(&error.message(), error.hint());
             ExitCode::FAILURE
         }
     }
+}
+
+/// Says on stderr what went wrong, and what to do about it where that is known.
+fn say(message: &str, hint: Option<&str>) {
+    let hint = hint.map_or_else(String::new, |hint| format!("hint: {hint}\n"));
+    // A closed stderr leaves nobody to tell.
+    let _ = write!(std::io::stderr(), "error: {message}\n{hint}");
 }

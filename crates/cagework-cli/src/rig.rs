@@ -1,9 +1,11 @@
 //! Rigged models: what is bound with them, and what a reshape says.
 
+use std::path::Path;
+
 use cagework_io::{Model, ReshapeReport, SavedWeights, WriteError};
 use glam::{DVec3, Vec3};
 
-use crate::args::DeformArgs;
+use crate::args::RigArgs;
 use crate::error::CliError;
 
 /// Writes a rigged model deformed by one pose, or at rest with all poses as morph targets. `by`: displacements of all bound
@@ -16,7 +18,8 @@ pub(crate) fn write(
     saved: &SavedWeights,
     names: &[String],
     mut by: Vec<Vec<DVec3>>,
-    args: &DeformArgs,
+    output: &Path,
+    rig: &RigArgs,
 ) -> Result<(Vec<u8>, ReshapeReport), CliError> {
     let n = model.positions.len();
     let wrong = |e| match e {
@@ -28,10 +31,10 @@ pub(crate) fn write(
             ),
             hint: "bind the model again, or export it without its rig (--static)",
         },
-        e => CliError::file(&args.output.path, e),
+        e => CliError::file(output, e),
     };
     let outside: Vec<u32> = saved.outside.iter().map(|o| o.vertex).collect();
-    let options = args.rig.options();
+    let options = rig.options();
     if by.len() == 1 {
         return model.write_reshaped(&by.remove(0), &outside, &[], &options).map_err(wrong);
     }
@@ -44,7 +47,7 @@ pub(crate) fn write(
 ///
 /// # Errors
 /// When the rig cannot be read.
-pub(crate) fn points(model: &Model, name: &std::path::Path) -> Result<(Vec<Vec3>, usize), CliError> {
+pub(crate) fn points(model: &Model, name: &Path) -> Result<(Vec<Vec3>, usize), CliError> {
     let extra = model.extra_points().map_err(|e| CliError::file(name, e))?;
     let n = extra.len();
     let mut all = model.positions.clone();

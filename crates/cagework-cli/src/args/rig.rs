@@ -16,10 +16,6 @@ pub(crate) struct RigArgs {
     /// Name of a node below a joint whose mesh keeps its shape: a buckle, an eye. May be given several times.
     #[arg(long, value_name = "NODE")]
     rigid: Vec<String>,
-    /// Experimental: let the cage bend the model while a clip moves it, instead of its shape at rest; writes the clip's frames as
-    /// morph targets, without skeleton.
-    #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "plain"])]
-    pub(crate) dynamic: Option<String>,
     /// Write the shape alone: no skin, no morph targets but those of several poses.
     #[arg(long = "static")]
     pub(crate) plain: bool,

@@ -68,6 +68,12 @@ impl<'a> SolvedCage<'a> {
         self.elapsed_ms
     }
 
+    /// Bytes of the fields.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.solved.field_bytes as u64
+    }
+
     /// Binds a model, as [`super::bind`] does. `held`, `extra_points`: as in [`BindOptions`]. The report's times are of the
     /// model alone.
     ///
@@ -81,8 +87,7 @@ impl<'a> SolvedCage<'a> {
     ) -> Result<Binding, BindError> {
         let watch = Watch::new(progress);
         let began = watch.now_ms();
-        let options =
-            BindOptions { held: held + self.solved.field_bytes as u64, extra_points, ..self.options };
+        let options = BindOptions { held: held + self.bytes(), extra_points, ..self.options };
         let mesh = Points::new(positions)?;
         let grid = Voxels::grid(self.controls.surface(), &options);
         let n_columns = self.controls.n_controls();
