@@ -34,7 +34,7 @@ fn assert_as_alone(sandbox: &Sandbox, names: &[&str], bind: &str, deform: &str) 
 
 #[test]
 fn models_together_are_the_bytes_of_each_alone() {
-    // Rigged ones, one twice as tall as its cage, and a shape.
+    // Rigged ones, one wider than its cage, and a shape.
     let sandbox = rigs::bound();
     sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
     sandbox
@@ -134,7 +134,9 @@ fn resume_leaves_what_is_newer_than_its_inputs() {
         let file = std::fs::File::options().append(true).open(sandbox.path(name)).unwrap();
         file.set_modified(now - Duration::from_secs(3600 * hours)).unwrap();
     };
-    ["a.obj", "b.obj", "cage.obj", "wide.obj"].map(|name| set_age(name, 5));
+    for name in ["a.obj", "b.obj", "cage.obj", "wide.obj"] {
+        set_age(name, 5);
+    }
     let resume = format!("{REFIT} --manifest list.txt --resume --json");
     let states = || {
         let done = sandbox.json(&resume);
