@@ -277,7 +277,7 @@ pub(crate) struct DeformArgs {
     pub(crate) rig: RigArgs,
     /// Experimental: let the cage bend the model while a clip moves it, instead of its shape at rest; writes the clip's frames as
     /// morph targets, without skeleton.
-    #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "plain"])]
+    #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "mask", "plain"])]
     pub(crate) dynamic: Option<String>,
     /// With --dynamic: smooth the cage by so many steps, as for `bind`.
     #[arg(long, default_value_t = 0, value_name = "STEPS", requires = "dynamic", value_parser = number::<u32>(options::SMOOTH))]

@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use cagework_core::Cage;
 use cagework_core::deform::{deform_bound, displacements};
-use cagework_io::{Model, ModelFormat, ReshapeReport, SavedWeights, read_weights_npz, shown};
+use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, read_weights_npz, shown};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use crate::args::{CageSource, ControlArgs, DeformArgs, MemoryArgs, ModelOutput, RigArgs};
+use crate::args::{CageSource, ControlArgs, DeformArgs, MemoryArgs, ModelOutput};
 use crate::bind::export;
 use crate::controls::{inner_controls, rest_of, with_inner};
 use crate::error::CliError;
@@ -75,9 +75,10 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     let poses = with_inner(poses, &args.pose_controls, &saved.inner_controls, model.up(), args.read.memory)?;
     let rest = rest_of(&cage.cage, &saved);
     let names: Vec<String> = args.pose.iter().map(|path| pose_name(path)).collect();
+    let options = args.rig.options(&model, &args.mesh)?;
     let outside_vertices = saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices).count();
     let poses = Poses { names, rest, positions: poses };
-    let (bytes, rig, deform_ms) = follow(&model, saved, &poses, &args.output, &args.rig)?;
+    let (bytes, rig, deform_ms) = follow(&model, saved, &poses, &args.output, (&options, args.rig.plain))?;
     let mut notices = model.notices.clone();
     notices.extend(rig.iter().flat_map(ReshapeReport::notices));
     write(output, &bytes)?;
@@ -106,7 +107,7 @@ pub(crate) struct Poses {
     pub(crate) positions: Vec<Vec<Vec3>>,
 }
 
-/// A model that follows one pose, or that has several as morph targets, as the bytes of a file; what became of its rig; and
+/// A model that follows one pose (`plain`: without its rig), or that has several as morph targets, as the bytes of a file; what became of its rig; and
 /// how long it took to compute, milliseconds.
 ///
 /// # Errors
@@ -116,21 +117,23 @@ pub(crate) fn follow(
     saved: SavedWeights,
     poses: &Poses,
     output: &ModelOutput,
-    rig: &RigArgs,
+    (options, plain): (&ReshapeOptions, bool),
 ) -> Result<(Vec<u8>, Option<ReshapeReport>, f64), CliError> {
     let Poses { names, rest, positions } = poses;
     let started = Instant::now();
     let elapsed_ms = || started.elapsed().as_secs_f64() * 1e3;
-    if output.format == ModelFormat::Gltf && model.is_rigged() && !rig.plain {
+    if output.format == ModelFormat::Gltf && model.is_rigged() && !plain {
         let by = |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.outside, rest, pose);
         let by: Vec<Vec<DVec3>> = positions.iter().map(by).collect();
         let deform_ms = elapsed_ms();
-        let (bytes, report) = rig::write(model, &saved, names, by, &output.path, rig)?;
+        let (bytes, report) = rig::write(model, &saved, names, by, (&output.path, options))?;
         return Ok((bytes, Some(report), deform_ms));
     }
     let saved = saved.of_vertices();
     let deformed: Vec<Vec<Vec3>> =
         positions.iter().map(|pose| deform_bound(&saved.weights, &saved.outside, pose)).collect();
+    let hold = |deformed: Vec<Vec3>| options.parts.hold(&model.positions, &deformed);
+    let deformed = if options.parts.is_empty() { deformed } else { deformed.into_iter().map(hold).collect() };
     let deform_ms = elapsed_ms();
     let bytes = if let [only] = deformed.as_slice() {
         export(model, only, output)?

@@ -1,6 +1,6 @@
 //! `cagework refit`: many models follow one cage, which is solved for once.
 
-use std::cell::OnceCell;
+use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -8,7 +8,7 @@ use std::time::Instant;
 use cagework_core::bind::{BindError, SolvedCage};
 use cagework_core::options::BindOptions;
 use cagework_core::{Binding, Controls};
-use cagework_io::{ModelFormat, ReshapeReport, SavedWeights};
+use cagework_io::{ModelFormat, ReshapeReport, SavedWeights, shown};
 use glam::Vec3;
 use serde::Serialize;
 
@@ -89,6 +89,8 @@ struct Binder<'a> {
     controls: Controls<'a>,
     /// Made for the first model that is not skipped; none if its fields are too large to be kept.
     solved: OnceCell<Option<SolvedCage<'a>>>,
+    /// Names of parts that no model had so far.
+    unnamed: RefCell<Vec<String>>,
 }
 
 /// Runs `cagework refit`.
@@ -124,7 +126,8 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
         rest: controls.rest().to_vec(),
         positions: with_inner(vec![pose], args.pose_controls.as_slice(), inner, up, memory)?,
     };
-    let binder = Binder { args, controls, solved: OnceCell::new() };
+    let unnamed = RefCell::new(args.rig.part_names().cloned().collect());
+    let binder = Binder { args, controls, solved: OnceCell::new(), unnamed };
     let mut models = Vec::with_capacity(jobs.len());
     let mut cancelled = None;
     for job in &jobs {
@@ -141,20 +144,26 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
                 Err(error) => Outcome::Failed { error: named(&error, &job.model), hint: error.hint() },
             }
         };
-        let shown = |path: &Path| path.display().to_string();
-        let entry = Entry { input: shown(&job.model), output: shown(&job.output.path), outcome };
+        let text = |path: &Path| path.display().to_string();
+        let entry = Entry { input: text(&job.model), output: text(&job.output.path), outcome };
         tell(&entry, as_json)?;
         models.push(entry);
     }
     let done = binder.report(models);
     print(&if as_json { json(&done) } else { text(&done, jobs.len()) })?;
-    match cancelled {
-        Some(error) => Err(error),
-        None if done.failed == 0 => Ok(()),
-        None => Err(CliError::Mismatch {
+    let unnamed = binder.unnamed.borrow();
+    match (cancelled, unnamed.first()) {
+        (Some(error), _) => Err(error),
+        _ if done.failed > 0 => Err(CliError::Mismatch {
             message: format!("{} of {} models failed", done.failed, jobs.len()),
             hint: "when they are mended, run it again with --resume: what is done is left as it is",
         }),
+        // Those that were skipped were not asked.
+        (None, Some(name)) if done.skipped == 0 => Err(CliError::Mismatch {
+            message: format!("no model has a part that is called '{}'", shown(name)),
+            hint: "what was written is without it: mend the name and run it again, without --resume",
+        }),
+        _ => Ok(()),
     }
 }
 
@@ -208,10 +217,11 @@ impl Binder<'_> {
         let is_static = args.rig.plain || job.output.format != ModelFormat::Gltf;
         let (points, extra_points) =
             if is_static { (model.positions.clone(), 0) } else { rig::points(&model, &job.model)? };
+        let (options, missing) = args.rig.options_of_one(&model, &job.model)?;
         let held = model.bytes();
         let binding = self.bind(&points, held, extra_points)?;
-        let options = BindOptions { held: held + self.held(), ..self.options() };
-        check_memory(&options, points.len(), *controls, model.bytes_to_write(job.output.format))?;
+        let bound = BindOptions { held: held + self.held(), ..self.options() };
+        check_memory(&bound, points.len(), *controls, model.bytes_to_write(job.output.format))?;
         let Binding { weights, outside, report } = binding;
         let saved = SavedWeights {
             weights,
@@ -219,9 +229,11 @@ impl Binder<'_> {
             extra_points: points[model.positions.len()..].to_vec(),
             inner_controls: inner.to_vec(),
         };
-        let (bytes, rig, deform_ms) = follow(&model, saved, poses, &job.output, &args.rig)?;
+        let (bytes, rig, deform_ms) = follow(&model, saved, poses, &job.output, (&options, args.rig.plain))?;
         write(&job.output.path, &bytes)?;
         let mut notices = model.notices.clone();
+        notices.extend(missing.iter().map(|name| format!("no part is called '{}' here", shown(name))));
+        self.unnamed.borrow_mut().retain(|name| missing.contains(name));
         notices.extend(rig.iter().flat_map(ReshapeReport::notices));
         if !report.converged {
             notices.push(format!(

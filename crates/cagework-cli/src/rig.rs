@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
-use cagework_io::{Model, ReshapeReport, SavedWeights, WriteError};
+use cagework_io::{Model, ReshapeOptions, ReshapeReport, SavedWeights, WriteError};
 use glam::{DVec3, Vec3};
 
-use crate::args::RigArgs;
 use crate::error::CliError;
 
 /// Writes a rigged model deformed by one pose, or at rest with all poses as morph targets. `by`: displacements of all bound
@@ -18,8 +17,7 @@ pub(crate) fn write(
     saved: &SavedWeights,
     names: &[String],
     mut by: Vec<Vec<DVec3>>,
-    output: &Path,
-    rig: &RigArgs,
+    (output, options): (&Path, &ReshapeOptions),
 ) -> Result<(Vec<u8>, ReshapeReport), CliError> {
     let n = model.positions.len();
     let wrong = |e| match e {
@@ -34,13 +32,12 @@ pub(crate) fn write(
         e => CliError::file(output, e),
     };
     let outside: Vec<u32> = saved.outside.iter().map(|o| o.vertex).collect();
-    let options = rig.options();
     if by.len() == 1 {
-        return model.write_reshaped(&by.remove(0), &outside, &[], &options).map_err(wrong);
+        return model.write_reshaped(&by.remove(0), &outside, &[], options).map_err(wrong);
     }
     let rest = vec![DVec3::ZERO; saved.weights.n_rows()];
     let poses: Vec<_> = names.iter().cloned().zip(by).collect();
-    model.write_reshaped(&rest, &outside, &poses, &options).map_err(wrong)
+    model.write_reshaped(&rest, &outside, &poses, options).map_err(wrong)
 }
 
 /// The points to bind: vertices, then those of the rig; and how many the latter are.

@@ -21,6 +21,7 @@ mod obj;
 mod pose_code;
 mod project;
 mod rigged;
+mod select;
 mod shown;
 mod siblings;
 mod up;
@@ -42,6 +43,7 @@ pub use obj::{ObjError, read_inner_controls, write_cage_obj, write_inner_control
 pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
 pub use project::{Project, ProjectError, read_project, write_project};
 pub use rigged::NoClip;
+pub use select::{PartKind, SelectError};
 pub use shown::shown;
 pub use siblings::Resolve;
 pub use up::UpAxis;

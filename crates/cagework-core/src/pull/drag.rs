@@ -7,9 +7,9 @@ use super::anderson::Anderson;
 use super::energy::Pull;
 use super::frame::group_matrices;
 use super::grip::{Grip, check as check_index};
-use super::rotation::nearest_rotation;
 use super::{MAX_HANDLES, PullError};
 use crate::edit::Symmetry;
+use crate::rotation::nearest_rotation;
 
 /// Weight of the cage's own part; flat from 0.02 to 0.4. With less the cage spikes where the model does not mind.
 const CAGE: f64 = 0.1;

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, DVector};
 
 use super::drag::{Drag, smooth};
-use super::rotation::nearest_rotation;
+use crate::rotation::nearest_rotation;
 
 /// Steps of a frame.
 const STEPS: usize = 4;

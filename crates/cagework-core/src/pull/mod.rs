@@ -22,7 +22,6 @@ mod frame;
 mod geodesic;
 mod grip;
 mod nearest;
-mod rotation;
 mod samples;
 #[cfg(test)]
 mod tests;

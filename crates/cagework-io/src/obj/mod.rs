@@ -9,6 +9,7 @@ mod inner;
 mod lex;
 mod look;
 mod read;
+mod select;
 mod triangulate;
 mod write;
 

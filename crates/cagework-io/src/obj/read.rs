@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::error::ObjError;
 use super::lex::{Line, lines, shown, tokens};
 use super::look::{Material, read_materials, rest_of};
+use super::select::Group;
 use super::triangulate::Triangulator;
 use crate::memory::MemoryError;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
@@ -43,6 +44,8 @@ pub(crate) struct ObjDocument {
     face_smoothing: Vec<u32>,
     /// Names after `usemtl`, in order of first use.
     pub(crate) materials: Vec<String>,
+    /// `o` and `g` lines, but for those that say the same as the one before.
+    pub(crate) groups: Vec<Group>,
     /// Triangles as indices into `corners`.
     pub(crate) triangles: Vec<[u32; 3]>,
     /// Materials of the `.mtl` files that were found, by name.
@@ -118,6 +121,7 @@ struct Reader<'a> {
     /// Corners that name a vertex not yet defined: line and index.
     forward: Vec<(usize, u32)>,
     groups: usize,
+    group_bytes: u64,
     bad_attributes: usize,
     ignored: usize,
     siblings: Siblings<'a>,
@@ -148,6 +152,7 @@ pub(crate) fn read(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit: u64) -
         has_smoothing: false,
         forward: Vec::new(),
         groups: 0,
+        group_bytes: 0,
         bad_attributes: 0,
         ignored: 0,
         siblings: Siblings::new(resolve, memory_limit),
@@ -201,7 +206,7 @@ impl<'a> Reader<'a> {
                 self.document.normals.push(n.as_dvec3().normalize_or_zero().as_vec3());
             }
             b"f" | b"fo" => self.face(line.number, words)?,
-            b"o" | b"g" => self.groups += 1,
+            b"o" | b"g" => self.group(&bytes[line.range.clone()]),
             b"s" => {
                 if let Some(group) = words.next().and_then(|t| smoothing_group(&bytes[t])) {
                     (self.smoothing, self.has_smoothing) = (group, true);
@@ -226,11 +231,12 @@ impl<'a> Reader<'a> {
             (24 + 24, document.corners.len()),
             (24, document.face_materials.len()),
             (80, document.colors.len()),
+            (64, document.groups.len()),
             (200, document.materials.len() + document.looks.len() + self.libraries.len()),
         ];
         let lists: u64 = lists.iter().map(|&(bytes, n)| bytes * n as u64).sum();
         // The caller holds the file, and the document a copy of it.
-        let needed = 2 * self.bytes.len() as u64 + self.siblings.bytes() + lists;
+        let needed = 2 * self.bytes.len() as u64 + self.siblings.bytes() + self.group_bytes + lists;
         MemoryError::check(needed, self.memory_limit).map(|()| needed)
     }
 
@@ -277,6 +283,19 @@ impl<'a> Reader<'a> {
         self.document.face_materials.push(self.material);
         self.document.face_smoothing.push(self.smoothing);
         Ok(())
+    }
+
+    fn group(&mut self, line: &[u8]) {
+        self.groups += 1;
+        let line = line.trim_ascii();
+        let is_object = line.starts_with(b"o");
+        let name = rest_of(line, if is_object { b"o" } else { b"g" });
+        let groups = &mut self.document.groups;
+        if groups.iter().rev().find(|g| g.is_object == is_object).is_some_and(|g| g.name == name) {
+            return;
+        }
+        self.group_bytes += name.len() as u64;
+        groups.push(Group { is_object, name, first_face: self.document.face_materials.len() as u32 });
     }
 
     /// Reads a file of materials, once however often it is named.
