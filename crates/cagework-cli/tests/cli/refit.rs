@@ -53,6 +53,29 @@ fn models_together_are_the_bytes_of_each_alone() {
 }
 
 #[test]
+fn parts_are_named_for_all_models_and_looked_for_in_each() {
+    let sandbox = rigs::bound();
+    sandbox
+        .run("deform humanoid.glb --cage cage.obj --weights w.npz --pose wide.obj -o larger.glb")
+        .success();
+    // A shape without names.
+    sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
+    let parts = "--mask joint:head=0.5 --rigid joint:spine";
+    let refit = "refit humanoid.glb larger.glb shape.obj --cage cage.obj --pose wide.obj -g 24 -o out";
+    let done = sandbox.json(&format!("{refit} {parts} --json"));
+    assert_as_alone(&sandbox, &["humanoid.glb", "larger.glb"], "-g 24", parts);
+    assert_as_alone(&sandbox, &["shape.obj"], "-g 24", "");
+    let notices = &done["models"][2]["notices"];
+    let said = ["joint:spine", "joint:head"].map(|name| format!("no part is called '{name}' here"));
+    assert!(said.iter().all(|said| notices.as_array().unwrap().contains(&said.as_str().into())), "{notices}");
+    sandbox
+        .run(&format!("{refit} {parts} --rigid Hed"))
+        .code(1)
+        .stdout(contains("refitted 3 of 3 models"))
+        .stderr(contains("error: no model has a part that is called 'Hed'\nhint: "));
+}
+
+#[test]
 fn fields_too_large_to_keep_are_solved_for_each_model() {
     let sandbox = spheres();
     let refit = "refit a.obj b.obj --cage cage.obj --pose wide.obj -g 64 -o out --json";
