@@ -78,7 +78,10 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     let options = args.rig.options(&model, &args.mesh)?;
     let outside_vertices = saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices).count();
     let poses = Poses { names, rest, positions: poses };
-    let (bytes, rig, deform_ms) = follow(&model, saved, &poses, &args.output, (&options, args.rig.plain))?;
+    let started = Instant::now();
+    let posed = Posed::new(&model, saved, &poses, format, (&options, args.rig.plain));
+    let deform_ms = started.elapsed().as_secs_f64() * 1e3;
+    let (bytes, rig) = posed.into_file(&model, &poses.names, &args.output, &options)?;
     let mut notices = model.notices.clone();
     notices.extend(rig.iter().flat_map(ReshapeReport::notices));
     write(output, &bytes)?;
@@ -107,41 +110,64 @@ pub(crate) struct Poses {
     pub(crate) positions: Vec<Vec<Vec3>>,
 }
 
-/// A model that follows one pose (`plain`: without its rig), or that has several as morph targets, as the bytes of a file; what became of its rig; and
-/// how long it took to compute, milliseconds.
-///
-/// # Errors
-/// When the weights lack the rig's points, or the model cannot be written in that format.
-pub(crate) fn follow(
-    model: &Model,
-    saved: SavedWeights,
-    poses: &Poses,
-    output: &ModelOutput,
-    (options, plain): (&ReshapeOptions, bool),
-) -> Result<(Vec<u8>, Option<ReshapeReport>, f64), CliError> {
-    let Poses { names, rest, positions } = poses;
-    let started = Instant::now();
-    let elapsed_ms = || started.elapsed().as_secs_f64() * 1e3;
-    if output.format == ModelFormat::Gltf && model.is_rigged() && !plain {
-        let by = |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.outside, rest, pose);
-        let by: Vec<Vec<DVec3>> = positions.iter().map(by).collect();
-        let deform_ms = elapsed_ms();
-        let (bytes, report) = rig::write(model, &saved, names, by, (&output.path, options))?;
-        return Ok((bytes, Some(report), deform_ms));
+/// Where poses put a model.
+pub(crate) enum Posed {
+    /// How far each bound point of a rigged model goes in each pose, and which of them are outside.
+    Rigged { by: Vec<Vec<DVec3>>, outside: Vec<u32> },
+    /// Where each vertex goes in each pose.
+    Plain(Vec<Vec<Vec3>>),
+}
+
+impl Posed {
+    /// What poses make of a model. `plain`: of its shape alone.
+    pub(crate) fn new(
+        model: &Model,
+        saved: SavedWeights,
+        poses: &Poses,
+        format: ModelFormat,
+        (options, plain): (&ReshapeOptions, bool),
+    ) -> Self {
+        if format == ModelFormat::Gltf && model.is_rigged() && !plain {
+            let by = |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.outside, &poses.rest, pose);
+            let by = poses.positions.iter().map(by).collect();
+            return Self::Rigged { by, outside: saved.outside.iter().map(|o| o.vertex).collect() };
+        }
+        let saved = saved.of_vertices();
+        let posed = |pose: &Vec<Vec3>| {
+            let posed = deform_bound(&saved.weights, &saved.outside, pose);
+            if options.parts.is_empty() { posed } else { options.parts.hold(&model.positions, &posed) }
+        };
+        Self::Plain(poses.positions.iter().map(posed).collect())
     }
-    let saved = saved.of_vertices();
-    let deformed: Vec<Vec<Vec3>> =
-        positions.iter().map(|pose| deform_bound(&saved.weights, &saved.outside, pose)).collect();
-    let hold = |deformed: Vec<Vec3>| options.parts.hold(&model.positions, &deformed);
-    let deformed = if options.parts.is_empty() { deformed } else { deformed.into_iter().map(hold).collect() };
-    let deform_ms = elapsed_ms();
-    let bytes = if let [only] = deformed.as_slice() {
-        export(model, only, output)?
-    } else {
-        let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(deformed).collect();
-        model.write_glb_poses(&model.positions, &named).map_err(|e| CliError::file(&output.path, e))?
-    };
-    Ok((bytes, None, deform_ms))
+
+    /// The model in its pose, or at rest with several as morph targets, as a file; and what became of its rig.
+    ///
+    /// # Errors
+    /// When the weights lack the rig's points, or the model cannot be written in that format.
+    pub(crate) fn into_file(
+        self,
+        model: &Model,
+        names: &[String],
+        output: &ModelOutput,
+        options: &ReshapeOptions,
+    ) -> Result<(Vec<u8>, Option<ReshapeReport>), CliError> {
+        match self {
+            Self::Rigged { by, outside } => {
+                let (bytes, report) = rig::write(model, &outside, names, by, (&output.path, options))?;
+                Ok((bytes, Some(report)))
+            }
+            Self::Plain(posed) => {
+                let bytes = if let [only] = posed.as_slice() {
+                    export(model, only, output)?
+                } else {
+                    let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(posed).collect();
+                    let glb = model.write_glb_poses(&model.positions, &named);
+                    glb.map_err(|e| CliError::file(&output.path, e))?
+                };
+                Ok((bytes, None))
+            }
+        }
+    }
 }
 
 /// Reads weights and checks that they belong to a mesh and a cage.

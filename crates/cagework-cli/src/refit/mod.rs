@@ -1,81 +1,32 @@
 //! `cagework refit`: many models follow one cage, which is solved for once.
 
+mod report;
+
 use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::thread::ScopedJoinHandle;
 use std::time::Instant;
 
 use cagework_core::bind::{BindError, SolvedCage};
 use cagework_core::options::BindOptions;
+use cagework_core::progress::Cancelled;
 use cagework_core::{Binding, Controls};
-use cagework_io::{ModelFormat, ReshapeReport, SavedWeights, shown};
+use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, shown};
 use glam::Vec3;
-use serde::Serialize;
 
 use crate::args::{ModelOutput, RefitArgs};
 use crate::bind::{bind_positions, check_memory};
-use crate::card::duration;
 use crate::controls::with_inner;
-use crate::deform::{Poses, follow, pose_name};
+use crate::deform::{Posed, Poses, pose_name};
 use crate::error::CliError;
 use crate::files::{check_outputs, is_newer, json, make_folder, print, read, shown_path, write};
 use crate::load::{load_cage_file, load_model};
 use crate::progress::Bar;
+use crate::rig;
 use crate::signals::{self, Asking};
-use crate::{rig, say};
 
-/// What was done; its JSON is the output of `--json`.
-#[derive(Debug, Serialize)]
-struct Refitted {
-    /// The folder.
-    output: String,
-    cage_vertices: usize,
-    /// Controls inside the cage.
-    inner_controls: usize,
-    /// Voxelizing and solving once for all models; none if no model asked for it, or if each was bound on its own.
-    solve_ms: Option<f64>,
-    written: usize,
-    skipped: usize,
-    failed: usize,
-    notices: Vec<String>,
-    models: Vec<Entry>,
-}
-
-/// One model.
-#[derive(Debug, Serialize)]
-struct Entry {
-    input: String,
-    output: String,
-    #[serde(flatten)]
-    outcome: Outcome,
-}
-
-/// What became of it.
-#[derive(Debug, Serialize)]
-#[serde(tag = "state", rename_all = "snake_case")]
-enum Outcome {
-    Written(Box<Written>),
-    /// It is newer than its inputs.
-    Skipped,
-    Failed {
-        error: String,
-        hint: Option<&'static str>,
-    },
-}
-
-#[derive(Debug, Serialize)]
-struct Written {
-    vertices: usize,
-    outside_vertices: usize,
-    /// Its samples and weights, without the solve that all models share.
-    bind_ms: f64,
-    deform_ms: f64,
-    /// All of it, reading and writing included.
-    total_ms: f64,
-    #[serde(flatten)]
-    rig: Option<ReshapeReport>,
-    notices: Vec<String>,
-}
+use report::{Entry, Outcome, Refitted, Written, tell, text};
 
 /// A model to be read and the file to be written.
 struct Job {
@@ -92,6 +43,24 @@ struct Binder<'a> {
     /// Names of parts that no model had so far.
     unnamed: RefCell<Vec<String>>,
 }
+
+/// A model in its pose, to be written.
+struct Bound<'a> {
+    job: &'a Job,
+    model: Model,
+    posed: Posed,
+    options: ReshapeOptions,
+    /// What there is to say so far.
+    written: Written,
+    started: Instant,
+}
+
+/// A model that is being written.
+type Writing<'scope, 'a> = Option<(&'a Job, ScopedJoinHandle<'scope, Outcome>)>;
+
+/// Models of which reading and writing takes a larger share of the memory limit than one in so many are written before the
+/// next one is read.
+const LARGE_SHARE: u64 = 16;
 
 /// Runs `cagework refit`.
 ///
@@ -129,37 +98,51 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     let unnamed = RefCell::new(args.rig.part_names().cloned().collect());
     let binder = Binder { args, controls, solved: OnceCell::new(), unnamed };
     let mut models = Vec::with_capacity(jobs.len());
-    let mut cancelled = None;
-    for job in &jobs {
-        let inputs: Vec<&Path> = shared.iter().copied().chain([job.model.as_path()]).collect();
-        let outcome = if args.resume && is_newer(&job.output.path, &inputs) {
-            Outcome::Skipped
-        } else {
-            match binder.refit(job, &poses, inner) {
-                Ok(written) => Outcome::Written(Box::new(written)),
-                Err(error) if signals::cancelled() => {
-                    cancelled = Some(error);
-                    break;
-                }
-                Err(error) => Outcome::Failed { error: named(&error, &job.model), hint: error.hint() },
-            }
-        };
+    let mut settle = |job: &Job, outcome: Outcome| -> Result<(), CliError> {
+        // That it was cancelled is not its own fault.
+        if matches!(outcome, Outcome::Failed { .. }) && signals::cancelled() {
+            return Ok(());
+        }
         let text = |path: &Path| path.display().to_string();
         let entry = Entry { input: text(&job.model), output: text(&job.output.path), outcome };
         tell(&entry, as_json)?;
         models.push(entry);
-    }
+        Ok(())
+    };
+    // A model is written while the next one is read and bound, unless it is large.
+    std::thread::scope(|scope| {
+        let mut writing = None;
+        for job in jobs.iter().take_while(|_| !signals::cancelled()) {
+            let inputs: Vec<&Path> = shared.iter().copied().chain([job.model.as_path()]).collect();
+            let is_done = args.resume && is_newer(&job.output.path, &inputs);
+            let bound = if is_done { None } else { Some(binder.refit(job, &poses, inner)) };
+            settle_one(&mut writing, &mut settle)?;
+            match bound {
+                None => settle(job, Outcome::Skipped)?,
+                Some(Err(error)) => settle(job, Outcome::of_error(&error, &job.model))?,
+                Some(Ok(bound)) => {
+                    let is_large = bound.bytes() > args.read.memory.bytes() / LARGE_SHARE;
+                    let names = &poses.names;
+                    writing = Some((job, scope.spawn(move || bound.write(names))));
+                    if is_large {
+                        settle_one(&mut writing, &mut settle)?;
+                    }
+                }
+            }
+        }
+        settle_one(&mut writing, &mut settle)
+    })?;
     let done = binder.report(models);
     print(&if as_json { json(&done) } else { text(&done, jobs.len()) })?;
     let unnamed = binder.unnamed.borrow();
-    match (cancelled, unnamed.first()) {
-        (Some(error), _) => Err(error),
+    match unnamed.first() {
+        _ if signals::cancelled() => Err(BindError::Cancelled(Cancelled).into()),
         _ if done.failed > 0 => Err(CliError::Mismatch {
             message: format!("{} of {} models failed", done.failed, jobs.len()),
             hint: "when they are mended, run it again with --resume: what is done is left as it is",
         }),
         // Those that were skipped were not asked.
-        (None, Some(name)) if done.skipped == 0 => Err(CliError::Mismatch {
+        Some(name) if done.skipped == 0 => Err(CliError::Mismatch {
             message: format!("no model has a part that is called '{}'", shown(name)),
             hint: "what was written is without it: mend the name and run it again, without --resume",
         }),
@@ -209,47 +192,48 @@ fn jobs(args: &RefitArgs) -> Result<Vec<Job>, CliError> {
 }
 
 impl Binder<'_> {
-    /// One model, from file to file; nothing of it stays.
-    fn refit(&self, job: &Job, poses: &Poses, inner: &[Vec3]) -> Result<Written, CliError> {
+    /// One model up to its pose; nothing but that stays of its weights.
+    fn refit<'j>(&self, job: &'j Job, poses: &Poses, inner: &[Vec3]) -> Result<Bound<'j>, CliError> {
         let started = Instant::now();
         let Self { args, controls, .. } = self;
-        let model = load_model(&job.model, args.read.axis(), args.read.memory)?;
-        let is_static = args.rig.plain || job.output.format != ModelFormat::Gltf;
+        let (path, format) = (&job.model, job.output.format);
+        let model = load_model(path, args.read.axis(), args.read.memory)?;
+        let is_static = args.rig.plain || format != ModelFormat::Gltf;
         let (points, extra_points) =
-            if is_static { (model.positions.clone(), 0) } else { rig::points(&model, &job.model)? };
-        let (options, missing) = args.rig.options_of_one(&model, &job.model)?;
+            if is_static { (model.positions.clone(), 0) } else { rig::points(&model, path)? };
+        let (options, missing) = args.rig.options_of_one(&model, path)?;
         let held = model.bytes();
-        let binding = self.bind(&points, held, extra_points)?;
+        let Binding { weights, outside, report } = self.bind(&points, held, extra_points)?;
         let bound = BindOptions { held: held + self.held(), ..self.options() };
-        check_memory(&bound, points.len(), *controls, model.bytes_to_write(job.output.format))?;
-        let Binding { weights, outside, report } = binding;
+        check_memory(&bound, points.len(), *controls, model.bytes_to_write(format))?;
         let saved = SavedWeights {
             weights,
             outside,
             extra_points: points[model.positions.len()..].to_vec(),
             inner_controls: inner.to_vec(),
         };
-        let (bytes, rig, deform_ms) = follow(&model, saved, poses, &job.output, (&options, args.rig.plain))?;
-        write(&job.output.path, &bytes)?;
+        let posing = Instant::now();
+        let posed = Posed::new(&model, saved, poses, format, (&options, args.rig.plain));
+        let deform_ms = elapsed_ms(posing);
         let mut notices = model.notices.clone();
         notices.extend(missing.iter().map(|name| format!("no part is called '{}' here", shown(name))));
         self.unnamed.borrow_mut().retain(|name| missing.contains(name));
-        notices.extend(rig.iter().flat_map(ReshapeReport::notices));
         if !report.converged {
             notices.push(format!(
                 "the solve did not converge within {} iterations: raise --max-iterations or --tau",
                 report.iterations
             ));
         }
-        Ok(Written {
+        let written = Written {
             vertices: model.positions.len(),
             outside_vertices: report.outside_vertices as usize,
             bind_ms: report.timings_ms.total,
             deform_ms,
-            total_ms: started.elapsed().as_secs_f64() * 1e3,
-            rig,
+            total_ms: 0.0,
+            rig: None,
             notices,
-        })
+        };
+        Ok(Bound { job, model, posed, options, written, started })
     }
 
     fn options(&self) -> BindOptions {
@@ -303,45 +287,38 @@ impl Binder<'_> {
     }
 }
 
-/// An error with the name of the model, unless it says it.
-fn named(error: &CliError, model: &Path) -> String {
-    let (message, name) = (error.message(), shown_path(model));
-    if message.contains(&name) { message } else { format!("{name}: {message}") }
-}
+impl Bound<'_> {
+    /// Bytes that it takes until it is written.
+    fn bytes(&self) -> u64 {
+        self.model.bytes() + self.model.bytes_to_write(self.job.output.format)
+    }
 
-/// Says what became of a model, at once; for JSON, only on stderr what failed.
-fn tell(entry: &Entry, as_json: bool) -> Result<(), CliError> {
-    let output = shown_path(entry.output.as_ref());
-    match &entry.outcome {
-        Outcome::Failed { error, hint } => {
-            say(error, *hint);
-            Ok(())
-        }
-        _ if as_json => Ok(()),
-        Outcome::Skipped => print(&format!("skipped {output}: newer than its inputs")),
-        Outcome::Written(done) => {
-            let outside = match done.outside_vertices {
-                0 => String::new(),
-                n => format!(", {n} outside the cage"),
-            };
-            let mut line =
-                format!("wrote {output}: {} vertices{outside}, {}", done.vertices, duration(done.total_ms));
-            for notice in &done.notices {
-                line += &format!("\nnote: {notice}");
+    fn write(self, names: &[String]) -> Outcome {
+        let Self { job, model, posed, options, mut written, started } = self;
+        let made = posed.into_file(&model, names, &job.output, &options);
+        match made.and_then(|(bytes, rig)| write(&job.output.path, &bytes).map(|()| rig)) {
+            Err(error) => Outcome::of_error(&error, &job.model),
+            Ok(rig) => {
+                written.notices.extend(rig.iter().flat_map(ReshapeReport::notices));
+                written.total_ms = elapsed_ms(started);
+                Outcome::Written(Box::new(Written { rig, ..written }))
             }
-            print(&line)
         }
     }
 }
 
-fn text(done: &Refitted, n: usize) -> String {
-    let solve = done.solve_ms.map_or(String::new(), |ms| format!("; one solve of {}", duration(ms)));
-    let mut out = format!(
-        "refitted {} of {n} models, {} skipped, {} failed{solve}\n",
-        done.written, done.skipped, done.failed
-    );
-    for notice in &done.notices {
-        out += &format!("note: {notice}\n");
+/// Waits until a model is written, if one is.
+fn settle_one<'a>(
+    writing: &mut Writing<'_, 'a>,
+    settle: &mut impl FnMut(&'a Job, Outcome) -> Result<(), CliError>,
+) -> Result<(), CliError> {
+    let Some((job, thread)) = writing.take() else { return Ok(()) };
+    match thread.join() {
+        Ok(outcome) => settle(job, outcome),
+        Err(panic) => std::panic::resume_unwind(panic),
     }
-    out
+}
+
+fn elapsed_ms(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
 }
