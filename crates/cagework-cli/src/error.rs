@@ -1,6 +1,7 @@
 //! What can go wrong with a command, said once on stderr.
 
 use std::error::Error;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use cagework_core::bind::{BindError, PartError};
@@ -133,4 +134,11 @@ impl CliError {
             _ => None,
         }
     }
+}
+
+/// Says on stderr what went wrong, and what to do about it where that is known.
+pub(crate) fn say(message: &str, hint: Option<&str>) {
+    let hint = hint.map_or_else(String::new, |hint| format!("hint: {hint}\n"));
+    // A closed stderr leaves nobody to tell.
+    let _ = write!(std::io::stderr(), "error: {message}\n{hint}");
 }

@@ -26,7 +26,6 @@ mod render;
 mod rig;
 mod signals;
 
-use std::io::Write as _;
 use std::process::ExitCode;
 
 use args::{Cli, Command};
@@ -57,15 +56,8 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            say(&error.message(), error.hint());
+            error::say(&error.message(), error.hint());
             ExitCode::FAILURE
         }
     }
-}
-
-/// Says on stderr what went wrong, and what to do about it where that is known.
-fn say(message: &str, hint: Option<&str>) {
-    let hint = hint.map_or_else(String::new, |hint| format!("hint: {hint}\n"));
-    // A closed stderr leaves nobody to tell.
-    let _ = write!(std::io::stderr(), "error: {message}\n{hint}");
 }

@@ -6,9 +6,8 @@ use cagework_io::ReshapeReport;
 use serde::Serialize;
 
 use crate::card::duration;
-use crate::error::CliError;
+use crate::error::{CliError, say};
 use crate::files::{print, shown_path};
-use crate::say;
 
 /// What was done; its JSON is the output of `--json`.
 #[derive(Debug, Serialize)]
