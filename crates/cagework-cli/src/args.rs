@@ -3,6 +3,7 @@
 mod cages;
 mod controls;
 mod many;
+mod pose;
 mod render;
 mod rig;
 
@@ -22,6 +23,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use controls::{ControlArgs, SmoothArgs};
 pub(crate) use many::{MergeArgs, RefitArgs};
+pub(crate) use pose::{FitArgs, PoseArgs};
 pub(crate) use render::{Compared, RenderArgs, Show};
 pub(crate) use rig::RigArgs;
 
@@ -61,6 +63,8 @@ pub(crate) enum Command {
     Merge(MergeArgs),
     /// Take the model by the hand: points of it go where they are pulled to, and the cage is solved for.
     Pull(PullArgs),
+    /// Find the pose of the cage that brings a model to a target: another model with the same vertices, or landmarks.
+    Fit(FitArgs),
     /// Draw a picture of a model in its cage (needs a GPU, or the software one of mesa-vulkan-drivers).
     Render(RenderArgs),
     /// Make a cage for a model: one that follows it, its convex hull, or a subdivided box.
@@ -297,30 +301,11 @@ pub(crate) struct DeformArgs {
     Example:\n  cagework pull horse.glb --cage cage.obj --weights horse.npz --job rear.json -o rear.obj"
 )]
 pub(crate) struct PullArgs {
-    /// The mesh that was bound (.obj, .gltf, .glb).
-    pub(crate) mesh: PathBuf,
     #[command(flatten)]
-    pub(crate) read: ReadArgs,
-    /// The cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
-    #[arg(long, value_name = "CAGE")]
-    pub(crate) cage: CageSource,
-    /// The weights that `cagework bind --weights` wrote.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) weights: PathBuf,
+    pub(crate) pose: PoseArgs,
     /// What is pulled where, as JSON.
     #[arg(long, value_name = "FILE")]
     pub(crate) job: PathBuf,
-    /// The cage's pose to write; the name's ending says the format.
-    #[arg(short, long, value_name = "FILE")]
-    pub(crate) output: ModelOutput,
-    /// Cells along the longest side of the cage, for the gradients of the weights.
-    #[arg(short, long, default_value_t = 64, value_parser = number::<u32>(options::GRID))]
-    pub(crate) grid: u32,
-    #[command(flatten)]
-    pub(crate) controls: ControlArgs,
-    /// The pose of the controls inside to write (.obj).
-    #[arg(long, value_name = "FILE", requires = "controls", value_parser = obj_output)]
-    pub(crate) save_controls: Option<PathBuf>,
 }
 
 /// `cagework bench`

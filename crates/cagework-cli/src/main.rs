@@ -16,9 +16,11 @@ mod dynamic;
 mod error;
 mod evaluate;
 mod files;
+mod fit;
 mod gpu;
 mod info;
 mod load;
+mod pose;
 mod progress;
 mod pull;
 mod refit;
@@ -46,6 +48,7 @@ fn main() -> ExitCode {
         Command::Refit(args) => refit::run(args, cli.json),
         Command::Merge(args) => columns::merge(args, cli.json),
         Command::Pull(args) => pull::run(args, cli.json),
+        Command::Fit(args) => fit::run(args, cli.json),
         Command::Render(args) => render::run(args, cli.json),
         Command::Cage(args) => cage::run(args, cli.json),
         Command::Check(args) => check::run(args, cli.json),

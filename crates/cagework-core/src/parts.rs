@@ -24,7 +24,7 @@ pub struct Parts {
 
 /// How a rigid piece moves: `x` to `x + turn (x - centre) - (x - centre) + shift`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Motion {
+pub(crate) struct Motion {
     centre: DVec3,
     /// A rotation, less the identity.
     turn: DMat3,
@@ -33,19 +33,15 @@ struct Motion {
 
 impl Motion {
     /// The rigid motion that leaves the least squares between where points are and where they should go (Kabsch 1976).
-    fn of(points: impl Iterator<Item = (DVec3, DVec3)> + Clone) -> Self {
-        let still = Self { centre: DVec3::ZERO, turn: DMat3::ZERO, shift: DVec3::ZERO };
-        let n = points.clone().count() as f64;
+    pub(crate) fn of(points: &[(DVec3, DVec3)]) -> Self {
         // At rest nothing is rounded.
-        if n == 0.0 || points.clone().all(|(_, by)| by == DVec3::ZERO) {
-            return still;
+        if points.iter().all(|(_, by)| *by == DVec3::ZERO) {
+            return Self { centre: DVec3::ZERO, turn: DMat3::ZERO, shift: DVec3::ZERO };
         }
-        let (centre, shift) =
-            points.clone().fold((DVec3::ZERO, DVec3::ZERO), |(c, s), (at, by)| (c + at, s + by));
-        let (centre, shift) = (centre / n, shift / n);
-        let mut moments = DMat3::ZERO;
-        let mut size = 0.0;
-        for (at, by) in points {
+        let sum = |of: fn(&(DVec3, DVec3)) -> DVec3| points.iter().map(of).sum::<DVec3>();
+        let [centre, shift] = [sum(|p| p.0), sum(|p| p.1)].map(|sum| sum / points.len() as f64);
+        let (mut moments, mut size) = (DMat3::ZERO, 0.0);
+        for &(at, by) in points {
             let from = at - centre;
             let to = from + by - shift;
             moments += DMat3::from_cols(to * from.x, to * from.y, to * from.z);
@@ -55,7 +51,7 @@ impl Motion {
         Self { centre, turn: rotation - DMat3::IDENTITY, shift }
     }
 
-    fn by(&self, at: DVec3) -> DVec3 {
+    pub(crate) fn by(&self, at: DVec3) -> DVec3 {
         self.turn * (at - self.centre) + self.shift
     }
 }
@@ -76,8 +72,10 @@ impl Parts {
     pub fn held(&self, rest: &[DVec3], by: &[DVec3]) -> Held {
         assert!(rest.len() == by.len(), "one displacement per vertex");
         assert!(self.stays.is_empty() || self.stays.len() == rest.len(), "one amount per vertex");
-        let motion_of =
-            |piece: &Vec<u32>| Motion::of(piece.iter().map(|&v| (rest[v as usize], by[v as usize])));
+        let motion_of = |piece: &Vec<u32>| {
+            let points: Vec<_> = piece.iter().map(|&v| (rest[v as usize], by[v as usize])).collect();
+            Motion::of(&points)
+        };
         let pieces = self.rigid.iter().zip(0..).flat_map(|(piece, k)| piece.iter().map(move |&v| (v, k)));
         Held {
             motions: self.rigid.iter().map(motion_of).collect(),

@@ -11,6 +11,7 @@ mod columns;
 mod controls;
 mod deform;
 mod evaluate;
+mod fit;
 #[cfg(unix)]
 mod outputs;
 mod pull;
