@@ -8,6 +8,7 @@ mod bind;
 mod cage;
 mod card;
 mod check;
+mod columns;
 mod controls;
 mod deform;
 mod demo;
@@ -22,11 +23,11 @@ mod load;
 mod pose;
 mod progress;
 mod pull;
+mod refit;
 mod render;
 mod rig;
 mod signals;
 
-use std::io::Write as _;
 use std::process::ExitCode;
 
 use args::{Cli, Command};
@@ -44,6 +45,8 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(args, cli.json),
         Command::Bind(args) => bind::run(args, cli.json),
         Command::Deform(args) => deform::run(args, cli.json),
+        Command::Refit(args) => refit::run(args, cli.json),
+        Command::Merge(args) => columns::merge(args, cli.json),
         Command::Pull(args) => pull::run(args, cli.json),
         Command::Fit(args) => fit::run(args, cli.json),
         Command::Render(args) => render::run(args, cli.json),
@@ -56,9 +59,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let hint = error.hint().map_or_else(String::new, |hint| format!("hint: {hint}\n"));
-            // A closed stderr leaves nobody to tell.
-            let _ = write!(std::io::stderr(), "error: {}\n{hint}", error.message());
+            error::say(&error.message(), error.hint());
             ExitCode::FAILURE
         }
     }

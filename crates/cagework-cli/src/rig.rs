@@ -2,19 +2,19 @@
 
 use std::path::Path;
 
-use cagework_io::{Model, ReshapeOptions, ReshapeReport, SavedWeights, WriteError};
+use cagework_io::{Model, ReshapeOptions, ReshapeReport, WriteError};
 use glam::{DVec3, Vec3};
 
 use crate::error::CliError;
 
 /// Writes a rigged model deformed by one pose, or at rest with all poses as morph targets. `by`: displacements of all bound
-/// points for each pose.
+/// points for each pose; `outside`: those of them outside the cage.
 ///
 /// # Errors
 /// When the weights lack the rig's points, or the model cannot be written.
 pub(crate) fn write(
     model: &Model,
-    saved: &SavedWeights,
+    outside: &[u32],
     names: &[String],
     mut by: Vec<Vec<DVec3>>,
     (output, options): (&Path, &ReshapeOptions),
@@ -31,13 +31,12 @@ pub(crate) fn write(
         },
         e => CliError::file(output, e),
     };
-    let outside: Vec<u32> = saved.outside.iter().map(|o| o.vertex).collect();
     if by.len() == 1 {
-        return model.write_reshaped(&by.remove(0), &outside, &[], options).map_err(wrong);
+        return model.write_reshaped(&by.remove(0), outside, &[], options).map_err(wrong);
     }
-    let rest = vec![DVec3::ZERO; saved.weights.n_rows()];
+    let rest = vec![DVec3::ZERO; by.first().map_or(0, Vec::len)];
     let poses: Vec<_> = names.iter().cloned().zip(by).collect();
-    model.write_reshaped(&rest, &outside, &poses, options).map_err(wrong)
+    model.write_reshaped(&rest, outside, &poses, options).map_err(wrong)
 }
 
 /// The points to bind: vertices, then those of the rig; and how many the latter are.

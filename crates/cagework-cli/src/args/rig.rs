@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use cagework_io::{Joints, Model, ReshapeOptions};
+use cagework_io::{Joints, Model, ReshapeOptions, SelectError};
 use clap::{Args, ValueEnum};
 
 use crate::error::CliError;
@@ -43,10 +43,6 @@ pub(crate) struct RigArgs {
     keep_travel: bool,
     #[command(flatten)]
     pub(crate) parts: PartArgs,
-    /// Experimental: let the cage bend the model while a clip moves it, instead of its shape at rest; writes the clip's frames as
-    /// morph targets, without skeleton.
-    #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "mask", "plain"])]
-    pub(crate) dynamic: Option<String>,
     /// Write the shape alone: no skin, no morph targets but those of several poses.
     #[arg(long = "static")]
     pub(crate) plain: bool,
@@ -65,16 +61,53 @@ impl RigArgs {
     /// # Errors
     /// When the model has no part of a name.
     pub(crate) fn options(&self, model: &Model, path: &Path) -> Result<ReshapeOptions, CliError> {
+        self.options_with(model, path, &self.parts)
+    }
+
+    /// As the library takes them for one of many models: without the names of parts that it does not have, which come back.
+    ///
+    /// # Errors
+    /// When a name means several parts, or the rig cannot be read.
+    pub(crate) fn options_of_one(
+        &self,
+        model: &Model,
+        path: &Path,
+    ) -> Result<(ReshapeOptions, Vec<String>), CliError> {
+        let props = self.props(model, path)?;
+        let mut missing = Vec::new();
+        let mut is_there = |name: &String| {
+            let there =
+                props.contains(name) || !matches!(model.select(name), Err(SelectError::Unknown { .. }));
+            if !there {
+                missing.push(name.clone());
+            }
+            there
+        };
+        let PartArgs { rigid, mask } = &self.parts;
+        let rigid = rigid.iter().filter(|name| is_there(name)).cloned().collect();
+        let mask = mask.iter().filter(|(name, _)| is_there(name)).cloned().collect();
+        Ok((self.options_with(model, path, &PartArgs { rigid, mask })?, missing))
+    }
+
+    /// Names of parts that something is to become of.
+    pub(crate) fn part_names(&self) -> impl Iterator<Item = &String> {
+        self.parts.rigid.iter().chain(self.parts.mask.iter().map(|(name, _)| name))
+    }
+
+    fn props(&self, model: &Model, path: &Path) -> Result<Vec<String>, CliError> {
+        if self.plain { Ok(Vec::new()) } else { model.props().map_err(|e| CliError::file(path, e)) }
+    }
+
+    fn options_with(&self, model: &Model, path: &Path, parts: &PartArgs) -> Result<ReshapeOptions, CliError> {
         let joints = match self.joints {
             JointsArg::Follow => Joints::Follow,
             JointsArg::Stay => Joints::Stay,
             JointsArg::Turn => Joints::Turn,
         };
-        let props =
-            if self.plain { Vec::new() } else { model.props().map_err(|e| CliError::file(path, e))? };
+        let props = self.props(model, path)?;
         let (rigid, others): (Vec<_>, Vec<_>) =
-            self.parts.rigid.iter().cloned().partition(|name| props.contains(name));
-        let parts = model.parts(&self.parts.mask, &others).map_err(|e| CliError::file(path, e))?;
+            parts.rigid.iter().cloned().partition(|name| props.contains(name));
+        let parts = model.parts(&parts.mask, &others).map_err(|e| CliError::file(path, e))?;
         Ok(ReshapeOptions { joints, keep_travel: self.keep_travel, rigid, parts })
     }
 }

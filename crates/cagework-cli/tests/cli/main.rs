@@ -7,6 +7,7 @@ mod bench_and_demo;
 mod bind;
 mod cage_and_info;
 mod cages;
+mod columns;
 mod controls;
 mod deform;
 mod evaluate;
@@ -14,6 +15,7 @@ mod fit;
 #[cfg(unix)]
 mod outputs;
 mod pull;
+mod refit;
 mod render;
 mod rigs;
 mod siblings;

@@ -7,7 +7,7 @@ use predicates::str::contains;
 use crate::support::Sandbox;
 
 /// The humanoid and a cage of it, bound, and the cage with everything above the hips wider.
-fn bound() -> Sandbox {
+pub(crate) fn bound() -> Sandbox {
     let sandbox = Sandbox::new();
     let sample = samples::build("humanoid").unwrap();
     let glb = write_mesh_glb("humanoid", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap();
