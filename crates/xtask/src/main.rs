@@ -6,6 +6,7 @@ mod arrows;
 mod command;
 mod licences;
 mod npm;
+mod python;
 mod site;
 mod tasks;
 mod wasm;
@@ -21,6 +22,7 @@ const USAGE: &str = "usage: cargo xtask TASK
   fuzz [--minutes N] [--seed S] | FILE ...
                  damaged files through all that reads them; what fails is kept in target/fuzz, and FILE is tried again
   arrows         the dependency arrows of ARCHITECTURE.md and import circles only
+  python         the Python package only: its wheel, installed and tested against the command that `cargo test` builds
   wasm [--dev]   crates/cagework-web as a JavaScript package, web/src/pkg
   page           build the page only
   page-test [ARGS]  build the page and test it in a browser (ARGS for Playwright)
@@ -40,6 +42,7 @@ fn main() -> ExitCode {
         ["test"] => tasks::test(),
         ["fuzz", rest @ ..] => tasks::fuzz(rest),
         ["check"] => tasks::check(),
+        ["python"] => python::test(),
         ["arrows"] => arrows::check(),
         ["wasm"] => wasm::build(wasm::Profile::Web),
         ["wasm", "--dev"] => wasm::build(wasm::Profile::Dev),
