@@ -19,7 +19,7 @@ def test_a_cage_from_a_trimesh_is_closed_and_encloses_it(model, cage):
 
 def test_the_cage_is_the_commands(model, tmp_path):
     model.export(tmp_path / "model.obj")
-    command(tmp_path, "cage model.obj -o cage.obj -n 30 --triangles")
+    command(tmp_path, "cage model.obj -o cage.obj --vertices 30 --triangles")
     made = cw.generate_cage(*cw.read_model(tmp_path / "model.obj"), target=30, quads=False)
     theirs = cw.Cage.load(tmp_path / "cage.obj")
     assert np.array_equal(made.vertices, theirs.vertices) and np.array_equal(made.triangles, theirs.triangles)

@@ -22,12 +22,12 @@ pub(crate) fn test() -> Result<(), String> {
     run("python3", &["-m", "venv", "--clear", &environment], &[])?;
     let python = format!("{environment}/bin/python");
     let in_package = |name: &str| root().join(PACKAGE).join(name).display().to_string();
-    let (pip, maturin) = (["-m", "pip", "install", "--quiet", "--disable-pip-version-check"], ["-m", "maturin", "build"]);
+    let (pip, maturin) =
+        (["-m", "pip", "install", "--quiet", "--disable-pip-version-check"], ["-m", "maturin", "build"]);
     let needed = in_package("requirements.txt");
     let pinned = ["--require-hashes", "--only-binary", ":all:", "--requirement", &needed];
     run(&python, &[&pip[..], &pinned].concat(), &[])?;
-    // With what `cargo test` builds the crates below with; see the feature's comment in Cargo.toml.
-    let built = ["--profile", "dev", "--locked", "--features", "typescript", "--auditwheel", "skip"];
+    let built = ["--profile", "dev", "--locked", "--auditwheel", "skip"];
     let manifest = in_package("Cargo.toml");
     let into = ["--quiet", "--manifest-path", &manifest, "--out", &wheels];
     run(&python, &[&maturin[..], &built, &into].concat(), &[])?;

@@ -41,6 +41,10 @@ pub(super) fn solve_and_sample(
         n_batches,
         || batch_solver(hierarchy, options),
         |solver, batch| {
+            // Before the first look at a batch lies its dearest part.
+            if watch.is_cancelled() {
+                return None;
+            }
             let begin = watch.now_ms();
             let report = solver.solve(hierarchy, batch, rule, &mut |iteration, delta| {
                 let fraction = watch.done() as f32 / n_batches as f32;
