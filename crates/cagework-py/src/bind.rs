@@ -50,6 +50,7 @@ pub(crate) fn bind<'py>(
     let (options, controls) = (bind_options(options)?, cage.get().controls());
     let points = arrays::points("points", points, None)?;
     let positions = points.as_slice();
+    let options = BindOptions { held: size_of_val(positions) as u64, ..options };
     let binding = work::run(py, |progress| bind_points(positions, controls, &options, progress))?;
     let binding = binding.map_err(error::bind)?;
     let report = dictionary(py, &binding.report)?;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use cagework_core::cage_check::check_smooth;
 use cagework_core::cage_gen::{CageReport, generate};
+use cagework_core::options::GRID;
 use cagework_core::{Cage as CoreCage, CageOptions, ControlSet, Controls, InnerControls, PolygonMesh};
 use cagework_io::write_cage_obj;
 use numpy::{PyArray1, PyArray2};
@@ -78,13 +79,13 @@ impl Cage {
     ///
     /// Raises OSError, ArrayError.
     #[pyo3(signature = (path, vertices = None))]
-    fn save(&self, path: PathBuf, vertices: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+    fn save(&self, path: &Bound<'_, PyAny>, vertices: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let mut mesh = self.mesh();
         if let Some(vertices) = vertices {
             let n = mesh.positions.len();
             mesh.positions = arrays::points("vertices", vertices, Some(n))?.as_slice().to_vec();
         }
-        files::write(&path, &write_cage_obj(&mesh))
+        files::write(&path.extract::<PathBuf>()?, &write_cage_obj(&mesh))
     }
 
     /// [n_cage, 3] float64, object units; read-only, because a cage does not change: poses begin as cage.vertices.copy().
@@ -185,6 +186,7 @@ pub(crate) fn check_cage<'py>(
     grid: u32,
     smooth: Option<u32>,
 ) -> PyResult<Bound<'py, PyAny>> {
+    GRID.check(grid).map_err(error::option)?;
     let own = cage.cast::<Cage>().map_or(0, |cage| cage.get().smooth());
     let smooth = smooth.unwrap_or(own);
     let mesh = PolygonMesh {

@@ -56,6 +56,9 @@ pub(crate) fn pull<'py>(
     let grabs = handles("grabs", grabs)?;
     let pins = pins.map(|pins| handles("pins", pins)).transpose()?.unwrap_or_default();
     let to = arrays::points("to", to, Some(grabs.len()))?.as_slice().to_vec();
+    if let Some(at) = to.iter().find(|at| !at.is_finite()) {
+        return Err(error::pull(format!("a grab goes to {at}: it must be finite numbers of 32 bits")));
+    }
     let n = controls.n_controls();
     let start = start.map(|start| arrays::points("start", start, Some(n))).transpose()?;
     let start: Vec<Vec3> = start.map_or_else(|| controls.rest().to_vec(), |start| start.as_slice().to_vec());

@@ -34,7 +34,12 @@ pub(crate) fn run<T: Send>(py: Python<'_>, work: impl FnOnce(&dyn Progress) -> T
             let mut raised = None;
             while matches!(ended.recv_timeout(LISTEN), Err(RecvTimeoutError::Timeout)) {
                 if raised.is_none() {
-                    raised = Python::attach(|py| py.check_signals()).err();
+                    #[expect(
+                        clippy::redundant_closure_for_method_calls,
+                        reason = "the method is of one lifetime"
+                    )]
+                    let raised_now = Python::attach(|py| py.check_signals()).err();
+                    raised = raised_now;
                     cancelled.store(raised.is_some(), Ordering::Relaxed);
                 }
             }
