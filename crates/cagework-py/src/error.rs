@@ -4,41 +4,29 @@ use std::fmt::Display;
 
 use pyo3::PyErr;
 
-mod classes {
-    pyo3::import_exception!(cagework._errors, ArrayError);
-    pyo3::import_exception!(cagework._errors, BindError);
-    pyo3::import_exception!(cagework._errors, CageError);
-    pyo3::import_exception!(cagework._errors, ModelError);
-    pyo3::import_exception!(cagework._errors, OptionError);
-    pyo3::import_exception!(cagework._errors, PullError);
+/// A class of Python and the function that makes one of an error.
+macro_rules! exceptions {
+    ($($(#[$about:meta])* $name:ident: $class:ident,)+) => {
+        mod classes {
+            $(pyo3::import_exception!(cagework._errors, $class);)+
+        }
+        $($(#[$about])* pub(crate) fn $name(error: impl Display) -> PyErr {
+            classes::$class::new_err(error.to_string())
+        })+
+    };
 }
 
-/// An array of another shape or type than is needed.
-pub(crate) fn array(error: impl Display) -> PyErr {
-    classes::ArrayError::new_err(error.to_string())
-}
-
-/// A bind that failed.
-pub(crate) fn bind(error: impl Display) -> PyErr {
-    classes::BindError::new_err(error.to_string())
-}
-
-/// No cage, or none could be made.
-pub(crate) fn cage(error: impl Display) -> PyErr {
-    classes::CageError::new_err(error.to_string())
-}
-
-/// A model that cannot be read or written.
-pub(crate) fn model(error: impl Display) -> PyErr {
-    classes::ModelError::new_err(error.to_string())
-}
-
-/// An option out of range.
-pub(crate) fn option(error: impl Display) -> PyErr {
-    classes::OptionError::new_err(error.to_string())
-}
-
-/// Nothing that can be pulled.
-pub(crate) fn pull(error: impl Display) -> PyErr {
-    classes::PullError::new_err(error.to_string())
+exceptions! {
+    /// An array of another shape or type than is needed.
+    array: ArrayError,
+    /// A bind that failed.
+    bind: BindError,
+    /// No cage, or none could be made.
+    cage: CageError,
+    /// A model that cannot be read or written.
+    model: ModelError,
+    /// An option out of range.
+    option: OptionError,
+    /// Nothing that can be pulled.
+    pull: PullError,
 }

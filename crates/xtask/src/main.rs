@@ -23,6 +23,7 @@ const USAGE: &str = "usage: cargo xtask TASK
                  damaged files through all that reads them; what fails is kept in target/fuzz, and FILE is tried again
   arrows         the dependency arrows of ARCHITECTURE.md and import circles only
   python         the Python package only: its wheel, installed and tested against the command that `cargo test` builds
+  wheel [ARGS]   the Python package's release wheel, into target/wheels (ARGS for `maturin build`)
   wasm [--dev]   crates/cagework-web as a JavaScript package, web/src/pkg
   page           build the page only
   page-test [ARGS]  build the page and test it in a browser (ARGS for Playwright)
@@ -43,6 +44,7 @@ fn main() -> ExitCode {
         ["fuzz", rest @ ..] => tasks::fuzz(rest),
         ["check"] => tasks::check(),
         ["python"] => python::test(),
+        ["wheel", rest @ ..] => python::wheel(rest),
         ["arrows"] => arrows::check(),
         ["wasm"] => wasm::build(wasm::Profile::Web),
         ["wasm", "--dev"] => wasm::build(wasm::Profile::Dev),
