@@ -23,10 +23,12 @@ fi
 if [ "${1:-}" = test ]; then
   command -v firefox-esr >/dev/null || missing+=(firefox-esr libegl1 libgl1-mesa-dri)
   command -v Xvfb >/dev/null || missing+=(xvfb)
-  # The Python package is tested in an environment of its own; its tests come with pip.
-  python3 -c 'import ensurepip, venv' 2>/dev/null || missing+=(python3-venv)
   compgen -G "/usr/lib/*/libvulkan.so.1" >/dev/null || missing+=(libvulkan1)
   compgen -G "/usr/share/vulkan/icd.d/*.json" >/dev/null || missing+=(mesa-vulkan-drivers)
+fi
+# The Python package is built and tested in an environment of its own.
+if [[ " test python wheel " == *" ${1:-} "* ]]; then
+  python3 -c 'import ensurepip, venv' 2>/dev/null || missing+=(python3-venv)
 fi
 if ((${#missing[@]})); then
   as_root=()

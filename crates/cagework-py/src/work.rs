@@ -18,6 +18,7 @@ const LISTEN: Duration = Duration::from_millis(50);
 ///
 /// # Errors
 /// What a signal's handler raised: `KeyboardInterrupt`, as a rule.
+#[expect(clippy::redundant_closure_for_method_calls, reason = "the method itself is of one lifetime only")]
 pub(crate) fn run<T: Send>(py: Python<'_>, work: impl FnOnce(&dyn Progress) -> T + Send) -> PyResult<T> {
     let cancelled = AtomicBool::new(false);
     let progress = |_: ProgressEvent| {
@@ -34,12 +35,7 @@ pub(crate) fn run<T: Send>(py: Python<'_>, work: impl FnOnce(&dyn Progress) -> T
             let mut raised = None;
             while matches!(ended.recv_timeout(LISTEN), Err(RecvTimeoutError::Timeout)) {
                 if raised.is_none() {
-                    #[expect(
-                        clippy::redundant_closure_for_method_calls,
-                        reason = "the method is of one lifetime"
-                    )]
-                    let raised_now = Python::attach(|py| py.check_signals()).err();
-                    raised = raised_now;
+                    raised = Python::attach(|py| py.check_signals()).err();
                     cancelled.store(raised.is_some(), Ordering::Relaxed);
                 }
             }
