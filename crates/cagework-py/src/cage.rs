@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use cagework_core::cage_check::check_smooth;
 use cagework_core::cage_gen::{CageReport, generate};
-use cagework_core::options::GRID;
+use cagework_core::options::{GRID, SMOOTH};
 use cagework_core::{Cage as CoreCage, CageOptions, ControlSet, Controls, InnerControls, PolygonMesh};
 use cagework_io::write_cage_obj;
 use numpy::{PyArray1, PyArray2};
@@ -50,16 +50,23 @@ impl Cage {
     }
 }
 
+/// Steps of subdivision; any number comes in, so that the core's sentence answers wrong ones.
+fn steps(smooth: f64) -> PyResult<u32> {
+    SMOOTH.check(smooth).map_err(error::option)?;
+    Ok(smooth as u32)
+}
+
 #[pymethods]
 impl Cage {
     #[new]
-    #[pyo3(signature = (vertices, faces, smooth = 0))]
+    #[pyo3(signature = (vertices, faces, smooth = 0.0))]
     fn new(
         py: Python<'_>,
         vertices: &Bound<'_, PyAny>,
         faces: &Bound<'_, PyAny>,
-        smooth: u32,
+        smooth: f64,
     ) -> PyResult<Self> {
+        let smooth = steps(smooth)?;
         let positions = arrays::points("vertices", vertices, None)?.as_slice().to_vec();
         Self::of(py, &PolygonMesh { positions, faces: arrays::faces(faces)? }, smooth, None)
     }
@@ -68,8 +75,9 @@ impl Cage {
     ///
     /// Raises OSError, ModelError when it is no model, CageError when it is no cage.
     #[staticmethod]
-    #[pyo3(signature = (path, smooth = 0))]
-    fn load(py: Python<'_>, path: PathBuf, smooth: u32) -> PyResult<Self> {
+    #[pyo3(signature = (path, smooth = 0.0))]
+    fn load(py: Python<'_>, path: PathBuf, smooth: f64) -> PyResult<Self> {
+        let smooth = steps(smooth)?;
         let model = files::Source::File(path).read()?;
         model.require_faces().map_err(error::model)?;
         Self::of(py, &model.cage_mesh(), smooth, None)
@@ -178,23 +186,23 @@ pub(crate) fn generate_cage(
 /// A problem has code, severity ("error", "warning" or "note"), count, places (vertices, edges, faces, points), message and
 /// fixes. No error among them: it can be bound. Raises ArrayError.
 #[pyfunction]
-#[pyo3(signature = (cage, points = None, grid = 64, smooth = None))]
+#[pyo3(signature = (cage, points = None, grid = 64.0, smooth = None))]
 pub(crate) fn check_cage<'py>(
     py: Python<'py>,
     cage: &Bound<'py, PyAny>,
     points: Option<&Bound<'py, PyAny>>,
-    grid: u32,
-    smooth: Option<u32>,
+    grid: f64,
+    smooth: Option<f64>,
 ) -> PyResult<Bound<'py, PyAny>> {
     GRID.check(grid).map_err(error::option)?;
     let own = cage.cast::<Cage>().map_or(0, |cage| cage.get().smooth());
-    let smooth = smooth.unwrap_or(own);
+    let smooth = smooth.map_or(Ok(own), steps)?;
     let mesh = PolygonMesh {
         positions: arrays::points("vertices", &cage.getattr("vertices")?, None)?.as_slice().to_vec(),
         faces: arrays::faces(&cage.getattr("faces")?)?,
     };
     let points = points.map(|points| arrays::points("points", points, None)).transpose()?;
     let inside = points.as_ref().map(arrays::Points::as_slice);
-    let check = work::run(py, |_| check_smooth(&mesh, inside, Some(grid), smooth))?;
+    let check = work::run(py, |_| check_smooth(&mesh, inside, Some(grid as u32), smooth))?;
     dictionary(py, &check.problems)
 }

@@ -31,6 +31,8 @@ def test_a_mesh_that_is_no_cage_is_refused_with_the_commands_sentence(tmp_path):
         (lambda: cw.bind(POINT, CUBE, solver="gauss"), cw.OptionError, "solver: .*gauss.*jacobi"),
         (lambda: cw.bind(POINT, CUBE, tau=[1]), cw.OptionError, "tau is of type .*list"),
         (lambda: cw.generate_cage(POINT, [[0, 0, 0]], target=7), cw.OptionError, "target is 7; it must be"),
+        (lambda: cw.Cage(*box(), smooth=-1), cw.OptionError, "smooth is -1; it must be a whole number from 0 to 3"),
+        (lambda: cw.check_cage(CUBE, grid=1.5), cw.OptionError, "grid is 1.5; it must be"),
         (lambda: cw.bind(POINT, CUBE, gird=7), TypeError, 'no option "gird"; there are .*grid'),
         (lambda: cw.bind(POINT + 9, CUBE, grid=8), cw.BindError, "none of the model's 1 vertices is inside"),
         (lambda: cw.bind(POINT * np.nan, CUBE, grid=8), cw.BindError, "mesh vertex 0 is not a finite number"),

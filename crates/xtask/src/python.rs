@@ -55,6 +55,10 @@ fn build(python: &str, args: &[&str]) -> Result<String, String> {
         std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {}: {e}", folder.display()))?;
     }
     licences::of_wheel(&notices)?;
+    for ours in ["LICENSE-MIT", "LICENSE-APACHE"] {
+        std::fs::copy(root().join(ours), notices.join(ours))
+            .map_err(|e| format!("cannot copy {ours}: {e}"))?;
+    }
     let (manifest, wheels) = (path(root().join(PACKAGE).join("Cargo.toml"))?, path(wheels)?);
     let fixed = ["-m", "maturin", "build", "--locked", "--manifest-path", &manifest, "--out", &wheels];
     run(python, &[&fixed[..], args].concat(), &[])?;

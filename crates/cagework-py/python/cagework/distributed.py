@@ -20,12 +20,12 @@ from distributed import Client
 
 from cagework import Cage, Error, reshape
 
-Path_ = str | os.PathLike[str]
+PathLike = str | os.PathLike[str]
 
 
 def reshape_files(
-    files: Iterable[Path_],
-    out: Path_,
+    files: Iterable[PathLike],
+    out: PathLike,
     cage: Cage,
     posed: np.ndarray,
     *,
