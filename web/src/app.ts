@@ -65,8 +65,9 @@ export interface App {
   key(command: Command): string;
 }
 
-const MODELS = ".glb,.vrm,.gltf,.obj,.bin,.png,.jpg,.jpeg,.webp,.ktx2,.mtl,model/gltf-binary,model/gltf+json";
-const CAGES = ".obj,.glb,.gltf,.bin";
+const MODELS =
+  ".glb,.vrm,.gltf,.obj,.ply,.stl,.bin,.png,.jpg,.jpeg,.webp,.ktx2,.mtl,model/gltf-binary,model/gltf+json";
+const CAGES = ".obj,.glb,.gltf,.ply,.stl,.bin";
 
 export interface Needs {
   store: Store;

@@ -14,7 +14,7 @@ export interface DropPlan {
   sentence: string;
 }
 
-const MODELS = ["glb", "vrm", "gltf", "obj"] as const;
+const MODELS = ["glb", "vrm", "gltf", "obj", "ply", "stl"] as const;
 const COMPANIONS = ["bin", "png", "jpg", "jpeg", "webp", "avif", "ktx2", "mtl"] as const;
 const CAGE_NAME = /(^|[^a-z])cage([^a-z]|$)/i;
 const CONTROLS_NAME = /(^|[^a-z])controls?([^a-z].*)?\.obj$/i;

@@ -2,10 +2,13 @@
 
 mod cages;
 mod controls;
+mod many;
+mod pose;
 mod render;
 mod rig;
 
 use std::error::Error;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -19,6 +22,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, Type
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use controls::{ControlArgs, SmoothArgs};
+pub(crate) use many::{MergeArgs, RefitArgs};
+pub(crate) use pose::{FitArgs, PoseArgs};
 pub(crate) use render::{Compared, RenderArgs, Show};
 pub(crate) use rig::RigArgs;
 
@@ -52,8 +57,14 @@ pub(crate) enum Command {
     Bind(BindArgs),
     /// Move the cage, and the mesh with it.
     Deform(DeformArgs),
+    /// Let many models follow one cage: the cage is solved for once, each model is sampled and written.
+    Refit(RefitArgs),
+    /// Put the parts of a bind together that `bind --columns` wrote.
+    Merge(MergeArgs),
     /// Take the model by the hand: points of it go where they are pulled to, and the cage is solved for.
     Pull(PullArgs),
+    /// Find the pose of the cage that brings a model to a target: another model with the same vertices, or landmarks.
+    Fit(FitArgs),
     /// Draw a picture of a model in its cage (needs a GPU, or the software one of mesa-vulkan-drivers).
     Render(RenderArgs),
     /// Make a cage for a model: one that follows it, its convex hull, or a subdivided box.
@@ -104,6 +115,10 @@ pub(crate) struct BindArgs {
     /// Write the weights (.npz; one row per vertex of the mesh file, one column per cage vertex, then one per control inside).
     #[arg(long, value_name = "FILE", value_parser = npz_output)]
     pub(crate) weights: Option<PathBuf>,
+    /// Bind these columns of the weights alone, from A to before B: a part of the weights file, for `merge`. Multiples of
+    /// 8 cost nothing twice.
+    #[arg(long, value_name = "A:B", requires = "weights", conflicts_with_all = ["output", "report"], value_parser = many::columns)]
+    pub(crate) columns: Option<Range<usize>>,
     /// Of a rigged model, bind and write the shape alone, without joints and morph targets; then deform needs --static as well.
     #[arg(long = "static")]
     pub(crate) plain: bool,
@@ -260,6 +275,10 @@ pub(crate) struct DeformArgs {
     pub(crate) output: ModelOutput,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
+    /// Experimental: let the cage bend the model while a clip moves it, instead of its shape at rest; writes the clip's frames as
+    /// morph targets, without skeleton.
+    #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "mask", "plain"])]
+    pub(crate) dynamic: Option<String>,
     /// With --dynamic: smooth the cage by so many steps, as for `bind`.
     #[arg(long, default_value_t = 0, value_name = "STEPS", requires = "dynamic", value_parser = number::<u32>(options::SMOOTH))]
     pub(crate) smooth: u32,
@@ -278,30 +297,11 @@ pub(crate) struct DeformArgs {
     Example:\n  cagework pull horse.glb --cage cage.obj --weights horse.npz --job rear.json -o rear.obj"
 )]
 pub(crate) struct PullArgs {
-    /// The mesh that was bound (.obj, .gltf, .glb).
-    pub(crate) mesh: PathBuf,
     #[command(flatten)]
-    pub(crate) read: ReadArgs,
-    /// The cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
-    #[arg(long, value_name = "CAGE")]
-    pub(crate) cage: CageSource,
-    /// The weights that `cagework bind --weights` wrote.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) weights: PathBuf,
+    pub(crate) pose: PoseArgs,
     /// What is pulled where, as JSON.
     #[arg(long, value_name = "FILE")]
     pub(crate) job: PathBuf,
-    /// The cage's pose to write; the name's ending says the format.
-    #[arg(short, long, value_name = "FILE")]
-    pub(crate) output: ModelOutput,
-    /// Cells along the longest side of the cage, for the gradients of the weights.
-    #[arg(short, long, default_value_t = 64, value_parser = number::<u32>(options::GRID))]
-    pub(crate) grid: u32,
-    #[command(flatten)]
-    pub(crate) controls: ControlArgs,
-    /// The pose of the controls inside to write (.obj).
-    #[arg(long, value_name = "FILE", requires = "controls", value_parser = obj_output)]
-    pub(crate) save_controls: Option<PathBuf>,
 }
 
 /// `cagework bench`

@@ -12,6 +12,7 @@ use glam::{DVec3, Vec3};
 
 use crate::args::{BindArgs, CageSource, ModelOutput};
 use crate::card;
+use crate::columns;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, refuse_files_read, write};
 use crate::gpu;
@@ -46,12 +47,15 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
         if args.plain { (model.positions.clone(), 0) } else { rig::points(&model, &args.mesh)? };
     let options =
         BindOptions { held: model.bytes(), extra_points, ..args.solve.options(args.grid, args.read.memory) };
-    let to_write = memory_to_write(args, &model, points.len(), controls, options.sparsify);
-    if to_write > options.memory_limit {
-        let (needed, limit) = (to_write, options.memory_limit);
-        let columns = controls.n_controls();
-        return Err(BindError::WeightsMemory { needed, limit, points: points.len(), columns }.into());
+    if let Some(columns) = &args.columns {
+        let written = columns::bind(args, &loaded, &points, &options, columns.clone(), as_json)?;
+        save_cage(args, cage, &model)?;
+        return print(&written);
     }
+    let weights = weights_bytes(points.len(), controls.n_controls(), options.sparsify);
+    let npz = if args.weights.is_some() { weights } else { 0 };
+    let output = args.output.as_ref().map_or(0, |output| model.bytes_to_write(output.format));
+    let to_write = check_memory(&options, points.len(), controls, npz.max(output))?;
     let mut binding = bind_positions(&points, controls, args.solve.on_gpu(), &options)?;
     let memory = &mut binding.report.memory_bytes;
     memory.estimated = memory.estimated.max(to_write);
@@ -75,9 +79,7 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
         };
         write(&output.path, &bytes)?;
     }
-    if let Some(path) = &args.save_cage {
-        write(path, &write_cage_obj(&model.up().mesh_turned_back(&cage.to_polygon_mesh())))?;
-    }
+    save_cage(args, cage, &model)?;
     let report = json(&binding.report);
     if let Some(path) = report_file {
         write(path, report.as_bytes())?;
@@ -98,18 +100,24 @@ pub(crate) fn bind_model(model: &Model, cage: &Cage, options: &BindOptions) -> R
     Ok(bind(&model.positions, cage, options, &bar)?)
 }
 
-/// Bytes that are in use at once while the outputs are written: the model, its weights, and a file.
-fn memory_to_write(
-    args: &BindArgs,
-    model: &Model,
-    n_points: usize,
+fn save_cage(args: &BindArgs, cage: &Cage, model: &Model) -> Result<(), CliError> {
+    let Some(path) = &args.save_cage else { return Ok(()) };
+    write(path, &write_cage_obj(&model.up().mesh_turned_back(&cage.to_polygon_mesh())))
+}
+
+/// Bytes that are in use at once while a file is written that takes so many: what is held, the weights, and that.
+///
+/// # Errors
+/// When they are more than the limit.
+pub(crate) fn check_memory(
+    options: &BindOptions,
+    points: usize,
     controls: Controls<'_>,
-    sparsify: f32,
-) -> u64 {
-    let weights = weights_bytes(n_points, controls.n_controls(), sparsify);
-    let npz = if args.weights.is_some() { weights } else { 0 };
-    let output = args.output.as_ref().map_or(0, |output| model.bytes_to_write(output.format));
-    model.bytes() + weights + npz.max(output)
+    to_write: u64,
+) -> Result<u64, BindError> {
+    let (limit, columns) = (options.memory_limit, controls.n_controls());
+    let needed = options.held + weights_bytes(points, columns, options.sparsify) + to_write;
+    if needed > limit { Err(BindError::WeightsMemory { needed, limit, points, columns }) } else { Ok(needed) }
 }
 
 /// Binds positions on the GPU or the processor, with progress on the terminal.

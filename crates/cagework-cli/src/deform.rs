@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use cagework_core::Cage;
 use cagework_core::deform::{deform_bound, displacements};
-use cagework_io::{Model, ModelFormat, ReshapeReport, SavedWeights, read_weights_npz, shown};
+use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, read_weights_npz, shown};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use crate::args::{CageSource, ControlArgs, DeformArgs, MemoryArgs};
+use crate::args::{CageSource, ControlArgs, DeformArgs, MemoryArgs, ModelOutput};
 use crate::bind::export;
 use crate::controls::{inner_controls, rest_of, with_inner};
 use crate::error::CliError;
@@ -40,7 +40,7 @@ struct Deformed {
 /// # Errors
 /// When a file cannot be read or written, or files do not belong together.
 pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
-    let weights = match (&args.weights, &args.rig.dynamic) {
+    let weights = match (&args.weights, &args.dynamic) {
         (_, Some(clip)) => return dynamic::run(args, clip, as_json),
         (Some(weights), None) => weights,
         // The command line's own rules leave no such case.
@@ -75,30 +75,15 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     let poses = with_inner(poses, &args.pose_controls, &saved.inner_controls, model.up(), args.read.memory)?;
     let rest = rest_of(&cage.cage, &saved);
     let names: Vec<String> = args.pose.iter().map(|path| pose_name(path)).collect();
+    let options = args.rig.options(&model, &args.mesh)?;
     let outside_vertices = saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices).count();
-
+    let poses = Poses { names, rest, positions: poses };
     let started = Instant::now();
+    let posed = Posed::new(&model, saved, &poses, format, (&options, args.rig.plain));
+    let deform_ms = started.elapsed().as_secs_f64() * 1e3;
+    let (bytes, rig) = posed.into_file(&model, &poses.names, &args.output, &options)?;
     let mut notices = model.notices.clone();
-    let (bytes, rig, deform_ms) = if format == ModelFormat::Gltf && model.is_rigged() && !args.rig.plain {
-        let by = |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.outside, &rest, pose);
-        let by: Vec<Vec<DVec3>> = poses.iter().map(by).collect();
-        let deform_ms = started.elapsed().as_secs_f64() * 1e3;
-        let (bytes, report) = rig::write(&model, &saved, &names, by, args)?;
-        notices.extend(report.notices());
-        (bytes, Some(report), deform_ms)
-    } else {
-        let saved = saved.of_vertices();
-        let deformed: Vec<Vec<Vec3>> =
-            poses.iter().map(|pose| deform_bound(&saved.weights, &saved.outside, pose)).collect();
-        let deform_ms = started.elapsed().as_secs_f64() * 1e3;
-        let bytes = if let [only] = deformed.as_slice() {
-            export(&model, only, &args.output)?
-        } else {
-            let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(deformed).collect();
-            model.write_glb_poses(&model.positions, &named).map_err(|e| CliError::file(output, e))?
-        };
-        (bytes, None, deform_ms)
-    };
+    notices.extend(rig.iter().flat_map(ReshapeReport::notices));
     write(output, &bytes)?;
 
     let done = Deformed {
@@ -107,12 +92,82 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         cage_vertices: n_cage,
         inner_controls: n_inner,
         outside_vertices,
-        poses: names,
+        poses: poses.names,
         rig,
         deform_ms,
         notices,
     };
     print(&if as_json { json(&done) } else { text(&done) })
+}
+
+/// Poses of a cage and the controls inside.
+pub(crate) struct Poses {
+    /// What they are called.
+    pub(crate) names: Vec<String>,
+    /// All controls at rest. `[n_controls]`, object units
+    pub(crate) rest: Vec<Vec3>,
+    /// All controls in each pose. `[n_poses][n_controls]`, object units
+    pub(crate) positions: Vec<Vec<Vec3>>,
+}
+
+/// Where poses put a model.
+pub(crate) enum Posed {
+    /// How far each bound point of a rigged model goes in each pose, and which of them are outside.
+    Rigged { by: Vec<Vec<DVec3>>, outside: Vec<u32> },
+    /// Where each vertex goes in each pose.
+    Plain(Vec<Vec<Vec3>>),
+}
+
+impl Posed {
+    /// What poses make of a model. `plain`: of its shape alone.
+    pub(crate) fn new(
+        model: &Model,
+        saved: SavedWeights,
+        poses: &Poses,
+        format: ModelFormat,
+        (options, plain): (&ReshapeOptions, bool),
+    ) -> Self {
+        if format == ModelFormat::Gltf && model.is_rigged() && !plain {
+            let by = |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.outside, &poses.rest, pose);
+            let by = poses.positions.iter().map(by).collect();
+            return Self::Rigged { by, outside: saved.outside.iter().map(|o| o.vertex).collect() };
+        }
+        let saved = saved.of_vertices();
+        let posed = |pose: &Vec<Vec3>| {
+            let posed = deform_bound(&saved.weights, &saved.outside, pose);
+            if options.parts.is_empty() { posed } else { options.parts.hold(&model.positions, &posed) }
+        };
+        Self::Plain(poses.positions.iter().map(posed).collect())
+    }
+
+    /// The model in its pose, or at rest with several as morph targets, as a file; and what became of its rig.
+    ///
+    /// # Errors
+    /// When the weights lack the rig's points, or the model cannot be written in that format.
+    pub(crate) fn into_file(
+        self,
+        model: &Model,
+        names: &[String],
+        output: &ModelOutput,
+        options: &ReshapeOptions,
+    ) -> Result<(Vec<u8>, Option<ReshapeReport>), CliError> {
+        match self {
+            Self::Rigged { by, outside } => {
+                let (bytes, report) = rig::write(model, &outside, names, by, (&output.path, options))?;
+                Ok((bytes, Some(report)))
+            }
+            Self::Plain(posed) => {
+                let bytes = if let [only] = posed.as_slice() {
+                    export(model, only, output)?
+                } else {
+                    let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(posed).collect();
+                    let glb = model.write_glb_poses(&model.positions, &named);
+                    glb.map_err(|e| CliError::file(&output.path, e))?
+                };
+                Ok((bytes, None))
+            }
+        }
+    }
 }
 
 /// Reads weights and checks that they belong to a mesh and a cage.
@@ -144,7 +199,7 @@ pub(crate) fn load_weights(
 }
 
 /// A pose is called as its file is, without folder and ending.
-fn pose_name(path: &Path) -> String {
+pub(crate) fn pose_name(path: &Path) -> String {
     path.file_stem().map_or_else(|| "pose".into(), |stem| stem.to_string_lossy().into_owned())
 }
 

@@ -1,9 +1,10 @@
 //! What can go wrong with a command, said once on stderr.
 
 use std::error::Error;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use cagework_core::bind::BindError;
+use cagework_core::bind::{BindError, PartError};
 use cagework_core::cage::CageError;
 use cagework_core::cage_check::RepairError;
 use cagework_core::cage_gen::CageGenError;
@@ -45,6 +46,9 @@ pub(crate) enum CliError {
     /// The bind did not come about.
     #[error(transparent)]
     Bind(#[from] BindError),
+    /// Columns cannot be bound apart, or parts are no whole.
+    #[error(transparent)]
+    Part(PartError),
     /// The GPU, or a bind on it.
     #[error(transparent)]
     Gpu(#[from] GpuError),
@@ -130,4 +134,11 @@ impl CliError {
             _ => None,
         }
     }
+}
+
+/// Says on stderr what went wrong, and what to do about it where that is known.
+pub(crate) fn say(message: &str, hint: Option<&str>) {
+    let hint = hint.map_or_else(String::new, |hint| format!("hint: {hint}\n"));
+    // A closed stderr leaves nobody to tell.
+    let _ = write!(std::io::stderr(), "error: {message}\n{hint}");
 }

@@ -20,7 +20,7 @@ pub(crate) use outputs::{check_outputs, refuse_files_read, write};
 pub(crate) use whole::abandon;
 
 /// Largest file that is read, bytes: above it the model's arrays would not fit a 32-bit index any more.
-const MAX_FILE_BYTES: u64 = 2 << 30;
+pub(crate) const MAX_FILE_BYTES: u64 = 2 << 30;
 
 /// All files that were read so far, those that a model names (buffers, materials, textures) among them.
 static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -107,6 +107,13 @@ fn content(file: File) -> Result<Vec<u8>, String> {
 pub(crate) fn make_folder(path: &Path) -> Result<(), CliError> {
     fs::create_dir_all(path)
         .map_err(|e| CliError::file(path, format!("cannot be made a folder: {}", reason(&e))))
+}
+
+/// Whether a file is there and was written after all of these. What cannot be asked was not.
+pub(crate) fn is_newer(file: &Path, than: &[&Path]) -> bool {
+    let modified = |path: &Path| fs::metadata(path).and_then(|metadata| metadata.modified()).ok();
+    modified(file)
+        .is_some_and(|file| than.iter().all(|path| modified(path).is_some_and(|other| other < file)))
 }
 
 /// Prints text on stdout, with a line end.

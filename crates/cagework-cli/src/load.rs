@@ -111,7 +111,7 @@ pub(crate) fn load_cage(
     controls: &ControlArgs,
 ) -> Result<LoadedCage, CliError> {
     let model = match source {
-        CageSource::File(path) => load_model(path, around.up(), memory)?,
+        CageSource::File(path) => return load_cage_file(path, around.up(), memory, controls),
         CageSource::Box { divisions } => {
             generated_model("box cage", &box_mesh(&around.positions, *divisions, DEFAULT_MARGIN)?)?
         }
@@ -120,11 +120,20 @@ pub(crate) fn load_cage(
             generated_model("generated cage", &generate_for(around, None, &options)?.0)?
         }
     };
-    let cage = cage_mesh(&model)
-        .and_then(|mesh| Cage::new(&mesh))
-        .map_err(|source| CliError::Cage { name: model.name.clone(), source })?;
-    let set = load_controls(&cage, controls, around.up(), memory)?;
-    Ok(LoadedCage { cage, model, up: around.up(), memory, set })
+    LoadedCage::new(model, around.up(), memory, controls)
+}
+
+/// The cage of a file. `up`: what points up in it.
+///
+/// # Errors
+/// When the file cannot be read or is no cage.
+pub(crate) fn load_cage_file(
+    path: &Path,
+    up: UpAxis,
+    memory: MemoryArgs,
+    controls: &ControlArgs,
+) -> Result<LoadedCage, CliError> {
+    LoadedCage::new(load_model(path, up, memory)?, up, memory, controls)
 }
 
 /// A generated cage around a model, its morph targets and a clip, with progress on the terminal.
@@ -158,6 +167,19 @@ pub(crate) fn box_mesh(positions: &[Vec3], divisions: u32, margin: f32) -> Resul
 }
 
 impl LoadedCage {
+    fn new(model: Model, up: UpAxis, memory: MemoryArgs, controls: &ControlArgs) -> Result<Self, CliError> {
+        let cage = cage_mesh(&model)
+            .and_then(|mesh| Cage::new(&mesh))
+            .map_err(|source| CliError::Cage { name: model.name.clone(), source })?;
+        let set = load_controls(&cage, controls, up, memory)?;
+        Ok(Self { cage, model, up, memory, set })
+    }
+
+    /// The cage as it was read, before faces are turned outward.
+    pub(crate) fn mesh(&self) -> PolygonMesh {
+        self.model.cage_mesh()
+    }
+
     /// What a model is bound to.
     pub(crate) fn controls(&self) -> Controls<'_> {
         self.set.as_ref().map_or_else(|| Controls::from(&self.cage), Controls::from)

@@ -8,6 +8,7 @@ mod bind;
 mod cage;
 mod card;
 mod check;
+mod columns;
 mod controls;
 mod deform;
 mod demo;
@@ -15,16 +16,18 @@ mod dynamic;
 mod error;
 mod evaluate;
 mod files;
+mod fit;
 mod gpu;
 mod info;
 mod load;
+mod pose;
 mod progress;
 mod pull;
+mod refit;
 mod render;
 mod rig;
 mod signals;
 
-use std::io::Write as _;
 use std::process::ExitCode;
 
 use args::{Cli, Command};
@@ -42,7 +45,10 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(args, cli.json),
         Command::Bind(args) => bind::run(args, cli.json),
         Command::Deform(args) => deform::run(args, cli.json),
+        Command::Refit(args) => refit::run(args, cli.json),
+        Command::Merge(args) => columns::merge(args, cli.json),
         Command::Pull(args) => pull::run(args, cli.json),
+        Command::Fit(args) => fit::run(args, cli.json),
         Command::Render(args) => render::run(args, cli.json),
         Command::Cage(args) => cage::run(args, cli.json),
         Command::Check(args) => check::run(args, cli.json),
@@ -53,9 +59,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let hint = error.hint().map_or_else(String::new, |hint| format!("hint: {hint}\n"));
-            // A closed stderr leaves nobody to tell.
-            let _ = write!(std::io::stderr(), "error: {}\n{hint}", error.message());
+            error::say(&error.message(), error.hint());
             ExitCode::FAILURE
         }
     }

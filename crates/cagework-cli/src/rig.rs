@@ -1,22 +1,23 @@
 //! Rigged models: what is bound with them, and what a reshape says.
 
-use cagework_io::{Model, ReshapeReport, SavedWeights, WriteError};
+use std::path::Path;
+
+use cagework_io::{Model, ReshapeOptions, ReshapeReport, WriteError};
 use glam::{DVec3, Vec3};
 
-use crate::args::DeformArgs;
 use crate::error::CliError;
 
 /// Writes a rigged model deformed by one pose, or at rest with all poses as morph targets. `by`: displacements of all bound
-/// points for each pose.
+/// points for each pose; `outside`: those of them outside the cage.
 ///
 /// # Errors
 /// When the weights lack the rig's points, or the model cannot be written.
 pub(crate) fn write(
     model: &Model,
-    saved: &SavedWeights,
+    outside: &[u32],
     names: &[String],
     mut by: Vec<Vec<DVec3>>,
-    args: &DeformArgs,
+    (output, options): (&Path, &ReshapeOptions),
 ) -> Result<(Vec<u8>, ReshapeReport), CliError> {
     let n = model.positions.len();
     let wrong = |e| match e {
@@ -28,23 +29,21 @@ pub(crate) fn write(
             ),
             hint: "bind the model again, or export it without its rig (--static)",
         },
-        e => CliError::file(&args.output.path, e),
+        e => CliError::file(output, e),
     };
-    let outside: Vec<u32> = saved.outside.iter().map(|o| o.vertex).collect();
-    let options = args.rig.options();
     if by.len() == 1 {
-        return model.write_reshaped(&by.remove(0), &outside, &[], &options).map_err(wrong);
+        return model.write_reshaped(&by.remove(0), outside, &[], options).map_err(wrong);
     }
-    let rest = vec![DVec3::ZERO; saved.weights.n_rows()];
+    let rest = vec![DVec3::ZERO; by.first().map_or(0, Vec::len)];
     let poses: Vec<_> = names.iter().cloned().zip(by).collect();
-    model.write_reshaped(&rest, &outside, &poses, &options).map_err(wrong)
+    model.write_reshaped(&rest, outside, &poses, options).map_err(wrong)
 }
 
 /// The points to bind: vertices, then those of the rig; and how many the latter are.
 ///
 /// # Errors
 /// When the rig cannot be read.
-pub(crate) fn points(model: &Model, name: &std::path::Path) -> Result<(Vec<Vec3>, usize), CliError> {
+pub(crate) fn points(model: &Model, name: &Path) -> Result<(Vec<Vec3>, usize), CliError> {
     let extra = model.extra_points().map_err(|e| CliError::file(name, e))?;
     let n = extra.len();
     let mut all = model.positions.clone();

@@ -22,10 +22,12 @@ pub mod levels;
 pub mod mean_value;
 pub mod mesh;
 pub mod options;
+pub mod parts;
 pub mod progress;
 pub mod pull;
 pub mod report;
 pub mod rest_edit;
+mod rotation;
 pub mod sample;
 pub mod samples;
 mod simd;
@@ -48,6 +50,12 @@ pub use controls::{ControlError, ControlSet, Controls, InnerControls, InnerEleme
 pub use mean_value::mean_value_weights;
 pub use mesh::{Bounds, PolygonMesh, TriMesh};
 pub use options::BindOptions;
+pub use parts::Parts;
 pub use progress::{Cancelled, Progress, ProgressEvent, Stage};
 pub use report::BindReport;
 pub use weights::Weights;
+
+/// The example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use rustc_hash::{FxBuildHasher, FxHashMap};
+use serde::{Deserialize, Serialize};
 
 /// Axis-aligned bounding box, in object units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +55,7 @@ pub struct TriMesh {
 }
 
 /// Polygon mesh, faces of any size: what a cage is read from.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PolygonMesh {
     /// Vertex positions.
     pub positions: Vec<Vec3>,

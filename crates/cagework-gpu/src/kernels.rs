@@ -36,8 +36,8 @@ macro_rules! kernels {
             pub const $id: Kernel = Kernel {
                 name: $name,
                 wgsl: concat!(
-                    $(include_str!(concat!("../../../shaders/", $shared, ".wgsl")),)+
-                    include_str!(concat!("../../../shaders/", $name, ".wgsl"))
+                    $(include_str!(concat!("../shaders/", $shared, ".wgsl")),)+
+                    include_str!(concat!("../shaders/", $name, ".wgsl"))
                 ),
                 workgroup: $workgroup,
                 bindings: $bindings,

@@ -31,3 +31,8 @@ pub use error::GpuError;
 pub use plan::{Plan, PlanError};
 pub use session::Session;
 pub use skin::Skinner;
+
+/// The example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

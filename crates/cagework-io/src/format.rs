@@ -3,9 +3,10 @@
 use thiserror::Error;
 
 use crate::shown::shown;
+use crate::stl;
 
 /// Format of a model's file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum ModelFormat {
@@ -13,6 +14,10 @@ pub enum ModelFormat {
     Obj,
     /// glTF 2.0: JSON or GLB to read, GLB to write.
     Gltf,
+    /// Stanford PLY, text or binary.
+    Ply,
+    /// STL, text or binary.
+    Stl,
 }
 
 /// The content of a file is no format that is read here.
@@ -29,7 +34,7 @@ pub struct FormatError {
 
 impl ModelFormat {
     /// Every format, in the order in which people are told of them.
-    pub const ALL: [Self; 2] = [Self::Gltf, Self::Obj];
+    pub const ALL: [Self; 4] = [Self::Gltf, Self::Obj, Self::Ply, Self::Stl];
 
     /// Short name, lower case.
     #[must_use]
@@ -37,6 +42,8 @@ impl ModelFormat {
         match self {
             Self::Obj => "obj",
             Self::Gltf => "gltf",
+            Self::Ply => "ply",
+            Self::Stl => "stl",
         }
     }
 
@@ -46,16 +53,15 @@ impl ModelFormat {
         match self {
             Self::Obj => "obj",
             Self::Gltf => "glb",
+            Self::Ply => "ply",
+            Self::Stl => "stl",
         }
     }
 
     /// Whether one file holds several poses.
     #[must_use]
     pub fn holds_poses(self) -> bool {
-        match self {
-            Self::Obj => false,
-            Self::Gltf => true,
-        }
+        self == Self::Gltf
     }
 
     /// The format that the name of a file to be written asks for by its ending.
@@ -74,7 +80,7 @@ impl ModelFormat {
     /// [`FormatError`] when its name promises another, or its content is known to be something else.
     pub fn of_file(name: &str, bytes: &[u8]) -> Result<Self, FormatError> {
         let fault = |found, hint| Err(FormatError { name: name.into(), found, hint });
-        let export = "export it as GLB or OBJ";
+        let export = "export it as GLB, OBJ, PLY or STL";
         let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
         match bytes {
             [] => return fault("empty", "the file has no bytes"),
@@ -82,7 +88,8 @@ impl ModelFormat {
             [b'P', b'K', 3, 4, ..] => return fault("a zip archive", "unpack it first"),
             [b'K', b'a', b'y', b'd', b'a', b'r', b'a', ..] => return fault("an FBX file", export),
             [b'B', b'L', b'E', b'N', b'D', b'E', b'R', ..] => return fault("a Blender file", export),
-            [b'p', b'l', b'y', b'\n' | b'\r', ..] => return fault("a PLY file", export),
+            [b'p', b'l', b'y', b'\n' | b'\r', ..] => return Ok(Self::Ply),
+            _ if stl::is_stl(bytes) => return Ok(Self::Stl),
             _ => {}
         }
         if text.first() == Some(&b'{') {
@@ -93,8 +100,10 @@ impl ModelFormat {
                 fault("not a GLB", "its first four bytes are not 'glTF': it is damaged or has the wrong name")
             }
             "gltf" => fault("not a glTF", "it does not begin with '{': it is damaged or has the wrong name"),
-            "stl" | "ply" | "fbx" | "dae" | "usdz" | "usd" | "3ds" | "blend" | "off" => {
-                fault("not OBJ or glTF", export)
+            "stl" => Ok(Self::Stl),
+            "ply" => fault("not a PLY", "its first line is not 'ply': it is damaged or has the wrong name"),
+            "fbx" | "dae" | "usdz" | "usd" | "3ds" | "blend" | "off" => {
+                fault("of a format that is not read", export)
             }
             _ => Ok(Self::Obj),
         }

@@ -18,11 +18,16 @@ mod model;
 mod normals;
 mod npz;
 mod obj;
+mod part_kind;
+mod ply;
+mod polygons;
 mod pose_code;
 mod project;
 mod rigged;
+mod select;
 mod shown;
 mod siblings;
+mod stl;
 mod up;
 
 pub use counts::Counts;
@@ -35,11 +40,21 @@ pub use gltf::{
 pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
 pub use memory::MemoryError;
 pub use model::{Model, ReadError};
-pub use npz::{NpzError, SavedWeights, read_weights_npz, write_weights_npz};
+pub use npz::{
+    NpzError, PartOf, SavedWeights, read_part_npz, read_weights_npz, write_part_npz, write_weights_npz,
+};
 pub use obj::{ObjError, read_inner_controls, write_cage_obj, write_inner_controls};
+pub use part_kind::PartKind;
+pub use polygons::PolygonsError;
 pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
 pub use project::{Project, ProjectError, read_project, write_project};
 pub use rigged::NoClip;
+pub use select::SelectError;
 pub use shown::shown;
 pub use siblings::Resolve;
 pub use up::UpAxis;
+
+/// The example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -13,9 +13,11 @@ use crate::format::{FormatError, ModelFormat};
 use crate::gltf::{self, GltfDocument, GltfError, Played, Pose, Rest};
 use crate::look::Look;
 use crate::obj::{self, ObjDocument, ObjError};
+use crate::polygons::{Encoding, Polygons, PolygonsError};
 use crate::shown::shown;
 use crate::siblings::Resolve;
 use crate::up::UpAxis;
+use crate::{ply, stl};
 
 /// Why bytes could not be read as a model.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -41,6 +43,14 @@ pub enum ReadError {
         name: String,
         /// The fault.
         source: ObjError,
+    },
+    /// A fault in a PLY or STL file.
+    #[error("{}: {source}", shown(name))]
+    Polygons {
+        /// Name the caller gave.
+        name: String,
+        /// The fault.
+        source: PolygonsError,
     },
     /// A fault in a glTF file.
     #[error("{}: {source}", shown(name))]
@@ -68,6 +78,10 @@ pub struct Model {
     /// What points up in the document.
     pub(crate) up: UpAxis,
     bytes: u64,
+    format: ModelFormat,
+    /// Of a PLY or STL: how its numbers are written; whether its vertices have normals.
+    encoding: Encoding,
+    has_normals: bool,
     pub(crate) document: Document,
 }
 
@@ -78,7 +92,7 @@ pub(crate) enum Document {
 }
 
 impl Model {
-    /// Reads an OBJ, glTF or GLB file; the content decides which, `name` helps with the error if it is none of them.
+    /// Reads an OBJ, glTF, GLB, PLY or STL file; the content decides which, `name` helps with the error if it is none of them.
     ///
     /// `resolve` is asked for sibling files (buffers and textures of a `.gltf`, materials and textures of an OBJ) by
     /// relative path, each once; `data:` URIs are decoded here. A buffer that is not read is an error, anything else a
@@ -101,7 +115,8 @@ impl Model {
         resolve: &mut Resolve<'_>,
         memory_limit: u64,
     ) -> Result<Self, ReadError> {
-        match ModelFormat::of_file(name, bytes)? {
+        let format = ModelFormat::of_file(name, bytes)?;
+        match format {
             ModelFormat::Gltf => {
                 let fault = |source| ReadError::Gltf { name: name.into(), source };
                 let model = gltf::read(name, bytes, resolve, memory_limit).map_err(fault)?;
@@ -113,6 +128,9 @@ impl Model {
                     notices: model.notices,
                     up: UpAxis::Y,
                     bytes: model.document.bytes,
+                    format,
+                    encoding: Encoding::default(),
+                    has_normals: false,
                     document: Document::Gltf(Box::new(model.document)),
                 })
             }
@@ -134,7 +152,31 @@ impl Model {
                     notices: model.notices,
                     up: UpAxis::Y,
                     bytes: model.bytes,
+                    format,
+                    encoding: Encoding::default(),
+                    has_normals: false,
                     document: Document::Obj(Box::new(model.document)),
+                })
+            }
+            ModelFormat::Ply | ModelFormat::Stl => {
+                let read = if format == ModelFormat::Ply { ply::read } else { stl::read };
+                let fault = |source| ReadError::Polygons { name: name.into(), source };
+                let mut read = read(bytes, memory_limit).map_err(fault)?;
+                let document = read.document().map_err(fault)?;
+                let corner = |c: u32| document.corners[c as usize].v;
+                let (vertices, corners) = (read.positions.len() as u64, document.corners.len() as u64);
+                Ok(Self {
+                    name: name.into(),
+                    triangles: document.triangles.iter().map(|t| t.map(corner)).collect(),
+                    counts: Counts { nodes: 1, meshes: 1, primitives: 1, ..Counts::default() },
+                    notices: read.notices,
+                    up: UpAxis::Y,
+                    bytes: Polygons::check_memory(0, vertices, corners, u64::MAX).unwrap_or(u64::MAX),
+                    format,
+                    encoding: read.encoding,
+                    has_normals: read.has_normals,
+                    positions: read.positions,
+                    document: Document::Obj(Box::new(document)),
                 })
             }
         }
@@ -159,6 +201,7 @@ impl Model {
         match format {
             ModelFormat::Gltf => shape + PRIMITIVE_BYTES * n(self.counts.primitives) + self.bytes,
             ModelFormat::Obj => shape / 3 + self.bytes,
+            ModelFormat::Ply | ModelFormat::Stl => shape,
         }
     }
 
@@ -191,10 +234,7 @@ impl Model {
     /// Format of the document.
     #[must_use]
     pub fn format(&self) -> ModelFormat {
-        match self.document {
-            Document::Obj(_) => ModelFormat::Obj,
-            Document::Gltf(_) => ModelFormat::Gltf,
-        }
+        self.format
     }
 
     /// Number of faces: polygons of an OBJ, triangles of a glTF.
@@ -288,12 +328,14 @@ impl Model {
         match format {
             ModelFormat::Obj => self.write_obj(positions),
             ModelFormat::Gltf => self.write_glb(positions),
+            ModelFormat::Ply => self.write_ply(positions),
+            ModelFormat::Stl => self.write_stl(positions),
         }
     }
 
     /// The model with new positions as an OBJ file.
     ///
-    /// An OBJ keeps everything but its coordinates and normals byte for byte; a glTF becomes a new OBJ with its vertices
+    /// An OBJ keeps everything but its coordinates and normals byte for byte; others become a new OBJ with their vertices
     /// in the same order. `positions`: world space, one for each vertex.
     ///
     /// # Errors
@@ -302,12 +344,54 @@ impl Model {
         self.check(positions)?;
         let (rest, positions) = (self.positions_in_file(), self.up.turned_back(positions));
         match &self.document {
-            Document::Obj(document) => Ok(obj::patch(document, &rest, &positions)),
+            Document::Obj(document) if self.format == ModelFormat::Obj => {
+                Ok(obj::patch(document, &rest, &positions))
+            }
+            Document::Obj(_) => {
+                let faces = self.cage_mesh().faces;
+                Ok(obj::write_cage_obj(&PolygonMesh { positions: positions.into_owned(), faces }))
+            }
             Document::Gltf(document) => {
                 let rest = Rest { positions: &rest, triangles: &self.triangles };
                 gltf::write_obj(document, rest, &positions)
             }
         }
+    }
+
+    /// The model with new positions as a PLY file: polygons, colours of vertices, and normals if a PLY had them; text if it was a
+    /// text, big-endian if it was, otherwise binary.
+    ///
+    /// # Errors
+    /// [`WriteError`] when there is not one finite position for each vertex.
+    pub fn write_ply(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        self.check(positions)?;
+        let (faces, colors) = match &self.document {
+            Document::Obj(document) => (self.cage_mesh().faces, Some(&document.colors)),
+            Document::Gltf(_) => (self.triangles.iter().map(|t| t.to_vec()).collect(), None),
+        };
+        let positions = self.up.turned_back(positions);
+        Ok(ply::write(ply::Written {
+            positions: &positions,
+            triangles: &self.triangles,
+            faces,
+            color: &|v| colors.and_then(|colors| colors.get(&v)).copied(),
+            has_colors: colors.is_some_and(|colors| !colors.is_empty()),
+            has_normals: self.has_normals,
+            encoding: self.encoding,
+        }))
+    }
+
+    /// The model with new positions as an STL file: triangles and the normals of their planes; text if it was a text, otherwise
+    /// binary.
+    ///
+    /// # Errors
+    /// [`WriteError`] when there is not one finite position for each vertex, or no triangle.
+    pub fn write_stl(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        self.check(positions)?;
+        if self.triangles.is_empty() {
+            return Err(WriteError::NoFaces);
+        }
+        Ok(stl::write(&self.up.turned_back(positions), &self.triangles, self.encoding))
     }
 
     /// The model with new positions as a GLB file.

@@ -4,13 +4,10 @@
 //! the cage also `outside_vertex` (int32), `outside_corners` (int32, [n, 3]) and `outside_offset` (float32, [n, 3]),
 //! which SciPy ignores; of a rigged model also `extra_points` (float32, [n, 3]): the last n rows are theirs; with controls inside
 //! the cage also `inner_controls` (float32, [n, 3]): the last n columns are theirs.
-//! Written uncompressed, as `numpy.savez` does, with one fixed time stamp: the same weights give
-//! the same bytes. Reading takes what SciPy writes too: deflated, 32- or 64-bit indices, 32- or 64-bit floats.
-//!
-//! The array headers are read here and not by a library: `npyz` parses any Python literal, recursively, and a header
-//! of nested brackets would overflow the stack.
+//! Reading takes what SciPy writes too: deflated, 32- or 64-bit indices, 32- or 64-bit floats.
 
-use std::io::{Cursor, Read as _, Write as _};
+mod arrays;
+mod part;
 
 use cagework_core::Weights;
 use cagework_core::deform::OutsideVertex;
@@ -18,10 +15,11 @@ use cagework_core::weights::WeightsError;
 use glam::Vec3;
 use thiserror::Error;
 use zip::result::ZipError;
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use crate::memory::MemoryError;
+use arrays::{Archive, NpzWriter, array, required};
+
+pub use part::{PartOf, read_part_npz, write_part_npz};
 
 /// Why a weights file could not be read.
 #[derive(Debug, Error)]
@@ -34,6 +32,12 @@ pub enum NpzError {
         "array '{0}' is missing: is this a sparse matrix written by scipy.sparse.save_npz or cagework bind?"
     )]
     Missing(&'static str),
+    /// A part of a bind where all of it is asked for.
+    #[error("holds some columns of the weights only: put all parts together with `cagework merge`")]
+    Part,
+    /// No part of a bind where one is asked for.
+    #[error("is no part of a bind: `cagework bind --columns A:B --weights` writes such files")]
+    NoPart,
     /// An array is not what it must be.
     #[error("array '{array}': {problem}")]
     Array {
@@ -55,12 +59,6 @@ impl From<ZipError> for NpzError {
         Self::Zip(error.to_string())
     }
 }
-
-/// Most bytes of an array's header: NumPy's have a hundred or two.
-const MAX_HEADER: u64 = 1 << 16;
-/// NumPy aligns the data to this.
-const NPY_ALIGN: usize = 64;
-const NPY_MAGIC: &[u8; 6] = b"\x93NUMPY";
 
 /// What a weights file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,15 +104,8 @@ pub fn write_weights_npz(
 ) -> Vec<u8> {
     let n = outside.len();
     let shape = [weights.n_rows() as i64, weights.n_columns() as i64];
-    let bytes = weights.bytes() + size_of_val(outside) + ROOM_FOR_HEADERS;
-    let mut zip = NpzWriter {
-        zip: ZipWriter::new(Cursor::new(Vec::with_capacity(bytes))),
-        // The zip epoch, 1980: no clock.
-        options: SimpleFileOptions::default()
-            .compression_method(CompressionMethod::Stored)
-            .last_modified_time(DateTime::default())
-            .large_file(weights.data().len() > (u32::MAX / 8) as usize),
-    };
+    let bytes = weights.bytes() + size_of_val(outside);
+    let mut zip = NpzWriter::new(bytes, 4 * weights.data().len());
     zip.put("format", "|S3", &[], [*b"csr"]);
     zip.put("shape", "<i8", &[2], shape.map(i64::to_le_bytes));
     zip.put("indptr", "<i4", &[weights.indptr().len()], weights.indptr().iter().map(|x| x.to_le_bytes()));
@@ -129,57 +120,10 @@ pub fn write_weights_npz(
     }
     for (name, points) in [("extra_points", extra_points), ("inner_controls", inner_controls)] {
         if !points.is_empty() {
-            let values = points.iter().flat_map(Vec3::to_array).map(f32::to_le_bytes);
-            zip.put(name, "<f4", &[points.len(), 3], values);
+            zip.put_points(name, points);
         }
     }
-    zip.zip.finish().expect("writing to memory does not fail").into_inner()
-}
-
-/// Bytes of all headers of an archive, more than enough: so that its memory does not grow by doubling.
-const ROOM_FOR_HEADERS: usize = 4096;
-
-struct NpzWriter {
-    zip: ZipWriter<Cursor<Vec<u8>>>,
-    options: SimpleFileOptions,
-}
-
-impl NpzWriter {
-    /// Adds an array, a run of its values at a time: there is no second copy of it.
-    fn put<const N: usize>(
-        &mut self,
-        name: &str,
-        dtype: &str,
-        shape: &[usize],
-        values: impl IntoIterator<Item = [u8; N]>,
-    ) {
-        /// Values written at a time.
-        const RUN: usize = 1 << 14;
-        let name = format!("{name}.npy");
-        self.zip.start_file(name, self.options).expect("names are distinct, memory does not fail");
-        self.zip.write_all(&npy_header(dtype, shape)).expect("writing to memory does not fail");
-        let mut values = values.into_iter().peekable();
-        while values.peek().is_some() {
-            let run: Vec<u8> = values.by_ref().take(RUN).flatten().collect();
-            self.zip.write_all(&run).expect("writing to memory does not fail");
-        }
-    }
-}
-
-fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
-    let shape = match shape {
-        [n] => format!("({n},)"),
-        _ => format!("({})", shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")),
-    };
-    let mut text = format!("{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}");
-    let unpadded = NPY_MAGIC.len() + 4 + text.len() + 1;
-    text.extend(std::iter::repeat_n(' ', unpadded.next_multiple_of(NPY_ALIGN) - unpadded));
-    text.push('\n');
-    let mut out = NPY_MAGIC.to_vec();
-    out.extend_from_slice(&[1, 0]);
-    out.extend_from_slice(&(text.len() as u16).to_le_bytes());
-    out.extend_from_slice(text.as_bytes());
-    out
+    zip.finish()
 }
 
 /// Reads weights and the vertices outside the cage within `memory_limit` bytes, besides those of the file.
@@ -188,7 +132,10 @@ fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
 /// [`NpzError`] when the file is no archive, an array is missing, of a wrong type or too large, or the arrays are no CSR
 /// matrix.
 pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<SavedWeights, NpzError> {
-    let mut zip = Archive { zip: ZipArchive::new(Cursor::new(bytes))?, unpacked: 0, memory_limit };
+    let mut zip = Archive::new(bytes, memory_limit)?;
+    if zip.has(part::HEAD) {
+        return Err(NpzError::Part);
+    }
     let format = required(&mut zip, "format")?;
     if format.data != b"csr" {
         let found = String::from_utf8_lossy(&format.data).into_owned();
@@ -224,7 +171,7 @@ fn read_points(
     (most, what): (u32, &str),
 ) -> Result<Vec<Vec3>, NpzError> {
     let Some(points) = self::array(zip, array)? else { return Ok(Vec::new()) };
-    let points: Vec<Vec3> = points.rows_of(&[3])?.floats()?.chunks_exact(3).map(Vec3::from_slice).collect();
+    let points = points.points()?;
     if points.len() <= most as usize {
         return Ok(points);
     }
@@ -261,140 +208,4 @@ fn read_outside(zip: &mut Archive<'_>, rows: u32, columns: u32) -> Result<Vec<Ou
             offset: Vec3::from_slice(o),
         })
         .collect())
-}
-
-/// An archive that is being read.
-struct Archive<'a> {
-    zip: ZipArchive<Cursor<&'a [u8]>>,
-    /// Bytes of the arrays so far, as they are in the file and as they are used.
-    unpacked: u64,
-    memory_limit: u64,
-}
-
-struct NpyArray {
-    name: &'static str,
-    dtype: String,
-    /// Lengths along the axes.
-    shape: Vec<usize>,
-    data: Vec<u8>,
-}
-
-fn required(zip: &mut Archive<'_>, name: &'static str) -> Result<NpyArray, NpzError> {
-    array(zip, name)?.ok_or(NpzError::Missing(name))
-}
-
-/// Unpacks an array as far as its shape needs: neither the archive's directory nor its streams are believed.
-fn array(archive: &mut Archive<'_>, name: &'static str) -> Result<Option<NpyArray>, NpzError> {
-    let mut entry = match archive.zip.by_name(&format!("{name}.npy")) {
-        Err(ZipError::FileNotFound) => return Ok(None),
-        other => other?,
-    };
-    let fault = |problem: String| NpzError::Array { array: name, problem };
-    let bad = || fault("is not in NumPy's .npy format".into());
-    let mut unpack = |most: u64, into: &mut Vec<u8>| {
-        let unpacked = entry.by_ref().take(most).read_to_end(into);
-        unpacked.map_err(|e| fault(format!("cannot be unpacked: {e}")))
-    };
-    let mut bytes = Vec::new();
-    unpack(START_BYTES, &mut bytes)?;
-    let end = header_end(&bytes).filter(|&end| end <= MAX_HEADER).ok_or_else(bad)?;
-    unpack(end.saturating_sub(START_BYTES), &mut bytes)?;
-    let text = bytes.get(TEXT..end as usize).ok_or_else(bad)?;
-    let text = std::str::from_utf8(text).map_err(|_| bad())?;
-    let dtype = field(text, "'descr':").and_then(quoted).ok_or_else(bad)?.to_owned();
-    if field(text, "'fortran_order':").is_none_or(|f| !f.starts_with("False")) {
-        return Err(fault("is in Fortran order; save it in C order".into()));
-    }
-    let shape = field(text, "'shape':").and_then(lengths).ok_or_else(bad)?;
-    // Other types are refused by whoever wants their values.
-    let width = dtype.get(2..).and_then(|width| width.parse().ok()).unwrap_or(8);
-    let needed = shape.iter().try_fold(width, |n: u64, &length| n.checked_mul(length as u64));
-    let needed = needed.ok_or_else(|| fault(format!("is of shape {shape:?}, which no memory holds")))?;
-    archive.unpacked = archive.unpacked.saturating_add(2 * needed.min(u64::MAX / 2));
-    MemoryError::check(archive.unpacked, archive.memory_limit)?;
-    let mut data = Vec::new();
-    // One more tells of a stream that does not end where it should.
-    unpack(needed.saturating_add(1), &mut data)?;
-    if data.len() as u64 > needed {
-        return Err(fault(format!("has more than the {needed} bytes that its shape {shape:?} takes")));
-    }
-    Ok(Some(NpyArray { name, dtype, shape, data }))
-}
-
-/// Bytes that tell a header's length: magic, version, and a length of two bytes or four.
-const START_BYTES: u64 = 12;
-/// Where its text begins, or the upper half of a length of four bytes.
-const TEXT: usize = 10;
-
-/// Where the header of an `.npy` file ends, versions 1 to 3.
-fn header_end(bytes: &[u8]) -> Option<u64> {
-    let rest = bytes.strip_prefix(NPY_MAGIC)?;
-    match rest.first()? {
-        1 => Some(10 + u64::from(u16::from_le_bytes(rest.get(2..4)?.try_into().ok()?))),
-        _ => Some(12 + u64::from(u32::from_le_bytes(rest.get(2..6)?.try_into().ok()?))),
-    }
-}
-
-fn field<'a>(header: &'a str, key: &str) -> Option<&'a str> {
-    header.split_once(key).map(|(_, rest)| rest.trim_start())
-}
-
-fn quoted(text: &str) -> Option<&str> {
-    text.strip_prefix('\'')?.split_once('\'').map(|(inner, _)| inner)
-}
-
-/// The numbers of a tuple such as `(4, 3)`.
-fn lengths(text: &str) -> Option<Vec<usize>> {
-    let (inner, _) = text.strip_prefix('(')?.split_once(')')?;
-    inner.split(',').map(str::trim).filter(|word| !word.is_empty()).map(|word| word.parse().ok()).collect()
-}
-
-impl NpyArray {
-    fn fault(&self, problem: &str) -> NpzError {
-        NpzError::Array { array: self.name, problem: problem.to_owned() }
-    }
-
-    /// The array, if its lengths along all axes but the first are these.
-    fn rows_of(self, lengths: &[usize]) -> Result<Self, NpzError> {
-        if self.shape.get(1..) == Some(lengths) {
-            return Ok(self);
-        }
-        let wanted = if lengths.is_empty() { "one axis".to_owned() } else { format!("rows of {lengths:?}") };
-        Err(self.fault(&format!("is of shape {:?}; it must have {wanted}", self.shape)))
-    }
-
-    fn chunks<const N: usize>(&self) -> Result<impl Iterator<Item = [u8; N]>, NpzError> {
-        let values = self.shape.iter().try_fold(1_usize, |n, &length| n.checked_mul(length));
-        let (chunks, rest) = self.data.as_chunks::<N>();
-        if values == Some(chunks.len()) && rest.is_empty() {
-            return Ok(chunks.iter().copied());
-        }
-        let problem =
-            format!("has {} bytes, which is not what its shape {:?} takes", self.data.len(), self.shape);
-        Err(self.fault(&problem))
-    }
-
-    /// Values of an integer array; each must fit 32 bits and not be negative.
-    fn unsigned(&self) -> Result<Vec<u32>, NpzError> {
-        let range = |_| self.fault("has a value that is negative or does not fit 32 bits");
-        match self.dtype.as_str() {
-            "<i4" => self.chunks()?.map(|b| u32::try_from(i32::from_le_bytes(b)).map_err(range)).collect(),
-            "<u4" => Ok(self.chunks()?.map(u32::from_le_bytes).collect()),
-            "<i8" => self.chunks()?.map(|b| u32::try_from(i64::from_le_bytes(b)).map_err(range)).collect(),
-            "<u8" => self.chunks()?.map(|b| u32::try_from(u64::from_le_bytes(b)).map_err(range)).collect(),
-            other => {
-                Err(self.fault(&format!("is of type {other}; it must be int32 or int64, little-endian")))
-            }
-        }
-    }
-
-    fn floats(&self) -> Result<Vec<f32>, NpzError> {
-        match self.dtype.as_str() {
-            "<f4" => Ok(self.chunks()?.map(f32::from_le_bytes).collect()),
-            "<f8" => Ok(self.chunks()?.map(|b| f64::from_le_bytes(b) as f32).collect()),
-            other => {
-                Err(self.fault(&format!("is of type {other}; it must be float32 or float64, little-endian")))
-            }
-        }
-    }
 }

@@ -120,7 +120,8 @@ impl Model {
         options: &ReshapeOptions,
     ) -> Result<(Vec<u8>, ReshapeReport), WriteError> {
         let Document::Gltf(document) = &self.document else { return Err(WriteError::NoRig) };
-        let rig = Rig::new(document, &self.positions_in_file())?;
+        let rest = self.positions_in_file();
+        let rig = Rig::new(document, &rest)?;
         let n = self.positions.len() + rig.bound().len();
         let turned = |by: &[DVec3]| -> Result<Vec<DVec3>, WriteError> {
             if by.len() != n {
@@ -131,9 +132,9 @@ impl Model {
             }
             Ok(by.iter().map(|&by| self.up.vector_turned_back(by)).collect())
         };
-        let by = rig.all_moved(turned(by)?);
-        let all_moved = |(_, by): &(String, Vec<DVec3>)| Ok(rig.all_moved(turned(by)?));
-        let by_poses = poses.iter().map(all_moved).collect::<Result<Vec<_>, WriteError>>()?;
+        let all_moved = |by: &[DVec3]| Ok(rig.held(&options.parts, &rest, rig.all_moved(turned(by)?)));
+        let by: Vec<DVec3> = all_moved(by)?;
+        let by_poses = poses.iter().map(|(_, by)| all_moved(by)).collect::<Result<Vec<_>, WriteError>>()?;
         let poses: Vec<Named<'_>> =
             poses.iter().zip(&by_poses).map(|((name, _), by)| Named { name, by }).collect();
         let mut is_outside = vec![false; n];

@@ -102,9 +102,10 @@ fn other_formats_are_named_with_a_way_out() {
     for (name, bytes, expected) in [
         ("a.obj", &b""[..], "empty"),
         ("a.zip", b"PK\x03\x04rest", "zip archive: unpack it"),
-        ("a.stl", b"solid x", "export it as GLB or OBJ"),
+        ("a.fbx", b"Kaydara FBX", "export it as GLB, OBJ, PLY or STL"),
+        ("a.stl", b"solid x", "damaged: it has no facets"),
         ("a.glb", b"glXF", "not a GLB"),
-        ("a.ply", b"ply\nformat", "PLY"),
+        ("a.ply", b"solid", "not a PLY"),
     ] {
         let message = read(name, bytes).unwrap_err().to_string();
         assert!(message.contains(expected), "{message}");

@@ -1,8 +1,9 @@
 //! Weights, and models posed by them.
 
-use cagework_core::BindOptions;
-use cagework_core::bind as bind_points;
+use cagework_core::bind::{BindError, Binding, SolvedCage};
 use cagework_core::deform::deform_bound;
+use cagework_core::{BindOptions, bind as bind_points};
+use glam::Vec3;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -46,13 +47,50 @@ pub(crate) fn bind<'py>(
     points: &Bound<'py, PyAny>,
     cage: &Bound<'py, Cage>,
     options: Option<&Bound<'py, PyDict>>,
-) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+) -> PyResult<Returned<'py>> {
     let (options, controls) = (bind_options(options)?, cage.get().controls());
     let points = arrays::points("points", points, None)?;
     let positions = points.as_slice();
     let options = BindOptions { held: size_of_val(positions) as u64, ..options };
     let binding = work::run(py, |progress| bind_points(positions, controls, &options, progress))?;
-    let binding = binding.map_err(error::bind)?;
+    returned(py, binding.map_err(error::bind)?)
+}
+
+/// Binds several models to one cage with one solve: bind_many(models, cage, **options) -> list of (weights, report)
+///
+/// models: a list of points [n_points, 3]: clothes, levels of detail, variants. What is returned for each is what bind returns, to
+/// the bit, at the cost of sampling alone; times in a report are of the model alone. The fields of all columns are kept meanwhile,
+/// for which half of memory_limit is there. Options and errors are those of bind.
+///
+/// Raises BindError, OptionError, ArrayError; Ctrl-C ends it.
+#[pyfunction]
+#[pyo3(signature = (models, cage, **options))]
+#[expect(clippy::needless_pass_by_value, reason = "a list of Python becomes a vector")]
+pub(crate) fn bind_many<'py>(
+    py: Python<'py>,
+    models: Vec<Bound<'py, PyAny>>,
+    cage: &Bound<'py, Cage>,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Vec<Returned<'py>>> {
+    let (options, controls) = (bind_options(options)?, cage.get().controls());
+    let points: Vec<_> =
+        models.iter().map(|points| arrays::points("points", points, None)).collect::<PyResult<_>>()?;
+    let positions: Vec<_> = points.iter().map(arrays::Points::as_slice).collect();
+    let all = work::run(py, |progress| {
+        let solved = SolvedCage::new(controls, &options, progress)?;
+        let held = |of: &[Vec3]| size_of_val(of) as u64;
+        positions
+            .iter()
+            .map(|of| solved.bind(of, (held(of), 0), progress))
+            .collect::<Result<Vec<_>, BindError>>()
+    })?;
+    all.map_err(error::bind)?.into_iter().map(|binding| returned(py, binding)).collect()
+}
+
+/// Weights and report for Python.
+type Returned<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
+
+fn returned(py: Python<'_>, binding: Binding) -> PyResult<Returned<'_>> {
     let report = dictionary(py, &binding.report)?;
     report.set_item("outside", arrays::outside_of(py, &binding.outside)?)?;
     Ok((arrays::matrix_of(py, binding.weights)?, report))

@@ -21,7 +21,7 @@ use pyo3::pymodule;
 #[pyo3(name = "_native")]
 mod native {
     #[pymodule_export]
-    use crate::bind::{bind, deform};
+    use crate::bind::{bind, bind_many, deform};
     #[pymodule_export]
     use crate::cage::{Cage, check_cage, generate_cage};
     #[pymodule_export]

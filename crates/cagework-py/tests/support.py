@@ -85,7 +85,7 @@ def rigged_glb(radius=0.3):
         data += bytes(-len(data) % 4)
     at = {name: k for k, name in enumerate(arrays)}
     attributes = {"POSITION": at["positions"], "JOINTS_0": at["joints"], "WEIGHTS_0": at["weights"]}
-    primitive = {"attributes": attributes, "indices": at["indices"], "targets": [{"POSITION": at["target"]}]}
+    primitive = {"attributes": attributes, "material": 0, "indices": at["indices"], "targets": [{"POSITION": at["target"]}]}
     clip = {
         "name": "bend",
         "samplers": [{"input": at["times"], "output": at["turns"]}],
@@ -95,7 +95,8 @@ def rigged_glb(radius=0.3):
         "asset": {"version": "2.0"},
         "scene": 0,
         "scenes": [{"nodes": [0, 1]}],
-        "nodes": [{"mesh": 0, "skin": 0}, {"children": [2]}, {"translation": [0, 0, 0.5]}],
+        "nodes": [{"mesh": 0, "skin": 0}, {"children": [2]}, {"name": "arm", "translation": [0, 0, 0.5]}],
+        "materials": [{"name": "skin"}],
         "meshes": [{"primitives": [primitive]}],
         "skins": [{"joints": [1, 2], "inverseBindMatrices": at["bind"]}],
         "animations": [clip],

@@ -77,6 +77,16 @@ def test_pull_poses_the_cage_as_the_command_does(model, cage, tmp_path):
     assert np.abs((weights @ posed)[top] - to).max() < 0.01
 
 
+def test_models_bound_together_are_bound_as_alone_by_one_solve(model, cage):
+    models = [model.vertices, (model.vertices * 0.9).astype(np.float32)]
+    together = cw.bind_many(models, cage, grid=24)
+    for points, (weights, report) in zip(models, together):
+        alone, said = cw.bind(points, cage, grid=24)
+        assert weights.data.tobytes() == alone.data.tobytes() and np.array_equal(weights.indices, alone.indices)
+        assert report["rest_error"] == said["rest_error"] and report["timings_ms"]["solve"] == 0.0
+    assert cw.bind_many([], cage) == []
+
+
 def test_smooth_cages_bind_to_their_surface(model, tmp_path):
     cage = cw.generate_cage(model.vertices, model.faces, target=40, smooth=2)
     cage.save(tmp_path / "cage.obj")

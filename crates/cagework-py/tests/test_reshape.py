@@ -20,7 +20,12 @@ def rigged(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("options", "line"),
-    [({}, ""), ({"joints": "turn"}, "--joints turn"), ({"joints": "stay", "keep_travel": True}, "--joints stay --keep-travel")],
+    [
+        ({}, ""),
+        ({"joints": "turn"}, "--joints turn"),
+        ({"joints": "stay", "keep_travel": True}, "--joints stay --keep-travel"),
+        ({"mask": {"skin": 0.5}, "rigid": ["arm"]}, "--mask skin=0.5 --rigid arm"),
+    ],
 )
 def test_bytes_of_a_rigged_model_are_those_of_the_command(rigged, options, line):
     folder, cage = rigged

@@ -1,8 +1,8 @@
 //! What JavaScript asks for: the option types of contract.ts.
 
-use cagework_core::BindOptions;
 use cagework_core::cage_gen::{CageOptions, Shape, Symmetry};
 use cagework_core::options::{Backend, Solver};
+use cagework_core::{BindOptions, Parts};
 use cagework_gpu::render::Theme;
 use cagework_io::{Joints, ReshapeOptions};
 use serde::de::DeserializeOwned;
@@ -286,7 +286,8 @@ impl RigAsked {
             JointsAsked::Stay => Joints::Stay,
             JointsAsked::Turn => Joints::Turn,
         };
-        ReshapeOptions { joints, keep_travel: self.keep_travel, rigid: self.rigid.clone() }
+        let (keep_travel, rigid) = (self.keep_travel, self.rigid.clone());
+        ReshapeOptions { joints, keep_travel, rigid, parts: Parts::default() }
     }
 }
 

@@ -1,6 +1,6 @@
 /** Files out of the page. */
 
-import type { NamedFile } from "../contract";
+import type { ModelFormat, NamedFile } from "../contract";
 import { stem } from "../format";
 import { fittingPoses, rigOf } from "../state";
 import { sentence } from "../strings";
@@ -9,7 +9,11 @@ import { loadLattice } from "./clips";
 import { attempt, type Context } from "./context";
 import type { Project } from "./project";
 
-export type ExportKind = "glb" | "poses" | "cage" | "controls" | "weights" | "picture" | "project";
+export type ExportKind = "glb" | "shape" | "poses" | "cage" | "controls" | "weights" | "picture" | "project";
+
+/** Formats of a shape without anything else. */
+export const SHAPE_FORMATS = ["obj", "ply", "stl"] as const satisfies readonly ModelFormat[];
+export type ShapeFormatName = (typeof SHAPE_FORMATS)[number];
 
 export interface Exports {
   save(kind: ExportKind): Promise<void>;
@@ -17,6 +21,8 @@ export interface Exports {
   share(): Promise<void>;
   /** Pixels of the picture for each of the view, and whether it shows the model alone. */
   pictureOf(scale: number, alone: boolean): void;
+  /** The format of the next shape. */
+  shapeIn(format: ShapeFormatName): void;
 }
 
 /** Largest side of a picture, pixels. */
@@ -25,12 +31,15 @@ const LONGEST_SIDE = 8192;
 export function createExports(ctx: Context, project: Project): Exports {
   let scale = 2;
   let alone = false;
+  let format: ShapeFormatName = SHAPE_FORMATS[0];
 
   const bytesOf = (kind: Exclude<ExportKind, "picture">): Uint8Array => {
     const { engine } = ctx.session();
     switch (kind) {
       case "glb":
         return engine.exportGlb(rigOf(ctx.store.get()), ctx.store.get().clip.clip ?? 0);
+      case "shape":
+        return engine.exportShape(format);
       case "poses": {
         const poses = fittingPoses(ctx.store.get());
         return engine.exportPoses(
@@ -52,6 +61,9 @@ export function createExports(ctx: Context, project: Project): Exports {
     }
   };
 
+  const suffix = (kind: Exclude<ExportKind, "project">): string =>
+    kind === "shape" ? `-posed.${format}` : SUFFIX[kind];
+
   const picture = () => {
     const { width, height } = ctx.viewport();
     const fit = Math.min(scale, LONGEST_SIDE / Math.max(width, height, 1));
@@ -64,7 +76,7 @@ export function createExports(ctx: Context, project: Project): Exports {
       await attempt(ctx, T.failed.write, async () => {
         if (kind === "glb") await loadLattice(ctx);
         const blob = kind === "picture" ? await picture() : new Blob([new Uint8Array(bytesOf(kind))]);
-        const full = kind === "project" ? project.fileName() : `${name}${SUFFIX[kind]}`;
+        const full = kind === "project" ? project.fileName() : `${name}${suffix(kind)}`;
         // A VRM stays one.
         const isVrm =
           /\.vrm$/i.test(ctx.store.get().model?.name ?? "") && (kind === "glb" || kind === "poses");
@@ -89,6 +101,9 @@ export function createExports(ctx: Context, project: Project): Exports {
     pictureOf(size, isAlone) {
       [scale, alone] = [size, isAlone];
     },
+    shapeIn(chosen) {
+      format = chosen;
+    },
   };
   return exports;
 }
@@ -105,7 +120,7 @@ export async function copyLink(ctx: Context, link: string, done: string): Promis
   }
 }
 
-const SUFFIX: Record<Exclude<ExportKind, "project">, string> = {
+const SUFFIX: Record<Exclude<ExportKind, "project" | "shape">, string> = {
   glb: "-posed.glb",
   poses: "-poses.glb",
   cage: "-cage.obj",

@@ -436,7 +436,7 @@ message: string, count: number, fix: Fix | null, };
 /**
  * Format of a model's file.
  */
-export type ModelFormat = "obj" | "gltf";
+export type ModelFormat = "obj" | "gltf" | "ply" | "stl";
 /**
  * The axis that points up in a file. Everything that is not in a file has Y up: a file with Z up is turned by 90
  * degrees about x when it is read, and back when it is written. Both are exact.

@@ -1,7 +1,7 @@
 /** Step 5: files to take along, each with a sentence on what it is good for. */
 
 import { useEffect, useState } from "preact/hooks";
-import type { ExportKind } from "../actions/exports";
+import { type ExportKind, SHAPE_FORMATS, type ShapeFormatName } from "../actions/exports";
 import type { App } from "../app";
 import { type AppState, fittingPoses, rigOf } from "../state";
 import { T } from "../words";
@@ -12,6 +12,7 @@ import { Privacy } from "./model";
 
 const ITEMS: readonly (readonly [ExportKind, IconName])[] = [
   ["glb", "model"],
+  ["shape", "shape"],
   ["poses", "layers"],
   ["cage", "cage"],
   ["controls", "bone"],
@@ -69,6 +70,7 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
       </button>
       {kind === "picture" && <PictureOptions app={app} />}
       {kind === "glb" && <RigExport app={app} />}
+      {kind === "shape" && <ShapeFormat app={app} />}
     </li>
   );
 }
@@ -88,6 +90,21 @@ function RigExport({ app }: { app: App }) {
         onChange={(on) => app.clips.rig({ plain: !on })}
       />
       {!rigOptions.plain && <RigChoices app={app} />}
+    </div>
+  );
+}
+
+function ShapeFormat({ app }: { app: App }) {
+  const [format, setFormat] = useState<ShapeFormatName>(SHAPE_FORMATS[0]);
+  useEffect(() => app.exports.shapeIn(format), [app, format]);
+  return (
+    <div class="export-option">
+      <Segments
+        label={T.exports.format}
+        choices={SHAPE_FORMATS.map((value) => ({ value, label: value.toUpperCase() }))}
+        value={format}
+        onChange={setFormat}
+      />
     </div>
   );
 }

@@ -37,6 +37,7 @@ import {
   RotateCw,
   Save,
   Scaling,
+  Shapes,
   Share2,
   Signpost,
   Slash,
@@ -60,6 +61,7 @@ import { h } from "preact";
 const ICONS = {
   model: Box,
   cage: Hexagon,
+  shape: Shapes,
   bind: Link2,
   pose: PersonStanding,
   export: Upload,

@@ -40,6 +40,7 @@ it("each file has the model's name, and its size is said", async () => {
     exportGlb: () => new Uint8Array(2000),
     rigNotices: () => ["3 of 4 joints moved"],
     exportCage: () => Uint8Array.of(1),
+    exportShape: (format: string) => new TextEncoder().encode(format),
   });
   await exports.save("glb");
   await exports.save("cage");
@@ -48,6 +49,10 @@ it("each file has the model's name, and its size is said", async () => {
   store.set({ model: { ...MODEL, name: "someone.vrm" } });
   await exports.save("glb");
   expect(downloads.at(-1), "a VRM stays one").toBe("someone-posed.vrm");
+  exports.shapeIn("stl");
+  await exports.save("shape");
+  expect(downloads.at(-1), "its shape is another file").toBe("someone-posed.stl");
+  expect(said.at(-1)).toContain("(3 B)");
 });
 
 it("an export that fails is a problem, and no file", async () => {

@@ -1,7 +1,7 @@
 //! How a pulled model looks, in numbers.
 
-use cagework_core::mesh::TriMesh;
 use cagework_core::pull::Drag;
+use cagework_io::Model;
 use glam::Vec3;
 use serde::Serialize;
 
@@ -20,7 +20,7 @@ pub(super) struct Stretches {
 }
 
 /// Of a model's edges, each once.
-pub(super) fn stretches(mesh: &TriMesh, posed: &[Vec3]) -> Stretches {
+pub(super) fn stretches(mesh: &Model, posed: &[Vec3]) -> Stretches {
     let mut edges: Vec<[u32; 2]> = mesh
         .triangles
         .iter()

@@ -7,19 +7,15 @@ use std::path::Path;
 use std::time::Instant;
 
 use cagework_core::deform::deform_bound;
-use cagework_core::mesh::TriMesh;
-use cagework_core::progress::Silent;
-use cagework_core::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
-use cagework_core::{BindOptions, InnerControls, bind};
-use cagework_io::{SavedWeights, shown, write_inner_controls};
+use cagework_core::pull::{Drag, DragOptions, Grip, Handle};
+use cagework_io::shown;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use crate::args::{CageSource, PullArgs};
-use crate::deform::load_weights;
+use crate::args::PullArgs;
 use crate::error::CliError;
-use crate::files::{check_outputs, json, print, shown_path, write};
-use crate::load::{load_cage, load_model};
+use crate::files::{json, print};
+use crate::pose::{Bound, pull, write_pose};
 use job::Job;
 use measure::{Stretches, far_mean, stretches};
 
@@ -55,48 +51,21 @@ struct Pulled {
 ///
 /// # Errors
 /// When a file cannot be read or written, files do not belong together, or the job asks for what there is not.
-pub(crate) fn run(args: &PullArgs, as_json: bool) -> Result<(), CliError> {
-    let job = Job::read(&args.job)?;
-    let mut inputs = vec![args.mesh.as_path(), args.weights.as_path(), args.job.as_path()];
-    inputs.extend(job.start.as_deref());
-    if let CageSource::File(path) = &args.cage {
-        inputs.push(path);
-    }
-    inputs.extend(args.controls.controls.as_deref());
-    let output = &args.output.path;
-    let outputs: Vec<&Path> =
-        std::iter::once(output).chain(&args.save_controls).map(std::path::PathBuf::as_path).collect();
-    check_outputs(&outputs, &inputs)?;
-    let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
-    let cage = load_cage(&args.cage, &model, args.read.memory, &args.controls)?;
-    let controls = cage.controls();
-    let SavedWeights { weights, outside, inner_controls, .. } =
-        load_weights(&args.weights, &model, &cage.cage, args.read.memory)?.of_vertices();
+pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
+    let job = Job::read(&given.job)?;
+    let inputs = [Some(given.job.as_path()), job.start.as_deref()];
+    let args = &given.pose;
+    let Bound { model, cage, weights, outside } = Bound::load(args, inputs.into_iter().flatten())?;
+    let (controls, output) = (cage.controls(), &args.output.path);
     let inner = &controls.rest()[cage.cage.n_vertices()..];
-    if inner_controls != inner {
-        return Err(CliError::Mismatch {
-            message: format!(
-                "{}: was bound with {} controls inside the cage, but {} are given, or they are elsewhere",
-                shown_path(&args.weights),
-                inner_controls.len(),
-                inner.len()
-            ),
-            hint: "give the --controls and --smooth of `cagework bind`",
-        });
-    }
     let start = match &job.start {
         Some(path) => [cage.load_pose(path)?.as_slice(), inner].concat(),
         None => controls.rest().to_vec(),
     };
-    let wrong = |e| CliError::file(&args.job, e);
+    let wrong = |e| CliError::file(&given.job, e);
 
     let begun = Instant::now();
-    let mesh = TriMesh { positions: model.positions.clone(), triangles: model.triangles.clone() };
-    let probes = Probes::new(&mesh, controls).map_err(wrong)?;
-    let options =
-        BindOptions { grid: args.grid, memory_limit: args.read.memory.bytes(), ..BindOptions::default() };
-    let of_probes = bind(probes.points(), controls, &options, &Silent)?.weights;
-    let pull = Pull::new(&mesh, controls, probes, &of_probes).map_err(wrong)?;
+    let pull = pull(&model, controls, args)?;
     let precompute_ms = since(begun);
 
     let begun = Instant::now();
@@ -124,12 +93,7 @@ pub(crate) fn run(args: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let after = deformed(&cage_pose);
     let way = grabbed.iter().zip(&to).map(|(a, b)| a.distance(*b)).fold(f64::MIN_POSITIVE, f64::max);
     let apart = |(a, b): (&Vec3, &Vec3)| f64::from(a.distance(*b));
-    let (of_cage, of_inner) = cage_pose.split_at(cage.cage.n_vertices());
-    write(output, &cage.write_pose(of_cage, &args.output)?)?;
-    if let (Some(path), Some(inner)) = (&args.save_controls, cage.inner()) {
-        let positions = model.up().turned_back(of_inner).into_owned();
-        write(path, &write_inner_controls(&InnerControls { positions, ..inner.clone() }))?;
-    }
+    write_pose(&model, &cage, &cage_pose, args)?;
     let done = Pulled {
         output: output.display().to_string(),
         samples: pull.n_samples(),
@@ -142,7 +106,7 @@ pub(crate) fn run(args: &PullArgs, as_json: bool) -> Result<(), CliError> {
         error: drag.error(),
         lag: after.iter().zip(&at_stop).map(apart).fold(0.0, f64::max) / way,
         settle_frames,
-        stretches: stretches(&mesh, &after),
+        stretches: stretches(&model, &after),
         far_mean: far_mean(&drag, &before, &after).map(|mean| mean / way),
         notices: model.notices,
     };

@@ -7,12 +7,15 @@ mod bench_and_demo;
 mod bind;
 mod cage_and_info;
 mod cages;
+mod columns;
 mod controls;
 mod deform;
 mod evaluate;
+mod fit;
 #[cfg(unix)]
 mod outputs;
 mod pull;
+mod refit;
 mod render;
 mod rigs;
 mod siblings;

@@ -7,7 +7,7 @@ use predicates::str::contains;
 use crate::support::Sandbox;
 
 /// The humanoid and a cage of it, bound, and the cage with everything above the hips wider.
-fn bound() -> Sandbox {
+pub(crate) fn bound() -> Sandbox {
     let sandbox = Sandbox::new();
     let sample = samples::build("humanoid").unwrap();
     let glb = write_mesh_glb("humanoid", &sample.mesh, &sample.colours, sample.rig.as_ref()).unwrap();
@@ -60,9 +60,10 @@ fn a_rigged_model_keeps_its_rig_and_an_unmoved_one_its_bytes() {
 #[test]
 fn what_a_rig_needs_is_said() {
     let sandbox = bound();
-    sandbox.run(&format!("{DEFORM} --pose wide.obj --rigid hat -o out.glb")).failure().stderr(contains(
-        "there is no node 'hat' below a joint to keep rigid: see the names with cagework info",
-    ));
+    sandbox
+        .run(&format!("{DEFORM} --pose wide.obj --rigid hat -o out.glb"))
+        .failure()
+        .stderr(contains("no part is called 'hat'; there are material:humanoid, node:humanoid, joint:hips"));
     sandbox
         .run("cage humanoid.glb --around-clip Run -o run.obj")
         .failure()
@@ -76,6 +77,40 @@ fn what_a_rig_needs_is_said() {
         .failure()
         .stderr(contains("the weights have 0 points of the model's rig, but it has 112"));
     sandbox.run(&format!("{DEFORM} --pose wide.obj --static -o out.glb")).success();
+}
+
+#[test]
+fn parts_stay_or_keep_their_shape() {
+    let sandbox = bound();
+    let read = |bytes: &[u8]| Model::read("model.glb", bytes, &mut |_| None).unwrap();
+    let rest = read(&sandbox.read("humanoid.glb"));
+    let joint = rest.part_names().into_iter().find(|name| name.contains("head")).unwrap();
+    let held = rest.select(&joint).unwrap();
+    assert!(held.len() > 100 && held.len() < rest.positions.len() / 2);
+    let run = |options: &str| {
+        sandbox.run(&format!("{DEFORM} --pose wide.obj {options} -o out.glb")).success();
+        read(&sandbox.read("out.glb")).positions
+    };
+    let bent = run("");
+    let off = |a: &[glam::Vec3], b: &[glam::Vec3]| {
+        held.iter().map(|&v| a[v as usize].distance(b[v as usize])).fold(0.0, f32::max)
+    };
+    assert!(off(&bent, &rest.positions) > 0.01);
+    assert!(off(&run(&format!("--mask {joint}")), &rest.positions) <= 1e-6);
+    let half: Vec<_> = bent.iter().zip(&rest.positions).map(|(a, b)| 0.5 * (*a + *b)).collect();
+    assert!(off(&run(&format!("--mask {joint}=0.5")), &half) <= 1e-6);
+    for options in ["", "--static"] {
+        let rigid = run(&format!("--rigid {joint} {options}"));
+        for pair in held.windows(2).step_by(7) {
+            let [before, after] =
+                [&rest.positions, &rigid].map(|at| at[pair[0] as usize].distance(at[pair[1] as usize]));
+            assert!((before - after).abs() <= 2e-6, "{options}: {before} {after}");
+        }
+    }
+    sandbox
+        .run(&format!("{DEFORM} --pose wide.obj --mask {joint}=2 -o out.glb"))
+        .failure()
+        .stderr(contains("the amount 2 is not between 0, which follows the cage, and 1, which stays"));
 }
 
 #[test]

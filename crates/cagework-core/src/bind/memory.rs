@@ -76,21 +76,18 @@ impl Needed {
     }
 }
 
-/// Bytes that a bind will need at once. `threads` 0: fields are kept elsewhere.
+/// Bytes that a bind of `n_columns` of the controls will need at once. `threads` 0: fields are kept elsewhere.
 pub(super) fn estimate(
     controls: Controls<'_>,
     grid: &Grid,
     vertices: Vertices,
     threads: usize,
+    n_columns: usize,
     options: &BindOptions,
 ) -> Needed {
-    let (volume, area) = volume_and_area(controls.surface());
-    let cell = grid.cell;
     let n_cells = grid.n_cells() as f64;
-    let n_unknowns = (volume / (cell.x * cell.y * cell.z)).min(n_cells);
-    let n_cut = (CUT_PER_AREA * area / (cell.x * cell.y * cell.z).powf(2.0 / 3.0)).min(n_cells);
-    let n_columns = controls.n_controls() as f64;
-    let n_batches = (n_columns / LANES as f64).ceil();
+    let (n_unknowns, n_cut) = unknowns(controls, grid);
+    let n_batches = n_columns.div_ceil(LANES) as f64;
     let row = size_of::<Row>() as f64;
     // A thread without a batch has no fields.
     let threads = threads.min(n_batches as usize);
@@ -117,7 +114,7 @@ pub(super) fn estimate(
         }
     };
     let Vertices { rows, points } = vertices;
-    let bytes_of = |n| weights_bytes(n, controls.n_controls(), options.sparsify) as f64;
+    let bytes_of = |n| weights_bytes(n, n_columns, options.sparsify) as f64;
     let blocks = points as f64 * n_batches * row;
     // Rows of points that several vertices share are copied once all of them are there.
     let copies = if rows > points { bytes_of(rows) } else { blocks };
@@ -127,6 +124,20 @@ pub(super) fn estimate(
     let of_grid = voxels * (1.0 + COARSER) + lines + stencils * (1.0 + 2.0 * COARSER) + fields;
     let bytes = options.held as f64 + of_points + of_grid;
     Needed { bytes: bytes as u64, of_points: of_points as u64 }
+}
+
+/// Bytes of the fields of all columns.
+pub(super) fn field_bytes(controls: Controls<'_>, grid: &Grid) -> u64 {
+    let n_batches = controls.n_controls().div_ceil(LANES) as f64;
+    (unknowns(controls, grid).0 * n_batches * size_of::<Row>() as f64) as u64
+}
+
+/// (cells to be solved for, those of them that the cage cuts)
+fn unknowns(controls: Controls<'_>, grid: &Grid) -> (f64, f64) {
+    let (volume, area) = volume_and_area(controls.surface());
+    let (cell, n_cells) = (grid.cell, grid.n_cells() as f64);
+    let of_cell = cell.x * cell.y * cell.z;
+    ((volume / of_cell).min(n_cells), (CUT_PER_AREA * area / of_cell.powf(2.0 / 3.0)).min(n_cells))
 }
 
 /// Volume enclosed (divergence theorem) and area of the cage.

@@ -1,14 +1,18 @@
 //! From mesh and cage to weights: the one call that runs every stage.
 
+mod many;
 mod memory;
 mod outside;
+mod parts;
 pub mod pipeline;
 mod solving;
 mod voxels;
 mod watch;
 
+pub use many::SolvedCage;
 pub use memory::weights_bytes;
 pub use outside::Misfit;
+pub use parts::{Merge, Part, PartError, bind_columns};
 pub use watch::Watch;
 
 use glam::Vec3;
@@ -132,5 +136,6 @@ pub fn estimate_memory<'a>(
     let controls = controls.into();
     let grid = voxels::Voxels::grid(controls.surface(), options);
     let vertices = memory::Vertices { rows: n_points, points: n_points };
-    Ok(memory::estimate(controls, &grid, vertices, options.threads.max(1), options).bytes)
+    let (threads, n_columns) = (options.threads.max(1), controls.n_controls());
+    Ok(memory::estimate(controls, &grid, vertices, threads, n_columns, options).bytes)
 }

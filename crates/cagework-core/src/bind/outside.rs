@@ -1,12 +1,16 @@
-//! A cage that holds nothing of the model: told before it is solved for, with what is likely to be wrong.
+//! Vertices that no cage holds: refused before anything is solved for, with what is likely to be wrong.
 
 use std::fmt;
 
 use glam::{DVec3, Vec3};
 
 use super::BindError;
+use super::pipeline::Points;
 use crate::cage::Cage;
+use crate::controls::Controls;
 use crate::mesh::Bounds;
+use crate::options::{BindOptions, OutsidePolicy};
+use crate::sample::{Outside, Stencils};
 
 /// Cage and model that differ in size by this factor or more are taken to be in different units, of which feet and metres differ
 /// least; a cage is seldom twice as large as its model.
@@ -61,9 +65,37 @@ fn about(x: f64) -> String {
     if (0.01..1e4).contains(&rounded) { rounded.to_string() } else { format!("{rounded:e}") }
 }
 
+/// Checks that the cage holds some of a model, and, if the options ask for it, all.
+///
+/// # Errors
+/// [`BindError::NoneInside`], [`BindError::Outside`].
+pub(super) fn refuse_outside(
+    controls: Controls<'_>,
+    mesh: &Points<'_>,
+    stencils: &Stencils,
+    options: &BindOptions,
+) -> Result<(), BindError> {
+    let positions = mesh.positions;
+    let cage = controls.surface();
+    let near_cage = |o: &&Outside| controls.cage_face(cage.face_of_facet()[o.triangle as usize]).is_some();
+    let outside = stencils.outside.iter().filter(near_cage);
+    if outside.clone().count() == stencils.len() {
+        return Err(none_inside(cage, positions));
+    }
+    let n_vertices = positions.len().saturating_sub(options.extra_points);
+    let vertices = outside.map(|o| mesh.welded.first[o.vertex as usize]);
+    let mut vertices = vertices.filter(|&v| (v as usize) < n_vertices);
+    match (options.outside, vertices.next()) {
+        (OutsidePolicy::Refuse, Some(first)) => {
+            Err(BindError::Outside { count: 1 + vertices.count() as u32, first })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// [`BindError::NoneInside`]: the cage holds none of the model, and nothing would follow it but by its closest point. `positions`,
 /// of which there are some: of the file.
-pub(super) fn none_inside(cage: &Cage, positions: &[Vec3]) -> BindError {
+fn none_inside(cage: &Cage, positions: &[Vec3]) -> BindError {
     let model = Bounds::of(positions).unwrap_or(cage.bounds());
     BindError::NoneInside { vertices: positions.len(), misfit: Misfit::of(cage.bounds(), model) }
 }

@@ -4,6 +4,7 @@
 //! [`Solved`], then [`Prepared::finish`].
 
 use std::cell::LazyCell;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
@@ -12,7 +13,7 @@ use crate::controls::Controls;
 use crate::deform::{OutsideVertex, triangle_frame};
 use crate::grid::Grid;
 use crate::mesh::{Weld, weld};
-use crate::options::{Backend, BindOptions, Method, OutsidePolicy};
+use crate::options::{Backend, BindOptions, Method};
 use crate::progress::{Progress, Stage};
 use crate::report::{BindReport, MemoryBytes, Timings, WeightStats};
 use crate::sample::{ClosestOnCage, Outside, Stencils};
@@ -21,11 +22,12 @@ use crate::solve::rows::Row;
 use crate::solve::stop::SolveReport;
 use crate::team::{Team, VERTEX_RUN};
 
-use super::outside::none_inside;
+use super::memory::{Vertices, estimate};
+use super::outside::refuse_outside;
 use super::solving::solve_and_sample;
-use super::voxels::Voxels;
+use super::voxels::{Gridded, Voxels};
 use super::watch::Watch;
-use super::{BindError, Binding, memory};
+use super::{BindError, Binding};
 
 /// Where the fields of a solve live: what counts towards the limit on working memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,17 +40,42 @@ pub enum FieldsOn {
 
 /// A bind up to the solve: the geometry of grid and mesh.
 pub struct Prepared<'a> {
-    positions: &'a [Vec3],
+    mesh: Points<'a>,
     controls: Controls<'a>,
     options: &'a BindOptions,
-    welded: Weld,
-    points: Vec<Vec3>,
-    team: Team,
-    voxels: Voxels,
+    pub(super) gridded: Arc<Gridded>,
     stencils: Stencils,
     estimated: u64,
     /// On the watcher's clock: the beginning, voxels made, stencils made.
     times_ms: [f64; 3],
+}
+
+/// The vertices of a model, and their different positions.
+pub(super) struct Points<'a> {
+    pub(super) positions: &'a [Vec3],
+    pub(super) welded: Weld,
+    points: Vec<Vec3>,
+}
+
+impl<'a> Points<'a> {
+    /// # Errors
+    /// When there are none, or one is not a finite number.
+    pub(super) fn new(positions: &'a [Vec3]) -> Result<Self, BindError> {
+        if positions.is_empty() {
+            return Err(BindError::EmptyMesh);
+        }
+        if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
+            return Err(BindError::NotFinite { vertex: vertex as u32 });
+        }
+        let welded = weld(positions);
+        let points = welded.first.iter().map(|&v| positions[v as usize]).collect();
+        Ok(Self { positions, welded, points })
+    }
+
+    /// How many there are of both.
+    pub(super) fn count(&self) -> Vertices {
+        Vertices { rows: self.positions.len(), points: self.points.len() }
+    }
 }
 
 /// The sampled columns and how the solve went.
@@ -80,8 +107,9 @@ pub(super) fn run(
 ) -> Result<Binding, BindError> {
     let watch = Watch::new(progress);
     let prepared = Prepared::new(positions, controls, options, FieldsOn::Host, &watch)?;
-    let solved =
-        solve_and_sample(&prepared.voxels.hierarchy, &prepared.stencils, options, &prepared.team, &watch)?;
+    let (hierarchy, team) = (prepared.hierarchy(), &prepared.gridded.team);
+    let all = 0..hierarchy.n_batches();
+    let solved = solve_and_sample(hierarchy, all, &prepared.stencils, options, team, &watch)?;
     prepared.finish(solved, &watch)
 }
 
@@ -97,42 +125,52 @@ impl<'a> Prepared<'a> {
         fields: FieldsOn,
         watch: &Watch<'_>,
     ) -> Result<Self, BindError> {
-        options.check()?;
-        if positions.is_empty() {
-            return Err(BindError::EmptyMesh);
-        }
-        if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
-            return Err(BindError::NotFinite { vertex: vertex as u32 });
-        }
-        let began = watch.now_ms();
-        let team = Team::new(options.threads);
-        let welded = weld(positions);
-        let points: Vec<Vec3> = welded.first.iter().map(|&v| positions[v as usize]).collect();
+        Self::for_columns(positions, controls, options, fields, controls.n_controls(), watch)
+    }
 
+    /// As [`Self::new`], with memory for so many of the columns.
+    pub(super) fn for_columns(
+        positions: &'a [Vec3],
+        controls: Controls<'a>,
+        options: &'a BindOptions,
+        fields: FieldsOn,
+        n_columns: usize,
+        watch: &Watch<'_>,
+    ) -> Result<Self, BindError> {
+        options.check()?;
+        let began = watch.now_ms();
+        let mesh = Points::new(positions)?;
+        let team = Team::new(options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
         let grid = Voxels::grid(controls.surface(), options);
         let field_threads = if fields == FieldsOn::Host { team.n_threads() } else { 0 };
-        let vertices = memory::Vertices { rows: positions.len(), points: points.len() };
-        let needed = memory::estimate(controls, &grid, vertices, field_threads, options);
-        needed.check(vertices, controls.n_controls(), options.memory_limit)?;
-        let estimated = needed.bytes;
-        let voxels = team.install(|| Voxels::new(controls, grid, options));
-        watch.report(Stage::Voxelize, 1.0, 0, None)?;
-        if voxels.hierarchy.levels[0].n_unknowns() == 0 && options.method == Method::Classic {
-            return Err(BindError::NoInterior { grid: options.grid });
-        }
-        let voxelized = watch.now_ms();
+        let needed = estimate(controls, &grid, mesh.count(), field_threads, n_columns, options);
+        needed.check(mesh.count(), n_columns, options.memory_limit)?;
+        let gridded = Arc::new(Gridded::new(controls, grid, options, team, watch)?);
+        Self::in_grid(mesh, controls, options, gridded, needed.bytes, began, watch)
+    }
 
-        let stencils = sampling_stencils(controls, &voxels, &points, &team, watch)?;
-        refuse_outside(controls, positions, &stencils, options, &welded)?;
+    /// Of a cage that is in its grid already. `estimated`: bytes; `began`: when, on the watcher's clock.
+    pub(super) fn in_grid(
+        mesh: Points<'a>,
+        controls: Controls<'a>,
+        options: &'a BindOptions,
+        gridded: Arc<Gridded>,
+        estimated: u64,
+        began: f64,
+        watch: &Watch<'_>,
+    ) -> Result<Self, BindError> {
+        let voxelized = watch.now_ms();
+        let stencils = sampling_stencils(controls, &gridded, &mesh.points, watch)?;
+        refuse_outside(controls, &mesh, &stencils, options)?;
         let times_ms = [began, voxelized, watch.now_ms()];
-        Ok(Self { positions, controls, options, welded, points, team, voxels, stencils, estimated, times_ms })
+        Ok(Self { mesh, controls, options, gridded, stencils, estimated, times_ms })
     }
 
     /// What is to be solved.
     #[must_use]
     pub fn hierarchy(&self) -> &Hierarchy {
-        &self.voxels.hierarchy
+        &self.gridded.voxels.hierarchy
     }
 
     /// Where the solution is to be sampled, one stencil per different position.
@@ -155,8 +193,8 @@ impl<'a> Prepared<'a> {
         };
         let is_outside = |vertex| self.stencils.is_outside(vertex);
         let blocks_bytes: usize = solved.blocks.iter().map(|b| size_of_val(b.as_slice())).sum();
-        let rows =
-            assemble(self.controls, &mut solved.blocks, &self.points, row_options, is_outside, &self.team);
+        let (points, team) = (&self.mesh.points, &self.gridded.team);
+        let rows = assemble(self.controls, &mut solved.blocks, points, row_options, is_outside, team);
         drop(std::mem::take(&mut solved.blocks));
         self.reported(rows, blocks_bytes, solved, sampled, watch)
     }
@@ -170,7 +208,8 @@ impl<'a> Prepared<'a> {
         sampled: f64,
         watch: &Watch<'_>,
     ) -> Result<Binding, BindError> {
-        let Self { positions, controls, options, welded, points, team, voxels, stencils, .. } = self;
+        let Self { mesh: Points { positions, welded, points }, controls, options, stencils, .. } = self;
+        let Gridded { team, voxels } = &*self.gridded;
         let [began, voxelized, stencils_made] = self.times_ms;
         let cage = controls.surface();
         let (rest_error, raw_error, weight_stats) = rows.statistics(f64::from(cage.diagonal()));
@@ -190,7 +229,7 @@ impl<'a> Prepared<'a> {
         let solve_ms = (sampled - stencils_made) * solved.solve_share;
         let level = &voxels.hierarchy.levels[0];
         let mut notices: Vec<String> = controls.cage().notices().iter().map(ToString::to_string).collect();
-        notices.extend(team.notice(options.threads).into_iter().chain(voxels.notices));
+        notices.extend(team.notice(options.threads).into_iter().chain(voxels.notices.iter().cloned()));
         notices.extend(notices_of(controls, &level.grid, options.grid));
         let is_vertex = |o: &&(u32, OutsideVertex)| (o.1.vertex as usize) < n_vertices;
         // Vertices inside of a control, or next to one, are not outside.
@@ -250,14 +289,13 @@ impl<'a> Prepared<'a> {
 /// Stencils of all points, in runs shared among threads.
 fn sampling_stencils(
     controls: Controls<'_>,
-    voxels: &Voxels,
+    gridded: &Gridded,
     points: &[Vec3],
-    team: &Team,
     watch: &Watch<'_>,
 ) -> Result<Stencils, BindError> {
-    let sampler = voxels.sampler(controls);
+    let sampler = gridded.voxels.sampler(controls);
     let runs: Vec<&[Vec3]> = points.chunks(VERTEX_RUN).collect();
-    let parts = team.share(
+    let parts = gridded.team.share(
         runs.len(),
         || (),
         |(), run| {
@@ -272,30 +310,6 @@ fn sampling_stencils(
         stencils.append(part);
     }
     Ok(stencils)
-}
-
-fn refuse_outside(
-    controls: Controls<'_>,
-    positions: &[Vec3],
-    stencils: &Stencils,
-    options: &BindOptions,
-    welded: &Weld,
-) -> Result<(), BindError> {
-    let cage = controls.surface();
-    let near_cage = |o: &&Outside| controls.cage_face(cage.face_of_facet()[o.triangle as usize]).is_some();
-    let outside = stencils.outside.iter().filter(near_cage);
-    if outside.clone().count() == stencils.len() {
-        return Err(none_inside(cage, positions));
-    }
-    let n_vertices = positions.len().saturating_sub(options.extra_points);
-    let vertices = outside.map(|o| welded.first[o.vertex as usize]);
-    let mut vertices = vertices.filter(|&v| (v as usize) < n_vertices);
-    match (options.outside, vertices.next()) {
-        (OutsidePolicy::Refuse, Some(first)) => {
-            Err(BindError::Outside { count: 1 + vertices.count() as u32, first })
-        }
-        _ => Ok(()),
-    }
 }
 
 /// Points that an offset keeps in place, ascending, and the facet near each: those outside the cage or inside of a control, and

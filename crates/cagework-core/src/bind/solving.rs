@@ -1,5 +1,6 @@
-//! Solve batch after batch, sample each and keep only the samples.
+//! Solve batch after batch, sample each and keep only the samples; or keep the fields, for many models.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::options::{BindOptions, Preconditioner, Solver};
@@ -20,56 +21,102 @@ use super::watch::Watch;
 /// Delta falls roughly by this factor from the first sweep to tau: for the progress bar only.
 const JACOBI_DECADES: f64 = 4.0;
 
-/// Solves all columns and samples them.
+/// Solves the columns of some batches and samples them. Jacobi, whose stop rule couples all columns, solves all batches.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub(super) fn solve_and_sample(
     hierarchy: &Hierarchy,
+    batches: Range<usize>,
     stencils: &Stencils,
     options: &BindOptions,
     team: &Team,
     watch: &Watch<'_>,
 ) -> Result<Solved, Cancelled> {
     if options.solver == Solver::Jacobi {
-        return jacobi_columns(hierarchy, stencils, options, team, watch);
+        let begin = watch.now_ms();
+        let (fields, mut solved) = jacobi_fields(hierarchy, options, team, watch)?;
+        let sampling = watch.now_ms();
+        solved.blocks = sample_fields(stencils, &fields, team);
+        let spent = Spent::default();
+        spent.add([begin, sampling, watch.now_ms()]);
+        solved.solve_share = spent.solve_share();
+        return Ok(solved);
     }
-    let n_batches = hierarchy.n_batches();
-    let rule = options.stop_rule().of_batch(n_batches);
+    let take = |batch, field: &[Row]| sample(stencils, batch, field);
+    let (blocks, solved) = solve_batches(hierarchy, batches, options, team, watch, take)?;
+    Ok(Solved { blocks, ..solved })
+}
+
+/// Solves all columns and keeps their fields, `[n_batches][n_rows]`, to be sampled by [`sample_fields`] again and again.
+///
+/// # Errors
+/// [`Cancelled`].
+pub(super) fn solve_fields(
+    hierarchy: &Hierarchy,
+    options: &BindOptions,
+    team: &Team,
+    watch: &Watch<'_>,
+) -> Result<(Vec<Vec<Row>>, Solved), Cancelled> {
+    if options.solver == Solver::Jacobi {
+        return jacobi_fields(hierarchy, options, team, watch);
+    }
+    let all = 0..hierarchy.n_batches();
+    solve_batches(hierarchy, all, options, team, watch, |_, field: &[Row]| field.to_vec())
+}
+
+/// Samples of all batches. `[n_batches][n_points]`
+pub(super) fn sample_fields(stencils: &Stencils, fields: &[Vec<Row>], team: &Team) -> Vec<Vec<Row>> {
+    team.share(fields.len(), || (), |(), batch| sample(stencils, batch, &fields[batch]))
+}
+
+/// Solves batch after batch and keeps what `take(batch, field)` makes of each.
+fn solve_batches<T: Send>(
+    hierarchy: &Hierarchy,
+    batches: Range<usize>,
+    options: &BindOptions,
+    team: &Team,
+    watch: &Watch<'_>,
+    take: impl Fn(usize, &[Row]) -> T + Sync,
+) -> Result<(Vec<T>, Solved), Cancelled> {
+    let n_batches = batches.len();
+    // Its share of the error is that of a bind of all columns, whoever solves the others.
+    let rule = options.stop_rule().of_batch(hierarchy.n_batches());
     let (spent, bytes) = (Spent::default(), AtomicU64::new(0));
-    let solved: Vec<Option<(SolveReport, Vec<Row>)>> = team.share(
+    let solved: Vec<Option<(SolveReport, T)>> = team.share(
         n_batches,
         || batch_solver(hierarchy, options),
-        |solver, batch| {
+        |solver, piece| {
             // Before the first look at a batch lies its dearest part.
             if watch.is_cancelled() {
                 return None;
             }
+            let batch = batches.start + piece;
             let begin = watch.now_ms();
             let report = solver.solve(hierarchy, batch, rule, &mut |iteration, delta| {
                 let fraction = watch.done() as f32 / n_batches as f32;
                 watch.report(Stage::Solve, fraction, iteration, Some(delta as f32)).is_ok()
             })?;
             let solved = watch.now_ms();
-            let samples = sample(stencils, batch, solver.field());
+            let taken = take(batch, solver.field());
             spent.add([begin, solved, watch.now_ms()]);
             bytes.fetch_max(solver.bytes() as u64, Ordering::Relaxed);
             watch.piece_done(Stage::Solve, n_batches).ok()?;
-            Some((report, samples))
+            Some((report, taken))
         },
     );
     let solved: Vec<_> = solved.into_iter().collect::<Option<_>>().ok_or(Cancelled)?;
-    let (reports, blocks): (Vec<_>, Vec<_>) = solved.into_iter().unzip();
+    let (reports, taken): (Vec<_>, Vec<_>) = solved.into_iter().unzip();
     let report = SolveReport::together(&reports);
-    Ok(Solved {
-        blocks,
+    let solved = Solved {
         iterations: report.latest().0,
         delta_interval: 1,
         report,
         field_bytes: bytes.into_inner() as usize * team.n_threads().min(n_batches),
         solve_share: spent.solve_share(),
         ..Solved::default()
-    })
+    };
+    Ok((taken, solved))
 }
 
 /// A solver with its fields.
@@ -109,26 +156,20 @@ impl Spent {
     }
 }
 
-fn jacobi_columns(
+/// Solves all columns by Jacobi's method. Returns their fields.
+fn jacobi_fields(
     hierarchy: &Hierarchy,
-    stencils: &Stencils,
     options: &BindOptions,
     team: &Team,
     watch: &Watch<'_>,
-) -> Result<Solved, Cancelled> {
-    let begin = watch.now_ms();
+) -> Result<(Vec<Vec<Row>>, Solved), Cancelled> {
     let rule = options.stop_rule();
     let (fields, report) = jacobi::solve(hierarchy, team, rule, options.delta_norm, |sweeps, delta| {
         let to_go = (delta / rule.tolerance).max(1.0).log10() / JACOBI_DECADES;
         watch.report(Stage::Solve, 1.0 - to_go as f32, sweeps, Some(delta as f32)).is_ok()
     })?;
-    let solved = watch.now_ms();
-    let blocks = team.share(fields.len(), || (), |(), batch| sample(stencils, batch, &fields[batch]));
-    let spent = Spent::default();
-    spent.add([begin, solved, watch.now_ms()]);
     let level = &hierarchy.levels[0];
-    Ok(Solved {
-        blocks,
+    let solved = Solved {
         iterations: report.latest().0,
         delta_interval: 1,
         report,
@@ -138,9 +179,10 @@ fn jacobi_columns(
             hierarchy.n_columns as u64,
             team.n_threads() as u64,
         ) as usize,
-        solve_share: spent.solve_share(),
+        solve_share: 1.0,
         ..Solved::default()
-    })
+    };
+    Ok((fields, solved))
 }
 
 impl BindOptions {

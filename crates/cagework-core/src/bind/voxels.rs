@@ -2,15 +2,19 @@
 
 use glam::DVec3;
 
+use super::BindError;
+use super::watch::Watch;
 use crate::cage::Cage;
 use crate::controls::Controls;
 use crate::grid::Grid;
 use crate::levels::{Boundary as _, Level, coarsened_until_few};
 use crate::options::{BindOptions, Method};
+use crate::progress::Stage;
 use crate::report::CellCounts;
 use crate::sample::embedded::Sampler;
 use crate::sample::{Stencils, classic};
 use crate::solve::hierarchy::Hierarchy;
+use crate::team::Team;
 use crate::voxelize::classic::{ClassicCells, place_grid};
 use crate::voxelize::embedded::Embedding;
 use crate::voxelize::lines::Overlaps;
@@ -31,6 +35,32 @@ pub(super) struct Voxels {
     /// Bytes held at most.
     pub(super) bytes: usize,
     classic: Option<ClassicCells>,
+}
+
+/// A cage in its grid, and the threads that work on it: what all models of one cage share.
+#[derive(Debug)]
+pub(super) struct Gridded {
+    pub(super) team: Team,
+    pub(super) voxels: Voxels,
+}
+
+impl Gridded {
+    /// # Errors
+    /// [`BindError::NoInterior`], or cancelled.
+    pub(super) fn new(
+        controls: Controls<'_>,
+        grid: Grid,
+        options: &BindOptions,
+        team: Team,
+        watch: &Watch<'_>,
+    ) -> Result<Self, BindError> {
+        let voxels = team.install(|| Voxels::new(controls, grid, options));
+        watch.report(Stage::Voxelize, 1.0, 0, None)?;
+        if voxels.hierarchy.levels[0].n_unknowns() == 0 && options.method == Method::Classic {
+            return Err(BindError::NoInterior { grid: options.grid });
+        }
+        Ok(Self { team, voxels })
+    }
 }
 
 /// A sampler of either method.

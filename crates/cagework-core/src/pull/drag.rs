@@ -7,12 +7,12 @@ use super::anderson::Anderson;
 use super::energy::Pull;
 use super::frame::group_matrices;
 use super::grip::{Grip, check as check_index};
-use super::rotation::nearest_rotation;
 use super::{MAX_HANDLES, PullError};
 use crate::edit::Symmetry;
+use crate::rotation::nearest_rotation;
 
 /// Weight of the cage's own part; flat from 0.02 to 0.4. With less the cage spikes where the model does not mind.
-const CAGE: f64 = 0.1;
+pub(super) const CAGE: f64 = 0.1;
 /// The same while a vertex of the cage is dragged: below, its neighbours move against the drag.
 const CAGE_GRABBED: f64 = 3.0;
 /// How firmly samples beyond the reach stay; flat from 100 to 300.
@@ -32,7 +32,7 @@ const PIN: f64 = 2e4;
 /// How firmly grabs and pins hold, over the mean of the whole matrix's diagonal.
 const HOLD: f64 = 1e3;
 /// What keeps the matrix regular, over the mean of the diagonal without what stays.
-const REGULAR: f64 = 1e-6;
+pub(super) const REGULAR: f64 = 1e-6;
 /// A frame that moves the cage by less, over the model's size, is the last one: above 1e-4 a pull of the whole model ends 5 % early.
 const SETTLED: f64 = 2e-5;
 
@@ -345,7 +345,7 @@ fn locality(pull: &Pull, follows: &[f64]) -> Vec<f64> {
 }
 
 /// Columns x, y, z one after the other.
-fn flat(cage: &[DVec3]) -> DVector<f64> {
+pub(super) fn flat(cage: &[DVec3]) -> DVector<f64> {
     DVector::from_iterator(3 * cage.len(), (0..3).flat_map(|x| cage.iter().map(move |p| p[x])))
 }
 

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::drag::{Drag, smooth};
 use super::grip::Handle;
-use super::rotation::nearest_rotation;
+use crate::rotation::nearest_rotation;
 
 /// Most frames after the last target, until nothing moves any more.
 const SETTLING: u32 = 60;
@@ -98,22 +98,26 @@ impl Drag {
 
     /// One local step (rotations) and one global step (the cage that fits them).
     fn step(&self) -> DVector<f64> {
-        let (n, width) = (self.n, 3 * self.n_groups);
-        let mut turned = vec![0.0; 3 * width];
-        for (r, matrix) in group_matrices(&self.moments, &self.cage, self.n_groups).into_iter().enumerate() {
-            let rotation = nearest_rotation(matrix);
-            for x in 0..3 {
-                turned[x * width + 3 * r..][..3].copy_from_slice(&rotation.row(x).to_array());
-            }
-        }
-        let rows: Vec<&[f64]> = self.moments.chunks_exact(width).collect();
-        let right =
-            DMatrix::from_fn(n, 3, |i, x| dot(rows[i], &turned[x * width..][..width])) + &self.constant;
+        let right = turned(&self.moments, &self.cage, self.n_groups) + &self.constant;
         let free = &self.inverse * right;
         let pulled = &self.targets - &self.handles * &free;
         let fitted = free + &self.spread * (&self.hold * pulled);
         DVector::from_column_slice(fitted.as_slice())
     }
+}
+
+/// `sum_r B_r R_r^T`, with the rotations that are nearest to a cage. `[n, 3]`
+pub(super) fn turned(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> DMatrix<f64> {
+    let width = 3 * n_groups;
+    let mut turned = vec![0.0; 3 * width];
+    for (r, matrix) in group_matrices(moments, cage, n_groups).into_iter().enumerate() {
+        let rotation = nearest_rotation(matrix);
+        for x in 0..3 {
+            turned[x * width + 3 * r..][..3].copy_from_slice(&rotation.row(x).to_array());
+        }
+    }
+    let rows: Vec<&[f64]> = moments.chunks_exact(width).collect();
+    DMatrix::from_fn(rows.len(), 3, |i, x| dot(rows[i], &turned[x * width..][..width]))
 }
 
 /// `c^T B_r` of each group r: how its references lie to what they have become.

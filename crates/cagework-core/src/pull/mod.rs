@@ -13,16 +13,17 @@
 //! A group is a sample of the model with the gradients of the weights there (three rows `D_e`: the energy measures how far
 //! the deformation's Jacobian is from a rotation), or a cage vertex with its edges. One solve per binding gives the
 //! gradients ([`Probes`]), one factorisation per grab the rest ([`Drag`]), and a frame is a few steps of rotations and
-//! multiplications ([`Drag::frame`]).
+//! multiplications ([`Drag::frame`]). With targets for all of the model, or for landmarks on it, the same energy fills in what they
+//! leave open ([`Pull::fit`]).
 
 mod anderson;
 mod drag;
 mod energy;
+mod fit;
 mod frame;
 mod geodesic;
 mod grip;
 mod nearest;
-mod rotation;
 mod samples;
 #[cfg(test)]
 mod tests;
@@ -31,6 +32,7 @@ use thiserror::Error;
 
 pub use drag::{Drag, DragOptions, Reach};
 pub use energy::Pull;
+pub use fit::{FitOptions, Fitted};
 pub use grip::{Grip, Handle};
 pub use samples::Probes;
 
@@ -96,6 +98,17 @@ pub enum PullError {
         /// What may be given.
         range: &'static str,
     },
+    /// Targets of other points.
+    #[error("there are {given} targets for {points} points: one for each")]
+    Targets {
+        /// Targets.
+        given: usize,
+        /// Points.
+        points: usize,
+    },
+    /// Nothing has a place to go to.
+    #[error("no point has a target: all of them lie outside the cage, or count for nothing")]
+    NoTarget,
     /// A pose of another cage.
     #[error("the start has {given} vertices, but the cage has {cage}")]
     Start {

@@ -1,5 +1,7 @@
 //! Properties of `pull.md` section 8, on the samples; figures on other models are in `docs/notes/pull.md`.
 
+mod fit;
+
 use std::sync::OnceLock;
 
 use glam::{DMat3, DVec3, Vec3};

@@ -3,6 +3,8 @@
 //! Delta is what the rule looks at. Jacobi: Eq. 2, the average change of a cell in a sweep. Multigrid and conjugate gradients:
 //! the error that is expected to remain, root mean square over cells, so that there tau bounds the error itself.
 
+use serde::{Deserialize, Serialize};
+
 /// When a solve is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopRule {
@@ -21,7 +23,7 @@ impl StopRule {
 }
 
 /// How a solve went.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SolveReport {
     /// Delta after each iteration.
     pub deltas: Vec<f64>,

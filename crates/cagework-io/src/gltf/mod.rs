@@ -19,6 +19,7 @@ mod pack;
 mod patch;
 mod rig;
 mod scene;
+mod select;
 mod size;
 mod skin;
 

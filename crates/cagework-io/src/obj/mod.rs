@@ -9,12 +9,13 @@ mod inner;
 mod lex;
 mod look;
 mod read;
+mod select;
 mod triangulate;
 mod write;
 
 pub use error::ObjError;
 pub use inner::{read_inner_controls, write_inner_controls};
 pub(crate) use look::look;
-pub(crate) use read::{NONE, ObjDocument, read};
+pub(crate) use read::{Corner, NONE, ObjDocument, read};
 pub use write::write_cage_obj;
 pub(crate) use write::{ObjPart, patch, write_new};

@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::error::ObjError;
 use super::lex::{Line, lines, shown, tokens};
 use super::look::{Material, read_materials, rest_of};
+use super::select::Group;
 use super::triangulate::Triangulator;
 use crate::memory::MemoryError;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
@@ -40,9 +41,11 @@ pub(crate) struct ObjDocument {
     /// Material of each face, an index into `materials`, or [`NONE`].
     pub(crate) face_materials: Vec<u32>,
     /// Smoothing group of each face, 0 for none; empty if the file has no `s` line.
-    face_smoothing: Vec<u32>,
+    pub(crate) face_smoothing: Vec<u32>,
     /// Names after `usemtl`, in order of first use.
     pub(crate) materials: Vec<String>,
+    /// `o` and `g` lines, but for those that say the same as the one before.
+    pub(crate) groups: Vec<Group>,
     /// Triangles as indices into `corners`.
     pub(crate) triangles: Vec<[u32; 3]>,
     /// Materials of the `.mtl` files that were found, by name.
@@ -72,6 +75,18 @@ impl ObjDocument {
             }
         }
         surfaces
+    }
+
+    /// Cuts all faces into triangles.
+    pub(crate) fn triangulate(&mut self, positions: &[Vec3]) {
+        let mut triangulator = Triangulator::new();
+        let mut polygon = Vec::new();
+        for face in self.face_starts.windows(2) {
+            let corners = &self.corners[face[0] as usize..face[1] as usize];
+            polygon.clear();
+            polygon.extend(corners.iter().map(|c| positions[c.v as usize]));
+            triangulator.triangulate(&polygon, face[0], &mut self.triangles);
+        }
     }
 
     /// Triangles (of corners) of each material, in order of first use.
@@ -118,6 +133,7 @@ struct Reader<'a> {
     /// Corners that name a vertex not yet defined: line and index.
     forward: Vec<(usize, u32)>,
     groups: usize,
+    group_bytes: u64,
     bad_attributes: usize,
     ignored: usize,
     siblings: Siblings<'a>,
@@ -148,6 +164,7 @@ pub(crate) fn read(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit: u64) -
         has_smoothing: false,
         forward: Vec::new(),
         groups: 0,
+        group_bytes: 0,
         bad_attributes: 0,
         ignored: 0,
         siblings: Siblings::new(resolve, memory_limit),
@@ -201,7 +218,7 @@ impl<'a> Reader<'a> {
                 self.document.normals.push(n.as_dvec3().normalize_or_zero().as_vec3());
             }
             b"f" | b"fo" => self.face(line.number, words)?,
-            b"o" | b"g" => self.groups += 1,
+            b"o" | b"g" => self.group(&bytes[line.range.clone()]),
             b"s" => {
                 if let Some(group) = words.next().and_then(|t| smoothing_group(&bytes[t])) {
                     (self.smoothing, self.has_smoothing) = (group, true);
@@ -226,11 +243,12 @@ impl<'a> Reader<'a> {
             (24 + 24, document.corners.len()),
             (24, document.face_materials.len()),
             (80, document.colors.len()),
+            (64, document.groups.len()),
             (200, document.materials.len() + document.looks.len() + self.libraries.len()),
         ];
         let lists: u64 = lists.iter().map(|&(bytes, n)| bytes * n as u64).sum();
         // The caller holds the file, and the document a copy of it.
-        let needed = 2 * self.bytes.len() as u64 + self.siblings.bytes() + lists;
+        let needed = 2 * self.bytes.len() as u64 + self.siblings.bytes() + self.group_bytes + lists;
         MemoryError::check(needed, self.memory_limit).map(|()| needed)
     }
 
@@ -277,6 +295,19 @@ impl<'a> Reader<'a> {
         self.document.face_materials.push(self.material);
         self.document.face_smoothing.push(self.smoothing);
         Ok(())
+    }
+
+    fn group(&mut self, line: &[u8]) {
+        self.groups += 1;
+        let line = line.trim_ascii();
+        let is_object = line.starts_with(b"o");
+        let name = rest_of(line, if is_object { b"o" } else { b"g" });
+        let groups = &mut self.document.groups;
+        if groups.iter().rev().find(|g| g.is_object == is_object).is_some_and(|g| g.name == name) {
+            return;
+        }
+        self.group_bytes += name.len() as u64;
+        groups.push(Group { is_object, name, first_face: self.document.face_materials.len() as u32 });
     }
 
     /// Reads a file of materials, once however often it is named.
@@ -329,7 +360,7 @@ impl<'a> Reader<'a> {
                 }
             }
         }
-        self.triangulate();
+        self.document.triangulate(&self.positions);
         if !self.has_smoothing {
             self.document.face_smoothing.clear();
         }
@@ -353,18 +384,6 @@ impl<'a> Reader<'a> {
             bytes,
             notices,
         })
-    }
-
-    fn triangulate(&mut self) {
-        let document = &mut self.document;
-        let mut triangulator = Triangulator::new();
-        let mut polygon = Vec::new();
-        for face in document.face_starts.windows(2) {
-            let corners = &document.corners[face[0] as usize..face[1] as usize];
-            polygon.clear();
-            polygon.extend(corners.iter().map(|c| self.positions[c.v as usize]));
-            triangulator.triangulate(&polygon, face[0], &mut document.triangles);
-        }
     }
 }
 

@@ -1,9 +1,11 @@
 //! Inputs by number: files of every kind that is read, damaged at random.
 
+use cagework_core::bind::Part;
 use cagework_core::deform::OutsideVertex;
 use cagework_core::mesh::Bounds;
-use cagework_core::{PolygonMesh, Weights, subdivided_box};
-use cagework_io::{encode_pose, write_cage_obj, write_project, write_weights_npz};
+use cagework_core::solve::stop::SolveReport;
+use cagework_core::{BindOptions, InnerControls, PolygonMesh, Weights, subdivided_box};
+use cagework_io::{PartOf, encode_pose, write_cage_obj, write_part_npz, write_project, write_weights_npz};
 use glam::Vec3;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
@@ -55,13 +57,39 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     );
     samples.push(write_weights_npz(&weights.expect("they are"), &[outside], &[Vec3::ONE], &[Vec3::ONE]));
     samples.push(encode_pose(&cube(), &bent));
+    samples.push(part(model.cage_mesh()));
     // Controls inside of that cube.
     samples.push(
         b"v .2 .2 .2\nv .5 .4 .5\nv .8 .2 .2\nv .3 .7 .5\nv .6 .7 .4\nv .5 .9 .6\nl 1 2 3\np -3\nf 4 5 6\n"
             .to_vec(),
     );
     samples.extend(cages().iter().map(write_cage_obj));
+    let text = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
+        property uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_index\nend_header\n\
+        0 0 0 9 9 9\n1 0 0 9 9 9\n0 1 0 255 0 9\n3 0 1 2\n";
+    samples.push(text.to_vec());
+    samples.push(
+        b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n"
+            .to_vec(),
+    );
+    samples.push(model.write_ply(&model.positions).expect("it fits"));
+    samples.push(model.write_stl(&model.positions).expect("it has triangles"));
     samples
+}
+
+/// Two columns of eight at three positions in a cage.
+fn part(cage: PolygonMesh) -> Vec<u8> {
+    let positions = vec![Vec3::splat(0.4), Vec3::splat(0.5), Vec3::splat(0.6)];
+    let of = PartOf {
+        version: "1".into(),
+        options: BindOptions::default(),
+        extra_points: 1,
+        cage,
+        smooth: 0,
+        inner: InnerControls::default(),
+        positions,
+    };
+    write_part_npz(&of, &Part { columns: 2..4, samples: vec![0.125; 6], report: SolveReport::default() })
 }
 
 /// Closed meshes: quads, a concave polygon, and a cavity.

@@ -2,6 +2,7 @@
 
 use std::sync::LazyLock;
 
+use cagework_core::bind::{Merge, Part};
 use cagework_core::cage_check::{Repair, check, repair};
 use cagework_core::cage_gen::{CageOptions, Shape, Symmetry, generate};
 use cagework_core::deform::deform_bound;
@@ -11,8 +12,8 @@ use cagework_core::progress::Silent;
 use cagework_core::skin::skin_vertices;
 use cagework_core::{Binding, Cage, ControlSet, Controls, InnerControls, PolygonMesh, bind};
 use cagework_io::{
-    Joints, Model, ReshapeOptions, decode_pose, encode_pose, read_inner_controls, read_project,
-    read_weights_npz, write_inner_controls, write_weights_npz,
+    Joints, Model, ModelFormat, PartOf, ReshapeOptions, decode_pose, encode_pose, read_inner_controls,
+    read_part_npz, read_project, read_weights_npz, write_inner_controls, write_part_npz, write_weights_npz,
 };
 use glam::{DVec3, Vec3};
 
@@ -53,6 +54,11 @@ pub(crate) fn survive(bytes: &[u8]) {
         let again = read_weights_npz(&written, LIMIT).expect("what was written can be read");
         assert_eq!((again.n_vertices(), again.outside.len()), (saved.n_vertices(), saved.outside.len()));
     }
+    if let Ok((of, part)) = read_part_npz(bytes, LIMIT) {
+        let again = read_part_npz(&write_part_npz(&of, &part), LIMIT).expect("what was written can be read");
+        assert_eq!(again.1.columns, part.columns);
+        as_part(of, &part);
+    }
     if let Ok(pose) = decode_pose(&cube(), bytes) {
         let _ = encode_pose(&cube(), &pose);
         let _ = deform_bound(&REST.binding.weights, &REST.binding.outside, &pose);
@@ -76,6 +82,17 @@ pub(crate) fn survive(bytes: &[u8]) {
     }
 }
 
+/// A part alone is no bind.
+fn as_part(of: PartOf, part: &Part) {
+    let Ok(cage) = Cage::new(&of.cage) else { return };
+    let Ok(set) = ControlSet::new(&cage, of.smooth.min(1), of.inner) else { return };
+    let options = BindOptions { grid: GRID, memory_limit: LIMIT, ..of.options };
+    if let Ok(mut merge) = Merge::new(&of.positions, Controls::from(&set), &options, &Silent) {
+        let _ = merge.add(part);
+        let _ = merge.finish();
+    }
+}
+
 /// Points are bound to controls inside of the cube, and stay where they are at rest.
 fn as_controls(inner: InnerControls, choice: u32) {
     let Ok(set) = ControlSet::new(&REST.closed, choice % 3, inner) else { return };
@@ -94,6 +111,12 @@ fn as_file(model: &Model) {
     let moved: Vec<Vec3> = model.positions.iter().map(|&p| twist(p.clamp_length_max(1e6))).collect();
     let _ = model.look();
     let _ = model.write_obj(&moved);
+    for format in [ModelFormat::Ply, ModelFormat::Stl] {
+        if let Ok(bytes) = model.write(format, &model.positions) {
+            let again = Model::read("y", &bytes, &mut |_| None);
+            assert!(again.is_ok(), "{}", again.err().map(|e| e.to_string()).unwrap_or_default());
+        }
+    }
     if let Ok(glb) = model.write_glb_poses(&model.positions, &[("moved".into(), moved)]) {
         let again = Model::read("y.glb", &glb, &mut |_| None);
         assert!(again.is_ok(), "{}", again.err().map(|e| e.to_string()).unwrap_or_default());

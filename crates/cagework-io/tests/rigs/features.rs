@@ -50,6 +50,33 @@ fn what_hangs_on_a_bone_bends_or_stays_rigid() {
     assert_eq!(last(&read(&bytes), 8), rigid);
 }
 
+#[test]
+fn what_stays_keeps_the_bytes_of_all_its_states() {
+    let bytes = rigged().glb();
+    let model = read(&bytes);
+    // Joints that stay are no reason to write anything, and no vertex moves, with any target.
+    let parts = model.parts(&[("bar".into(), 1.0)], &[]).unwrap();
+    let options = ReshapeOptions { joints: Joints::Stay, parts, ..ReshapeOptions::default() };
+    assert!(model.write_reshaped(&by(&model), &[], &[], &options).unwrap().0 == bytes);
+}
+
+#[test]
+fn a_rigid_piece_of_a_skin_keeps_its_lengths_with_every_target() {
+    let model = read(&rigged().glb());
+    let parts = model.parts(&[], &["bar".into()]).unwrap();
+    let options = ReshapeOptions { parts, ..ReshapeOptions::default() };
+    let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &options).unwrap();
+    let [before, after] = [player(&model), player(&read(&bytes))];
+    for targets in [[0.25, 0.0], [1.0, 0.0], [0.0, 1.0]] {
+        let [from, to] = [&before, &after].map(|player| shown(player, None, 0.0, &targets));
+        for (a, b) in [(0, 19), (3, 12), (7, 8)] {
+            let change = to[a].distance(to[b]) - from[a].distance(from[b]);
+            assert!(change.abs() <= ROUNDED, "{targets:?}, {a} to {b}: {change:e}");
+        }
+        assert!(to[19].distance(from[19]) > 0.3, "it has moved");
+    }
+}
+
 /// The second influence of each vertex in a set of its own.
 #[test]
 fn several_sets_of_joints_are_one() {

@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any, Literal, Protocol, TypedDict, final
 
@@ -71,6 +71,9 @@ def check_cage(
 def bind(
     points: ArrayLike, cage: Cage, **options: Unpack[BindOptions]
 ) -> tuple[csr_array, dict[str, Any]]: ...
+def bind_many(
+    models: Sequence[ArrayLike], cage: Cage, **options: Unpack[BindOptions]
+) -> list[tuple[csr_array, dict[str, Any]]]: ...
 def deform(
     weights: Any, posed: ArrayLike, report: dict[str, Any] | None = None
 ) -> NDArray[np.float32]: ...
@@ -98,6 +101,7 @@ def reshape(
     joints: Literal["follow", "stay", "turn"] = "follow",
     keep_travel: bool = False,
     rigid: Sequence[str] = [],
+    mask: Mapping[str, float] | None = None,
     static: bool = False,
     **options: Unpack[BindOptions],
 ) -> bytes: ...

@@ -4,7 +4,7 @@ use cagework_core::deform::{OutsideVertex, deform_bound, displacements};
 use cagework_core::dynamic::bend_vertices;
 use cagework_core::{ControlSet, InnerControls, PolygonMesh};
 use cagework_io::{
-    Model, ReshapeReport, write_cage_obj, write_inner_controls, write_project, write_weights_npz,
+    Model, ModelFormat, ReshapeReport, write_cage_obj, write_inner_controls, write_project, write_weights_npz,
 };
 use glam::{DVec3, Vec3};
 use js_sys::{Array, Float32Array, Uint32Array};
@@ -37,6 +37,21 @@ impl Engine {
             if asked.dynamic { self.baked(clip as usize)? } else { self.posed_glb(&asked)? };
         self.state.borrow_mut().rig_notices = notices;
         Ok(bytes)
+    }
+
+    /// The model's shape as posed, in a format of shapes alone.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    #[wasm_bindgen(js_name = exportShape)]
+    pub fn export_shape(
+        &self,
+        #[wasm_bindgen(unchecked_param_type = "ModelFormat")] format: JsValue,
+    ) -> Result<Vec<u8>, JsValue> {
+        let format: ModelFormat = taken(format)?;
+        let pose = self.read(|state| state.positions.clone());
+        let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
+        Ok(self.read(|state| Answer::Ok(state.the_model()?.write(format, &posed)?))?)
     }
 
     /// What the last export did to the rig, each a sentence; they are told once.

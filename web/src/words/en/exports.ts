@@ -7,6 +7,7 @@ export const exports = {
   sentence: "Files for Blender, Unity, Unreal, three.js, Python, and for this page.",
   items: {
     glb: ["Posed model", "GLB as you see it. Materials, textures and parts are those of your file."],
+    shape: ["Shape alone", "OBJ, PLY or STL as you see it: for printing, measuring, other programs."],
     poses: [
       "Poses as morph targets",
       "GLB with one morph target a pose and an animation through them. Exact in every blend.",
@@ -22,6 +23,7 @@ export const exports = {
   poseFirst: "Save a pose first, in the step before.",
   modelFirst: "Open a model first.",
   poses: (n: number, sentence: string) => `${plural(n, "pose")}. ${sentence}`,
+  format: "Format of the shape",
   size: "Size of the picture",
   sizes: ["As shown", "Twice", "Four times"],
   alone: "The model alone",

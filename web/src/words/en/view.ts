@@ -40,7 +40,8 @@ export const status = {
     line: "Click from joint to joint, then Done",
     face: "Click into the model to put a sheet there",
   },
-  manySelected: (n: number) => `${plural(n, "cage vertex", "cage vertices")} selected`,
+  /** Of the cage, inside it, or both. */
+  manySelected: (n: number) => `${plural(n, "handle", "handles")} selected`,
   reshaping: "Reshaping the cage",
   ready: "Ready",
   notBound: "Not bound yet",

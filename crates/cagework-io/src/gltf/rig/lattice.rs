@@ -136,7 +136,7 @@ impl Rig<'_> {
     }
 
     /// Numbers of an end's points among the extras.
-    fn range(&self, target: &Target, first: usize) -> Range<usize> {
+    pub(super) fn range(&self, target: &Target, first: usize) -> Range<usize> {
         first - self.n_vertices..first - self.n_vertices + target.moved.len()
     }
 
@@ -196,7 +196,7 @@ impl Rig<'_> {
 }
 
 /// Each end of a part's targets, with the first of its points.
-fn ends(part: &Part) -> impl Iterator<Item = (&Target, usize)> + Clone {
+pub(super) fn ends(part: &Part) -> impl Iterator<Item = (&Target, usize)> + Clone {
     part.targets.iter().flat_map(|target| target.ends.iter().flatten().map(move |&first| (target, first)))
 }
 

@@ -23,7 +23,7 @@ mod vrm;
 use std::collections::HashMap;
 
 use ::gltf::json::mesh::{Primitive, Semantic};
-use cagework_core::Bounds;
+use cagework_core::{Bounds, Parts as Unbent};
 use glam::{DMat4, DVec3, Vec3};
 
 use super::geometry::{Frame, attribute, vectors};
@@ -169,6 +169,27 @@ impl<'a> Rig<'a> {
             primitives.iter().any(|p| p.targets.as_ref().is_some_and(|t| !t.is_empty()))
         };
         document.instances.iter().any(|i| i.skin.is_some() || morphs(i.mesh))
+    }
+
+    /// How far points move with what the cage does not bend. `by`: of all points.
+    pub(crate) fn held(&self, parts: &Unbent, rest: &[Vec3], mut by: Vec<DVec3>) -> Vec<DVec3> {
+        if parts.is_empty() {
+            return by;
+        }
+        let rest: Vec<DVec3> = rest.iter().map(|p| p.as_dvec3()).collect();
+        let held = parts.held(&rest, &by[..rest.len()]);
+        for part in self.parts.iter().filter(|part| part.slot.is_some()) {
+            for (target, first) in lattice::ends(part) {
+                let ends = &self.extras[self.range(target, first)];
+                for ((&v, &end), by) in target.moved.iter().zip(ends).zip(&mut by[first..]) {
+                    *by = held.by(part.first as u32 + v, end, *by);
+                }
+            }
+        }
+        for (v, (&at, by)) in (0..).zip(rest.iter().zip(&mut by)) {
+            *by = held.by(v, at, *by);
+        }
+        by
     }
 
     fn add_instance(&mut self, shown: Option<usize>, instance: &Instance) -> Result<(), GltfError> {

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use cagework_core::Parts;
 use glam::{DMat4, DVec3, Mat4, Vec3};
 use serde::Serialize;
 use serde_json::Value;
@@ -19,7 +20,7 @@ use crate::gltf::{GltfDocument, skin};
 use crate::shown::shown;
 
 /// How a rigged document is reshaped.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReshapeOptions {
     /// What becomes of the skeleton.
     pub joints: Joints,
@@ -27,6 +28,8 @@ pub struct ReshapeOptions {
     pub keep_travel: bool,
     /// Names of nodes below joints whose meshes keep their shape: buckles, eyes, weapons.
     pub rigid: Vec<String>,
+    /// Vertices that the cage does not bend, in every state of theirs.
+    pub parts: Parts,
 }
 
 /// What was moved.

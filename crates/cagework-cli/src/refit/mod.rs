@@ -1,0 +1,324 @@
+//! `cagework refit`: many models follow one cage, which is solved for once.
+
+mod report;
+
+use std::cell::{OnceCell, RefCell};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::thread::ScopedJoinHandle;
+use std::time::Instant;
+
+use cagework_core::bind::{BindError, SolvedCage};
+use cagework_core::options::BindOptions;
+use cagework_core::progress::Cancelled;
+use cagework_core::{Binding, Controls};
+use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, shown};
+use glam::Vec3;
+
+use crate::args::{ModelOutput, RefitArgs};
+use crate::bind::{bind_positions, check_memory};
+use crate::controls::with_inner;
+use crate::deform::{Posed, Poses, pose_name};
+use crate::error::CliError;
+use crate::files::{check_outputs, is_newer, json, make_folder, print, read, shown_path, write};
+use crate::load::{load_cage_file, load_model};
+use crate::progress::Bar;
+use crate::rig;
+use crate::signals::{self, Asking};
+
+use report::{Entry, Outcome, Refitted, Written, tell, text};
+
+/// A model to be read and the file to be written.
+struct Job {
+    model: PathBuf,
+    output: ModelOutput,
+}
+
+/// What binds models to one cage.
+struct Binder<'a> {
+    args: &'a RefitArgs,
+    controls: Controls<'a>,
+    /// Made for the first model that is not skipped; none if its fields are too large to be kept.
+    solved: OnceCell<Option<SolvedCage<'a>>>,
+    /// Names of parts that no model had so far.
+    unnamed: RefCell<Vec<String>>,
+}
+
+/// A model in its pose, to be written.
+struct Bound<'a> {
+    job: &'a Job,
+    model: Model,
+    posed: Posed,
+    options: ReshapeOptions,
+    /// What there is to say so far.
+    written: Written,
+    started: Instant,
+}
+
+/// A model that is being written.
+type Writing<'scope, 'a> = Option<(&'a Job, ScopedJoinHandle<'scope, Outcome>)>;
+
+/// Models of which reading and writing takes a larger share of the memory limit than one in so many are written before the
+/// next one is read.
+const LARGE_SHARE: u64 = 16;
+
+/// Runs `cagework refit`.
+///
+/// # Errors
+/// When cage or pose cannot be used, two models would be written to one file, a model failed, or the work was cancelled.
+pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
+    if args.solve.on_gpu() {
+        return Err(CliError::Mismatch {
+            message: "the cage is solved for once on the processor only".into(),
+            hint: "leave out `--backend gpu`",
+        });
+    }
+    let jobs = jobs(args)?;
+    make_folder(&args.output)?;
+    let shared =
+        [Some(&args.cage), Some(&args.pose), args.pose_controls.as_ref(), args.controls.controls.as_ref()];
+    let shared: Vec<&Path> = shared.into_iter().flatten().map(AsRef::as_ref).collect();
+    let outputs: Vec<&Path> = jobs.iter().map(|job| job.output.path.as_path()).collect();
+    let models = jobs.iter().map(|job| job.model.as_path());
+    let inputs: Vec<&Path> = shared.iter().copied().chain(models).chain(args.manifest.as_deref()).collect();
+    check_outputs(&outputs, &inputs)?;
+
+    // From here on Ctrl-C ends the work after what is being written.
+    let _asking = Asking::start();
+    let (up, memory) = (args.read.axis(), args.read.memory);
+    let cage = load_cage_file(&args.cage, up, memory, &args.controls)?;
+    let controls = cage.controls();
+    let inner = &controls.rest()[cage.cage.n_vertices()..];
+    let pose = cage.load_pose(&args.pose)?;
+    let poses = Poses {
+        names: vec![pose_name(&args.pose)],
+        rest: controls.rest().to_vec(),
+        positions: with_inner(vec![pose], args.pose_controls.as_slice(), inner, up, memory)?,
+    };
+    let unnamed = RefCell::new(args.rig.part_names().cloned().collect());
+    let binder = Binder { args, controls, solved: OnceCell::new(), unnamed };
+    let mut models = Vec::with_capacity(jobs.len());
+    let mut settle = |job: &Job, outcome: Outcome| -> Result<(), CliError> {
+        // That it was cancelled is not its own fault.
+        if matches!(outcome, Outcome::Failed { .. }) && signals::cancelled() {
+            return Ok(());
+        }
+        let text = |path: &Path| path.display().to_string();
+        let entry = Entry { input: text(&job.model), output: text(&job.output.path), outcome };
+        tell(&entry, as_json)?;
+        models.push(entry);
+        Ok(())
+    };
+    // A model is written while the next one is read and bound, unless it is large.
+    std::thread::scope(|scope| {
+        let mut writing = None;
+        for job in jobs.iter().take_while(|_| !signals::cancelled()) {
+            let inputs: Vec<&Path> = shared.iter().copied().chain([job.model.as_path()]).collect();
+            let is_done = args.resume && is_newer(&job.output.path, &inputs);
+            let bound = if is_done { None } else { Some(binder.refit(job, &poses, inner)) };
+            settle_one(&mut writing, &mut settle)?;
+            match bound {
+                None => settle(job, Outcome::Skipped)?,
+                Some(Err(error)) => settle(job, Outcome::of_error(&error, &job.model))?,
+                Some(Ok(bound)) => {
+                    let is_large = bound.bytes() > args.read.memory.bytes() / LARGE_SHARE;
+                    let names = &poses.names;
+                    writing = Some((job, scope.spawn(move || bound.write(names))));
+                    if is_large {
+                        settle_one(&mut writing, &mut settle)?;
+                    }
+                }
+            }
+        }
+        settle_one(&mut writing, &mut settle)
+    })?;
+    let done = binder.report(models);
+    print(&if as_json { json(&done) } else { text(&done, jobs.len()) })?;
+    let unnamed = binder.unnamed.borrow();
+    match unnamed.first() {
+        _ if signals::cancelled() => Err(BindError::Cancelled(Cancelled).into()),
+        _ if done.failed > 0 => Err(CliError::Mismatch {
+            message: format!("{} of {} models failed", done.failed, jobs.len()),
+            hint: "when they are mended, run it again with --resume: what is done is left as it is",
+        }),
+        // Those that were skipped were not asked.
+        Some(name) if done.skipped == 0 => Err(CliError::Mismatch {
+            message: format!("no model has a part that is called '{}'", shown(name)),
+            hint: "what was written is without it: mend the name and run it again, without --resume",
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// All models and where they are written.
+///
+/// # Errors
+/// When the manifest cannot be read, there is no model, or two would be written to one file.
+fn jobs(args: &RefitArgs) -> Result<Vec<Job>, CliError> {
+    let mut models = args.models.clone();
+    if let Some(path) = &args.manifest {
+        let text = String::from_utf8(read(path)?).map_err(|e| CliError::file(path, e))?;
+        let lines = text.strip_prefix('\u{feff}').unwrap_or(&text).lines().map(str::trim);
+        models.extend(lines.filter(|line| !line.is_empty() && !line.starts_with('#')).map(PathBuf::from));
+        if models.is_empty() {
+            return Err(CliError::file(path, "names no model"));
+        }
+    }
+    let mut by_output: BTreeMap<PathBuf, &PathBuf> = BTreeMap::new();
+    let mut jobs = Vec::with_capacity(models.len());
+    for model in &models {
+        let name = Path::new(model.file_name().ok_or_else(|| CliError::file(model, "is no name of a file"))?);
+        let output = match ModelFormat::of_export(&name.to_string_lossy()) {
+            Some(format) => ModelOutput { path: args.output.join(name), format },
+            None => ModelOutput {
+                path: args.output.join(name).with_extension(ModelFormat::Gltf.export_extension()),
+                format: ModelFormat::Gltf,
+            },
+        };
+        if let Some(other) = by_output.insert(output.path.clone(), model) {
+            return Err(CliError::Mismatch {
+                message: format!(
+                    "{} and {} would both be written to {}",
+                    shown_path(other),
+                    shown_path(model),
+                    shown_path(&output.path)
+                ),
+                hint: "rename one of them, or run the command once for each with another -o",
+            });
+        }
+        jobs.push(Job { model: model.clone(), output });
+    }
+    Ok(jobs)
+}
+
+impl Binder<'_> {
+    /// One model up to its pose; nothing but that stays of its weights.
+    fn refit<'j>(&self, job: &'j Job, poses: &Poses, inner: &[Vec3]) -> Result<Bound<'j>, CliError> {
+        let started = Instant::now();
+        let Self { args, controls, .. } = self;
+        let (path, format) = (&job.model, job.output.format);
+        let model = load_model(path, args.read.axis(), args.read.memory)?;
+        let is_static = args.rig.plain || format != ModelFormat::Gltf;
+        let (points, extra_points) =
+            if is_static { (model.positions.clone(), 0) } else { rig::points(&model, path)? };
+        let (options, missing) = args.rig.options_of_one(&model, path)?;
+        let held = model.bytes();
+        let Binding { weights, outside, report } = self.bind(&points, held, extra_points)?;
+        let bound = BindOptions { held: held + self.held(), ..self.options() };
+        check_memory(&bound, points.len(), *controls, model.bytes_to_write(format))?;
+        let saved = SavedWeights {
+            weights,
+            outside,
+            extra_points: points[model.positions.len()..].to_vec(),
+            inner_controls: inner.to_vec(),
+        };
+        let posing = Instant::now();
+        let posed = Posed::new(&model, saved, poses, format, (&options, args.rig.plain));
+        let deform_ms = elapsed_ms(posing);
+        let mut notices = model.notices.clone();
+        notices.extend(missing.iter().map(|name| format!("no part is called '{}' here", shown(name))));
+        self.unnamed.borrow_mut().retain(|name| missing.contains(name));
+        if !report.converged {
+            notices.push(format!(
+                "the solve did not converge within {} iterations: raise --max-iterations or --tau",
+                report.iterations
+            ));
+        }
+        let written = Written {
+            vertices: model.positions.len(),
+            outside_vertices: report.outside_vertices as usize,
+            bind_ms: report.timings_ms.total,
+            deform_ms,
+            total_ms: 0.0,
+            rig: None,
+            notices,
+        };
+        Ok(Bound { job, model, posed, options, written, started })
+    }
+
+    fn options(&self) -> BindOptions {
+        self.args.solve.options(self.args.grid, self.args.read.memory)
+    }
+
+    /// Bytes of the fields that are kept.
+    fn held(&self) -> u64 {
+        self.solved.get().and_then(Option::as_ref).map_or(0, SolvedCage::bytes)
+    }
+
+    fn bind(&self, points: &[Vec3], held: u64, extra_points: usize) -> Result<Binding, CliError> {
+        let options = self.options();
+        if self.solved.get().is_none() {
+            let solved = match SolvedCage::new(self.controls, &options, &Bar::start()) {
+                Err(BindError::Memory { .. }) => None,
+                solved => Some(solved?),
+            };
+            // It is not there yet.
+            let _ = self.solved.set(solved);
+        }
+        match self.solved.get() {
+            Some(Some(solved)) => Ok(solved.bind(points, (held, extra_points), &Bar::start())?),
+            _ => bind_positions(points, self.controls, false, &BindOptions { held, extra_points, ..options }),
+        }
+    }
+
+    fn report(&self, models: Vec<Entry>) -> Refitted {
+        let count = |is: fn(&Outcome) -> bool| models.iter().filter(|entry| is(&entry.outcome)).count();
+        let n_cage = self.controls.cage().n_vertices();
+        let mut notices: Vec<String> =
+            self.controls.cage().notices().iter().map(ToString::to_string).collect();
+        if matches!(self.solved.get(), Some(None)) {
+            notices.push(format!(
+                "The fields of this grid are too large to be kept in half of {} MiB: the cage was solved for anew for each \
+                 model. A smaller --grid or a larger --memory-limit avoids that.",
+                self.options().memory_limit >> 20
+            ));
+        }
+        Refitted {
+            output: self.args.output.display().to_string(),
+            cage_vertices: n_cage,
+            inner_controls: self.controls.n_controls() - n_cage,
+            solve_ms: self.solved.get().and_then(Option::as_ref).map(SolvedCage::elapsed_ms),
+            written: count(|o| matches!(o, Outcome::Written(_))),
+            skipped: count(|o| matches!(o, Outcome::Skipped)),
+            failed: count(|o| matches!(o, Outcome::Failed { .. })),
+            notices,
+            models,
+        }
+    }
+}
+
+impl Bound<'_> {
+    /// Bytes that it takes until it is written.
+    fn bytes(&self) -> u64 {
+        self.model.bytes() + self.model.bytes_to_write(self.job.output.format)
+    }
+
+    fn write(self, names: &[String]) -> Outcome {
+        let Self { job, model, posed, options, mut written, started } = self;
+        let made = posed.into_file(&model, names, &job.output, &options);
+        match made.and_then(|(bytes, rig)| write(&job.output.path, &bytes).map(|()| rig)) {
+            Err(error) => Outcome::of_error(&error, &job.model),
+            Ok(rig) => {
+                written.notices.extend(rig.iter().flat_map(ReshapeReport::notices));
+                written.total_ms = elapsed_ms(started);
+                Outcome::Written(Box::new(Written { rig, ..written }))
+            }
+        }
+    }
+}
+
+/// Waits until a model is written, if one is.
+fn settle_one<'a>(
+    writing: &mut Writing<'_, 'a>,
+    settle: &mut impl FnMut(&'a Job, Outcome) -> Result<(), CliError>,
+) -> Result<(), CliError> {
+    let Some((job, thread)) = writing.take() else { return Ok(()) };
+    match thread.join() {
+        Ok(outcome) => settle(job, outcome),
+        Err(panic) => std::panic::resume_unwind(panic),
+    }
+}
+
+fn elapsed_ms(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}

@@ -1,0 +1,93 @@
+use predicates::str::contains;
+
+use crate::support::{CORNERS, Sandbox, box_obj, obj_positions};
+
+/// A sphere in a box, bound; the box bent, and the sphere as that bends it.
+fn bound() -> Sandbox {
+    let sandbox = Sandbox::with_sphere_in_box();
+    sandbox.run("bind mesh.obj --cage cage.obj -g 16 --weights w.npz").success();
+    let bent = CORNERS.map(|[x, y, z]| [x + 0.4 * y * y * z + 2.0, 1.3 * y + 0.2 * x * z, z - 0.1 * x]);
+    sandbox.write("bent.obj", box_obj(&bent));
+    sandbox.run("deform mesh.obj --cage cage.obj --weights w.npz --pose bent.obj -o target.obj").success();
+    sandbox
+}
+
+const FIT: &str = "fit mesh.obj --cage cage.obj --weights w.npz -o pose.obj";
+
+fn off(sandbox: &Sandbox, a: &str, b: &str) -> f64 {
+    let [a, b] = [a, b].map(|name| obj_positions(&sandbox.read(name)));
+    assert_eq!(a.len(), b.len());
+    let apart = |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
+    a.iter().zip(&b).map(apart).fold(0.0, f64::max)
+}
+
+#[test]
+fn the_pose_of_a_cage_is_found_from_the_model_that_it_made() {
+    let sandbox = bound();
+    let done = sandbox.json(&format!("{FIT} --target target.obj --json"));
+    // The box's diagonal is above 3.
+    assert!(off(&sandbox, "pose.obj", "bent.obj") <= 1e-4, "{done}");
+    assert_eq!(
+        (&done["points"], &done["left_out"], &done["settled"]),
+        (&178.into(), &0.into(), &true.into())
+    );
+    assert!(done["rms"].as_f64().unwrap() < 1e-5 && done["rms_before"].as_f64().unwrap() > 0.1, "{done}");
+    for field in ["cage", "lambda", "energy", "largest", "largest_before", "steps", "precompute_ms", "fit_ms"]
+    {
+        assert!(done[field].is_number(), "{field}: {done}");
+    }
+}
+
+#[test]
+fn landmarks_bring_the_model_to_where_they_are() {
+    let sandbox = bound();
+    let [rest, target] = ["mesh.obj", "target.obj"].map(|name| obj_positions(&sandbox.read(name)));
+    let say = |p: [f64; 3]| format!("[{}, {}, {}]", p[0], p[1], p[2]);
+    // Every third by its number, the others by the place on the model where they are.
+    let landmarks = (0..rest.len()).map(|v| {
+        let named =
+            if v % 3 == 0 { format!("\"vertex\": {v}") } else { format!("\"point\": {}", say(rest[v])) };
+        format!("{{{named}, \"to\": {}}}", say(target[v]))
+    });
+    sandbox.write("all.json", format!("[{}]", landmarks.collect::<Vec<_>>().join(",")));
+    let done = sandbox.json(&format!("{FIT} --landmarks all.json --json"));
+    assert!(off(&sandbox, "pose.obj", "bent.obj") <= 1e-3, "{done}");
+
+    // One alone shifts the whole.
+    sandbox.write("one.json", format!("[{{\"vertex\": 7, \"to\": {}}}]", say(rest[7].map(|x| x + 0.5))));
+    sandbox.run(&format!("{FIT} --landmarks one.json")).success().stdout(contains("to 1 points"));
+    let [pose, cage] = ["pose.obj", "cage.obj"].map(|name| obj_positions(&sandbox.read(name)));
+    for (a, b) in pose.iter().zip(&cage) {
+        assert!((0..3).all(|k| (a[k] - b[k] - 0.5).abs() < 1e-3), "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn what_cannot_be_fitted_is_said_and_nothing_written() {
+    let sandbox = bound();
+    sandbox.run(FIT).failure().stderr(contains("--target <MESH>|--landmarks <FILE>"));
+    sandbox
+        .run(&format!("{FIT} --target cage.obj"))
+        .failure()
+        .stderr(contains(
+            "cage.obj: has 8 vertices, but mesh.obj has 178: vertices are matched by their order",
+        ))
+        .stderr(contains("hint: give some --landmarks"));
+    sandbox
+        .run(&format!("{FIT} --target target.obj --lambda=-1"))
+        .failure()
+        .stderr(contains("lambda is -1; it must be a number from 0 on"));
+    for (landmarks, said) in [
+        ("[]", "bad.json: 0 landmarks; there must be 1 to 10000"),
+        ("{}", "bad.json: invalid type"),
+        ("[{\"vertex\": 178, \"to\": [0, 0, 0]}]", "landmark 0 names vertex 178: they count from 0 to 177"),
+        ("[{\"to\": [0, 0, 0]}]", "landmark 0 must name one of vertex, triangle (with bary) and point"),
+        ("[{\"triangle\": 0, \"bary\": [1, 1, 1], \"to\": [0, 0, 0]}]", "which is no point of a triangle"),
+        ("[{\"vertex\": 1, \"to\": [0, 0, 1e39]}]", "landmark 0 has the coordinate inf"),
+        ("[{\"vertex\": 1, \"to\": [0, 0, 1], \"weight\": 0}]", "landmark 0 weighs 0; it must be above 0"),
+    ] {
+        sandbox.write("bad.json", landmarks);
+        sandbox.run(&format!("{FIT} --landmarks bad.json")).failure().stderr(contains(said));
+    }
+    assert!(!sandbox.path("pose.obj").exists());
+}

@@ -1,0 +1,187 @@
+//! Many models in one cage, with one solve.
+
+use std::time::{Duration, SystemTime};
+
+use predicates::prelude::*;
+use predicates::str::contains;
+
+use crate::rigs;
+use crate::support::{CORNERS, Sandbox, box_obj, sphere_obj};
+
+/// Spheres `a.obj` and `b.obj` in `cage.obj`, and `wide.obj`, its pose.
+fn spheres() -> Sandbox {
+    let sandbox = Sandbox::with_sphere_in_box();
+    sandbox.write("a.obj", sphere_obj(0.7));
+    sandbox.write("b.obj", sphere_obj(0.5));
+    sandbox.write("wide.obj", box_obj(&CORNERS.map(|[x, y, z]| [1.5 * x, y, z + 0.1 * x])));
+    sandbox
+}
+
+const REFIT: &str = "refit --cage cage.obj --pose wide.obj -g 8 -o out";
+
+/// Asserts that files of `out` are what `bind` and `deform` make of each model alone.
+fn assert_as_alone(sandbox: &Sandbox, names: &[&str], bind: &str, deform: &str) {
+    for name in names {
+        sandbox.run(&format!("bind {name} --cage cage.obj --weights w.npz {bind}")).success();
+        let alone =
+            format!("deform {name} --cage cage.obj --weights w.npz --pose wide.obj -o alone_{name} {deform}");
+        sandbox.run(&alone).success();
+        let [together, alone] =
+            [format!("out/{name}"), format!("alone_{name}")].map(|file| sandbox.read(&file));
+        assert!(together == alone, "{name}: {} and {} bytes", together.len(), alone.len());
+    }
+}
+
+#[test]
+fn models_together_are_the_bytes_of_each_alone() {
+    // Rigged ones, one wider than its cage, and a shape.
+    let sandbox = rigs::bound();
+    sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
+    sandbox
+        .run("deform humanoid.glb --cage cage.obj --weights w.npz --pose wide.obj -o larger.vrm")
+        .success();
+    let refit = "refit humanoid.glb larger.vrm shape.obj --cage cage.obj --pose wide.obj -g 24 -o out";
+    let names = ["humanoid.glb", "larger.vrm", "shape.obj"];
+    for (bind, deform) in [("", "--joints turn"), ("--sparsify 1e-3 --static", "--static")] {
+        let options = format!("{} {deform}", bind.trim_end_matches("--static"));
+        let done = sandbox.json(&format!("{refit} {options} --json"));
+        assert_eq!([&done["written"], &done["failed"], &done["skipped"]], [3, 0, 0]);
+        assert_as_alone(&sandbox, &names, &format!("-g 24 {bind}"), deform);
+        let joints = &done["models"][0]["joints"];
+        assert_eq!((joints == 16, joints.is_null()), (bind.is_empty(), !bind.is_empty()), "{done}");
+    }
+}
+
+#[test]
+fn parts_are_named_for_all_models_and_looked_for_in_each() {
+    let sandbox = rigs::bound();
+    sandbox
+        .run("deform humanoid.glb --cage cage.obj --weights w.npz --pose wide.obj -o larger.glb")
+        .success();
+    // A shape without names.
+    sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
+    let parts = "--mask joint:head=0.5 --rigid joint:spine";
+    let refit = "refit humanoid.glb larger.glb shape.obj --cage cage.obj --pose wide.obj -g 24 -o out";
+    let done = sandbox.json(&format!("{refit} {parts} --json"));
+    assert_as_alone(&sandbox, &["humanoid.glb", "larger.glb"], "-g 24", parts);
+    assert_as_alone(&sandbox, &["shape.obj"], "-g 24", "");
+    let notices = &done["models"][2]["notices"];
+    let said = ["joint:spine", "joint:head"].map(|name| format!("no part is called '{name}' here"));
+    assert!(said.iter().all(|said| notices.as_array().unwrap().contains(&said.as_str().into())), "{notices}");
+    sandbox
+        .run(&format!("{refit} {parts} --rigid Hed"))
+        .code(1)
+        .stdout(contains("refitted 3 of 3 models"))
+        .stderr(contains("error: no model has a part that is called 'Hed'\nhint: "));
+}
+
+#[test]
+fn fields_too_large_to_keep_are_solved_for_each_model() {
+    let sandbox = spheres();
+    let refit = "refit a.obj b.obj --cage cage.obj --pose wide.obj -g 64 -o out --json";
+    assert!(sandbox.json(refit)["solve_ms"].as_f64().is_some());
+    // 64^3 rows of 32 bytes are 8 MiB: kept, above half of 64 MiB with what solving takes; alone, below 64.
+    let done = sandbox.json(&format!("{refit} --memory-limit 64"));
+    assert!(done["solve_ms"].is_null());
+    assert!(done["notices"][0].as_str().unwrap().contains("kept in half of 64 MiB"), "{done}");
+    assert_as_alone(&sandbox, &["a.obj", "b.obj"], "-g 64", "");
+}
+
+#[test]
+fn what_fails_is_named_and_the_rest_goes_on() {
+    let sandbox = spheres();
+    sandbox.write("broken.glb", "glTF");
+    sandbox.write("far.obj", box_obj(&CORNERS.map(|[x, y, z]| [x + 9.0, y, z])));
+    let refit = format!("{REFIT} a.obj missing.obj broken.glb far.obj b.obj");
+    sandbox
+        .run(&refit)
+        .code(1)
+        .stdout(
+            contains("wrote out/a.obj: 178 vertices")
+                .and(contains("wrote out/b.obj"))
+                .and(contains("refitted 2 of 5 models, 0 skipped, 3 failed; one solve of ")),
+        )
+        .stderr(
+            contains("error: missing.obj: there is no such file\n")
+                .and(contains("error: broken.glb: "))
+                .and(contains("error: far.obj: none of the model's 8 vertices is inside the cage"))
+                .and(contains("error: 3 of 5 models failed\nhint: ")),
+        );
+    let names = |folder: &str| {
+        let entries = std::fs::read_dir(sandbox.path(folder)).unwrap();
+        let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names("out"), ["a.obj", "b.obj"]);
+    let output = sandbox.run(&format!("{refit} --json")).code(1).get_output().stdout.clone();
+    let done: serde_json::Value = serde_json::from_slice(&output).unwrap();
+    let states: Vec<_> = done["models"].as_array().unwrap().iter().map(|m| m["state"].clone()).collect();
+    assert_eq!(states, ["written", "failed", "failed", "failed", "written"]);
+    assert_eq!(done["models"][1]["error"], "missing.obj: there is no such file");
+
+    // A fault of the cage or the pose is one of all models.
+    sandbox.write("short.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    sandbox
+        .run("refit a.obj b.obj --cage cage.obj --pose short.obj -o other")
+        .code(1)
+        .stdout("")
+        .stderr(contains("3 vertices").and(contains("8")));
+    assert!(names("other").is_empty());
+}
+
+#[test]
+fn outputs_that_meet_are_refused_before_anything_starts() {
+    let sandbox = spheres();
+    std::fs::create_dir(sandbox.path("more")).unwrap();
+    sandbox.write("more/a.obj", sphere_obj(0.3));
+    sandbox
+        .run(&format!("{REFIT} a.obj b.obj more/a.obj"))
+        .code(1)
+        .stdout("")
+        .stderr(contains("a.obj and more/a.obj would both be written to out/a.obj\nhint: "));
+    // Whatever .gltf and .glb hold, both would be a .glb.
+    sandbox.run(&format!("{REFIT} x.gltf x.glb")).code(1).stderr(contains("both be written to out/x.glb"));
+    assert!(!sandbox.path("out").exists());
+    let in_place = REFIT.replace("-o out", "-o .");
+    sandbox.run(&format!("{in_place} b.obj more/a.obj")).code(1).stdout("").stderr(contains("is an input"));
+    assert_eq!(sandbox.read("b.obj"), sphere_obj(0.5).as_bytes());
+}
+
+#[test]
+fn resume_leaves_what_is_newer_than_its_inputs() {
+    let sandbox = spheres();
+    sandbox.write("list.txt", "\u{feff}# garments\r\n\r\n  a.obj\r\nb.obj\n");
+    let now = SystemTime::now();
+    let set_age = |name: &str, hours: u64| {
+        let file = std::fs::File::options().append(true).open(sandbox.path(name)).unwrap();
+        file.set_modified(now - Duration::from_secs(3600 * hours)).unwrap();
+    };
+    for name in ["a.obj", "b.obj", "cage.obj", "wide.obj"] {
+        set_age(name, 5);
+    }
+    let resume = format!("{REFIT} --manifest list.txt --resume --json");
+    let states = || {
+        let done = sandbox.json(&resume);
+        [0, 1].map(|k| done["models"][k]["state"].as_str().unwrap().to_owned())
+    };
+    assert_eq!(states(), ["written", "written"]);
+    assert_eq!(states(), ["skipped", "skipped"]);
+    let all_skipped = sandbox.json(&resume);
+    assert!(all_skipped["solve_ms"].is_null(), "nothing was solved for");
+    // Each input is newer than what was made of it in turn, or as old, which may be older.
+    let older = || ["out/a.obj", "out/b.obj"].map(|name| set_age(name, 3));
+    for (name, hours, expected) in [
+        ("b.obj", 2, ["skipped", "written"]),
+        ("cage.obj", 2, ["written", "written"]),
+        ("wide.obj", 3, ["written", "written"]),
+        ("wide.obj", 4, ["skipped", "skipped"]),
+    ] {
+        older();
+        set_age(name, hours);
+        assert_eq!(states(), expected, "{name} of {hours} hours");
+        set_age(name, 5);
+    }
+    sandbox.write("list.txt", "# nothing\n");
+    sandbox.run(&resume).code(1).stderr(contains("list.txt: names no model"));
+}

@@ -1,0 +1,173 @@
+//! One solve for many models: the fields belong to the cage, only samples of them to a model.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::memory::{Vertices, estimate, field_bytes};
+use super::pipeline::{Points, Prepared, Solved};
+use super::solving::{sample_fields, solve_fields};
+use super::voxels::{Gridded, Voxels};
+use super::{BindError, Binding, Watch};
+use crate::controls::Controls;
+use crate::options::{BindOptions, Solver};
+use crate::progress::{Progress, Stage};
+use crate::solve::rows::Row;
+use crate::team::Team;
+
+/// A cage in its grid with all columns solved: any number of models are bound to it at the cost of sampling alone.
+///
+/// No model reaches grid or solve, so what [`Self::bind`] returns is what [`super::bind`] returns, to the bit.
+pub struct SolvedCage<'a> {
+    controls: Controls<'a>,
+    options: BindOptions,
+    gridded: Arc<Gridded>,
+    /// `[n_batches][n_rows]`
+    fields: Vec<Vec<Row>>,
+    /// How the solve went; without samples.
+    solved: Solved,
+    elapsed_ms: f64,
+}
+
+impl<'a> SolvedCage<'a> {
+    /// Voxelizes and solves. The fields of all columns stay, for which half of the memory limit is there: the other half is
+    /// the models'. `held` and `extra_points` of the options are not looked at.
+    ///
+    /// # Errors
+    /// [`BindError`]: options out of range, [`BindError::Memory`] when the fields are too large to be kept, cancelled.
+    pub fn new(
+        controls: impl Into<Controls<'a>>,
+        options: &BindOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self, BindError> {
+        options.check()?;
+        let (controls, watch) = (controls.into(), Watch::new(progress));
+        let options = BindOptions { held: 0, extra_points: 0, ..*options };
+        let began = watch.now_ms();
+        let team = Team::new(options.threads);
+        watch.report(Stage::Voxelize, 0.0, 0, None)?;
+        let grid = Voxels::grid(controls.surface(), &options);
+        let (none, n_columns) = (Vertices { rows: 0, points: 0 }, controls.n_controls());
+        let solving = estimate(controls, &grid, none, team.n_threads(), n_columns, &options).bytes;
+        // Jacobi keeps all fields in any case.
+        let kept = if options.solver == Solver::Jacobi { 0 } else { field_bytes(controls, &grid) };
+        let (needed, limit) = (solving + kept, options.memory_limit / 2);
+        if needed > limit {
+            return Err(BindError::Memory { needed, limit });
+        }
+        let gridded = Arc::new(Gridded::new(controls, grid, &options, team, &watch)?);
+        let hierarchy = &gridded.voxels.hierarchy;
+        let (fields, mut solved) = solve_fields(hierarchy, &options, &gridded.team, &watch)?;
+        solved.field_bytes = fields.iter().map(|field| size_of_val(field.as_slice())).sum();
+        Ok(Self { controls, options, gridded, fields, solved, elapsed_ms: watch.now_ms() - began })
+    }
+
+    /// How long voxelizing and solving took, milliseconds.
+    #[must_use]
+    pub fn elapsed_ms(&self) -> f64 {
+        self.elapsed_ms
+    }
+
+    /// Bytes of the fields.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.solved.field_bytes as u64
+    }
+
+    /// Binds a model, as [`super::bind`] does. `held`, `extra_points`: as in [`BindOptions`]. The report's times are of the
+    /// model alone.
+    ///
+    /// # Errors
+    /// Those of [`super::bind`].
+    pub fn bind(
+        &self,
+        positions: &[Vec3],
+        (held, extra_points): (u64, usize),
+        progress: &dyn Progress,
+    ) -> Result<Binding, BindError> {
+        let watch = Watch::new(progress);
+        let began = watch.now_ms();
+        let options = BindOptions { held: held + self.bytes(), extra_points, ..self.options };
+        let mesh = Points::new(positions)?;
+        let grid = Voxels::grid(self.controls.surface(), &options);
+        let n_columns = self.controls.n_controls();
+        // Fields are there already.
+        let needed = estimate(self.controls, &grid, mesh.count(), 0, n_columns, &options);
+        needed.check(mesh.count(), n_columns, options.memory_limit)?;
+        let gridded = Arc::clone(&self.gridded);
+        let prepared =
+            Prepared::in_grid(mesh, self.controls, &options, gridded, needed.bytes, began, &watch)?;
+        let blocks = sample_fields(prepared.stencils(), &self.fields, &self.gridded.team);
+        prepared.finish(Solved { blocks, solve_share: 0.0, ..self.solved.clone() }, &watch)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bind::bind;
+    use crate::cage::Cage;
+    use crate::cage_gen::subdivided_box;
+    use crate::controls::{ControlSet, InnerControls, InnerElement};
+    use crate::mesh::Bounds;
+    use crate::options::Method;
+    use crate::progress::Silent;
+
+    /// Points of a spiral in the cube, with one twice and one outside.
+    fn points(turns: f32) -> Vec<Vec3> {
+        let on_spiral = |k: u16| {
+            let t = f32::from(k) / 300.0;
+            Vec3::new(0.9 * t * (turns * t).cos(), 1.8 * t - 0.9, 0.9 * t * (turns * t).sin())
+        };
+        let mut points: Vec<Vec3> = (0..300).map(on_spiral).collect();
+        points.extend([points[7], Vec3::new(0.2, 1.3, 0.1)]);
+        points
+    }
+
+    #[test]
+    fn models_of_a_solved_cage_are_bound_to_the_bit_as_alone() {
+        let cube = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+        let cage = Cage::new(&subdivided_box(cube, 0.0, [2, 2, 2])).unwrap();
+        let inner = InnerControls {
+            positions: vec![Vec3::new(0.3, 0.1, 0.0)],
+            elements: vec![InnerElement::Point(0)],
+            radius: Some(0.2),
+        };
+        let set = ControlSet::new(&cage, 1, inner).unwrap();
+        let usual = BindOptions { grid: 12, ..BindOptions::default() };
+        let of = |method, solver| BindOptions { method, solver, ..usual };
+        for (controls, options) in [
+            (Controls::from(&cage), usual),
+            (Controls::from(&set), BindOptions { sparsify: 1e-3, threads: 1, ..usual }),
+            (Controls::from(&cage), of(Method::Embedded, Solver::ConjugateGradient)),
+            (Controls::from(&cage), of(Method::Embedded, Solver::Jacobi)),
+            (Controls::from(&cage), of(Method::Classic, Solver::Jacobi)),
+        ] {
+            let solved = SolvedCage::new(controls, &options, &Silent).unwrap();
+            for turns in [3.0, 20.0] {
+                let points = points(turns);
+                let alone = bind(&points, controls, &options, &Silent).unwrap();
+                let together = solved.bind(&points, (0, 0), &Silent).unwrap();
+                assert!(
+                    together.weights == alone.weights && together.outside == alone.outside,
+                    "{options:?}"
+                );
+                let said =
+                    |b: &Binding| (b.report.iterations, b.report.rest_error, b.report.outside_vertices);
+                assert_eq!(said(&together), said(&alone));
+                assert!(together.report.outside_vertices >= 1);
+            }
+        }
+    }
+
+    #[test]
+    fn fields_that_do_not_fit_half_of_the_memory_are_refused() {
+        let cube = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+        let cage = Cage::new(&subdivided_box(cube, 0.0, [8, 8, 8])).unwrap();
+        let options = BindOptions { grid: 64, memory_limit: 512 << 20, ..BindOptions::default() };
+        let refused = SolvedCage::new(&cage, &options, &Silent).err().unwrap();
+        // 386 columns are 49 batches of 64^3 rows of 32 bytes: 392 MiB, above 256.
+        let BindError::Memory { needed, limit } = refused else { panic!("{refused:?}") };
+        assert!(needed > 392 << 20 && limit == 256 << 20, "{needed} {limit}");
+    }
+}

@@ -1,0 +1,248 @@
+//! Arrays of an `.npz` archive, in and out.
+//!
+//! Written uncompressed, as `numpy.savez` does, with one fixed time stamp: the same values give the same bytes. The array
+//! headers are read here and not by a library: `npyz` parses any Python literal, recursively, and a header of nested
+//! brackets would overflow the stack.
+
+use std::io::{Cursor, Read as _, Write as _};
+
+use glam::Vec3;
+use zip::result::ZipError;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
+
+use super::NpzError;
+use crate::memory::MemoryError;
+
+/// Most bytes of an array's header: NumPy's have a hundred or two.
+const MAX_HEADER: u64 = 1 << 16;
+/// NumPy aligns the data to this.
+const NPY_ALIGN: usize = 64;
+const NPY_MAGIC: &[u8; 6] = b"\x93NUMPY";
+
+/// Bytes of all headers of an archive, more than enough: so that its memory does not grow by doubling.
+const ROOM_FOR_HEADERS: usize = 4096;
+
+/// Archives with longer arrays, bytes, get zip's longer headers: half of what the short ones can say.
+const LARGE: usize = (u32::MAX / 2) as usize;
+
+/// An archive that is being written.
+pub(super) struct NpzWriter {
+    zip: ZipWriter<Cursor<Vec<u8>>>,
+    options: SimpleFileOptions,
+}
+
+impl NpzWriter {
+    /// With room for `bytes` of arrays, the longest of `longest` bytes.
+    pub(super) fn new(bytes: usize, longest: usize) -> Self {
+        Self {
+            zip: ZipWriter::new(Cursor::new(Vec::with_capacity(bytes + ROOM_FOR_HEADERS))),
+            // The zip epoch, 1980: no clock.
+            options: SimpleFileOptions::default()
+                .compression_method(CompressionMethod::Stored)
+                .last_modified_time(DateTime::default())
+                .large_file(longest > LARGE),
+        }
+    }
+
+    /// The archive.
+    pub(super) fn finish(self) -> Vec<u8> {
+        self.zip.finish().expect("writing to memory does not fail").into_inner()
+    }
+
+    /// Adds points as `[n, 3]` values of 32 bits.
+    pub(super) fn put_points(&mut self, name: &str, points: &[Vec3]) {
+        let values = points.iter().flat_map(Vec3::to_array).map(f32::to_le_bytes);
+        self.put(name, "<f4", &[points.len(), 3], values);
+    }
+
+    /// Adds an array, a run of its values at a time: there is no second copy of it.
+    pub(super) fn put<const N: usize>(
+        &mut self,
+        name: &str,
+        dtype: &str,
+        shape: &[usize],
+        values: impl IntoIterator<Item = [u8; N]>,
+    ) {
+        /// Values written at a time.
+        const RUN: usize = 1 << 14;
+        let name = format!("{name}.npy");
+        self.zip.start_file(name, self.options).expect("names are distinct, memory does not fail");
+        self.zip.write_all(&npy_header(dtype, shape)).expect("writing to memory does not fail");
+        let mut values = values.into_iter().peekable();
+        while values.peek().is_some() {
+            let run: Vec<u8> = values.by_ref().take(RUN).flatten().collect();
+            self.zip.write_all(&run).expect("writing to memory does not fail");
+        }
+    }
+}
+
+fn npy_header(dtype: &str, shape: &[usize]) -> Vec<u8> {
+    let shape = match shape {
+        [n] => format!("({n},)"),
+        _ => format!("({})", shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")),
+    };
+    let mut text = format!("{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}");
+    let unpadded = NPY_MAGIC.len() + 4 + text.len() + 1;
+    text.extend(std::iter::repeat_n(' ', unpadded.next_multiple_of(NPY_ALIGN) - unpadded));
+    text.push('\n');
+    let mut out = NPY_MAGIC.to_vec();
+    out.extend_from_slice(&[1, 0]);
+    out.extend_from_slice(&(text.len() as u16).to_le_bytes());
+    out.extend_from_slice(text.as_bytes());
+    out
+}
+
+/// An archive that is being read.
+pub(super) struct Archive<'a> {
+    zip: ZipArchive<Cursor<&'a [u8]>>,
+    /// Bytes of the arrays so far, as they are in the file and as they are used.
+    unpacked: u64,
+    memory_limit: u64,
+}
+
+impl<'a> Archive<'a> {
+    /// # Errors
+    /// When it is none.
+    pub(super) fn new(bytes: &'a [u8], memory_limit: u64) -> Result<Self, NpzError> {
+        Ok(Self { zip: ZipArchive::new(Cursor::new(bytes))?, unpacked: 0, memory_limit })
+    }
+
+    /// Whether there is an array of this name.
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.zip.index_for_name(&format!("{name}.npy")).is_some()
+    }
+}
+
+pub(super) struct NpyArray {
+    name: &'static str,
+    dtype: String,
+    /// Lengths along the axes.
+    pub(super) shape: Vec<usize>,
+    pub(super) data: Vec<u8>,
+}
+
+pub(super) fn required(zip: &mut Archive<'_>, name: &'static str) -> Result<NpyArray, NpzError> {
+    array(zip, name)?.ok_or(NpzError::Missing(name))
+}
+
+/// Unpacks an array as far as its shape needs: neither the archive's directory nor its streams are believed.
+pub(super) fn array(archive: &mut Archive<'_>, name: &'static str) -> Result<Option<NpyArray>, NpzError> {
+    let mut entry = match archive.zip.by_name(&format!("{name}.npy")) {
+        Err(ZipError::FileNotFound) => return Ok(None),
+        other => other?,
+    };
+    let fault = |problem: String| NpzError::Array { array: name, problem };
+    let bad = || fault("is not in NumPy's .npy format".into());
+    let mut unpack = |most: u64, into: &mut Vec<u8>| {
+        let unpacked = entry.by_ref().take(most).read_to_end(into);
+        unpacked.map_err(|e| fault(format!("cannot be unpacked: {e}")))
+    };
+    let mut bytes = Vec::new();
+    unpack(START_BYTES, &mut bytes)?;
+    let end = header_end(&bytes).filter(|&end| end <= MAX_HEADER).ok_or_else(bad)?;
+    unpack(end.saturating_sub(START_BYTES), &mut bytes)?;
+    let text = bytes.get(TEXT..end as usize).ok_or_else(bad)?;
+    let text = std::str::from_utf8(text).map_err(|_| bad())?;
+    let dtype = field(text, "'descr':").and_then(quoted).ok_or_else(bad)?.to_owned();
+    if field(text, "'fortran_order':").is_none_or(|f| !f.starts_with("False")) {
+        return Err(fault("is in Fortran order; save it in C order".into()));
+    }
+    let shape = field(text, "'shape':").and_then(lengths).ok_or_else(bad)?;
+    // Other types are refused by whoever wants their values.
+    let width = dtype.get(2..).and_then(|width| width.parse().ok()).unwrap_or(8);
+    let needed = shape.iter().try_fold(width, |n: u64, &length| n.checked_mul(length as u64));
+    let needed = needed.ok_or_else(|| fault(format!("is of shape {shape:?}, which no memory holds")))?;
+    archive.unpacked = archive.unpacked.saturating_add(2 * needed.min(u64::MAX / 2));
+    MemoryError::check(archive.unpacked, archive.memory_limit)?;
+    let mut data = Vec::new();
+    // One more tells of a stream that does not end where it should.
+    unpack(needed.saturating_add(1), &mut data)?;
+    if data.len() as u64 > needed {
+        return Err(fault(format!("has more than the {needed} bytes that its shape {shape:?} takes")));
+    }
+    Ok(Some(NpyArray { name, dtype, shape, data }))
+}
+
+/// Bytes that tell a header's length: magic, version, and a length of two bytes or four.
+const START_BYTES: u64 = 12;
+/// Where its text begins, or the upper half of a length of four bytes.
+const TEXT: usize = 10;
+
+/// Where the header of an `.npy` file ends, versions 1 to 3.
+fn header_end(bytes: &[u8]) -> Option<u64> {
+    let rest = bytes.strip_prefix(NPY_MAGIC)?;
+    match rest.first()? {
+        1 => Some(10 + u64::from(u16::from_le_bytes(rest.get(2..4)?.try_into().ok()?))),
+        _ => Some(12 + u64::from(u32::from_le_bytes(rest.get(2..6)?.try_into().ok()?))),
+    }
+}
+
+fn field<'a>(header: &'a str, key: &str) -> Option<&'a str> {
+    header.split_once(key).map(|(_, rest)| rest.trim_start())
+}
+
+fn quoted(text: &str) -> Option<&str> {
+    text.strip_prefix('\'')?.split_once('\'').map(|(inner, _)| inner)
+}
+
+/// The numbers of a tuple such as `(4, 3)`.
+fn lengths(text: &str) -> Option<Vec<usize>> {
+    let (inner, _) = text.strip_prefix('(')?.split_once(')')?;
+    inner.split(',').map(str::trim).filter(|word| !word.is_empty()).map(|word| word.parse().ok()).collect()
+}
+
+impl NpyArray {
+    pub(super) fn fault(&self, problem: &str) -> NpzError {
+        NpzError::Array { array: self.name, problem: problem.to_owned() }
+    }
+
+    /// The array, if its lengths along all axes but the first are these.
+    pub(super) fn rows_of(self, lengths: &[usize]) -> Result<Self, NpzError> {
+        if self.shape.get(1..) == Some(lengths) {
+            return Ok(self);
+        }
+        let wanted = if lengths.is_empty() { "one axis".to_owned() } else { format!("rows of {lengths:?}") };
+        Err(self.fault(&format!("is of shape {:?}; it must have {wanted}", self.shape)))
+    }
+
+    /// The points of rows of three.
+    pub(super) fn points(self) -> Result<Vec<Vec3>, NpzError> {
+        Ok(self.rows_of(&[3])?.floats()?.chunks_exact(3).map(Vec3::from_slice).collect())
+    }
+
+    fn chunks<const N: usize>(&self) -> Result<impl Iterator<Item = [u8; N]>, NpzError> {
+        let values = self.shape.iter().try_fold(1_usize, |n, &length| n.checked_mul(length));
+        let (chunks, rest) = self.data.as_chunks::<N>();
+        if values == Some(chunks.len()) && rest.is_empty() {
+            return Ok(chunks.iter().copied());
+        }
+        let problem =
+            format!("has {} bytes, which is not what its shape {:?} takes", self.data.len(), self.shape);
+        Err(self.fault(&problem))
+    }
+
+    /// Values of an integer array; each must fit 32 bits and not be negative.
+    pub(super) fn unsigned(&self) -> Result<Vec<u32>, NpzError> {
+        let range = |_| self.fault("has a value that is negative or does not fit 32 bits");
+        match self.dtype.as_str() {
+            "<i4" => self.chunks()?.map(|b| u32::try_from(i32::from_le_bytes(b)).map_err(range)).collect(),
+            "<u4" => Ok(self.chunks()?.map(u32::from_le_bytes).collect()),
+            "<i8" => self.chunks()?.map(|b| u32::try_from(i64::from_le_bytes(b)).map_err(range)).collect(),
+            "<u8" => self.chunks()?.map(|b| u32::try_from(u64::from_le_bytes(b)).map_err(range)).collect(),
+            other => {
+                Err(self.fault(&format!("is of type {other}; it must be int32 or int64, little-endian")))
+            }
+        }
+    }
+
+    pub(super) fn floats(&self) -> Result<Vec<f32>, NpzError> {
+        match self.dtype.as_str() {
+            "<f4" => Ok(self.chunks()?.map(f32::from_le_bytes).collect()),
+            "<f8" => Ok(self.chunks()?.map(|b| f64::from_le_bytes(b) as f32).collect()),
+            other => {
+                Err(self.fault(&format!("is of type {other}; it must be float32 or float64, little-endian")))
+            }
+        }
+    }
+}

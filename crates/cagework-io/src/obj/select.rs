@@ -1,0 +1,56 @@
+//! Vertices of an OBJ's materials and groups.
+
+use std::collections::HashSet;
+
+use super::read::ObjDocument;
+use crate::part_kind::PartKind;
+
+/// An `o` or `g` line.
+#[derive(Clone, Debug)]
+pub(crate) struct Group {
+    /// An `o` line holds until the next one, a `g` line until the next `g`.
+    pub(crate) is_object: bool,
+    /// What it says; a `g` line may have several names.
+    pub(crate) name: String,
+    /// The face after it.
+    pub(crate) first_face: u32,
+}
+
+impl Group {
+    fn is_called(&self, name: &str) -> bool {
+        self.name == name || (!self.is_object && self.name.split_whitespace().any(|one| one == name))
+    }
+}
+
+impl ObjDocument {
+    /// Materials, objects and groups, each once.
+    pub(crate) fn part_names(&self) -> Vec<(PartKind, String)> {
+        let materials = self.materials.iter().map(|name| (PartKind::Material, name.clone()));
+        let mut seen = HashSet::new();
+        let groups = self.groups.iter().filter(|group| seen.insert(group.name.as_str()));
+        materials.chain(groups.map(|group| (PartKind::Group, group.name.clone()))).collect()
+    }
+
+    /// Vertices of what is called so, in no order, some several times.
+    pub(crate) fn vertices_of(&self, kind: PartKind, name: &str) -> Vec<u32> {
+        let n_faces = self.face_materials.len();
+        let mut is_of = vec![false; n_faces];
+        match kind {
+            PartKind::Material => {
+                let material = self.materials.iter().position(|m| m == name).map(|m| m as u32);
+                is_of.iter_mut().zip(&self.face_materials).for_each(|(is, m)| *is = Some(*m) == material);
+            }
+            PartKind::Group => {
+                for (k, group) in self.groups.iter().enumerate().filter(|(_, group)| group.is_called(name)) {
+                    let next = self.groups[k + 1..].iter().find(|g| g.is_object == group.is_object);
+                    let end = next.map_or(n_faces, |g| g.first_face as usize);
+                    is_of[group.first_face as usize..end].fill(true);
+                }
+            }
+            PartKind::Node | PartKind::Joint => {}
+        }
+        let corners = |face: usize| self.face_starts[face] as usize..self.face_starts[face + 1] as usize;
+        let faces = (0..n_faces).filter(|&face| is_of[face]);
+        faces.flat_map(|face| self.corners[corners(face)].iter().map(|c| c.v)).collect()
+    }
+}

@@ -1,0 +1,193 @@
+//! PLY in and out: vertices with colours, and polygons.
+
+use cagework_core::deform::vertex_normals;
+use glam::Vec3;
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{
+    Addable as _, ElementDef, Encoding as PlyEncoding, Header, Ply, Property, PropertyAccess,
+    PropertyAccessResult, PropertyDef, PropertyType, ScalarType,
+};
+use ply_rs_bw::writer::Writer;
+
+use crate::polygons::{Encoding, Polygons, PolygonsError};
+use crate::shown::{MAX_NAME_CHARS, shown_start};
+
+/// Properties of a vertex that are understood.
+const PLACE: [&str; 3] = ["x", "y", "z"];
+const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
+const COLOR: [&str; 3] = ["red", "green", "blue"];
+/// The list of a face's vertices has one of two names.
+const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// An element of any kind, as far as it is understood.
+#[derive(Default)]
+struct Element {
+    place: [f32; 3],
+    normal: [f32; 3],
+    color: [u8; 3],
+    corners: Vec<u32>,
+}
+
+impl PropertyAccess for Element {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let of = |names: [&str; 3]| names.iter().position(|&n| n == name);
+        let set = if let Some(k) = of(PLACE) {
+            property.to_f32_lossy().map(|x| self.place[k] = x)
+        } else if let Some(k) = of(COLOR) {
+            property.to_u8_color_lossy().map(|x| self.color[k] = x)
+        } else if CORNERS.contains(&name) {
+            property.to_u32_list().map(|list| self.corners = list)
+        } else {
+            return PropertyAccessResult::Ignored;
+        };
+        set.map_or(PropertyAccessResult::UnsupportedType, |()| PropertyAccessResult::Set)
+    }
+
+    fn get_float(&self, name: &str) -> Option<f32> {
+        let find =
+            |names: [&str; 3], values: [f32; 3]| names.iter().position(|&n| n == name).map(|k| values[k]);
+        find(PLACE, self.place).or_else(|| find(NORMAL, self.normal))
+    }
+
+    fn get_uchar(&self, name: &str) -> Option<u8> {
+        COLOR.iter().position(|&n| n == name).map(|k| self.color[k])
+    }
+
+    fn get_list_uint(&self, _name: &str) -> Option<&[u32]> {
+        Some(&self.corners)
+    }
+}
+
+/// Reads a file within `memory_limit` bytes.
+pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, PolygonsError> {
+    let wrong = |e: ply_rs_bw::parser::ParseError| {
+        PolygonsError::Syntax(shown_start(&e.to_string(), 2 * MAX_NAME_CHARS))
+    };
+    let parser = Parser::<Element>::new();
+    let mut reader = Reader::new(bytes);
+    let header = parser.read_header(&mut reader).map_err(wrong)?;
+    let n_bytes = bytes.len() as u64;
+    let count = |name: &str| header.elements.get(name).map_or(0, |e| e.count as u64);
+    for element in header.elements.values() {
+        // An element takes a byte at least, if only that of its line's end.
+        if element.count as u64 > n_bytes {
+            let name = shown_start(&element.name, MAX_NAME_CHARS);
+            return Err(PolygonsError::Count { name, count: element.count as u64, bytes: n_bytes });
+        }
+    }
+    // A corner takes a byte at least, and each element is held until all of its kind are read.
+    let others: u64 = header.elements.values().map(|e| e.count as u64).max().unwrap_or(0);
+    let corners = if count("face") > 0 { n_bytes } else { 0 };
+    let elements = others * size_of::<Element>() as u64;
+    Polygons::check_memory(2 * n_bytes + elements, count("vertex"), corners / 2, memory_limit)?;
+
+    let mut read = Polygons {
+        face_starts: vec![0],
+        encoding: match header.encoding {
+            PlyEncoding::Ascii => Encoding::Text,
+            PlyEncoding::BinaryBigEndian => Encoding::BigEndian,
+            PlyEncoding::BinaryLittleEndian => Encoding::LittleEndian,
+        },
+        ..Polygons::default()
+    };
+    let mut left_out = Vec::new();
+    let mut faces: Vec<Element> = Vec::new();
+    for (name, element) in &header.elements {
+        let elements = parser.read_payload_for_element(&mut reader, element, &header).map_err(wrong)?;
+        let has = |names: &[&str]| names.iter().all(|&n| element.properties.contains_key(n));
+        let known: Vec<&str> = [&PLACE[..], &NORMAL, &COLOR].concat();
+        match name.as_str() {
+            "vertex" => {
+                if !has(&PLACE) {
+                    return Err(PolygonsError::Syntax("its vertices lack x, y or z".into()));
+                }
+                read.positions = elements.iter().map(|e| Vec3::from_array(e.place)).collect();
+                read.has_normals = has(&NORMAL);
+                if has(&COLOR) {
+                    read.colors = elements.iter().map(|e| e.color.map(|c| f32::from(c) / 255.0)).collect();
+                }
+                left_out.extend(element.properties.keys().filter(|k| !known.contains(&k.as_str())).cloned());
+            }
+            "face" => {
+                left_out
+                    .extend(element.properties.keys().filter(|k| !CORNERS.contains(&k.as_str())).cloned());
+                faces = elements;
+            }
+            _ => left_out.push(name.clone()),
+        }
+    }
+    for face in faces {
+        read.corners.extend(&face.corners);
+        read.end_face()?;
+    }
+    if !left_out.is_empty() {
+        let names = shown_start(&left_out.join(", "), MAX_NAME_CHARS);
+        read.notices.push(format!("'{names}' of the PLY file are not kept"));
+    }
+    Ok(read)
+}
+
+/// What is written: vertices, with normals and colours if there are any, and polygons.
+pub(crate) struct Written<'a> {
+    pub(crate) positions: &'a [Vec3],
+    /// For normals.
+    pub(crate) triangles: &'a [[u32; 3]],
+    pub(crate) faces: Vec<Vec<u32>>,
+    pub(crate) color: &'a dyn Fn(u32) -> Option<[f32; 3]>,
+    pub(crate) has_colors: bool,
+    pub(crate) has_normals: bool,
+    pub(crate) encoding: Encoding,
+}
+
+/// As a file.
+pub(crate) fn write(given: Written<'_>) -> Vec<u8> {
+    let Written { positions, triangles, faces, color, has_colors, has_normals, encoding } = given;
+    let normals = if has_normals { vertex_normals(positions, triangles) } else { Vec::new() };
+    let mut header = Header::new();
+    header.encoding = match encoding {
+        Encoding::Text => PlyEncoding::Ascii,
+        Encoding::LittleEndian => PlyEncoding::BinaryLittleEndian,
+        Encoding::BigEndian => PlyEncoding::BinaryBigEndian,
+    };
+    let mut element = |name: &str, properties: Vec<(&str, PropertyType)>| {
+        let mut element = ElementDef::new(name.into());
+        for (name, kind) in properties {
+            element.properties.add(PropertyDef::new(name.into(), kind));
+        }
+        header.elements.add(element);
+    };
+    let scalars =
+        |names: [&'static str; 3], kind: ScalarType| names.map(|n| (n, PropertyType::Scalar(kind.clone())));
+    let mut properties = scalars(PLACE, ScalarType::Float).to_vec();
+    if has_normals {
+        properties.extend(scalars(NORMAL, ScalarType::Float));
+    }
+    if has_colors {
+        properties.extend(scalars(COLOR, ScalarType::UChar));
+    }
+    element("vertex", properties);
+    // A list of few corners counts them in a byte, as most programs expect.
+    let is_small = faces.iter().all(|face| face.len() < 256);
+    let counter = if is_small { ScalarType::UChar } else { ScalarType::UInt };
+    element("face", vec![(CORNERS[0], PropertyType::List(counter, ScalarType::UInt))]);
+    let vertex = |(v, p): (usize, &Vec3)| Element {
+        place: p.to_array(),
+        normal: normals.get(v).map_or([0.0; 3], Vec3::to_array),
+        color: color(v as u32).unwrap_or([1.0; 3]).map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8),
+        corners: Vec::new(),
+    };
+    let mut ply = Ply::<Element>::new();
+    ply.header = header;
+    ply.payload.insert("vertex".into(), positions.iter().enumerate().map(vertex).collect());
+    let faces = faces.into_iter().map(|corners| Element { corners, ..Element::default() });
+    ply.payload.insert("face".into(), faces.collect());
+    let mut bytes = Vec::new();
+    Writer::new()
+        .write_ply(&mut bytes, &mut ply)
+        .expect("a Vec takes all bytes, and both lists are declared");
+    bytes
+}

@@ -1,0 +1,139 @@
+//! What PLY and STL files have in common: polygons of vertices, and little else.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+use thiserror::Error;
+
+use crate::memory::MemoryError;
+use crate::obj::{Corner, NONE, ObjDocument};
+
+/// Bytes that a vertex takes in the table of different positions.
+const WELD_BYTES: u64 = 36;
+
+/// Why a PLY or STL file could not be read.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum PolygonsError {
+    /// Its own grammar is not kept.
+    #[error("the file is damaged: {0}")]
+    Syntax(String),
+    /// It says that there is more than it has bytes for.
+    #[error("it says that it has {count} of '{name}', but the file has {bytes} bytes")]
+    Count {
+        /// What it counts.
+        name: String,
+        /// How many there are to be.
+        count: u64,
+        /// Bytes of the file.
+        bytes: u64,
+    },
+    /// No vertex at all.
+    #[error("it has no vertices")]
+    Empty,
+    /// A vertex is no place.
+    #[error("vertex {vertex} has a coordinate that is not finite")]
+    NotFinite {
+        /// The vertex, from 0.
+        vertex: usize,
+    },
+    /// A face names a vertex that does not exist.
+    #[error("face {face} names vertex {index}, but there are {vertices}, from 0 to {}", vertices - 1)]
+    Vertex {
+        /// The face, from 0.
+        face: usize,
+        /// What it names.
+        index: u32,
+        /// Vertices there are.
+        vertices: usize,
+    },
+    /// A face with fewer than three corners.
+    #[error("face {face} has {corners} corners; it needs at least 3")]
+    Face {
+        /// The face, from 0.
+        face: usize,
+        /// Corners it has.
+        corners: usize,
+    },
+    /// More memory than is allowed.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
+}
+
+/// How the numbers of a file are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Encoding {
+    Text,
+    #[default]
+    LittleEndian,
+    BigEndian,
+}
+
+/// A file that was read.
+#[derive(Debug, Default)]
+pub(crate) struct Polygons {
+    pub(crate) positions: Vec<Vec3>,
+    /// Corners of all faces, one after another, and where each face starts. `[n_faces + 1]`
+    pub(crate) corners: Vec<u32>,
+    pub(crate) face_starts: Vec<u32>,
+    /// Of each vertex, sRGB from 0 to 1; empty if the file has none.
+    pub(crate) colors: Vec<[f32; 3]>,
+    pub(crate) has_normals: bool,
+    pub(crate) encoding: Encoding,
+    pub(crate) notices: Vec<String>,
+}
+
+impl Polygons {
+    /// Bytes that a file of so many vertices and corners takes with the `bytes` of its file, about; faces are triangles.
+    ///
+    /// # Errors
+    /// When they are above a limit.
+    pub(crate) fn check_memory(
+        bytes: u64,
+        vertices: u64,
+        corners: u64,
+        limit: u64,
+    ) -> Result<u64, MemoryError> {
+        let needed = bytes + vertices * (120 + WELD_BYTES) + corners * 48;
+        MemoryError::check(needed, limit).map(|()| needed)
+    }
+
+    /// Ends a face that began where the last one ended.
+    ///
+    /// # Errors
+    /// When it is none.
+    pub(crate) fn end_face(&mut self) -> Result<(), PolygonsError> {
+        let start = self.face_starts.last().map_or(0, |&start| start as usize);
+        let (face, corners) = (self.face_starts.len().saturating_sub(1), self.corners.len() - start);
+        let vertices = self.positions.len();
+        if let Some(&index) = self.corners[start..].iter().find(|&&v| v as usize >= vertices) {
+            return Err(PolygonsError::Vertex { face, index, vertices });
+        }
+        if corners < 3 {
+            return Err(PolygonsError::Face { face, corners });
+        }
+        self.face_starts.push(self.corners.len() as u32);
+        Ok(())
+    }
+
+    /// As a document of polygons.
+    ///
+    /// # Errors
+    /// When a vertex is no place, or there is none.
+    pub(crate) fn document(&mut self) -> Result<ObjDocument, PolygonsError> {
+        if self.positions.is_empty() {
+            return Err(PolygonsError::Empty);
+        }
+        if let Some(vertex) = self.positions.iter().position(|p| !p.is_finite()) {
+            return Err(PolygonsError::NotFinite { vertex });
+        }
+        let mut document = ObjDocument {
+            corners: self.corners.iter().map(|&v| Corner { v, vt: NONE, vn: NONE }).collect(),
+            face_materials: vec![NONE; self.face_starts.len() - 1],
+            face_starts: std::mem::take(&mut self.face_starts),
+            colors: (0..).zip(self.colors.iter().copied()).collect::<HashMap<_, _>>(),
+            ..ObjDocument::default()
+        };
+        document.triangulate(&self.positions);
+        Ok(document)
+    }
+}

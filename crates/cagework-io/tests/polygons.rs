@@ -1,0 +1,177 @@
+//! PLY and STL in and out.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, outside the test functions")]
+
+mod common;
+
+use cagework_io::{Model, ModelFormat};
+use common::{CUBE_OBJ, cube, read, twist, volume};
+use glam::Vec3;
+
+fn fault(name: &str, bytes: &[u8]) -> String {
+    read(name, bytes).unwrap_err().to_string()
+}
+
+fn obj() -> Model {
+    read("cube.obj", CUBE_OBJ.as_bytes()).unwrap()
+}
+
+/// The cube of quads as a PLY, with a colour, a number that nobody knows, and edges.
+fn ply_text() -> String {
+    let mut text = "ply\nformat ascii 1.0\ncomment by hand\nelement vertex 8\nproperty double x\nproperty double y\n\
+        property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nproperty float quality\n\
+        element edge 1\nproperty int vertex1\nproperty int vertex2\nelement face 6\n\
+        property list uchar int vertex_indices\nend_header\n"
+        .to_owned();
+    for (k, p) in cube().iter().enumerate() {
+        text += &format!("{} {} {} {} 0 51 0.5\n", p.x, p.y, p.z, 10 * k);
+    }
+    text += "0 1\n";
+    for face in obj().cage_mesh().faces {
+        let corners: Vec<String> = face.iter().map(u32::to_string).collect();
+        text += &format!("{} {}\n", face.len(), corners.join(" "));
+    }
+    text
+}
+
+#[test]
+fn a_ply_is_read_with_polygons_and_colours_and_says_what_it_leaves_out() {
+    let model = read("cube.ply", ply_text().as_bytes()).unwrap();
+    assert_eq!((model.format(), model.n_faces(), model.triangles.len()), (ModelFormat::Ply, 6, 12));
+    assert_eq!(model.positions, cube());
+    assert_eq!(model.cage_mesh().faces, obj().cage_mesh().faces);
+    assert!((volume(&model) - volume(&obj())).abs() < 1e-6);
+    // The seventh vertex is 60 / 255 red and 51 / 255 = 0.2 blue; linear by the sRGB curve.
+    let look = model.look();
+    let corner = look.vertices.iter().find(|v| v.source == 6).unwrap();
+    let linear = |c: f32| ((c + 0.055) / 1.055).powf(2.4);
+    assert!(
+        (corner.color[0] - linear(60.0 / 255.0)).abs() < 1e-5 && (corner.color[2] - linear(0.2)).abs() < 1e-5
+    );
+    assert_eq!(model.notices, ["'quality, edge' of the PLY file are not kept"]);
+}
+
+#[test]
+fn ply_and_stl_come_back_from_what_is_written() {
+    let moved: Vec<Vec3> = cube().into_iter().map(twist).collect();
+    let from_text = read("cube.ply", ply_text().as_bytes()).unwrap();
+    let written = from_text.write_ply(&moved).unwrap();
+    assert!(written.starts_with(b"ply\nformat ascii 1.0\n"), "text stays text");
+    let again = read("again.ply", &written).unwrap();
+    assert_eq!((&again.positions, again.cage_mesh().faces), (&moved, from_text.cage_mesh().faces));
+    assert_eq!(again.look().vertices, from_text.look().vertices, "colours stay");
+
+    // From an OBJ both are binary.
+    for format in [ModelFormat::Ply, ModelFormat::Stl] {
+        let bytes = obj().write(format, &moved).unwrap();
+        let again = read("again", &bytes).unwrap();
+        assert_eq!((again.format(), again.triangles.len()), (format, 12));
+        let twice = again.write(format, &again.positions).unwrap();
+        assert!(twice == bytes, "{format:?}: the same bytes again");
+        if format == ModelFormat::Ply {
+            assert_eq!(again.positions, moved);
+        } else {
+            // Corners in another order, at the same places.
+            let places = |model: &Model| -> Vec<Vec3> {
+                model.triangles.iter().flatten().map(|&v| model.positions[v as usize]).collect()
+            };
+            let mut shape = obj();
+            shape.positions = moved.clone();
+            assert_eq!((again.positions.len(), places(&again)), (8, places(&shape)));
+        }
+    }
+}
+
+#[test]
+fn both_byte_orders_of_a_ply_are_read_and_kept() {
+    let little = obj().write_ply(&cube()).unwrap();
+    let end = little.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let header = String::from_utf8(little[..end].to_vec()).unwrap();
+    assert!(
+        header.contains("property float x") && header.contains("property list uchar uint vertex_indices")
+    );
+    let mut big = header.replace("little", "big").into_bytes();
+    let (vertices, faces) = little[end..].split_at(8 * 12);
+    vertices.chunks(4).for_each(|x| big.extend(x.iter().rev()));
+    for face in faces.chunks(1 + 4 * 4) {
+        big.push(face[0]);
+        face[1..].chunks(4).for_each(|v| big.extend(v.iter().rev()));
+    }
+    let model = read("big.ply", &big).unwrap();
+    assert_eq!(model.positions, cube());
+    assert!(model.write_ply(&cube()).unwrap() == big);
+}
+
+#[test]
+fn an_stl_of_text_may_have_several_solids_in_any_letters() {
+    let triangle = |x: f32| {
+        format!(
+            "FACET NORMAL 0 0 1\r\n OUTER LOOP\r\n VERTEX {x} 0 0\r\n VERTEX {} 0 0\r\n vertex {x} 1e0 0\r\n endloop\r\nendfacet\r\n",
+            x + 1.0
+        )
+    };
+    let text = format!(
+        "solid\r\n{}{}endsolid\r\nsolid second one\r\n{}endsolid second one\r\n",
+        triangle(0.0),
+        triangle(1.0),
+        triangle(5.0)
+    );
+    let model = read("x.stl", text.as_bytes()).unwrap();
+    assert_eq!((model.format(), model.triangles.len()), (ModelFormat::Stl, 3));
+    // The second triangle's first corner is the first one's second.
+    assert_eq!(model.positions.len(), 8);
+    assert_eq!(model.triangles[1], [1, 3, 4]);
+    let again = model.write_stl(&model.positions).unwrap();
+    assert!(again.starts_with(b"solid cagework\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n"));
+    assert_eq!(read("again.stl", &again).unwrap().positions, model.positions);
+}
+
+#[test]
+fn a_binary_stl_may_begin_like_a_text_and_has_normals_of_its_planes() {
+    let mut bytes = obj().write_stl(&cube()).unwrap();
+    assert_eq!(bytes.len(), 84 + 12 * 50);
+    let float = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    for t in 0..12 {
+        let [n, a, b, c] =
+            [0, 12, 24, 36].map(|k| Vec3::from_array([0, 4, 8].map(|x| float(84 + 50 * t + k + x))));
+        assert!((n - (b - a).cross(c - a).normalize()).length() < 1e-6 && n.dot(a - Vec3::splat(0.5)) > 0.0);
+    }
+    bytes[..12].copy_from_slice(b"solid facets");
+    assert_eq!(read("x.stl", &bytes).unwrap().triangles.len(), 12);
+}
+
+#[test]
+fn what_is_wrong_with_them_is_said() {
+    let ply = ply_text();
+    for (from, to, said) in [
+        (
+            "element vertex 8",
+            "element vertex 80000",
+            "it says that it has 80000 of 'vertex', but the file has",
+        ),
+        ("element vertex 8", "element vertex 9", "damaged"),
+        ("property double x\n", "", "its vertices lack x, y or z"),
+        ("\n4 ", "\n2 ", "face 0 has 2 corners; it needs at least 3"),
+        ("\n0 1\n4 0", "\n0 1\n4 8", "face 0 names vertex 8, but there are 8, from 0 to 7"),
+        ("format ascii 1.0", "format braille 1.0", "damaged"),
+    ] {
+        let broken = ply.replacen(from, to, 1);
+        assert!(broken != ply, "{from}");
+        let message = fault("x.ply", broken.as_bytes());
+        assert!(message.contains(said), "{to}: {message}");
+    }
+    let mut stl = obj().write_stl(&cube()).unwrap();
+    stl.truncate(300);
+    let message = fault("x.stl", &stl);
+    assert!(
+        message.contains("it says that it has 12 of 'triangle', but the file has 300 bytes"),
+        "{message}"
+    );
+    assert!(fault("x.stl", b"solid x\nfacet normal 0 0\n").contains("damaged"));
+    assert!(fault("x.stl", b"solid x\nfacet\nendsolid x\n").contains("damaged"));
+    let mut stl = obj().write_stl(&cube()).unwrap();
+    stl[96..100].copy_from_slice(&f32::NAN.to_le_bytes());
+    assert!(fault("x.stl", &stl).contains("vertex 0 has a coordinate that is not finite"));
+    let tight = Model::read_within("x.stl", &obj().write_stl(&cube()).unwrap(), &mut |_| None, 1000);
+    assert!(tight.unwrap_err().to_string().contains("memory"));
+}
