@@ -226,14 +226,10 @@ impl SolveArgs {
 
     /// The options of a bind on `grid` cells within a limit on memory.
     pub(crate) fn options(&self, grid: u32, memory: MemoryArgs) -> BindOptions {
-        let usual = match self.method {
-            Method::Classic => Solver::Jacobi,
-            Method::Embedded => Solver::Multigrid,
-        };
         BindOptions {
             grid,
             method: self.method,
-            solver: self.solver.unwrap_or(usual),
+            solver: self.solver.unwrap_or(self.method.usual_solver()),
             preconditioner: self.preconditioner,
             cell_shape: self.cells,
             delta_norm: self.delta,

@@ -68,6 +68,17 @@ choice! {
     }
 }
 
+impl Method {
+    /// The solver of a bind that asks for none: the paper's for the paper's method.
+    #[must_use]
+    pub fn usual_solver(self) -> Solver {
+        match self {
+            Self::Classic => Solver::Jacobi,
+            Self::Embedded => Solver::Multigrid,
+        }
+    }
+}
+
 choice! {
     /// What conjugate gradients are preconditioned by.
     Preconditioner {

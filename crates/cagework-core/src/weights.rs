@@ -102,6 +102,12 @@ impl Weights {
         Self { n_columns, indptr, indices, data }
     }
 
+    /// `indptr`, `indices` and `data`: the arrays that [`Self::new`] takes.
+    #[must_use]
+    pub fn into_parts(self) -> (Vec<u32>, Vec<u32>, Vec<f32>) {
+        (self.indptr, self.indices, self.data)
+    }
+
     /// The matrix whose row v is this one's row `row_of[v]`.
     #[must_use]
     pub fn with_rows(&self, row_of: &[u32]) -> Self {

@@ -34,6 +34,7 @@ const RULES: &[Rule] = &[
         may_use: &["cagework-core", "cagework-gpu", "cagework-io"],
         must_not_use: &[],
     },
+    Rule { name: "cagework-py", may_use: &["cagework-core", "cagework-io"], must_not_use: &["wgpu", "clap"] },
     Rule { name: "cagework-gpu", may_use: &["cagework-core"], must_not_use: &["gltf", "gltf-json", "clap"] },
     Rule {
         name: "cagework-web",

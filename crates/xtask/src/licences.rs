@@ -1,4 +1,4 @@
-//! Notices of everything that is compiled into the page and into the command, as their licences ask for.
+//! Notices of everything that is compiled into the page, the command and the Python package, as their licences ask for.
 //!
 //! From what is there anyhow: `cargo tree` knows what is compiled in, the registry's sources hold the licence files, and Vite
 //! writes those of the npm packages that it bundles. So nothing has to be installed and nothing is asked of a network.
@@ -53,9 +53,24 @@ pub(crate) fn of_page(folder: &Path) -> Result<(), String> {
 /// # Errors
 /// Names the package whose licence is not known.
 pub(crate) fn of_command(folder: &Path) -> Result<(), String> {
+    write(folder, of_crates("cagework-cli", &host()?, &[])?)
+}
+
+/// Writes the notices of the Python package into a folder of it.
+///
+/// # Errors
+/// Names the package whose licence is not known.
+pub(crate) fn of_wheel(folder: &Path) -> Result<(), String> {
+    write(folder, of_crates("cagework-py", &host()?, &[])?)
+}
+
+fn host() -> Result<String, String> {
     let about = output("rustc", &["-vV"])?;
-    let host = about.lines().find_map(|line| line.strip_prefix("host: ")).ok_or("rustc names no host")?;
-    write(folder, of_crates("cagework-cli", host, &[])?)
+    about
+        .lines()
+        .find_map(|line| line.strip_prefix("host: "))
+        .map(str::to_owned)
+        .ok_or("rustc names no host".to_owned())
 }
 
 fn write(folder: &Path, parts: Vec<Part>) -> Result<(), String> {
@@ -210,10 +225,9 @@ mod tests {
 
     #[test]
     fn what_the_command_is_made_of_is_named_and_what_only_builds_it_is_not() {
-        let host = output("rustc", &["-vV"]).unwrap();
-        let host = host.lines().find_map(|line| line.strip_prefix("host: ")).unwrap();
+        let host = host().unwrap();
         let names: Vec<String> =
-            of_crates("cagework-cli", host, &[]).unwrap().into_iter().map(|part| part.name).collect();
+            of_crates("cagework-cli", &host, &[]).unwrap().into_iter().map(|part| part.name).collect();
         let has = |name: &str| names.iter().any(|n| n.starts_with(&format!("{name} v")));
         assert!(has("wgpu") && has("glam") && has("clap"), "{names:?}");
         assert!(!has("syn") && !has("clap_derive") && !has("proptest") && !has("wasm-bindgen-cli-support"));

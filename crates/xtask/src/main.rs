@@ -7,6 +7,7 @@ mod command;
 mod deny;
 mod licences;
 mod npm;
+mod python;
 mod site;
 mod tasks;
 mod wasm;
@@ -22,6 +23,8 @@ const USAGE: &str = "usage: cargo xtask TASK
   fuzz [--minutes N] [--seed S] | FILE ...
                  damaged files through all that reads them; what fails is kept in target/fuzz, and FILE is tried again
   arrows         the dependency arrows of ARCHITECTURE.md and import circles only
+  python         the Python package only: its wheel, installed and tested against the command that `cargo test` builds
+  wheel [ARGS]   the Python package's release wheel, into target/wheels (ARGS for `maturin build`)
   wasm [--dev]   crates/cagework-web as a JavaScript package, web/src/pkg
   page           build the page only
   page-test [ARGS]  build the page and test it in a browser (ARGS for Playwright)
@@ -41,6 +44,8 @@ fn main() -> ExitCode {
         ["test"] => tasks::test(),
         ["fuzz", rest @ ..] => tasks::fuzz(rest),
         ["check"] => tasks::check(),
+        ["python"] => python::test(),
+        ["wheel", rest @ ..] => python::wheel(rest),
         ["arrows"] => arrows::check(),
         ["wasm"] => wasm::build(wasm::Profile::Web),
         ["wasm", "--dev"] => wasm::build(wasm::Profile::Dev),

@@ -2,7 +2,7 @@
 
 use crate::command::{root, run};
 use crate::npm::{self, exec};
-use crate::{arrows, deny, licences, site, wasm};
+use crate::{arrows, deny, licences, python, site, wasm};
 
 /// Builds the release command and runs it on its built-in sample.
 pub(crate) fn demo(args: &[&str]) -> Result<(), String> {
@@ -27,6 +27,7 @@ pub(crate) fn test() -> Result<(), String> {
     // The same inputs in each run; `cargo xtask fuzz` alone takes others each time.
     fuzz(&["--minutes", "1", "--seed", "1"])?;
     validate_exports()?;
+    python::test()?;
     site::test_scripts()?;
     site::test_page(&[])?;
     site::test_firefox()

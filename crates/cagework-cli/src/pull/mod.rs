@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use cagework_core::deform::deform_bound;
 use cagework_core::pull::{Drag, DragOptions, Grip, Handle};
-use cagework_io::{UpAxis, shown};
+use cagework_io::shown;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
@@ -18,9 +18,6 @@ use crate::files::{json, print};
 use crate::pose::{Bound, pull, write_pose};
 use job::Job;
 use measure::{Stretches, far_mean, stretches};
-
-/// Most frames after the last target, until nothing moves any more.
-const SETTLING: u32 = 60;
 
 /// What was done; its JSON is the output of `--json`. Lengths are shares of the model's size, but for `lag` and `far_mean`.
 #[derive(Debug, Serialize)]
@@ -85,20 +82,13 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let pose = |drag: &Drag| drag.cage().iter().map(|p| p.as_vec3()).collect::<Vec<Vec3>>();
     let deformed = |cage: &[Vec3]| deform_bound(&weights, &outside, cage);
     let before = deformed(&start);
-    let to = targets(&job, model.up(), &drag, &before);
+    let to = drag.targets(&job.grabs, &model.up().turned(&job.to), &before);
     let grabbed = drag.start().to_vec();
     let begun = Instant::now();
-    for k in 1..=job.frames {
-        let share = f64::from(k) / f64::from(job.frames);
-        drag.frame(&grabbed.iter().zip(&to).map(|(a, b)| a.lerp(*b, share)).collect::<Vec<_>>());
-    }
+    drag.go(&to, job.frames);
     let frame_ms = since(begun) / f64::from(job.frames);
     let at_stop = deformed(&pose(&drag));
-    let mut settle_frames = 0;
-    while settle_frames == 0 || settle_frames < SETTLING && !drag.is_settled() {
-        drag.frame(&to);
-        settle_frames += 1;
-    }
+    let settle_frames = drag.settle(&to);
     let cage_pose = pose(&drag);
     let after = deformed(&cage_pose);
     let way = grabbed.iter().zip(&to).map(|(a, b)| a.distance(*b)).fold(f64::MIN_POSITIVE, f64::max);
@@ -121,17 +111,6 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
         notices: model.notices,
     };
     print(&if as_json { json(&done) } else { text(&done, output) })
-}
-
-/// Targets of the grabs, which the job gives in the file's axes. A vertex outside the cage is beside what its weights give: its target is moved by as much.
-fn targets(job: &Job, up: UpAxis, drag: &Drag, before: &[Vec3]) -> Vec<DVec3> {
-    let beside = |(grab, start): (&Handle, &DVec3)| match grab {
-        Handle::Vertex(v) => before[*v as usize].as_dvec3() - *start,
-        Handle::Triangle(..) | Handle::Cage(_) => DVec3::ZERO,
-    };
-    let beside = job.grabs.iter().zip(drag.start()).map(beside);
-    let to = up.turned(&job.to);
-    to.iter().zip(beside).map(|(to, beside)| to.as_dvec3() - beside).collect()
 }
 
 fn since(begun: Instant) -> f64 {

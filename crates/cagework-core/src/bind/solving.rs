@@ -87,6 +87,10 @@ fn solve_batches<T: Send>(
         n_batches,
         || batch_solver(hierarchy, options),
         |solver, piece| {
+            // Before the first look at a batch lies its dearest part.
+            if watch.is_cancelled() {
+                return None;
+            }
             let batch = batches.start + piece;
             let begin = watch.now_ms();
             let report = solver.solve(hierarchy, batch, rule, &mut |iteration, delta| {

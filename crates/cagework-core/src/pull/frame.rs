@@ -1,11 +1,14 @@
 //! A frame of a drag: rotations of the groups, then the cage that fits them.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3};
 use nalgebra::{DMatrix, DVector};
 
 use super::drag::{Drag, smooth};
+use super::grip::Handle;
 use crate::rotation::nearest_rotation;
 
+/// Most frames after the last target, until nothing moves any more.
+const SETTLING: u32 = 60;
 /// Steps of a frame.
 const STEPS: usize = 4;
 /// A target that moves by less, over the model's size, has not moved.
@@ -44,6 +47,37 @@ impl Drag {
             }
             self.cage = next;
         }
+    }
+
+    /// The grabs go straight from where they were taken to `to` (`[n_grabs]`, object units), in so many frames.
+    pub fn go(&mut self, to: &[DVec3], frames: u32) {
+        let from = self.start.clone();
+        for k in 1..=frames {
+            let share = f64::from(k) / f64::from(frames);
+            self.frame(&from.iter().zip(to).map(|(a, b)| a.lerp(*b, share)).collect::<Vec<_>>());
+        }
+    }
+
+    /// Frames with the grabs at `to` until nothing moves any more, 60 at most. Returns how many.
+    pub fn settle(&mut self, to: &[DVec3]) -> u32 {
+        let mut frames = 0;
+        while frames == 0 || frames < SETTLING && !self.is_settled() {
+            self.frame(to);
+            frames += 1;
+        }
+        frames
+    }
+
+    /// Targets for the handles that were grabbed, which are to go to `to`. A vertex outside the cage is beside what its weights
+    /// give, and its target is moved by as much. `deformed`: the model at the start of the drag. `[n_vertices]`, object units
+    #[must_use]
+    pub fn targets(&self, grabs: &[Handle], to: &[Vec3], deformed: &[Vec3]) -> Vec<DVec3> {
+        let beside = |(grab, start): (&Handle, &DVec3)| match grab {
+            Handle::Vertex(v) => deformed[*v as usize].as_dvec3() - *start,
+            Handle::Triangle(..) | Handle::Cage(_) => DVec3::ZERO,
+        };
+        let beside = grabs.iter().zip(&self.start).map(beside);
+        to.iter().zip(beside).map(|(to, beside)| to.as_dvec3() - beside).collect()
     }
 
     fn set_targets(&mut self, to: &[DVec3]) {

@@ -1,0 +1,107 @@
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any, Literal, Protocol, TypedDict, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
+from typing_extensions import Unpack
+
+__version__: str
+
+_Faces = ArrayLike | Sequence[ArrayLike]
+_Model = str | PathLike[str] | bytes
+
+class BindOptions(TypedDict, total=False):
+    grid: int
+    method: Literal["embedded", "classic"]
+    solver: Literal["multigrid", "jacobi", "cg"] | None
+    preconditioner: Literal["none", "v_cycle"]
+    cell_shape: Literal["box", "cubic"]
+    delta_norm: Literal["euclidean", "literal"]
+    threads: int
+    tau: float
+    max_iterations: int
+    sparsify: float
+    memory_limit: int
+    outside: Literal["closest_point", "refuse"]
+
+class CageOptions(TypedDict, total=False):
+    target: int
+    detail: float
+    quads: bool
+    shape: Literal["follow", "hull"]
+    symmetry: Literal["auto", "none", "x", "y", "z"]
+    per_component: bool
+    clearance: float
+    voxels: int
+    smooth: int
+
+class _Mesh(Protocol):
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+@final
+class Cage:
+    def __new__(cls, vertices: ArrayLike, faces: _Faces, smooth: int = 0) -> Cage: ...
+    @staticmethod
+    def load(path: str | PathLike[str], smooth: int = 0) -> Cage: ...
+    def save(self, path: str | PathLike[str], vertices: ArrayLike | None = None) -> None: ...
+    @property
+    def vertices(self) -> NDArray[np.float64]: ...
+    @property
+    def faces(self) -> list[NDArray[np.int32]]: ...
+    @property
+    def triangles(self) -> NDArray[np.int32]: ...
+    @property
+    def smooth(self) -> int: ...
+    @property
+    def notices(self) -> list[str]: ...
+    @property
+    def checked(self) -> dict[str, Any]: ...
+    @property
+    def report(self) -> dict[str, Any] | None: ...
+
+def generate_cage(vertices: ArrayLike, triangles: ArrayLike, **options: Unpack[CageOptions]) -> Cage: ...
+def check_cage(
+    cage: Cage | _Mesh, points: ArrayLike | None = None, grid: int = 64, smooth: int | None = None
+) -> list[dict[str, Any]]: ...
+def bind(
+    points: ArrayLike, cage: Cage, **options: Unpack[BindOptions]
+) -> tuple[csr_array, dict[str, Any]]: ...
+def bind_many(
+    models: Sequence[ArrayLike], cage: Cage, **options: Unpack[BindOptions]
+) -> list[tuple[csr_array, dict[str, Any]]]: ...
+def deform(
+    weights: Any, posed: ArrayLike, report: dict[str, Any] | None = None
+) -> NDArray[np.float32]: ...
+def pull(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    cage: Cage,
+    weights: Any,
+    grabs: ArrayLike,
+    to: ArrayLike,
+    *,
+    pins: ArrayLike | None = None,
+    report: dict[str, Any] | None = None,
+    start: ArrayLike | None = None,
+    reach: float | None = None,
+    relax: float = 0.5,
+    **options: Unpack[BindOptions],
+) -> NDArray[np.float64]: ...
+def read_model(model: _Model) -> tuple[NDArray[np.float32], NDArray[np.int32]]: ...
+def reshape(
+    model: _Model,
+    cage: Cage,
+    posed: ArrayLike,
+    *,
+    joints: Literal["follow", "stay", "turn"] = "follow",
+    keep_travel: bool = False,
+    rigid: Sequence[str] = [],
+    mask: Mapping[str, float] | None = None,
+    static: bool = False,
+    **options: Unpack[BindOptions],
+) -> bytes: ...

@@ -1,0 +1,208 @@
+//! Cages: made, checked, read and written.
+
+use std::path::PathBuf;
+
+use cagework_core::cage_check::check_smooth;
+use cagework_core::cage_gen::{CageReport, generate};
+use cagework_core::options::{GRID, SMOOTH};
+use cagework_core::{Cage as CoreCage, CageOptions, ControlSet, Controls, InnerControls, PolygonMesh};
+use cagework_io::write_cage_obj;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList, PyTuple};
+
+use crate::options::{dictionary, options};
+use crate::{arrays, error, files, work};
+
+/// A closed, outward polygon mesh around a model: checked when it is made, and not changed afterwards.
+///
+/// Cage(vertices, faces, smooth=0)
+///
+/// vertices: [n_cage, 3] float32 or float64, object units; faces: whole numbers of shape [n, 3] or [n, 4], or a list of
+/// arrays of any lengths, counter-clockwise seen from outside (the other way round is mended, see notices); smooth: 0 to 3 steps of
+/// Catmull-Clark subdivision between the cage and its surface. Numbers are kept in 32 bits.
+///
+/// Raises CageError, which names the face, edge or vertex that is wrong, and ArrayError.
+#[pyclass(frozen, module = "cagework")]
+pub(crate) struct Cage {
+    set: ControlSet,
+    /// `[n_cage, 3]`, not writeable: poses are copies.
+    vertices: Py<PyArray2<f64>>,
+    report: Option<CageReport>,
+}
+
+impl Cage {
+    fn of(py: Python<'_>, mesh: &PolygonMesh, smooth: u32, report: Option<CageReport>) -> PyResult<Self> {
+        let cage = CoreCage::new(mesh).map_err(error::cage)?;
+        let set = ControlSet::new(&cage, smooth, InnerControls::default()).map_err(error::cage)?;
+        let vertices = arrays::wide_array_of(py, cage.positions().iter().map(|p| p.as_dvec3()))?;
+        vertices.call_method1("setflags", (false,))?;
+        Ok(Self { set, vertices: vertices.unbind(), report })
+    }
+
+    /// What a model is bound to.
+    pub(crate) fn controls(&self) -> Controls<'_> {
+        Controls::from(&self.set)
+    }
+
+    fn mesh(&self) -> PolygonMesh {
+        self.set.cage().to_polygon_mesh()
+    }
+}
+
+/// Steps of subdivision; any number comes in, so that the core's sentence answers wrong ones.
+fn steps(smooth: f64) -> PyResult<u32> {
+    SMOOTH.check(smooth).map_err(error::option)?;
+    Ok(smooth as u32)
+}
+
+#[pymethods]
+impl Cage {
+    #[new]
+    #[pyo3(signature = (vertices, faces, smooth = 0.0))]
+    fn new(
+        py: Python<'_>,
+        vertices: &Bound<'_, PyAny>,
+        faces: &Bound<'_, PyAny>,
+        smooth: f64,
+    ) -> PyResult<Self> {
+        let smooth = steps(smooth)?;
+        let positions = arrays::points("vertices", vertices, None)?.as_slice().to_vec();
+        Self::of(py, &PolygonMesh { positions, faces: arrays::faces(faces)? }, smooth, None)
+    }
+
+    /// A cage from a file, faces of any size: .obj, .gltf or .glb, whose vertices are joined where their positions are equal.
+    ///
+    /// Raises OSError, ModelError when it is no model, CageError when it is no cage.
+    #[staticmethod]
+    #[pyo3(signature = (path, smooth = 0.0))]
+    fn load(py: Python<'_>, path: PathBuf, smooth: f64) -> PyResult<Self> {
+        let smooth = steps(smooth)?;
+        let model = files::Source::File(path).read()?;
+        model.require_faces().map_err(error::model)?;
+        Self::of(py, &model.cage_mesh(), smooth, None)
+    }
+
+    /// Writes the cage as an OBJ file, at rest or in a pose: vertices [n_cage, 3], float32 or float64, object units.
+    ///
+    /// Raises OSError, ArrayError.
+    #[pyo3(signature = (path, vertices = None))]
+    fn save(&self, path: &Bound<'_, PyAny>, vertices: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let mut mesh = self.mesh();
+        if let Some(vertices) = vertices {
+            let n = mesh.positions.len();
+            mesh.positions = arrays::points("vertices", vertices, Some(n))?.as_slice().to_vec();
+        }
+        files::write(&path.extract::<PathBuf>()?, &write_cage_obj(&mesh))
+    }
+
+    /// [n_cage, 3] float64, object units; read-only, because a cage does not change: poses begin as cage.vertices.copy().
+    #[getter]
+    fn vertices(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
+        self.vertices.clone_ref(py)
+    }
+
+    /// Vertices of each face, counter-clockwise seen from outside: a list of arrays of int32.
+    #[getter]
+    fn faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        let face = |face: &Vec<u32>| PyArray1::from_iter(py, face.iter().map(|&i| i as i32));
+        PyList::new(py, self.set.cage().faces().iter().map(face))
+    }
+
+    /// The faces as triangles, [n_triangles, 3] int32: for trimesh and for drawing.
+    #[getter]
+    fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i32>>> {
+        arrays::triples(py, self.set.cage().triangles())
+    }
+
+    /// Steps of subdivision between the cage and its surface.
+    #[getter]
+    fn smooth(&self) -> u32 {
+        self.set.smooth()
+    }
+
+    /// What was mended or is worth knowing, a sentence each.
+    #[getter]
+    fn notices(&self) -> Vec<String> {
+        self.set.cage().notices().iter().map(ToString::to_string).collect()
+    }
+
+    /// What a check of the cage alone says: valid, vertices, faces, components, thickness (object units), problems.
+    #[getter]
+    fn checked<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (mesh, smooth) = (self.mesh(), self.smooth());
+        dictionary(py, &work::run(py, move |_| check_smooth(&mesh, None, None, smooth))?)
+    }
+
+    /// How a generated cage came about: voxels, clearance, mirror and so on; None for others.
+    #[getter]
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.report.as_ref().map(|report| dictionary(py, report)).transpose()
+    }
+
+    fn __repr__(&self) -> String {
+        let cage = self.set.cage();
+        format!("Cage({} vertices, {} faces)", cage.n_vertices(), cage.faces().len())
+    }
+
+    /// For pickle: the cage goes to other processes.
+    fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        (self.vertices(py), self.faces(py)?, self.smooth()).into_pyobject(py)
+    }
+}
+
+/// A cage that encloses a model strictly: generate_cage(vertices, triangles, **options) -> Cage
+///
+/// vertices: [n, 3] float32 or float64, object units; triangles: [m, 3] whole numbers, any soup.
+///
+/// Options, as of `cagework cage`: target=80 (vertices, 8 to 400), detail=0.028 (fraction of the longest side), quads=True,
+/// shape="follow" or "hull", symmetry="auto", "none", "x", "y" or "z", per_component=False, clearance=0.0 (fraction of the
+/// diagonal), voxels=0 (along the longest side; 0: by the target), smooth=0 (steps of subdivision after which it encloses).
+///
+/// Raises CageError when none can be made, OptionError, ArrayError.
+#[pyfunction]
+#[pyo3(signature = (vertices, triangles, **options))]
+pub(crate) fn generate_cage(
+    py: Python<'_>,
+    vertices: &Bound<'_, PyAny>,
+    triangles: &Bound<'_, PyAny>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Cage> {
+    let options: CageOptions = self::options(options)?;
+    options.check().map_err(error::option)?;
+    let (points, triangles) = (arrays::points("vertices", vertices, None)?, arrays::triangles(triangles)?);
+    let positions = points.as_slice();
+    let made = work::run(py, |progress| generate(positions, &triangles, &options, progress))?;
+    let made = made.map_err(error::cage)?;
+    Cage::of(py, &made.cage.to_polygon_mesh(), options.smooth, Some(made.report))
+}
+
+/// Everything that is wrong with a cage: check_cage(cage, points=None, grid=64, smooth=None) -> list of dict
+///
+/// cage: a Cage, or anything with vertices and faces, such as a trimesh.Trimesh, which need not be closed; points: [n, 3] that
+/// should be inside; grid: cells along the longest side that will be used to bind, to find parts thinner than one; smooth: steps
+/// of subdivision (the cage's own).
+///
+/// A problem has code, severity ("error", "warning" or "note"), count, places (vertices, edges, faces, points), message and
+/// fixes. No error among them: it can be bound. Raises ArrayError.
+#[pyfunction]
+#[pyo3(signature = (cage, points = None, grid = 64.0, smooth = None))]
+pub(crate) fn check_cage<'py>(
+    py: Python<'py>,
+    cage: &Bound<'py, PyAny>,
+    points: Option<&Bound<'py, PyAny>>,
+    grid: f64,
+    smooth: Option<f64>,
+) -> PyResult<Bound<'py, PyAny>> {
+    GRID.check(grid).map_err(error::option)?;
+    let own = cage.cast::<Cage>().map_or(0, |cage| cage.get().smooth());
+    let smooth = smooth.map_or(Ok(own), steps)?;
+    let mesh = PolygonMesh {
+        positions: arrays::points("vertices", &cage.getattr("vertices")?, None)?.as_slice().to_vec(),
+        faces: arrays::faces(&cage.getattr("faces")?)?,
+    };
+    let points = points.map(|points| arrays::points("points", points, None)).transpose()?;
+    let inside = points.as_ref().map(arrays::Points::as_slice);
+    let check = work::run(py, |_| check_smooth(&mesh, inside, Some(grid as u32), smooth))?;
+    dictionary(py, &check.problems)
+}

@@ -1,0 +1,54 @@
+//! Keyword arguments as options of the core, and reports as dictionaries.
+
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use crate::error;
+
+/// Options with their defaults where nothing is said, under the names that they have everywhere. None stands for the default.
+///
+/// # Errors
+/// `TypeError` for a name that there is not, `OptionError` for a value of another kind; ranges are for the core to check.
+pub(crate) fn options<T: Default + Serialize + DeserializeOwned>(
+    given: Option<&Bound<'_, PyDict>>,
+) -> PyResult<T> {
+    let wrong = |name: &str, e: serde_json::Error| error::option(format!("{name}: {e}"));
+    let mut all = serde_json::to_value(T::default()).map_err(|e| wrong("defaults", e))?;
+    for (name, value) in given.into_iter().flatten() {
+        let name: String = name.extract()?;
+        let names: Vec<String> = all.as_object().into_iter().flat_map(|all| all.keys().cloned()).collect();
+        let Some(option) = all.get_mut(&name) else {
+            return Err(PyTypeError::new_err(format!("no option {name:?}; there are {}", names.join(", "))));
+        };
+        if !value.is_none() {
+            *option = json(&name, &value)?;
+            // One by one, so that the error is of this one.
+            serde_json::from_value::<T>(all.clone()).map_err(|e| wrong(&name, e))?;
+        }
+    }
+    serde_json::from_value(all).map_err(|e| wrong("options", e))
+}
+
+fn json(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
+    if value.is_instance_of::<PyBool>() {
+        return value.extract::<bool>().map(Value::from);
+    }
+    let number = value.extract::<u64>().map(Value::from).or_else(|_| value.extract::<i64>().map(Value::from));
+    let number = number.or_else(|_| value.extract::<f64>().map(Value::from));
+    number.or_else(|_| value.extract::<String>().map(Value::from)).map_err(|_| {
+        error::option(format!("{name} is of type {}; a number, a word or a bool is needed", value.get_type()))
+    })
+}
+
+/// A report as a dictionary.
+///
+/// # Errors
+/// None in practice: reports are of text, numbers and lists.
+pub(crate) fn dictionary<'py>(py: Python<'py>, report: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(report).map_err(error::option)?;
+    py.import("json")?.call_method1("loads", (text,))
+}

@@ -1,0 +1,88 @@
+//! A cage solved for points of the model that are pulled.
+
+use cagework_core::bind as bind_points;
+use cagework_core::deform::deform_bound;
+use cagework_core::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull, Reach};
+use cagework_core::{BindOptions, TriMesh};
+use glam::{DVec3, Vec3};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::bind::bind_options;
+use crate::cage::Cage;
+use crate::{arrays, error, work};
+
+/// Frames of a drag, as many as `cagework pull` takes.
+const FRAMES: u32 = 30;
+
+/// Pulls vertices of a model, and solves for the cage, so that the rest bends as little as it can:
+/// pull(vertices, triangles, cage, weights, grabs, to, *, pins=(), report=None, start=None, reach=None, relax=0.5, **options)
+/// -> [n_cage, 3] float64, object units: the posed cage
+///
+/// vertices: [n, 3], triangles: [m, 3], weights: [n, n_cage], as bind made them; grabs: [k] numbers of vertices, to: [k, 3] where
+/// they go; pins: [l] vertices that stay; report: of bind, for points outside; start: [n_cage, 3] to begin with (the cage at
+/// rest); reach: how far the drag reaches over the model's size, None by its area, math.inf for all of it; relax: 0 to 1, how much
+/// parts within reach go back to their shape at rest; options: of the bind of the model's samples.
+///
+/// Raises PullError, BindError, OptionError, ArrayError.
+#[pyfunction]
+#[pyo3(signature = (vertices, triangles, cage, weights, grabs, to, *, pins = None, report = None, start = None, reach = None, relax = 0.5, **options))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+pub(crate) fn pull<'py>(
+    py: Python<'py>,
+    vertices: &Bound<'py, PyAny>,
+    triangles: &Bound<'py, PyAny>,
+    cage: &Bound<'py, Cage>,
+    weights: &Bound<'py, PyAny>,
+    grabs: &Bound<'py, PyAny>,
+    to: &Bound<'py, PyAny>,
+    pins: Option<&Bound<'py, PyAny>>,
+    report: Option<&Bound<'py, PyAny>>,
+    start: Option<&Bound<'py, PyAny>>,
+    reach: Option<f64>,
+    relax: f64,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let options: BindOptions = bind_options(options)?;
+    let controls = cage.get().controls();
+    let positions = arrays::points("vertices", vertices, None)?.as_slice().to_vec();
+    let mesh = TriMesh { positions, triangles: arrays::triangles(triangles)? };
+    let weights = arrays::weights(weights)?;
+    let outside = report.map(|report| arrays::outside(report, &weights)).transpose()?.unwrap_or_default();
+    let handles = |name, value| -> PyResult<Vec<Handle>> {
+        Ok(arrays::list(name, value)?.into_iter().map(Handle::Vertex).collect())
+    };
+    let grabs = handles("grabs", grabs)?;
+    let pins = pins.map(|pins| handles("pins", pins)).transpose()?.unwrap_or_default();
+    let to = arrays::points("to", to, Some(grabs.len()))?.as_slice().to_vec();
+    if let Some(at) = to.iter().find(|at| !at.is_finite()) {
+        return Err(error::pull(format!("a grab goes to {at}: it must be finite numbers of 32 bits")));
+    }
+    let n = controls.n_controls();
+    let start = start.map(|start| arrays::points("start", start, Some(n))).transpose()?;
+    let start: Vec<Vec3> = start.map_or_else(|| controls.rest().to_vec(), |start| start.as_slice().to_vec());
+    let reach = match reach {
+        None => Reach::Automatic,
+        Some(f64::INFINITY) => Reach::Whole,
+        Some(share) => Reach::Of(share),
+    };
+    let posed = work::run(py, |progress| -> PyResult<Vec<DVec3>> {
+        let probes = Probes::new(&mesh, controls).map_err(error::pull)?;
+        let of_probes = bind_points(probes.points(), controls, &options, progress).map_err(error::bind)?;
+        let pull = Pull::new(&mesh, controls, probes, &of_probes.weights).map_err(error::pull)?;
+        let grips = |handles: &[Handle]| -> PyResult<Vec<Grip>> {
+            let grips = handles.iter().map(|&h| Grip::new(h, &pull, &mesh.triangles, &weights));
+            grips.collect::<Result<_, _>>().map_err(error::pull)
+        };
+        let from: Vec<DVec3> = start.iter().map(|p| p.as_dvec3()).collect();
+        let drag_options = DragOptions { reach, relax, symmetry: None };
+        let drag = Drag::new(&pull, &from, &grips(&grabs)?, &grips(&pins)?, drag_options);
+        let mut drag = drag.map_err(error::pull)?;
+        let to = drag.targets(&grabs, &to, &deform_bound(&weights, &outside, &start));
+        drag.go(&to, FRAMES);
+        drag.settle(&to);
+        Ok(drag.cage())
+    })??;
+    arrays::wide_array_of(py, posed.into_iter())
+}

@@ -1,0 +1,82 @@
+//! Models in, models out: what `cagework bind` and `cagework deform` do with a file.
+
+use std::collections::BTreeMap;
+
+use cagework_core::deform::{deform_bound, displacements};
+use cagework_core::{BindOptions, bind};
+use cagework_io::{Joints, ModelFormat, ReshapeOptions};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+
+use crate::bind::bind_options;
+use crate::cage::Cage;
+use crate::files::Source;
+use crate::{arrays, error, work};
+
+/// A model that follows a posed cage, as the bytes of a file: reshape(model, cage, posed, *, joints="follow",
+/// keep_travel=False, rigid=(), mask=None, static=False, **options) -> bytes
+///
+/// model: path of a .glb, .gltf or .obj, or its bytes; posed: [n_cage, 3] float32 or float64, object units; options: those of
+/// bind. A glTF becomes a GLB that keeps skin, joints, morph targets, clips, materials and textures; an OBJ stays one. The bytes
+/// are those that `cagework bind` and `cagework deform` write.
+///
+/// joints: "follow" the cage, "stay", or "turn" with the shape, too; keep_travel: clips travel as far as before; rigid: names of
+/// parts that keep their shape, each of their pieces: materials, nodes, joints, groups; mask: a dict of parts that stay as they
+/// are, and how much, 0 to 1; static: the shape alone, no rig.
+///
+/// Raises OSError, ModelError, BindError, OptionError, ArrayError; Ctrl-C ends it.
+#[pyfunction]
+#[pyo3(signature = (model, cage, posed, *, joints = "follow", keep_travel = false, rigid = Vec::new(), mask = None, r#static = false, **options))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+pub(crate) fn reshape<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, PyAny>,
+    cage: &Bound<'py, Cage>,
+    posed: &Bound<'py, PyAny>,
+    joints: &str,
+    keep_travel: bool,
+    rigid: Vec<String>,
+    mask: Option<BTreeMap<String, f32>>,
+    r#static: bool,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let joints = match joints {
+        "follow" => Joints::Follow,
+        "stay" => Joints::Stay,
+        "turn" => Joints::Turn,
+        other => return Err(error::option(format!("joints is {other:?}; it must be follow, stay or turn"))),
+    };
+    let mask: Vec<(String, f32)> = mask.into_iter().flatten().collect();
+    if let Some((name, amount)) = mask.iter().find(|(_, amount)| !(0.0..=1.0).contains(amount)) {
+        return Err(error::option(format!("the mask of {name:?} is {amount}; it must be from 0 to 1")));
+    }
+    let (options, controls, source) = (bind_options(options)?, cage.get().controls(), Source::of(model)?);
+    let posed = arrays::points("posed", posed, Some(controls.n_controls()))?;
+    let posed = posed.as_slice();
+    let bytes = work::run(py, move |progress| -> PyResult<Vec<u8>> {
+        let model = source.read_within(options.memory_limit)?;
+        model.require_faces().map_err(error::model)?;
+        let props = if r#static { Vec::new() } else { model.props().map_err(error::model)? };
+        let (rigid, others): (Vec<_>, Vec<_>) = rigid.into_iter().partition(|name| props.contains(name));
+        let parts = model.parts(&mask, &others).map_err(error::model)?;
+        let of_rig = ReshapeOptions { joints, keep_travel, rigid, parts };
+        let keeps_rig = model.is_rigged() && !r#static;
+        let extra = if keeps_rig { model.extra_points().map_err(error::model)? } else { Vec::new() };
+        let points = [model.positions.as_slice(), &extra].concat();
+        // What writing takes counts from the start, so that it does not end what took long.
+        let held = model.bytes() + model.bytes_to_write(model.format());
+        let options = BindOptions { held, extra_points: extra.len(), ..options };
+        let bound = bind(&points, controls, &options, progress).map_err(error::bind)?;
+        if keeps_rig && model.format() == ModelFormat::Gltf {
+            let by = displacements(&bound.weights, &bound.outside, controls.rest(), posed);
+            let outside: Vec<u32> = bound.outside.iter().map(|o| o.vertex).collect();
+            let written = model.write_reshaped(&by, &outside, &[], &of_rig);
+            return Ok(written.map_err(error::model)?.0);
+        }
+        let deformed = deform_bound(&bound.weights, &bound.outside, posed);
+        let parts = &of_rig.parts;
+        let deformed = if parts.is_empty() { deformed } else { parts.hold(&model.positions, &deformed) };
+        model.write(model.format(), &deformed).map_err(error::model)
+    })??;
+    Ok(PyBytes::new(py, &bytes))
+}

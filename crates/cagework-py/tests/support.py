@@ -1,0 +1,115 @@
+"""Models of the tests, made by formula, and the command that the package is compared with."""
+
+import json
+import os
+import struct
+import subprocess
+
+import numpy as np
+import trimesh
+
+import cagework as cw
+
+COMMAND = os.environ["CAGEWORK_COMMAND"]
+
+
+def command(folder, line):
+    """Runs the `cagework` command in a folder; returns what it printed."""
+    done = subprocess.run([COMMAND, *line.split()], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def capsule():
+    """A closed model, two units long, about z."""
+    return trimesh.creation.capsule(height=1.4, radius=0.3, count=[16, 16])
+
+
+def box(divisions=1):
+    """Vertices and quads of the cube from -1 to 1."""
+    vertices = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
+    faces = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    for _ in range(1, divisions):
+        # Each quad into four, joined by position.
+        corners = vertices[faces]
+        edges = (corners + np.roll(corners, -1, axis=1)) / 2
+        middle = corners.mean(axis=1)
+        quads = [
+            np.stack([corners[:, k], edges[:, k], middle, edges[:, k - 1]], axis=1) for k in range(4)
+        ]
+        split = np.concatenate(quads)
+        vertices, number = np.unique(split.reshape(-1, 3), axis=0, return_inverse=True)
+        faces = number.reshape(-1, 4)
+    return vertices, faces
+
+
+def bent(cage):
+    """A pose: the part above the middle goes aside, more the higher it is."""
+    posed = cage.vertices.copy()
+    posed[:, 0] += 0.4 * np.maximum(posed[:, 2], 0.0) ** 2
+    return posed
+
+
+def rigged_glb(radius=0.3):
+    """A capsule on two joints, with a morph target and a clip that turns the second joint."""
+    mesh = trimesh.creation.capsule(height=1.4, radius=radius, count=[12, 12])
+    positions = mesh.vertices.astype("<f4")
+    joints = np.zeros((len(positions), 4), dtype="u1")
+    joints[:, 1] = 1
+    weights = np.zeros((len(positions), 4), dtype="<f4")
+    weights[:, 1] = np.clip(positions[:, 2] + 0.5, 0, 1)
+    weights[:, 0] = 1 - weights[:, 1]
+    bind = np.stack([np.eye(4, dtype="<f4")] * 2)
+    bind[1, 3, 2] = -0.5  # The inverse of the second joint, in columns.
+    half = np.sqrt(0.5)
+    arrays = {
+        "positions": (positions, "VEC3"),
+        "indices": (mesh.faces.astype("<u4").reshape(-1), "SCALAR"),
+        "joints": (joints, "VEC4"),
+        "weights": (weights, "VEC4"),
+        "target": ((positions * [0.2, 0.2, 0.0]).astype("<f4"), "VEC3"),
+        "bind": (bind.reshape(2, 16), "MAT4"),
+        "times": (np.array([0, 1], dtype="<f4"), "SCALAR"),
+        "turns": (np.array([[0, 0, 0, 1], [half, 0, 0, half]], dtype="<f4"), "VEC4"),
+    }
+    of_dtype = {"float32": 5126, "uint32": 5125, "uint8": 5121}
+    data, views, accessors = b"", [], []
+    for array, kind in arrays.values():
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes})
+        accessor = {"bufferView": len(accessors), "componentType": of_dtype[array.dtype.name], "type": kind}
+        accessor["count"] = len(array)
+        if kind in ("VEC3", "SCALAR") and array.dtype.name == "float32":
+            accessor["min"], accessor["max"] = np.atleast_1d(array.min(0)).tolist(), np.atleast_1d(array.max(0)).tolist()
+        accessors.append(accessor)
+        data += array.tobytes()
+        data += bytes(-len(data) % 4)
+    at = {name: k for k, name in enumerate(arrays)}
+    attributes = {"POSITION": at["positions"], "JOINTS_0": at["joints"], "WEIGHTS_0": at["weights"]}
+    primitive = {"attributes": attributes, "material": 0, "indices": at["indices"], "targets": [{"POSITION": at["target"]}]}
+    clip = {
+        "name": "bend",
+        "samplers": [{"input": at["times"], "output": at["turns"]}],
+        "channels": [{"sampler": 0, "target": {"node": 2, "path": "rotation"}}],
+    }
+    document = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0, 1]}],
+        "nodes": [{"mesh": 0, "skin": 0}, {"children": [2]}, {"name": "arm", "translation": [0, 0, 0.5]}],
+        "materials": [{"name": "skin"}],
+        "meshes": [{"primitives": [primitive]}],
+        "skins": [{"joints": [1, 2], "inverseBindMatrices": at["bind"]}],
+        "animations": [clip],
+        "buffers": [{"byteLength": len(data)}],
+        "bufferViews": views,
+        "accessors": accessors,
+    }
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
+    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+
+
+def cage_of(mesh, **options):
+    """A generated cage of a trimesh."""
+    return cw.generate_cage(mesh.vertices, mesh.faces, **options)

@@ -1,0 +1,72 @@
+import tracemalloc
+
+import cagework as cw
+import numpy as np
+import pytest
+import scipy.sparse
+from support import box
+
+CUBE = cw.Cage(*box())
+POINTS = np.zeros((5, 3))
+N_MANY = 200_000
+
+
+@pytest.mark.parametrize(
+    ("call", "came", "needed"),
+    [
+        (lambda: cw.bind(np.zeros((5, 2)), CUBE), "float64 of shape [5, 2]", "float32 or float64 of shape [n, 3]"),
+        (lambda: cw.bind(np.zeros(3, "f4"), CUBE), "float32 of shape [3]", "float32 or float64 of shape [n, 3]"),
+        (lambda: cw.bind(np.zeros((5, 3), int), CUBE), "int64 of shape [5, 3]", "float32 or float64 of shape [n, 3]"),
+        (lambda: cw.bind(np.zeros((5, 3), ">f4"), CUBE), ">f4 of shape [5, 3]", "float32 or float64 of shape [n, 3]"),
+        (lambda: cw.bind([["a", "b", "c"]], CUBE), "<U1 of shape [1, 3]", "float32 or float64 of shape [n, 3]"),
+        (lambda: cw.generate_cage(POINTS, POINTS), "float64 of shape [5, 3]", "whole numbers of shape [n, 3]"),
+        (lambda: cw.generate_cage(POINTS, [[0, 1, 2, 3]]), "int64 of shape [1, 4]", "whole numbers of shape [n, 3]"),
+        (lambda: cw.Cage(POINTS, np.zeros((2, 3))), "float64 of shape [2, 3]", "whole numbers of shape"),
+        (lambda: cw.Cage(POINTS, [[0.5, 1.0, 2.0]]), "float64 of shape [3]", "whole numbers of shape [n]"),
+        (lambda: cw.reshape(b"", CUBE, np.zeros((7, 3))), "float64 of shape [7, 3]", "float64 of shape [8, 3]"),
+        (lambda: CUBE.save("x", np.zeros((7, 3))), "float64 of shape [7, 3]", "float64 of shape [8, 3]"),
+        (lambda: cw.deform(np.eye(8), POINTS), "ndarray", "sparse matrix or array of SciPy"),
+        (lambda: cw.deform(scipy.sparse.eye_array(8, dtype=int), POINTS), "int64 of shape [8]", "float32 or float64"),
+        (lambda: cw.deform(scipy.sparse.eye_array(8), POINTS), "float64 of shape [5, 3]", "float64 of shape [8, 3]"),
+    ],
+)
+def test_wrong_types_and_shapes_are_answered_by_what_came_and_what_is_needed(call, came, needed):
+    with pytest.raises(cw.ArrayError) as error:
+        call()
+    assert came in str(error.value) and needed in str(error.value)
+    assert isinstance(error.value, cw.Error) and isinstance(error.value, ValueError)
+
+
+def test_indices_that_are_none_are_named():
+    with pytest.raises(cw.ArrayError, match="index -1 is not from 0 to 4294967295"):
+        cw.generate_cage(POINTS, [[0, 1, -1]])
+
+
+def test_all_layouts_of_the_same_points_give_the_same_weights():
+    points = np.random.default_rng(1).uniform(-0.9, 0.9, (50, 3)).astype(np.float32)
+    wide = np.zeros((50, 6), np.float32)
+    wide[:, ::2] = points
+    expected = cw.bind(points, CUBE, grid=8)[0].data.tobytes()
+    for same in [points.astype(np.float64), np.asfortranarray(points), wide[:, ::2], points.tolist()]:
+        assert cw.bind(same, CUBE, grid=8)[0].data.tobytes() == expected
+
+
+def allocated(call):
+    """Most bytes that Python and NumPy had allocated at once during a call."""
+    tracemalloc.start()
+    try:
+        result = call()
+        return tracemalloc.get_traced_memory()[1], result
+    finally:
+        tracemalloc.stop()
+
+
+def test_200_000_points_are_bound_without_copies_of_them():
+    points = np.random.default_rng(2).uniform(-0.9, 0.9, (N_MANY, 3)).astype(np.float32)
+    cw.bind(points[:10], CUBE, grid=8)  # What is imported at the first call is not looked at.
+    bytes_at_once, (weights, _) = allocated(lambda: cw.bind(points, CUBE, grid=16))
+    assert weights.shape == (N_MANY, 8) and bytes_at_once < points.nbytes / 10
+    # Nor are weights copied on the way to SciPy: 64 bytes a row.
+    assert all(not a.flags.owndata for a in (weights.indices, weights.indptr)) and weights.nnz == 8 * N_MANY
+    # Where a copy has to be made, it is seen.
+    assert allocated(lambda: cw.bind(np.asfortranarray(points), CUBE, grid=8))[0] > points.nbytes

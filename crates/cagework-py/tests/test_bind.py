@@ -1,0 +1,98 @@
+import json
+
+import cagework as cw
+import numpy as np
+import scipy.sparse
+from support import bent, box, command
+
+# Weights and positions are f32, sums of them f64: a few units in the last place of coordinates near 1.
+ROUNDED = 1e-6
+
+
+def test_weights_are_those_of_the_command_to_the_bit(model, cage, tmp_path):
+    model.export(tmp_path / "model.obj")
+    cage.save(tmp_path / "cage.obj")
+    for options, line in [
+        ({}, ""),
+        ({"grid": 20, "sparsify": 1e-3, "tau": 1e-4}, "-g 20 --sparsify 1e-3 --tau 1e-4"),
+        ({"grid": 12, "method": "classic"}, "-g 12 --method classic"),
+    ]:
+        command(tmp_path, f"bind model.obj --cage cage.obj {line} --weights w.npz --report r.json")
+        expected = scipy.sparse.load_npz(tmp_path / "w.npz")
+        points, _ = cw.read_model(tmp_path / "model.obj")
+        weights, report = cw.bind(points, cw.Cage.load(tmp_path / "cage.obj"), **options)
+        assert isinstance(weights, scipy.sparse.csr_array) and weights.shape == expected.shape
+        for part in ["indptr", "indices", "data"]:
+            ours, theirs = getattr(weights, part), getattr(expected, part)
+            assert ours.dtype == theirs.dtype and ours.tobytes() == theirs.tobytes(), part
+        said = json.loads((tmp_path / "r.json").read_text())
+        for name in ["grid", "method", "solver", "tau", "iterations", "delta_history", "rest_error", "notices"]:
+            assert report[name] == said[name], name
+
+
+def test_rows_sum_to_one_and_the_rest_pose_comes_back(model, cage, bound):
+    weights, report = bound
+    assert weights.shape == (len(model.vertices), len(cage.vertices)) and report["outside_vertices"] == 0
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=ROUNDED)
+    np.testing.assert_allclose(weights @ cage.vertices, model.vertices, atol=ROUNDED)
+
+
+def test_an_affine_map_of_the_cage_is_one_of_the_model(model, cage, bound):
+    # Weights reproduce positions and sum to 1: all affine maps follow.
+    turn = np.array([[0.5, -1.0, 0.2], [0.9, 0.4, 0.0], [0.0, 0.3, 1.5]])
+    moved = bound[0] @ (cage.vertices @ turn.T + [3.0, -2.0, 1.0])
+    np.testing.assert_allclose(moved, model.vertices @ turn.T + [3.0, -2.0, 1.0], atol=10 * ROUNDED)
+
+
+def test_deform_is_the_product_but_for_points_outside_which_keep_their_offset(cage, bound):
+    weights, _ = bound
+    posed = bent(cage)
+    np.testing.assert_allclose(cw.deform(weights, posed), weights @ posed, atol=ROUNDED)
+
+    cube = cw.Cage(*box())
+    weights, report = cw.bind(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.5]]), cube, grid=8)
+    assert report["outside_vertices"] == 1 and report["outside"]["vertex"].tolist() == [1]
+    moved = cube.vertices + [5.0, 0.0, 0.0]
+    expected = [[5.0, 0.0, 0.0], [5.0, 0.0, 1.5]]
+    np.testing.assert_allclose(cw.deform(weights, moved, report), expected, atol=ROUNDED)
+    np.testing.assert_allclose(cw.deform(weights, moved)[1], [5.0, 0.0, 1.0], atol=ROUNDED)
+
+
+def test_pull_poses_the_cage_as_the_command_does(model, cage, tmp_path):
+    model.export(tmp_path / "model.obj")
+    cage.save(tmp_path / "cage.obj")
+    points, triangles = cw.read_model(tmp_path / "model.obj")
+    cage = cw.Cage.load(tmp_path / "cage.obj")
+    top, bottom = int(points[:, 2].argmax()), int(points[:, 2].argmin())
+    to = points[top] + np.float32([0.3, 0.0, 0.1])
+    job = {"grabs": [{"vertex": top, "to": to.tolist()}], "pins": [{"vertex": bottom}], "reach": "all"}
+    (tmp_path / "job.json").write_text(json.dumps(job))
+    command(tmp_path, "bind model.obj --cage cage.obj -g 24 --weights w.npz")
+    command(tmp_path, "pull model.obj --cage cage.obj --weights w.npz -g 24 --job job.json -o posed.obj")
+    weights, report = cw.bind(points, cage, grid=24)
+    options = {"pins": [bottom], "report": report, "reach": float("inf"), "grid": 24}
+    posed = cw.pull(points, triangles, cage, weights, [top], [to], **options)
+    assert np.array_equal(posed.astype(np.float32), cw.read_model(tmp_path / "posed.obj")[0])
+    assert np.abs(weights @ posed - points)[bottom].max() < 0.01
+    assert np.abs((weights @ posed)[top] - to).max() < 0.01
+
+
+def test_models_bound_together_are_bound_as_alone_by_one_solve(model, cage):
+    models = [model.vertices, (model.vertices * 0.9).astype(np.float32)]
+    together = cw.bind_many(models, cage, grid=24)
+    for points, (weights, report) in zip(models, together):
+        alone, said = cw.bind(points, cage, grid=24)
+        assert weights.data.tobytes() == alone.data.tobytes() and np.array_equal(weights.indices, alone.indices)
+        assert report["rest_error"] == said["rest_error"] and report["timings_ms"]["solve"] == 0.0
+    assert cw.bind_many([], cage) == []
+
+
+def test_smooth_cages_bind_to_their_surface(model, tmp_path):
+    cage = cw.generate_cage(model.vertices, model.faces, target=40, smooth=2)
+    cage.save(tmp_path / "cage.obj")
+    model.export(tmp_path / "model.obj")
+    command(tmp_path, "bind model.obj --cage cage.obj --smooth 2 -g 16 --weights w.npz")
+    points, _ = cw.read_model(tmp_path / "model.obj")
+    weights, report = cw.bind(points, cw.Cage.load(tmp_path / "cage.obj", smooth=2), grid=16)
+    assert report["smooth"] == 2
+    assert weights.data.tobytes() == scipy.sparse.load_npz(tmp_path / "w.npz").data.tobytes()

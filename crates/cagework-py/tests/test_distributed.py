@@ -1,0 +1,101 @@
+"""Many files on a cluster of two processes of this machine."""
+
+import logging
+import os
+import signal
+from pathlib import Path
+
+import cagework as cw
+import distributed
+import pytest
+from cagework.distributed import reshape_files
+from support import bent, rigged_glb
+
+N_FILES = 200
+
+
+class Counted:
+    """cagework.reshape, which notes what it has done. At some files its process is killed, the first time."""
+
+    def __init__(self, log, fatal):
+        self.log, self.fatal = log, fatal
+
+    def __call__(self, file, *args, **options):
+        if Path(file).name in self.fatal:
+            try:
+                # Only one can make it.
+                (self.log / f"{Path(file).name}.killed").touch(exist_ok=False)
+            except FileExistsError:
+                pass
+            else:
+                os.kill(os.getpid(), signal.SIGKILL)
+        data = cw.reshape(file, *args, **options)
+        with open(self.log / "done", "a") as log:
+            log.write(f"{Path(file).name}\n")
+        return data
+
+
+@pytest.fixture(scope="module")
+def client():
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=logging.CRITICAL
+    )
+    with cluster, distributed.Client(cluster) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Small rigged models, each of another width."""
+    folder = tmp_path_factory.mktemp("models")
+    for k in range(N_FILES):
+        (folder / f"model-{k:03}.glb").write_bytes(rigged_glb(0.2 + 0.1 * k / N_FILES))
+    return sorted(folder.iterdir())
+
+
+def test_200_files_are_done_once_each_by_workers_of_which_two_are_killed(client, files, tmp_path):
+    cage = cw.generate_cage(*cw.read_model(files[-1]), target=24, clearance=0.05)
+    posed, out, log = bent(cage), tmp_path / "out", tmp_path / "log"
+    log.mkdir()
+    fatal = {files[20].name, files[150].name}
+    workers = set(client.run(os.getpid).values())
+    assert len(workers) == 2 and os.getpid() not in workers
+    options = {"grid": 8, "threads": 1, "client": client, "work": Counted(log, fatal)}
+    done = reshape_files(files, out, cage, posed, **options)
+
+    assert len(list(log.glob("*.killed"))) == len(fatal) == 2
+    assert workers != set(client.run(os.getpid).values())
+    assert [Path(said["file"]) for said in done] == files
+    # Kept: done by the worker that then was killed, and what it said of them with it.
+    assert {said["state"] for said in done} == {"written", "kept"}
+    counted = (log / "done").read_text().split()
+    assert sorted(counted) == [file.name for file in files]
+    assert sorted(out.iterdir()) == [out / file.name for file in files]
+    for file in [files[0], files[20], files[199]]:
+        assert (out / file.name).read_bytes() == cw.reshape(file, cage, posed, grid=8)
+
+    # Again: nothing is done, but what is newer than its output, and what is missing.
+    os.utime(files[7])
+    (out / files[8].name).unlink()
+    again = reshape_files(files, out, cage, posed, **options)
+    assert [Path(said["file"]) for said in again if said["state"] == "written"] == files[7:9]
+    assert len((log / "done").read_text().split()) == N_FILES + 2
+
+
+def test_what_fails_is_named_and_the_rest_is_done(client, files, tmp_path):
+    broken = tmp_path / "broken.glb"
+    broken.write_bytes(b"no model")
+    cage = cw.generate_cage(*cw.read_model(files[0]), target=24)
+    names = [broken, tmp_path / "missing.glb", files[0]]
+    done = reshape_files(names, tmp_path / "out", cage, cage.vertices, client=client, grid=8, files_per_task=3)
+    assert [said["state"] for said in done] == ["failed", "failed", "written"]
+    assert "ModelError" in done[0]["error"] and "FileNotFoundError" in done[1]["error"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == [files[0].name]
+
+
+def test_two_files_of_one_name_are_refused(files, tmp_path):
+    cage = cw.generate_cage(*cw.read_model(files[0]), target=24)
+    other = tmp_path / files[0].name
+    with pytest.raises(ValueError, match="would both be written to"):
+        reshape_files([files[0], other], tmp_path / "out", cage, cage.vertices)
+    assert reshape_files([], tmp_path / "out", cage, cage.vertices) == []

@@ -1,0 +1,63 @@
+"""Work leaves the interpreter to others, and ends on Ctrl-C."""
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import cagework as cw
+import numpy as np
+from support import box
+
+# A bind of 193 batches of columns, each of them a piece of work that is not interrupted.
+LONG = """
+import sys
+sys.path.insert(0, {tests!r})
+import cagework as cw, numpy as np
+from support import box
+cage = cw.Cage(*box(5))
+points = np.zeros((1, 3))
+cw.bind(points, cage, grid=8)
+print("binding", flush=True)
+try:
+    cw.bind(points, cage, grid=96)
+    print("bound")
+except KeyboardInterrupt:
+    print("interrupted")
+print(cw.bind(points, cage, grid=8)[0].shape)
+"""
+# Longest wait between Ctrl-C and the end, seconds: a piece of work between two looks, on a busy machine.
+PATIENCE = 3.0
+
+
+def test_ctrl_c_ends_a_bind_and_python_goes_on():
+    script = LONG.format(tests=__file__.rpartition("/")[0])
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout.readline() == "binding\n"
+        time.sleep(0.5)
+        child.send_signal(signal.SIGINT)
+        sent = time.monotonic()
+        assert child.stdout.read().split("\n") == ["interrupted", "(1, 1538)", ""]
+        assert child.wait() == 0 and time.monotonic() - sent < PATIENCE
+
+
+def test_another_thread_runs_while_a_bind_does():
+    ticks, ended = [], threading.Event()
+
+    def count():
+        while not ended.is_set():
+            ticks.append(time.perf_counter())
+            time.sleep(0.001)
+
+    cage = cw.Cage(*box(3))
+    counting = threading.Thread(target=count)
+    counting.start()
+    began = time.perf_counter()
+    cw.bind(np.zeros((1, 3)), cage, grid=64)
+    took = time.perf_counter() - began
+    ended.set()
+    counting.join()
+    during = [began, *(t for t in ticks if began < t < began + took), began + took]
+    # With the interpreter's lock kept, the longest wait would be all of it.
+    assert max(np.diff(during)) < took / 2 and len(during) > 10
