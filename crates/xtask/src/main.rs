@@ -4,6 +4,7 @@
 
 mod arrows;
 mod command;
+mod deny;
 mod licences;
 mod npm;
 mod python;

@@ -2,7 +2,7 @@
 
 use crate::command::{root, run};
 use crate::npm::{self, exec};
-use crate::{arrows, licences, python, site, wasm};
+use crate::{arrows, deny, licences, python, site, wasm};
 
 /// Builds the release command and runs it on its built-in sample.
 pub(crate) fn demo(args: &[&str]) -> Result<(), String> {
@@ -53,8 +53,36 @@ pub(crate) fn check() -> Result<(), String> {
     run("cargo", &fuzz, &[])?;
     run("cargo", &["doc", "--workspace", "--no-deps", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")])?;
     arrows::check()?;
+    deny::check()?;
+    one_version()?;
+    // Names what a package lacks; `cargo publish --dry-run` builds them as well, once before a release.
+    let package = [
+        "package",
+        "--quiet",
+        "--no-verify",
+        "--allow-dirty",
+        "--locked",
+        "-p",
+        "cagework-core",
+        "-p",
+        "cagework-io",
+        "-p",
+    ];
+    run("cargo", &[&package[..], &["cagework-gpu"]].concat(), &[])?;
     site::check_types()?;
     exec(&["biome", "ci", "--error-on-warnings"])
+}
+
+/// Packages have the version of the workspace.
+fn one_version() -> Result<(), String> {
+    let path = root().join("package.json");
+    let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let own = concat!("\"version\": \"", env!("CARGO_PKG_VERSION"), "\"");
+    if text.contains(own) {
+        Ok(())
+    } else {
+        Err(format!("{} must say {own}, as Cargo.toml does", path.display()))
+    }
 }
 
 /// Exported GLBs must pass the Khronos glTF validator, and play in three.js as they do here.

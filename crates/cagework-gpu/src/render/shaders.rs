@@ -39,7 +39,7 @@ const OVERLAY_GROUP: &[DrawBinding] = &[Uniform, Table(Entry::Point), Table(Entr
 /// Text of the files of some shaders, joined.
 macro_rules! text {
     ($($file:expr),+) => {
-        concat!($(include_str!(concat!("../../../../shaders/", $file, ".wgsl"))),+)
+        concat!($(include_str!(concat!("../../shaders/", $file, ".wgsl"))),+)
     };
 }
 
