@@ -46,7 +46,7 @@ describe("dropped files", () => {
   it("say what can be opened when nothing fits", () => {
     expect(planDrop(["notes.txt"])).toEqual({
       kind: "unknown",
-      sentence: "Cagework opens .glb, .vrm, .gltf and .obj files.",
+      sentence: "Cagework opens .glb, .vrm, .gltf, .obj, .ply and .stl files.",
     });
     expect(planDrop([]).kind).toBe("nothing");
   });

@@ -31,7 +31,7 @@ pub(crate) use rig::RigArgs;
 #[derive(Debug, Parser)]
 #[command(name = "cagework", version, propagate_version = true, max_term_width = 100)]
 #[command(
-    after_help = "Models and cages are read from .obj, .gltf, .glb and .vrm files. Errors go to stderr; the exit \
+    after_help = "Models and cages are read from .gltf, .glb, .vrm, .obj, .ply and .stl files. Errors go to stderr; the exit \
     code is 1 after an error and 2 after a wrong command line.\n\n\
     Examples:\n  \
     cagework demo\n  \

@@ -37,7 +37,7 @@ pub enum PolygonsError {
         vertex: usize,
     },
     /// A face names a vertex that does not exist.
-    #[error("face {face} names vertex {index}, but there are {vertices}, from 0 to {}", vertices - 1)]
+    #[error("face {face} names vertex {index}, but there are {vertices}, numbered from 0")]
     Vertex {
         /// The face, from 0.
         face: usize,

@@ -152,7 +152,7 @@ fn what_is_wrong_with_them_is_said() {
         ("element vertex 8", "element vertex 9", "damaged"),
         ("property double x\n", "", "its vertices lack x, y or z"),
         ("\n4 ", "\n2 ", "face 0 has 2 corners; it needs at least 3"),
-        ("\n0 1\n4 0", "\n0 1\n4 8", "face 0 names vertex 8, but there are 8, from 0 to 7"),
+        ("\n0 1\n4 0", "\n0 1\n4 8", "face 0 names vertex 8, but there are 8, numbered from 0"),
         ("format ascii 1.0", "format braille 1.0", "damaged"),
     ] {
         let broken = ply.replacen(from, to, 1);
@@ -160,7 +160,16 @@ fn what_is_wrong_with_them_is_said() {
         let message = fault("x.ply", broken.as_bytes());
         assert!(message.contains(said), "{to}: {message}");
     }
+    let alone = b"ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n3 0 1 2\n";
+    let message = fault("x.ply", alone);
+    assert!(message.contains("face 0 names vertex 0, but there are 0"), "{message}");
+    // Elements of no bytes: each kind may be as many as there are bytes, but not all together.
+    let mut idle = String::from("ply\nformat binary_little_endian 1.0\n");
+    (0..2000).for_each(|k| idle += &format!("element a{k} 20000\n"));
+    let message = fault("x.ply", (idle + "end_header\n").as_bytes());
+    assert!(message.contains("it says that it has 20000 of 'a"), "{message}");
     let mut stl = obj().write_stl(&cube()).unwrap();
+    assert!(!stl.starts_with(b"solid"), "others take that for text");
     stl.truncate(300);
     let message = fault("x.stl", &stl);
     assert!(

@@ -52,7 +52,7 @@ it("each file has the model's name, and its size is said", async () => {
   exports.shapeIn("stl");
   await exports.save("shape");
   expect(downloads.at(-1), "its shape is another file").toBe("someone-posed.stl");
-  expect(said.at(-1)).toContain("(3 B)");
+  expect(said.at(-1)).toContain("(3 byte)");
 });
 
 it("an export that fails is a problem, and no file", async () => {

@@ -15,6 +15,9 @@ use crate::pose::Bound;
 /// Most landmarks: of each the nearest of all triangles may be looked for.
 const MAX: usize = 10_000;
 
+/// Landmarks that fix place, turn and size of the whole; fewer leave something of it open.
+const FEW: usize = 4;
+
 /// How far barycentric coordinates may be off.
 const OFF: f64 = 1e-3;
 
@@ -84,7 +87,10 @@ pub(super) fn landmarks(bound: &Bound, path: &Path) -> Result<Goals, CliError> {
             "{n_outside} landmarks are outside the cage: the closest point of it is brought to their targets"
         )
     });
-    Ok(Goals { weights, shares, to, notices: notices.into_iter().collect() })
+    let few = (to.len() < FEW).then(|| {
+        format!("{} landmarks leave turns open: the energy alone decides on them; {FEW} or more that are not in one plane do not", to.len())
+    });
+    Ok(Goals { weights, shares, to, notices: notices.into_iter().chain(few).collect() })
 }
 
 fn place(bound: &Bound, said: &Said) -> Result<Place, String> {

@@ -48,7 +48,7 @@ pub struct Fitted {
     pub lambda: f64,
     /// Energy of the pose: the mean squared distance of the model's gradients from rotations, and a tenth of the cage's own.
     pub energy: f64,
-    /// Root of the mean squared distance from the targets, and the largest one.
+    /// Root of the mean squared distance from the targets.
     pub rms: f64,
     /// The largest distance from a target.
     pub largest: f64,
