@@ -1,5 +1,15 @@
 /** The one way from the page to Rust: the engine on this thread, the binder in a worker, files, frames. */
 
+import { findAdapter, hasWebGl2, lackOf } from "@cagework/core/session/adapter";
+import { type Artifact, compile } from "@cagework/core/session/artifact";
+import { startBind } from "@cagework/core/session/bind";
+import { type Client, createClient } from "@cagework/core/session/client";
+import { createFrames } from "@cagework/core/session/frames";
+import { chain } from "@cagework/core/session/jobs";
+import type { ReadModel } from "@cagework/core/session/messages";
+import { createApart, load } from "@cagework/core/session/reader";
+import { polygons } from "@cagework/core/session/reading";
+import { WEBGPU } from "@cagework/core/session/webgpu";
 import type {
   BindOptions,
   Check,
@@ -12,17 +22,7 @@ import type {
   Session,
 } from "./contract";
 import { BIND_DEFAULTS } from "./defaults";
-import { findAdapter, hasWebGl2, lackOf } from "./session/adapter";
-import { type Artifact, compile } from "./session/artifact";
-import { startBind } from "./session/bind";
-import { type Client, createClient } from "./session/client";
-import { createFrames } from "./session/frames";
-import { chain } from "./session/jobs";
-import type { ReadModel } from "./session/messages";
 import { once, prepareSample, samples } from "./session/opening";
-import { createApart, load } from "./session/reader";
-import { polygons } from "./session/reading";
-import { WEBGPU } from "./session/webgpu";
 
 declare global {
   /** For the browser's console, and for tests. */
@@ -62,7 +62,7 @@ export async function openSession(canvases: Canvases, fresh: Promise<boolean>): 
   } catch (error) {
     const lack = lackOf(error);
     if (!lack || !hasWebGl2()) throw error;
-    const { WEBGL } = await import("./session/webgl");
+    const { WEBGL } = await import("@cagework/core/session/webgl");
     try {
       const module = await compile(WEBGL.wasm);
       return await start({
