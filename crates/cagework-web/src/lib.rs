@@ -28,6 +28,7 @@ pub mod loaded;
 mod options;
 mod problems;
 pub mod puller;
+pub mod reshape;
 mod scene;
 pub mod settings;
 mod state;
@@ -41,7 +42,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
 import type { BindOptions, BindReport, CageOptions, CageState, Element, Gesture, GizmoHandle, Legend, ModelInfo,
-  Grip, Pivot, Problem, Progress, PullOptions, Repair, RestEdit, SceneOptions, SelectMode, Settings, SurfacePoint,
+  Grip, Pivot, Problem, Progress, PullOptions, Repair, RestEdit, RigOptions, SceneOptions, SelectMode, Settings, SurfacePoint,
   CameraView, UpAxis } from "../contract/generated";
 "#;
 
