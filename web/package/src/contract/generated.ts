@@ -443,6 +443,46 @@ export type ModelFormat = "obj" | "gltf" | "ply" | "stl";
  */
 export type UpAxis = "y" | "z";
 /**
+ * What of a model is shown, and what the cage does not bend.
+ */
+export type PartOptions = { shown: boolean,
+/**
+ * Names of what keeps its shape; "all" for the whole model.
+ */
+rigid: Array<string>,
+/**
+ * Names of what stays as it is; "all" for the whole model.
+ */
+stays: Array<string>, };
+/**
+ * One of the models in a cage.
+ */
+export type MemberInfo = {
+/**
+ * Its number, which stays.
+ */
+id: number, name: string, format: ModelFormat, vertices: number, triangles: number, rigged: boolean,
+/**
+ * Names of its parts, each with its kind: "material:Cloth".
+ */
+parts: Array<string>, options: PartOptions,
+/**
+ * Whether some of it is painted to stay.
+ */
+painted: boolean, };
+/**
+ * What a project says of one of its models besides its file.
+ */
+export type MemberSettings = {
+/**
+ * What its first triangle is counted as.
+ */
+first_triangle: number, options: PartOptions,
+/**
+ * How much of each vertex is painted to stay, 0 to 255, and of how many vertices in turn; empty for nothing.
+ */
+painted: Array<[number, number]>, };
+/**
  * `ModelInfo`.
  */
 export type ModelInfo = { name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number, skins: number, joints: number, clips: Array<ClipView>,
@@ -457,7 +497,11 @@ props: Array<string>,
 /**
  * Whether exports keep more than the shape.
  */
-rigged: boolean, bounds: Bounds, notices: Array<string>, };
+rigged: boolean, bounds: Bounds, notices: Array<string>,
+/**
+ * Each of the models in the cage; all else is of all of them.
+ */
+members: Array<MemberInfo>, };
 /**
  * The page's part of a project, as far as it can be used.
  */
@@ -478,6 +522,10 @@ pins?: Array<SurfacePoint>,
  * The same for each pose of the project, in turn.
  */
 pose_pins?: Array<Array<SurfacePoint>>,
+/**
+ * What of its models the cage does not bend: read with the models.
+ */
+models?: Array<MemberSettings>,
 /**
  * What was wrong, in whole sentences.
  */
