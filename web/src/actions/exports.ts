@@ -75,6 +75,8 @@ export function createExports(ctx: Context, project: Project): Exports {
       const name = stem(ctx.store.get().model?.name ?? "model");
       await attempt(ctx, T.failed.write, async () => {
         if (kind === "glb") await loadLattice(ctx);
+        // The moment after a bind its weights are still on the way to the GPU.
+        await ctx.session().engine.ready();
         const blob = kind === "picture" ? await picture() : new Blob([new Uint8Array(bytesOf(kind))]);
         const full = kind === "project" ? project.fileName() : `${name}${suffix(kind)}`;
         // A VRM stays one.
