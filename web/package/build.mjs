@@ -40,6 +40,8 @@ await build({
   configFile: false,
   root: here,
   logLevel: "error",
+  // Draco's decoder would look for its files where Node has them; it is given what it needs.
+  define: { process: "undefined" },
   build: {
     outDir: dist,
     emptyOutDir: false,

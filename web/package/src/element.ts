@@ -196,7 +196,7 @@ export class CageDeformer extends Base {
 
   #fail(error: unknown): void {
     const message = error instanceof Error ? error.message : String(error);
-    this.#say(message.charAt(0).toUpperCase() + message.slice(1));
+    this.#say(message);
     this.dispatchEvent(new ErrorEvent("error", { error, message }));
   }
 }
