@@ -90,11 +90,13 @@ export class CageDeformer extends Base {
   #draw(): void {
     if (this.shadowRoot) return;
     const root = this.attachShadow({ mode: "open" });
-    const style = document.createElement("style");
-    style.textContent = STYLE;
+    const style = new CSSStyleSheet();
+    style.replaceSync(STYLE);
+    // Not an element, which a page's Content-Security-Policy may forbid.
+    root.adoptedStyleSheets = [style];
     this.#said = document.createElement("p");
     this.#said.setAttribute("role", "status");
-    root.append(style, this.#freshCanvas(), this.#said);
+    root.append(this.#freshCanvas(), this.#said);
     attachPointer(
       this,
       () => this.#shown?.engine,

@@ -190,12 +190,20 @@ test("an element opens compressed files, says what it cannot open, and leaves no
   expect(await error).toBe("Format");
   await expect(page.locator("cage-deformer p")).toHaveText(/package\.json/);
   expect(page.workers()).toHaveLength(1);
-  await page.evaluate(() => {
+  await page.evaluate(async () => {
+    const glue = "/node_modules/@cagework/core/dist/pkg-webgl/cagework_webgl.js";
+    const { Engine }: typeof import("../src/pkg/cagework") = await import(glue);
+    const { free } = Engine.prototype;
+    Engine.prototype.free = function () {
+      free.call(this);
+      Object.assign(globalThis, { freed: true });
+    };
     const element = document.querySelector("cage-deformer");
     Object.assign(globalThis, { element });
     element?.remove();
   });
   await expect.poll(() => page.workers().length).toBe(0);
+  await page.waitForFunction(() => "freed" in globalThis);
   // Back in the page it begins anew.
   await page.evaluate(() => {
     const { element } = globalThis as unknown as { element: CageDeformer };

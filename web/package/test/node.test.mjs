@@ -118,6 +118,20 @@ for (const [options, line] of [
   });
 }
 
+test("the example of the README runs", async () => {
+  const [, code] = /```js\n([\s\S]*?)```/.exec(
+    readFileSync(join(import.meta.dirname, "node_modules/@cagework/core/README.md"), "utf8"),
+  );
+  const [imports, ...rest] = code.split("\n");
+  const file = join(import.meta.dirname, "readme.mjs");
+  const glb_ = `import { readFileSync } from "node:fs";\nconst glb = readFileSync(${JSON.stringify(join(folder, "model.glb"))});`;
+  writeFileSync(file, [imports, glb_, ...rest, "export { cage, wide };"].join("\n"));
+  const { cage: made, wide } = await import(file);
+  const width = (positions) => positions.reduce((most, x, k) => (k % 3 === 0 ? Math.max(most, x) : most), 0);
+  assert.ok(made.positions.length <= 240);
+  assert.ok(Math.abs(width((await readModel(wide)).positions) / width(mesh.positions) - 1.3) < 1e-5);
+});
+
 test("at rest the file is what it was", async () => {
   assert.ok(
     Buffer.from(await reshape(new Blob([glb]), cage, cage.positions, { grid: 12 })).equals(Buffer.from(glb)),
