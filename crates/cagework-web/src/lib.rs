@@ -41,7 +41,8 @@ use wasm_bindgen::prelude::wasm_bindgen;
 /// The types of `unchecked_*_type` below: serde's, as `border.rs` writes them for TypeScript.
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
-import type { BindOptions, BindReport, CageOptions, CageState, Element, Gesture, GizmoHandle, Legend, ModelInfo,
+import type { BindOptions, BindReport, CageControls, CageOptions, CageState, Coordinates, Element, Gesture, GizmoHandle,
+  InnerKind, Legend, ModelFormat, ModelInfo,
   Grip, Pivot, Problem, Progress, PullOptions, Repair, RestEdit, RigOptions, SceneOptions, SelectMode, Settings, SurfacePoint,
   CameraView, UpAxis } from "../contract/generated";
 "#;

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::command::{output, root, run};
 use crate::licences;
-use crate::npm;
+use crate::npm::{self, exec};
 use crate::wasm::{self, Profile, target_folder};
 
 const PACKAGE: &str = "web/package";
@@ -24,6 +24,12 @@ pub(crate) fn test() -> Result<(), String> {
     let project = blank_project(&tarball)?;
     let command = path(&target_folder()?.join("debug/cagework"))?;
     let envs = [("NPM_PROJECT", project.as_str()), ("CAGEWORK_COMMAND", &command)];
+    for module in ["nodenext", "esnext"] {
+        let resolution = if module == "esnext" { "bundler" } else { module };
+        let strict = ["--noEmit", "--strict", "--skipLibCheck", "false", "--target", "es2023", "--types", ""];
+        let as_users = ["--module", module, "--moduleResolution", resolution];
+        exec(&[&["tsc"], &strict[..], &as_users, &[&format!("{project}/consumer.ts")]].concat())?;
+    }
     // As a user's bundler makes its pages.
     let vite = ["vite", "build", "--config", "web/package/test/vite.config.ts", "--logLevel", "error"];
     run("npx", &[&["--no-install"], &vite[..]].concat(), &envs)?;

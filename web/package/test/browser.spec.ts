@@ -4,8 +4,8 @@ import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { type Browser, test as base, chromium, expect, type Page } from "@playwright/test";
 import { WITH_WEBGL, WITH_WEBGPU } from "../../e2e/browser";
-import type { Bound } from "../src/api";
 import type { CageDeformer } from "../src/element";
+import type { Bound } from "../src/types";
 
 /** Pictures, to be looked at. */
 const SCREENS = join(import.meta.dirname, "../../../target/screens");
