@@ -457,7 +457,39 @@ props: Array<string>,
 /**
  * Whether exports keep more than the shape.
  */
-rigged: boolean, bounds: Bounds, notices: Array<string>, };
+rigged: boolean, bounds: Bounds, notices: Array<string>,
+/**
+ * The models that share the cage, in order; at least one.
+ */
+members: Array<MemberInfo>, };
+/**
+ * What becomes of parts of a model. A name is that of a part; "all" is the whole model.
+ */
+export type PartOptions = { shown: boolean,
+/**
+ * Names that keep their shape.
+ */
+rigid: Array<string>,
+/**
+ * Names that stay as they are.
+ */
+stays: Array<string>, };
+/**
+ * One of the models in the cage.
+ */
+export type MemberInfo = { id: number, name: string, format: ModelFormat, vertices: number, triangles: number, rigged: boolean,
+/**
+ * "material:Cloth", "node:Buckle", "joint:Head", "group:eyes"
+ */
+parts: Array<string>, options: PartOptions,
+/**
+ * Some of it is painted to stay.
+ */
+painted: boolean, };
+/**
+ * What a project says of a model. The page does not look into it.
+ */
+export type MemberSettings = Record<string, unknown>;
 /**
  * The page's part of a project, as far as it can be used.
  */
@@ -478,6 +510,10 @@ pins?: Array<SurfacePoint>,
  * The same for each pose of the project, in turn.
  */
 pose_pins?: Array<Array<SurfacePoint>>,
+/**
+ * `Engine.memberSettings`.
+ */
+models?: Array<MemberSettings>,
 /**
  * What was wrong, in whole sentences.
  */
