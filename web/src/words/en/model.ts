@@ -56,12 +56,18 @@ export const opening = {
   kinds: "Cagework opens .glb, .vrm, .gltf, .obj, .ply and .stl files.",
   companions: "These files belong to a .gltf or .obj file: drop that one together with them.",
   damagedPose: "The pose in this project is damaged; it opens at rest.",
-  dropAsCage: "Drop to use it as the cage",
-  dropToOpen: "Drop to open",
-  asCage: "A closed mesh around the model.",
+  dropTo: {
+    page: "Drop to open",
+    cage: "Drop to use it as the cage",
+    list: "Drop to add it to this cage",
+  },
+  becomes: {
+    cage: "A closed mesh around the model.",
+    list: "Clothes, hair, gear: all in this cage follow it together.",
+  },
   asControls: (name: string) => `Puts the controls of ${name} inside the cage.`,
-  together: "A model with its textures, or a model and its cage: drop them together.",
+  together: "Models dropped together share one cage; their textures and a cage of theirs come along.",
   onCageStep: "It becomes the model; to use it as the cage, drop it on the Cage panel.",
-  replaces: "It takes the place of the model that is open.",
+  replaces: "It takes the place of what is open. On the list of models it is added instead.",
   getsCage: "It gets a cage and can be posed at once.",
 };
