@@ -21,6 +21,7 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]): P
     const state = store.get();
     const controls = shared()?.controls;
     const pose = state.posed ? toBase64Url(ctx.session().engine.encodePose()) : undefined;
+    const models = ctx.session().engine.memberSettings();
     const all: Omit<Settings, "notices"> = {
       bind: state.bindOptions,
       cage: state.cageOptions,
@@ -31,6 +32,7 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]): P
         ? { pose_pins: state.poses.map(({ pins }) => [...(pins ?? [])]) }
         : {}),
       ...(state.sample && state.sampleCage ? { sample: state.sample } : {}),
+      ...(models.length > 0 ? { models } : {}),
       ...(pose ? { pose } : {}),
       ...(controls ? { controls } : {}),
     };
