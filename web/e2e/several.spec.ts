@@ -136,10 +136,10 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
       return page.locator("canvas").first().screenshot();
     };
     const before = await picture();
-    await press(page, "Show shirt.glb");
+    await press(page, "Hide shirt.glb");
     await expect(row(page, "shirt.glb")).toContainText("hidden");
     expect(before.equals(await picture())).toBe(false);
-    await press(page, "Show shirt.glb");
+    await press(page, "Hide shirt.glb");
     expect(before.equals(await picture())).toBe(true);
   });
 

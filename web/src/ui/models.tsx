@@ -24,11 +24,14 @@ export function Models({ app, model }: { app: App; model: ModelInfo }) {
       <div class="stack" data-adds="">
         {only && others.length === 0 && <Parts app={app} member={only} isAlone />}
         {others.length > 0 && (
-          <ul class="stack">
-            {model.members.map((member) => (
-              <Row key={member.id} app={app} member={member} />
-            ))}
-          </ul>
+          <>
+            <Signs />
+            <ul class="stack">
+              {model.members.map((member) => (
+                <Row key={member.id} app={app} member={member} />
+              ))}
+            </ul>
+          </>
         )}
         <div class="row">
           <Button label={T.models.add} icon="plus" kind="small" onClick={app.chooseMore} />
@@ -36,6 +39,16 @@ export function Models({ app, model }: { app: App; model: ModelInfo }) {
         </div>
       </div>
     </Section>
+  );
+}
+
+/** What the signs of the buttons mean: fingers see no tool tips. */
+function Signs() {
+  return (
+    <p class="hint signs">
+      <Icon name="rigid" /> {T.models.is.rigid}
+      <Icon name="stays" /> {T.models.is.stays}
+    </p>
   );
 }
 
@@ -51,10 +64,10 @@ function Row({ app, member }: { app: App; member: MemberInfo }) {
         <div class="row icons">
           <IconButton
             icon={options.shown ? "eye" : "hidden"}
-            label={T.models.eye(name)}
-            tip={options.shown ? T.models.hide : T.models.show}
+            label={T.models.hide(name)}
+            tip={options.shown ? T.models.hideTip : T.models.show}
             kind="small"
-            pressed={options.shown}
+            pressed={!options.shown}
             onClick={() => app.models.show(id, !options.shown)}
           />
           <Ways app={app} member={member} part={ALL} label={name} />
@@ -111,15 +124,14 @@ function Parts({ app, member, isAlone = false }: { app: App; member: MemberInfo;
   const kinds = [...new Set(member.parts.map((part) => split(part)[0]))];
   return (
     <Fold title={T.models.parts}>
-      <p class="hint legend-icons">
-        <Icon name="rigid" /> {T.models.is.rigid}
-        <Icon name="stays" /> {T.models.is.stays}
-      </p>
       {isAlone && (
-        <div class="row part">
-          <span class="grow">{T.models.whole}</span>
-          <Ways app={app} member={member} part={ALL} label={member.name} />
-        </div>
+        <>
+          <Signs />
+          <div class="row part">
+            <span class="grow">{T.models.whole}</span>
+            <Ways app={app} member={member} part={ALL} label={member.name} />
+          </div>
+        </>
       )}
       {kinds.map((kind) => (
         <div class="stack tight" key={kind} role="group" aria-label={T.models.kinds[kind] ?? kind}>

@@ -6,8 +6,8 @@ export const model = {
   title: "Choose a model",
   sentence:
     "A cage is a lattice that fits the shape of a model. What you see is already bound to its own: pull it anywhere, and the cage moves along. Or drop a file on this page.",
-  drop: "Drop a model here",
-  kinds: ".glb, .vrm, .gltf with its files, .obj, .ply or .stl; a folder works too",
+  drop: "Drop models here",
+  kinds: ".glb, .vrm, .gltf with its files, .obj, .ply or .stl; a folder works too. Several share one cage.",
   openFolder: "Open a folder",
   kept: (n: number) => `Kept in this browser (${n})`,
   samples: "Samples",

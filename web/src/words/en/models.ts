@@ -7,8 +7,8 @@ export const models = {
   vertices: (n: number) => plural(n, "vertex", "vertices"),
   /** "body.glb", "body.glb and 2 more" */
   several: (first: string, more: number) => (more > 0 ? `${first} and ${more} more` : first),
-  eye: (name: string) => `Show ${name}`,
-  hide: "Hide it; it is bound and exported all the same",
+  hide: (name: string) => `Hide ${name}`,
+  hideTip: "Hide it; it is bound and exported all the same",
   show: "Show it again",
   rigid: (name: string) => `${name} keeps its shape`,
   stays: (name: string) => `${name} stays as it is`,
