@@ -1,7 +1,6 @@
 import { expect, it } from "vitest";
 import { createModels } from "../../src/actions/models";
 import type { MemberInfo, PartOptions } from "../../src/contract";
-import { named } from "../../src/session/client";
 import { cageOf, createFake, memberOf, modelOf, settled } from "../fake";
 
 const file = (name: string, content = "v") => ({ name, path: name, file: new Blob([content]) });
@@ -103,7 +102,7 @@ it("several are one step; one that cannot be read is named, and the others come"
   const { models, asked, read, names, problems, ctx } = page();
   const added = models.add([file("bad.glb"), file("empty.obj", ""), file("shirt.glb"), file("hat.glb")]);
   await settled();
-  asked.at(-1)?.reject(named("Format", "bad.glb: not a GLB"));
+  asked.at(-1)?.reject(new Error("bad.glb: not a GLB"));
   await settled();
   asked.at(-1)?.resolve({ took: 0 });
   await settled();
