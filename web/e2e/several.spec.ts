@@ -94,6 +94,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
 
   await test.step("a stroke of the brush stays, another takes some of it back", async () => {
     await row(page, "body.glb").getByRole("button", { name: "Paint what stays" }).click();
+    await page.getByRole("slider", { name: "Size of the brush" }).fill("0.15");
     const before = still(apart(await modelPositions(page)).body, own.body)[0];
     await shoot(page, "several-painting");
     const at = await paintable(page, 0);
@@ -190,6 +191,7 @@ test.describe("without WebGPU", () => {
     await row(page, "body.glb").getByText("What follows the cage").click();
     await press(page, "Trousers stays as it is");
     await row(page, "body.glb").getByRole("button", { name: "Paint what stays" }).click();
+    await page.getByRole("slider", { name: "Size of the brush" }).fill("0.15");
     await pull(page, await paintable(page, 0), 10, 10);
     await shoot(page, "several-webgl");
     await page.keyboard.press("Escape");

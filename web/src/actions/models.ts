@@ -1,6 +1,6 @@
 /** The models that share the cage: more of them, fewer, and which parts of them follow it. */
 
-import type { MemberInfo, ModelInfo, NamedFile, PartOptions, Pose, SurfacePoint } from "../contract";
+import type { MemberInfo, ModelInfo, NamedFile, PartOptions } from "../contract";
 import { planDrop } from "../drop";
 import type { Store } from "../state";
 import { T } from "../words";
@@ -52,8 +52,8 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
 
   /** What belongs to a step besides the models. */
   const now = () => {
-    const { sample, sampleCage, pins, poses } = store.get();
-    return { sample, sampleCage, pins, poses };
+    const { sample, sampleCage } = store.get();
+    return { sample, sampleCage };
   };
   /** Some come, or go, as undo and redo do it. */
   const turn = async (ids: readonly number[], binned: boolean, others: ReturnType<typeof now>) => {
@@ -61,7 +61,6 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
     let info: ModelInfo | undefined;
     for (const id of ids) info = await engine().bin(id, binned);
     if (!info) return;
-    store.set({ pins: others.pins, poses: others.poses });
     const looked = changed(info);
     // What adopts a cage takes it for another one than the sample's.
     store.set({ sample: others.sample, sampleCage: others.sampleCage });
@@ -97,7 +96,7 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
           const ids = added.map(({ id }) => id);
           if (!model || ids.length === 0) return;
           store.set({ sample: null });
-          const after = { ...before, sample: null, sampleCage: false };
+          const after = { sample: null, sampleCage: false };
           ctx.history.push({
             label: T.did.addModels(ids.length),
             undo: () => turn([...ids].reverse(), true, before),
@@ -121,7 +120,7 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
       const label = T.did.binModel(nameOf(id));
       const work = async () => {
         const before = now();
-        const after = { ...before, ...without(members(), id, before), sample: null, sampleCage: false };
+        const after = { sample: null, sampleCage: false };
         await turn([id], true, after);
         const [undo, redo] = [() => turn([id], false, before), () => turn([id], true, after)];
         ctx.history.push({ label, undo, redo });
@@ -164,23 +163,3 @@ export function takeModel(store: Store, info: ModelInfo): void {
 }
 
 const rest = (names: readonly string[], name: string) => names.filter((other) => other !== name);
-
-/** Pins without those on a model that goes: triangles of the models after it are counted on from those before it. */
-function without(
-  members: readonly MemberInfo[],
-  id: number,
-  { pins, poses }: { readonly pins: readonly SurfacePoint[]; readonly poses: readonly Pose[] },
-) {
-  const k = members.findIndex((member) => member.id === id);
-  const n = members[k]?.triangles ?? 0;
-  const from = members.slice(0, k).reduce((sum, { triangles }) => sum + triangles, 0);
-  const left = (all: readonly SurfacePoint[]) =>
-    all.flatMap((pin) => {
-      if (pin.triangle < from) return [pin];
-      return pin.triangle < from + n ? [] : [{ ...pin, triangle: pin.triangle - n }];
-    });
-  return {
-    pins: left(pins),
-    poses: poses.map((pose) => (pose.pins ? { ...pose, pins: left(pose.pins) } : pose)),
-  };
-}

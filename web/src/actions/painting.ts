@@ -3,7 +3,7 @@
 import { effect, untracked } from "@preact/signals";
 import type { Painting } from "../state";
 import { T } from "../words";
-import type { Context } from "./context";
+import { type Context, report } from "./context";
 import { takeModel } from "./models";
 
 export interface PaintActions {
@@ -70,7 +70,12 @@ export function createPainting(ctx: Context, settle: () => void): PaintActions {
       const { painting } = store.get();
       if (!painting || stroke) return false;
       const before = engine().painted(painting.id);
-      if (!dab(x, y)) return false;
+      try {
+        if (!dab(x, y)) return false;
+      } catch (error) {
+        report(ctx, T.models.notPainted, error);
+        return false;
+      }
       stroke = { before, x, y };
       return true;
     },
@@ -78,8 +83,12 @@ export function createPainting(ctx: Context, settle: () => void): PaintActions {
       if (!stroke) return;
       const { x: x0, y: y0 } = stroke;
       const n = Math.max(1, Math.ceil(Math.hypot(x - x0, y - y0) / DAB_PX));
-      for (let k = 1; k <= n; k += 1) dab(x0 + ((x - x0) * k) / n, y0 + ((y - y0) * k) / n);
-      stroke = { ...stroke, x, y };
+      try {
+        for (let k = 1; k <= n; k += 1) dab(x0 + ((x - x0) * k) / n, y0 + ((y - y0) * k) / n);
+        stroke = { ...stroke, x, y };
+      } catch {
+        // The GPU was busy for a moment: the next movement goes on from here.
+      }
     },
     end(keepIt) {
       const { painting } = store.get();

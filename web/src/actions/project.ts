@@ -57,8 +57,8 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]): P
     fileName,
     async link() {
       const { sample, sampleCage, posed, scene } = store.get();
-      if (!sample || !sampleCage) return undefined;
       const { engine } = ctx.session();
+      if (!sample || !sampleCage || engine.memberSettings().length > 0) return undefined;
       const pose = posed ? engine.encodePose() : undefined;
       const seen = { camera: engine.camera(), selected: [...engine.selection()], scene: ofLink(scene) };
       const controls = shared();

@@ -145,10 +145,13 @@ it("a project holds the page's settings", async () => {
 });
 
 it("a link is for samples in their own cage; others are told what to do instead", async () => {
-  const { exports, store, said } = page();
+  const { exports, store, said, teach } = page();
   await exports.share();
   expect([copied, said[0]]).toEqual([[], expect.stringContaining("Save a project file")]);
   store.set({ sample: "rat", sampleCage: true });
   await exports.share();
   expect(copied).toEqual([expect.stringMatching(/^https:\/\/cagework\.example\/#.*rat/)]);
+  teach({ memberSettings: () => [{ rigid: ["all"] }] });
+  await exports.share();
+  expect([copied.length, said.length], "what keeps its shape is not in it").toEqual([1, 3]);
 });

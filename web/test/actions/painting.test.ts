@@ -84,6 +84,25 @@ it("a stroke that is given up leaves nothing, and clearing is a step", async () 
   expect(amounts()[0]).toBe(255);
 });
 
+it("what cannot be painted yet is said; a moment without the GPU leaves no gap", () => {
+  const { painting, problems, amounts, teach, engine } = page();
+  painting.on(0);
+  const real = engine.paint;
+  const busy = () => {
+    throw new Error("there are no weights yet");
+  };
+  teach({ paint: busy });
+  expect([painting.begin(5, 150), problems.length]).toEqual([false, 1]);
+  teach({ paint: real });
+  painting.begin(5, 150);
+  teach({ paint: busy });
+  painting.drag(25, 150);
+  teach({ paint: real });
+  painting.drag(45, 150);
+  painting.end(true);
+  expect([amounts().slice(0, 5), problems.length]).toEqual([[255, 255, 255, 255, 255], 1]);
+});
+
 it("painting ends with its model, and where the cage is reshaped", () => {
   const { painting, store, shown } = page();
   painting.on(0);

@@ -33,7 +33,7 @@ export const exports = {
   saved: (files: readonly string[], size: number) =>
     `${list(files)} ${files.length === 1 ? "is" : "are"} in your downloads (${bytes(size)}).`,
   noLink:
-    "A link can hold a sample in its own cage and pose, but no files of yours. Save a project file to pass this on.",
+    "A link holds a sample in its own cage and pose: no files of yours, and not what keeps its shape or stays. Save a project file to pass this on.",
   saveProject: "Save the project",
   copied: "Link copied. Whoever opens it sees this sample in this pose, as you see it.",
   inAddress: "The link is in the address bar; copy it from there.",

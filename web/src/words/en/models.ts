@@ -44,6 +44,7 @@ export const models = {
   notAdded: "Nothing was added",
   noProject: "A project has a cage of its own. Open it, or add the files of its models.",
   notBinned: "The model could not be taken out",
+  notPainted: "This cannot be painted now",
   notParts: "This part cannot be told apart",
   painting: "Painting what stays",
   hint: "Drag over the model to paint, beside it to turn the view. Esc ends painting.",
