@@ -7,7 +7,7 @@ use cagework_core::deform::{deform_bound, deform_vertices};
 use cagework_core::green::{green_controls, green_weights};
 use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::progress::{ProgressEvent, Silent};
-use cagework_core::{Binding, Bounds, Cage, Weights, subdivided_box};
+use cagework_core::{Binding, Bounds, Cage, Parts, Weights, subdivided_box};
 use cagework_gpu::render::{DrawModel, DrawVertex, MeshStyle, SceneOptions};
 use cagework_gpu::{ContextOptions, GpuContext, GpuError, PlanError, Session};
 use cagework_tests::cages::cage;
@@ -102,6 +102,40 @@ fn adopted_weights_move_the_mesh_as_on_the_cpu() {
     let expected = deform_bound(&cpu.weights, &cpu.outside, &pose);
     // The same weights on both sides: f32 sums of dozens of products of size 10 are all that differs.
     assert_close(&flat(&positions), &flat(&expected), 2e-5);
+}
+
+/// In pose after pose, with kernels and without; set before the weights and after them, and on another device.
+#[test]
+fn parts_are_held_as_an_export_holds_them() {
+    let (rest, cage) = input();
+    let cpu = on_cpu(&options(Method::Embedded, Solver::Multigrid));
+    let pose = posed(cage.positions());
+    let n = rest.len() as u32;
+    // One vertex in five stays, whole or by half; two pieces keep their shape.
+    let stays = (0..n).map(|v| [0.0, 1.0, 0.0, 0.5, 0.0][v as usize % 5]).collect();
+    let parts = Parts { stays, rigid: vec![(0..n / 4).collect(), (n / 2..n / 2 + 9).collect()] };
+    let expected = parts.hold(&rest, &deform_bound(&cpu.weights, &cpu.outside, &pose));
+    for draws_only in [false, true] {
+        let options = ContextOptions { draws_only, ..ContextOptions::default() };
+        let mut session = session_with(&options);
+        block_on(session.set_parts(parts.clone())).expect("they are of this model");
+        block_on(session.adopt(cpu.weights.clone(), cpu.outside.clone())).expect("they belong to it");
+        session.pose(&pose);
+        let held = block_on(session.read_positions()).expect("they come back");
+        assert_close(&flat(&held), &flat(&expected), 2e-5);
+        let by_processor = session.deformed(&pose).expect("it is bound");
+        assert_close(&flat(&by_processor), &flat(&expected), 2e-5);
+        let mut again = block_on(session.recover(context(&options))).expect("it recovers");
+        let held = block_on(again.read_positions()).expect("they come back");
+        assert_close(&flat(&held), &flat(&expected), 2e-5);
+        block_on(again.set_parts(Parts::default())).expect("none is fine");
+        let free = block_on(again.read_positions()).expect("they come back");
+        let moved = deform_bound(&cpu.weights, &cpu.outside, &pose);
+        assert_close(&flat(&free), &flat(&moved), 2e-5);
+        let astray = Parts { rigid: vec![vec![n]], ..Parts::default() };
+        let error = block_on(again.set_parts(astray)).unwrap_err().to_string();
+        assert!(error.contains("vertex that does not exist"), "{error}");
+    }
 }
 
 /// Columns are the cage's vertices and its triangles, whose controls follow from the pose.

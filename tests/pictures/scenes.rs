@@ -1,6 +1,7 @@
 //! Sessions that pictures are made of.
 
 use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
 
 use cagework_core::Cage;
 use cagework_core::options::{BindOptions, Method, Solver};
@@ -101,11 +102,15 @@ pub(crate) fn textured(options: &ContextOptions) -> Session {
             },
         });
     }
-    let checks = |odd: [u8; 4], even: [u8; 4]| DrawTexture {
-        width: 128,
-        height: 64,
-        rgba: (0..8192u32).flat_map(|p| if (p % 128 / 8 + p / 1024) % 2 == 0 { even } else { odd }).collect(),
-        ..DrawTexture::default()
+    let checks = |odd: [u8; 4], even: [u8; 4]| {
+        Arc::new(DrawTexture {
+            width: 128,
+            height: 64,
+            rgba: (0..8192u32)
+                .flat_map(|p| if (p % 128 / 8 + p / 1024) % 2 == 0 { even } else { odd })
+                .collect(),
+            ..DrawTexture::default()
+        })
     };
     model.textures =
         vec![checks([220, 60, 40, 255], [245, 240, 230, 255]), checks([255; 4], [255, 255, 255, 0])];

@@ -1,6 +1,7 @@
 //! The GPU from the command's side: opening one, and models as they are drawn.
 
 use std::io::Cursor;
+use std::sync::Arc;
 
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
 use cagework_gpu::{ContextOptions, GpuContext, GpuError};
@@ -79,6 +80,7 @@ pub(crate) fn draw_model(model: &Model) -> (DrawModel, Vec<String>) {
         .collect();
     let positions = model.positions.clone();
     let (copies, triangles) = (look.copies, look.triangles);
+    let textures = textures.into_iter().map(Arc::new).collect();
     (DrawModel { positions, copies, vertices, triangles, groups, textures }, notices)
 }
 

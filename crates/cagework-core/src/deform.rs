@@ -70,12 +70,18 @@ pub fn displacements(
     };
     let mut all: Vec<DVec3> = weights.rows().map(of_row).collect();
     for o in outside {
-        let [before, after] = [rest, posed].map(|at| triangle_frame(o.corners.map(|i| at[i as usize])));
-        if before != after {
-            all[o.vertex as usize] += (after * o.offset).as_dvec3() - (before * o.offset).as_dvec3();
-        }
+        all[o.vertex as usize] += turned_offset(o, rest, posed);
     }
     all
+}
+
+/// How far the offset of a vertex outside moves it, besides its row.
+pub(crate) fn turned_offset(o: &OutsideVertex, rest: &[Vec3], posed: &[Vec3]) -> DVec3 {
+    let [before, after] = [rest, posed].map(|at| triangle_frame(o.corners.map(|i| at[i as usize])));
+    if before == after {
+        return DVec3::ZERO;
+    }
+    (after * o.offset).as_dvec3() - (before * o.offset).as_dvec3()
 }
 
 /// Orthonormal frame of a triangle: first edge, in-plane normal to it, triangle normal, as columns. A triangle without

@@ -2,12 +2,16 @@
 //!
 //! Both change how far a point moves, so they work after any deformation, of vertices as of states of a morph target.
 
+mod bound;
+
 use std::collections::HashMap;
 
 use glam::{DMat3, DVec3, Vec3};
 
 use crate::mesh::weld;
 use crate::rotation::nearest_rotation;
+
+pub use bound::{BoundParts, PieceMotion, hold_parts};
 
 /// Share of a piece's size that stands still in all directions when its turn is looked for: where the piece itself does not say
 /// (a line does not, about itself), it turns as little as it can.
@@ -40,20 +44,39 @@ impl Motion {
         }
         let sum = |of: fn(&(DVec3, DVec3)) -> DVec3| points.iter().map(of).sum::<DVec3>();
         let [centre, shift] = [sum(|p| p.0), sum(|p| p.1)].map(|sum| sum / points.len() as f64);
-        let (mut moments, mut size) = (DMat3::ZERO, 0.0);
+        let (mut at_rest, mut moved) = (DMat3::ZERO, DMat3::ZERO);
         for &(at, by) in points {
             let from = at - centre;
-            let to = from + by - shift;
-            moments += DMat3::from_cols(to * from.x, to * from.y, to * from.z);
-            size += from.length_squared();
+            at_rest += outer(from, from);
+            moved += outer(by, from);
         }
-        let rotation = nearest_rotation(moments + DMat3::from_diagonal(DVec3::splat(UNTURNED * size)));
+        Self::from_sums(centre, shift, at_rest, moved)
+    }
+
+    /// The same from what is summed: `centre` of the points and their mean `shift`; sums of `from from^T` and of `by from^T`, where
+    /// `from` is a point's place from the centre and `by` how far it moves.
+    fn from_sums(centre: DVec3, shift: DVec3, at_rest: DMat3, moved: DMat3) -> Self {
+        let size = at_rest.x_axis.x + at_rest.y_axis.y + at_rest.z_axis.z;
+        let rotation =
+            nearest_rotation(at_rest + moved + DMat3::from_diagonal(DVec3::splat(UNTURNED * size)));
         Self { centre, turn: rotation - DMat3::IDENTITY, shift }
+    }
+
+    /// As [`PieceMotion`].
+    fn rows(&self) -> PieceMotion {
+        let at_origin = self.by(DVec3::ZERO);
+        let rows = self.turn.transpose();
+        [0, 1, 2].map(|axis| rows.col(axis).extend(at_origin[axis]).as_vec4())
     }
 
     pub(crate) fn by(&self, at: DVec3) -> DVec3 {
         self.turn * (at - self.centre) + self.shift
     }
+}
+
+/// `a b^T`.
+fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
 impl Parts {

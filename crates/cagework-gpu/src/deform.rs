@@ -11,6 +11,7 @@ use glam::{Vec3, Vec4};
 use crate::buffers::Allocator;
 use crate::device::GpuContext;
 use crate::error::GpuError;
+use crate::hold::Holder;
 use crate::kernels;
 use crate::layout::Work;
 use crate::pipelines::Launch;
@@ -99,14 +100,19 @@ impl GpuWeights {
     }
 }
 
+/// A kernel with the offset of its parameters and its workgroups.
+type Step = (Launch, u32, [u32; 2]);
+
 /// Deforms one mesh, frame after frame.
 #[derive(Debug)]
 pub struct Deformer {
     cage: wgpu::Buffer,
     positions: wgpu::Buffer,
     normals: wgpu::Buffer,
-    /// Kernels in order, with the offsets of their parameters and their workgroups.
-    steps: Vec<(Launch, u32, [u32; 2])>,
+    /// Kernels in order; normals are the last.
+    steps: Vec<Step>,
+    /// What comes before the normals.
+    holder: Option<Holder>,
     n_vertices: u32,
     n_columns: u32,
 }
@@ -141,7 +147,8 @@ impl Deformer {
         let launch = |kernel, buffers: &[&wgpu::Buffer]| {
             context.pipelines.launch(&context.device, kernel, &works, buffers)
         };
-        let mut deformer = Self { cage, positions, normals, steps: Vec::new(), n_vertices, n_columns };
+        let mut deformer =
+            Self { cage, positions, normals, steps: Vec::new(), holder: None, n_vertices, n_columns };
         let (cage, positions) = (deformer.cage.clone(), deformer.positions.clone());
         for part in &weights.parts {
             let buffers = [&part.slices, &part.columns, &part.weights, &cage, &positions];
@@ -183,35 +190,50 @@ impl Deformer {
         assert_eq!(cage_positions.len(), self.n_columns as usize, "one position per cage vertex");
         let padded: Vec<Vec4> = cage_positions.iter().map(|p| p.extend(1.0)).collect();
         context.queue.write_buffer(&self.cage, 0, bytemuck::cast_slice(&padded));
+        if let Some(holder) = &self.holder {
+            holder.pose(context, cage_positions);
+        }
+    }
+
+    /// Holds parts that the cage does not bend from the next pose on, or none.
+    pub(crate) fn hold(&mut self, holder: Option<Holder>) {
+        self.holder = holder;
     }
 
     /// Records the deformation: positions and normals are up to date for what comes after it.
     pub fn encode(&self, encoder: &mut wgpu::CommandEncoder) {
-        self.encode_steps(encoder, &self.steps, |_| {});
+        let (_, moving) = self.steps.split_last().expect("normals are the last step");
+        self.encode_steps(encoder, moving, |pass| {
+            if let Some(holder) = &self.holder {
+                holder.encode(pass);
+            }
+        });
     }
 
     /// The same for a clip: positions by a skin, then normals.
     pub(crate) fn encode_skinned(&self, encoder: &mut wgpu::CommandEncoder, skinner: &Skinner) {
-        let normals = &self.steps[self.steps.len() - 1..];
-        self.encode_steps(encoder, normals, |pass| skinner.encode(pass));
+        self.encode_steps(encoder, &[], |pass| skinner.encode(pass));
     }
 
+    /// Records `moving`, then what puts vertices right, then normals.
     fn encode_steps(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        steps: &[(Launch, u32, [u32; 2])],
-        first: impl FnOnce(&mut wgpu::ComputePass<'_>),
+        moving: &[Step],
+        then: impl FnOnce(&mut wgpu::ComputePass<'_>),
     ) {
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("deform"),
             ..wgpu::ComputePassDescriptor::default()
         });
-        first(&mut pass);
-        for (launch, offset, groups) in steps {
+        let record = |pass: &mut wgpu::ComputePass<'_>, (launch, offset, groups): &Step| {
             pass.set_pipeline(&launch.pipeline);
             pass.set_bind_group(0, &launch.bind_group, &[*offset]);
             pass.dispatch_workgroups(groups[0], groups[1], 1);
-        }
+        };
+        moving.iter().for_each(|step| record(&mut pass, step));
+        then(&mut pass);
+        self.steps.last().into_iter().for_each(|normals| record(&mut pass, normals));
     }
 
     /// Vertex buffer of positions: x, y, z, 1 as f32, stride 16 bytes, object units.

@@ -16,7 +16,7 @@ pub enum Binding {
 /// One compute shader.
 #[derive(Debug)]
 pub struct Kernel {
-    /// Name of the file, the entry point, and the CPU twin in `cagework_core::stencil`, `skin` or `dynamic`.
+    /// Name of the file, the entry point, and the CPU twin in `cagework_core::stencil`, `parts`, `skin` or `dynamic`.
     pub name: &'static str,
     /// The whole source.
     pub wgsl: &'static str,
@@ -74,6 +74,8 @@ kernels! {
     DEFORM_VERTICES = "deform_vertices" + ["work"], 64, 900, &[Uniform, Read, Read, Read, Read, ReadWrite];
     /// Rigid offsets of vertices outside the cage.
     OFFSET_OUTSIDE = "offset_outside" + ["work"], 64, 24, &[Uniform, Read, Read, Read, ReadWrite];
+    /// Parts that the cage does not bend.
+    HOLD_PARTS = "hold_parts" + ["work"], 64, 16, &[Uniform, Read, Read, Read, ReadWrite];
     /// Positions of a clip.
     SKIN_VERTICES = "skin_vertices" + ["work"], 64, 60, &[Uniform, Read, Read, Read, Read, Read, Read, ReadWrite];
     /// Positions of a clip, bent by the cage.

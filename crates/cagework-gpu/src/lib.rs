@@ -10,6 +10,7 @@ pub mod buffers;
 pub mod deform;
 pub mod device;
 pub mod error;
+mod hold;
 pub mod jacobi;
 pub mod kernels;
 pub mod layout;

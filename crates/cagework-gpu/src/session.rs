@@ -6,6 +6,7 @@
 mod again;
 mod green;
 mod mover;
+mod parts;
 mod picture;
 mod playing;
 
@@ -14,6 +15,7 @@ use std::sync::Arc;
 use cagework_core::deform::OutsideVertex;
 use cagework_core::deform::{deform_bound, vertex_normals};
 use cagework_core::options::BindOptions;
+use cagework_core::parts::{BoundParts, Parts};
 use cagework_core::{BindReport, Bounds, Cage, ControlSet, Controls, Progress, Weights};
 use glam::{Vec2, Vec3};
 
@@ -40,6 +42,8 @@ pub struct Session {
     controls: Option<ControlSet>,
     pose: Vec<Vec3>,
     bound: Option<Bound>,
+    /// What of the model the cage does not bend.
+    parts: Parts,
     /// What the mesh follows while a clip plays.
     playing: Option<Skinner>,
     /// Whether the cage moved since the mesh was deformed last.
@@ -54,6 +58,8 @@ struct Bound {
     /// Columns are the cage's triangles, too.
     is_green: bool,
     mover: Mover,
+    /// What of it the cage does not bend, if there is anything.
+    parts: Option<Arc<BoundParts>>,
 }
 
 impl Session {
@@ -69,6 +75,7 @@ impl Session {
             controls: None,
             pose: Vec::new(),
             bound: None,
+            parts: Parts::default(),
             playing: None,
             moved: false,
         }
@@ -89,11 +96,16 @@ impl Session {
         self.set_shared_model(Arc::new(model)).await
     }
 
-    async fn set_shared_model(&mut self, model: Arc<DrawModel>) -> Result<(), GpuError> {
+    /// As [`Self::set_model`], of a model that others hold, too.
+    ///
+    /// # Errors
+    /// As [`Self::set_model`].
+    pub async fn set_shared_model(&mut self, model: Arc<DrawModel>) -> Result<(), GpuError> {
         if let Some(reason) = model.fault() {
             return Err(GpuError::Model { reason });
         }
         self.drop_weights();
+        self.parts = Parts::default();
         let normals = vertex_normals(&model.with_copies(&model.positions), &model.shading_triangles());
         self.renderer.set_model(&self.context, &model, &normals).await?;
         self.model = Some(model);
@@ -182,8 +194,8 @@ impl Session {
         mover.pose(&self.context, &self.columns(is_green, &self.pose));
         self.renderer.set_vertices(&self.context, Some(mover.tables()));
         self.playing = None;
-        self.bound = Some(Bound { weights, outside, is_green, mover });
-        self.moved = true;
+        self.bound = Some(Bound { weights, outside, is_green, mover, parts: None });
+        self.hold().await?;
         self.write_values();
         Ok(())
     }
@@ -373,17 +385,13 @@ impl Session {
     }
 
     fn encode_deformation(&mut self, encoder: &mut wgpu::CommandEncoder) {
-        if let Some(Bound { weights, outside, is_green, mover }) = self.bound.as_ref().filter(|_| self.moved)
-        {
+        if let Some(bound) = self.bound.as_ref().filter(|_| self.moved) {
             match &self.playing {
-                Some(skinner) => mover.encode_skinned(&self.context, encoder, skinner),
-                None => mover.encode(
-                    &self.context,
-                    encoder,
-                    weights,
-                    outside,
-                    &self.columns(*is_green, &self.pose),
-                ),
+                Some(skinner) => bound.mover.encode_skinned(&self.context, encoder, skinner),
+                None => {
+                    let positions = || self.deformed(&self.pose).unwrap_or_default();
+                    bound.mover.encode(&self.context, encoder, positions);
+                }
             }
             self.moved = false;
         }
@@ -397,9 +405,9 @@ impl Session {
     pub async fn read_positions(&self) -> Result<Vec<Vec3>, GpuError> {
         let Some(model) = &self.model else { return Err(GpuError::NotReady { missing: "model" }) };
         match &self.bound {
-            Some(Bound { weights, outside, is_green, mover }) => {
-                let columns = self.columns(*is_green, &self.pose);
-                let mut positions = mover.read_positions(&self.context, weights, outside, &columns).await?;
+            Some(bound) => {
+                let by_processor = || self.deformed(&self.pose).unwrap_or_default();
+                let mut positions = bound.mover.read_positions(&self.context, by_processor).await?;
                 // Copies of vertices come last.
                 positions.truncate(model.positions.len());
                 Ok(positions)

@@ -82,7 +82,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let bounds = cagework_core::Bounds::of(&model.positions).ok_or("the model has vertices")?;
         let cage = cagework_core::subdivided_box(bounds, 0.1, [2, 2, 2]);
         let cage_poses = [("raised".to_owned(), cage.positions.iter().map(|&p| p + Vec3::Y).collect())];
-        let project = cagework_io::write_project(&model, &cage, &cage_poses, "{}")?;
+        let project = cagework_io::write_project(&[&model], &cage, &cage_poses, "{}")?;
         std::fs::write(directory.join(format!("{stem}-project.glb")), project)?;
     }
     Ok(())

@@ -2,8 +2,9 @@
 //!
 //! The visible part is the model at rest, its document unchanged, and the cage as lines. What only we read is in the
 //! extension [`EXTENSION`] of the document: buffer views with the cage's positions, its faces (for each the number of
-//! corners, then the corners) and the poses, all little endian and in the model's axes, and which of them points up. An OBJ travels as it is in a buffer view; what viewers
-//! see is made from it. Weights are not kept: they are made again from the same settings.
+//! corners, then the corners) and the poses, all little endian and in the model's axes, and which of them points up. A model that is no
+//! glTF travels as a file in a buffer view, and what viewers see is made from it; so do further models in the same cage, which
+//! viewers do not see. Weights are not kept: they are made again from the same settings.
 
 use cagework_core::PolygonMesh;
 use glam::Vec3;
@@ -11,19 +12,21 @@ use serde_json::{Value, json};
 use thiserror::Error;
 
 use crate::error::WriteError;
+use crate::format::ModelFormat;
 use crate::gltf::{self, PROJECT_EXTENSION as EXTENSION, Pack, push};
 use crate::model::{Document, Model, ReadError};
 use crate::shown::shown;
 use crate::up::UpAxis;
 
-/// Version that is written, and the only one that is read.
+/// Version that is written for one model; those for several have the next one, which older programs cannot read.
 const VERSION: u64 = 1;
+const VERSION_OF_SEVERAL: u64 = 2;
 
 /// What a project holds.
 #[derive(Clone, Debug)]
 pub struct Project {
-    /// The model.
-    pub model: Model,
+    /// The models, one at least.
+    pub models: Vec<Model>,
     /// The cage, as it was: it may not be closed yet.
     pub cage: PolygonMesh,
     /// Names and cage positions of the poses. `[n_cage]` each
@@ -40,7 +43,7 @@ pub enum ProjectError {
     Model(#[from] ReadError),
     /// From another version of this program.
     #[error(
-        "{} is a project of version {found}, but this program reads version {VERSION}: update it",
+        "{} is a project of version {found}, but this program reads versions up to {VERSION_OF_SEVERAL}: update it",
         shown(name)
     )]
     Version {
@@ -59,24 +62,26 @@ pub enum ProjectError {
     },
 }
 
-/// Everything as one GLB. `poses`: cage positions, `[n_cage]` each.
+/// Everything as one GLB. `models`: in one cage, all with the same axis up; `poses`: cage positions, `[n_cage]` each.
 ///
 /// # Errors
-/// [`WriteError`] when the model's document cannot be written or the file would be too large.
+/// [`WriteError`] when there is no model, a document cannot be written or the file would be too large.
 pub fn write_project(
-    model: &Model,
+    models: &[&Model],
     cage: &PolygonMesh,
     poses: &[(String, Vec<Vec3>)],
     settings: &str,
 ) -> Result<Vec<u8>, WriteError> {
+    let (model, more) =
+        models.split_first().ok_or_else(|| WriteError::Document("there is no model".into()))?;
     let built;
-    // What viewers see of an OBJ.
+    // What viewers see of another format.
     let (document, source) = match &model.document {
         Document::Gltf(document) => (&**document, None),
         Document::Obj(document) => {
             let (glb, _) = gltf::build_from_obj(&model.name, document, &model.positions_in_file())?;
             built = gltf::read(&model.name, &glb, &mut |_| None, u64::MAX)?.document;
-            (&built, Some(&document.bytes))
+            (&built, Some(file_of(model)?))
         }
     };
     let mut json = document.json.clone();
@@ -87,10 +92,16 @@ pub fn write_project(
     let node = add_cage(&mut json, &mut pack, cage);
     let mut view =
         |json: &mut Value, bytes: Vec<u8>| json!({ "bufferView": pack.push_view(json, bytes, None) });
-    let mut project = json!({ "version": VERSION, "name": model.name, "node": node, "settings": settings });
+    let version = if more.is_empty() { VERSION } else { VERSION_OF_SEVERAL };
+    let mut project = json!({ "version": version, "name": model.name, "node": node, "settings": settings });
     project["up"] = up.name().into();
     if let Some(source) = source {
-        project["source"] = view(&mut json, source.clone());
+        project["source"] = view(&mut json, source);
+    }
+    for model in more {
+        let mut part = view(&mut json, file_of(model)?);
+        part["name"] = model.name.as_str().into();
+        push(&mut project, "more", part);
     }
     project["cage"] = json!({
         "positions": view(&mut json, position_bytes(&cage.positions)),
@@ -131,11 +142,12 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         .map_err(|source| ReadError::Gltf { name: name.into(), source })?;
     let Some(project) = take_project(&mut json) else { return Ok(None) };
     let found = project["version"].as_u64().unwrap_or(0);
-    if found != VERSION {
+    if !(VERSION..=VERSION_OF_SEVERAL).contains(&found) {
         return Err(ProjectError::Version { name: name.into(), found });
     }
+    let views = json["bufferViews"].clone();
     let view = |part: &Value| {
-        let view = &json["bufferViews"][part["bufferView"].as_u64()? as usize];
+        let view = &views[part["bufferView"].as_u64()? as usize];
         let start = view["byteOffset"].as_u64().unwrap_or(0);
         bin.get(start as usize..start.checked_add(view["byteLength"].as_u64()?)? as usize)
     };
@@ -162,7 +174,32 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         Model::read_within(model_name, &plain, &mut |_| None, memory_limit)?
     };
     model.set_up(up);
-    Ok(Some(Project { model, cage: PolygonMesh { positions, faces }, poses, settings }))
+    let mut models = vec![model];
+    for part in project["more"].as_array().into_iter().flatten() {
+        let bytes = view(part).ok_or(damaged("one of its models is cut off"))?;
+        let taken: u64 = models.iter().map(Model::bytes).sum();
+        let left = memory_limit.saturating_sub(taken);
+        let name = part["name"].as_str().unwrap_or("model");
+        let mut model = Model::read_within(name, bytes, &mut |_| None, left)?;
+        model.require_faces()?;
+        model.set_up(up);
+        models.push(model);
+    }
+    Ok(Some(Project { models, cage: PolygonMesh { positions, faces }, poses, settings }))
+}
+
+/// A model as a file of its own format that needs no other file.
+fn file_of(model: &Model) -> Result<Vec<u8>, WriteError> {
+    match (&model.document, model.format()) {
+        (Document::Gltf(document), _) => {
+            let (mut json, mut pack) = (document.json.clone(), Pack::of(document));
+            gltf::embed_images(document, &mut json, &mut pack);
+            pack.finish(json)
+        }
+        (Document::Obj(document), ModelFormat::Obj) => Ok(document.bytes.clone()),
+        // Of them nothing but what is written is kept.
+        (_, format) => model.write(format, &model.positions),
+    }
 }
 
 /// Takes the extension out of the document.

@@ -5,7 +5,7 @@
 mod common;
 
 use cagework_core::{PolygonMesh, subdivided_box};
-use cagework_io::{Look, Model, Project, ProjectError, UpAxis, read_project, write_project};
+use cagework_io::{Look, Model, ModelFormat, Project, ProjectError, UpAxis, read_project, write_project};
 use common::{CUBE_OBJ, PNG, glb, instanced, json_of, plain_cube, quantized, read, skinned, textured_square};
 use glam::Vec3;
 use serde_json::json;
@@ -21,6 +21,12 @@ fn models() -> Vec<Model> {
         [plain_cube(), instanced(), skinned(), quantized()].map(|b| read("x.glb", &b.glb()).unwrap()),
     );
     models.push(read("box.obj", CUBE_OBJ.as_bytes()).unwrap());
+    // Once their files were lost on the way, and the project could not be opened again.
+    for name in ["box.ply", "box.stl"] {
+        let cube = read("box.obj", CUBE_OBJ.as_bytes()).unwrap();
+        let format = ModelFormat::of_export(name).unwrap();
+        models.push(read(name, &cube.write(format, &cube.positions).unwrap()).unwrap());
+    }
     models
 }
 
@@ -35,7 +41,7 @@ fn poses(cage: &PolygonMesh) -> Vec<(String, Vec<Vec3>)> {
 
 fn written(model: &Model) -> Vec<u8> {
     let cage = cage(model);
-    write_project(model, &cage, &poses(&cage), SETTINGS).unwrap()
+    write_project(&[model], &cage, &poses(&cage), SETTINGS).unwrap()
 }
 
 fn reopened(bytes: &[u8]) -> Project {
@@ -52,17 +58,39 @@ fn without_names(mut look: Look) -> Look {
 fn everything_comes_back_as_it_was() {
     for model in models() {
         let project = reopened(&written(&model));
-        assert_eq!(project.model.name, model.name);
-        assert_eq!(project.model.format(), model.format(), "{}", model.name);
-        assert_eq!(project.model.positions, model.positions, "{}", model.name);
-        assert_eq!(project.model.triangles, model.triangles);
-        assert_eq!(project.model.counts, model.counts, "{}", model.name);
-        assert_eq!(project.model.notices, model.notices);
-        assert_eq!(without_names(project.model.look()), without_names(model.look()), "{}", model.name);
+        assert_eq!(project.models[0].name, model.name);
+        assert_eq!(project.models[0].format(), model.format(), "{}", model.name);
+        assert_eq!(project.models[0].positions, model.positions, "{}", model.name);
+        assert_eq!(project.models[0].triangles, model.triangles);
+        assert_eq!(project.models[0].counts, model.counts, "{}", model.name);
+        assert_eq!(project.models[0].notices, model.notices);
+        assert_eq!(without_names(project.models[0].look()), without_names(model.look()), "{}", model.name);
         let cage = cage(&model);
         assert_eq!((&project.cage, &project.poses), (&cage, &poses(&cage)));
         assert_eq!(project.settings, SETTINGS);
     }
+}
+
+#[test]
+fn several_models_in_one_cage_come_back_in_their_order() {
+    let models = models();
+    let all: Vec<&Model> = models.iter().collect();
+    let cage = cage(&models[0]);
+    let once = write_project(&all, &cage, &poses(&cage), SETTINGS).unwrap();
+    let project = reopened(&once);
+    assert_eq!(project.models.len(), models.len());
+    for (back, model) in project.models.iter().zip(&models) {
+        assert_eq!((&back.name, back.format()), (&model.name, model.format()));
+        assert_eq!((&back.positions, &back.triangles), (&model.positions, &model.triangles));
+        assert_eq!(without_names(back.look()), without_names(model.look()), "{}", model.name);
+    }
+    assert_eq!((project.cage, project.poses), (cage.clone(), poses(&cage)));
+    // Programs that know of one model only must not lose the others silently.
+    assert_eq!(json_of(&once)["extensions"]["CAGEWORK_project"]["version"], json!(2));
+    assert_eq!(json_of(&written(&models[0]))["extensions"]["CAGEWORK_project"]["version"], json!(1));
+    let again: Vec<&Model> = project.models.iter().collect();
+    let twice = write_project(&again, &cage, &poses(&cage), SETTINGS).unwrap();
+    assert!(twice.len() <= once.len() + 64, "{} then {}", once.len(), twice.len());
 }
 
 #[test]
@@ -72,7 +100,7 @@ fn what_points_up_is_kept_and_others_see_the_files_own_axes() {
         model.set_up(UpAxis::Z);
         let bytes = written(&model);
         let project = reopened(&bytes);
-        assert_eq!((project.model.up(), &project.model.positions), (UpAxis::Z, &model.positions));
+        assert_eq!((project.models[0].up(), &project.models[0].positions), (UpAxis::Z, &model.positions));
         let cage = cage(&model);
         assert_eq!((&project.cage, &project.poses), (&cage, &poses(&cage)));
         let seen = read("seen.glb", &bytes).unwrap();
@@ -95,8 +123,8 @@ fn bounds(positions: &[Vec3]) -> cagework_core::Bounds {
 fn saving_again_and_again_does_not_grow_the_file() {
     for model in models() {
         let once = written(&model);
-        let twice = written(&reopened(&once).model);
-        let thrice = written(&reopened(&twice).model);
+        let twice = written(&reopened(&once).models[0]);
+        let thrice = written(&reopened(&twice).models[0]);
         assert_eq!(twice.len(), thrice.len(), "{}", model.name);
         assert!(twice.len() <= once.len() + 64, "{}: {} then {}", model.name, once.len(), twice.len());
     }

@@ -23,14 +23,15 @@ use ts_rs::{Config, TS};
 use crate::clock::Event;
 use crate::controls::{CageControls, InnerKind};
 use crate::error::ErrorName;
+use crate::models::{MemberSettings, PartOptions};
 use crate::options::{
     BindAsked, CageAsked, Colour, Coordinates, GizmoAsked, GizmoHandle, JointsAsked, PullAsked, RestEdit,
     RigAsked, SceneAsked, SliceShown, SymmetryAsked, ThemeAsked,
 };
 use crate::settings::Settings;
 use crate::views::{
-    BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, Fix, Grip, Largest, Legend, Mend,
-    ModelInfo, Problem, SurfacePoint, TargetView,
+    BoundsView, CageInfo, CageState, CameraView, ClipView, ColorMap, Fix, Grip, Largest, Legend, MemberInfo,
+    Mend, ModelInfo, Problem, SurfacePoint, TargetView,
 };
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/src/contract/generated.ts");
@@ -95,6 +96,9 @@ fn the_page_has_the_types_of_rust() {
         Problem,
         ModelFormat,
         UpAxis,
+        PartOptions,
+        MemberInfo,
+        MemberSettings,
         ModelInfo,
         Settings,
         ThemeAsked,

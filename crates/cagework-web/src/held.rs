@@ -1,8 +1,8 @@
-//! What a hand holds of the model, and the model where it is now.
+//! What a hand holds of the models, and where they are now.
 
 use cagework_core::Weights;
-use cagework_core::deform::{OutsideVertex, deform_bound};
 use cagework_core::edit::pick_surface;
+use cagework_gpu::Session;
 use cagework_gpu::render::Marks;
 use glam::{Vec2, Vec3};
 
@@ -13,36 +13,36 @@ use crate::views::{Grip, SurfacePoint};
 const MIRROR_OFF: f32 = 0.02;
 
 impl State {
-    /// Brings the model in memory to where the cage is.
-    pub(crate) fn pose_model(&mut self, weights: &Weights, outside: &[OutsideVertex]) {
+    /// Brings the models in memory to where the cage is.
+    pub(crate) fn pose_models(&mut self, session: &Session) {
         if self.held.posed_for != self.positions {
-            self.held.posed = deform_bound(weights, outside, &self.positions);
+            self.held.posed = session.deformed(&self.positions).unwrap_or_default();
             self.held.posed_for.clone_from(&self.positions);
         }
     }
 
     /// The point of the posed model under the pointer.
     pub(crate) fn surface_at(&self, at: Vec2) -> Option<SurfacePoint> {
-        let model = self.model.as_ref()?;
-        if self.held.posed.len() != model.positions.len() {
+        if self.held.posed.len() != self.models.positions.len() {
             return None;
         }
-        let (triangle, bary) = pick_surface(&self.held.posed, &model.triangles, &self.camera, at)?;
-        Some(SurfacePoint { triangle, bary })
+        let (triangle, bary) =
+            pick_surface(&self.held.posed, self.models.shown_triangles(), &self.camera, at)?;
+        Some(SurfacePoint { triangle: self.models.counted(triangle), bary })
     }
 
     /// Where a point of the model is; none if there is no such point.
     pub(crate) fn place_of(&self, point: SurfacePoint) -> Option<Vec3> {
-        let corners = self.model.as_ref()?.triangles.get(point.triangle as usize)?;
+        let corners = self.models.corners(point.triangle)?;
         let at = |k: usize| Some(point.bary[k] * *self.held.posed.get(corners[k] as usize)?);
         Some(at(0)? + at(1)? + at(2)?)
     }
 
     /// How a point of the model follows the cage.
     pub(crate) fn grip_of(&self, point: SurfacePoint, weights: &Weights) -> Option<Grip> {
-        let corners = self.model.as_ref()?.triangles.get(point.triangle as usize)?;
+        let corners = self.models.corners(point.triangle)?;
         let mut row = vec![0.0; weights.n_columns()];
-        for (&v, share) in corners.iter().zip(point.bary) {
+        for (v, share) in corners.into_iter().zip(point.bary) {
             let (columns, values) = weights.row(v as usize);
             columns
                 .iter()
@@ -55,27 +55,27 @@ impl State {
 
     /// The point of the model that is a point's mirror image at rest, if there is one, and it is another.
     pub(crate) fn image_of(&self, point: SurfacePoint) -> Option<SurfacePoint> {
-        let model = self.model.as_ref()?;
-        let corners = model.triangles.get(point.triangle as usize)?;
-        let at: Vec3 = corners.iter().zip(point.bary).map(|(&v, b)| b * model.positions[v as usize]).sum();
+        let models = &self.models;
+        let corners = models.corners(point.triangle)?;
+        let at: Vec3 = corners.iter().zip(point.bary).map(|(&v, b)| b * models.positions[v as usize]).sum();
         let limit = MIRROR_OFF * self.bounds()?.diagonal();
         let image = Vec3::new(2.0 * self.symmetry.plane() - at.x, at.y, at.z);
-        let near = |v: u32| model.positions[v as usize].distance(image);
+        let near = |v: u32| models.positions[v as usize].distance(image);
         let (t, k) = (0u32..)
-            .zip(&model.triangles)
+            .zip(&models.triangles)
             .flat_map(|(t, corners)| (0..3).map(move |k| (t, k, corners[k])))
             .min_by(|a, b| near(a.2).total_cmp(&near(b.2)))
             .filter(|found| near(found.2) < limit && image.distance(at) > limit)
             .map(|(t, k, _)| (t, k))?;
         let mut bary = [0.0; 3];
         bary[k] = 1.0;
-        Some(SurfacePoint { triangle: t, bary })
+        Some(SurfacePoint { triangle: models.counted(t), bary })
     }
 
     /// What is held, as it is drawn, where the cage is now; nothing before there are weights.
     pub(crate) fn held_marks(&self, weights: Option<&Weights>) -> Marks {
         let place = |point: &SurfacePoint| {
-            let corners = self.model.as_ref()?.triangles.get(point.triangle as usize)?;
+            let corners = self.models.corners(point.triangle)?;
             let follow = |v: u32| {
                 let (columns, values) = weights?.row(v as usize);
                 let moved =

@@ -25,7 +25,9 @@ mod held;
 mod incoming;
 mod joints;
 pub mod loaded;
+mod models;
 mod options;
+mod playing;
 mod problems;
 pub mod puller;
 mod scene;
@@ -41,7 +43,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
 import type { BindOptions, BindReport, CageOptions, CageState, Element, Gesture, GizmoHandle, Legend, ModelInfo,
-  Grip, Pivot, Problem, Progress, PullOptions, Repair, RestEdit, SceneOptions, SelectMode, Settings, SurfacePoint,
+  Grip, MemberSettings, PartOptions, Pivot, Problem, Progress, PullOptions, Repair, RestEdit, SceneOptions, SelectMode, Settings, SurfacePoint,
   CameraView, UpAxis } from "../contract/generated";
 "#;
 

@@ -1,5 +1,8 @@
 //! A file that was read, before it is shown: its textures are decoded by the browser in between.
 
+use std::collections::VecDeque;
+use std::sync::Arc;
+
 use cagework_core::PolygonMesh;
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
 use cagework_io::{Look, LookAlpha, LookWrap, Model, UpAxis, read_project};
@@ -10,9 +13,10 @@ use wasm_bindgen::{JsCast as _, JsValue};
 
 use crate::arrays::flat;
 use crate::binder::Polygons;
-use crate::error::Answer;
+use crate::error::{Answer, Fault};
+use crate::models::MemberSettings;
 use crate::options::taken;
-use crate::settings::{controls_of, has_controls};
+use crate::settings::{controls_of, has_controls, member_settings};
 
 /// A model with its looks, and what else was in its file.
 #[wasm_bindgen]
@@ -23,6 +27,10 @@ pub struct Loaded {
     textures: Vec<DrawTexture>,
     poses: Vec<(String, Vec<Vec3>)>,
     settings: Option<String>,
+    /// Which model of a project it is.
+    number: usize,
+    /// Further models of a project.
+    more: VecDeque<Self>,
 }
 
 #[wasm_bindgen]
@@ -61,14 +69,15 @@ impl Loaded {
         &mut self,
         #[wasm_bindgen(unchecked_param_type = "UpAxis")] up: JsValue,
     ) -> Result<(), JsValue> {
-        let (before, up): (_, UpAxis) = (self.model.up(), taken(up)?);
-        let turn = |positions: &mut Vec<Vec3>| {
-            *positions = up.turned(&before.turned_back(positions)).into_owned();
-        };
-        self.model.set_up(up);
-        self.cage.iter_mut().for_each(|cage| turn(&mut cage.positions));
-        self.poses.iter_mut().for_each(|(_, positions)| turn(positions));
+        self.turn_to(taken(up)?);
         Ok(())
+    }
+
+    /// The next of a project's further models, which share its cage; undefined when there is no more.
+    #[wasm_bindgen(js_name = takeNext)]
+    #[must_use]
+    pub fn take_next(&mut self) -> Option<Loaded> {
+        self.more.pop_front()
     }
 
     /// The model's vertices. `[n_vertices, 3]`
@@ -153,10 +162,14 @@ pub(crate) const READ_LIMIT: u64 = 1 << 30;
 impl Loaded {
     fn from_bytes(name: &str, bytes: &[u8], sibling: &Function) -> Answer<Self> {
         if let Some(project) = read_project(name, bytes, READ_LIMIT)? {
-            let mut loaded = Self::new(project.model);
+            let mut models = project.models.into_iter().enumerate().map(|(number, model)| {
+                let settings = Some(project.settings.clone());
+                Self { number, settings, ..Self::new(model) }
+            });
+            let mut loaded = models.next().ok_or_else(|| Fault::missing("model", "the project has none"))?;
+            loaded.more = models.collect();
             loaded.cage = Some(project.cage);
             loaded.poses = project.poses;
-            loaded.settings = Some(project.settings);
             let settings = loaded.settings.as_deref();
             if has_controls(settings) && loaded.cage.as_ref().and_then(|c| controls_of(settings, c)).is_none()
             {
@@ -177,7 +190,25 @@ impl Loaded {
 
     fn new(model: Model) -> Self {
         let (look, textures) = (Look::default(), Vec::new());
-        Self { model, cage: None, look, textures, poses: Vec::new(), settings: None }
+        let more = VecDeque::new();
+        Self { model, cage: None, look, textures, poses: Vec::new(), settings: None, number: 0, more }
+    }
+
+    /// Turns everything in it to what points up.
+    pub(crate) fn turn_to(&mut self, up: UpAxis) {
+        let before = self.model.up();
+        let turn = |positions: &mut Vec<Vec3>| {
+            *positions = up.turned(&before.turned_back(positions)).into_owned();
+        };
+        self.model.set_up(up);
+        self.cage.iter_mut().for_each(|cage| turn(&mut cage.positions));
+        self.poses.iter_mut().for_each(|(_, positions)| turn(positions));
+        self.more.iter_mut().for_each(|next| next.turn_to(up));
+    }
+
+    /// What a project says of this model besides its file.
+    pub(crate) fn member_settings(&self) -> Option<MemberSettings> {
+        member_settings(self.settings.as_deref()).into_iter().nth(self.number)
     }
 
     /// What the renderer takes; a texture that was not decoded is left out.
@@ -215,7 +246,7 @@ impl Loaded {
             vertices: look.vertices.iter().map(vertex).collect(),
             groups: groups.collect(),
             triangles: look.triangles,
-            textures: textures.into_iter().filter(|t| !t.rgba.is_empty()).collect(),
+            textures: textures.into_iter().filter(|t| !t.rgba.is_empty()).map(Arc::new).collect(),
         }
     }
 }

@@ -6,7 +6,6 @@ use cagework_core::Weights;
 use cagework_core::dynamic::bend_vertices;
 use cagework_core::edit::Element;
 use cagework_gpu::render::{Gizmo, GizmoMode, Marks, MeshStyle, SceneOptions, Selection, SliceView};
-use cagework_io::JointPoint;
 use glam::{Quat, Vec3};
 
 use crate::options::{Colour, GizmoAsked, JointsAsked, SliceShown};
@@ -46,7 +45,12 @@ impl State {
             gizmo: self.gizmo().filter(|_| cage),
             slice: self.shown_slice(),
             marks: self.marks(),
-            greyed: self.held.stays.clone(),
+            hidden: self.models.hidden(),
+            greyed: self
+                .painting
+                .as_ref()
+                .map(|(_, stays)| Arc::clone(stays))
+                .or_else(|| self.held.stays.clone()),
             held: self.held_marks(weights),
             joints: self.joint_marks(),
         }
@@ -77,6 +81,7 @@ impl State {
             backdrop: false,
             mesh: self.mesh_style(),
             weights_to_one: self.view.weights_to_one,
+            hidden: self.models.hidden(),
             cage_lines: false,
             handles: false,
             floor: false,
@@ -138,9 +143,9 @@ impl State {
         let (Some(asked), Some(dots)) = (self.view.joints, &self.joints) else { return Marks::default() };
         let at = match &self.playing {
             Some(playing) => {
-                let of = |joint: &JointPoint| playing.posed.origins.get(joint.node as usize);
-                let origins = dots.joints.iter().filter_map(of);
-                let mut at: Vec<Vec3> = origins.map(|&p| playing.up.transform_point3(p)).collect();
+                let joints = dots.joints.iter().zip(&dots.models);
+                let mut at: Vec<Vec3> =
+                    joints.filter_map(|(joint, &id)| playing.origin(id, joint.node)).collect();
                 if let Some(field) = &playing.field {
                     bend_vertices(field, &mut at);
                 }

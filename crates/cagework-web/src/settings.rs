@@ -13,6 +13,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::controls::{CageControls, MadeCage};
 use crate::error::{ErrorName, Fault};
+use crate::models::MemberSettings;
 use crate::options::{BindAsked, CageAsked, RigAsked};
 use crate::views::{SurfacePoint, object};
 
@@ -66,6 +67,10 @@ pub(crate) struct Settings {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[cfg_attr(test, ts(optional, as = "Option<Vec<Vec<SurfacePoint>>>"))]
     pose_pins: Vec<Vec<SurfacePoint>>,
+    /// What of its models the cage does not bend: read with the models.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(test, ts(optional, as = "Option<Vec<MemberSettings>>"))]
+    models: Vec<MemberSettings>,
     /// What was wrong, in whole sentences.
     notices: Vec<String>,
 }
@@ -95,6 +100,12 @@ pub(crate) fn controls_of(settings: Option<&str>, cage: &PolygonMesh) -> Option<
     let given: Map<String, Value> = serde_json::from_str(settings?).ok()?;
     let controls: CageControls = serde_json::from_value(given.get("controls")?.clone()).ok()?;
     MadeCage::new(cage.clone(), controls.clone()).is_ok().then_some(controls)
+}
+
+/// What a project says of its models; nothing of what cannot be read.
+pub(crate) fn member_settings(settings: Option<&str>) -> Vec<MemberSettings> {
+    let given = settings.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
+    points(&given, "models")
 }
 
 /// Points of the surface in settings; none if they cannot be read.

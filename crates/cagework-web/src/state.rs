@@ -3,30 +3,35 @@
 use std::sync::Arc;
 
 use cagework_core::deform::OutsideVertex;
-use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
+use cagework_core::dynamic::Lattice;
 use cagework_core::edit::{Element, Gesture, Pivot, Pull, Selection, SharedPull, Symmetry, Topology};
 use cagework_core::enclosure::Enclosure;
-use cagework_core::skin::skin_vertices;
 use cagework_core::slice::Slice;
 use cagework_core::{Bounds, ControlSet, PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, GizmoPart};
-use cagework_io::{Model, Player, Posed, UpAxis};
-use glam::{Mat4, Vec2, Vec3};
+use cagework_io::{Model, UpAxis};
+use glam::{Vec2, Vec3};
 
 use crate::controls::MadeCage;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::joints::JointDots;
+use crate::models::Models;
 use crate::options::{Coordinates, SceneAsked};
+use crate::playing::Playing;
 use crate::problems::Faults;
 use crate::views::{CageInfo, CageState, SurfacePoint};
 
 /// Model, cage, selection, gesture and camera of a page.
 #[derive(Default)]
 pub(crate) struct State {
-    pub(crate) model: Option<Model>,
-    /// How many points its rig has, once they were counted.
+    pub(crate) models: Models,
+    /// How many points their rigs have, once they were counted.
     pub(crate) n_rig: Option<usize>,
+    /// Whether the GPU has to be told what the cage does not bend.
+    pub(crate) other_parts: bool,
+    /// What stays of the model that is being painted, and its number. `[n_vertices]` of all models
+    pub(crate) painting: Option<(u32, Arc<Vec<f32>>)>,
     /// The cage at rest, or a draft of one, with the controls inside.
     pub(crate) made: MadeCage,
     pub(crate) topology: Topology,
@@ -95,43 +100,27 @@ pub(crate) struct Held {
     pub(crate) posed_for: Vec<Vec3>,
 }
 
-/// A model that plays.
-pub(crate) struct Playing {
-    pub(crate) player: Player,
-    /// From the file's axes to those that are drawn.
-    pub(crate) up: Mat4,
-    pub(crate) posed: Posed,
-    /// What bends it.
-    pub(crate) field: Option<DisplacementField>,
-    /// Whether the GPU does not have it yet.
-    pub(crate) is_new: bool,
-}
-
-impl Playing {
-    /// Matrices of the joints, in the axes that are drawn.
-    pub(crate) fn palette(&self) -> Vec<Mat4> {
-        self.posed.palette.iter().map(|&m| self.up * m).collect()
-    }
-
-    /// Where the vertices are, by the processor. `[n_vertices]`
-    pub(crate) fn positions(&self) -> Vec<Vec3> {
-        let mut positions = skin_vertices(&self.player.skin, &self.palette(), &self.posed.targets);
-        if let Some(field) = &self.field {
-            bend_vertices(field, &mut positions);
-        }
-        positions
-    }
-}
-
 impl State {
     /// Another model, without a cage.
-    pub(crate) fn set_model(&mut self, model: Model) {
-        self.model = Some(model);
-        self.n_rig = None;
+    pub(crate) fn set_models(&mut self, models: Models) {
+        self.models = models;
+        (self.n_rig, self.painting) = (None, None);
         self.set_cage(MadeCage::default());
         self.camera = Camera::default();
         self.fit_camera();
         self.frame_all();
+    }
+
+    /// Other models in the same cage: its pose stays, the weights are of others.
+    pub(crate) fn change_models(&mut self, models: Models) {
+        self.models = models;
+        let (on_gpu, selection) = (self.is_on_gpu(), self.selection.clone());
+        let (made, positions) = (std::mem::take(&mut self.made), std::mem::take(&mut self.positions));
+        (self.n_rig, self.painting) = (None, None);
+        self.set_cage(made);
+        // The cage itself is the same.
+        self.on_gpu = on_gpu.then_some(self.revision);
+        (self.positions, self.selection) = (positions, selection);
     }
 
     /// Another cage, or a draft of one.
@@ -182,7 +171,7 @@ impl State {
 
     /// What points up in the model's file.
     pub(crate) fn up(&self) -> UpAxis {
-        self.model.as_ref().map_or_else(UpAxis::default, Model::up)
+        self.models.up()
     }
 
     /// Tells the camera where everything is.
@@ -230,8 +219,7 @@ impl State {
 
     /// Where model and cage are at rest.
     pub(crate) fn bounds(&self) -> Option<Bounds> {
-        let model = self.model.as_ref().and_then(|m| Bounds::of(&m.positions));
-        match (model, Bounds::of(&self.rest().positions)) {
+        match (Bounds::of(&self.models.positions), Bounds::of(&self.rest().positions)) {
             (Some(a), Some(b)) => Some(Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }),
             (one, other) => one.or(other),
         }
@@ -282,7 +270,7 @@ impl State {
         let scene = self.is_changed.then(|| self.scene(main.weights()));
         match &mut self.playing {
             Some(playing) if playing.is_new => {
-                main.play(&playing.palette(), &playing.posed.targets);
+                main.play(&playing.palette(), playing.targets());
                 playing.is_new = false;
             }
             Some(_) => {}

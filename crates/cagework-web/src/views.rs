@@ -4,12 +4,14 @@ use cagework_core::cage::CageNotice;
 use cagework_core::cage_check::{Code, Repair, Severity};
 use cagework_core::edit::Topology;
 use cagework_core::{Bounds, ControlSet};
-use cagework_io::{Clip, Model, ModelFormat, UpAxis};
+use cagework_io::{Model, ModelFormat, UpAxis};
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::JsValue;
 
 use crate::controls::{CageControls, MadeCage};
 use crate::error::Answer;
+use crate::models::{Member, Models, PartOptions};
+use crate::playing::SharedClip;
 
 /// Corners of a box.
 #[derive(Clone, Copy, Serialize)]
@@ -86,29 +88,72 @@ pub(crate) struct ModelInfo {
     rigged: bool,
     bounds: BoundsView,
     notices: Vec<String>,
+    /// Each of the models in the cage; all else is of all of them.
+    members: Vec<MemberInfo>,
 }
 
 impl ModelInfo {
-    pub(crate) fn of(model: &Model) -> Self {
-        let counts = model.counts;
+    /// # Errors
+    /// When there is no model.
+    pub(crate) fn of(models: &Models) -> Answer<Self> {
+        let first = &*models.first()?.model;
+        let all = || models.iter().map(|member| &*member.model);
+        let sum = |of: fn(&Model) -> usize| all().map(of).sum();
+        let more = all().count() - 1;
+        Ok(Self {
+            name: if more == 0 { first.name.clone() } else { format!("{} and {more} more", first.name) },
+            format: first.format(),
+            up: first.up(),
+            vertices: sum(|model| model.positions.len()),
+            triangles: sum(|model| model.triangles.len()),
+            faces: sum(Model::n_faces),
+            materials: sum(|model| model.counts.materials),
+            textures: sum(|model| model.counts.textures),
+            skins: sum(|model| model.counts.skins),
+            joints: sum(|model| model.counts.joints),
+            clips: SharedClip::all(models).into_iter().map(ClipView::of).collect(),
+            targets: TargetView::all(models),
+            // What is wrong with a rig is said where it is used.
+            props: all().flat_map(|model| model.props().unwrap_or_default()).collect(),
+            rigged: all().any(Model::is_rigged),
+            bounds: BoundsView::of(Bounds::of(&models.positions)),
+            notices: all().flat_map(|model| model.notices.clone()).collect(),
+            members: models.iter().map(MemberInfo::of).collect(),
+        })
+    }
+}
+
+/// One of the models in a cage.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) struct MemberInfo {
+    /// Its number, which stays.
+    id: u32,
+    name: String,
+    format: ModelFormat,
+    vertices: usize,
+    triangles: usize,
+    rigged: bool,
+    /// Names of its parts, each with its kind: "material:Cloth".
+    parts: Vec<String>,
+    options: PartOptions,
+    /// Whether some of it is painted to stay.
+    painted: bool,
+}
+
+impl MemberInfo {
+    fn of(member: &Member) -> Self {
+        let model = &member.model;
         Self {
+            id: member.id,
             name: model.name.clone(),
             format: model.format(),
-            up: model.up(),
             vertices: model.positions.len(),
             triangles: model.triangles.len(),
-            faces: model.n_faces(),
-            materials: counts.materials,
-            textures: counts.textures,
-            skins: counts.skins,
-            joints: counts.joints,
-            clips: model.clips().iter().map(ClipView::of).collect(),
-            targets: TargetView::all(model),
-            // What is wrong with a rig is said where it is used.
-            props: model.props().unwrap_or_default(),
             rigged: model.is_rigged(),
-            bounds: BoundsView::of(Bounds::of(&model.positions)),
-            notices: model.notices.clone(),
+            parts: model.part_names(),
+            options: member.options.clone(),
+            painted: !member.painted.is_empty(),
         }
     }
 }
@@ -123,8 +168,8 @@ pub(crate) struct ClipView {
 }
 
 impl ClipView {
-    fn of(clip: &Clip) -> Self {
-        Self { name: clip.name.clone().unwrap_or_default(), seconds: clip.seconds }
+    fn of(SharedClip { name, seconds, .. }: SharedClip) -> Self {
+        Self { name, seconds }
     }
 }
 
@@ -137,13 +182,23 @@ pub(crate) struct TargetView {
 }
 
 impl TargetView {
-    fn all(model: &Model) -> Vec<Self> {
-        if !model.is_rigged() {
-            return Vec::new();
-        }
-        let Ok(Some(player)) = model.player() else { return Vec::new() };
-        let (names, defaults) = player.targets();
-        names.iter().zip(defaults).map(|(name, &default)| Self { name: name.clone(), default }).collect()
+    fn all(models: &Models) -> Vec<Self> {
+        let is_alone = models.iter().nth(1).is_none();
+        let of = |member: &Member| {
+            let model = &member.model;
+            let player = model.player().ok().flatten().filter(|_| model.is_rigged());
+            let named =
+                |name: &String| if is_alone { name.clone() } else { format!("{}: {name}", model.name) };
+            player.map_or_else(Vec::new, |player| {
+                let (names, defaults) = player.targets();
+                names
+                    .iter()
+                    .zip(defaults)
+                    .map(|(name, &default)| Self { name: named(name), default })
+                    .collect()
+            })
+        };
+        models.iter().flat_map(of).collect()
     }
 }
 

@@ -173,18 +173,18 @@ pub fn pick_face(positions: &[Vec3], topology: &Topology, view: &dyn View, point
 #[must_use]
 pub fn pick_surface(
     positions: &[Vec3],
-    triangles: &[[u32; 3]],
+    triangles: impl Iterator<Item = (u32, [u32; 3])>,
     view: &dyn View,
     pointer: Vec2,
 ) -> Option<(u32, [f32; 3])> {
     let (origin, direction) = view.ray(pointer);
     let mut nearest = (f32::INFINITY, None);
-    for (t, corners) in triangles.iter().enumerate() {
+    for (t, corners) in triangles {
         let corners = corners.map(|v| positions[v as usize]);
         if let Some((along, barycentric)) = ray_meets_triangle(origin, direction, corners)
             && along < nearest.0
         {
-            nearest = (along, Some((t as u32, barycentric)));
+            nearest = (along, Some((t, barycentric)));
         }
     }
     nearest.1

@@ -191,11 +191,14 @@ impl Renderer {
             if before.is_none_or(|b| b.mesh != scene.mesh || b.greyed.is_some() != scene.greyed.is_some()) {
                 mesh.set_style(context, scene.mesh, self.range, scene.greyed.is_some());
             }
+            if before.is_none_or(|b| b.hidden != scene.hidden) {
+                self.wires = None;
+            }
             if (scene.base_wireframe || scene.mesh_edges)
                 && self.wires.is_none()
                 && let Some(model) = model
             {
-                let wires = Wires::new(context, &self.layouts, mesh, model);
+                let wires = Wires::new(context, &self.layouts, mesh, model, &scene.hidden);
                 wires.set_theme(context, scene.theme);
                 self.wires = Some(wires);
             }
@@ -289,7 +292,7 @@ impl Renderer {
         let mesh = self.mesh.as_ref().filter(|_| scene.mesh != MeshStyle::Hidden);
         if let Some(mesh) = mesh {
             pass.set_pipeline(pipelines.get(Kind::Mesh));
-            mesh.draw(pass, scene.mesh, false);
+            mesh.draw(pass, scene.mesh, false, &scene.hidden);
         }
         if let Some(slice) = &self.slice {
             pass.set_pipeline(pipelines.get(Kind::Slice));
@@ -297,7 +300,7 @@ impl Renderer {
         }
         if let Some(mesh) = mesh {
             pass.set_pipeline(pipelines.get(Kind::MeshBlended));
-            mesh.draw(pass, scene.mesh, true);
+            mesh.draw(pass, scene.mesh, true, &scene.hidden);
         }
         if scene.floor {
             pass.set_pipeline(pipelines.get(Kind::Floor));

@@ -1,5 +1,7 @@
 //! Places with a problem, what is held, and wireframes: overlays that come and go.
 
+use std::ops::Range;
+
 use glam::Vec3;
 
 use super::layout::Style;
@@ -95,8 +97,17 @@ pub(super) struct Wires {
 }
 
 impl Wires {
-    pub(super) fn new(context: &GpuContext, layouts: &Layouts, mesh: &Mesh, model: &DrawModel) -> Self {
-        let triangles = model.shading_triangles();
+    /// Without edges of `hidden` triangles alone.
+    pub(super) fn new(
+        context: &GpuContext,
+        layouts: &Layouts,
+        mesh: &Mesh,
+        model: &DrawModel,
+        hidden: &[Range<u32>],
+    ) -> Self {
+        let shown =
+            (0..).zip(model.shading_triangles()).filter(|(t, _)| !hidden.iter().any(|h| h.contains(t)));
+        let triangles: Vec<[u32; 3]> = shown.map(|(_, corners)| corners).collect();
         let edges = unique_edges(triangles.iter().map(<[u32; 3]>::as_slice));
         let items: Vec<Item> = edges.into_iter().map(|[a, b]| item(0, a, b)).collect();
         Self {

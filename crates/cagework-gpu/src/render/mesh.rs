@@ -1,5 +1,7 @@
 //! The model on the GPU: corners, indices, materials, textures.
 
+use std::ops::Range;
+
 use super::layout::{Surface, surface_mode};
 use super::model::{Alpha, CLAY, DrawGroup, DrawModel, DrawTexture, Wrap};
 use super::pipelines::Layouts;
@@ -31,7 +33,7 @@ pub(super) struct Mesh {
 
 #[derive(Debug)]
 struct Group {
-    indices: std::ops::Range<u32>,
+    indices: Range<u32>,
     surface: Surface,
     uniform: wgpu::Buffer,
     bind_group: wgpu::BindGroup,
@@ -75,7 +77,7 @@ impl Mesh {
             textures.push(texture::upload(context, &mut allocator, texture));
         }
         let mut groups = Vec::new();
-        for group in whole(model) {
+        for group in model.whole_groups() {
             let (view, wrap) = match group.texture {
                 Some(t) => (&textures[t as usize], model.textures[t as usize].wrap),
                 None => (&white, [Wrap::Repeat; 2]),
@@ -136,13 +138,20 @@ impl Mesh {
         }
     }
 
-    /// Draws the groups that are `blended` or not. Colours that mean a value cover everything.
-    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, style: MeshStyle, blended: bool) {
+    /// Draws the groups that are `blended` or not, but for those of `hidden` triangles. Colours that mean a value cover everything.
+    pub(super) fn draw(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        style: MeshStyle,
+        blended: bool,
+        hidden: &[Range<u32>],
+    ) {
         pass.set_bind_group(1, &self.vertices, &[]);
         pass.set_vertex_buffer(0, self.corners.slice(..));
         pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
         for group in &self.groups {
-            if (group.blended && style == MeshStyle::Solid) == blended {
+            let is_hidden = hidden.iter().any(|range| range.contains(&(group.indices.start / 3)));
+            if (group.blended && style == MeshStyle::Solid) == blended && !is_hidden {
                 pass.set_bind_group(2, &group.bind_group, &[]);
                 pass.draw_indexed(group.indices.clone(), 0, 0..1);
             }
@@ -166,28 +175,6 @@ fn bind_vertices(
             wgpu::BindGroupEntry { binding: 2, resource: values.resource() },
         ],
     })
-}
-
-/// The groups of a model, and clay for the triangles of none.
-fn whole(model: &DrawModel) -> Vec<DrawGroup> {
-    // By numbers, which are sorted elsewhere too: another sort makes the page's module larger.
-    let mut order: Vec<[u32; 2]> = (0u32..).zip(&model.groups).map(|(k, g)| [g.triangles.start, k]).collect();
-    order.sort_unstable();
-    let mut groups: Vec<DrawGroup> = order.iter().map(|[_, k]| model.groups[*k as usize].clone()).collect();
-    let mut gaps = Vec::new();
-    let mut covered = 0;
-    for group in &groups {
-        if group.triangles.start > covered {
-            gaps.push(DrawGroup { triangles: covered..group.triangles.start, ..DrawGroup::default() });
-        }
-        covered = covered.max(group.triangles.end);
-    }
-    let n = model.triangles.len() as u32;
-    if covered < n {
-        gaps.push(DrawGroup { triangles: covered..n, ..DrawGroup::default() });
-    }
-    groups.extend(gaps);
-    groups
 }
 
 impl Group {
@@ -243,22 +230,5 @@ impl Group {
             bind_group,
             blended: group.alpha == Alpha::Blend,
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use glam::Vec3;
-
-    #[test]
-    fn triangles_of_no_group_are_clay() {
-        let mut model = DrawModel::plain(vec![Vec3::ZERO; 3], vec![[0, 1, 2]; 10]);
-        let group = |range| DrawGroup { triangles: range, base_color: [1.0; 4], ..DrawGroup::default() };
-        model.groups = vec![group(6..8), group(1..4)];
-        let mut all = whole(&model);
-        all.sort_by_key(|g| g.triangles.start);
-        let ranges: Vec<_> = all.iter().map(|g| (g.triangles.clone(), g.base_color == CLAY)).collect();
-        assert_eq!(ranges, [(0..1, true), (1..4, false), (4..6, true), (6..8, false), (8..10, true)]);
     }
 }

@@ -1,6 +1,7 @@
 //! What is drawn of a model: corners with texture coordinates and colours, material groups, decoded textures.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use cagework_core::Weights;
@@ -28,7 +29,7 @@ pub struct DrawModel {
     /// Material of each range of triangles; triangles of no group are drawn as clay.
     pub groups: Vec<DrawGroup>,
     /// Textures that groups name.
-    pub textures: Vec<DrawTexture>,
+    pub textures: Vec<Arc<DrawTexture>>,
 }
 
 /// A corner of triangles.
@@ -116,6 +117,58 @@ impl DrawModel {
     pub fn plain(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
         let vertices = (0..positions.len() as u32).map(DrawVertex::plain).collect();
         Self { positions, vertices, triangles, ..Self::default() }
+    }
+
+    /// Several models as one: vertices, copies, corners and triangles of the first, then those of the next; textures are shared.
+    #[must_use]
+    pub fn joined(models: &[&Self]) -> Self {
+        let n_vertices: usize = models.iter().map(|m| m.positions.len()).sum();
+        let mut all = Self::default();
+        for model in models {
+            let first = all.positions.len() as u32;
+            let own = model.positions.len() as u32;
+            // Copies come after the vertices of all.
+            let first_copy = (n_vertices + all.copies.len()) as u32;
+            let source = |s: u32| if s < own { first + s } else { first_copy + s - own };
+            let (corner, triangle) = (all.vertices.len() as u32, all.triangles.len() as u32);
+            let texture = all.textures.len() as u32;
+            all.positions.extend(&model.positions);
+            all.copies.extend(model.copies.iter().map(|v| first + v));
+            all.vertices.extend(model.vertices.iter().map(|v| DrawVertex { source: source(v.source), ..*v }));
+            all.triangles.extend(model.triangles.iter().map(|t| t.map(|c| corner + c)));
+            all.textures.extend(model.textures.iter().cloned());
+            // Triangles of no group get one of their own, so that no group is of two models.
+            all.groups.extend(model.whole_groups().into_iter().map(|group| DrawGroup {
+                triangles: triangle + group.triangles.start..triangle + group.triangles.end,
+                texture: group.texture.map(|t| texture + t),
+                ..group
+            }));
+        }
+        all
+    }
+
+    /// The groups, and clay for the triangles of none.
+    pub(super) fn whole_groups(&self) -> Vec<DrawGroup> {
+        // By numbers, which are sorted elsewhere too: another sort makes the page's module larger.
+        let mut order: Vec<[u32; 2]> =
+            (0u32..).zip(&self.groups).map(|(k, g)| [g.triangles.start, k]).collect();
+        order.sort_unstable();
+        let mut groups: Vec<DrawGroup> =
+            order.iter().map(|[_, k]| self.groups[*k as usize].clone()).collect();
+        let mut gaps = Vec::new();
+        let mut covered = 0;
+        for group in &groups {
+            if group.triangles.start > covered {
+                gaps.push(DrawGroup { triangles: covered..group.triangles.start, ..DrawGroup::default() });
+            }
+            covered = covered.max(group.triangles.end);
+        }
+        let n = self.triangles.len() as u32;
+        if covered < n {
+            gaps.push(DrawGroup { triangles: covered..n, ..DrawGroup::default() });
+        }
+        groups.extend(gaps);
+        groups
     }
 
     /// Values of vertices, and those of the copies after them. `[n_vertices]` -> `[n_vertices + n_copies]`
@@ -221,6 +274,40 @@ mod tests {
     }
 
     #[test]
+    fn triangles_of_no_group_are_clay() {
+        let mut model = DrawModel::plain(vec![Vec3::ZERO; 3], vec![[0, 1, 2]; 10]);
+        let group = |range| DrawGroup { triangles: range, base_color: [1.0; 4], ..DrawGroup::default() };
+        model.groups = vec![group(6..8), group(1..4)];
+        let mut all = model.whole_groups();
+        all.sort_by_key(|g| g.triangles.start);
+        let ranges: Vec<_> = all.iter().map(|g| (g.triangles.clone(), g.base_color == CLAY)).collect();
+        assert_eq!(ranges, [(0..1, true), (1..4, false), (4..6, true), (6..8, false), (8..10, true)]);
+    }
+
+    /// Two triangles each; the first model has a hard edge (two copies), the second a texture.
+    #[test]
+    fn joined_models_keep_their_corners_copies_and_textures() {
+        let mut first = DrawModel::plain(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2], [2, 1, 0]]);
+        first.copies = vec![0, 2];
+        first.vertices.extend([3, 4].map(DrawVertex::plain));
+        let mut second = triangle();
+        second.copies = vec![1];
+        second.vertices.push(DrawVertex::plain(3));
+        let texture = DrawTexture { width: 1, height: 1, rgba: vec![9; 4], ..DrawTexture::default() };
+        second.textures = vec![texture.into()];
+        second.groups = vec![DrawGroup { triangles: 0..1, texture: Some(0), ..DrawGroup::default() }];
+        let all = DrawModel::joined(&[&first, &second, &second]);
+        assert_eq!(all.fault(), None);
+        assert_eq!(all.copies, [0, 2, 4, 7]);
+        let sources: Vec<u32> = all.vertices.iter().map(|v| v.source).collect();
+        // Nine vertices, then the copies: two of the first model, one of each other.
+        assert_eq!(sources, [0, 1, 2, 9, 10, 3, 4, 5, 11, 6, 7, 8, 12]);
+        assert_eq!(all.triangles[2..], [[5, 6, 7], [9, 10, 11]]);
+        let groups: Vec<_> = all.groups.iter().map(|g| (g.triangles.clone(), g.texture)).collect();
+        assert_eq!(groups, [(0..2, None), (2..3, Some(0)), (3..4, Some(1))]);
+    }
+
+    #[test]
     fn every_fault_is_named() {
         let faulty = |edit: fn(&mut DrawModel)| {
             let mut model = triangle();
@@ -238,7 +325,7 @@ mod tests {
         model.groups = vec![DrawGroup { texture: Some(0), ..group() }];
         assert!(model.fault().is_some_and(|f| f.contains("texture 0")));
         model.textures =
-            vec![DrawTexture { width: 2, height: 2, rgba: vec![0; 15], ..DrawTexture::default() }];
+            vec![DrawTexture { width: 2, height: 2, rgba: vec![0; 15], ..DrawTexture::default() }.into()];
         assert!(model.fault().is_some_and(|f| f.contains("2 x 2") && f.contains("15")));
     }
 }

@@ -1,5 +1,6 @@
 //! What of it all is drawn, and how: plain values that a page or a command sets.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use cagework_core::slice::Slice;
@@ -60,6 +61,8 @@ pub struct SceneOptions {
     pub handles: bool,
     /// Whether the cage steps back: fainter lines, and only handles that are chosen or pointed at.
     pub cage_faint: bool,
+    /// Ranges of [`super::DrawModel::triangles`] that are not drawn, each of whole groups.
+    pub hidden: Vec<Range<u32>>,
     /// Whether a floor grid is drawn below the model.
     pub floor: bool,
     /// What of the cage is chosen or pointed at.
@@ -89,6 +92,7 @@ impl Default for SceneOptions {
             cage_lines: true,
             handles: true,
             cage_faint: false,
+            hidden: Vec::new(),
             floor: true,
             selection: Selection::default(),
             gizmo: None,

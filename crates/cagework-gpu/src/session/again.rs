@@ -18,6 +18,7 @@ impl Session {
         let mut twin = Self::new(self.context.clone());
         if let Some(model) = &self.model {
             twin.set_shared_model(Arc::clone(model)).await?;
+            twin.parts.clone_from(&self.parts);
         }
         twin.set_cage(cage).await?;
         twin.pose(&self.pose[..cage.n_vertices()]);
@@ -34,6 +35,7 @@ impl Session {
         session.camera = self.camera;
         if let Some(model) = self.model {
             session.set_shared_model(model).await?;
+            session.parts = self.parts;
         }
         if let Some(controls) = &self.controls {
             session.set_cage(controls).await?;

@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use cagework_core::Weights;
 use cagework_core::deform::OutsideVertex;
-use cagework_core::deform::{deform_bound, vertex_normals};
+use cagework_core::deform::vertex_normals;
 use cagework_core::dynamic::DisplacementField;
+use cagework_core::parts::BoundParts;
 use cagework_core::skin::Skin;
 use glam::{Vec3, Vec4};
 
@@ -15,6 +16,7 @@ use crate::buffers::Allocator;
 use crate::deform::{Deformer, GpuWeights};
 use crate::device::GpuContext;
 use crate::error::GpuError;
+use crate::hold::Holder;
 use crate::render::DrawModel;
 use crate::skin::Skinner;
 use crate::table::{Entry, Table};
@@ -23,7 +25,7 @@ use crate::table::{Entry, Table};
 #[derive(Debug)]
 pub(super) enum Mover {
     /// By kernels: a moved cage is all that is uploaded.
-    Kernels { deformer: Deformer, tables: [Table; 2] },
+    Kernels { deformer: Box<Deformer>, tables: [Table; 2] },
     /// By the processor: every vertex is uploaded.
     Processor { model: Arc<DrawModel>, triangles: Vec<[u32; 3]>, tables: [Table; 2] },
 }
@@ -53,7 +55,24 @@ impl Mover {
         };
         let deformer = Deformer::new(context, &on_gpu, &triangles).await?;
         let tables = [deformer.positions(), deformer.normals()].map(|b| Table::Buffer(b.clone()));
-        Ok(Self::Kernels { deformer, tables })
+        Ok(Self::Kernels { deformer: Box::new(deformer), tables })
+    }
+
+    /// Holds parts that the cage does not bend from the next pose on; none: everything follows. The processor is told with each
+    /// frame.
+    pub(super) async fn hold(
+        &mut self,
+        context: &GpuContext,
+        model: &DrawModel,
+        parts: Option<Arc<BoundParts>>,
+    ) -> Result<(), GpuError> {
+        let Self::Kernels { deformer, .. } = self else { return Ok(()) };
+        let holder = match parts {
+            Some(parts) => Some(Holder::new(context, parts, &model.copies, deformer.positions()).await?),
+            None => None,
+        };
+        deformer.hold(holder);
+        Ok(())
     }
 
     pub(super) fn tables(&self) -> [&Table; 2] {
@@ -70,20 +89,18 @@ impl Mover {
         }
     }
 
-    /// Sees to it that what is recorded next finds the mesh where the cage has it.
+    /// Sees to it that what is recorded next finds the mesh where the cage has it: `positions`, by the processor.
     pub(super) fn encode(
         &self,
         context: &GpuContext,
         encoder: &mut wgpu::CommandEncoder,
-        weights: &Weights,
-        outside: &[OutsideVertex],
-        cage_positions: &[Vec3],
+        positions: impl FnOnce() -> Vec<Vec3>,
     ) {
         match self {
             Self::Kernels { deformer, .. } => deformer.encode(encoder),
             // There is none elsewhere; the condition leaves this out of the page's main artifact.
             Self::Processor { model, .. } if context.draws_only() => {
-                self.show(context, model.with_copies(&deform_bound(weights, outside, cage_positions)));
+                self.show(context, model.with_copies(&positions()));
             }
             Self::Processor { .. } => {}
         }
@@ -131,9 +148,7 @@ impl Mover {
     pub(super) async fn read_positions(
         &self,
         context: &GpuContext,
-        weights: &Weights,
-        outside: &[OutsideVertex],
-        cage_positions: &[Vec3],
+        positions: impl FnOnce() -> Vec<Vec3>,
     ) -> Result<Vec<Vec3>, GpuError> {
         match self {
             Self::Kernels { deformer, .. } => {
@@ -143,7 +158,7 @@ impl Mover {
             }
             Self::Processor { .. } => {
                 context.check()?;
-                Ok(deform_bound(weights, outside, cage_positions))
+                Ok(positions())
             }
         }
     }

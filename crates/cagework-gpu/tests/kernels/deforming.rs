@@ -2,6 +2,7 @@
 
 use cagework_core::deform::OutsideVertex;
 use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
+use cagework_core::parts::{PieceMotion, hold_parts};
 use cagework_core::skin::{Skin, skin_vertices};
 use cagework_core::stencil::tables::{BUNDLE, NormalTable, OutsideTable, SlicedWeights};
 use cagework_core::{Cage, PolygonMesh, TriMesh, Weights, stencil};
@@ -124,6 +125,25 @@ fn bend_vertices_matches_cpu() {
     bend_vertices(&field, &mut points);
     // Values jump from node to node, so that rounding of where a vertex is counts a hundredfold.
     assert_close(&unpadded(&result), &flat(&points), 100.0 * POINT_TOLERANCE);
+}
+
+#[test]
+fn hold_parts_matches_cpu() {
+    let mut seeded = Seeded(17);
+    let n = 131;
+    // Some stay in part, every third belongs to one of four pieces, some do both, some neither.
+    let rest: Vec<Vec4> =
+        (0..n).map(|v| seeded.point().extend([0.0, 0.0, 0.4, 1.0][v as usize % 4])).collect();
+    let piece_of: Vec<u32> = (0..n).map(|v| if v % 3 == 0 { 1 + v / 3 % 4 } else { 0 }).collect();
+    let motions: Vec<PieceMotion> =
+        (0..4).map(|_| [0, 1, 2].map(|_| seeded.point().extend(seeded.point().x))).collect();
+    let mut moved: Vec<Vec3> = (0..n).map(|_| seeded.point()).collect();
+    let inputs = [bytes(&rest), bytes(&piece_of), bytes(&motions)].map(<[u8]>::to_vec);
+    let at = padded(&moved, 1.0);
+    let inputs = [&inputs[0], &inputs[1], &inputs[2], bytes(&at)];
+    let result = run(&kernels::HOLD_PARTS, ROWS, n, &inputs);
+    hold_parts(&rest, &piece_of, &motions, &mut moved);
+    assert_close(&unpadded(&result), &flat(&moved), POINT_TOLERANCE);
 }
 
 #[test]

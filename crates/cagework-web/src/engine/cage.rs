@@ -26,10 +26,7 @@ impl Engine {
     #[wasm_bindgen(js_name = boxCage)]
     pub fn box_cage(&self, divisions: u32) -> Result<Polygons, JsValue> {
         let mesh = self.read(|state| {
-            let bounds = state
-                .model
-                .as_ref()
-                .and_then(|m| cagework_core::Bounds::of(&m.positions))
+            let bounds = cagework_core::Bounds::of(&state.models.positions)
                 .ok_or_else(|| Fault::missing("model", "open one first"))?;
             let longest = bounds.extent().max_element().max(f32::MIN_POSITIVE);
             let cut = |side: f32| (side / longest * divisions as f32).round().max(1.0) as u32;
@@ -137,12 +134,12 @@ impl Engine {
     ) -> Result<f64, JsValue> {
         let asked: BindAsked = taken(options)?;
         if self.read(|state| state.n_rig.is_none()) {
-            let n = self.read(|state| Answer::Ok(state.the_model()?.extra_points()?.len()))?;
+            let n = self.read(|state| Answer::Ok(state.models.extra_points()?.len()))?;
             self.state.borrow_mut().n_rig = Some(n);
         }
         let bytes = self.read(|state| {
-            let (model, set) = state.parts()?;
-            let n = model.positions.len() + state.n_rig.unwrap_or(0);
+            let set = state.the_set()?;
+            let n = state.models.positions.len() + state.n_rig.unwrap_or(0);
             Answer::Ok(estimate_memory(set, n, &asked.into())?)
         })?;
         Ok(bytes as f64)

@@ -12,6 +12,7 @@ use crate::arrays::points;
 use crate::controls::{CageControls, InnerKind, MadeCage};
 use crate::error::Fault;
 use crate::loaded::READ_LIMIT;
+use crate::models::Models;
 use crate::options::taken;
 use crate::views::object;
 
@@ -93,8 +94,7 @@ impl Engine {
     pub fn middle_at(&self, x: f32, y: f32) -> Vec<f32> {
         let middle = self.read(|state| {
             let center = state.bounds().map_or(Vec3::ZERO, |b| b.center());
-            let (positions, triangles) =
-                state.model.as_ref().map_or((&[][..], &[][..]), |m| (&m.positions, &m.triangles));
+            let Models { positions, triangles, .. } = &state.models;
             pick_middle(positions, triangles, &state.camera, state.pointer(x, y), center)
         });
         middle.to_array().to_vec()

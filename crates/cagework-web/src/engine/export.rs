@@ -1,8 +1,11 @@
 //! Files.
 
-use cagework_core::deform::{OutsideVertex, deform_bound, displacements};
+use std::ops::Range;
+
+use cagework_core::deform::{OutsideVertex, displacements};
 use cagework_core::dynamic::bend_vertices;
-use cagework_core::{ControlSet, InnerControls, PolygonMesh};
+use cagework_core::{ControlSet, InnerControls, PolygonMesh, Weights};
+use cagework_gpu::Session;
 use cagework_io::{
     Model, ModelFormat, ReshapeReport, write_cage_obj, write_inner_controls, write_project, write_weights_npz,
 };
@@ -16,42 +19,51 @@ use super::gesture::pose_list;
 use crate::arrays::flat;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::options::{RigAsked, taken};
+use crate::playing::SharedClip;
 use crate::state::State;
 use crate::views::object;
 
 #[wasm_bindgen]
 impl Engine {
-    /// The model as GLB, as posed; a rigged one with its skeleton, morph targets and clips. Where the cage bends the moving model,
-    /// frames of `clip` instead.
+    /// A model as GLB, as posed; a rigged one with its skeleton, morph targets and clips. Where the cage bends the moving model,
+    /// frames of `clip` instead, if it has this clip.
     ///
     /// # Errors
     /// When it cannot be written.
     #[wasm_bindgen(js_name = exportGlb)]
     pub fn export_glb(
         &self,
+        id: u32,
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
         clip: u32,
     ) -> Result<Vec<u8>, JsValue> {
         let asked: RigAsked = taken(options)?;
-        let (bytes, notices) =
-            if asked.dynamic { self.baked(clip as usize)? } else { self.posed_glb(&asked)? };
+        let clips = self.read(|state| SharedClip::all(&state.models));
+        let (bytes, notices) = match clips.get(clip as usize).and_then(|clip| clip.of(id)) {
+            Some(clip) if asked.dynamic => self.baked(id, clip)?,
+            _ => self.posed_glb(id, &asked)?,
+        };
         self.state.borrow_mut().rig_notices = notices;
         Ok(bytes)
     }
 
-    /// The model's shape as posed, in a format of shapes alone.
+    /// A model's shape as posed, in a format of shapes alone.
     ///
     /// # Errors
     /// When it cannot be written.
     #[wasm_bindgen(js_name = exportShape)]
     pub fn export_shape(
         &self,
+        id: u32,
         #[wasm_bindgen(unchecked_param_type = "ModelFormat")] format: JsValue,
     ) -> Result<Vec<u8>, JsValue> {
         let format: ModelFormat = taken(format)?;
         let pose = self.read(|state| state.positions.clone());
         let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
-        Ok(self.read(|state| Answer::Ok(state.the_model()?.write(format, &posed)?))?)
+        Ok(self.read(|state| {
+            let member = state.models.get(id)?;
+            Answer::Ok(member.model.write(format, member.share(&posed))?)
+        })?)
     }
 
     /// What the last export did to the rig, each a sentence; they are told once.
@@ -61,13 +73,14 @@ impl Engine {
         std::mem::take(&mut self.state.borrow_mut().rig_notices)
     }
 
-    /// The model as GLB with a morph target for each pose and an animation through all of them.
+    /// A model as GLB with a morph target for each pose and an animation through all of them.
     ///
     /// # Errors
     /// When it cannot be written.
     #[wasm_bindgen(js_name = exportPoses)]
     pub fn export_poses(
         &self,
+        id: u32,
         #[wasm_bindgen(unchecked_param_type = "readonly string[]")] names: Vec<String>,
         #[wasm_bindgen(unchecked_param_type = "readonly Float32Array[]")] poses: &Array,
         #[wasm_bindgen(unchecked_param_type = "RigOptions")] options: JsValue,
@@ -75,14 +88,15 @@ impl Engine {
         let poses = pose_list(poses);
         let rest = self.read(|state| state.rest().positions.clone());
         let pairs: Vec<_> = names.iter().cloned().zip(poses.iter().cloned()).collect();
-        if let Some((bytes, _)) = self.reshaped(&rest, &pairs, &taken(options)?)? {
+        if let Some((bytes, _)) = self.reshaped(id, &rest, &pairs, &taken(options)?)? {
             return Ok(bytes);
         }
         let posed = self.deformed(&poses)?;
-        let named: Vec<(String, Vec<Vec3>)> = names.into_iter().zip(posed).collect();
         Ok(self.read(|state| {
-            let model = state.the_model()?;
-            Answer::Ok(model.write_glb_poses(&model.positions, &named)?)
+            let member = state.models.get(id)?;
+            let own = posed.iter().map(|posed| member.share(posed).to_vec());
+            let named: Vec<(String, Vec<Vec3>)> = names.into_iter().zip(own).collect();
+            Answer::Ok(member.model.write_glb_poses(&member.model.positions, &named)?)
         })?)
     }
 
@@ -118,31 +132,28 @@ impl Engine {
         })?)
     }
 
-    /// Weights as NPZ, which SciPy loads.
+    /// A model's weights as NPZ, which SciPy loads.
     ///
     /// # Errors
-    /// When the model is not bound.
+    /// When the models are not bound.
     #[wasm_bindgen(js_name = exportWeights)]
-    pub fn export_weights(&self) -> Result<Vec<u8>, JsValue> {
+    pub fn export_weights(&self, id: u32) -> Result<Vec<u8>, JsValue> {
         Ok(self.with_session(|session| {
-            let weights =
-                session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
             self.read(|state| {
-                let up = state.up();
-                let inner = up.turned_back(state.made.inner_positions());
-                let Some((rows, of_rig)) = &state.rig else {
-                    return Ok(write_weights_npz(weights, session.outside(), &[], &inner));
+                let Some(Own { mut weights, mut outside, rig }) = state.own_rows(id, session)? else {
+                    return Err(Fault::missing("weights", "bind the model first"));
                 };
-                let (mut all, mut outside) = (weights.clone(), session.outside().to_vec());
-                all.append(rows);
+                let inner = state.up().turned_back(state.made.inner_positions());
                 let n = weights.n_rows() as u32;
-                outside.extend(of_rig.iter().map(|&o| OutsideVertex { vertex: o.vertex + n, ..o }));
-                Ok(write_weights_npz(&all, &outside, &state.the_model()?.extra_points()?, &inner))
+                weights.append(&rig.0);
+                outside.extend(rig.1.iter().map(|&o| OutsideVertex { vertex: o.vertex + n, ..o }));
+                let points = state.models.get(id)?.model.extra_points()?;
+                Ok(write_weights_npz(&weights, &outside, &points, &inner))
             })
         })?)
     }
 
-    /// Model, cage, poses and the page's settings as one file.
+    /// Models, cage, poses and the page's settings as one file.
     ///
     /// # Errors
     /// When there is no model or the file would be too large.
@@ -154,11 +165,13 @@ impl Engine {
         settings: &str,
     ) -> Result<Vec<u8>, JsValue> {
         let poses: Vec<(String, Vec<Vec3>)> = names.into_iter().zip(pose_list(poses)).collect();
-        Ok(self
-            .read(|state| Answer::Ok(write_project(state.the_model()?, state.rest(), &poses, settings)?))?)
+        Ok(self.read(|state| {
+            let models: Vec<&Model> = state.models.iter().map(|member| &*member.model).collect();
+            Answer::Ok(write_project(&models, state.rest(), &poses, settings)?)
+        })?)
     }
 
-    /// What points up in the model's file.
+    /// What points up in the models' files.
     ///
     /// # Errors
     /// Never.
@@ -167,69 +180,81 @@ impl Engine {
         Ok(self.read(|state| object(&state.up()))?)
     }
 
-    /// The model's vertices at rest. `[n_vertices, 3]`
+    /// The models' vertices at rest, one model after the other. `[n_vertices, 3]`
     #[wasm_bindgen(js_name = modelPositions)]
     #[must_use]
     pub fn model_positions(&self) -> Vec<f32> {
-        self.read(|state| state.model.as_ref().map(|m| flat(&m.positions)).unwrap_or_default())
+        self.read(|state| flat(&state.models.positions))
     }
 
-    /// All that is bound: the model's vertices, then the points of its rig. `[n_points, 3]`
+    /// All that is bound: the models' vertices, then the points of their rigs. `[n_points, 3]`
     ///
     /// # Errors
     /// When the rig cannot be read.
     #[wasm_bindgen(js_name = boundPoints)]
     pub fn bound_points(&self) -> Result<Vec<f32>, JsValue> {
         Ok(self.read(|state| {
-            let Some(model) = &state.model else { return Ok(Vec::new()) };
-            let mut points = flat(&model.positions);
-            points.extend(flat(&model.extra_points()?));
+            let mut points = flat(&state.models.positions);
+            points.extend(flat(&state.models.extra_points()?));
             Answer::Ok(points)
         })?)
     }
 
-    /// What a cage should enclose: positions and triangles of the model at rest, of its morph targets, and of a clip if one is
+    /// What a cage should enclose: positions and triangles of the models at rest, of their morph targets, and of a clip if one is
     /// named. `[n, 3]` each
     ///
     /// # Errors
     /// When there is no such clip.
     #[wasm_bindgen(js_name = modelStates, unchecked_return_type = "[Float32Array, Uint32Array]")]
     pub fn model_states(&self, clip: Option<String>) -> Result<JsValue, JsValue> {
-        let (positions, triangles) = self.read(|state| {
-            let states = state.the_model()?.states(clip.as_deref());
-            states.map_err(|e| Fault::new(ErrorName::Error, e))
+        let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+        self.read(|state| {
+            let is_alone = state.models.iter().nth(1).is_none();
+            for member in state.models.iter() {
+                // One that lacks the clip stays where it is, as it does when the others play.
+                let has = |name: &&str| {
+                    is_alone || member.model.clips().iter().any(|c| c.name.as_deref() == Some(name))
+                };
+                let states = member.model.states(clip.as_deref().filter(has));
+                let (own, corners) = states.map_err(|e| Fault::new(ErrorName::Error, e))?;
+                let first = positions.len() as u32;
+                triangles.extend(corners.into_iter().map(|t| t.map(|v| first + v)));
+                positions.extend(own);
+            }
+            Answer::Ok(())
         })?;
         let positions = Float32Array::from(flat(&positions).as_slice());
         let triangles = Uint32Array::from(triangles.as_flattened());
         Ok(Array::of2(&positions, &triangles).into())
     }
 
-    /// The model's triangles. `[n_triangles, 3]`
+    /// The models' triangles. `[n_triangles, 3]`
     #[wasm_bindgen(js_name = modelTriangles)]
     #[must_use]
     pub fn model_triangles(&self) -> Vec<u32> {
-        self.read(|state| {
-            state.model.as_ref().map(|m| m.triangles.as_flattened().to_vec()).unwrap_or_default()
-        })
+        self.read(|state| state.models.triangles.as_flattened().to_vec())
     }
 }
 
 impl Engine {
-    /// The model as posed, and what became of its rig.
-    pub(super) fn posed_glb(&self, asked: &RigAsked) -> Answer<(Vec<u8>, Vec<String>)> {
+    /// A model as posed, and what became of its rig.
+    pub(super) fn posed_glb(&self, id: u32, asked: &RigAsked) -> Answer<(Vec<u8>, Vec<String>)> {
         let pose = self.read(|state| state.positions.clone());
-        if let Some((bytes, report)) = self.reshaped(&pose, &[], asked)? {
+        if let Some((bytes, report)) = self.reshaped(id, &pose, &[], asked)? {
             return Ok((bytes, report.notices()));
         }
         let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
-        Ok((self.read(|state| Answer::Ok(state.the_model()?.write_glb(&posed)?))?, Vec::new()))
+        self.read(|state| {
+            let member = state.models.get(id)?;
+            Ok((member.model.write_glb(member.share(&posed))?, Vec::new()))
+        })
     }
 
-    /// Frames of a clip, each bent by the cage.
-    fn baked(&self, clip: usize) -> Answer<(Vec<u8>, Vec<String>)> {
+    /// Frames of a model's clip, each bent by the cage.
+    fn baked(&self, id: u32, clip: usize) -> Answer<(Vec<u8>, Vec<String>)> {
         let field = self.field()?;
         self.read(|state| {
-            let model = state.the_model()?;
+            let model = &state.models.get(id)?.model;
             let (mut frames, mut rest) = (model.frames(clip)?, model.positions.clone());
             frames.iter_mut().chain([&mut rest]).for_each(|frame| bend_vertices(&field, frame));
             let told = format!("{} frames became morph targets; the skeleton is left out", frames.len());
@@ -239,67 +264,93 @@ impl Engine {
 
     /// A rigged model in a pose of the cage, or at rest with poses as morph targets; none if it has no rig, or is to be written
     /// without it.
-    pub(super) fn reshaped(
+    fn reshaped(
         &self,
+        id: u32,
         pose: &[Vec3],
         poses: &[(String, Vec<Vec3>)],
         asked: &RigAsked,
     ) -> Answer<Option<(Vec<u8>, ReshapeReport)>> {
-        if asked.plain || !self.read(|state| state.model.as_ref().is_some_and(Model::is_rigged)) {
+        let is_rigged = |state: &State| Answer::Ok(state.models.get(id)?.model.is_rigged());
+        if asked.plain || !self.read(is_rigged)? {
             return Ok(None);
         }
         self.with_session(|session| {
             self.read(|state| {
-                let (model, rest) = (state.the_model()?, &state.rest().positions);
-                let by = |pose: &[Vec3]| match (session.weights(), &state.rig) {
-                    (Some(weights), Some((rows, of_rig))) if pose.len() == rest.len() => {
-                        let mut by = displacements(weights, session.outside(), rest, pose);
-                        by.extend(displacements(rows, of_rig, rest, pose));
+                let (member, rest) = (state.models.get(id)?, &state.rest().positions);
+                let (model, own) = (&member.model, state.own_rows(id, session)?);
+                let by = |pose: &[Vec3]| match &own {
+                    Some(Own { weights, outside, rig }) if pose.len() == rest.len() => {
+                        let mut by = displacements(weights, outside, rest, pose);
+                        by.extend(displacements(&rig.0, &rig.1, rest, pose));
                         Ok(by)
                     }
-                    (Some(_), _) => Err(Fault::new(ErrorName::Error, "a pose belongs to another cage")),
-                    (None, _) => Ok(vec![DVec3::ZERO; model.positions.len() + model.extra_points()?.len()]),
+                    Some(_) => Err(Fault::new(ErrorName::Error, "a pose belongs to another cage")),
+                    None => Ok(vec![DVec3::ZERO; model.positions.len() + model.extra_points()?.len()]),
                 };
                 let n = model.positions.len() as u32;
-                let of_rig = state.rig.iter().flat_map(|(_, of_rig)| of_rig).map(|o| o.vertex + n);
-                let outside: Vec<u32> = session.outside().iter().map(|o| o.vertex).chain(of_rig).collect();
+                let outside = own.as_ref().map_or_else(Vec::new, |own| {
+                    let of_rig = own.rig.1.iter().map(|o| o.vertex + n);
+                    own.outside.iter().map(|o| o.vertex).chain(of_rig).collect()
+                });
                 let by_poses = poses
                     .iter()
                     .map(|(name, pose)| Ok((name.clone(), by(pose)?)))
                     .collect::<Answer<Vec<_>>>()?;
-                let options = asked.options();
+                let mut options = asked.options();
+                // Names may be those of another model.
+                let props = model.props()?;
+                options.rigid.retain(|name| props.contains(name));
+                options.parts = member.parts()?;
                 Ok(Some(model.write_reshaped(&by(pose)?, &outside, &by_poses, &options)?))
             })
         })
     }
 
-    /// The model in poses of the cage; at rest while it is not bound.
+    /// All vertices in poses of the cage; at rest while they are not bound.
     pub(super) fn deformed(&self, poses: &[Vec<Vec3>]) -> Answer<Vec<Vec<Vec3>>> {
-        let rest = self.read(|state| Answer::Ok(state.the_model()?.positions.clone()))?;
+        let rest = self.read(|state| state.models.positions.clone());
         self.with_session(|session| {
             let Some(weights) = session.weights() else { return Ok(vec![rest; poses.len()]) };
-            poses
-                .iter()
-                .map(|pose| {
-                    if pose.len() == weights.n_columns() {
-                        Ok(deform_bound(weights, session.outside(), pose))
-                    } else {
-                        Err(Fault::new(ErrorName::Error, "a pose belongs to another cage"))
-                    }
-                })
-                .collect()
+            let deformed = |pose: &Vec<Vec3>| {
+                let fits = pose.len() == weights.n_columns();
+                let other = || Fault::new(ErrorName::Error, "a pose belongs to another cage");
+                session.deformed(pose).filter(|_| fits).ok_or_else(other)
+            };
+            poses.iter().map(deformed).collect()
         })
     }
 }
 
+/// What is bound of one model: rows of its vertices and of its rig's points, numbered as its own.
+struct Own {
+    weights: Weights,
+    outside: Vec<OutsideVertex>,
+    rig: (Weights, Vec<OutsideVertex>),
+}
+
 impl State {
-    pub(crate) fn the_model(&self) -> Answer<&Model> {
-        self.model.as_ref().ok_or_else(|| Fault::missing("model", "open one first"))
+    /// Rows of one model; none before there are weights.
+    fn own_rows(&self, id: u32, session: &Session) -> Answer<Option<Own>> {
+        let Some(all) = session.weights() else { return Ok(None) };
+        let (weights, outside) = rows_of(all, session.outside(), self.models.get(id)?.vertices.clone());
+        let rig = match &self.rig {
+            Some((rows, outside)) => rows_of(rows, outside, self.models.extra_of(id)?),
+            None => (Weights::with_room(all.n_columns() as u32, 0, 0), Vec::new()),
+        };
+        Ok(Some(Own { weights, outside, rig }))
     }
 
-    /// Model and cage, which a bind needs.
-    pub(crate) fn parts(&self) -> Answer<(&Model, &ControlSet)> {
-        let set = self.set().ok_or_else(|| Fault::missing("cage", "make or open one first"))?;
-        Ok((self.the_model()?, set))
+    /// The cage, which a bind needs.
+    pub(crate) fn the_set(&self) -> Answer<&ControlSet> {
+        self.set().ok_or_else(|| Fault::missing("cage", "make or open one first"))
     }
+}
+
+/// Some of the rows, and vertices outside among them, counted from the first.
+fn rows_of(all: &Weights, outside: &[OutsideVertex], range: Range<usize>) -> (Weights, Vec<OutsideVertex>) {
+    let first = range.start as u32;
+    let own = outside.iter().filter(|o| range.contains(&(o.vertex as usize)));
+    let outside = own.map(|&o| OutsideVertex { vertex: o.vertex - first, ..o }).collect();
+    (all.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>()), outside)
 }

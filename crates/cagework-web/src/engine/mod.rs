@@ -8,6 +8,7 @@ mod camera;
 mod controls;
 mod export;
 mod gesture;
+mod models;
 mod picture;
 mod play;
 mod pull;
@@ -24,7 +25,6 @@ use cagework_core::Weights;
 use cagework_core::deform::OutsideVertex;
 use cagework_gpu::Session;
 use cagework_gpu::render::check_layers;
-use cagework_io::Model;
 use js_sys::{Float32Array, Function, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -37,12 +37,12 @@ use crate::gpu::{Gpu, SharedGpu};
 use crate::incoming::{self, page_turn};
 use crate::joints::JointDots;
 use crate::loaded::Loaded;
+use crate::models::Models;
 use crate::options::{Coordinates, taken};
 use crate::state::State;
 use crate::surface::Surface;
-use crate::views::{ModelInfo, object};
 
-/// Model, cage, camera and picture of one page.
+/// Models, cage, camera and picture of one page.
 #[wasm_bindgen]
 pub struct Engine {
     state: Rc<RefCell<State>>,
@@ -71,19 +71,21 @@ impl Engine {
     pub async fn open(&self, mut loaded: Loaded) -> Result<JsValue, JsValue> {
         let (camera, size) = self.read(|state| state.view_of(&loaded.model));
         let draw = loaded.draw_model();
+        let settings = loaded.member_settings();
         page_turn().await;
+        let models = Models::one(loaded.model, draw, settings.as_ref());
         {
             let mut gpu = self.gpu.lock().await;
             let gpu = gpu.as_mut().ok_or_else(lost)?;
-            let Model { positions, triangles, .. } = &loaded.model;
+            let Models { positions, triangles, .. } = &models;
             check_layers(gpu.main.context(), &camera, positions, triangles, size).map_err(Fault::from)?;
-            gpu.main.set_model(draw).await.map_err(Fault::from)?;
+            gpu.main.set_shared_model(models.draw()).await.map_err(Fault::from)?;
+            gpu.main.set_parts(models.parts()).await.map_err(Fault::from)?;
             gpu.others.clear();
         }
         page_turn().await;
-        let info = ModelInfo::of(&loaded.model);
-        self.change(|state| state.set_model(loaded.model));
-        Ok(object(&info)?)
+        self.change(|state| state.set_models(models));
+        Ok(self.info()?)
     }
 
     /// Takes what the worker has bound: rows, columns and weights; for each vertex outside the cage the vertex and the
@@ -100,7 +102,7 @@ impl Engine {
         offsets: Vec<f32>,
     ) -> Result<(), JsValue> {
         let (revision, n_columns) = self.read(|state| (state.revision, state.rest().positions.len() as u32));
-        let n_vertices = self.read(|state| state.model.as_ref().map_or(0, |m| m.positions.len()));
+        let n_vertices = self.read(|state| state.models.positions.len());
         let all = incoming::weights(n_columns, &indptr, &indices, &data).await?;
         let (weights, outside, rig) = split(all, incoming::outside(&outside, &offsets), n_vertices);
         let is_current = || self.read(|state| state.require(revision));
@@ -113,9 +115,9 @@ impl Engine {
         is_current()?;
         self.change(|state| {
             state.is_bound = true;
-            state.joints = rig.as_ref().zip(state.model.as_ref()).and_then(|((weights, outside), model)| {
+            state.joints = rig.as_ref().and_then(|(weights, outside)| {
                 // What is wrong with a rig is said when it is exported.
-                JointDots::new(model, weights, outside).ok()
+                JointDots::new(&state.models, weights, outside).ok()
             });
             state.rig = rig;
             state.playing = None;

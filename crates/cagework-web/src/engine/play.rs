@@ -2,7 +2,7 @@
 
 use cagework_core::dynamic::{DisplacementField, Lattice};
 use cagework_core::{Controls, Weights};
-use cagework_io::WriteError;
+use cagework_io::ModelFormat;
 use js_sys::Float32Array;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -11,11 +11,11 @@ use super::{Engine, lost};
 use crate::error::{Answer, ErrorName, Fault};
 use crate::incoming;
 use crate::options::{RigAsked, taken};
-use crate::state::Playing;
+use crate::playing::{Part, Playing, SharedClip};
 
 #[wasm_bindgen]
 impl Engine {
-    /// Gets the model ready to be played in the pose of the moment; `showClip` shows it.
+    /// Gets the models ready to be played in the pose of the moment; `showClip` shows it.
     ///
     /// # Errors
     /// When it is not bound or cannot be exported, or the GPU has no room for its skin.
@@ -26,21 +26,17 @@ impl Engine {
     ) -> Result<(), JsValue> {
         let revision = self.revision();
         let asked: RigAsked = taken(options)?;
-        let (player, field) = if asked.dynamic {
-            let player = self.read(|state| Answer::Ok(state.the_model()?.player()?))?;
-            (player.ok_or_else(|| Fault::from(WriteError::NoRig))?, Some(self.field()?))
-        } else {
-            let bytes = self.posed_glb(&asked)?.0;
-            (self.read(|state| Answer::Ok(state.the_model()?.player_of(&bytes)?))?, None)
-        };
-        let up = self.read(|state| Answer::Ok(state.the_model()?.up().turn()))?;
+        let field = if asked.dynamic { Some(self.field()?) } else { None };
+        let ids: Vec<u32> = self.read(|state| state.models.iter().map(|member| member.id).collect());
+        let parts = ids.into_iter().map(|id| Ok((id, self.part(id, &asked)?))).collect::<Answer<Vec<_>>>()?;
+        let (clips, up) = self.read(|state| (SharedClip::all(&state.models), state.up().turn()));
+        let playing = Playing::new(parts, clips, up, field.clone());
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
-        gpu.main.start_playing(&player.skin, field.clone()).await.map_err(Fault::from)?;
+        gpu.main.start_playing(&playing.skin, field).await.map_err(Fault::from)?;
         self.read(|state| state.require(revision))?;
-        let posed = player.at(None, 0.0, &[]);
         self.change(|state| {
-            state.playing = Some(Playing { player, up, posed, field, is_new: true });
+            state.playing = Some(playing);
             state.is_changed = true;
         });
         Ok(())
@@ -56,9 +52,7 @@ impl Engine {
         }
         self.change(|state| {
             if let Some(playing) = &mut state.playing {
-                let clip = clip.map(|clip| clip as usize);
-                playing.posed = playing.player.at(clip, seconds, &targets.to_vec());
-                playing.is_new = true;
+                playing.show(clip.map(|clip| clip as usize), seconds, &targets.to_vec());
                 // Joints are part of the scene.
                 state.is_changed |= state.view.joints.is_some();
             }
@@ -102,7 +96,7 @@ impl Engine {
         offsets: &[f32],
     ) -> Result<(), JsValue> {
         let lattice = self.read(|state| {
-            let controls = Controls::from(state.parts()?.1);
+            let controls = Controls::from(state.the_set()?);
             let lattice = Lattice::new(controls.surface());
             let weights = Weights::new(controls.n_controls() as u32, indptr, indices, data)?;
             let outside = incoming::outside(outside, offsets);
@@ -128,6 +122,28 @@ impl Engine {
 }
 
 impl Engine {
+    /// What plays a model: its export, or the file itself where the cage bends what moves.
+    fn part(&self, id: u32, asked: &RigAsked) -> Answer<Part> {
+        let is_gltf =
+            self.read(|state| Answer::Ok(state.models.get(id)?.model.format() == ModelFormat::Gltf))?;
+        if is_gltf && !asked.dynamic {
+            let bytes = self.posed_glb(id, asked)?.0;
+            let player = self.read(|state| Answer::Ok(state.models.get(id)?.model.player_of(&bytes)?))?;
+            return Ok(Part::Player(Box::new(player)));
+        }
+        if let Some(player) = self.read(|state| Answer::Ok(state.models.get(id)?.model.player()?))? {
+            return Ok(Part::Player(Box::new(player)));
+        }
+        // Other formats move only with the cage.
+        let pose =
+            self.read(|state| if asked.dynamic { &state.rest().positions } else { &state.positions }.clone());
+        let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
+        self.read(|state| {
+            let own = state.models.get(id)?.share(&posed);
+            Ok(Part::Still(state.up().turned_back(own).into_owned()))
+        })
+    }
+
     /// How far the cage as posed moves each place.
     ///
     /// # Errors

@@ -118,12 +118,11 @@ impl Engine {
 
 impl Engine {
     /// Reads the state with the model where the cage is.
-    fn posed<T>(&self, read: impl FnOnce(&State, &Session) -> Answer<T>) -> Answer<T> {
+    pub(super) fn posed<T>(&self, read: impl FnOnce(&State, &Session) -> Answer<T>) -> Answer<T> {
         self.with_session(|session| {
-            let weights =
-                session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
+            session.weights().ok_or_else(|| Fault::missing("weights", "bind the model first"))?;
             let mut state = self.state.borrow_mut();
-            state.pose_model(weights, session.outside());
+            state.pose_models(session);
             read(&state, session)
         })
     }

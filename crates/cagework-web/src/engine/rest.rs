@@ -46,15 +46,16 @@ impl Engine {
         // What nobody sees does not change: no frame is asked for.
         let mut state = self.state.borrow_mut();
         let state = &mut *state;
-        let (Some(model), Ok(set)) = (&state.model, &state.made.set) else { return 0 };
+        let Ok(set) = &state.made.set else { return 0 };
+        let vertices = &state.models.positions;
         let (plain, watched) = state.watched.get_or_insert_with(|| {
             // Without balls and tubes, which are holes in the surface. It could be made before.
             let plain = ControlSet::new(set.cage(), set.smooth(), InnerControls::default())
                 .unwrap_or_else(|_| ControlSet::plain(set.cage()));
             let surface = Controls::from(&plain).surface();
-            let pairs = model.positions.len() * surface.triangles().len();
+            let pairs = vertices.len() * surface.triangles().len();
             let some: Vec<_> =
-                model.positions.iter().copied().step_by(pairs.div_ceil(WATCHED_PAIRS).max(1)).collect();
+                vertices.iter().copied().step_by(pairs.div_ceil(WATCHED_PAIRS).max(1)).collect();
             let watched = Enclosure::new(surface, &some);
             (plain, watched)
         });

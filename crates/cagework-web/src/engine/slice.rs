@@ -30,7 +30,7 @@ impl Engine {
     ) -> Result<(), JsValue> {
         let asked: BindAsked = taken(options)?;
         let slice = self.read(|state| {
-            let (_, set) = state.parts()?;
+            let set = state.the_set()?;
             let mut slice = Slice::new(set, &BindOptions::from(asked), axis.min(2), fraction);
             if !data.is_empty() {
                 slice.set_weights(Weights::new(

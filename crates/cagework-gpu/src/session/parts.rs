@@ -1,0 +1,66 @@
+//! What of the model the cage does not bend.
+
+use std::sync::Arc;
+
+use cagework_core::Controls;
+use cagework_core::deform::deform_bound;
+use cagework_core::parts::{BoundParts, Parts, hold_parts};
+use glam::Vec3;
+
+use super::Session;
+use crate::error::GpuError;
+
+impl Session {
+    /// Lets parts of the model stay as they are or keep their shape, whatever the cage does; weights come and go meanwhile.
+    ///
+    /// # Errors
+    /// [`GpuError::NotReady`] without a model, [`GpuError::Model`] if a vertex does not exist; otherwise as
+    /// [`crate::buffers::Allocator::zeros`].
+    pub async fn set_parts(&mut self, parts: Parts) -> Result<(), GpuError> {
+        let Some(model) = &self.model else { return Err(GpuError::NotReady { missing: "model" }) };
+        let n = model.positions.len();
+        let is_there = |v: &u32| (*v as usize) < n;
+        let is_whole = parts.stays.is_empty() || parts.stays.len() == n;
+        if !is_whole || !parts.rigid.iter().flatten().all(is_there) {
+            let reason = "a part names a vertex that does not exist".to_owned();
+            return Err(GpuError::Model { reason });
+        }
+        self.parts = parts;
+        self.hold().await
+    }
+
+    /// Gets the parts ready for the weights of the moment.
+    pub(super) async fn hold(&mut self) -> Result<(), GpuError> {
+        let (Some(bound), Some(model), Some(set)) = (&self.bound, &self.model, &self.controls) else {
+            return Ok(());
+        };
+        let is_nothing = self.parts.rigid.is_empty() && self.parts.stays.iter().all(|&s| s == 0.0);
+        let columns = self.columns(bound.is_green, &self.pose).into_owned();
+        let ready = (!is_nothing).then(|| {
+            let at_rest = self.columns(bound.is_green, Controls::from(set).rest());
+            Arc::new(BoundParts::new(&self.parts, &model.positions, &bound.weights, &bound.outside, &at_rest))
+        });
+        if let Some(bound) = &mut self.bound {
+            bound.mover.hold(&self.context, model, ready.clone()).await?;
+            bound.mover.pose(&self.context, &columns);
+            bound.parts = ready;
+        }
+        self.moved = true;
+        Ok(())
+    }
+
+    /// Where vertices are with the controls at `pose`, by the processor, `[n_vertices]`, object units; none before there are weights.
+    ///
+    /// # Panics
+    /// If there is not one position per control.
+    #[must_use]
+    pub fn deformed(&self, pose: &[Vec3]) -> Option<Vec<Vec3>> {
+        let bound = self.bound.as_ref()?;
+        let columns = self.columns(bound.is_green, pose);
+        let mut positions = deform_bound(&bound.weights, &bound.outside, &columns);
+        if let Some(parts) = &bound.parts {
+            hold_parts(&parts.rest, &parts.piece_of, &parts.motions(&columns), &mut positions);
+        }
+        Some(positions)
+    }
+}

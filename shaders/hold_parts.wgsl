@@ -1,0 +1,28 @@
+// Parts of a model that the cage does not bend: what stays goes back to its place, rigid pieces move by the nearest rotation. One
+// invocation per vertex, in place, after deform_vertices and offset_outside. Twin: cagework_core::parts::hold_parts.
+
+@group(0) @binding(0) var<uniform> work: Work;
+/// Where each vertex rests, and how much of it stays there.
+@group(0) @binding(1) var<storage, read> rest: array<vec4f>;
+/// The piece of each vertex, from 1; 0 for none.
+@group(0) @binding(2) var<storage, read> piece_of: array<u32>;
+/// Three rows for each piece: a vertex at x moves by rows * (x, 1).
+@group(0) @binding(3) var<storage, read> motions: array<vec4f>;
+@group(0) @binding(4) var<storage, read_write> positions: array<vec4f>;
+
+@compute @workgroup_size(64)
+fn hold_parts(@builtin(global_invocation_id) id: vec3u) {
+    let v = invocation(id, work.stride);
+    if v >= work.count { return; }
+    let piece = piece_of[v];
+    let stays = rest[v].w;
+    if piece == 0u && stays == 0.0 { return; }
+    let at = rest[v].xyz;
+    var by = positions[v].xyz - at;
+    if piece > 0u {
+        let x = vec4f(at, 1.0);
+        let row = 3u * (piece - 1u);
+        by = vec3f(dot(motions[row], x), dot(motions[row + 1u], x), dot(motions[row + 2u], x));
+    }
+    positions[v] = vec4f(at + (1.0 - stays) * by, 1.0);
+}
