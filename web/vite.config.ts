@@ -25,6 +25,8 @@ const licencesOfWorkers = (): Plugin => ({
 /** Relative addresses: the built page works below any path of any server. */
 export default defineConfig({
   root: import.meta.dirname,
+  // The page is a user of its own package, from its sources.
+  resolve: { alias: { "@cagework/core": `${import.meta.dirname}/package/src` } },
   base: "./",
   plugins: [findLicences],
   build: {

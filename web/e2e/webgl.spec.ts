@@ -52,7 +52,13 @@ test("opens bound, follows a handle, shows colours, exports, and survives a lost
     const pictures = await page.evaluate(async () => {
       const session = globalThis.cagework;
       if (!session) throw new Error("no session");
-      await session.engine.startClip({ joints: "follow", keep_travel: false, plain: false, dynamic: false });
+      await session.engine.startClip({
+        joints: "follow",
+        keep_travel: false,
+        rigid: [],
+        plain: false,
+        dynamic: false,
+      });
       const all: string[] = [];
       for (const seconds of [0.5, 1.5, 0.5]) {
         session.engine.showClip(0, seconds, new Float32Array());

@@ -1,6 +1,9 @@
 /** What dropped files are, by their names: a model, a cage, a project, or what the page cannot open. */
 
+import { extension, isModel } from "@cagework/core/names";
 import { T } from "./words";
+
+export { extension, isModel };
 
 export type DropKind = "model" | "controls" | "project" | "textures" | "nothing" | "unknown";
 
@@ -16,23 +19,10 @@ export interface DropPlan {
   sentence: string;
 }
 
-const MODELS = ["glb", "vrm", "gltf", "obj", "ply", "stl"] as const;
 const COMPANIONS = ["bin", "png", "jpg", "jpeg", "webp", "avif", "ktx2", "mtl"] as const;
 const CAGE_NAME = /(^|[^a-z])cage([^a-z]|$)/i;
 const CONTROLS_NAME = /(^|[^a-z])controls?([^a-z].*)?\.obj$/i;
 const PROJECT_NAME = /\.cagework\.glb$/i;
-
-/** Lower-case extension without the dot, or "". */
-export function extension(name: string): string {
-  const base = name.split("/").at(-1) ?? name;
-  const dot = base.lastIndexOf(".");
-  return dot < 0 ? "" : base.slice(dot + 1).toLowerCase();
-}
-
-/** Whether a name's ending is that of a model. */
-export function isModel(name: string): boolean {
-  return (MODELS as readonly string[]).includes(extension(name));
-}
 
 /** Says what opening these files means. Files named "...cage..." are cages when another model is among them. */
 export function planDrop(names: readonly string[]): DropPlan {

@@ -1,5 +1,6 @@
 /** The page: its state, what it shows, and the session that it opens. */
 
+import { lackOf } from "@cagework/core/session/adapter";
 import { createApp } from "./app";
 import type { Session } from "./contract";
 import { watchCrashes } from "./crash";
@@ -7,7 +8,6 @@ import { attachDrop } from "./input/drop";
 import { attachKeyboard } from "./input/keyboard";
 import { attachPointer } from "./input/pointer";
 import { openSession } from "./session";
-import { lackOf } from "./session/adapter";
 import { isFresh, startUp } from "./start";
 import { createStore, INITIAL } from "./state";
 import { forgetCrash } from "./store";

@@ -1,28 +1,16 @@
 /** The one way from the page to Rust: the engine on this thread, the binder in a worker, files, frames. */
 
-import type {
-  BindOptions,
-  Check,
-  CheckedCage,
-  Job,
-  Lack,
-  ModelInfo,
-  Opened,
-  ReadFile,
-  Session,
-} from "./contract";
+import { startBind } from "@cagework/core/session/bind";
+import { type Client, createClient } from "@cagework/core/session/client";
+import { createFrames } from "@cagework/core/session/frames";
+import { chain } from "@cagework/core/session/jobs";
+import type { ReadModel } from "@cagework/core/session/messages";
+import { type Canvases, type OpenedOn, openOn } from "@cagework/core/session/open";
+import { createApart, load } from "@cagework/core/session/reader";
+import { polygons } from "@cagework/core/session/reading";
+import type { BindOptions, Check, CheckedCage, Job, ModelInfo, Opened, ReadFile, Session } from "./contract";
 import { BIND_DEFAULTS } from "./defaults";
-import { findAdapter, hasWebGl2, lackOf } from "./session/adapter";
-import { type Artifact, compile } from "./session/artifact";
-import { startBind } from "./session/bind";
-import { type Client, createClient } from "./session/client";
-import { createFrames } from "./session/frames";
-import { chain } from "./session/jobs";
-import type { ReadModel } from "./session/messages";
 import { once, prepareSample, samples } from "./session/opening";
-import { createApart, load } from "./session/reader";
-import { polygons } from "./session/reading";
-import { WEBGPU } from "./session/webgpu";
 
 declare global {
   /** For the browser's console, and for tests. */
@@ -35,58 +23,12 @@ const LONGEST_EMPTY = 3000;
 /** What a file of the page's own has: nothing that anybody would have to look for. */
 const OWN = { siblings: new Map(), up: undefined, textures: [], cage: undefined, notices: [], took: 0 };
 
-/** Where the picture goes; a canvas that one interface has used is lost to the other. */
-export interface Canvases {
-  canvas(): HTMLCanvasElement;
-  freshCanvas(): HTMLCanvasElement;
+/** Opens the page: see `openOn`. `fresh`: whether the first sample is what will be opened first. */
+export function openSession(canvases: Canvases, fresh: Promise<boolean>): Promise<Session> {
+  return openOn(canvases, (opened) => start({ ...opened, fresh }));
 }
 
-/**
- * Opens the page on WebGPU; where that is missing on WebGL2, with the processor to compute. Fails with the name NoWebGPU,
- * NoAdapter or NoDevice where there is neither. `fresh`: whether the first sample is what will be opened first.
- */
-export async function openSession(canvases: Canvases, fresh: Promise<boolean>): Promise<Session> {
-  try {
-    const adapter = findAdapter();
-    // Downloaded meanwhile, but not where it is of no use.
-    const module = navigator.gpu ? compile(WEBGPU.wasm) : adapter.then(() => compile(WEBGPU.wasm));
-    const [found, compiled] = await Promise.all([adapter, module]);
-    return await start({
-      artifact: WEBGPU,
-      module: compiled,
-      canvas: canvases.canvas(),
-      adapter: found,
-      lack: null,
-      fresh,
-    });
-  } catch (error) {
-    const lack = lackOf(error);
-    if (!lack || !hasWebGl2()) throw error;
-    const { WEBGL } = await import("./session/webgl");
-    try {
-      const module = await compile(WEBGL.wasm);
-      return await start({
-        artifact: WEBGL,
-        module,
-        canvas: canvases.freshCanvas(),
-        adapter: "WebGL2",
-        lack,
-        fresh,
-      });
-    } catch (other) {
-      // A WebGL2 that does not do what it promised is none: what helps is WebGPU.
-      const isNone = lackOf(other) || (other instanceof Error && other.name === "Canvas");
-      throw isNone ? error : other;
-    }
-  }
-}
-
-interface Start {
-  readonly artifact: Artifact;
-  readonly module: WebAssembly.Module;
-  readonly canvas: HTMLCanvasElement;
-  readonly adapter: string;
-  readonly lack: Lack | null;
+interface Start extends OpenedOn {
   /** Whether the first sample is what will be opened first. */
   readonly fresh: Promise<boolean>;
 }

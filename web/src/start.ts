@@ -1,5 +1,6 @@
 /** The first moments of a visit, and what goes on by itself: size, title, autosave, and what to open. */
 
+import { isSoftware } from "@cagework/core/session/adapter";
 import { effect, untracked } from "@preact/signals";
 import { report } from "./actions/context";
 import { stopOf } from "./actions/tour";
@@ -131,9 +132,4 @@ async function openShared(app: App): Promise<Link> {
 
 function sayDamage(app: App, damage: unknown): void {
   if (damage !== undefined) report(app.ctx, T.failed.link, damage);
-}
-
-/** Whether a GPU is made of processor cores: then the processor itself binds faster, and drawing does not wait for it. */
-export function isSoftware(adapter: string): boolean {
-  return /swiftshader|llvmpipe|lavapipe|software|basic render/i.test(adapter);
 }

@@ -1,6 +1,6 @@
+import { createClient, named } from "@cagework/core/session/client";
 import { afterEach, expect, it, vi } from "vitest";
 import { isFatal, sayDuring, watchCrashes } from "../src/crash";
-import { createClient, named } from "../src/session/client";
 import { createStore, INITIAL } from "../src/state";
 
 /** A browser's window and its tab's storage, as far as crashes need them. */

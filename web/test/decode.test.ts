@@ -1,7 +1,7 @@
+import { decompress } from "@cagework/core/decode";
 import { NodeIO } from "@gltf-transform/core";
 import { describe, expect, it } from "vitest";
 import { meshoptGlb } from "../e2e/models";
-import { decompress } from "../src/decode";
 
 const GLB_HEADER = 12;
 const CHUNK_HEADER = 8;

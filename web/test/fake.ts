@@ -1,5 +1,6 @@
 /** A session without wasm, worker and GPU: jobs end when a test says so, a cage is two arrays. */
 
+import { named } from "@cagework/core/session/client";
 import type { Context, Fix } from "../src/actions/context";
 import type {
   BindReport,
@@ -15,7 +16,6 @@ import type {
 } from "../src/contract";
 import { createHistory } from "../src/history";
 import { createQueue } from "../src/queue";
-import { named } from "../src/session/client";
 import { createStore, INITIAL, type Store } from "../src/state";
 import type { Explained } from "../src/strings";
 

@@ -1,5 +1,5 @@
+import { createFrames } from "@cagework/core/session/frames";
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { createFrames } from "../src/session/frames";
 
 /** Between two frames, ms. */
 const FRAME = 16;

@@ -1,3 +1,5 @@
+import { isSoftware } from "@cagework/core/session/adapter";
+import { pinch } from "@cagework/core/session/touch";
 import { describe, expect, it } from "vitest";
 import { grown } from "../src/actions/bind";
 import { freshName } from "../src/actions/poses";
@@ -6,8 +8,6 @@ import { nextAmount } from "../src/amount";
 import type { BindReport, CageState } from "../src/contract";
 import { BIND_DEFAULTS } from "../src/defaults";
 import { rectangle } from "../src/input/pointer";
-import { pinch } from "../src/input/touch";
-import { isSoftware } from "../src/start";
 import { drawn, INITIAL, type StepName } from "../src/state";
 import { explain, isCancelled, sentence } from "../src/strings";
 import { curvesOf } from "../src/ui/curves";

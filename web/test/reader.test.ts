@@ -1,7 +1,7 @@
+import { type Client, named } from "@cagework/core/session/client";
+import { createApart } from "@cagework/core/session/reader";
 import { expect, it } from "vitest";
 import type { NamedFile } from "../src/contract";
-import { type Client, named } from "../src/session/client";
-import { createApart } from "../src/session/reader";
 import { T } from "../src/words";
 
 const file = (name: string, size = 10): NamedFile => ({ name, path: name, file: { size } as Blob });

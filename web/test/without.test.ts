@@ -1,6 +1,6 @@
+import { lackOf } from "@cagework/core/session/adapter";
+import { named } from "@cagework/core/session/client";
 import { describe, expect, it } from "vitest";
-import { lackOf } from "../src/session/adapter";
-import { named } from "../src/session/client";
 import { sayLack } from "../src/ui/unsupported";
 
 describe("what is missing", () => {

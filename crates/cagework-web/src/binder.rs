@@ -319,7 +319,7 @@ impl Binder {
         self.gpu.as_ref().ok_or_else(|| Fault::missing("GPU", "open one first"))
     }
 
-    async fn run(
+    pub(crate) async fn run(
         &self,
         positions: &[Vec3],
         set: &ControlSet,

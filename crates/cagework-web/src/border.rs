@@ -34,7 +34,7 @@ use crate::views::{
     Mend, ModelInfo, Problem, SurfacePoint, TargetView,
 };
 
-const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/src/contract/generated.ts");
+const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../web/package/src/contract/generated.ts");
 
 /// Bytes that a bind in a page may take unless asked: half of what a tab has.
 const PAGE_MEMORY: u64 = 2 << 30;
@@ -143,6 +143,8 @@ fn the_page_has_the_types_of_rust() {
     .unwrap();
     if fs::read_to_string(FILE).unwrap_or_default() != text {
         fs::write(FILE, text).unwrap();
-        panic!("web/src/contract/generated.ts was old; it has been written again: look at it and commit it");
+        panic!(
+            "web/package/src/contract/generated.ts was old; it is written again: look at it and commit it"
+        );
     }
 }

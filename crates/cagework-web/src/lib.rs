@@ -30,6 +30,7 @@ mod options;
 mod playing;
 mod problems;
 pub mod puller;
+pub mod reshape;
 mod scene;
 pub mod settings;
 mod state;
@@ -43,7 +44,8 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
 import type { BindOptions, BindReport, CageOptions, CageState, Element, Gesture, GizmoHandle, Legend, ModelInfo,
-  Grip, MemberSettings, PartOptions, Pivot, Problem, Progress, PullOptions, Repair, RestEdit, SceneOptions, SelectMode, Settings, SurfacePoint,
+  Grip, MemberSettings, PartOptions, Pivot, Problem, Progress, PullOptions, Repair, RestEdit, RigOptions, SceneOptions,
+  SelectMode, Settings, SurfacePoint,
   CameraView, UpAxis } from "../contract/generated";
 "#;
 

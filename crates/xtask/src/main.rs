@@ -25,7 +25,7 @@ const USAGE: &str = "usage: cargo xtask TASK
   arrows         the dependency arrows of ARCHITECTURE.md and import circles only
   python         the Python package only: its wheel, installed and tested against the command that `cargo test` builds
   wheel [ARGS]   the Python package's release wheel, into target/wheels (ARGS for `maturin build`)
-  wasm [--dev]   crates/cagework-web as a JavaScript package, web/src/pkg
+  wasm [--dev]   crates/cagework-web as a JavaScript package, web/package/src/pkg
   page           build the page only
   page-test [ARGS]  build the page and test it in a browser (ARGS for Playwright)
   pictures       make the pictures of the samples that the page shows

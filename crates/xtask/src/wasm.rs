@@ -31,10 +31,10 @@ struct Artifact {
 const ARTIFACTS: [Artifact; 2] = [
     Artifact {
         features: &["--no-default-features", "--features", "webgl"],
-        package: "web/src/pkg-webgl",
+        package: "web/package/src/pkg-webgl",
         name: "cagework_webgl",
     },
-    Artifact { features: &[], package: "web/src/pkg", name: "cagework" },
+    Artifact { features: &[], package: "web/package/src/pkg", name: "cagework" },
 ];
 
 /// What the web's profile adds to rustc. Vectors of 128 bits are wherever WebGPU or WebGL2 are. The pass that makes them of

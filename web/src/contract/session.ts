@@ -1,56 +1,36 @@
 /** What `session.ts` offers: files, jobs in the worker, frames. */
 
-import type { Engine } from "../pkg/cagework";
-import type { BindEvent } from "./bind";
-import type { CageArrays, Check, CheckedCage } from "./cage";
 import type {
+  BindEvent,
   BindOptions,
   BindReport,
+  CageArrays,
   CageOptions,
   CageState,
+  Check,
+  CheckedCage,
   Coordinates,
-  ErrorName,
+  Engine,
+  Grabbed,
+  GrabInput,
+  Job,
+  Lack,
   ModelInfo,
-  PullOptions,
+  NamedFile,
+  PullFrame,
+  Reading,
   Repair,
   RigOptions,
   Settings,
   SurfacePoint,
   UpAxis,
-} from "./generated";
+} from "@cagework/core/contract";
 
 export interface Pose {
   readonly name: string;
   readonly positions: Float32Array;
   /** Points that pulls left where they were; none: not known, the pins of the moment stay. */
   readonly pins?: readonly SurfacePoint[];
-}
-
-/** What is taken hold of, in the pose `start` of the cage and controls inside, `[n_controls, 3]`. */
-export interface GrabInput {
-  readonly start: Float32Array;
-  /** Weights of the grabs, then of the pins. `[n_grips, n_controls]` */
-  readonly rows: Float64Array;
-  /** The nearest vertex of the model of each. */
-  readonly seeds: Uint32Array;
-  readonly grabs: number;
-  readonly options: PullOptions;
-}
-export interface Grabbed {
-  /** Where the grabs are. `[n_grabs, 3]` */
-  readonly place: Float32Array;
-  /** How much each vertex of the model stays. `[n_vertices]` */
-  readonly stays: Float32Array;
-  /** Over the model's size. */
-  readonly reach: number;
-}
-export interface PullFrame {
-  /** `[n_controls, 3]` */
-  readonly cage: Float32Array;
-  /** Another frame would be the same. */
-  readonly settled: boolean;
-  /** How far grabs and pins are from where they should be, over the model's size. */
-  readonly error: number;
 }
 
 export interface Session {
@@ -139,30 +119,11 @@ export interface Session {
   close(): void;
 }
 
-/** What is missing: the browser has no WebGPU, or has it and found no graphics card for it, or that did not start. */
-export type Lack = "NoWebGPU" | Extract<ErrorName, "NoAdapter" | "NoDevice">;
-
-export interface Job<T> {
-  readonly done: Promise<T>;
-  cancel(): void;
-}
-export interface NamedFile {
-  readonly name: string;
-  readonly path: string;
-  readonly file: Blob;
-}
 export interface Sample {
   readonly id: string;
   readonly label: string;
   /** What there is to see. */
   readonly sentence?: string;
-}
-
-/** What a worker does with a file. */
-export interface Reading {
-  readonly stage: "bytes" | "decompress" | "geometry" | "textures" | "check";
-  /** Of the stage, 0 to 1; 0 where nobody can know. */
-  readonly fraction: number;
 }
 
 /** A file that a worker has read without harm. */

@@ -1,9 +1,9 @@
 /** Mouse and pen on the view, and which touches they share with: what a press means is decided here. */
 
+import { createTouch } from "@cagework/core/session/touch";
 import type { App } from "../app";
 import type { GizmoHandle, SelectMode } from "../contract";
 import type { Stage } from "../ui/viewport";
-import { createTouch } from "./touch";
 
 /** Pixels that tell a drag from a click. */
 const SLOP = 4;

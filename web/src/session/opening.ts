@@ -1,8 +1,8 @@
 /** The first moments: which samples there are, and the first of them built before it is asked for. */
 
+import type { Package } from "@cagework/core/session/artifact";
+import type { Client } from "@cagework/core/session/client";
 import type { Sample } from "../contract";
-import type { Package } from "./artifact";
-import type { Client } from "./client";
 
 /** Does it the first time only. */
 export function once(work: () => void): () => void {

@@ -1,6 +1,6 @@
+import { named } from "@cagework/core/session/client";
 import { expect, it } from "vitest";
 import { createBind } from "../../src/actions/bind";
-import { named } from "../../src/session/client";
 import { cageOf, createFake, MODEL, reportOf, settled } from "../fake";
 
 /** A page with a model in a cage. */

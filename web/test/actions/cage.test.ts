@@ -1,7 +1,7 @@
+import { named } from "@cagework/core/session/client";
 import { effect } from "@preact/signals";
 import { expect, it } from "vitest";
 import { createCage } from "../../src/actions/cage";
-import { named } from "../../src/session/client";
 import { cageOf, createFake, settled } from "../fake";
 
 function page() {

@@ -1,10 +1,10 @@
 /** Smooth cages and controls inside: steps of the history, poses that come along, bones that clicks draw. */
 
+import { named } from "@cagework/core/session/client";
 import { expect, test } from "vitest";
 import { createCage, type Posed } from "../../src/actions/cage";
 import { createControls } from "../../src/actions/controls";
 import { createEdit } from "../../src/actions/edit";
-import { named } from "../../src/session/client";
 import { cageOf, createFake, type Fake, settled } from "../fake";
 
 const BEFORE = Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1);

@@ -1,6 +1,6 @@
+import { named } from "@cagework/core/session/client";
 import { expect, it } from "vitest";
 import { createFiles } from "../../src/actions/files";
-import { named } from "../../src/session/client";
 import { cageOf, createFake, MODEL, OPENED, settled } from "../fake";
 
 const file = (name: string, content = "v") => ({ name, path: name, file: new Blob([content]) });

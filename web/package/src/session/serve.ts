@@ -3,7 +3,7 @@
 import type { Binder, Bound, Puller } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import type { BoundArrays, FromWorker, JobKind, Jobs, Step, ToWorker } from "./messages";
-import { check, checked, readCage, readModel } from "./reading";
+import { check, checked, read, readCage, readModel } from "./reading";
 
 /** Steps are told at most this often, ms: a page draws no more of them. */
 const STEP_PAUSE = 33;
@@ -90,6 +90,20 @@ function createWork(pkg: Package): Work {
     async formula({ kind, positions, cage }) {
       const by = await binder(false);
       return taken(by.bindByFormula(kind, positions, cage.positions, cage.corners, cage.controls));
+    },
+    async model({ files }, step) {
+      const { loaded } = await read(pkg, files, step);
+      const { positions, triangles } = loaded;
+      loaded.free();
+      return { positions, triangles };
+    },
+    async reshape({ files, cage, posed, options, rig }, step) {
+      const { loaded } = await read(pkg, files, step);
+      const by = await binder(options.backend === "gpu");
+      const { positions, corners, controls } = cage;
+      return by
+        .reshape(loaded, positions, corners, controls, posed, options, rig, step)
+        .finally(() => loaded.free());
     },
     async slice({ cage, axis, fraction, options }, step) {
       const by = await binder(options.backend === "gpu");

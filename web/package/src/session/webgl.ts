@@ -1,13 +1,12 @@
 /** The build that draws with WebGL2 and computes on the processor. Import it when it is needed, not before. */
 
 import * as pkg from "../pkg-webgl/cagework_webgl";
-import wasm from "../pkg-webgl/cagework_webgl_bg.wasm?url";
 import type { Artifact, Package } from "./artifact";
 
 export const WEBGL: Artifact = {
   // Two builds of one crate: TypeScript holds their classes for strangers, because constructors are private.
   pkg: pkg as unknown as Package,
-  wasm,
+  wasm: new URL("../pkg-webgl/cagework_webgl_bg.wasm", import.meta.url).href,
   openWorker: () =>
     new Worker(new URL("../worker-webgl.ts", import.meta.url), { type: "module", name: "cagework" }),
 };

@@ -1,7 +1,7 @@
 /** Dropped files to bytes: which one is the model, and where its siblings are. */
 
 import type { NamedFile } from "../contract";
-import { extension, isModel } from "../drop";
+import { extension, isModel } from "../names";
 import { named } from "./client";
 
 /** Larger files are refused, bytes: the browser's memory for them would be several times as much. */

@@ -69,7 +69,7 @@ export function polygons(mesh: Polygons): CageArrays {
   return { positions, corners, controls };
 }
 
-async function read(
+export async function read(
   pkg: Package,
   files: Jobs["read"]["input"]["files"],
   tell: Tell,

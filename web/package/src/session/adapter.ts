@@ -25,6 +25,11 @@ export function lackOf(error: unknown): Lack | undefined {
   return name === "NoWebGPU" || name === "NoAdapter" || name === "NoDevice" ? name : undefined;
 }
 
+/** Whether a GPU is made of processor cores: then the processor itself binds faster, and drawing does not wait for it. */
+export function isSoftware(adapter: string): boolean {
+  return /swiftshader|llvmpipe|lavapipe|software|basic render/i.test(adapter);
+}
+
 /** Whether this browser can at least draw. */
 export function hasWebGl2(): boolean {
   const context = document.createElement("canvas").getContext("webgl2");

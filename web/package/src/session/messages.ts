@@ -15,6 +15,7 @@ import type {
   PullFrame,
   Reading,
   Repair,
+  RigOptions,
   UpAxis,
 } from "../contract";
 import type { Bytes } from "./files";
@@ -67,6 +68,24 @@ export interface Jobs {
     input: { kind: Coordinates; positions: Float32Array; cage: CageArrays };
     step: never;
     output: BoundArrays;
+  };
+  /** A model's vertices and triangles. */
+  model: {
+    input: { files: readonly NamedFile[] };
+    step: Reading;
+    output: { positions: Float32Array; triangles: Uint32Array };
+  };
+  /** A model's file as it follows a posed cage. */
+  reshape: {
+    input: {
+      files: readonly NamedFile[];
+      cage: CageArrays;
+      posed: Float32Array;
+      options: BindOptions;
+      rig: RigOptions;
+    };
+    step: Step;
+    output: Uint8Array;
   };
   slice: {
     input: { cage: CageArrays; axis: number; fraction: number; options: BindOptions };

@@ -1,0 +1,218 @@
+/** `<cage-deformer src="fox.glb">`: a model in a cage whose vertices are dragged. custom-elements.json says all of it. */
+
+import { poseOf } from "./check";
+import { CAGE_DEFAULTS, RIG_DEFAULTS } from "./contract/generated";
+import { attachPointer } from "./element/pointer";
+import { openView, type Ready, sceneOf, type View } from "./element/view";
+import { named } from "./session/client";
+
+/** Sharper than this nobody sees, and it costs four times the pixels. */
+const MOST_SHARP = 2;
+/** Cells along the cage's longest side, unless told. */
+const GRID = 64;
+
+const STYLE = `
+  :host { display: block; position: relative; min-height: 240px; aspect-ratio: 4 / 3; overflow: hidden;
+    background: #1b1d22; color: #e8eaee; touch-action: none; }
+  :host([theme="light"]) { background: #f2f3f5; color: #22252b; }
+  :host([hidden]) { display: none; }
+  canvas { display: block; position: absolute; inset: 0; width: 100%; height: 100%; }
+  p { position: absolute; left: 12px; right: 12px; bottom: 12px; margin: 0; font: 14px/1.4 system-ui, sans-serif;
+    pointer-events: none; text-align: center; text-wrap: balance; }
+`;
+
+// Where there is no page, as on a server, the module can be imported, and defines nothing.
+const Base: typeof HTMLElement = globalThis.HTMLElement ?? (class {} as typeof HTMLElement);
+
+export class CageDeformer extends Base {
+  static readonly observedAttributes = ["src", "vertices", "grid", "theme"];
+
+  #view: Promise<View> | undefined;
+  /** The view, while it is there. */
+  #shown: View | undefined;
+  /** Counts what was asked to be opened: what comes late is of no interest. */
+  #asked = 0;
+  #bound: Promise<Ready> | undefined;
+  #canvas: HTMLCanvasElement | undefined;
+  #said: HTMLElement | undefined;
+  readonly #sizes = globalThis.ResizeObserver && new ResizeObserver(() => this.#resize());
+
+  connectedCallback(): void {
+    this.#draw();
+    this.#sizes.observe(this);
+    this.#open();
+  }
+
+  disconnectedCallback(): void {
+    // One that is only moved within the page keeps its model.
+    queueMicrotask(() => {
+      if (!this.isConnected) this.#close();
+    });
+  }
+
+  attributeChangedCallback(name: string, before: string | null, now: string | null): void {
+    if (!this.isConnected || before === now) return;
+    if (name === "theme") this.#shown?.engine.setScene(sceneOf(now));
+    else this.#open();
+  }
+
+  /** The file that is shown. */
+  get src(): string | null {
+    return this.getAttribute("src");
+  }
+  set src(src: string | null) {
+    if (src === null) this.removeAttribute("src");
+    else this.setAttribute("src", src);
+  }
+
+  /** The cage's vertices, `[n_cage, 3]`, object units; null while there is no cage. A pose of that length can be set. */
+  get pose(): Float32Array | null {
+    const positions = this.#shown?.engine.cagePositions();
+    return positions?.length ? positions : null;
+  }
+  set pose(posed: ArrayLike<number> | null) {
+    const engine = this.#shown?.engine;
+    if (!engine?.bound) throw named("Missing", "there is no cage yet: wait for the event ready");
+    const rest = engine.restPositions();
+    // Null is the rest pose.
+    engine.setCagePositions(posed === null ? rest : poseOf(posed, rest));
+  }
+
+  /** The model as it is posed, as a GLB; rig, clips, morph targets and materials are kept. */
+  async export(): Promise<Uint8Array<ArrayBuffer>> {
+    if (!this.#bound) throw named("Missing", "there is nothing to export: the element has no src");
+    await this.#bound;
+    const engine = this.#shown?.engine;
+    if (!engine) throw named("Missing", "there is nothing to export any more");
+    return engine.exportGlb(RIG_DEFAULTS, 0) as Uint8Array<ArrayBuffer>;
+  }
+
+  #draw(): void {
+    if (this.shadowRoot) return;
+    const root = this.attachShadow({ mode: "open" });
+    const style = document.createElement("style");
+    style.textContent = STYLE;
+    this.#said = document.createElement("p");
+    this.#said.setAttribute("role", "status");
+    root.append(style, this.#freshCanvas(), this.#said);
+    attachPointer(
+      this,
+      () => this.#shown?.engine,
+      () => this.dispatchEvent(new CustomEvent("pose", { detail: this.pose })),
+    );
+  }
+
+  #freshCanvas(): HTMLCanvasElement {
+    const canvas = document.createElement("canvas");
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", this.getAttribute("aria-label") ?? "A 3-D model in a cage");
+    this.#canvas?.replaceWith(canvas);
+    this.#canvas = canvas;
+    return canvas;
+  }
+
+  #open(): void {
+    this.#asked += 1;
+    const { src } = this;
+    this.#bound = undefined;
+    if (src === null) {
+      this.#say("");
+      return;
+    }
+    const asked = this.#asked;
+    const opening = this.#show(src, asked);
+    this.#bound = opening;
+    opening.then(
+      (ready) => {
+        if (asked !== this.#asked) return;
+        this.#say("");
+        this.dispatchEvent(new CustomEvent("ready", { detail: ready }));
+      },
+      (error: unknown) => {
+        if (asked === this.#asked) this.#fail(error);
+      },
+    );
+  }
+
+  async #show(src: string, asked: number): Promise<Ready> {
+    this.#say("Opening");
+    const number = (name: string, usual: number) => Number(this.getAttribute(name) ?? usual);
+    const address = new URL(src, this.baseURI);
+    const [view, file] = await Promise.all([this.#opened(), download(address)]);
+    if (asked !== this.#asked) throw named("Cancelled", "something else was opened");
+    const name = decodeURIComponent(address.pathname.split("/").at(-1) ?? "") || "model.glb";
+    const wanted = {
+      name,
+      file,
+      vertices: number("vertices", CAGE_DEFAULTS.vertices),
+      grid: number("grid", GRID),
+    };
+    return view.open(wanted, (what, fraction) => {
+      if (asked === this.#asked) this.#say(fraction > 0 ? `${what}: ${Math.round(100 * fraction)} %` : what);
+    });
+  }
+
+  #opened(): Promise<View> {
+    if (this.#view) return this.#view;
+    const opening = openView(
+      { canvas: () => this.#canvas ?? this.#freshCanvas(), freshCanvas: () => this.#freshCanvas() },
+      (error) => this.#fail(error),
+    );
+    this.#view = opening;
+    opening.then(
+      (view) => {
+        if (this.#view !== opening) return;
+        this.#shown = view;
+        view.engine.setScene(sceneOf(this.getAttribute("theme")));
+        this.#resize();
+      },
+      () => {
+        // The next src tries again.
+        if (this.#view === opening) this.#view = undefined;
+      },
+    );
+    return opening;
+  }
+
+  #close(): void {
+    this.#asked += 1;
+    this.#sizes.disconnect();
+    const view = this.#view;
+    this.#view = this.#shown = this.#bound = undefined;
+    view?.then((view) => view.close()).catch(() => undefined);
+    // A canvas that had one device cannot have another.
+    this.#freshCanvas();
+  }
+
+  #resize(): void {
+    const { clientWidth, clientHeight } = this;
+    if (clientWidth === 0 || clientHeight === 0) return;
+    this.#shown?.engine.resize(clientWidth, clientHeight, Math.min(MOST_SHARP, devicePixelRatio));
+  }
+
+  #say(words: string): void {
+    if (this.#said) this.#said.textContent = words;
+  }
+
+  #fail(error: unknown): void {
+    const message = error instanceof Error ? error.message : String(error);
+    this.#say(message.charAt(0).toUpperCase() + message.slice(1));
+    this.dispatchEvent(new ErrorEvent("error", { error, message }));
+  }
+}
+
+async function download(address: URL): Promise<Blob> {
+  const response = await fetch(address);
+  if (response.ok) return response.blob();
+  throw named("Unreadable", `${address.href} could not be downloaded (${response.status})`);
+}
+
+if (globalThis.customElements && !customElements.get("cage-deformer")) {
+  customElements.define("cage-deformer", CageDeformer);
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    "cage-deformer": CageDeformer;
+  }
+}

@@ -1,0 +1,149 @@
+/** What an element shows: an engine on a canvas, a model in it, and a cage around that. */
+
+import type { BindReport, Engine, Job, ModelInfo, SceneOptions } from "../contract";
+import { BIND_DEFAULTS, CAGE_DEFAULTS, SCENE_DEFAULTS } from "../contract/generated";
+import { isSoftware } from "../session/adapter";
+import type { Package } from "../session/artifact";
+import { startBind } from "../session/bind";
+import { type Client, createClient, named } from "../session/client";
+import { createFrames, type Frames } from "../session/frames";
+import { type Canvases, type OpenedOn, openOn } from "../session/open";
+import { createApart, load } from "../session/reader";
+
+export interface Wanted {
+  readonly name: string;
+  readonly file: Blob;
+  /** Vertices of the cage, at most. */
+  readonly vertices: number;
+  readonly grid: number;
+}
+
+export interface Ready {
+  readonly model: ModelInfo;
+  readonly report: BindReport;
+}
+
+/** What is under way: a word, and the share that is done. */
+export type Hear = (what: "Opening" | "Making a cage" | "Binding", fraction: number) => void;
+
+export interface View {
+  readonly engine: Engine;
+  /** Opens a model, makes a cage and binds; a project brings its own cage. Ends what was under way. */
+  open(wanted: Wanted, hear: Hear): Promise<Ready>;
+  close(): Promise<void>;
+}
+
+/** Opens on what the browser draws with. `lost` hears when the device is gone for good. */
+export function openView(canvases: Canvases, lost: (error: unknown) => void): Promise<View> {
+  return openOn(canvases, async (opened) => {
+    const { artifact, module, canvas } = opened;
+    await artifact.pkg.default({ module_or_path: module });
+    const client = createClient(module, artifact.openWorker);
+    const frames = createFrames();
+    const engine = await artifact.pkg.Engine.create(canvas, frames.ask).catch((error: unknown) => {
+      client.close();
+      throw error;
+    });
+    return viewOf({ ...opened, pkg: artifact.pkg, client, frames, engine }, canvases, lost);
+  });
+}
+
+interface Parts extends OpenedOn {
+  readonly pkg: Package;
+  readonly client: Client;
+  readonly frames: Frames;
+  readonly engine: Engine;
+}
+
+function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void): View {
+  const { artifact, module, adapter, lack, pkg, client, frames, engine } = parts;
+  const reading = createApart(() => createClient(module, artifact.openWorker));
+  const backend = lack || isSoftware(adapter) ? "cpu" : "gpu";
+  let current: Job<unknown> | undefined;
+  let work: Promise<unknown> = Promise.resolve();
+  let isClosed = false;
+
+  /** A device that was taken away comes back on another canvas: the old one is of no use any more. */
+  const watch = async (canvas: HTMLCanvasElement): Promise<void> => {
+    canvas.addEventListener("webglcontextlost", () => engine.lose());
+    await engine.lost();
+    if (isClosed) return;
+    const fresh = canvases.freshCanvas();
+    await engine.recover(fresh);
+    frames.ask();
+    return watch(fresh);
+  };
+  const watching = watch(parts.canvas).catch((error: unknown) => {
+    if (!isClosed) lost(error);
+  });
+
+  const run = <T>(job: Job<T>): Promise<T> => {
+    if (isClosed) job.cancel();
+    current = job;
+    return job.done;
+  };
+
+  async function openModel({ name, file, vertices, grid }: Wanted, hear: Hear): Promise<Ready> {
+    hear("Opening", 0);
+    const read = await run(reading("read", { files: [{ name, path: name, file }], up: undefined }));
+    const model = await engine.open(await load(pkg, read));
+    engine.frameAll();
+    let cage = read.cage;
+    if (!cage) {
+      const [positions, triangles] = engine.modelStates();
+      const options = { ...CAGE_DEFAULTS, vertices };
+      const input = { positions, triangles, model: engine.modelPositions(), options, smooth: 0 };
+      cage = await run(client.run("cage", input, ({ fraction }) => hear("Making a cage", fraction)));
+    }
+    engine.setCage(cage.positions, cage.corners, cage.controls);
+    engine.frameAll();
+    const report = await run(
+      startBind({
+        client,
+        engine,
+        adapter,
+        options: { ...BIND_DEFAULTS, grid, backend },
+        listener: (event) => event.kind === "progress" && hear("Binding", event.fraction),
+        cage: {
+          positions: engine.restPositions(),
+          corners: engine.cageCorners(),
+          controls: engine.cageControls(),
+        },
+      }),
+    );
+    return { model, report };
+  }
+
+  return {
+    engine,
+    open(wanted, hear) {
+      current?.cancel();
+      // The engine has one model at a time: the one before must have let go.
+      const opening = work.then(() => {
+        if (isClosed) throw named("Cancelled", "the element was taken out of the page");
+        frames.start(
+          (sharp) => engine.drawFrame(sharp),
+          () => !client.isBusy(),
+        );
+        return openModel(wanted, hear);
+      });
+      work = opening.catch(() => undefined);
+      return opening;
+    },
+    async close() {
+      isClosed = true;
+      frames.stop();
+      current?.cancel();
+      client.close();
+      engine.lose();
+      // Rust must not be in the middle of anything when its memory is given back.
+      await Promise.all([work, watching]);
+      engine.free();
+    },
+  };
+}
+
+/** What an element shows of the scene: handles of the cage are dragged, not the model. */
+export function sceneOf(theme: string | null): SceneOptions {
+  return { ...SCENE_DEFAULTS, theme: theme === "light" ? "light" : "dark", pull: false };
+}

@@ -1,0 +1,44 @@
+/** The package in Node: as in a browser, with threads for workers. */
+
+import { readFile } from "node:fs/promises";
+import { availableParallelism } from "node:os";
+import { Worker as Thread } from "node:worker_threads";
+import { createApi } from "./api";
+import * as pkg from "./pkg/cagework";
+import { createClient } from "./session/client";
+import type { FromWorker, ToWorker } from "./session/messages";
+
+const api = /* @__PURE__ */ createApi(async () => {
+  const bytes = await readFile(new URL("./pkg/cagework_bg.wasm", import.meta.url));
+  const module = await WebAssembly.compile(new Uint8Array(bytes));
+  await pkg.default({ module_or_path: module });
+  const most = availableParallelism();
+  return { pkg, openClient: () => createClient(module, openThread), most, hasGpu: false };
+});
+const { bind, generateCage, deform, reshape, readModel } = api;
+
+export { bind, deform, generateCage, readModel, reshape };
+
+/** A thread that looks like a browser's worker. It keeps the process alive only while it has something to do. */
+function openThread(): Worker {
+  const thread = new Thread(new URL("./worker-node.ts", import.meta.url));
+  const target = new EventTarget();
+  let jobs = 0;
+  thread.unref();
+  thread.on("message", (data: FromWorker) => {
+    if (data.kind !== "step") jobs -= 1;
+    if (jobs === 0) thread.unref();
+    target.dispatchEvent(new MessageEvent("message", { data }));
+  });
+  thread.on("error", ({ message }: Error) => {
+    target.dispatchEvent(Object.assign(new Event("error"), { message }));
+  });
+  return Object.assign(target, {
+    postMessage(message: ToWorker) {
+      if (message.kind === "job") jobs += 1;
+      if (jobs > 0) thread.ref();
+      thread.postMessage(message);
+    },
+    terminate: () => void thread.terminate(),
+  }) as unknown as Worker;
+}
