@@ -1,7 +1,7 @@
 /** The one way from the page to Rust: the engine on this thread, the binder in a worker, files, frames. */
 
 import { startBind } from "@cagework/core/session/bind";
-import { type Client, createClient } from "@cagework/core/session/client";
+import { type Client, createClient, named } from "@cagework/core/session/client";
 import { createFrames } from "@cagework/core/session/frames";
 import { chain } from "@cagework/core/session/jobs";
 import type { ReadModel } from "@cagework/core/session/messages";
@@ -100,10 +100,11 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   };
 
   async function openRead(read: ReadModel): Promise<Opened> {
-    const loaded = await load(pkg, read);
+    const [loaded, ...further] = await load(pkg, read);
     const { settings } = loaded;
     const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
-    const info: ModelInfo = await engine.open(loaded);
+    let info: ModelInfo = await engine.open(loaded);
+    for (const next of further) info = await engine.add(next);
     const cage = read.cage ? takeCage(read.cage) : null;
     const model = { ...info, notices: [...info.notices, ...read.notices] };
     const project = settings === undefined ? null : { poses, settings };
@@ -117,6 +118,14 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     samples: samples(pkg),
     readFiles: (files, hear) => reading("read", { files, up: undefined }, hear),
     open: (read: ReadFile) => openRead(read as ReadModel).finally(begin),
+    async add(read: ReadFile) {
+      // A project brings its models, and leaves its cage.
+      let info: ModelInfo | undefined;
+      for (const next of await load(pkg, read as ReadModel)) info = await engine.add(next);
+      if (!info) throw named("Error", "there is no model in the file");
+      const { notices } = read as ReadModel;
+      return { ...info, notices: [...info.notices, ...notices] };
+    },
     async openSample(id) {
       const { glb, cage, poses } = await buildSample(id);
       const label = samples(pkg).find((sample) => sample.id === id)?.label ?? id;

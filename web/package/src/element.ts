@@ -84,7 +84,7 @@ export class CageDeformer extends Base {
     await this.#bound;
     const engine = this.#shown?.engine;
     if (!engine) throw named("Missing", "there is nothing to export any more");
-    return engine.exportGlb(RIG_DEFAULTS, 0) as Uint8Array<ArrayBuffer>;
+    return engine.exportGlb(0, RIG_DEFAULTS, 0) as Uint8Array<ArrayBuffer>;
   }
 
   #draw(): void {

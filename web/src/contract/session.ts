@@ -51,7 +51,7 @@ export interface Session {
   readFiles(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<ReadFile>;
   /** Opens what was read, once; a project's cage and poses are open afterwards too. */
   open(read: ReadFile): Promise<Opened>;
-  /** Another model into the cage that is open, once; cage and pose stay, weights are dropped. */
+  /** Another model into the cage that is open: cage and pose stay, weights are dropped. */
   add(read: ReadFile): Promise<ModelInfo>;
   openSample(id: string): Promise<Opened>;
   /** Opens a project again with another axis up: model, cage and poses are turned. */

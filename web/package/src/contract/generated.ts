@@ -443,6 +443,46 @@ export type ModelFormat = "obj" | "gltf" | "ply" | "stl";
  */
 export type UpAxis = "y" | "z";
 /**
+ * What of a model is shown, and what the cage does not bend.
+ */
+export type PartOptions = { shown: boolean,
+/**
+ * Names of what keeps its shape; "all" for the whole model.
+ */
+rigid: Array<string>,
+/**
+ * Names of what stays as it is; "all" for the whole model.
+ */
+stays: Array<string>, };
+/**
+ * One of the models in a cage.
+ */
+export type MemberInfo = {
+/**
+ * Its number, which stays.
+ */
+id: number, name: string, format: ModelFormat, vertices: number, triangles: number, rigged: boolean,
+/**
+ * Names of its parts, each with its kind: "material:Cloth".
+ */
+parts: Array<string>, options: PartOptions,
+/**
+ * Whether some of it is painted to stay.
+ */
+painted: boolean, };
+/**
+ * What a project says of one of its models besides its file.
+ */
+export type MemberSettings = {
+/**
+ * What its first triangle is counted as.
+ */
+first_triangle: number, options: PartOptions,
+/**
+ * How much of each vertex is painted to stay, 0 to 255, and of how many vertices in turn; empty for nothing.
+ */
+painted: Array<[number, number]>, };
+/**
  * `ModelInfo`.
  */
 export type ModelInfo = { name: string, format: ModelFormat, up: UpAxis, vertices: number, triangles: number, faces: number, materials: number, textures: number, skins: number, joints: number, clips: Array<ClipView>,
@@ -459,37 +499,9 @@ props: Array<string>,
  */
 rigged: boolean, bounds: Bounds, notices: Array<string>,
 /**
- * The models that share the cage, in order; at least one.
+ * Each of the models in the cage; all else is of all of them.
  */
 members: Array<MemberInfo>, };
-/**
- * What becomes of parts of a model. A name is that of a part; "all" is the whole model.
- */
-export type PartOptions = { shown: boolean,
-/**
- * Names that keep their shape.
- */
-rigid: Array<string>,
-/**
- * Names that stay as they are.
- */
-stays: Array<string>, };
-/**
- * One of the models in the cage.
- */
-export type MemberInfo = { id: number, name: string, format: ModelFormat, vertices: number, triangles: number, rigged: boolean,
-/**
- * "material:Cloth", "node:Buckle", "joint:Head", "group:eyes"
- */
-parts: Array<string>, options: PartOptions,
-/**
- * Some of it is painted to stay.
- */
-painted: boolean, };
-/**
- * What a project says of a model. The page does not look into it.
- */
-export type MemberSettings = Record<string, unknown>;
 /**
  * The page's part of a project, as far as it can be used.
  */
@@ -511,7 +523,7 @@ pins?: Array<SurfacePoint>,
  */
 pose_pins?: Array<Array<SurfacePoint>>,
 /**
- * `Engine.memberSettings`.
+ * What of its models the cage does not bend: read with the models.
  */
 models?: Array<MemberSettings>,
 /**

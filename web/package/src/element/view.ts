@@ -86,7 +86,9 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
   async function openModel({ name, file, vertices, grid }: Wanted, hear: Hear): Promise<Ready> {
     hear("Opening", 0);
     const read = await run(reading("read", { files: [{ name, path: name, file }], up: undefined }));
-    const model = await engine.open(await load(pkg, read));
+    const [first, ...further] = await load(pkg, read);
+    let model = await engine.open(first);
+    for (const next of further) model = await engine.add(next);
     engine.frameAll();
     let cage = read.cage;
     if (!cage) {

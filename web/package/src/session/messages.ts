@@ -31,8 +31,8 @@ export interface Texture {
 export interface ReadModel extends Bytes {
   /** What points up in it, if that is not what the file says. */
   readonly up: UpAxis | undefined;
-  /** By number; null where there is none, or none that this browser could decode. */
-  readonly textures: readonly (Texture | null)[];
+  /** Of each model, a project's further ones too: by number; null where there is none, or none that this browser could decode. */
+  readonly textures: readonly (readonly (Texture | null)[])[];
   /** A project's. */
   readonly cage: CheckedCage | undefined;
   readonly notices: readonly string[];

@@ -6,6 +6,7 @@ import type { Package } from "./artifact";
 import { type Client, named } from "./client";
 import { siblingOf, tooLarge } from "./files";
 import type { Jobs, ReadModel } from "./messages";
+import { furtherOf } from "./reading";
 
 export type Hear = ((progress: Reading) => void) | undefined;
 
@@ -40,14 +41,17 @@ export function createApart(open: () => Client): Apart {
 /** Events and frames that wait have their turn. */
 const pause = () => new Promise((resolve) => setTimeout(resolve));
 
-/** A file that was read before, for `Engine.open`. */
-export async function load(pkg: Package, read: ReadModel): Promise<Loaded> {
+/** A file that was read before: for `Engine.open`, and a project's further models for `Engine.add`. */
+export async function load(pkg: Package, read: ReadModel): Promise<[Loaded, ...Loaded[]]> {
   const loaded = pkg.Loaded.read(read.name, read.bytes, siblingOf(read.siblings));
   if (read.up) loaded.setUp(read.up);
   await pause();
-  loaded.prepare();
-  read.textures.forEach((texture, k) => {
-    if (texture) loaded.setTexture(k, texture.width, texture.height, texture.rgba);
+  const all: [Loaded, ...Loaded[]] = [loaded, ...furtherOf(loaded)];
+  all.forEach((one, number) => {
+    one.prepare();
+    read.textures[number]?.forEach((texture, k) => {
+      if (texture) one.setTexture(k, texture.width, texture.height, texture.rgba);
+    });
   });
-  return loaded;
+  return all;
 }

@@ -20,15 +20,44 @@ export async function readModel(
   const { loaded, bytes } = await read(pkg, files, tell);
   const began = performance.now();
   if (up) loaded.setUp(up);
-  loaded.prepare();
+  const all = [loaded, ...furtherOf(loaded)];
+  for (const one of all) one.prepare();
   const took = bytes.took + performance.now() - began;
-  const { textures, failed } = await decodeTextures(loaded, (share) => say(tell, "textures", share));
+  const decoded = [];
+  for (const one of all) {
+    decoded.push(await decodeTextures(one, (share) => say(tell, "textures", share)));
+  }
+  const failed = decoded.reduce((sum, one) => sum + one.failed, 0);
   const many = failed === 1 ? "a texture" : `${failed} textures`;
   const notice = `this browser cannot decode ${many}: the material's plain colour is shown, exports keep the file`;
   say(tell, "check");
   const mesh = loaded.cage;
-  const cage = mesh && checked(pkg, mesh, loaded.positions);
-  return { ...bytes, up, textures, cage, notices: failed > 0 ? [notice] : [], took };
+  const cage = mesh && checked(pkg, mesh, flat(all.map(({ positions }) => positions)));
+  return {
+    ...bytes,
+    up,
+    textures: decoded.map(({ textures }) => textures),
+    cage,
+    notices: failed > 0 ? [notice] : [],
+    took,
+  };
+}
+
+/** A project's further models, taken out of it. */
+export function furtherOf(loaded: Loaded): Loaded[] {
+  const next = loaded.takeNext();
+  return next ? [next, ...furtherOf(loaded)] : [];
+}
+
+/** One array of several. */
+function flat(arrays: readonly Float32Array[]): Float32Array {
+  const all = new Float32Array(arrays.reduce((sum, { length }) => sum + length, 0));
+  let at = 0;
+  for (const array of arrays) {
+    all.set(array, at);
+    at += array.length;
+  }
+  return all;
 }
 
 /** Reads a file as a cage and checks it. */
