@@ -1,6 +1,5 @@
 /** Several models in one cage: dropped together, each with its own way to follow, each its own file again. */
 
-import { WITH_WEBGL } from "./browser";
 import {
   apart,
   BUCKLE,
@@ -171,36 +170,5 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
     await expect(page).toHaveTitle(/body/);
     await bound(page);
     await same();
-  });
-});
-
-test.describe("without WebGPU", () => {
-  test.use({ launchOptions: WITH_WEBGL });
-
-  test("two models follow, keep their shape and stay as they are exported", async ({ page }) => {
-    await page.addInitScript(() => {
-      Object.defineProperty(Navigator.prototype, "gpu", { get: () => undefined });
-    });
-    await open(page);
-    await dressed(page);
-    await bend(page);
-    const own = apart(
-      await page.evaluate(() => Array.from(globalThis.cagework?.engine.modelPositions() ?? [])),
-    );
-    await press(page, "buckle.glb keeps its shape");
-    await row(page, "body.glb").getByText("What follows the cage").click();
-    await press(page, "Trousers stays as it is");
-    await row(page, "body.glb").getByRole("button", { name: "Paint what stays" }).click();
-    await page.getByRole("slider", { name: "Size of the brush" }).fill("0.15");
-    await pull(page, await paintable(page, 0), 10, 10);
-    await shoot(page, "several-webgl");
-    await page.keyboard.press("Escape");
-    const found = await exportsEach(page);
-    const [skin, trousers] = still(found.body, own.body);
-    expect([skin > 0, trousers]).toEqual([true, 1]);
-    const before = distances(own.buckle);
-    expect(Math.max(...distances(found.buckle).map((d, k) => Math.abs(d - (before[k] ?? 0))))).toBeLessThan(
-      RIGID * BUCKLE,
-    );
   });
 });

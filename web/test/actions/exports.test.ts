@@ -3,6 +3,9 @@ import { createExports } from "../../src/actions/exports";
 import { createProject } from "../../src/actions/project";
 import { cageOf, createFake, MODEL, memberOf, modelOf, settled } from "../fake";
 
+/** What a project says of a model that keeps its shape. */
+const SETTINGS = { first_triangle: 0, options: { shown: true, rigid: ["all"], stays: [] }, painted: [] };
+
 /** Names of downloads. */
 let downloads: string[] = [];
 let copied: string[] = [];
@@ -131,9 +134,9 @@ it("a project holds the page's settings", async () => {
   store.set({ posed: true, sample: "rat", sampleCage: true, symmetry: true });
   project.write();
   expect(written[0], "one model without choices says nothing").not.toContain("models");
-  teach({ memberSettings: () => [{ rigid: ["all"] }] });
+  teach({ memberSettings: () => [SETTINGS] });
   project.write();
-  expect(JSON.parse(written[1] ?? "").models).toEqual([{ rigid: ["all"] }]);
+  expect(JSON.parse(written[1] ?? "").models).toEqual([SETTINGS]);
   expect(JSON.parse(written[0] ?? "")).toMatchObject({
     bind: { grid: 64 },
     cage: { vertices: 80 },
@@ -151,7 +154,7 @@ it("a link is for samples in their own cage; others are told what to do instead"
   store.set({ sample: "rat", sampleCage: true });
   await exports.share();
   expect(copied).toEqual([expect.stringMatching(/^https:\/\/cagework\.example\/#.*rat/)]);
-  teach({ memberSettings: () => [{ rigid: ["all"] }] });
+  teach({ memberSettings: () => [SETTINGS] });
   await exports.share();
   expect([copied.length, said.length], "what keeps its shape is not in it").toEqual([1, 3]);
 });
