@@ -73,8 +73,11 @@ export function createPainting(ctx: Context, settle: () => void): PaintActions {
       try {
         if (!dab(x, y)) return false;
       } catch (error) {
-        report(ctx, T.models.notPainted, error);
-        return false;
+        if (!store.get().bound) {
+          report(ctx, T.models.notPainted, error);
+          return false;
+        }
+        // The GPU is busy with the stroke before for a moment: this one paints from its first movement on.
       }
       stroke = { before, x, y };
       return true;
@@ -97,7 +100,9 @@ export function createPainting(ctx: Context, settle: () => void): PaintActions {
       // Something else may have been opened under the hand.
       if (!ended || !painting) return;
       const { id, erase } = painting;
-      if (keepIt) keep(erase ? T.did.erase : T.did.paint, id, ended.before, engine().painted(id));
+      const after = engine().painted(id);
+      if (String(after) === String(ended.before)) return;
+      if (keepIt) keep(erase ? T.did.erase : T.did.paint, id, ended.before, after);
       else put(id, ended.before);
     },
     active: () => stroke !== undefined,

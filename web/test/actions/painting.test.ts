@@ -85,7 +85,7 @@ it("a stroke that is given up leaves nothing, and clearing is a step", async () 
 });
 
 it("what cannot be painted yet is said; a moment without the GPU leaves no gap", () => {
-  const { painting, problems, amounts, teach, engine } = page();
+  const { painting, problems, amounts, teach, engine, store, ctx } = page();
   painting.on(0);
   const real = engine.paint;
   const busy = () => {
@@ -93,9 +93,11 @@ it("what cannot be painted yet is said; a moment without the GPU leaves no gap",
   };
   teach({ paint: busy });
   expect([painting.begin(5, 150), problems.length]).toEqual([false, 1]);
-  teach({ paint: real });
+  store.set({ bound: true });
+  expect([painting.begin(5, 150), problems.length], "busy").toEqual([true, 1]);
+  painting.end(true);
+  expect(ctx.history.undoLabel, "nothing was painted").toBeUndefined();
   painting.begin(5, 150);
-  teach({ paint: busy });
   painting.drag(25, 150);
   teach({ paint: real });
   painting.drag(45, 150);
