@@ -87,7 +87,7 @@ export function createPainting(ctx: Context, settle: () => void): PaintActions {
       const { x: x0, y: y0 } = stroke;
       const n = Math.max(1, Math.ceil(Math.hypot(x - x0, y - y0) / DAB_PX));
       try {
-        for (let k = 1; k <= n; k += 1) dab(x0 + ((x - x0) * k) / n, y0 + ((y - y0) * k) / n);
+        for (let k = 0; k <= n; k += 1) dab(x0 + ((x - x0) * k) / n, y0 + ((y - y0) * k) / n);
         stroke = { ...stroke, x, y };
       } catch {
         // The GPU was busy for a moment: the next movement goes on from here.
