@@ -82,6 +82,9 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     // Before there is a cage: it encloses all of them.
     for (const other of others) await follow.join(other);
     store.set({ busy: null });
+    const { length } = store.get().model?.members ?? [];
+    const showList = { label: T.models.showList, run: () => store.set({ step: "model" }) };
+    if (others.length > 0 && length > 1) ctx.tell.say(T.models.together(length), showList);
     void prepare(cageFiles, sample !== null || opened.project !== null);
   };
 

@@ -1,7 +1,7 @@
 import { named } from "@cagework/core/session/client";
 import { expect, it } from "vitest";
 import { createFiles } from "../../src/actions/files";
-import { cageOf, createFake, MODEL, OPENED, settled } from "../fake";
+import { cageOf, createFake, MODEL, memberOf, modelOf, OPENED, settled } from "../fake";
 
 const file = (name: string, content = "v") => ({ name, path: name, file: new Blob([content]) });
 
@@ -26,6 +26,7 @@ function page() {
     },
     async join({ name }) {
       steps.push(`join ${name}`);
+      fake.store.set({ model: modelOf([memberOf(0, "body.glb"), memberOf(1, name)]) });
     },
     async bind() {
       steps.push("bind");
@@ -57,7 +58,7 @@ it("a model that is dropped gets a cage and is bound; what was open is kept firs
 });
 
 it("models dropped together are all in before there is a cage; one that cannot be read is named", async () => {
-  const { files, asked, steps, problems, store } = page();
+  const { files, asked, steps, problems, store, said } = page();
   const list = ["bad.glb", "body.glb", "skin.png", "shirt.gltf", "body-cage.obj"].map((name) => file(name));
   const opened = files.openFiles(list);
   await settled();
@@ -76,6 +77,7 @@ it("models dropped together are all in before there is a cage; one that cannot b
   await settled();
   expect(steps).toEqual(["keep", "leave", "pose undefined", "join shirt.gltf", "load body-cage.obj"]);
   expect(problems).toMatchObject([{ title: "bad.glb could not be opened" }]);
+  expect(said).toEqual(["2 models share this cage."]);
   expect(store.get().busy).toBeNull();
 });
 

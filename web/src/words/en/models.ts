@@ -40,7 +40,9 @@ export const models = {
   addHint: "Clothes, hair, gear. Or drop them on this list.",
   makeAround: "Make a cage around all",
   outside: (names: readonly string[]) =>
-    `The cage was made before ${list(names)}, which ${names.length === 1 ? "reaches" : "reach"} outside. Another cage can be made around all.`,
+    `${list(names)} ${names.length === 1 ? "reaches" : "reach"} outside of this cage.`,
+  together: (n: number) => `${n} models share this cage.`,
+  showList: "Show the list",
   notAdded: "Nothing was added",
   noProject: "A project has a cage of its own. Open it, or add the files of its models.",
   notBinned: "The model could not be taken out",
