@@ -26,7 +26,7 @@ test("clothes are added to a sample, dropped on the list, and said when they rea
   ]);
   await expect(page.getByRole("alert").getByText("notes.obj could not be opened")).toBeVisible();
   await expect(rows(page)).toHaveCount(3);
-  await expect(page.getByText(/tent\.obj reaches outside/)).toBeVisible();
+  await expect(page.getByText(/What was added reaches outside/)).toBeVisible();
   await shoot(page, "several-outside");
   await press(page, "Make a cage around all");
   await bound(page);

@@ -92,8 +92,9 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
           for (const other of reads) await models.join(other);
           store.set({ busy: null });
           const { model } = store.get();
-          const added = members().slice(n);
-          const ids = added.map(({ id }) => id);
+          const ids = members()
+            .slice(n)
+            .map(({ id }) => id);
           if (!model || ids.length === 0) return;
           store.set({ sample: null });
           const after = { sample: null, sampleCage: false };
@@ -104,7 +105,7 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
           });
           void changed(model).then((isOut) => {
             const around = { label: T.models.makeAround, run: () => void cage.regenerate() };
-            if (isOut) ctx.tell.say(T.models.outside(added.map(({ name }) => name)), around);
+            if (isOut) ctx.tell.say(T.models.outside, around);
           });
         });
       });

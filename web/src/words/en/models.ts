@@ -1,6 +1,6 @@
 /** The models that share the cage. */
 
-import { list, plural } from "../../format";
+import { plural } from "../../format";
 
 export const models = {
   title: "In this cage",
@@ -39,8 +39,7 @@ export const models = {
   add: "Add to this cage",
   addHint: "Clothes, hair, gear. Or drop them on this list.",
   makeAround: "Make a cage around all",
-  outside: (names: readonly string[]) =>
-    `${list(names)} ${names.length === 1 ? "reaches" : "reach"} outside of this cage.`,
+  outside: "What was added reaches outside of this cage.",
   together: (n: number) => `${n} models share this cage.`,
   showList: "Show the list",
   notAdded: "Nothing was added",
