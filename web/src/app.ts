@@ -9,6 +9,8 @@ import { createEdit, type Edit } from "./actions/edit";
 import { copyLink, createExports, type Exports } from "./actions/exports";
 import { createFiles, type Files } from "./actions/files";
 import { followCage } from "./actions/follow";
+import { createModels, type Models } from "./actions/models";
+import { createPainting, type PaintActions } from "./actions/painting";
 import { createPoses, type PoseActions } from "./actions/poses";
 import { createProject, type Project, poseOf } from "./actions/project";
 import { createPulling, type Pulling } from "./actions/pull";
@@ -39,6 +41,8 @@ export interface App {
   readonly view: View;
   readonly files: Files;
   readonly project: Project;
+  readonly models: Models;
+  readonly painting: PaintActions;
   readonly works: WorkActions;
   readonly exports: Exports;
   readonly tour: TourActions;
@@ -49,6 +53,8 @@ export interface App {
   /** Opens the browser's file dialog. */
   chooseModel(): void;
   chooseFolder(): void;
+  /** Models to add to the cage. */
+  chooseMore(): void;
   chooseCage(): void;
   /** Controls inside, of a file. */
   chooseControls(): void;
@@ -104,6 +110,14 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     edit.settle();
     edit.setEditingRest(false);
   });
+  const settle = () => {
+    poses.stop();
+    clips.stop();
+    edit.settle();
+    edit.setEditingRest(false);
+  };
+  const models = createModels(ctx, { cage, openFiles: (list) => files.openFiles(list), settle });
+  const painting = createPainting(ctx, settle);
   const project = createProject(ctx, controls.shared);
   const exports = createExports(ctx, project);
   const startFresh = () => void files.openSample(store.get().samples[0]?.id ?? "");
@@ -114,10 +128,11 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
   });
   const files = createFiles(ctx, {
     adoptCage: (opened) => cage.adopt(opened.cage, opened.check),
-    makeCage: () => cage.make(),
-    loadCage: (list) => cage.load(list),
+    makeCage: () => cage.make(true),
+    loadCage: (list) => cage.load(list, true),
+    join: models.join,
     loadControls: (list) => controls.load(list),
-    bind: () => bind.start(),
+    bind: () => bind.start(true),
     applySettings(settings) {
       store.set({
         ...(settings.bind ? { bindOptions: settings.bind } : {}),
@@ -180,6 +195,8 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     view,
     files,
     project,
+    models,
+    painting,
     works,
     exports,
     tour,
@@ -187,11 +204,13 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     run: (command) => commands[command](),
     go(step) {
       if (step !== "cage" && store.get().placing) controls.arm(null);
+      if (step !== "model") painting.on(null);
       if (step === "pose" || step === "export") edit.setEditingRest(false);
       store.set({ step });
     },
     chooseModel: () => choose(MODELS, false, (list) => void files.openFiles(list)),
     chooseFolder: () => choose("", true, (list) => void files.openFiles(list)),
+    chooseMore: () => choose(MODELS, false, (list) => void models.add(list)),
     chooseCage: () => choose(CAGES, false, (list) => void cage.load(list)),
     chooseControls: () => choose(".obj", false, (list) => void controls.load(list)),
     share: () => void exports.share(),

@@ -11,7 +11,9 @@ export interface DropPlan {
   kind: DropKind;
   /** Index of the file to open. */
   main?: number;
-  /** Other files that could be models: the second one may be the cage. */
+  /** Other models, which share its cage, in the order given. */
+  more?: readonly number[];
+  /** The file that is their cage. */
   second?: number;
   /** What will happen, as a sentence. */
   sentence: string;
@@ -33,7 +35,10 @@ export function planDrop(names: readonly string[]): DropPlan {
   if (only !== undefined && names.length === 1 && CONTROLS_NAME.test(base(only))) {
     return { kind: "controls", main: 0, sentence: T.opening.asControls(base(only)) };
   }
-  const models = names.map((name, index) => ({ name, index })).filter(({ name }) => isModel(name));
+  const all = names.map((name, index) => ({ name, index })).filter(({ name }) => isModel(name));
+  // Controls come alone, when the cage is there.
+  const plain = all.filter(({ name }) => !CONTROLS_NAME.test(base(name)));
+  const models = plain.length > 0 ? plain : all;
   const model = models.find(({ name }) => !CAGE_NAME.test(base(name))) ?? models[0];
   if (!model) {
     const companions = names.every((name) => (COMPANIONS as readonly string[]).includes(extension(name)));
@@ -45,12 +50,20 @@ export function planDrop(names: readonly string[]): DropPlan {
       : { kind: "unknown", sentence: T.opening.kinds };
   }
   const second = models.find((other) => other !== model && CAGE_NAME.test(base(other.name)));
+  const more = models.filter((other) => other !== model && !CAGE_NAME.test(base(other.name)));
   const companions = names.length - models.length;
   const files = companions > 0 ? ` with ${companions} ${companions === 1 ? "file" : "files"}` : "";
+  const what = T.models.several(base(model.name), more.length) + files;
   const sentence = second
-    ? `Opens ${base(model.name)}${files} with ${base(second.name)} as its cage.`
-    : `Opens ${base(model.name)}${files} and makes a cage for it.`;
-  return { kind: "model", main: model.index, sentence, ...(second ? { second: second.index } : {}) };
+    ? `Opens ${what} with ${base(second.name)} as ${more.length > 0 ? "their" : "its"} cage.`
+    : `Opens ${what} and makes a cage for ${more.length > 0 ? "all of them" : "it"}.`;
+  return {
+    kind: "model",
+    main: model.index,
+    sentence,
+    ...(more.length > 0 ? { more: more.map(({ index }) => index) } : {}),
+    ...(second ? { second: second.index } : {}),
+  };
 }
 
 /** What the page can say while files hover over it: browsers tell how many there are, and types of some. */

@@ -4,6 +4,7 @@
 export const LOCALE = "en";
 
 const INTEGER = new Intl.NumberFormat(LOCALE, { maximumFractionDigits: 0 });
+const LIST = new Intl.ListFormat(LOCALE);
 const PLURAL = new Intl.PluralRules(LOCALE);
 
 /** 3 minutes: "3 min". */
@@ -24,6 +25,11 @@ export function count(value: number): string {
 /** 1 vertex, 2 vertices. */
 export function plural(value: number, one: string, many = `${one}s`): string {
   return `${count(value)} ${PLURAL.select(value) === "one" ? one : many}`;
+}
+
+/** a, b, and c */
+export function list(names: readonly string[]): string {
+  return LIST.format(names);
 }
 
 /** Bytes in the unit that leaves one to three digits before the point: 1536 -> "1.5 kB". */

@@ -56,6 +56,9 @@ export interface Slice {
   busy: boolean;
 }
 
+/** Where files are dropped: anywhere, on the panel of the cage, or on the list of the models in it. */
+export type DropPlace = "page" | "cage" | "list";
+
 export type CageSource = "auto" | "hull" | "box" | "file";
 
 export interface AppState {
@@ -131,6 +134,8 @@ export interface AppState {
   /** Shares of `poses` in the blend. */
   shares: readonly number[];
   playing: boolean;
+  /** What stays of a model is painted; null when nothing is. */
+  painting: Painting | null;
   /** The clip that is shown in place of the cage's pose. */
   clip: ClipState;
   /** What becomes of the model's skeleton. */
@@ -152,7 +157,7 @@ export interface AppState {
   /** Whether the steps to switch WebGPU on are shown. */
   waysOpen: boolean;
   /** Files hover over the window; null when none do. */
-  hovering: { readonly files: number; readonly asCage: boolean } | null;
+  hovering: { readonly files: number; readonly to: DropPlace } | null;
 }
 
 export const NO_CLIP: ClipState = {
@@ -214,6 +219,7 @@ export const INITIAL: AppState = {
   poses: [],
   shares: [],
   playing: false,
+  painting: null,
   clip: NO_CLIP,
   rigOptions: RIG_DEFAULTS,
   playingPose: null,
@@ -237,6 +243,15 @@ export interface TourState {
   readonly reports: readonly BindReport[];
   /** Which bind of how many it is at; null when it is ready. */
   readonly doing: readonly [bind: number, all: number] | null;
+}
+
+/** The brush, and the model that it paints. */
+export interface Painting {
+  readonly id: number;
+  /** Over the model's size. */
+  readonly radius: number;
+  /** It takes away what was painted. */
+  readonly erase: boolean;
 }
 
 /** A clip and the time in it. */

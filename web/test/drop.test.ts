@@ -35,6 +35,23 @@ describe("dropped files", () => {
     expect(plan.sentence).toBe("Opens scene.gltf with 2 files and makes a cage for it.");
   });
 
+  it("open together: several models share a cage, made for all of them or given", () => {
+    expect(planDrop(["body.glb", "skin.png", "shirt.obj", "a/buckle.glb"])).toEqual({
+      kind: "model",
+      main: 0,
+      more: [2, 3],
+      sentence: "Opens body.glb and 2 more with 1 file and makes a cage for all of them.",
+    });
+    expect(planDrop(["body-cage.obj", "shirt-cage.obj", "body.glb", "shirt.glb"])).toEqual({
+      kind: "model",
+      main: 2,
+      more: [3],
+      second: 0,
+      sentence: "Opens body.glb and 1 more with body-cage.obj as their cage.",
+    });
+    expect(planDrop(["body.glb", "body-controls.obj"]).more, "controls are no model").toBeUndefined();
+  });
+
   it("know a project by its name", () => {
     expect(planDrop(["horse.cagework.glb"])).toMatchObject({ kind: "project", main: 0 });
   });
@@ -59,6 +76,7 @@ describe("dropped files", () => {
   it("announce what will happen while they hover", () => {
     expect(hoverSentence(1, false, false)).toContain("gets a cage");
     expect(hoverSentence(1, true, true)).toContain("Cage panel");
-    expect(hoverSentence(3, true, false)).toContain("together");
+    expect(hoverSentence(1, true, false)).toContain("On the list of models it is added");
+    expect(hoverSentence(3, true, false)).toContain("share one cage");
   });
 });

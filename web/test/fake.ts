@@ -9,6 +9,7 @@ import type {
   CheckedCage,
   Engine,
   Job,
+  MemberInfo,
   ModelInfo,
   Opened,
   Session,
@@ -46,6 +47,20 @@ export interface Fake {
 
 const BOUNDS: CageState["info"]["bounds"] = { min: [0, 0, 0], max: [1, 1, 1] };
 
+/** One of several models. */
+export function memberOf(id: number, name: string, triangles = 12): MemberInfo {
+  const options = { shown: true, rigid: [], stays: [] };
+  const parts = ["material:Cloth", "node:Buckle"];
+  return { id, name, format: "obj", vertices: 8, triangles, rigged: false, parts, options, painted: false };
+}
+
+/** What the engine says of these models. */
+export function modelOf(members: readonly MemberInfo[]): ModelInfo {
+  const [first, ...more] = members.map(({ name }) => name);
+  const name = more.length > 0 ? `${first} and ${more.length} more` : (first ?? "");
+  return { ...MODEL, name, members: [...members] };
+}
+
 export const MODEL: ModelInfo = {
   name: "cube.obj",
   format: "obj",
@@ -63,6 +78,7 @@ export const MODEL: ModelInfo = {
   rigged: false,
   bounds: BOUNDS,
   notices: [],
+  members: [memberOf(0, "cube.obj")],
 };
 
 /** A cage of `n` vertices, all at one height. */
@@ -213,6 +229,7 @@ export function createFake(): Fake {
     legend: () => undefined,
     hasOther: (kind) => fake.others.includes(kind),
     strays: () => 0,
+    memberSettings: () => [],
     transformLabel: () => "Move",
   };
   const engine = new Proxy({} as Engine, {
@@ -224,6 +241,7 @@ export function createFake(): Fake {
     samples: [{ id: "rat", label: "Rat" }],
     readFiles: (files) => job("read", files),
     open: (read) => job<Opened>("open", read).done,
+    add: (read) => job<ModelInfo>("add", read).done,
     openSample: (id) => job<Opened>("sample", id).done,
     turn: (project, up) => job<Opened>("turn", { project, up }).done,
     readCage: (files) => job("readCage", files),

@@ -21,17 +21,18 @@ export interface CageActions {
   setSmooth(steps: number): boolean;
   /** Another value beside the same cage, as a step of the history; false when it does not fit. */
   change(label: string, work: () => CageState, failed?: string): boolean;
-  /** Makes a cage the way the Cage panel says. True when there is a new one. */
-  make(): Promise<boolean>;
+  /** Makes a cage the way the Cage panel says. True when there is a new one. Problems on screen stay when nobody asked
+   * for it. */
+  make(unasked?: boolean): Promise<boolean>;
   cancel(): void;
-  load(files: readonly NamedFile[]): Promise<boolean>;
+  load(files: readonly NamedFile[], unasked?: boolean): Promise<boolean>;
   repair(kind: Repair): Promise<boolean>;
   /** Another one, by itself. */
   regenerate(): Promise<boolean>;
   /** What the button beside a problem does. */
   mend(fix: Mend): void;
-  /** The page's side of a new or changed cage; one that was not checked yet is now. */
-  adopt(state: CageState | null, check: Check | null): void;
+  /** The page's side of a new or changed cage; one that was not checked yet is now, and true when that is done. */
+  adopt(state: CageState | null, check: Check | null): Promise<boolean>;
 }
 
 /** A hull needs few vertices: it has no limbs to follow. */
@@ -62,7 +63,7 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
       ),
     );
 
-  const adopt = (state: CageState | null, check: Check | null) => {
+  const adopt = async (state: CageState | null, check: Check | null) => {
     ctx.store.set({
       cage: state,
       check,
@@ -72,7 +73,7 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
       earlier: [],
       scene: { ...ctx.store.get().scene, compare: SCENE_DEFAULTS.compare, slice: "off" },
     });
-    if (state && !check) void look();
+    return state !== null && check === null && look();
   };
 
   const now = (): CheckedCage | undefined => {
@@ -83,7 +84,7 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
     return { positions: engine.restPositions(), corners: engine.cageCorners(), controls, check };
   };
 
-  const set = (cage: CheckedCage) => adopt(ctx.session().takeCage(cage), cage.check);
+  const set = (cage: CheckedCage) => void adopt(ctx.session().takeCage(cage), cage.check);
 
   const posedNow = (): Posed | undefined => {
     const cage = now();
@@ -100,7 +101,7 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
     const before = posedNow();
     if (!before) return false;
     try {
-      adopt(work(), null);
+      void adopt(work(), null);
     } catch (error) {
       report(ctx, failed, error);
       return false;
@@ -176,8 +177,8 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
   const actions: CageActions = {
     change,
     setSmooth: (steps) => change(T.did.smooth(steps), () => ctx.session().engine.setSmooth(steps)),
-    make() {
-      ctx.tell.clear();
+    make(unasked = false) {
+      if (!unasked) ctx.tell.clear();
       return attempt(ctx, T.failed.noCage, () =>
         ctx.queue.replace("cage", async (signal) => {
           const before = posedNow();
@@ -188,8 +189,8 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
       );
     },
     cancel: () => ctx.queue.cancel("cage"),
-    load(files) {
-      ctx.tell.clear();
+    load(files, unasked = false) {
+      if (!unasked) ctx.tell.clear();
       return attempt(ctx, T.failed.cageFile, () =>
         ctx.queue.replace("open", async (signal) => {
           const before = posedNow();

@@ -1,6 +1,6 @@
 /** Files out of the page. */
 
-import type { ModelFormat, NamedFile } from "../contract";
+import type { ModelFormat, ModelInfo, NamedFile } from "../contract";
 import { stem } from "../format";
 import { fittingPoses, rigOf } from "../state";
 import { sentence } from "../strings";
@@ -23,7 +23,17 @@ export interface Exports {
   pictureOf(scale: number, alone: boolean): void;
   /** The format of the next shape. */
   shapeIn(format: ShapeFormatName): void;
+  /** Which of several models the next files are of; null for each of them. */
+  only(id: number | null): void;
 }
+
+/** Files of which each model has its own. */
+const OWN = ["glb", "shape", "poses", "weights"] as const satisfies readonly ExportKind[];
+type OwnKind = (typeof OWN)[number];
+const isOwn = (kind: ExportKind): kind is OwnKind => (OWN as readonly string[]).includes(kind);
+
+/** Browsers drop downloads that begin at the same time, ms. */
+const BETWEEN_MS = 250;
 
 /** Largest side of a picture, pixels. */
 const LONGEST_SIDE = 8192;
@@ -31,29 +41,39 @@ const LONGEST_SIDE = 8192;
 export function createExports(ctx: Context, project: Project): Exports {
   let scale = 2;
   let alone = false;
+  let which: number | null = null;
   let format: ShapeFormatName = SHAPE_FORMATS[0];
 
-  const bytesOf = (kind: Exclude<ExportKind, "picture">): Uint8Array => {
+  const ownBytes = (kind: OwnKind, id: number): Uint8Array => {
     const { engine } = ctx.session();
+    const rig = rigOf(ctx.store.get());
     switch (kind) {
       case "glb":
-        return engine.exportGlb(rigOf(ctx.store.get()), ctx.store.get().clip.clip ?? 0);
+        return engine.exportGlb(id, rig, ctx.store.get().clip.clip ?? 0);
       case "shape":
-        return engine.exportShape(format);
+        return engine.exportShape(id, format);
       case "poses": {
         const poses = fittingPoses(ctx.store.get());
         return engine.exportPoses(
+          id,
           poses.map((pose) => pose.name),
           poses.map((pose) => pose.positions),
-          rigOf(ctx.store.get()),
+          rig,
         );
       }
-      case "cage":
-        return engine.exportCage();
-      case "controls":
-        return engine.exportControls();
       case "weights":
-        return engine.exportWeights();
+        return engine.exportWeights(id);
+      default:
+        return kind satisfies never;
+    }
+  };
+
+  const bytesOf = (kind: Exclude<ExportKind, OwnKind | "picture">): Uint8Array => {
+    switch (kind) {
+      case "cage":
+        return ctx.session().engine.exportCage();
+      case "controls":
+        return ctx.session().engine.exportControls();
       case "project":
         return project.write();
       default:
@@ -64,6 +84,32 @@ export function createExports(ctx: Context, project: Project): Exports {
   const suffix = (kind: Exclude<ExportKind, "project">): string =>
     kind === "shape" ? `-posed.${format}` : SUFFIX[kind];
 
+  /** A file for each model that is asked for. */
+  const saveOwn = async (kind: OwnKind, model: ModelInfo) => {
+    if (kind === "glb") await loadLattice(ctx);
+    const { members } = model;
+    const chosen = members.filter(({ id }) => id === which);
+    const notices = new Set<string>();
+    const files: string[] = [];
+    let size = 0;
+    for (const { id, name } of chosen.length > 0 ? chosen : members) {
+      // One that is open alone may be called otherwise: a sample by its label, a project by its file.
+      const source = members.length === 1 ? model.name : name;
+      const full = `${stem(source)}${suffix(kind)}`;
+      // A VRM stays one.
+      const isVrm = /\.vrm$/i.test(source) && (kind === "glb" || kind === "poses");
+      const file = other(isVrm ? full.replace(/glb$/, "vrm") : full, files);
+      const blob = new Blob([new Uint8Array(ownBytes(kind, id))]);
+      if (kind === "glb") for (const notice of ctx.session().engine.rigNotices()) notices.add(notice);
+      if (files.length > 0) await new Promise((resolve) => setTimeout(resolve, BETWEEN_MS));
+      download(blob, file);
+      files.push(file);
+      size += blob.size;
+    }
+    ctx.tell.say(T.exports.saved(files, size));
+    for (const notice of notices) ctx.tell.say(sentence(notice));
+  };
+
   const picture = () => {
     const { width, height } = ctx.viewport();
     const fit = Math.min(scale, LONGEST_SIDE / Math.max(width, height, 1));
@@ -72,21 +118,16 @@ export function createExports(ctx: Context, project: Project): Exports {
 
   const exports: Exports = {
     async save(kind) {
-      const name = stem(ctx.store.get().model?.name ?? "model");
+      const { model } = ctx.store.get();
       await attempt(ctx, T.failed.write, async () => {
-        if (kind === "glb") await loadLattice(ctx);
         // The moment after a bind its weights are still on the way to the GPU.
         await ctx.session().engine.ready();
+        if (isOwn(kind)) return model ? saveOwn(kind, model) : undefined;
         const blob = kind === "picture" ? await picture() : new Blob([new Uint8Array(bytesOf(kind))]);
-        const full = kind === "project" ? project.fileName() : `${name}${suffix(kind)}`;
-        // A VRM stays one.
-        const isVrm =
-          /\.vrm$/i.test(ctx.store.get().model?.name ?? "") && (kind === "glb" || kind === "poses");
-        const file = isVrm ? full.replace(/glb$/, "vrm") : full;
+        const own = stem(model?.name ?? "model");
+        const file = kind === "project" ? project.fileName() : `${own}${suffix(kind)}`;
         download(blob, file);
-        ctx.tell.say(T.exports.saved(file, blob.size));
-        if (kind === "glb")
-          for (const notice of ctx.session().engine.rigNotices()) ctx.tell.say(sentence(notice));
+        ctx.tell.say(T.exports.saved([file], blob.size));
       });
     },
     async share() {
@@ -105,6 +146,9 @@ export function createExports(ctx: Context, project: Project): Exports {
     },
     shapeIn(chosen) {
       format = chosen;
+    },
+    only(id) {
+      which = id;
     },
   };
   return exports;
@@ -130,6 +174,14 @@ const SUFFIX: Record<Exclude<ExportKind, "project" | "shape">, string> = {
   weights: "-weights.npz",
   picture: ".png",
 };
+
+/** A name that none of `taken` is: models of one name may come from several folders. */
+function other(name: string, taken: readonly string[]): string {
+  const again = (n: number) => name.replace(/(?=\.\w+$)/, `-${n}`);
+  let n = 2;
+  while (taken.includes(again(n))) n += 1;
+  return taken.includes(name) ? again(n) : name;
+}
 
 /** Hands a file to the browser's downloads. */
 function download(blob: Blob, name: string): void {

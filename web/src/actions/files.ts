@@ -8,7 +8,8 @@ import type { StepName } from "../state";
 import { NO_CLIP } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
-import { attempt, type Context, waitFor } from "./context";
+import { attempt, type Context } from "./context";
+import { modelsOf, type Named, readModels } from "./read";
 
 export interface Files {
   openSample(id: string): Promise<boolean>;
@@ -25,6 +26,8 @@ export interface Follow {
   loadCage(files: readonly NamedFile[]): Promise<boolean>;
   loadControls(files: readonly NamedFile[]): Promise<boolean>;
   bind(): Promise<boolean>;
+  /** Puts another model into the cage that there will be; says what does not work. */
+  join(other: Named): Promise<unknown>;
   /** Takes a project's settings, before the bind. */
   applySettings(settings: Partial<Settings>): void;
   /** And its pose. */
@@ -39,7 +42,12 @@ export interface Follow {
 
 export function createFiles(ctx: Context, follow: Follow): Files {
   const { store } = ctx;
-  const take = async (opened: Opened, sample: string | null, cageFiles?: readonly NamedFile[]) => {
+  const take = async (
+    opened: Opened,
+    sample: string | null,
+    others: readonly Named[] = [],
+    cageFiles?: readonly NamedFile[],
+  ) => {
     // Nobody needs the weights of what was open.
     ctx.queue.cancel("bind");
     const settings = settingsOf(opened);
@@ -61,7 +69,8 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       rigOptions: RIG_DEFAULTS,
       cageClip: null,
       gesture: null,
-      busy: null,
+      painting: null,
+      busy: others.length > 0 ? store.get().busy : null,
     });
     follow.applySettings(settings);
     follow.adoptCage(opened);
@@ -70,6 +79,12 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     follow.applyPose(settings);
     for (const notice of opened.model.notices) ctx.tell.say(sentence(notice));
     if (settings.notices.length > 0) ctx.tell.say(settings.notices.join(" "));
+    // Before there is a cage: it encloses all of them.
+    for (const other of others) await follow.join(other);
+    store.set({ busy: null });
+    const { length } = store.get().model?.members ?? [];
+    const showList = { label: T.models.showList, run: () => store.set({ step: "model" }) };
+    if (others.length > 0 && length > 1) ctx.tell.say(T.models.together(length), showList);
     void prepare(cageFiles, sample !== null || opened.project !== null);
   };
 
@@ -116,12 +131,13 @@ export function createFiles(ctx: Context, follow: Follow): Files {
   const replace = async (
     open: () => Promise<Opened>,
     sample: string | null,
+    others?: readonly Named[],
     cageFiles?: readonly NamedFile[],
   ) => {
     await follow.keep(sample);
     const opened = await open();
     follow.leave();
-    await take(opened, sample, cageFiles);
+    await take(opened, sample, others, cageFiles);
   };
 
   return {
@@ -140,24 +156,9 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       }
       if (plan.kind === "controls" && store.get().cage) return follow.loadControls([main]);
       const second = plan.second === undefined ? undefined : files[plan.second];
-      if (main.file.size === 0) {
-        ctx.tell.problem(
-          {
-            title: T.opening.empty,
-            message: T.opening.noContent(main.name),
-          },
-          ctx.fixFor("file"),
-        );
-        return Promise.resolve(false);
-      }
-      const what = T.opening.file(main.name);
-      const title = T.failed.open(main.name);
-      const cageFiles = second && [second];
-      const own = [main, ...files.filter((file) => file !== second && file !== main)];
-      return busy(what, title, async (signal) => {
-        const read = await waitFor(ctx, signal, what, (hear) => ctx.session().readFiles(own, hear));
-        store.set({ busy: what });
-        await replace(() => ctx.session().open(read), null, cageFiles);
+      return busy(T.opening.file(main.name), T.failed.open(main.name), async (signal) => {
+        const [first, ...others] = await readModels(ctx, signal, modelsOf(files, plan));
+        if (first) await replace(() => ctx.session().open(first.read), null, others, second && [second]);
       });
     },
     turn(up) {
@@ -172,5 +173,6 @@ export function createFiles(ctx: Context, follow: Follow): Files {
 function shownName(opened: Opened, sample: string | null, samples: readonly Sample[]): string {
   const { name } = opened.model;
   const label = samples.find(({ id }) => id === sample)?.label;
-  return label ?? (opened.project ? stem(name) : name);
+  // One with several models is called as they are.
+  return label ?? (opened.project && opened.model.members.length === 1 ? stem(name) : name);
 }

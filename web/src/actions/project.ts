@@ -21,6 +21,7 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]): P
     const state = store.get();
     const controls = shared()?.controls;
     const pose = state.posed ? toBase64Url(ctx.session().engine.encodePose()) : undefined;
+    const models = ctx.session().engine.memberSettings();
     const all: Omit<Settings, "notices"> = {
       bind: state.bindOptions,
       cage: state.cageOptions,
@@ -31,6 +32,7 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]): P
         ? { pose_pins: state.poses.map(({ pins }) => [...(pins ?? [])]) }
         : {}),
       ...(state.sample && state.sampleCage ? { sample: state.sample } : {}),
+      ...(models.length > 0 ? { models } : {}),
       ...(pose ? { pose } : {}),
       ...(controls ? { controls } : {}),
     };
@@ -55,8 +57,8 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]): P
     fileName,
     async link() {
       const { sample, sampleCage, posed, scene } = store.get();
-      if (!sample || !sampleCage) return undefined;
       const { engine } = ctx.session();
+      if (!sample || !sampleCage || engine.memberSettings().length > 0) return undefined;
       const pose = posed ? engine.encodePose() : undefined;
       const seen = { camera: engine.camera(), selected: [...engine.selection()], scene: ofLink(scene) };
       const controls = shared();

@@ -13,7 +13,7 @@ const NUDGE_FAR = 20;
 const NEXT_ELEMENT: Record<CageElement, CageElement> = { vertex: "edge", edge: "face", face: "vertex" };
 
 export function createCommands(app: App): Record<Command, () => void> {
-  const { store, edit, pull, view, poses, cage, bind, exports, tour } = app;
+  const { store, edit, pull, view, poses, cage, bind, painting, exports, tour } = app;
   const engine = () => app.ctx.session().engine;
   const hasCage = () => store.get().cage !== null;
 
@@ -36,9 +36,10 @@ export function createCommands(app: App): Record<Command, () => void> {
     else edit.nudge(right, up);
   };
   const turn = (way: "undo" | "redo") => () => {
-    if (edit.active() || pull.active()) {
+    if (edit.active() || pull.active() || painting.active()) {
       edit.end(false);
       pull.end(false);
+      painting.end(false);
       return;
     }
     edit.settle();
@@ -71,6 +72,8 @@ export function createCommands(app: App): Record<Command, () => void> {
       if (store.get().placing) app.controls.finish();
       else if (edit.active()) edit.end(false);
       else if (pull.active()) pull.end(false);
+      else if (painting.active()) painting.end(false);
+      else if (store.get().painting) painting.on(null);
       else if (store.get().boxArmed) store.set({ boxArmed: false });
       else if (store.get().playing) poses.stop();
       else if (store.get().seeOpen) store.set({ seeOpen: false });

@@ -2,17 +2,19 @@
 
 import type { App } from "../app";
 import type { NamedFile } from "../contract";
+import type { DropPlace } from "../state";
 
 /** Files of a folder that are read at most: a drop of a whole disk must end. */
 const MOST_FILES = 2000;
 
 export function attachDrop(panel: HTMLElement, app: App): void {
   const { store } = app;
-  const onCagePanel = (event: DragEvent) =>
-    store.get().step === "cage" &&
-    store.get().model !== null &&
-    event.target instanceof Node &&
-    panel.contains(event.target);
+  const placeOf = ({ target }: DragEvent): DropPlace => {
+    const { step, model } = store.get();
+    if (!model || !(target instanceof Element) || !panel.contains(target)) return "page";
+    if (target.closest("[data-adds]")) return "list";
+    return step === "cage" ? "cage" : "page";
+  };
   const hide = () => store.set({ hovering: null });
 
   window.addEventListener("dragover", (event) => {
@@ -20,7 +22,7 @@ export function attachDrop(panel: HTMLElement, app: App): void {
     event.preventDefault();
     event.dataTransfer.dropEffect = "copy";
     const files = [...event.dataTransfer.items].filter((item) => item.kind === "file").length;
-    store.set({ hovering: { files, asCage: onCagePanel(event) } });
+    store.set({ hovering: { files, to: placeOf(event) } });
   });
   window.addEventListener("dragleave", (event) => {
     if (event.relatedTarget === null) hide();
@@ -29,10 +31,11 @@ export function attachDrop(panel: HTMLElement, app: App): void {
     if (!event.dataTransfer?.types.includes("Files")) return;
     event.preventDefault();
     hide();
-    const asCage = onCagePanel(event);
-    void collect(event.dataTransfer).then((files) =>
-      asCage ? app.cage.load(files) : app.files.openFiles(files),
-    );
+    const to = placeOf(event);
+    void collect(event.dataTransfer).then((files) => {
+      if (to === "cage") return app.cage.load(files);
+      return to === "list" ? app.models.add(files) : app.files.openFiles(files);
+    });
   });
 }
 

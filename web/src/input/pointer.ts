@@ -22,12 +22,13 @@ type Drag =
   | { kind: "pull"; started: boolean }
   | { kind: "pin" }
   | { kind: "place" }
+  | { kind: "paint" }
   | { kind: "gizmo" }
   | { kind: "box"; mode: SelectMode };
 
 export function attachPointer(stage: Stage, app: App): void {
   const { viewport } = stage;
-  const { store, edit, pull, controls } = app;
+  const { store, edit, pull, controls, painting } = app;
   const engine = () => app.ctx.session().engine;
   const ready = () => store.get().busy === null && store.get().model !== null;
   let drag: Drag | undefined;
@@ -54,6 +55,10 @@ export function attachPointer(stage: Stage, app: App): void {
     if (event.altKey && event.button !== 0) return { kind: event.button === 1 ? "pan" : "zoom" };
     if (event.button !== 0) return { kind: "pan" };
     if (store.get().placing) return { kind: "place" };
+    if (store.get().painting) {
+      const kind = !event.altKey && painting.begin(at.x, at.y) ? "paint" : event.shiftKey ? "pan" : "orbit";
+      return { kind };
+    }
     if (event.altKey) {
       const vertices =
         store.get().cage && store.get().scene.cage ? engine().pick(at.x, at.y, MOUSE_RADIUS) : [];
@@ -145,6 +150,9 @@ export function attachPointer(stage: Stage, app: App): void {
         drag.started ||= pull.begin(start.x, start.y);
         if (drag.started) pull.drag(at.x, at.y);
         break;
+      case "paint":
+        painting.drag(at.x, at.y);
+        break;
       case "pin":
         engine().pan(dx, dy);
         break;
@@ -182,6 +190,9 @@ export function attachPointer(stage: Stage, app: App): void {
         break;
       case "pin":
         if (keep && !moved) pull.pin(start.x, start.y);
+        break;
+      case "paint":
+        painting.end(keep);
         break;
       case "place":
         if (keep && !moved) controls.place(start.x, start.y);
@@ -248,7 +259,7 @@ export function attachPointer(stage: Stage, app: App): void {
         hoverFrame = 0;
         if (!drag && ready() && store.get().placing) {
           controls.hover(pointer.x, pointer.y);
-        } else if (!drag && ready() && store.get().cage) {
+        } else if (!drag && ready() && store.get().cage && !store.get().painting) {
           const under = engine().pick(pointer.x, pointer.y, MOUSE_RADIUS);
           engine().hover(under);
           const isOver = under.length > 0;

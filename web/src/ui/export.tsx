@@ -35,6 +35,7 @@ export function ExportPanel({ app }: { app: App }) {
   return (
     <div class="stack loose">
       <Head title={T.exports.title} sentence={T.exports.sentence} />
+      <Which app={app} />
       <ul class="stack">
         {ITEMS.filter(([kind]) => kind !== "controls" || hasInside).map(([kind, icon]) => (
           <Item key={kind} app={app} kind={kind} icon={icon} />
@@ -72,6 +73,28 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
       {kind === "glb" && <RigExport app={app} />}
       {kind === "shape" && <ShapeFormat app={app} />}
     </li>
+  );
+}
+
+/** Of which of several models the files are. */
+function Which({ app }: { app: App }) {
+  const [chosen, setChosen] = useState("");
+  const members = app.store.get().model?.members ?? [];
+  const which = members.find(({ id }) => String(id) === chosen)?.id ?? null;
+  useEffect(() => app.exports.only(which), [app, which]);
+  if (members.length < 2) return null;
+  return (
+    <label class="stack tight">
+      <span class="legend-text">{T.exports.which}</span>
+      <select value={which ?? ""} onChange={({ currentTarget: { value } }) => setChosen(value)}>
+        <option value="">{T.exports.all(members.length)}</option>
+        {members.map(({ id, name }) => (
+          <option key={id} value={id}>
+            {name}
+          </option>
+        ))}
+      </select>
+    </label>
   );
 }
 

@@ -8,13 +8,15 @@ import { Icon } from "./icons";
 export function Hover({ app }: { app: App }) {
   const { hovering, model, step } = app.store.get();
   if (!hovering) return null;
-  const { files, asCage } = hovering;
+  const { files, to } = hovering;
   return (
-    <div class="drop-overlay" data-panel={asCage ? "" : undefined} aria-hidden="true">
+    <div class="drop-overlay" data-panel={to === "page" ? undefined : ""} aria-hidden="true">
       <div class="drop-card">
         <Icon name="upload" />
-        <strong>{asCage ? T.opening.dropAsCage : T.opening.dropToOpen}</strong>
-        <p>{asCage ? T.opening.asCage : hoverSentence(files, model !== null, step === "cage")}</p>
+        <strong>{T.opening.dropTo[to]}</strong>
+        <p>
+          {to === "page" ? hoverSentence(files, model !== null, step === "cage") : T.opening.becomes[to]}
+        </p>
       </div>
     </div>
   );

@@ -1,18 +1,22 @@
 /** The page's icons: Lucide's, 24 x 24, strokes only; and the product's mark. */
 
 import {
+  Anchor,
   ArrowUpFromLine,
   Bandage,
   Bone,
   Box,
+  Brush,
   Check,
   CircleDot,
   CircleQuestionMark,
   Download,
   Eye,
+  EyeOff,
   File,
   Focus,
   FolderOpen,
+  Gem,
   Grid2x2,
   Hand,
   Hexagon,
@@ -113,6 +117,10 @@ const ICONS = {
   extrude: ArrowUpFromLine,
   patch: Bandage,
   bone: Bone,
+  hidden: EyeOff,
+  rigid: Gem,
+  stays: Anchor,
+  brush: Brush,
 } satisfies Record<string, IconNode>;
 
 export type IconName = keyof typeof ICONS;

@@ -8,12 +8,26 @@ import { sentence } from "../strings";
 import { T } from "../words";
 import { Badge, Button, Facts, Head, Section, Segments } from "./controls";
 import { Icon, type IconName } from "./icons";
+import { Models } from "./models";
 
 /** Until a sample's picture is there. */
 const ICONS: Record<string, IconName> = { rat: "spark", humanoid: "pose", clamp: "bind" };
 
 export function ModelPanel({ app }: { app: App }) {
   const { model, sample, samples, works } = app.store.get();
+  const open = model && (
+    <>
+      {model.members.length === 1 && (
+        <ModelCard model={model} about={samples.find(({ id }) => id === sample)?.sentence} />
+      )}
+      <Models app={app} model={model} />
+      {model.notices.map((notice) => (
+        <p class="hint" key={notice}>
+          {sentence(notice)}
+        </p>
+      ))}
+    </>
+  );
   return (
     <div class="stack loose">
       <Head title={T.model.title} sentence={T.model.sentence} />
@@ -38,6 +52,7 @@ export function ModelPanel({ app }: { app: App }) {
           />
         </div>
       )}
+      {sample === null && open}
       <Section title={T.model.samples}>
         <ul class="gallery">
           {samples.map((one) => (
@@ -45,7 +60,7 @@ export function ModelPanel({ app }: { app: App }) {
           ))}
         </ul>
       </Section>
-      {model && <ModelCard model={model} about={samples.find(({ id }) => id === sample)?.sentence} />}
+      {sample !== null && open}
       {model && (
         <Segments<UpAxis>
           label={T.model.up}
@@ -130,11 +145,6 @@ function ModelCard({ model, about }: { model: ModelInfo; about: string | undefin
       </div>
       {about && <p class="hint">{about}</p>}
       <Facts rows={rows} />
-      {model.notices.map((notice) => (
-        <p class="hint" key={notice}>
-          {sentence(notice)}
-        </p>
-      ))}
     </section>
   );
 }

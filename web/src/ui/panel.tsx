@@ -46,7 +46,11 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
       };
     case "export":
       return {
-        primary: { label: T.panel.download, icon: "download", run: () => void app.exports.save("glb") },
+        primary: {
+          label: (state.model?.members.length ?? 0) > 1 ? T.panel.downloadAs : T.panel.download,
+          icon: "download",
+          run: () => void app.exports.save("glb"),
+        },
       };
     default:
       return state.step satisfies never;

@@ -14,10 +14,11 @@ import { hintOf, statusOf, underWay } from "./status";
 
 /** Everything that lies on the view; `stage` says by an attribute whether the cage at rest is shaped. */
 export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
-  const { cage, scene, editingRest } = app.store.get();
+  const { cage, scene, editingRest, painting } = app.store.get();
   useLayoutEffect(() => {
     stage.toggleAttribute("data-rest", editingRest);
-  }, [stage, editingRest]);
+    stage.toggleAttribute("data-painting", painting !== null);
+  }, [stage, editingRest, painting]);
   return (
     <>
       {cage && <Mode app={app} />}
@@ -63,14 +64,15 @@ function isPlain(cage: CageState | null): boolean {
   return !cage || (cage.controls.smooth === 0 && cage.controls.inner === 0);
 }
 
-/** Ends what clicks put inside: fingers have no Enter. */
+/** Ends what clicks put inside, or painting: fingers have no Enter and no Escape. */
 function Placing({ app }: { app: App }) {
-  const { placing } = app.store.get();
-  const label = placing === "line" ? T.view.done : T.view.cancel;
+  const { placing, painting } = app.store.get();
+  const label = placing === "line" || painting ? T.view.done : T.view.cancel;
+  const end = painting ? () => app.painting.on(null) : app.controls.finish;
   return (
-    placing && (
+    (placing || painting) && (
       <div class="floating placing">
-        <Button label={label} kind="small" onClick={app.controls.finish} />
+        <Button label={label} kind="small" onClick={end} />
       </div>
     )
   );

@@ -16,6 +16,7 @@ export function underWay(state: AppState): string | null {
   if (state.cageProgress !== null) return T.bind.stages.simplify;
   if (state.bindRun) return T.bind.stages[state.bindRun.stage];
   if (state.placing) return T.status.placing[state.placing];
+  if (state.painting) return T.models.painting;
   if (state.boxArmed) return T.status.boxArmed;
   if (state.playing) return T.status.playing(state.playingPose ?? T.status.rest);
   if (cageBroken(state)) return T.status.broken;
@@ -34,8 +35,9 @@ function settled(state: AppState): string {
 
 /** What the status line suggests when nothing else is going on. */
 export function hintOf(state: AppState, isTouch: boolean): string {
-  const { cage, bound, bindRun, editingRest, clip, placing } = state;
+  const { cage, bound, bindRun, editingRest, clip, placing, painting } = state;
   if (placing) return T.hints.placing;
+  if (painting) return isTouch ? T.models.hintTouch : T.models.hint;
   if (!cage) return T.hints.noCage;
   if (clip.clip !== null) return T.hints.clip;
   if (editingRest) return isTouch ? T.hints.restTouch : T.hints.rest;

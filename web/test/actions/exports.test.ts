@@ -1,7 +1,10 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import { createExports } from "../../src/actions/exports";
 import { createProject } from "../../src/actions/project";
-import { cageOf, createFake, MODEL, settled } from "../fake";
+import { cageOf, createFake, MODEL, memberOf, modelOf, settled } from "../fake";
+
+/** What a project says of a model that keeps its shape. */
+const SETTINGS = { first_triangle: 0, options: { shown: true, rigid: ["all"], stays: [] }, painted: [] };
 
 /** Names of downloads. */
 let downloads: string[] = [];
@@ -40,7 +43,7 @@ it("each file has the model's name, and its size is said", async () => {
     exportGlb: () => new Uint8Array(2000),
     rigNotices: () => ["3 of 4 joints moved"],
     exportCage: () => Uint8Array.of(1),
-    exportShape: (format: string) => new TextEncoder().encode(format),
+    exportShape: (_id: number, format: string) => new TextEncoder().encode(format),
   });
   await exports.save("glb");
   await exports.save("cage");
@@ -53,6 +56,38 @@ it("each file has the model's name, and its size is said", async () => {
   await exports.save("shape");
   expect(downloads.at(-1), "its shape is another file").toBe("someone-posed.stl");
   expect(said.at(-1)).toContain("(3 byte)");
+});
+
+it("several models leave as a file each, or one of them alone", async () => {
+  const { exports, teach, said, store } = page();
+  const members = [memberOf(4, "body.vrm"), memberOf(5, "a/shirt.glb"), memberOf(7, "shirt.glb")];
+  store.set({ model: modelOf(members) });
+  const asked: number[] = [];
+  teach({
+    exportGlb: (id: number) => {
+      asked.push(id);
+      return new Uint8Array(1000);
+    },
+    rigNotices: () => ["3 of 4 joints moved"],
+    exportWeights: () => Uint8Array.of(1),
+    exportCage: () => Uint8Array.of(1),
+  });
+  await exports.save("glb");
+  expect([asked, downloads]).toEqual([
+    [4, 5, 7],
+    ["body-posed.vrm", "shirt-posed.glb", "shirt-posed-2.glb"],
+  ]);
+  expect(said).toEqual([
+    "body-posed.vrm, shirt-posed.glb, and shirt-posed-2.glb are in your downloads (3 kB).",
+    "3 of 4 joints moved.",
+  ]);
+  exports.only(5);
+  await exports.save("weights");
+  await exports.save("cage");
+  expect(downloads.slice(3), "the cage is all of theirs").toEqual(["shirt-weights.npz", "body-cage.obj"]);
+  exports.only(6);
+  await exports.save("weights");
+  expect(downloads.length, "one that is gone is no choice").toBe(8);
 });
 
 it("an export that fails is a problem, and no file", async () => {
@@ -77,7 +112,7 @@ it("only poses of the cage that is open are exported", async () => {
   store.set({ poses: [pose("Fits", 6), pose("Of another cage", 9)] });
   const names: (readonly string[])[] = [];
   teach({
-    exportPoses: (given: readonly string[]) => {
+    exportPoses: (_id: number, given: readonly string[]) => {
       names.push(given);
       return Uint8Array.of(1);
     },
@@ -98,6 +133,10 @@ it("a project holds the page's settings", async () => {
   });
   store.set({ posed: true, sample: "rat", sampleCage: true, symmetry: true });
   project.write();
+  expect(written[0], "one model without choices says nothing").not.toContain("models");
+  teach({ memberSettings: () => [SETTINGS] });
+  project.write();
+  expect(JSON.parse(written[1] ?? "").models).toEqual([SETTINGS]);
   expect(JSON.parse(written[0] ?? "")).toMatchObject({
     bind: { grid: 64 },
     cage: { vertices: 80 },
@@ -109,10 +148,13 @@ it("a project holds the page's settings", async () => {
 });
 
 it("a link is for samples in their own cage; others are told what to do instead", async () => {
-  const { exports, store, said } = page();
+  const { exports, store, said, teach } = page();
   await exports.share();
   expect([copied, said[0]]).toEqual([[], expect.stringContaining("Save a project file")]);
   store.set({ sample: "rat", sampleCage: true });
   await exports.share();
   expect(copied).toEqual([expect.stringMatching(/^https:\/\/cagework\.example\/#.*rat/)]);
+  teach({ memberSettings: () => [SETTINGS] });
+  await exports.share();
+  expect([copied.length, said.length], "what keeps its shape is not in it").toEqual([1, 3]);
 });

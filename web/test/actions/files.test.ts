@@ -1,7 +1,7 @@
 import { named } from "@cagework/core/session/client";
 import { expect, it } from "vitest";
 import { createFiles } from "../../src/actions/files";
-import { cageOf, createFake, MODEL, OPENED, settled } from "../fake";
+import { cageOf, createFake, MODEL, memberOf, modelOf, OPENED, settled } from "../fake";
 
 const file = (name: string, content = "v") => ({ name, path: name, file: new Blob([content]) });
 
@@ -23,6 +23,10 @@ function page() {
     async loadCage(list) {
       steps.push(`load ${list[0]?.name}`);
       return true;
+    },
+    async join({ name }) {
+      steps.push(`join ${name}`);
+      fake.store.set({ model: modelOf([memberOf(0, "body.glb"), memberOf(1, name)]) });
     },
     async bind() {
       steps.push("bind");
@@ -51,6 +55,30 @@ it("a model that is dropped gets a cage and is bound; what was open is kept firs
   await settled();
   expect(steps).toEqual(["keep", "leave", "pose undefined", "make a cage", "bind"]);
   expect(store.get()).toMatchObject({ model: { name: "cube.obj" }, sample: null, busy: null, step: "pose" });
+});
+
+it("models dropped together are all in before there is a cage; one that cannot be read is named", async () => {
+  const { files, asked, steps, problems, store, said } = page();
+  const list = ["bad.glb", "body.glb", "skin.png", "shirt.gltf", "body-cage.obj"].map((name) => file(name));
+  const opened = files.openFiles(list);
+  await settled();
+  asked[0]?.reject(named("Format", "bad.glb: not a GLB"));
+  for (const at of [1, 2]) {
+    await settled();
+    asked[at]?.resolve({ took: 0 });
+  }
+  await settled();
+  expect(asked[2]?.input, "with what may belong to it").toMatchObject([
+    { name: "shirt.gltf" },
+    { name: "skin.png" },
+  ]);
+  asked[3]?.resolve(OPENED);
+  expect(await opened).toBe(true);
+  await settled();
+  expect(steps).toEqual(["keep", "leave", "pose undefined", "join shirt.gltf", "load body-cage.obj"]);
+  expect(problems).toMatchObject([{ title: "bad.glb could not be opened" }]);
+  expect(said).toEqual(["2 models share this cage."]);
+  expect(store.get().busy).toBeNull();
 });
 
 it("a second file ends the reading of the first", async () => {

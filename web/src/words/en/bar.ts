@@ -27,6 +27,7 @@ export const panel = {
   export: "Export",
   savePose: "Save pose",
   download: "Download the GLB",
+  downloadAs: "Download as GLB",
   makeCage: "Make a cage",
   newCage: "Make a new cage",
 };

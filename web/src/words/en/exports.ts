@@ -1,6 +1,6 @@
 /** Step Export. */
 
-import { bytes, plural } from "../../format";
+import { bytes, list, plural } from "../../format";
 
 export const exports = {
   title: "Take it along",
@@ -28,9 +28,12 @@ export const exports = {
   sizes: ["As shown", "Twice", "Four times"],
   alone: "The model alone",
   aloneSentence: "Without cage and floor, transparent around it.",
-  saved: (file: string, size: number) => `${file} is in your downloads (${bytes(size)}).`,
+  which: "Which model",
+  all: (n: number) => `All ${n}, each to its own file`,
+  saved: (files: readonly string[], size: number) =>
+    `${list(files)} ${files.length === 1 ? "is" : "are"} in your downloads (${bytes(size)}).`,
   noLink:
-    "A link can hold a sample in its own cage and pose, but no files of yours. Save a project file to pass this on.",
+    "A link holds a sample in its own cage and pose: no files of yours, and not what keeps its shape or stays. Save a project file to pass this on.",
   saveProject: "Save the project",
   copied: "Link copied. Whoever opens it sees this sample in this pose, as you see it.",
   inAddress: "The link is in the address bar; copy it from there.",

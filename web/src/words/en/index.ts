@@ -8,6 +8,7 @@ import { clips } from "./clips";
 import { crash, failed, fixes, lost } from "./errors";
 import { exports } from "./exports";
 import { model, opening } from "./model";
+import { models } from "./models";
 import { did, pose, pull } from "./pose";
 import { legend, see } from "./see";
 import { sheet } from "./sheet";
@@ -33,6 +34,7 @@ export const EN = {
   bar,
   panel,
   model,
+  models,
   opening,
   works,
   cage,

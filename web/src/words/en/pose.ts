@@ -100,5 +100,11 @@ export const did = {
   removeControls: "Delete controls inside",
   loadControls: "Load controls inside",
   repairCage: "Repair the cage",
+  addModels: (n: number) => (n === 1 ? "Add a model" : `Add ${n} models`),
+  binModel: (name: string) => `Take ${name} out`,
+  parts: (name: string) => `What of ${name} follows`,
+  paint: "Paint what stays",
+  erase: "Paint what follows",
+  clearPaint: "Clear what is painted",
   poseName: (n: number) => `Pose ${n}`,
 };

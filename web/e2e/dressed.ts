@@ -1,0 +1,128 @@
+/** A body in its clothes, as tests see it. */
+
+import { readFileSync } from "node:fs";
+import type { Download, Page } from "@playwright/test";
+import { validationErrors } from "./models";
+import { bound, type Dropped, drop, expect, largestMove, modelPositions } from "./support";
+import { pointsOf, SIZES, wardrobe } from "./wardrobe";
+
+/** Of the buckle's size: what keeps its shape does so up to rounding. */
+export const RIGID = 1e-5;
+/** What is drawn is what is exported, up to the file's rounding. */
+export const SAME = 1e-5;
+export const BUCKLE = 0.2;
+
+export const step = (page: Page, name: string) =>
+  page.getByRole("button", { name, exact: false }).first().click();
+export const rows = (page: Page) => page.locator("[data-adds] li.card");
+export const row = (page: Page, name: string) => page.getByRole("listitem", { name });
+export const press = (page: Page, name: string) => page.getByRole("button", { name, exact: true }).click();
+export const undo = (page: Page) => page.keyboard.press("Control+z");
+
+/** Drops the three and waits until they are bound; shows the list. */
+export async function dressed(page: Page): Promise<readonly Dropped[]> {
+  const files = await wardrobe();
+  await drop(page, files);
+  await expect(page).toHaveTitle(/body\.glb and 2 more/);
+  await bound(page);
+  await step(page, "Model");
+  await expect(rows(page)).toHaveCount(3);
+  return files;
+}
+
+/** Bends all of the cage: no part of what is inside keeps its shape, or stays, by itself. */
+export async function bend(page: Page): Promise<void> {
+  await page.evaluate(() => {
+    const engine = globalThis.cagework?.engine;
+    const rest = engine?.restPositions() ?? new Float32Array();
+    const height = (k: number) => rest[k - (k % 3) + 1] ?? 0;
+    engine?.setCagePositions(
+      rest.map((x, k) => (k % 3 === 0 ? (1 + 0.2 * height(k)) * x + 0.15 * height(k) ** 2 : x)),
+    );
+  });
+}
+
+/** Of all models, in the order of the list: body, shirt, buckle. */
+export function apart(all: readonly number[]) {
+  const [shirt, buckle] = [3 * SIZES.body, 3 * (SIZES.body + SIZES.shirt)];
+  return { body: all.slice(0, shirt), shirt: all.slice(shirt, buckle), buckle: all.slice(buckle) };
+}
+
+/** All files that one click brings. */
+export async function downloads(page: Page, kind: string, n: number): Promise<Dropped[]> {
+  await step(page, "Export");
+  const heard: Download[] = [];
+  const hear = (file: Download) => heard.push(file);
+  page.on("download", hear);
+  await page.locator(`button[data-kind="${kind}"]`).click();
+  await expect.poll(() => heard.length).toBe(n);
+  page.off("download", hear);
+  return Promise.all(
+    heard.map(async (file) => ({ name: file.suggestedFilename(), bytes: readFileSync(await file.path()) })),
+  );
+}
+
+/** What is exported of each is what is drawn of it. */
+export async function exportsEach(page: Page): Promise<Record<"body" | "shirt" | "buckle", number[]>> {
+  const drawn = apart(await modelPositions(page));
+  const files = await downloads(page, "glb", 3);
+  expect(files.map(({ name }) => name).sort()).toEqual([
+    "body-posed.glb",
+    "buckle-posed.glb",
+    "shirt-posed.glb",
+  ]);
+  const found = { body: [] as number[], shirt: [] as number[], buckle: [] as number[] };
+  for (const name of ["body", "shirt", "buckle"] as const) {
+    const file = files.find((one) => one.name.startsWith(name));
+    expect(await validationErrors(file?.bytes ?? new Uint8Array())).toEqual([]);
+    found[name] = file ? await pointsOf(file) : [];
+    expect(found[name].length).toBe(3 * SIZES[name]);
+    expect(largestMove(found[name], drawn[name]), `${name} as it is drawn`).toBeLessThan(SAME);
+  }
+  return found;
+}
+
+/** How much of the body's skin and trousers does not move, up to a distance: a graphics card rounds, an export does not. */
+export function still(
+  points: readonly number[],
+  rest: readonly number[],
+  within = SAME,
+): [skin: number, trousers: number] {
+  const half = SIZES.body / 2;
+  const kept = Array.from({ length: SIZES.body }, (_, v) =>
+    [0, 1, 2].every((c) => Math.abs((points[3 * v + c] ?? 0) - (rest[3 * v + c] ?? 0)) <= within),
+  );
+  const share = (list: boolean[]) => list.filter(Boolean).length / half;
+  return [share(kept.slice(0, half)), share(kept.slice(half))];
+}
+
+/** A place of the view where the brush touches a model, beside its handles; nothing is left painted. */
+export async function paintable(page: Page, id: number): Promise<{ x: number; y: number }> {
+  const look = (id: number) => {
+    const engine = globalThis.cagework?.engine;
+    const {
+      left = 0,
+      top = 0,
+      width = 0,
+      height = 0,
+    } = document.querySelector("canvas")?.getBoundingClientRect() ?? {};
+    const before = engine?.painted(id) ?? new Uint8Array();
+    for (let y = 0.1 * height; y < height; y += 6) {
+      for (let x = 0.3 * width; x < 0.7 * width; x += 6) {
+        // Well within: its neighbours are the model's as well.
+        const isOn = [0, 14].every((d) => engine?.paint(x + d, y + d, 0.005, 255));
+        if (!isOn) continue;
+        engine?.setPainted(id, before);
+        engine?.showPainting(id);
+        return { x: left + x, y: top + y };
+      }
+    }
+    throw new Error("the brush finds nothing");
+  };
+  let found = { x: 0, y: 0 };
+  await expect(async () => {
+    // The graphics card may be busy with the stroke before.
+    found = await page.evaluate(look, id);
+  }).toPass();
+  return found;
+}

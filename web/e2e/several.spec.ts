@@ -1,0 +1,176 @@
+/** Several models in one cage: dropped together, each with its own way to follow, each its own file again. */
+
+import {
+  apart,
+  BUCKLE,
+  bend,
+  downloads,
+  dressed,
+  exportsEach,
+  paintable,
+  press,
+  RIGID,
+  row,
+  rows,
+  SAME,
+  step,
+  still,
+  undo,
+} from "./dressed";
+import { savedSince } from "./kept";
+import { validationErrors } from "./models";
+import {
+  bound,
+  download,
+  drag,
+  drawn,
+  drop,
+  expect,
+  largestMove,
+  modelPositions,
+  open,
+  pull,
+  shoot,
+  test,
+} from "./support";
+import { distances, pointsOf, SIZES } from "./wardrobe";
+
+test("a body, its shirt and a buckle are dropped, told apart, undone, exported and kept", async ({
+  page,
+}) => {
+  await open(page);
+  const files = await dressed(page);
+  const rest = await modelPositions(page);
+  const own = apart(rest);
+
+  await test.step("one cage, one bind, and all of them follow", async () => {
+    expect(rest.length / 3).toBe(SIZES.body + SIZES.shirt + SIZES.buckle);
+    const cage = await page.evaluate(() => globalThis.cagework?.engine.cageCorners().length ?? 0);
+    expect(cage).toBeGreaterThan(0);
+    await drag(page, 50, -30);
+    const moved = apart(await modelPositions(page));
+    for (const name of ["body", "shirt", "buckle"] as const)
+      expect(largestMove(moved[name], own[name]), name).toBeGreaterThan(1e-6);
+    await undo(page);
+    await shoot(page, "several");
+  });
+
+  await test.step("an eye hides one", async () => {
+    const picture = async () => {
+      await drawn(page);
+      return page.locator("canvas").first().screenshot();
+    };
+    // Away from the handles, which show that the pointer is near.
+    await page.getByRole("button", { name: "Hide shirt.glb" }).hover();
+    const before = await picture();
+    await press(page, "Hide shirt.glb");
+    await expect(row(page, "shirt.glb")).toContainText("hidden");
+    expect(before.equals(await picture())).toBe(false);
+    await press(page, "Hide shirt.glb");
+    expect(before.equals(await picture())).toBe(true);
+  });
+
+  await bend(page);
+  const bent = apart(await modelPositions(page));
+  const size = (points: readonly number[]) => distances(points);
+  const worst = (points: readonly number[]) =>
+    Math.max(...size(points).map((d, k) => Math.abs(d - (size(own.buckle)[k] ?? 0))));
+
+  await test.step("the buckle keeps its shape, the trousers stay; each is undone", async () => {
+    expect(worst(bent.buckle), "bent, if nobody says otherwise").toBeGreaterThan(0.01);
+    await press(page, "buckle.glb keeps its shape");
+    await expect(row(page, "buckle.glb")).toContainText("keeps its shape");
+    expect(worst(apart(await modelPositions(page)).buckle)).toBeLessThan(RIGID * BUCKLE);
+    await undo(page);
+    expect(worst(apart(await modelPositions(page)).buckle)).toBeGreaterThan(0.01);
+    await page.keyboard.press("Control+y");
+
+    await row(page, "body.glb").getByText("What follows the cage").click();
+    await press(page, "Trousers stays as it is");
+    expect(still(apart(await modelPositions(page)).body, own.body)).toEqual([expect.any(Number), 1]);
+    await undo(page);
+    expect(still(apart(await modelPositions(page)).body, own.body)[1]).toBeLessThan(0.2);
+    await page.keyboard.press("Control+y");
+  });
+
+  await test.step("a stroke of the brush stays, another takes some of it back", async () => {
+    await row(page, "body.glb").getByRole("button", { name: "Paint what stays" }).click();
+    await page.getByRole("slider", { name: "Size of the brush" }).fill("0.15");
+    const before = still(apart(await modelPositions(page)).body, own.body)[0];
+    await shoot(page, "several-painting");
+    await pull(page, await paintable(page, 0), 12, 12);
+    const painted = still(apart(await modelPositions(page)).body, own.body)[0];
+    expect(painted).toBeGreaterThan(before);
+    expect(painted, "not all of it").toBeLessThan(0.9);
+    await expect(row(page, "body.glb")).toContainText("painted");
+    await undo(page);
+    expect(still(apart(await modelPositions(page)).body, own.body)[0]).toBe(before);
+    await page.keyboard.press("Control+y");
+    await page.getByRole("radio", { name: "Follows again" }).check({ force: true });
+    // What stays has gone back to where it rests: another place is under the pointer.
+    await pull(page, await paintable(page, 0), 2, 6);
+    expect(still(apart(await modelPositions(page)).body, own.body)[0]).toBeLessThan(painted);
+    await undo(page);
+    await page.keyboard.press("Escape");
+    await expect(row(page, "body.glb").getByRole("button", { name: "Paint what stays" })).toBeVisible();
+  });
+
+  const exported = await test.step("each leaves as its own file", async () => {
+    const found = await exportsEach(page);
+    expect(worst(found.buckle)).toBeLessThan(RIGID * BUCKLE);
+    const before = await pointsOf(files[0] ?? { bytes: new Uint8Array() });
+    const [skin, trousers] = still(found.body, before, 0);
+    expect([skin > 0, trousers], "the trousers to the last bit").toEqual([true, 1]);
+    await page.getByRole("combobox", { name: "Which model" }).selectOption({ label: "shirt.glb" });
+    const [alone] = await downloads(page, "weights", 1);
+    expect(alone?.name).toBe("shirt-weights.npz");
+    return found;
+  });
+
+  await test.step("the shirt is taken out, and comes back", async () => {
+    await step(page, "Model");
+    await press(page, "Take shirt.glb out of the cage");
+    await expect(rows(page)).toHaveCount(2);
+    await bound(page);
+    expect((await modelPositions(page)).length / 3).toBe(SIZES.body + SIZES.buckle);
+    await undo(page);
+    await expect(rows(page)).toHaveCount(3);
+    await bound(page);
+    expect(largestMove(apart(await modelPositions(page)).shirt, exported.shirt)).toBeLessThan(SAME);
+  });
+
+  const same = async () => {
+    await step(page, "Model");
+    await expect(rows(page)).toHaveCount(3);
+    for (const [name, text] of [
+      ["body.glb", /1 part stays.*painted/],
+      ["buckle.glb", /keeps its shape/],
+    ] as const)
+      await expect(row(page, name)).toContainText(text);
+    const again = await exportsEach(page);
+    for (const name of ["body", "shirt", "buckle"] as const)
+      expect(largestMove(again[name], exported[name]), name).toBeLessThan(SAME);
+  };
+
+  await test.step("a reload brings all of it back", async () => {
+    const moment = await page.evaluate(() => Date.now());
+    await drag(page, 3, 0);
+    await undo(page);
+    await expect.poll(() => savedSince(page, moment), { timeout: 60_000 }).toBe(true);
+    await page.reload();
+    await bound(page);
+    await same();
+  });
+
+  await test.step("and so does a project", async () => {
+    await bend(page);
+    const project = await download(page, "project");
+    expect(project.name).toBe("body.cagework.glb");
+    expect(await validationErrors(project.bytes)).toEqual([]);
+    await page.evaluate(() => globalThis.cagework?.openSample("clamp"));
+    await drop(page, [project]);
+    await expect(page).toHaveTitle(/body/);
+    await bound(page);
+    await same();
+  });
+});

@@ -1,0 +1,197 @@
+/** The models that share the cage, and what of each follows it. */
+
+import type { How } from "../actions/models";
+import type { App } from "../app";
+import type { MemberInfo, ModelInfo } from "../contract";
+import { percent } from "../format";
+import { T } from "../words";
+import { Button, Fold, IconButton, Section, Segments, Slider } from "./controls";
+import { Icon, type IconName } from "./icons";
+
+/** Sizes of the brush, over the model's size. */
+const THINNEST = 0.01;
+const THICKEST = 0.3;
+const ALL = "all";
+const WAYS: readonly (readonly [How, IconName])[] = [
+  ["rigid", "rigid"],
+  ["stays", "stays"],
+];
+
+export function Models({ app, model }: { app: App; model: ModelInfo }) {
+  const [only, ...others] = model.members;
+  return (
+    <Section title={T.models.title}>
+      <div class="stack" data-adds="">
+        {only && others.length === 0 && <Parts app={app} member={only} isAlone />}
+        {others.length > 0 && (
+          <>
+            <Signs />
+            <ul class="stack">
+              {model.members.map((member) => (
+                <Row key={member.id} app={app} member={member} />
+              ))}
+            </ul>
+          </>
+        )}
+        <div class="row">
+          <Button label={T.models.add} icon="plus" kind="small" onClick={app.chooseMore} />
+          <p class="hint grow">{T.models.addHint}</p>
+        </div>
+      </div>
+    </Section>
+  );
+}
+
+/** What the signs of the buttons mean: fingers see no tool tips. */
+function Signs() {
+  return (
+    <p class="hint signs">
+      <Icon name="rigid" /> {T.models.is.rigid}
+      <Icon name="stays" /> {T.models.is.stays}
+    </p>
+  );
+}
+
+function Row({ app, member }: { app: App; member: MemberInfo }) {
+  const { id, name, options } = member;
+  return (
+    <li class="card stack tight" aria-label={name}>
+      <div class="row">
+        <div class="grow">
+          <strong class="clip">{name}</strong>
+          <p class="hint">{about(member)}</p>
+        </div>
+        <div class="row icons">
+          <IconButton
+            icon={options.shown ? "eye" : "hidden"}
+            label={T.models.hide(name)}
+            tip={options.shown ? T.models.hideTip : T.models.show}
+            kind="small"
+            pressed={!options.shown}
+            onClick={() => app.models.show(id, !options.shown)}
+          />
+          <Ways app={app} member={member} part={ALL} label={name} />
+          <IconButton
+            icon="trash"
+            label={T.models.bin(name)}
+            kind="small"
+            onClick={() => void app.models.bin(id)}
+          />
+        </div>
+      </div>
+      <Parts app={app} member={member} />
+    </li>
+  );
+}
+
+/** How many vertices it has, and what is not as usual. */
+function about({ vertices, options, painted }: MemberInfo): string {
+  const { shown, rigid, stays } = options;
+  const isWhole = rigid.includes(ALL) || stays.includes(ALL);
+  return [
+    T.models.vertices(vertices),
+    !shown && T.models.is.hidden,
+    rigid.includes(ALL) && T.models.is.rigid,
+    stays.includes(ALL) && T.models.is.stays,
+    !isWhole && T.models.some(rigid.length, stays.length),
+    painted && T.models.is.painted,
+  ]
+    .filter(Boolean)
+    .join(" · ");
+}
+
+/** Two buttons: keeps its shape, stays as it is. One takes the other back. */
+function Ways(props: { app: App; member: MemberInfo; part: string; label: string; disabled?: boolean }) {
+  const { app, member, part, label, disabled } = props;
+  return WAYS.map(([how, icon]) => (
+    <IconButton
+      key={how}
+      icon={icon}
+      label={T.models[how](label)}
+      tip={T.models.tips[how]}
+      kind="small"
+      disabled={disabled}
+      pressed={member.options[how].includes(part)}
+      onClick={() => app.models.part(member.id, part, how)}
+    />
+  ));
+}
+
+/** Its parts by name, and the brush. */
+function Parts({ app, member, isAlone = false }: { app: App; member: MemberInfo; isAlone?: boolean }) {
+  const { rigid, stays } = member.options;
+  const isWhole = rigid.includes(ALL) || stays.includes(ALL);
+  const kinds = [...new Set(member.parts.map((part) => split(part)[0]))];
+  return (
+    <Fold title={T.models.parts}>
+      {isAlone && (
+        <>
+          <Signs />
+          <div class="row part">
+            <span class="grow">{T.models.whole}</span>
+            <Ways app={app} member={member} part={ALL} label={member.name} />
+          </div>
+        </>
+      )}
+      {kinds.map((kind) => (
+        <div class="stack tight" key={kind} role="group" aria-label={T.models.kinds[kind] ?? kind}>
+          <span class="legend-text">{T.models.kinds[kind] ?? kind}</span>
+          {member.parts
+            .filter((part) => split(part)[0] === kind)
+            .map((part) => (
+              <div class="row part" key={part}>
+                <span class="grow clip">{split(part)[1]}</span>
+                <Ways app={app} member={member} part={part} label={split(part)[1]} disabled={isWhole} />
+              </div>
+            ))}
+        </div>
+      ))}
+      <Paint app={app} member={member} />
+    </Fold>
+  );
+}
+
+/** "material:Cloth" */
+function split(part: string): [kind: string, name: string] {
+  const [kind = "", ...rest] = part.split(":");
+  return [kind, rest.join(":")];
+}
+
+function Paint({ app, member: { id, painted } }: { app: App; member: MemberInfo }) {
+  const { painting } = app.store.get();
+  const isOn = painting?.id === id;
+  const clear = painted && (
+    <Button label={T.models.clear} icon="close" kind="small" onClick={() => app.painting.clear(id)} />
+  );
+  if (!isOn)
+    return (
+      <div class="row wrap">
+        <Button label={T.models.paint} icon="brush" kind="small" onClick={() => app.painting.on(id)} />
+        {clear}
+      </div>
+    );
+  return (
+    <div class="stack" role="group" aria-label={T.models.paint}>
+      <p class="hint">{T.models.paintSentence}</p>
+      <Segments
+        label={T.models.brush}
+        choices={(["paint", "erase"] as const).map((value) => ({ value, label: T.models.brushes[value] }))}
+        value={painting.erase ? "erase" : "paint"}
+        onChange={(value) => app.painting.brush({ erase: value === "erase" })}
+      />
+      <Slider
+        label={T.models.size}
+        min={THINNEST}
+        max={THICKEST}
+        step={0.01}
+        format={(share) => T.cage.ofSize(percent(share))}
+        value={painting.radius}
+        onInput={(radius) => app.painting.brush({ radius })}
+      />
+      <div class="row wrap">
+        <Button label={T.models.done} icon="check" kind="small" onClick={() => app.painting.on(null)} />
+        {clear}
+      </div>
+    </div>
+  );
+}

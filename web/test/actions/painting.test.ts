@@ -1,0 +1,116 @@
+import { expect, it } from "vitest";
+import { createPainting } from "../../src/actions/painting";
+import { createFake, memberOf, modelOf } from "../fake";
+
+/** Two models of eight vertices; the view is ten pixels a vertex of the first, and beside it below y = 100. */
+function page() {
+  const fake = createFake();
+  let amounts = new Uint8Array();
+  const shown: (number | undefined)[] = [];
+  const dabs: number[] = [];
+  const info = () =>
+    modelOf([{ ...memberOf(0, "body.glb"), painted: amounts.some((a) => a > 0) }, memberOf(1, "b")]);
+  fake.teach({
+    painted: () => amounts.slice(),
+    setPainted(_id: number, next: Uint8Array) {
+      amounts = Uint8Array.from(next);
+      return info();
+    },
+    showPainting: (id?: number) => shown.push(id),
+    paint(x: number, y: number, radius: number, amount: number) {
+      if (y < 100) return false;
+      if (amounts.length === 0) amounts = new Uint8Array(8);
+      amounts[Math.floor(x / 10)] = amount;
+      dabs.push(radius);
+      return true;
+    },
+  });
+  fake.store.set({ model: info() });
+  const painting = createPainting(fake.ctx, () => fake.calls.push("settle"));
+  return { ...fake, painting, shown, dabs, amounts: () => [...amounts] };
+}
+
+it("a stroke is one step, without gaps where the hand was quick", async () => {
+  const { painting, store, amounts, ctx, shown, calls } = page();
+  painting.on(0);
+  expect([store.get().painting, shown, calls]).toEqual([
+    { id: 0, radius: 0.05, erase: false },
+    [0],
+    ["settle"],
+  ]);
+  expect(painting.begin(5, 50), "beside the model").toBe(false);
+  expect([painting.begin(5, 150), painting.active()]).toEqual([true, true]);
+  painting.drag(45, 150);
+  painting.end(true);
+  expect([painting.active(), amounts()]).toEqual([false, [255, 255, 255, 255, 255, 0, 0, 0]]);
+  expect(store.get().model?.members[0]?.painted).toBe(true);
+  await ctx.history.undo();
+  expect([amounts(), store.get().model?.members[0]?.painted]).toEqual([[], false]);
+  await ctx.history.redo();
+  expect(amounts()).toEqual([255, 255, 255, 255, 255, 0, 0, 0]);
+});
+
+it("the brush takes away as well, and keeps its size for the next time", async () => {
+  const { painting, store, amounts, dabs, ctx } = page();
+  painting.on(0);
+  painting.brush({ radius: 0.2 });
+  painting.begin(5, 150);
+  painting.drag(25, 150);
+  painting.end(true);
+  painting.brush({ erase: true });
+  painting.begin(15, 150);
+  painting.end(true);
+  expect([amounts().slice(0, 3), new Set(dabs)]).toEqual([[255, 0, 255], new Set([0.2])]);
+  expect(ctx.history.undoLabel).toBe("Paint what follows");
+  painting.on(null);
+  expect(store.get().painting).toBeNull();
+  painting.on(1);
+  expect(store.get().painting).toEqual({ id: 1, radius: 0.2, erase: false });
+});
+
+it("a stroke that is given up leaves nothing, and clearing is a step", async () => {
+  const { painting, amounts, ctx } = page();
+  painting.on(0);
+  painting.begin(5, 150);
+  painting.end(false);
+  expect([amounts(), ctx.history.undoLabel]).toEqual([[], undefined]);
+  painting.clear(0);
+  expect(ctx.history.undoLabel, "there was nothing to clear").toBeUndefined();
+  painting.begin(5, 150);
+  painting.end(true);
+  painting.clear(0);
+  expect([amounts(), ctx.history.undoLabel]).toEqual([[], "Clear what is painted"]);
+  await ctx.history.undo();
+  expect(amounts()[0]).toBe(255);
+});
+
+it("what cannot be painted yet is said; a moment without the GPU leaves no gap", () => {
+  const { painting, problems, amounts, teach, engine, store, ctx } = page();
+  painting.on(0);
+  const real = engine.paint;
+  const busy = () => {
+    throw new Error("there are no weights yet");
+  };
+  teach({ paint: busy });
+  expect([painting.begin(5, 150), problems.length]).toEqual([false, 1]);
+  store.set({ bound: true });
+  expect([painting.begin(5, 150), problems.length], "busy").toEqual([true, 1]);
+  painting.end(true);
+  expect(ctx.history.undoLabel, "nothing was painted").toBeUndefined();
+  painting.begin(5, 150);
+  painting.drag(25, 150);
+  teach({ paint: real });
+  painting.drag(45, 150);
+  painting.end(true);
+  expect([amounts().slice(0, 5), problems.length]).toEqual([[255, 255, 255, 255, 255], 1]);
+});
+
+it("painting ends with its model, and where the cage is reshaped", () => {
+  const { painting, store, shown } = page();
+  painting.on(0);
+  store.set({ model: modelOf([memberOf(1, "b")]) });
+  expect([store.get().painting, shown.at(-1)]).toEqual([null, undefined]);
+  painting.on(1);
+  store.set({ editingRest: true });
+  expect(store.get().painting).toBeNull();
+});
