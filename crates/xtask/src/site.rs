@@ -5,12 +5,13 @@ use crate::licences;
 use crate::npm::{self, exec};
 use crate::wasm::{self, Profile};
 
-/// Largest wasm file, gzip-compressed: what a visitor waits for. Two per cent above what it is (PLY and STL took 60 kB).
-const MAX_WASM_BYTES: usize = 1_057_000;
+/// Largest wasm file, gzip-compressed: what a visitor waits for. Two per cent above what it is (PLY and STL took 60 kB, several
+/// models and the npm package 40).
+const MAX_WASM_BYTES: usize = 1_108_000;
 /// Largest wasm file of visitors without WebGPU, gzip-compressed: it carries its own translator of shaders.
-const MAX_WEBGL_BYTES: usize = 1_700_000;
+const MAX_WEBGL_BYTES: usize = 1_752_000;
 /// Largest script that a visitor waits for, gzip-compressed.
-const MAX_SCRIPT_BYTES: usize = 86_400;
+const MAX_SCRIPT_BYTES: usize = 92_000;
 
 /// Fewest `f32x4.add` in a wasm file whose loops are vectors: it has 596, and had 261 (of libraries, and written by
 /// hand) when the core's loops were not.
