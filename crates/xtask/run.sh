@@ -15,7 +15,7 @@ for row in "${debian_packages[@]}"; do
   command -v "$command" >/dev/null || missing+=($packages)
 done
 # The page is tested in a browser; Debian's will do.
-if [ "${1:-}" = test ] || [ "${1:-}" = page-test ]; then
+if [[ " test page-test npm " == *" ${1:-} "* ]]; then
   command -v chromium >/dev/null || missing+=(chromium)
 fi
 # The tests of the kernels need a Vulkan device: Mesa's software one where there is no other. The second browser needs a

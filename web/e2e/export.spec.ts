@@ -30,10 +30,11 @@ test("a visit that takes files along", async ({ page }) => {
     await page.getByRole("radio", { name: "PLY" }).check({ force: true });
     const shape = await download(page, "shape");
     expect(new TextDecoder().decode(shape.bytes.slice(0, 3))).toBe("ply");
-    const vertices = await page.evaluate(() => globalThis.cagework?.engine.modelTriangles().length ?? 0);
+    const corners = await page.evaluate(() => globalThis.cagework?.engine.modelTriangles().length ?? 0);
     await drop(page, [shape]);
+    await expect(page).toHaveTitle(/-posed\.ply/);
     await bound(page);
-    expect(await page.evaluate(() => globalThis.cagework?.engine.modelTriangles().length)).toBe(vertices);
+    expect(await page.evaluate(() => globalThis.cagework?.engine.modelTriangles().length)).toBe(corners);
   });
 
   await test.step("a project brings back model, cage, poses and pose", async () => {

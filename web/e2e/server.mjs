@@ -1,4 +1,4 @@
-// Serves dist/ as the plainest of web servers would: at the root and below a path, without special headers.
+// Serves dist/, or another folder, as the plainest of web servers would: at the root and below a path, without special headers.
 
 import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
@@ -6,7 +6,7 @@ import { extname, join, normalize } from "node:path";
 
 // Two copies of the repository can be tested at once, each on its own port.
 const PORT = Number(process.env.E2E_PORT ?? 4179);
-const FOLDER = join(import.meta.dirname, "../../dist");
+const FOLDER = process.env.E2E_FOLDER ?? join(import.meta.dirname, "../../dist");
 const BELOW = "/~student/some%20where/cagework";
 
 const TYPES = {

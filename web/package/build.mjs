@@ -6,7 +6,7 @@
 
 import { execFileSync } from "node:child_process";
 import { copyFileSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { join } from "node:path";
+import { join, relative } from "node:path";
 import { build } from "vite";
 
 const here = import.meta.dirname;
@@ -20,7 +20,7 @@ for (const [folder, name] of [
   ["pkg-webgl", "cagework_webgl"],
 ]) {
   mkdirSync(join(dist, folder), { recursive: true });
-  for (const file of [`${name}.js`, `${name}.d.ts`, `${name}_bg.wasm`]) {
+  for (const file of [`${name}.js`, `${name}_bg.wasm`]) {
     copyFileSync(join(here, "src", folder, file), join(dist, folder, file));
   }
 }
@@ -30,9 +30,15 @@ const whole = (text) =>
   text
     .replace(/(\bfrom |\bimport\(|\bimport )"(\.{1,2}\/[^"]+?)(?:\.js)?"/g, '$1"$2.js"')
     .replace(/(new URL\("\.{1,2}\/[^"]+)\.ts"/g, '$1.js"');
+/** What is said of the inside is of no use, and would have to be right in every project. */
+const isPublic = (path) => /^(index|element|types|contract\/(generated|work))\.d\.ts$/.test(path);
 for (const entry of readdirSync(dist, { recursive: true, withFileTypes: true })) {
   if (!/\.(js|d\.ts)$/.test(entry.name)) continue;
   const path = join(entry.parentPath, entry.name);
+  if (entry.name.endsWith(".d.ts") && !isPublic(relative(dist, path))) {
+    rmSync(path);
+    continue;
+  }
   writeFileSync(path, whole(readFileSync(path, "utf8")));
 }
 
@@ -40,6 +46,8 @@ await build({
   configFile: false,
   root: here,
   logLevel: "error",
+  // Draco's decoder would look for its files where Node has them; it is given what it needs.
+  define: { process: "undefined" },
   build: {
     outDir: dist,
     emptyOutDir: false,

@@ -2,7 +2,7 @@
 
 use cagework_core::BindOptions;
 use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
-use cagework_io::{ModelFormat, NoClip, shown};
+use cagework_io::{Clip, ModelFormat, shown};
 use serde::Serialize;
 
 use crate::args::{CageSource, ControlArgs, DeformArgs, SmoothArgs};
@@ -52,10 +52,7 @@ pub(crate) fn run(args: &DeformArgs, clip: &str, as_json: bool) -> Result<(), Cl
     let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
     let wrong = |e| CliError::file(&args.mesh, e);
     let clips = model.clips();
-    let number = clips.iter().position(|c| c.name.as_deref() == Some(clip)).ok_or_else(|| {
-        let names = clips.iter().filter_map(|c| c.name.clone()).collect();
-        CliError::file(&args.mesh, NoClip { asked: clip.to_owned(), names })
-    })?;
+    let number = Clip::named(&clips, clip).map_err(|e| CliError::file(&args.mesh, e))?;
     let mut frames = model.frames(number).map_err(wrong)?;
     let controls = ControlArgs { smooth: SmoothArgs { smooth: args.smooth }, ..ControlArgs::default() };
     let cage = load_cage(&args.cage, &model, args.read.memory, &controls)?;

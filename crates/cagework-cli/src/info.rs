@@ -174,8 +174,8 @@ fn text(info: &Info) -> String {
             format!("{} skins, {} joints, {} morph targets", info.skins, info.joints, info.morph_targets),
         );
     }
-    for clip in &info.clips {
-        let name = clip.name.as_deref().map_or_else(|| "(no name)".into(), shown);
+    for (number, clip) in info.clips.iter().enumerate() {
+        let name = shown(&clip.label(number));
         row("clip", format!("{name}, {} s, {} channels, {} keys", clip.seconds, clip.channels, clip.keys));
     }
     if !info.props.is_empty() {

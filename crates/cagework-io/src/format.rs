@@ -81,14 +81,15 @@ impl ModelFormat {
     pub fn of_file(name: &str, bytes: &[u8]) -> Result<Self, FormatError> {
         let fault = |found, hint| Err(FormatError { name: name.into(), found, hint });
         let export = "export it as GLB, OBJ, PLY or STL";
-        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+        let unmarked = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        let text = unmarked.trim_ascii_start();
         match bytes {
             [] => return fault("empty", "the file has no bytes"),
             [b'g', b'l', b'T', b'F', ..] => return Ok(Self::Gltf),
             [b'P', b'K', 3, 4, ..] => return fault("a zip archive", "unpack it first"),
             [b'K', b'a', b'y', b'd', b'a', b'r', b'a', ..] => return fault("an FBX file", export),
             [b'B', b'L', b'E', b'N', b'D', b'E', b'R', ..] => return fault("a Blender file", export),
-            [b'p', b'l', b'y', b'\n' | b'\r', ..] => return Ok(Self::Ply),
+            _ if unmarked.starts_with(b"ply\n") || unmarked.starts_with(b"ply\r") => return Ok(Self::Ply),
             _ if stl::is_stl(bytes) => return Ok(Self::Stl),
             _ => {}
         }

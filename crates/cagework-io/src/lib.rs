@@ -20,6 +20,7 @@ mod npz;
 mod obj;
 mod part_kind;
 mod ply;
+mod ply_text;
 mod polygons;
 mod pose_code;
 mod project;

@@ -9,6 +9,7 @@ use ply_rs_bw::ply::{
 };
 use ply_rs_bw::writer::Writer;
 
+use crate::ply_text::readable;
 use crate::polygons::{Encoding, Polygons, PolygonsError};
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
@@ -16,6 +17,8 @@ use crate::shown::{MAX_NAME_CHARS, shown_start};
 const PLACE: [&str; 3] = ["x", "y", "z"];
 const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
 const COLOR: [&str; 3] = ["red", "green", "blue"];
+/// Ends a strip, and stands for what is no vertex.
+const NO_VERTEX: u32 = u32::MAX;
 /// The list of a face's vertices has one of two names.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
@@ -38,9 +41,9 @@ impl PropertyAccess for Element {
         let set = if let Some(k) = of(PLACE) {
             property.to_f32_lossy().map(|x| self.place[k] = x)
         } else if let Some(k) = of(COLOR) {
-            property.to_u8_color_lossy().map(|x| self.color[k] = x)
+            color(&property).map(|x| self.color[k] = x)
         } else if CORNERS.contains(&name) {
-            property.to_u32_list().map(|list| self.corners = list)
+            corners(&property).map(|list| self.corners = list)
         } else {
             return PropertyAccessResult::Ignored;
         };
@@ -62,12 +65,55 @@ impl PropertyAccess for Element {
     }
 }
 
+/// Vertices of a list of any numbers; [`NO_VERTEX`] for those that are none.
+fn corners(property: &Property) -> Option<Vec<u32>> {
+    let of = |numbers: &mut dyn Iterator<Item = f64>| {
+        let whole = |x: f64| x >= 0.0 && x < f64::from(NO_VERTEX) && x.fract() == 0.0;
+        Some(numbers.map(|x| if whole(x) { x as u32 } else { NO_VERTEX }).collect())
+    };
+    match property {
+        Property::ListChar(list) => of(&mut list.iter().map(|&x| x.into())),
+        Property::ListShort(list) => of(&mut list.iter().map(|&x| x.into())),
+        Property::ListInt(list) => of(&mut list.iter().map(|&x| x.into())),
+        Property::ListFloat(list) => of(&mut list.iter().map(|&x| x.into())),
+        Property::ListDouble(list) => of(&mut list.iter().copied()),
+        list => list.to_u32_list(),
+    }
+}
+
+/// A share of a colour: of bytes, of 65,535, or of 1.
+fn color(property: &Property) -> Option<u8> {
+    match property {
+        Property::UShort(x) => Some((x >> 8) as u8),
+        Property::Float(x) => Some((x * 255.0).round() as u8),
+        Property::Double(x) => Some((x * 255.0).round() as u8),
+        other => other.to_u8_color_lossy(),
+    }
+}
+
+/// Triangles of strips, each of which ends where there is no vertex; every second one is turned round.
+fn unstrip(strips: &[Element]) -> Vec<Element> {
+    let strips = strips.iter().flat_map(|strip| strip.corners.split(|&v| v == NO_VERTEX));
+    let triangles = strips.flat_map(|strip| strip.windows(3).enumerate()).map(|(k, of)| {
+        let [a, b, c] = [of[0], of[1 + k % 2], of[2 - k % 2]];
+        Element { corners: vec![a, b, c], ..Element::default() }
+    });
+    // Stitches have a corner twice.
+    triangles
+        .filter(|t| {
+            t.corners[0] != t.corners[1] && t.corners[1] != t.corners[2] && t.corners[2] != t.corners[0]
+        })
+        .collect()
+}
+
 /// Reads a file within `memory_limit` bytes.
 pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, PolygonsError> {
     let wrong = |e: ply_rs_bw::parser::ParseError| {
         PolygonsError::Syntax(shown_start(&e.to_string(), 2 * MAX_NAME_CHARS))
     };
     let parser = Parser::<Element>::new();
+    Polygons::check_memory(3 * bytes.len() as u64, 0, 0, memory_limit)?;
+    let bytes = &*readable(bytes);
     let mut reader = Reader::new(bytes);
     let header = parser.read_header(&mut reader).map_err(wrong)?;
     let n_bytes = bytes.len() as u64;
@@ -84,7 +130,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
     }
     // A corner takes a byte at least, and each element is held until all of its kind are read.
     let others: u64 = header.elements.values().map(|e| e.count as u64).max().unwrap_or(0);
-    let corners = if count("face") > 0 { n_bytes } else { 0 };
+    let corners = if count("face") + count("tristrips") > 0 { n_bytes } else { 0 };
     let elements = others * size_of::<Element>() as u64;
     Polygons::check_memory(2 * n_bytes + elements, count("vertex"), corners / 2, memory_limit)?;
 
@@ -115,10 +161,10 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
                 }
                 left_out.extend(element.properties.keys().filter(|k| !known.contains(&k.as_str())).cloned());
             }
-            "face" => {
+            "face" | "tristrips" => {
                 left_out
                     .extend(element.properties.keys().filter(|k| !CORNERS.contains(&k.as_str())).cloned());
-                faces = elements;
+                faces.extend(if name == "face" { elements } else { unstrip(&elements) });
             }
             _ => left_out.push(name.clone()),
         }

@@ -28,6 +28,25 @@ pub struct NoClip {
     pub names: Vec<String>,
 }
 
+impl Clip {
+    /// The number of the first clip of a name. One without a name of its own is called by its number, "clip 0".
+    ///
+    /// # Errors
+    /// [`NoClip`].
+    pub fn named(clips: &[Self], name: &str) -> Result<usize, NoClip> {
+        let own = clips.iter().position(|clip| clip.name.as_deref() == Some(name));
+        let names: Vec<String> = clips.iter().enumerate().map(|(k, clip)| clip.label(k)).collect();
+        let found = own.or_else(|| names.iter().position(|label| label == name));
+        found.ok_or_else(|| NoClip { asked: name.to_owned(), names })
+    }
+
+    /// What the clip with a number is called: its name, or its number if it has none.
+    #[must_use]
+    pub fn label(&self, number: usize) -> String {
+        self.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| format!("clip {number}"))
+    }
+}
+
 impl Model {
     /// Whether it has a skin or morph targets: what [`Self::write_glb`] leaves out and [`Self::write_reshaped`] keeps.
     #[must_use]
@@ -156,9 +175,8 @@ impl Model {
     pub fn states(&self, clip: Option<&str>) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), NoClip> {
         let (mut positions, mut triangles) = (self.positions.clone(), self.triangles.clone());
         let player = self.player().ok().flatten().filter(|_| self.is_rigged() || clip.is_some());
-        let no_clip = |names| clip.map_or(Ok(()), |asked| Err(NoClip { asked: asked.to_owned(), names }));
         let Some(player) = player else {
-            no_clip(Vec::new())?;
+            clip.map_or(Ok(0), |asked| Clip::named(&[], asked))?;
             return Ok((positions, triangles));
         };
         let (_, defaults) = player.targets();
@@ -170,11 +188,7 @@ impl Model {
             positions.extend(moved.map(|(p, _)| *p));
         }
         let Some(asked) = clip else { return Ok((positions, triangles)) };
-        let clips = player.clips();
-        let Some(number) = clips.iter().position(|c| c.name.as_deref() == Some(asked)) else {
-            no_clip(clips.iter().filter_map(|c| c.name.clone()).collect())?;
-            return Ok((positions, triangles));
-        };
+        let number = Clip::named(player.clips(), asked)?;
         for at in self.frames_of(&player, number, FRAMES) {
             if at.iter().all(|p| p.is_finite()) {
                 let first = positions.len() as u32;

@@ -29,8 +29,11 @@ fn is_binary(bytes: &[u8]) -> bool {
 }
 
 fn is_text(bytes: &[u8]) -> bool {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let start = &bytes[..bytes.len().min(4096)];
     bytes.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+        // A binary file may have both words in its header, and bytes after its triangles; but it has zeros.
+        && !start.contains(&0)
         && start.windows(5).any(|word| word.eq_ignore_ascii_case(b"facet"))
 }
 
@@ -40,8 +43,11 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
     let most = if is_text { bytes.len() / SHORTEST } else { bytes.len() / TRIANGLE } as u64;
     Polygons::check_memory(2 * bytes.len() as u64, 3 * most, 3 * most, memory_limit)?;
     let mut corners = Vec::new();
+    let mut is_whole = true;
     if is_text {
-        for solid in solids(bytes) {
+        let (solids, has_ended) = solids(bytes);
+        is_whole = has_ended;
+        for solid in solids {
             add(&mut std::io::Cursor::new(solid), &mut corners)?;
         }
     } else {
@@ -77,6 +83,9 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
         read.corners.extend(triangle);
         read.end_face()?;
     }
+    if !is_whole {
+        read.notices.push("the text does not end with 'endsolid': it may be cut off".into());
+    }
     if collapsed > 0 {
         read.notices.push(format!("{collapsed} triangles have two corners at one place: left out"));
     }
@@ -91,19 +100,31 @@ fn add(file: &mut std::io::Cursor<Vec<u8>>, corners: &mut Vec<Vec3>) -> Result<(
     Ok(())
 }
 
-/// The solids of a text, each as the reader takes it: in small letters, with a name.
-fn solids(bytes: &[u8]) -> Vec<Vec<u8>> {
+/// The solids of a text, each as the reader takes it: in small letters, with a name and an end. Normals are not looked at, which
+/// some programs write as "nan"; nor is what is in no format of STL, such as colours. Also says whether the last one has ended.
+fn solids(bytes: &[u8]) -> (Vec<Vec<u8>>, bool) {
     let mut solids: Vec<Vec<u8>> = Vec::new();
+    let mut has_ended = true;
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     for line in bytes.split(|&b| b == b'\n' || b == b'\r') {
         let line = line.trim_ascii().to_ascii_lowercase();
-        if line == b"solid" || line.starts_with(b"solid ") {
-            solids.push(b"solid x\n".to_vec());
-        } else if let Some(solid) = solids.last_mut() {
-            solid.extend(line);
-            solid.push(b'\n');
+        let word = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+        match (word, solids.last_mut()) {
+            (b"solid", _) => {
+                solids.push(b"solid x\n".to_vec());
+                has_ended = false;
+            }
+            (b"endsolid", _) => has_ended = true,
+            (b"facet", Some(solid)) => solid.extend(b"facet normal 0 0 0\n"),
+            (b"outer" | b"vertex" | b"endloop" | b"endfacet", Some(solid)) => {
+                solid.extend(&line);
+                solid.push(b'\n');
+            }
+            _ => {}
         }
     }
-    solids
+    solids.iter_mut().for_each(|solid| solid.extend(b"endsolid x\n"));
+    (solids, has_ended)
 }
 
 /// Triangles as a file, with the normals of their planes.

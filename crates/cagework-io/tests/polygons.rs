@@ -138,6 +138,8 @@ fn a_binary_stl_may_begin_like_a_text_and_has_normals_of_its_planes() {
     }
     bytes[..12].copy_from_slice(b"solid facets");
     assert_eq!(read("x.stl", &bytes).unwrap().triangles.len(), 12);
+    bytes.extend(b"\0\0");
+    assert_eq!(read("x.stl", &bytes).unwrap().triangles.len(), 12, "more after the last triangle");
 }
 
 #[test]
@@ -183,4 +185,113 @@ fn what_is_wrong_with_them_is_said() {
     assert!(fault("x.stl", &stl).contains("vertex 0 has a coordinate that is not finite"));
     let tight = Model::read_within("x.stl", &obj().write_stl(&cube()).unwrap(), &mut |_| None, 1000);
     assert!(tight.unwrap_err().to_string().contains("memory"));
+}
+
+/// As other programs write them: normals that are no numbers, no end, tabs, a byte order mark, lines of nobody's format.
+#[test]
+fn texts_of_stl_as_they_are_met() {
+    let triangle = |x: f32, normal: &str| {
+        format!(
+            "facet normal {normal}\n outer loop\n vertex {x} 0 0\n vertex {} 0 0\n vertex {x} 1 0\n endloop\n endfacet\n",
+            x + 1.0
+        )
+    };
+    let plain = format!("solid a\n{}{}endsolid a\n", triangle(0.0, "0 0 1"), triangle(3.0, "0 0 1"));
+    let expected = read("x.stl", plain.as_bytes()).unwrap();
+    assert_eq!((expected.triangles.len(), expected.notices.len()), (2, 0));
+    let cut = plain.replace("endsolid a\n", "");
+    for text in [
+        format!("solid a\n{}{}endsolid", triangle(0.0, "nan nan nan"), triangle(3.0, "-nan(ind) 0 1")),
+        plain.replace("solid a", "solid\ta"),
+        plain.replace(' ', "\t"),
+        format!("\u{feff}{plain}"),
+        plain.replace(" outer", " color 1 0 0\n outer"),
+        cut.clone(),
+    ] {
+        let model = read("x.stl", text.as_bytes()).unwrap();
+        assert_eq!(
+            (&model.positions, &model.triangles),
+            (&expected.positions, &expected.triangles),
+            "{text}"
+        );
+        let is_cut =
+            model.notices.iter().any(|n| n == "the text does not end with 'endsolid': it may be cut off");
+        assert_eq!(is_cut, text == cut, "{text}");
+    }
+}
+
+/// As other programs write them: comments of any encoding, empty lines, numbers without a digit before or after the point, numbers
+/// that are none where nobody looks, vertices of faces as numbers with a point, strips.
+#[test]
+fn texts_of_ply_as_they_are_met() {
+    let plain = ply_text();
+    let expected = read("x.ply", plain.as_bytes()).unwrap();
+    let with = |from: &str, to: &[u8]| {
+        let at = plain.find(from).unwrap();
+        [&plain.as_bytes()[..at], to, &plain.as_bytes()[at + from.len()..]].concat()
+    };
+    for bytes in [
+        with("comment by hand", b"comment M\xf6bel"),
+        with("end_header\n", b"end_header\n\n"),
+        plain.replace("0.5\n", ".5\n").into_bytes(),
+        plain.replace("0.5\n", "-.5e1\n\n").into_bytes(),
+        plain.replace("0.5\n", "nan\n").into_bytes(),
+        plain.replace("0.5\n", "-inf\n").into_bytes(),
+        plain.replace("0.5\n", "1.\n").into_bytes(),
+        plain.replace('\n', "\r\n").into_bytes(),
+        plain.replace('\n', "\r").into_bytes(),
+        format!("\u{feff}{plain}").into_bytes(),
+        with("list uchar int", b"list uint8 float"),
+        with("list uchar int", b"list int double"),
+    ] {
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        let model = read("x.ply", &bytes).unwrap_or_else(|e| panic!("{text}: {e}"));
+        assert_eq!(
+            (&model.positions, &model.triangles),
+            (&expected.positions, &expected.triangles),
+            "{text}"
+        );
+        assert_eq!(model.look().vertices, expected.look().vertices, "{text}");
+    }
+    let no_place = plain.replacen("\n1 0 0 ", "\nnan 0 0 ", 1);
+    assert!(fault("x.ply", no_place.as_bytes()).contains("vertex 1 has a coordinate that is not finite"));
+    let negative = plain.replacen("\n0 1\n4 0", "\n0 1\n4 -1", 1);
+    assert!(fault("x.ply", negative.as_bytes()).contains("face 0 names vertex 4294967295, but there are 8"));
+
+    // Two strips in one list: a square and, behind a stitch, a triangle.
+    let strips =
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
+        element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+            .to_owned()
+            + &cube().iter().map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect::<String>()
+            + "10 0 1 2 3 -1 4 4 5 6 7\n";
+    let model = read("x.ply", strips.as_bytes()).unwrap();
+    assert_eq!(model.triangles, [[0, 1, 2], [1, 3, 2], [4, 6, 5], [5, 6, 7]]);
+}
+
+/// Shares of colours as bytes, as 16 bits, and from 0 to 1.
+#[test]
+fn colours_of_a_ply_may_be_numbers_of_other_kinds() {
+    let of = |kind: &str, red: &str| {
+        let text = ply_text()
+            .replace("property uchar", &format!("property {kind}"))
+            .replace(" 0 51 0.5", " 0 0 0.5");
+        let lines = text.lines().map(|line| {
+            let words: Vec<&str> = line.split(' ').collect();
+            if words.len() == 7 {
+                [&words[..3], &[red], &words[4..]].concat().join(" ")
+            } else {
+                line.to_owned()
+            }
+        });
+        let text = lines.collect::<Vec<_>>().join("\n") + "\n";
+        let model = read("x.ply", text.as_bytes()).unwrap_or_else(|e| panic!("{kind}: {e}"));
+        model.look().vertices[0].color[0]
+    };
+    let expected = of("uchar", "128");
+    assert!(expected > 0.2 && expected < 0.22, "{expected}");
+    assert_eq!(
+        (of("ushort", "32896"), of("float", "0.502"), of("double", "0.502")),
+        (expected, expected, expected)
+    );
 }

@@ -98,4 +98,7 @@ def test_two_files_of_one_name_are_refused(files, tmp_path):
     other = tmp_path / files[0].name
     with pytest.raises(ValueError, match="would both be written to"):
         reshape_files([files[0], other], tmp_path / "out", cage, cage.vertices)
+    # It was said to be there already, and nothing was done.
+    with pytest.raises(ValueError, match="would be written over itself: take another folder"):
+        reshape_files([files[0]], files[0].parent, cage, cage.vertices)
     assert reshape_files([], tmp_path / "out", cage, cage.vertices) == []

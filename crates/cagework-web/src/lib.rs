@@ -43,9 +43,9 @@ use wasm_bindgen::prelude::wasm_bindgen;
 /// The types of `unchecked_*_type` below: serde's, as `border.rs` writes them for TypeScript.
 #[wasm_bindgen(typescript_custom_section)]
 const TYPES: &str = r#"
-import type { BindOptions, BindReport, CageOptions, CageState, Element, Gesture, GizmoHandle, Legend, ModelInfo,
-  Grip, MemberSettings, PartOptions, Pivot, Problem, Progress, PullOptions, Repair, RestEdit, RigOptions, SceneOptions,
-  SelectMode, Settings, SurfacePoint,
+import type { BindOptions, BindReport, CageControls, CageOptions, CageState, Coordinates, Element, Gesture, GizmoHandle,
+  Grip, InnerKind, Legend, MemberSettings, ModelFormat, ModelInfo, PartOptions, Pivot, Problem, Progress, PullOptions,
+  Repair, RestEdit, RigOptions, SceneOptions, SelectMode, Settings, SurfacePoint,
   CameraView, UpAxis } from "../contract/generated";
 "#;
 

@@ -1,4 +1,4 @@
-//! Notices of everything that is compiled into the page, the command and the Python package, as their licences ask for.
+//! Notices of everything that is compiled into the page, the command, the Python and the npm package, as their licences ask for.
 //!
 //! From what is there anyhow: `cargo tree` knows what is compiled in, the registry's sources hold the licence files, and Vite
 //! writes those of the npm packages that it bundles. So nothing has to be installed and nothing is asked of a network.
@@ -37,15 +37,20 @@ struct Part {
 /// # Errors
 /// Names the package whose licence is not known.
 pub(crate) fn of_page(folder: &Path) -> Result<(), String> {
+    write(folder, of_web(folder, &OF_NPM)?)
+}
+
+/// What both wasm files are made of, and what Vite said of npm packages, in files that are taken away.
+fn of_web(folder: &Path, of_npm: &[&str]) -> Result<Vec<Part>, String> {
     let target = "wasm32-unknown-unknown";
     let mut parts = of_crates("cagework-web", target, &[])?;
     parts.extend(of_crates("cagework-web", target, &["--no-default-features", "--features", "webgl"])?);
-    for name in OF_NPM {
-        let of_npm = folder.join(name);
-        parts.extend(of_npm_packages(&read(&of_npm)?)?);
-        std::fs::remove_file(&of_npm).map_err(|e| format!("cannot remove {}: {e}", of_npm.display()))?;
+    for name in of_npm {
+        let said = folder.join(name);
+        parts.extend(of_npm_packages(&read(&said)?)?);
+        std::fs::remove_file(&said).map_err(|e| format!("cannot remove {}: {e}", said.display()))?;
     }
-    write(folder, parts)
+    Ok(parts)
 }
 
 /// Writes the notices of the command beside it.
@@ -62,6 +67,14 @@ pub(crate) fn of_command(folder: &Path) -> Result<(), String> {
 /// Names the package whose licence is not known.
 pub(crate) fn of_wheel(folder: &Path) -> Result<(), String> {
     write(folder, of_crates("cagework-py", &host()?, &[])?)
+}
+
+/// Writes the notices of the npm package into a folder of it. What Vite said of the packages in its decoder lies in `dist`.
+///
+/// # Errors
+/// Names the package whose licence is not known.
+pub(crate) fn of_package(dist: &Path, folder: &Path) -> Result<(), String> {
+    write(folder, of_web(dist, &OF_NPM[..1])?)
 }
 
 fn host() -> Result<String, String> {

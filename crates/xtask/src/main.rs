@@ -7,6 +7,7 @@ mod command;
 mod deny;
 mod licences;
 mod npm;
+mod package;
 mod python;
 mod site;
 mod tasks;
@@ -18,13 +19,15 @@ const USAGE: &str = "usage: cargo xtask TASK
 
   start [ARGS]   build the page and serve it on this machine (ARGS for `vite preview`: --port 8080, --open)
   build          build the page into dist/, and the release `cagework` (target/release/cagework)
-  test           every test there is: Rust, wasm32 builds, glTF validator, TypeScript, the page in a browser
+  test           every test there is: Rust, wasm32 builds, glTF validator, TypeScript, the page in a browser, packages
   check          format, lints, documentation, dependency arrows, import circles, types, biome
   fuzz [--minutes N] [--seed S] | FILE ...
                  damaged files through all that reads them; what fails is kept in target/fuzz, and FILE is tried again
   arrows         the dependency arrows of ARCHITECTURE.md and import circles only
   python         the Python package only: its wheel, installed and tested against the command that `cargo test` builds
   wheel [ARGS]   the Python package's release wheel, into target/wheels (ARGS for `maturin build`)
+  npm            the npm package only: packed, installed into a blank project and tested there, in Node and in a browser
+  npm-pack       the npm package, packed into target/npm
   wasm [--dev]   crates/cagework-web as a JavaScript package, web/package/src/pkg
   page           build the page only
   page-test [ARGS]  build the page and test it in a browser (ARGS for Playwright)
@@ -46,6 +49,8 @@ fn main() -> ExitCode {
         ["check"] => tasks::check(),
         ["python"] => python::test(),
         ["wheel", rest @ ..] => python::wheel(rest),
+        ["npm"] => package::test(),
+        ["npm-pack"] => package::pack().map(drop),
         ["arrows"] => arrows::check(),
         ["wasm"] => wasm::build(wasm::Profile::Web),
         ["wasm", "--dev"] => wasm::build(wasm::Profile::Dev),

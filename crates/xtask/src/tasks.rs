@@ -2,7 +2,7 @@
 
 use crate::command::{root, run};
 use crate::npm::{self, exec};
-use crate::{arrows, deny, licences, python, site, wasm};
+use crate::{arrows, deny, licences, package, python, site, wasm};
 
 /// Builds the release command and runs it on its built-in sample.
 pub(crate) fn demo(args: &[&str]) -> Result<(), String> {
@@ -30,7 +30,8 @@ pub(crate) fn test() -> Result<(), String> {
     python::test()?;
     site::test_scripts()?;
     site::test_page(&[])?;
-    site::test_firefox()
+    site::test_firefox()?;
+    package::test()
 }
 
 /// Damaged files through everything that reads them. As tests are built: overflows and debug assertions count.
@@ -75,14 +76,14 @@ pub(crate) fn check() -> Result<(), String> {
 
 /// Packages have the version of the workspace.
 fn one_version() -> Result<(), String> {
-    let path = root().join("package.json");
-    let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
     let own = concat!("\"version\": \"", env!("CARGO_PKG_VERSION"), "\"");
-    if text.contains(own) {
-        Ok(())
-    } else {
-        Err(format!("{} must say {own}, as Cargo.toml does", path.display()))
+    for path in ["package.json", "web/package/package.json"] {
+        let text = std::fs::read_to_string(root().join(path)).map_err(|e| format!("{path}: {e}"))?;
+        if !text.contains(own) {
+            return Err(format!("{path} must say {own}, as Cargo.toml does"));
+        }
     }
+    Ok(())
 }
 
 /// Exported GLBs must pass the Khronos glTF validator, and play in three.js as they do here.

@@ -1,102 +1,13 @@
 /** What the package does, over whatever opens a worker: in a browser, or in Node. */
 
 import { indicesOf, optionsOf, pointsOf, poseOf, requireKnown, trianglesOf } from "./check";
-import type {
-  BindOptions,
-  BindReport,
-  CageArrays,
-  CageControls,
-  CageOptions,
-  NamedFile,
-  Problem,
-  RigOptions,
-} from "./contract";
+import type { BindOptions, CageArrays, NamedFile } from "./contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS } from "./contract/generated";
 import type { Deformer } from "./pkg/cagework";
-import { createPool, type Follow } from "./pool";
+import { createPool } from "./pool";
 import type { Package } from "./session/artifact";
 import { type Client, named } from "./session/client";
-
-/** Vertices `[n, 3]` in object units, and triangles `[n, 3]`, flattened. */
-export interface Mesh {
-  readonly positions: ArrayLike<number>;
-  readonly triangles: ArrayLike<number>;
-}
-
-/** A closed mesh of polygons. */
-export interface Cage {
-  /** Vertices `[n_cage, 3]`, object units; a pose is another array of that length. */
-  readonly positions: ArrayLike<number>;
-  /** For each face the number of its corners, then them, counter-clockwise seen from outside. */
-  readonly corners: ArrayLike<number>;
-  /** Steps of subdivision, and controls inside, whose positions come last. */
-  readonly controls?: CageControls | undefined;
-}
-
-/** A cage that was made for a model. */
-export interface GeneratedCage extends Cage {
-  readonly positions: Float32Array;
-  readonly corners: Uint32Array;
-  /** What a check of it found; nothing of severity "error". */
-  readonly problems: readonly Problem[];
-}
-
-/** Weights as compressed sparse rows: a row a point, a column a control. Each row sums to 1. */
-export interface Weights {
-  /** `[n_points + 1]` */
-  readonly indptr: Uint32Array;
-  /** `[n_nonzeros]` */
-  readonly indices: Uint32Array;
-  /** `[n_nonzeros]`, dimensionless. */
-  readonly data: Float32Array;
-  /** For each point outside the cage: the point, and the corners of its frame. `[n_outside, 4]` */
-  readonly outside: Uint32Array;
-  /** Where it is in that frame. `[n_outside, 3]` */
-  readonly offsets: Float32Array;
-  /** Columns. */
-  readonly controls: number;
-}
-
-export interface Bound {
-  readonly weights: Weights;
-  /** As `cagework bind --report` writes it. */
-  readonly report: BindReport;
-}
-
-/** A file: `name` says of what kind, "model.glb" unless told. */
-export type File = Uint8Array | ArrayBuffer | Blob;
-export interface Named {
-  readonly name?: string | undefined;
-}
-
-export type BindAsked = Follow & Partial<BindOptions>;
-export type CageAsked = Follow & Partial<CageOptions>;
-/** `plain`: the shape alone, no rig. */
-export type ReshapeAsked = Follow & Named & Partial<BindOptions> & Partial<Omit<RigOptions, "dynamic">>;
-
-export interface Api {
-  /**
-   * Binds points, `[n, 3]`, to a cage by harmonic coordinates. On the processor, with the command's numbers; `backend: "gpu"`
-   * takes WebGPU.
-   */
-  bind(points: ArrayLike<number>, cage: Cage, options?: BindAsked): Promise<Bound>;
-  /** A cage that encloses a model strictly; the model may be any triangle soup. */
-  generateCage(mesh: Mesh, options?: CageAsked): Promise<GeneratedCage>;
-  /** Where the points are in a pose of the cage, `[n_points, 3]`: on this thread, once the module is there. */
-  deform(weights: Weights, posed: ArrayLike<number>): Promise<Float32Array>;
-  /** The file of a model as it follows a posed cage: a glTF keeps rig, clips, morph targets and materials, as a GLB. */
-  reshape(
-    model: File,
-    cage: Cage,
-    posed: ArrayLike<number>,
-    options?: ReshapeAsked,
-  ): Promise<Uint8Array<ArrayBuffer>>;
-  /** Vertices and triangles of a file, in the order that `reshape` binds them in. */
-  readModel(
-    model: File,
-    options?: Follow & Named,
-  ): Promise<{ positions: Float32Array; triangles: Uint32Array }>;
-}
+import type { Api, Cage, File, Follow, Named, Weights } from "./types";
 
 /** The module, ready on this thread, and workers. */
 export interface Runtime {

@@ -90,11 +90,13 @@ export class CageDeformer extends Base {
   #draw(): void {
     if (this.shadowRoot) return;
     const root = this.attachShadow({ mode: "open" });
-    const style = document.createElement("style");
-    style.textContent = STYLE;
+    const style = new CSSStyleSheet();
+    style.replaceSync(STYLE);
+    // Not an element, which a page's Content-Security-Policy may forbid.
+    root.adoptedStyleSheets = [style];
     this.#said = document.createElement("p");
     this.#said.setAttribute("role", "status");
-    root.append(style, this.#freshCanvas(), this.#said);
+    root.append(this.#freshCanvas(), this.#said);
     attachPointer(
       this,
       () => this.#shown?.engine,
@@ -196,7 +198,7 @@ export class CageDeformer extends Base {
 
   #fail(error: unknown): void {
     const message = error instanceof Error ? error.message : String(error);
-    this.#say(message.charAt(0).toUpperCase() + message.slice(1));
+    this.#say(message);
     this.dispatchEvent(new ErrorEvent("error", { error, message }));
   }
 }

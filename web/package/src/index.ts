@@ -17,7 +17,6 @@ const api = /* @__PURE__ */ createApi(async () => {
 });
 const { bind, generateCage, deform, reshape, readModel } = api;
 
-export type * from "./api";
 export type {
   BindOptions,
   BindReport,
@@ -26,5 +25,6 @@ export type {
   ErrorName,
   Problem,
   RigOptions,
-} from "./contract";
+} from "./contract/generated";
+export type * from "./types";
 export { bind, deform, generateCage, readModel, reshape };

@@ -1,15 +1,8 @@
 /** Workers, each with one job at a time: a job that is given up takes its worker with it, and no other job. */
 
-import type { Progress, Reading } from "./contract";
 import type { Client } from "./session/client";
 import type { JobKind, Jobs } from "./session/messages";
-
-/** What can be followed, and given up. */
-export interface Follow {
-  /** Ends the work at once; the promise is rejected with the signal's reason. */
-  readonly signal?: AbortSignal | undefined;
-  readonly onProgress?: ((progress: Progress | Reading) => void) | undefined;
-}
+import type { Follow } from "./types";
 
 export interface Pool {
   run<K extends JobKind>(job: K, input: Jobs[K]["input"], follow: Follow): Promise<Jobs[K]["output"]>;

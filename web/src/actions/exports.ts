@@ -120,6 +120,8 @@ export function createExports(ctx: Context, project: Project): Exports {
     async save(kind) {
       const { model } = ctx.store.get();
       await attempt(ctx, T.failed.write, async () => {
+        // The moment after a bind its weights are still on the way to the GPU.
+        await ctx.session().engine.ready();
         if (isOwn(kind)) return model ? saveOwn(kind, model) : undefined;
         const blob = kind === "picture" ? await picture() : new Blob([new Uint8Array(bytesOf(kind))]);
         const own = stem(model?.name ?? "model");

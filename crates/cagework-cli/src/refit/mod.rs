@@ -176,6 +176,12 @@ fn jobs(args: &RefitArgs) -> Result<Vec<Job>, CliError> {
             },
         };
         if let Some(other) = by_output.insert(output.path.clone(), model) {
+            if other == model {
+                return Err(CliError::Mismatch {
+                    message: format!("{} is named twice", shown_path(model)),
+                    hint: "name each model once, here or in the manifest",
+                });
+            }
             return Err(CliError::Mismatch {
                 message: format!(
                     "{} and {} would both be written to {}",

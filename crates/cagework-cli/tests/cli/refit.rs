@@ -140,6 +140,11 @@ fn outputs_that_meet_are_refused_before_anything_starts() {
         .code(1)
         .stdout("")
         .stderr(contains("a.obj and more/a.obj would both be written to out/a.obj\nhint: "));
+    sandbox.write("list.txt", "b.obj\na.obj\n");
+    sandbox
+        .run(&format!("{REFIT} a.obj --manifest list.txt"))
+        .code(1)
+        .stderr(contains("a.obj is named twice\nhint: name each model once"));
     // Whatever .gltf and .glb hold, both would be a .glb.
     sandbox.run(&format!("{REFIT} x.gltf x.glb")).code(1).stderr(contains("both be written to out/x.glb"));
     assert!(!sandbox.path("out").exists());

@@ -14,6 +14,9 @@ use crate::words::grouped;
 /// Largest radius of balls and tubes, as a share of the cage's longest side.
 pub const MAX_RADIUS: f32 = 0.25;
 
+/// Smallest radius, as a share of the same: no grid resolves it, and in 32 bits a smaller ball has faces without area.
+const MIN_RADIUS: f32 = 1e-4;
+
 /// The radius unless one is given, as a share of the cage's longest side: two cells of a grid of 64.
 const DEFAULT_RADIUS: f32 = 2.0 / 64.0;
 
@@ -105,11 +108,13 @@ pub enum ControlError {
     },
     /// A radius out of range.
     #[error(
-        "the radius of controls inside is {radius}; it must be above 0 and at most {most}, a quarter of the cage's longest side"
+        "the radius of controls inside is {radius}; it must be from {least} to {most}, a quarter of the cage's longest side"
     )]
     Radius {
         /// What was given, object units.
         radius: f32,
+        /// The smallest, object units.
+        least: f32,
         /// The largest, object units.
         most: f32,
     },
@@ -178,9 +183,10 @@ impl InnerControls {
         if let Some(vertex) = self.positions.iter().position(|p| !p.is_finite()) {
             return Err(ControlError::NotFinite { vertex: vertex as u32 });
         }
-        let (radius, most) = (self.radius_in(longest), MAX_RADIUS * longest);
-        if !(radius > 0.0 && radius <= most) {
-            return Err(ControlError::Radius { radius, most });
+        let radius = self.radius_in(longest);
+        let [least, most] = [MIN_RADIUS, MAX_RADIUS].map(|share| share * longest);
+        if !(radius >= least && radius <= most) {
+            return Err(ControlError::Radius { radius, least, most });
         }
         let n = self.positions.len();
         for (number, element) in (0u32..).zip(&self.elements) {

@@ -293,13 +293,13 @@ mod tests {
     fn the_nearest_point_of_a_surface_is_picked() {
         let positions = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::X + Vec3::Z, Vec3::Y + Vec3::Z];
         let triangles = [[0, 1, 2], [3, 4, 5]];
-        let (triangle, barycentric) = pick_surface(&positions, &triangles, &Flat, pixel(0.25, 0.5)).unwrap();
+        let (triangle, barycentric) = pick_surface(&positions, (0..).zip(triangles), &Flat, pixel(0.25, 0.5)).unwrap();
         assert_eq!(triangle, 1, "in front of the other one");
         assert!(
             barycentric.iter().zip([0.25, 0.25, 0.5]).all(|(a, b)| (a - b).abs() < 1e-5),
             "{barycentric:?}"
         );
-        assert_eq!(pick_surface(&positions, &triangles, &Flat, pixel(0.6, 0.6)), None);
+        assert_eq!(pick_surface(&positions, (0..).zip(triangles), &Flat, pixel(0.6, 0.6)), None);
     }
 
     #[test]

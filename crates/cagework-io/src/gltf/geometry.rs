@@ -1,5 +1,7 @@
 //! Primitives: positions in world space, triangles, normals and tangents.
 
+use std::collections::BTreeMap;
+
 use ::gltf::json::Index;
 use ::gltf::json::accessor::Accessor;
 use ::gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
@@ -39,6 +41,7 @@ pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result
     let mut geometry = Geometry { positions: Vec::new(), triangles: Vec::new(), slots: Vec::new() };
     let (mut skipped, mut morphed, mut ragged) = (0, 0, 0);
     let (mut skinned, mut repeated) = (Vec::new(), Vec::new());
+    let mut loose: BTreeMap<u32, usize> = BTreeMap::new();
     for (number, instance) in document.instances.iter().enumerate() {
         let mesh = &document.root.meshes[instance.mesh as usize];
         for (p, primitive) in mesh.primitives.iter().enumerate() {
@@ -49,7 +52,10 @@ pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result
             let start = geometry.positions.len();
             let (local, n_morphed) = positions(document, instance, primitive, position)?;
             morphed += n_morphed;
-            let frame = Frame::of(document, instance, primitive, local.len())?;
+            let (frame, n_loose) = Frame::of(document, instance, primitive, local.len())?;
+            if let Some(skin) = instance.skin.filter(|_| n_loose > 0) {
+                *loose.entry(skin).or_insert(0) += n_loose;
+            }
             for (v, p) in local.iter().enumerate() {
                 let world = frame.world(v).transform_point3(*p).as_vec3();
                 if !world.is_finite() {
@@ -84,6 +90,11 @@ pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result
         let name = shown_start(&name, MAX_NAME_CHARS);
         let others = others(skinned.len());
         notices.push(format!("'{name}'{others} is skinned: bound in its rest pose"));
+    }
+    for (skin, n) in loose {
+        notices.push(format!(
+            "skin {skin} has no weight above zero for {n} vertices: they go with the mesh's node"
+        ));
     }
     if let Some(node) = repeated.first() {
         let others = others(repeated.len());
@@ -144,19 +155,17 @@ pub(super) enum Frame {
 }
 
 impl Frame {
+    /// Of a primitive, and how many of its vertices a skin does not hold.
     pub(super) fn of(
         document: &GltfDocument,
         instance: &Instance,
         primitive: &Primitive,
         count: usize,
-    ) -> Result<Self, GltfError> {
-        Ok(match instance.skin {
-            None => Self::Rigid(instance.world),
-            Some(skin) => {
-                let joints = (skin, document.joints[skin as usize].as_slice());
-                Self::Skinned(skin::matrices(document.source(), joints, instance.world, primitive, count)?)
-            }
-        })
+    ) -> Result<(Self, usize), GltfError> {
+        let Some(skin) = instance.skin else { return Ok((Self::Rigid(instance.world), 0)) };
+        let joints = (skin, document.joints[skin as usize].as_slice());
+        let (all, n_loose) = skin::matrices(document.source(), joints, instance.world, primitive, count)?;
+        Ok((Self::Skinned(all), n_loose))
     }
 
     pub(super) fn world(&self, v: usize) -> DMat4 {
@@ -263,7 +272,7 @@ pub(super) fn world_normals(document: &GltfDocument, slot: &Slot) -> Result<Opti
     let Some(accessor) = attribute(primitive, Semantic::Normals) else { return Ok(None) };
     let mut local = vectors(document, accessor, "NORMAL")?;
     add_morphs(document, instance, primitive, "NORMAL", |t| t.normals, &mut local)?;
-    let frame = Frame::of(document, instance, primitive, local.len())?;
+    let (frame, _) = Frame::of(document, instance, primitive, local.len())?;
     let world = local.iter().enumerate().map(|(v, &n)| {
         let m = DMat3::from_mat4(frame.world(v));
         // The cofactor matrix: the inverse transpose times the determinant, and it exists for flattened models too.
@@ -283,7 +292,7 @@ pub(super) fn world_tangents(
     let (instance, primitive) = document.primitive(slot);
     let Some(accessor) = attribute(primitive, Semantic::Tangents) else { return Ok(None) };
     let local = document.source().floats::<4>(accessor, "TANGENT")?;
-    let frame = Frame::of(document, instance, primitive, local.len())?;
+    let (frame, _) = Frame::of(document, instance, primitive, local.len())?;
     let world = local.iter().enumerate().map(|(v, &[x, y, z, w])| {
         let t = frame.world(v).transform_vector3(DVec3::new(x.into(), y.into(), z.into()));
         (t.normalize_or_zero().as_vec3(), if w < 0.0 { -1.0 } else { 1.0 })

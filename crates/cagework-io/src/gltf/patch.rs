@@ -268,7 +268,7 @@ fn tangents(
 /// Whether the original winding was turned round when the model was read.
 fn is_mirrored(document: &GltfDocument, slot: &Slot) -> Result<bool, WriteError> {
     let (instance, primitive) = document.primitive(slot);
-    let frame = Frame::of(document, instance, primitive, slot.count as usize)?;
+    let (frame, _) = Frame::of(document, instance, primitive, slot.count as usize)?;
     Ok(slot.count > 0 && frame.world(0).determinant() < 0.0)
 }
 

@@ -55,7 +55,16 @@ pub(crate) fn inverse_binds(document: &GltfDocument, number: u32) -> Result<Vec<
     let binds = document.source().floats::<16>(accessor, "a skin")?;
     let from = || format!("skin {number}");
     let bind = |j| Ok(Mat4::from_cols_array(get(&binds, j, "inverse bind matrix", from)?).as_dmat4());
-    (0..skin.joints.len()).map(bind).collect()
+    let all = (0..skin.joints.len()).map(bind).collect::<Result<Vec<DMat4>, GltfError>>()?;
+    match all.iter().position(|bind| !bind.is_finite()) {
+        Some(joint) => {
+            let problem = format!(
+                "holds the inverse bind matrix of joint {joint} of skin {number}, which is not finite"
+            );
+            Err(GltfError::Accessor { accessor, problem })
+        }
+        None => Ok(all),
+    }
 }
 
 /// Calls `hear` with a vertex, a joint of the skin and its weight, for all weights above zero.
@@ -86,7 +95,8 @@ pub(crate) fn each_influence(
     Ok(())
 }
 
-/// World from mesh for each vertex of a skinned primitive: `sum_j w_j * joint_j`; `world` for a vertex without weights.
+/// World from mesh for each vertex of a skinned primitive: `sum_j w_j * joint_j`; `world` for a vertex without weights, or with
+/// none that is a number above zero. Also returns how many of these there are.
 ///
 /// The transform of the mesh's own node plays no part (glTF 2.0, section 3.7.3.3).
 pub(crate) fn matrices(
@@ -95,7 +105,7 @@ pub(crate) fn matrices(
     world: DMat4,
     primitive: &Primitive,
     count: usize,
-) -> Result<Vec<DMat4>, GltfError> {
+) -> Result<(Vec<DMat4>, usize), GltfError> {
     let mut sum = vec![(DMat4::ZERO, 0.0_f64); count];
     let mut wrong = None;
     each_influence(source, primitive, count, |v, joint, weight| match joints.get(joint as usize) {
@@ -109,5 +119,6 @@ pub(crate) fn matrices(
         get(joints, joint as usize, "joint", || format!("a vertex of skin {skin}"))?;
     }
     // Weights need not sum to one after quantisation.
-    Ok(sum.into_iter().map(|(m, w)| if w > 0.0 { m * (1.0 / w) } else { world }).collect())
+    let n_loose = sum.iter().filter(|(_, w)| *w <= 0.0).count();
+    Ok((sum.into_iter().map(|(m, w)| if w > 0.0 { m * (1.0 / w) } else { world }).collect(), n_loose))
 }

@@ -228,3 +228,80 @@ fn skin_that_shrinks_beyond_32_bits_is_refused() {
     let refused = model.write_reshaped(&by, &[], &[], &ReshapeOptions::default()).unwrap_err().to_string();
     assert!(refused.contains("beyond numbers of 32 bits"), "{refused}");
 }
+
+/// Colliders of VRM 1 that leave out their offset are at their node: their sizes and ends were left as they were.
+#[test]
+fn colliders_without_an_offset_grow_as_well() {
+    let mut rig = rigged();
+    rig.json["extensionsUsed"] = json!(["VRMC_springBone"]);
+    rig.json["extensions"] = json!({ "VRMC_springBone": { "colliders": [
+        { "node": 2, "shape": { "sphere": { "radius": 0.1 } } },
+        { "node": 2, "shape": { "capsule": { "radius": 0.1, "tail": [0.0, 0.4, 0.0] } } },
+    ] } });
+    let json = json_of(&reshaped(&read(&rig.glb()), Joints::Follow).0);
+    let shape =
+        |k: usize, kind: &str| json["extensions"]["VRMC_springBone"]["colliders"][k]["shape"][kind].clone();
+    // At a height of 1 `f` grows y by 1.2 and shears, which keeps volumes; the armature doubles.
+    for of in [shape(0, "sphere"), shape(1, "capsule")] {
+        let radius = of["radius"].as_f64().unwrap();
+        assert!((radius / 0.1 - 1.2_f64.cbrt()).abs() < 1e-3, "{radius}");
+        assert!(of.get("offset").is_none(), "{of}");
+    }
+    let tail = (f(vec3(0.0, 1.8, 0.0)) - f(vec3(0.0, 1.0, 0.0))) / 2.0;
+    let found = Vec3::from_array([0, 1, 2].map(|k| shape(1, "capsule")["tail"][k].as_f64().unwrap() as f32));
+    assert!(found.distance(tail) <= ROUNDED, "{found} instead of {tail}");
+}
+
+/// Viewers show them at one place or another: they are kept, and it is said.
+#[test]
+fn vertices_that_no_joint_holds_are_counted() {
+    for (weight, n) in [(f32::NAN, 1), (0.0, 1), (-1.0, 1)] {
+        let mut rig = rigged();
+        let weights = rig.primitive(0)["attributes"]["WEIGHTS_0"].as_u64().unwrap();
+        let mut values = super::floats(&rig, weights);
+        values[4 * 7..4 * 8].fill(weight);
+        let weights = rig.accessor(&floats(&values), F32, 20, "VEC4");
+        rig.primitive(0)["attributes"]["WEIGHTS_0"] = weights.into();
+        let model = read(&rig.glb());
+        let said = format!("skin 0 has no weight above zero for {n} vertices: they go with the mesh's node");
+        assert!(model.notices.contains(&said), "{weight}: {:?}", model.notices);
+        // The node is at 7, 7, 7: there it is bound, and from there it moves.
+        let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
+        let bytes = reshaped(&model, Joints::Follow).0;
+        assert_near(&read(&bytes).positions, &moved, 16.0 * ROUNDED, "with a loose vertex");
+    }
+    assert!(!read(&rigged().glb()).notices.iter().any(|notice| notice.contains("no weight")));
+}
+
+/// glTF asks for as many targets in each primitive of a mesh; where a file has fewer, poses were put at wrong numbers.
+#[test]
+fn primitives_with_fewer_targets_are_posed_as_the_others() {
+    let mut rig = rigged();
+    let mut second = rig.primitive(0).clone();
+    second.as_object_mut().unwrap().shift_remove("targets");
+    rig.json["meshes"][0]["primitives"].as_array_mut().unwrap().push(second);
+    // Its first target's default moves the first primitive only.
+    let model = read(&rig.glb());
+    let by = by(&model);
+    let still = vec![DVec3::ZERO; by.len()];
+    let poses = [("bent".to_owned(), by)];
+    let (bytes, _) = model.write_reshaped(&still, &[], &poses, &ReshapeOptions::default()).unwrap();
+    let json = json_of(&bytes);
+    let n_targets = [0, 1].map(|p| json["meshes"][0]["primitives"][p]["targets"].as_array().unwrap().len());
+    assert_eq!((n_targets, json["meshes"][0]["weights"].as_array().unwrap().len()), ([3, 3], 3));
+    let posed = shown(&player(&read(&bytes)), None, 0.0, &[0.25, 0.0, 1.0]);
+    let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
+    assert_near(&posed, &moved, 4.0 * ROUNDED, "the pose");
+}
+
+#[test]
+fn bind_matrices_that_are_no_numbers_name_their_skin() {
+    let mut rig = rigged();
+    let binds = rig.json["skins"][0]["inverseBindMatrices"].as_u64().unwrap();
+    let mut values = super::floats(&rig, binds);
+    values[20] = f32::NAN;
+    let binds = rig.accessor(&floats(&values), F32, 3, "MAT4");
+    rig.json["skins"][0]["inverseBindMatrices"] = binds.into();
+    let said = Model::read("rigged.glb", &rig.glb(), &mut |_| None).unwrap_err().to_string();
+    assert!(said.contains("the inverse bind matrix of joint 1 of skin 0, which is not finite"), "{said}");
+}

@@ -41,11 +41,14 @@ def reshape_files(
     each file, cagework.reshape or a function like it.
 
     Returns a dict for each file, in their order: file, output, state ("written", "kept" when the output was there, "failed") and
-    the error. What fails does not end the rest. Raises ValueError when two files would be written to one.
+    the error. One that is named twice is done once. What fails does not end the rest. Raises ValueError when two files would be
+    written to one, or one over itself.
     """
     jobs: dict[Path, Path] = {}
     for file in map(Path, files):
         output = Path(out) / (file.with_suffix(".glb") if file.suffix.lower() == ".gltf" else file).name
+        if output.resolve() == file.resolve():
+            raise ValueError(f"{file} would be written over itself: take another folder than {out}")
         other = jobs.setdefault(output.absolute(), file.absolute())
         if other != file.absolute():
             raise ValueError(f"{other} and {file.absolute()} would both be written to {output}")

@@ -63,6 +63,11 @@ impl Engine {
         Ok(session.frame(&view, format, [SMALL; 2], 1.0).map_err(Fault::from)?)
     }
 
+    /// Waits until the GPU has answered all that was asked of it: what reads its weights is refused until then.
+    pub async fn ready(&self) {
+        drop(self.gpu.lock().await);
+    }
+
     /// A picture, red, green, blue, alpha, rows from the top: of what is shown, or of the model `alone`, transparent around
     /// it. `[height, width, 4]`
     ///

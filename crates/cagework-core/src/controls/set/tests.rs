@@ -48,7 +48,12 @@ fn controls_that_cannot_be_used_are_refused_with_what_to_do() {
         ),
         (
             InnerControls { radius: Some(0.3), ..inner(&middle, vec![Point(0)]) },
-            "the radius of controls inside is 0.3; it must be above 0 and at most 0.25",
+            "the radius of controls inside is 0.3; it must be from 0.0001 to 0.25",
+        ),
+        // It was said that the smooth surface of this cage has a face without area.
+        (
+            InnerControls { radius: Some(1e-9), ..inner(&middle, vec![Point(0)]) },
+            "the radius of controls inside is 0.000000001; it must be from 0.0001 to 0.25",
         ),
         (
             inner(&[[0.5; 3]; 10_000], (0..10_000).map(Point).collect()),

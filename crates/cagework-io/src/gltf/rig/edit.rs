@@ -53,6 +53,11 @@ impl<'a> Edit<'a> {
         }
     }
 
+    /// Something that was copied names an accessor as well.
+    pub(super) fn use_again(&mut self, accessor: usize) {
+        *self.uses.entry(self.place(accessor)).or_default() += 1;
+    }
+
     fn place(&self, accessor: usize) -> (u64, u64) {
         let accessor_json = &self.json["accessors"][accessor];
         match accessor_json["bufferView"].as_u64() {
@@ -62,7 +67,7 @@ impl<'a> Edit<'a> {
     }
 
     /// Writes vectors over those of an accessor if they are plain floats that nothing else uses; otherwise, or without one,
-    /// into a new accessor. Returns its number.
+    /// into a new accessor, which takes the place of the other. Returns its number.
     pub(super) fn write<const N: usize>(
         &mut self,
         accessor: Option<usize>,
@@ -71,6 +76,10 @@ impl<'a> Edit<'a> {
         bounds: bool,
     ) -> usize {
         let over = accessor.filter(|&accessor| self.overwrite(accessor, values));
+        if let Some(left) = accessor.filter(|_| over.is_none()) {
+            let place = self.place(left);
+            self.uses.entry(place).and_modify(|uses| *uses = uses.saturating_sub(1));
+        }
         let accessor = over.unwrap_or_else(|| self.append(values, attribute));
         let of_accessor = &mut self.json["accessors"][accessor];
         if bounds || of_accessor.get("min").is_some() || of_accessor.get("max").is_some() {

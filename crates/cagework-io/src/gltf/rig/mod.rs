@@ -20,7 +20,7 @@ mod surface;
 mod tracks;
 mod vrm;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use ::gltf::json::mesh::{Primitive, Semantic};
 use cagework_core::{Bounds, Parts as Unbent};
@@ -128,21 +128,24 @@ impl<'a> Rig<'a> {
             lattice: None,
             worlds,
         };
-        let mut seen = Vec::new();
+        let mut seen = HashSet::new();
+        let slots = (0..).zip(&document.slots).map(|(k, slot)| ((slot.instance as usize, slot.primitive), k));
+        let slots: HashMap<(usize, u32), usize> = slots.collect();
         let shown = document.instances.iter().enumerate().map(|(k, i)| (Some(k), i));
         for (shown, instance) in shown.chain(document.elsewhere.iter().map(|i| (None, i))) {
             let key = key_of(instance);
             if seen.contains(&key) {
                 continue;
             }
-            let added = rig.add_instance(shown, instance);
+            let slot = |primitive| slots.get(&(shown?, primitive)).copied();
+            let added = rig.add_instance(slot, instance);
             if shown.is_some() {
                 added?;
             } else if added.is_err() {
                 // Nobody sees it: it stays as it is.
                 continue;
             }
-            seen.push(key);
+            seen.insert(key);
         }
         let states: Vec<Vec3> = rest.iter().copied().chain(rig.extras.iter().map(|p| p.as_vec3())).collect();
         rig.diagonal = Bounds::of(&states).map_or(0.0, |b| f64::from(b.diagonal()));
@@ -192,7 +195,12 @@ impl<'a> Rig<'a> {
         by
     }
 
-    fn add_instance(&mut self, shown: Option<usize>, instance: &Instance) -> Result<(), GltfError> {
+    /// `slot`: the number of the document's slot of a primitive, if it is shown.
+    fn add_instance(
+        &mut self,
+        slot: impl Fn(u32) -> Option<usize>,
+        instance: &Instance,
+    ) -> Result<(), GltfError> {
         let document = self.document;
         let mut joints = Vec::new();
         if let Some(number) = instance.skin {
@@ -213,12 +221,8 @@ impl<'a> Rig<'a> {
         let mut parts = Vec::new();
         let (before, n_ends) = (self.extras.len(), self.n_ends);
         let primitives = &document.root.meshes[instance.mesh as usize].primitives;
-        for (number, primitive) in primitives.iter().enumerate() {
-            let slot = document
-                .slots
-                .iter()
-                .position(|slot| Some(slot.instance as usize) == shown && slot.primitive as usize == number);
-            match self.part(instance, primitive, number as u32, slot, &joints) {
+        for (number, primitive) in (0..).zip(primitives) {
+            match self.part(instance, primitive, number, slot(number), &joints) {
                 Ok(Some(part)) => parts.push(part),
                 Ok(None) => {}
                 Err(error) => {
@@ -245,13 +249,11 @@ impl<'a> Rig<'a> {
         let local = vectors(document, positions, "POSITION")?;
         let frame = match instance.skin {
             None => Frame::Rigid(instance.world),
-            Some(skin) => Frame::Skinned(skin::matrices(
-                document.source(),
-                (skin, joints),
-                instance.world,
-                primitive,
-                local.len(),
-            )?),
+            Some(skin) => {
+                let (source, n) = (document.source(), local.len());
+                let (all, _) = skin::matrices(source, (skin, joints), instance.world, primitive, n)?;
+                Frame::Skinned(all)
+            }
         };
         let first = slot.map(|slot| document.slots[slot].start as usize);
         let mut part = Part {

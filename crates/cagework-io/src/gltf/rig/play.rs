@@ -75,15 +75,15 @@ impl Player {
                 None => format!("target {k}"),
             }));
         }
-        for wanted in &like.slots {
-            let node = like.instances[wanted.instance as usize].node;
-            let is_same = |slot: &&Slot| {
-                slot.primitive == wanted.primitive && document.instances[slot.instance as usize].node == node
-            };
+        let place = |of: &GltfDocument, slot: &Slot| {
+            Some((of.instances[slot.instance as usize].node?, slot.primitive))
+        };
+        let places: HashMap<(u32, u32), &Slot> =
+            document.slots.iter().filter_map(|slot| Some((place(document, slot)?, slot))).collect();
+        for (number, wanted) in like.slots.iter().enumerate() {
             // Exports keep nodes and primitives; without nodes there is one instance of each mesh, in order.
-            let own = || document.slots.get(like.slots.iter().position(|s| std::ptr::eq(s, wanted))?);
-            let slot = document.slots.iter().find(is_same).filter(|_| node.is_some()).or_else(own);
-            let Some(slot) = slot else { continue };
+            let same = place(like, wanted).and_then(|place| places.get(&place).copied());
+            let Some(slot) = same.or_else(|| document.slots.get(number)) else { continue };
             let (instance, primitive) = document.primitive(slot);
             let own = player.palette.len() as u32;
             // Of a mesh without a node the world is all there is.

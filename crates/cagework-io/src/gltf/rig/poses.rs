@@ -1,5 +1,8 @@
 //! Poses of the cage as morph targets after those that a document has.
 
+use std::borrow::Cow;
+use std::collections::{BTreeMap, HashSet};
+
 use glam::{DMat3, DVec3};
 use serde_json::{Value, json};
 
@@ -21,20 +24,30 @@ pub(super) fn append(
     if poses.is_empty() {
         return Ok(());
     }
-    let mut meshes: Vec<(usize, usize)> = Vec::new();
+    // How many targets each had before. Its primitives must have as many.
+    let mut meshes: BTreeMap<usize, usize> = BTreeMap::new();
+    for part in &rig.parts {
+        let most = meshes.entry(mesh_of(edit, &part.instance)).or_insert(0);
+        *most = part.targets.len().max(*most);
+    }
     for part in &rig.parts {
         let mesh = mesh_of(edit, &part.instance);
-        let (number, n_before) = (part.primitive as usize, part.targets.len());
-        if !meshes.contains(&(mesh, n_before)) {
-            meshes.push((mesh, n_before));
+        let number = part.primitive as usize;
+        for _ in part.targets.len()..meshes[&mesh] {
+            let nothing = edit.write(None, &vec![[0.0; 3]; part.local.len()], true, true);
+            push(
+                &mut edit.json["meshes"][mesh]["primitives"][number],
+                "targets",
+                json!({ "POSITION": nothing }),
+            );
         }
         for pose in poses {
             // Only the rest shape moves: existing targets add to it as before.
-            let mut by = pose.by.to_vec();
+            let mut by = Cow::Borrowed(pose.by);
             for target in &part.targets {
                 for first in target.ends.iter().flatten() {
                     for (k, &v) in target.moved.iter().enumerate() {
-                        by[first + k] = by[part.first + v as usize];
+                        by.to_mut()[first + k] = pose.by[part.first + v as usize];
                     }
                 }
             }
@@ -61,7 +74,7 @@ pub(super) fn append(
         }
     }
     let names: Vec<&str> = poses.iter().map(|pose| pose.name).collect();
-    for &(mesh, n_before) in &meshes {
+    for (&mesh, &n_before) in &meshes {
         pad(&mut edit.json["meshes"][mesh]["weights"], n_before, poses.len());
         let extras = &mut edit.json["meshes"][mesh]["extras"];
         if !extras.is_object() {
@@ -75,7 +88,7 @@ pub(super) fn append(
     }
     let targets_of = |json: &Value, node: usize| {
         let mesh = json["nodes"][node]["mesh"].as_u64()? as usize;
-        meshes.iter().find(|(m, _)| *m == mesh).map(|&(_, n_before)| n_before)
+        meshes.get(&mesh).copied()
     };
     for node in 0..rig.document.root.nodes.len() {
         let Some(n_before) = targets_of(&edit.json, node) else { continue };
@@ -91,11 +104,11 @@ pub(super) fn append(
         for c in 0..edit.json["animations"][a]["channels"].as_array().map_or(0, Vec::len) {
             let n_before = match driven(&edit.json["animations"][a]["channels"][c]) {
                 Some(Driven::Weights(node)) => targets_of(&edit.json, node),
-                Some(Driven::MeshWeights(mesh)) => meshes.iter().find(|(m, _)| *m == mesh).map(|m| m.1),
+                Some(Driven::MeshWeights(mesh)) => meshes.get(&mesh).copied(),
                 _ => None,
             };
             let Some(n_before) = n_before.filter(|&n| n > 0) else { continue };
-            let Some(sampler) = own_sampler(&mut edit.json["animations"][a], c) else { continue };
+            let Some(sampler) = own_sampler(edit, a, c) else { continue };
             let sampler_json = &edit.json["animations"][a]["samplers"][sampler];
             let Some(output) = output(edit, sampler_json) else { continue };
             let Ok(values) = rig.document.source().floats::<1>(output.accessor, "weights") else { continue };
@@ -120,20 +133,15 @@ fn pad(weights: &mut Value, n_before: usize, n_poses: usize) {
 }
 
 /// An animation from rest through all poses back to rest. Targets that were there keep their defaults.
-fn play(rig: &Rig<'_>, edit: &mut Edit<'_>, meshes: &[(usize, usize)], n_poses: usize) {
+fn play(rig: &Rig<'_>, edit: &mut Edit<'_>, meshes: &BTreeMap<usize, usize>, n_poses: usize) {
     let n_keys = n_poses + 2;
     let times: Vec<[f32; 1]> = (0..n_keys).map(|k| [k as f32 * SECONDS_PER_POSE]).collect();
     let input = edit.write(None, &times, false, true);
     let (mut samplers, mut channels) = (Vec::new(), Vec::new());
+    let shapes: HashSet<_> = rig.parts.iter().map(|part| key_of(&part.instance)).collect();
     for instance in rig.document.instances.iter().chain(&rig.document.elsewhere) {
-        let Some(&(_, n_before)) = meshes.iter().find(|(mesh, _)| *mesh == mesh_of(edit, instance)) else {
-            continue;
-        };
-        let Some(node) =
-            instance.node.filter(|_| rig.parts.iter().any(|p| key_of(&p.instance) == key_of(instance)))
-        else {
-            continue;
-        };
+        let Some(&n_before) = meshes.get(&mesh_of(edit, instance)) else { continue };
+        let Some(node) = instance.node.filter(|_| shapes.contains(&key_of(instance))) else { continue };
         let defaults = rig.document.default_weights(instance);
         let default = |k: usize| defaults.and_then(|w| w.get(k)).copied().unwrap_or(0.0);
         let values: Vec<[f32; 1]> = (0..n_keys)

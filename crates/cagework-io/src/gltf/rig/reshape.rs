@@ -201,7 +201,8 @@ impl Rig<'_> {
             joints.iter().zip(&binds[&number]).map(|(j, &bind)| world[j.value()] * bind).collect();
         let source = self.document.source();
         let primitive = part.primitive(self.document);
-        Ok(Frame::Skinned(skin::matrices(source, (number, &joints), node, primitive, part.local.len())?))
+        let (all, _) = skin::matrices(source, (number, &joints), node, primitive, part.local.len())?;
+        Ok(Frame::Skinned(all))
     }
 }
 

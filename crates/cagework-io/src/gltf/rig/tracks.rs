@@ -67,16 +67,19 @@ pub(super) fn output(edit: &Edit<'_>, sampler: &Value) -> Option<Output> {
     Some(Output { accessor, is_cubic: sampler["interpolation"] == "CUBICSPLINE", n_keys })
 }
 
-/// Makes a sampler the channel's own if others use it; returns its number.
-pub(super) fn own_sampler(animation: &mut Value, channel: usize) -> Option<usize> {
-    let sampler = animation["channels"][channel]["sampler"].as_u64()?;
-    let users = animation["channels"].as_array()?.iter().filter(|c| c["sampler"] == sampler).count();
+/// Makes a sampler the channel's own if others use it; returns its number, none if there is no such sampler.
+pub(super) fn own_sampler(edit: &mut Edit<'_>, animation: usize, channel: usize) -> Option<usize> {
+    let of = &mut edit.json["animations"][animation];
+    let sampler = of["channels"][channel]["sampler"].as_u64()? as usize;
+    let copy = of["samplers"].get(sampler)?.clone();
+    let users = of["channels"].as_array()?.iter().filter(|c| c["sampler"] == sampler).count();
     if users < 2 {
-        return Some(sampler as usize);
+        return Some(sampler);
     }
-    let copy = animation["samplers"][sampler as usize].clone();
-    let number = push(animation, "samplers", copy);
-    animation["channels"][channel]["sampler"] = number.into();
+    let accessors = ["input", "output"].map(|key| copy[key].as_u64());
+    let number = push(of, "samplers", copy);
+    of["channels"][channel]["sampler"] = number.into();
+    accessors.into_iter().flatten().for_each(|accessor| edit.use_again(accessor as usize));
     Some(number)
 }
 
@@ -100,8 +103,10 @@ pub(super) fn rescale(
             let Some(change) = change(node).filter(|change| !is_rotation || change.turn.is_some()) else {
                 continue;
             };
-            let Some(sampler) = own_sampler(&mut edit.json["animations"][a], c) else { continue };
-            edit.count_uses();
+            let Some(sampler) = own_sampler(edit, a, c) else {
+                report.tracks_unread += 1;
+                continue;
+            };
             let found = output(edit, &edit.json["animations"][a]["samplers"][sampler]);
             let written = found.and_then(|output| {
                 let per_key = if output.is_cubic { 3 } else { 1 };

@@ -84,9 +84,15 @@ pub(super) fn spots(document: &GltfDocument, worlds: &Worlds) -> Vec<Spot> {
     for collider in items("/extensions/VRMC_springBone/colliders".into()) {
         let node = number(&format!("{collider}/node"));
         for shape in ["sphere", "capsule"].map(|shape| format!("{collider}/shape/{shape}")) {
-            let Some(at) = array(&format!("{shape}/offset")) else { continue };
-            add(node, at, What::Radius(format!("{shape}/radius")));
-            add(node, at, What::Array(format!("{shape}/offset")));
+            if !json.pointer(&shape).is_some_and(Value::is_object) {
+                continue;
+            }
+            // Without an offset it is at the node.
+            let offset = array(&format!("{shape}/offset"));
+            add(node, offset.unwrap_or(DVec3::ZERO), What::Radius(format!("{shape}/radius")));
+            if let Some(offset) = offset {
+                add(node, offset, What::Array(format!("{shape}/offset")));
+            }
             if let Some(tail) = array(&format!("{shape}/tail")) {
                 add(node, tail, What::Array(format!("{shape}/tail")));
             }

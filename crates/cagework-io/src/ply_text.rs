@@ -1,0 +1,90 @@
+//! PLY files as they are met, brought to what the reader takes: headers with comments in any encoding or with line ends of old
+//! programs, and in texts empty lines and numbers such as `.5`, `1.` and `nan`.
+
+use std::borrow::Cow;
+
+/// A number of a text that is not finite, as the reader takes it: it becomes infinite.
+const NO_NUMBER: &[u8] = b"1e999";
+
+/// The file without what the reader stumbles over. What needs no change is not copied.
+pub(crate) fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    // Lines end as the first one does.
+    let is_old = bytes
+        .iter()
+        .position(|b| b"\r\n".contains(b))
+        .is_some_and(|k| bytes[k] == b'\r' && bytes.get(k + 1) != Some(&b'\n'));
+    let line_end = if is_old { b'\r' } else { b'\n' };
+    let Some(end) = end_of_header(bytes, line_end) else { return bytes.into() };
+    let (header, body) = bytes.split_at(end);
+    let is_text = header.windows(6).any(|word| word == b" ascii");
+    let is_line_end = |b: &u8| *b == line_end;
+    if header.is_ascii() && !is_old && (!is_text || body.split(is_line_end).all(is_readable)) {
+        return bytes.into();
+    }
+    let of_header = |&b: &u8| {
+        if b == line_end {
+            b'\n'
+        } else if b.is_ascii() {
+            b
+        } else {
+            b'?'
+        }
+    };
+    let mut out: Vec<u8> = header.iter().map(of_header).collect();
+    if !is_text {
+        out.extend(body);
+        return out.into();
+    }
+    for line in body.split(is_line_end).filter(|line| !line.trim_ascii().is_empty()) {
+        for word in words(line) {
+            tidy(word, &mut out);
+            out.push(b' ');
+        }
+        out.push(b'\n');
+    }
+    out.into()
+}
+
+/// Where the body begins.
+fn end_of_header(bytes: &[u8], line_end: u8) -> Option<usize> {
+    const END: &[u8] = b"end_header";
+    let is_end = |word: &[u8]| word[0] == line_end && word[1..] == *END;
+    let at = bytes.windows(END.len() + 1).position(is_end)? + END.len() + 1;
+    Some(at + bytes[at..].iter().position(|&b| b == line_end)? + 1)
+}
+
+fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
+/// Whether the reader takes a line as it is. The last one may be empty.
+fn is_readable(line: &[u8]) -> bool {
+    let is_number = |word: &[u8]| {
+        let digits = word.strip_prefix(b"-").or_else(|| word.strip_prefix(b"+")).unwrap_or(word);
+        let at_ends = [digits.first(), digits.last()].iter().all(|b| b.is_some_and(u8::is_ascii_digit));
+        let is_dotted = |pair: &[u8]| pair[0] == b'.' && !pair[1].is_ascii_digit();
+        at_ends && !digits.windows(2).any(is_dotted)
+    };
+    words(line).next().is_some() && words(line).all(is_number)
+}
+
+/// A number in the words of the reader's grammar.
+fn tidy(word: &[u8], out: &mut Vec<u8>) {
+    let lower = word.to_ascii_lowercase();
+    if lower.windows(3).any(|part| part == b"nan" || part == b"inf") {
+        return out.extend(NO_NUMBER);
+    }
+    let mut before = b' ';
+    for (k, &b) in word.iter().enumerate() {
+        let after = word.get(k + 1).copied().unwrap_or(b' ');
+        if b == b'.' && !before.is_ascii_digit() {
+            out.push(b'0');
+        }
+        out.push(b);
+        if b == b'.' && !after.is_ascii_digit() {
+            out.push(b'0');
+        }
+        before = b;
+    }
+}

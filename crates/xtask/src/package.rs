@@ -1,0 +1,108 @@
+//! The npm package: packed, installed into a blank project, tested there in Node and in a browser.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::command::{output, root, run};
+use crate::licences;
+use crate::npm::{self, exec};
+use crate::wasm::{self, Profile, target_folder};
+
+const PACKAGE: &str = "web/package";
+/// What is compiled and bundled into the package, for those who get it; ignored by git.
+const NOTICES: &str = "web/package/licences";
+/// What the tests run in the blank project, and its pages.
+const COPIED: [&str; 2] = ["web/package/examples", "web/package/test"];
+
+/// Tests the package. The page's build has made its wasm, `cargo test` the command that it is compared with.
+///
+/// # Errors
+/// When a step fails.
+pub(crate) fn test() -> Result<(), String> {
+    let tarball = pack()?;
+    let project = blank_project(&tarball)?;
+    let command = path(&target_folder()?.join("debug/cagework"))?;
+    let envs = [("NPM_PROJECT", project.as_str()), ("CAGEWORK_COMMAND", &command)];
+    for module in ["nodenext", "esnext"] {
+        let resolution = if module == "esnext" { "bundler" } else { module };
+        let strict = ["--noEmit", "--strict", "--skipLibCheck", "false", "--target", "es2023", "--types", ""];
+        let as_users = ["--module", module, "--moduleResolution", resolution];
+        exec(&[&["tsc"], &strict[..], &as_users, &[&format!("{project}/consumer.ts")]].concat())?;
+    }
+    // As a user's bundler makes its pages.
+    let vite = ["vite", "build", "--config", "web/package/test/vite.config.ts", "--logLevel", "error"];
+    run("npx", &[&["--no-install"], &vite[..]].concat(), &envs)?;
+    let playwright = ["playwright", "test", "--config", "web/package/playwright.config.ts"];
+    run("npx", &[&["--no-install"], &playwright[..]].concat(), &envs)?;
+    run("node", &["--test", "--test-reporter", "spec", &format!("{project}/node.test.mjs")], &envs)
+}
+
+/// Builds the package and packs it into `target/npm`; returns the archive.
+///
+/// # Errors
+/// When a step fails.
+pub(crate) fn pack() -> Result<String, String> {
+    npm::install()?;
+    if !wasm::is_fresh() {
+        wasm::build(Profile::Web)?;
+    }
+    run("node", &["web/package/build.mjs"], &[])?;
+    let notices = root().join(NOTICES);
+    emptied(&notices)?;
+    licences::of_package(&root().join(PACKAGE).join("dist"), &notices)?;
+    for ours in ["LICENSE-MIT", "LICENSE-APACHE"] {
+        copy(&root().join(ours), &notices.join(ours))?;
+    }
+    let folder = target_folder()?.join("npm");
+    emptied(&folder)?;
+    let folder = path(&folder)?;
+    let name = output("npm", &["pack", "./web/package", "--silent", "--pack-destination", &folder])?;
+    let tarball = format!("{folder}/{}", name.trim());
+    let size = std::fs::metadata(&tarball).map_err(|e| format!("cannot find {tarball}: {e}"))?.len();
+    println!("{tarball}: {} kB", size / 1000);
+    Ok(tarball)
+}
+
+/// A project that has nothing but the package and three.js; returns its folder.
+fn blank_project(tarball: &str) -> Result<String, String> {
+    let folder = target_folder()?.join("npm/project");
+    emptied(&folder)?;
+    std::fs::write(folder.join("package.json"), "{ \"private\": true, \"type\": \"module\" }\n")
+        .map_err(|e| format!("cannot write package.json: {e}"))?;
+    let project = path(&folder)?;
+    // The version that is locked here: it comes out of npm's cache where there is no network.
+    let lock = read(&root().join("package-lock.json"))?;
+    let lock: Value = serde_json::from_str(&lock).map_err(|e| format!("package-lock.json: {e}"))?;
+    let three = lock["packages"]["node_modules/three"]["version"].as_str().ok_or("no three.js is locked")?;
+    let three = format!("three@{three}");
+    let quiet = ["--prefer-offline", "--no-audit", "--no-fund", "--ignore-scripts"];
+    run("npm", &[&["install", "--prefix", &project], &quiet[..], &[tarball, &three]].concat(), &[])?;
+    for from in COPIED {
+        let from = root().join(from);
+        let entries = from.read_dir().map_err(|e| format!("cannot read {}: {e}", from.display()))?;
+        for entry in entries.flatten() {
+            copy(&entry.path(), &folder.join(entry.file_name()))?;
+        }
+    }
+    Ok(project)
+}
+
+fn emptied(folder: &Path) -> Result<(), String> {
+    if folder.exists() {
+        std::fs::remove_dir_all(folder).map_err(|e| format!("cannot remove {}: {e}", folder.display()))?;
+    }
+    std::fs::create_dir_all(folder).map_err(|e| format!("cannot create {}: {e}", folder.display()))
+}
+
+fn copy(from: &Path, to: &Path) -> Result<(), String> {
+    std::fs::copy(from, to).map(drop).map_err(|e| format!("cannot copy {}: {e}", from.display()))
+}
+
+fn read(path: &Path) -> Result<String, String> {
+    std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+fn path(path: &Path) -> Result<String, String> {
+    path.to_str().map(str::to_owned).ok_or_else(|| "the repository's path is not UTF-8".to_owned())
+}

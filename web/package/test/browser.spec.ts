@@ -1,0 +1,225 @@
+/** The installed package in Chromium: a page of three.js and the element, as they are and as a bundler makes them. */
+
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
+import { type Browser, test as base, chromium, expect, type Page } from "@playwright/test";
+import { WITH_WEBGL, WITH_WEBGPU } from "../../e2e/browser";
+import type { CageDeformer } from "../src/element";
+import type { Bound } from "../src/types";
+
+/** Pictures, to be looked at. */
+const SCREENS = join(import.meta.dirname, "../../../target/screens");
+/** Rounding of 32-bit sums, over the model's size. */
+const ROUNDING = 1e-6;
+
+/** What three.html leaves for the console, as far as it is used here. */
+interface Example {
+  camera: { projectionMatrix: { elements: number[] }; matrixWorldInverse: { elements: number[] } };
+  posed: { array: Float32Array };
+  position: { array: Float32Array };
+  weights: Bound["weights"];
+}
+
+interface Browsers {
+  webgpu: Browser;
+  webgl: Browser;
+}
+
+/** Pages whose console must stay empty. */
+const test = base.extend<{ visit: (how: keyof Browsers, address: string) => Promise<Page> }, Browsers>({
+  // biome-ignore lint/correctness/noEmptyPattern: Playwright reads what a fixture needs from its pattern.
+  webgpu: [async ({}, use) => opened(WITH_WEBGPU, use), { scope: "worker" }],
+  // biome-ignore lint/correctness/noEmptyPattern: as above.
+  webgl: [async ({}, use) => opened(WITH_WEBGL, use), { scope: "worker" }],
+  visit: async ({ baseURL, viewport, webgpu, webgl }, use) => {
+    const complaints: string[] = [];
+    const pages: Page[] = [];
+    await use(async (how, address) => {
+      const page = await { webgpu, webgl }[how].newPage({ baseURL: baseURL ?? "", viewport });
+      page.on("console", (message) => {
+        const isMeant = /GL Driver Message|No available adapters/.test(message.text());
+        const isIcon = message.location().url.endsWith("favicon.ico");
+        if (/error|warning/.test(message.type()) && !isMeant && !isIcon) complaints.push(message.text());
+      });
+      page.on("pageerror", ({ name, message }) => complaints.push(`${name}: ${message}`));
+      await page.goto(address);
+      pages.push(page);
+      return page;
+    });
+    for (const page of pages) await page.close();
+    expect(complaints, "the console is clean").toEqual([]);
+  },
+});
+
+async function opened(options: typeof WITH_WEBGL, use: (browser: Browser) => Promise<void>): Promise<void> {
+  const browser = await chromium.launch(options);
+  await use(browser);
+  await browser.close();
+}
+
+for (const [how, address] of [
+  ["as it is", "three.html"],
+  ["bundled by Vite", "bundled/three.html"],
+] as const) {
+  test(`a mesh of three.js follows its cage, ${how}`, async ({ visit }) => {
+    const page = await visit("webgl", address);
+    await page.waitForFunction(() => "weights" in globalThis);
+    const rest = await page.evaluate(() => Array.from((globalThis as unknown as Example).posed.array));
+    // A frame later the camera's matrices are there.
+    await page.waitForTimeout(200);
+    const place = await page.evaluate(() => {
+      const { camera, posed } = globalThis as unknown as Example;
+      const by = (m: number[], v: number[]) =>
+        [0, 1, 2, 3].map((row) => v.reduce((sum, x, k) => sum + (m[4 * k + row] ?? 0) * x, 0));
+      const [x = 0, y = 0, , w = 1] = by(
+        camera.projectionMatrix.elements,
+        by(camera.matrixWorldInverse.elements, [...posed.array.slice(0, 3), 1]),
+      );
+      return { x: ((1 + x / w) / 2) * innerWidth, y: ((1 - y / w) / 2) * innerHeight };
+    });
+    await page.mouse.click(place.x, place.y);
+    await page.mouse.move(place.x, place.y);
+    await page.mouse.down();
+    await page.mouse.move(place.x + 30, place.y + 10, { steps: 2 });
+    await page.mouse.move(place.x + 60, place.y + 20, { steps: 2 });
+    await page.mouse.up();
+    await page.screenshot({ path: join(SCREENS, `npm-three-${how}.png`) });
+    const { posed, position, weights } = await page.evaluate(() => {
+      const { posed, position, weights } = globalThis as unknown as Example;
+      const { indptr, indices, data } = weights;
+      return {
+        posed: Array.from(posed.array),
+        position: Array.from(position.array),
+        weights: { indptr: [...indptr], indices: [...indices], data: [...data] },
+      };
+    });
+    const moved = posed.flatMap((x, k) => (x === rest[k] ? [] : [Math.floor(k / 3)]));
+    expect([...new Set(moved)], "the vertex that was dragged").toEqual([0]);
+    // What weights mean: each vertex is the weighted mean of the cage's.
+    const { indptr, indices, data } = weights;
+    const size = Math.max(...position) - Math.min(...position);
+    let worst = 0;
+    for (let v = 0; v < position.length / 3; v++) {
+      for (const axis of [0, 1, 2]) {
+        let sum = 0;
+        for (let k = indptr[v] ?? 0; k < (indptr[v + 1] ?? 0); k++) {
+          sum += (data[k] ?? 0) * (posed[3 * (indices[k] ?? 0) + axis] ?? 0);
+        }
+        worst = Math.max(worst, Math.abs(sum - (position[3 * v + axis] ?? 0)) / size);
+      }
+    }
+    expect(worst).toBeLessThan(ROUNDING);
+  });
+}
+
+/** Waits until the element's model follows its cage; fails with what it says instead. */
+async function ready(page: Page): Promise<void> {
+  const element = page.locator("cage-deformer");
+  await expect(element.locator("p")).not.toHaveText(/^(Opening|Making|Binding)/);
+  await expect(element.locator("p")).toHaveText("");
+}
+
+for (const [how, address] of [
+  ["webgpu", "element.html"],
+  ["webgl", "bundled/element.html"],
+] as const) {
+  test(`the element's model is dragged, posed and exported by ${how}`, async ({ visit }) => {
+    const page = await visit(how, address);
+    await ready(page);
+    // The first place where the pointer says that there is a handle.
+    const found = await page.evaluate(() => {
+      const element = document.querySelector("cage-deformer");
+      const events: Float32Array[] = [];
+      element?.addEventListener("pose", (event) => events.push((event as CustomEvent).detail));
+      Object.assign(globalThis, { events, rest: element?.pose });
+      for (let y = 4; y < innerHeight; y += 8) {
+        for (let x = 4; x < innerWidth; x += 8) {
+          const at = { clientX: x, clientY: y, pointerType: "mouse" };
+          element?.dispatchEvent(new PointerEvent("pointermove", at));
+          if (element?.style.cursor === "pointer") return { x, y };
+        }
+      }
+      return null;
+    });
+    if (!found) throw new Error("no handle");
+    await page.mouse.move(found.x, found.y);
+    await page.mouse.down();
+    await page.mouse.move(found.x + 40, found.y + 20, { steps: 2 });
+    await page.mouse.up();
+    const moved = await page.evaluate(() => {
+      const { events, rest } = globalThis as unknown as { events: Float32Array[]; rest: Float32Array };
+      const last = events.at(-1) ?? rest;
+      return [...new Set(Array.from(last).flatMap((x, k) => (x === rest[k] ? [] : [Math.floor(k / 3)])))];
+    });
+    expect(moved, "one vertex").toHaveLength(1);
+    await page.screenshot({ path: join(SCREENS, `npm-element-${how}.png`) });
+    // A cage that is moved as a whole moves the model as a whole.
+    const bytes = await page.evaluate(async () => {
+      const element = document.querySelector("cage-deformer");
+      const { rest } = globalThis as unknown as { rest: Float32Array };
+      if (element) element.pose = rest.map((x, k) => x + ([0.5, -0.25, 1][k % 3] ?? 0));
+      return Array.from((await element?.export()) ?? []);
+    });
+    const model = readFileSync(join(process.env.NPM_PROJECT ?? "", "model.glb"));
+    const [before, after] = [new Uint8Array(model), Uint8Array.from(bytes)].map(positionsOf);
+    const errors =
+      after?.map((x, k) => Math.abs(x - (before?.[k] ?? 0) - ([0.5, -0.25, 1][k % 3] ?? 0))) ?? [];
+    expect(after).toHaveLength(before?.length ?? 0);
+    expect(Math.max(...errors)).toBeLessThan(4 * ROUNDING);
+  });
+}
+
+test("an element opens compressed files, says what it cannot open, and leaves nothing behind", async ({
+  visit,
+}) => {
+  const page = await visit("webgl", "element.html");
+  const open = (src: string) =>
+    page.evaluate((src) => document.querySelector("cage-deformer")?.setAttribute("src", src), src);
+  await ready(page);
+  await open("draco.glb");
+  await ready(page);
+  const error = page.evaluate(
+    () =>
+      new Promise((resolve) => {
+        document
+          .querySelector("cage-deformer")
+          ?.addEventListener("error", (event) => resolve((event as ErrorEvent).error.name));
+      }),
+  );
+  await open("package.json");
+  expect(await error).toBe("Format");
+  await expect(page.locator("cage-deformer p")).toHaveText(/package\.json/);
+  expect(page.workers()).toHaveLength(1);
+  await page.evaluate(async () => {
+    const glue = "/node_modules/@cagework/core/dist/pkg-webgl/cagework_webgl.js";
+    const { Engine }: typeof import("../src/pkg/cagework") = await import(glue);
+    const { free } = Engine.prototype;
+    Engine.prototype.free = function () {
+      free.call(this);
+      Object.assign(globalThis, { freed: true });
+    };
+    const element = document.querySelector("cage-deformer");
+    Object.assign(globalThis, { element });
+    element?.remove();
+  });
+  await expect.poll(() => page.workers().length).toBe(0);
+  await page.waitForFunction(() => "freed" in globalThis);
+  // Back in the page it begins anew.
+  await page.evaluate(() => {
+    const { element } = globalThis as unknown as { element: CageDeformer };
+    element.src = "model.glb";
+    document.body.append(element);
+  });
+  await ready(page);
+});
+
+/** Positions of the only primitive of a GLB. */
+function positionsOf(glb: Uint8Array): Float32Array {
+  const view = new DataView(glb.buffer, glb.byteOffset);
+  const length = view.getUint32(12, true);
+  const document = JSON.parse(new TextDecoder().decode(glb.subarray(20, 20 + length)));
+  const accessor = document.accessors[document.meshes[0].primitives[0].attributes.POSITION];
+  const { byteOffset = 0 } = document.bufferViews[accessor.bufferView];
+  const start = 28 + length + byteOffset + (accessor.byteOffset ?? 0);
+  return new Float32Array(glb.slice(start, start + 12 * accessor.count).buffer);
+}

@@ -1,0 +1,183 @@
+// The installed package in Node, beside the command: the same weights, the same files. Runs in the blank project.
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, test } from "node:test";
+import { inflateRawSync } from "node:zlib";
+import { bind, deform, generateCage, readModel, reshape } from "@cagework/core";
+import { sample } from "./sample.mjs";
+
+/** Rounding of 32-bit sums, over the model's size. */
+const ROUNDING = 1e-6;
+/** Weights of two processors: the solver stops at tau = 1e-5, and sums differ in their last bits. */
+const WEIGHTS = 1e-6;
+
+const { glb, cage, posed } = await sample(import.meta.dirname, "humanoid");
+const mesh = await readModel(glb);
+const size = Math.max(...cage.positions) - Math.min(...cage.positions);
+const folder = mkdtempSync(join(tmpdir(), "cagework-npm-"));
+after(() => rmSync(folder, { recursive: true }));
+
+function command(line) {
+  execFileSync(process.env.CAGEWORK_COMMAND, line.split(" "), {
+    cwd: folder,
+    stdio: ["ignore", "ignore", "inherit"],
+  });
+}
+
+/** A cage as OBJ; JavaScript writes a number with all its digits. */
+function obj(positions, corners) {
+  const lines = [];
+  for (let k = 0; k < positions.length; k += 3) lines.push(`v ${positions.slice(k, k + 3).join(" ")}`);
+  for (let k = 0; k < corners.length; k += 1 + corners[k]) {
+    lines.push(`f ${Array.from(corners.slice(k + 1, k + 1 + corners[k]), (i) => i + 1).join(" ")}`);
+  }
+  return `${lines.join("\n")}\n`;
+}
+
+/** An array of an NPZ file: an NPY file in a ZIP archive. */
+function npz(path, name) {
+  const zip = readFileSync(path);
+  const view = new DataView(zip.buffer, zip.byteOffset, zip.byteLength);
+  let at = view.getUint32(zip.length - 6, true);
+  while (view.getUint32(at, true) === 0x02014b50) {
+    const [method, packed, nameLength] = [
+      view.getUint16(at + 10, true),
+      view.getUint32(at + 20, true),
+      view.getUint16(at + 28, true),
+    ];
+    const skip = view.getUint16(at + 30, true) + view.getUint16(at + 32, true);
+    const local = view.getUint32(at + 42, true);
+    if (zip.subarray(at + 46, at + 46 + nameLength).toString() === `${name}.npy`) {
+      const start = local + 30 + view.getUint16(local + 26, true) + view.getUint16(local + 28, true);
+      const data = zip.subarray(start, start + packed);
+      const npy = method === 0 ? data : inflateRawSync(data);
+      const body = npy.subarray(10 + npy.readUInt16LE(8));
+      const kind = npy
+        .subarray(10, 10 + npy.readUInt16LE(8))
+        .toString()
+        .includes("<f4")
+        ? Float32Array
+        : Int32Array;
+      return new kind(body.buffer.slice(body.byteOffset, body.byteOffset + body.length));
+    }
+    at += 46 + nameLength + skip;
+  }
+  assert.fail(`${path} has no ${name}`);
+}
+
+writeFileSync(join(folder, "model.glb"), glb);
+writeFileSync(join(folder, "cage.obj"), obj(cage.positions, cage.corners));
+writeFileSync(join(folder, "pose.obj"), obj(posed, cage.corners));
+command("bind model.glb --cage cage.obj -g 24 --weights all.npz");
+command("bind model.glb --cage cage.obj -g 24 --static --weights static.npz");
+
+test("weights are those of the command, and each row sums to 1", async () => {
+  const stages = [];
+  const { weights, report } = await bind(mesh.positions, cage, {
+    grid: 24,
+    onProgress: ({ stage }) => stages.push(stage),
+  });
+  const theirs = ["indptr", "indices", "data"].map((name) => npz(join(folder, "static.npz"), name));
+  assert.deepEqual([...weights.indptr], [...theirs[0]]);
+  assert.deepEqual([...weights.indices], [...theirs[1]]);
+  const worst = weights.data.reduce((most, w, k) => Math.max(most, Math.abs(w - theirs[2][k])), 0);
+  assert.ok(worst < WEIGHTS, `${worst}`);
+  for (let v = 0; v < mesh.positions.length / 3; v++) {
+    const sum = weights.data.slice(weights.indptr[v], weights.indptr[v + 1]).reduce((a, b) => a + b, 0);
+    assert.ok(Math.abs(sum - 1) < 1e-5, `row ${v} sums to ${sum}`);
+  }
+  assert.equal(report.vertices, mesh.positions.length / 3);
+  assert.deepEqual([...new Set(stages)], ["voxelize", "solve", "sample"]);
+});
+
+test("an affine pose of a generated cage is that of the model", async () => {
+  const made = await generateCage(mesh, { vertices: 60 });
+  assert.ok(made.positions.length <= 180 && made.problems.every(({ severity }) => severity !== "error"));
+  const { weights } = await bind(mesh.positions, made, { grid: 24 });
+  const affine = (p) => p.map((x, k) => (k % 3 === 1 ? 2 * x + 0.5 * p[k - 1] - 1 : x));
+  const followed = await deform(weights, affine(Float64Array.from(made.positions)));
+  const wanted = affine(Float64Array.from(mesh.positions));
+  const worst = followed.reduce((most, x, k) => Math.max(most, Math.abs(x - wanted[k])), 0);
+  assert.ok(worst < 4 * ROUNDING * size, `${worst}`);
+});
+
+for (const [options, line] of [
+  [{}, ""],
+  [{ joints: "turn", keep_travel: true }, " --joints turn --keep-travel"],
+  [{ plain: true }, " --static"],
+]) {
+  test(`a rigged file is the command's, byte for byte${line}`, async () => {
+    const weights = options.plain ? "static" : "all";
+    command(`deform model.glb --cage cage.obj --weights ${weights}.npz --pose pose.obj${line} -o out.glb`);
+    const out = await reshape(glb, cage, posed, { grid: 24, ...options });
+    assert.ok(Buffer.from(out).equals(readFileSync(join(folder, "out.glb"))));
+  });
+}
+
+test("the example of the README runs", async () => {
+  const [, code] = /```js\n([\s\S]*?)```/.exec(
+    readFileSync(join(import.meta.dirname, "node_modules/@cagework/core/README.md"), "utf8"),
+  );
+  const [imports, ...rest] = code.split("\n");
+  const file = join(import.meta.dirname, "readme.mjs");
+  const glb_ = `import { readFileSync } from "node:fs";\nconst glb = readFileSync(${JSON.stringify(join(folder, "model.glb"))});`;
+  writeFileSync(file, [imports, glb_, ...rest, "export { cage, wide };"].join("\n"));
+  const { cage: made, wide } = await import(file);
+  const width = (positions) => positions.reduce((most, x, k) => (k % 3 === 0 ? Math.max(most, x) : most), 0);
+  assert.ok(made.positions.length <= 240);
+  assert.ok(Math.abs(width((await readModel(wide)).positions) / width(mesh.positions) - 1.3) < 1e-5);
+});
+
+test("at rest the file is what it was", async () => {
+  assert.ok(
+    Buffer.from(await reshape(new Blob([glb]), cage, cage.positions, { grid: 12 })).equals(Buffer.from(glb)),
+  );
+});
+
+test("compressed files are read", async () => {
+  for (const name of ["draco.glb", "meshopt.glb"]) {
+    const { positions, triangles } = await readModel(readFileSync(join(import.meta.dirname, name)));
+    assert.ok(positions.length > 0 && triangles.every((v) => v < positions.length / 3), name);
+  }
+});
+
+test("who gives up hears at once, and nobody else does", async () => {
+  const giveUp = new AbortController();
+  const began = performance.now();
+  const long = bind(mesh.positions, cage, {
+    grid: 256,
+    signal: giveUp.signal,
+    onProgress: () => giveUp.abort(),
+  });
+  const short = bind(mesh.positions, cage, { grid: 12 });
+  await assert.rejects(long, { name: "AbortError" });
+  assert.ok(performance.now() - began < 5000);
+  assert.ok((await short).report.converged);
+  await assert.rejects(bind(mesh.positions, cage, { signal: AbortSignal.abort() }), { name: "AbortError" });
+});
+
+test("what is wrong is said by name, with what was given and what is needed", async () => {
+  const { weights } = await bind(mesh.positions, cage, { grid: 12 });
+  const n = cage.positions.length;
+  const wrong = [
+    [() => bind([1, 2], cage), /^points has 2 numbers; three for each point are needed, so 0 or 3$/],
+    [() => bind(mesh.positions, { ...cage, corners: [3, 0, 1] }), /^the last face of the cage is cut off$/],
+    [() => bind(mesh.positions, cage, { gird: 32 }), /^there is no option gird; there are .*grid/],
+    [() => bind(mesh.positions, cage, { grid: 4 }), /^grid is 4; it must be a whole number from 8 to 512$/],
+    [() => bind(mesh.positions, cage, { grid: "32" }), /^grid is a string; it must be a number$/],
+    [() => bind(mesh.positions, cage, { backend: "gpu" }), /^there is no WebGPU here/, "NoAdapter"],
+    [() => deform(weights, [1, 2, 3]), new RegExp(`^posed has 3 numbers; it must have ${n},`)],
+    [
+      () => reshape(glb, cage, [1, 2, 3]),
+      new RegExp(`^posed has 3 numbers; it must have as many as the cage, ${n}$`),
+    ],
+    [() => reshape("fox.glb", cage, posed), /^model must be the bytes of a file/],
+    [() => generateCage({ positions: [0, 0, 0], triangles: [0, 1] }), /^triangles has 2 numbers/],
+    [() => readModel(new Uint8Array(5)), /not a GLB/, "Format"],
+  ];
+  for (const [call, message, name = "Error"] of wrong) await assert.rejects(call, { name, message });
+});
