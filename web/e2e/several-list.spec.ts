@@ -25,6 +25,7 @@ test("clothes are added to a sample, dropped on the list, and said when they rea
     { name: "tent.obj", mimeType: "text/plain", buffer: Buffer.from(box(9)) },
   ]);
   await expect(page.getByRole("alert").getByText("notes.obj could not be opened")).toBeVisible();
+  await expect(page.getByRole("button", { name: "Add another file" })).toBeVisible();
   await expect(rows(page)).toHaveCount(3);
   await expect(page.getByText(/What was added reaches outside/)).toBeVisible();
   await shoot(page, "several-outside");

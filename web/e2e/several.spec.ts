@@ -154,7 +154,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
 
   await test.step("a reload brings all of it back", async () => {
     const moment = await page.evaluate(() => Date.now());
-    await drag(page, 3, 0);
+    await drag(page, 40, 0);
     await undo(page);
     await expect.poll(() => savedSince(page, moment), { timeout: 60_000 }).toBe(true);
     await page.reload();

@@ -178,6 +178,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
       void bind.start();
     },
     file: () => app.chooseModel(),
+    add: () => app.chooseMore(),
     regenerate: () => void cage.regenerate(),
     reload: () => location.reload(),
   };

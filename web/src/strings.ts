@@ -18,7 +18,7 @@ export interface Explained {
   title: string;
   message: string;
   /** What the page can do about it. */
-  fix?: "coarser" | "fewer" | "cpu" | "file" | "regenerate" | "reload";
+  fix?: "coarser" | "fewer" | "cpu" | "file" | "add" | "regenerate" | "reload";
 }
 
 const FIXES: Readonly<Partial<Record<ErrorName | "Empty", NonNullable<Explained["fix"]>>>> = {

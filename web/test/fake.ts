@@ -277,7 +277,7 @@ export function createFake(): Fake {
         fake.offered = offered;
       },
       problem: (explained, fix) =>
-        problems.push(fix ? ({ ...explained, fix: explained.fix } as never) : explained),
+        problems.push(fix ? ({ ...explained, fix: fix.label } as never) : explained),
       clear: () => problems.splice(0),
     },
     fixFor: (fix) => ({ label: fix, run: () => undefined }),

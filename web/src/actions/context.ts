@@ -82,8 +82,8 @@ export async function waitFor<T extends object>(
   }
 }
 
-/** Shows an error, once. */
-export function report(ctx: Context, title: string, error: unknown): void {
+/** Shows an error, once. `file`: what "choose another file" means where it happened. */
+export function report(ctx: Context, title: string, error: unknown, file: "file" | "add" = "file"): void {
   if (isCancelled(error)) return;
   if (isFatal(error)) {
     // More than this action failed: see crash.ts.
@@ -91,5 +91,6 @@ export function report(ctx: Context, title: string, error: unknown): void {
     return;
   }
   const explained = explain(error, title);
-  ctx.tell.problem(explained, explained.fix ? ctx.fixFor(explained.fix) : undefined);
+  const fix = explained.fix === "file" ? file : explained.fix;
+  ctx.tell.problem(explained, fix ? ctx.fixFor(fix) : undefined);
 }

@@ -157,7 +157,10 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       if (plan.kind === "controls" && store.get().cage) return follow.loadControls([main]);
       const second = plan.second === undefined ? undefined : files[plan.second];
       return busy(T.opening.file(main.name), T.failed.open(main.name), async (signal) => {
-        const [first, ...others] = await readModels(ctx, signal, modelsOf(files, plan));
+        const models = modelsOf(files, plan);
+        // The others open: another file is for their cage.
+        const another = models.length > 1 ? "add" : "file";
+        const [first, ...others] = await readModels(ctx, signal, models, another);
         if (first) await replace(() => ctx.session().open(first.read), null, others, second && [second]);
       });
     },

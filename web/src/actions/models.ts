@@ -86,7 +86,7 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
       const went = await attempt(ctx, T.models.notAdded, () => {
         ctx.tell.clear();
         return ctx.queue.replace("open", async (signal) => {
-          const reads = await readModels(ctx, signal, modelsOf(files, plan));
+          const reads = await readModels(ctx, signal, modelsOf(files, plan), "add");
           settle();
           const n = members().length;
           for (const other of reads) await models.join(other);

@@ -20,18 +20,19 @@ export function modelsOf(files: readonly NamedFile[], plan: DropPlan): (readonly
   return models.map((model) => [model, ...companions]);
 }
 
-/** Reads them in turn. Ends as if it were cancelled when there is nothing left to open. */
+/** Reads them in turn. Ends as if it were cancelled when there is nothing left to open. `another`: what helps. */
 export async function readModels(
   ctx: Context,
   signal: AbortSignal,
   models: readonly (readonly NamedFile[])[],
+  another: "file" | "add",
 ): Promise<Named[]> {
   const reads: Named[] = [];
   for (const own of models) {
     const name = own[0]?.name ?? "";
     if (own[0]?.file.size === 0) {
       const explained = { title: T.opening.empty, message: T.opening.noContent(name) };
-      ctx.tell.problem(explained, ctx.fixFor("file"));
+      ctx.tell.problem(explained, ctx.fixFor(another));
       continue;
     }
     try {
@@ -41,7 +42,7 @@ export async function readModels(
       ctx.store.set({ busy: what });
     } catch (error) {
       if (isCancelled(error)) throw error;
-      report(ctx, T.failed.open(name), error);
+      report(ctx, T.failed.open(name), error, another);
     }
   }
   if (reads.length === 0) throw Object.assign(new Error("there is nothing to open"), { name: "Cancelled" });

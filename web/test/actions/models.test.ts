@@ -102,7 +102,7 @@ it("several are one step; one that cannot be read is named, and the others come"
   const { models, asked, read, names, problems, ctx } = page();
   const added = models.add([file("bad.glb"), file("empty.obj", ""), file("shirt.glb"), file("hat.glb")]);
   await settled();
-  asked.at(-1)?.reject(new Error("bad.glb: not a GLB"));
+  asked.at(-1)?.reject(Object.assign(new Error("bad.glb: not a GLB"), { name: "Format" }));
   await settled();
   asked.at(-1)?.resolve({ took: 0 });
   await settled();
@@ -110,10 +110,10 @@ it("several are one step; one that cannot be read is named, and the others come"
   asked.at(-1)?.reject(new Error("too many vertices"));
   await added;
   expect(names()).toEqual(["body.glb", "hat.glb"]);
-  expect(problems.map(({ title }) => title)).toEqual([
-    "bad.glb could not be opened",
-    "This file is empty",
-    "hat.glb could not be opened",
+  expect(problems.map(({ title, fix }) => [title, fix])).toEqual([
+    ["bad.glb could not be opened", "add"],
+    ["This file is empty", "add"],
+    ["hat.glb could not be opened", undefined],
   ]);
   await ctx.history.undo();
   expect([names(), ctx.history.undoLabel]).toEqual([["body.glb"], undefined]);

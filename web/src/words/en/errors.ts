@@ -5,6 +5,7 @@ export const fixes = {
   cpu: "Use the processor",
   fewer: "Make a cage of fewer vertices",
   file: "Choose another file",
+  add: "Add another file",
   regenerate: "Make a new cage",
   reload: "Reload the page",
 };
