@@ -27,8 +27,9 @@ except KeyboardInterrupt:
     print("interrupted")
 print(cw.bind(points, cage, grid=8)[0].shape)
 """
-# Longest wait between Ctrl-C and the end, seconds: a piece of work between two looks, on a busy machine.
-PATIENCE = 3.0
+# Longest wait between Ctrl-C and the end, seconds. A piece of work between two looks takes a tenth of one, all pieces a
+# minute and a half; a machine that does much else needs more than a few seconds even for the piece.
+PATIENCE = 20.0
 
 
 def test_ctrl_c_ends_a_bind_and_python_goes_on():

@@ -11,7 +11,7 @@ use crate::models::Models;
 
 /// A clip, of all models that have one of this name.
 pub(crate) struct SharedClip {
-    /// Empty if it has none; then it is of one model.
+    /// Or its number, if it has none.
     pub(crate) name: String,
     /// Of the longest.
     pub(crate) seconds: f32,
@@ -25,11 +25,9 @@ impl SharedClip {
         let mut all: Vec<Self> = Vec::new();
         for member in models.iter() {
             for (number, clip) in member.model.clips().iter().enumerate() {
-                let name = clip.name.clone().unwrap_or_default();
+                let name = clip.label(number);
                 // One file may have several of a name.
-                let is_same = |other: &&mut Self| {
-                    !name.is_empty() && other.name == name && other.of(member.id).is_none()
-                };
+                let is_same = |other: &&mut Self| other.name == name && other.of(member.id).is_none();
                 match all.iter_mut().find(is_same) {
                     Some(other) => {
                         other.of.push((member.id, number));

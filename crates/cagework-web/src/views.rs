@@ -162,7 +162,7 @@ impl MemberInfo {
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct ClipView {
-    /// Its name; empty if it has none.
+    /// Its name, or its number if it has none.
     name: String,
     seconds: f32,
 }

@@ -89,7 +89,7 @@ const finenessOf = (detail: number) => Math.log(COARSE_DETAIL / detail) / Math.l
 /** How a cage is made for the model. */
 function Automatic({ app }: { app: App }) {
   const { cageOptions: options, cageClip, model } = app.store.get();
-  const named = [...new Set(model?.clips.map((clip) => clip.name).filter(Boolean))];
+  const named = [...new Set(model?.clips.map((clip) => clip.name))];
   const change = (patch: Partial<CageOptions>) =>
     app.store.set({ cageOptions: { ...app.store.get().cageOptions, ...patch } });
   return (

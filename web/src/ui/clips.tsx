@@ -28,7 +28,7 @@ export function Clips({ app }: { app: App }) {
             {clips.map(({ name, seconds }, k) => (
               // biome-ignore lint/suspicious/noArrayIndexKey: clips have no other identity, and never change places
               <option key={k} value={k}>
-                {T.clips.named(name, k, duration(1000 * seconds))}
+                {T.clips.named(name, duration(1000 * seconds))}
               </option>
             ))}
           </select>

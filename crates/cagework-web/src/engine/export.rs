@@ -7,7 +7,8 @@ use cagework_core::dynamic::bend_vertices;
 use cagework_core::{ControlSet, InnerControls, PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_io::{
-    Model, ModelFormat, ReshapeReport, write_cage_obj, write_inner_controls, write_project, write_weights_npz,
+    Clip, Model, ModelFormat, ReshapeReport, write_cage_obj, write_inner_controls, write_project,
+    write_weights_npz,
 };
 use glam::{DVec3, Vec3};
 use js_sys::{Array, Float32Array, Uint32Array};
@@ -212,9 +213,7 @@ impl Engine {
             let is_alone = state.models.iter().nth(1).is_none();
             for member in state.models.iter() {
                 // One that lacks the clip stays where it is, as it does when the others play.
-                let has = |name: &&str| {
-                    is_alone || member.model.clips().iter().any(|c| c.name.as_deref() == Some(name))
-                };
+                let has = |name: &&str| is_alone || Clip::named(&member.model.clips(), name).is_ok();
                 let states = member.model.states(clip.as_deref().filter(has));
                 let (own, corners) = states.map_err(|e| Fault::new(ErrorName::Error, e))?;
                 let first = positions.len() as u32;

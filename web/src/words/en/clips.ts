@@ -6,7 +6,7 @@ export const clips = {
   title: "Its own movement",
   clip: "Clip",
   rest: "None: the cage poses it",
-  named: (name: string, number: number, length: string) => `${name || `Clip ${number + 1}`}, ${length}`,
+  named: (name: string, length: string) => `${name}, ${length}`,
   posing: "While a clip is shown, a drag looks around. To pose the model, choose none.",
   play: "Play the clip",
   pause: "Pause the clip",
