@@ -645,7 +645,7 @@ dynamic: boolean, };
  */
 export type ClipView = {
 /**
- * Its name; empty if it has none.
+ * Its name, or its number if it has none.
  */
 name: string, seconds: number, };
 /**
