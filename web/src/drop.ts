@@ -1,6 +1,6 @@
 /** What dropped files are, by their names: a model, a cage, a project, or what the page cannot open. */
 
-import { extension, isModel } from "@cagework/core/names";
+import { extension, isModel, MODELS } from "@cagework/core/names";
 import { T } from "./words";
 
 export { extension, isModel };
@@ -38,7 +38,7 @@ export function planDrop(names: readonly string[]): DropPlan {
   const all = names.map((name, index) => ({ name, index })).filter(({ name }) => isModel(name));
   // Controls come alone, when the cage is there.
   const plain = all.filter(({ name }) => !CONTROLS_NAME.test(base(name)));
-  const models = plain.length > 0 ? plain : all;
+  const models = oneFormatEach(plain.length > 0 ? plain : all);
   const model = models.find(({ name }) => !CAGE_NAME.test(base(name))) ?? models[0];
   if (!model) {
     const companions = names.every((name) => (COMPANIONS as readonly string[]).includes(extension(name)));
@@ -51,7 +51,7 @@ export function planDrop(names: readonly string[]): DropPlan {
   }
   const second = models.find((other) => other !== model && CAGE_NAME.test(base(other.name)));
   const more = models.filter((other) => other !== model && !CAGE_NAME.test(base(other.name)));
-  const companions = names.length - models.length;
+  const companions = names.length - all.length;
   const files = companions > 0 ? ` with ${companions} ${companions === 1 ? "file" : "files"}` : "";
   const what = T.models.several(base(model.name), more.length) + files;
   const sentence = second
@@ -64,6 +64,15 @@ export function planDrop(names: readonly string[]): DropPlan {
     ...(more.length > 0 ? { more: more.map(({ index }) => index) } : {}),
     ...(second ? { second: second.index } : {}),
   };
+}
+
+/** Of a model that came in several formats, as downloads do, the one that says most. */
+function oneFormatEach<T extends { readonly name: string }>(models: readonly T[]): T[] {
+  const path = (name: string) => name.slice(0, name.length - extension(name).length);
+  const rank = (name: string) => MODELS.indexOf(extension(name) as (typeof MODELS)[number]);
+  const isBest = ({ name }: T) =>
+    !models.some((other) => path(other.name) === path(name) && rank(other.name) < rank(name));
+  return models.filter(isBest);
 }
 
 /** What the page can say while files hover over it: browsers tell how many there are, and types of some. */

@@ -52,6 +52,13 @@ describe("dropped files", () => {
     expect(planDrop(["body.glb", "body-controls.obj"]).more, "controls are no model").toBeUndefined();
   });
 
+  it("open one format of a model that came in several", () => {
+    const plan = planDrop(["fox/fox.stl", "fox/fox.obj", "fox/fox.mtl", "fox/fox.glb"]);
+    expect(plan).toMatchObject({ kind: "model", main: 3 });
+    expect(plan.more).toBeUndefined();
+    expect(planDrop(["body/scene.gltf", "shirt/scene.gltf"]).more, "of two folders they are two").toEqual([1]);
+  });
+
   it("know a project by its name", () => {
     expect(planDrop(["horse.cagework.glb"])).toMatchObject({ kind: "project", main: 0 });
   });

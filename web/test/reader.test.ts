@@ -1,4 +1,5 @@
 import { type Client, named } from "@cagework/core/session/client";
+import { readFiles, siblingOf } from "@cagework/core/session/files";
 import { createApart } from "@cagework/core/session/reader";
 import { expect, it } from "vitest";
 import type { NamedFile } from "../src/contract";
@@ -73,4 +74,16 @@ it("how far reading is, is said with a share where there is one", () => {
   const { far, stages } = T.opening;
   expect(far(stages.geometry, 0)).toBe("Finding vertices and faces");
   expect(far(stages.textures, 0.4)).toBe("Decoding textures, 40%");
+});
+
+it("an OBJ and a glTF find the files that lie beside them, other formats take none", async () => {
+  const dropped = (name: string) => ({ name, path: `fox/${name}`, file: new Blob([name]) });
+  const beside = [dropped("fox.mtl"), { ...dropped("fur.png"), path: "fox/textures/fur.png" }];
+  const text = (bytes: Uint8Array | undefined) => bytes && new TextDecoder().decode(bytes);
+  for (const name of ["fox.obj", "fox.gltf"]) {
+    const find = siblingOf((await readFiles([dropped(name), ...beside])).siblings);
+    expect([text(find("./fox.mtl")), text(find("textures/fur.png"))]).toEqual(["fox.mtl", "fur.png"]);
+  }
+  // Once an OBJ was shown without its colours: only glTFs had their files read.
+  expect((await readFiles([dropped("fox.stl"), ...beside])).siblings.size).toBe(0);
 });

@@ -1,6 +1,6 @@
 /** What files are, by their names. */
 
-const MODELS = ["glb", "vrm", "gltf", "obj", "ply", "stl"] as const;
+export const MODELS = ["glb", "vrm", "gltf", "obj", "ply", "stl"] as const;
 
 /** Lower-case extension without the dot, or "". */
 export function extension(name: string): string {

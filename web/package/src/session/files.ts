@@ -4,6 +4,9 @@ import type { NamedFile } from "../contract";
 import { extension, isModel } from "../names";
 import { named } from "./client";
 
+/** Files that name others: buffers and textures, or materials and theirs. */
+const NAMING: readonly string[] = ["gltf", "obj"];
+
 /** Larger files are refused, bytes: the browser's memory for them would be several times as much. */
 const LARGEST = 1 << 30;
 
@@ -28,7 +31,7 @@ export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
   if (!main) throw named("Empty", "there is no file to open");
   const bytes = await read(main);
   const siblings = new Map<string, Uint8Array>();
-  if (extension(main.name) === "gltf") {
+  if (NAMING.includes(extension(main.name))) {
     const folder = main.path.slice(0, main.path.lastIndexOf("/") + 1);
     for (const file of files.filter((file) => file !== main)) {
       const content = await read(file);
