@@ -18,7 +18,7 @@ import { createTour, type TourActions } from "./actions/tour";
 import { createView, type View } from "./actions/view";
 import { createWorks, type WorkActions } from "./actions/works";
 import type { Session } from "./contract";
-import { RANGES } from "./defaults";
+import { MODEL_ENDINGS, RANGES } from "./defaults";
 import { createHistory } from "./history";
 import { choose } from "./input/choose";
 import { createCommands } from "./input/commands";
@@ -71,9 +71,8 @@ export interface App {
   key(command: Command): string;
 }
 
-const MODELS =
-  ".glb,.vrm,.gltf,.obj,.ply,.stl,.bin,.png,.jpg,.jpeg,.webp,.ktx2,.mtl,model/gltf-binary,model/gltf+json";
-const CAGES = ".obj,.glb,.gltf,.ply,.stl,.bin";
+const CAGES = `${MODEL_ENDINGS.map((ending) => `.${ending}`)},.bin`;
+const MODELS = `${CAGES},.png,.jpg,.jpeg,.webp,.ktx2,.mtl,model/gltf-binary,model/gltf+json`;
 
 export interface Needs {
   store: Store;

@@ -5,9 +5,11 @@ import { BIND_DEFAULTS, type BindOptions } from "@cagework/core/contract/generat
 export {
   BIND_DEFAULTS,
   CAGE_DEFAULTS,
+  MODEL_ENDINGS,
   RANGES,
   RIG_DEFAULTS,
   SCENE_DEFAULTS,
+  SHAPE_FORMATS,
 } from "@cagework/core/contract/generated";
 
 /** What the paper did. */

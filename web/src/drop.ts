@@ -1,6 +1,6 @@
 /** What dropped files are, by their names: a model, a cage, a project, or what the page cannot open. */
 
-import { extension, isModel, MODELS } from "@cagework/core/names";
+import { extension, isModel, rankOf } from "@cagework/core/names";
 import { T } from "./words";
 
 export { extension, isModel };
@@ -69,9 +69,8 @@ export function planDrop(names: readonly string[]): DropPlan {
 /** Of a model that came in several formats, as downloads do, the one that says most. */
 function oneFormatEach<T extends { readonly name: string }>(models: readonly T[]): T[] {
   const path = (name: string) => name.slice(0, name.length - extension(name).length);
-  const rank = (name: string) => MODELS.indexOf(extension(name) as (typeof MODELS)[number]);
   const isBest = ({ name }: T) =>
-    !models.some((other) => path(other.name) === path(name) && rank(other.name) < rank(name));
+    !models.some((other) => path(other.name) === path(name) && rankOf(other.name) < rankOf(name));
   return models.filter(isBest);
 }
 

@@ -1,5 +1,7 @@
 /** Numbers as people read them, in the language of the page. */
 
+import { MODEL_ENDINGS } from "./defaults";
+
 /** Of the words in words/index.ts. */
 export const LOCALE = "en";
 
@@ -25,6 +27,11 @@ export function count(value: number): string {
 /** 1 vertex, 2 vertices. */
 export function plural(value: number, one: string, many = `${one}s`): string {
   return `${count(value)} ${PLURAL.select(value) === "one" ? one : many}`;
+}
+
+/** ".glb, .obj, and .stl": what may be opened. */
+export function endings(type: "conjunction" | "disjunction"): string {
+  return new Intl.ListFormat(LOCALE, { type }).format(MODEL_ENDINGS.map((ending) => `.${ending}`));
 }
 
 /** a, b, and c */

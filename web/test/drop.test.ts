@@ -56,7 +56,9 @@ describe("dropped files", () => {
     const plan = planDrop(["fox/fox.stl", "fox/fox.obj", "fox/fox.mtl", "fox/fox.glb"]);
     expect(plan).toMatchObject({ kind: "model", main: 3 });
     expect(plan.more).toBeUndefined();
-    expect(planDrop(["body/scene.gltf", "shirt/scene.gltf"]).more, "of two folders they are two").toEqual([1]);
+    expect(planDrop(["body/scene.gltf", "shirt/scene.gltf"]).more, "of two folders they are two").toEqual([
+      1,
+    ]);
   });
 
   it("know a project by its name", () => {
@@ -70,7 +72,7 @@ describe("dropped files", () => {
   it("say what can be opened when nothing fits", () => {
     expect(planDrop(["notes.txt"])).toEqual({
       kind: "unknown",
-      sentence: "Cagework opens .glb, .vrm, .gltf, .obj, .ply and .stl files.",
+      sentence: "Cagework opens .glb, .vrm, .gltf, .obj, .ply, and .stl files.",
     });
     expect(planDrop([]).kind).toBe("nothing");
   });

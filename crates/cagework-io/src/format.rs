@@ -47,6 +47,17 @@ impl ModelFormat {
         }
     }
 
+    /// Endings of names of files that are read, lower case, without the dot; what says most of a model comes first.
+    #[must_use]
+    pub fn endings(self) -> &'static [&'static str] {
+        match self {
+            Self::Obj => &["obj"],
+            Self::Gltf => &["glb", "vrm", "gltf"],
+            Self::Ply => &["ply"],
+            Self::Stl => &["stl"],
+        }
+    }
+
     /// Ending of names of files that are written, lower case, without the dot.
     #[must_use]
     pub fn export_extension(self) -> &'static str {

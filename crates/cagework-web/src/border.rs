@@ -133,6 +133,19 @@ fn the_page_has_the_types_of_rust() {
     text += &constant("CAGE_DEFAULTS", "CageOptions", &CageAsked::from(CageOptions::default()));
     text += &constant("RIG_DEFAULTS", "RigOptions", &RigAsked::default());
     text += &constant("SCENE_DEFAULTS", "SceneOptions", &SceneAsked::default());
+    let formats = ModelFormat::ALL.into_iter();
+    let endings: Vec<&str> = formats.clone().flat_map(ModelFormat::endings).copied().collect();
+    writeln!(
+        text,
+        "/** Endings of files of models, best first. */\nexport const MODEL_ENDINGS = {endings:?} as const;"
+    )
+    .unwrap();
+    let shapes: Vec<&str> = formats.filter(|format| !format.holds_poses()).map(ModelFormat::name).collect();
+    writeln!(
+        text,
+        "/** Formats of a shape without anything else. */\nexport const SHAPE_FORMATS = {shapes:?} as const;"
+    )
+    .unwrap();
     writeln!(
         text,
         "/** Least and most of each option that is a number. */\nexport const RANGES = {{ grid: [{MIN_GRID}, {MAX_GRID}], \

@@ -1,6 +1,6 @@
 /** What files are, by their names. */
 
-export const MODELS = ["glb", "vrm", "gltf", "obj", "ply", "stl"] as const;
+import { MODEL_ENDINGS } from "./contract/generated";
 
 /** Lower-case extension without the dot, or "". */
 export function extension(name: string): string {
@@ -9,7 +9,12 @@ export function extension(name: string): string {
   return dot < 0 ? "" : base.slice(dot + 1).toLowerCase();
 }
 
+/** The place of a name's ending among those of models, the best of which are first; -1 if it is none of them. */
+export function rankOf(name: string): number {
+  return (MODEL_ENDINGS as readonly string[]).indexOf(extension(name));
+}
+
 /** Whether a name's ending is that of a model. */
 export function isModel(name: string): boolean {
-  return (MODELS as readonly string[]).includes(extension(name));
+  return rankOf(name) >= 0;
 }

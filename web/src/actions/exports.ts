@@ -1,6 +1,7 @@
 /** Files out of the page. */
 
-import type { ModelFormat, ModelInfo, NamedFile } from "../contract";
+import type { ModelInfo, NamedFile } from "../contract";
+import { SHAPE_FORMATS } from "../defaults";
 import { stem } from "../format";
 import { fittingPoses, rigOf } from "../state";
 import { sentence } from "../strings";
@@ -11,8 +12,6 @@ import type { Project } from "./project";
 
 export type ExportKind = "glb" | "shape" | "poses" | "cage" | "controls" | "weights" | "picture" | "project";
 
-/** Formats of a shape without anything else. */
-export const SHAPE_FORMATS = ["obj", "ply", "stl"] as const satisfies readonly ModelFormat[];
 export type ShapeFormatName = (typeof SHAPE_FORMATS)[number];
 
 export interface Exports {

@@ -1,8 +1,9 @@
 /** Step 5: files to take along, each with a sentence on what it is good for. */
 
 import { useEffect, useState } from "preact/hooks";
-import { type ExportKind, SHAPE_FORMATS, type ShapeFormatName } from "../actions/exports";
+import type { ExportKind, ShapeFormatName } from "../actions/exports";
 import type { App } from "../app";
+import { SHAPE_FORMATS } from "../defaults";
 import { type AppState, fittingPoses, rigOf } from "../state";
 import { T } from "../words";
 import { RigChoices } from "./clips";

@@ -696,5 +696,9 @@ export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"e
 export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"detail":0.028,"quads":true,"margin":0.0,"symmetry":"auto","voxels":0,"shape":"follow","per_component":false};
 export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"plain":false,"dynamic":false};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":["harmonic"],"problems":true,"joints":null};
+/** Endings of files of models, best first. */
+export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "obj", "ply", "stl"] as const;
+/** Formats of a shape without anything else. */
+export const SHAPE_FORMATS = ["obj", "ply", "stl"] as const;
 /** Least and most of each option that is a number. */
 export const RANGES = { grid: [8, 512], vertices: [8, 400], detail: [0.005, 0.2], margin: [0, 0.25], voxels: [8, 128] } as const;

@@ -1,6 +1,6 @@
 /** Step Cage. */
 
-import { count, plural } from "../../format";
+import { count, endings, plural } from "../../format";
 
 export const cage = {
   title: "Put a cage around it",
@@ -11,7 +11,7 @@ export const cage = {
     auto: "Follows the limbs of the model, closed and around every vertex; checked before you see it.",
     hull: "A rough hull of two dozen vertices: good for bodies without limbs, and quick to pose.",
     box: "A box around the model, its sides cut into squares: free-form deformation, good for studying.",
-    file: "A closed mesh that you modelled around it: .obj, .glb, .gltf, .ply or .stl.",
+    file: `A closed mesh that you modelled around it: ${endings("disjunction")}.`,
   },
   wanted: "Vertices, at most",
   detail: "Distance from the shape",

@@ -1,13 +1,13 @@
 /** Step Model, and how a file is opened. */
 
-import { duration, percent, plural } from "../../format";
+import { duration, endings, percent, plural } from "../../format";
 
 export const model = {
   title: "Choose a model",
   sentence:
     "A cage is a lattice that fits the shape of a model. What you see is already bound to its own: pull it anywhere, and the cage moves along. Or drop a file on this page.",
   drop: "Drop models here",
-  kinds: ".glb, .vrm, .gltf with its files, .obj, .ply or .stl; a folder works too. Several share one cage.",
+  kinds: `${endings("disjunction")}, with the files that they name; a folder works too. Several share one cage.`,
   openFolder: "Open a folder",
   kept: (n: number) => `Kept in this browser (${n})`,
   samples: "Samples",
@@ -53,7 +53,7 @@ export const opening = {
   empty: "This file is empty",
   noContent: (name: string) => `${name} has no content. Export it again, or choose another file.`,
   dropped: "Nothing was dropped.",
-  kinds: "Cagework opens .glb, .vrm, .gltf, .obj, .ply and .stl files.",
+  kinds: `Cagework opens ${endings("conjunction")} files.`,
   companions: "These files belong to a .gltf or .obj file: drop that one together with them.",
   damagedPose: "The pose in this project is damaged; it opens at rest.",
   dropTo: {
