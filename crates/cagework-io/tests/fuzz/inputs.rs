@@ -53,7 +53,7 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     let outside = OutsideVertex { vertex: 2, corners: [1, 2, 4], offset: Vec3::ONE };
     samples.push(CUBE_OBJ.as_bytes().to_vec());
     samples.push(
-        write_project(&[&model], &model.cage_mesh(), &[("bent".into(), bent.clone())], "{}")
+        write_project(&[&model, &model], &model.cage_mesh(), &[("bent".into(), bent.clone())], "{}")
             .expect("it fits"),
     );
     samples.push(write_weights_npz(&weights.expect("they are"), &[outside], &[Vec3::ONE], &[Vec3::ONE]));
