@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::command::{output, root, run};
 use crate::licences;
 use crate::npm::{self, exec};
-use crate::wasm::{self, Profile, target_folder};
+use crate::wasm::{self, target_folder};
 
 const PACKAGE: &str = "web/package";
 /// What is compiled and bundled into the package, for those who get it; ignored by git.
@@ -44,9 +44,7 @@ pub(crate) fn test() -> Result<(), String> {
 /// When a step fails.
 pub(crate) fn pack() -> Result<String, String> {
     npm::install()?;
-    if !wasm::is_fresh() {
-        wasm::build(Profile::Web)?;
-    }
+    wasm::ensure()?;
     run("node", &["web/package/build.mjs"], &[])?;
     let notices = root().join(NOTICES);
     emptied(&notices)?;

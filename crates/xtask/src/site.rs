@@ -3,7 +3,7 @@
 use crate::command::{root, run};
 use crate::licences;
 use crate::npm::{self, exec};
-use crate::wasm::{self, Profile};
+use crate::wasm;
 
 /// Largest wasm file, gzip-compressed: what a visitor waits for. Two per cent above what it is (PLY and STL took 60 kB, several
 /// models and the npm package 40).
@@ -28,7 +28,7 @@ const FOLDER: &str = "dist";
 /// When a step fails or the result is too large to download.
 pub(crate) fn build() -> Result<(), String> {
     npm::install()?;
-    wasm::build(Profile::Web)?;
+    wasm::ensure()?;
     exec(&["vite", "build", "web", "--config", "web/vite.config.ts", "--logLevel", "warn"])?;
     licences::of_page(&root().join(FOLDER))?;
     check_sizes()?;
@@ -86,9 +86,7 @@ pub(crate) fn pictures() -> Result<(), String> {
 /// # Errors
 /// When one is wrong.
 pub(crate) fn check_types() -> Result<(), String> {
-    if !wasm::is_fresh() {
-        wasm::build(Profile::Web)?;
-    }
+    wasm::ensure()?;
     exec(&["tsc", "--project", "web"])
 }
 

@@ -16,6 +16,15 @@ pub(crate) enum Profile {
     Web,
 }
 
+impl Profile {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Dev => "dev",
+            Self::Web => "web",
+        }
+    }
+}
+
 /// One of the page's two artifacts: the same crate for what a browser may have.
 struct Artifact {
     /// What of `cagework-web` is built.
@@ -43,13 +52,35 @@ const ARTIFACTS: [Artifact; 2] = [
 const RUSTFLAGS: &str = "-C target-feature=+simd128 -C passes=slp-vectorizer";
 
 /// What the packages are made of.
-const SOURCES: [&str; 4] = ["crates", "shaders", "Cargo.toml", "Cargo.lock"];
+const SOURCES: [&str; 7] = [
+    "crates/cagework-core",
+    "crates/cagework-io",
+    "crates/cagework-gpu",
+    "crates/cagework-web",
+    "shaders",
+    "Cargo.toml",
+    "Cargo.lock",
+];
 
-/// Whether the packages have been made, from the sources as they are now.
-pub(crate) fn is_fresh() -> bool {
+/// Says in each package how it was built.
+const PROFILE: &str = "profile.txt";
+
+/// Builds the packages as visitors get them, unless that has been done of the sources as they are now: Cargo keeps one artifact
+/// alone, so that building both again links both again, five minutes of two cores.
+///
+/// # Errors
+/// When a step fails.
+pub(crate) fn ensure() -> Result<(), String> {
+    let is_web = |a: &Artifact| {
+        let profile = std::fs::read_to_string(root().join(a.package).join(PROFILE));
+        profile.is_ok_and(|profile| profile == Profile::Web.name())
+    };
     let made = ARTIFACTS.iter().map(|a| modified(&root().join(a.package).join(format!("{}.d.ts", a.name))));
     let newest = SOURCES.iter().filter_map(|source| newest(&root().join(source))).max();
-    made.into_iter().min().flatten() >= newest
+    if ARTIFACTS.iter().all(is_web) && made.into_iter().min().flatten() >= newest {
+        return Ok(());
+    }
+    build(Profile::Web)
 }
 
 fn modified(path: &Path) -> Option<SystemTime> {
@@ -67,10 +98,8 @@ fn newest(path: &Path) -> Option<SystemTime> {
 /// # Errors
 /// When a step fails.
 pub(crate) fn build(profile: Profile) -> Result<(), String> {
-    let (name, folder) = match profile {
-        Profile::Dev => ("dev", "debug"),
-        Profile::Web => ("web", "web"),
-    };
+    let name = profile.name();
+    let folder = if profile == Profile::Dev { "debug" } else { name };
     let wasm = target_folder()?.join("wasm32-unknown-unknown").join(folder).join("cagework_web.wasm");
     for artifact in &ARTIFACTS {
         let target = ["--target", "wasm32-unknown-unknown", "--profile", name];
@@ -97,7 +126,10 @@ fn bindgen(wasm: &Path, artifact: &Artifact, profile: Profile) -> Result<(), Str
         .remove_name_section(profile == Profile::Web)
         .remove_producers_section(profile == Profile::Web)
         .out_name(artifact.name);
-    bindgen.generate(root().join(artifact.package)).map_err(fault("cannot make JavaScript of the wasm"))
+    let package = root().join(artifact.package);
+    bindgen.generate(&package).map_err(fault("cannot make JavaScript of the wasm"))?;
+    std::fs::write(package.join(PROFILE), profile.name())
+        .map_err(|e| format!("cannot write in {}: {e}", package.display()))
 }
 
 /// Cargo's target folder, wherever the user has put it.
