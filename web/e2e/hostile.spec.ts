@@ -10,8 +10,11 @@ import { bound, drop, expect, open, test } from "./support";
 const TARGET = join(import.meta.dirname, "../../target");
 const FOLDER = join(TARGET, "tmp/hostile");
 
-/** What a file may take, each: ms, and bytes of the tab's process. */
-const LONGEST_MS = 10_000;
+/**
+ * A file takes so long at most, ms. On an idle machine none takes more than 7 s, 10 are promised; a machine that is shared takes
+ * twice as long. What never ends is found all the same.
+ */
+const LONGEST_MS = 30_000;
 const MOST_BYTES = 1e9;
 
 /** Most memory that a tab's process has at this moment, bytes. */
