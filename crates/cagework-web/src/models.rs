@@ -14,6 +14,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Answer, ErrorName, Fault};
 
+/// Most that a project may count a model's first triangle as: models that come after it have room to be counted on.
+const MAX_FIRST: u32 = u32::MAX / 2;
 /// The name that stands for all of a model.
 const WHOLE: &str = "all";
 
@@ -92,7 +94,7 @@ impl Models {
             draw: Arc::new(draw),
             is_binned: false,
             // Never below what is there: points of the surface mean one triangle.
-            first_triangle: settings.map_or(0, |s| s.first_triangle).clamp(next, u32::MAX / 2),
+            first_triangle: settings.map_or(0, |s| s.first_triangle).min(MAX_FIRST).max(next),
             vertices: 0..0,
             triangles: 0..0,
             model: Arc::new(model),
@@ -432,8 +434,11 @@ mod tests {
         let mut other = Models::default();
         let odd: MemberSettings = serde_json::from_str(odd).unwrap();
         other.add(model("a.obj", 0.0), draw(&model("a.obj", 0.0)), Some(&odd));
+        // A second one once ended in a panic: it is counted on from the first.
+        other.add(model("b.obj", 0.0), draw(&model("b.obj", 0.0)), Some(&odd));
         assert!(other.parts().is_empty());
-        assert_eq!(other.settings().len(), 1);
+        assert_eq!(other.settings().len(), 2);
+        assert_eq!([MAX_FIRST, MAX_FIRST + 3].map(|t| other.corners(t)), [Some([0, 2, 1]), Some([4, 6, 5])]);
     }
 
     #[test]
