@@ -124,11 +124,8 @@ solver_suite!(classic_jacobi_gpu, every, gpu(Method::Classic, Solver::Jacobi));
 solver_suite!(embedded_multigrid_one_thread, embedded, cpu(Method::Embedded, Solver::Multigrid, 1));
 solver_suite!(embedded_multigrid_all_threads, embedded, cpu(Method::Embedded, Solver::Multigrid, 0));
 solver_suite!(embedded_jacobi_one_thread, embedded, cpu(Method::Embedded, Solver::Jacobi, 1));
-solver_suite!(embedded_jacobi_all_threads, embedded, cpu(Method::Embedded, Solver::Jacobi, 0));
 solver_suite!(classic_multigrid_one_thread, every, cpu(Method::Classic, Solver::Multigrid, 1));
-solver_suite!(classic_multigrid_all_threads, every, cpu(Method::Classic, Solver::Multigrid, 0));
 solver_suite!(classic_jacobi_one_thread, every, cpu(Method::Classic, Solver::Jacobi, 1));
-solver_suite!(classic_jacobi_all_threads, every, cpu(Method::Classic, Solver::Jacobi, 0));
 
 solver_suite!(embedded_cg, embedded, cpu(Method::Embedded, Solver::ConjugateGradient, 0));
 solver_suite!(classic_cg, every, cpu(Method::Classic, Solver::ConjugateGradient, 0));

@@ -5,10 +5,13 @@ import { torus } from "./models";
 import { bound, carry, expect, letGo, open, test } from "./support";
 import { longestTask } from "./tasks";
 
-/** Vertices, and the longest task of the main thread that may be, ms of processor time. */
-const AIMS = [
-  [30_000, 50],
-  [200_000, 100],
+/**
+ * Vertices, and the longest task of the main thread that may be, ms of processor time: three times what is promised, since a slow
+ * machine takes twice as long. Reading, caging or binding on the main thread takes seconds.
+ */
+const LIMITS = [
+  [30_000, 150],
+  [200_000, 300],
 ] as const;
 
 declare global {
@@ -34,7 +37,7 @@ const watch = (page: Page): Promise<void> =>
 // Every pixel is computed by the processor: a small picture.
 test.use({ viewport: { width: 420, height: 420 } });
 
-for (const [vertices, most] of AIMS) {
+for (const [vertices, most] of LIMITS) {
   test(`${vertices} vertices are read, caged and bound in tasks of less than ${most} ms`, async ({
     browser,
     page,

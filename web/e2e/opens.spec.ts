@@ -1,6 +1,5 @@
 /** The page opens with a model that can be dragged at once. */
 
-import { savedSince } from "./kept";
 import { followsAHandle } from "./stories";
 import { cagePositions, drag, drawn, expect, largestMove, open, shoot, test } from "./support";
 
@@ -39,7 +38,7 @@ test("opens with a sample that is bound, is idle, follows a handle, and is passe
   });
 });
 
-test("works below any path, from its own files alone", async ({ page }) => {
+test("works below any path, from its own files alone", async ({ page, context }) => {
   const strangers: string[] = [];
   page.on("request", (request) => {
     const { hostname, protocol } = new URL(request.url());
@@ -48,15 +47,27 @@ test("works below any path, from its own files alone", async ({ page }) => {
   await open(page, "~student/some%20where/cagework/");
   await drag(page, 40, 10);
   expect(strangers).toEqual([]);
-});
-
-test("keeps the work of the last visit", async ({ page }) => {
-  await open(page);
-  const before = await page.evaluate(() => Date.now());
-  await drag(page, 50, 30);
-  const posed = await cagePositions(page);
-  await expect.poll(() => savedSince(page, before)).toBe(true);
-  await page.reload();
-  await open(page);
-  expect(largestMove(posed, await cagePositions(page)), "the pose is back").toBeLessThan(1e-3);
+  await test.step("the page has the licences of all that is compiled into it", async () => {
+    await page.getByRole("button", { name: "Model", exact: false }).first().click();
+    const opened = context.waitForEvent("page");
+    await page.getByRole("link", { name: "Licences" }).click();
+    const licences = await opened;
+    const text = (await licences.textContent("body")) ?? "";
+    for (const name of [
+      "wgpu",
+      "glam",
+      "serde",
+      "gltf",
+      "@gltf-transform/core",
+      "draco3dgltf",
+      "meshoptimizer",
+    ])
+      expect(text).toMatch(new RegExp(`^${name} v\\d.*: .*(MIT|Apache)`, "m"));
+    expect(text).toContain("Permission is hereby granted");
+    expect(text).toContain("Apache License");
+    // Tools that only build the page are no part of it.
+    expect(text).not.toMatch(/^(vite|syn|wasm-bindgen-cli-support) v/m);
+    const library = await page.request.get("./rust-standard-library.html");
+    expect(library.ok()).toBe(true);
+  });
 });

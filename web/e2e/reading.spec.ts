@@ -82,14 +82,10 @@ test("a file that takes for ever is given up by Cancel and by Escape", async ({ 
   expect(await complaintsOfAxe(page)).toEqual([]);
   for (const scheme of ["light", "dark"] as const) {
     await page.emulateMedia({ colorScheme: scheme });
-    for (const [width, height] of [
-      [1440, 900],
-      [390, 844],
-    ] as const) {
-      await page.setViewportSize({ width, height });
-      await calm(page);
-      await shoot(page, `reading-${scheme}-${width}`);
-    }
+    const [width, height] = scheme === "light" ? [1440, 900] : [390, 844];
+    await page.setViewportSize({ width, height });
+    await calm(page);
+    await shoot(page, `reading-${scheme}-${width}`);
   }
   await page.setViewportSize({ width: 1024, height: 640 });
   await busy.getByRole("button", { name: "Cancel" }).click();
@@ -122,15 +118,15 @@ test("a cage with a vertex far away is a message or a draft, and the page goes o
   await drag(page, 20, 10);
 });
 
-test("ten models in turn, then a panic, then a good model: it opens", async ({ page, complaints }) => {
+test("models in turn, then a panic, then a good model: it opens", async ({ page, complaints }) => {
   await open(page);
   const before = await page.evaluate(() => Date.now());
-  for (let k = 0; k < 10; k++) await dropBox(page, `model${k}`);
-  await expect.poll(() => savedSince(page, before, "model9"), { timeout: 60_000 }).toBe(true);
+  for (const k of [1, 2, 3]) await dropBox(page, `model${k}`);
+  await expect.poll(() => savedSince(page, before, "model3"), { timeout: 60_000 }).toBe(true);
   await crash(page, "panic");
   const alert = page.locator("#toasts [role=alert]");
   await expect(alert).toContainText("Cagework stopped, and was begun anew", { timeout: 60_000 });
-  await expect(page, "the last one is back").toHaveTitle(/model9/);
+  await expect(page, "the last one is back").toHaveTitle(/model3/);
   await dropBox(page, "good");
   await drag(page, 20, 10);
   complaints.length = 0;

@@ -16,10 +16,16 @@ import {
   test,
 } from "./support";
 
-test("a project whose settings no bind could have is opened with others, and says which", async ({
+test("a damaged link and a project whose settings no bind could have are opened with others, and say which", async ({
   page,
 }) => {
-  await open(page);
+  await open(page, "./#sample=rat&pose=****");
+  const alert = page.locator("#toasts [role=alert]");
+  await expect(alert).toContainText("This link is damaged");
+  await expect(alert).toContainText("Its pose cannot be read.");
+  const before = await cagePositions(page);
+  await drag(page, 30, 20);
+  expect(await cagePositions(page)).not.toEqual(before);
   // All of them were taken once; then neither a bind nor an estimate worked until the page was loaded anew.
   const settings = {
     bind: { grid: 64.5, tau: 0, memory_limit: 1e18 },
@@ -41,16 +47,6 @@ test("a project whose settings no bind could have is opened with others, and say
   await expect(said).toContainText("The pose in this project is damaged");
   await bound(page);
   await drag(page, 30, 20);
-});
-
-test("a damaged link says so and opens the page", async ({ page }) => {
-  await open(page, "./#sample=rat&pose=****");
-  const alert = page.locator("#toasts [role=alert]");
-  await expect(alert).toContainText("This link is damaged");
-  await expect(alert).toContainText("Its pose cannot be read.");
-  const before = await cagePositions(page);
-  await drag(page, 30, 20);
-  expect(await cagePositions(page)).not.toEqual(before);
 });
 
 for (const how of ["panic", "out of memory"] as const) {
@@ -127,29 +123,4 @@ test("kept work that the page stops with twice is not opened a third time, and s
     "Cagework stopped with it the last time.",
   );
   complaints.length = 0;
-});
-
-test("the page has the licences of all that is compiled into it", async ({ page, context }) => {
-  await open(page);
-  await page.getByRole("button", { name: "Model", exact: false }).first().click();
-  const opened = context.waitForEvent("page");
-  await page.getByRole("link", { name: "Licences" }).click();
-  const licences = await opened;
-  const text = (await licences.textContent("body")) ?? "";
-  for (const name of [
-    "wgpu",
-    "glam",
-    "serde",
-    "gltf",
-    "@gltf-transform/core",
-    "draco3dgltf",
-    "meshoptimizer",
-  ])
-    expect(text).toMatch(new RegExp(`^${name} v\\d.*: .*(MIT|Apache)`, "m"));
-  expect(text).toContain("Permission is hereby granted");
-  expect(text).toContain("Apache License");
-  // Tools that only build the page are no part of it.
-  expect(text).not.toMatch(/^(vite|syn|wasm-bindgen-cli-support) v/m);
-  const library = await page.request.get("./rust-standard-library.html");
-  expect(library.ok()).toBe(true);
 });

@@ -93,8 +93,9 @@ export async function showsColours(page: Page, picture: string): Promise<void> {
   await shoot(page, `${picture}-compare`);
 }
 
-/** All three kinds of coordinates side by side: alike at rest, and each its own way in a pose. */
+/** All three kinds of coordinates side by side, of a small model: alike at rest, and each its own way in a pose. */
 async function comparesAll(page: Page): Promise<void> {
+  await dropsAWorm(page);
   const choices = page.getByRole("group", { name: "Coordinates side by side" });
   const choice = (name: string) => choices.getByRole("checkbox", { name });
   await expect(choice("Harmonic"), "there is nothing else to show").toBeDisabled();
@@ -136,11 +137,15 @@ async function comparesAll(page: Page): Promise<void> {
   for (const gap of await apart()) expect(gap, "posed").toBeGreaterThan(1e-3 * size);
 }
 
-/** Drops a model and poses it. */
-export async function posesAWorm(page: Page, [dx, dy]: readonly [number, number]): Promise<void> {
+async function dropsAWorm(page: Page): Promise<void> {
   await drop(page, [{ name: "worm.glb", bytes: await glb() }]);
   await expect(page).toHaveTitle(/worm/);
   await bound(page);
+}
+
+/** Drops a model and poses it. */
+export async function posesAWorm(page: Page, [dx, dy]: readonly [number, number]): Promise<void> {
+  await dropsAWorm(page);
   await drag(page, dx, dy);
 }
 

@@ -148,6 +148,11 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
     // The posed cage is elsewhere.
     engine.selectAll();
     engine.frameSelection();
+    if (stop.compare) {
+      // What is leftmost would be behind the tools.
+      const { width, height } = ctx.viewport();
+      engine.zoomAt(width / stop.compare.length / 2, height / 2, 0.8);
+    }
     engine.select(new Uint32Array(), "replace");
     edit.sync();
   };
