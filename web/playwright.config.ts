@@ -4,8 +4,8 @@ import { WITH_WEBGPU } from "./e2e/browser";
 /** Where e2e/server.mjs serves the built page. */
 const BASE = `http://127.0.0.1:${process.env.E2E_PORT ?? 4179}/`;
 
-/** What measures time runs after the others, alone. */
-const MEASURED = ["long-tasks.spec.ts"];
+/** What measures time or memory runs after the others, alone. */
+const MEASURED = ["hostile.spec.ts", "long-tasks.spec.ts"];
 
 export default defineConfig({
   testDir: "e2e",

@@ -118,7 +118,8 @@ pub(crate) fn parts_thinner_than_a_cell_get_weights(back_end: &BackEnd) {
     let with_body = together(&cuboid(Vec3::new(1.0, 0.0, 0.0), Vec3::new(2.0, 1.0, 2.0)), &leg);
     for mesh in [thin_bar(0.5), thin_bar(0.1), thin_bar(0.01), with_body] {
         let cage = cage(&mesh);
-        let points = points::inside(&cage, 400, 77);
+        // Few: so thin, each takes a hundred tries.
+        let points = points::inside(&cage, 60, 77);
         for grid in [8, 16] {
             let binding = back_end.bind_with(&points, &cage, |o| o.grid = grid);
             assert_eq!(binding.outside, [], "g = {grid}");

@@ -6,6 +6,7 @@ import {
   bound,
   cagePositions,
   download,
+  drawn,
   drop,
   expect,
   grip,
@@ -64,7 +65,10 @@ test("a visit that shapes somebody who walks", async ({ page }) => {
   });
 
   await test.step("joints are shown where the clip has them", async () => {
-    const picture = () => page.locator("canvas").first().screenshot();
+    const picture = async () => {
+      await drawn(page);
+      return page.locator("canvas").first().screenshot();
+    };
     const without = await picture();
     const joints = page.getByRole("switch", { name: "Show joints" });
     await joints.click();

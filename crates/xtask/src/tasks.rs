@@ -17,12 +17,14 @@ pub(crate) fn build() -> Result<(), String> {
     licences::of_command(&wasm::target_folder()?.join("release"))
 }
 
-/// What is tested, and built with the same features each time: benches have no tests, and criterion takes half a minute.
-const TESTED: [&str; 3] = ["--workspace", "--exclude", "cagework-benches"];
+/// What is tested, and built with the same features each time. Benches have no tests, and criterion takes half a minute; what
+/// this crate needs has been built with its own features.
+const TESTED: [&str; 5] = ["--workspace", "--exclude", "cagework-benches", "--exclude", "xtask"];
 
 /// Everything that can fail because the program is wrong.
 pub(crate) fn test() -> Result<(), String> {
     npm::install()?;
+    run("cargo", &["test", "--locked", "--package", "xtask"], &[])?;
     run("cargo", &[&["test", "--locked"], &TESTED[..]].concat(), &[])?;
     // The same inputs in each run; `cargo xtask fuzz` alone takes others each time.
     fuzz(&["--minutes", "0.3", "--seed", "1"])?;
