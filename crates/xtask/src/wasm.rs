@@ -47,8 +47,8 @@ const ARTIFACTS: [Artifact; 2] = [
 ];
 
 /// What the web's profile adds to rustc. Vectors of 128 bits are wherever WebGPU or WebGL2 are. The pass that makes them of
-/// the kernels' loops is asked for by name: linking takes the last crate's `opt-level = "z"` as a wish for
-/// none, whatever the core's own level is, and all loops stayed scalar (a bind took 1.6 times as long).
+/// the kernels' loops is asked for by name: without, all loops stayed scalar, whatever the core's own level is (a bind took 1.6
+/// times as long).
 const RUSTFLAGS: &str = "-C target-feature=+simd128 -C passes=slp-vectorizer";
 
 /// What the packages are made of.
