@@ -9,7 +9,8 @@ use crate::wasm::target_folder;
 const PACKAGE: &str = "crates/cagework-py";
 /// What is compiled into the wheel, for those who get it; ignored by git.
 const NOTICES: &str = "crates/cagework-py/python/cagework/licences";
-const INSTALL: [&str; 5] = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
+/// Modules are compiled when they are first imported: to compile all of SciPy takes as long as to install it.
+const INSTALL: [&str; 6] = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-compile"];
 
 /// Tests the wheel. `cargo test` has built the command that it is compared with.
 ///
