@@ -6,12 +6,12 @@ import {
   bound,
   cagePositions,
   download,
-  drawn,
   drop,
   expect,
   grip,
   handle,
   largestMove,
+  middle,
   open,
   pull,
   reachable,
@@ -65,15 +65,7 @@ test("a visit that shapes somebody who walks", async ({ page }) => {
   });
 
   await test.step("joints are shown where the clip has them", async () => {
-    const box = await page.locator("canvas").first().boundingBox();
-    if (!box) throw new Error("no canvas");
-    // Without the tools around it: the browser paints their shadows differently from time to time.
-    const { x, y, width, height } = box;
-    const clip = { x: x + width / 4, y: y + height / 8, width: width / 2, height: (3 * height) / 4 };
-    const picture = async () => {
-      await drawn(page);
-      return page.screenshot({ clip });
-    };
+    const picture = () => middle(page);
     const without = await picture();
     const joints = page.getByRole("switch", { name: "Show joints" });
     await joints.click();

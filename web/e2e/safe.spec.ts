@@ -70,7 +70,8 @@ for (const how of ["panic", "out of memory"] as const) {
     const report = page.getByRole("dialog", { name: "Report" });
     await expect(report).toContainText(how === "panic" ? "panicked at" : "unreachable");
     await shoot(page, "crash-report");
-    expect(complaints.join(), "the console has it, too").toMatch(/panicked at|unreachable/);
+    // What the console says comes by another way than the page.
+    await expect.poll(() => complaints.join(), "the console has it, too").toMatch(/panicked at|unreachable/);
     complaints.length = 0;
   });
 }

@@ -23,10 +23,10 @@ import {
   bound,
   download,
   drag,
-  drawn,
   drop,
   expect,
   largestMove,
+  middle,
   modelPositions,
   open,
   pull,
@@ -56,10 +56,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
   });
 
   await test.step("an eye hides one", async () => {
-    const picture = async () => {
-      await drawn(page);
-      return page.locator("canvas").first().screenshot();
-    };
+    const picture = () => middle(page);
     // Away from the handles, which show that the pointer is near.
     await page.getByRole("button", { name: "Hide shirt.glb" }).hover();
     const before = await picture();

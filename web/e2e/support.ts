@@ -269,6 +269,16 @@ export async function drawn(page: Page): Promise<void> {
   await page.waitForFunction(isSharp);
 }
 
+/** What is drawn in the middle of the view, without the tools: the browser paints their shadows now so, now so. */
+export async function middle(page: Page): Promise<Buffer> {
+  await drawn(page);
+  const box = await page.locator("canvas").first().boundingBox();
+  if (!box) throw new Error("no canvas");
+  const { x, y, width, height } = box;
+  const clip = { x: x + width / 4, y: y + height / 8, width: width / 2, height: (3 * height) / 4 };
+  return page.screenshot({ clip });
+}
+
 /** Waits until nothing of the page moves by itself. */
 export async function calm(page: Page): Promise<void> {
   await page.waitForFunction(() =>
