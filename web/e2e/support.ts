@@ -269,7 +269,7 @@ export async function drawn(page: Page): Promise<void> {
   await page.waitForFunction(isSharp);
 }
 
-/** What is drawn in the middle of the view, without the tools: the browser paints their shadows now so, now so. */
+/** What is drawn in the middle of the view, without the tools: the browser does not always paint their shadows alike. */
 export async function middle(page: Page): Promise<Buffer> {
   await drawn(page);
   const box = await page.locator("canvas").first().boundingBox();
