@@ -1,5 +1,6 @@
 /** Several models in one cage: dropped together, each with its own way to follow, each its own file again. */
 
+import type { Page } from "@playwright/test";
 import {
   apart,
   BUCKLE,
@@ -34,6 +35,24 @@ import {
   test,
 } from "./support";
 import { distances, pointsOf, SIZES } from "./wardrobe";
+
+/** Clicks with the brush; how far from there it has touched the model `0`, whose vertices are at `positions`, pixels. */
+async function dabbed(page: Page, at: { x: number; y: number }, positions: number[]): Promise<number> {
+  await page.mouse.click(at.x, at.y);
+  return page.evaluate(
+    ({ at, positions }) => {
+      const engine = globalThis.cagework?.engine;
+      const { left = 0, top = 0 } = document.querySelector("canvas")?.getBoundingClientRect() ?? {};
+      const off = Array.from(engine?.painted(0) ?? [], (amount, v) => {
+        const [x = 0, y = 0, z = 0] = positions.slice(3 * v, 3 * v + 3);
+        const [px = 0, py = 0] = engine?.project(x, y, z) ?? [];
+        return amount > 0 ? Math.hypot(left + px - at.x, top + py - at.y) : 0;
+      });
+      return Math.max(0, ...off);
+    },
+    { at, positions },
+  );
+}
 
 test("a body, its shirt and a buckle are dropped, told apart, undone, exported and kept", async ({
   page,
@@ -94,7 +113,15 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
     await row(page, "body.glb").getByRole("button", { name: "Paint what stays" }).click();
     await page.getByRole("slider", { name: "Size of the brush" }).fill("0.15");
     const before = still(apart(await modelPositions(page)).body, own.body)[0];
+    const place = await paintable(page, 0);
+    await page.mouse.move(place.x, place.y);
+    await expect(page.locator(".brush")).toBeVisible();
     await shoot(page, "several-painting");
+    const radius = ((await page.locator(".brush").boundingBox())?.width ?? 0) / 2;
+    const touched = await dabbed(page, place, apart(await modelPositions(page)).body);
+    expect(touched, "what it touches lies within its outline").toBeLessThan(1.02 * radius);
+    expect(touched, "and reaches out to it").toBeGreaterThan(0.7 * radius);
+    await undo(page);
     await pull(page, await paintable(page, 0), 12, 12);
     const painted = still(apart(await modelPositions(page)).body, own.body)[0];
     expect(painted).toBeGreaterThan(before);

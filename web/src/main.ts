@@ -4,6 +4,7 @@ import { lackOf } from "@cagework/core/session/adapter";
 import { createApp } from "./app";
 import type { Session } from "./contract";
 import { watchCrashes } from "./crash";
+import { attachBrush } from "./input/brush";
 import { attachDrop } from "./input/drop";
 import { attachKeyboard } from "./input/keyboard";
 import { attachPointer } from "./input/pointer";
@@ -66,6 +67,7 @@ async function main(): Promise<void> {
     return;
   }
   attachPointer(stage, app);
+  attachBrush(stage.viewport, app);
   attachKeyboard({ viewport: stage.viewport, app, run: app.run, original: (on) => app.view.original(on) });
   attachDrop(byId("panel"), app);
   lost.watch(session);

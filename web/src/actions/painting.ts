@@ -18,6 +18,8 @@ export interface PaintActions {
   /** Keeps the stroke, or puts back what was there before. */
   end(keep: boolean): void;
   active(): boolean;
+  /** Radius of the brush where it would paint, CSS pixels. */
+  radiusAt(x: number, y: number): number | null;
 }
 
 /** Farther apart than this a stroke gets dabs between, CSS pixels. */
@@ -106,6 +108,15 @@ export function createPainting(ctx: Context, settle: () => void): PaintActions {
       else put(id, ended.before);
     },
     active: () => stroke !== undefined,
+    radiusAt(x, y) {
+      const { painting } = store.get();
+      try {
+        return (painting && engine().brushRadius(x, y, painting.radius)) ?? null;
+      } catch {
+        // Not bound, or the GPU is busy for a moment: the next movement asks again.
+        return null;
+      }
+    },
   };
   effect(() => {
     const { editingRest, model, painting } = store.get();

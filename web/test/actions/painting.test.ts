@@ -105,6 +105,20 @@ it("what cannot be painted yet is said; a moment without the GPU leaves no gap",
   expect([amounts().slice(0, 5), problems.length]).toEqual([[255, 255, 255, 255, 255], 1]);
 });
 
+it("the brush has an outline where it would paint", () => {
+  const { painting, teach } = page();
+  teach({ brushRadius: (_x: number, y: number, radius: number) => (y < 100 ? undefined : 100 * radius) });
+  expect(painting.radiusAt(5, 150), "nobody paints").toBeNull();
+  painting.on(0);
+  expect([painting.radiusAt(5, 150), painting.radiusAt(5, 50)]).toEqual([5, null]);
+  teach({
+    brushRadius() {
+      throw new Error("there are no weights yet");
+    },
+  });
+  expect(painting.radiusAt(5, 150)).toBeNull();
+});
+
 it("painting ends with its model, and where the cage is reshaped", () => {
   const { painting, store, shown } = page();
   painting.on(0);

@@ -128,6 +128,21 @@ impl Engine {
         }))
     }
 
+    /// Radius of the brush of [`Engine::paint`] around the point under the pointer, CSS pixels; undefined where it would paint
+    /// nothing.
+    ///
+    /// # Errors
+    /// Before there are weights, or while the GPU is busy.
+    #[wasm_bindgen(js_name = brushRadius)]
+    pub fn brush_radius(&self, x: f32, y: f32, radius: f32) -> Result<Option<f32>, JsValue> {
+        self.posed(|_, _| Ok(()))?;
+        Ok(self.read(|state| {
+            let (id, _) = state.painting.as_ref()?;
+            let (center, reach) = state.touched(*id, [x, y], radius)?;
+            Some(reach / state.camera.units_per_pixel(center))
+        }))
+    }
+
     /// What a project keeps of the models besides their files; nothing if there is nothing to say.
     ///
     /// # Errors
@@ -210,23 +225,26 @@ impl State {
         self.is_changed = true;
     }
 
-    /// Paints vertices of a model around the point under the pointer; false if another one is there, or none.
-    fn dab(&mut self, id: u32, [x, y]: [f32; 2], radius: f32, amount: u8) -> bool {
+    /// The point of a model under the pointer, and how far a brush reaches from there, object units; nothing if another model is
+    /// there, or none.
+    fn touched(&self, id: u32, [x, y]: [f32; 2], radius: f32) -> Option<(Vec3, f32)> {
         let (at, posed) = (self.pointer(x, y), &self.held.posed);
         if posed.len() != self.models.positions.len() {
-            return false;
+            return None;
         }
-        let Some((triangle, bary)) = pick_surface(posed, self.models.shown_triangles(), &self.camera, at)
-        else {
-            return false;
-        };
+        let (triangle, bary) = pick_surface(posed, self.models.shown_triangles(), &self.camera, at)?;
         let corners = self.models.triangles[triangle as usize];
-        let center: Vec3 = corners.iter().zip(bary).map(|(&v, share)| share * posed[v as usize]).sum();
-        let reach = radius * self.bounds().map_or(0.0, |b| b.diagonal());
+        let center = corners.iter().zip(bary).map(|(&v, share)| share * posed[v as usize]).sum();
+        let reach = radius * self.bounds()?.diagonal();
+        let is_own = self.models.get(id).ok()?.triangles.contains(&(triangle as usize));
+        (is_own && reach > 0.0).then_some((center, reach))
+    }
+
+    /// Paints vertices of a model around the point under the pointer; false if another one is there, or none.
+    fn dab(&mut self, id: u32, at: [f32; 2], radius: f32, amount: u8) -> bool {
+        let Some((center, reach)) = self.touched(id, at, radius) else { return false };
+        let posed = &self.held.posed;
         let Ok(member) = self.models.get_mut(id) else { return false };
-        if !member.triangles.contains(&(triangle as usize)) || reach <= 0.0 {
-            return false;
-        }
         member.painted.resize(member.model.positions.len(), 0);
         for (painted, at) in member.painted.iter_mut().zip(&posed[member.vertices.clone()]) {
             let share = 1.0 - ((at.distance(center) / reach - FULL) / (1.0 - FULL)).clamp(0.0, 1.0);
