@@ -1,8 +1,9 @@
-/** The package in a browser: what `Api` describes, each function in a worker but `deform`. */
+/** The package in a browser: each function in a worker but `deform`. */
 
 import { createApi } from "./api";
 import { compile } from "./session/artifact";
 import { createClient } from "./session/client";
+import type { Api } from "./types";
 
 /** Binds take a core each; more than these would only take memory. */
 const MOST = 4;
@@ -15,7 +16,21 @@ const api = /* @__PURE__ */ createApi(async () => {
   const openClient = () => createClient(module, WEBGPU.openWorker);
   return { pkg: WEBGPU.pkg, openClient, most, hasGpu: "gpu" in navigator };
 });
-const { bind, generateCage, deform, reshape, readModel } = api;
+
+// Each with its sentence: editors show what stands at the name that is imported.
+/**
+ * Binds points, `[n, 3]`, to a cage by harmonic coordinates. On the processor, with the command's numbers; `backend: "gpu"`
+ * takes WebGPU. A promise here is rejected with an error whose `name` is an `ErrorName`, or with the signal's reason.
+ */
+export const bind: Api["bind"] = api.bind;
+/** A cage that encloses a model strictly; the model may be any triangle soup. */
+export const generateCage: Api["generateCage"] = api.generateCage;
+/** Where the points are in a pose of the cage, `[n_points, 3]`: on this thread, once the module is there. */
+export const deform: Api["deform"] = api.deform;
+/** The file of a model as it follows a posed cage: a glTF keeps rig, clips, morph targets and materials, as a GLB. */
+export const reshape: Api["reshape"] = api.reshape;
+/** Vertices and triangles of a file, in the order that `reshape` binds them in. */
+export const readModel: Api["readModel"] = api.readModel;
 
 export type {
   BindOptions,
@@ -27,4 +42,3 @@ export type {
   RigOptions,
 } from "./contract/generated";
 export type * from "./types";
-export { bind, deform, generateCage, readModel, reshape };

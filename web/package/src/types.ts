@@ -75,24 +75,17 @@ export type CageAsked = Follow & Partial<CageOptions>;
 /** `plain`: the shape alone, no rig. */
 export type ReshapeAsked = Follow & Named & Partial<BindOptions> & Partial<Omit<RigOptions, "dynamic">>;
 
+/** What index.ts exports, and says of it. */
 export interface Api {
-  /**
-   * Binds points, `[n, 3]`, to a cage by harmonic coordinates. On the processor, with the command's numbers; `backend: "gpu"`
-   * takes WebGPU.
-   */
   bind(points: ArrayLike<number>, cage: Cage, options?: BindAsked): Promise<Bound>;
-  /** A cage that encloses a model strictly; the model may be any triangle soup. */
   generateCage(mesh: Mesh, options?: CageAsked): Promise<GeneratedCage>;
-  /** Where the points are in a pose of the cage, `[n_points, 3]`: on this thread, once the module is there. */
   deform(weights: Weights, posed: ArrayLike<number>): Promise<Float32Array>;
-  /** The file of a model as it follows a posed cage: a glTF keeps rig, clips, morph targets and materials, as a GLB. */
   reshape(
     model: File,
     cage: Cage,
     posed: ArrayLike<number>,
     options?: ReshapeAsked,
   ): Promise<Uint8Array<ArrayBuffer>>;
-  /** Vertices and triangles of a file, in the order that `reshape` binds them in. */
   readModel(
     model: File,
     options?: Follow & Named,
