@@ -60,6 +60,7 @@ async function opened(options: typeof WITH_WEBGL, use: (browser: Browser) => Pro
 for (const [how, address] of [
   ["as it is", "three.html"],
   ["bundled by Vite", "bundled/three.html"],
+  ["bundled by webpack", "webpack/three.html"],
 ] as const) {
   test(`a mesh of three.js follows its cage, ${how}`, async ({ visit }) => {
     const page = await visit("webgl", address);

@@ -1,7 +1,8 @@
-/** Models of all tests, put into the blank project; the tests in Node, which come after, read them too. */
+/** Models of all tests and what webpack makes, put into the blank project; the tests in Node, which come after, read models too. */
 
-import { writeFileSync } from "node:fs";
+import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
+import webpack from "webpack";
 import { dracoGlb, meshoptGlb, torus } from "../../e2e/models";
 
 /** Few: processors draw here. */
@@ -9,8 +10,36 @@ const VERTICES = 1500;
 
 export default async function setup(): Promise<void> {
   const project = process.env.NPM_PROJECT ?? "";
+  await bundle(project);
   const glb = await torus(VERTICES);
-  for (const folder of ["", "bundled"]) writeFileSync(join(project, folder, "model.glb"), glb);
+  for (const folder of ["", "bundled", "webpack"]) writeFileSync(join(project, folder, "model.glb"), glb);
   writeFileSync(join(project, "draco.glb"), await dracoGlb());
   writeFileSync(join(project, "meshopt.glb"), await meshoptGlb());
+}
+
+/** The pages as webpack makes them, which takes their scripts alone. Vite takes whole pages: see vite.config.ts. */
+async function bundle(project: string): Promise<void> {
+  const path = join(project, "webpack");
+  const entry: Record<string, string> = {};
+  const pages: Record<string, string> = {};
+  for (const name of ["three", "element"]) {
+    pages[name] = readFileSync(join(project, `${name}.html`), "utf8").replace(
+      /<script type="module">(.*?)<\/script>/s,
+      (_, script: string) => {
+        entry[name] = `data:text/javascript,${encodeURIComponent(script)}`;
+        return `<script defer src="${name}.js"></script>`;
+      },
+    );
+  }
+  const made = webpack({
+    context: project,
+    entry,
+    mode: "production",
+    optimization: { minimize: false },
+    output: { path },
+  });
+  await new Promise<void>((done, failed) => {
+    made.run((error, stats) => (error || stats?.hasErrors() ? failed(error ?? stats?.toString()) : done()));
+  });
+  for (const [name, page] of Object.entries(pages)) writeFileSync(join(path, `${name}.html`), page);
 }
