@@ -119,7 +119,7 @@ pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result
 
 /// What stands after the first of `n` names.
 fn others(n: usize) -> String {
-    if n > 1 { format!(" (as {} more)", n - 1) } else { String::new() }
+    if n > 1 { format!(" (and {} more)", n - 1) } else { String::new() }
 }
 
 /// What an export will need must not fail only then, after a long bind.
