@@ -4,7 +4,7 @@ use cagework_io::{Joints, Model, ReshapeOptions};
 use glam::{DVec3, Mat4, Vec3, vec3};
 use serde_json::json;
 
-use super::common::{self, Builder, F32, U8, floats, json_of, rigged};
+use super::common::{self, Builder, F32, U8, floats, json_of, plain_cube, rigged};
 use super::{ROUNDED, assert_near, assert_targets, by, f, player, read, reshaped, shown};
 
 /// The column with a cube on its tip, placed by a matrix.
@@ -304,4 +304,17 @@ fn bind_matrices_that_are_no_numbers_name_their_skin() {
     rig.json["skins"][0]["inverseBindMatrices"] = binds.into();
     let said = Model::read("rigged.glb", &rig.glb(), &mut |_| None).unwrap_err().to_string();
     assert!(said.contains("the inverse bind matrix of joint 1 of skin 0, which is not finite"), "{said}");
+}
+
+#[test]
+fn what_lies_on_indices_is_not_written_over() {
+    let mut cube = plain_cube();
+    // A ninth vertex, which no triangle uses, is the first six indices.
+    cube.json["accessors"][0]["count"] = 9.into();
+    cube.json["bufferViews"][0]["byteLength"] = (9 * 12).into();
+    let model = read(&cube.glb());
+    let again = read(&reshaped(&model, Joints::Follow).0);
+    assert_eq!(again.triangles, model.triangles);
+    let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
+    assert_near(&again.positions, &moved, ROUNDED, "where the cage brings them");
 }

@@ -1,10 +1,11 @@
 //! A document that is changed as little as possible: what nobody writes keeps its bytes.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use ::gltf::binary::{Glb, Header};
 use serde_json::{Value, json};
 
+use super::overlap::{Place, overlapping};
 use crate::error::WriteError;
 use crate::gltf::GltfDocument;
 use crate::gltf::pack::{F32, VERTICES, each_accessor, push};
@@ -18,8 +19,10 @@ pub(super) struct Edit<'a> {
     pub(super) json: Value,
     /// All buffers, one after the other.
     bin: Vec<u8>,
-    /// References to each place in the buffer, by buffer view and offset.
-    uses: HashMap<(u64, u64), usize>,
+    /// References to each place in the buffer.
+    uses: HashMap<Place, usize>,
+    /// Places that are never written over.
+    overlapping: HashSet<Place>,
 }
 
 impl<'a> Edit<'a> {
@@ -38,7 +41,8 @@ impl<'a> Edit<'a> {
                 view["buffer"] = 0.into();
             }
         }
-        let mut edit = Self { document, json, bin, uses: HashMap::new() };
+        let overlapping = overlapping(&json);
+        let mut edit = Self { document, json, bin, uses: HashMap::new(), overlapping };
         edit.count_uses();
         edit
     }
@@ -58,7 +62,7 @@ impl<'a> Edit<'a> {
         *self.uses.entry(self.place(accessor)).or_default() += 1;
     }
 
-    fn place(&self, accessor: usize) -> (u64, u64) {
+    fn place(&self, accessor: usize) -> Place {
         let accessor_json = &self.json["accessors"][accessor];
         match accessor_json["bufferView"].as_u64() {
             Some(view) => (view, accessor_json["byteOffset"].as_u64().unwrap_or(0)),
@@ -98,7 +102,8 @@ impl<'a> Edit<'a> {
         let plain = of_accessor["componentType"] == F32
             && of_accessor.get("sparse").is_none()
             && number(of_accessor, "count") == values.len()
-            && self.uses.get(&self.place(accessor)) == Some(&1);
+            && self.uses.get(&self.place(accessor)) == Some(&1)
+            && !self.overlapping.contains(&self.place(accessor));
         let Some(view) = of_accessor["bufferView"].as_u64().filter(|_| plain) else { return false };
         let view = &self.json["bufferViews"][view as usize];
         let start = number(view, "byteOffset") + number(of_accessor, "byteOffset");

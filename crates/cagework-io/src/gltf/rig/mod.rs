@@ -12,6 +12,7 @@ mod clip;
 mod edit;
 mod lattice;
 mod nodes;
+mod overlap;
 mod play;
 mod poses;
 mod reshape;

@@ -1,0 +1,148 @@
+//! Accessors that have bytes of others: to write over one would change the others.
+
+use std::collections::{HashMap, HashSet};
+
+use serde_json::Value;
+
+/// Buffer view and offset in it.
+pub(super) type Place = (u64, u64);
+
+/// `size` bytes of every `stride` from `start` on, before `end`.
+struct Span {
+    /// Where it can be written; None for images and sparse values, which are not.
+    place: Option<Place>,
+    start: u64,
+    end: u64,
+    stride: u64,
+    size: u64,
+}
+
+/// Places of accessors that lie on others in part. Attributes that take turns in a vertex do not, nor do accessors of one
+/// and the same place, which are counted by their uses.
+pub(super) fn overlapping(json: &Value) -> HashSet<Place> {
+    let mut spans = spans(json);
+    spans.sort_by_key(|span| span.start);
+    let (mut found, mut first, mut end) = (HashSet::new(), 0, 0);
+    for k in 0..=spans.len() {
+        if k == spans.len() || spans[k].start >= end {
+            let cluster = &spans[first..k];
+            if cluster.len() > 1 && !take_turns(cluster) {
+                found.extend(cluster.iter().filter_map(|span| span.place));
+            }
+            (first, end) = (k, 0);
+        }
+        end = end.max(spans.get(k).map_or(0, |span| span.end));
+    }
+    found
+}
+
+/// Whether spans are attributes of the same vertices, each with its own part of the stride.
+fn take_turns(spans: &[Span]) -> bool {
+    let stride = spans[0].stride;
+    let mut parts: Vec<(u64, u64)> =
+        spans.iter().map(|span| (span.start % stride, span.start % stride + span.size)).collect();
+    parts.sort_unstable();
+    let around = parts[0].0 + stride;
+    spans.iter().all(|span| span.stride == stride)
+        && parts.windows(2).all(|pair| pair[0].1 <= pair[1].0)
+        && parts.iter().all(|part| part.1 <= around)
+}
+
+fn spans(json: &Value) -> Vec<Span> {
+    let number = |of: &Value, key: &str| of[key].as_u64().unwrap_or(0);
+    let list = |key: &str| json[key].as_array().into_iter().flatten();
+    let view = |of: &Value| of["bufferView"].as_u64().map(|view| (view, &json["bufferViews"][view as usize]));
+    let whole = |of: &Value| {
+        let (_, view) = view(of)?;
+        let (start, size) = (number(view, "byteOffset"), number(view, "byteLength"));
+        (size > 0).then(|| Span { place: None, start, end: start.saturating_add(size), stride: size, size })
+    };
+    let mut at_places: HashMap<Place, Span> = HashMap::new();
+    let mut spans: Vec<Span> = list("images").filter_map(whole).collect();
+    for accessor in list("accessors") {
+        let sparse = &accessor["sparse"];
+        spans.extend([&sparse["indices"], &sparse["values"]].into_iter().filter_map(whole));
+        let (Some((number_of_view, view)), count) = (view(accessor), number(accessor, "count")) else {
+            continue;
+        };
+        let components = match accessor["type"].as_str() {
+            Some("SCALAR") => 1,
+            Some("VEC2") => 2,
+            Some("VEC3") => 3,
+            Some("MAT3") => 9,
+            Some("MAT4") => 16,
+            _ => 4,
+        };
+        let size = components
+            * match number(accessor, "componentType") {
+                5120 | 5121 => 1,
+                5122 | 5123 => 2,
+                _ => 4,
+            };
+        let offset = number(accessor, "byteOffset");
+        let start = number(view, "byteOffset").saturating_add(offset);
+        let stride = view["byteStride"].as_u64().filter(|&stride| stride > 0).unwrap_or(size);
+        let end = start.saturating_add(stride.saturating_mul(count.saturating_sub(1))).saturating_add(size);
+        let place = (number_of_view, offset);
+        let span = Span { place: Some(place), start, end, stride, size };
+        // Of several the largest.
+        let at_place = at_places.entry(place).or_insert(span);
+        (at_place.end, at_place.size) = (at_place.end.max(end), at_place.size.max(size));
+    }
+    spans.extend(at_places.into_values());
+    spans
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    /// Offset, length and stride (0 for none) of views; view, offset and type of accessors of ten floats or vectors of them.
+    fn found(views: &[[u64; 3]], accessors: &[(u64, u64, &str)]) -> Vec<Place> {
+        let views: Vec<Value> = views
+            .iter()
+            .map(|[start, length, stride]| match stride {
+                0 => json!({ "byteOffset": start, "byteLength": length }),
+                _ => json!({ "byteOffset": start, "byteLength": length, "byteStride": stride }),
+            })
+            .collect();
+        let accessors: Vec<Value> = accessors
+            .iter()
+            .map(|(view, offset, kind)| {
+                json!({ "bufferView": view, "byteOffset": offset, "componentType": 5126, "count": 10, "type": kind })
+            })
+            .collect();
+        let mut found: Vec<Place> = overlapping(
+            &json!({ "bufferViews": views, "accessors": accessors, "images": [{ "bufferView": 0 }] }),
+        )
+        .into_iter()
+        .collect();
+        found.sort_unstable();
+        found
+    }
+
+    #[test]
+    fn only_what_shares_bytes_is_found() {
+        let picture = [0, 100, 0];
+        let apart = found(&[picture, [100, 120, 0], [220, 40, 0]], &[(1, 0, "VEC3"), (2, 0, "SCALAR")]);
+        assert_eq!(apart, []);
+        let by_a_byte = found(&[picture, [101, 120, 0], [220, 40, 0]], &[(1, 0, "VEC3"), (2, 0, "SCALAR")]);
+        assert_eq!(by_a_byte, [(1, 0), (2, 0)]);
+        assert_eq!(found(&[picture, [99, 120, 0]], &[(1, 0, "VEC3")]), [(1, 0)], "on a picture");
+        let within = found(&[picture, [100, 240, 0]], &[(1, 0, "VEC3"), (1, 60, "VEC3")]);
+        assert_eq!(within, [(1, 0), (1, 60)], "of one view");
+        assert_eq!(found(&[picture, [100, 120, 0]], &[(1, 0, "VEC3"), (1, 0, "SCALAR")]), [], "one place");
+    }
+
+    #[test]
+    fn attributes_may_take_turns() {
+        let one_view = found(&[[0, 100, 0], [100, 240, 24]], &[(1, 0, "VEC3"), (1, 12, "VEC3")]);
+        assert_eq!(one_view, []);
+        let two_views = [[0, 100, 0], [100, 228, 24], [112, 228, 24]];
+        assert_eq!(found(&two_views, &[(1, 0, "VEC3"), (2, 0, "VEC3")]), []);
+        let too_wide = found(&[[0, 100, 0], [100, 244, 24]], &[(1, 0, "VEC3"), (1, 12, "VEC4")]);
+        assert_eq!(too_wide, [(1, 0), (1, 12)]);
+    }
+}
