@@ -18,8 +18,8 @@ export interface PaintActions {
   /** Keeps the stroke, or puts back what was there before. */
   end(keep: boolean): void;
   active(): boolean;
-  /** Radius of the brush where it would paint, CSS pixels. */
-  radiusAt(x: number, y: number): number | null;
+  /** Radius of the brush, CSS pixels: null where it would not paint, undefined while the GPU is busy for a moment. */
+  radiusAt(x: number, y: number): number | null | undefined;
 }
 
 /** Farther apart than this a stroke gets dabs between, CSS pixels. */
@@ -113,8 +113,7 @@ export function createPainting(ctx: Context, settle: () => void): PaintActions {
       try {
         return (painting && engine().brushRadius(x, y, painting.radius)) ?? null;
       } catch {
-        // Not bound, or the GPU is busy for a moment: the next movement asks again.
-        return null;
+        return store.get().bound ? undefined : null;
       }
     },
   };

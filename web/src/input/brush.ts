@@ -13,10 +13,15 @@ export function attachBrush(viewport: HTMLElement, app: App): void {
     frame = 0;
     outline.hidden = true;
   };
-  const show = ({ clientX, clientY }: MouseEvent) => {
+  const show = (event: MouseEvent) => {
     const { left, top } = viewport.getBoundingClientRect();
-    const [x, y] = [clientX - left, clientY - top];
+    const [x, y] = [event.clientX - left, event.clientY - top];
     const radius = app.painting.radiusAt(x, y);
+    if (radius === undefined) {
+      // What was shown stays until it is known.
+      frame = requestAnimationFrame(() => show(event));
+      return;
+    }
     outline.hidden = radius === null;
     outline.style.translate = `${x}px ${y}px`;
     outline.style.width = `${2 * (radius ?? 0)}px`;

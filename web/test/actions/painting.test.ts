@@ -106,7 +106,7 @@ it("what cannot be painted yet is said; a moment without the GPU leaves no gap",
 });
 
 it("the brush has an outline where it would paint", () => {
-  const { painting, teach } = page();
+  const { painting, store, teach } = page();
   teach({ brushRadius: (_x: number, y: number, radius: number) => (y < 100 ? undefined : 100 * radius) });
   expect(painting.radiusAt(5, 150), "nobody paints").toBeNull();
   painting.on(0);
@@ -117,6 +117,8 @@ it("the brush has an outline where it would paint", () => {
     },
   });
   expect(painting.radiusAt(5, 150)).toBeNull();
+  store.set({ bound: true });
+  expect(painting.radiusAt(5, 150), "the GPU is busy").toBeUndefined();
 });
 
 it("painting ends with its model, and where the cage is reshaped", () => {
