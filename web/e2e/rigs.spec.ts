@@ -6,12 +6,12 @@ import {
   bound,
   cagePositions,
   download,
+  drawing,
   drop,
   expect,
   grip,
   handle,
   largestMove,
-  middle,
   open,
   pull,
   reachable,
@@ -65,7 +65,7 @@ test("a visit that shapes somebody who walks", async ({ page }) => {
   });
 
   await test.step("joints are shown where the clip has them", async () => {
-    const picture = () => middle(page);
+    const picture = () => drawing(page);
     const without = await picture();
     const joints = page.getByRole("switch", { name: "Show joints" });
     await joints.click();

@@ -24,10 +24,10 @@ import {
   bound,
   download,
   drag,
+  drawing,
   drop,
   expect,
   largestMove,
-  middle,
   modelPositions,
   open,
   pull,
@@ -75,7 +75,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
   });
 
   await test.step("an eye hides one", async () => {
-    const picture = () => middle(page);
+    const picture = () => drawing(page);
     // Away from the handles, which show that the pointer is near.
     await page.getByRole("button", { name: "Hide shirt.glb" }).hover();
     const before = await picture();

@@ -8,13 +8,13 @@ import {
   cagePositions,
   download,
   drag,
+  drawing,
   drawn,
   drop,
   expect,
   grip,
   handle,
   largestMove,
-  middle,
   modelPositions,
   placeOf,
   pull,
@@ -32,7 +32,7 @@ export async function complaintsOfAxe(page: Page): Promise<string[]> {
 /** The model follows a handle, on the screen and in numbers; undo and redo bring both back. */
 export async function followsAHandle(page: Page, picture: string): Promise<void> {
   const before = { cage: await cagePositions(page), model: await modelPositions(page) };
-  const pixels = await middle(page);
+  const pixels = await drawing(page);
 
   const vertex = await drag(page, 60, -50);
   const after = { cage: await cagePositions(page), model: await modelPositions(page) };
@@ -42,7 +42,7 @@ export async function followsAHandle(page: Page, picture: string): Promise<void>
   const follows = largestMove(before.model, after.model);
   expect(follows).toBeGreaterThan(0.02 * moved);
   expect(follows).toBeLessThanOrEqual(1.001 * moved);
-  expect(pixels.equals(await middle(page)), "pixels change").toBe(false);
+  expect(pixels.equals(await drawing(page)), "pixels change").toBe(false);
   await shoot(page, picture);
 
   await page.keyboard.press("Control+z");
@@ -66,7 +66,7 @@ export async function pullsTheModel(page: Page): Promise<void> {
 
 /** A heat map of a vertex, a slice through the grid, and harmonic beside mean value coordinates: each with its legend. */
 export async function showsColours(page: Page, picture: string): Promise<void> {
-  const pixels = () => middle(page);
+  const pixels = () => drawing(page);
   const vertex = await reachable(page);
   const { x, y } = await handle(page, vertex);
   await page.mouse.click(x, y);

@@ -269,14 +269,26 @@ export async function drawn(page: Page): Promise<void> {
   await page.waitForFunction(isSharp);
 }
 
-/** What is drawn in the middle of the view, without the tools: the browser does not always paint their shadows alike. */
-export async function middle(page: Page): Promise<Buffer> {
+/** What is drawn in the view, without what lies on it: toasts come and go, and the browser does not always paint shadows alike. */
+export async function drawing(page: Page): Promise<Buffer> {
   await drawn(page);
   const box = await page.locator("canvas").first().boundingBox();
   if (!box) throw new Error("no canvas");
   const { x, y, width, height } = box;
-  const clip = { x: x + width / 4, y: y + height / 8, width: width / 2, height: (3 * height) / 4 };
-  return page.screenshot({ clip });
+  // Not an element, which the page's Content-Security-Policy forbids; not hidden, which would take the focus away.
+  const sheet = await page.evaluateHandle(() => {
+    const sheet = new CSSStyleSheet();
+    sheet.replaceSync(
+      "body :not(canvas, :has(canvas)) { opacity: 0 !important; transition: none !important }",
+    );
+    document.adoptedStyleSheets.push(sheet);
+    return sheet;
+  });
+  const picture = await page.screenshot({ clip: { x, y, width, height } });
+  await sheet.evaluate((sheet) => {
+    document.adoptedStyleSheets = document.adoptedStyleSheets.filter((other) => other !== sheet);
+  });
+  return picture;
 }
 
 /** Waits until nothing of the page moves by itself. */
