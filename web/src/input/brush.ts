@@ -2,7 +2,7 @@
 
 import type { App } from "../app";
 
-/** Drawn on `viewport`, which is shown only while somebody paints: see stage.css. */
+/** Puts it on `viewport`; stage.css shows it only while somebody paints. */
 export function attachBrush(viewport: HTMLElement, app: App): void {
   const outline = document.createElement("div");
   outline.className = "brush";
