@@ -6,6 +6,7 @@ mod many;
 mod pose;
 mod render;
 mod rig;
+mod solve;
 
 use std::error::Error;
 use std::ops::Range;
@@ -13,10 +14,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 pub(crate) use cages::{CageArgs, CageSource, CheckArgs, DEFAULT_DIVISIONS, DEFAULT_MARGIN, KindArg};
-use cagework_core::options::{
-    self, Backend, BindOptions, CellShape, Choice, DeltaNorm, Method, Number, OutsidePolicy, Preconditioner,
-    Solver,
-};
+use cagework_core::options::{self, Choice, Number};
 use cagework_io::{ModelFormat, UpAxis};
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -26,13 +24,13 @@ pub(crate) use many::{MergeArgs, RefitArgs};
 pub(crate) use pose::{FitArgs, PoseArgs};
 pub(crate) use render::{Compared, RenderArgs, Show};
 pub(crate) use rig::RigArgs;
+pub(crate) use solve::{MemoryArgs, SolveArgs};
 
 /// Bind a 3-D model to a cage by harmonic coordinates, then deform it by moving the cage.
 #[derive(Debug, Parser)]
 #[command(name = "cagework", version, propagate_version = true, max_term_width = 100)]
 #[command(
-    after_help = "Models and cages are read from .gltf, .glb, .vrm, .obj, .ply and .stl files. Errors go to stderr; the exit \
-    code is 1 after an error and 2 after a wrong command line.\n\n\
+    after_help = "Errors go to stderr; the exit code is 1 after an error and 2 after a wrong command line.\n\n\
     Examples:\n  \
     cagework demo\n  \
     cagework info horse.glb\n  \
@@ -83,7 +81,8 @@ pub(crate) enum Command {
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  cagework info horse.glb\n  cagework info cage.obj --json")]
 pub(crate) struct InfoArgs {
-    /// Model to look at (.obj, .gltf, .glb).
+    /// Model to look at.
+    #[arg(help = model_help("Model to look at"))]
     pub(crate) model: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
@@ -98,7 +97,8 @@ pub(crate) struct InfoArgs {
     cagework bind horse.glb --cage cage.obj --smooth 2 --controls spine.obj --weights horse.npz\n  \
     cagework bind horse.obj --cage cage.obj --method classic --threads 1   (the paper's way)")]
 pub(crate) struct BindArgs {
-    /// Mesh to bind (.obj, .gltf, .glb).
+    /// Mesh to bind.
+    #[arg(help = model_help("Mesh to bind"))]
     pub(crate) mesh: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
@@ -155,95 +155,6 @@ impl ReadArgs {
     }
 }
 
-/// How much memory may be taken.
-#[derive(Args, Clone, Copy, Debug)]
-pub(crate) struct MemoryArgs {
-    /// Refuse to start what would need more memory than this, in MiB: reading models, binding, writing.
-    #[arg(long, default_value_t = DEFAULT_MEMORY_MIB, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
-    memory_limit: u64,
-}
-
-/// Memory that may be taken unless said otherwise, MiB.
-const DEFAULT_MEMORY_MIB: u64 = 4096;
-
-impl Default for MemoryArgs {
-    fn default() -> Self {
-        Self { memory_limit: DEFAULT_MEMORY_MIB }
-    }
-}
-
-impl MemoryArgs {
-    /// The limit, bytes.
-    pub(crate) fn bytes(self) -> u64 {
-        self.memory_limit << 20
-    }
-}
-
-/// How to solve: shared by `bind` and what else binds.
-#[derive(Args, Debug)]
-pub(crate) struct SolveArgs {
-    /// How the cage meets the grid: as published, or where it really is.
-    #[arg(long, default_value_t, value_parser = words::<Method>())]
-    method: Method,
-    /// How Laplace's equation is solved [default: multigrid; jacobi with --method classic].
-    #[arg(long, value_parser = words::<Solver>())]
-    solver: Option<Solver>,
-    /// What conjugate gradients (--solver cg) are preconditioned by.
-    #[arg(long, default_value_t, value_parser = words::<Preconditioner>())]
-    preconditioner: Preconditioner,
-    /// Threads; 0 for all.
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    threads: usize,
-    /// Stop when delta (the paper's Eq. 2; multigrid and cg: the error that is expected to remain) falls below this.
-    #[arg(long, default_value = "1e-5", value_parser = number::<f32>(options::TAU))]
-    tau: f32,
-    /// Stop after this many Jacobi sweeps, V-cycles or steps of cg in any case.
-    #[arg(long, default_value_t = 20_000, value_name = "N", value_parser = number::<u32>(options::MAX_ITERATIONS))]
-    max_iterations: u32,
-    /// Drop the smallest weights of a row as long as their sum is not above this, then restore its sum and rest position; 0
-    /// keeps all.
-    #[arg(long, default_value_t = 0.0, value_name = "WEIGHT", value_parser = number::<f32>(options::SPARSIFY))]
-    sparsify: f32,
-    /// Shape of the classic method's cells: of the cage's box (as published), or cubic.
-    #[arg(long, default_value_t, value_parser = words::<CellShape>())]
-    cells: CellShape,
-    /// How Eq. 2 is read: as a Euclidean norm, or to the letter.
-    #[arg(long, default_value_t, value_parser = words::<DeltaNorm>())]
-    delta: DeltaNorm,
-    /// What to do with vertices outside the cage: bind them to its closest point, or end with an error.
-    #[arg(long, default_value_t, value_parser = words::<OutsidePolicy>())]
-    outside: OutsidePolicy,
-    /// Where to compute; CAGEWORK_ADAPTER chooses among several GPUs by part of a name.
-    #[arg(long, default_value_t, value_parser = words::<Backend>())]
-    backend: Backend,
-}
-
-impl SolveArgs {
-    /// Whether the GPU is to solve.
-    pub(crate) fn on_gpu(&self) -> bool {
-        self.backend == Backend::Gpu
-    }
-
-    /// The options of a bind on `grid` cells within a limit on memory.
-    pub(crate) fn options(&self, grid: u32, memory: MemoryArgs) -> BindOptions {
-        BindOptions {
-            grid,
-            method: self.method,
-            solver: self.solver.unwrap_or(self.method.usual_solver()),
-            preconditioner: self.preconditioner,
-            cell_shape: self.cells,
-            delta_norm: self.delta,
-            threads: self.threads,
-            tau: self.tau,
-            max_iterations: self.max_iterations,
-            sparsify: self.sparsify,
-            memory_limit: memory.bytes(),
-            outside: self.outside,
-            ..BindOptions::default()
-        }
-    }
-}
-
 /// `cagework deform`
 #[derive(Args, Debug)]
 #[command(
@@ -254,7 +165,8 @@ impl SolveArgs {
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj -o poses.glb"
 )]
 pub(crate) struct DeformArgs {
-    /// The mesh that was bound (.obj, .gltf, .glb).
+    /// The mesh that was bound.
+    #[arg(help = model_help("The mesh that was bound"))]
     pub(crate) mesh: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
@@ -309,8 +221,8 @@ pub(crate) struct PullArgs {
 #[command(after_help = "Without a mesh, the built-in sample is timed.\n\n\
     Examples:\n  cagework bench\n  cagework bench horse.obj --cage cage.obj -g 32,64,128 --runs 5 --json")]
 pub(crate) struct BenchArgs {
-    /// Mesh to bind (.obj, .gltf, .glb).
-    #[arg(requires = "cage")]
+    /// Mesh to bind.
+    #[arg(requires = "cage", help = model_help("Mesh to bind"))]
     pub(crate) mesh: Option<PathBuf>,
     /// Cage: a file, auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE", requires = "mesh")]
@@ -328,7 +240,7 @@ pub(crate) struct BenchArgs {
 #[command(after_help = "Examples:\n  cagework evaluate\n  cagework evaluate --runs 5 -o evening\n  \
     cagework evaluate --mesh horse.obj --cage cage.obj -g 32 -o horse")]
 pub(crate) struct EvaluateArgs {
-    /// Mesh to bind (.obj, .gltf, .glb); the built-in sample unless given.
+    /// Mesh to bind; the built-in sample unless given.
     #[arg(long, requires = "cage")]
     pub(crate) mesh: Option<PathBuf>,
     /// Cage: a file, auto:VERTICES, hull:VERTICES or box:DIVISIONS; the sample's own unless given.
@@ -377,6 +289,12 @@ impl FromStr for ModelOutput {
 enum UpArg {
     Y,
     Z,
+}
+
+/// What an argument is, and which files it takes: a model's.
+fn model_help(what: &str) -> String {
+    let endings = ModelFormat::ALL.map(ModelFormat::endings).concat().join(", .");
+    format!("{what} (.{endings})")
 }
 
 /// The words of an option.

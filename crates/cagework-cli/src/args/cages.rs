@@ -27,7 +27,8 @@ const DEFAULT_HULL: u32 = 24;
     cagework cage horse.glb -o cage.glb --vertices 120 --symmetry x\n  \
     cagework cage horse.glb -o box.obj --kind box --divisions 3")]
 pub(crate) struct CageArgs {
-    /// Model to make a cage for (.obj, .gltf, .glb).
+    /// Model to make a cage for.
+    #[arg(help = super::model_help("Model to make a cage for"))]
     pub(crate) model: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
@@ -105,9 +106,10 @@ impl CageArgs {
     cagework check cage.obj --repair weld,fill-holes,flip -o mended.obj\n  \
     cagework check cage.obj --mesh horse.glb --repair grow -o grown.obj")]
 pub(crate) struct CheckArgs {
-    /// The cage (.obj, .gltf, .glb).
+    /// The cage.
+    #[arg(help = super::model_help("The cage"))]
     pub(crate) cage: PathBuf,
-    /// The model that should be inside (.obj, .gltf, .glb).
+    /// The model that should be inside.
     #[arg(long, value_name = "FILE")]
     pub(crate) mesh: Option<PathBuf>,
     /// Look for parts thinner than a cell of a grid with so many cells, 8 to 512.

@@ -18,8 +18,8 @@ use super::{ControlArgs, MemoryArgs, ReadArgs, RigArgs, SolveArgs, npz_output, n
     cagework refit --manifest garments.txt --cage body.obj --pose bulky.obj -o out --resume --json"
 )]
 pub(crate) struct RefitArgs {
-    /// Models in the cage (.obj, .gltf, .glb, .vrm).
-    #[arg(value_name = "MODEL", required_unless_present = "manifest")]
+    /// Models in the cage.
+    #[arg(value_name = "MODEL", required_unless_present = "manifest", help = super::model_help("Models in the cage"))]
     pub(crate) models: Vec<PathBuf>,
     /// Read the names of more models from a text file, one a line; empty lines and those that begin with # say nothing.
     #[arg(long, value_name = "FILE")]

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use cagework_core::options;
 use clap::Args;
 
-use super::{CageSource, ControlArgs, ModelOutput, ReadArgs, number, obj_output};
+use super::{CageSource, ControlArgs, ModelOutput, ReadArgs, model_help, number, obj_output};
 
 /// What is posed, and where the pose goes.
 #[derive(Args, Debug)]
 pub(crate) struct PoseArgs {
-    /// The mesh that was bound (.obj, .gltf, .glb).
+    /// The mesh that was bound.
+    #[arg(help = model_help("The mesh that was bound"))]
     pub(crate) mesh: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,

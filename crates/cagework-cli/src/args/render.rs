@@ -20,7 +20,8 @@ use super::{CageSource, ControlArgs, ReadArgs, SolveArgs, output};
     cagework render horse.glb --cage cage.obj --show wireframe --method classic -g 16 --no-cage -o figure-4.png\n  \
     cagework render horse.glb --cage cage.obj --show cells --axis x --at 0.5 --theme light -o cells.png")]
 pub(crate) struct RenderArgs {
-    /// Model to draw (.obj, .gltf, .glb).
+    /// Model to draw.
+    #[arg(help = super::model_help("Model to draw"))]
     pub(crate) model: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
