@@ -24,7 +24,8 @@ import { choose } from "./input/choose";
 import { createCommands } from "./input/commands";
 import { type Command, isMac, shortcutText } from "./input/shortcuts";
 import { createQueue } from "./queue";
-import type { StepName, Store } from "./state";
+import type { Store } from "./signals";
+import type { StepName } from "./state";
 import type { Explained } from "./strings";
 import { T } from "./words";
 

@@ -1,6 +1,8 @@
 /** A panic or memory that ran out in wasm leaves a module whose every call fails: the page is begun anew, and says so. */
 
-import { type AppState, cageBroken, type Store } from "./state";
+import { cageBroken } from "./derived";
+import type { Store } from "./signals";
+import type { AppState } from "./state";
 import { forgetCrash, keepCrash, lastCrash } from "./store";
 import { T } from "./words";
 

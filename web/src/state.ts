@@ -1,6 +1,5 @@
 /** Everything the page shows, in one place, a signal a key: panels derive from it. */
 
-import { batch, signal } from "@preact/signals";
 import type {
   BindOptions,
   BindReport,
@@ -264,64 +263,4 @@ export interface ClipState {
   readonly loop: boolean;
   /** Weights of the morph targets; none for those of the file. */
   readonly targets: readonly number[];
-}
-
-/** What becomes of the rig of the model that is open. */
-export function rigOf({ model, rigOptions }: AppState): RigOptions {
-  // A project may be of another model by now.
-  const rigid = rigOptions.rigid.filter((name) => model?.props.includes(name));
-  return { ...rigOptions, rigid, dynamic: rigOptions.dynamic && (model?.clips.length ?? 0) > 0 };
-}
-
-export interface Store {
-  /** The state of the moment; a panel or an effect that reads a key hears of its changes. */
-  get(): AppState;
-  /** Changes some keys at once. */
-  set(patch: Partial<AppState>): void;
-}
-
-/** A store with a signal a key. */
-export function createStore(initial: AppState): Store {
-  const entries = Object.entries(initial).map(([key, value]) => [key, signal<unknown>(value)] as const);
-  const signals = new Map(entries);
-  const state = Object.defineProperties(
-    {},
-    Object.fromEntries(entries.map(([key, own]) => [key, { enumerable: true, get: () => own.value }])),
-  ) as AppState;
-  return {
-    get: () => state,
-    set: (patch) =>
-      batch(() => {
-        for (const [key, value] of Object.entries(patch)) {
-          const own = signals.get(key);
-          if (own) own.value = value;
-        }
-      }),
-  };
-}
-
-/** Whether the cage's faults forbid a bind. */
-export function cageBroken(state: AppState): boolean {
-  return state.cage !== null && !state.cage.usable;
-}
-
-/** What is drawn: faults are marked where they can be mended, or when they stop the bind. */
-export function drawn(state: AppState): SceneOptions {
-  const { scene, step, rigOptions } = state;
-  return {
-    ...scene,
-    problems: scene.problems && (step === "cage" || cageBroken(state)),
-    joints: scene.joints && rigOptions.joints,
-  };
-}
-
-/** Vertices of the cage and controls inside. */
-export function controlCount({ cage }: Pick<AppState, "cage">): number {
-  return cage ? cage.info.vertices + cage.controls.inner : 0;
-}
-
-/** Poses of the cage that is open; others wait for theirs to come back by undo. */
-export function fittingPoses(state: AppState): readonly Pose[] {
-  const n = controlCount(state) * 3;
-  return state.poses.filter((pose) => pose.positions.length === n);
 }

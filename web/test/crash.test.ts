@@ -1,7 +1,8 @@
 import { createClient, named } from "@cagework/core/session/client";
 import { afterEach, expect, it, vi } from "vitest";
 import { isFatal, sayDuring, watchCrashes } from "../src/crash";
-import { createStore, INITIAL } from "../src/state";
+import { createStore } from "../src/signals";
+import { INITIAL } from "../src/state";
 
 /** A browser's window and its tab's storage, as far as crashes need them. */
 function browser() {

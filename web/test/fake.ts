@@ -16,7 +16,8 @@ import type {
 } from "../src/contract";
 import { createHistory } from "../src/history";
 import { createQueue } from "../src/queue";
-import { createStore, INITIAL, type Store } from "../src/state";
+import { createStore, type Store } from "../src/signals";
+import { INITIAL } from "../src/state";
 import type { Explained } from "../src/strings";
 
 /** Work that was asked for. */

@@ -1,6 +1,7 @@
 import { effect } from "@preact/signals";
 import { describe, expect, it } from "vitest";
-import { createStore, INITIAL } from "../src/state";
+import { createStore } from "../src/signals";
+import { INITIAL } from "../src/state";
 
 describe("store", () => {
   it("tells who reads a key of its changes, and nobody else", () => {

@@ -2,9 +2,10 @@
 
 import { effect } from "@preact/signals";
 import type { BindEvent, BindOptions, BindReport, Coordinates } from "../contract";
+import { cageBroken, drawn } from "../derived";
 import { createEta, type Eta } from "../eta";
 import { follow } from "../queue";
-import { type BindRun, cageBroken, drawn } from "../state";
+import type { BindRun } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
 import { attempt, type Context } from "./context";

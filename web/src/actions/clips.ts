@@ -2,8 +2,9 @@
 
 import { effect, untracked } from "@preact/signals";
 import type { RigOptions } from "../contract";
+import { drawn, rigOf } from "../derived";
 import { follow } from "../queue";
-import { type ClipState, drawn, rigOf } from "../state";
+import type { ClipState } from "../state";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 

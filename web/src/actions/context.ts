@@ -4,7 +4,7 @@ import type { Job, ReadFile, Reading, Session } from "../contract";
 import { isFatal } from "../crash";
 import type { History } from "../history";
 import type { Queue } from "../queue";
-import type { Store } from "../state";
+import type { Store } from "../signals";
 import { type Explained, explain, isCancelled } from "../strings";
 import { T } from "../words";
 

@@ -2,8 +2,8 @@
 
 import type { ModelInfo, NamedFile } from "../contract";
 import { SHAPE_FORMATS } from "../defaults";
+import { fittingPoses, rigOf } from "../derived";
 import { stem } from "../format";
-import { fittingPoses, rigOf } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
 import { loadLattice } from "./clips";

@@ -2,7 +2,7 @@
 
 import type { MemberInfo, ModelInfo, NamedFile, PartOptions } from "../contract";
 import { planDrop } from "../drop";
-import type { Store } from "../state";
+import type { Store } from "../signals";
 import { T } from "../words";
 import type { CageActions } from "./cage";
 import { attempt, type Context, report } from "./context";
@@ -44,8 +44,13 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
     take(info);
     const { cage: state, cageClip } = store.get();
     if (!info.clips.some(({ name }) => name === cageClip)) store.set({ cageClip: null });
+    if (!state) {
+      // One that was being made was for other models.
+      void cage.regenerate();
+      return false;
+    }
     // Another value, so that whoever follows the cage hears of it.
-    const isChecked = await cage.adopt(state && { ...state }, null);
+    const isChecked = await cage.adopt({ ...state }, null);
     const isOut = store.get().check?.problems.some(({ code }) => code === "model_outside");
     return isChecked && isOut === true;
   };
@@ -55,16 +60,19 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
     const { sample, sampleCage } = store.get();
     return { sample, sampleCage };
   };
-  /** Some come, or go, as undo and redo do it. */
+  /** Some come, or go; `looked`: the cage was looked at again. */
   const turn = async (ids: readonly number[], binned: boolean, others: ReturnType<typeof now>) => {
     settle();
     let info: ModelInfo | undefined;
     for (const id of ids) info = await engine().bin(id, binned);
-    if (!info) return;
-    const looked = changed(info);
+    const looked = info && changed(info);
     // What adopts a cage takes it for another one than the sample's.
     store.set({ sample: others.sample, sampleCage: others.sampleCage });
-    await looked;
+    return { looked };
+  };
+  /** The same, as undo and redo do it. */
+  const turnBack = async (...how: Parameters<typeof turn>) => {
+    await (await turn(...how)).looked;
   };
 
   const put = (id: number, options: Omit<PartOptions, "shown">) => {
@@ -100,8 +108,8 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
           const after = { sample: null, sampleCage: false };
           ctx.history.push({
             label: T.did.addModels(ids.length),
-            undo: () => turn([...ids].reverse(), true, before),
-            redo: () => turn(ids, false, after),
+            undo: () => turnBack([...ids].reverse(), true, before),
+            redo: () => turnBack(ids, false, after),
           });
           void changed(model).then((isOut) => {
             const around = { label: T.models.makeAround, run: () => void cage.regenerate() };
@@ -122,9 +130,10 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
       const work = async () => {
         const before = now();
         const after = { sample: null, sampleCage: false };
-        await turn([id], true, after);
-        const [undo, redo] = [() => turn([id], false, before), () => turn([id], true, after)];
+        const { looked } = await turn([id], true, after);
+        const [undo, redo] = [() => turnBack([id], false, before), () => turnBack([id], true, after)];
         ctx.history.push({ label, undo, redo });
+        await looked;
       };
       return attempt(ctx, T.models.notBinned, () => ctx.queue.add("open", work));
     },

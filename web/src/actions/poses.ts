@@ -1,8 +1,8 @@
 /** Poses: saved, named, blended and played. */
 
 import type { Pose } from "../contract";
+import { fittingPoses } from "../derived";
 import { follow } from "../queue";
-import { fittingPoses } from "../state";
 import { T } from "../words";
 import type { Posed } from "./cage";
 import { attempt, type Context } from "./context";

@@ -1,11 +1,12 @@
 /** Pulling the model by its own points: the page points, a worker solves, the cage follows. */
 
 import type { SurfacePoint } from "../contract";
+import { controlCount } from "../derived";
 import { follow } from "../queue";
-import { controlCount } from "../state";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 import type { Edit } from "./edit";
+import { createPins } from "./pins";
 
 export interface Pulling {
   /** Makes ready for the model and the cage that are bound. */
@@ -30,8 +31,6 @@ export interface Pulling {
   whole(on: boolean): void;
 }
 
-/** A grab and a pin that are nearer to each other are one, CSS pixels. */
-const SAME_PX = 14;
 /** Farther than this off its target, over the model's size, a grab cannot follow. */
 const OFF = 0.01;
 /** Frames for which a pull goes on after it was let go, at most. */
@@ -69,34 +68,21 @@ export function createPulling(ctx: Context, edit: Edit): Pulling {
   let held: SurfacePoint | undefined;
   let timer: ReturnType<typeof setTimeout> | undefined;
 
+  const pins = createPins(ctx);
+  const { show } = pins;
+
   const isReady = () => {
     const { bound, editingRest, playing, pullReady } = store.get();
     return bound && pullReady && !editingRest && !playing;
   };
-  const show = (first?: SurfacePoint, target?: Float32Array) =>
-    engine().showHeld([...(first ? [first] : []), ...store.get().pins], target);
-
-  /** Where a point of the model is in the view; undefined for one that is not there. */
-  const inView = (point: SurfacePoint) => {
-    const [x, y, z] = engine().placeOf(point);
-    if (x === undefined || y === undefined || z === undefined) return undefined;
-    const [px = 0, py = 0] = engine().project(x, y, z);
-    return { x: px, y: py };
-  };
-  const pinAt = (x: number, y: number) =>
-    store.get().pins.find((pin) => {
-      const at = inView(pin);
-      return at && Math.hypot(at.x - x, at.y - y) < SAME_PX;
-    });
 
   /** Asks the worker to take hold, with the pins that are not grabbed. */
   const grab = async (drag: Drag) => {
-    const { pins, pullWhole, symmetry } = store.get();
+    const { pullWhole, symmetry } = store.get();
     const n = controlCount(store.get());
-    const free = pins.filter((pin) => pin !== pinAt(drag.from.x, drag.from.y));
     const rows: number[] = [];
     const seeds: number[] = [];
-    for (const handle of [...drag.grabs, ...free]) {
+    for (const handle of [...drag.grabs, ...pins.free(drag.from.x, drag.from.y)]) {
       if (typeof handle === "number") {
         rows.push(...Array.from({ length: n }, (_, i) => (i === handle ? 1 : 0)));
         seeds.push(ON_CAGE);
@@ -256,7 +242,7 @@ export function createPulling(ctx: Context, edit: Edit): Pulling {
     nudge(right, up) {
       if (!current || current.letGo) {
         const middle = { x: ctx.viewport().width / 2, y: ctx.viewport().height / 2 };
-        const at = (held && inView(held)) ?? middle;
+        const at = (held && pins.inView(held)) ?? middle;
         if (!pulling.begin(at.x, at.y)) {
           ctx.tell.say(T.pull.nothingThere);
           return;
@@ -268,33 +254,8 @@ export function createPulling(ctx: Context, edit: Edit): Pulling {
       clearTimeout(timer);
       timer = setTimeout(() => pulling.end(true), NUDGE_PAUSE_MS);
     },
-    pin(x, y) {
-      const { pins } = store.get();
-      const there = pinAt(x, y);
-      const point = isReady() ? engine().surfaceAt(x, y) : undefined;
-      if (!there && !point) return false;
-      const next = there ? pins.filter((pin) => pin !== there) : [...pins, ...(point ? [point] : [])];
-      const set = (list: readonly SurfacePoint[]) => {
-        store.set({ pins: list });
-        show();
-      };
-      set(next);
-      ctx.history.push({
-        label: there ? T.did.unpin : T.did.pin,
-        undo: () => set(pins),
-        redo: () => set(next),
-      });
-      return true;
-    },
-    unpinAll() {
-      const { pins } = store.get();
-      const set = (list: readonly SurfacePoint[]) => {
-        store.set({ pins: list });
-        show();
-      };
-      set([]);
-      ctx.history.push({ label: T.did.unpin, undo: () => set(pins), redo: () => set([]) });
-    },
+    pin: (x, y) => pins.toggle(x, y, isReady()),
+    unpinAll: pins.removeAll,
     whole: (on) => store.set({ pullWhole: on }),
   };
   return pulling;

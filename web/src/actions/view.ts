@@ -2,9 +2,10 @@
 
 import type { Element as CageElement, Coordinates, Pivot, SceneOptions } from "../contract";
 import { SCENE_DEFAULTS } from "../defaults";
+import { drawn } from "../derived";
 import { follow } from "../queue";
 import type { Seen } from "../share";
-import { drawn, type Slice } from "../state";
+import type { Slice } from "../state";
 import { saveTheme, type Theme } from "../store";
 import { T } from "../words";
 import type { BindActions } from "./bind";

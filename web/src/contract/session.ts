@@ -61,7 +61,7 @@ export interface Session {
    * so. The memory limit is the default's.
    */
   readSettings(text: string, defaults: Defaults): Settings;
-  /** Reads a cage from a file (.obj, .glb, .gltf) as a model is read, and checks it. */
+  /** Reads a cage from a file as a model is read, and checks it. */
   readCage(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<CheckedCage>;
   /** A box around the model, its longest side cut into `divisions`. */
   boxCage(divisions: number): CageArrays;

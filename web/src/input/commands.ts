@@ -3,7 +3,7 @@
 import { report } from "../actions/context";
 import type { App } from "../app";
 import type { Element as CageElement, Gesture } from "../contract";
-import { controlCount } from "../state";
+import { controlCount } from "../derived";
 import { T } from "../words";
 import type { Command } from "./shortcuts";
 

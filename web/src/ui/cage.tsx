@@ -1,20 +1,15 @@
 /** Step 2: where the cage comes from, what is wrong with it, and shaping it. */
 
 import type { App } from "../app";
-import type { Element as CageElement, CageOptions, CageState, Check, Problem, RestEdit } from "../contract";
-import { RANGES } from "../defaults";
+import type { Element as CageElement, CageState, Check, Problem, RestEdit } from "../contract";
 import { count, percent } from "../format";
 import type { CageSource } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
+import { Automatic } from "./cage-options";
 import { Badge, Button, Facts, Head, Section, Segments, Slider, Toggle } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { Inside, Smooth } from "./inside";
-
-/** Where the slider of voxels starts: it stands for none in particular. */
-const COARSEST = 16;
-/** Gaps narrower than so many voxels are closed. */
-const GAP_VOXELS = 3;
 
 const SOURCES = ["auto", "hull", "box", "file"] as const satisfies readonly CageSource[];
 
@@ -76,99 +71,6 @@ export function CagePanel({ app }: { app: App }) {
       )}
       {cage && <Inside app={app} cage={cage} />}
       <Section title={T.cage.shape}>{cage && <Reshape app={app} />}</Section>
-    </div>
-  );
-}
-
-/** The slider of detail goes from coarse to fine, by factors: 0 is four times the usual distance, 1 a quarter of it. */
-const COARSE_DETAIL = 0.112;
-const FINER = 16;
-const detailOf = (fineness: number) => COARSE_DETAIL * FINER ** -fineness;
-const finenessOf = (detail: number) => Math.log(COARSE_DETAIL / detail) / Math.log(FINER);
-
-/** How a cage is made for the model. */
-function Automatic({ app }: { app: App }) {
-  const { cageOptions: options, cageClip, model } = app.store.get();
-  const named = [...new Set(model?.clips.map((clip) => clip.name))];
-  const change = (patch: Partial<CageOptions>) =>
-    app.store.set({ cageOptions: { ...app.store.get().cageOptions, ...patch } });
-  return (
-    <div class="stack">
-      <Slider
-        label={T.cage.wanted}
-        min={RANGES.vertices[0]}
-        max={RANGES.vertices[1]}
-        step={2}
-        format={count}
-        value={options.vertices}
-        onInput={(vertices) => change({ vertices })}
-      />
-      <Slider
-        label={T.cage.detail}
-        min={0}
-        max={1}
-        step={0.05}
-        format={() => T.cage.ofSize(percent(options.detail, 1))}
-        value={finenessOf(options.detail)}
-        onInput={(fineness) => change({ detail: detailOf(fineness) })}
-      />
-      <Toggle
-        label={T.cage.quads}
-        sentence={T.cage.quadsSentence}
-        on={options.quads}
-        onChange={(on) => change({ quads: on })}
-      />
-      <Segments<CageOptions["symmetry"]>
-        label={T.cage.symmetry}
-        choices={(["auto", "on", "off"] as const).map((value) => ({
-          value,
-          label: T.cage.symmetries[value],
-        }))}
-        value={options.symmetry}
-        onChange={(symmetry) => change({ symmetry })}
-      />
-      <Slider
-        label={T.cage.margin}
-        min={0}
-        max={0.15}
-        step={0.005}
-        format={(value) => (value === 0 ? T.cage.tight : T.cage.ofSize(percent(value, 1)))}
-        value={options.margin}
-        onInput={(margin) => change({ margin })}
-      />
-      <Slider
-        label={T.cage.gaps}
-        min={COARSEST}
-        max={RANGES.voxels[1]}
-        step={8}
-        format={(value) =>
-          value === COARSEST ? T.cage.asVertices : T.cage.from(percent(GAP_VOXELS / value, 1))
-        }
-        value={options.voxels || COARSEST}
-        onInput={(voxels) => change({ voxels: voxels === COARSEST ? 0 : voxels })}
-      />
-      {named.length > 0 && (
-        <label class="stack tight">
-          <span>{T.cage.around}</span>
-          <select
-            value={cageClip ?? ""}
-            onChange={({ currentTarget: { value } }) => app.store.set({ cageClip: value || null })}
-          >
-            <option value="">{T.cage.aroundRest}</option>
-            {named.map((name) => (
-              <option key={name} value={name}>
-                {name}
-              </option>
-            ))}
-          </select>
-        </label>
-      )}
-      <Toggle
-        label={T.cage.perPart}
-        sentence={T.cage.perPartSentence}
-        on={options.per_component}
-        onChange={(on) => change({ per_component: on })}
-      />
     </div>
   );
 }

@@ -2,7 +2,8 @@
 
 import { useLayoutEffect, useRef } from "preact/hooks";
 import type { App } from "../app";
-import { type AppState, cageBroken, type StepName } from "../state";
+import { cageBroken } from "../derived";
+import type { AppState, StepName } from "../state";
 import { T } from "../words";
 import { BindPanel } from "./bind";
 import { CagePanel } from "./cage";

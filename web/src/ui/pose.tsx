@@ -3,7 +3,7 @@
 import type { App } from "../app";
 import type { Pivot, Pose } from "../contract";
 import { coordinate, percent } from "../format";
-import { fittingPoses } from "../state";
+import { fittingPoses } from "../derived";
 import { T } from "../words";
 import { Clips } from "./clips";
 import { Button, Head, IconButton, NumberInput, Section, Segments, Slider, Toggle } from "./controls";

@@ -1,6 +1,7 @@
 /** The status line of the view, in words. */
 
-import { type AppState, cageBroken } from "../state";
+import { cageBroken } from "../derived";
+import type { AppState } from "../state";
 import { T } from "../words";
 
 /** The status line: what is going on, said once. How far it is the panel and the title say. */

@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import { createClips } from "../../src/actions/clips";
-import { rigOf } from "../../src/state";
+import { rigOf } from "../../src/derived";
 import { createFake, MODEL, settled } from "../fake";
 
 const frames: ((now: number) => void)[] = [];

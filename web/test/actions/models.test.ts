@@ -27,11 +27,13 @@ function page() {
   const adopted: unknown[] = [];
   const steps: string[] = [];
   let outside = false;
+  let look = Promise.resolve();
   const models = createModels(fake.ctx, {
     cage: {
       async adopt(cage, check) {
         adopted.push(cage);
         fake.store.set({ cage, bound: false, sampleCage: false, check });
+        await look;
         fake.store.set({ check: { ...CHECK, problems: outside ? [OUTSIDE] : [] } });
         return true;
       },
@@ -72,6 +74,14 @@ function page() {
     offer: () => fake.offered[0],
     reachOut: () => {
       outside = true;
+    },
+    /** From now on a look at the cage ends when what is returned is called. */
+    holdLooks() {
+      let end = () => {};
+      look = new Promise((resolve) => {
+        end = resolve;
+      });
+      return end;
     },
   };
 }
@@ -163,6 +173,30 @@ it("a binned model is one step; pins keep the numbers that Rust knows them by", 
   expect(store.get()).toMatchObject({ pins, bound: false });
   await ctx.history.undo();
   expect(names()).toEqual(["body.glb", "shirt.glb"]);
+});
+
+it("a binned model is a step while the cage is looked at: undo brings it back, and nothing else", async () => {
+  const { models, names, ctx, holdLooks } = await withShirt();
+  const looked = holdLooks();
+  const binned = models.bin(1);
+  await settled();
+  expect([names(), ctx.history.undoLabel]).toEqual([["body.glb"], "Take shirt.glb out"]);
+  const undone = ctx.history.undo();
+  await settled();
+  expect(names()).toEqual(["body.glb", "shirt.glb"]);
+  looked();
+  await Promise.all([binned, undone]);
+  expect([ctx.history.undoLabel, ctx.history.redoLabel]).toEqual(["Add a model", "Take shirt.glb out"]);
+});
+
+it("whoever joins while a cage is made gets one around all", async () => {
+  const { models, store, steps, read } = page();
+  store.set({ cage: null, cageProgress: 0.5 });
+  const added = models.add([file("shirt.glb")]);
+  await settled();
+  await read("shirt.glb", 1);
+  expect(await added).toBe(true);
+  expect(steps).toContain("cage around all");
 });
 
 it("the last model cannot be taken out, which is said", async () => {

@@ -1,0 +1,37 @@
+/** What follows from the state of the page. */
+
+import type { Pose, RigOptions, SceneOptions } from "./contract";
+import type { AppState } from "./state";
+
+/** What becomes of the rig of the model that is open. */
+export function rigOf({ model, rigOptions }: AppState): RigOptions {
+  // A project may be of another model by now.
+  const rigid = rigOptions.rigid.filter((name) => model?.props.includes(name));
+  return { ...rigOptions, rigid, dynamic: rigOptions.dynamic && (model?.clips.length ?? 0) > 0 };
+}
+
+/** Whether the cage's faults forbid a bind. */
+export function cageBroken(state: AppState): boolean {
+  return state.cage !== null && !state.cage.usable;
+}
+
+/** What is drawn: faults are marked where they can be mended, or when they stop the bind. */
+export function drawn(state: AppState): SceneOptions {
+  const { scene, step, rigOptions } = state;
+  return {
+    ...scene,
+    problems: scene.problems && (step === "cage" || cageBroken(state)),
+    joints: scene.joints && rigOptions.joints,
+  };
+}
+
+/** Vertices of the cage and controls inside. */
+export function controlCount({ cage }: Pick<AppState, "cage">): number {
+  return cage ? cage.info.vertices + cage.controls.inner : 0;
+}
+
+/** Poses of the cage that is open; others wait for theirs to come back by undo. */
+export function fittingPoses(state: AppState): readonly Pose[] {
+  const n = controlCount(state) * 3;
+  return state.poses.filter((pose) => pose.positions.length === n);
+}
