@@ -43,18 +43,38 @@ pub enum WriteError {
 
 /// Why a file is not a pose of a cage.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error(
-    "pose {} has {given} vertices, but cage {} has {expected}: a pose keeps the cage's vertices and their order",
-    shown(pose),
-    shown(cage)
-)]
-pub struct PoseError {
-    /// Name of the pose.
-    pub pose: String,
-    /// Vertices of the pose.
-    pub given: usize,
-    /// Name of the cage.
-    pub cage: String,
-    /// Vertices of the cage.
-    pub expected: usize,
+pub enum PoseError {
+    /// It has another number of vertices.
+    #[error(
+        "pose {} has {given} vertices, but cage {} has {expected}: a pose keeps the cage's vertices and their order",
+        shown(pose),
+        shown(cage)
+    )]
+    Count {
+        /// Name of the pose.
+        pose: String,
+        /// Vertices of the pose.
+        given: usize,
+        /// Name of the cage.
+        cage: String,
+        /// Vertices of the cage.
+        expected: usize,
+    },
+    /// Its faces join vertices that have nothing to do with each other in the cage.
+    #[error(
+        "pose {} has an edge from vertex {} to {}, which are of no face together in cage {}: its vertices are in another order; \
+        write it as OBJ or PLY, which keep the order",
+        shown(pose),
+        edge[0],
+        edge[1],
+        shown(cage)
+    )]
+    Order {
+        /// Name of the pose.
+        pose: String,
+        /// Vertices of the edge, from 0.
+        edge: [u32; 2],
+        /// Name of the cage.
+        cage: String,
+    },
 }

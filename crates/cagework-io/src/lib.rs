@@ -1,4 +1,4 @@
-//! Bytes to scene and back: OBJ, glTF/GLB, NPZ, project files.
+//! Bytes to scene and back: OBJ, glTF/GLB, PLY, STL, NPZ, project files.
 //!
 //! No mathematics beyond transforms and normals, no file system, no clock; everything compiles for
 //! `wasm32-unknown-unknown`. A [`Model`] keeps the document it was read from, so that an export is the user's own file

@@ -1,5 +1,5 @@
-//! PLY files as they are met, brought to what the reader takes: headers with comments in any encoding or with line ends of old
-//! programs, and in texts empty lines and numbers such as `.5`, `1.` and `nan`.
+//! PLY files as they are met, brought to what the reader takes: headers with comments in any encoding, line ends of old programs,
+//! empty lines or odd names, and in texts empty lines and numbers such as `.5`, `1.` and `nan`.
 
 use std::borrow::Cow;
 
@@ -17,21 +17,12 @@ pub(crate) fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
     let line_end = if is_old { b'\r' } else { b'\n' };
     let Some(end) = end_of_header(bytes, line_end) else { return bytes.into() };
     let (header, body) = bytes.split_at(end);
-    let is_text = header.windows(6).any(|word| word == b" ascii");
+    let mut out = tidy_header(header, line_end);
+    let is_text = out.split(|&b| b == b'\n').any(|line| words(line).take(2).eq([&b"format"[..], b"ascii"]));
     let is_line_end = |b: &u8| *b == line_end;
-    if header.is_ascii() && !is_old && (!is_text || body.split(is_line_end).all(is_readable)) {
+    if out == header && (!is_text || body.split(is_line_end).all(is_readable)) {
         return bytes.into();
     }
-    let of_header = |&b: &u8| {
-        if b == line_end {
-            b'\n'
-        } else if b.is_ascii() {
-            b
-        } else {
-            b'?'
-        }
-    };
-    let mut out: Vec<u8> = header.iter().map(of_header).collect();
     if !is_text {
         out.extend(body);
         return out.into();
@@ -44,6 +35,28 @@ pub(crate) fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
         out.push(b'\n');
     }
     out.into()
+}
+
+/// The header in the words of the reader's grammar: lines end in `\n`, none is empty, all is ASCII, and properties with other
+/// signs in their names, which nobody here knows, have others.
+fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
+    let mut out = Vec::with_capacity(header.len());
+    for (number, line) in header.split(|&b| b == line_end).enumerate() {
+        let words: Vec<&[u8]> = words(line).collect();
+        let Some((name, before)) = words.split_last() else { continue };
+        let is_plain = |b: &u8| b.is_ascii_alphanumeric() || b"_-".contains(b);
+        if before.first() == Some(&&b"property"[..]) && !name.iter().all(is_plain) {
+            out.extend(before.join(&b' '));
+            out.push(b' ');
+            out.extend(name.iter().map(|b| if is_plain(b) { *b } else { b'_' }));
+            // Names that become alike are still two.
+            out.extend(format!("-{number}").into_bytes());
+        } else {
+            out.extend(line.iter().map(|&b| if b.is_ascii() { b } else { b'?' }));
+        }
+        out.push(b'\n');
+    }
+    out
 }
 
 /// Where the body begins.

@@ -97,6 +97,9 @@ fn both_byte_orders_of_a_ply_are_read_and_kept() {
         big.push(face[0]);
         face[1..].chunks(4).for_each(|v| big.extend(v.iter().rev()));
     }
+    // A word of a comment does not make it a text.
+    let commented = header.replacen("element", "comment converted from ascii\nelement", 1).into_bytes();
+    assert_eq!(read("x.ply", &[&commented, &little[end..]].concat()).unwrap().positions, cube());
     let model = read("big.ply", &big).unwrap();
     assert_eq!(model.positions, cube());
     assert!(model.write_ply(&cube()).unwrap() == big);
@@ -233,6 +236,9 @@ fn texts_of_ply_as_they_are_met() {
     for bytes in [
         with("comment by hand", b"comment M\xf6bel"),
         with("end_header\n", b"end_header\n\n"),
+        with("element edge", b"\nelement edge"),
+        // CloudCompare
+        with("float quality", b"float scalar_Illuminance_(PCV)"),
         plain.replace("0.5\n", ".5\n").into_bytes(),
         plain.replace("0.5\n", "-.5e1\n\n").into_bytes(),
         plain.replace("0.5\n", "nan\n").into_bytes(),

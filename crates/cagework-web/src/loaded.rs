@@ -35,7 +35,7 @@ pub struct Loaded {
 
 #[wasm_bindgen]
 impl Loaded {
-    /// Reads an OBJ, glTF, GLB or project file; [`Self::prepare`] comes next. `sibling` is called with the path of each file that it refers to and
+    /// Reads a model of any format, or a project; [`Self::prepare`] comes next. `sibling` is called with the path of each file that it refers to and
     /// returns a Uint8Array or undefined.
     ///
     /// # Errors

@@ -1,0 +1,160 @@
+//! A model with new positions, as a file.
+
+use std::borrow::Cow;
+
+use cagework_core::PolygonMesh;
+use glam::Vec3;
+
+use super::{Document, Model};
+use crate::error::WriteError;
+use crate::format::ModelFormat;
+use crate::gltf::{self, Played, Pose, Rest};
+use crate::{obj, ply, stl};
+
+impl Model {
+    /// The model with new positions as a file of `format`.
+    ///
+    /// # Errors
+    /// Those of [`Self::write_obj`] and [`Self::write_glb`].
+    pub fn write(&self, format: ModelFormat, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        match format {
+            ModelFormat::Obj => self.write_obj(positions),
+            ModelFormat::Gltf => self.write_glb(positions),
+            ModelFormat::Ply => self.write_ply(positions),
+            ModelFormat::Stl => self.write_stl(positions),
+        }
+    }
+
+    /// The model with new positions as an OBJ file.
+    ///
+    /// An OBJ keeps everything but its coordinates and normals byte for byte; others become a new OBJ with their vertices
+    /// in the same order. `positions`: world space, one for each vertex.
+    ///
+    /// # Errors
+    /// [`WriteError`] when there is not one finite position for each vertex.
+    pub fn write_obj(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        self.check(positions)?;
+        let (rest, positions) = (self.positions_in_file(), self.up.turned_back(positions));
+        match &self.document {
+            Document::Obj(document) if self.format == ModelFormat::Obj => {
+                Ok(obj::patch(document, &rest, &positions))
+            }
+            Document::Obj(_) => {
+                let faces = self.cage_mesh().faces;
+                Ok(obj::write_cage_obj(&PolygonMesh { positions: positions.into_owned(), faces }))
+            }
+            Document::Gltf(document) => {
+                let rest = Rest { positions: &rest, triangles: &self.triangles };
+                gltf::write_obj(document, rest, &positions)
+            }
+        }
+    }
+
+    /// The model with new positions as a PLY file: polygons, colours of vertices, and normals if a PLY had them; text if it was a
+    /// text, big-endian if it was, otherwise binary.
+    ///
+    /// # Errors
+    /// [`WriteError`] when there is not one finite position for each vertex.
+    pub fn write_ply(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        self.check(positions)?;
+        let (faces, colors) = match &self.document {
+            Document::Obj(document) => (self.cage_mesh().faces, Some(&document.colors)),
+            Document::Gltf(_) => (self.triangles.iter().map(|t| t.to_vec()).collect(), None),
+        };
+        let positions = self.up.turned_back(positions);
+        Ok(ply::write(ply::Written {
+            positions: &positions,
+            triangles: &self.triangles,
+            faces,
+            color: &|v| colors.and_then(|colors| colors.get(&v)).copied(),
+            has_colors: colors.is_some_and(|colors| !colors.is_empty()),
+            has_normals: self.has_normals,
+            encoding: self.encoding,
+        }))
+    }
+
+    /// The model with new positions as an STL file: triangles and the normals of their planes; text if it was a text, otherwise
+    /// binary.
+    ///
+    /// # Errors
+    /// [`WriteError`] when there is not one finite position for each vertex, or no triangle.
+    pub fn write_stl(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        self.check(positions)?;
+        if self.triangles.is_empty() {
+            return Err(WriteError::NoFaces);
+        }
+        Ok(stl::write(&self.up.turned_back(positions), &self.triangles, self.encoding))
+    }
+
+    /// The model with new positions as a GLB file.
+    ///
+    /// A glTF keeps its materials, textures (those by URI are embedded), texture coordinates, names and nodes; see
+    /// the notices for what a deformed shape cannot keep. An OBJ becomes one mesh. `positions`: world space, one for
+    /// each vertex.
+    ///
+    /// # Errors
+    /// [`WriteError`] when there is not one finite position for each vertex, there are no triangles, or the file would
+    /// be too large.
+    pub fn write_glb(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        self.glb(positions, &[], Played::InTurn)
+    }
+
+    /// The model with `rest` as its shape and one morph target for each pose, with an animation that goes from rest
+    /// through all poses back to rest, a second each.
+    ///
+    /// # Errors
+    /// As [`Self::write_glb`].
+    pub fn write_glb_poses(
+        &self,
+        rest: &[Vec3],
+        poses: &[(String, Vec<Vec3>)],
+    ) -> Result<Vec<u8>, WriteError> {
+        self.glb(rest, poses, Played::InTurn)
+    }
+
+    pub(crate) fn glb(
+        &self,
+        base: &[Vec3],
+        poses: &[(String, Vec<Vec3>)],
+        played: Played<'_>,
+    ) -> Result<Vec<u8>, WriteError> {
+        self.check(base)?;
+        poses.iter().try_for_each(|(_, positions)| self.check(positions))?;
+        if self.triangles.is_empty() {
+            return Err(WriteError::NoFaces);
+        }
+        let at_rest = self.positions_in_file();
+        let base = self.up.turned_back(base);
+        let turned: Vec<_> = poses.iter().map(|(_, positions)| self.up.turned_back(positions)).collect();
+        let document = match &self.document {
+            Document::Gltf(document) => {
+                let rest = Rest { positions: &at_rest, triangles: &self.triangles };
+                return gltf::patch(document, rest, &base, &named(poses, &turned), played);
+            }
+            Document::Obj(document) => document,
+        };
+        // One way to deform a GLB: make one of the shape at rest, then patch that.
+        let stem = self.name.rsplit_once('.').map_or(self.name.as_str(), |(stem, _)| stem);
+        let (glb, source) = gltf::build_from_obj(stem, document, &at_rest)?;
+        let built = gltf::read(&self.name, &glb, &mut |_| None, u64::MAX)?;
+        let spread = |positions: &[Vec3]| source.iter().map(|&v| positions[v as usize]).collect::<Vec<_>>();
+        let spread_poses: Vec<_> = turned.iter().map(|positions| spread(positions).into()).collect();
+        let rest = Rest { positions: &built.positions, triangles: &built.triangles };
+        gltf::patch(&built.document, rest, &spread(&base), &named(poses, &spread_poses), played)
+    }
+
+    fn check(&self, positions: &[Vec3]) -> Result<(), WriteError> {
+        if positions.len() != self.positions.len() {
+            return Err(WriteError::Count { given: positions.len(), expected: self.positions.len() });
+        }
+        match positions.iter().position(|p| !p.is_finite()) {
+            Some(vertex) => Err(WriteError::NotFinite { vertex }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Poses by the names of `poses`.
+fn named<'a>(poses: &'a [(String, Vec<Vec3>)], positions: &'a [Cow<'_, [Vec3]>]) -> Vec<Pose<'a>> {
+    poses.iter().zip(positions).map(|((name, _), positions)| Pose { name, positions }).collect()
+}
