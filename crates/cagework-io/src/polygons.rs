@@ -46,14 +46,6 @@ pub enum PolygonsError {
         /// Vertices there are.
         vertices: usize,
     },
-    /// A face with fewer than three corners.
-    #[error("face {face} has {corners} corners; it needs at least 3")]
-    Face {
-        /// The face, from 0.
-        face: usize,
-        /// Corners it has.
-        corners: usize,
-    },
     /// More memory than is allowed.
     #[error(transparent)]
     Memory(#[from] MemoryError),
@@ -75,6 +67,8 @@ pub(crate) struct Polygons {
     /// Corners of all faces, one after another, and where each face starts. `[n_faces + 1]`
     pub(crate) corners: Vec<u32>,
     pub(crate) face_starts: Vec<u32>,
+    /// Faces that are no surfaces.
+    pub(crate) n_left_out: usize,
     /// Of each vertex, sRGB from 0 to 1; empty if the file has none.
     pub(crate) colors: Vec<[f32; 3]>,
     pub(crate) has_normals: bool,
@@ -97,19 +91,21 @@ impl Polygons {
         MemoryError::check(needed, limit).map(|()| needed)
     }
 
-    /// Ends a face that began where the last one ended.
+    /// Ends a face that began where the last one ended; one of fewer than three corners is left out.
     ///
     /// # Errors
     /// When it is none.
     pub(crate) fn end_face(&mut self) -> Result<(), PolygonsError> {
         let start = self.face_starts.last().map_or(0, |&start| start as usize);
-        let (face, corners) = (self.face_starts.len().saturating_sub(1), self.corners.len() - start);
+        let face = self.face_starts.len().saturating_sub(1) + self.n_left_out;
         let vertices = self.positions.len();
         if let Some(&index) = self.corners[start..].iter().find(|&&v| v as usize >= vertices) {
             return Err(PolygonsError::Vertex { face, index, vertices });
         }
-        if corners < 3 {
-            return Err(PolygonsError::Face { face, corners });
+        if self.corners.len() - start < 3 {
+            self.corners.truncate(start);
+            self.n_left_out += 1;
+            return Ok(());
         }
         self.face_starts.push(self.corners.len() as u32);
         Ok(())
@@ -125,6 +121,10 @@ impl Polygons {
         }
         if let Some(vertex) = self.positions.iter().position(|p| !p.is_finite()) {
             return Err(PolygonsError::NotFinite { vertex });
+        }
+        if self.n_left_out > 0 {
+            let n = self.n_left_out;
+            self.notices.push(format!("{n} faces of fewer than three corners are no surfaces: left out"));
         }
         let mut document = ObjDocument {
             corners: self.corners.iter().map(|&v| Corner { v, vt: NONE, vn: NONE }).collect(),

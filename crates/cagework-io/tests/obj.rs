@@ -82,7 +82,6 @@ fn errors_name_the_line() {
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99", "line 4: names vertex 99, but there are 3"),
         ("v 0 0 0\nv 1 0 0\nf 1 2 -3\nv 0 1 0", "line 3: names vertex -3, but there are 2"),
         ("v 0 0 0\nf 0 1 1", "line 2: names vertex 0, but there are 1"),
-        ("v 0 0 0\nf 1 1", "line 2: face has 2 corners; it needs at least 3"),
         ("v 0 0 0\nf 1 x 1", "line 2: corner 'x' is not an index"),
         ("v 0 0 0\nf 1/1/1/1 1 1", "line 2: corner '1/1/1/1'"),
         ("# c\nv 0 nan 0", "line 2: y coordinate is 'nan'"),
@@ -119,6 +118,22 @@ fn forward_references_and_dangling_attributes_are_tolerated() {
     let model = read("x.obj", b"f 1/7 2/8 3/9\nv 0 0 0\nv 1 0 0\nv 0 1 0").unwrap();
     assert_eq!(model.triangles, [[0, 1, 2]]);
     assert_eq!(model.notices.len(), 1);
+}
+
+/// Exporters leave them behind where edges were merged.
+#[test]
+fn faces_of_fewer_than_three_corners_are_left_as_they_are() {
+    let short = "f 3//3 1//2\n";
+    let at = CUBE_OBJ.rfind("f ").unwrap();
+    let with = [&CUBE_OBJ[..at], short, "f # none\n", &CUBE_OBJ[at..]].concat();
+    let [plain, model] = [CUBE_OBJ, &with].map(|text| read("x.obj", text.as_bytes()).unwrap());
+    assert_eq!((&model.triangles, model.n_faces()), (&plain.triangles, plain.n_faces()));
+    assert!(model.notices[0].starts_with("2 lines, points, curves or faces of fewer than three corners"));
+    // Normals get other numbers: those of the faces after it are their own.
+    let bent: Vec<Vec3> = model.positions.iter().map(|&p| twist(p)).collect();
+    let [expected, out] =
+        [&plain, &model].map(|model| String::from_utf8(model.write_obj(&bent).unwrap()).unwrap());
+    assert_eq!(out.replace(short, "").replace("f # none\n", ""), expected);
 }
 
 #[test]

@@ -35,14 +35,6 @@ pub enum ObjError {
         /// Vertices there are (so far, for a relative index).
         vertices: usize,
     },
-    /// A face with fewer than three corners.
-    #[error("line {line}: face has {corners} corners; it needs at least 3")]
-    Face {
-        /// Line, from 1.
-        line: usize,
-        /// Corners it has.
-        corners: usize,
-    },
     /// No `v` line at all.
     #[error("no vertices: an OBJ file has lines such as 'v 0 1 0'")]
     Empty,

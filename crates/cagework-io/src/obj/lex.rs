@@ -76,7 +76,7 @@ fn is_blank(b: u8) -> bool {
 }
 
 /// Tokens of a logical line as ranges of the file; a token that starts with `#` ends the line.
-pub(crate) fn tokens(bytes: &[u8], line: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+pub(crate) fn tokens(bytes: &[u8], line: Range<usize>) -> impl Iterator<Item = Range<usize>> + Clone {
     let mut at = line.start;
     let end = line.end;
     let separates = move |i: usize| {

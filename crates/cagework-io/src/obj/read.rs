@@ -149,6 +149,9 @@ const WELD_BYTES: u64 = 36;
 /// Most materials that `usemtl` names: each is drawn on its own, and a primitive of a GLB.
 const MAX_MATERIALS: usize = 1 << 14;
 
+/// Corners of a face, at least: others are left as they are, as lines and points are.
+pub(super) const MIN_CORNERS: usize = 3;
+
 /// Lines or corners after which the memory is looked at again.
 const LINES_BETWEEN: usize = 1 << 12;
 
@@ -253,7 +256,7 @@ impl<'a> Reader<'a> {
     }
 
     fn face(&mut self, line: usize, words: impl Iterator<Item = Range<usize>>) -> Result<(), ObjError> {
-        let start = self.document.corners.len();
+        let (start, forward) = (self.document.corners.len(), self.forward.len());
         for token in words {
             if self.document.corners.len().is_multiple_of(LINES_BETWEEN) {
                 self.check_memory()?;
@@ -286,9 +289,11 @@ impl<'a> Reader<'a> {
             }
             self.document.corners.push(Corner { v, vt, vn });
         }
-        let corners = self.document.corners.len() - start;
-        if corners < 3 {
-            return Err(ObjError::Face { line, corners });
+        if self.document.corners.len() - start < MIN_CORNERS {
+            self.document.corners.truncate(start);
+            self.forward.truncate(forward);
+            self.ignored += 1;
+            return Ok(());
         }
         check_count(self.document.corners.len(), line)?;
         self.document.face_starts.push(self.document.corners.len() as u32);
@@ -372,7 +377,10 @@ impl<'a> Reader<'a> {
         };
         notice(dangling, "face corners name texture coordinates or normals that do not exist: ignored");
         notice(self.bad_attributes, "'vt' or 'vn' lines are not numbers: read as zero");
-        notice(self.ignored, "line, point or curve elements are not surfaces: left as they are");
+        notice(
+            self.ignored,
+            "lines, points, curves or faces of fewer than three corners are no surfaces: left as they are",
+        );
         self.document.bytes = self.bytes.to_vec();
         let (bytes, welding) = (self.bytes.len() as u64, WELD_BYTES * vertices as u64);
         // The file is the caller's, and gone when it has been read.

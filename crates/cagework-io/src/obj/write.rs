@@ -7,7 +7,7 @@ use cagework_core::PolygonMesh;
 use glam::Vec3;
 
 use super::lex::{lines, tokens};
-use super::read::{NONE, ObjDocument};
+use super::read::{MIN_CORNERS, NONE, ObjDocument};
 use crate::normals::Shading;
 
 /// Distinct pairs of a vertex and a normal at a file's corners; where there is none, of a vertex and a surface.
@@ -74,7 +74,7 @@ pub(crate) fn patch(document: &ObjDocument, rest: &[Vec3], positions: &[Vec3]) -
                 }
                 vn += 1;
             }
-            (b"f" | b"fo", Some(normals)) => {
+            (b"f" | b"fo", Some(normals)) if words.clone().count() >= MIN_CORNERS => {
                 for token in words {
                     let pair = normals.of_corner[corner];
                     corner += 1;
