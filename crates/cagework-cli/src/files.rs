@@ -5,7 +5,7 @@ mod whole;
 
 use std::fs;
 use std::io::{ErrorKind, Read as _, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use cap_fs_ext::OpenOptionsSyncExt as _;
@@ -16,6 +16,7 @@ use serde::Serialize;
 use crate::error::CliError;
 pub(crate) use crate::error::shown_path;
 
+use outputs::Named;
 pub(crate) use outputs::{check_outputs, refuse_files_read, write};
 pub(crate) use whole::abandon;
 
@@ -23,7 +24,7 @@ pub(crate) use whole::abandon;
 pub(crate) const MAX_FILE_BYTES: u64 = 2 << 30;
 
 /// All files that were read so far, those that a model names (buffers, materials, textures) among them.
-static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+static READ: Mutex<Vec<Named>> = Mutex::new(Vec::new());
 
 /// Reads a whole file.
 ///
@@ -32,7 +33,7 @@ static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, CliError> {
     let file = File::open_ambient_with(path, &to_read(), ambient_authority()).map_err(|e| reason(&e));
     let bytes = file.and_then(content).map_err(|problem| CliError::file(path, problem))?;
-    note_read(path.to_path_buf());
+    note_read(path);
     Ok(bytes)
 }
 
@@ -44,7 +45,7 @@ pub(crate) fn read_beside(main: &Path, relative: &str) -> Option<Result<Vec<u8>,
     let folder = Dir::open_ambient_dir(folder_of(main), ambient_authority());
     match folder.and_then(|folder| folder.open_with(relative, &to_read())) {
         Ok(file) => {
-            note_read(folder_of(main).join(relative));
+            note_read(&folder_of(main).join(relative));
             Some(content(file))
         }
         Err(error) => match error.kind() {
@@ -59,8 +60,8 @@ pub(crate) fn read_beside(main: &Path, relative: &str) -> Option<Result<Vec<u8>,
 }
 
 /// Remembers a file that was read: no output may take its place.
-fn note_read(path: PathBuf) {
-    READ.lock().unwrap_or_else(PoisonError::into_inner).push(path);
+fn note_read(path: &Path) {
+    READ.lock().unwrap_or_else(PoisonError::into_inner).push(Named::new(path));
 }
 
 /// To open what may be a pipe: without this that waits until somebody writes.

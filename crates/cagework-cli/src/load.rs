@@ -190,6 +190,23 @@ impl LoadedCage {
         self.controls().inner()
     }
 
+    /// Refuses a format in which a pose of this cage would come back as another one.
+    ///
+    /// # Errors
+    /// When its vertices would have another order there.
+    pub(crate) fn require_order_in(&self, output: &ModelOutput) -> Result<(), CliError> {
+        if self.model.keeps_order_in(output.format) {
+            return Ok(());
+        }
+        Err(CliError::Mismatch {
+            message: format!(
+                "{}: the cage's vertices would be in another order there",
+                output.path.display()
+            ),
+            hint: "a pose keeps the order of the cage: write it as .obj or .ply",
+        })
+    }
+
     /// A pose of this cage, `[n_cage]`, as a file of it.
     ///
     /// # Errors

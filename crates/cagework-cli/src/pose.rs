@@ -43,6 +43,7 @@ impl Bound {
         check_outputs(&outputs, &inputs)?;
         let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
         let cage = load_cage(&args.cage, &model, args.read.memory, &args.controls)?;
+        cage.require_order_in(&args.output)?;
         let SavedWeights { weights, outside, inner_controls, .. } =
             load_weights(&args.weights, &model, &cage.cage, args.read.memory)?.of_vertices();
         let inner = &cage.controls().rest()[cage.cage.n_vertices()..];

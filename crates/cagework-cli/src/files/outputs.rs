@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
+use std::time::SystemTime;
 
 use cagework_core::bind::BindError;
 use cagework_core::progress::Cancelled;
@@ -24,7 +25,9 @@ const OPEN_FILES: [&str; 2] = ["/proc", "/dev/fd"];
 /// # Errors
 /// When a folder is missing or two names mean one file.
 pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), CliError> {
-    for (i, output) in outputs.iter().enumerate() {
+    let inputs: Vec<Named> = inputs.iter().map(|path| Named::new(path)).collect();
+    let named: Vec<Named> = outputs.iter().map(|path| Named::new(path)).collect();
+    for (i, (output, name)) in outputs.iter().zip(&named).enumerate() {
         let folder = folder_of(output);
         if !folder.is_dir() {
             return Err(CliError::Mismatch {
@@ -39,8 +42,8 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
         if output.is_dir() {
             return Err(CliError::file(output, "cannot be written, it is a folder"));
         }
-        refuse_inputs(output, inputs)?;
-        if outputs[..i].iter().any(|other| same_file(other, output)) {
+        refuse_inputs(name, &inputs)?;
+        if named[..i].iter().any(|other| other.is(name)) {
             return Err(CliError::Mismatch {
                 message: format!("{}: is named for two outputs", output.display()),
                 hint: "choose different names",
@@ -56,8 +59,7 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
 /// When an output is such a file, under this or another name.
 pub(crate) fn refuse_files_read(outputs: &[&Path]) -> Result<(), CliError> {
     let read = READ.lock().unwrap_or_else(PoisonError::into_inner);
-    let read: Vec<&Path> = read.iter().map(PathBuf::as_path).collect();
-    outputs.iter().try_for_each(|output| refuse_inputs(output, &read))
+    outputs.iter().try_for_each(|output| refuse_inputs(&Named::new(output), &read))
 }
 
 /// Writes a whole file, or leaves the older one as it was. A symbolic link stays, and the file that it leads to is
@@ -78,27 +80,37 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     written.map_err(|e| CliError::file(path, format!("cannot be written: {}", reason(&e))))
 }
 
-fn refuse_inputs(output: &Path, inputs: &[&Path]) -> Result<(), CliError> {
-    if inputs.iter().any(|input| same_file(input, output)) {
+fn refuse_inputs(output: &Named, inputs: &[Named]) -> Result<(), CliError> {
+    if inputs.iter().any(|input| input.is(output)) {
         return Err(CliError::Mismatch {
-            message: format!("{}: is an input and would be overwritten", output.display()),
+            message: format!("{}: is an input and would be overwritten", output.path.display()),
             hint: "choose another name for the output",
         });
     }
     Ok(())
 }
 
-/// Whether two names mean one regular file; neither need exist. Devices such as /dev/null may well be named twice.
-fn same_file(a: &Path, b: &Path) -> bool {
-    // Most pairs of hundreds of files end here.
-    let seen = |path| fs::metadata(path).ok().map(|m| (m.len(), m.modified().ok()));
-    if seen(a) != seen(b) {
-        return false;
+/// A name of a file, and what the disk says of it: asked once, as thousands are compared with each other.
+pub(super) struct Named {
+    path: PathBuf,
+    /// Its length and last change; none if it is not there.
+    state: Option<(u64, Option<SystemTime>)>,
+    /// None for what is no regular file: devices such as /dev/null may well be named twice.
+    place: Option<PathBuf>,
+}
+
+impl Named {
+    pub(super) fn new(path: &Path) -> Self {
+        let state = fs::metadata(path).ok().map(|m| (m.len(), m.modified().ok()));
+        Self { path: path.into(), state, place: place(path).ok().flatten() }
     }
-    match (place(a), place(b)) {
+
+    /// Whether two names mean one regular file; neither need exist.
+    fn is(&self, other: &Self) -> bool {
+        let (Some(a), Some(b)) = (&self.place, &other.place) else { return false };
         // Hard links have different names and are one file.
-        (Ok(Some(a)), Ok(Some(b))) => a == b || same_file::is_same_file(a, b).unwrap_or(false),
-        _ => false,
+        let may_be_linked = self.state.is_some() && self.state == other.state;
+        a == b || (may_be_linked && same_file::is_same_file(a, b).unwrap_or(false))
     }
 }
 

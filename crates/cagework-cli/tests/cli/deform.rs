@@ -141,3 +141,38 @@ fn files_with_z_up_keep_their_axes() {
     sandbox.run("cage mesh.obj --up z --vertices 24 -o made.obj").success();
     sandbox.run("check made.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
 }
+
+#[test]
+fn a_pose_whose_vertices_are_in_another_order_is_refused() {
+    let sandbox = bound();
+    // The same box, but two corners that lie across a face have each other's number.
+    let [a, b] = [
+        0,
+        CORNERS
+            .iter()
+            .position(|c| c[0] == CORNERS[0][0] && c[1] != CORNERS[0][1] && c[2] != CORNERS[0][2])
+            .unwrap(),
+    ];
+    let mut corners = CORNERS.map(affine);
+    corners.swap(a, b);
+    let renamed = |word: &str| match word.parse::<usize>() {
+        Ok(corner) if corner == a + 1 => (b + 1).to_string(),
+        Ok(corner) if corner == b + 1 => (a + 1).to_string(),
+        _ => word.to_owned(),
+    };
+    let lines = box_obj(&corners)
+        .lines()
+        .map(|line| {
+            let words: Vec<String> = line
+                .split(' ')
+                .map(|word| if line.starts_with('f') { renamed(word) } else { word.into() })
+                .collect();
+            words.join(" ") + "\n"
+        })
+        .collect::<String>();
+    sandbox.write("swapped.obj", lines);
+    sandbox
+        .run("deform mesh.obj --cage cage.obj --weights w.npz --pose swapped.obj -o out.obj")
+        .failure()
+        .stderr(contains("its vertices are in another order"));
+}

@@ -95,3 +95,18 @@ fn what_cannot_be_fitted_is_said_and_nothing_written() {
     }
     assert!(!sandbox.path("pose.obj").exists());
 }
+
+#[test]
+fn a_pose_is_not_written_where_its_vertices_lose_their_order() {
+    let sandbox = bound();
+    let fit =
+        |pose: &str| format!("fit mesh.obj --cage cage.obj --weights w.npz --target target.obj -o {pose}");
+    for pose in ["pose.stl", "pose.glb"] {
+        let said = format!("{pose}: the cage's vertices would be in another order there");
+        sandbox.run(&fit(pose)).failure().stderr(contains(said)).stderr(contains("write it as .obj or .ply"));
+        assert!(!sandbox.path(pose).exists());
+    }
+    sandbox.run(&fit("pose.ply")).success();
+    sandbox.run("deform mesh.obj --cage cage.obj --weights w.npz --pose pose.ply -o fitted.obj").success();
+    assert!(off(&sandbox, "fitted.obj", "target.obj") <= 1e-4);
+}
