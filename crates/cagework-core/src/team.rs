@@ -27,11 +27,8 @@ impl Team {
         {
             let processors = std::thread::available_parallelism().map_or(1, usize::from);
             let wanted = if threads == 0 { processors } else { threads.min(MAX_PER_PROCESSOR * processors) };
-            let pool = if wanted > 1 {
-                rayon::ThreadPoolBuilder::new().num_threads(wanted).build().ok()
-            } else {
-                None
-            };
+            // One thread has its pool, too: what it spawns would else run on all processors.
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(wanted).build().ok();
             let n_threads = if pool.is_some() { wanted } else { 1 };
             Self { pool, n_threads }
         }
@@ -139,6 +136,13 @@ mod tests {
         let said = format!("100000 threads were asked for, but {expected} are used");
         assert!(team.notice(100_000).unwrap().starts_with(&said));
         assert_eq!(team.notice(expected), None);
+    }
+
+    #[test]
+    fn one_thread_is_one_for_what_it_spawns_as_well() {
+        let on = |team: &Team| team.install(|| map_indices(100, |_| std::thread::current().id()));
+        let threads: std::collections::HashSet<_> = on(&Team::new(1)).into_iter().collect();
+        assert_eq!(threads.len(), 1);
     }
 
     #[test]

@@ -39,7 +39,7 @@ impl Probes {
     /// Of a model and the controls at rest.
     ///
     /// # Errors
-    /// [`PullError::Empty`], [`PullError::Cage`].
+    /// [`PullError::Empty`], [`PullError::Cage`], [`PullError::Missing`] for a corner of a triangle.
     pub fn new<'a>(mesh: &TriMesh, controls: impl Into<Controls<'a>>) -> Result<Self, PullError> {
         let controls = controls.into();
         if controls.n_controls() > MAX_CAGE {
@@ -47,6 +47,10 @@ impl Probes {
         }
         let cage = controls.cage();
         let positions = &mesh.positions;
+        let last = positions.len().checked_sub(1).ok_or(PullError::Empty)?;
+        if let Some(&index) = mesh.triangles.as_flattened().iter().find(|&&v| v as usize > last) {
+            return Err(PullError::Missing { what: "vertex", index, last });
+        }
         let areas = areas(mesh);
         let (samples, nearest) = farthest_points(positions).ok_or(PullError::Empty)?;
         let mut shares = vec![0.0; samples.len()];
