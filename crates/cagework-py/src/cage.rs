@@ -71,7 +71,8 @@ impl Cage {
         Self::of(py, &PolygonMesh { positions, faces: arrays::faces(faces)? }, smooth, None)
     }
 
-    /// A cage from a file, faces of any size: .obj, .gltf or .glb, whose vertices are joined where their positions are equal.
+    /// A cage from a file, faces of any size: .obj, .ply, .stl, .gltf or .glb; vertices of all but the first two are joined where their
+    /// positions are equal.
     ///
     /// Raises OSError, ModelError when it is no model, CageError when it is no cage.
     #[staticmethod]
@@ -184,7 +185,7 @@ pub(crate) fn generate_cage(
 /// of subdivision (the cage's own).
 ///
 /// A problem has code, severity ("error", "warning" or "note"), count, places (vertices, edges, faces, points), message and
-/// fixes. No error among them: it can be bound. Raises ArrayError.
+/// fixes. No error among them: it can be bound. Raises ArrayError, OptionError.
 #[pyfunction]
 #[pyo3(signature = (cage, points = None, grid = 64.0, smooth = None))]
 pub(crate) fn check_cage<'py>(

@@ -80,19 +80,34 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
     std::fs::write(path, bytes).map_err(|e| named(path, &e))
 }
 
-/// Vertices and triangles of a model: read_model(model) -> (vertices [n, 3] float32, triangles [m, 3] int32)
+/// Vertices and triangles of a model: read_model(model, states=False, clip=None) -> (vertices [n, 3] float32, triangles [m, 3]
+/// int32)
 ///
-/// model: path of an .obj, .gltf or .glb, or its bytes. Vertices are in world space, object units, in the file's order, split
+/// model: path of a .glb, .gltf, .vrm, .obj, .ply or .stl, or its bytes. Vertices are in world space, object units, in the file's order, split
 /// at seams as the file has them: those that reshape moves. A file without faces is read, too: a pose of a cage is one.
+///
+/// states: after the vertices also where each morph target takes them; clip: the name of a clip, with states, whose frames come
+/// after those. That is what a cage should enclose: generate_cage(*read_model(model, states=True)).
 ///
 /// Raises OSError, ModelError.
 #[pyfunction]
+#[pyo3(signature = (model, states = false, clip = None))]
 #[expect(clippy::type_complexity, reason = "two arrays, as Python gets them")]
 pub(crate) fn read_model<'py>(
     py: Python<'py>,
     model: &Bound<'py, PyAny>,
+    states: bool,
+    clip: Option<String>,
 ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<i32>>)> {
     let source = Source::of(model)?;
-    let model = work::run(py, move |_| source.read())??;
-    Ok((arrays::array_of(py, model.positions)?, arrays::triples(py, &model.triangles)?))
+    let read = move |_: &_| {
+        let model = source.read()?;
+        if states {
+            model.states(clip.as_deref()).map_err(error::model)
+        } else {
+            Ok((model.positions, model.triangles))
+        }
+    };
+    let (positions, triangles) = work::run(py, read)??;
+    Ok((arrays::array_of(py, positions)?, arrays::triples(py, &triangles)?))
 }

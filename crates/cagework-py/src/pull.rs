@@ -2,6 +2,7 @@
 
 use cagework_core::bind as bind_points;
 use cagework_core::deform::deform_bound;
+use cagework_core::options::OutsidePolicy;
 use cagework_core::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull, Reach};
 use cagework_core::{BindOptions, TriMesh};
 use glam::{DVec3, Vec3};
@@ -44,7 +45,8 @@ pub(crate) fn pull<'py>(
     relax: f64,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let options: BindOptions = bind_options(options)?;
+    // Some samples lie beside the model, and outside of the cage where that is close.
+    let options = BindOptions { outside: OutsidePolicy::ClosestPoint, ..bind_options(options)? };
     let controls = cage.get().controls();
     let positions = arrays::points("vertices", vertices, None)?.as_slice().to_vec();
     let mesh = TriMesh { positions, triangles: arrays::triangles(triangles)? };

@@ -16,9 +16,9 @@ use crate::{arrays, error, work};
 /// A model that follows a posed cage, as the bytes of a file: reshape(model, cage, posed, *, joints="follow",
 /// keep_travel=False, rigid=(), mask=None, static=False, **options) -> bytes
 ///
-/// model: path of a .glb, .gltf or .obj, or its bytes; posed: [n_cage, 3] float32 or float64, object units; options: those of
-/// bind. A glTF becomes a GLB that keeps skin, joints, morph targets, clips, materials and textures; an OBJ stays one. The bytes
-/// are those that `cagework bind` and `cagework deform` write.
+/// model: path of a .glb, .gltf, .vrm, .obj, .ply or .stl, or its bytes; posed: [n_cage, 3] float32 or float64, object units; options: those of
+/// bind. A glTF becomes a GLB that keeps skin, joints, morph targets, clips, materials and textures; an OBJ, PLY or STL stays one. The
+/// bytes are those that `cagework bind` and `cagework deform` write.
 ///
 /// joints: "follow" the cage, "stay", or "turn" with the shape, too; keep_travel: clips travel as far as before; rigid: names of
 /// parts that keep their shape, each of their pieces: materials, nodes, joints, groups; mask: a dict of parts that stay as they

@@ -93,12 +93,34 @@ def test_what_fails_is_named_and_the_rest_is_done(client, files, tmp_path):
     assert [path.name for path in (tmp_path / "out").iterdir()] == [files[0].name]
 
 
+class Fatal:
+    """Kills its process at one file, always."""
+
+    def __init__(self, name):
+        self.name = name
+
+    def __call__(self, file, *args, **options):
+        if Path(file).name == self.name:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return cw.reshape(file, *args, **options)
+
+
+def test_a_file_that_kills_every_worker_has_failed_and_the_rest_is_done(client, files, tmp_path):
+    cage = cw.generate_cage(*cw.read_model(files[0]), target=24)
+    some, work = files[:4], Fatal(files[2].name)
+    done = reshape_files(some, tmp_path / "out", cage, cage.vertices, client=client, work=work, grid=8, threads=1)
+    assert [said["state"] for said in done] == ["written", "written", "failed", "written"]
+    assert done[2]["error"].startswith("KilledWorker")
+
+
 def test_two_files_of_one_name_are_refused(files, tmp_path):
     cage = cw.generate_cage(*cw.read_model(files[0]), target=24)
     other = tmp_path / files[0].name
     with pytest.raises(ValueError, match="would both be written to"):
         reshape_files([files[0], other], tmp_path / "out", cage, cage.vertices)
     # It was said to be there already, and nothing was done.
-    with pytest.raises(ValueError, match="would be written over itself: take another folder"):
+    with pytest.raises(ValueError, match="is in the folder .* take another one"):
         reshape_files([files[0]], files[0].parent, cage, cage.vertices)
+    with pytest.raises(ValueError, match="files_per_task is 0; it must be at least 1"):
+        reshape_files(files, tmp_path / "out", cage, cage.vertices, files_per_task=0)
     assert reshape_files([], tmp_path / "out", cage, cage.vertices) == []

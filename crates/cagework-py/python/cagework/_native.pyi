@@ -1,4 +1,4 @@
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from typing import Any, Literal, Protocol, TypedDict, final
 
@@ -92,7 +92,9 @@ def pull(
     relax: float = 0.5,
     **options: Unpack[BindOptions],
 ) -> NDArray[np.float64]: ...
-def read_model(model: _Model) -> tuple[NDArray[np.float32], NDArray[np.int32]]: ...
+def read_model(
+    model: _Model, states: bool = False, clip: str | None = None
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]: ...
 def reshape(
     model: _Model,
     cage: Cage,
@@ -101,7 +103,7 @@ def reshape(
     joints: Literal["follow", "stay", "turn"] = "follow",
     keep_travel: bool = False,
     rigid: Sequence[str] = [],
-    mask: Mapping[str, float] | None = None,
+    mask: dict[str, float] | None = None,
     static: bool = False,
     **options: Unpack[BindOptions],
 ) -> bytes: ...

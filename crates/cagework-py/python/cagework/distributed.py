@@ -4,21 +4,22 @@
     from cagework.distributed import reshape_files
     done = reshape_files(files, "out", cage, posed, client=Client("scheduler:8786"))
 
-Inputs and outputs are on a file system that all workers see. An output appears whole or not at all, and one that is newer than
-its input is left alone: after a crash, the same call again does what is missing. A task of a worker that dies is given to another.
+Inputs and outputs are on a file system that all workers see. An output appears whole or not at all; one that is newer than its
+input is left alone: after a crash, the same call does what is missing. A task of a worker that dies is given to another.
 """
 
 import os
-import tempfile
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 from dask.bag import from_sequence
-from distributed import Client
+from distributed import Client, default_client
 
-from cagework import Cage, Error, reshape
+from cagework import Cage, reshape
 
 PathLike = str | os.PathLike[str]
 
@@ -41,54 +42,58 @@ def reshape_files(
     each file, cagework.reshape or a function like it.
 
     Returns a dict for each file, in their order: file, output, state ("written", "kept" when the output was there, "failed") and
-    the error. One that is named twice is done once. What fails does not end the rest. Raises ValueError when two files would be
-    written to one, or one over itself.
+    the error. One that is named twice is done once. What fails does not end the rest; a task whose workers die again and again has
+    failed with all its files. Raises ValueError when two files would be written to one, or into their own folder.
     """
+    if files_per_task < 1:
+        raise ValueError(f"files_per_task is {files_per_task}; it must be at least 1")
     jobs: dict[Path, Path] = {}
     for file in map(Path, files):
         output = Path(out) / (file.with_suffix(".glb") if file.suffix.lower() == ".gltf" else file).name
-        if output.resolve() == file.resolve():
-            raise ValueError(f"{file} would be written over itself: take another folder than {out}")
+        if Path(out).resolve() in (file.parent.resolve(), file.resolve().parent):
+            raise ValueError(f"{file} is in the folder {out}: take another one for what is written")
         other = jobs.setdefault(output.absolute(), file.absolute())
         if other != file.absolute():
             raise ValueError(f"{other} and {file.absolute()} would both be written to {output}")
     Path(out).mkdir(parents=True, exist_ok=True)
     if not jobs:
         return []
-    bag = from_sequence([(str(file), str(output)) for output, file in jobs.items()], partition_size=files_per_task)
-    tasks = bag.map(_reshape_file, cage=cage, posed=posed, work=work, options=options)
-    return list(client.compute(tasks, sync=True) if client else tasks.compute())
+    named = [(str(file), str(output)) for output, file in jobs.items()]
+    bag = from_sequence(named, partition_size=files_per_task)
+    tasks = bag.map(_reshape_file, cage=cage, posed=posed, work=work, options=options).to_delayed()
+    done: list[dict[str, str]] = []
+    with _client(client) as workers:
+        for future in workers.compute(tasks):
+            part = named[len(done) : len(done) + files_per_task]
+            error = future.exception()
+            done += future.result() if error is None else [_said(job, "failed", error) for job in part]
+    return done
+
+
+def _client(client: Client | None) -> AbstractContextManager[Client]:
+    try:
+        return nullcontext(client or default_client())
+    except ValueError:
+        return Client(threads_per_worker=1, dashboard_address=None)
+
+
+def _said(job: tuple[str, str], state: str, error: BaseException | None = None) -> dict[str, str]:
+    text = f"{type(error).__name__}: {error}" if error else ""
+    return {"file": job[0], "output": job[1], "state": state, "error": text}
 
 
 def _reshape_file(
     job: tuple[str, str], cage: Cage, posed: np.ndarray, work: Callable[..., bytes], options: dict[str, Any]
 ) -> dict[str, str]:
     file, output = job
-    said = {"file": file, "output": output, "error": ""}
+    part = Path(output).with_name(f".{Path(output).name}.{uuid4().hex}")
     try:
         if os.path.exists(output) and os.path.getmtime(output) >= os.path.getmtime(file):
-            return said | {"state": "kept"}
-        _write_whole(output, work(file, cage, posed, **options))
-    except (Error, OSError) as error:
-        return said | {"state": "failed", "error": f"{type(error).__name__}: {error}"}
-    return said | {"state": "written"}
-
-
-def _write_whole(path: str, data: bytes) -> None:
-    """Writes a file beside its place, then puts it there."""
-    folder, name = os.path.split(path)
-    handle, written = tempfile.mkstemp(prefix=f".{name}.", dir=folder)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.chmod(written, 0o666 & ~_umask())
-        os.replace(written, path)
-    except BaseException:
-        os.unlink(written)
-        raise
-
-
-def _umask() -> int:
-    umask = os.umask(0o077)
-    os.umask(umask)
-    return umask
+            return _said(job, "kept")
+        part.write_bytes(work(file, cage, posed, **options))
+        part.replace(output)
+    except Exception as error:
+        return _said(job, "failed", error)
+    finally:
+        part.unlink(missing_ok=True)
+    return _said(job, "written")
