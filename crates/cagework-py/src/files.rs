@@ -100,14 +100,13 @@ pub(crate) fn read_model<'py>(
     clip: Option<String>,
 ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<i32>>)> {
     let source = Source::of(model)?;
-    let read = move |_: &_| {
+    let (positions, triangles) = work::run(py, move |_| {
         let model = source.read()?;
         if states {
             model.states(clip.as_deref()).map_err(error::model)
         } else {
             Ok((model.positions, model.triangles))
         }
-    };
-    let (positions, triangles) = work::run(py, read)??;
+    })??;
     Ok((arrays::array_of(py, positions)?, arrays::triples(py, &triangles)?))
 }

@@ -109,8 +109,9 @@ def test_a_file_that_kills_every_worker_has_failed_and_the_rest_is_done(client, 
     cage = cw.generate_cage(*cw.read_model(files[0]), target=24)
     some, work = files[:4], Fatal(files[2].name)
     done = reshape_files(some, tmp_path / "out", cage, cage.vertices, client=client, work=work, grid=8, threads=1)
-    assert [said["state"] for said in done] == ["written", "written", "failed", "written"]
+    assert [said["file"] for said in done if said["state"] == "failed"] == [str(files[2])]
     assert done[2]["error"].startswith("KilledWorker")
+    assert sorted((tmp_path / "out").iterdir()) == [tmp_path / "out" / files[k].name for k in (0, 1, 3)]
 
 
 def test_two_files_of_one_name_are_refused(files, tmp_path):

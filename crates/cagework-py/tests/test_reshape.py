@@ -58,6 +58,22 @@ def test_a_pose_at_rest_leaves_the_file_as_it_was(rigged):
     assert cw.reshape(folder / "model.glb", cage, cage.vertices, grid=12) == rigged_glb()
 
 
+def test_what_a_cage_should_enclose_are_the_vertices_those_of_targets_and_frames_of_a_clip(rigged):
+    path = rigged[0] / "model.glb"
+    vertices, triangles = cw.read_model(path)
+    n = len(vertices)
+    states, same = cw.read_model(path, states=True)
+    moving, more = cw.read_model(path, states=True, clip="bend")
+    assert np.array_equal(states[:n], vertices) and np.array_equal(same, triangles)
+    assert np.array_equal(moving[: len(states)], states) and len(more) > len(triangles)
+    # The target widens the capsule by a fifth, the clip lays its half aside.
+    width = np.abs(vertices[:, 0]).max()
+    assert np.abs(states[:, 0]).max() == pytest.approx(1.2 * width, rel=1e-4)
+    assert np.abs(moving[:, 1]).max() > 1.5 * width
+    with pytest.raises(cw.ModelError, match="no clip"):
+        cw.read_model(path, states=True, clip="run")
+
+
 def test_buffers_beside_a_gltf_are_read_and_no_others(rigged, tmp_path):
     _, cage = rigged
     glb = rigged_glb()
