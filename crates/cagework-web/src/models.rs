@@ -131,6 +131,14 @@ impl Models {
         Ok(())
     }
 
+    /// What was said of models meanwhile: what of them is shown, keeps its shape, or stays.
+    pub(crate) fn take_choices(&mut self, now: &Self) {
+        for (member, now) in self.all.iter_mut().zip(&now.all) {
+            member.options.clone_from(&now.options);
+            member.painted.clone_from(&now.painted);
+        }
+    }
+
     fn join(&mut self) {
         self.positions.clear();
         self.triangles.clear();

@@ -4,7 +4,7 @@ use cagework_core::deform::{OutsideVertex, deform_bound, displacements};
 use cagework_core::{Controls, Parts, Weights};
 use cagework_io::{Model, ModelFormat, ReshapeOptions};
 use glam::Vec3;
-use js_sys::Function;
+use js_sys::{Array, Float32Array, Function, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -23,6 +23,20 @@ impl Loaded {
     #[must_use]
     pub fn triangles(&self) -> Vec<u32> {
         self.model.triangles.as_flattened().to_vec()
+    }
+
+    /// What a cage should enclose: the vertices, where morph targets take them, and frames of a clip if one is named; triangles as in
+    /// `Engine.modelStates`. `[n, 3]` each
+    ///
+    /// # Errors
+    /// When there is no such clip.
+    #[wasm_bindgen(unchecked_return_type = "[Float32Array, Uint32Array]")]
+    pub fn states(&self, clip: Option<String>) -> Result<JsValue, JsValue> {
+        let states = self.model.states(clip.as_deref());
+        let (positions, triangles) = states.map_err(|e| Fault::new(ErrorName::Error, e))?;
+        let positions = Float32Array::from(flat(&positions).as_slice());
+        let triangles = Uint32Array::from(triangles.as_flattened());
+        Ok(Array::of2(&positions, &triangles).into())
     }
 }
 

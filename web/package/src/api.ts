@@ -7,6 +7,7 @@ import type { Deformer } from "./pkg/cagework";
 import { createPool } from "./pool";
 import type { Package } from "./session/artifact";
 import { type Client, named } from "./session/client";
+import type { JobKind, Jobs } from "./session/messages";
 import type { Api, Cage, File, Follow, Named, Weights } from "./types";
 
 /** The module, ready on this thread, and workers. */
@@ -26,6 +27,29 @@ export function createApi(open: () => Promise<Runtime>): Api {
     const { openClient, most } = await runtime();
     return createPool(openClient, most);
   });
+  /** A job in a worker. Who gives it up waits neither for its turn nor for the module; so does who fails to hear of it. */
+  const run = <K extends JobKind>(job: K, input: Jobs[K]["input"], { signal, onProgress }: Follow) =>
+    new Promise<Jobs[K]["output"]>((resolve, reject) => {
+      const ended = new AbortController();
+      const giveUp = (reason: unknown) => {
+        ended.abort();
+        reject(reason);
+      };
+      const hearSignal = () => giveUp(signal?.reason);
+      if (signal?.aborted) return hearSignal();
+      signal?.addEventListener("abort", hearSignal);
+      const hearStep = (step: Jobs[K]["step"]) => {
+        try {
+          onProgress?.(step);
+        } catch (error) {
+          giveUp(error);
+        }
+      };
+      workers()
+        .then((pool) => pool.run(job, input, ended.signal, hearStep))
+        .then(resolve, reject)
+        .finally(() => signal?.removeEventListener("abort", hearSignal));
+    });
   const requireGpu = async ({ backend }: Partial<BindOptions>) => {
     if (backend !== "gpu" || (await runtime()).hasGpu) return;
     throw named("NoAdapter", 'there is no WebGPU here: leave out backend: "gpu"');
@@ -42,7 +66,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
         options: bindOptions(options),
       };
       await requireGpu(options);
-      const { report, ...arrays } = await (await workers()).run("bind", input, options);
+      const { report, ...arrays } = await run("bind", input, options);
       if (!report) throw named("Error", "the bind left no report");
       return { weights: { ...arrays, controls: input.cage.positions.length / 3 }, report };
     },
@@ -52,7 +76,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
       const triangles = trianglesOf("triangles", mesh.triangles);
       const asked = optionsOf(CAGE_DEFAULTS, options);
       const input = { positions, triangles, model: positions, options: asked, smooth: 0 };
-      const made = await (await workers()).run("cage", input, options);
+      const made = await run("cage", input, options);
       return {
         positions: made.positions,
         corners: made.corners,
@@ -82,11 +106,12 @@ export function createApi(open: () => Promise<Runtime>): Api {
         rig: optionsOf(RIG_DEFAULTS, options),
       };
       await requireGpu(options);
-      return (await (await workers()).run("reshape", input, options)) as Uint8Array<ArrayBuffer>;
+      return (await run("reshape", input, options)) as Uint8Array<ArrayBuffer>;
     },
     async readModel(model, options = {}) {
-      requireKnown(options, FOLLOWED, { name: null });
-      return (await workers()).run("model", { files: [fileOf(model, options)] }, options);
+      requireKnown(options, FOLLOWED, { name: null, states: null, clip: null });
+      const { states = false, clip } = options;
+      return run("model", { files: [fileOf(model, options)], states, clip }, options);
     },
   };
 }

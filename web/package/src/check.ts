@@ -2,6 +2,9 @@
 
 import { named } from "./session/client";
 
+/** The largest number of 32 bits. */
+const MOST = 0xffffffff;
+
 function wrong(message: string): Error {
   return named("Error", message);
 }
@@ -28,7 +31,12 @@ export function trianglesOf(name: string, given: ArrayLike<number>): Uint32Array
 /** Whole numbers from 0 on. */
 export function indicesOf(name: string, given: ArrayLike<number>): Uint32Array {
   lengthOf(name, given);
-  return given instanceof Uint32Array ? given : Uint32Array.from(given);
+  if (given instanceof Uint32Array) return given;
+  const wrongOne = Array.from(given).findIndex((x) => !Number.isInteger(x) || x < 0 || x > MOST);
+  if (wrongOne >= 0) {
+    throw wrong(`${name} has ${given[wrongOne]} at ${wrongOne}; it must be whole numbers from 0 on`);
+  }
+  return Uint32Array.from(given);
 }
 
 function requireTriples(name: string, length: number, what: string): void {
@@ -40,8 +48,12 @@ function requireTriples(name: string, length: number, what: string): void {
 /** A pose has as many points as the cage. */
 export function poseOf(given: ArrayLike<number>, cage: Float32Array): Float32Array {
   const posed = pointsOf("posed", given);
-  if (posed.length === cage.length) return posed;
-  throw wrong(`posed has ${posed.length} numbers; it must have as many as the cage, ${cage.length}`);
+  if (posed.length !== cage.length) {
+    throw wrong(`posed has ${posed.length} numbers; it must have as many as the cage, ${cage.length}`);
+  }
+  const wrongOne = posed.findIndex((x) => !Number.isFinite(x));
+  if (wrongOne < 0) return posed;
+  throw wrong(`posed has ${posed[wrongOne]} at ${wrongOne}; it must be finite numbers of 32 bits`);
 }
 
 /** Those of the options that belong to a set, over its defaults; what words and numbers may be is Rust's to say. */

@@ -35,25 +35,32 @@ export class CageDeformer extends Base {
   #bound: Promise<Ready> | undefined;
   #canvas: HTMLCanvasElement | undefined;
   #said: HTMLElement | undefined;
+  /** Ends what a hand is at. */
+  #release: (() => void) | undefined;
   readonly #sizes = globalThis.ResizeObserver && new ResizeObserver(() => this.#resize());
 
   connectedCallback(): void {
     this.#draw();
     this.#sizes.observe(this);
-    this.#open();
+    this.#shown?.engine.setScene(sceneOf(this.getAttribute("theme")));
+    if (!this.#bound) this.#open();
   }
 
   disconnectedCallback(): void {
     // One that is only moved within the page keeps its model.
     queueMicrotask(() => {
-      if (!this.isConnected) this.#close();
+      if (this.isConnected) return;
+      this.#sizes.disconnect();
+      this.#close();
     });
   }
 
   attributeChangedCallback(name: string, before: string | null, now: string | null): void {
-    if (!this.isConnected || before === now) return;
+    if (before === now) return;
     if (name === "theme") this.#shown?.engine.setScene(sceneOf(now));
-    else this.#open();
+    else if (this.isConnected && this.shadowRoot) this.#open();
+    // Not there yet, or on its way to another place of the page: that opens it.
+    else this.#bound = undefined;
   }
 
   /** The file that is shown. */
@@ -97,7 +104,7 @@ export class CageDeformer extends Base {
     this.#said = document.createElement("p");
     this.#said.setAttribute("role", "status");
     root.append(this.#freshCanvas(), this.#said);
-    attachPointer(
+    this.#release = attachPointer(
       this,
       () => this.#shown?.engine,
       () => this.dispatchEvent(new CustomEvent("pose", { detail: this.pose })),
@@ -118,6 +125,7 @@ export class CageDeformer extends Base {
     const { src } = this;
     this.#bound = undefined;
     if (src === null) {
+      this.#close();
       this.#say("");
       return;
     }
@@ -178,7 +186,7 @@ export class CageDeformer extends Base {
 
   #close(): void {
     this.#asked += 1;
-    this.#sizes.disconnect();
+    this.#release?.();
     const view = this.#view;
     this.#view = this.#shown = this.#bound = undefined;
     view?.then((view) => view.close()).catch(() => undefined);

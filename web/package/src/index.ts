@@ -29,7 +29,7 @@ export const generateCage: Api["generateCage"] = api.generateCage;
 export const deform: Api["deform"] = api.deform;
 /** The file of a model as it follows a posed cage: a glTF keeps rig, clips, morph targets and materials, as a GLB. */
 export const reshape: Api["reshape"] = api.reshape;
-/** Vertices and triangles of a file, in the order that `reshape` binds them in. */
+/** Vertices and triangles of a file, in the order that `reshape` binds them in; with `states` what a cage should enclose. */
 export const readModel: Api["readModel"] = api.readModel;
 
 export type {

@@ -35,9 +35,9 @@ function openThread(): Worker {
   });
   return Object.assign(target, {
     postMessage(message: ToWorker) {
+      thread.postMessage(message);
       if (message.kind === "job") jobs += 1;
       if (jobs > 0) thread.ref();
-      thread.postMessage(message);
     },
     terminate: () => void thread.terminate(),
   }) as unknown as Worker;

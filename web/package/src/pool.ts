@@ -2,10 +2,15 @@
 
 import type { Client } from "./session/client";
 import type { JobKind, Jobs } from "./session/messages";
-import type { Follow } from "./types";
 
 export interface Pool {
-  run<K extends JobKind>(job: K, input: Jobs[K]["input"], follow: Follow): Promise<Jobs[K]["output"]>;
+  /** The signal takes the worker away from the job, or the job out of the queue. */
+  run<K extends JobKind>(
+    job: K,
+    input: Jobs[K]["input"],
+    signal: AbortSignal,
+    step: (step: Jobs[K]["step"]) => void,
+  ): Promise<Jobs[K]["output"]>;
 }
 
 /** `most` of them at a time, others wait; one without work is kept for the next. */
@@ -14,37 +19,27 @@ export function createPool(open: () => Client, most: number): Pool {
   let idle: Client | undefined;
   let taken = 0;
 
-  async function take(): Promise<Client> {
-    while (taken >= most) await new Promise<void>((turn) => waiting.push(turn));
-    taken += 1;
-    const client = idle;
-    idle = undefined;
-    return client ?? open();
-  }
-
-  function give(client: Client | undefined): void {
-    taken -= 1;
-    if (idle) client?.close();
-    else idle = client;
-    waiting.shift()?.();
-  }
-
   return {
-    async run(job, input, { signal, onProgress }) {
-      signal?.throwIfAborted();
-      const client = await take();
-      const stop = () => client.close();
-      signal?.addEventListener("abort", stop);
+    async run(job, input, signal, step) {
+      while (taken >= most) await new Promise<void>((turn) => waiting.push(turn));
+      taken += 1;
+      let client: Client | undefined;
+      const stop = () => {
+        client?.close();
+        client = undefined;
+      };
       try {
-        signal?.throwIfAborted();
-        return await client.run(job, input, onProgress).done;
-      } catch (error) {
-        signal?.throwIfAborted();
-        throw error;
+        signal.throwIfAborted();
+        signal.addEventListener("abort", stop);
+        client = idle ?? open();
+        idle = undefined;
+        return await client.run(job, input, step).done;
       } finally {
-        signal?.removeEventListener("abort", stop);
-        if (signal?.aborted) client.close();
-        give(signal?.aborted ? undefined : client);
+        signal.removeEventListener("abort", stop);
+        taken -= 1;
+        if (idle) stop();
+        else idle = client;
+        waiting.shift()?.();
       }
     },
   };

@@ -70,6 +70,13 @@ export interface Named {
   readonly name?: string | undefined;
 }
 
+/** `states`: after the vertices also where each morph target takes them, and `clip`: the name of a clip, the frames of it: what a
+ * cage should enclose. */
+export interface ReadAsked extends Follow, Named {
+  readonly states?: boolean | undefined;
+  readonly clip?: string | undefined;
+}
+
 export type BindAsked = Follow & Partial<BindOptions>;
 export type CageAsked = Follow & Partial<CageOptions>;
 /** `plain`: the shape alone, no rig. */
@@ -86,8 +93,5 @@ export interface Api {
     posed: ArrayLike<number>,
     options?: ReshapeAsked,
   ): Promise<Uint8Array<ArrayBuffer>>;
-  readModel(
-    model: File,
-    options?: Follow & Named,
-  ): Promise<{ positions: Float32Array; triangles: Uint32Array }>;
+  readModel(model: File, options?: ReadAsked): Promise<{ positions: Float32Array; triangles: Uint32Array }>;
 }

@@ -212,6 +212,35 @@ test("an element opens compressed files, says what it cannot open, and leaves no
     document.body.append(element);
   });
   await ready(page);
+  // Moved within the page it keeps its model, and how that is posed.
+  const [pose, kept] = await page.evaluate(async () => {
+    const { element } = globalThis as unknown as { element: CageDeformer };
+    element.pose = element.pose?.map((x) => x + 1) ?? null;
+    const { pose } = element;
+    document.body.prepend(element);
+    await new Promise(requestAnimationFrame);
+    return [pose?.join(), element.pose?.join()];
+  });
+  expect(kept).toBe(pose);
+  // Without an address it shows nothing; gone while it opens, it leaves nothing behind either.
+  await page.evaluate(() => {
+    const { element } = globalThis as unknown as { element: CageDeformer };
+    element.src = null;
+  });
+  await expect.poll(() => page.workers().length).toBe(0);
+  expect(await page.evaluate(() => document.querySelector("cage-deformer")?.pose)).toBeNull();
+  for (const ms of [0, 100, 300]) {
+    await page.evaluate(async (ms) => {
+      const { element } = globalThis as unknown as { element: CageDeformer };
+      Object.assign(globalThis, { freed: false });
+      element.src = "model.glb";
+      document.body.append(element);
+      await new Promise((later) => setTimeout(later, ms));
+      element.remove();
+    }, ms);
+    await page.waitForFunction(() => (globalThis as unknown as { freed: boolean }).freed);
+    await expect.poll(() => page.workers().length).toBe(0);
+  }
 });
 
 /** Positions of the only primitive of a GLB. */

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { availableParallelism, tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, test } from "node:test";
 import { inflateRawSync } from "node:zlib";
@@ -138,6 +138,17 @@ test("at rest the file is what it was", async () => {
   );
 });
 
+test("what a cage should enclose are the vertices, those of morph targets and of a clip", async () => {
+  const states = await readModel(glb, { states: true });
+  assert.deepEqual([...states.positions.subarray(0, mesh.positions.length)], [...mesh.positions]);
+  assert.deepEqual(states.triangles, mesh.triangles);
+  const [clip] = JSON.parse(
+    execFileSync(process.env.CAGEWORK_COMMAND, ["info", join(folder, "model.glb"), "--json"]),
+  ).clips;
+  const moving = await readModel(glb, { states: true, clip: clip.name });
+  assert.ok(moving.positions.length > states.positions.length + mesh.positions.length);
+});
+
 test("compressed files are read", async () => {
   for (const name of ["draco.glb", "meshopt.glb"]) {
     const { positions, triangles } = await readModel(readFileSync(join(import.meta.dirname, name)));
@@ -160,6 +171,36 @@ test("who gives up hears at once, and nobody else does", async () => {
   await assert.rejects(bind(mesh.positions, cage, { signal: AbortSignal.abort() }), { name: "AbortError" });
 });
 
+test("who waits for a turn gives up at once, and what fails to hear ends its own job alone", async () => {
+  const wait = AbortSignal.timeout(50);
+  const others = Array.from({ length: availableParallelism() }, () =>
+    bind(mesh.positions, cage, { grid: 64 }),
+  );
+  let isDone = false;
+  const all = Promise.all(others).then(() => {
+    isDone = true;
+  });
+  await assert.rejects(bind(mesh.positions, cage, { grid: 12, signal: wait }), { name: "TimeoutError" });
+  assert.ok(!isDone);
+  const onProgress = () => {
+    throw new RangeError("mine");
+  };
+  await assert.rejects(bind(mesh.positions, cage, { grid: 12, onProgress }), {
+    name: "RangeError",
+    message: "mine",
+  });
+  await all;
+});
+
+test("what cannot be sent to a thread is an error, and the next call works", async () => {
+  const positions = mesh.positions.slice();
+  structuredClone(positions.buffer, { transfer: [positions.buffer] });
+  const controls = { smooth: 0, inner: 0, elements: [() => 0], radius: null };
+  await assert.rejects(bind(mesh.positions, { ...cage, controls }, { grid: 12 }), { name: "DataCloneError" });
+  await assert.rejects(bind(positions, cage, { grid: 12 }));
+  assert.ok((await bind(mesh.positions, cage, { grid: 12 })).report.converged);
+});
+
 test("what is wrong is said by name, with what was given and what is needed", async () => {
   const { weights } = await bind(mesh.positions, cage, { grid: 12 });
   const n = cage.positions.length;
@@ -177,7 +218,21 @@ test("what is wrong is said by name, with what was given and what is needed", as
     ],
     [() => reshape("fox.glb", cage, posed), /^model must be the bytes of a file/],
     [() => generateCage({ positions: [0, 0, 0], triangles: [0, 1] }), /^triangles has 2 numbers/],
+    [
+      () => generateCage({ positions: [0, 0, 0], triangles: [[0, 1, 2], 0, 0] }),
+      /^triangles has 0,1,2 at 0; /,
+    ],
+    [
+      () =>
+        reshape(
+          glb,
+          cage,
+          posed.map(() => Number.NaN),
+        ),
+      /^posed has NaN at 0; /,
+    ],
     [() => readModel(new Uint8Array(5)), /not a GLB/, "Format"],
+    [() => readModel(glb, { states: true, clip: "no clip" }), /no clip/],
   ];
   for (const [call, message, name = "Error"] of wrong) await assert.rejects(call, { name, message });
 });

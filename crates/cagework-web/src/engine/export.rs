@@ -144,12 +144,12 @@ impl Engine {
                 let Some(Own { mut weights, mut outside, rig }) = state.own_rows(id, session)? else {
                     return Err(Fault::missing("weights", "bind the model first"));
                 };
-                let inner = state.up().turned_back(state.made.inner_positions());
+                let inner = state.made.inner_positions();
                 let n = weights.n_rows() as u32;
                 weights.append(&rig.0);
                 outside.extend(rig.1.iter().map(|&o| OutsideVertex { vertex: o.vertex + n, ..o }));
                 let points = state.models.get(id)?.model.extra_points()?;
-                Ok(write_weights_npz(&weights, &outside, &points, &inner))
+                Ok(write_weights_npz(&weights, &outside, &points, inner))
             })
         })?)
     }

@@ -34,13 +34,13 @@ impl Engine {
     /// As `open`; nothing changes then.
     #[wasm_bindgen(unchecked_return_type = "ModelInfo")]
     pub async fn add(&self, mut loaded: Loaded) -> Result<JsValue, JsValue> {
-        let draw = loaded.draw_model();
-        let up = self.read(State::up);
-        loaded.turn_to(up);
-        let settings = loaded.member_settings();
-        let mut models = self.read(|state| state.models.clone());
-        models.add(loaded.model, draw, settings.as_ref());
-        Ok(self.show_models(models).await?)
+        loaded.turn_to(self.read(State::up));
+        let (draw, settings) = (loaded.draw_model(), loaded.member_settings());
+        let add = |models: &mut Models| {
+            models.add(loaded.model, draw, settings.as_ref());
+            Ok(())
+        };
+        Ok(self.show_models(add).await?)
     }
 
     /// Takes a model out of the cage, or brings it back. Cage and pose stay, weights are dropped.
@@ -49,9 +49,7 @@ impl Engine {
     /// When it is the only one, or the GPU has no room for it; nothing changes then.
     #[wasm_bindgen(unchecked_return_type = "ModelInfo")]
     pub async fn bin(&self, id: u32, binned: bool) -> Result<JsValue, JsValue> {
-        let mut models = self.read(|state| state.models.clone());
-        models.bin(id, binned)?;
-        Ok(self.show_models(models).await?)
+        Ok(self.show_models(|models| models.bin(id, binned)).await?)
     }
 
     /// What of a model is shown, keeps its shape, or stays as it is. Weights stay.
@@ -159,13 +157,15 @@ impl Engine {
         self.read(|state| object(&ModelInfo::of(&state.models)?))
     }
 
-    /// Brings other models in the same cage to the GPU.
-    async fn show_models(&self, models: Models) -> Answer<JsValue> {
-        let (draw, parts) = (models.draw(), models.parts());
+    /// Brings other models in the same cage to the GPU. One change after the other: each waits for the GPU first.
+    async fn show_models(&self, change: impl FnOnce(&mut Models) -> Answer<()>) -> Answer<JsValue> {
         page_turn().await;
         {
             let mut gpu = self.gpu.lock().await;
             let gpu = gpu.as_mut().ok_or_else(lost)?;
+            let mut models = self.read(|state| state.models.clone());
+            change(&mut models)?;
+            let (draw, parts) = (models.draw(), models.parts());
             self.read(|state| {
                 let size = (state.size * state.scale).as_uvec2().to_array();
                 check_layers(gpu.main.context(), &state.camera, &models.positions, &models.triangles, size)
@@ -174,7 +174,10 @@ impl Engine {
             gpu.main.set_parts(parts).await?;
             gpu.others.clear();
             // Before anybody else has the GPU: what it shows and what is known of it belong together.
-            self.change(|state| state.change_models(models));
+            self.change(|state| {
+                models.take_choices(&state.models);
+                state.change_models(models);
+            });
         }
         self.info()
     }
@@ -245,6 +248,9 @@ impl State {
         let Some((center, reach)) = self.touched(id, at, radius) else { return false };
         let posed = &self.held.posed;
         let Ok(member) = self.models.get_mut(id) else { return false };
+        if amount == 0 && member.painted.is_empty() {
+            return true;
+        }
         member.painted.resize(member.model.positions.len(), 0);
         for (painted, at) in member.painted.iter_mut().zip(&posed[member.vertices.clone()]) {
             let share = 1.0 - ((at.distance(center) / reach - FULL) / (1.0 - FULL)).clamp(0.0, 1.0);

@@ -8,11 +8,12 @@ const TOUCH_RADIUS = 24;
 /** A wheel notch is about 100 units; this makes it a seventh nearer. */
 const WHEEL_RATE = 0.0015;
 
+/** `posed` hears of every change. What is returned ends what is under way: the element leaves the page. */
 export function attachPointer(
   element: HTMLElement,
   engineOf: () => Engine | undefined,
   posed: () => void,
-): void {
+): () => void {
   let drag: "handle" | "orbit" | undefined;
   let last = { x: 0, y: 0 };
   const place = ({ clientX, clientY }: MouseEvent) => {
@@ -20,7 +21,9 @@ export function attachPointer(
     return { x: clientX - left, y: clientY - top };
   };
   const release = (keep: boolean) => {
-    if (drag === "handle" && engineOf()?.endTransform(keep)) posed();
+    const isMoved = drag === "handle" && engineOf()?.endTransform(keep);
+    // What was put back was heard of as it moved.
+    if (isMoved || (drag === "handle" && !keep)) posed();
     drag = undefined;
   };
   const touch = createTouch({
@@ -91,4 +94,8 @@ export function attachPointer(
     },
     { passive: false },
   );
+  return () => {
+    release(false);
+    touch.clear();
+  };
 }

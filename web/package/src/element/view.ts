@@ -71,7 +71,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
     const fresh = canvases.freshCanvas();
     await engine.recover(fresh);
     frames.ask();
-    return watch(fresh);
+    return isClosed ? undefined : watch(fresh);
   };
   const watching = watch(parts.canvas).catch((error: unknown) => {
     if (!isClosed) lost(error);
@@ -137,9 +137,11 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
       frames.stop();
       current?.cancel();
       client.close();
+      // Rust must not be in the middle of anything when its memory is given back, and hears of nothing while it is.
       engine.lose();
-      // Rust must not be in the middle of anything when its memory is given back.
-      await Promise.all([work, watching]);
+      await work;
+      engine.lose();
+      await watching;
       engine.free();
     },
   };

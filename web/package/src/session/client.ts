@@ -30,11 +30,14 @@ export function named(name: string, message: string): Error {
   return error;
 }
 
-/** Starts a worker with the compiled module; a worker that does not listen is replaced. */
+const closing = () => named("Cancelled", "the page is closing");
+
+/** Starts a worker with the compiled module; one that does not listen, or has stopped, is replaced when there is work again. */
 export function createClient(module: WebAssembly.Module, open: () => Worker): Client {
   const waiting = new Map<number, Waiting>();
   let next = 0;
-  let worker = start();
+  let worker: Worker | undefined = start();
+  let isClosed = false;
 
   function start(): Worker {
     const started = open();
@@ -42,7 +45,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
     started.addEventListener("error", (event) => {
       event.preventDefault();
       // One that has been replaced already may still be heard.
-      if (started === worker) restart(named("Worker", event.message || "the worker stopped"));
+      if (started === worker) lose(named("Worker", event.message || "the worker stopped"));
     });
     say(started, { kind: "start", module });
     return started;
@@ -67,44 +70,46 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
         `the computation broke off (${message.message}): it may need too much memory`,
       );
       job.failed(error);
-      restart(error);
+      lose(error);
       return;
     }
     if (message.kind === "done") job.done(message.output as never);
     else job.failed(named(message.name, message.message));
   }
 
-  function restart(error: Error): void {
-    worker.terminate();
+  function lose(error: Error): void {
+    worker?.terminate();
+    worker = undefined;
     const lost = [...waiting.values()];
     waiting.clear();
-    worker = start();
     for (const job of lost) job.failed(error);
   }
 
   return {
     run(job, input, step) {
+      if (isClosed) return { done: Promise.reject(closing()), cancel: () => undefined };
       const id = next++;
+      worker ??= start();
+      // Throws what cannot be sent; then there is nothing to wait for.
+      say(worker, { kind: "job", id, job, input });
       const done = new Promise<never>((resolve, reject) => {
         waiting.set(id, { done: resolve, failed: reject, step });
       });
-      say(worker, { kind: "job", id, job, input });
       return {
         done,
         cancel() {
-          if (!waiting.has(id)) return;
+          if (!worker || !waiting.has(id)) return;
           say(worker, { kind: "cancel", id });
           setTimeout(() => {
-            if (waiting.has(id)) restart(named("Cancelled", "cancelled"));
+            if (waiting.has(id)) lose(named("Cancelled", "cancelled"));
           }, PATIENCE);
         },
       };
     },
     isBusy: () => waiting.size > 0,
     close() {
-      worker.terminate();
-      for (const job of waiting.values()) job.failed(named("Cancelled", "the page is closing"));
-      waiting.clear();
+      isClosed = true;
+      lose(closing());
     },
   };
 }

@@ -71,7 +71,8 @@ export interface Jobs {
   };
   /** A model's vertices and triangles. */
   model: {
-    input: { files: readonly NamedFile[] };
+    /** `states`: what a cage should enclose, with the frames of a clip if one is named. */
+    input: { files: readonly NamedFile[]; states: boolean; clip: string | undefined };
     step: Reading;
     output: { positions: Float32Array; triangles: Uint32Array };
   };

@@ -12,6 +12,7 @@ type Send = (message: FromWorker, transfer?: Transferable[]) => void;
 const send: Send = (message, transfer = []) => postMessage(message, { transfer });
 
 const cancelled = new Set<number>();
+let ready: Promise<unknown> = Promise.resolve();
 let queue: Promise<unknown> = Promise.resolve();
 
 /** Answers the page from one build of the module. */
@@ -20,7 +21,9 @@ export function serve(pkg: Package): void {
   addEventListener("message", ({ data }: MessageEvent<ToWorker>) => {
     switch (data.kind) {
       case "start":
-        queue = pkg.default({ module_or_path: data.module });
+        ready = pkg.default({ module_or_path: data.module });
+        // Each job says so.
+        ready.catch(() => undefined);
         break;
       case "cancel":
         cancelled.add(data.id);
@@ -36,6 +39,7 @@ export function serve(pkg: Package): void {
 
 async function answer(work: Work, id: number, job: JobKind, input: unknown): Promise<void> {
   try {
+    await ready;
     const output = await work[job](input as never, steps(id));
     send({ kind: "done", id, output }, buffers(output));
   } catch (error) {
@@ -91,11 +95,14 @@ function createWork(pkg: Package): Work {
       const by = await binder(false);
       return taken(by.bindByFormula(kind, positions, cage.positions, cage.corners, cage.controls));
     },
-    async model({ files }, step) {
+    async model({ files, states, clip }, step) {
       const { loaded } = await read(pkg, files, step);
-      const { positions, triangles } = loaded;
-      loaded.free();
-      return { positions, triangles };
+      try {
+        const [positions, triangles] = states ? loaded.states(clip) : [loaded.positions, loaded.triangles];
+        return { positions, triangles };
+      } finally {
+        loaded.free();
+      }
     },
     async reshape({ files, cage, posed, options, rig }, step) {
       const { loaded } = await read(pkg, files, step);

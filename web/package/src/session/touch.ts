@@ -12,6 +12,8 @@ export interface Touch {
   down(id: number, at: Spot): boolean;
   move(id: number, at: Spot): boolean;
   up(id: number): boolean;
+  /** No finger is there any more. */
+  clear(): void;
 }
 
 export function createTouch(options: { engine: () => Engine; interrupt: () => void }): Touch {
@@ -45,6 +47,10 @@ export function createTouch(options: { engine: () => Engine; interrupt: () => vo
       const was = navigating;
       if (fingers.size === 0) navigating = false;
       return was;
+    },
+    clear() {
+      fingers.clear();
+      navigating = false;
     },
   };
 }
