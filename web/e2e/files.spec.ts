@@ -4,7 +4,7 @@ import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { box, dracoGlb, glb, gltfFiles, meshoptGlb, obj } from "./models";
-import { bound, cagePositions, drag, drop, expect, open, shoot, test } from "./support";
+import { bound, cagePositions, drag, drop, expect, modelPositions, open, shoot, test } from "./support";
 
 test("good files get a cage, are bound and can be dragged", async ({ page }) => {
   const worm = [{ name: "worm.glb", bytes: await glb() }];
@@ -84,6 +84,16 @@ test("a model with Z up is turned with its cage and pose, and files keep their a
   const written = files.cage.match(/^v .*/gm)?.flatMap((line) => line.split(" ").slice(1).map(Number));
   expect(farthest(written ?? [], lying)).toBeLessThan(TOLERANCE);
   await shoot(page, "turned");
+  // What is added lies as the others do, where it stays as it is in a bent cage, too.
+  const chooser = page.waitForEvent("filechooser");
+  await page.getByRole("button", { name: "Add to this cage" }).click();
+  const beam = { name: "beam.obj", mimeType: "text/plain", buffer: Buffer.from(box([0.1, 0.2, 0.6])) };
+  await (await chooser).setFiles([beam]);
+  await bound(page);
+  await page.getByRole("button", { name: "beam.obj stays as it is", exact: true }).click();
+  const off = async () =>
+    farthest((await modelPositions(page)).slice(-24).map(Math.abs), Array(8).fill([0.1, 0.6, 0.2]).flat());
+  await expect.poll(off).toBeLessThan(1e-5);
   await drop(page, [{ name: "tower.cagework.glb", bytes: Uint8Array.from(files.project) }]);
   await bound(page);
   await expect(choice.getByLabel("Z")).toBeChecked();

@@ -256,7 +256,7 @@ pub struct BindOptions {
     pub max_iterations: u32,
     /// Weights below it are dropped (then sum and rest pose are restored); 0 = keep all. Default 0.
     pub sparsify: f32,
-    /// Refuse to start above this many bytes of memory, `held` ones included. Default 4 GiB.
+    /// Refuse to start above this many bytes of memory, `held` ones included. Default 4 GiB; 2 GiB in wasm.
     pub memory_limit: u64,
     /// Default closest point.
     pub outside: OutsidePolicy,

@@ -398,6 +398,20 @@ mod tests {
         assert_eq!(at(&opened).unwrap(), before);
     }
 
+    /// What was chosen while another change went to the GPU.
+    #[test]
+    fn choices_that_were_made_meanwhile_are_kept() {
+        let mut now = three();
+        let mut later = now.clone();
+        later.bin(1, true).unwrap();
+        now.get_mut(2).unwrap().options.shown = false;
+        now.get_mut(0).unwrap().painted = vec![255, 0, 0, 0];
+        later.take_choices(&now);
+        assert_eq!(names(&later), ["body.obj", "hat.obj"]);
+        assert!(!later.get(2).unwrap().options.shown);
+        assert_eq!(later.get(0).unwrap().painted, [255, 0, 0, 0]);
+    }
+
     #[test]
     fn the_last_model_stays() {
         let mut models = three();

@@ -172,9 +172,9 @@ test("who gives up hears at once, and nobody else does", async () => {
 });
 
 test("who waits for a turn gives up at once, and what fails to hear ends its own job alone", async () => {
-  const wait = AbortSignal.timeout(50);
+  const wait = AbortSignal.timeout(20);
   const others = Array.from({ length: availableParallelism() }, () =>
-    bind(mesh.positions, cage, { grid: 64 }),
+    bind(mesh.positions, cage, { grid: 128 }),
   );
   let isDone = false;
   const all = Promise.all(others).then(() => {

@@ -73,7 +73,7 @@ max_iterations: number,
  */
 sparsify: number,
 /**
- * Refuse to start above this many bytes of memory, `held` ones included. Default 4 GiB.
+ * Refuse to start above this many bytes of memory, `held` ones included. Default 4 GiB; 2 GiB in wasm.
  */
 memory_limit: number,
 /**
