@@ -31,6 +31,7 @@ impl Loaded {
     /// # Errors
     /// When there is no such clip.
     #[wasm_bindgen(unchecked_return_type = "[Float32Array, Uint32Array]")]
+    #[allow(clippy::needless_pass_by_value, reason = "how an optional string crosses the border")]
     pub fn states(&self, clip: Option<String>) -> Result<JsValue, JsValue> {
         let states = self.model.states(clip.as_deref());
         let (positions, triangles) = states.map_err(|e| Fault::new(ErrorName::Error, e))?;
