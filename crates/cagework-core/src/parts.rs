@@ -6,7 +6,7 @@ mod bound;
 
 use std::collections::HashMap;
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec3};
 
 use crate::mesh::weld;
 use crate::rotation::nearest_rotation;
@@ -28,7 +28,7 @@ pub struct Parts {
 
 /// How a rigid piece moves: `x` to `x + turn (x - centre) - (x - centre) + shift`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Motion {
+pub struct Motion {
     centre: DVec3,
     /// A rotation, less the identity.
     turn: DMat3,
@@ -37,7 +37,9 @@ pub(crate) struct Motion {
 
 impl Motion {
     /// The rigid motion that leaves the least squares between where points are and where they should go (Kabsch 1976).
-    pub(crate) fn of(points: &[(DVec3, DVec3)]) -> Self {
+    /// Each is where it is, and how far it should go; not none.
+    #[must_use]
+    pub fn of(points: &[(DVec3, DVec3)]) -> Self {
         // At rest nothing is rounded.
         if points.iter().all(|(_, by)| *by == DVec3::ZERO) {
             return Self { centre: DVec3::ZERO, turn: DMat3::ZERO, shift: DVec3::ZERO };
@@ -51,6 +53,12 @@ impl Motion {
             moved += outer(by, from);
         }
         Self::from_sums(centre, shift, at_rest, moved)
+    }
+
+    /// A rotation about a point, which itself goes by `shift`.
+    #[must_use]
+    pub fn about(centre: DVec3, rotation: DMat3, shift: DVec3) -> Self {
+        Self { centre, turn: rotation - DMat3::IDENTITY, shift }
     }
 
     /// The same from what is summed: `centre` of the points and their mean `shift`; sums of `from from^T` and of `by from^T`, where
@@ -69,8 +77,16 @@ impl Motion {
         [0, 1, 2].map(|axis| rows.col(axis).extend(at_origin[axis]).as_vec4())
     }
 
-    pub(crate) fn by(&self, at: DVec3) -> DVec3 {
+    /// How far it moves a point.
+    #[must_use]
+    pub fn by(&self, at: DVec3) -> DVec3 {
         self.turn * (at - self.centre) + self.shift
+    }
+
+    /// The same as a transform.
+    #[must_use]
+    pub fn transform(&self) -> DMat4 {
+        DMat4::from_mat3_translation(DMat3::IDENTITY + self.turn, self.by(DVec3::ZERO))
     }
 }
 

@@ -167,7 +167,7 @@ impl Model {
         gltf::reshape(document, &rig, &self.triangles, (&by, &is_outside), &poses, (options, up))
     }
 
-    /// The vertices at rest, those that morph targets move with each target at 1, and frames of a clip: what a cage should
+    /// The vertices at rest, those that morph targets move with each target at 0 and at 1, and frames of a clip: what a cage should
     /// enclose.
     ///
     /// # Errors
@@ -180,9 +180,11 @@ impl Model {
             return Ok((positions, triangles));
         };
         let (_, defaults) = player.targets();
-        for k in 0..defaults.len() {
+        let ends =
+            |k: usize| [0.0, 1.0].into_iter().filter(move |&end| end != defaults[k]).map(move |end| (k, end));
+        for (k, end) in (0..defaults.len()).flat_map(ends) {
             let mut targets = defaults.to_vec();
-            targets[k] = 1.0;
+            targets[k] = end;
             let at = self.shown_at(&player, None, 0.0, &targets);
             let moved = at.iter().zip(&self.positions).filter(|(p, rest)| p.is_finite() && p != rest);
             positions.extend(moved.map(|(p, _)| *p));

@@ -65,8 +65,15 @@ pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result
             }
             let first = geometry.triangles.len();
             let flip = !local.is_empty() && frame.world(0).determinant() < 0.0;
-            ragged +=
-                triangles(document, primitive, mode, start as u32, local.len() as u32, flip, &mut geometry)?;
+            ragged += triangles(
+                document,
+                primitive,
+                mode,
+                start as u32,
+                local.len() as u32,
+                flip,
+                &mut geometry.triangles,
+            )?;
             check_attributes(document, primitive)?;
             geometry.slots.push(Slot {
                 instance: number as u32,
@@ -106,7 +113,7 @@ pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result
         return Err(GltfError::NoTriangles);
     }
     if skipped > 0 {
-        notices.push(format!("{skipped} primitives are points or lines: left as they are"));
+        notices.push(format!("{skipped} primitives are points or lines: they are not shown"));
     }
     if morphed > 0 {
         notices.push(format!("{morphed} morph targets: bound at their default weights"));
@@ -218,6 +225,19 @@ fn add_morphs(
     Ok(())
 }
 
+/// Triangles of the own vertices of a primitive; none of points and lines.
+pub(super) fn triangles_of(
+    document: &GltfDocument,
+    primitive: &Primitive,
+    count: usize,
+) -> Result<Vec<[u32; 3]>, GltfError> {
+    let mut all = Vec::new();
+    if let Some((_, mode)) = surface(primitive) {
+        triangles(document, primitive, mode, 0, count as u32, false, &mut all)?;
+    }
+    Ok(all)
+}
+
 /// Appends the triangles of a primitive; returns how many indices are left over.
 fn triangles(
     document: &GltfDocument,
@@ -226,7 +246,7 @@ fn triangles(
     start: u32,
     count: u32,
     flip: bool,
-    geometry: &mut Geometry,
+    all: &mut Vec<[u32; 3]>,
 ) -> Result<usize, GltfError> {
     let indices: Vec<u32> = match primitive.indices {
         None => (0..count).collect(),
@@ -261,7 +281,7 @@ fn triangles(
             // Stitches of strips.
             continue;
         }
-        geometry.triangles.push(if flip { [a, c, b] } else { [a, b, c] });
+        all.push(if flip { [a, c, b] } else { [a, b, c] });
     }
     Ok(if mode == Mode::Triangles { indices.len() % 3 } else { 0 })
 }

@@ -150,7 +150,7 @@ pub(crate) fn instances(
     }
     if !elsewhere.is_empty() {
         notices.push(format!(
-            "{} nodes with a mesh are not in scene {scene}: left as they are",
+            "{} nodes with a mesh are not in scene {scene}: they are not shown",
             elsewhere.len()
         ));
     }

@@ -33,13 +33,59 @@ fn what_hangs_on_a_bone_bends_or_stays_rigid() {
     let options = ReshapeOptions { rigid: vec!["hat".into()], ..ReshapeOptions::default() };
     let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &options).unwrap();
     let rigid = last(&read(&bytes), 8);
-    // Its first corner is the node's origin.
-    assert!(rigid[0].distance(moved[0]) <= ROUNDED, "{} {}", rigid[0], moved[0]);
+    // What is nearest in the least squares has the middle of what would bend (Kabsch 1976).
+    let middle = |at: &[Vec3]| at.iter().sum::<Vec3>() / at.len() as f32;
+    assert!(middle(&rigid).distance(middle(&moved)) <= ROUNDED, "{rigid:?} {moved:?}");
     for (a, b) in [(0, 7), (1, 6), (2, 4)] {
         let [before, after] = [&last(&model, 8), &rigid].map(|at| at[a].distance(at[b]));
         assert!((before - after).abs() <= ROUNDED, "{before} {after}");
         assert!((before - moved[a].distance(moved[b])).abs() > 1e-3, "otherwise it is stretched");
     }
+
+    // The same on a skeleton that stays, in one of several poses, with its origin elsewhere, and mirrored.
+    let stays = ReshapeOptions { joints: Joints::Stay, ..options.clone() };
+    let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &stays).unwrap();
+    assert_near(&last(&read(&bytes), 8), &rigid, ROUNDED, "the skeleton stays");
+    let still = vec![DVec3::ZERO; by(&model).len()];
+    let poses = ["once", "twice"].map(|name| (name.to_owned(), by(&model)));
+    let (bytes, _) = model.write_reshaped(&still, &[], &poses, &options).unwrap();
+    let posed = player(&read(&bytes));
+    let mut targets = posed.targets().1.to_vec();
+    *targets.last_mut().unwrap() = 1.0;
+    let all = shown(&posed, None, 0.0, &targets);
+    assert_near(&all[all.len() - 8..], &rigid, ROUNDED, "in a pose");
+    let mut baked = with_hat();
+    let away = vec3(0.4, -3.0, 0.2);
+    let corners = common::CUBE.map(|c| (Vec3::from_array(c) * 0.1 - away).to_array());
+    let position = baked.vec3(&corners);
+    baked.json["meshes"][1]["primitives"][0]["attributes"]["POSITION"] = json!(position);
+    baked.json["nodes"][5] =
+        json!({ "name": "hat", "mesh": 1, "translation": (vec3(0.05, 0.1, 0.0) + away).to_array() });
+    // The cube is as wide to the left as it was to the right.
+    let mut mirrored = with_hat();
+    mirrored.json["nodes"][5] =
+        json!({ "name": "hat", "mesh": 1, "translation": [0.15, 0.1, 0.0], "scale": [-0.1, 0.1, 0.1] });
+    for (what, rig) in [("baked", baked), ("mirrored", mirrored)] {
+        let model = read(&rig.glb());
+        let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &options).unwrap();
+        for p in last(&read(&bytes), 8) {
+            let near = rigid.iter().map(|q| p.distance(*q)).fold(f32::INFINITY, f32::min);
+            assert!(near <= 4.0 * ROUNDED, "{what}: {near:e}");
+        }
+    }
+    // A joint or a skinned mesh of the same name is something else.
+    let mut same_name = with_hat();
+    for node in [3, 4] {
+        same_name.json["nodes"][node]["name"] = json!("hat");
+    }
+    let model = read(&same_name.glb());
+    let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &options).unwrap();
+    assert_near(
+        &read(&bytes).positions[..20],
+        &read(&reshaped(&model, Joints::Follow).0).positions[..20],
+        ROUNDED,
+        "bends",
+    );
 
     let mut nameless = with_hat();
     nameless.json["nodes"][5].as_object_mut().unwrap().shift_remove("name");
@@ -48,6 +94,28 @@ fn what_hangs_on_a_bone_bends_or_stays_rigid() {
     let options = ReshapeOptions { rigid: vec!["node 5".into()], ..ReshapeOptions::default() };
     let (bytes, _) = model.write_reshaped(&by(&model), &[], &[], &options).unwrap();
     assert_eq!(last(&read(&bytes), 8), rigid);
+}
+
+/// As UniVRM exports a mesh of several materials.
+#[test]
+fn vertices_that_primitives_share_are_written_once_or_twice() {
+    let mut rig = rigged();
+    let one = reshaped(&read(&rig.glb()), Joints::Follow).0.len();
+    let primitive = rig.json["meshes"][0]["primitives"][0].clone();
+    rig.json["meshes"][0]["primitives"] = vec![primitive; 8].into();
+    let model = read(&rig.glb());
+    let (bytes, _) = reshaped(&model, Joints::Follow);
+    let moved: Vec<Vec3> = model.positions.iter().map(|&p| f(p)).collect();
+    assert_near(&read(&bytes).positions, &moved, ROUNDED, "each is where it goes");
+    let document = json_of(&bytes);
+    for attribute in ["POSITION", "NORMAL"] {
+        let primitives = document["meshes"][0]["primitives"].as_array().unwrap();
+        let accessors = primitives.iter().map(|p| p["attributes"][attribute].as_u64().unwrap());
+        let different: std::collections::HashSet<u64> = accessors.collect();
+        assert!(different.len() <= 2, "{attribute}: {different:?}");
+    }
+    // Otherwise 8 times the vertices.
+    assert!(bytes.len() < 3 * one, "{} and {one} bytes", bytes.len());
 }
 
 #[test]

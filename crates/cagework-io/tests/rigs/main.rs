@@ -9,6 +9,7 @@ mod clips;
 mod common;
 mod features;
 mod people;
+mod surfaces;
 
 use cagework_core::skin::skin_vertices;
 use cagework_io::{Joints, Model, Player, ReshapeOptions, ReshapeReport};
@@ -212,6 +213,9 @@ fn cage_of_a_model_encloses_targets_and_a_clip() {
     assert!(positions.len() > rest && triangles == model.triangles);
     let widest = positions.iter().map(|p| p.x).fold(0.0, f32::max);
     assert!(widest > model.positions.iter().map(|p| p.x).fold(0.0, f32::max), "the target 'wide' is at 1");
+    // Its default is a quarter; the column itself is as narrow as that target leaves it.
+    let narrow = |p: &&Vec3| p.y > 1.9 && (p.x - 0.2).abs() < 1e-5;
+    assert_eq!([&model.positions, &positions].map(|at| at.iter().filter(narrow).count()), [0, 2]);
     let (frames, of_frames) = model.states(Some("walk")).unwrap();
     assert_eq!(of_frames.len(), 33 * model.triangles.len());
     assert!(frames.len() > positions.len());
@@ -253,6 +257,9 @@ fn offsets_of_a_vrm_move_with_the_shape() {
         (f(joint + 2.0 * offset) - f(joint)) / 2.0
     };
     let offset = Vec3::from_array(offset);
+    let turns = ReshapeOptions { joints: Joints::Turn, ..ReshapeOptions::default() };
+    let message = model.write_reshaped(&by(&model), &[], &[], &turns).unwrap_err().to_string();
+    assert!(message.contains("the bones of a VRM 0 have no rotation"), "{message}");
     let springs = &json["VRM"]["secondaryAnimation"]["colliderGroups"][0]["colliders"][0];
     let capsule = &json["VRMC_springBone"]["colliders"][0]["shape"]["capsule"];
     for (what, found, expected) in [

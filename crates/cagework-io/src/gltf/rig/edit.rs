@@ -1,6 +1,7 @@
 //! A document that is changed as little as possible: what nobody writes keeps its bytes.
 
 use std::collections::{HashMap, HashSet};
+use std::hash::{BuildHasher as _, BuildHasherDefault, DefaultHasher};
 
 use ::gltf::binary::{Glb, Header};
 use serde_json::{Value, json};
@@ -23,6 +24,8 @@ pub(super) struct Edit<'a> {
     uses: HashMap<Place, usize>,
     /// Places that are never written over.
     overlapping: HashSet<Place>,
+    /// New accessors of attributes by a hash of their bytes: primitives may share their vertices.
+    appended: HashMap<u64, usize>,
 }
 
 impl<'a> Edit<'a> {
@@ -42,7 +45,8 @@ impl<'a> Edit<'a> {
             }
         }
         let overlapping = overlapping(&json);
-        let mut edit = Self { document, json, bin, uses: HashMap::new(), overlapping };
+        let mut edit =
+            Self { document, json, bin, uses: HashMap::new(), overlapping, appended: HashMap::new() };
         edit.count_uses();
         edit
     }
@@ -121,7 +125,13 @@ impl<'a> Edit<'a> {
     }
 
     fn append<const N: usize>(&mut self, values: &[[f32; N]], attribute: bool) -> usize {
-        let bytes = values.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+        let bytes: Vec<u8> = values.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+        let hash = BuildHasherDefault::<DefaultHasher>::default().hash_one((&bytes, N));
+        if let Some(&same) =
+            self.appended.get(&hash).filter(|&&same| attribute && self.has_bytes(same, &bytes))
+        {
+            return same;
+        }
         let view = Self::push_view(&mut self.bin, &mut self.json, bytes);
         if attribute {
             self.json["bufferViews"][view]["target"] = VERTICES.into();
@@ -134,7 +144,18 @@ impl<'a> Edit<'a> {
         };
         let of_accessor =
             json!({ "bufferView": view, "componentType": F32, "count": values.len(), "type": kind });
-        push(&mut self.json, "accessors", of_accessor)
+        let accessor = push(&mut self.json, "accessors", of_accessor);
+        if attribute {
+            self.appended.insert(hash, accessor);
+        }
+        accessor
+    }
+
+    /// Whether a new accessor has these bytes.
+    fn has_bytes(&self, accessor: usize, bytes: &[u8]) -> bool {
+        let view = self.json["accessors"][accessor]["bufferView"].as_u64().unwrap_or(0) as usize;
+        let start = self.json["bufferViews"][view]["byteOffset"].as_u64().unwrap_or(0) as usize;
+        self.bin.get(start..start + bytes.len()) == Some(bytes)
     }
 
     fn push_view(bin: &mut Vec<u8>, json: &mut Value, bytes: Vec<u8>) -> usize {

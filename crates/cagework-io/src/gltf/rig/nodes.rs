@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use ::gltf::json::scene::{Node, UnitQuaternion};
+use cagework_core::parts::Motion;
 use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 
@@ -28,6 +29,8 @@ const SMALL: f64 = 1e-6;
 const SHORT: f64 = 1e-4;
 /// Joints lower than this above the lowest one, over the diagonal, have no height to compare.
 const LOW: f64 = 0.02;
+/// Vertices inside the cage that tell how a rigid mesh moves, at least.
+const LEAST: usize = 3;
 /// Bounds of the ratio of heights.
 const RATIOS: (f64, f64) = (0.2, 5.0);
 
@@ -61,21 +64,19 @@ pub(super) struct Given<'a> {
     pub(super) is_outside: &'a [bool],
     pub(super) joints: Joints,
     pub(super) keep_travel: bool,
-    /// Nodes whose meshes stay rigid.
-    pub(super) rigid: &'a [u32],
+    /// How nodes move whose meshes keep their shape.
+    pub(super) rigid: &'a HashMap<u32, Motion>,
     /// The file's axis that points up.
     pub(super) up: DVec3,
 }
 
-impl Given<'_> {
-    /// Gradient of the deformation at an anchor, by central differences.
-    pub(super) fn gradient(&self, anchor: usize, diagonal: f64) -> DMat3 {
-        let column = |axis: usize| {
-            let [plus, minus] = [1 + axis, 1 + axis + AROUND.len() / 2].map(|k| self.by[anchor + k]);
-            DMat3::IDENTITY.col(axis) + (plus - minus) / (2.0 * STEP * diagonal)
-        };
-        DMat3::from_cols(column(0), column(1), column(2))
-    }
+/// Gradient of the deformation at an anchor, by central differences.
+pub(super) fn gradient(by: &[DVec3], anchor: usize, diagonal: f64) -> DMat3 {
+    let column = |axis: usize| {
+        let [plus, minus] = [1 + axis, 1 + axis + AROUND.len() / 2].map(|k| by[anchor + k]);
+        DMat3::IDENTITY.col(axis) + (plus - minus) / (2.0 * STEP * diagonal)
+    };
+    DMat3::from_cols(column(0), column(1), column(2))
 }
 
 /// A joint, or a node below one.
@@ -114,9 +115,37 @@ impl Rig<'_> {
 
     /// Names of the nodes below joints that show a mesh without a skin.
     pub(crate) fn props(&self) -> Vec<String> {
-        let has_mesh = |node: u32| self.document.root.nodes[node as usize].mesh.is_some();
         let name = |node| name_of(&self.document.json, "nodes", node, "node");
-        self.follows.iter().map(|&(node, _)| node).filter(|&node| has_mesh(node)).map(name).collect()
+        self.follows.iter().map(|&(node, _)| node).filter(|&node| self.is_prop(node)).map(name).collect()
+    }
+
+    fn is_prop(&self, node: u32) -> bool {
+        let of_node = &self.document.root.nodes[node as usize];
+        of_node.mesh.is_some() && of_node.skin.is_none()
+    }
+
+    /// The nodes of [`Self::props`] that have a name.
+    pub(super) fn props_named(&self, name: &str) -> Vec<u32> {
+        let follows = |node: &u32| self.follows.iter().any(|(follows, _)| follows == node);
+        let named = named(&self.document.json, name).into_iter();
+        named.filter(|&node| self.is_prop(node)).filter(follows).collect()
+    }
+
+    /// How they move if their meshes keep their shape: as near as a rigid motion is to how what the cage encloses of them would
+    /// bend; as their origin does where that is too little.
+    pub(super) fn motions(&self, props: &[u32], by: &[DVec3], is_outside: &[bool]) -> HashMap<u32, Motion> {
+        let of = |&(node, at): &(u32, usize)| {
+            let own = self.parts.iter().filter(|part| part.instance.node == Some(node));
+            let points = own.flat_map(|part| (part.first..).zip(part.rest()));
+            let inside: Vec<(DVec3, DVec3)> =
+                points.filter(|&(v, _)| !is_outside[v]).map(|(v, rest)| (rest, by[v])).collect();
+            if inside.len() >= LEAST {
+                return (node, Motion::of(&inside));
+            }
+            let turn = rotation(gradient(by, at, self.diagonal)).unwrap_or(DMat3::IDENTITY);
+            (node, Motion::about(self.worlds.world[node as usize].w_axis.truncate(), turn, by[at]))
+        };
+        self.follows.iter().filter(|(node, _)| props.contains(node)).map(of).collect()
     }
 
     /// Moves the nodes that follow, in `json` and as what they are now.
@@ -131,11 +160,17 @@ impl Rig<'_> {
             n_outside: 0,
             n_loose: 0,
         };
-        if given.joints == Joints::Stay {
+        let stays = given.joints == Joints::Stay;
+        if stays && given.rigid.is_empty() {
             return moved;
         }
         let mut anchor = vec![None; n];
-        self.follows.iter().for_each(|&(node, at)| anchor[node as usize] = Some(at));
+        // Of a skeleton that stays, what hangs on it rigidly still follows the cage.
+        let goes = |node: u32| !stays || given.rigid.contains_key(&node);
+        self.follows
+            .iter()
+            .filter(|(node, _)| goes(*node))
+            .for_each(|&(node, at)| anchor[node as usize] = Some(at));
         let old = &self.worlds.world;
         let mut delta = vec![DVec3::ZERO; n];
         let mut new: Vec<DMat4> = Vec::from(old.as_slice());
@@ -150,6 +185,11 @@ impl Rig<'_> {
                 }
                 continue;
             };
+            if let Some(motion) = given.rigid.get(&node) {
+                new[i] = motion.transform() * old[i];
+                delta[i] = (new[i].w_axis - old[i].w_axis).truncate();
+                continue;
+            }
             let is_outside = given.is_outside[at];
             let is_loose = is_outside && self.held[i] <= 0.0;
             moved.n_outside += usize::from(is_outside && !is_loose);
@@ -157,9 +197,8 @@ impl Rig<'_> {
             // It holds nothing: a root on the floor, a control, the end of a chain.
             let by = if is_loose { parent.map_or(DVec3::ZERO, |p| delta[p as usize]) } else { given.by[at] };
             delta[i] = if by.length() <= SMALL * self.diagonal { DVec3::ZERO } else { by };
-            let is_rigid = given.rigid.contains(&node);
-            let turn = given.joints == Joints::Turn || is_rigid;
-            let turn = turn.then(|| rotation(given.gradient(at, self.diagonal))).flatten();
+            let turn = given.joints == Joints::Turn;
+            let turn = turn.then(|| rotation(gradient(given.by, at, self.diagonal))).flatten();
             if delta[i] == DVec3::ZERO && turn.is_none_or(|t| t == DMat3::IDENTITY) {
                 continue;
             }
@@ -194,12 +233,14 @@ impl Rig<'_> {
                 node.translation = Some(translation);
                 let turned = DMat3::from_mat4(new[i]) != DMat3::from_mat4(old[i])
                     || DMat3::from_mat4(above) != DMat3::from_mat4(above_new);
-                if let Some(m) = rotation(DMat3::from_mat4(to)).filter(|_| turned) {
+                // Of the change alone: its own scale may mirror it.
+                let change = DMat3::from_mat4(to) * DMat3::from_mat4(from).inverse();
+                if let Some(m) = rotation(change).filter(|_| turned) {
                     let before = node
                         .rotation
                         .as_ref()
                         .map_or(DQuat::IDENTITY, |r| DQuat::from_array(r.0.map(f64::from)).normalize());
-                    let after = DQuat::from_mat3(&m);
+                    let after = (DQuat::from_mat3(&m) * before).normalize();
                     let rotation = after.as_quat().to_array();
                     of_json["rotation"] = json!(rotation);
                     node.rotation = Some(UnitQuaternion(rotation));
@@ -258,7 +299,7 @@ impl Rig<'_> {
 }
 
 /// The number of a node that has a name, or of the nodes that have it; "node 7" where the file has none.
-pub(super) fn named(json: &Value, name: &str) -> Vec<u32> {
+fn named(json: &Value, name: &str) -> Vec<u32> {
     let n = json["nodes"].as_array().map_or(0, Vec::len) as u32;
     (0..n).filter(|&node| name_of(json, "nodes", node, "node") == name).collect()
 }

@@ -1,6 +1,5 @@
 //! Poses of the cage as morph targets after those that a document has.
 
-use std::borrow::Cow;
 use std::collections::{BTreeMap, HashSet};
 
 use glam::{DMat3, DVec3};
@@ -8,18 +7,20 @@ use serde_json::{Value, json};
 
 use super::edit::Edit;
 use super::reshape::{Named, mesh_of};
+use super::shape::Turned;
 use super::tracks::{Driven, driven, output, own_sampler};
 use super::{Rig, key_of};
 use crate::error::WriteError;
 use crate::gltf::animate::SECONDS_PER_POSE;
 use crate::gltf::pack::push;
 
-/// Appends a morph target for each pose to every mesh, and an animation that plays them.
+/// Appends a morph target for each pose to every mesh, and an animation that plays them. `rigid`: nodes whose meshes keep their shape, and which points are outside the cage.
 pub(super) fn append(
     rig: &Rig<'_>,
     edit: &mut Edit<'_>,
     triangles: &[[u32; 3]],
     poses: &[Named<'_>],
+    rigid: (&[u32], &[bool]),
 ) -> Result<(), WriteError> {
     if poses.is_empty() {
         return Ok(());
@@ -30,6 +31,9 @@ pub(super) fn append(
         let most = meshes.entry(mesh_of(edit, &part.instance)).or_insert(0);
         *most = part.targets.len().max(*most);
     }
+    // Each pose with what keeps its shape, and how its surface turns.
+    let all: Vec<Vec<DVec3>> = poses.iter().map(|pose| held(rig, rigid, pose.by)).collect();
+    let turned: Vec<Turned<'_>> = all.iter().map(|by| Turned::new(triangles, by)).collect();
     for part in &rig.parts {
         let mesh = mesh_of(edit, &part.instance);
         let number = part.primitive as usize;
@@ -41,18 +45,8 @@ pub(super) fn append(
                 json!({ "POSITION": nothing }),
             );
         }
-        for pose in poses {
-            // Only the rest shape moves: existing targets add to it as before.
-            let mut by = Cow::Borrowed(pose.by);
-            for target in &part.targets {
-                for first in target.ends.iter().flatten() {
-                    for (k, &v) in target.moved.iter().enumerate() {
-                        by.to_mut()[first + k] = pose.by[part.first + v as usize];
-                    }
-                }
-            }
-            let own = || rig.triangles(part, triangles);
-            let shape = rig.shape(part, &by, &part.frame, own)?;
+        for (by, turned) in all.iter().zip(&turned) {
+            let shape = rig.shape(part, turned, &part.frame)?;
             let inverse = |v: usize| DMat3::from_mat4(part.frame.world(v)).inverse();
             let positions: Vec<[f32; 3]> = (0..part.local.len())
                 .map(|v| {
@@ -122,6 +116,25 @@ pub(super) fn append(
     }
     play(rig, edit, &meshes, poses.len());
     Ok(())
+}
+
+/// How far points move in a pose. Only the rest shape moves: existing targets add to it as before.
+fn held(rig: &Rig<'_>, (rigid, is_outside): (&[u32], &[bool]), by: &[DVec3]) -> Vec<DVec3> {
+    let (mut all, motions) = (by.to_vec(), rig.motions(rigid, by, is_outside));
+    for part in &rig.parts {
+        if let Some(motion) = part.instance.node.and_then(|node| motions.get(&node)) {
+            let own = part.rest().into_iter().zip(&mut all[part.first..]);
+            own.for_each(|(at, by)| *by = motion.by(at));
+        }
+        for target in &part.targets {
+            for first in target.ends.iter().flatten() {
+                for (k, &v) in target.moved.iter().enumerate() {
+                    all[first + k] = all[part.first + v as usize];
+                }
+            }
+        }
+    }
+    all
 }
 
 /// Extends weights to those of the poses.

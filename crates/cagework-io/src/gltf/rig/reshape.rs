@@ -9,11 +9,11 @@ use serde_json::Value;
 
 use super::edit::Edit;
 use super::lattice::MAX_ENDS;
-use super::nodes::{Given, Joints, named};
-use super::shape::Shape;
+use super::nodes::{Given, Joints};
+use super::shape::{Shape, Turned};
 use super::{Part, Rig, key_of, poses, tracks, vrm};
 use crate::error::WriteError;
-use crate::gltf::geometry::Frame;
+use crate::gltf::geometry::{Frame, triangles_of};
 use crate::gltf::pack::push;
 use crate::gltf::scene::Instance;
 use crate::gltf::{GltfDocument, skin};
@@ -115,11 +115,16 @@ pub(crate) fn reshape(
     poses: &[Named<'_>],
     (options, up): (&ReshapeOptions, DVec3),
 ) -> Result<(Vec<u8>, ReshapeReport), WriteError> {
+    if options.joints == Joints::Turn && document.json.pointer("/extensions/VRM").is_some() {
+        let message = "the bones of a VRM 0 have no rotation of their own, and must not get one: let joints follow or stay, \
+            or convert the file to VRM 1";
+        return Err(WriteError::Document(message.into()));
+    }
     let mut edit = Edit::new(document);
     let mut rigid = Vec::new();
     for name in &options.rigid {
-        let found = named(&edit.json, name);
-        if !found.iter().any(|node| rig.follows.iter().any(|(follows, _)| follows == node)) {
+        let found = rig.props_named(name);
+        if found.is_empty() {
             let name = shown(name);
             return Err(WriteError::Document(format!(
                 "there is no node '{name}' below a joint to keep rigid: see the names with cagework info"
@@ -141,19 +146,20 @@ pub(crate) fn reshape(
     }
     if has_moved {
         let (joints, keep_travel) = (options.joints, options.keep_travel);
-        let given = Given { by, is_outside, joints, keep_travel, rigid: &rigid, up };
+        let motions = rig.motions(&rigid, by, is_outside);
+        let given = Given { by, is_outside, joints, keep_travel, rigid: &motions, up };
         let moved = rig.moved(&given, &mut edit.json);
         report.joints_moved = moved.n_moved;
         report.joints_outside = moved.n_outside;
         report.joints_loose = moved.n_loose;
         let binds = write_binds(rig, &mut edit, &moved.world);
+        let turned = Turned::new(triangles, by);
         for part in &rig.parts {
-            if part.instance.node.is_some_and(|node| rigid.contains(&node)) {
+            if part.instance.node.is_some_and(|node| motions.contains_key(&node)) {
                 continue;
             }
             let frame = rig.frame(part, &moved.world, &binds)?;
-            let own = || rig.triangles(part, triangles);
-            let Some(shape) = rig.shape(part, by, &frame, own)? else { continue };
+            let Some(shape) = rig.shape(part, &turned, &frame)? else { continue };
             let states = shape.targets.iter().map(|target| &target.positions).chain([&shape.positions]);
             if states.flatten().any(|p| !p.as_vec3().is_finite()) {
                 return Err(WriteError::Document(format!(
@@ -169,7 +175,7 @@ pub(crate) fn reshape(
         tracks::rescale(document, &mut edit, &moved.changes, &mut report);
         vrm::write(rig, &given, &moved.world, &mut edit.json);
     }
-    poses::append(rig, &mut edit, triangles, poses)?;
+    poses::append(rig, &mut edit, triangles, poses, (&rigid, is_outside))?;
     Ok((edit.finish()?, report))
 }
 
@@ -183,7 +189,11 @@ impl Rig<'_> {
 
     /// Triangles of a part's own vertices; none of points and lines.
     pub(super) fn triangles(&self, part: &Part, all: &[[u32; 3]]) -> Vec<[u32; 3]> {
-        let Some(slot) = part.slot.map(|slot| &self.document.slots[slot]) else { return Vec::new() };
+        let Some(slot) = part.slot.map(|slot| &self.document.slots[slot]) else {
+            // What no scene shows, such as a coarser level of detail; what cannot be read has none.
+            let own = triangles_of(self.document, part.primitive(self.document), part.local.len());
+            return own.unwrap_or_default();
+        };
         all[slot.triangles.clone()].iter().map(|t| t.map(|v| v - slot.start)).collect()
     }
 

@@ -1,5 +1,7 @@
 //! A part's vertices, morph targets, normals and tangents after a deformation.
 
+use std::cell::OnceCell;
+
 use ::gltf::json::mesh::Semantic;
 use glam::{DMat3, DMat4, DVec3};
 
@@ -30,6 +32,38 @@ pub(super) struct Deltas {
     pub(super) tangents: Option<Vec<DVec3>>,
 }
 
+/// How far points move, and how that turns the surface of all parts together: those that meet in a seam turn alike there.
+pub(super) struct Turned<'a> {
+    triangles: &'a [[u32; 3]],
+    by: &'a [DVec3],
+    /// At rest, of all vertices that are shown.
+    gradients: OnceCell<Vec<Option<DMat3>>>,
+}
+
+impl<'a> Turned<'a> {
+    /// `triangles` of the model; `by`: of all points.
+    pub(super) fn new(triangles: &'a [[u32; 3]], by: &'a [DVec3]) -> Self {
+        Self { triangles, by, gradients: OnceCell::new() }
+    }
+
+    /// Gradients at the vertices of a part at rest; nothing for one that is not shown.
+    fn of(&self, rig: &Rig<'_>, part: &Part) -> Option<&[Option<DMat3>]> {
+        part.slot?;
+        let all = self.gradients.get_or_init(|| {
+            let mut from = vec![DVec3::ZERO; rig.n_vertices];
+            let mut triangles = Vec::with_capacity(self.triangles.len());
+            for part in &rig.parts {
+                let Some(slot) = part.slot.map(|slot| &rig.document.slots[slot]) else { continue };
+                from[part.first..].iter_mut().zip(part.rest()).for_each(|(from, rest)| *from = rest);
+                triangles.extend(&self.triangles[slot.triangles.clone()]);
+            }
+            let to: Vec<DVec3> = from.iter().zip(self.by).map(|(&from, &by)| from + by).collect();
+            Surface::new(&from, &to, triangles).gradients(&from, &to)
+        });
+        Some(&all[part.first..part.first + part.local.len()])
+    }
+}
+
 /// Where the vertices of a part are in one of its states, before and after. World space.
 struct State {
     from: Vec<DVec3>,
@@ -46,16 +80,14 @@ struct Directions {
 }
 
 impl Rig<'_> {
-    /// A part after its points moved `by`; none if nothing of it has changed. `frame`: its new skinning matrices. `triangles` of
-    /// its own vertices.
+    /// A part after its points moved; none if nothing of it has changed. `frame`: its new skinning matrices.
     pub(super) fn shape(
         &self,
         part: &Part,
-        by: &[DVec3],
+        turned: &Turned<'_>,
         frame: &Frame,
-        triangles: impl FnOnce() -> Vec<[u32; 3]>,
     ) -> Result<Option<Shape>, GltfError> {
-        let n = part.local.len();
+        let (n, by) = (part.local.len(), turned.by);
         let is_framed = |v: usize| frame.world(v) == part.frame.world(v);
         let mut is_kept: Vec<bool> =
             (0..n).map(|v| is_framed(v) && by[part.first + v] == DVec3::ZERO).collect();
@@ -114,7 +146,7 @@ impl Rig<'_> {
         for v in (0..n).filter(|&v| is_kept[v]) {
             positions[v] = part.local[v];
         }
-        let surface = Surface::new(&base.from, triangles());
+        let surface = Surface::new(&base.from, &base.to, self.triangles(part, turned.triangles));
         if n_singular > 0 {
             let mut offsets: Vec<DVec3> = positions.iter().zip(&part.local).map(|(a, b)| *a - *b).collect();
             surface.fill_from_neighbours(&mut offsets, &is_known);
@@ -125,7 +157,8 @@ impl Rig<'_> {
 
         let mut shape = Shape { positions, normals: None, tangents: None, targets, condition, n_singular };
         if let Some(directions) = Directions::of(self, part)? {
-            let at_base = surface.gradients(&base.from, &base.to);
+            let own = || surface.gradients(&base.from, &base.to);
+            let at_base = turned.of(self, part).map_or_else(own, <[_]>::to_vec);
             let resting =
                 [0, 1].map(|kind| (0..n).map(|v| directions.at_rest(part, kind, v)).collect::<Vec<DVec3>>());
             let turn = |gradients: &[Option<DMat3>], at: &dyn Fn(usize, usize) -> DVec3| {

@@ -7,20 +7,43 @@ use cagework_core::mesh::weld;
 /// Below this a gradient counts as flat, and nothing turns.
 const FLAT: f64 = 1e-9;
 
-/// Triangles of a part, for gradients by least squares over the edges at a vertex.
+/// Faces at one place whose normals have a smaller dot product are back to back: a card of hair, a cape.
+const BACK: f64 = -0.5;
+
+/// Triangles of a model or a part, for gradients by least squares over the edges at a vertex.
 pub(super) struct Surface {
     triangles: Vec<[u32; 3]>,
-    /// Vertices at one place are one. `[n]`
+    /// Vertices at one place are one, if they go to one place and are not back to back. `[n]`
     unique_of: Vec<u32>,
     n_unique: usize,
 }
 
 impl Surface {
-    /// `rest`: vertices; `triangles` of them.
-    pub(super) fn new(rest: &[DVec3], triangles: Vec<[u32; 3]>) -> Self {
-        let places: Vec<Vec3> = rest.iter().map(|p| p.as_vec3()).collect();
+    /// Vertices go `from` a place `to` another; `triangles` of them.
+    pub(super) fn new(from: &[DVec3], to: &[DVec3], triangles: Vec<[u32; 3]>) -> Self {
+        let places: Vec<Vec3> = from.iter().map(|p| p.as_vec3()).collect();
         let welded = weld(&places);
-        Self { triangles, n_unique: welded.first.len(), unique_of: welded.unique_of }
+        let mut normals = vec![DVec3::ZERO; from.len()];
+        for triangle in &triangles {
+            let [a, b, c] = triangle.map(|v| from[v as usize]);
+            triangle.iter().for_each(|&v| normals[v as usize] += (b - a).cross(c - a));
+        }
+        normals.iter_mut().for_each(|normal| *normal = normal.normalize_or_zero());
+        // At each place, the first vertex of each that it is, and which that is.
+        let mut at: Vec<Vec<(usize, u32)>> = vec![Vec::new(); welded.first.len()];
+        let mut n_unique = 0;
+        let own = welded.unique_of.iter().enumerate().map(|(v, &place)| {
+            let here = &mut at[place as usize];
+            let is_same =
+                |&&(first, _): &&(usize, u32)| to[first] == to[v] && normals[first].dot(normals[v]) >= BACK;
+            here.iter().find(is_same).map(|&(_, unique)| unique).unwrap_or_else(|| {
+                here.push((v, n_unique));
+                n_unique += 1;
+                n_unique - 1
+            })
+        });
+        let unique_of = own.collect();
+        Self { triangles, unique_of, n_unique: n_unique as usize }
     }
 
     /// Gradient at each vertex of the map from `from` to `to`: least squares over the edges, and the unit normal goes to the

@@ -6,7 +6,7 @@ use glam::{DMat3, DMat4, DVec3};
 use serde_json::{Value, json};
 
 use super::Rig;
-use super::nodes::{Given, vector};
+use super::nodes::{Given, gradient, vector};
 use crate::gltf::GltfDocument;
 use crate::gltf::scene::Worlds;
 
@@ -129,7 +129,7 @@ pub(super) fn write(rig: &Rig<'_>, given: &Given<'_>, world: &[DMat4], json: &mu
                 }
             }
             What::Radius(path) => {
-                let grows = DMat3::determinant(&given.gradient(spot.point, rig.diagonal)).abs().cbrt();
+                let grows = DMat3::determinant(&gradient(given.by, spot.point, rig.diagonal)).abs().cbrt();
                 if let Some(of) = json.pointer_mut(path)
                     && let Some(radius) = of.as_f64()
                 {

@@ -1,0 +1,106 @@
+//! Normals where a surface is not one sheet of one primitive: cards with a back, seams between primitives.
+
+use cagework_io::Joints;
+use glam::{Mat3, Vec3, vec3};
+use serde_json::json;
+
+use super::common::{Builder, json_of};
+use super::{f, read, reshaped};
+
+/// Cells of the sheet along a side.
+const N: u32 = 24;
+
+/// A wave, and a roof with a smooth normal at its ridge: height and slope.
+fn wave(u: f32) -> [f32; 2] {
+    [0.2 * (3.0 * u).sin(), 0.6 * (3.0 * u).cos()]
+}
+fn roof(u: f32) -> [f32; 2] {
+    let slope = 0.5 - u;
+    [-slope.abs(), if slope == 0.0 { 0.0 } else { slope.signum() }]
+}
+
+/// A sheet of that height: where it is, its normals, and triangles. Columns from `from` to `to` of `N`.
+fn sheet(height: fn(f32) -> [f32; 2], from: u32, to: u32) -> (Vec<Vec3>, Vec<Vec3>, Vec<[u32; 3]>) {
+    let at = |i: u32, k: u32| {
+        let (u, v) = (i as f32 / N as f32, k as f32 / N as f32);
+        let [height, slope] = height(u);
+        (vec3(u, v, height), vec3(-slope, 0.0, 1.0).normalize())
+    };
+    let (places, normals) = (0..=N).flat_map(|k| (from..=to).map(move |i| at(i, k))).unzip();
+    let width = to - from + 1;
+    let cells = (0..N).flat_map(|k| (0..to - from).map(move |i| k * width + i));
+    let triangles = cells.flat_map(|a| [[a, a + 1, a + width], [a + 1, a + width + 1, a + width]]).collect();
+    (places, normals, triangles)
+}
+
+/// The inverse transpose of the gradient of `f` brings a normal along.
+fn brought(p: Vec3, normal: Vec3) -> Vec3 {
+    let [x, y] = [p.x, p.y];
+    let gradient =
+        Mat3::from_cols(vec3(1.0, 0.0, 0.05 * y), vec3(0.2 * y, 1.2, 0.05 * x), vec3(0.0, 0.0, 1.0));
+    (gradient.inverse().transpose() * normal).normalize()
+}
+
+/// Largest angle, in degrees, of the normals of primitives after a reshape from what the gradient of `f` makes of them.
+fn largest_angle(primitives: &[(Vec<Vec3>, Vec<Vec3>, Vec<[u32; 3]>)]) -> f32 {
+    let mut rig = Builder::new();
+    let list = |all: &[Vec3]| all.iter().map(|p| p.to_array()).collect::<Vec<_>>();
+    let of = |(at, normals, triangles): &(Vec<Vec3>, Vec<Vec3>, Vec<[u32; 3]>)| {
+        let attributes = json!({ "POSITION": rig.vec3(&list(at)), "NORMAL": rig.vec3(&list(normals)) });
+        // A target makes it more than a statue.
+        let target = json!({ "POSITION": rig.vec3(&vec![[0.0, 0.0, 0.1]; at.len()]) });
+        let indices = rig.indices(triangles.as_flattened());
+        json!({ "attributes": attributes, "indices": indices, "targets": [target] })
+    };
+    let primitives_json: Vec<_> = primitives.iter().map(of).collect();
+    rig.push("meshes", json!({ "primitives": primitives_json }));
+    rig.json["nodes"] = json!([{ "mesh": 0 }]);
+    let (bytes, _) = reshaped(&read(&rig.glb()), Joints::Follow);
+    let (document, mut largest) = (json_of(&bytes), 0.0_f32);
+    let start = bytes.len() - document["buffers"][0]["byteLength"].as_u64().unwrap() as usize;
+    for (k, (at, normals, _)) in primitives.iter().enumerate() {
+        let accessor = &document["meshes"][0]["primitives"][k]["attributes"]["NORMAL"];
+        let accessor = &document["accessors"][accessor.as_u64().unwrap() as usize];
+        let view = &document["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
+        let first = start + view["byteOffset"].as_u64().unwrap_or(0) as usize;
+        for (v, (&p, &normal)) in at.iter().zip(normals).enumerate() {
+            let number =
+                |c: usize| f32::from_le_bytes(bytes[first + 12 * v + 4 * c..][..4].try_into().unwrap());
+            let found = vec3(number(0), number(1), number(2));
+            largest = largest.max(found.angle_between(brought(p, normal)).to_degrees());
+        }
+    }
+    largest
+}
+
+#[test]
+fn the_gradient_above_is_that_of_the_deformation() {
+    let (p, step) = (vec3(0.3, 0.7, 0.2), 1e-3);
+    let along = |way: Vec3| (f(p + step * way) - f(p - step * way)) / (2.0 * step);
+    let normal = vec3(0.2, -0.5, 0.8).normalize();
+    let [a, b] = [normal.any_orthonormal_vector(), normal.cross(normal.any_orthonormal_vector())];
+    let expected = along(a).cross(along(b)).normalize();
+    assert!(brought(p, normal).dot(expected).abs() > 0.9999);
+}
+
+/// Hair and capes have a back: the same places, with normals against those of the front.
+#[test]
+fn normals_of_a_card_with_a_back_turn_as_those_of_one_without() {
+    let front = sheet(wave, 0, N);
+    let one = largest_angle(std::slice::from_ref(&front));
+    let (mut at, mut normals, mut triangles) = front;
+    let n = at.len() as u32;
+    at.extend(at.clone());
+    normals.extend(normals.clone().iter().map(|normal| -normal));
+    triangles.extend(triangles.clone().iter().map(|&[a, b, c]| [n + a, n + c, n + b]));
+    let both = largest_angle(&[(at, normals, triangles)]);
+    assert!(one < 2.0 && both < one + 0.1, "{one} and {both} degrees");
+}
+
+/// A head and a body, or two materials of one: where they meet nobody should see it.
+#[test]
+fn normals_of_two_primitives_agree_at_their_seam() {
+    let one = largest_angle(&[sheet(roof, 0, N)]);
+    let two = largest_angle(&[sheet(roof, 0, N / 2), sheet(roof, N / 2, N)]);
+    assert!((two - one).abs() < 0.05, "{one} and {two} degrees");
+}
