@@ -10,6 +10,9 @@ use super::{f, read, reshaped};
 /// Cells of the sheet along a side.
 const N: u32 = 24;
 
+/// Where it is, its normals, and triangles.
+type Sheet = (Vec<Vec3>, Vec<Vec3>, Vec<[u32; 3]>);
+
 /// A wave, and a roof with a smooth normal at its ridge: height and slope.
 fn wave(u: f32) -> [f32; 2] {
     [0.2 * (3.0 * u).sin(), 0.6 * (3.0 * u).cos()]
@@ -19,8 +22,8 @@ fn roof(u: f32) -> [f32; 2] {
     [-slope.abs(), if slope == 0.0 { 0.0 } else { slope.signum() }]
 }
 
-/// A sheet of that height: where it is, its normals, and triangles. Columns from `from` to `to` of `N`.
-fn sheet(height: fn(f32) -> [f32; 2], from: u32, to: u32) -> (Vec<Vec3>, Vec<Vec3>, Vec<[u32; 3]>) {
+/// A sheet of that height. Columns from `from` to `to` of `N`.
+fn sheet(height: fn(f32) -> [f32; 2], from: u32, to: u32) -> Sheet {
     let at = |i: u32, k: u32| {
         let (u, v) = (i as f32 / N as f32, k as f32 / N as f32);
         let [height, slope] = height(u);
@@ -42,10 +45,10 @@ fn brought(p: Vec3, normal: Vec3) -> Vec3 {
 }
 
 /// Largest angle, in degrees, of the normals of primitives after a reshape from what the gradient of `f` makes of them.
-fn largest_angle(primitives: &[(Vec<Vec3>, Vec<Vec3>, Vec<[u32; 3]>)]) -> f32 {
+fn largest_angle(primitives: &[Sheet]) -> f32 {
     let mut rig = Builder::new();
-    let list = |all: &[Vec3]| all.iter().map(|p| p.to_array()).collect::<Vec<_>>();
-    let of = |(at, normals, triangles): &(Vec<Vec3>, Vec<Vec3>, Vec<[u32; 3]>)| {
+    let list = |all: &[Vec3]| all.iter().map(Vec3::to_array).collect::<Vec<_>>();
+    let of = |(at, normals, triangles): &Sheet| {
         let attributes = json!({ "POSITION": rig.vec3(&list(at)), "NORMAL": rig.vec3(&list(normals)) });
         // A target makes it more than a statue.
         let target = json!({ "POSITION": rig.vec3(&vec![[0.0, 0.0, 0.1]; at.len()]) });

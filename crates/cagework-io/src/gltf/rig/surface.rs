@@ -32,17 +32,18 @@ impl Surface {
         // At each place, the first vertex of each that it is, and which that is.
         let mut at: Vec<Vec<(usize, u32)>> = vec![Vec::new(); welded.first.len()];
         let mut n_unique = 0;
-        let own = welded.unique_of.iter().enumerate().map(|(v, &place)| {
+        let mut unique_of = Vec::with_capacity(from.len());
+        for (v, &place) in welded.unique_of.iter().enumerate() {
             let here = &mut at[place as usize];
             let is_same =
                 |&&(first, _): &&(usize, u32)| to[first] == to[v] && normals[first].dot(normals[v]) >= BACK;
-            here.iter().find(is_same).map(|&(_, unique)| unique).unwrap_or_else(|| {
+            let known = here.iter().find(is_same).map(|&(_, unique)| unique);
+            if known.is_none() {
                 here.push((v, n_unique));
                 n_unique += 1;
-                n_unique - 1
-            })
-        });
-        let unique_of = own.collect();
+            }
+            unique_of.push(known.unwrap_or(n_unique - 1));
+        }
         Self { triangles, unique_of, n_unique: n_unique as usize }
     }
 
