@@ -113,6 +113,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
   const settle = () => {
     poses.stop();
     clips.stop();
+    edit.end(true);
     edit.settle();
     edit.setEditingRest(false);
   };
@@ -151,9 +152,9 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
       }
       edit.sync();
     },
+    settle,
     writeProject: project.write,
     keep(sample) {
-      edit.setEditingRest(false);
       tour.guide()?.overtaken(sample);
       return works.flush();
     },

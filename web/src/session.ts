@@ -105,7 +105,8 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
     let info: ModelInfo = await engine.open(loaded);
     for (const next of further) info = await engine.add(next);
-    const cage = read.cage ? takeCage(read.cage) : null;
+    // A project of a model that has no cage yet has an empty one.
+    const cage = read.cage?.positions.length ? takeCage(read.cage) : null;
     const model = { ...info, notices: [...info.notices, ...read.notices] };
     const project = settings === undefined ? null : { poses, settings };
     return { model, cage, check: read.cage?.check ?? null, project };

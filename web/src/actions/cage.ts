@@ -52,7 +52,7 @@ export interface CageNeeds {
   /** Brings pose and poses of another cage to the one that is open. */
   carry(before: Posed): Promise<unknown>;
   /** Brings poses along to a cage with other controls, as part of a step that there is. */
-  carryAlong(before: Posed): Promise<unknown>;
+  carryAlong(before: Posed): Promise<boolean>;
 }
 
 export function createCage(ctx: Context, does: CageNeeds): CageActions {
@@ -69,6 +69,7 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
       check,
       sampleCage: false,
       bound: false,
+      pullReady: false,
       report: null,
       earlier: [],
       scene: { ...ctx.store.get().scene, compare: SCENE_DEFAULTS.compare, slice: "off" },
@@ -123,7 +124,9 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
       },
     });
     if (next?.positions.length !== before.positions.length) {
-      void does.carryAlong(before).then(() => {
+      void does.carryAlong(before).then((went) => {
+        // Undone meanwhile: what is there now is not what this step leads to.
+        if (!went) return;
         next = posedNow();
         carried = ctx.store.get().poses;
       });
@@ -132,7 +135,8 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
   };
 
   /** Takes a new cage as a step of the history; the first cage of a model is none. */
-  const take = (label: string, before: Posed | undefined, cage: CheckedCage) => {
+  const take = (label: string, cage: CheckedCage) => {
+    const before = posedNow();
     const { posed, poses } = ctx.store.get();
     set(cage);
     // A cage from elsewhere may reach beyond the view.
@@ -181,10 +185,9 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
       if (!unasked) ctx.tell.clear();
       return attempt(ctx, T.failed.noCage, () =>
         ctx.queue.replace("cage", async (signal) => {
-          const before = posedNow();
           const { cageSource, boxDivisions } = ctx.store.get();
           const box = () => ({ ...ctx.session().boxCage(boxDivisions), check: null });
-          take(T.did.makeCage, before, cageSource === "box" ? box() : await generate(cageSource, signal));
+          take(T.did.makeCage, cageSource === "box" ? box() : await generate(cageSource, signal));
         }),
       );
     },
@@ -193,21 +196,19 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
       if (!unasked) ctx.tell.clear();
       return attempt(ctx, T.failed.cageFile, () =>
         ctx.queue.replace("open", async (signal) => {
-          const before = posedNow();
           const name = files[0]?.name ?? "the cage";
           const read = (hear: (progress: Reading) => void) => ctx.session().readCage(files, hear);
           const cage = await waitFor(ctx, signal, T.opening.file(name), read);
           ctx.store.set({ cageSource: "file" });
-          take(T.did.loadCage, before, cage);
+          take(T.did.loadCage, cage);
         }),
       );
     },
     repair(kind) {
       return attempt(ctx, T.failed.repair, () =>
         ctx.queue.replace("open", async (signal) => {
-          const before = posedNow();
           const repair = () => ctx.session().repair(kind);
-          take(T.did.repairCage, before, await waitFor(ctx, signal, T.opening.repairing, repair));
+          take(T.did.repairCage, await waitFor(ctx, signal, T.opening.repairing, repair));
         }),
       );
     },

@@ -111,6 +111,8 @@ export function createClips(ctx: Context, settle: () => void): ClipActions {
     const { seconds } = store.get().clip;
     set({ clip, seconds: seconds >= length ? 0 : seconds, playing: true });
     last = performance.now();
+    // One that is asked for twice plays once.
+    cancelAnimationFrame(frame);
     frame = requestAnimationFrame(step);
   };
 

@@ -59,8 +59,8 @@ export function createEdit(ctx: Context, adopt: (state: CageState, check: Check 
     | undefined;
 
   const restNow = (): CheckedCage => {
-    const { check } = ctx.store.get();
-    return { positions: engine().restPositions(), corners: engine().cageCorners(), check };
+    const [positions, corners] = [engine().restPositions(), engine().cageCorners()];
+    return { positions, corners, controls: engine().cageControls(), check: ctx.store.get().check };
   };
 
   const sync = () => {
@@ -268,7 +268,13 @@ export function createEdit(ctx: Context, adopt: (state: CageState, check: Check 
     sync,
     setEditingRest(on) {
       settle();
+      const { posed, shares } = ctx.store.get();
+      const from = engine().cagePositions();
       setEditingRest(on);
+      if (!on || !posed) return;
+      // The pose is gone with that; undo brings it back.
+      ctx.store.set({ shares: shares.map(() => 0) });
+      pushPose(T.did.reset, from, shares);
     },
   };
 }

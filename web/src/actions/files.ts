@@ -32,6 +32,8 @@ export interface Follow {
   applySettings(settings: Partial<Settings>): void;
   /** And its pose. */
   applyPose(settings: Partial<Settings>): void;
+  /** Ends what plays or is under way: something else will be open. */
+  settle(): void;
   /** What is open, as a project. */
   writeProject(): Uint8Array;
   /** Keeps what is open: something else will be, a sample or a file (null). */
@@ -134,6 +136,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     others?: readonly Named[],
     cageFiles?: readonly NamedFile[],
   ) => {
+    follow.settle();
     await follow.keep(sample);
     const opened = await open();
     follow.leave();
@@ -143,6 +146,8 @@ export function createFiles(ctx: Context, follow: Follow): Files {
   return {
     openSample(id) {
       const label = store.get().samples.find((sample) => sample.id === id)?.label ?? id;
+      // Its worker is the one that binds.
+      for (const kind of ["bind", "cage"] as const) ctx.queue.cancel(kind);
       return busy(T.opening.file(label), T.failed.sample, () =>
         replace(() => ctx.session().openSample(id), id),
       );
@@ -166,6 +171,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     },
     turn(up) {
       return busy(T.opening.turning, T.failed.turn, async () => {
+        follow.settle();
         await take(await ctx.session().turn(follow.writeProject(), up), null);
       });
     },

@@ -45,6 +45,8 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   let saving: Promise<void> | undefined;
   /** What is open could not be kept; that was said. */
   let hasFailed = false;
+  /** What is open was deleted from what is kept, and has not changed since. */
+  let isUnwanted = false;
   /** What is open, and how other tabs may have it. */
   let current: { readonly id: string; readonly name: string; readonly release: () => void } | undefined;
 
@@ -96,10 +98,11 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
   };
 
   const touch = () => {
+    isUnwanted = false;
     clearTimeout(timer);
     timer = setTimeout(() => {
-      const { bindRun, gesture, playing, editingRest } = store.get();
-      if (bindRun || gesture || playing || editingRest) touch();
+      const { bindRun, gesture, playing } = store.get();
+      if (bindRun || gesture || playing) touch();
       else void save();
     }, PAUSE_MS);
   };
@@ -174,7 +177,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
     touch,
     async flush() {
       const { sample } = store.get();
-      if (timer !== undefined || (sample === null && !current)) await save();
+      if (timer !== undefined || (sample === null && !current && !isUnwanted)) await save();
       await saving;
     },
     leave() {
@@ -182,6 +185,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
       timer = undefined;
       const left = store.get().works.find(({ id }) => id === current?.id);
       drop();
+      isUnwanted = false;
       store.set({ savedAt: null });
       void refresh();
       if (!left) return;
@@ -195,6 +199,7 @@ export function createWorks(ctx: Context, { write, openFiles, startFresh }: Work
         clearTimeout(timer);
         timer = undefined;
         drop();
+        isUnwanted = true;
       }
       hasFailed = false;
       await attempt(ctx, T.failed.delete, () => deleteEntry(id));

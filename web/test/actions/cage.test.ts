@@ -11,7 +11,7 @@ function page() {
   const cage = createCage(fake.ctx, {
     refine: (grid) => grids.push(grid),
     carry: () => Promise.resolve(),
-    carryAlong: () => Promise.resolve(),
+    carryAlong: () => Promise.resolve(true),
   });
   effect(() => {
     if (fake.store.get().cage) changes += 1;
@@ -108,7 +108,7 @@ it("a cage that joins separate parts offers one for each", async () => {
   const cage = createCage(fake.ctx, {
     refine: () => undefined,
     carry: () => Promise.resolve(),
-    carryAlong: () => Promise.resolve(),
+    carryAlong: () => Promise.resolve(true),
   });
   const made = cage.make();
   await settled();

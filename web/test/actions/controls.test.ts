@@ -14,7 +14,7 @@ function actions(fake: Fake) {
   const cage = createCage(fake.ctx, {
     refine: () => undefined,
     carry: () => Promise.resolve(),
-    carryAlong: (before) => Promise.resolve(carried.push(before)),
+    carryAlong: (before) => Promise.resolve(carried.push(before) > 0),
   });
   const edit = createEdit(fake.ctx, cage.adopt);
   cage.adopt(fake.ctx.session().takeCage({ ...cageOf(4), positions: BEFORE }), cageOf(4).check);

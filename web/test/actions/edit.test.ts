@@ -30,6 +30,18 @@ function page() {
   return { ...fake, edit, changed, height };
 }
 
+it("reshaping begins at rest: the pose before comes back by undo, with its shares", async () => {
+  const { edit, ctx, store, height } = page();
+  store.set({ shares: [1] });
+  expect(edit.begin("grab", 0, 0)).toBe(true);
+  edit.drag(1, 1);
+  edit.end(true);
+  edit.setEditingRest(true);
+  expect([store.get().shares, ctx.history.undoLabel]).toEqual([[0], "Reset the pose"]);
+  await ctx.history.undo();
+  expect([store.get().shares, height(), store.get().editingRest]).toEqual([[1], 1, false]);
+});
+
 it("a gesture is one step, and one that is given up is none", async () => {
   const { edit, ctx, store, height } = page();
   expect(edit.begin("grab", 0, 0)).toBe(true);

@@ -34,6 +34,7 @@ function page() {
     },
     applySettings: ({ bind }) => bind && fake.store.set({ bindOptions: bind }),
     applyPose: ({ pose }) => steps.push(`pose ${pose}`),
+    settle: () => undefined,
     writeProject: () => Uint8Array.of(1),
     async keep() {
       steps.push("keep");

@@ -7,6 +7,8 @@ import type { FromWorker, JobKind, Jobs, ToWorker } from "./messages";
 const PATIENCE = 400;
 
 interface Waiting {
+  /** To ask again: another job may take the worker with it. */
+  readonly asked: ToWorker;
   readonly done: (output: never) => void;
   readonly failed: (error: Error) => void;
   readonly step: ((step: never) => void) | undefined;
@@ -85,23 +87,42 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
     for (const job of lost) job.failed(error);
   }
 
+  /** A worker that does not hear that a job is given up is replaced, and asked the others again. */
+  function replace(id: number): void {
+    worker?.terminate();
+    worker = undefined;
+    drop(id);
+    if (waiting.size === 0) return;
+    worker = start();
+    for (const { asked } of waiting.values()) say(worker, asked);
+  }
+
+  function drop(id: number): void {
+    const job = waiting.get(id);
+    waiting.delete(id);
+    job?.failed(named("Cancelled", "cancelled"));
+  }
+
   return {
     run(job, input, step) {
       if (isClosed) return { done: Promise.reject(closing()), cancel: () => undefined };
       const id = next++;
       worker ??= start();
       // Throws what cannot be sent; then there is nothing to wait for.
-      say(worker, { kind: "job", id, job, input });
+      const asked: ToWorker = { kind: "job", id, job, input };
+      say(worker, asked);
       const done = new Promise<never>((resolve, reject) => {
-        waiting.set(id, { done: resolve, failed: reject, step });
+        waiting.set(id, { asked, done: resolve, failed: reject, step });
       });
       return {
         done,
         cancel() {
           if (!worker || !waiting.has(id)) return;
           say(worker, { kind: "cancel", id });
+          const [running] = waiting.keys();
+          if (running !== id) drop(id);
           setTimeout(() => {
-            if (waiting.has(id)) lose(named("Cancelled", "cancelled"));
+            if (waiting.has(id)) replace(id);
           }, PATIENCE);
         },
       };

@@ -1,0 +1,81 @@
+import { createClient } from "@cagework/core/session/client";
+import type { FromWorker, ToWorker } from "@cagework/core/session/messages";
+import { afterEach, beforeEach, expect, it, vi } from "vitest";
+
+beforeEach(() => {
+  vi.useFakeTimers();
+});
+afterEach(() => {
+  vi.useRealTimers();
+});
+
+const MODULE = {} as WebAssembly.Module;
+
+/** Workers that answer when a test says so. */
+function workers() {
+  const all: { target: EventTarget; jobs: number[]; isOver: boolean }[] = [];
+  const client = createClient(MODULE, () => {
+    const made = { target: new EventTarget(), jobs: [] as number[], isOver: false };
+    all.push(made);
+    return Object.assign(made.target, {
+      postMessage(message: ToWorker) {
+        if (message.kind === "job" && message.input === undefined) throw new TypeError("cannot be sent");
+        if (message.kind === "job") made.jobs.push(message.id);
+      },
+      terminate() {
+        made.isOver = true;
+      },
+    }) as unknown as Worker;
+  });
+  const answer = (of: number, data: FromWorker) =>
+    all[of]?.target.dispatchEvent(new MessageEvent("message", { data }));
+  const stop = (of: number) => all[of]?.target.dispatchEvent(new Event("error"));
+  const jobs = () => all.map((one) => one.jobs);
+  const run = (id: string) => client.run("sample", { id });
+  return { all, client, answer, stop, jobs, run };
+}
+
+const said = (done: Promise<unknown>) => done.then(String, (error: Error) => error.name);
+
+it("a job that does not hear takes its worker with it, and no other job", async () => {
+  const { all, answer, jobs, run } = workers();
+  const [first, second] = [run("a"), run("b")];
+  first.cancel();
+  vi.advanceTimersByTime(1000);
+  expect(await said(first.done)).toBe("Cancelled");
+  expect([all.map(({ isOver }) => isOver), jobs()]).toEqual([
+    [true, false],
+    [[0, 1], [1]],
+  ]);
+  answer(1, { kind: "done", id: 1, output: "b" as never });
+  expect(await said(second.done)).toBe("b");
+});
+
+it("a job that waits is given up at once, and the one before goes on", async () => {
+  const { all, answer, run } = workers();
+  const [first, second] = [run("a"), run("b")];
+  second.cancel();
+  expect(await said(second.done)).toBe("Cancelled");
+  vi.advanceTimersByTime(1000);
+  answer(0, { kind: "done", id: 0, output: "a" as never });
+  expect([await said(first.done), all.length]).toEqual(["a", 1]);
+});
+
+it("a worker that stops is started again when there is work, not before", async () => {
+  const { all, client, stop, run } = workers();
+  const first = run("a");
+  stop(0);
+  expect([await said(first.done), all.length, client.isBusy()]).toEqual(["Worker", 1, false]);
+  const second = run("b");
+  expect(all.length).toBe(2);
+  stop(1);
+  expect(await said(second.done)).toBe("Worker");
+});
+
+it("what cannot be sent is thrown, and nothing waits for it; a closed client starts nothing", async () => {
+  const { all, client, run } = workers();
+  expect(() => client.run("sample", undefined as never)).toThrow("cannot be sent");
+  expect(client.isBusy()).toBe(false);
+  client.close();
+  expect([await said(run("a").done), all.length]).toEqual(["Cancelled", 1]);
+});
