@@ -62,6 +62,7 @@ macro_rules! solver_suite {
             errors::memory_limit_is_kept_and_named,
             progress::fraction_never_falls_and_ends_at_one,
             progress::break_cancels_in_every_stage,
+            progress::who_waits_is_asked_while_points_are_looked_up,
         }
     };
     (@embedded $back_end:expr) => {

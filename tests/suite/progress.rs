@@ -53,3 +53,19 @@ pub(crate) fn break_cancels_in_every_stage(back_end: &BackEnd) {
         assert!(calls <= threads.max(1), "{calls} reports after the break in {stage:?}");
     }
 }
+
+/// Between the grid and the solve all points are looked up in it: with faces of hundreds of corners that takes minutes.
+pub(crate) fn who_waits_is_asked_while_points_are_looked_up(back_end: &BackEnd) {
+    let cage = cage(&triangulated(&c_shape()));
+    let points = points::inside(&cage, 2000, 52);
+    let asked = Mutex::new(0);
+    let watch = |event: ProgressEvent| {
+        // The grid is done.
+        *asked.lock().expect("no panic") += u32::from(event.stage == Stage::Voxelize && event.fraction > 0.0);
+        ControlFlow::Continue(())
+    };
+    let options = cagework_core::BindOptions { grid: 24, ..back_end.options };
+    (back_end.bind)(&points, &cage, &options, &watch).unwrap();
+    let runs = points.len().div_ceil(cagework_core::team::VERTEX_RUN) as u32;
+    assert!(asked.into_inner().unwrap() >= runs, "once for each run of {} points", points.len());
+}

@@ -299,8 +299,9 @@ fn sampling_stencils(
         runs.len(),
         || (),
         |(), run| {
-            let cancelled = watch.is_cancelled();
-            let points = if cancelled { &[][..] } else { runs[run] };
+            // Faces of hundreds of corners make this long: whoever waits is asked.
+            let is_wanted = watch.report(Stage::Voxelize, 1.0, 0, None).is_ok();
+            let points = if is_wanted { runs[run] } else { &[][..] };
             sampler.stencils(points.iter().map(|p| p.as_dvec3()))
         },
     );

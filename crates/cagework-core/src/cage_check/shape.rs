@@ -128,7 +128,8 @@ pub(super) fn report_crossings(
         }
         ControlFlow::Continue(())
     });
-    if count == 0 && complete {
+    // A search that ended early and found nothing says nothing.
+    if count == 0 {
         return;
     }
     pairs.sort_unstable();
