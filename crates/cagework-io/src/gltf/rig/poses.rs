@@ -31,9 +31,6 @@ pub(super) fn append(
         let most = meshes.entry(mesh_of(edit, &part.instance)).or_insert(0);
         *most = part.targets.len().max(*most);
     }
-    // Each pose with what keeps its shape, and how its surface turns.
-    let all: Vec<Vec<DVec3>> = poses.iter().map(|pose| held(rig, rigid, pose.by)).collect();
-    let turned: Vec<Turned<'_>> = all.iter().map(|by| Turned::new(triangles, by)).collect();
     for part in &rig.parts {
         let mesh = mesh_of(edit, &part.instance);
         let number = part.primitive as usize;
@@ -45,8 +42,15 @@ pub(super) fn append(
                 json!({ "POSITION": nothing }),
             );
         }
-        for (by, turned) in all.iter().zip(&turned) {
-            let shape = rig.shape(part, turned, &part.frame)?;
+    }
+    // One after the other: how a surface turns takes more memory than what is written of it.
+    for pose in poses {
+        let by = held(rig, rigid, pose.by);
+        let turned = Turned::new(triangles, &by);
+        for part in &rig.parts {
+            let mesh = mesh_of(edit, &part.instance);
+            let number = part.primitive as usize;
+            let shape = rig.shape(part, &turned, &part.frame)?;
             let inverse = |v: usize| DMat3::from_mat4(part.frame.world(v)).inverse();
             let positions: Vec<[f32; 3]> = (0..part.local.len())
                 .map(|v| {
