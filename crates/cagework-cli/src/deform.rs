@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use cagework_core::Cage;
-use cagework_core::deform::{deform_bound, displacements};
+use cagework_core::deform::displacements;
 use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, read_weights_npz, shown};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
@@ -133,10 +133,8 @@ impl Posed {
             return Self::Rigged { by, outside: saved.outside.iter().map(|o| o.vertex).collect() };
         }
         let saved = saved.of_vertices();
-        let posed = |pose: &Vec<Vec3>| {
-            let posed = deform_bound(&saved.weights, &saved.outside, pose);
-            if options.parts.is_empty() { posed } else { options.parts.hold(&model.positions, &posed) }
-        };
+        let bound = (&saved.weights, saved.outside.as_slice());
+        let posed = |pose: &Vec<Vec3>| model.deformed(bound, (&poses.rest, pose), &options.parts);
         Self::Plain(poses.positions.iter().map(posed).collect())
     }
 

@@ -48,13 +48,15 @@ impl Clip {
 }
 
 impl Model {
-    /// Whether it has a skin or morph targets: what [`Self::write_glb`] leaves out and [`Self::write_reshaped`] keeps.
+    /// Whether it has skins, morph targets or nodes that follow the cage: what [`Self::write_glb`] leaves out or as it is, and
+    /// [`Self::write_reshaped`] brings to the new shape.
     #[must_use]
     pub fn is_rigged(&self) -> bool {
         matches!(&self.document, Document::Gltf(document) if Rig::is_needed(document))
     }
 
-    /// Points that move besides the vertices when a rigged model is reshaped: ends of morph targets, joints, offsets of a VRM.
+    /// Points that move besides the vertices when a rigged model is reshaped: ends of morph targets, joints and other nodes that
+    /// follow, offsets of a VRM.
     /// They are bound after the vertices. Empty without a rig.
     ///
     /// # Errors
@@ -73,7 +75,7 @@ impl Model {
         Ok(self.rig()?.map_or_else(Vec::new, |rig| rig.joints()))
     }
 
-    /// Names of what hangs below joints without a skin and can be kept rigid: buckles, eyes, weapons.
+    /// Names of what hangs on joints, or on nodes that clips move, without a skin and can be kept rigid: buckles, eyes, weapons.
     ///
     /// # Errors
     /// [`WriteError`] when a part of the rig cannot be read.

@@ -1,6 +1,9 @@
 //! Parts of a model by the names that its file gives them.
 
+use cagework_core::Weights;
+use cagework_core::deform::{OutsideVertex, deform_bound};
 use cagework_core::parts::{Parts, pieces};
+use glam::Vec3;
 use thiserror::Error;
 
 use crate::error::WriteError;
@@ -55,6 +58,27 @@ fn listed(names: &[String]) -> String {
 }
 
 impl Model {
+    /// Where the vertices go with a posed cage, and `parts` as they are held; exactly where they are if no control has moved, which
+    /// sums of weighted controls are not.
+    ///
+    /// `weights`, `outside` of the vertices; `rest`, `posed`: `[n_controls]`, object units. Returns `[n_vertices]`.
+    ///
+    /// # Panics
+    /// As [`deform_bound`].
+    #[must_use]
+    pub fn deformed(
+        &self,
+        (weights, outside): (&Weights, &[OutsideVertex]),
+        (rest, posed): (&[Vec3], &[Vec3]),
+        parts: &Parts,
+    ) -> Vec<Vec3> {
+        if posed == rest {
+            return self.positions.clone();
+        }
+        let deformed = deform_bound(weights, outside, posed);
+        if parts.is_empty() { deformed } else { parts.hold(&self.positions, &deformed) }
+    }
+
     /// Vertices of what the file calls `name`, ascending: `material:skin`, `node:Buckle`, `joint:Head`, `group:eyes`, or the name
     /// alone where only one kind of thing is called so.
     ///

@@ -4,13 +4,13 @@
 
 mod common;
 
-use cagework_io::Model;
+use cagework_io::{Model, ReshapeOptions};
 use common::{Builder, CUBE, CUBE_TRIANGLES, json_of, plain_cube, read, volume};
 use draco_core::{
     DataType, EncoderBuffer, EncoderOptions, FaceIndex, GeometryAttributeType, Mesh, MeshEncoder,
     PointAttribute, PointIndex,
 };
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use meshoptimizer_rs::Workspace;
 use meshoptimizer_rs::codec::{IndexEncoding, VertexEncoding, encode_index_buffer, encode_vertex_buffer};
 use serde_json::json;
@@ -21,8 +21,7 @@ fn floats() -> Vec<u8> {
     CUBE.iter().flatten().flat_map(|x| x.to_le_bytes()).collect()
 }
 
-/// A Draco stream of the cube.
-fn draco_stream() -> Vec<u8> {
+fn cube_mesh() -> Mesh {
     let mut positions = PointAttribute::new();
     positions.init(GeometryAttributeType::Position, 3, DataType::Float32, false, CUBE.len());
     positions.buffer_mut().write(0, &floats());
@@ -33,6 +32,15 @@ fn draco_stream() -> Vec<u8> {
     for (f, t) in (0..).zip(CUBE_TRIANGLES) {
         mesh.set_face(FaceIndex(f), t.map(PointIndex));
     }
+    mesh
+}
+
+/// A Draco stream of the cube.
+fn draco_stream() -> Vec<u8> {
+    stream_of(cube_mesh())
+}
+
+fn stream_of(mesh: Mesh) -> Vec<u8> {
     let mut encoder = MeshEncoder::new();
     encoder.set_mesh(mesh);
     let mut out = EncoderBuffer::new();
@@ -89,16 +97,19 @@ fn with_fallback(b: &Builder) -> Vec<u8> {
     common::glb(&json, Some(&b.bin))
 }
 
-/// An export is a plain GLB.
-fn assert_plain(model: &Model) {
-    let written = model.write_glb(&model.positions).unwrap();
+/// An export is a plain GLB, and the file itself where nothing has moved.
+fn assert_plain(model: &Model, bytes: &[u8]) {
+    assert!(model.write_glb(&model.positions).unwrap() == bytes);
+    let moved: Vec<Vec3> = model.positions.iter().map(|&p| p + Vec3::X).collect();
+    let written = model.write_glb(&moved).unwrap();
     assert!(!json_of(&written).to_string().contains("compression"));
-    assert_eq!(read("y.glb", &written).unwrap().positions, model.positions);
+    assert_eq!(read("y.glb", &written).unwrap().positions, moved);
 }
 
 #[test]
 fn draco_is_decoded_and_written_plain() {
-    let model = read("x.glb", &draco(&draco_stream()).glb()).unwrap();
+    let bytes = draco(&draco_stream()).glb();
+    let model = read("x.glb", &bytes).unwrap();
     // Draco numbers vertices anew, but no quantisation was asked for.
     let sorted = |mut positions: Vec<Vec3>| {
         positions.sort_by(|a, b| a.to_array().partial_cmp(&b.to_array()).unwrap());
@@ -108,17 +119,81 @@ fn draco_is_decoded_and_written_plain() {
     assert_eq!(model.triangles.len(), CUBE_TRIANGLES.len());
     let plain = read("x.glb", &plain_cube().glb()).unwrap();
     assert!((volume(&model) - volume(&plain)).abs() < 1e-6);
-    assert_plain(&model);
+    assert_plain(&model, &bytes);
+}
+
+/// What a coder rounds and renumbers is not what the document says of it.
+#[test]
+fn bounds_and_weights_are_those_of_what_was_decoded() {
+    let mut weights = [[0.5_f32, 0.49, 0.0, 0.0]; 8];
+    weights[3] = [1.0, 0.0, 0.0, 0.0];
+    let weights: Vec<u8> = weights.as_flattened().iter().flat_map(|w| w.to_le_bytes()).collect();
+    let joints = [[0_u8, 1, 1, 0]; 8];
+    let mut mesh = cube_mesh();
+    for (bytes, kind) in [(joints.as_flattened(), DataType::Uint8), (&weights, DataType::Float32)] {
+        let mut attribute = PointAttribute::new();
+        attribute.init(GeometryAttributeType::Generic, 4, kind, false, CUBE.len());
+        attribute.buffer_mut().write(0, bytes);
+        mesh.add_attribute(attribute);
+    }
+    let mut b = draco(&stream_of(mesh));
+    for (name, component, id) in [("JOINTS_0", common::U8, 1), ("WEIGHTS_0", common::F32, 2)] {
+        let accessor = json!({ "componentType": component, "count": 8, "type": "VEC4", "min": [9, 9, 9, 9] });
+        let accessor = b.push("accessors", accessor);
+        b.primitive(0)["attributes"][name] = accessor.into();
+        b.primitive(0)["extensions"][DRACO]["attributes"][name] = id.into();
+    }
+    for (accessor, bounds) in [(0, json!([-1.0, -1.0, -1.0])), (1, json!([99]))] {
+        (b.json["accessors"][accessor]["min"], b.json["accessors"][accessor]["max"]) =
+            (bounds.clone(), bounds);
+    }
+    b.json["nodes"][0]["skin"] = 0.into();
+    let joint = b.push("nodes", json!({ "children": [2] }));
+    b.push("nodes", json!({}));
+    b.push("skins", json!({ "joints": [joint, joint + 1] }));
+    b.json["scenes"][0]["nodes"] = json!([0, joint]);
+    let bytes = b.glb();
+    let model = read("x.glb", &bytes).unwrap();
+    let n = model.positions.len() + model.extra_points().unwrap().len();
+    let reshaped = |by| model.write_reshaped(&vec![by; n], &[], &[], &ReshapeOptions::default()).unwrap().0;
+    assert!(reshaped(DVec3::ZERO) == bytes, "unmoved");
+    let written = reshaped(DVec3::X);
+    let json = json_of(&written);
+    let start = 28 + u32::from_le_bytes(written[12..16].try_into().unwrap()) as usize;
+    let primitive = &json["meshes"][0]["primitives"][0];
+    let accessor = |number: &serde_json::Value| &json["accessors"][number.as_u64().unwrap() as usize];
+    let data = |number: &serde_json::Value| {
+        let view = &json["bufferViews"][accessor(number)["bufferView"].as_u64().unwrap() as usize];
+        let [from, length] = ["byteOffset", "byteLength"].map(|key| view[key].as_u64().unwrap() as usize);
+        written[start + from..][..length].to_vec()
+    };
+    let names = ["POSITION", "JOINTS_0", "WEIGHTS_0"].map(|name| &primitive["attributes"][name]);
+    for number in [names[1], names[2], &primitive["indices"]] {
+        assert!(accessor(number).get("min").is_none(), "{}", accessor(number));
+    }
+    let weights = data(names[2]);
+    let weights: Vec<f32> = weights.as_chunks().0.iter().map(|&w| f32::from_le_bytes(w)).collect();
+    for (weights, joints) in weights.chunks(4).zip(data(names[1]).chunks(8)) {
+        assert!((weights.iter().sum::<f32>() - 1.0).abs() <= f32::EPSILON, "{weights:?}");
+        // 16 bits each.
+        let is_free = |k: usize| weights[k] > 0.0 || joints[2 * k] == 0;
+        assert!((0..4).all(is_free), "{weights:?} of {joints:?}");
+    }
+    let decoded = read("x.glb", &written).unwrap();
+    assert_eq!(decoded.positions.iter().copied().reduce(Vec3::min), Some(Vec3::X));
+    assert_eq!(accessor(names[0])["max"], json!([2.0, 1.0, 1.0]));
+    assert!(!json.to_string().contains(DRACO) && json["buffers"].as_array().unwrap().len() == 1);
 }
 
 #[test]
 fn meshopt_is_decoded_by_both_names_without_its_fallback() {
     for extension in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
-        let model = read("x.glb", &with_fallback(&meshopt(extension))).unwrap();
+        let bytes = with_fallback(&meshopt(extension));
+        let model = read("x.glb", &bytes).unwrap();
         let plain = read("x.glb", &plain_cube().glb()).unwrap();
         assert_eq!(model.positions, plain.positions);
         assert!((volume(&model) - volume(&plain)).abs() < 1e-6);
-        assert_plain(&model);
+        assert_plain(&model, &bytes);
     }
 }
 

@@ -302,3 +302,52 @@ fn attribute_without_an_accessor_is_left_out_and_named() {
     let written = model.write_glb_poses(&model.positions, &poses).unwrap();
     assert_eq!(read("y.glb", &written).unwrap().positions, model.positions);
 }
+
+#[test]
+fn extras_of_any_type_are_read_and_kept() {
+    const PLACES: [&str; 12] = [
+        "",
+        "/asset",
+        "/scenes/0",
+        "/nodes/0",
+        "/nodes/1",
+        "/meshes/0",
+        "/meshes/0/primitives/0",
+        "/accessors/0",
+        "/bufferViews/0",
+        "/skins/0",
+        "/animations/0",
+        "/animations/0/channels/0/target",
+    ];
+    for extras in [json!(null), json!("a note"), json!(7.5), json!(true), json!([{ "key": "value" }])] {
+        let mut b = skinned();
+        for place in PLACES {
+            b.json.pointer_mut(place).unwrap()["extras"] = extras.clone();
+        }
+        let (model, plain) = (read_glb(&b), read_glb(&skinned()));
+        assert_eq!(model.positions, plain.positions);
+        let moved: Vec<Vec3> = model.positions.iter().map(|&p| p + Vec3::X).collect();
+        let written = common::json_of(&model.write_glb(&moved).unwrap());
+        for place in &PLACES[..6] {
+            assert_eq!(written.pointer(place).unwrap()["extras"], extras, "{place}");
+        }
+    }
+}
+
+/// glTF 2.0, section 2.7: integers should be written without a fraction, and so they may be written with one.
+#[test]
+fn integers_may_have_a_fraction_of_zero() {
+    fn with_fractions(value: &mut serde_json::Value) {
+        match value {
+            serde_json::Value::Number(number) => *value = json!(number.as_f64().unwrap()),
+            serde_json::Value::Array(items) => items.iter_mut().for_each(with_fractions),
+            serde_json::Value::Object(object) => object.values_mut().for_each(with_fractions),
+            _ => {}
+        }
+    }
+    let mut b = skinned();
+    with_fractions(&mut b.json);
+    let (model, plain) = (read_glb(&b), read_glb(&skinned()));
+    assert_eq!((&model.positions, &model.triangles), (&plain.positions, &plain.triangles));
+    assert_eq!(model.clips(), plain.clips());
+}

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use cagework_core::deform::{deform_bound, displacements};
+use cagework_core::deform::displacements;
 use cagework_core::{BindOptions, bind};
 use cagework_io::{Joints, ModelFormat, ReshapeOptions};
 use pyo3::prelude::*;
@@ -73,9 +73,8 @@ pub(crate) fn reshape<'py>(
             let written = model.write_reshaped(&by, &outside, &[], &of_rig);
             return Ok(written.map_err(error::model)?.0);
         }
-        let deformed = deform_bound(&bound.weights, &bound.outside, posed);
-        let parts = &of_rig.parts;
-        let deformed = if parts.is_empty() { deformed } else { parts.hold(&model.positions, &deformed) };
+        let (weights, poses) = ((&bound.weights, bound.outside.as_slice()), (controls.rest(), posed));
+        let deformed = model.deformed(weights, poses, &of_rig.parts);
         model.write(model.format(), &deformed).map_err(error::model)
     })??;
     Ok(PyBytes::new(py, &bytes))

@@ -79,10 +79,7 @@ impl Binder {
             let written = model.write_reshaped(&by, &outside, &[], &of_rig).map_err(Fault::from)?;
             return Ok(written.0);
         }
-        let mut deformed = deform_bound(&bound.weights, &bound.outside, &posed);
-        if !of_rig.parts.is_empty() {
-            deformed = of_rig.parts.hold(&model.positions, &deformed);
-        }
+        let deformed = model.deformed((&bound.weights, &bound.outside), (&rest, &posed), &of_rig.parts);
         Ok(model.write(model.format(), &deformed).map_err(Fault::from)?)
     }
 }

@@ -10,6 +10,8 @@ import { named } from "./session/client";
 
 const GLB = 0x46546c67;
 const JSON_CHUNK = 0x4e4f534a;
+/** Sums of four weights in 32 bits are off by less. */
+const ROUNDED = 1e-6;
 
 /** A plain GLB of a compressed GLB or glTF. */
 export async function decompress(
@@ -26,6 +28,7 @@ export async function decompress(
     const document = await readDocument(io, renamed(bytes), sibling);
     // A GLB has one buffer; meshopt's fallback is a second one.
     await document.transform(dequantize(), unpartition());
+    normaliseWeights(document);
     for (const extension of document.getRoot().listExtensionsUsed()) {
       const { extensionName } = extension;
       if ([KHRDracoMeshCompression, EXTMeshoptCompression].some((e) => e.EXTENSION_NAME === extensionName)) {
@@ -36,6 +39,35 @@ export async function decompress(
   } catch (error) {
     const reason = error instanceof Error ? error.message : String(error);
     throw named("Damaged", `${name} is compressed, and its geometry could not be decoded: ${reason}`);
+  }
+}
+
+/** Lets the weights of each vertex sum to 1, and names no joints of weight 0: a coder's rounding has changed both. */
+function normaliseWeights(document: Document): void {
+  for (const primitive of document
+    .getRoot()
+    .listMeshes()
+    .flatMap((mesh) => mesh.listPrimitives())) {
+    const sets = primitive.listSemantics().filter((name) => name.startsWith("WEIGHTS_"));
+    const all = sets.flatMap((name) => primitive.getAttribute(name) ?? []);
+    for (let v = 0; v < (all[0]?.getCount() ?? 0); v += 1) {
+      const weights = all.map((set) => set.getElement(v, []));
+      const sum = weights.flat().reduce((a, b) => a + b, 0);
+      if (!(sum > 0) || Math.abs(sum - 1) <= ROUNDED) continue;
+      for (const [k, set] of all.entries()) {
+        set.setElement(v, weights[k]?.map((weight) => weight / sum) ?? []);
+      }
+    }
+    for (const [k, set] of all.entries()) {
+      const joints = primitive.getAttribute(sets[k]?.replace("WEIGHTS", "JOINTS") ?? "");
+      for (let v = 0; joints && v < set.getCount(); v += 1) {
+        const weights = set.getElement(v, []);
+        joints.setElement(
+          v,
+          joints.getElement(v, []).map((joint, c) => (weights[c] ? joint : 0)),
+        );
+      }
+    }
   }
 }
 

@@ -34,11 +34,11 @@ fn mask(text: &str) -> Result<(String, f32), String> {
 /// How a rigged model is deformed.
 #[derive(Args, Debug)]
 pub(crate) struct RigArgs {
-    /// What joints do: follow the cage and keep their directions; stay where they are, for skeletons that other files share; or
+    /// What joints, and other nodes that clips move or that carry meshes, do: follow the cage and keep their directions; stay where they are, for skeletons that other files share; or
     /// turn with the shape as well.
     #[arg(long, value_enum, default_value_t = JointsArg::Follow)]
     joints: JointsArg,
-    /// Keep how far clips travel; otherwise it grows with the height of the joint.
+    /// Keep how far clips travel; otherwise it grows as the height of the hips does.
     #[arg(long)]
     keep_travel: bool,
     #[command(flatten)]

@@ -29,8 +29,10 @@ const NOT_GEOMETRY: [&str; 8] =
 
 pub(crate) struct Loaded {
     pub(crate) json: Value,
-    /// The JSON chunk of a GLB with one buffer.
+    /// The JSON chunk of a GLB whose buffers are in it.
     pub(crate) text: Option<Vec<u8>>,
+    /// Whether its geometry was compressed.
+    pub(crate) is_decoded: bool,
     pub(crate) root: Root,
     pub(crate) buffers: Vec<Arc<Vec<u8>>>,
     pub(crate) images: Vec<Option<Image>>,
@@ -55,14 +57,19 @@ pub(crate) fn load(
     let text = bin.is_some().then(|| json.to_vec());
     let mut json: Value = serde_json::from_slice(&json).map_err(|e| GltfError::Json(e.to_string()))?;
     check_version(&json)?;
+    write_integers(&mut json, false);
     let nodes = json["nodes"].as_array().map_or(0, Vec::len) as u64;
     if nodes > MAX_NODES {
         return Err(GltfError::TooLarge { what: "nodes", count: nodes, limit: MAX_NODES });
     }
     #[cfg(not(feature = "decompress"))]
     check_compression(name, &json)?;
+    let (fallbacks, all) = (fallbacks(&json), (0..).zip(json["buffers"].as_array().into_iter().flatten()));
+    let mut used = all.filter(|(number, _)| !fallbacks.contains(number));
+    let text = text.filter(|_| used.all(|(_, buffer)| buffer.get("uri").is_none()));
     let mut siblings = Siblings::new(resolve, memory_limit);
     let buffers = load_buffers(&mut json, bin.as_deref(), &mut siblings)?;
+    let n_in_file = buffers.len();
     #[cfg(feature = "decompress")]
     let buffers = {
         let mut buffers = buffers;
@@ -71,8 +78,8 @@ pub(crate) fn load(
         })?;
         buffers
     };
+    let is_decoded = buffers.len() > n_in_file;
     drop_missing(&mut json, notices);
-    let text = text.filter(|_| buffers.len() == 1);
     let root = typed(&json)?;
     let images = load_images(&json, &root, &buffers, &mut siblings, notices);
     // The caller still holds the file itself; buffers and images of one file share its bytes.
@@ -81,7 +88,7 @@ pub(crate) fn load(
     let loaded = loaded.filter(|bytes| seen.insert(Arc::as_ptr(bytes))).map(|bytes| bytes.len() as u64);
     let held = of_json + bytes.len() as u64 + loaded.sum::<u64>();
     MemoryError::check(held, memory_limit)?;
-    Ok(Loaded { json, text, root, buffers, images, bytes: held })
+    Ok(Loaded { json, text, is_decoded, root, buffers, images, bytes: held })
 }
 
 /// Takes out attributes that only pictures need and whose accessor is not there. Accessors that are written later would take
@@ -197,13 +204,15 @@ fn check_compression(name: &str, json: &Value) -> Result<(), GltfError> {
 }
 
 /// Typed view of what geometry needs.
-fn typed(json: &Value) -> Result<Root, GltfError> {
+pub(super) fn typed(json: &Value) -> Result<Root, GltfError> {
     let Value::Object(object) = json else {
         return Err(GltfError::Json("the JSON is not an object".into()));
     };
-    let of_geometry = object.iter().filter(|(key, _)| !NOT_GEOMETRY.contains(&key.as_str()));
+    let is_geometry = |key: &str, value: &Value| !NOT_GEOMETRY.contains(&key) && !value.is_null();
+    let of_geometry = object.iter().filter(|(key, value)| is_geometry(key, value));
     let mut geometry: Map<String, Value> =
-        of_geometry.map(|(key, value)| (key.clone(), value.clone())).collect();
+        of_geometry.map(|(key, value)| (key.clone(), strict(value))).collect();
+    geometry.insert("asset".into(), json!({ "version": "2.0" }));
     // The specification lets a scene have no nodes; the library does not.
     for scene in geometry.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
         if let Some(scene) = scene.as_object_mut() {
@@ -211,6 +220,67 @@ fn typed(json: &Value) -> Result<Root, GltfError> {
         }
     }
     serde_json::from_value(Value::Object(geometry)).map_err(|e| GltfError::Json(e.to_string()))
+}
+
+/// A value as the library wants it: `extras`, which may have any type, and extensions are left out, and so is `null`.
+fn strict(value: &Value) -> Value {
+    let is_read = |key: &str, value: &Value| !matches!(key, "extras" | "extensions") && !value.is_null();
+    match value {
+        Value::Array(items) => items.iter().map(strict).collect(),
+        Value::Object(object) => {
+            let read = object.iter().filter(|(key, value)| is_read(key, value));
+            Value::Object(read.map(|(key, value)| (key.clone(), strict(value))).collect())
+        }
+        value => value.clone(),
+    }
+}
+
+/// Writes integers as such: glTF 2.0 (section 2.7) lets a file write 24 as 24.0.
+fn write_integers(value: &mut Value, is_integer: bool) {
+    const MEMBERS: [&str; 26] = [
+        "attributes",
+        "buffer",
+        "bufferView",
+        "byteLength",
+        "byteOffset",
+        "byteStride",
+        "camera",
+        "children",
+        "componentType",
+        "count",
+        "index",
+        "indices",
+        "input",
+        "inverseBindMatrices",
+        "joints",
+        "material",
+        "mesh",
+        "mode",
+        "node",
+        "nodes",
+        "output",
+        "sampler",
+        "scene",
+        "skeleton",
+        "skin",
+        "targets",
+    ];
+    match value {
+        Value::Number(number) if is_integer && !number.is_u64() => {
+            let whole = number.as_f64().filter(|x| x.fract() == 0.0 && (0.0..=9e15).contains(x));
+            if let Some(x) = whole {
+                *value = (x as u64).into();
+            }
+        }
+        Value::Array(items) => items.iter_mut().for_each(|item| write_integers(item, is_integer)),
+        Value::Object(object) => {
+            for (key, value) in object.iter_mut().filter(|(key, _)| *key != "extras") {
+                let is_member = is_integer && value.is_number() || MEMBERS.contains(&key.as_str());
+                write_integers(value, is_member);
+            }
+        }
+        _ => {}
+    }
 }
 
 fn load_buffers(

@@ -2,17 +2,24 @@
 
 use std::sync::Arc;
 
+use ::gltf::json::accessor::Accessor;
+use ::gltf::json::mesh::Semantic;
+use ::gltf::json::validation::Checked;
+use ::gltf::json::{Index, Root};
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointIndex};
 use meshoptimizer_rs::Workspace;
 use meshoptimizer_rs::codec::{BufferView, Filter, Mode};
 use serde_json::{Map, Value, json};
 
-use super::accessor::MAX_ELEMENTS;
-use super::container::{DRACO, MESHOPT};
-use super::pack::push;
+use super::accessor::{MAX_ELEMENTS, Source};
+use super::container::{DRACO, MESHOPT, typed};
+use super::pack::{INDICES, VERTICES, bounds, push};
 
 /// Most bytes that all streams become; a few hundred bytes may claim anything.
 const MAX_BYTES: u64 = 1 << 30;
+
+/// Sums of four weights in 32 bits are off by less.
+const ROUNDED: f64 = 1e-6;
 
 type Buffers = Vec<Arc<Vec<u8>>>;
 
@@ -21,7 +28,7 @@ type Buffers = Vec<Arc<Vec<u8>>>;
 /// # Errors
 /// The extension and what is wrong with its stream.
 pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), (&'static str, String)> {
-    let mut left = MAX_BYTES;
+    let (mut left, n_in_file) = (MAX_BYTES, buffers.len());
     for extension in MESHOPT {
         for number in 0..json["bufferViews"].as_array().map_or(0, Vec::len) {
             let Some(packed) = take(json, &format!("/bufferViews/{number}"), extension) else { continue };
@@ -43,6 +50,13 @@ pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), 
             left = left.saturating_sub(buffers[before..].iter().map(|b| b.len() as u64).sum());
         }
     }
+    if buffers.len() > n_in_file {
+        // What is wrong with the document itself is said later.
+        if let Ok(root) = typed(json) {
+            correct_bounds(json, &root, buffers, n_in_file);
+            normalise_weights(json, &root, buffers, n_in_file);
+        }
+    }
     let Some(document) = json.as_object_mut() else { return Ok(()) };
     for key in ["extensionsUsed", "extensionsRequired"] {
         let Some(names) = document.get_mut(key).and_then(Value::as_array_mut) else { continue };
@@ -52,6 +66,104 @@ pub(super) fn decompress(json: &mut Value, buffers: &mut Buffers) -> Result<(), 
         }
     }
     Ok(())
+}
+
+/// The accessors whose values were decoded, and that need no sparse ones: those of buffers from `first` on.
+fn decoded(root: &Root, first: usize) -> impl Iterator<Item = (usize, &Accessor)> {
+    let is_decoded = move |accessor: &Accessor| {
+        let view = accessor.buffer_view.and_then(|view| root.buffer_views.get(view.value()));
+        accessor.sparse.is_none() && view.is_some_and(|view| view.buffer.value() >= first)
+    };
+    root.accessors.iter().enumerate().filter(move |(_, accessor)| is_decoded(accessor))
+}
+
+/// Bounds are of the values before a coder rounded them, and Draco renumbers vertices. Positions and times must have bounds.
+fn correct_bounds(json: &mut Value, root: &Root, buffers: &Buffers, first: usize) {
+    let mut plain = root.clone();
+    plain.accessors.iter_mut().for_each(|accessor| accessor.normalized = false);
+    let source = Source { root: &plain, buffers };
+    for (number, _) in decoded(root, first) {
+        let Some(of_json) = json["accessors"][number].as_object_mut() else { continue };
+        let had = [of_json.shift_remove("min"), of_json.shift_remove("max")];
+        if had.iter().all(Option::is_none) {
+            continue;
+        }
+        let number = number as u32;
+        let vectors = source.floats::<3>(number, "").map(|all| bounds(&all)).ok();
+        let found = vectors.or_else(|| source.floats::<1>(number, "").map(|all| bounds(&all)).ok());
+        if let Some([min, max]) = found {
+            of_json.insert("min".into(), min);
+            of_json.insert("max".into(), max);
+        }
+    }
+}
+
+/// Lets the weights of each vertex sum to 1, and names no joints of weight 0: a coder's rounding has changed both.
+fn normalise_weights(json: &mut Value, root: &Root, buffers: &mut Buffers, first: usize) {
+    let decoded: Vec<usize> = decoded(root, first).map(|(number, _)| number).collect();
+    let mut done = Vec::new();
+    for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        let accessor = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(Index::value);
+        let of_set = |set| Some((accessor(Semantic::Joints(set))?, accessor(Semantic::Weights(set))?));
+        let sets: Vec<(usize, usize)> = (0..).map_while(of_set).collect();
+        if done.contains(&sets) || !sets.iter().any(|(_, weights)| decoded.contains(weights)) {
+            continue;
+        }
+        let source = Source { root, buffers };
+        let read = |&(joints, weights): &(usize, usize)| {
+            let joints = source.unsigned::<4>(joints as u32, "joints").ok()?;
+            let weights = source.floats::<4>(weights as u32, "joint weights").ok()?;
+            (joints.len() == weights.len()).then_some((joints, weights))
+        };
+        let Some(mut values) = sets.iter().map(read).collect::<Option<Vec<_>>>() else { continue };
+        let (mut is_off, mut is_named) = (false, false);
+        for v in 0..values.iter().map(|(joints, _)| joints.len()).min().unwrap_or(0) {
+            let sum: f64 = values.iter().flat_map(|(_, weights)| weights[v]).map(f64::from).sum();
+            let changes = sum.is_finite() && sum > 0.0 && (sum - 1.0).abs() > ROUNDED;
+            is_off |= changes;
+            for (joints, weights) in &mut values {
+                for (joint, weight) in joints[v].iter_mut().zip(&mut weights[v]) {
+                    if changes {
+                        *weight = (f64::from(*weight) / sum) as f32;
+                    }
+                    if *weight == 0.0 && *joint != 0 {
+                        (*joint, is_named) = (0, true);
+                    }
+                }
+            }
+        }
+        for ((joints, weights), (new_joints, new_weights)) in sets.iter().zip(values) {
+            let n = new_weights.len();
+            if is_named {
+                let bytes = new_joints.iter().flatten().flat_map(|&joint| (joint as u16).to_le_bytes());
+                put_vertices(json, buffers, *joints, bytes.collect(), UNSIGNED_SHORT, n);
+            }
+            if is_off {
+                let bytes = new_weights.iter().flatten().flat_map(|weight| weight.to_le_bytes());
+                put_vertices(json, buffers, *weights, bytes.collect(), FLOAT, n);
+            }
+        }
+        done.push(sets);
+    }
+}
+
+/// Gives an accessor of four components for each of `n` vertices new values.
+fn put_vertices(
+    json: &mut Value,
+    buffers: &mut Buffers,
+    accessor: usize,
+    bytes: Vec<u8>,
+    component_type: u32,
+    n: usize,
+) {
+    let view = json!({ "byteStride": bytes.len() / n.max(1), "target": VERTICES });
+    if fill(json, buffers, accessor, bytes, view, component_type, n).is_ok()
+        && let Some(accessor) = json["accessors"][accessor].as_object_mut()
+    {
+        for key in ["normalized", "sparse", "min", "max"] {
+            accessor.shift_remove(key);
+        }
+    }
 }
 
 /// Takes an extension away from the object at `place`.
@@ -129,15 +241,8 @@ fn draco(
             bytes.extend_from_slice(value.ok_or_else(|| format!("{name} is cut off"))?);
             bytes.resize(bytes.len().next_multiple_of(4), 0);
         }
-        let view = json!({ "byteStride": stride });
+        let view = json!({ "byteStride": stride, "target": VERTICES });
         fill(json, buffers, accessor as usize, bytes, view, kind, mesh.num_points())?;
-        if name != "POSITION"
-            && let Some(accessor) = json["accessors"][accessor as usize].as_object_mut()
-        {
-            // They are of the values before Draco's quantisation. A deformed shape gets bounds of its own.
-            accessor.shift_remove("min");
-            accessor.shift_remove("max");
-        }
     }
     let corners = mesh.faces().iter().flatten();
     let bytes: Vec<u8> = corners.flat_map(|corner| corner.0.to_le_bytes()).collect();
@@ -145,13 +250,15 @@ fn draco(
         Some(indices) => indices as usize,
         None => push(json, "accessors", json!({ "type": "SCALAR" })),
     };
-    fill(json, buffers, indices, bytes, json!({}), UNSIGNED_INT, 3 * mesh.num_faces())?;
+    fill(json, buffers, indices, bytes, json!({ "target": INDICES }), UNSIGNED_INT, 3 * mesh.num_faces())?;
     json.pointer_mut(place).ok_or("its primitive is not there")?["indices"] = indices.into();
     Ok(())
 }
 
 /// glTF's component types.
+const UNSIGNED_SHORT: u32 = 5123;
 const UNSIGNED_INT: u32 = 5125;
+const FLOAT: u32 = 5126;
 
 /// Component type and bytes of an element; nothing for what glTF does not have.
 fn layout(attribute: &PointAttribute) -> Option<(u32, usize)> {
@@ -159,9 +266,9 @@ fn layout(attribute: &PointAttribute) -> Option<(u32, usize)> {
         DataType::Int8 => 5120,
         DataType::Uint8 => 5121,
         DataType::Int16 => 5122,
-        DataType::Uint16 => 5123,
+        DataType::Uint16 => UNSIGNED_SHORT,
         DataType::Uint32 => UNSIGNED_INT,
-        DataType::Float32 => 5126,
+        DataType::Float32 => FLOAT,
         _ => return None,
     };
     Some((kind, attribute.data_type().byte_length() * usize::from(attribute.num_components())))

@@ -174,8 +174,10 @@ pub(crate) struct GltfDocument {
     pub(crate) buffers: Vec<Arc<Vec<u8>>>,
     /// Images that came by URI and were found.
     pub(crate) images: Vec<Option<Image>>,
-    /// The JSON chunk of a GLB with one buffer, as it was.
+    /// The JSON chunk of a GLB whose buffers are in it, as it was.
     pub(crate) text: Option<Vec<u8>>,
+    /// Whether its geometry was compressed; the first buffer is still that of the file.
+    pub(crate) is_decoded: bool,
     /// Meshes shown, in vertex order.
     instances: Vec<Instance>,
     /// Meshes that are not shown: levels of detail, other scenes.
@@ -224,6 +226,7 @@ pub(crate) fn read(
         buffers: loaded.buffers,
         images: loaded.images,
         text: loaded.text,
+        is_decoded: loaded.is_decoded,
         instances,
         elsewhere,
         joints: Vec::new(),

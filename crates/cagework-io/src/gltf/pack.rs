@@ -15,7 +15,7 @@ const U32: u32 = 5125;
 const U16: u32 = 5123;
 /// Buffer view targets.
 pub(super) const VERTICES: u32 = 34962;
-const INDICES: u32 = 34963;
+pub(super) const INDICES: u32 = 34963;
 /// Every component type's size divides it.
 const ALIGN: usize = 4;
 
@@ -54,6 +54,16 @@ impl<'a> Pack<'a> {
             let bytes = view_bytes(&document.root, &document.buffers, number)?;
             let start = view.byte_offset.map_or(0, |o| o.0) as usize;
             Some((bytes.into(), start % ALIGN))
+        });
+        Self { views: views.collect() }
+    }
+
+    /// The views of one buffer, which holds all of them.
+    pub(crate) fn of_bytes(json: &Value, bin: &'a [u8]) -> Self {
+        let views = json["bufferViews"].as_array().into_iter().flatten().map(|view| {
+            let [start, length] =
+                ["byteOffset", "byteLength"].map(|key| view[key].as_u64().unwrap_or(0) as usize);
+            Some((bin.get(start..start.checked_add(length)?)?.into(), start % ALIGN))
         });
         Self { views: views.collect() }
     }
@@ -146,14 +156,7 @@ impl<'a> Pack<'a> {
                 object.shift_remove(key);
             }
         }
-        let text = serde_json::to_vec(&json).map_err(|e| WriteError::Document(e.to_string()))?;
-        let bytes = 64 + text.len() as u64 + bin.len() as u64;
-        if bytes > u64::from(u32::MAX) {
-            return Err(WriteError::TooLarge { bytes });
-        }
-        let header = Header { magic: *b"glTF", version: 2, length: 0 };
-        let glb = Glb { header, json: text.into(), bin: (!bin.is_empty()).then(|| bin.into()) };
-        glb.to_vec().map_err(|e| WriteError::Document(e.to_string()))
+        write_glb(&json, &bin)
     }
 
     fn lay_out(&self, json: &mut Value) -> Result<Vec<u8>, WriteError> {
@@ -174,6 +177,37 @@ impl<'a> Pack<'a> {
         }
         bin.resize(bin.len().next_multiple_of(ALIGN), 0);
         Ok(bin)
+    }
+}
+
+/// Smallest and largest of each component.
+pub(super) fn bounds<const N: usize>(values: &[[f32; N]]) -> [Value; 2] {
+    let fold = |f: fn(f32, f32) -> f32, start: f32| {
+        values.iter().fold([start; N], |all, value| std::array::from_fn(|k| f(all[k], value[k])))
+    };
+    [fold(f32::min, f32::INFINITY), fold(f32::max, f32::NEG_INFINITY)].map(|all| all.to_vec().into())
+}
+
+/// A GLB of a document whose only buffer is `bin`.
+pub(super) fn write_glb(json: &Value, bin: &[u8]) -> Result<Vec<u8>, WriteError> {
+    let text = serde_json::to_vec(json).map_err(|e| WriteError::Document(e.to_string()))?;
+    write_chunks(&text, bin)
+}
+
+fn write_chunks(text: &[u8], bin: &[u8]) -> Result<Vec<u8>, WriteError> {
+    let bytes = 64 + text.len() as u64 + bin.len() as u64;
+    if bytes > u64::from(u32::MAX) {
+        return Err(WriteError::TooLarge { bytes });
+    }
+    let header = Header { magic: *b"glTF", version: 2, length: 0 };
+    let glb = Glb { header, json: text.into(), bin: (!bin.is_empty()).then(|| bin.into()) };
+    glb.to_vec().map_err(|e| WriteError::Document(e.to_string()))
+}
+
+impl GltfDocument {
+    /// The file as it was read, byte for byte; none if it was not a GLB that holds its buffers.
+    pub(super) fn as_read(&self) -> Option<Result<Vec<u8>, WriteError>> {
+        Some(write_chunks(self.text.as_deref()?, self.buffers.first()?))
     }
 }
 

@@ -18,7 +18,7 @@ use super::animate::{self, Played};
 use super::geometry::{Frame, world_normals, world_tangents};
 use super::pack::{Pack, push};
 use super::scene::{Instance, name_of};
-use super::{GltfDocument, GltfError, Slot};
+use super::{GltfDocument, GltfError, Rig, Slot};
 use crate::error::WriteError;
 use crate::normals::Shading;
 
@@ -55,6 +55,10 @@ pub(crate) fn patch(
     poses: &[Pose<'_>],
     played: Played<'_>,
 ) -> Result<Vec<u8>, WriteError> {
+    let is_at_rest = base == rest.positions && poses.is_empty() && !Rig::has_skin_or_targets(document);
+    if let Some(file) = document.as_read().filter(|_| is_at_rest) {
+        return file;
+    }
     let mut json = document.json.clone();
     let mut pack = Pack::of(document);
     embed_images(document, &mut json, &mut pack);
@@ -152,7 +156,7 @@ fn place_meshes(document: &GltfDocument, json: &mut Value) -> Vec<Place> {
     places
 }
 
-fn is_flat(world: DMat4) -> bool {
+pub(super) fn is_flat(world: DMat4) -> bool {
     let m = DMat3::from_mat4(world);
     let size = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
     m.determinant().abs() <= FLAT * size || !world.inverse().is_finite()

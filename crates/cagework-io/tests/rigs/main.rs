@@ -8,6 +8,7 @@ mod clips;
 #[path = "../common/mod.rs"]
 mod common;
 mod features;
+mod nodes;
 mod people;
 mod surfaces;
 
@@ -242,7 +243,15 @@ fn offsets_of_a_vrm_move_with_the_shape() {
             "lookAt": { "offsetFromHeadBone": offset },
         },
         "VRMC_springBone": {
-            "colliders": [{ "node": 2, "shape": { "capsule": { "offset": offset, "tail": [0.0, 0.4, 0.0], "radius": 0.1 } } }],
+            "colliders": [{
+                "node": 2,
+                "shape": { "capsule": { "offset": offset, "tail": [0.0, 0.4, 0.0], "radius": 0.1 } },
+                "extensions": { "VRMC_springBone_extended_collider": { "specVersion": "1.0", "shape": {
+                    "sphere": { "offset": offset, "radius": 0.1, "inside": true },
+                    "capsule": { "offset": offset, "tail": [0.0, 0.4, 0.0], "radius": 0.1, "inside": true },
+                    "plane": { "offset": offset, "normal": [0.0, 1.0, 0.0] },
+                } } },
+            }, { "node": 2, "shape": { "sphere": { "offset": [0.0, -10000.0, 0.0], "radius": 10000.0 } } }],
             "springs": [{ "joints": [{ "node": 3, "hitRadius": 0.02 }] }],
         },
     });
@@ -261,20 +270,32 @@ fn offsets_of_a_vrm_move_with_the_shape() {
     let message = model.write_reshaped(&by(&model), &[], &[], &turns).unwrap_err().to_string();
     assert!(message.contains("the bones of a VRM 0 have no rotation"), "{message}");
     let springs = &json["VRM"]["secondaryAnimation"]["colliderGroups"][0]["colliders"][0];
-    let capsule = &json["VRMC_springBone"]["colliders"][0]["shape"]["capsule"];
+    let colliders = &json["VRMC_springBone"]["colliders"];
+    let capsule = &colliders[0]["shape"]["capsule"];
+    let extended = &colliders[0]["extensions"]["VRMC_springBone_extended_collider"]["shape"];
     for (what, found, expected) in [
         ("first person", object(&json["VRM"]["firstPerson"]["firstPersonBoneOffset"]), expected(2.0, offset)),
         ("collider of VRM 0", object(&springs["offset"]), expected(1.0, offset)),
         ("look at", array(&json["VRMC_vrm"]["lookAt"]["offsetFromHeadBone"]), expected(2.0, offset)),
         ("capsule", array(&capsule["offset"]), expected(1.0, offset)),
         ("its tail", array(&capsule["tail"]), expected(1.0, vec3(0.0, 0.4, 0.0))),
+        ("extended sphere", array(&extended["sphere"]["offset"]), expected(1.0, offset)),
+        ("extended capsule", array(&extended["capsule"]["tail"]), expected(1.0, vec3(0.0, 0.4, 0.0))),
+        ("plane", array(&extended["plane"]["offset"]), expected(1.0, offset)),
+        ("instead of a plane", array(&colliders[1]["shape"]["sphere"]["offset"]), vec3(0.0, -1e4, 0.0)),
     ] {
         assert!(found.distance(expected) <= ROUNDED, "{what}: {found} instead of {expected}");
     }
     // `f` grows y by 1.2, and nothing else at first order but shears, which keep a volume.
-    for (radius, before) in [(&springs["radius"], 0.1), (&capsule["radius"], 0.1)] {
-        assert!((number(radius) / before - 1.2_f32.cbrt()).abs() < 1e-3, "{radius}");
+    for radius in [&springs["radius"], &capsule["radius"], &extended["sphere"]["radius"]] {
+        assert!((number(radius) / 0.1 - 1.2_f32.cbrt()).abs() < 1e-3, "{radius}");
     }
+    // What is on a joint outside the cage keeps its place to the joint, wherever that goes.
+    let joints = model.joints().unwrap();
+    let outside = (model.positions.len() + joints[2].point) as u32;
+    let (bytes, _) = model.write_reshaped(&by(&model), &[outside], &[], &ReshapeOptions::default()).unwrap();
+    let person = &json_of(&bytes)["extensions"]["VRM"]["firstPerson"];
+    assert_eq!(person["firstPersonBoneOffset"], serde_json::json!({ "x": 0.1, "y": 0.2, "z": -0.05 }));
 }
 
 /// A sheet of 4,000 vertices with targets: what each adds to a vertex along z, and half of it along y.

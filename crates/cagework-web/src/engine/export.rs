@@ -308,10 +308,15 @@ impl Engine {
 
     /// All vertices in poses of the cage; at rest while they are not bound.
     pub(super) fn deformed(&self, poses: &[Vec<Vec3>]) -> Answer<Vec<Vec<Vec3>>> {
-        let rest = self.read(|state| state.models.positions.clone());
+        let (rest, controls) =
+            self.read(|state| (state.models.positions.clone(), state.rest().positions.clone()));
         self.with_session(|session| {
             let Some(weights) = session.weights() else { return Ok(vec![rest; poses.len()]) };
             let deformed = |pose: &Vec<Vec3>| {
+                // Exactly: sums of weighted controls are rounded.
+                if *pose == controls {
+                    return Ok(rest.clone());
+                }
                 let fits = pose.len() == weights.n_columns();
                 let other = || Fault::new(ErrorName::Error, "a pose belongs to another cage");
                 session.deformed(pose).filter(|_| fits).ok_or_else(other)

@@ -3,13 +3,12 @@
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasher as _, BuildHasherDefault, DefaultHasher};
 
-use ::gltf::binary::{Glb, Header};
 use serde_json::{Value, json};
 
 use super::overlap::{Place, overlapping};
 use crate::error::WriteError;
 use crate::gltf::GltfDocument;
-use crate::gltf::pack::{F32, VERTICES, each_accessor, push};
+use crate::gltf::pack::{self, F32, Pack, VERTICES, each_accessor, push, write_glb};
 use crate::gltf::patch::embed_images_by;
 
 /// All accessors are aligned to it.
@@ -20,6 +19,8 @@ pub(super) struct Edit<'a> {
     pub(super) json: Value,
     /// All buffers, one after the other.
     bin: Vec<u8>,
+    /// Whether values of an accessor were written.
+    has_written: bool,
     /// References to each place in the buffer.
     uses: HashMap<Place, usize>,
     /// Places that are never written over.
@@ -30,23 +31,15 @@ pub(super) struct Edit<'a> {
 
 impl<'a> Edit<'a> {
     pub(super) fn new(document: &'a GltfDocument) -> Self {
-        let mut json = document.json.clone();
-        let (mut bin, mut starts) = (Vec::new(), Vec::new());
+        let mut bin = Vec::new();
         for bytes in &document.buffers {
             bin.resize(bin.len().next_multiple_of(ALIGN), 0);
-            starts.push(bin.len());
             bin.extend_from_slice(bytes);
         }
-        for view in json["bufferViews"].as_array_mut().into_iter().flatten() {
-            let start = view["buffer"].as_u64().and_then(|b| starts.get(b as usize)).copied().unwrap_or(0);
-            if start > 0 {
-                view["byteOffset"] = (view["byteOffset"].as_u64().unwrap_or(0) + start as u64).into();
-                view["buffer"] = 0.into();
-            }
-        }
+        let json = joined(document);
         let overlapping = overlapping(&json);
-        let mut edit =
-            Self { document, json, bin, uses: HashMap::new(), overlapping, appended: HashMap::new() };
+        let (uses, appended) = (HashMap::new(), HashMap::new());
+        let mut edit = Self { document, json, bin, has_written: false, uses, overlapping, appended };
         edit.count_uses();
         edit
     }
@@ -83,6 +76,7 @@ impl<'a> Edit<'a> {
         attribute: bool,
         bounds: bool,
     ) -> usize {
+        self.has_written = true;
         let over = accessor.filter(|&accessor| self.overwrite(accessor, values));
         if let Some(left) = accessor.filter(|_| over.is_none()) {
             let place = self.place(left);
@@ -91,11 +85,7 @@ impl<'a> Edit<'a> {
         let accessor = over.unwrap_or_else(|| self.append(values, attribute));
         let of_accessor = &mut self.json["accessors"][accessor];
         if bounds || of_accessor.get("min").is_some() || of_accessor.get("max").is_some() {
-            let fold = |f: fn(f32, f32) -> f32, start: f32| {
-                values.iter().fold([start; N], |all, value| std::array::from_fn(|k| f(all[k], value[k])))
-            };
-            of_accessor["min"] = fold(f32::min, f32::INFINITY).to_vec().into();
-            of_accessor["max"] = fold(f32::max, f32::NEG_INFINITY).to_vec().into();
+            [of_accessor["min"], of_accessor["max"]] = pack::bounds(values);
         }
         accessor
     }
@@ -167,30 +157,42 @@ impl<'a> Edit<'a> {
 
     /// The GLB; the file as it was read if nothing has changed.
     pub(super) fn finish(self) -> Result<Vec<u8>, WriteError> {
-        let Self { document, mut json, mut bin, .. } = self;
-        let is_as_read = |text: &&[u8]| serde_json::from_slice::<Value>(text).is_ok_and(|read| read == json);
-        let text = match document.text.as_deref().filter(is_as_read) {
-            Some(text) => text.to_vec(),
-            None => {
-                embed_images_by(document, &mut json, &mut |json, bytes| {
-                    Self::push_view(&mut bin, json, bytes)
-                });
-                // What was there keeps its length: a chunk may be padded.
-                let only = if let [only] = document.buffers.as_slice() { only.len() } else { 0 };
-                if bin.is_empty() {
-                    json.as_object_mut().map(|object| object.shift_remove("buffers"));
-                } else if bin.len() != only {
-                    json["buffers"] = json!([{ "byteLength": bin.len() }]);
-                }
-                serde_json::to_vec(&json).map_err(|e| WriteError::Document(e.to_string()))?
-            }
-        };
-        let bytes = 64 + text.len() as u64 + bin.len() as u64;
-        if bytes > u64::from(u32::MAX) {
-            return Err(WriteError::TooLarge { bytes });
+        let Self { document, mut json, mut bin, has_written, .. } = self;
+        if let Some(file) = document.as_read().filter(|_| !has_written && json == joined(document)) {
+            return file;
         }
-        let header = Header { magic: *b"glTF", version: 2, length: 0 };
-        let glb = Glb { header, json: text.into(), bin: (!bin.is_empty()).then(|| bin.into()) };
-        glb.to_vec().map_err(|e| WriteError::Document(e.to_string()))
+        embed_images_by(document, &mut json, &mut |json, bytes| Self::push_view(&mut bin, json, bytes));
+        if document.is_decoded {
+            // Its compressed streams are no longer of use.
+            return Pack::of_bytes(&json, &bin).finish(json);
+        }
+        // What was there keeps its length: a chunk may be padded.
+        let only = if let [only] = document.buffers.as_slice() { only.len() } else { 0 };
+        if bin.is_empty() {
+            json.as_object_mut().map(|object| object.shift_remove("buffers"));
+        } else if bin.len() != only {
+            json["buffers"] = json!([{ "byteLength": bin.len() }]);
+        }
+        write_glb(&json, &bin)
     }
+}
+
+/// The JSON of a document with all its buffers as one, one after the other.
+fn joined(document: &GltfDocument) -> Value {
+    let mut json = document.json.clone();
+    let (mut starts, mut end) = (Vec::new(), 0);
+    for bytes in &document.buffers {
+        let start = usize::next_multiple_of(end, ALIGN);
+        starts.push(start as u64);
+        end = start + bytes.len();
+    }
+    let views = json.get_mut("bufferViews").and_then(Value::as_array_mut);
+    for view in views.into_iter().flatten() {
+        let start = view["buffer"].as_u64().and_then(|b| starts.get(b as usize)).copied().unwrap_or(0);
+        if start > 0 {
+            view["byteOffset"] = (view["byteOffset"].as_u64().unwrap_or(0) + start).into();
+            view["buffer"] = 0.into();
+        }
+    }
+    json
 }

@@ -28,6 +28,7 @@ use cagework_core::{Bounds, Parts as Unbent};
 use glam::{DMat4, DVec3, Vec3};
 
 use super::geometry::{Frame, attribute, vectors};
+use super::patch::is_flat;
 use super::scene::{Instance, Worlds};
 use super::{GltfDocument, GltfError, skin};
 
@@ -55,8 +56,10 @@ pub(crate) struct Rig<'a> {
     parts: Vec<Part>,
     /// Nodes that follow the cage, each after its parent, with the first of its seven points: the origin, then those around it.
     follows: Vec<(u32, usize)>,
-    /// Sum of the weights that each node has as a joint. `[n_nodes]`
+    /// Sum of the weights that each node has as a joint, and the number of vertices that it carries without a skin. `[n_nodes]`
     held: Vec<f64>,
+    /// Joints, nodes that clips or a person's bones move, and all nodes below them. `[n_nodes]`
+    on_skeleton: Vec<bool>,
     spots: Vec<Spot>,
     n_vertices: usize,
     /// Diagonal of the box of all states, object units.
@@ -121,6 +124,7 @@ impl<'a> Rig<'a> {
             parts: Vec::new(),
             follows: Vec::new(),
             held: vec![0.0; document.root.nodes.len()],
+            on_skeleton: vec![false; document.root.nodes.len()],
             spots: Vec::new(),
             n_vertices: rest.len(),
             diagonal: 0.0,
@@ -151,7 +155,8 @@ impl<'a> Rig<'a> {
         let states: Vec<Vec3> = rest.iter().copied().chain(rig.extras.iter().map(|p| p.as_vec3())).collect();
         rig.diagonal = Bounds::of(&states).map_or(0.0, |b| f64::from(b.diagonal()));
         rig.add_nodes();
-        rig.spots = vrm::spots(document, &rig.worlds);
+        rig.hold_without_skins();
+        rig.spots = vrm::spots(document, &rig.worlds, rig.diagonal);
         for k in 0..rig.spots.len() {
             rig.spots[k].point = rig.n_vertices + rig.extras.len();
             rig.anchor(rig.spots[k].at);
@@ -166,8 +171,15 @@ impl<'a> Rig<'a> {
         Ok(rig)
     }
 
-    /// Whether the document has more than the plain export can keep.
+    /// Whether the document has more than the plain export can move: skins, morph targets, or nodes that follow the cage.
     pub(crate) fn is_needed(document: &GltfDocument) -> bool {
+        let instances = || document.instances.iter();
+        let follow = || !nodes::holders(document).is_empty() || instances().any(|i| has_pivot(&i.world));
+        Self::has_skin_or_targets(document) || !instances().any(|i| is_flat(i.world)) && follow()
+    }
+
+    /// Whether the document has what the plain export leaves out.
+    pub(crate) fn has_skin_or_targets(document: &GltfDocument) -> bool {
         let morphs = |mesh: u32| {
             let primitives = &document.root.meshes[mesh as usize].primitives;
             primitives.iter().any(|p| p.targets.as_ref().is_some_and(|t| !t.is_empty()))
@@ -305,14 +317,17 @@ impl<'a> Rig<'a> {
         Ok(Some(part))
     }
 
-    /// Joints of all skins and what hangs below them, but for nodes whose own transform has no effect.
+    /// Joints of all skins, nodes that clips or a person's bones move, nodes with meshes and a pivot, and what hangs below any of
+    /// these; but no nodes whose own transform has no effect.
     fn add_nodes(&mut self) {
         let nodes = &self.document.root.nodes;
-        let mut below = vec![false; nodes.len()];
-        for joint in self.document.root.skins.iter().flat_map(|skin| &skin.joints) {
-            if let Some(below) = below.get_mut(joint.value()) {
-                *below = true;
-            }
+        for node in nodes::holders(self.document) {
+            self.on_skeleton[node] = true;
+        }
+        self.worlds.mark_below(&mut self.on_skeleton);
+        let mut below = self.on_skeleton.clone();
+        for ((below, node), world) in below.iter_mut().zip(nodes).zip(&self.worlds.world) {
+            *below |= node.mesh.is_some() && node.skin.is_none() && has_pivot(world);
         }
         self.worlds.mark_below(&mut below);
         for (node, _) in self.worlds.order.clone() {
@@ -323,10 +338,36 @@ impl<'a> Rig<'a> {
         }
     }
 
+    /// Adds to [`Self::held`] what nodes carry without a skin: of each mesh its node, and the joint or animated node above it.
+    fn hold_without_skins(&mut self) {
+        let mut holders = vec![None; self.held.len()];
+        for node in nodes::holders(self.document) {
+            holders[node] = Some(node);
+        }
+        for &(node, parent) in &self.worlds.order {
+            holders[node as usize] = holders[node as usize].or(parent.and_then(|p| holders[p as usize]));
+        }
+        for part in &self.parts {
+            let Some(node) = part.instance.node.filter(|_| part.instance.skin.is_none()) else { continue };
+            let (node, n) = (node as usize, part.local.len() as f64);
+            if has_pivot(&part.instance.world) {
+                self.held[node] += n;
+            }
+            if let Some(holder) = holders[node].filter(|&holder| holder != node) {
+                self.held[holder] += n;
+            }
+        }
+    }
+
     fn anchor(&mut self, at: DVec3) {
         self.extras.push(at);
         self.extras.extend(AROUND.map(|way| at + STEP * self.diagonal * way));
     }
+}
+
+/// Whether a node's origin says more than where the world has its own, about which no mesh turns on purpose.
+fn has_pivot(world: &DMat4) -> bool {
+    world.w_axis.truncate() != DVec3::ZERO
 }
 
 /// What makes two nodes that show a mesh one shape.

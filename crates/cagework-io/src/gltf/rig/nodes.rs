@@ -2,13 +2,16 @@
 
 use std::collections::HashMap;
 
+use ::gltf::json::Index;
 use ::gltf::json::scene::{Node, UnitQuaternion};
 use cagework_core::parts::Motion;
 use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 
 use super::surface::rotation;
+use super::tracks::{self, Driven};
 use super::{AROUND, Rig, STEP};
+use crate::gltf::GltfDocument;
 use crate::gltf::scene::{Worlds, local, name_of};
 
 /// What becomes of the skeleton.
@@ -27,8 +30,8 @@ pub enum Joints {
 const SMALL: f64 = 1e-6;
 /// Bones shorter than this, over the diagonal, have no direction.
 const SHORT: f64 = 1e-4;
-/// Joints lower than this above the lowest one, over the diagonal, have no height to compare.
-const LOW: f64 = 0.02;
+/// Joints lower than this above the floor, over the height of what their skeleton holds, do not tell how long the legs are.
+const LOW: f64 = 0.1;
 /// Vertices inside the cage that tell how a rigid mesh moves, at least.
 const LEAST: usize = 3;
 /// Bounds of the ratio of heights.
@@ -79,7 +82,24 @@ pub(super) fn gradient(by: &[DVec3], anchor: usize, diagonal: f64) -> DMat3 {
     DMat3::from_cols(column(0), column(1), column(2))
 }
 
-/// A joint, or a node below one.
+/// What holds vertices, by a skin or by carrying them: joints, nodes that clips move, bones of a person (VRM).
+pub(super) fn holders(document: &GltfDocument) -> Vec<usize> {
+    let json = &document.json;
+    let animations = json["animations"].as_array().into_iter().flatten();
+    let channels = animations.flat_map(|animation| animation["channels"].as_array().into_iter().flatten());
+    let animated = channels.filter_map(|channel| match tracks::driven(channel)? {
+        Driven::Translation(node) | Driven::Rotation(node) | Driven::Scale(node) => Some(node),
+        Driven::Weights(_) | Driven::MeshWeights(_) => None,
+    });
+    let bones = |extension: &str| &json["extensions"][extension]["humanoid"]["humanBones"];
+    let of_vrm0 = bones("VRM").as_array().into_iter().flatten();
+    let of_vrm1 = bones("VRMC_vrm").as_object().into_iter().flat_map(|bones| bones.values());
+    let bones = of_vrm0.chain(of_vrm1).filter_map(|bone| bone["node"].as_u64()).map(|node| node as usize);
+    let joints = document.root.skins.iter().flat_map(|skin| &skin.joints).map(Index::value);
+    joints.chain(animated).chain(bones).filter(|&node| node < document.root.nodes.len()).collect()
+}
+
+/// A node that follows the cage: a joint, one that a clip moves or that shows a mesh, or one below these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JointPoint {
     /// Its number in the file.
@@ -113,7 +133,7 @@ impl Rig<'_> {
         joints
     }
 
-    /// Names of the nodes below joints that show a mesh without a skin.
+    /// Names of the nodes of a skeleton that show a mesh without a skin.
     pub(crate) fn props(&self) -> Vec<String> {
         let name = |node| name_of(&self.document.json, "nodes", node, "node");
         self.follows.iter().map(|&(node, _)| node).filter(|&node| self.is_prop(node)).map(name).collect()
@@ -121,7 +141,7 @@ impl Rig<'_> {
 
     fn is_prop(&self, node: u32) -> bool {
         let of_node = &self.document.root.nodes[node as usize];
-        of_node.mesh.is_some() && of_node.skin.is_none()
+        of_node.mesh.is_some() && of_node.skin.is_none() && self.on_skeleton[node as usize]
     }
 
     /// The nodes of [`Self::props`] that have a name.
@@ -205,7 +225,8 @@ impl Rig<'_> {
             let linear = turn.unwrap_or(DMat3::IDENTITY) * DMat3::from_mat4(old[i]);
             new[i] = DMat4::from_mat3_translation(linear, old[i].w_axis.truncate() + delta[i]);
         }
-        let heights = self.heights(given, &delta);
+        let travels = !given.keep_travel && json["animations"].as_array().is_some_and(|all| !all.is_empty());
+        let ratios = if travels { self.ratios(given, &delta) } else { vec![1.0; n] };
         for &(node, parent) in &self.worlds.order {
             let i = node as usize;
             let [above, above_new] =
@@ -256,8 +277,7 @@ impl Rig<'_> {
             } else {
                 DMat3::IDENTITY
             };
-            let ratio = if given.keep_travel { 1.0 } else { heights(old[i], new[i]) };
-            let moving = DMat3::from_diagonal(DVec3::splat(ratio));
+            let moving = DMat3::from_diagonal(DVec3::splat(ratios[i]));
             moved.changes[i] = Some(Change { from: t0, to: t1, still, moving, turn });
         }
         if moved.n_moved > 0 {
@@ -272,29 +292,73 @@ impl Rig<'_> {
         moved
     }
 
-    /// From a joint's old and new world to the ratio of its heights above the lowest joint that holds something.
-    fn heights<'g>(&self, given: &'g Given<'_>, delta: &[DVec3]) -> impl Fn(DMat4, DMat4) -> f64 + use<'g> {
-        let is_firm = |node: &u32| self.held[*node as usize] > 0.0;
-        let mut firm: Vec<u32> = self.follows.iter().map(|(node, _)| *node).filter(is_firm).collect();
-        if firm.is_empty() {
-            firm = self.follows.iter().map(|(node, _)| *node).collect();
+    /// By how much the translations of clips grow, by node; one number for a skeleton, or its feet would leave its legs.
+    ///
+    /// It is the ratio of the heights of its hips over the lowest vertex that it holds. The hips are the node that carries most
+    /// of those that are not as low as the floor.
+    fn ratios(&self, given: &Given<'_>, delta: &[DVec3]) -> Vec<f64> {
+        let (skeletons, n_skeletons) = self.skeletons();
+        let mut carried = self.held.clone();
+        for &(node, parent) in self.worlds.order.iter().rev() {
+            if let Some(parent) = parent {
+                carried[parent as usize] += carried[node as usize];
+            }
         }
-        let height = |at: DVec3| at.dot(given.up);
-        let lowest = |is_new: bool| {
-            let at = |&node: &u32| {
-                let i = node as usize;
-                let by = if is_new { delta[i] } else { DVec3::ZERO };
-                height(self.worlds.world[i].w_axis.truncate() + by)
-            };
-            firm.iter().map(at).fold(f64::INFINITY, f64::min)
+        // Lowest and highest vertex at rest, and the lowest after.
+        let mut spans = vec![[f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY]; n_skeletons];
+        for part in self.parts.iter().filter(|part| part.slot.is_some()) {
+            let joint =
+                part.instance.skin.and_then(|skin| self.document.root.skins[skin as usize].joints.first());
+            let holder = joint.map(Index::value).or(part.instance.node.map(|node| node as usize));
+            let Some(skeleton) = holder.and_then(|node| skeletons[node]) else { continue };
+            let motion = part.instance.node.and_then(|node| given.rigid.get(&node));
+            for (at, by) in part.rest().into_iter().zip(&given.by[part.first..]) {
+                let (height, by) = (at.dot(given.up), motion.map_or(*by, |motion| motion.by(at)));
+                let [low, high, after] = &mut spans[skeleton];
+                (*low, *high) = (low.min(height), high.max(height));
+                *after = after.min(height + by.dot(given.up));
+            }
+        }
+        let mut hips = vec![(0.0, 1.0); n_skeletons];
+        for &(node, _) in &self.follows {
+            let i = node as usize;
+            let Some(skeleton) = skeletons[i] else { continue };
+            let ([low, high, after], at) = (spans[skeleton], self.worlds.world[i].w_axis.truncate());
+            let (before, now) = (at.dot(given.up) - low, (at + delta[i]).dot(given.up) - after);
+            if carried[i] > hips[skeleton].0 && before > LOW * (high - low) {
+                hips[skeleton] = (carried[i], (now / before).clamp(RATIOS.0, RATIOS.1));
+            }
+        }
+        skeletons.iter().map(|skeleton| skeleton.map_or(1.0, |skeleton| hips[skeleton].1)).collect()
+    }
+
+    /// The number of the skeleton of each node that follows, and how many there are: what hangs on one node that does not follow,
+    /// or has joints of the same skin, belongs together.
+    fn skeletons(&self) -> (Vec<Option<usize>>, usize) {
+        let n = self.held.len();
+        let top = |above: &[usize], mut node: usize| {
+            while above[node] != node {
+                node = above[node];
+            }
+            node
         };
-        let (old_lowest, new_lowest, low) = (lowest(false), lowest(true), LOW * self.diagonal);
-        let up = given.up;
-        move |old, new| {
-            let [before, after] = [(old, old_lowest), (new, new_lowest)]
-                .map(|(world, lowest)| world.w_axis.truncate().dot(up) - lowest);
-            if before > low { (after / before).clamp(RATIOS.0, RATIOS.1) } else { 1.0 }
+        // Number `n` is of what hangs on nothing.
+        let mut above: Vec<usize> = (0..=n).collect();
+        let mut follows = vec![false; n];
+        self.follows.iter().for_each(|(node, _)| follows[*node as usize] = true);
+        for &(node, parent) in self.worlds.order.iter().filter(|(node, _)| follows[*node as usize]) {
+            above[node as usize] = parent.map_or(n, |parent| above[parent as usize]);
         }
+        for skin in &self.document.root.skins {
+            let mut joints = skin.joints.iter().map(Index::value).filter(|&joint| joint < n);
+            let Some(first) = joints.next().map(|joint| top(&above, joint)) else { continue };
+            for joint in joints {
+                let other = top(&above, joint);
+                above[other] = first;
+            }
+        }
+        let skeletons = (0..n).map(|node| follows[node].then(|| top(&above, node)));
+        (skeletons.collect(), n + 1)
     }
 }
 

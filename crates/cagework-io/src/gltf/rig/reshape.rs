@@ -24,7 +24,7 @@ use crate::shown::shown;
 pub struct ReshapeOptions {
     /// What becomes of the skeleton.
     pub joints: Joints,
-    /// How far clips travel stays as it is; otherwise it grows with the height of the joint.
+    /// How far clips travel stays as it is; otherwise it grows as the height of the hips does.
     pub keep_travel: bool,
     /// Names of nodes below joints whose meshes keep their shape: buckles, eyes, weapons.
     pub rigid: Vec<String>,
@@ -35,7 +35,7 @@ pub struct ReshapeOptions {
 /// What was moved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ReshapeReport {
-    /// Joints and nodes below them.
+    /// Joints and other nodes that follow: those that clips move or that carry meshes, and what hangs below.
     pub joints: usize,
     /// Of them, those whose transform was written anew.
     pub joints_moved: usize,
@@ -68,11 +68,16 @@ impl ReshapeReport {
         let Self { joints, joints_moved, joints_outside, morph_ends, morph_ends_outside, tracks, .. } = self;
         let mut notices = Vec::new();
         let mut say = |n: usize, sentence: String| notices.extend((n > 0).then_some(sentence));
-        say(*joints, format!("{joints_moved} of {joints} joints moved, {tracks} animation tracks with them"));
+        say(
+            *joints,
+            format!(
+                "{joints_moved} of {joints} joints and other nodes moved, {tracks} animation tracks with them"
+            ),
+        );
         say(
             *joints_outside,
             format!(
-                "{joints_outside} joints that hold vertices are outside the cage: they follow its closest point"
+                "{joints_outside} joints or other nodes that hold vertices are outside the cage: they follow its closest point"
             ),
         );
         say(

@@ -9,7 +9,7 @@ use super::reshape::ReshapeReport;
 use crate::gltf::GltfDocument;
 use crate::gltf::pack::push;
 
-/// A translation that moves by less than this, over the node's own, stands still: it is a bone's length.
+/// A translation that moves by less than this, over the node's own, stands still.
 const STILL: f64 = 1e-3;
 
 /// What a channel drives.
@@ -58,6 +58,13 @@ pub(super) struct Output {
     pub(super) n_keys: usize,
 }
 
+impl Output {
+    /// Whether element `k` is the value of a key, and no tangent.
+    fn is_value(&self, k: usize) -> bool {
+        !self.is_cubic || k % 3 == 1
+    }
+}
+
 pub(super) fn output(edit: &Edit<'_>, sampler: &Value) -> Option<Output> {
     let count = |key: &str| {
         let accessor = sampler[key].as_u64()?;
@@ -83,6 +90,35 @@ pub(super) fn own_sampler(edit: &mut Edit<'_>, animation: usize, channel: usize)
     Some(number)
 }
 
+/// Values of a translation or rotation track; none if there are not as many as it has keys.
+fn values<const N: usize>(document: &GltfDocument, output: &Output) -> Option<Vec<[f32; N]>> {
+    let values = document.source().floats::<N>(output.accessor, "a track").ok()?;
+    let per_key = if output.is_cubic { 3 } else { 1 };
+    (values.len() == per_key * output.n_keys).then_some(values)
+}
+
+/// Whether clips move nodes that have changed, by node: otherwise their translations are the lengths of bones.
+fn moving(document: &GltfDocument, edit: &Edit<'_>, changes: &[Option<Change>]) -> Vec<bool> {
+    let mut moving = vec![false; changes.len()];
+    for animation in edit.json["animations"].as_array().into_iter().flatten() {
+        for channel in animation["channels"].as_array().into_iter().flatten() {
+            let Some(Driven::Translation(node)) = driven(channel) else { continue };
+            let Some(change) = changes.get(node).and_then(Option::as_ref) else { continue };
+            let sampler = channel["sampler"].as_u64().and_then(|s| animation["samplers"].get(s as usize));
+            let Some(output) = sampler.and_then(|sampler| output(edit, sampler)) else { continue };
+            let Some(values) = values(document, &output) else { continue };
+            let keys = || {
+                let keys = values.iter().enumerate().filter(|(k, _)| output.is_value(*k));
+                keys.map(|(_, &v)| Vec3::from_array(v).as_dvec3())
+            };
+            let range =
+                keys().fold(DVec3::NEG_INFINITY, DVec3::max) - keys().fold(DVec3::INFINITY, DVec3::min);
+            moving[node] |= range.max_element() > STILL * change.from.length();
+        }
+    }
+    moving
+}
+
 /// Brings translations, and rotations where bones turn, to nodes that have moved.
 pub(super) fn rescale(
     document: &GltfDocument,
@@ -90,6 +126,7 @@ pub(super) fn rescale(
     changes: &[Option<Change>],
     report: &mut ReshapeReport,
 ) {
+    let moving = moving(document, edit, changes);
     let n_animations = edit.json["animations"].as_array().map_or(0, Vec::len);
     for a in 0..n_animations {
         let n_channels = edit.json["animations"][a]["channels"].as_array().map_or(0, Vec::len);
@@ -109,17 +146,13 @@ pub(super) fn rescale(
             };
             let found = output(edit, &edit.json["animations"][a]["samplers"][sampler]);
             let written = found.and_then(|output| {
-                let per_key = if output.is_cubic { 3 } else { 1 };
                 let accessor = Some(output.accessor as usize);
                 if is_rotation {
-                    let values = document.source().floats::<4>(output.accessor, "a rotation").ok()?;
-                    let values =
-                        (values.len() == per_key * output.n_keys).then(|| turned(&values, change))?;
+                    let values = turned(&values(document, &output)?, change);
                     Some(edit.write(accessor, &values, false, false))
                 } else {
-                    let values = document.source().floats::<3>(output.accessor, "a translation").ok()?;
-                    let values = (values.len() == per_key * output.n_keys)
-                        .then(|| moved(&values, change, output.is_cubic))?;
+                    let linear = if moving[node] { change.moving } else { change.still };
+                    let values = moved(&values(document, &output)?, change, linear, &output);
                     Some(edit.write(accessor, &values, false, false))
                 }
             });
@@ -134,19 +167,14 @@ pub(super) fn rescale(
     }
 }
 
-/// `t' + S (t(t) - t)`; tangents take the linear part only.
-fn moved(values: &[[f32; 3]], change: &Change, is_cubic: bool) -> Vec<[f32; 3]> {
-    let is_value = |k: usize| !is_cubic || k % 3 == 1;
-    let all: Vec<DVec3> = values.iter().map(|&v| Vec3::from_array(v).as_dvec3()).collect();
-    let keys = || all.iter().enumerate().filter(|(k, _)| is_value(*k)).map(|(_, v)| *v);
-    let range = keys().fold(DVec3::NEG_INFINITY, DVec3::max) - keys().fold(DVec3::INFINITY, DVec3::min);
-    let moves = range.max_element() > STILL * change.from.length();
-    let linear: DMat3 = if moves { change.moving } else { change.still };
-    let value = |(k, &v): (usize, &DVec3)| {
-        let v = if is_value(k) { change.to + linear * (v - change.from) } else { linear * v };
+/// `t' + S (t(t) - t)` with `linear` as S; tangents take the linear part only.
+fn moved(values: &[[f32; 3]], change: &Change, linear: DMat3, output: &Output) -> Vec<[f32; 3]> {
+    let value = |(k, &v): (usize, &[f32; 3])| {
+        let v = Vec3::from_array(v).as_dvec3();
+        let v = if output.is_value(k) { change.to + linear * (v - change.from) } else { linear * v };
         v.as_vec3().to_array()
     };
-    all.iter().enumerate().map(value).collect()
+    values.iter().enumerate().map(value).collect()
 }
 
 fn turned(values: &[[f32; 4]], change: &Change) -> Vec<[f32; 4]> {

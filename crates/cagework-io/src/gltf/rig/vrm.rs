@@ -2,6 +2,8 @@
 //!
 //! All else of a VRM is indices of nodes, meshes and targets, which a reshape never renumbers.
 
+use std::collections::HashSet;
+
 use glam::{DMat3, DMat4, DVec3};
 use serde_json::{Value, json};
 
@@ -30,7 +32,7 @@ enum What {
 }
 
 /// The spots of a document, their points not numbered yet.
-pub(super) fn spots(document: &GltfDocument, worlds: &Worlds) -> Vec<Spot> {
+pub(super) fn spots(document: &GltfDocument, worlds: &Worlds, diagonal: f64) -> Vec<Spot> {
     let mut spots = Vec::new();
     let json = &document.json;
     let mut add = |node: Option<u64>, offset: DVec3, what: What| {
@@ -38,7 +40,9 @@ pub(super) fn spots(document: &GltfDocument, worlds: &Worlds) -> Vec<Spot> {
             return;
         };
         let at = world.transform_point3(offset);
-        if at.is_finite() {
+        // What is farther away than the model is large is no place on it: colliders that stand in for others have such.
+        let is_near = at.distance(world.w_axis.truncate()) <= diagonal;
+        if is_near {
             spots.push(Spot { node, at, point: 0, what });
         }
     };
@@ -83,7 +87,11 @@ pub(super) fn spots(document: &GltfDocument, worlds: &Worlds) -> Vec<Spot> {
     }
     for collider in items("/extensions/VRMC_springBone/colliders".into()) {
         let node = number(&format!("{collider}/node"));
-        for shape in ["sphere", "capsule"].map(|shape| format!("{collider}/shape/{shape}")) {
+        let extended = format!("{collider}/extensions/VRMC_springBone_extended_collider");
+        let shapes = [&collider, &extended]
+            .into_iter()
+            .flat_map(|of| ["sphere", "capsule", "plane"].map(|shape| format!("{of}/shape/{shape}")));
+        for shape in shapes {
             if !json.pointer(&shape).is_some_and(Value::is_object) {
                 continue;
             }
@@ -108,7 +116,10 @@ pub(super) fn spots(document: &GltfDocument, worlds: &Worlds) -> Vec<Spot> {
 
 /// Writes the spots that have moved. `world` of the nodes as they are now.
 pub(super) fn write(rig: &Rig<'_>, given: &Given<'_>, world: &[DMat4], json: &mut Value) {
-    for spot in &rig.spots {
+    let outside = rig.follows.iter().filter(|(_, at)| given.is_outside[*at]);
+    let outside: HashSet<usize> = outside.map(|(node, _)| *node as usize).collect();
+    // What hangs on a joint outside the cage keeps its place to it.
+    for spot in rig.spots.iter().filter(|spot| !outside.contains(&spot.node)) {
         let by = given.by[spot.point];
         let has_moved = by != DVec3::ZERO || world[spot.node] != rig.worlds.world[spot.node];
         let at = world[spot.node].inverse().transform_point3(spot.at + by);

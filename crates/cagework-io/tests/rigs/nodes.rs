@@ -1,0 +1,184 @@
+//! Nodes without a skin: wheels, robots of rigid parts, bones of a person that carry meshes.
+
+use cagework_io::{Joints, Model, ReshapeOptions};
+use glam::{DVec3, Vec3, vec3};
+use serde_json::{Value, json};
+
+use super::common::{self, Builder, CUBE, F32, U8, floats, json_of, rigged};
+use super::{ROUNDED, assert_near, by, f, player, read, reshaped, shown};
+
+/// A mesh of a cube of half a unit about its own origin.
+fn centred_cube(b: &mut Builder) -> usize {
+    let mesh = b.cube_mesh("part");
+    let position = b.vec3(&CUBE.map(|corner| corner.map(|x| 0.5 * (x - 0.5))));
+    b.primitive(mesh)["attributes"]["POSITION"] = position.into();
+    mesh
+}
+
+/// A clip of channels (node, path, values of two keys, a second apart).
+fn clip(b: &mut Builder, channels: &[(usize, &str, Vec<f32>)]) {
+    let times = b.accessor(&floats(&[0.0, 1.0]), F32, 2, "SCALAR");
+    (b.json["accessors"][times]["min"], b.json["accessors"][times]["max"]) = (json!([0.0]), json!([1.0]));
+    let mut animation = json!({ "samplers": [], "channels": [] });
+    for (k, (node, path, values)) in channels.iter().enumerate() {
+        let kind = if *path == "rotation" { "VEC4" } else { "VEC3" };
+        let output = b.accessor(&floats(values), F32, 2, kind);
+        let list = |animation: &mut Value, key: &str, item| animation[key].as_array_mut().unwrap().push(item);
+        list(&mut animation, "samplers", json!({ "input": times, "output": output }));
+        list(&mut animation, "channels", json!({ "sampler": k, "target": { "node": node, "path": path } }));
+    }
+    b.push("animations", animation);
+}
+
+/// A model after `moved` moves all its points, as its bytes.
+fn moved_by(model: &Model, joints: Joints, moved: impl Fn(Vec3) -> Vec3) -> Vec<u8> {
+    let extra = model.extra_points().unwrap();
+    let by: Vec<DVec3> =
+        model.positions.iter().chain(&extra).map(|&p| moved(p).as_dvec3() - p.as_dvec3()).collect();
+    let options = ReshapeOptions { joints, ..ReshapeOptions::default() };
+    model.write_reshaped(&by, &[], &[], &options).unwrap().0
+}
+
+fn translation(json: &Value, node: usize) -> Vec3 {
+    let at = &json["nodes"][node]["translation"];
+    Vec3::from_array([0, 1, 2].map(|k| at[k].as_f64().unwrap() as f32))
+}
+
+/// A body that stands still, and beside it a wheel that a clip turns.
+fn wheel() -> Builder {
+    let mut b = Builder::new();
+    let mesh = centred_cube(&mut b);
+    b.push("nodes", json!({ "mesh": mesh, "translation": [0.0, 1.0, 0.0] }));
+    b.push("nodes", json!({ "name": "wheel", "mesh": mesh, "translation": [3.0, 0.0, 0.0] }));
+    b.json["scenes"] = json!([{ "nodes": [0, 1] }]);
+    clip(&mut b, &[(1, "rotation", vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.8, 0.6])]);
+    b
+}
+
+#[test]
+fn wheels_turn_about_where_their_axles_have_gone() {
+    let model = read(&wheel().glb());
+    let wider = |p: Vec3| vec3(1.2 * (p.x - 1.25) + 1.25, p.y, p.z);
+    let bytes = moved_by(&model, Joints::Follow, wider);
+    let after = player(&read(&bytes));
+    for seconds in [0.0, 0.5, 1.0] {
+        let at = shown(&after, Some(0), seconds, &[]);
+        let middle = at[8..].iter().sum::<Vec3>() / 8.0;
+        assert!(middle.distance(vec3(3.35, 0.0, 0.0)) <= ROUNDED, "{middle} at {seconds} s");
+    }
+    let rest: Vec<Vec3> = model.positions.iter().map(|&p| wider(p)).collect();
+    assert_near(&read(&bytes).positions, &rest, ROUNDED, "at rest");
+    let (_, report) = reshaped(&model, Joints::Follow);
+    assert_eq!(report.notices()[0], "2 of 2 joints and other nodes moved, 0 animation tracks with them");
+
+    assert_eq!(model.props().unwrap(), ["wheel"]);
+    let rigid = ReshapeOptions { rigid: vec!["wheel".into()], ..ReshapeOptions::default() };
+    let by: Vec<DVec3> = by(&model);
+    let json = json_of(&model.write_reshaped(&by, &[], &[], &rigid).unwrap().0);
+    let corners = model.positions[8..].iter().map(|&p| f(p)).sum::<Vec3>() / 8.0;
+    assert!(
+        translation(&json, 1).distance(corners) <= ROUNDED,
+        "the axle is where the rigid wheel has its middle"
+    );
+
+    let stays = json_of(&moved_by(&model, Joints::Stay, wider));
+    assert_eq!(stays["nodes"][1]["translation"], json!([3.0, 0.0, 0.0]));
+    assert!(moved_by(&model, Joints::Follow, |p| p) == wheel().glb(), "unmoved");
+}
+
+#[test]
+fn pivots_of_still_models_follow_and_those_at_the_origin_need_not() {
+    let mut still = wheel();
+    still.json.as_object_mut().unwrap().shift_remove("animations");
+    let model = read(&still.glb());
+    let json = json_of(&reshaped(&model, Joints::Follow).0);
+    for (node, at) in [(0, vec3(0.0, 1.0, 0.0)), (1, vec3(3.0, 0.0, 0.0))] {
+        assert!(translation(&json, node).distance(f(at)) <= ROUNDED);
+    }
+    assert_eq!(model.props().unwrap(), Vec::<String>::new(), "nothing hangs on a skeleton");
+    let plain = read(&common::plain_cube().glb());
+    assert!(!plain.is_rigged() && plain.extra_points().unwrap().is_empty());
+    // What a node flattens cannot be undone in its space.
+    still.json["nodes"][0]["scale"] = json!([1.0, 0.0, 1.0]);
+    assert!(!read(&still.glb()).is_rigged());
+}
+
+#[test]
+fn bones_of_a_person_follow_with_the_meshes_they_carry() {
+    for extension in ["VRM", "VRMC_vrm"] {
+        let mut rig = rigged();
+        let mesh = centred_cube(&mut rig);
+        rig.push("nodes", json!({ "name": "head", "translation": [0.1, 1.0, 0.0], "children": [6] }));
+        rig.push("nodes", json!({ "name": "hair", "mesh": mesh, "translation": [0.0, 0.5, 0.0] }));
+        rig.push("nodes", json!({ "name": "chest", "translation": [0.0, 1.5, 0.1] }));
+        rig.json["scenes"][0]["nodes"] = json!([0, 4, 5, 7]);
+        rig.json["extensionsUsed"] = json!([extension]);
+        let bones = if extension == "VRM" {
+            json!([{ "bone": "head", "node": 5 }, { "bone": "chest", "node": 7 }])
+        } else {
+            json!({ "head": { "node": 5 }, "chest": { "node": 7 } })
+        };
+        rig.json["extensions"] = json!({ extension: { "humanoid": { "humanBones": bones } } });
+        let model = read(&rig.glb());
+        let (bytes, report) = reshaped(&model, Joints::Follow);
+        assert_eq!((report.joints, report.joints_moved), (6, 6));
+        let json = json_of(&bytes);
+        let [head, hair, chest] = [5, 6, 7].map(|node| translation(&json, node));
+        assert!(head.distance(f(vec3(0.1, 1.0, 0.0))) <= ROUNDED, "{extension}: {head}");
+        assert!((head + hair).distance(f(vec3(0.1, 1.5, 0.0))) <= ROUNDED, "{extension}: {hair}");
+        assert!(chest.distance(f(vec3(0.0, 1.5, 0.1))) <= ROUNDED, "{extension}: {chest}");
+    }
+}
+
+/// A robot of rigid parts whose foot hangs on the root beside its hips, with a hand on a skin. Its shin ends where the foot is, in
+/// both clips: it jumps, and stands elsewhere.
+fn robot() -> Builder {
+    let mut b = Builder::new();
+    let mesh = centred_cube(&mut b);
+    let hand = b.cube_mesh("hand");
+    let joints = b.accessor(&[0_u8; 32], U8, 8, "VEC4");
+    let weights = b.accessor(&floats(&[[1.0, 0.0, 0.0, 0.0]; 8].concat()), F32, 8, "VEC4");
+    let bind = glam::Mat4::from_translation(vec3(0.0, -1.5, 0.0)).to_cols_array();
+    let bind = b.accessor(&floats(&bind), F32, 1, "MAT4");
+    let attributes = &mut b.primitive(hand)["attributes"];
+    (attributes["JOINTS_0"], attributes["WEIGHTS_0"]) = (joints.into(), weights.into());
+    b.push("skins", json!({ "joints": [4], "inverseBindMatrices": bind }));
+    b.json["nodes"] = json!([
+        { "name": "root", "children": [1, 3] },
+        { "name": "hips", "mesh": mesh, "translation": [0.0, 1.0, 0.0], "children": [2, 4] },
+        { "name": "end of the shin", "translation": [0.5, -0.75, 0.0] },
+        { "name": "foot", "mesh": mesh, "translation": [0.5, 0.25, 0.0] },
+        { "name": "hand", "translation": [0.0, 0.5, 0.0] },
+        { "mesh": hand, "skin": 0 },
+    ]);
+    b.json["scenes"] = json!([{ "nodes": [0, 5] }]);
+    let jump = |x: f32, y: f32| vec![x, y, 0.0, x, y + 0.2, 0.4];
+    clip(&mut b, &[(1, "translation", jump(0.0, 1.0)), (3, "translation", jump(0.5, 0.25))]);
+    let elsewhere = |x: f32, y: f32| vec![x, y, 0.5, x, y, 0.5];
+    clip(&mut b, &[(1, "translation", elsewhere(0.0, 1.0)), (3, "translation", elsewhere(0.5, 0.25))]);
+    b
+}
+
+#[test]
+fn feet_stay_on_legs_that_clips_move_apart_from_them() {
+    let model = read(&robot().glb());
+    // Longer legs: the floor is at 0, where the foot's cube ends, and the hips at 1.
+    let taller = |p: Vec3| vec3(p.x, if p.y < 1.0 { 1.35 * p.y } else { p.y + 0.35 }, p.z);
+    let bytes = moved_by(&model, Joints::Follow, taller);
+    let [before, after] = [player(&model), player(&read(&bytes))];
+    for (clip, seconds) in [(0, 0.0), (0, 0.5), (0, 1.0), (1, 0.0)] {
+        let [old, new] = [&before, &after].map(|player| player.at(Some(clip), seconds, &[]).origins);
+        assert!(old[2].distance(old[3]) <= ROUNDED);
+        let gap = new[2].distance(new[3]);
+        assert!(gap <= ROUNDED, "clip {clip} at {seconds} s: {gap} between shin and foot");
+        // Jumps and steps grow as the hips' height over the floor does.
+        let way = |origins: &[Vec3], start: Vec3| origins[1] - start;
+        let [old, new] = [way(&old, vec3(0.0, 1.0, 0.0)), way(&new, vec3(0.0, 1.35, 0.0))];
+        assert!(new.distance(1.35 * old) <= ROUNDED, "{new} instead of 1.35 times {old}");
+    }
+    let options = ReshapeOptions { keep_travel: true, ..ReshapeOptions::default() };
+    let by: Vec<DVec3> = by(&model);
+    let kept = player(&read(&model.write_reshaped(&by, &[], &[], &options).unwrap().0));
+    let way = |seconds| kept.at(Some(0), seconds, &[]).origins[1];
+    assert!((way(1.0) - way(0.0)).distance(vec3(0.0, 0.2, 0.4)) <= ROUNDED);
+}
