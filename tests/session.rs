@@ -145,7 +145,7 @@ fn green_coordinates_move_the_mesh_as_on_the_cpu() {
     let bounds = Bounds::of(&positions).expect("there are some");
     // Green coordinates are defined inside alone.
     let cage = cage(&subdivided_box(bounds, 0.1, [2, 1, 3]));
-    let green = green_weights(&positions, &cage).expect("all are inside");
+    let green = green_weights(&positions, &cage, u64::MAX, &Silent).expect("all are inside");
     let pose = posed(cage.positions());
     let expected = flat(&deform_vertices(&green, &green_controls(&cage, &pose)));
     for draws_only in [false, true] {

@@ -13,11 +13,11 @@ use crate::error::CliError;
 /// Most pixels of a texture that is decoded, 8192 x 8192: a damaged file may claim anything.
 const MAX_TEXTURE_PIXELS: u64 = 1 << 26;
 
-/// Most pixels of all textures together: half a gigabyte here, and more on the GPU.
-const MAX_PIXELS: u64 = 1 << 27;
+/// Most pixels of all textures together: a quarter of a gigabyte here, and a third on the GPU.
+const MAX_PIXELS: u64 = 1 << 26;
 
 /// Larger textures are drawn with fewer pixels: no picture shows more, pixels along a side.
-const DRAWN_SIDE: u32 = 4096;
+const DRAWN_SIDE: u32 = 2048;
 
 /// Opens a GPU.
 ///

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use cagework_core::mesh::weld;
 use cagework_core::{Bounds, Cage};
-use cagework_io::{Clip, Model, ModelFormat, read_inner_controls, shown};
+use cagework_io::{Clip, Model, ModelFormat, escaped, read_inner_controls, shown};
 use serde::Serialize;
 
 use crate::args::InfoArgs;
@@ -179,7 +179,7 @@ fn text(info: &Info) -> String {
         row("clip", format!("{name}, {} s, {} channels, {} keys", clip.seconds, clip.channels, clip.keys));
     }
     if !info.props.is_empty() {
-        row("on joints", shown(&info.props.join(", ")));
+        row("on joints", escaped(&info.props.join(", ")));
     }
     let [min, max] = [info.bounds.min, info.bounds.max];
     row("bounds", format!("{min:?} to {max:?}, diagonal {}", info.bounds.diagonal));

@@ -14,7 +14,7 @@ use glam::Vec3;
 
 use crate::args::{CageSource, ControlArgs, DEFAULT_MARGIN, MemoryArgs, ModelOutput};
 use crate::controls::load_controls;
-use crate::error::CliError;
+use crate::error::{CliError, shown_path};
 use crate::files::{read, read_beside};
 use crate::progress::Bar;
 
@@ -201,7 +201,7 @@ impl LoadedCage {
         Err(CliError::Mismatch {
             message: format!(
                 "{}: the cage's vertices would be in another order there",
-                output.path.display()
+                shown_path(&output.path)
             ),
             hint: "a pose keeps the order of the cage: write it as .obj or .ply",
         })

@@ -22,6 +22,7 @@ use crate::error::CliError;
 use crate::files::{check_outputs, json, print, write};
 use crate::gpu;
 use crate::load::{LoadedCage, load_cage, load_model};
+use crate::progress::Bar;
 
 /// What was done; its JSON is the output of `--json`.
 #[derive(Debug, Serialize)]
@@ -73,9 +74,11 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     if let (Some(cage), Some(compared)) = (&cage, args.compare) {
         let mut twin = pollster::block_on(session.twin())?;
         let n_controls = cage.controls().n_controls();
+        let limit = args.read.memory.bytes();
         match compared {
             Compared::MeanValue => {
-                let weights = mean_value_weights(&model.positions, &cage.cage)?.widened(n_controls);
+                let weights = mean_value_weights(&model.positions, &cage.cage, limit, &Bar::start())?
+                    .widened(n_controls);
                 pollster::block_on(twin.adopt(weights, Vec::new()))?;
             }
             Compared::Plain => {
@@ -85,7 +88,7 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
                 pollster::block_on(twin.adopt(weights.widened(n_controls), outside))?;
             }
             Compared::Green => {
-                let weights = green_weights(&model.positions, &cage.cage)?;
+                let weights = green_weights(&model.positions, &cage.cage, limit, &Bar::start())?;
                 pollster::block_on(twin.adopt_green(weights))?;
             }
         }

@@ -1,4 +1,4 @@
-//! Ctrl-C, SIGTERM and the file-size limit: work is cancelled, and no file is left half written.
+//! Ctrl-C, SIGTERM, SIGHUP and other ends, and the file-size limit: work is cancelled, and no file is left half written.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -29,23 +29,26 @@ impl Drop for Asking {
     }
 }
 
-/// Starts to listen: the first Ctrl-C or SIGTERM ends work in good order, if there is some that asks; any other ends
-/// the process through `abandon`, without the file that is being written.
+/// Starts to listen: the first Ctrl-C, SIGTERM or SIGHUP ends work in good order, if there is some that asks; any other of these
+/// signals, SIGQUIT, SIGXCPU or SIGUSR1 end the process through `abandon`, without the file that is being written.
 #[cfg(unix)]
 pub(crate) fn listen(abandon: fn(&mut dyn FnMut())) {
-    use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1, SIGXCPU, SIGXFSZ};
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
 
     // Without a handler a signal ends the program, which is what it is for.
-    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGXFSZ]) else { return };
+    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU, SIGUSR1, SIGXFSZ]) else {
+        return;
+    };
     std::thread::spawn(move || {
         for signal in signals.forever() {
             // That somebody listens is enough: the write ends with an error, and not the process.
             if signal == SIGXFSZ {
                 continue;
             }
-            let first = !CANCELLED.swap(true, Ordering::SeqCst);
+            let cancels = matches!(signal, SIGINT | SIGTERM | SIGHUP);
+            let first = cancels && !CANCELLED.swap(true, Ordering::SeqCst);
             if !first || ASKING.load(Ordering::SeqCst) == 0 {
                 abandon(&mut || drop(emulate_default_handler(signal)));
             }

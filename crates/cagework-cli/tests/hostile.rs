@@ -112,6 +112,39 @@ fn nodes(json: &mut Value, n: usize, is_chain: bool) {
     json["scenes"][0]["nodes"] = if is_chain { json!([0]) } else { (0..n).collect() };
 }
 
+/// An animation of `channels` channels that share one sampler of so many keys and values, all zeros.
+fn clip(json: &mut Value, [keys, values]: [Value; 2], interpolation: &str, channels: usize) {
+    json["accessors"].as_array_mut().unwrap().extend([
+        json!({ "componentType": 5126, "count": keys, "type": "SCALAR" }),
+        json!({ "componentType": 5126, "count": values, "type": "VEC3" }),
+    ]);
+    let channel = json!({ "sampler": 0, "target": { "node": 0, "path": "translation" } });
+    json["animations"] = json!([{ "name": "a", "channels": vec![channel; channels],
+        "samplers": [{ "input": 4, "output": 5, "interpolation": interpolation }] }]);
+}
+
+/// A corner of a star of `n` corners.
+fn star(i: usize, n: usize) -> [f64; 3] {
+    let (angle, radius) = (std::f64::consts::TAU * i as f64 / n as f64, 1.0 - 0.5 * (i % 2) as f64);
+    [radius * angle.cos(), radius * angle.sin(), 0.0]
+}
+
+const PLY_FACES: &[u8] =
+    b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+    element face 3000000\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n";
+
+/// A file whose only face has `n` corners at three places.
+fn ply_of_one_face(n: u32) -> Vec<u8> {
+    let mut bytes =
+        b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+        property float z\nelement face 1\nproperty list uint uint vertex_indices\nend_header\n"
+            .to_vec();
+    bytes.extend([0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(n.to_le_bytes());
+    bytes.extend((0..n).flat_map(|i| (i % 3).to_le_bytes()));
+    bytes
+}
+
 /// A PNG of one colour.
 fn png(width: u32, height: u32) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
@@ -182,6 +215,37 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
                 d["meshes"][0]["primitives"] = json!(vec![primitive; 1000]);
             }),
         ),
+        (
+            "morph_unused.glb",
+            glb(|d| {
+                d["meshes"][0]["primitives"][0] = json!({ "attributes": { "POSITION": 2 },
+                    "targets": vec![json!({ "POSITION": 2 }); 1000] });
+            }),
+        ),
+        (
+            "skin_zero.glb",
+            glb(|d| {
+                d["accessors"].as_array_mut().unwrap().extend([
+                    json!({ "componentType": 5121, "count": MANY, "type": "VEC4" }),
+                    json!({ "componentType": 5126, "count": MANY, "type": "VEC4" }),
+                ]);
+                d["meshes"][0]["primitives"][0] =
+                    json!({ "attributes": { "POSITION": 2, "JOINTS_0": 4, "WEIGHTS_0": 5 } });
+                d["nodes"] = json!([{ "mesh": 0, "skin": 0 }, {}]);
+                d["skins"] = json!([{ "joints": [1] }]);
+            }),
+        ),
+        ("clip_shared.glb", glb(|d| clip(d, [json!(1 << 20), json!(1 << 20)], "LINEAR", 1000))),
+        ("clip_short.glb", glb(|d| clip(d, [json!(3), json!(2)], "LINEAR", 1))),
+        ("clip_short_cubic.glb", glb(|d| clip(d, [json!(2), json!(4)], "CUBICSPLINE", 1))),
+        (
+            "target_names.glb",
+            glb(|d| {
+                nodes(d, 30_000, false);
+                d["meshes"][0]["primitives"][0]["targets"] = json!(vec![json!({}); 2000]);
+                d["meshes"][0]["extras"] = json!({ "targetNames": vec!["n"; 2000] });
+            }),
+        ),
         ("chain.glb", glb(|d| nodes(d, 2000, true))),
         ("nodes.glb", glb(|d| nodes(d, 300_000, false))),
         (
@@ -215,6 +279,10 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
         ("line.obj", obj(&format!("# {}\n", "x".repeat(10_000_000)))),
         ("token.obj", obj(&format!("v {} 0 0\n", "1".repeat(10_000_000)))),
         ("polygon_circle.obj", polygon(100_000, circle).into()),
+        ("polygon_star.obj", polygon(60_000, |i| star(i, 60_000)).into()),
+        ("numbers.obj", obj(&format!("v 0 0 0{}\nvn{}\n", " 1".repeat(3_000_000), " 1".repeat(3_000_000)))),
+        ("faces_empty.ply", [PLY_FACES, &b"0\n".repeat(3_000_000)].concat()),
+        ("face_large.ply", ply_of_one_face(2_000_000)),
         ("polygon_noise.obj", polygon(5000, |i| [noise(i), noise(i + 5000), noise(i + 10_000)]).into()),
         ("polygon_comb.obj", polygon(5000, |i| [i as f64, (i % 2) as f64, 0.0]).into()),
         ("all_meet.obj", triangles_that_all_meet(2000).into()),

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
+use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
 use crate::weights::Weights;
 
 /// Why there are no coordinates by formula.
@@ -24,6 +25,21 @@ pub enum ClosedFormError {
         /// The point.
         vertex: u32,
     },
+    /// More memory than is allowed.
+    #[error(
+        "the coordinates need about {} MiB of memory, more than the limit of {} MiB: use a smaller model or raise the limit",
+        needed.div_ceil(1 << 20),
+        limit.div_ceil(1 << 20)
+    )]
+    Memory {
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
+    /// The work was cancelled.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// There would be more weights than row pointers can count.
     #[error("{rows} vertices times {columns} controls are more than {} weights: use fewer", u32::MAX)]
     TooMany {
@@ -34,11 +50,16 @@ pub enum ClosedFormError {
     },
 }
 
-/// Rows that have all columns. `coordinates` of a point go into a row of zeros, `[columns]`; whether they are defined there.
+/// Rows between two reports of progress.
+const RUN: usize = 1 << 10;
+
+/// Rows that have all columns, within `memory_limit` bytes. `coordinates` of a point go into a row of zeros, `[columns]`; whether they are defined there.
 pub(crate) fn dense(
     kind: &'static str,
     points: &[Vec3],
     columns: usize,
+    memory_limit: u64,
+    progress: &dyn Progress,
     coordinates: impl Fn(DVec3, &mut [f64]) -> bool + Sync,
 ) -> Result<Weights, ClosedFormError> {
     let rows = points.len();
@@ -48,14 +69,26 @@ pub(crate) fn dense(
     if rows.checked_mul(columns).is_none_or(|n| u32::try_from(n).is_err()) {
         return Err(ClosedFormError::TooMany { rows, columns });
     }
-    let found = crate::team::map_indices(rows, |v| {
-        let mut row = vec![0.0; columns];
-        let defined = coordinates(points[v].as_dvec3(), &mut row);
-        defined.then(|| row.into_iter().map(|w| w as f32).collect::<Vec<f32>>())
-    });
+    // A value and a column for each weight.
+    let needed = 8 * (rows * columns) as u64;
+    if needed > memory_limit {
+        return Err(ClosedFormError::Memory { needed, limit: memory_limit });
+    }
     let mut data = Vec::with_capacity(rows * columns);
-    for (v, row) in found.into_iter().enumerate() {
-        data.extend(row.ok_or(ClosedFormError::Undefined { kind, vertex: v as u32 })?);
+    for (run, of_run) in points.chunks(RUN).enumerate() {
+        let fraction = (run * RUN) as f32 / rows as f32;
+        let event = ProgressEvent { stage: Stage::Sample, fraction, iteration: 0, delta: None };
+        if progress.report(event).is_break() {
+            return Err(Cancelled.into());
+        }
+        let found = crate::team::map_indices(of_run.len(), |v| {
+            let mut row = vec![0.0; columns];
+            let defined = coordinates(of_run[v].as_dvec3(), &mut row);
+            defined.then(|| row.into_iter().map(|w| w as f32).collect::<Vec<f32>>())
+        });
+        for (v, row) in (run * RUN..).zip(found) {
+            data.extend(row.ok_or(ClosedFormError::Undefined { kind, vertex: v as u32 })?);
+        }
     }
     let indptr = (0..=rows).map(|v| (v * columns) as u32).collect();
     let indices = (0..rows).flat_map(|_| 0..columns as u32).collect();

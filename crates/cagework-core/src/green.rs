@@ -12,6 +12,7 @@ use glam::{DVec3, Vec3};
 
 use crate::cage::Cage;
 use crate::closed_form::{ClosedFormError, dense};
+use crate::progress::Progress;
 use crate::weights::Weights;
 
 /// Sine, or fraction of the cage's diagonal, below which directions count as in one plane: the root of the rounding of f64.
@@ -23,10 +24,16 @@ const LEAST_SUM: f64 = 0.99;
 /// Green coordinates at `points` (`[n_vertices]`, object units, inside the cage). Dense. `[n_vertices, n_cage + n_triangles]`
 ///
 /// # Errors
-/// [`ClosedFormError`]: a point is not finite or not inside, or there are too many weights.
-pub fn green_weights(points: &[Vec3], cage: &Cage) -> Result<Weights, ClosedFormError> {
+/// [`ClosedFormError`]: a point is not finite or not inside, the weights take more than `memory_limit` bytes, or `progress`
+/// cancelled.
+pub fn green_weights(
+    points: &[Vec3],
+    cage: &Cage,
+    memory_limit: u64,
+    progress: &dyn Progress,
+) -> Result<Weights, ClosedFormError> {
     let columns = cage.n_vertices() + cage.triangles().len();
-    dense("Green", points, columns, |point, row| coordinates(point, cage, row))
+    dense("Green", points, columns, memory_limit, progress, |point, row| coordinates(point, cage, row))
 }
 
 /// What the columns of [`green_weights`] are for a posed cage: its vertices, then `s n` of its triangles (the paper's section 3.1).
@@ -115,6 +122,8 @@ mod tests {
     use glam::DQuat;
     use proptest::prelude::*;
 
+    use crate::progress::Silent;
+
     use super::*;
     use crate::cage::shapes;
 
@@ -179,12 +188,18 @@ mod tests {
     fn point_outside_or_not_finite_is_named() {
         let cage = Cage::new(&shapes::cube()).unwrap();
         let inside = cage.bounds().center();
-        let outside = green_weights(&[inside, inside + 9.0], &cage).unwrap_err();
+        let outside = green_weights(&[inside, inside + 9.0], &cage, u64::MAX, &Silent).unwrap_err();
         assert_eq!(
             outside.to_string(),
             "Green coordinates are not defined at mesh vertex 1, outside of the cage: enlarge the cage"
         );
-        let not_finite = green_weights(&[Vec3::NAN], &cage).unwrap_err();
+        let memory = green_weights(&[inside; 100], &cage, 100 * 20 * 8 - 1, &Silent).unwrap_err();
+        // A cube has 8 vertices and 12 triangles.
+        assert_eq!(memory, ClosedFormError::Memory { needed: 16_000, limit: 15_999 });
+        let cancel = |_: crate::progress::ProgressEvent| std::ops::ControlFlow::Break(());
+        let cancelled = green_weights(&[inside], &cage, u64::MAX, &cancel).unwrap_err();
+        assert!(matches!(cancelled, ClosedFormError::Cancelled(_)));
+        let not_finite = green_weights(&[Vec3::NAN], &cage, u64::MAX, &Silent).unwrap_err();
         assert_eq!(not_finite, ClosedFormError::NotFinite { vertex: 0 });
     }
 

@@ -13,6 +13,7 @@ use glam::{DVec3, Vec3};
 
 use crate::cage::Cage;
 use crate::closed_form::{ClosedFormError, dense};
+use crate::progress::Progress;
 use crate::weights::Weights;
 
 /// Sine below which directions count as in one plane or along one line, and fraction of the cage's diagonal below
@@ -28,9 +29,17 @@ const ALL_AROUND: f64 = 1e-7;
 /// cage). Dense: every row has all columns. `[n_vertices, n_cage]`
 ///
 /// # Errors
-/// [`ClosedFormError`]: a point is not finite, has no coordinates, or there are too many weights.
-pub fn mean_value_weights(points: &[Vec3], cage: &Cage) -> Result<Weights, ClosedFormError> {
-    dense("mean value", points, cage.n_vertices(), |point, row| coordinates(point, cage, row))
+/// [`ClosedFormError`]: a point is not finite or has no coordinates, the weights take more than `memory_limit` bytes, or
+/// `progress` cancelled.
+pub fn mean_value_weights(
+    points: &[Vec3],
+    cage: &Cage,
+    memory_limit: u64,
+    progress: &dyn Progress,
+) -> Result<Weights, ClosedFormError> {
+    dense("mean value", points, cage.n_vertices(), memory_limit, progress, |point, row| {
+        coordinates(point, cage, row)
+    })
 }
 
 /// Mean value coordinates at one point; `row` must be zero. `[n_cage]`. Whether they are defined there.
@@ -81,6 +90,8 @@ fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
 mod tests {
     use proptest::prelude::*;
 
+    use crate::progress::Silent;
+
     use super::*;
     use crate::cage::shapes;
 
@@ -129,7 +140,7 @@ mod tests {
     #[test]
     fn vertex_has_weight_one_at_itself() {
         let cage = Cage::new(&shapes::c_shape()).unwrap();
-        let weights = mean_value_weights(cage.positions(), &cage).unwrap();
+        let weights = mean_value_weights(cage.positions(), &cage, u64::MAX, &Silent).unwrap();
         for (v, (columns, row)) in weights.rows().enumerate() {
             assert_eq!(columns, (0..16).collect::<Vec<u32>>());
             assert!(row.iter().enumerate().all(|(i, &w)| w == if i == v { 1.0 } else { 0.0 }));
@@ -148,7 +159,10 @@ mod tests {
     fn point_that_is_not_finite_is_named() {
         let cage = Cage::new(&shapes::cube()).unwrap();
         let points = [Vec3::ONE, Vec3::NAN];
-        assert_eq!(mean_value_weights(&points, &cage), Err(ClosedFormError::NotFinite { vertex: 1 }));
+        assert_eq!(
+            mean_value_weights(&points, &cage, u64::MAX, &Silent),
+            Err(ClosedFormError::NotFinite { vertex: 1 })
+        );
     }
 
     proptest! {

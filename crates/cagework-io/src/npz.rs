@@ -17,6 +17,7 @@ use thiserror::Error;
 use zip::result::ZipError;
 
 use crate::memory::MemoryError;
+use crate::shown::shown;
 use arrays::{Archive, NpzWriter, array, required};
 
 pub use part::{PartOf, read_part_npz, write_part_npz};
@@ -138,7 +139,7 @@ pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<SavedWeights,
     }
     let format = required(&mut zip, "format")?;
     if format.data != b"csr" {
-        let found = String::from_utf8_lossy(&format.data).into_owned();
+        let found = shown(&String::from_utf8_lossy(&format.data));
         return Err(
             format.fault(&format!("is '{found}', but only csr is read: convert it with matrix.tocsr()"))
         );

@@ -122,7 +122,9 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
     for element in header.elements.values() {
         // An element takes a byte at least, if only that of its line's end. One without properties takes none in a binary
         // file, so that many kinds of them could keep the reader busy for ever: all together may be as many as the bytes.
-        claimed = claimed.saturating_add(element.count as u64);
+        // A face takes four: the number of its corners, and three corners.
+        let least = if element.name == "face" { 4 } else { 1 };
+        claimed = claimed.saturating_add(least * element.count as u64);
         if claimed > n_bytes {
             let name = shown_start(&element.name, MAX_NAME_CHARS);
             return Err(PolygonsError::Count { name, count: element.count as u64, bytes: n_bytes });

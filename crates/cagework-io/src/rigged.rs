@@ -9,8 +9,9 @@ use crate::gltf::{self, Clip, JointPoint, Named, Played, Player, ReshapeOptions,
 use crate::model::{Document, Model};
 use crate::shown::shown;
 
-/// Frames of a clip that a cage is made around.
+/// Most frames of a clip that a cage is made around, and most vertices of all of them: fewer frames of a large model.
 const FRAMES: usize = 32;
+const MOST_FRAME_VERTICES: usize = 1 << 24;
 
 /// Frames of a clip that are baked: for each second, and at most; engines struggle with more morph targets.
 const BAKED_PER_SECOND: f32 = 30.0;
@@ -176,24 +177,19 @@ impl Model {
     /// [`NoClip`]; the rig's own faults only leave it at the rest shape.
     pub fn states(&self, clip: Option<&str>) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), NoClip> {
         let (mut positions, mut triangles) = (self.positions.clone(), self.triangles.clone());
-        let player = self.player().ok().flatten().filter(|_| self.is_rigged() || clip.is_some());
-        let Some(player) = player else {
-            clip.map_or(Ok(0), |asked| Clip::named(&[], asked))?;
-            return Ok((positions, triangles));
-        };
-        let (_, defaults) = player.targets();
-        let ends =
-            |k: usize| [0.0, 1.0].into_iter().filter(move |&end| end != defaults[k]).map(move |end| (k, end));
-        for (k, end) in (0..defaults.len()).flat_map(ends) {
-            let mut targets = defaults.to_vec();
-            targets[k] = end;
-            let at = self.shown_at(&player, None, 0.0, &targets);
-            let moved = at.iter().zip(&self.positions).filter(|(p, rest)| p.is_finite() && p != rest);
-            positions.extend(moved.map(|(p, _)| *p));
+        if let Ok(Some(rig)) = self.rig() {
+            let ends: Vec<Vec3> =
+                rig.shown_ends().map(|end| end.as_vec3()).filter(|end| end.is_finite()).collect();
+            positions.extend_from_slice(&self.up.turned(&ends));
         }
         let Some(asked) = clip else { return Ok((positions, triangles)) };
+        let Some(player) = self.player().ok().flatten() else {
+            Clip::named(&[], asked)?;
+            return Ok((positions, triangles));
+        };
         let number = Clip::named(player.clips(), asked)?;
-        for at in self.frames_of(&player, number, FRAMES) {
+        let n = (MOST_FRAME_VERTICES / self.positions.len().max(1)).clamp(2, FRAMES);
+        for at in self.frames_of(&player, number, n) {
             if at.iter().all(|p| p.is_finite()) {
                 let first = positions.len() as u32;
                 triangles.extend(self.triangles.iter().map(|t| t.map(|v| first + v)));

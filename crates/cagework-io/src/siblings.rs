@@ -1,6 +1,6 @@
 //! The files that a model names.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use thiserror::Error;
@@ -38,11 +38,11 @@ pub(crate) enum Absent {
 /// The files that one model names, each asked for once and shared by all that name it.
 pub(crate) struct Siblings<'a> {
     resolve: &'a mut Resolve<'a>,
-    files: HashMap<String, Result<Arc<Vec<u8>>, Absent>>,
+    files: BTreeMap<String, Result<Arc<Vec<u8>>, Absent>>,
     images: HashMap<String, Option<Image>>,
-    /// Bytes of them.
+    /// Bytes that were read, of the same file under several names each time.
     bytes: u64,
-    /// Most bytes of them.
+    /// Most of them.
     limit: u64,
 }
 
@@ -64,7 +64,7 @@ impl<'a> Siblings<'a> {
     /// Files that `resolve` fetches, as far as they fit into `memory_limit` bytes.
     pub(crate) fn new(resolve: &'a mut Resolve<'_>, memory_limit: u64) -> Self {
         let limit = memory_limit.min(MAX_BYTES);
-        Self { resolve, files: HashMap::new(), images: HashMap::new(), bytes: 0, limit }
+        Self { resolve, files: BTreeMap::new(), images: HashMap::new(), bytes: 0, limit }
     }
 
     /// Bytes of all files that were read.
@@ -72,11 +72,18 @@ impl<'a> Siblings<'a> {
         self.bytes
     }
 
-    /// The file of this name.
+    /// The file of this name. Names that differ in `.` and doubled slashes alone are one; files with the same bytes are held once.
     ///
     /// # Errors
     /// Why there is none.
     pub(crate) fn file(&mut self, name: &str) -> Result<Arc<Vec<u8>>, Absent> {
+        let parts: Vec<&str> = name
+            .split('/')
+            .enumerate()
+            .filter(|(k, part)| *part != "." && (*k == 0 || !part.is_empty()))
+            .map(|(_, part)| part)
+            .collect();
+        let name = &*parts.join("/");
         if let Some(known) = self.files.get(name) {
             return known.clone();
         }
@@ -91,7 +98,8 @@ impl<'a> Siblings<'a> {
             }
             Some(Ok(bytes)) => {
                 self.bytes += bytes.len() as u64;
-                Ok(Arc::new(bytes))
+                let same = self.files.values().flatten().find(|known| ***known == bytes).cloned();
+                Ok(same.unwrap_or_else(|| Arc::new(bytes)))
             }
         };
         self.files.insert(name.to_owned(), found.clone());
@@ -110,5 +118,24 @@ impl<'a> Siblings<'a> {
         let image = image.ok();
         self.images.insert(name.to_owned(), image.clone());
         image
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spellings_of_a_name_are_one_file_and_equal_files_are_held_once() {
+        let mut asked = Vec::new();
+        let mut resolve = |name: &str| {
+            asked.push(name.to_owned());
+            Some(Ok(vec![7; 100]))
+        };
+        let mut siblings = Siblings::new(&mut resolve, 1 << 20);
+        let files = ["h.mtl", "./h.mtl", "././h.mtl", "a/../h.mtl", "a//b/./c.mtl", "a/b/c.mtl"]
+            .map(|name| siblings.file(name).expect("it is there"));
+        assert!(files.iter().all(|file| Arc::ptr_eq(file, &files[0])));
+        assert_eq!(asked, ["h.mtl", "a/../h.mtl", "a/b/c.mtl"]);
     }
 }

@@ -23,6 +23,7 @@ use crate::arrays::{flat, points, polygon_mesh};
 use crate::clock::Listener;
 use crate::controls::{CageControls, control_set, said};
 use crate::error::{Answer, ErrorName, Fault};
+use crate::loaded::READ_LIMIT;
 use crate::options::{BindAsked, CageAsked, Coordinates, taken};
 use crate::problems::{self, Check};
 use crate::views::object;
@@ -109,7 +110,7 @@ impl Binder {
                 );
             }
         };
-        let weights = by_formula(&points(positions), set.cage()).map_err(Fault::from)?;
+        let weights = by_formula(&points(positions), set.cage(), READ_LIMIT, &Silent).map_err(Fault::from)?;
         Ok(Bound { weights, outside: Vec::new(), report: JsValue::UNDEFINED })
     }
 

@@ -1,7 +1,7 @@
 //! Outputs: none destroys an input, a file that an input names, or another output.
 
-use std::fs;
-use std::io;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
 use std::time::SystemTime;
@@ -11,7 +11,7 @@ use cagework_core::progress::Cancelled;
 
 use super::whole::replace;
 use super::{READ, folder_of, reason};
-use crate::error::CliError;
+use crate::error::{CliError, shown_path};
 use crate::signals;
 
 /// Most symbolic links on the way to a file, as on Linux.
@@ -33,8 +33,8 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
             return Err(CliError::Mismatch {
                 message: format!(
                     "{}: cannot be written, there is no folder {}",
-                    output.display(),
-                    folder.display()
+                    shown_path(output),
+                    shown_path(folder)
                 ),
                 hint: "make the folder first",
             });
@@ -45,7 +45,7 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
         refuse_inputs(name, &inputs)?;
         if named[..i].iter().any(|other| other.is(name)) {
             return Err(CliError::Mismatch {
-                message: format!("{}: is named for two outputs", output.display()),
+                message: format!("{}: is named for two outputs", shown_path(output)),
                 hint: "choose different names",
             });
         }
@@ -75,7 +75,7 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     refuse_files_read(&[path])?;
     let written = place(path).and_then(|place| match place {
         Some(file) => replace(&file, bytes),
-        None => fs::write(path, bytes),
+        None => open_as_it_is(path).and_then(|mut file| file.write_all(bytes)),
     });
     written.map_err(|e| CliError::file(path, format!("cannot be written: {}", reason(&e))))
 }
@@ -83,7 +83,7 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
 fn refuse_inputs(output: &Named, inputs: &[Named]) -> Result<(), CliError> {
     if inputs.iter().any(|input| input.is(output)) {
         return Err(CliError::Mismatch {
-            message: format!("{}: is an input and would be overwritten", output.path.display()),
+            message: format!("{}: is an input and would be overwritten", shown_path(&output.path)),
             hint: "choose another name for the output",
         });
     }
@@ -93,25 +93,54 @@ fn refuse_inputs(output: &Named, inputs: &[Named]) -> Result<(), CliError> {
 /// A name of a file, and what the disk says of it: asked once, as thousands are compared with each other.
 pub(super) struct Named {
     path: PathBuf,
-    /// Its length and last change; none if it is not there.
+    /// Length and last change of a regular file; none if it is not there.
     state: Option<(u64, Option<SystemTime>)>,
-    /// None for what is no regular file: devices such as /dev/null may well be named twice.
+    /// None for devices, which may well be named twice, and for what is open already.
     place: Option<PathBuf>,
 }
 
 impl Named {
     pub(super) fn new(path: &Path) -> Self {
-        let state = fs::metadata(path).ok().map(|m| (m.len(), m.modified().ok()));
+        let state =
+            fs::metadata(path).ok().filter(fs::Metadata::is_file).map(|m| (m.len(), m.modified().ok()));
         Self { path: path.into(), state, place: place(path).ok().flatten() }
     }
 
     /// Whether two names mean one regular file; neither need exist.
     fn is(&self, other: &Self) -> bool {
-        let (Some(a), Some(b)) = (&self.place, &other.place) else { return false };
-        // Hard links have different names and are one file.
+        // Hard links and descriptors have other names than the file that they are.
         let may_be_linked = self.state.is_some() && self.state == other.state;
-        a == b || (may_be_linked && same_file::is_same_file(a, b).unwrap_or(false))
+        (self.place.is_some() && self.place == other.place)
+            || (may_be_linked && same_file::is_same_file(&self.path, &other.path).unwrap_or(false))
     }
+}
+
+/// A device or pipe, or the descriptor that a name such as `/dev/fd/3` stands for, at the place where it is: what is open
+/// already is neither truncated nor opened again.
+fn open_as_it_is(path: &Path) -> io::Result<File> {
+    #[cfg(target_os = "linux")]
+    if let Some(number) = descriptor(path) {
+        use rustix::process::{PidfdFlags, PidfdGetfdFlags, getpid, pidfd_getfd, pidfd_open};
+        let own = pidfd_open(getpid(), PidfdFlags::empty())?;
+        return Ok(pidfd_getfd(own, number, PidfdGetfdFlags::empty())?.into());
+    }
+    OpenOptions::new().append(true).open(path)
+}
+
+/// The number of this process's descriptor that a name leads to.
+#[cfg(target_os = "linux")]
+fn descriptor(path: &Path) -> Option<i32> {
+    let own = fs::canonicalize("/proc/self/fd").ok()?;
+    let mut place = path.to_path_buf();
+    for _ in 0..MAX_LINKS {
+        let folder = fs::canonicalize(folder_of(&place)).ok()?;
+        let name = place.file_name()?;
+        if folder == own {
+            return name.to_str()?.parse().ok();
+        }
+        place = folder.join(fs::read_link(folder.join(name)).ok()?);
+    }
+    None
 }
 
 /// The file that a name leads to through symbolic links, which need not exist. `None`: a device, a pipe or a file that

@@ -1,13 +1,18 @@
 //! Files appear whole or not at all: each is written beside its place, then renamed.
 
+use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use tempfile::Builder;
+use tempfile::{Builder, NamedTempFile};
 
 use super::folder_of;
+
+/// How the names of parts begin and end.
+const PREFIX: &str = ".cagework-";
+const SUFFIX: &str = ".part";
 
 /// The file that is being written beside its place. Locked while it comes and goes, so that a signal finds it.
 static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
@@ -23,13 +28,10 @@ pub(super) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
         Err(e) if e.kind() == ErrorKind::NotFound => None,
         Err(e) => return Err(e),
     };
+    sweep(folder_of(path));
     let mut file = {
         let mut unfinished = unfinished();
-        // Made as any new file is, not for the user alone as temporary files are.
-        let file = Builder::new()
-            .prefix(".cagework-")
-            .suffix(".part")
-            .make_in(folder_of(path), |path| File::create_new(path))?;
+        let file = create_part(folder_of(path))?;
         *unfinished = Some(file.path().to_path_buf());
         file
     };
@@ -44,6 +46,40 @@ pub(super) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let renamed = written.and_then(|()| Ok(file.persist(path).map(drop)?));
     *unfinished = None;
     renamed
+}
+
+/// A new part, locked until it is closed: [`sweep`] leaves it alone.
+fn create_part(folder: &Path) -> io::Result<NamedTempFile<File>> {
+    loop {
+        // Made as any new file is, not for the user alone as temporary files are.
+        let part =
+            Builder::new().prefix(PREFIX).suffix(SUFFIX).make_in(folder, |path| File::create_new(path))?;
+        // A sweep may have removed it before it was locked. Where there are no locks there are no sweeps.
+        if part.as_file().lock().is_err() || part.path().exists() {
+            return Ok(part);
+        }
+    }
+}
+
+/// Removes what killed processes left in a folder, once for each folder: parts that nobody holds a lock on.
+fn sweep(folder: &Path) {
+    static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    if !SWEPT.lock().unwrap_or_else(PoisonError::into_inner).insert(folder.to_path_buf()) {
+        return;
+    }
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let is_part = name.to_str().is_some_and(|name| name.starts_with(PREFIX) && name.ends_with(SUFFIX));
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        if is_part
+            && is_file
+            && let Ok(part) = OpenOptions::new().write(true).open(entry.path())
+            && part.try_lock().is_ok()
+        {
+            // What cannot be removed stays.
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Removes an unfinished file and does `end`, which is to end the process; nothing is renamed meanwhile.

@@ -3,11 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use cagework_core::pull::{Handle, Reach};
+use cagework_io::shown;
 use glam::Vec3;
 use serde::Deserialize;
 
 use crate::error::CliError;
 use crate::files::{read, shown_path};
+
+/// Largest file of a job, bytes: thousands of grabs.
+const MAX_JOB_BYTES: usize = 1 << 20;
 
 /// Most frames of a drag.
 const MAX_FRAMES: u32 = 10_000;
@@ -72,11 +76,20 @@ impl Job {
     /// # Errors
     /// When the file cannot be read, is no JSON, or asks for what there is not.
     pub(super) fn read(path: &Path) -> Result<Self, CliError> {
-        let said: Said = serde_json::from_slice(&read(path)?).map_err(|e| CliError::file(path, e))?;
+        let bytes = read(path)?;
         let wrong = |what: String| CliError::Mismatch {
             message: format!("{}: {what}", shown_path(path)),
             hint: "see `cagework pull --help` for an example of a job",
         };
+        if bytes.len() > MAX_JOB_BYTES {
+            return Err(wrong(format!(
+                "is {} kB long; a job has at most {} kB",
+                bytes.len() >> 10,
+                MAX_JOB_BYTES >> 10
+            )));
+        }
+        let said: Said = serde_json::from_slice(&bytes)
+            .map_err(|e| wrong(format!("is no job: {}", shown(&e.to_string()))))?;
         let handle = |list: &str, k: usize, said: &HandleSaid| match said {
             HandleSaid { vertex: Some(v), triangle: None, bary: None, cage: None, .. } => {
                 Ok(Handle::Vertex(*v))
@@ -94,7 +107,10 @@ impl Job {
             Some(ReachSaid::Of(share)) => Reach::Of(share),
             Some(ReachSaid::Word(word)) if word == "all" => Reach::Whole,
             Some(ReachSaid::Word(word)) => {
-                return Err(wrong(format!("the reach is {word:?}; it must be null, a number or \"all\"")));
+                return Err(wrong(format!(
+                    "the reach is '{}'; it must be null, a number or \"all\"",
+                    shown(&word)
+                )));
             }
         };
         if !(1..=MAX_FRAMES).contains(&said.frames) {

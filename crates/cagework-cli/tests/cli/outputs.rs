@@ -55,7 +55,9 @@ fn command_killed_while_it_writes_leaves_the_older_file_or_the_whole_new_one_and
                 break status;
             }
             if grown().is_some_and(|n| n >= enough) {
-                let signal = if moment % 2 == 0 { Signal::TERM } else { Signal::INT };
+                let signals =
+                    [Signal::TERM, Signal::INT, Signal::HUP, Signal::USR1, Signal::QUIT, Signal::XCPU];
+                let signal = signals[moment as usize % signals.len()];
                 kill_process(Pid::from_child(&child), signal).unwrap();
                 break child.wait().unwrap();
             }
@@ -134,6 +136,51 @@ fn devices_and_stdout_are_written_to_and_stay() {
         .unwrap();
     assert!(status.success());
     assert!(file.metadata().unwrap().len() > 0, "the report went to another file of that name");
+}
+
+/// A report to a descriptor opened the file again: it overwrote an input, and cut off what a log already had.
+#[test]
+fn descriptors_are_written_to_where_they_are_and_are_no_inputs() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    let run = |shell: &str| {
+        let mut sh = Command::new("sh");
+        sh.args(["-c", shell]).arg(cargo_bin!("cagework")).current_dir(sandbox.path("")).output().unwrap()
+    };
+    let bind = "\"$0\" bind mesh.obj --cage cage.obj -g 8 --weights w.npz";
+    let mesh = sandbox.read("mesh.obj");
+    symlink("/dev/fd/3", sandbox.path("link.json")).unwrap();
+    for report in ["/dev/fd/3", "/proc/self/fd/3", "link.json"] {
+        let output = run(&format!("{bind} --report {report} 3<>mesh.obj"));
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(said.contains("is an input and would be overwritten"), "{report}: {said}");
+        assert_eq!(sandbox.read("mesh.obj"), mesh, "{report}");
+    }
+    for (name, shell) in [
+        ("fd.log", format!("exec 3>fd.log; echo before >&3; {bind} --report /dev/fd/3; echo after >&3")),
+        (
+            "out.log",
+            format!("echo before >out.log; {bind} --report /dev/stdout >>out.log; echo after >>out.log"),
+        ),
+    ] {
+        assert!(run(&shell).status.success(), "{shell}");
+        let log = String::from_utf8(sandbox.read(name)).unwrap();
+        assert!(
+            log.starts_with("before\n") && log.ends_with("after\n") && log.contains("\"grid\": 8"),
+            "{log}"
+        );
+    }
+}
+
+/// What a killed command leaves is removed by the next one; what a running one writes is not.
+#[test]
+fn litter_of_killed_commands_is_removed() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    sandbox.write(".cagework-dead00.part", "half a file");
+    sandbox.write(".cagework-alive0.part", "half a file");
+    let alive = std::fs::File::open(sandbox.path(".cagework-alive0.part")).unwrap();
+    alive.lock().unwrap();
+    sandbox.run("cage mesh.obj --kind box -o out.obj").success();
+    assert_eq!(sandbox.names(), [".cagework-alive0.part", "cage.obj", "mesh.obj", "out.obj"]);
 }
 
 /// Only names were compared: a hard link was overwritten, and with it the input.

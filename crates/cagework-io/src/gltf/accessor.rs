@@ -14,6 +14,9 @@ use super::{GltfError, get};
 /// Most elements of one accessor, and most vertices of a model: with what is needed to read and weld them, a gigabyte.
 pub(crate) const MAX_ELEMENTS: u64 = 1 << 24;
 
+/// Most elements of an accessor that no byte of the file holds: zeros without a buffer view, besides its sparse values.
+const MAX_ABSENT: u64 = 1 << 20;
+
 /// What accessors are read from.
 #[derive(Clone, Copy)]
 pub(crate) struct Source<'a> {
@@ -95,9 +98,38 @@ impl<'a> Source<'a> {
         self.read(accessor, what, kind, 0, |bytes| unsigned(kind, bytes))
     }
 
-    /// Elements an accessor says it has.
+    /// Elements of an accessor.
+    ///
+    /// # Errors
+    /// There is no such accessor, or too many of its elements are zeros that the file does not hold.
     pub(crate) fn count(self, accessor: u32) -> Result<u64, GltfError> {
-        Ok(get(&self.root.accessors, accessor as usize, "accessor", || "a primitive".into())?.count.0)
+        let a = get(&self.root.accessors, accessor as usize, "accessor", || "a primitive".into())?;
+        let absent = match a.buffer_view {
+            Some(_) => 0,
+            None => a.count.0.saturating_sub(a.sparse.as_ref().map_or(0, |sparse| sparse.count.0)),
+        };
+        if absent > MAX_ABSENT {
+            return Err(fault(
+                accessor,
+                format!(
+                    "has {absent} elements that no byte of the file holds; at most {MAX_ABSENT} are read"
+                ),
+            ));
+        }
+        Ok(a.count.0)
+    }
+
+    /// At most how many elements of an accessor differ from zero; nothing is allocated.
+    pub(crate) fn count_nonzero(self, accessor: u32) -> Result<u64, GltfError> {
+        let a = get(&self.root.accessors, accessor as usize, "accessor", || "a primitive".into())?;
+        let sparse = a.sparse.as_ref().map_or(0, |sparse| sparse.count.0);
+        let (Some(view), Checked::Valid(kind)) = (a.buffer_view, &a.type_) else { return Ok(sparse) };
+        let (count, size) =
+            (self.count(accessor)?.min(MAX_ELEMENTS) as usize, self.component(accessor)?.kind.size());
+        let offset = a.byte_offset.map_or(0, |o| o.0);
+        let elements = self.elements(accessor, view.value(), offset, count, kind.multiplicity() * size)?;
+        let nonzero = (0..count).filter(|&i| elements.get(i).iter().any(|&b| b != 0)).count();
+        Ok(nonzero as u64 + sparse)
     }
 
     fn component(self, accessor: u32) -> Result<Component, GltfError> {
@@ -127,14 +159,11 @@ impl<'a> Source<'a> {
                 format!("is {found:?}, but {what} needs {:?}", type_of(N)).to_ascii_lowercase(),
             ));
         }
-        if a.count.0 > MAX_ELEMENTS {
-            return Err(GltfError::TooLarge {
-                what: "elements of an accessor",
-                count: a.count.0,
-                limit: MAX_ELEMENTS,
-            });
+        let count = self.count(accessor)?;
+        if count > MAX_ELEMENTS {
+            return Err(GltfError::TooLarge { what: "elements of an accessor", count, limit: MAX_ELEMENTS });
         }
-        let (count, size) = (a.count.0 as usize, kind.size());
+        let (count, size) = (count as usize, kind.size());
         let decode_element = |bytes: &[u8]| {
             let mut element = [zero; N];
             for (value, bytes) in element.iter_mut().zip(bytes.chunks_exact(size)) {

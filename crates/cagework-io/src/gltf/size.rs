@@ -1,11 +1,14 @@
-//! What a document becomes, counted before any of it is allocated.
+//! The cost of a document: bytes and work of reading, playing and reshaping it, added up before anything is decoded.
 //!
-//! Accessors without a buffer view are zeros that take no byte of the file, and a mesh may be shown by any number of
-//! nodes: neither counts nor products of them are believed before they were held against the limits.
+//! Counts in a file are not bounded by its bytes: accessors may overlap, be zeros without bytes, and a mesh may be shown by any
+//! number of nodes.
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use ::gltf::json::Index;
 use ::gltf::json::accessor::Accessor;
-use ::gltf::json::mesh::{Mode, Primitive};
+use ::gltf::json::mesh::{Mode, Primitive, Semantic};
+use ::gltf::json::validation::Checked;
 
 use super::accessor::MAX_ELEMENTS;
 use super::geometry::surface;
@@ -16,10 +19,11 @@ use crate::memory::MemoryError;
 /// Most triangles of a model.
 const MAX_TRIANGLES: u64 = 2 * MAX_ELEMENTS;
 
-/// Most primitives of all nodes: each is drawn on its own, and takes some kilobytes of a document that is written.
+/// Most primitives, and most morph targets, of all nodes: each takes some kilobytes of a document that is written.
 const MAX_PRIMITIVES: u64 = 1 << 17;
 
-/// Most values that are decoded: vertices times attributes and morph targets, and corners of triangles; a second or two.
+/// Most elements that are decoded: vertices times attributes and morph targets, corners of triangles, keys of clips. A second
+/// or two.
 const MAX_DECODED: u64 = 1 << 28;
 
 /// Bytes of a vertex and of a triangle in a model, and of a primitive of one node.
@@ -34,64 +38,127 @@ const VERTEX_READ_BYTES: u64 = 52;
 /// Bytes that a triangle takes besides: its indices as the file has them.
 const TRIANGLE_READ_BYTES: u64 = 12;
 
-/// What meshes become.
+/// Bytes of a vertex of a mesh with morph targets or a skin in a player and while it is reshaped; and what a skin adds: two
+/// matrices, and joints with weights.
+const RIGGED_BYTES: u64 = 100;
+const SKINNED_BYTES: u64 = 300;
+
+/// Bytes of a vertex that a morph target moves: in a player, and with both ends of the target while it is reshaped.
+const MOVED_BYTES: u64 = 96;
+
+/// Bytes of a joint of a skin: matrices.
+const JOINT_BYTES: u64 = 400;
+
+/// Bytes of a number of a clip: decoded, and as it is kept.
+const KEY_BYTES: u64 = 8;
+
+/// Counts of which the cost is made.
 #[derive(Clone, Copy, Debug, Default)]
 struct Size {
     primitives: u64,
     vertices: u64,
     triangles: u64,
+    targets: u64,
     decoded: u64,
 }
 
-/// Checks that a document can be read within `limit` bytes, `held` of which are in use, and that the attributes of each
-/// vertex are all there. Returns the bytes that the model will take, without those for reading and welding it.
+impl Size {
+    fn add(&mut self, times: u64, other: Self) {
+        let add = |sum: &mut u64, n: u64| *sum = sum.saturating_add(times.saturating_mul(n));
+        add(&mut self.primitives, other.primitives);
+        add(&mut self.vertices, other.vertices);
+        add(&mut self.triangles, other.triangles);
+        add(&mut self.targets, other.targets);
+        add(&mut self.decoded, other.decoded);
+    }
+}
+
+/// Checks that a document can be read, played and reshaped within `limit` bytes, `held` of which are in use, and that the
+/// attributes of each vertex are all there. Returns the bytes of the model alone.
 ///
 /// # Errors
-/// [`GltfError::Memory`], [`GltfError::TooLarge`], [`GltfError::Count`].
+/// [`GltfError::Memory`], [`GltfError::TooLarge`], [`GltfError::Count`], [`GltfError::Accessor`].
 pub(super) fn check(document: &GltfDocument, held: u64, limit: u64) -> Result<u64, GltfError> {
-    let mut whole = Size::default();
-    for shown in document.instances.chunk_by(|a, b| a.mesh == b.mesh) {
-        let one = of_mesh(document, shown[0].mesh)?;
-        let times = shown.len() as u64;
-        whole.primitives = whole.primitives.saturating_add(times.saturating_mul(one.primitives));
-        whole.vertices = whole.vertices.saturating_add(times.saturating_mul(one.vertices));
-        whole.triangles = whole.triangles.saturating_add(times.saturating_mul(one.triangles));
-        let morphs = morphs_of(document, shown).saturating_mul(one.vertices);
-        whole.decoded =
-            whole.decoded.saturating_add(times.saturating_mul(one.decoded)).saturating_add(morphs);
+    let (mut model, mut unseen) = (Size::default(), Size::default());
+    for shown in by_mesh(&document.instances) {
+        model.add(shown.len() as u64, of_mesh(document, shown[0].mesh)?);
     }
+    for hidden in by_mesh(&document.elsewhere) {
+        // A fault in what no scene shows does not refuse the file.
+        unseen.add(hidden.len() as u64, of_mesh(document, hidden[0].mesh).unwrap_or_default());
+    }
+    let keys = keys_of(document);
+    let decoded = model.decoded.saturating_add(unseen.decoded).saturating_add(keys);
     for (what, count, limit) in [
-        ("vertices", whole.vertices, MAX_ELEMENTS),
-        ("triangles", whole.triangles, MAX_TRIANGLES),
-        ("primitives of all nodes", whole.primitives, MAX_PRIMITIVES),
-        ("values of attributes and morph targets", whole.decoded, MAX_DECODED),
+        ("vertices", model.vertices, MAX_ELEMENTS),
+        ("triangles", model.triangles, MAX_TRIANGLES),
+        ("primitives of all nodes", model.primitives, MAX_PRIMITIVES),
+        ("morph targets of all nodes", model.targets.saturating_add(unseen.targets), MAX_PRIMITIVES),
+        ("values of attributes, morph targets and clips", decoded, MAX_DECODED),
     ] {
         if count > limit {
             return Err(GltfError::TooLarge { what, count, limit });
         }
     }
-    let model =
-        VERTEX_BYTES * whole.vertices + TRIANGLE_BYTES * whole.triangles + PRIMITIVE_BYTES * whole.primitives;
-    let reading = VERTEX_READ_BYTES * whole.vertices + TRIANGLE_READ_BYTES * whole.triangles;
-    MemoryError::check(held + model + reading, limit)?;
-    Ok(model)
+    let bytes =
+        VERTEX_BYTES * model.vertices + TRIANGLE_BYTES * model.triangles + PRIMITIVE_BYTES * model.primitives;
+    let reading = VERTEX_READ_BYTES * model.vertices + TRIANGLE_READ_BYTES * model.triangles;
+    let joints: u64 = document.root.skins.iter().map(|skin| skin.joints.len() as u64).sum();
+    let rig = rig_bytes(document) + JOINT_BYTES * joints + KEY_BYTES * keys;
+    MemoryError::check(held + bytes + reading + rig, limit)?;
+    Ok(bytes)
 }
 
-/// Morph targets that are added to a mesh, over all nodes that show it.
-fn morphs_of(document: &GltfDocument, shown: &[Instance]) -> u64 {
-    let active = |weights: &Option<Vec<f32>>| weights.iter().flatten().filter(|w| **w != 0.0).count() as u64;
-    let own = active(&document.root.meshes[shown[0].mesh as usize].weights);
-    let of_node = |instance: &Instance| {
-        let node = &document.root.nodes[instance.node? as usize];
-        node.weights.is_some().then(|| active(&node.weights))
+fn by_mesh(instances: &[Instance]) -> impl Iterator<Item = &[Instance]> {
+    instances.chunk_by(|a, b| a.mesh == b.mesh)
+}
+
+/// Bytes of skins and morph targets; what is decoded was checked. Vertices that cannot be read count as if they could.
+fn rig_bytes(document: &GltfDocument) -> u64 {
+    let mut moved: BTreeMap<u32, u64> = BTreeMap::new();
+    let mut moved_by = |accessor: u32| {
+        *moved.entry(accessor).or_insert_with(|| document.source().count_nonzero(accessor).unwrap_or(0))
     };
-    shown.iter().map(|instance| of_node(instance).unwrap_or(own)).sum()
+    let mut bytes = 0;
+    for shown in [&document.instances, &document.elsewhere].into_iter().flat_map(|all| by_mesh(all)) {
+        let n_skinned = shown.iter().filter(|instance| instance.skin.is_some()).count() as u64;
+        for primitive in &document.root.meshes[shown[0].mesh as usize].primitives {
+            let Some(position) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)) else {
+                continue;
+            };
+            let vertices = document.source().count(position.value() as u32).unwrap_or(0);
+            let targets = || primitive.targets.iter().flatten();
+            let moved: u64 = targets().filter_map(|t| t.positions).map(|a| moved_by(a.value() as u32)).sum();
+            let rigged = if targets().next().is_some() { shown.len() as u64 } else { n_skinned };
+            bytes += vertices * (RIGGED_BYTES * rigged + SKINNED_BYTES * n_skinned)
+                + MOVED_BYTES * moved * shown.len() as u64;
+        }
+    }
+    bytes
+}
+
+/// Numbers of the accessors that clips are made of, each once.
+fn keys_of(document: &GltfDocument) -> u64 {
+    let animations = document.json["animations"].as_array().into_iter().flatten();
+    let samplers = animations.flat_map(|animation| animation["samplers"].as_array().into_iter().flatten());
+    let accessors: BTreeSet<u64> =
+        samplers.flat_map(|s| ["input", "output"].map(|key| s[key].as_u64())).flatten().collect();
+    let numbers = |accessor: &u64| {
+        let width = match &document.root.accessors.get(*accessor as usize)?.type_ {
+            Checked::Valid(kind) => kind.multiplicity() as u64,
+            Checked::Invalid => return None,
+        };
+        Some(document.source().count(*accessor as u32).ok()?.saturating_mul(width))
+    };
+    accessors.iter().filter_map(numbers).fold(0, u64::saturating_add)
 }
 
 fn of_mesh(document: &GltfDocument, mesh: u32) -> Result<Size, GltfError> {
     let mut size = Size::default();
     for primitive in &document.root.meshes[mesh as usize].primitives {
         size.primitives += 1;
+        let n_targets = primitive.targets.as_ref().map_or(0, Vec::len) as u64;
+        size.targets = size.targets.max(n_targets);
         let Some((position, mode)) = surface(primitive) else { continue };
         let vertices = document.source().count(position)?;
         let attributes = check_counts(document, primitive, vertices)?;
@@ -102,7 +169,7 @@ fn of_mesh(document: &GltfDocument, mesh: u32) -> Result<Size, GltfError> {
         let triangles = if mode == Mode::Triangles { corners / 3 } else { corners };
         size.vertices = size.vertices.saturating_add(vertices);
         size.triangles = size.triangles.saturating_add(triangles);
-        let decoded = attributes.saturating_mul(vertices).saturating_add(corners);
+        let decoded = (attributes + n_targets).saturating_mul(vertices).saturating_add(corners);
         size.decoded = size.decoded.saturating_add(decoded);
     }
     Ok(size)

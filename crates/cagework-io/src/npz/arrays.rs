@@ -13,6 +13,7 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use super::NpzError;
 use crate::memory::MemoryError;
+use crate::shown::shown;
 
 /// Most bytes of an array's header: NumPy's have a hundred or two.
 const MAX_HEADER: u64 = 1 << 16;
@@ -152,7 +153,9 @@ pub(super) fn array(archive: &mut Archive<'_>, name: &'static str) -> Result<Opt
     // Other types are refused by whoever wants their values.
     let width = dtype.get(2..).and_then(|width| width.parse().ok()).unwrap_or(8);
     let needed = shape.iter().try_fold(width, |n: u64, &length| n.checked_mul(length as u64));
-    let needed = needed.ok_or_else(|| fault(format!("is of shape {shape:?}, which no memory holds")))?;
+    let needed = needed.ok_or_else(|| {
+        fault(format!("is of shape {}, which no memory holds", shown(&format!("{shape:?}"))))
+    })?;
     archive.unpacked = archive.unpacked.saturating_add(2 * needed.min(u64::MAX / 2));
     MemoryError::check(archive.unpacked, archive.memory_limit)?;
     let mut data = Vec::new();
@@ -231,7 +234,8 @@ impl NpyArray {
             "<i8" => self.chunks()?.map(|b| u32::try_from(i64::from_le_bytes(b)).map_err(range)).collect(),
             "<u8" => self.chunks()?.map(|b| u32::try_from(u64::from_le_bytes(b)).map_err(range)).collect(),
             other => {
-                Err(self.fault(&format!("is of type {other}; it must be int32 or int64, little-endian")))
+                Err(self
+                    .fault(&format!("is of type {}; it must be int32 or int64, little-endian", shown(other))))
             }
         }
     }
@@ -240,9 +244,10 @@ impl NpyArray {
         match self.dtype.as_str() {
             "<f4" => Ok(self.chunks()?.map(f32::from_le_bytes).collect()),
             "<f8" => Ok(self.chunks()?.map(|b| f64::from_le_bytes(b) as f32).collect()),
-            other => {
-                Err(self.fault(&format!("is of type {other}; it must be float32 or float64, little-endian")))
-            }
+            other => Err(self.fault(&format!(
+                "is of type {}; it must be float32 or float64, little-endian",
+                shown(other)
+            ))),
         }
     }
 }

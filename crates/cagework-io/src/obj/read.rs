@@ -77,8 +77,8 @@ impl ObjDocument {
         surfaces
     }
 
-    /// Cuts all faces into triangles.
-    pub(crate) fn triangulate(&mut self, positions: &[Vec3]) {
+    /// Cuts all faces into triangles. Returns how many concave faces became a fan, because all together have too many corners.
+    pub(crate) fn triangulate(&mut self, positions: &[Vec3]) -> usize {
         let mut triangulator = Triangulator::new();
         let mut polygon = Vec::new();
         for face in self.face_starts.windows(2) {
@@ -87,6 +87,7 @@ impl ObjDocument {
             polygon.extend(corners.iter().map(|c| positions[c.v as usize]));
             triangulator.triangulate(&polygon, face[0], &mut self.triangles);
         }
+        triangulator.fans
     }
 
     /// Triangles (of corners) of each material, in order of first use.
@@ -199,7 +200,7 @@ impl<'a> Reader<'a> {
                         ObjError::Coordinate { line: line.number, axis, found }
                     })?;
                 }
-                let after: Vec<f32> = words.map_while(|t| number(&bytes[t])).collect();
+                let after: Vec<f32> = words.map_while(|t| number(&bytes[t])).take(4).collect();
                 // Four numbers are a weight, six a colour.
                 if let [r, g, b] = after[..] {
                     self.document.colors.insert(self.positions.len() as u32, [r, g, b]);
@@ -215,7 +216,7 @@ impl<'a> Reader<'a> {
                 self.document.texcoords.push([u.unwrap_or(0.0), v.unwrap_or(0.0)]);
             }
             b"vn" => {
-                let n: Vec<f32> = words.map_while(|t| number(&bytes[t])).collect();
+                let n: Vec<f32> = words.map_while(|t| number(&bytes[t])).take(3).collect();
                 self.bad_attributes += usize::from(n.len() < 3);
                 let n = if n.len() < 3 { Vec3::ZERO } else { Vec3::from_slice(&n) };
                 self.document.normals.push(n.as_dvec3().normalize_or_zero().as_vec3());
@@ -365,7 +366,7 @@ impl<'a> Reader<'a> {
                 }
             }
         }
-        self.document.triangulate(&self.positions);
+        let fans = self.document.triangulate(&self.positions);
         if !self.has_smoothing {
             self.document.face_smoothing.clear();
         }
@@ -376,6 +377,11 @@ impl<'a> Reader<'a> {
             }
         };
         notice(dangling, "face corners name texture coordinates or normals that do not exist: ignored");
+        notice(
+            fans,
+            "concave faces have too many corners to be cut along their border: each is a fan of triangles around its first \
+             corner; cut them into smaller faces first",
+        );
         notice(self.bad_attributes, "'vt' or 'vn' lines are not numbers: read as zero");
         notice(
             self.ignored,

@@ -3,9 +3,9 @@
 use earcut::Earcut;
 use glam::{DVec3, Vec3};
 
-/// Most squares of the corners of all polygons that ears are clipped from: a star of 65,536 corners takes 2 s, growing
-/// with the square.
-const MAX_CLIPPED: u64 = 1 << 32;
+/// Most squares of the corners of all polygons that ears are clipped from: at worst the time grows with the square, and is 5 s
+/// for 60,000 corners.
+const MAX_CLIPPED: u64 = 1 << 28;
 
 /// Scratch memory for many polygons.
 pub(crate) struct Triangulator {
@@ -14,11 +14,13 @@ pub(crate) struct Triangulator {
     corners: Vec<u32>,
     /// Of [`MAX_CLIPPED`].
     left: u64,
+    /// Concave polygons that were cut into a fan because [`MAX_CLIPPED`] was reached.
+    pub(crate) fans: usize,
 }
 
 impl Triangulator {
     pub(crate) fn new() -> Self {
-        Self { earcut: Earcut::new(), flat: Vec::new(), corners: Vec::new(), left: MAX_CLIPPED }
+        Self { earcut: Earcut::new(), flat: Vec::new(), corners: Vec::new(), left: MAX_CLIPPED, fans: 0 }
     }
 
     /// Appends the triangles of `polygon` (its corners' positions, in order) as `base` + corner numbers.
@@ -47,6 +49,7 @@ impl Triangulator {
     /// Whether there is time for another polygon of `n` corners.
     fn may_clip(&mut self, n: u64) -> bool {
         let left = self.left.checked_sub(n * n);
+        self.fans += usize::from(left.is_none());
         self.left = left.unwrap_or(self.left);
         left.is_some()
     }

@@ -178,3 +178,21 @@ fn many_clips_take_time_by_their_number() {
     assert_eq!(report.tracks, 2 * 6001);
     assert_eq!(read(&bytes).clips().len(), 6001);
 }
+
+/// A width that is taken from the number of values had room for two of a translation's three.
+#[test]
+fn channels_with_too_few_values_for_their_keys_are_left_out() {
+    let mut rig = rigged();
+    let whole = player(&read(&rig.glb())).clips()[0].channels;
+    let output = rig.json["animations"][0]["samplers"][0]["output"].as_u64().unwrap() as usize;
+    let count = rig.json["accessors"][output]["count"].as_u64().unwrap();
+    for interpolation in ["LINEAR", "CUBICSPLINE"] {
+        rig.json["animations"][0]["samplers"][0]["interpolation"] = interpolation.into();
+        rig.json["accessors"][output]["count"] = (2 * count / 3).into();
+        let model = read(&rig.glb());
+        let player = player(&model);
+        assert_eq!(player.clips()[0].channels, whole - 1, "{interpolation}");
+        assert_eq!(player.at(Some(0), 0.5, &[]).palette.len(), player.at(None, 0.0, &[]).palette.len());
+        assert!(model.states(Some(&player.clips()[0].label(0))).is_ok());
+    }
+}

@@ -1,10 +1,13 @@
 //! Animation clips: values of nodes at a time.
 
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use glam::{DQuat, DVec3};
 use serde_json::Value;
 
 use super::tracks::{Driven, driven};
-use crate::gltf::GltfDocument;
+use crate::gltf::{GltfDocument, GltfError};
 
 /// An animation of a document.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
@@ -24,9 +27,9 @@ pub struct Clip {
 /// One channel.
 #[derive(Clone, Debug, PartialEq)]
 struct Track {
-    times: Vec<f32>,
+    times: Numbers,
     /// `[n_keys, width]`, or `[n_keys, 3, width]` with tangents.
-    values: Vec<f32>,
+    values: Numbers,
     width: usize,
     interpolation: Interpolation,
 }
@@ -38,8 +41,15 @@ enum Interpolation {
     Cubic,
 }
 
+/// The numbers of an accessor, shared by all tracks that use it.
+type Numbers = Arc<[f32]>;
+
+/// Accessors that were decoded, with the width of an element; `None` if that failed.
+type Decoded = HashMap<(u32, usize), Option<Numbers>>;
+
 /// The clips of a document; channels that cannot be read are left out.
 pub(crate) fn clips(document: &GltfDocument) -> Vec<Clip> {
+    let mut decoded = Decoded::new();
     let animations = document.json["animations"].as_array().into_iter().flatten();
     animations
         .map(|animation| {
@@ -47,7 +57,7 @@ pub(crate) fn clips(document: &GltfDocument) -> Vec<Clip> {
             for channel in animation["channels"].as_array().into_iter().flatten() {
                 let read = driven(channel).and_then(|driven| {
                     let sampler = animation["samplers"].get(channel["sampler"].as_u64()? as usize)?;
-                    Some((driven, Track::read(document, sampler, driven)?))
+                    Some((driven, Track::read(document, sampler, driven, &mut decoded)?))
                 });
                 clip.tracks.extend(read);
             }
@@ -68,31 +78,32 @@ impl Clip {
 }
 
 impl Track {
-    fn read(document: &GltfDocument, sampler: &Value, driven: Driven) -> Option<Self> {
-        let accessor = |key: &str| sampler[key].as_u64().map(|a| a as u32);
-        let (input, output) = (accessor("input")?, accessor("output")?);
-        let source = document.source();
-        let times: Vec<f32> = source.floats::<1>(input, "times").ok()?.into_iter().flatten().collect();
-        let flat = |all: Vec<[f32; 3]>| all.into_iter().flatten().collect::<Vec<f32>>();
-        let values: Vec<f32> = match driven {
-            Driven::Translation(_) | Driven::Scale(_) => flat(source.floats(output, "a vector").ok()?),
-            Driven::Rotation(_) => {
-                source.floats::<4>(output, "a rotation").ok()?.into_iter().flatten().collect()
-            }
-            _ => source.floats::<1>(output, "weights").ok()?.into_iter().flatten().collect(),
+    fn read(document: &GltfDocument, sampler: &Value, driven: Driven, decoded: &mut Decoded) -> Option<Self> {
+        let mut numbers = |key: &str, width: usize| {
+            let accessor = sampler[key].as_u64()? as u32;
+            let read = || numbers(document, accessor, width).ok();
+            decoded.entry((accessor, width)).or_insert_with(read).clone()
         };
+        let times = numbers("input", 1)?;
+        let width = match driven {
+            Driven::Translation(_) | Driven::Scale(_) => 3,
+            Driven::Rotation(_) => 4,
+            Driven::Weights(_) | Driven::MeshWeights(_) => 1,
+        };
+        let values = numbers("output", width)?;
         let interpolation = match sampler["interpolation"].as_str() {
             Some("STEP") => Interpolation::Step,
             Some("CUBICSPLINE") => Interpolation::Cubic,
             _ => Interpolation::Linear,
         };
         let per_key = if interpolation == Interpolation::Cubic { 3 } else { 1 };
-        let width = values.len() / (per_key * times.len()).max(1);
+        // A key has one weight for each morph target.
+        let width = if width == 1 { values.len() / (per_key * times.len()).max(1) } else { width };
         let is_right = !times.is_empty()
             && width > 0
             && values.len() == width * per_key * times.len()
             && times.is_sorted()
-            && values.iter().chain(&times).all(|x| x.is_finite());
+            && values.iter().chain(times.iter()).all(|x| x.is_finite());
         is_right.then_some(Self { times, values, width, interpolation })
     }
 
@@ -130,6 +141,16 @@ impl Track {
             Interpolation::Linear => of(last).zip(of(next)).map(|(a, b)| a + share * (b - a)).collect(),
         }
     }
+}
+
+/// All numbers of an accessor whose elements have `width` components.
+fn numbers(document: &GltfDocument, accessor: u32, width: usize) -> Result<Numbers, GltfError> {
+    let source = document.source();
+    Ok(match width {
+        1 => source.floats::<1>(accessor, "times or weights")?.as_flattened().into(),
+        3 => source.floats::<3>(accessor, "a vector")?.as_flattened().into(),
+        _ => source.floats::<4>(accessor, "a rotation")?.as_flattened().into(),
+    })
 }
 
 /// The rotation of four numbers; none for zeros.

@@ -187,6 +187,13 @@ impl<'a> Rig<'a> {
         document.instances.iter().any(|i| i.skin.is_some() || morphs(i.mesh))
     }
 
+    /// The vertices that the shown meshes' morph targets move, with each target at 0 and at 1. World space.
+    pub(crate) fn shown_ends(&self) -> impl Iterator<Item = DVec3> {
+        let shown = self.parts.iter().filter(|part| part.slot.is_some());
+        let ends = shown.flat_map(lattice::ends);
+        ends.flat_map(|(target, first)| self.extras[self.range(target, first)].iter().copied())
+    }
+
     /// How far points move with what the cage does not bend. `by`: of all points.
     pub(crate) fn held(&self, parts: &Unbent, rest: &[Vec3], mut by: Vec<DVec3>) -> Vec<DVec3> {
         if parts.is_empty() {
