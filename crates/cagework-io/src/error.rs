@@ -62,8 +62,7 @@ pub enum PoseError {
     },
     /// Its faces join vertices that have nothing to do with each other in the cage.
     #[error(
-        "pose {} has an edge from vertex {} to {}, which are of no face together in cage {}: its vertices are in another order; \
-        write it as OBJ or PLY, which keep the order",
+        "pose {} has an edge from vertex {} to {}, which are of no face together in cage {}: its vertices are in another order; {hint}",
         shown(pose),
         edge[0],
         edge[1],
@@ -76,5 +75,7 @@ pub enum PoseError {
         edge: [u32; 2],
         /// Name of the cage.
         cage: String,
+        /// What to do.
+        hint: &'static str,
     },
 }

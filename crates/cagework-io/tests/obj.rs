@@ -76,6 +76,61 @@ fn pose_without_faces_is_read_and_is_no_mesh() {
     assert!(message.contains("has 1 vertices, but cage cage.obj has 8"), "{message}");
 }
 
+/// Blender cuts quads and n-gons along diagonals that depend on the shape: a pose has the vertices of the cage, and other diagonals.
+#[test]
+fn pose_may_cut_polygons_along_other_diagonals_but_not_swap_vertices() {
+    // A prism over a hexagon: vertices 0 to 5 below, 6 to 11 above.
+    let prism = |sides: &dyn Fn(usize) -> [usize; 6], caps: &[[usize; 3]], names: &dyn Fn(usize) -> usize| {
+        let mut faces: Vec<Vec<usize>> = Vec::new();
+        for k in 0..6 {
+            faces.extend(sides(k).chunks(3).map(<[usize]>::to_vec));
+        }
+        for cap in caps {
+            faces.push(cap.iter().rev().copied().collect());
+            faces.push(cap.iter().map(|v| v + 6).collect());
+        }
+        let vertex = |v: usize| {
+            let (y, x) = (std::f32::consts::TAU * (v % 6) as f32 / 6.0).sin_cos();
+            format!("v {x} {y} {}\n", v / 6)
+        };
+        let mut places: Vec<String> = (0..12).map(vertex).collect();
+        (0..12).for_each(|v| places[names(v)] = vertex(v));
+        let face = |f: &Vec<usize>| {
+            format!("f {}\n", f.iter().map(|&v| (names(v) + 1).to_string()).collect::<Vec<_>>().join(" "))
+        };
+        read("prism.obj", (places.concat() + &faces.iter().map(face).collect::<String>()).as_bytes()).unwrap()
+    };
+    let up = |k: usize| [k, (k + 1) % 6, (k + 1) % 6 + 6, k, (k + 1) % 6 + 6, k + 6];
+    let down = |k: usize| [k, (k + 1) % 6, k + 6, (k + 1) % 6, (k + 1) % 6 + 6, k + 6];
+    let fan = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
+    let zigzag = [[1, 2, 3], [1, 3, 0], [0, 3, 4], [0, 4, 5]];
+    let corner = [[1, 2, 3], [3, 4, 5], [5, 0, 1], [1, 3, 5]];
+    let same = |v: usize| v;
+    let cage = prism(&up, &fan, &same);
+    for pose in [prism(&down, &zigzag, &same), prism(&down, &corner, &same), prism(&up, &corner, &same)] {
+        assert_eq!(cage.pose_positions(&pose).unwrap(), pose.positions);
+    }
+    // Two vertices have each other's number: in any of these the order is another one.
+    for (a, b) in [(0, 9), (2, 11), (4, 8)] {
+        let names = |v: usize| {
+            if v == a {
+                b
+            } else if v == b {
+                a
+            } else {
+                v
+            }
+        };
+        for caps in [&fan, &corner] {
+            let message = cage.pose_positions(&prism(&down, caps, &names)).unwrap_err().to_string();
+            assert!(
+                message.ends_with("export it from the cage itself, with the settings of the cage's export"),
+                "{message}"
+            );
+        }
+    }
+}
+
 #[test]
 fn errors_name_the_line() {
     let cases = [

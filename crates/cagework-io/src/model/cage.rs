@@ -1,5 +1,7 @@
 //! A model as a cage, and poses of that cage.
 
+use std::collections::HashSet;
+
 use cagework_core::PolygonMesh;
 use cagework_core::mesh::weld;
 use glam::Vec3;
@@ -48,13 +50,17 @@ impl Model {
             let (pose, cage) = (pose.name.clone(), self.name.clone());
             return Err(PoseError::Count { pose, given, cage, expected: first.len() });
         }
-        let faces = if is_welded && is_unwelded {
-            self.triangles.iter().map(|t| t.to_vec()).collect()
-        } else {
-            self.cage_mesh().faces
+        let faces = |model: &Self| match &model.document {
+            Document::Gltf(_) if is_unwelded => model.triangles.iter().map(|t| t.to_vec()).collect(),
+            _ => model.cage_mesh().faces,
         };
-        if let Some(edge) = foreign_edge(&faces, &pose.triangles, given) {
-            return Err(PoseError::Order { pose: pose.name.clone(), edge, cage: self.name.clone() });
+        if let Some(edge) = foreign_edge(&faces(self), &faces(pose), given) {
+            let hint = if pose.keeps_order_in(ModelFormat::Obj) && pose.format != ModelFormat::Stl {
+                "export it from the cage itself, with the settings of the cage's export"
+            } else {
+                "write it as OBJ or PLY, which keep the order"
+            };
+            return Err(PoseError::Order { pose: pose.name.clone(), edge, cage: self.name.clone(), hint });
         }
         Ok(if is_unwelded {
             first.iter().map(|&v| pose.positions[v as usize]).collect()
@@ -84,17 +90,55 @@ impl Model {
     }
 }
 
-/// An edge of `triangles` whose ends are corners of no face together. `n`: vertices of both
-fn foreign_edge(faces: &[Vec<u32>], triangles: &[[u32; 3]], n: usize) -> Option<[u32; 2]> {
-    // Ascending.
-    let mut faces_of = vec![Vec::new(); n];
-    for (face, corners) in faces.iter().enumerate() {
-        corners.iter().for_each(|&v| faces_of[v as usize].push(face));
-    }
-    let is_known = |[a, b]: [u32; 2]| {
-        let [a, b] = [&faces_of[a as usize], &faces_of[b as usize]];
-        a.iter().any(|face| b.binary_search(face).is_ok())
+/// An edge of `pose` that cannot be one of the mesh `cage`. `n`: vertices of both.
+///
+/// Exporters cut polygons along diagonals that depend on the shape. So cage faces are joined across the edges that `pose` lacks,
+/// and an edge may join any two corners of a polygon that results. A connected set of T triangles with T + 2 vertices is a polygon;
+/// if one has fewer, a vertex inside it has lost its edges, and what it joins is in another order.
+fn foreign_edge(cage: &[Vec<u32>], pose: &[Vec<u32>], n: usize) -> Option<[u32; 2]> {
+    let edges_of = |face: &[u32]| -> Vec<[u32; 2]> {
+        let ends = face.iter().zip(face.iter().cycle().skip(1));
+        ends.map(|(&a, &b)| [a.min(b), a.max(b)]).filter(|[a, b]| a != b).collect()
     };
-    let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-    edges.into_iter().find(|&[a, b]| a != b && !is_known([a, b]))
+    let posed: HashSet<[u32; 2]> = pose.iter().flat_map(|face| edges_of(face)).collect();
+    let mut lost: Vec<([u32; 2], usize)> =
+        (0..).zip(cage).flat_map(|(f, face)| edges_of(face).into_iter().map(move |e| (e, f))).collect();
+    lost.retain(|(edge, _)| !posed.contains(edge));
+    lost.sort_unstable();
+    let mut region: Vec<usize> = (0..cage.len()).collect();
+    let root = |region: &mut [usize], mut f: usize| {
+        while region[f] != f {
+            region[f] = region[region[f]];
+            f = region[f];
+        }
+        f
+    };
+    for pair in lost.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        let [a, b] = [0, 1].map(|k| root(&mut region, pair[k].1));
+        region[a.max(b)] = a.min(b);
+    }
+    let mut regions = vec![(0, 0); cage.len()];
+    // Both ascending: faces of each vertex, and their regions.
+    let mut faces_of = vec![Vec::new(); n];
+    for (f, face) in cage.iter().enumerate() {
+        regions[root(&mut region, f)].0 += face.len() - 2;
+        face.iter().for_each(|&v| faces_of[v as usize].push(f));
+    }
+    let mut regions_of: Vec<Vec<usize>> = Vec::with_capacity(n);
+    for faces in &faces_of {
+        let mut of_vertex: Vec<usize> = faces.iter().map(|&f| root(&mut region, f)).collect();
+        of_vertex.sort_unstable();
+        of_vertex.dedup();
+        of_vertex.iter().for_each(|&region| regions[region].1 += 1);
+        regions_of.push(of_vertex);
+    }
+    let is_polygon = |region: usize| regions[region].1 == regions[region].0 + 2;
+    let is_known = |&[a, b]: &[u32; 2]| {
+        let [a, b] = [a as usize, b as usize];
+        let share = |of: &[Vec<usize>], is_fit: &dyn Fn(usize) -> bool| {
+            of[a].iter().any(|&x| is_fit(x) && of[b].binary_search(&x).is_ok())
+        };
+        share(&faces_of, &|_| true) || share(&regions_of, &is_polygon)
+    };
+    pose.iter().flat_map(|face| edges_of(face)).find(|edge| !is_known(edge))
 }
