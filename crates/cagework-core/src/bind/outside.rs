@@ -11,10 +11,15 @@ use crate::controls::Controls;
 use crate::mesh::Bounds;
 use crate::options::{BindOptions, OutsidePolicy};
 use crate::sample::{Outside, Stencils};
+use crate::weights::Weights;
 
 /// Cage and model that differ in size by this factor or more are taken to be in different units, of which feet and metres differ
 /// least; a cage is seldom twice as large as its model.
 const OTHER_UNIT: f64 = 3.0;
+
+/// A cage that is larger by this factor or more is worth a remark: metres and centimetres differ by 100, and a cage is up to twice as
+/// large as its model.
+const LARGE: f64 = 50.0;
 
 /// How a cage and a model lie to each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,6 +105,30 @@ fn none_inside(cage: &Cage, positions: &[Vec3]) -> BindError {
     BindError::NoneInside { vertices: positions.len(), misfit: Misfit::of(cage.bounds(), model) }
 }
 
+/// What to say of a cage that is so much larger than the model that all vertices have nearly the same weights. `positions`: of the
+/// model, the first rows of `weights`.
+pub(super) fn oversized(cage: Bounds, positions: &[Vec3], weights: &Weights) -> Option<String> {
+    let larger = 1.0 / Misfit::of(cage, Bounds::of(positions)?).ratio;
+    if !(LARGE..f64::INFINITY).contains(&larger) {
+        return None;
+    }
+    let mut ranges = vec![(f32::INFINITY, f32::NEG_INFINITY, 0_usize); weights.n_columns()];
+    let rows = weights.rows().take(positions.len());
+    for (&column, &weight) in rows.flat_map(|(columns, data)| columns.iter().zip(data)) {
+        let (low, high, count) = &mut ranges[column as usize];
+        (*low, *high, *count) = (low.min(weight), high.max(weight), *count + 1);
+    }
+    // What a row does not store is 0.
+    let spread =
+        |&(low, high, n): &(f32, f32, usize)| if n < positions.len() { high.max(0.0) } else { high - low };
+    let spread = ranges.iter().map(spread).fold(0.0, f32::max);
+    Some(format!(
+        "The cage is {} times larger than the model, and weights differ by {spread:.0e} over it at most: it hardly bends. Are both in \
+         the same unit?",
+        about(larger)
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -134,6 +163,26 @@ mod tests {
         );
         let both = said(Vec3::new(3.0, 0.0, 0.0), 100.0);
         assert!(both.contains("the cage is 2 away from it and 120 times larger than the model: "), "{both}");
+        // 100 times larger and around it: bound, with a remark. The unit cube's corner has weights of 1/100 more or less.
+        let bound = |size: f32| {
+            let cage = Cage::new(&subdivided_box(
+                Bounds { min: Vec3::splat(-0.4 * size), max: Vec3::splat(0.6 * size) },
+                0.0,
+                [1; 3],
+            ));
+            let points = [Vec3::ZERO, Vec3::X, Vec3::Y];
+            let options = BindOptions { grid: 8, ..BindOptions::default() };
+            bind(&points, &cage.unwrap(), &options, &Silent).unwrap().report.notices
+        };
+        // Root of 3 times 100 over root of 2; trilinear weights of (0.41, 0.4, 0.4) and (0.4, 0.4, 0.4): 0.6 * 0.6 * 0.01.
+        assert_eq!(
+            bound(100.0),
+            [
+                "The cage is 120 times larger than the model, and weights differ by 4e-3 over it at most: it hardly bends. Are both in \
+              the same unit?"
+            ]
+        );
+        assert_eq!(bound(20.0), [""; 0]);
         let beside = said(Vec3::new(0.1, 0.1, -0.4), 0.8);
         assert!(beside.contains("beside what the cage encloses"), "{beside}");
     }

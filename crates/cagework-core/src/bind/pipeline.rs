@@ -23,7 +23,7 @@ use crate::solve::stop::SolveReport;
 use crate::team::{Team, VERTEX_RUN};
 
 use super::memory::{Vertices, estimate};
-use super::outside::refuse_outside;
+use super::outside::{oversized, refuse_outside};
 use super::solving::solve_and_sample;
 use super::voxels::{Gridded, Voxels};
 use super::watch::Watch;
@@ -231,6 +231,7 @@ impl<'a> Prepared<'a> {
         let mut notices: Vec<String> = controls.cage().notices().iter().map(ToString::to_string).collect();
         notices.extend(team.notice(options.threads).into_iter().chain(voxels.notices.iter().cloned()));
         notices.extend(notices_of(controls, &level.grid, options.grid));
+        notices.extend(oversized(cage.bounds(), &positions[..n_vertices], &weights));
         let is_vertex = |o: &&(u32, OutsideVertex)| (o.1.vertex as usize) < n_vertices;
         // Vertices inside of a control, or next to one, are not outside.
         let near_cage = |facet: u32| controls.cage_face(cage.face_of_facet()[facet as usize]).is_some();
