@@ -4,7 +4,7 @@
 
 mod common;
 
-use cagework_io::Model;
+use cagework_io::{Model, ModelFormat};
 use common::{
     Builder, CUBE_OBJ, PNG, cube, instanced, json_of, plain_cube, quantized, read, relative_error, skinned,
     textured_square, twist, volume,
@@ -260,6 +260,58 @@ fn obj_becomes_a_glb_with_texture_coordinates_and_hard_edges() {
     assert!((volume(&before) - volume(&again)).abs() < 1e-5);
     let no_faces = read("p.obj", b"v 0 0 0").unwrap();
     assert!(no_faces.write_glb(&no_faces.positions).unwrap_err().to_string().contains("no faces"));
+}
+
+/// Several poses can only be written as GLB: colour, texture and opacity of the materials and colours of vertices come along.
+#[test]
+fn obj_and_ply_become_a_glb_with_materials_and_colours() {
+    let mtl = "newmtl red\nKd 1 0.5 0\nd 0.25\nnewmtl blue\nKd 0 0 0\nmap_Kd t.png\n";
+    let mut files = |name: &str| match name {
+        "box.mtl" => Some(Ok(mtl.into())),
+        "t.png" => Some(Ok(PNG.to_vec())),
+        _ => None,
+    };
+    let model = Model::read("box.obj", CUBE_OBJ.as_bytes(), &mut files).unwrap();
+    assert_eq!(model.lost_in(ModelFormat::Gltf).unwrap(), "the glb file does not keep: names of parts");
+    let glb = model.write_glb(&deformed(&model)).unwrap();
+    let json = json_of(&glb);
+    let material = |name: &str| {
+        json["materials"].as_array().unwrap().iter().find(|m| m["name"] == name).unwrap().clone()
+    };
+    let color = |m: &Value| {
+        m["pbrMetallicRoughness"]["baseColorFactor"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|x| x.as_f64().unwrap())
+            .collect::<Vec<_>>()
+    };
+    // 0.5 of sRGB is 0.214 of linear light (IEC 61966-2-1).
+    let red = material("red");
+    assert!(color(&red).iter().zip([1.0, 0.214_04, 0.0, 0.25]).all(|(a, b)| (a - b).abs() < 1e-5));
+    assert_eq!(
+        (&red["alphaMode"], red["pbrMetallicRoughness"]["baseColorTexture"].is_null()),
+        (&"BLEND".into(), true)
+    );
+    let blue = material("blue");
+    assert_eq!((color(&blue), &blue["alphaMode"]), (vec![1.0; 4], &Value::Null));
+    let again = read("again.glb", &glb).unwrap().look();
+    assert_eq!(
+        (again.images.len(), again.images[0].bytes.as_slice(), again.images[0].mime.as_str()),
+        (1, &PNG[..], "image/png")
+    );
+
+    let colored = CUBE_OBJ
+        .lines()
+        .map(|line| if line.starts_with("v ") { format!("{line} 1 0.5 0\n") } else { format!("{line}\n") });
+    let model = read("box.obj", colored.collect::<String>().as_bytes()).unwrap();
+    for model in [read("box.ply", &model.write_ply(&model.positions).unwrap()).unwrap(), model] {
+        let glb = model.write_glb(&model.positions).unwrap();
+        // A byte of a PLY holds 128 / 255.
+        let close = |c: &Vec<f32>| (c[0], c[2]) == (1.0, 0.0) && (c[1] - 0.214).abs() < 2e-3;
+        let colors = attribute(&glb, "COLOR_0", 3);
+        assert!(colors.len() >= 8 && colors.iter().all(close), "{colors:?}");
+    }
 }
 
 #[test]

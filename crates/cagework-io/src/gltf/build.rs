@@ -1,6 +1,7 @@
 //! A new GLB from an OBJ file.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use cagework_core::TriMesh;
 use cagework_core::deform::vertex_normals;
@@ -10,13 +11,15 @@ use serde_json::{Value, json};
 
 use super::pack::{Pack, VERTICES, push};
 use crate::error::WriteError;
+use crate::look::linear_from_srgb;
 use crate::obj::{NONE, ObjDocument};
+use crate::siblings::Image;
 
 /// A GLB with the OBJ's shape at rest, and for each of its vertices the `v` line it came from.
 ///
 /// One node, one mesh, one primitive for each `usemtl`; a vertex for each different corner (position, texture
-/// coordinate, normal). Without `vn` lines the normals are area-weighted, over a smoothing group where the file has any. Materials have their names and a
-/// plain surface: `.mtl` files are not read.
+/// coordinate, normal). Without `vn` lines the normals are area-weighted, over a smoothing group where the file has any. Materials have
+/// names, base colour and texture; vertices their colours.
 pub(crate) fn build_from_obj(
     name: &str,
     document: &ObjDocument,
@@ -32,6 +35,7 @@ pub(crate) fn build_from_obj(
     });
     let mut pack = Pack::empty();
     let mut sources = Vec::new();
+    let mut textures = HashMap::new();
     for (material, triangles) in document.by_material() {
         let mut part = Part::default();
         for corner in triangles.into_iter().flatten() {
@@ -56,14 +60,60 @@ pub(crate) fn build_from_obj(
             let flat: Vec<f32> = part.vertices.iter().flat_map(uv).collect();
             primitive["attributes"]["TEXCOORD_0"] = pack.push_floats(&mut json, &flat, 2, true, false).into();
         }
+        if !document.colors.is_empty() {
+            let color = |&(pair, _): &(u32, u32)| {
+                let color = document.colors.get(&pairs.shading.vertex[pair as usize]);
+                color.map_or([1.0; 3], |color| color.map(|share| linear_from_srgb(share.clamp(0.0, 1.0))))
+            };
+            let flat: Vec<f32> = part.vertices.iter().flat_map(color).collect();
+            primitive["attributes"]["COLOR_0"] = pack.push_floats(&mut json, &flat, 3, true, false).into();
+        }
         if material != NONE {
-            primitive["material"] =
-                push(&mut json, "materials", plain(&document.materials[material as usize])).into();
+            let name = &document.materials[material as usize];
+            let mut made = plain(name);
+            if let Some(found) = document.looks.get(name) {
+                let image = found.image.as_ref().map(|image| {
+                    let key = Arc::as_ptr(&image.bytes);
+                    *textures.entry(key).or_insert_with(|| push_texture(&mut json, &mut pack, image))
+                });
+                let [r, g, b, alpha] = found.color;
+                let [r, g, b] = if image.is_some() { [1.0; 3] } else { [r, g, b].map(linear_from_srgb) };
+                let surface = &mut made["pbrMetallicRoughness"];
+                surface["baseColorFactor"] = json!([r, g, b, alpha].map(|share| share.clamp(0.0, 1.0)));
+                if let Some(texture) = image {
+                    surface["baseColorTexture"] = json!({ "index": texture });
+                }
+                if alpha < 1.0 {
+                    made["alphaMode"] = "BLEND".into();
+                }
+            }
+            primitive["material"] = push(&mut json, "materials", made).into();
         }
         push(&mut json["meshes"][0], "primitives", primitive);
         sources.extend(part.vertices.iter().map(|&(pair, _)| pairs.shading.vertex[pair as usize]));
     }
     Ok((pack.finish(json)?, sources))
+}
+
+/// A texture with its image embedded.
+fn push_texture(json: &mut Value, pack: &mut Pack<'_>, image: &Image) -> usize {
+    let view = pack.push_view(json, image.bytes.to_vec(), None);
+    let mut shown = json!({ "bufferView": view, "mimeType": image.mime });
+    if !image.name.is_empty() {
+        shown["name"] = json!(&*image.name);
+    }
+    let source = push(json, "images", shown);
+    let extension = match image.mime {
+        "image/webp" => "EXT_texture_webp",
+        "image/ktx2" => "KHR_texture_basisu",
+        _ => return push(json, "textures", json!({ "source": source })),
+    };
+    for list in ["extensionsUsed", "extensionsRequired"] {
+        if !json[list].as_array().is_some_and(|list| list.iter().any(|name| name == extension)) {
+            push(json, list, extension.into());
+        }
+    }
+    push(json, "textures", json!({ "extensions": { extension: { "source": source } } }))
 }
 
 /// A GLB of one mesh with colours (sRGB and opacity for each vertex, 0 to 255, or none at all) and a rig.
