@@ -78,6 +78,7 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
             export(&model, &rest[..model.positions.len()], output)?
         };
         write(&output.path, &bytes)?;
+        binding.report.notices.extend(model.lost_in(output.format));
     }
     save_cage(args, cage, &model)?;
     let report = json(&binding.report);

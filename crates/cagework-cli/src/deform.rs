@@ -84,6 +84,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     let (bytes, rig) = posed.into_file(&model, &poses.names, &args.output, &options)?;
     let mut notices = model.notices.clone();
     notices.extend(rig.iter().flat_map(ReshapeReport::notices));
+    notices.extend(model.lost_in(format));
     write(output, &bytes)?;
 
     let done = Deformed {

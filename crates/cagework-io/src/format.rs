@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use crate::shown::shown;
-use crate::stl;
+use crate::{off, stl};
 
 /// Format of a model's file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
@@ -18,6 +18,8 @@ pub enum ModelFormat {
     Ply,
     /// STL, text or binary.
     Stl,
+    /// OFF of Geomview, as text: OFF, COFF, NOFF.
+    Off,
 }
 
 /// The content of a file is no format that is read here.
@@ -34,7 +36,7 @@ pub struct FormatError {
 
 impl ModelFormat {
     /// Every format, in the order in which people are told of them.
-    pub const ALL: [Self; 4] = [Self::Gltf, Self::Obj, Self::Ply, Self::Stl];
+    pub const ALL: [Self; 5] = [Self::Gltf, Self::Obj, Self::Ply, Self::Stl, Self::Off];
 
     /// Short name, lower case.
     #[must_use]
@@ -44,6 +46,7 @@ impl ModelFormat {
             Self::Gltf => "gltf",
             Self::Ply => "ply",
             Self::Stl => "stl",
+            Self::Off => "off",
         }
     }
 
@@ -55,6 +58,7 @@ impl ModelFormat {
             Self::Gltf => &["glb", "vrm", "gltf"],
             Self::Ply => &["ply"],
             Self::Stl => &["stl"],
+            Self::Off => &["off"],
         }
     }
 
@@ -66,6 +70,7 @@ impl ModelFormat {
             Self::Gltf => "glb",
             Self::Ply => "ply",
             Self::Stl => "stl",
+            Self::Off => "off",
         }
     }
 
@@ -91,7 +96,7 @@ impl ModelFormat {
     /// [`FormatError`] when its name promises another, or its content is known to be something else.
     pub fn of_file(name: &str, bytes: &[u8]) -> Result<Self, FormatError> {
         let fault = |found, hint| Err(FormatError { name: name.into(), found, hint });
-        let export = "export it as GLB, OBJ, PLY or STL";
+        let export = "export it as GLB, OBJ, PLY, STL or OFF";
         let unmarked = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         let text = unmarked.trim_ascii_start();
         match bytes {
@@ -102,6 +107,19 @@ impl ModelFormat {
             [b'B', b'L', b'E', b'N', b'D', b'E', b'R', ..] => return fault("a Blender file", export),
             _ if unmarked.starts_with(b"ply\n") || unmarked.starts_with(b"ply\r") => return Ok(Self::Ply),
             _ if stl::is_stl(bytes) => return Ok(Self::Stl),
+            [0xff, 0xfe, ..]
+            | [0xfe, 0xff, ..]
+            | [b'#' | b'v' | b'o' | b'g' | b's' | b'm' | b'p' | b'{', 0, ..] => {
+                return fault("a text in UTF-16", "save it as UTF-8");
+            }
+            _ if off::is_off(bytes) => return Ok(Self::Off),
+            _ if text.starts_with(b"version https://git-lfs.github.com/spec/") => {
+                return fault(
+                    "a Git LFS pointer, which stands for the file",
+                    "fetch the file itself with `git lfs pull`",
+                );
+            }
+            [b'<', ..] => return fault("an XML or HTML text", export),
             _ => {}
         }
         if text.first() == Some(&b'{') {
@@ -113,10 +131,9 @@ impl ModelFormat {
             }
             "gltf" => fault("not a glTF", "it does not begin with '{': it is damaged or has the wrong name"),
             "stl" => Ok(Self::Stl),
+            "off" => Ok(Self::Off),
             "ply" => fault("not a PLY", "its first line is not 'ply': it is damaged or has the wrong name"),
-            "fbx" | "dae" | "usdz" | "usd" | "3ds" | "blend" | "off" => {
-                fault("of a format that is not read", export)
-            }
+            "fbx" | "dae" | "usdz" | "usd" | "3ds" | "blend" => fault("of a format that is not read", export),
             _ => Ok(Self::Obj),
         }
     }

@@ -1,4 +1,4 @@
-//! Bytes to scene and back: OBJ, glTF/GLB, PLY, STL, NPZ, project files.
+//! Bytes to scene and back: OBJ, glTF/GLB, PLY, STL, OFF, NPZ, project files.
 //!
 //! No mathematics beyond transforms and normals, no file system, no clock; everything compiles for
 //! `wasm32-unknown-unknown`. A [`Model`] keeps the document it was read from, so that an export is the user's own file
@@ -18,6 +18,7 @@ mod model;
 mod normals;
 mod npz;
 mod obj;
+mod off;
 mod part_kind;
 mod ply;
 mod ply_text;

@@ -18,7 +18,7 @@ use crate::polygons::{Encoding, Polygons, PolygonsError};
 use crate::shown::shown;
 use crate::siblings::Resolve;
 use crate::up::UpAxis;
-use crate::{ply, stl};
+use crate::{off, ply, stl};
 
 /// Why bytes could not be read as a model.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -45,7 +45,7 @@ pub enum ReadError {
         /// The fault.
         source: ObjError,
     },
-    /// A fault in a PLY or STL file.
+    /// A fault in a PLY, STL or OFF file.
     #[error("{}: {source}", shown(name))]
     Polygons {
         /// Name the caller gave.
@@ -80,7 +80,7 @@ pub struct Model {
     pub(crate) up: UpAxis,
     bytes: u64,
     format: ModelFormat,
-    /// Of a PLY or STL: how its numbers are written; whether its vertices have normals.
+    /// Of a PLY, STL or OFF: how its numbers are written; whether its vertices have normals.
     encoding: Encoding,
     has_normals: bool,
     pub(crate) document: Document,
@@ -93,7 +93,7 @@ pub(crate) enum Document {
 }
 
 impl Model {
-    /// Reads an OBJ, glTF, GLB, PLY or STL file; the content decides which, `name` helps with the error if it is none of them.
+    /// Reads an OBJ, glTF, GLB, PLY, STL or OFF file; the content decides which, `name` helps with the error if it is none of them.
     ///
     /// `resolve` is asked for sibling files (buffers and textures of a `.gltf`, materials and textures of an OBJ) by
     /// relative path, each once; `data:` URIs are decoded here. A buffer that is not read is an error, anything else a
@@ -159,8 +159,12 @@ impl Model {
                     document: Document::Obj(Box::new(model.document)),
                 })
             }
-            ModelFormat::Ply | ModelFormat::Stl => {
-                let read = if format == ModelFormat::Ply { ply::read } else { stl::read };
+            ModelFormat::Ply | ModelFormat::Stl | ModelFormat::Off => {
+                let read = match format {
+                    ModelFormat::Ply => ply::read,
+                    ModelFormat::Stl => stl::read,
+                    _ => off::read,
+                };
                 let fault = |source| ReadError::Polygons { name: name.into(), source };
                 let mut read = read(bytes, memory_limit).map_err(fault)?;
                 let document = read.document().map_err(fault)?;
@@ -169,7 +173,12 @@ impl Model {
                 Ok(Self {
                     name: name.into(),
                     triangles: document.triangles.iter().map(|t| t.map(corner)).collect(),
-                    counts: Counts { nodes: 1, meshes: 1, primitives: 1, ..Counts::default() },
+                    counts: Counts {
+                        nodes: document.groups.len().max(1),
+                        meshes: 1,
+                        primitives: 1,
+                        ..Counts::default()
+                    },
                     notices: read.notices,
                     up: UpAxis::Y,
                     bytes: Polygons::check_memory(0, vertices, corners, u64::MAX).unwrap_or(u64::MAX),
@@ -202,7 +211,7 @@ impl Model {
         match format {
             ModelFormat::Gltf => shape + PRIMITIVE_BYTES * n(self.counts.primitives) + self.bytes,
             ModelFormat::Obj => shape / 3 + self.bytes,
-            ModelFormat::Ply | ModelFormat::Stl => shape,
+            ModelFormat::Ply | ModelFormat::Stl | ModelFormat::Off => shape,
         }
     }
 

@@ -26,7 +26,7 @@ pub use part::{PartOf, read_part_npz, write_part_npz};
 #[derive(Debug, Error)]
 pub enum NpzError {
     /// Not a zip archive, or a damaged one.
-    #[error("not an .npz file, or a damaged one: {0}")]
+    #[error("not an .npz file, or a damaged one")]
     Zip(String),
     /// An array is not in the file.
     #[error(

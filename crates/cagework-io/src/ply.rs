@@ -9,7 +9,7 @@ use ply_rs_bw::ply::{
 };
 use ply_rs_bw::writer::Writer;
 
-use crate::ply_text::readable;
+use crate::ply_text::{fault_of, readable, stray_line};
 use crate::polygons::{Encoding, Polygons, PolygonsError};
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
@@ -29,6 +29,8 @@ struct Element {
     normal: [f32; 3],
     color: [u8; 3],
     corners: Vec<u32>,
+    /// The first of the corners that can be no vertex, as written.
+    odd: Option<f64>,
 }
 
 impl PropertyAccess for Element {
@@ -43,7 +45,7 @@ impl PropertyAccess for Element {
         } else if let Some(k) = of(COLOR) {
             color(&property).map(|x| self.color[k] = x)
         } else if CORNERS.contains(&name) {
-            corners(&property).map(|list| self.corners = list)
+            corners(&property).map(|(list, odd)| (self.corners, self.odd) = (list, odd))
         } else {
             return PropertyAccessResult::Ignored;
         };
@@ -65,11 +67,16 @@ impl PropertyAccess for Element {
     }
 }
 
-/// Vertices of a list of any numbers; [`NO_VERTEX`] for those that are none.
-fn corners(property: &Property) -> Option<Vec<u32>> {
+/// Vertices of a list of any numbers; [`NO_VERTEX`] for those that are none, and the first of these.
+fn corners(property: &Property) -> Option<(Vec<u32>, Option<f64>)> {
     let of = |numbers: &mut dyn Iterator<Item = f64>| {
         let whole = |x: f64| x >= 0.0 && x < f64::from(NO_VERTEX) && x.fract() == 0.0;
-        Some(numbers.map(|x| if whole(x) { x as u32 } else { NO_VERTEX }).collect())
+        let mut odd = None;
+        let list = numbers.map(|x| {
+            odd = odd.or((!whole(x)).then_some(x));
+            if whole(x) { x as u32 } else { NO_VERTEX }
+        });
+        Some((list.collect(), odd))
     };
     match property {
         Property::ListChar(list) => of(&mut list.iter().map(|&x| x.into())),
@@ -77,7 +84,7 @@ fn corners(property: &Property) -> Option<Vec<u32>> {
         Property::ListInt(list) => of(&mut list.iter().map(|&x| x.into())),
         Property::ListFloat(list) => of(&mut list.iter().map(|&x| x.into())),
         Property::ListDouble(list) => of(&mut list.iter().copied()),
-        list => list.to_u32_list(),
+        list => list.to_u32_list().map(|list| (list, None)),
     }
 }
 
@@ -108,9 +115,8 @@ fn unstrip(strips: &[Element]) -> Vec<Element> {
 
 /// Reads a file within `memory_limit` bytes.
 pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, PolygonsError> {
-    let wrong = |e: ply_rs_bw::parser::ParseError| {
-        PolygonsError::Syntax(shown_start(&e.to_string(), 2 * MAX_NAME_CHARS))
-    };
+    let original = bytes;
+    let wrong = |_| fault_of(original);
     let parser = Parser::<Element>::new();
     Polygons::check_memory(3 * bytes.len() as u64, 0, 0, memory_limit)?;
     let bytes = &*readable(bytes);
@@ -145,6 +151,9 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
         },
         ..Polygons::default()
     };
+    if let Some(line) = stray_line(original) {
+        read.notices.push(format!("{line} of the header is no statement of PLY: left out"));
+    }
     let mut left_out = Vec::new();
     let mut faces: Vec<Element> = Vec::new();
     for (name, element) in &header.elements {
@@ -173,7 +182,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
     }
     for face in faces {
         read.corners.extend(&face.corners);
-        read.end_face()?;
+        read.end_face(face.odd)?;
     }
     if !left_out.is_empty() {
         let names = shown_start(&left_out.join(", "), MAX_NAME_CHARS);
@@ -229,7 +238,7 @@ pub(crate) fn write(given: Written<'_>) -> Vec<u8> {
         place: p.to_array(),
         normal: normals.get(v).map_or([0.0; 3], Vec3::to_array),
         color: color(v as u32).unwrap_or([1.0; 3]).map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8),
-        corners: Vec::new(),
+        ..Element::default()
     };
     let mut ply = Ply::<Element>::new();
     ply.header = header;

@@ -1,10 +1,80 @@
 //! PLY files as they are met, brought to what the reader takes: headers with comments in any encoding, line ends of old programs,
-//! empty lines or odd names, and in texts empty lines and numbers such as `.5`, `1.` and `nan`.
+//! empty lines, odd names or lines of no statement, and in texts empty lines and numbers such as `.5`, `1.` and `nan`.
 
 use std::borrow::Cow;
 
+use crate::obj::{lines, shown_token};
+use crate::polygons::{PolygonsError, fault};
+use crate::shown::{MAX_NAME_CHARS, shown_start};
+
 /// A number of a text that is not finite, as the reader takes it: it becomes infinite.
 const NO_NUMBER: &[u8] = b"1e999";
+
+/// First words of the lines of a header.
+const STATEMENTS: [&[u8]; 7] =
+    [b"ply", b"format", b"comment", b"obj_info", b"element", b"property", b"end_header"];
+
+/// The first line of the header that begins with no word of PLY, such as a comment of Blender 2.47, for a message.
+pub(crate) fn stray_line(bytes: &[u8]) -> Option<String> {
+    for line in lines(bytes) {
+        let text = &bytes[line.range];
+        match words(text).next() {
+            Some(b"end_header") => return None,
+            Some(word) if !STATEMENTS.contains(&word) => {
+                let text = shown_start(String::from_utf8_lossy(text).trim(), MAX_NAME_CHARS);
+                return Some(format!("line {} '{text}'", line.number));
+            }
+            _ => {}
+        }
+    }
+    None
+}
+
+/// Why the reader does not take a file: the first line that is no statement of a header, or no numbers.
+pub(crate) fn fault_of(bytes: &[u8]) -> PolygonsError {
+    const TYPES: [&[u8]; 16] = [
+        b"char", b"uchar", b"short", b"ushort", b"int", b"uint", b"float", b"double", b"int8", b"uint8",
+        b"int16", b"uint16", b"int32", b"uint32", b"float32", b"float64",
+    ];
+    let mut is_text = false;
+    let mut is_body = false;
+    for line in lines(bytes) {
+        let words: Vec<&[u8]> = words(&bytes[line.range.clone()]).collect();
+        if is_body {
+            let is_number =
+                |word: &&[u8]| std::str::from_utf8(word).is_ok_and(|word| word.parse::<f64>().is_ok());
+            if let Some(word) = words.iter().find(|word| !is_number(word)) {
+                return fault(line.number, &format!("'{}' is not a number such as 1.25", shown_token(word)));
+            }
+            continue;
+        }
+        let is_statement = match words.as_slice() {
+            [b"format", kind, _] => {
+                is_text = *kind == b"ascii";
+                is_text || [&b"binary_little_endian"[..], b"binary_big_endian"].contains(kind)
+            }
+            [b"element", _, count] => {
+                std::str::from_utf8(count).is_ok_and(|count| count.parse::<usize>().is_ok())
+            }
+            [b"property", b"list", count, kind, _] => TYPES.contains(count) && TYPES.contains(kind),
+            [b"property", kind, _] => TYPES.contains(kind),
+            [b"end_header"] if !is_text => break,
+            [b"end_header"] => {
+                is_body = true;
+                true
+            }
+            [b"format" | b"element" | b"property" | b"end_header", ..] => false,
+            _ => true,
+        };
+        if !is_statement {
+            let text = shown_start(&String::from_utf8_lossy(&words.join(&b' ')), MAX_NAME_CHARS);
+            return fault(line.number, &format!("'{text}' is no statement of a PLY header"));
+        }
+    }
+    PolygonsError::Syntax(
+        "it ends before all that its header names, or its elements are not as the header says".into(),
+    )
+}
 
 /// The file without what the reader stumbles over. What needs no change is not copied.
 pub(crate) fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
@@ -44,6 +114,9 @@ fn tidy_header(header: &[u8], line_end: u8) -> Vec<u8> {
     for (number, line) in header.split(|&b| b == line_end).enumerate() {
         let words: Vec<&[u8]> = words(line).collect();
         let Some((name, before)) = words.split_last() else { continue };
+        if !STATEMENTS.contains(&words[0]) {
+            continue;
+        }
         let is_plain = |b: &u8| b.is_ascii_alphanumeric() || b"_-".contains(b);
         if before.first() == Some(&&b"property"[..]) && !name.iter().all(is_plain) {
             out.extend(before.join(&b' '));

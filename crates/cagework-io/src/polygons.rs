@@ -1,17 +1,18 @@
-//! What PLY and STL files have in common: polygons of vertices, and little else.
+//! What PLY, STL and OFF files have in common: polygons of vertices, and little else.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use glam::Vec3;
 use thiserror::Error;
 
 use crate::memory::MemoryError;
-use crate::obj::{Corner, NONE, ObjDocument};
+use crate::obj::{Corner, Group, Line, NONE, ObjDocument, shown_token};
 
 /// Bytes that a vertex takes in the table of different positions.
 const WELD_BYTES: u64 = 36;
 
-/// Why a PLY or STL file could not be read.
+/// Why a PLY, STL or OFF file could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PolygonsError {
     /// Its own grammar is not kept.
@@ -41,8 +42,8 @@ pub enum PolygonsError {
     Vertex {
         /// The face, from 0.
         face: usize,
-        /// What it names.
-        index: u32,
+        /// What it names, as written.
+        index: String,
         /// Vertices there are.
         vertices: usize,
     },
@@ -71,6 +72,8 @@ pub(crate) struct Polygons {
     pub(crate) n_left_out: usize,
     /// Of each vertex, sRGB from 0 to 1; empty if the file has none.
     pub(crate) colors: Vec<[f32; 3]>,
+    /// Names of runs of faces, such as solids.
+    pub(crate) groups: Vec<Group>,
     pub(crate) has_normals: bool,
     pub(crate) encoding: Encoding,
     pub(crate) notices: Vec<String>,
@@ -91,15 +94,17 @@ impl Polygons {
         MemoryError::check(needed, limit).map(|()| needed)
     }
 
-    /// Ends a face that began where the last one ended; one of fewer than three corners is left out.
+    /// Ends a face that began where the last one ended; one of fewer than three corners is left out. `odd`: a corner of it that can
+    /// be no index.
     ///
     /// # Errors
     /// When it is none.
-    pub(crate) fn end_face(&mut self) -> Result<(), PolygonsError> {
+    pub(crate) fn end_face(&mut self, odd: Option<f64>) -> Result<(), PolygonsError> {
         let start = self.face_starts.last().map_or(0, |&start| start as usize);
         let face = self.face_starts.len().saturating_sub(1) + self.n_left_out;
         let vertices = self.positions.len();
         if let Some(&index) = self.corners[start..].iter().find(|&&v| v as usize >= vertices) {
+            let index = odd.map_or_else(|| index.to_string(), |odd| odd.to_string());
             return Err(PolygonsError::Vertex { face, index, vertices });
         }
         if self.corners.len() - start < 3 {
@@ -130,10 +135,37 @@ impl Polygons {
             corners: self.corners.iter().map(|&v| Corner { v, vt: NONE, vn: NONE }).collect(),
             face_materials: vec![NONE; self.face_starts.len() - 1],
             face_starts: std::mem::take(&mut self.face_starts),
+            groups: std::mem::take(&mut self.groups),
             colors: (0..).zip(self.colors.iter().copied()).collect::<HashMap<_, _>>(),
             ..ObjDocument::default()
         };
         document.triangulate(&self.positions);
         Ok(document)
     }
+}
+
+/// A fault in a line of a text.
+pub(crate) fn fault(line: usize, problem: &str) -> PolygonsError {
+    PolygonsError::Syntax(format!("line {line}: {problem}"))
+}
+
+/// The next numbers of a line, as the words that follow; infinite ones too, which are refused with the vertex they belong to.
+///
+/// # Errors
+/// When one is missing, or is none.
+pub(crate) fn numbers<T: std::str::FromStr, const N: usize>(
+    bytes: &[u8],
+    line: &Line,
+    words: impl Iterator<Item = Range<usize>>,
+) -> Result<[T; N], PolygonsError> {
+    let parsed = words.take(N).map(|word| {
+        let number = std::str::from_utf8(&bytes[word.clone()]).ok().and_then(|word| word.parse().ok());
+        number.ok_or_else(|| {
+            let word = shown_token(&bytes[word]);
+            fault(line.number, &format!("'{word}' is not a number such as 1.25"))
+        })
+    });
+    let parsed = parsed.collect::<Result<Vec<T>, _>>()?;
+    let found = parsed.len();
+    parsed.try_into().map_err(|_| fault(line.number, &format!("has {found} numbers of {N}")))
 }

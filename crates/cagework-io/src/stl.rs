@@ -4,9 +4,10 @@
 
 use cagework_core::mesh::weld;
 use glam::Vec3;
-use stl_io::{Normal, Triangle, Vertex, create_stl_reader};
+use stl_io::{Normal, Triangle, Vertex};
 
-use crate::polygons::{Encoding, Polygons, PolygonsError};
+use crate::obj::{Group, lines, rest_of, shown_token, tokens};
+use crate::polygons::{Encoding, Polygons, PolygonsError, fault, numbers};
 
 /// Bytes of the header with the number of triangles, and of each triangle, in a binary file.
 const HEADER: usize = 84;
@@ -42,49 +43,35 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
     let is_text = is_text(bytes) && !is_binary(bytes);
     let most = if is_text { bytes.len() / SHORTEST } else { bytes.len() / TRIANGLE } as u64;
     Polygons::check_memory(2 * bytes.len() as u64, 3 * most, 3 * most, memory_limit)?;
-    let mut corners = Vec::new();
-    let mut is_whole = true;
-    if is_text {
-        let (solids, has_ended) = solids(bytes);
-        is_whole = has_ended;
-        for solid in solids {
-            add(&mut std::io::Cursor::new(solid), &mut corners)?;
-        }
-    } else {
-        let count = bytes.get(HEADER - 4..HEADER).and_then(|count| <[u8; 4]>::try_from(count).ok());
-        let Some(count) = count.map(|count| u64::from(u32::from_le_bytes(count))) else {
-            return Err(PolygonsError::Syntax(
-                "it has no facets of text, and is too short for a binary file".into(),
-            ));
-        };
-        if HEADER as u64 + count * TRIANGLE as u64 > bytes.len() as u64 {
-            let bytes = bytes.len() as u64;
-            return Err(PolygonsError::Count { name: "triangle".into(), count, bytes });
-        }
-        // The reader takes whatever begins with this word for text.
-        let mut bytes = bytes.to_vec();
-        bytes.iter_mut().take(1).for_each(|first| *first = b' ');
-        add(&mut std::io::Cursor::new(bytes), &mut corners)?;
-    }
-    let welded = weld(&corners);
     let mut read = Polygons {
-        positions: welded.first.iter().map(|&v| corners[v as usize]).collect(),
         face_starts: vec![0],
         encoding: if is_text { Encoding::Text } else { Encoding::LittleEndian },
         ..Polygons::default()
     };
+    let (corners, solids) = if is_text {
+        read_text(bytes, &mut read.notices)?
+    } else {
+        (read_binary(bytes, &mut read.notices)?, Vec::new())
+    };
+    let welded = weld(&corners);
+    read.positions = welded.first.iter().map(|&v| corners[v as usize]).collect();
     let mut collapsed = 0;
-    for triangle in welded.unique_of.as_chunks::<3>().0 {
+    let mut solids = solids.into_iter().peekable();
+    for (t, triangle) in welded.unique_of.as_chunks::<3>().0.iter().enumerate() {
+        while let Some((name, _)) = solids.next_if(|(_, first)| *first <= t) {
+            let first_face = read.face_starts.len() as u32 - 1;
+            read.groups.push(Group { is_object: true, name, first_face });
+        }
         let [a, b, c] = *triangle;
         if a == b || b == c || c == a {
             collapsed += 1;
             continue;
         }
         read.corners.extend(triangle);
-        read.end_face()?;
+        read.end_face(None)?;
     }
-    if !is_whole {
-        read.notices.push("the text does not end with 'endsolid': it may be cut off".into());
+    if read.groups.iter().all(|solid| solid.name.is_empty()) && read.groups.len() < 2 {
+        read.groups.clear();
     }
     if collapsed > 0 {
         read.notices.push(format!("{collapsed} triangles have two corners at one place: left out"));
@@ -92,43 +79,105 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
     Ok(read)
 }
 
-fn add(file: &mut std::io::Cursor<Vec<u8>>, corners: &mut Vec<Vec3>) -> Result<(), PolygonsError> {
-    let wrong = |e: std::io::Error| PolygonsError::Syntax(e.to_string());
-    for triangle in create_stl_reader(file).map_err(wrong)? {
-        corners.extend(triangle.map_err(wrong)?.vertices.map(|v| Vec3::from_array(v.0)));
+/// Corners of the triangles of a binary file.
+fn read_binary(bytes: &[u8], notices: &mut Vec<String>) -> Result<Vec<Vec3>, PolygonsError> {
+    let count = bytes.get(HEADER - 4..HEADER).and_then(|count| <[u8; 4]>::try_from(count).ok());
+    let Some(count) = count.map(|count| u64::from(u32::from_le_bytes(count))) else {
+        return Err(PolygonsError::Syntax(
+            "it has no facets of text, and is too short for a binary file".into(),
+        ));
+    };
+    let (length, follow) = (bytes.len() as u64, (bytes.len() - HEADER) as u64);
+    if count * TRIANGLE as u64 > follow {
+        return Err(PolygonsError::Count { name: "triangle".into(), count, bytes: length });
     }
-    Ok(())
+    if count == 0 && follow > 0 {
+        let problem = format!("its header counts 0 facets, but {follow} bytes follow");
+        return Err(PolygonsError::Syntax(problem));
+    }
+    let (triangles, rest) = bytes[HEADER..].split_at(count as usize * TRIANGLE);
+    if !rest.is_empty() {
+        let n = rest.len();
+        notices.push(format!("its header counts {count} facets: {n} bytes after them are left out"));
+    }
+    let is_colored = triangles.chunks(TRIANGLE).any(|triangle| triangle[TRIANGLE - 2..] != [0, 0]);
+    if is_colored || bytes[..HEADER - 4].windows(6).any(|word| word == b"COLOR=") {
+        notices.push("colours of an STL (attributes of facets, COLOR= in the header) are not kept".into());
+    }
+    let number = |bytes: &[u8; 4]| f32::from_le_bytes(*bytes);
+    let corners = triangles.chunks(TRIANGLE).flat_map(|triangle| {
+        let numbers: Vec<f32> = triangle[12..48].as_chunks().0.iter().map(number).collect();
+        [0, 3, 6].map(|k| Vec3::from_slice(&numbers[k..]))
+    });
+    Ok(corners.collect())
 }
 
-/// The solids of a text, each as the reader takes it: in small letters, with a name and an end. Normals are not looked at, which
-/// some programs write as "nan"; nor is what is in no format of STL, such as colours. Also says whether the last one has ended.
-fn solids(bytes: &[u8]) -> (Vec<Vec<u8>>, bool) {
-    let mut solids: Vec<Vec<u8>> = Vec::new();
-    let mut has_ended = true;
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    for line in bytes.split(|&b| b == b'\n' || b == b'\r') {
-        let line = line.trim_ascii().to_ascii_lowercase();
-        let word = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
-        match (word, solids.last_mut()) {
-            (b"solid", _) => {
-                solids.push(b"solid x\n".to_vec());
+/// Names of solids, with the first triangle of each.
+type Solids = Vec<(String, usize)>;
+
+/// Corners of the triangles of a text, and its solids. Normals are not read, which some programs write as "nan".
+fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<Vec3>, Solids), PolygonsError> {
+    let (mut corners, mut solids, mut has_ended) = (Vec::new(), Solids::new(), true);
+    let mut unknown = None;
+    // First corner of a facet that has not ended.
+    let mut open: Option<usize> = None;
+    let mut end =
+        |line: usize, corners: &[Vec3], next: Option<usize>| match std::mem::replace(&mut open, next) {
+            Some(start) if corners.len() != start + 3 => Err(fault(
+                line,
+                &format!("the facet that ends here has {} corners, not 3", corners.len() - start),
+            )),
+            _ => Ok(()),
+        };
+    let mut last = 0;
+    for line in lines(bytes) {
+        last = line.number;
+        let mut words = tokens(bytes, line.range.clone());
+        let Some(word) = words.next() else { continue };
+        match bytes[word.clone()].to_ascii_lowercase().as_slice() {
+            b"solid" => {
+                end(last, &corners, None)?;
+                solids.push((rest_of(&bytes[line.range], &bytes[word]), corners.len() / 3));
                 has_ended = false;
             }
-            (b"endsolid", _) => has_ended = true,
-            (b"facet", Some(solid)) => solid.extend(b"facet normal 0 0 0\n"),
-            (b"outer" | b"vertex" | b"endloop" | b"endfacet", Some(solid)) => {
-                solid.extend(&line);
-                solid.push(b'\n');
+            b"facet" => end(last, &corners, Some(corners.len()))?,
+            b"vertex" => {
+                let p: [f32; 3] = numbers(bytes, &line, words)?;
+                corners.push(Vec3::from_array(p));
             }
-            _ => {}
+            b"outer" | b"endloop" => {}
+            b"endfacet" => end(last, &corners, None)?,
+            b"endsolid" => {
+                end(last, &corners, None)?;
+                has_ended = true;
+            }
+            _ => unknown = unknown.or_else(|| Some(shown_token(&bytes[word]))),
         }
     }
-    solids.iter_mut().for_each(|solid| solid.extend(b"endsolid x\n"));
-    (solids, has_ended)
+    end(last, &corners, None)?;
+    if corners.is_empty() {
+        return Err(PolygonsError::Syntax("it has no facets".into()));
+    }
+    if corners.len() % 3 != 0 {
+        return Err(fault(last, "corners are of no facet"));
+    }
+    if !has_ended {
+        notices.push("the text does not end with 'endsolid': it may be cut off".into());
+    }
+    if let Some(word) = unknown {
+        notices.push(format!("lines of other words than those of STL, such as '{word}', are not kept"));
+    }
+    Ok((corners, solids))
 }
 
 /// Triangles as a file, with the normals of their planes.
-pub(crate) fn write(positions: &[Vec3], triangles: &[[u32; 3]], encoding: Encoding) -> Vec<u8> {
+/// `solids`: names, and the first triangle of each; a text has them.
+pub(crate) fn write(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    encoding: Encoding,
+    solids: &[(&str, usize)],
+) -> Vec<u8> {
     let all = triangles.iter().map(|t| {
         let corners = t.map(|v| positions[v as usize]);
         let [a, b, c] = corners.map(Vec3::as_dvec3);
@@ -139,13 +188,27 @@ pub(crate) fn write(positions: &[Vec3], triangles: &[[u32; 3]], encoding: Encodi
         }
     });
     if encoding == Encoding::Text {
-        let mut text = String::from("solid cagework\n");
-        for Triangle { normal: n, vertices } in all {
+        let mut text = String::new();
+        let mut solids = solids.iter().peekable();
+        let mut name = "cagework";
+        for (t, Triangle { normal: n, vertices }) in all.enumerate() {
+            let before = name;
+            let mut is_first = t == 0;
+            while let Some((next, _)) = solids.next_if(|(_, first)| *first <= t) {
+                (name, is_first) = (if next.is_empty() { "cagework" } else { next }, true);
+            }
+            if is_first {
+                text += &if t == 0 {
+                    format!("solid {name}\n")
+                } else {
+                    format!("endsolid {before}\nsolid {name}\n")
+                };
+            }
             text += &format!("facet normal {} {} {}\nouter loop\n", n[0], n[1], n[2]);
             vertices.iter().for_each(|v| text += &format!("vertex {} {} {}\n", v[0], v[1], v[2]));
             text += "endloop\nendfacet\n";
         }
-        return (text + "endsolid cagework\n").into_bytes();
+        return (text + &format!("endsolid {name}\n")).into_bytes();
     }
     let mut bytes = Vec::with_capacity(HEADER + TRIANGLE * triangles.len());
     stl_io::write_stl(&mut bytes, all).expect("a Vec takes all bytes");

@@ -41,6 +41,27 @@ fn damaged_headers_are_errors() {
     assert!(fault(&with(8, u32::MAX)).contains("cut off"));
     assert!(fault(&with(12, u32::MAX)).contains("not a readable GLB"));
     assert!(fault(&with(16, 0)).contains("not a readable GLB"));
+    assert!(fault(&with(12, u32::MAX)).contains("one of its chunks ends after the file"));
+    assert!(fault(&with(16, 0)).contains("its first chunk must be JSON"));
+    assert!(
+        fault(b"{\"asset\": {\n \"version\"").contains("its JSON ends too early: it is cut off, at line 2")
+    );
+    assert!(fault(b"{\"asset\" {}}").contains("its JSON is damaged, at line 1, column 10"));
+    let of_type = fault_of(|b| b.json["bufferViews"][1]["byteLength"] = "long".into());
+    assert!(
+        of_type
+            .contains("item 1 of 'bufferViews' lacks a value, or has one of another type than glTF 2.0 says"),
+        "{of_type}"
+    );
+    // Some writers fill up the JSON with zeros.
+    let mut padded = good.clone();
+    let end = 20 + padded[12] as usize + 256 * padded[13] as usize;
+    padded.splice(end..end, [0; 4]);
+    let length = padded.len() as u32;
+    padded[8..12].copy_from_slice(&length.to_le_bytes());
+    let length = (end - 20 + 4) as u32;
+    padded[12..16].copy_from_slice(&length.to_le_bytes());
+    assert_eq!(read("x.glb", &padded).unwrap().positions, read("x.glb", &good).unwrap().positions);
     assert!(fault(&glb(&json!([1, 2]), None)).contains("version"));
     assert!(fault(&glb(&json!({ "asset": { "version": "1.0" } }), None)).contains("1.0"));
 }

@@ -156,10 +156,15 @@ fn other_formats_are_named_with_a_way_out() {
     for (name, bytes, expected) in [
         ("a.obj", &b""[..], "empty"),
         ("a.zip", b"PK\x03\x04rest", "zip archive: unpack it"),
-        ("a.fbx", b"Kaydara FBX", "export it as GLB, OBJ, PLY or STL"),
+        ("a.fbx", b"Kaydara FBX", "export it as GLB, OBJ, PLY, STL or OFF"),
         ("a.stl", b"solid x", "damaged: it has no facets"),
         ("a.glb", b"glXF", "not a GLB"),
         ("a.ply", b"solid", "not a PLY"),
+        ("a.obj", b"\xff\xfev\0 \0", "is a text in UTF-16: save it as UTF-8"),
+        ("a.obj", b"v\0 \x000\0", "is a text in UTF-16: save it as UTF-8"),
+        ("a.obj", b"version https://git-lfs.github.com/spec/v1\noid sha256:0", "`git lfs pull`"),
+        ("a.glb", b"version https://git-lfs.github.com/spec/v1\noid sha256:0", "is a Git LFS pointer"),
+        ("a.obj", b"<!DOCTYPE html>", "is an XML or HTML text"),
     ] {
         let message = read(name, bytes).unwrap_err().to_string();
         assert!(message.contains(expected), "{message}");

@@ -146,6 +146,65 @@ fn a_binary_stl_may_begin_like_a_text_and_has_normals_of_its_planes() {
 }
 
 #[test]
+fn solids_keep_their_names_and_what_an_stl_loses_is_said() {
+    let triangle = |z: f32| {
+        format!(
+            "facet normal 0 0 1\nouter loop\nvertex 0 0 {z}\nvertex 1 0 {z}\nvertex 0 1 {z}\nendloop\nendfacet\n"
+        )
+    };
+    let [first, second, third] = [0.0, 1.0, 2.0].map(triangle);
+    let text = format!("solid left wing\n{first}{second}endsolid left wing\nsolid b\n{third}endsolid b\n");
+    let model = read("x.stl", text.as_bytes()).unwrap();
+    assert_eq!(model.counts.nodes, 2);
+    assert_eq!(String::from_utf8(model.write_stl(&model.positions).unwrap()).unwrap(), text);
+    assert_eq!(model.lost_in(ModelFormat::Ply).unwrap(), "the ply file does not keep: names of parts");
+    assert_eq!((model.notices.len(), model.lost_in(ModelFormat::Stl)), (0, None));
+
+    let mut bytes = obj().write_stl(&cube()).unwrap();
+    assert_eq!(read("x.stl", &bytes).unwrap().notices, [""; 0]);
+    // Blue in 15 bits, as VisCAM and Materialise have it.
+    bytes[84 + 48] = 0x1f;
+    let colors = "colours of an STL (attributes of facets, COLOR= in the header) are not kept";
+    assert_eq!(read("x.stl", &bytes).unwrap().notices, [colors]);
+    bytes[84 + 48] = 0;
+    bytes[..6].copy_from_slice(b"COLOR=");
+    assert_eq!(read("x.stl", &bytes).unwrap().notices, [colors]);
+    bytes[..6].fill(0);
+    bytes[80] = 7;
+    let short = read("x.stl", &bytes).unwrap();
+    assert_eq!(short.notices, ["its header counts 7 facets: 250 bytes after them are left out"]);
+    bytes[80] = 0;
+    assert!(fault("x.stl", &bytes).ends_with("its header counts 0 facets, but 600 bytes follow"));
+}
+
+/// A line of the file and its word, and never the words of a library.
+#[test]
+fn faults_of_texts_name_the_line() {
+    let stl = "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid x\n";
+    let ply = ply_text();
+    for (name, text, said) in [
+        ("x.stl", stl.replace("vertex 1 0", "vertex 1,5 0"), "line 5: '1,5' is not a number such as 1.25"),
+        ("x.stl", stl.replace("vertex 1 0 0\n", ""), "line 7: the facet that ends here has 2 corners, not 3"),
+        ("x.stl", stl.replace("vertex 1 0 0", "vertex 1 0"), "line 5: has 2 numbers of 3"),
+        ("x.ply", ply.replacen("\n1 0 0 ", "\n1,5 0 0 ", 1), "line 19: '1,5' is not a number such as 1.25"),
+        (
+            "x.ply",
+            ply.replacen("double y", "duble y", 1),
+            "line 6: 'property duble y' is no statement of a PLY header",
+        ),
+        ("x.ply", ply.replacen("4 0 2", "5 0 2", 1), "it ends before all that its header names"),
+    ] {
+        let message = fault(name, text.as_bytes());
+        assert!(message.contains(&format!("the file is damaged: {said}")), "{message}");
+    }
+    // Blender 2.47 forgot the word 'comment'.
+    let old = ply.replace("comment by hand", "Created by hand");
+    let model = read("x.ply", old.as_bytes()).unwrap();
+    assert_eq!(model.positions, cube());
+    assert_eq!(model.notices[0], "line 3 'Created by hand' of the header is no statement of PLY: left out");
+}
+
+#[test]
 fn what_is_wrong_with_them_is_said() {
     let ply = ply_text();
     for (from, to, said) in [
@@ -270,7 +329,7 @@ fn texts_of_ply_as_they_are_met() {
     let no_place = plain.replacen("\n1 0 0 ", "\nnan 0 0 ", 1);
     assert!(fault("x.ply", no_place.as_bytes()).contains("vertex 1 has a coordinate that is not finite"));
     let negative = plain.replacen("\n0 1\n4 0", "\n0 1\n4 -1", 1);
-    assert!(fault("x.ply", negative.as_bytes()).contains("face 0 names vertex 4294967295, but there are 8"));
+    assert!(fault("x.ply", negative.as_bytes()).contains("face 0 names vertex -1, but there are 8"));
 
     // Two strips in one list: a square and, behind a stitch, a triangle.
     let strips =

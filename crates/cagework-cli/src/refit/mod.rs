@@ -306,6 +306,7 @@ impl Bound<'_> {
             Err(error) => Outcome::of_error(&error, &job.model),
             Ok(rig) => {
                 written.notices.extend(rig.iter().flat_map(ReshapeReport::notices));
+                written.notices.extend(model.lost_in(job.output.format));
                 written.total_ms = elapsed_ms(started);
                 Outcome::Written(Box::new(Written { rig, ..written }))
             }

@@ -55,7 +55,7 @@ pub(crate) fn load(
     let of_json = bytes_of_json(&json);
     MemoryError::check(of_json + bytes.len() as u64, memory_limit)?;
     let text = bin.is_some().then(|| json.to_vec());
-    let mut json: Value = serde_json::from_slice(&json).map_err(|e| GltfError::Json(e.to_string()))?;
+    let mut json = parsed(&json)?;
     check_version(&json)?;
     write_integers(&mut json, false);
     let nodes = json["nodes"].as_array().map_or(0, Vec::len) as u64;
@@ -151,15 +151,42 @@ fn split(bytes: &[u8]) -> Result<Chunks<'_>, GltfError> {
             bytes.len()
         )));
     }
-    let glb = Glb::from_slice(&bytes[..length]).map_err(|e| fault(e.to_string()))?;
-    Ok((glb.json, glb.bin))
+    let glb = Glb::from_slice(&bytes[..length]).map_err(|e| {
+        use ::gltf::binary::Error::{ChunkType, UnknownChunkType};
+        fault(match e {
+            ::gltf::Error::Binary(ChunkType(_) | UnknownChunkType(_)) => {
+                "its first chunk must be JSON, and the one after it binary data".into()
+            }
+            _ => "one of its chunks ends after the file: it is cut off or damaged".to_owned(),
+        })
+    })?;
+    // Some writers fill up the chunk with zeros instead of spaces.
+    let json = match glb.json {
+        Cow::Borrowed(json) => Cow::Borrowed(unpadded(json)),
+        Cow::Owned(json) => unpadded(&json).to_vec().into(),
+    };
+    Ok((json, glb.bin))
+}
+
+fn unpadded(json: &[u8]) -> &[u8] {
+    json.trim_ascii_end().strip_suffix(b"\0").map_or(json, |json| {
+        let end = json.iter().rposition(|&b| b != 0).map_or(0, |last| last + 1);
+        &json[..end]
+    })
+}
+
+fn parsed(json: &[u8]) -> Result<Value, GltfError> {
+    serde_json::from_slice(json).map_err(|e| {
+        let how = if e.is_eof() { "ends too early: it is cut off" } else { "is damaged" };
+        GltfError::Json(format!("its JSON {how}, at line {}, column {}", e.line(), e.column()))
+    })
 }
 
 /// JSON and binary chunk of a GLB, nothing resolved.
 pub(crate) fn glb_parts(bytes: &[u8], memory_limit: u64) -> Result<(Value, Vec<u8>), GltfError> {
     let (json, bin) = split(bytes)?;
     MemoryError::check(bytes_of_json(&json) + 2 * bytes.len() as u64, memory_limit)?;
-    let json: Value = serde_json::from_slice(&json).map_err(|e| GltfError::Json(e.to_string()))?;
+    let json = parsed(&json)?;
     check_version(&json)?;
     Ok((json, bin.map(Cow::into_owned).unwrap_or_default()))
 }
@@ -219,7 +246,18 @@ pub(super) fn typed(json: &Value) -> Result<Root, GltfError> {
             scene.entry("nodes").or_insert_with(|| json!([]));
         }
     }
-    serde_json::from_value(Value::Object(geometry)).map_err(|e| GltfError::Json(e.to_string()))
+    let whole = Value::Object(geometry);
+    serde_json::from_value(whole.clone()).map_err(|_| {
+        let lists =
+            whole.as_object().into_iter().flatten().filter_map(|(key, list)| Some((key, list.as_array()?)));
+        let mut items =
+            lists.flat_map(|(key, list)| list.iter().enumerate().map(move |(k, item)| (key, k, item)));
+        let at = items.find(|(key, _, item)| {
+            serde_json::from_value::<Root>(json!({ "asset": whole["asset"], *key: [item] })).is_err()
+        });
+        let place = at.map_or("a part of it".into(), |(key, k, _)| format!("item {k} of '{}'", shown(key)));
+        GltfError::Json(format!("{place} lacks a value, or has one of another type than glTF 2.0 says"))
+    })
 }
 
 /// A value as the library wants it: `extras`, which may have any type, and extensions are left out, and so is `null`.

@@ -58,7 +58,7 @@ impl Model {
             let hint = if pose.keeps_order_in(ModelFormat::Obj) && pose.format != ModelFormat::Stl {
                 "export it from the cage itself, with the settings of the cage's export"
             } else {
-                "write it as OBJ or PLY, which keep the order"
+                "write it as OBJ, PLY or OFF, which keep the order"
             };
             return Err(PoseError::Order { pose: pose.name.clone(), edge, cage: self.name.clone(), hint });
         }
@@ -73,7 +73,7 @@ impl Model {
     #[must_use]
     pub fn keeps_order_in(&self, format: ModelFormat) -> bool {
         match format {
-            ModelFormat::Obj | ModelFormat::Ply => true,
+            ModelFormat::Obj | ModelFormat::Ply | ModelFormat::Off => true,
             // Their vertices are in the order of faces.
             ModelFormat::Gltf | ModelFormat::Stl => self.format == format,
         }

@@ -1,15 +1,18 @@
 //! A model with new positions, as a file.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 
+use ::gltf::json::validation::Checked;
 use cagework_core::PolygonMesh;
+use cagework_core::deform::vertex_normals;
 use glam::Vec3;
 
 use super::{Document, Model};
 use crate::error::WriteError;
 use crate::format::ModelFormat;
 use crate::gltf::{self, Played, Pose, Rest};
-use crate::{obj, ply, stl};
+use crate::{obj, off, ply, stl};
 
 impl Model {
     /// The model with new positions as a file of `format`.
@@ -22,7 +25,49 @@ impl Model {
             ModelFormat::Gltf => self.write_glb(positions),
             ModelFormat::Ply => self.write_ply(positions),
             ModelFormat::Stl => self.write_stl(positions),
+            ModelFormat::Off => self.write_off(positions),
         }
+    }
+
+    /// What the model has and a file of `format` does not keep, a sentence; nothing if it keeps all.
+    #[must_use]
+    pub fn lost_in(&self, format: ModelFormat) -> Option<String> {
+        let is_same = self.format == format;
+        let keeps = |formats: &[ModelFormat]| is_same || formats.contains(&format);
+        let (colors, texcoords, materials, names, rig);
+        match &self.document {
+            Document::Obj(document) => {
+                colors = !document.colors.is_empty()
+                    && !keeps(&[ModelFormat::Gltf, ModelFormat::Ply, ModelFormat::Off]);
+                texcoords = !document.texcoords.is_empty() && !keeps(&[ModelFormat::Gltf]);
+                materials = !document.materials.is_empty() && !keeps(&[ModelFormat::Gltf]);
+                names = !document.groups.is_empty() && !is_same;
+                rig = false;
+            }
+            Document::Gltf(document) => {
+                let has = |name: &str| {
+                    let all = document.root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+                    let mut names = all.flat_map(|primitive| primitive.attributes.keys());
+                    names.any(|key| matches!(key, Checked::Valid(key) if key.to_string().starts_with(name)))
+                };
+                colors = !is_same && has("COLOR_");
+                texcoords = has("TEXCOORD_") && !keeps(&[ModelFormat::Obj]);
+                // An OBJ gets their names.
+                materials = !is_same && self.counts.materials > 0;
+                names = !keeps(&[ModelFormat::Obj]) && self.counts.nodes > 1;
+                rig = !is_same && self.is_rigged();
+            }
+        }
+        let all = [
+            (colors, "colours"),
+            (texcoords, "texture coordinates"),
+            (materials, "materials and textures"),
+            (names, "names of parts"),
+            (rig, "skeleton, morph targets and animations"),
+        ];
+        let lost: Vec<&str> = all.into_iter().filter_map(|(is_lost, what)| is_lost.then_some(what)).collect();
+        (!lost.is_empty())
+            .then(|| format!("the {} file does not keep: {}", format.export_extension(), lost.join(", ")))
     }
 
     /// The model with new positions as an OBJ file.
@@ -73,6 +118,23 @@ impl Model {
         }))
     }
 
+    /// The model with new positions as an OFF file: polygons, colours of vertices, or normals if an OFF had them.
+    ///
+    /// # Errors
+    /// [`WriteError`] when there is not one finite position for each vertex.
+    pub fn write_off(&self, positions: &[Vec3]) -> Result<Vec<u8>, WriteError> {
+        self.check(positions)?;
+        let positions = self.up.turned_back(positions);
+        let has_normals = self.has_normals && self.format == ModelFormat::Off;
+        let normals = if has_normals { vertex_normals(&positions, &self.triangles) } else { Vec::new() };
+        let none = HashMap::new();
+        let (faces, colors) = match &self.document {
+            Document::Obj(document) => (self.cage_mesh().faces, &document.colors),
+            Document::Gltf(_) => (self.triangles.iter().map(|t| t.to_vec()).collect(), &none),
+        };
+        Ok(off::write(&positions, &faces, colors, &normals))
+    }
+
     /// The model with new positions as an STL file: triangles and the normals of their planes; text if it was a text, otherwise
     /// binary.
     ///
@@ -83,7 +145,18 @@ impl Model {
         if self.triangles.is_empty() {
             return Err(WriteError::NoFaces);
         }
-        Ok(stl::write(&self.up.turned_back(positions), &self.triangles, self.encoding))
+        let mut solids = Vec::new();
+        if let Document::Obj(document) = &self.document {
+            // Triangles come in the order of faces.
+            let mut t = 0;
+            for group in &document.groups {
+                let starts = &document.face_starts;
+                let first = starts.get(group.first_face as usize).copied().unwrap_or(u32::MAX);
+                t += document.triangles[t..].iter().take_while(|triangle| triangle[0] < first).count();
+                solids.push((group.name.as_str(), t));
+            }
+        }
+        Ok(stl::write(&self.up.turned_back(positions), &self.triangles, self.encoding, &solids))
     }
 
     /// The model with new positions as a GLB file.

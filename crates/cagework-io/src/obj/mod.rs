@@ -15,7 +15,9 @@ mod write;
 
 pub use error::ObjError;
 pub use inner::{read_inner_controls, write_inner_controls};
-pub(crate) use look::look;
+pub(crate) use lex::{Line, lines, shown as shown_token, tokens};
+pub(crate) use look::{look, rest_of};
 pub(crate) use read::{Corner, NONE, ObjDocument, read};
+pub(crate) use select::Group;
 pub use write::write_cage_obj;
 pub(crate) use write::{ObjPart, patch, write_new};

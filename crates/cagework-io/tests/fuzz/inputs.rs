@@ -75,6 +75,10 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     );
     samples.push(model.write_ply(&model.positions).expect("it fits"));
     samples.push(model.write_stl(&model.positions).expect("it has triangles"));
+    samples.push(model.write_off(&model.positions).expect("it fits"));
+    samples.push(
+        b"# c\nCOFF 3 1 0\n0 0 0 9 9 9 255\n1 0 0 9 9 9 255\n0 1 0 255 0 9 255\n3 0 1 2 1 0 0\n".to_vec(),
+    );
     samples
 }
 

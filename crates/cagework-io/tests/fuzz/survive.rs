@@ -111,7 +111,7 @@ fn as_file(model: &Model) {
     let moved: Vec<Vec3> = model.positions.iter().map(|&p| twist(p.clamp_length_max(1e6))).collect();
     let _ = model.look();
     let _ = model.write_obj(&moved);
-    for format in [ModelFormat::Ply, ModelFormat::Stl] {
+    for format in [ModelFormat::Ply, ModelFormat::Stl, ModelFormat::Off] {
         if let Ok(bytes) = model.write(format, &model.positions) {
             let again = Model::read("y", &bytes, &mut |_| None);
             assert!(again.is_ok(), "{}", again.err().map(|e| e.to_string()).unwrap_or_default());

@@ -61,13 +61,15 @@ impl Engine {
         let format: ModelFormat = taken(format)?;
         let pose = self.read(|state| state.positions.clone());
         let posed = self.deformed(&[pose])?.pop().unwrap_or_default();
-        Ok(self.read(|state| {
-            let member = state.models.get(id)?;
-            Answer::Ok(member.model.write(format, member.share(&posed))?)
-        })?)
+        let (bytes, lost) = self.read(|state| {
+            let model = &state.models.get(id)?.model;
+            Answer::Ok((model.write(format, state.models.get(id)?.share(&posed))?, model.lost_in(format)))
+        })?;
+        self.state.borrow_mut().rig_notices = lost.into_iter().collect();
+        Ok(bytes)
     }
 
-    /// What the last export did to the rig, each a sentence; they are told once.
+    /// What the last export did to the rig or did not keep, each a sentence; they are told once.
     #[wasm_bindgen(js_name = rigNotices)]
     #[must_use]
     pub fn rig_notices(&self) -> Vec<String> {

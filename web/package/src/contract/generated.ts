@@ -436,7 +436,7 @@ message: string, count: number, fix: Fix | null, };
 /**
  * Format of a model's file.
  */
-export type ModelFormat = "obj" | "gltf" | "ply" | "stl";
+export type ModelFormat = "obj" | "gltf" | "ply" | "stl" | "off";
 /**
  * The axis that points up in a file. Everything that is not in a file has Y up: a file with Z up is turned by 90
  * degrees about x when it is read, and back when it is written. Both are exact.
@@ -697,8 +697,8 @@ export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"detail":0.028,"quads":
 export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"plain":false,"dynamic":false};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":["harmonic"],"problems":true,"joints":null};
 /** Endings of files of models, best first. */
-export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "obj", "ply", "stl"] as const;
+export const MODEL_ENDINGS = ["glb", "vrm", "gltf", "obj", "ply", "stl", "off"] as const;
 /** Formats of a shape without anything else. */
-export const SHAPE_FORMATS = ["obj", "ply", "stl"] as const;
+export const SHAPE_FORMATS = ["obj", "ply", "stl", "off"] as const;
 /** Least and most of each option that is a number. */
 export const RANGES = { grid: [8, 512], vertices: [8, 400], detail: [0.005, 0.2], margin: [0, 0.25], voxels: [8, 128] } as const;

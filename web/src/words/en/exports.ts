@@ -7,7 +7,7 @@ export const exports = {
   sentence: "Files for Blender, Unity, Unreal, three.js, Python, and for this page.",
   items: {
     glb: ["Posed model", "GLB as you see it. Materials, textures and parts are those of your file."],
-    shape: ["Shape alone", "OBJ, PLY or STL as you see it: for printing, measuring, other programs."],
+    shape: ["Shape alone", "OBJ, PLY, STL or OFF as you see it: for printing, measuring, other programs."],
     poses: [
       "Poses as morph targets",
       "GLB with one morph target a pose and an animation through them. Exact in every blend.",

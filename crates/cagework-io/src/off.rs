@@ -1,0 +1,147 @@
+//! OFF in and out (Geomview's object file format, as text): vertices with colours or normals, and polygons.
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+
+use glam::Vec3;
+
+use crate::obj::{lines, shown_token, tokens};
+use crate::polygons::{Encoding, Polygons, PolygonsError, fault, numbers};
+
+/// Whether the first word names the format: `OFF` after letters for what its vertices have.
+pub(crate) fn is_off(bytes: &[u8]) -> bool {
+    let word = lines(bytes).find_map(|line| tokens(bytes, line.range).next());
+    word.is_some_and(|word| prefix(&bytes[word]).is_some())
+}
+
+/// The letters before `OFF`.
+fn prefix(word: &[u8]) -> Option<&[u8]> {
+    word.strip_suffix(b"OFF").filter(|letters| letters.iter().all(|b| b"STCN4n".contains(b)))
+}
+
+/// Reads a file within `memory_limit` bytes. A vertex and a face have a line each.
+pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, PolygonsError> {
+    let n_bytes = bytes.len() as u64;
+    Polygons::check_memory(n_bytes, 0, 0, memory_limit)?;
+    let mut rows = lines(bytes).filter(|line| tokens(bytes, line.range.clone()).next().is_some()).peekable();
+    let mut last = 1;
+    let (mut has_colors, mut has_normals) = (false, false);
+    let mut header = None;
+    if let Some(line) = rows.peek().cloned() {
+        let mut words = tokens(bytes, line.range.clone()).peekable();
+        if let Some(letters) = words.peek().and_then(|word| prefix(&bytes[word.clone()])) {
+            words.next();
+            rows.next();
+            if letters.contains(&b'4') || letters.contains(&b'n') {
+                return Err(fault(line.number, "its vertices are not of three dimensions"));
+            }
+            (has_colors, has_normals) = (letters.contains(&b'C'), letters.contains(&b'N'));
+            // The numbers may follow in the same line.
+            header = words.peek().is_some().then(|| (line, words.collect::<Vec<_>>()));
+        }
+    }
+    let header = header.or_else(|| {
+        rows.next().map(|line| {
+            let words = tokens(bytes, line.range.clone()).collect();
+            (line, words)
+        })
+    });
+    let Some((line, words)) = header else { return Err(PolygonsError::Empty) };
+    if words.first().is_some_and(|word| bytes[word.clone()].eq_ignore_ascii_case(b"BINARY")) {
+        return Err(fault(line.number, "it is binary; only OFF files of text are read"));
+    }
+    let [n_vertices, n_faces] = numbers::<u64, 2>(bytes, &line, words.into_iter())?;
+    // Each has a line of two bytes at least.
+    for (name, count) in [("vertex", n_vertices), ("face", n_faces)] {
+        if count > n_bytes / 2 {
+            return Err(PolygonsError::Count { name: name.into(), count, bytes: n_bytes });
+        }
+    }
+    Polygons::check_memory(n_bytes, n_vertices, n_bytes / 2, memory_limit)?;
+    let mut read = Polygons { face_starts: vec![0], encoding: Encoding::Text, ..Polygons::default() };
+    let ends = |last, n, what| fault(last, &format!("the text ends after {n} {what}"));
+    let mut odd_words = 0_usize;
+    for v in 0..n_vertices {
+        let line = rows.next().ok_or_else(|| ends(last, v, format!("of {n_vertices} vertices")))?;
+        last = line.number;
+        let mut words = tokens(bytes, line.range.clone());
+        read.positions.push(Vec3::from_array(numbers(bytes, &line, words.by_ref())?));
+        if has_normals {
+            let _: [f32; 3] = numbers(bytes, &line, words.by_ref())?;
+        }
+        if has_colors {
+            read.colors.push(numbers(bytes, &line, words.by_ref())?);
+        }
+        // A fourth number of a colour is its opacity.
+        odd_words += words.skip(usize::from(has_colors)).count();
+    }
+    let mut colored = 0_usize;
+    for f in 0..n_faces {
+        let line = rows.next().ok_or_else(|| ends(last, f, format!("of {n_faces} faces")))?;
+        last = line.number;
+        let mut words = tokens(bytes, line.range.clone());
+        let [n] = numbers::<u32, 1>(bytes, &line, words.by_ref())?;
+        let mut odd = None;
+        for k in 0..n {
+            let word = words.next().ok_or_else(|| fault(last, &format!("has {k} corners of {n}")))?;
+            let index: Option<i64> =
+                std::str::from_utf8(&bytes[word.clone()]).ok().and_then(|w| w.parse().ok());
+            let Some(index) = index else {
+                let word = shown_token(&bytes[word]);
+                return Err(fault(last, &format!("'{word}' is not a vertex, which have numbers from 0")));
+            };
+            odd = odd.or((index < 0).then_some(index as f64));
+            read.corners.push(u32::try_from(index).unwrap_or(u32::MAX));
+        }
+        read.end_face(odd)?;
+        colored += usize::from(words.next().is_some());
+    }
+    // Whole numbers up to 255, or shares of 1.
+    if read.colors.as_flattened().iter().any(|&share| share > 1.0) {
+        read.colors.as_flattened_mut().iter_mut().for_each(|share| *share /= 255.0);
+    }
+    let mut say = |count: usize, what: &str| {
+        if count > 0 {
+            read.notices.push(format!("{what} of the OFF file are not kept"));
+        }
+    };
+    say(colored, "colours of faces");
+    say(odd_words, "further numbers of vertices");
+    say(usize::from(has_normals && has_colors), "normals beside colours");
+    read.has_normals = has_normals && !has_colors;
+    Ok(read)
+}
+
+/// As a file: OFF, or COFF if there are colours (of vertices, sRGB from 0 to 1), or NOFF if there are normals.
+pub(crate) fn write(
+    positions: &[Vec3],
+    faces: &[Vec<u32>],
+    colors: &HashMap<u32, [f32; 3]>,
+    normals: &[Vec3],
+) -> Vec<u8> {
+    let kind = match (colors.is_empty(), normals.is_empty()) {
+        (false, _) => "COFF",
+        (true, false) => "NOFF",
+        (true, true) => "OFF",
+    };
+    let mut text = format!("{kind}\n{} {} 0\n", positions.len(), faces.len());
+    for (v, p) in (0..).zip(positions) {
+        let _ = write!(text, "{} {} {}", p.x, p.y, p.z);
+        if !colors.is_empty() {
+            let bytes =
+                colors.get(&v).map_or([255; 3], |c| c.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8));
+            let _ = write!(text, " {} {} {} 255", bytes[0], bytes[1], bytes[2]);
+        } else if let Some(n) = normals.get(v as usize) {
+            let _ = write!(text, " {} {} {}", n.x, n.y, n.z);
+        }
+        text.push('\n');
+    }
+    for face in faces {
+        let _ = write!(text, "{}", face.len());
+        face.iter().for_each(|v| {
+            let _ = write!(text, " {v}");
+        });
+        text.push('\n');
+    }
+    text.into_bytes()
+}
