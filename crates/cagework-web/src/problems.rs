@@ -24,6 +24,7 @@ fn view(problem: &Problem) -> views::Problem {
         Repair::Weld => "Join them".to_owned(),
         Repair::DropDegenerate if n == 1 => "Drop it".to_owned(),
         Repair::DropDegenerate => format!("Drop all {n}"),
+        Repair::Mirror => "Mirror this half".to_owned(),
         Repair::FillHoles => "Fill the holes".to_owned(),
         Repair::Flip => "Turn them outward".to_owned(),
         Repair::Grow => "Grow the cage".to_owned(),

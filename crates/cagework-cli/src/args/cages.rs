@@ -174,6 +174,8 @@ pub(crate) enum RepairArg {
     Weld,
     /// Drop faces without area, doubled faces and unused vertices.
     DropDegenerate,
+    /// Add the other half of a cage that ends in a plane across an axis.
+    Mirror,
     /// Close holes.
     FillHoles,
     /// Turn faces outward.
@@ -187,6 +189,7 @@ impl From<RepairArg> for Repair {
         match arg {
             RepairArg::Weld => Self::Weld,
             RepairArg::DropDegenerate => Self::DropDegenerate,
+            RepairArg::Mirror => Self::Mirror,
             RepairArg::FillHoles => Self::FillHoles,
             RepairArg::Flip => Self::Flip,
             RepairArg::Grow => Self::Grow,

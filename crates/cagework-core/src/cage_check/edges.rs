@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::mirror::Plane;
 use super::{Code, Fix, Places, Problem, Repair, Severity, diagonal, problem};
 use crate::cage::{Side, sides_of};
 use crate::mesh::PolygonMesh;
@@ -39,8 +40,9 @@ impl Edges {
         if !open.is_empty() {
             // Vertices that were split at a seam leave open edges, too: welding is tried first.
             let (_, joined) = same_places(mesh);
-            let fixes = [Repair::Weld, Repair::FillHoles].into_iter();
-            let fixes = fixes.filter(|&r| r != Repair::Weld || joined > 0);
+            let is_half = joined == 0 && Plane::of(mesh, &open).is_some_and(Plane::is_central);
+            let fixes = [Repair::Weld, Repair::Mirror, Repair::FillHoles].into_iter();
+            let fixes = fixes.filter(|&r| (r != Repair::Weld || joined > 0) && (r != Repair::Mirror || is_half));
             found.push(Problem {
                 places: Places {
                     edges: open.iter().map(|&[a, b]| [a.min(b), a.max(b)]).collect(),

@@ -6,6 +6,7 @@
 mod edges;
 mod fill;
 mod grow;
+mod mirror;
 mod orient;
 mod repair;
 mod sentences;

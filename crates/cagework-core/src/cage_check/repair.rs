@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use super::edges::{Edges, same_places};
 use super::grow;
+use super::mirror::Plane;
 use super::{fill, orient, shape};
 use crate::cage::CageError;
 use crate::controls::ControlError;
@@ -22,6 +23,8 @@ pub enum Repair {
     Weld,
     /// Drops faces without area, faces with the corners of another one, corners named twice, and unused vertices.
     DropDegenerate,
+    /// Adds the other half of a cage that ends in a plane across an axis.
+    Mirror,
     /// Closes holes of up to 64 edges.
     FillHoles,
     /// Turns faces outward.
@@ -61,7 +64,7 @@ pub enum RepairError {
     },
 }
 
-/// Repairs a mesh: in the order weld, drop, fill, flip, grow, whichever of them are asked for. Faces keep their order.
+/// Repairs a mesh: in the order weld, drop, mirror, fill, flip, grow, whichever of them are asked for. Faces keep their order.
 ///
 /// # Errors
 /// [`RepairError`], all about growing; the other repairs do what they can.
@@ -94,6 +97,11 @@ pub fn repair_smooth(
     }
     if asked(Repair::DropDegenerate) {
         drop_degenerate(&mut repaired);
+    }
+    if asked(Repair::Mirror) {
+        let mesh = &mut repaired.mesh;
+        let open = Edges::of(mesh, &shape::sound_faces(mesh, &mut Vec::new())).open();
+        repaired.done.extend(Plane::of(mesh, &open).map(|plane| plane.mirror(mesh, &open)));
     }
     if asked(Repair::FillHoles) {
         fill_holes(&mut repaired);

@@ -416,7 +416,7 @@ export type Severity = "error" | "warning" | "note";
 /**
  * A repair.
  */
-export type Repair = "weld" | "drop_degenerate" | "fill_holes" | "flip" | "grow";
+export type Repair = "weld" | "drop_degenerate" | "mirror" | "fill_holes" | "flip" | "grow";
 /**
  * What a button beside a problem does.
  */
