@@ -7,10 +7,11 @@ use cagework_core::deform::deform_bound;
 use cagework_core::options::BindOptions;
 use cagework_core::{Cage, Controls, bind};
 use cagework_gpu::{GpuContext, bind_on as bind_on_gpu};
-use cagework_io::{Model, ModelFormat, ReshapeOptions, write_cage_obj, write_weights_npz};
+use cagework_io::{Model, ModelFormat, ReshapeOptions, write_weights_npz};
 use glam::{DVec3, Vec3};
 
 use crate::args::{BindArgs, CageSource, ModelOutput};
+use crate::cage::write_cage;
 use crate::card;
 use crate::columns;
 use crate::error::CliError;
@@ -103,7 +104,8 @@ pub(crate) fn bind_model(model: &Model, cage: &Cage, options: &BindOptions) -> R
 
 fn save_cage(args: &BindArgs, cage: &Cage, model: &Model) -> Result<(), CliError> {
     let Some(path) = &args.save_cage else { return Ok(()) };
-    write(path, &write_cage_obj(&model.up().mesh_turned_back(&cage.to_polygon_mesh())))
+    let mesh = model.up().mesh_turned_back(&cage.to_polygon_mesh());
+    write_cage(&ModelOutput { path: path.clone(), format: ModelFormat::Obj }, &mesh, model.origin())
 }
 
 /// Bytes that are in use at once while a file is written that takes so many: what is held, the weights, and that.

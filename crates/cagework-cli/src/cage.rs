@@ -3,6 +3,7 @@
 use cagework_core::PolygonMesh;
 use cagework_core::cage_gen::CageReport;
 use cagework_io::shown;
+use glam::DVec3;
 use serde::Serialize;
 
 use crate::args::{CageArgs, DEFAULT_DIVISIONS, KindArg, ModelOutput};
@@ -59,19 +60,19 @@ pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
         }
     };
     (made.vertices, made.faces) = (cage.positions.len(), cage.faces.len());
-    write_cage(&args.output, &model.up().mesh_turned_back(&cage))?;
+    write_cage(&args.output, &model.up().mesh_turned_back(&cage), model.origin())?;
     if as_json {
         return print(&json(&made));
     }
     print(&text(&made))
 }
 
-/// Writes a cage in the format that the output asks for.
+/// Writes a cage, its positions from an origin, in the format that the output asks for.
 ///
 /// # Errors
 /// When it cannot be written.
-pub(crate) fn write_cage(output: &ModelOutput, cage: &PolygonMesh) -> Result<(), CliError> {
-    write(&output.path, &export(&generated_model("cage.obj", cage)?, &cage.positions, output)?)
+pub(crate) fn write_cage(output: &ModelOutput, cage: &PolygonMesh, origin: DVec3) -> Result<(), CliError> {
+    write(&output.path, &export(&generated_model("cage.obj", cage, origin)?, &cage.positions, output)?)
 }
 
 /// A length of a model of any size, to three digits.

@@ -37,8 +37,10 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
     // Which way is up makes no difference to what is wrong with a cage.
     let load = |path| load_model(path, UpAxis::Y, args.memory);
     let refused = |source| CliError::Cage { name: args.cage.display().to_string(), source };
-    let mut cage = cage_mesh(&load(&args.cage)?).map_err(refused)?;
-    let model = args.mesh.as_deref().map(load).transpose()?;
+    let of_cage = load(&args.cage)?;
+    let mut cage = cage_mesh(&of_cage).map_err(refused)?;
+    let mut model = args.mesh.as_deref().map(load).transpose()?;
+    model.iter_mut().for_each(|model| model.see_from(of_cage.origin()));
     let inside = model.as_ref().map(|m| m.positions.as_slice());
     let smooth = args.smooth.smooth;
     let mut checked = Checked {
@@ -51,7 +53,7 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
         let repairs: Vec<Repair> = args.repair.iter().map(|&r| r.into()).collect();
         let mended = repair_smooth(&cage, &repairs, inside, smooth)?;
         cage = mended.mesh;
-        write_cage(output, &cage)?;
+        write_cage(output, &cage, of_cage.origin())?;
         checked.repaired = mended.done;
         checked.output = Some(output.path.display().to_string());
         checked.check = check_smooth(&cage, inside, Some(args.grid), smooth);

@@ -4,26 +4,27 @@ use std::path::{Path, PathBuf};
 
 use cagework_core::{Cage, ControlSet, InnerControls};
 use cagework_io::{SavedWeights, UpAxis, read_inner_controls};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::args::{ControlArgs, MemoryArgs};
 use crate::error::CliError;
 use crate::files::{read, shown_path};
 
-/// The controls of a cage that the arguments ask for; none if that is the plain cage. `up`: what points up in the files.
+/// The controls of a cage that the arguments ask for; none if that is the plain cage. `axes`: what points up in the
+/// files, and what the cage is seen from.
 ///
 /// # Errors
 /// When the file cannot be read, or names what cannot be a control.
 pub(crate) fn load_controls(
     cage: &Cage,
     args: &ControlArgs,
-    up: UpAxis,
+    axes: (UpAxis, DVec3),
     memory: MemoryArgs,
 ) -> Result<Option<ControlSet>, CliError> {
     let inner = match &args.controls {
         None if args.smooth.smooth == 0 => return Ok(None),
         None => InnerControls::default(),
-        Some(path) => InnerControls { radius: args.radius, ..load_inner(path, up, memory)? },
+        Some(path) => InnerControls { radius: args.radius, ..load_inner(path, axes, memory)? },
     };
     // What the elements are is asked for even if there is none.
     if args.controls.is_some() && inner.elements.is_empty() {
@@ -39,8 +40,9 @@ fn wrong(args: &ControlArgs, error: cagework_core::ControlError) -> CliError {
     }
 }
 
-fn load_inner(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<InnerControls, CliError> {
+fn load_inner(path: &Path, (up, origin): (UpAxis, DVec3), memory: MemoryArgs) -> Result<InnerControls, CliError> {
     let mut inner = read_inner_controls(&read(path)?, memory.bytes()).map_err(|e| CliError::file(path, e))?;
+    inner.positions.iter_mut().for_each(|p| *p = (p.as_dvec3() - origin).as_vec3());
     inner.positions = up.turned(&inner.positions).into_owned();
     Ok(inner)
 }
@@ -53,7 +55,7 @@ pub(crate) fn with_inner(
     poses: Vec<Vec<Vec3>>,
     files: &[PathBuf],
     rest: &[Vec3],
-    up: UpAxis,
+    axes: (UpAxis, DVec3),
     memory: MemoryArgs,
 ) -> Result<Vec<Vec<Vec3>>, CliError> {
     if !files.is_empty() && files.len() != poses.len() {
@@ -63,7 +65,7 @@ pub(crate) fn with_inner(
         });
     }
     let inner = |path: &PathBuf| {
-        let positions = load_inner(path, up, memory)?.positions;
+        let positions = load_inner(path, axes, memory)?.positions;
         if positions.len() == rest.len() {
             return Ok(positions);
         }

@@ -72,7 +72,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     let n_vertices = model.positions.len();
     let (n_cage, n_inner) = (cage.cage.n_vertices(), saved.inner_controls.len());
     let poses = args.pose.iter().map(|path| cage.load_pose(path)).collect::<Result<Vec<_>, _>>()?;
-    let poses = with_inner(poses, &args.pose_controls, &saved.inner_controls, model.up(), args.read.memory)?;
+    let poses = with_inner(poses, &args.pose_controls, &saved.inner_controls, (model.up(), model.origin()), args.read.memory)?;
     let rest = rest_of(&cage.cage, &saved);
     let names: Vec<String> = args.pose.iter().map(|path| pose_name(path)).collect();
     let options = args.rig.options(&model, &args.mesh)?;

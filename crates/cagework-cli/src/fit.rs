@@ -66,7 +66,8 @@ pub(crate) fn run(given: &FitArgs, as_json: bool) -> Result<(), CliError> {
     let precompute_ms = begun.elapsed().as_secs_f64() * 1e3;
     let Goals { weights, shares, to, notices } = match (&given.target, &given.landmarks) {
         (Some(path), _) => {
-            let target = load_model(path, args.read.axis(), args.read.memory)?;
+            let mut target = load_model(path, args.read.axis(), args.read.memory)?;
+            target.see_from(bound.model.origin());
             vertices(&bound, target, pull.areas())?
         }
         (None, Some(path)) => landmarks(&bound, path)?,

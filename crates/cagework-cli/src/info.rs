@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use cagework_core::mesh::weld;
 use cagework_core::{Bounds, Cage};
 use cagework_io::{Clip, Model, ModelFormat, escaped, read_inner_controls, shown};
+use glam::Vec3;
 use serde::Serialize;
 
 use crate::args::InfoArgs;
@@ -40,8 +41,8 @@ struct Info {
 /// Corners and diagonal of the bounding box, object units.
 #[derive(Debug, Serialize)]
 struct BoundsInfo {
-    min: [f32; 3],
-    max: [f32; 3],
+    min: [f64; 3],
+    max: [f64; 3],
     diagonal: f32,
 }
 
@@ -132,14 +133,23 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
         // What is wrong with a rig is said where it is used.
         props: model.props().unwrap_or_default(),
         bounds: BoundsInfo {
-            min: bounds.min.to_array(),
-            max: bounds.max.to_array(),
+            min: in_world(model, bounds.min),
+            max: in_world(model, bounds.max),
             diagonal: bounds.diagonal(),
         },
         closed: is_closed(&model.triangles, &welded.unique_of),
         cage,
         notices: model.notices.clone(),
     })
+}
+
+/// A position of a model, Y up, with the digits of its file.
+fn in_world(model: &Model, position: Vec3) -> [f64; 3] {
+    let origin = model.up().vector_turned(model.origin()).to_array();
+    let mut axes = origin.into_iter().zip(position.to_array()).map(|(origin, x)| {
+        if origin == 0.0 { x.to_string().parse().unwrap_or(x.into()) } else { origin + f64::from(x) }
+    });
+    std::array::from_fn(|_| axes.next().unwrap_or_default())
 }
 
 /// Whether every edge belongs to exactly two triangles; triangles without area between welded vertices do not count.

@@ -10,7 +10,7 @@ use cagework_core::{
     subdivided_box,
 };
 use cagework_io::{Model, UpAxis, write_cage_obj};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::args::{CageSource, ControlArgs, DEFAULT_MARGIN, MemoryArgs, ModelOutput};
 use crate::controls::load_controls;
@@ -57,17 +57,19 @@ fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliErr
     let bytes = read(path)?;
     let name = path.display().to_string();
     let mut beside = |relative: &str| read_beside(path, relative);
-    let mut model = Model::read_within(&name, &bytes, &mut beside, memory.bytes())?;
+    let mut model = Model::read_near(&name, &bytes, &mut beside, memory.bytes())?;
     model.set_up(up);
     Ok(model)
 }
 
-/// A mesh made by formula as the model that its OBJ file would be.
+/// A mesh that was made, its positions from an origin, as the model that its OBJ file would be.
 ///
 /// # Errors
 /// When it has no vertices.
-pub(crate) fn generated_model(name: &str, mesh: &PolygonMesh) -> Result<Model, CliError> {
-    Ok(Model::read(name, &write_cage_obj(mesh), &mut |_| None)?)
+pub(crate) fn generated_model(name: &str, mesh: &PolygonMesh, origin: DVec3) -> Result<Model, CliError> {
+    let mut model = Model::read(name, &write_cage_obj(mesh), &mut |_| None)?;
+    model.set_origin(origin);
+    Ok(model)
 }
 
 /// The built-in sample: what `demo`, `bench` and `evaluate` work on unless told otherwise.
@@ -95,7 +97,7 @@ pub(crate) fn built_in() -> Result<BuiltIn, CliError> {
     let Sample { mesh, cage, poses, .. } = samples::build(id).ok_or_else(missing)?;
     let TriMesh { positions, triangles } = mesh;
     let mesh = PolygonMesh { positions, faces: triangles.iter().map(|t| t.to_vec()).collect() };
-    let model = generated_model(&format!("{id}.obj"), &mesh)?;
+    let model = generated_model(&format!("{id}.obj"), &mesh, DVec3::ZERO)?;
     let cage = Cage::new(&cage).map_err(|source| CliError::Cage { name: id.into(), source })?;
     Ok(BuiltIn { name: id.to_owned(), mesh, model, cage, poses })
 }
@@ -111,29 +113,35 @@ pub(crate) fn load_cage(
     controls: &ControlArgs,
 ) -> Result<LoadedCage, CliError> {
     let model = match source {
-        CageSource::File(path) => return load_cage_file(path, around.up(), memory, controls),
+        CageSource::File(path) => {
+            return load_cage_file(path, around.up(), Some(around.origin()), memory, controls);
+        }
         CageSource::Box { divisions } => {
-            generated_model("box cage", &box_mesh(&around.positions, *divisions, DEFAULT_MARGIN)?)?
+            let mesh = box_mesh(&around.positions, *divisions, DEFAULT_MARGIN)?;
+            generated_model("box cage", &mesh, around.origin())?
         }
         CageSource::Auto(options) => {
             let options = CageOptions { smooth: controls.smooth.smooth, ..*options };
-            generated_model("generated cage", &generate_for(around, None, &options)?.0)?
+            generated_model("generated cage", &generate_for(around, None, &options)?.0, around.origin())?
         }
     };
     LoadedCage::new(model, around.up(), memory, controls)
 }
 
-/// The cage of a file. `up`: what points up in it.
+/// The cage of a file. `up`: what points up in it; `origin`: of its positions, near the cage unless said.
 ///
 /// # Errors
 /// When the file cannot be read or is no cage.
 pub(crate) fn load_cage_file(
     path: &Path,
     up: UpAxis,
+    origin: Option<DVec3>,
     memory: MemoryArgs,
     controls: &ControlArgs,
 ) -> Result<LoadedCage, CliError> {
-    LoadedCage::new(load_model(path, up, memory)?, up, memory, controls)
+    let mut model = load_model(path, up, memory)?;
+    model.see_from(origin.unwrap_or(model.origin()));
+    LoadedCage::new(model, up, memory, controls)
 }
 
 /// A generated cage around a model, its morph targets and a clip, with progress on the terminal.
@@ -171,13 +179,18 @@ impl LoadedCage {
         let cage = cage_mesh(&model)
             .and_then(|mesh| Cage::new(&mesh))
             .map_err(|source| CliError::Cage { name: model.name.clone(), source })?;
-        let set = load_controls(&cage, controls, up, memory)?;
+        let set = load_controls(&cage, controls, (up, model.origin()), memory)?;
         Ok(Self { cage, model, up, memory, set })
     }
 
     /// The cage as it was read, before faces are turned outward.
     pub(crate) fn mesh(&self) -> PolygonMesh {
         self.model.cage_mesh()
+    }
+
+    /// What its positions are seen from, in the axes of its file.
+    pub(crate) fn origin(&self) -> DVec3 {
+        self.model.origin()
     }
 
     /// What a model is bound to.
@@ -225,6 +238,8 @@ impl LoadedCage {
     /// # Errors
     /// When the file cannot be read or has another number of vertices than the cage.
     pub(crate) fn load_pose(&self, path: &Path) -> Result<Vec<Vec3>, CliError> {
-        Ok(self.model.pose_positions(&load_any(path, self.up, self.memory)?)?)
+        let mut pose = load_any(path, self.up, self.memory)?;
+        pose.see_from(self.model.origin());
+        Ok(self.model.pose_positions(&pose)?)
     }
 }

@@ -19,6 +19,7 @@ mod normals;
 mod npz;
 mod obj;
 mod off;
+mod origin;
 mod part_kind;
 mod ply;
 mod ply_text;

@@ -6,7 +6,7 @@ mod write;
 use std::borrow::Cow;
 
 use cagework_core::TriMesh;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use thiserror::Error;
 
 use crate::counts::Counts;
@@ -14,6 +14,7 @@ use crate::format::{FormatError, ModelFormat};
 use crate::gltf::{self, GltfDocument, GltfError};
 use crate::look::Look;
 use crate::obj::{self, ObjDocument, ObjError};
+use crate::origin::{far_notice, origin_near, relative};
 use crate::polygons::{Encoding, Polygons, PolygonsError};
 use crate::shown::shown;
 use crate::siblings::Resolve;
@@ -68,7 +69,8 @@ pub enum ReadError {
 pub struct Model {
     /// Name the caller gave.
     pub name: String,
-    /// World-space position of every vertex, Y up, in the order of the input (see the crate's root), not welded.
+    /// World-space position of every vertex, Y up, in the order of the input (see the crate's root), not welded; as seen from
+    /// [`Self::origin`].
     pub positions: Vec<Vec3>,
     /// Triangles, counter-clockwise seen from outside; polygons are triangulated.
     pub triangles: Vec<[u32; 3]>,
@@ -78,6 +80,8 @@ pub struct Model {
     pub notices: Vec<String>,
     /// What points up in the document.
     pub(crate) up: UpAxis,
+    /// Origin of the positions, in the file's axes.
+    pub(crate) origin: DVec3,
     bytes: u64,
     format: ModelFormat,
     /// Of a PLY, STL or OFF: how its numbers are written; whether its vertices have normals.
@@ -116,11 +120,41 @@ impl Model {
         resolve: &mut Resolve<'_>,
         memory_limit: u64,
     ) -> Result<Self, ReadError> {
+        let mut model = Self::read_from(name, bytes, resolve, memory_limit, false)?;
+        model.notices.extend(far_notice(&model.positions));
+        Ok(model)
+    }
+
+    /// As [`Self::read_within`]; a model far from the world's origin has its positions from an [`Self::origin`] near it, without
+    /// loss. That of models with skeletons or clips is always zero.
+    ///
+    /// # Errors
+    /// Those of [`Self::read_within`].
+    pub fn read_near(
+        name: &str,
+        bytes: &[u8],
+        resolve: &mut Resolve<'_>,
+        memory_limit: u64,
+    ) -> Result<Self, ReadError> {
+        let mut model = Self::read_from(name, bytes, resolve, memory_limit, true)?;
+        if model.origin == DVec3::ZERO {
+            model.notices.extend(far_notice(&model.positions));
+        }
+        Ok(model)
+    }
+
+    fn read_from(
+        name: &str,
+        bytes: &[u8],
+        resolve: &mut Resolve<'_>,
+        memory_limit: u64,
+        near: bool,
+    ) -> Result<Self, ReadError> {
         let format = ModelFormat::of_file(name, bytes)?;
         match format {
             ModelFormat::Gltf => {
                 let fault = |source| ReadError::Gltf { name: name.into(), source };
-                let model = gltf::read(name, bytes, resolve, memory_limit).map_err(fault)?;
+                let model = gltf::read(name, bytes, resolve, memory_limit, (!near).then_some(DVec3::ZERO)).map_err(fault)?;
                 Ok(Self {
                     name: name.into(),
                     positions: model.positions,
@@ -128,6 +162,7 @@ impl Model {
                     counts: model.counts,
                     notices: model.notices,
                     up: UpAxis::Y,
+                    origin: model.origin,
                     bytes: model.document.bytes,
                     format,
                     encoding: Encoding::default(),
@@ -139,10 +174,16 @@ impl Model {
                 let model = obj::read(bytes, resolve, memory_limit)
                     .map_err(|source| ReadError::Obj { name: name.into(), source })?;
                 let corner = |c: u32| model.document.corners[c as usize].v;
+                let origin = if near { origin_near(&model.positions) } else { DVec3::ZERO };
+                let positions = if origin == DVec3::ZERO {
+                    model.positions
+                } else {
+                    obj::positions_near(&model.document.bytes, origin)
+                };
                 Ok(Self {
                     name: name.into(),
                     triangles: model.document.triangles.iter().map(|t| t.map(corner)).collect(),
-                    positions: model.positions,
+                    positions,
                     counts: Counts {
                         nodes: model.groups,
                         meshes: 1,
@@ -152,6 +193,7 @@ impl Model {
                     },
                     notices: model.notices,
                     up: UpAxis::Y,
+                    origin,
                     bytes: model.bytes,
                     format,
                     encoding: Encoding::default(),
@@ -166,7 +208,7 @@ impl Model {
                     _ => off::read,
                 };
                 let fault = |source| ReadError::Polygons { name: name.into(), source };
-                let mut read = read(bytes, memory_limit).map_err(fault)?;
+                let mut read = read(bytes, memory_limit, near).map_err(fault)?;
                 let document = read.document().map_err(fault)?;
                 let corner = |c: u32| document.corners[c as usize].v;
                 let (vertices, corners) = (read.positions.len() as u64, document.corners.len() as u64);
@@ -181,6 +223,7 @@ impl Model {
                     },
                     notices: read.notices,
                     up: UpAxis::Y,
+                    origin: read.origin,
                     bytes: Polygons::check_memory(0, vertices, corners, u64::MAX).unwrap_or(u64::MAX),
                     format,
                     encoding: read.encoding,
@@ -227,7 +270,28 @@ impl Model {
         self.up = up;
     }
 
-    /// Positions at rest as they are in the file.
+    /// What the positions are seen from, in the file's axes: zero but for models far away that [`Self::read_near`] read.
+    #[must_use]
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// Sees the positions from another origin, in the file's axes: a cage and its poses from that of their model.
+    pub fn see_from(&mut self, origin: DVec3) {
+        if origin != self.origin {
+            let from = |p: &Vec3| relative(self.origin + p.as_dvec3(), origin);
+            let positions: Vec<Vec3> = self.positions_in_file().iter().map(from).collect();
+            self.positions = self.up.turned(&positions).into_owned();
+            self.origin = origin;
+        }
+    }
+
+    /// Says what the positions are seen from, and leaves them as they are: of a model that was made, not read.
+    pub fn set_origin(&mut self, origin: DVec3) {
+        self.origin = origin;
+    }
+
+    /// Positions at rest as they are in the file, as seen from the origin.
     pub(crate) fn positions_in_file(&self) -> Cow<'_, [Vec3]> {
         self.up.turned_back(&self.positions)
     }

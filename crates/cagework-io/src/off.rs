@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::obj::{lines, shown_token, tokens};
+use crate::origin::Coordinate;
 use crate::polygons::{Encoding, Polygons, PolygonsError, fault, numbers};
 
 /// Whether the first word names the format: `OFF` after letters for what its vertices have.
@@ -20,7 +21,7 @@ fn prefix(word: &[u8]) -> Option<&[u8]> {
 }
 
 /// Reads a file within `memory_limit` bytes. A vertex and a face have a line each.
-pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, PolygonsError> {
+pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygons, PolygonsError> {
     let n_bytes = bytes.len() as u64;
     Polygons::check_memory(n_bytes, 0, 0, memory_limit)?;
     let mut rows = lines(bytes).filter(|line| tokens(bytes, line.range.clone()).next().is_some()).peekable();
@@ -61,11 +62,12 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
     let mut read = Polygons { face_starts: vec![0], encoding: Encoding::Text, ..Polygons::default() };
     let ends = |last, n, what| fault(last, &format!("the text ends after {n} {what}"));
     let mut odd_words = 0_usize;
+    let mut positions = Vec::new();
     for v in 0..n_vertices {
         let line = rows.next().ok_or_else(|| ends(last, v, format!("of {n_vertices} vertices")))?;
         last = line.number;
         let mut words = tokens(bytes, line.range.clone());
-        read.positions.push(Vec3::from_array(numbers(bytes, &line, words.by_ref())?));
+        positions.push(DVec3::from_array(numbers(bytes, &line, words.by_ref())?));
         if has_normals {
             let _: [f32; 3] = numbers(bytes, &line, words.by_ref())?;
         }
@@ -75,6 +77,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
         // A fourth number of a colour is its opacity.
         odd_words += words.skip(usize::from(has_colors)).count();
     }
+    read.place(&positions, near);
     let mut colored = 0_usize;
     for f in 0..n_faces {
         let line = rows.next().ok_or_else(|| ends(last, f, format!("of {n_faces} faces")))?;
@@ -115,6 +118,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
 /// As a file: OFF, or COFF if there are colours (of vertices, sRGB from 0 to 1), or NOFF if there are normals.
 pub(crate) fn write(
     positions: &[Vec3],
+    origin: DVec3,
     faces: &[Vec<u32>],
     colors: &HashMap<u32, [f32; 3]>,
     normals: &[Vec3],
@@ -126,7 +130,8 @@ pub(crate) fn write(
     };
     let mut text = format!("{kind}\n{} {} 0\n", positions.len(), faces.len());
     for (v, p) in (0..).zip(positions) {
-        let _ = write!(text, "{} {} {}", p.x, p.y, p.z);
+        let [x, y, z] = Coordinate::of(origin, *p);
+        let _ = write!(text, "{x} {y} {z}");
         if !colors.is_empty() {
             let bytes =
                 colors.get(&v).map_or([255; 3], |c| c.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8));

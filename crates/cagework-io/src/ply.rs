@@ -1,7 +1,7 @@
 //! PLY in and out: vertices with colours, and polygons.
 
 use cagework_core::deform::vertex_normals;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
     Addable as _, ElementDef, Encoding as PlyEncoding, Header, Ply, Property, PropertyAccess,
@@ -25,7 +25,7 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 /// An element of any kind, as far as it is understood.
 #[derive(Default)]
 struct Element {
-    place: [f32; 3],
+    place: [f64; 3],
     normal: [f32; 3],
     color: [u8; 3],
     corners: Vec<u32>,
@@ -41,7 +41,7 @@ impl PropertyAccess for Element {
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
         let of = |names: [&str; 3]| names.iter().position(|&n| n == name);
         let set = if let Some(k) = of(PLACE) {
-            property.to_f32_lossy().map(|x| self.place[k] = x)
+            place(&property).map(|x| self.place[k] = x)
         } else if let Some(k) = of(COLOR) {
             color(&property).map(|x| self.color[k] = x)
         } else if CORNERS.contains(&name) {
@@ -55,7 +55,11 @@ impl PropertyAccess for Element {
     fn get_float(&self, name: &str) -> Option<f32> {
         let find =
             |names: [&str; 3], values: [f32; 3]| names.iter().position(|&n| n == name).map(|k| values[k]);
-        find(PLACE, self.place).or_else(|| find(NORMAL, self.normal))
+        find(PLACE, self.place.map(|x| x as f32)).or_else(|| find(NORMAL, self.normal))
+    }
+
+    fn get_double(&self, name: &str) -> Option<f64> {
+        PLACE.iter().position(|&n| n == name).map(|k| self.place[k])
     }
 
     fn get_uchar(&self, name: &str) -> Option<u8> {
@@ -64,6 +68,16 @@ impl PropertyAccess for Element {
 
     fn get_list_uint(&self, _name: &str) -> Option<&[u32]> {
         Some(&self.corners)
+    }
+}
+
+/// A coordinate.
+fn place(property: &Property) -> Option<f64> {
+    match property {
+        Property::Double(x) => Some(*x),
+        Property::Int(x) => Some(f64::from(*x)),
+        Property::UInt(x) => Some(f64::from(*x)),
+        other => other.to_f32_lossy().map(f64::from),
     }
 }
 
@@ -114,7 +128,7 @@ fn unstrip(strips: &[Element]) -> Vec<Element> {
 }
 
 /// Reads a file within `memory_limit` bytes.
-pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, PolygonsError> {
+pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygons, PolygonsError> {
     let original = bytes;
     let wrong = |_| fault_of(original);
     let parser = Parser::<Element>::new();
@@ -165,7 +179,8 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
                 if !has(&PLACE) {
                     return Err(PolygonsError::Syntax("its vertices lack x, y or z".into()));
                 }
-                read.positions = elements.iter().map(|e| Vec3::from_array(e.place)).collect();
+                let places: Vec<DVec3> = elements.iter().map(|e| DVec3::from_array(e.place)).collect();
+                read.place(&places, near);
                 read.has_normals = has(&NORMAL);
                 if has(&COLOR) {
                     read.colors = elements.iter().map(|e| e.color.map(|c| f32::from(c) / 255.0)).collect();
@@ -194,6 +209,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
 /// What is written: vertices, with normals and colours if there are any, and polygons.
 pub(crate) struct Written<'a> {
     pub(crate) positions: &'a [Vec3],
+    pub(crate) origin: DVec3,
     /// For normals.
     pub(crate) triangles: &'a [[u32; 3]],
     pub(crate) faces: Vec<Vec<u32>>,
@@ -205,7 +221,7 @@ pub(crate) struct Written<'a> {
 
 /// As a file.
 pub(crate) fn write(given: Written<'_>) -> Vec<u8> {
-    let Written { positions, triangles, faces, color, has_colors, has_normals, encoding } = given;
+    let Written { positions, origin, triangles, faces, color, has_colors, has_normals, encoding } = given;
     let normals = if has_normals { vertex_normals(positions, triangles) } else { Vec::new() };
     let mut header = Header::new();
     header.encoding = match encoding {
@@ -222,7 +238,8 @@ pub(crate) fn write(given: Written<'_>) -> Vec<u8> {
     };
     let scalars =
         |names: [&'static str; 3], kind: ScalarType| names.map(|n| (n, PropertyType::Scalar(kind.clone())));
-    let mut properties = scalars(PLACE, ScalarType::Float).to_vec();
+    let is_near = origin == DVec3::ZERO;
+    let mut properties = scalars(PLACE, if is_near { ScalarType::Float } else { ScalarType::Double }).to_vec();
     if has_normals {
         properties.extend(scalars(NORMAL, ScalarType::Float));
     }
@@ -235,7 +252,7 @@ pub(crate) fn write(given: Written<'_>) -> Vec<u8> {
     let counter = if is_small { ScalarType::UChar } else { ScalarType::UInt };
     element("face", vec![(CORNERS[0], PropertyType::List(counter, ScalarType::UInt))]);
     let vertex = |(v, p): (usize, &Vec3)| Element {
-        place: p.to_array(),
+        place: (origin + p.as_dvec3()).to_array(),
         normal: normals.get(v).map_or([0.0; 3], Vec3::to_array),
         color: color(v as u32).unwrap_or([1.0; 3]).map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8),
         ..Element::default()

@@ -3,10 +3,11 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use thiserror::Error;
 
 use crate::memory::MemoryError;
+use crate::origin::{origin_near, relative};
 use crate::obj::{Corner, Group, Line, NONE, ObjDocument, shown_token};
 
 /// Bytes that a vertex takes in the table of different positions.
@@ -65,6 +66,8 @@ pub(crate) enum Encoding {
 #[derive(Debug, Default)]
 pub(crate) struct Polygons {
     pub(crate) positions: Vec<Vec3>,
+    /// What they are seen from: zero unless they are far away.
+    pub(crate) origin: DVec3,
     /// Corners of all faces, one after another, and where each face starts. `[n_faces + 1]`
     pub(crate) corners: Vec<u32>,
     pub(crate) face_starts: Vec<u32>,
@@ -92,6 +95,15 @@ impl Polygons {
     ) -> Result<u64, MemoryError> {
         let needed = bytes + vertices * (120 + WELD_BYTES) + corners * 48;
         MemoryError::check(needed, limit).map(|()| needed)
+    }
+
+    /// Sets the positions; with `near`, as seen from an origin near them.
+    pub(crate) fn place(&mut self, positions: &[DVec3], near: bool) {
+        self.positions = positions.iter().map(|p| p.as_vec3()).collect();
+        self.origin = if near { origin_near(&self.positions) } else { DVec3::ZERO };
+        if self.origin != DVec3::ZERO {
+            self.positions = positions.iter().map(|&p| relative(p, self.origin)).collect();
+        }
     }
 
     /// Ends a face that began where the last one ended; one of fewer than three corners is left out. `odd`: a corner of it that can

@@ -80,7 +80,7 @@ pub fn write_project(
         Document::Gltf(document) => (&**document, None),
         Document::Obj(document) => {
             let (glb, _) = gltf::build_from_obj(&model.name, document, &model.positions_in_file())?;
-            built = gltf::read(&model.name, &glb, &mut |_| None, u64::MAX)?.document;
+            built = gltf::read(&model.name, &glb, &mut |_| None, u64::MAX, Some(DVec3::ZERO))?.document;
             (&built, Some(file_of(model)?))
         }
     };

@@ -3,9 +3,10 @@
 //! Corners at one place are one vertex, in order of first occurrence, so that a bind has no place twice and a cage is closed.
 
 use cagework_core::mesh::weld;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use stl_io::{Normal, Triangle, Vertex};
 
+use crate::origin::Coordinate;
 use crate::obj::{Group, lines, rest_of, shown_token, tokens};
 use crate::polygons::{Encoding, Polygons, PolygonsError, fault, numbers};
 
@@ -39,7 +40,7 @@ fn is_text(bytes: &[u8]) -> bool {
 }
 
 /// Reads a file within `memory_limit` bytes.
-pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, PolygonsError> {
+pub(crate) fn read(bytes: &[u8], memory_limit: u64, near: bool) -> Result<Polygons, PolygonsError> {
     let is_text = is_text(bytes) && !is_binary(bytes);
     let most = if is_text { bytes.len() / SHORTEST } else { bytes.len() / TRIANGLE } as u64;
     Polygons::check_memory(2 * bytes.len() as u64, 3 * most, 3 * most, memory_limit)?;
@@ -53,8 +54,9 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
     } else {
         (read_binary(bytes, &mut read.notices)?, Vec::new())
     };
-    let welded = weld(&corners);
-    read.positions = welded.first.iter().map(|&v| corners[v as usize]).collect();
+    read.place(&corners, near);
+    let welded = weld(&read.positions);
+    read.positions = welded.first.iter().map(|&v| read.positions[v as usize]).collect();
     let mut collapsed = 0;
     let mut solids = solids.into_iter().peekable();
     for (t, triangle) in welded.unique_of.as_chunks::<3>().0.iter().enumerate() {
@@ -80,7 +82,7 @@ pub(crate) fn read(bytes: &[u8], memory_limit: u64) -> Result<Polygons, Polygons
 }
 
 /// Corners of the triangles of a binary file.
-fn read_binary(bytes: &[u8], notices: &mut Vec<String>) -> Result<Vec<Vec3>, PolygonsError> {
+fn read_binary(bytes: &[u8], notices: &mut Vec<String>) -> Result<Vec<DVec3>, PolygonsError> {
     let count = bytes.get(HEADER - 4..HEADER).and_then(|count| <[u8; 4]>::try_from(count).ok());
     let Some(count) = count.map(|count| u64::from(u32::from_le_bytes(count))) else {
         return Err(PolygonsError::Syntax(
@@ -107,7 +109,7 @@ fn read_binary(bytes: &[u8], notices: &mut Vec<String>) -> Result<Vec<Vec3>, Pol
     let number = |bytes: &[u8; 4]| f32::from_le_bytes(*bytes);
     let corners = triangles.chunks(TRIANGLE).flat_map(|triangle| {
         let numbers: Vec<f32> = triangle[12..48].as_chunks().0.iter().map(number).collect();
-        [0, 3, 6].map(|k| Vec3::from_slice(&numbers[k..]))
+        [0, 3, 6].map(|k| Vec3::from_slice(&numbers[k..]).as_dvec3())
     });
     Ok(corners.collect())
 }
@@ -116,13 +118,12 @@ fn read_binary(bytes: &[u8], notices: &mut Vec<String>) -> Result<Vec<Vec3>, Pol
 type Solids = Vec<(String, usize)>;
 
 /// Corners of the triangles of a text, and its solids. Normals are not read, which some programs write as "nan".
-fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<Vec3>, Solids), PolygonsError> {
+fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<DVec3>, Solids), PolygonsError> {
     let (mut corners, mut solids, mut has_ended) = (Vec::new(), Solids::new(), true);
     let mut unknown = None;
     // First corner of a facet that has not ended.
     let mut open: Option<usize> = None;
-    let mut end =
-        |line: usize, corners: &[Vec3], next: Option<usize>| match std::mem::replace(&mut open, next) {
+    let mut end = |line: usize, corners: &[DVec3], next: Option<usize>| match std::mem::replace(&mut open, next) {
             Some(start) if corners.len() != start + 3 => Err(fault(
                 line,
                 &format!("the facet that ends here has {} corners, not 3", corners.len() - start),
@@ -142,8 +143,8 @@ fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<Vec3>, Soli
             }
             b"facet" => end(last, &corners, Some(corners.len()))?,
             b"vertex" => {
-                let p: [f32; 3] = numbers(bytes, &line, words)?;
-                corners.push(Vec3::from_array(p));
+                let p: [f64; 3] = numbers(bytes, &line, words)?;
+                corners.push(DVec3::from_array(p));
             }
             b"outer" | b"endloop" => {}
             b"endfacet" => end(last, &corners, None)?,
@@ -174,6 +175,7 @@ fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<Vec3>, Soli
 /// `solids`: names, and the first triangle of each; a text has them.
 pub(crate) fn write(
     positions: &[Vec3],
+    origin: DVec3,
     triangles: &[[u32; 3]],
     encoding: Encoding,
     solids: &[(&str, usize)],
@@ -181,17 +183,13 @@ pub(crate) fn write(
     let all = triangles.iter().map(|t| {
         let corners = t.map(|v| positions[v as usize]);
         let [a, b, c] = corners.map(Vec3::as_dvec3);
-        let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
-        Triangle {
-            normal: Normal::new(normal.to_array()),
-            vertices: corners.map(|p| Vertex::new(p.to_array())),
-        }
+        ((b - a).cross(c - a).normalize_or_zero().as_vec3(), corners)
     });
     if encoding == Encoding::Text {
         let mut text = String::new();
         let mut solids = solids.iter().peekable();
         let mut name = "cagework";
-        for (t, Triangle { normal: n, vertices }) in all.enumerate() {
+        for (t, (n, corners)) in all.enumerate() {
             let before = name;
             let mut is_first = t == 0;
             while let Some((next, _)) = solids.next_if(|(_, first)| *first <= t) {
@@ -205,12 +203,19 @@ pub(crate) fn write(
                 };
             }
             text += &format!("facet normal {} {} {}\nouter loop\n", n[0], n[1], n[2]);
-            vertices.iter().for_each(|v| text += &format!("vertex {} {} {}\n", v[0], v[1], v[2]));
+            for corner in corners {
+                let [x, y, z] = Coordinate::of(origin, corner);
+                text += &format!("vertex {x} {y} {z}\n");
+            }
             text += "endloop\nendfacet\n";
         }
         return (text + &format!("endsolid {name}\n")).into_bytes();
     }
     let mut bytes = Vec::with_capacity(HEADER + TRIANGLE * triangles.len());
+    let all = all.map(|(normal, corners)| Triangle {
+        normal: Normal::new(normal.to_array()),
+        vertices: corners.map(|p| Vertex::new((origin + p.as_dvec3()).as_vec3().to_array())),
+    });
     stl_io::write_stl(&mut bytes, all).expect("a Vec takes all bytes");
     bytes
 }

@@ -52,6 +52,15 @@ impl UpAxis {
         }
     }
 
+    /// A vector of a file with Y up.
+    #[must_use]
+    pub fn vector_turned(self, v: DVec3) -> DVec3 {
+        match self {
+            Self::Y => v,
+            Self::Z => DVec3::new(v.x, v.z, -v.y),
+        }
+    }
+
     /// A vector with Y up as it is in a file.
     pub(crate) fn vector_turned_back(self, v: DVec3) -> DVec3 {
         match self {

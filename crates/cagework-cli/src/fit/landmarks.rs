@@ -28,8 +28,8 @@ struct Said {
     vertex: Option<u32>,
     triangle: Option<u32>,
     bary: Option<[f64; 3]>,
-    point: Option<[f32; 3]>,
-    to: [f32; 3],
+    point: Option<[f64; 3]>,
+    to: [f64; 3],
     #[serde(default = "one")]
     weight: f64,
 }
@@ -52,6 +52,7 @@ pub(super) fn landmarks(bound: &Bound, path: &Path) -> Result<Goals, CliError> {
     }
     let model = &bound.model;
     let up = model.up();
+    let from_origin = |p: [f64; 3]| (DVec3::from_array(p) - model.origin()).as_vec3();
     let n = bound.weights.n_columns();
     let (mut indptr, mut indices, mut data) = (vec![0], Vec::new(), Vec::new());
     let (mut shares, mut to, mut n_outside) = (Vec::new(), Vec::new(), 0);
@@ -59,7 +60,7 @@ pub(super) fn landmarks(bound: &Bound, path: &Path) -> Result<Goals, CliError> {
     for (k, said) in all.iter().enumerate() {
         let wrong = |what: String| wrong(path, &format!("landmark {k} {what}"));
         let numbers = said.to.iter().chain(said.point.iter().flatten());
-        if let Some(x) = numbers.into_iter().find(|x| !x.is_finite()) {
+        if let Some(x) = numbers.into_iter().find(|x| !(**x as f32).is_finite()) {
             return Err(wrong(format!("has the coordinate {x}: numbers of 32 bits end at {:e}", f32::MAX)));
         }
         if !(said.weight > 0.0 && said.weight.is_finite()) {
@@ -79,7 +80,7 @@ pub(super) fn landmarks(bound: &Bound, path: &Path) -> Result<Goals, CliError> {
         }
         indptr.push(indices.len() as u32);
         shares.push(said.weight);
-        to.push(up.turned(&[Vec3::from_array(said.to)])[0]);
+        to.push(up.turned(&[from_origin(said.to)])[0]);
     }
     let weights = Weights::new(n as u32, indptr, indices, data).map_err(|e| CliError::file(path, e))?;
     let notices = (n_outside > 0).then(|| {
@@ -117,7 +118,8 @@ fn place(bound: &Bound, said: &Said) -> Result<Place, String> {
             Ok((model.triangles[t as usize], bary.map(|b| b.max(0.0))))
         }
         Said { point: Some(point), vertex: None, triangle: None, bary: None, .. } => {
-            let point = model.up().turned(&[Vec3::from_array(point)])[0];
+            let point = (DVec3::from_array(point) - model.origin()).as_vec3();
+            let point = model.up().turned(&[point])[0];
             nearest(bound, point.as_dvec3())
                 .ok_or_else(|| "is a point, but the model has no triangles".into())
         }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use cagework_core::pull::{Handle, Reach};
 use cagework_io::shown;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::Deserialize;
 
 use crate::error::CliError;
@@ -39,7 +39,7 @@ struct HandleSaid {
     triangle: Option<u32>,
     bary: Option<[f64; 3]>,
     cage: Option<u32>,
-    to: Option<[f32; 3]>,
+    to: Option<[f64; 3]>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -61,7 +61,7 @@ fn thirty() -> u32 {
 pub(super) struct Job {
     pub(super) grabs: Vec<Handle>,
     /// Where each grab goes, in the file's axes. `[n_grabs]`, object units
-    pub(super) to: Vec<Vec3>,
+    to: Vec<DVec3>,
     pub(super) pins: Vec<Handle>,
     pub(super) reach: Reach,
     /// A pose of the cage to begin with.
@@ -71,6 +71,11 @@ pub(super) struct Job {
 }
 
 impl Job {
+    /// Where each grab goes, in the file's axes, as seen from an origin. `[n_grabs]`, object units
+    pub(super) fn to(&self, origin: DVec3) -> Vec<Vec3> {
+        self.to.iter().map(|&to| (to - origin).as_vec3()).collect()
+    }
+
     /// Reads a job; numbers of vertices are checked by who knows the model.
     ///
     /// # Errors
@@ -121,10 +126,10 @@ impl Job {
         for (k, grab) in said.grabs.iter().enumerate() {
             grabs.push(handle("grab", k, grab)?);
             let target = grab.to.ok_or_else(|| wrong(format!("grab {k} has no target \"to\": [x, y, z]")))?;
-            if let Some(x) = target.iter().find(|x| !x.is_finite()) {
+            if let Some(x) = target.iter().find(|x| !(**x as f32).is_finite()) {
                 return Err(wrong(format!("grab {k} goes to {x}: numbers of 32 bits end at {:e}", f32::MAX)));
             }
-            to.push(Vec3::from_array(target));
+            to.push(DVec3::from_array(target));
         }
         let pins =
             said.pins.iter().enumerate().map(|(k, pin)| handle("pin", k, pin)).collect::<Result<_, _>>()?;

@@ -13,7 +13,7 @@ use cagework_core::options::BindOptions;
 use cagework_core::progress::Cancelled;
 use cagework_core::{Binding, Controls};
 use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, shown};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::args::{ModelOutput, RefitArgs};
 use crate::bind::{bind_positions, check_memory};
@@ -38,6 +38,8 @@ struct Job {
 struct Binder<'a> {
     args: &'a RefitArgs,
     controls: Controls<'a>,
+    /// What the cage is seen from.
+    origin: DVec3,
     /// Made for the first model that is not skipped; none if its fields are too large to be kept.
     solved: OnceCell<Option<SolvedCage<'a>>>,
     /// Names of parts that no model had so far.
@@ -86,17 +88,17 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     // From here on Ctrl-C ends the work after what is being written.
     let _asking = Asking::start();
     let (up, memory) = (args.read.axis(), args.read.memory);
-    let cage = load_cage_file(&args.cage, up, memory, &args.controls)?;
+    let cage = load_cage_file(&args.cage, up, None, memory, &args.controls)?;
     let controls = cage.controls();
     let inner = &controls.rest()[cage.cage.n_vertices()..];
     let pose = cage.load_pose(&args.pose)?;
     let poses = Poses {
         names: vec![pose_name(&args.pose)],
         rest: controls.rest().to_vec(),
-        positions: with_inner(vec![pose], args.pose_controls.as_slice(), inner, up, memory)?,
+        positions: with_inner(vec![pose], args.pose_controls.as_slice(), inner, (up, cage.origin()), memory)?,
     };
     let unnamed = RefCell::new(args.rig.part_names().cloned().collect());
-    let binder = Binder { args, controls, solved: OnceCell::new(), unnamed };
+    let binder = Binder { args, controls, origin: cage.origin(), solved: OnceCell::new(), unnamed };
     let mut models = Vec::with_capacity(jobs.len());
     let mut settle = |job: &Job, outcome: Outcome| -> Result<(), CliError> {
         // That it was cancelled is not its own fault.
@@ -203,7 +205,8 @@ impl Binder<'_> {
         let started = Instant::now();
         let Self { args, controls, .. } = self;
         let (path, format) = (&job.model, job.output.format);
-        let model = load_model(path, args.read.axis(), args.read.memory)?;
+        let mut model = load_model(path, args.read.axis(), args.read.memory)?;
+        model.see_from(self.origin);
         let is_static = args.rig.plain || format != ModelFormat::Gltf;
         let (points, extra_points) =
             if is_static { (model.positions.clone(), 0) } else { rig::points(&model, path)? };

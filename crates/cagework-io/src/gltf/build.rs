@@ -6,7 +6,7 @@ use std::sync::Arc;
 use cagework_core::TriMesh;
 use cagework_core::deform::vertex_normals;
 use cagework_core::samples::Rig;
-use glam::{Mat4, Quat, Vec3};
+use glam::{DVec3, Mat4, Quat, Vec3};
 use serde_json::{Value, json};
 
 use super::pack::{Pack, VERTICES, push};
@@ -15,7 +15,7 @@ use crate::look::linear_from_srgb;
 use crate::obj::{NONE, ObjDocument};
 use crate::siblings::Image;
 
-/// A GLB with the OBJ's shape at rest, and for each of its vertices the `v` line it came from.
+/// A GLB with the OBJ's shape at rest, as seen from an origin, where its node is, and for each of its vertices the `v` line it came from.
 ///
 /// One node, one mesh, one primitive for each `usemtl`; a vertex for each different corner (position, texture
 /// coordinate, normal). Without `vn` lines the normals are area-weighted, over a smoothing group where the file has any. Materials have
@@ -24,6 +24,7 @@ pub(crate) fn build_from_obj(
     name: &str,
     document: &ObjDocument,
     rest: &[Vec3],
+    origin: DVec3,
 ) -> Result<(Vec<u8>, Vec<u32>), WriteError> {
     let pairs = document.pairs(rest);
     let mut json = json!({
@@ -33,6 +34,9 @@ pub(crate) fn build_from_obj(
         "nodes": [{ "name": name, "mesh": 0 }],
         "meshes": [{ "name": name, "primitives": [] }],
     });
+    if origin != DVec3::ZERO {
+        json["nodes"][0]["translation"] = json!(origin.as_vec3().to_array());
+    }
     let mut pack = Pack::empty();
     let mut sources = Vec::new();
     let mut textures = HashMap::new();

@@ -42,7 +42,7 @@ pub(crate) fn write_obj(
             part.normals.copy_from_slice(&new[range(slot)]);
         }
     }
-    Ok(write_new(positions, &parts))
+    Ok(write_new(positions, rest.origin, &parts))
 }
 
 fn range(slot: &Slot) -> std::ops::Range<usize> {

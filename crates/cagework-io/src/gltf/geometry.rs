@@ -11,6 +11,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::accessor::Source;
 use super::scene::{Instance, name_of};
 use super::{GltfDocument, GltfError, Slot, skin};
+use crate::origin::relative;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 
 pub(crate) struct Geometry {
@@ -36,8 +37,8 @@ impl GltfDocument {
     }
 }
 
-/// Reads the vertices and triangles of all instances.
-pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result<Geometry, GltfError> {
+/// Reads the vertices, as seen from an origin, and triangles of all instances.
+pub(crate) fn read(document: &GltfDocument, origin: DVec3, notices: &mut Vec<String>) -> Result<Geometry, GltfError> {
     let mut geometry = Geometry { positions: Vec::new(), triangles: Vec::new(), slots: Vec::new() };
     let (mut skipped, mut morphed, mut ragged) = (0, 0, 0);
     let (mut skinned, mut repeated) = (Vec::new(), Vec::new());
@@ -57,7 +58,7 @@ pub(crate) fn read(document: &GltfDocument, notices: &mut Vec<String>) -> Result
                 *loose.entry(skin).or_insert(0) += n_loose;
             }
             for (v, p) in local.iter().enumerate() {
-                let world = frame.world(v).transform_point3(*p).as_vec3();
+                let world = relative(frame.world(v).transform_point3(*p), origin);
                 if !world.is_finite() {
                     return Err(GltfError::NotFinite { accessor: position, vertex: v });
                 }

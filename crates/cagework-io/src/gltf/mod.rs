@@ -26,12 +26,13 @@ mod skin;
 use std::sync::Arc;
 
 use ::gltf::json::Root;
-use glam::{DMat4, Vec3};
+use glam::{DMat4, DVec3, Vec3};
 use serde_json::Value;
 use thiserror::Error;
 
 use crate::counts::Counts;
 use crate::memory::MemoryError;
+use crate::origin::origin_near;
 use crate::shown::shown;
 use crate::siblings::{Image, Resolve};
 use scene::{Instance, Worlds};
@@ -202,6 +203,8 @@ struct Slot {
 
 /// A file that was read.
 pub(crate) struct GltfModel {
+    /// What the positions are seen from.
+    pub(crate) origin: DVec3,
     pub(crate) positions: Vec<Vec3>,
     pub(crate) triangles: Vec<[u32; 3]>,
     pub(crate) document: GltfDocument,
@@ -209,12 +212,13 @@ pub(crate) struct GltfModel {
     pub(crate) notices: Vec<String>,
 }
 
-/// Reads a glTF or GLB file within `memory_limit` bytes; `resolve` fetches sibling files by their decoded relative URI.
+/// Reads a glTF or GLB file within `memory_limit` bytes, with positions from an origin: near the model unless said; `resolve` fetches sibling files by their decoded relative URI.
 pub(crate) fn read(
     name: &str,
     bytes: &[u8],
     resolve: &mut Resolve<'_>,
     memory_limit: u64,
+    origin: Option<DVec3>,
 ) -> Result<GltfModel, GltfError> {
     let mut notices = Vec::new();
     let loaded = container::load(name, bytes, resolve, memory_limit, &mut notices)?;
@@ -237,10 +241,21 @@ pub(crate) fn read(
     let model = size::check(&document, loaded.bytes, memory_limit)?;
     document.bytes = loaded.bytes - bytes.len() as u64 + model;
     document.joints = skin::shown_joints(&document, &worlds)?;
-    let geometry = geometry::read(&document, &mut notices)?;
+    let n_before = notices.len();
+    let mut geometry = geometry::read(&document, origin.unwrap_or_default(), &mut notices)?;
+    let mut near = origin.unwrap_or_default();
+    // Skeletons and clips are computed with in world space.
+    let is_still = document.root.skins.is_empty() && document.json["animations"].as_array().is_none_or(Vec::is_empty);
+    if origin.is_none() && is_still {
+        near = origin_near(&geometry.positions);
+        if near != DVec3::ZERO {
+            notices.truncate(n_before);
+            geometry = geometry::read(&document, near, &mut notices)?;
+        }
+    }
     document.slots = geometry.slots;
     let counts = scene::counts(&document);
-    Ok(GltfModel { positions: geometry.positions, triangles: geometry.triangles, document, counts, notices })
+    Ok(GltfModel { origin: near, positions: geometry.positions, triangles: geometry.triangles, document, counts, notices })
 }
 
 /// `list[index]`, or the error that says who named it.

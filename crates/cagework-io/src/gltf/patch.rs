@@ -36,6 +36,8 @@ pub(crate) struct Pose<'a> {
 #[derive(Clone, Copy)]
 pub(crate) struct Rest<'a> {
     pub(crate) positions: &'a [Vec3],
+    /// What all positions are seen from, in world space.
+    pub(crate) origin: DVec3,
     pub(crate) triangles: &'a [[u32; 3]],
 }
 
@@ -47,7 +49,7 @@ impl From<GltfError> for WriteError {
 
 /// Writes the document with `base` as its shape and `poses` as morph targets with an animation.
 ///
-/// All positions are in world space, in the model's vertex order; counts are the caller's to check.
+/// All positions are in world space, as seen from the origin, in the model's vertex order; counts are the caller's to check.
 pub(crate) fn patch(
     document: &GltfDocument,
     rest: Rest<'_>,
@@ -62,7 +64,7 @@ pub(crate) fn patch(
     let mut json = document.json.clone();
     let mut pack = Pack::of(document);
     embed_images(document, &mut json, &mut pack);
-    let places = place_meshes(document, &mut json);
+    let places = place_meshes(document, &mut json, rest.origin);
     let normals = Normals::new(document, rest)?;
     let rotations = normals.shading.rotations(base);
     let mut shapes = Vec::with_capacity(document.slots.len());
@@ -113,11 +115,12 @@ pub(crate) struct Place {
     pub(crate) original: Option<usize>,
     /// At a node of its own without a transform.
     detached: bool,
+    /// From world space as seen from the origin.
     mesh_from_world: DMat4,
 }
 
 /// Gives every instance a mesh that is its own, at a node that can be undone.
-fn place_meshes(document: &GltfDocument, json: &mut Value) -> Vec<Place> {
+fn place_meshes(document: &GltfDocument, json: &mut Value, origin: DVec3) -> Vec<Place> {
     let mut users = vec![0_usize; document.root.meshes.len()];
     for mesh in document.root.nodes.iter().filter_map(|n| n.mesh) {
         // Nodes outside the scene may name meshes that are not there.
@@ -142,7 +145,7 @@ fn place_meshes(document: &GltfDocument, json: &mut Value) -> Vec<Place> {
             let copy = document.json["meshes"][instance.mesh as usize].clone();
             push(json, "meshes", copy)
         };
-        let mesh_from_world = instance.world.inverse();
+        let mesh_from_world = instance.world.inverse() * DMat4::from_translation(origin);
         let detached = instance.node.is_none() || instance.skin.is_some() || is_flat(instance.world);
         let original = instance.node.map(|n| n as usize);
         let node = match original {
@@ -150,6 +153,9 @@ fn place_meshes(document: &GltfDocument, json: &mut Value) -> Vec<Place> {
             _ => detach(document, json, instance),
         };
         json["nodes"][node]["mesh"] = mesh.into();
+        if detached && origin != DVec3::ZERO {
+            json["nodes"][node]["translation"] = json!(origin.as_vec3().to_array());
+        }
         let mesh_from_world = if detached { DMat4::IDENTITY } else { mesh_from_world };
         places.push(Place { mesh, node, original, detached, mesh_from_world });
     }

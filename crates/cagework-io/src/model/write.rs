@@ -6,12 +6,13 @@ use std::collections::HashMap;
 use ::gltf::json::validation::Checked;
 use cagework_core::PolygonMesh;
 use cagework_core::deform::vertex_normals;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::{Document, Model};
 use crate::error::WriteError;
 use crate::format::ModelFormat;
 use crate::gltf::{self, Played, Pose, Rest};
+use crate::polygons::Encoding;
 use crate::{obj, off, ply, stl};
 
 impl Model {
@@ -35,6 +36,7 @@ impl Model {
         let is_same = self.format == format;
         let keeps = |formats: &[ModelFormat]| is_same || formats.contains(&format);
         let (colors, texcoords, materials, names, rig);
+        let is_binary = format == ModelFormat::Stl && self.encoding != Encoding::Text;
         match &self.document {
             Document::Obj(document) => {
                 colors = !document.colors.is_empty()
@@ -64,6 +66,7 @@ impl Model {
             (materials, "materials and textures"),
             (names, "names of parts"),
             (rig, "skeleton, morph targets and animations"),
+            (is_binary && self.origin != DVec3::ZERO, "places as exact as they were read, so far from the origin"),
         ];
         let lost: Vec<&str> = all.into_iter().filter_map(|(is_lost, what)| is_lost.then_some(what)).collect();
         (!lost.is_empty())
@@ -82,14 +85,14 @@ impl Model {
         let (rest, positions) = (self.positions_in_file(), self.up.turned_back(positions));
         match &self.document {
             Document::Obj(document) if self.format == ModelFormat::Obj => {
-                Ok(obj::patch(document, &rest, &positions))
+                Ok(obj::patch(document, &rest, &positions, self.origin))
             }
             Document::Obj(_) => {
                 let faces = self.cage_mesh().faces;
-                Ok(obj::write_cage_obj(&PolygonMesh { positions: positions.into_owned(), faces }))
+                Ok(obj::write_mesh(&PolygonMesh { positions: positions.into_owned(), faces }, self.origin))
             }
             Document::Gltf(document) => {
-                let rest = Rest { positions: &rest, triangles: &self.triangles };
+                let rest = Rest { positions: &rest, origin: self.origin, triangles: &self.triangles };
                 gltf::write_obj(document, rest, &positions)
             }
         }
@@ -109,6 +112,7 @@ impl Model {
         let positions = self.up.turned_back(positions);
         Ok(ply::write(ply::Written {
             positions: &positions,
+            origin: self.origin,
             triangles: &self.triangles,
             faces,
             color: &|v| colors.and_then(|colors| colors.get(&v)).copied(),
@@ -132,7 +136,7 @@ impl Model {
             Document::Obj(document) => (self.cage_mesh().faces, &document.colors),
             Document::Gltf(_) => (self.triangles.iter().map(|t| t.to_vec()).collect(), &none),
         };
-        Ok(off::write(&positions, &faces, colors, &normals))
+        Ok(off::write(&positions, self.origin, &faces, colors, &normals))
     }
 
     /// The model with new positions as an STL file: triangles and the normals of their planes; text if it was a text, otherwise
@@ -156,7 +160,7 @@ impl Model {
                 solids.push((group.name.as_str(), t));
             }
         }
-        Ok(stl::write(&self.up.turned_back(positions), &self.triangles, self.encoding, &solids))
+        Ok(stl::write(&self.up.turned_back(positions), self.origin, &self.triangles, self.encoding, &solids))
     }
 
     /// The model with new positions as a GLB file.
@@ -201,18 +205,18 @@ impl Model {
         let turned: Vec<_> = poses.iter().map(|(_, positions)| self.up.turned_back(positions)).collect();
         let document = match &self.document {
             Document::Gltf(document) => {
-                let rest = Rest { positions: &at_rest, triangles: &self.triangles };
+                let rest = Rest { positions: &at_rest, origin: self.origin, triangles: &self.triangles };
                 return gltf::patch(document, rest, &base, &named(poses, &turned), played);
             }
             Document::Obj(document) => document,
         };
         // One way to deform a GLB: make one of the shape at rest, then patch that.
         let stem = self.name.rsplit_once('.').map_or(self.name.as_str(), |(stem, _)| stem);
-        let (glb, source) = gltf::build_from_obj(stem, document, &at_rest)?;
-        let built = gltf::read(&self.name, &glb, &mut |_| None, u64::MAX)?;
+        let (glb, source) = gltf::build_from_obj(stem, document, &at_rest, self.origin)?;
+        let built = gltf::read(&self.name, &glb, &mut |_| None, u64::MAX, Some(self.origin))?;
         let spread = |positions: &[Vec3]| source.iter().map(|&v| positions[v as usize]).collect::<Vec<_>>();
         let spread_poses: Vec<_> = turned.iter().map(|positions| spread(positions).into()).collect();
-        let rest = Rest { positions: &built.positions, triangles: &built.triangles };
+        let rest = Rest { positions: &built.positions, origin: self.origin, triangles: &built.triangles };
         gltf::patch(&built.document, rest, &spread(&base), &named(poses, &spread_poses), played)
     }
 

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::error::ObjError;
 use super::lex::{Line, lines, shown, tokens};
@@ -11,6 +11,7 @@ use super::look::{Material, read_materials, rest_of};
 use super::select::Group;
 use super::triangulate::Triangulator;
 use crate::memory::MemoryError;
+use crate::origin::relative;
 use crate::shown::{MAX_NAME_CHARS, shown_start};
 use crate::siblings::{Absent, Resolve, Siblings};
 
@@ -183,6 +184,17 @@ pub(crate) fn read(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit: u64) -
         }
     }
     reader.finish()
+}
+
+/// Positions of the `v` lines of a file that was read, from an origin.
+pub(crate) fn positions_near(bytes: &[u8], origin: DVec3) -> Vec<Vec3> {
+    let vertices = lines(bytes).filter_map(|line| {
+        let mut words = tokens(bytes, line.range);
+        let is_vertex = words.next().is_some_and(|keyword| &bytes[keyword] == b"v");
+        let mut number = || std::str::from_utf8(&bytes[words.next()?]).ok()?.parse().ok();
+        is_vertex.then(|| Some(relative(DVec3::new(number()?, number()?, number()?), origin))).flatten()
+    });
+    vertices.collect()
 }
 
 impl<'a> Reader<'a> {

@@ -4,10 +4,11 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 
 use cagework_core::PolygonMesh;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::lex::{lines, tokens};
 use super::read::{MIN_CORNERS, NONE, ObjDocument};
+use crate::origin::Coordinate;
 use crate::normals::Shading;
 
 /// Distinct pairs of a vertex and a normal at a file's corners; where there is none, of a vertex and a surface.
@@ -44,13 +45,13 @@ impl ObjDocument {
     }
 }
 
-/// The original file with new positions: coordinates of `v` lines and normals are replaced, all else is kept byte for
+/// The original file with new positions, from an origin: coordinates of `v` lines that are others now, and normals are replaced, all else is kept byte for
 /// byte (comments, vertex colours, materials, groups, line ends).
 ///
 /// Each `vn` line becomes one line for each vertex that uses it, since two corners that shared a normal need not share
 /// it after the deformation; only if that changes the numbering are normal indices in faces rewritten. A file without
 /// `vn` lines gets none.
-pub(crate) fn patch(document: &ObjDocument, rest: &[Vec3], positions: &[Vec3]) -> Vec<u8> {
+pub(crate) fn patch(document: &ObjDocument, rest: &[Vec3], positions: &[Vec3], origin: DVec3) -> Vec<u8> {
     let normals = (!document.normals.is_empty()).then(|| PatchedNormals::new(document, rest, positions));
     let bytes = &document.bytes;
     let mut out = Vec::with_capacity(bytes.len() + bytes.len() / 4);
@@ -61,7 +62,10 @@ pub(crate) fn patch(document: &ObjDocument, rest: &[Vec3], positions: &[Vec3]) -
         let keyword = words.next().map_or(&b""[..], |k| &bytes[k]);
         match (keyword, &normals) {
             (b"v", _) => {
-                for (token, x) in words.by_ref().take(3).zip(positions[v].to_array()) {
+                for (token, x) in words.by_ref().take(3).zip(Coordinate::of(origin, positions[v])) {
+                    if x.is(&bytes[token.clone()]) {
+                        continue;
+                    }
                     out.extend_from_slice(&bytes[copied..token.start]);
                     out.extend_from_slice(x.to_string().as_bytes());
                     copied = token.end;
@@ -165,10 +169,11 @@ pub(crate) struct ObjPart {
 }
 
 /// A new OBJ file: all vertices in the model's order, then each part.
-pub(crate) fn write_new(positions: &[Vec3], parts: &[ObjPart]) -> Vec<u8> {
+pub(crate) fn write_new(positions: &[Vec3], origin: DVec3, parts: &[ObjPart]) -> Vec<u8> {
     let mut text = String::with_capacity(64 * positions.len());
     for p in positions {
-        line(&mut text, format_args!("v {} {} {}", p.x, p.y, p.z));
+        let [x, y, z] = Coordinate::of(origin, *p);
+        line(&mut text, format_args!("v {x} {y} {z}"));
     }
     let (mut n_vt, mut n_vn) = (0_u32, 0_u32);
     for part in parts {
@@ -206,9 +211,15 @@ pub(crate) fn write_new(positions: &[Vec3], parts: &[ObjPart]) -> Vec<u8> {
 /// A cage as an OBJ file: its vertices and polygons in order.
 #[must_use]
 pub fn write_cage_obj(cage: &PolygonMesh) -> Vec<u8> {
+    write_mesh(cage, DVec3::ZERO)
+}
+
+/// The same, with positions from an origin.
+pub(crate) fn write_mesh(cage: &PolygonMesh, origin: DVec3) -> Vec<u8> {
     let mut text = String::with_capacity(64 * cage.positions.len());
     for p in &cage.positions {
-        line(&mut text, format_args!("v {} {} {}", p.x, p.y, p.z));
+        let [x, y, z] = Coordinate::of(origin, *p);
+        line(&mut text, format_args!("v {x} {y} {z}"));
     }
     for face in &cage.faces {
         text.push('f');
