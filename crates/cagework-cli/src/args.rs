@@ -176,7 +176,8 @@ pub(crate) struct DeformArgs {
     /// The weights that `cagework bind --weights` wrote; not needed with --dynamic.
     #[arg(long, value_name = "FILE", required_unless_present = "dynamic")]
     pub(crate) weights: Option<PathBuf>,
-    /// The cage, moved: same vertices in the same order. May be given several times.
+    /// The cage, moved: same vertices in the same order. May be given several times. Keys of a clip or shape keys in a file are a
+    /// pose each.
     #[arg(long, value_name = "FILE", required = true)]
     pub(crate) pose: Vec<PathBuf>,
     /// The controls inside, moved (.obj): same vertices in the same order; one for each --pose, or none if they stay.

@@ -40,7 +40,11 @@ fn wrong(args: &ControlArgs, error: cagework_core::ControlError) -> CliError {
     }
 }
 
-fn load_inner(path: &Path, (up, origin): (UpAxis, DVec3), memory: MemoryArgs) -> Result<InnerControls, CliError> {
+fn load_inner(
+    path: &Path,
+    (up, origin): (UpAxis, DVec3),
+    memory: MemoryArgs,
+) -> Result<InnerControls, CliError> {
     let mut inner = read_inner_controls(&read(path)?, memory.bytes()).map_err(|e| CliError::file(path, e))?;
     inner.positions.iter_mut().for_each(|p| *p = (p.as_dvec3() - origin).as_vec3());
     inner.positions = up.turned(&inner.positions).into_owned();

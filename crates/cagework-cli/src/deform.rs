@@ -54,35 +54,60 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     let output = &args.output.path;
     check_outputs(&[output], &inputs)?;
     let format = args.output.format;
-    if !format.holds_poses() && args.pose.len() > 1 {
-        return Err(CliError::Mismatch {
+    let require_room = |n_poses: usize| {
+        if format.holds_poses() || n_poses <= 1 {
+            return Ok(());
+        }
+        Err(CliError::Mismatch {
             message: format!(
-                "{}: a file of format {} holds one pose, but {} were given",
+                "{}: a file of format {} holds one pose, but {n_poses} were given",
                 shown_path(output),
                 format.name(),
-                args.pose.len()
             ),
             hint: "write a .glb, which gets one morph target per pose, or run the command once per pose",
-        });
-    }
+        })
+    };
+    require_room(args.pose.len())?;
 
     let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
     let cage = load_cage(&args.cage, &model, args.read.memory, &ControlArgs::default())?;
     let saved = load_weights(weights, &model, &cage.cage, args.read.memory)?;
     let n_vertices = model.positions.len();
     let (n_cage, n_inner) = (cage.cage.n_vertices(), saved.inner_controls.len());
-    let poses = args.pose.iter().map(|path| cage.load_pose(path)).collect::<Result<Vec<_>, _>>()?;
-    let poses = with_inner(poses, &args.pose_controls, &saved.inner_controls, (model.up(), model.origin()), args.read.memory)?;
+    let (mut names, mut poses, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
+    for path in &args.pose {
+        for state in cage.load_states(path)? {
+            names.push(format!("{} {}", pose_name(path), state.name).trim_end().to_owned());
+            seconds.extend(state.seconds);
+            poses.push(state.positions);
+        }
+    }
+    require_room(poses.len())?;
+    let poses = with_inner(
+        poses,
+        &args.pose_controls,
+        &saved.inner_controls,
+        (model.up(), model.origin()),
+        args.read.memory,
+    )?;
     let rest = rest_of(&cage.cage, &saved);
-    let names: Vec<String> = args.pose.iter().map(|path| pose_name(path)).collect();
     let options = args.rig.options(&model, &args.mesh)?;
     let outside_vertices = saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices).count();
-    let poses = Poses { names, rest, positions: poses };
+    // Times of one file: those of several files have nothing to do with each other.
+    let is_timed = args.pose.len() == 1 && seconds.len() == poses.len();
+    let seconds = if is_timed { seconds } else { Vec::new() };
+    let poses = Poses { names, seconds, rest, positions: poses };
     let started = Instant::now();
     let posed = Posed::new(&model, saved, &poses, format, (&options, args.rig.plain));
     let deform_ms = started.elapsed().as_secs_f64() * 1e3;
-    let (bytes, rig) = posed.into_file(&model, &poses.names, &args.output, &options)?;
+    let (bytes, rig) = posed.into_file(&model, (&poses.names, &poses.seconds), &args.output, &options)?;
     let mut notices = model.notices.clone();
+    if rig.is_some() && !poses.seconds.is_empty() {
+        notices.push(
+            "the poses are played one second each, beside the model's own clips; their names say their times"
+                .into(),
+        );
+    }
     notices.extend(rig.iter().flat_map(ReshapeReport::notices));
     notices.extend(model.lost_in(format));
     write(output, &bytes)?;
@@ -105,6 +130,8 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
 pub(crate) struct Poses {
     /// What they are called.
     pub(crate) names: Vec<String>,
+    /// When each is to be shown, if that is known.
+    pub(crate) seconds: Vec<f32>,
     /// All controls at rest. `[n_controls]`, object units
     pub(crate) rest: Vec<Vec3>,
     /// All controls in each pose. `[n_poses][n_controls]`, object units
@@ -146,7 +173,7 @@ impl Posed {
     pub(crate) fn into_file(
         self,
         model: &Model,
-        names: &[String],
+        (names, seconds): (&[String], &[f32]),
         output: &ModelOutput,
         options: &ReshapeOptions,
     ) -> Result<(Vec<u8>, Option<ReshapeReport>), CliError> {
@@ -160,7 +187,11 @@ impl Posed {
                     export(model, only, output)?
                 } else {
                     let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(posed).collect();
-                    let glb = model.write_glb_poses(&model.positions, &named);
+                    let glb = if seconds.is_empty() {
+                        model.write_glb_poses(&model.positions, &named)
+                    } else {
+                        model.write_glb_poses_at(&model.positions, &named, seconds)
+                    };
                     glb.map_err(|e| CliError::file(&output.path, e))?
                 };
                 Ok((bytes, None))

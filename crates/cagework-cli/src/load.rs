@@ -9,13 +9,13 @@ use cagework_core::{
     Bounds, Cage, CageError, CageOptions, ControlSet, Controls, InnerControls, PolygonMesh, TriMesh,
     subdivided_box,
 };
-use cagework_io::{Model, UpAxis, write_cage_obj};
+use cagework_io::{Model, PoseState, UpAxis, write_cage_obj};
 use glam::{DVec3, Vec3};
 
 use crate::args::{CageSource, ControlArgs, DEFAULT_MARGIN, MemoryArgs, ModelOutput};
 use crate::controls::load_controls;
-use crate::error::{CliError, shown_path};
-use crate::files::{read, read_beside};
+use crate::error::CliError;
+use crate::files::{read, read_beside, shown_path};
 use crate::progress::Bar;
 
 /// A cage with the document that it came from, which knows how a pose of it is read.
@@ -236,10 +236,34 @@ impl LoadedCage {
     /// The positions of a pose of this cage, in the cage's own order. `[n_cage]`, object units.
     ///
     /// # Errors
-    /// When the file cannot be read or has another number of vertices than the cage.
+    /// When the file cannot be read, has another number of vertices than the cage, or holds several states.
     pub(crate) fn load_pose(&self, path: &Path) -> Result<Vec<Vec3>, CliError> {
+        let mut states = self.load_states(path)?;
+        match states.pop() {
+            Some(only) if states.is_empty() => Ok(only.positions),
+            _ => Err(CliError::Mismatch {
+                message: format!(
+                    "pose {} holds {} states, as keys of a clip or as shape keys, but one is needed here",
+                    shown_path(path),
+                    states.len() + 1
+                ),
+                hint: "export one of them alone; `cagework deform` takes them all and writes a .glb",
+            }),
+        }
+    }
+
+    /// The states that the file of a pose holds.
+    ///
+    /// # Errors
+    /// When the file cannot be read or has another number of vertices than the cage.
+    pub(crate) fn load_states(&self, path: &Path) -> Result<Vec<PoseState>, CliError> {
         let mut pose = load_any(path, self.up, self.memory)?;
         pose.see_from(self.model.origin());
-        Ok(self.model.pose_positions(&pose)?)
+        let states = self.model.pose_states(&pose)?;
+        if !states.is_empty() {
+            return Ok(states);
+        }
+        let positions = self.model.pose_positions(&pose)?;
+        Ok(vec![PoseState { name: String::new(), seconds: None, positions }])
     }
 }

@@ -237,7 +237,13 @@ fn prepare(
     if let Some(path) = &args.pose {
         let files: Vec<_> = args.pose_controls.iter().cloned().collect();
         let inner = &controls.rest()[cage.cage.n_vertices()..];
-        let poses = with_inner(vec![cage.load_pose(path)?], &files, inner, (model.up(), model.origin()), args.read.memory)?;
+        let poses = with_inner(
+            vec![cage.load_pose(path)?],
+            &files,
+            inner,
+            (model.up(), model.origin()),
+            args.read.memory,
+        )?;
         let pose = poses.into_iter().flatten().collect::<Vec<_>>();
         session.pose(&pose);
         places.extend(pose);

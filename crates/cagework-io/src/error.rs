@@ -60,6 +60,14 @@ pub enum PoseError {
         /// Vertices of the cage.
         expected: usize,
     },
+    /// Its clip or morph targets cannot be read.
+    #[error("pose {}: {source}", shown(pose))]
+    States {
+        /// Name of the pose.
+        pose: String,
+        /// Why.
+        source: WriteError,
+    },
     /// Its faces join vertices that have nothing to do with each other in the cage.
     #[error(
         "pose {} has an edge from vertex {} to {}, which are of no face together in cage {}: its vertices are in another order; {hint}",

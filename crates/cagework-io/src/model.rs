@@ -3,6 +3,8 @@
 mod cage;
 mod write;
 
+pub use cage::PoseState;
+
 use std::borrow::Cow;
 
 use cagework_core::TriMesh;
@@ -154,7 +156,8 @@ impl Model {
         match format {
             ModelFormat::Gltf => {
                 let fault = |source| ReadError::Gltf { name: name.into(), source };
-                let model = gltf::read(name, bytes, resolve, memory_limit, (!near).then_some(DVec3::ZERO)).map_err(fault)?;
+                let model = gltf::read(name, bytes, resolve, memory_limit, (!near).then_some(DVec3::ZERO))
+                    .map_err(fault)?;
                 Ok(Self {
                     name: name.into(),
                     positions: model.positions,

@@ -25,8 +25,9 @@ pub(crate) fn relative(position: DVec3, origin: DVec3) -> Vec3 {
     (position - origin).as_vec3()
 }
 
-/// What to say of a model of which numbers of 32 bits are kept.
-pub(crate) fn far_notice(positions: &[Vec3]) -> Option<String> {
+/// What to say of positions so far from the origin that numbers of 32 bits have coarse steps there.
+#[must_use]
+pub fn far_notice(positions: &[Vec3]) -> Option<String> {
     let far = origin_near(positions).abs().max_element() as f32;
     (far > 0.0).then(|| {
         format!(
@@ -46,7 +47,8 @@ impl Coordinate {
     /// Those of a position, given from the origin.
     pub(crate) fn of(origin: DVec3, position: Vec3) -> [Self; 3] {
         let [x, y, z] = position.to_array();
-        [(origin.x, x), (origin.y, y), (origin.z, z)].map(|(origin, from_origin)| Self { origin, from_origin })
+        [(origin.x, x), (origin.y, y), (origin.z, z)]
+            .map(|(origin, from_origin)| Self { origin, from_origin })
     }
 
     /// Whether a word of a file already says this number.

@@ -239,7 +239,8 @@ pub(crate) fn write(given: Written<'_>) -> Vec<u8> {
     let scalars =
         |names: [&'static str; 3], kind: ScalarType| names.map(|n| (n, PropertyType::Scalar(kind.clone())));
     let is_near = origin == DVec3::ZERO;
-    let mut properties = scalars(PLACE, if is_near { ScalarType::Float } else { ScalarType::Double }).to_vec();
+    let mut properties =
+        scalars(PLACE, if is_near { ScalarType::Float } else { ScalarType::Double }).to_vec();
     if has_normals {
         properties.extend(scalars(NORMAL, ScalarType::Float));
     }

@@ -7,8 +7,8 @@ use glam::{DVec3, Vec3};
 use thiserror::Error;
 
 use crate::memory::MemoryError;
-use crate::origin::{origin_near, relative};
 use crate::obj::{Corner, Group, Line, NONE, ObjDocument, shown_token};
+use crate::origin::{origin_near, relative};
 
 /// Bytes that a vertex takes in the table of different positions.
 const WELD_BYTES: u64 = 36;

@@ -79,8 +79,9 @@ pub fn write_project(
     let (document, source) = match &model.document {
         Document::Gltf(document) => (&**document, None),
         Document::Obj(document) => {
-            let (glb, _) = gltf::build_from_obj(&model.name, document, &model.positions_in_file())?;
-            built = gltf::read(&model.name, &glb, &mut |_| None, u64::MAX, Some(DVec3::ZERO))?.document;
+            let (glb, _) =
+                gltf::build_from_obj(&model.name, document, &model.positions_in_file(), model.origin)?;
+            built = gltf::read(&model.name, &glb, &mut |_| None, u64::MAX, Some(model.origin))?.document;
             (&built, Some(file_of(model)?))
         }
     };

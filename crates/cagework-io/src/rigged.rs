@@ -199,7 +199,13 @@ impl Model {
         Ok((positions, triangles))
     }
 
-    fn shown_at(&self, player: &Player, clip: Option<usize>, seconds: f32, targets: &[f32]) -> Vec<Vec3> {
+    pub(crate) fn shown_at(
+        &self,
+        player: &Player,
+        clip: Option<usize>,
+        seconds: f32,
+        targets: &[f32],
+    ) -> Vec<Vec3> {
         let posed = player.at(clip, seconds, targets);
         self.up().turned(&skin_vertices(&player.skin, &posed.palette, &posed.targets)).into_owned()
     }

@@ -6,8 +6,8 @@ use cagework_core::mesh::weld;
 use glam::{DVec3, Vec3};
 use stl_io::{Normal, Triangle, Vertex};
 
-use crate::origin::Coordinate;
 use crate::obj::{Group, lines, rest_of, shown_token, tokens};
+use crate::origin::Coordinate;
 use crate::polygons::{Encoding, Polygons, PolygonsError, fault, numbers};
 
 /// Bytes of the header with the number of triangles, and of each triangle, in a binary file.
@@ -123,7 +123,8 @@ fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<DVec3>, Sol
     let mut unknown = None;
     // First corner of a facet that has not ended.
     let mut open: Option<usize> = None;
-    let mut end = |line: usize, corners: &[DVec3], next: Option<usize>| match std::mem::replace(&mut open, next) {
+    let mut end =
+        |line: usize, corners: &[DVec3], next: Option<usize>| match std::mem::replace(&mut open, next) {
             Some(start) if corners.len() != start + 3 => Err(fault(
                 line,
                 &format!("the facet that ends here has {} corners, not 3", corners.len() - start),
@@ -159,7 +160,7 @@ fn read_text(bytes: &[u8], notices: &mut Vec<String>) -> Result<(Vec<DVec3>, Sol
     if corners.is_empty() {
         return Err(PolygonsError::Syntax("it has no facets".into()));
     }
-    if corners.len() % 3 != 0 {
+    if !corners.len().is_multiple_of(3) {
         return Err(fault(last, "corners are of no facet"));
     }
     if !has_ended {

@@ -239,6 +239,29 @@ fn morph_target_at_weight_one_is_the_pose() {
 }
 
 #[test]
+fn states_of_a_pose_are_the_keys_of_its_clip_or_its_morph_targets() {
+    let cage = read("cage.glb", &plain_cube().glb()).unwrap();
+    let poses = poses(&cage);
+    let glb = cage.write_glb_poses_at(&cage.positions, &poses, &[0.25, 1.5]).unwrap();
+    let states = cage.pose_states(&read("pose.glb", &glb).unwrap()).unwrap();
+    let names: Vec<_> = states.iter().map(|state| (state.name.as_str(), state.seconds)).collect();
+    assert_eq!(names, [("0.250 s", Some(0.25)), ("1.500 s", Some(1.5))]);
+    for (state, (_, expected)) in states.iter().zip(&poses) {
+        assert!(relative_error(expected, &state.positions) < ROUND_TRIP, "{}", state.name);
+    }
+    // Without the clip they are shape keys.
+    let mut json = json_of(&glb);
+    json.as_object_mut().unwrap().remove("animations");
+    let json_length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let keys = read("keys.glb", &common::glb(&json, Some(&glb[28 + json_length..]))).unwrap();
+    let keys = cage.pose_states(&keys).unwrap();
+    for ((state, key), (name, _)) in states.iter().zip(&keys).zip(&poses) {
+        assert_eq!((&key.name, key.seconds, &key.positions), (name, None, &state.positions));
+    }
+    assert_eq!((keys.len(), cage.pose_states(&cage).unwrap()), (2, vec![]));
+}
+
+#[test]
 fn obj_becomes_a_glb_with_texture_coordinates_and_hard_edges() {
     let model = read("box.obj", CUBE_OBJ.as_bytes()).unwrap();
     let expected = deformed(&model);

@@ -2,6 +2,7 @@
 
 use cagework_core::Weights;
 use cagework_core::deform::OutsideVertex;
+use cagework_io::far_notice;
 use glam::{DVec3, Vec3};
 use numpy::{
     PyArray1, PyArray2, PyArrayDescrMethods as _, PyArrayDyn, PyArrayMethods as _, PyReadonlyArray2,
@@ -52,7 +53,9 @@ pub(crate) fn points<'py>(name: &str, value: &Bound<'py, PyAny>, n: Option<usize
         (true, _, Ok(array)) => {
             let array = array.try_readonly()?;
             let rows = array.as_slice().expect("rows were asked for").as_chunks::<3>().0;
-            Ok(Points::Converted(rows.iter().map(|&p| DVec3::from_array(p).as_vec3()).collect()))
+            let points: Vec<Vec3> = rows.iter().map(|&p| DVec3::from_array(p).as_vec3()).collect();
+            far_notice(&points).map_or(Ok(()), |said| error::warn(value.py(), &format!("{name}: {said}")))?;
+            Ok(Points::Converted(points))
         }
         _ => {
             let n = n.map_or("n".to_owned(), |n| n.to_string());

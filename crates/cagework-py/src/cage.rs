@@ -71,7 +71,7 @@ impl Cage {
         Self::of(py, &PolygonMesh { positions, faces: arrays::faces(faces)? }, smooth, None)
     }
 
-    /// A cage from a file, faces of any size: .obj, .ply, .stl, .gltf or .glb; vertices of all but the first two are joined where their
+    /// A cage from a file, faces of any size: .obj, .ply, .off, .stl, .gltf or .glb; vertices of the last three are joined where their
     /// positions are equal.
     ///
     /// Raises OSError, ModelError when it is no model, CageError when it is no cage.

@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use cagework_core::BindOptions;
-use cagework_io::Model;
+use cagework_io::{Model, far_notice};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -52,7 +52,9 @@ impl Source {
                 )
             }
         };
-        model.map_err(error::model)
+        let model = model.map_err(error::model)?;
+        far_notice(&model.positions).map_or(Ok(()), |said| Python::attach(|py| error::warn(py, &said)))?;
+        Ok(model)
     }
 }
 
@@ -83,7 +85,7 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
 /// Vertices and triangles of a model: read_model(model, states=False, clip=None) -> (vertices [n, 3] float32, triangles [m, 3]
 /// int32)
 ///
-/// model: path of a .glb, .gltf, .vrm, .obj, .ply or .stl, or its bytes. Vertices are in world space, object units, in the file's order, split
+/// model: path of a .glb, .gltf, .vrm, .obj, .ply, .stl or .off, or its bytes. Vertices are in world space, object units, in the file's order, split
 /// at seams as the file has them: those that reshape moves. A file without faces is read, too: a pose of a cage is one.
 ///
 /// states: after the vertices also where each morph target takes them; clip: the name of a clip, with states, whose frames come

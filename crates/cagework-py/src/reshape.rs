@@ -16,8 +16,8 @@ use crate::{arrays, error, work};
 /// A model that follows a posed cage, as the bytes of a file: reshape(model, cage, posed, *, joints="follow",
 /// keep_travel=False, rigid=(), mask=None, static=False, **options) -> bytes
 ///
-/// model: path of a .glb, .gltf, .vrm, .obj, .ply or .stl, or its bytes; posed: [n_cage, 3] float32 or float64, object units; options: those of
-/// bind. A glTF becomes a GLB that keeps skin, joints, morph targets, clips, materials and textures; an OBJ, PLY or STL stays one. The
+/// model: path of a .glb, .gltf, .vrm, .obj, .ply, .stl or .off, or its bytes; posed: [n_cage, 3] float32 or float64, object units; options: those of
+/// bind. A glTF becomes a GLB that keeps skin, joints, morph targets, clips, materials and textures; an OBJ, PLY, STL or OFF stays one. The
 /// bytes are those that `cagework bind` and `cagework deform` write.
 ///
 /// joints: "follow" the cage, "stay", or "turn" with the shape, too; keep_travel: clips travel as far as before; rigid: names of

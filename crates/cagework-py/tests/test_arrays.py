@@ -70,3 +70,9 @@ def test_200_000_points_are_bound_without_copies_of_them():
     assert all(not a.flags.owndata for a in (weights.indices, weights.indptr)) and weights.nnz == 8 * N_MANY
     # Where a copy has to be made, it is seen.
     assert allocated(lambda: cw.bind(np.asfortranarray(points), CUBE, grid=8))[0] > points.nbytes
+
+
+def test_numbers_that_lose_digits_far_from_the_origin_are_named():
+    vertices, faces = box()
+    with pytest.warns(UserWarning, match="vertices: the model is so far from the origin that its coordinates have steps of 5e-1"):
+        cw.Cage(np.asarray(vertices, float) + [0, 0, 4.5e6], faces)

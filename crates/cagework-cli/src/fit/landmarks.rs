@@ -4,7 +4,7 @@ use std::path::Path;
 
 use cagework_core::Weights;
 use cagework_core::geometry::closest_point_on_triangle;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use serde::Deserialize;
 
 use super::{Goals, wrong};

@@ -176,3 +176,66 @@ fn a_pose_whose_vertices_are_in_another_order_is_refused() {
         .failure()
         .stderr(contains("its vertices are in another order"));
 }
+
+/// On a map, 32-bit floats have steps of 0.5: model, cage and poses are seen from one origin near the model.
+#[test]
+fn models_far_from_the_origin_are_deformed_as_near_ones() {
+    let place = |[x, y, z]: [f64; 3]| [x + 500_000.25, y + 100.0, z + 4_500_000.5];
+    let moved = |text: &str| {
+        let mut places = obj_positions(text.as_bytes()).into_iter().map(place);
+        let line = |line: &str| match line.starts_with("v ").then(|| places.next()).flatten() {
+            Some([x, y, z]) => format!("v {x:.6} {y:.6} {z:.6}\n"),
+            None => format!("{line}\n"),
+        };
+        text.lines().map(line).collect::<String>()
+    };
+    let sandbox = Sandbox::new();
+    sandbox.write("mesh.obj", moved(&sphere_obj(0.7)));
+    sandbox.write("cage.obj", moved(&box_obj(&CORNERS)));
+    sandbox.write("affine.obj", moved(&box_obj(&CORNERS.map(affine))));
+    sandbox.run("bind mesh.obj --cage cage.obj -g 16 --weights w.npz -o rest.obj").success();
+    let rest = obj_positions(&sandbox.read("mesh.obj"));
+    assert_close(&obj_positions(&sandbox.read("rest.obj")), &rest, 1e-6);
+    sandbox.run("deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj -o out.obj").success();
+    let near = obj_positions(sphere_obj(0.7).as_bytes());
+    let expected: Vec<_> = near.iter().map(|&p| place(affine(p))).collect();
+    assert_close(&obj_positions(&sandbox.read("out.obj")), &expected, 1e-5);
+    sandbox.run("refit mesh.obj --cage cage.obj --pose affine.obj -g 16 -o fitted").success();
+    assert_close(&obj_positions(&sandbox.read("fitted/mesh.obj")), &expected, 1e-5);
+    // A cage that is made is there too, and holds the model.
+    sandbox.run("cage mesh.obj --kind box --divisions 1 -o box.obj").success();
+    sandbox.run("check box.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
+    let bounds = &sandbox.json("info box.obj --json")["bounds"];
+    assert!((bounds["min"][2].as_f64().unwrap() - 4_499_999.8).abs() < 0.3, "{bounds}");
+    sandbox.run("bind mesh.obj --cage auto:40 -g 16 --save-cage auto.obj").success();
+    sandbox.run("check auto.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
+}
+
+/// A pose whose file has several states is as many poses; commands that take one say so.
+#[test]
+fn states_of_a_pose_file_are_poses_of_their_own() {
+    let sandbox = bound();
+    sandbox.run("bind mesh.obj --cage cage.obj -g 8 -o mesh.glb").success();
+    // The sphere as its own cage: its animated file, as a pose.
+    sandbox
+        .run(
+            "deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj --pose lifted.obj -o keys.glb",
+        )
+        .success();
+    sandbox.write("small.obj", sphere_obj(0.3));
+    sandbox.run("bind small.obj --cage mesh.glb -g 8 --weights s.npz").success();
+    let done =
+        sandbox.json("deform small.obj --cage mesh.glb --weights s.npz --pose keys.glb -o out.glb --json");
+    let names = ["keys 0.000 s", "keys 1.000 s", "keys 2.000 s", "keys 3.000 s"];
+    assert_eq!(done["poses"], serde_json::json!(names));
+    let document = glb_json(&sandbox.read("out.glb"));
+    let input = document["animations"][0]["samplers"][0]["input"].as_u64().unwrap() as usize;
+    assert_eq!(document["accessors"][input]["max"], serde_json::json!([3.0]));
+    sandbox
+        .run("deform small.obj --cage mesh.glb --weights s.npz --pose keys.glb -o out.obj")
+        .failure()
+        .stderr(contains("a file of format obj holds one pose, but 4 were given"));
+    sandbox.run("refit small.obj --cage mesh.glb --pose keys.glb -g 8 -o fitted").failure().stderr(contains(
+        "pose keys.glb holds 4 states, as keys of a clip or as shape keys, but one is needed here",
+    ));
+}

@@ -42,7 +42,8 @@ impl Edges {
             let (_, joined) = same_places(mesh);
             let is_half = joined == 0 && Plane::of(mesh, &open).is_some_and(Plane::is_central);
             let fixes = [Repair::Weld, Repair::Mirror, Repair::FillHoles].into_iter();
-            let fixes = fixes.filter(|&r| (r != Repair::Weld || joined > 0) && (r != Repair::Mirror || is_half));
+            let fixes =
+                fixes.filter(|&r| (r != Repair::Weld || joined > 0) && (r != Repair::Mirror || is_half));
             found.push(Problem {
                 places: Places {
                     edges: open.iter().map(|&[a, b]| [a.min(b), a.max(b)]).collect(),

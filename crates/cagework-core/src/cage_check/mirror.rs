@@ -1,7 +1,5 @@
 //! Half a cage, as it is modelled with a mirror that was not applied: all its open edges lie in one plane across an axis.
 
-use glam::Vec3;
-
 use super::diagonal;
 use crate::mesh::PolygonMesh;
 
@@ -66,6 +64,8 @@ impl Plane {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
     use crate::cage::Cage;
     use crate::cage_check::{Code, Fix, Repair, check, repair};
@@ -95,7 +95,11 @@ mod tests {
         }
         let beside = half(0, 3.0);
         let fixes = check(&beside, None, None).problem(Code::OpenEdge).unwrap().fixes.clone();
-        assert_eq!(fixes, [Fix::Repair { repair: Repair::FillHoles }], "no mirror stands there, but it may be asked for");
+        assert_eq!(
+            fixes,
+            [Fix::Repair { repair: Repair::FillHoles }],
+            "no mirror stands there, but it may be asked for"
+        );
         let mended = repair(&beside, &[Repair::Mirror], None).unwrap();
         assert_eq!(mended.done, ["Mirrored 12 faces across x = 3."]);
         // A hole that is bent, and one with faces on both sides of it: nothing to mirror.

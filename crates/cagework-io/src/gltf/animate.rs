@@ -47,6 +47,8 @@ pub(crate) fn forget_morphs(json: &mut Value, places: &[Place]) {
 pub(crate) enum Played<'a> {
     /// Rest, each in turn, rest; beside the animations that there are.
     InTurn,
+    /// Each at its time, seconds; beside the animations that there are.
+    At(&'a [f32]),
     /// The frames of a clip, which lasts so many seconds, instead of all animations that there are.
     Frames { clip: &'a str, seconds: f32 },
 }
@@ -68,16 +70,17 @@ pub(crate) fn play_poses(
         }
         mesh["extras"]["targetNames"] = json!(names);
     }
-    // Keys, those before the first pose, and seconds from one to the next.
-    let (name, keys, before, step) = match played {
-        Played::InTurn => ("poses", poses.len() + 2, 1, SECONDS_PER_POSE),
+    let every = |n: usize, step: f32| (0..n).map(|k| k as f32 * step).collect::<Vec<f32>>();
+    // Times of keys, and how many are before the first pose.
+    let (name, times, before) = match played {
+        Played::InTurn => ("poses", every(poses.len() + 2, SECONDS_PER_POSE), 1),
+        Played::At(times) => ("poses", times.to_vec(), 0),
         Played::Frames { clip, seconds } => {
             json["animations"] = json!([]);
-            (clip, poses.len(), 0, seconds / (poses.len().max(2) - 1) as f32)
+            (clip, every(poses.len(), seconds / (poses.len().max(2) - 1) as f32), 0)
         }
     };
-    let times: Vec<f32> = (0..keys).map(|k| k as f32 * step).collect();
-    let weights: Vec<f32> = (0..keys)
+    let weights: Vec<f32> = (0..times.len())
         .flat_map(|key| (0..poses.len()).map(move |pose| if key == pose + before { 1.0 } else { 0.0 }))
         .collect();
     let input = pack.push_floats(json, &times, 1, false, true);

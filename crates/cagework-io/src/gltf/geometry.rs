@@ -38,7 +38,11 @@ impl GltfDocument {
 }
 
 /// Reads the vertices, as seen from an origin, and triangles of all instances.
-pub(crate) fn read(document: &GltfDocument, origin: DVec3, notices: &mut Vec<String>) -> Result<Geometry, GltfError> {
+pub(crate) fn read(
+    document: &GltfDocument,
+    origin: DVec3,
+    notices: &mut Vec<String>,
+) -> Result<Geometry, GltfError> {
     let mut geometry = Geometry { positions: Vec::new(), triangles: Vec::new(), slots: Vec::new() };
     let (mut skipped, mut morphed, mut ragged) = (0, 0, 0);
     let (mut skinned, mut repeated) = (Vec::new(), Vec::new());

@@ -245,7 +245,8 @@ pub(crate) fn read(
     let mut geometry = geometry::read(&document, origin.unwrap_or_default(), &mut notices)?;
     let mut near = origin.unwrap_or_default();
     // Skeletons and clips are computed with in world space.
-    let is_still = document.root.skins.is_empty() && document.json["animations"].as_array().is_none_or(Vec::is_empty);
+    let is_still =
+        document.root.skins.is_empty() && document.json["animations"].as_array().is_none_or(Vec::is_empty);
     if origin.is_none() && is_still {
         near = origin_near(&geometry.positions);
         if near != DVec3::ZERO {
@@ -255,7 +256,14 @@ pub(crate) fn read(
     }
     document.slots = geometry.slots;
     let counts = scene::counts(&document);
-    Ok(GltfModel { origin: near, positions: geometry.positions, triangles: geometry.triangles, document, counts, notices })
+    Ok(GltfModel {
+        origin: near,
+        positions: geometry.positions,
+        triangles: geometry.triangles,
+        document,
+        counts,
+        notices,
+    })
 }
 
 /// `list[index]`, or the error that says who named it.

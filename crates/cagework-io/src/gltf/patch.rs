@@ -145,7 +145,10 @@ fn place_meshes(document: &GltfDocument, json: &mut Value, origin: DVec3) -> Vec
             let copy = document.json["meshes"][instance.mesh as usize].clone();
             push(json, "meshes", copy)
         };
-        let mesh_from_world = instance.world.inverse() * DMat4::from_translation(origin);
+        let mut mesh_from_world = instance.world.inverse();
+        if origin != DVec3::ZERO {
+            mesh_from_world *= DMat4::from_translation(origin);
+        }
         let detached = instance.node.is_none() || instance.skin.is_some() || is_flat(instance.world);
         let original = instance.node.map(|n| n as usize);
         let node = match original {

@@ -7,8 +7,25 @@ use cagework_core::mesh::weld;
 use glam::Vec3;
 
 use super::{Document, Model};
-use crate::error::PoseError;
+use crate::error::{PoseError, WriteError};
 use crate::format::ModelFormat;
+use crate::gltf::Clip;
+use crate::memory::MemoryError;
+use crate::origin::relative;
+
+/// Bytes of all states of a pose's file.
+const MOST_STATES_BYTES: u64 = 512 << 20;
+
+/// One of the states that the file of a pose holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PoseState {
+    /// Name of the morph target, or the time.
+    pub name: String,
+    /// When the clip is there.
+    pub seconds: Option<f32>,
+    /// Of the cage's vertices, object units. `[n_cage]`
+    pub positions: Vec<Vec3>,
+}
 
 impl Model {
     /// The model as a cage: an OBJ's `v` lines and polygons as they are; a glTF's triangles, welded by position in order
@@ -42,6 +59,43 @@ impl Model {
     /// # Errors
     /// [`PoseError`] when the numbers of vertices do not agree, or the pose's faces say that they are in another order.
     pub fn pose_positions(&self, pose: &Self) -> Result<Vec<Vec3>, PoseError> {
+        Ok(self.order_of(pose)?.into_iter().map(|v| pose.positions[v as usize]).collect())
+    }
+
+    /// The states that the file of a pose holds: keys of its first clip, with their times, or, without a clip, each of its morph
+    /// targets alone. Empty if it holds one state, which is [`Self::pose_positions`].
+    ///
+    /// # Errors
+    /// [`PoseError`] as of [`Self::pose_positions`], and when a clip cannot be read.
+    pub fn pose_states(&self, pose: &Self) -> Result<Vec<PoseState>, PoseError> {
+        let order = self.order_of(pose)?;
+        let faulty = |source| PoseError::States { pose: pose.name.clone(), source };
+        let Some(player) = pose.player().map_err(faulty)? else { return Ok(Vec::new()) };
+        let origin = self.up.vector_turned(self.origin);
+        let state = |name: String, seconds: Option<f32>, clip, targets: &[f32]| {
+            let all = pose.shown_at(&player, clip, seconds.unwrap_or(0.0), targets);
+            let positions = order.iter().map(|&v| relative(all[v as usize].as_dvec3(), origin)).collect();
+            PoseState { name, seconds, positions }
+        };
+        let times = player.clips().first().map_or(Vec::new(), Clip::times);
+        let (names, defaults) = player.targets();
+        let n = if times.is_empty() { names.len() } else { times.len() };
+        let needed = (n * order.len() * size_of::<Vec3>()) as u64;
+        MemoryError::check(needed, MOST_STATES_BYTES)
+            .map_err(|e| faulty(WriteError::Document(e.to_string())))?;
+        if !times.is_empty() {
+            return Ok(times.iter().map(|&at| state(format!("{at:.3} s"), Some(at), Some(0), &[])).collect());
+        }
+        let alone = |k: usize| {
+            let mut targets = vec![0.0; defaults.len()];
+            targets[k] = 1.0;
+            state(names[k].clone(), None, None, &targets)
+        };
+        Ok((0..n).map(alone).collect())
+    }
+
+    /// The vertex of a pose for each vertex of this cage.
+    fn order_of(&self, pose: &Self) -> Result<Vec<u32>, PoseError> {
         let is_welded = matches!(self.document, Document::Gltf(_));
         let (n, given) = (self.positions.len(), pose.positions.len());
         let first = if is_welded { weld(&self.positions).first } else { (0..n as u32).collect() };
@@ -62,11 +116,7 @@ impl Model {
             };
             return Err(PoseError::Order { pose: pose.name.clone(), edge, cage: self.name.clone(), hint });
         }
-        Ok(if is_unwelded {
-            first.iter().map(|&v| pose.positions[v as usize]).collect()
-        } else {
-            pose.positions.clone()
-        })
+        Ok(if is_unwelded { first } else { (0..given as u32).collect() })
     }
 
     /// Whether a pose of this model as a cage that is written in `format` has its vertices in this model's order when it is read again.

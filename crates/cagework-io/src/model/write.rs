@@ -66,7 +66,10 @@ impl Model {
             (materials, "materials and textures"),
             (names, "names of parts"),
             (rig, "skeleton, morph targets and animations"),
-            (is_binary && self.origin != DVec3::ZERO, "places as exact as they were read, so far from the origin"),
+            (
+                is_binary && self.origin != DVec3::ZERO,
+                "places as exact as they were read, so far from the origin",
+            ),
         ];
         let lost: Vec<&str> = all.into_iter().filter_map(|(is_lost, what)| is_lost.then_some(what)).collect();
         (!lost.is_empty())
@@ -187,6 +190,23 @@ impl Model {
         poses: &[(String, Vec<Vec3>)],
     ) -> Result<Vec<u8>, WriteError> {
         self.glb(rest, poses, Played::InTurn)
+    }
+
+    /// As [`Self::write_glb_poses`], with each pose at its time: seconds, ascending, one for each pose.
+    ///
+    /// # Errors
+    /// As [`Self::write_glb`].
+    pub fn write_glb_poses_at(
+        &self,
+        rest: &[Vec3],
+        poses: &[(String, Vec<Vec3>)],
+        seconds: &[f32],
+    ) -> Result<Vec<u8>, WriteError> {
+        let n = poses.len();
+        if seconds.len() != n {
+            return Err(WriteError::Count { given: seconds.len(), expected: n });
+        }
+        self.glb(rest, poses, Played::At(seconds))
     }
 
     pub(crate) fn glb(

@@ -8,8 +8,8 @@ use glam::{DVec3, Vec3};
 
 use super::lex::{lines, tokens};
 use super::read::{MIN_CORNERS, NONE, ObjDocument};
-use crate::origin::Coordinate;
 use crate::normals::Shading;
+use crate::origin::Coordinate;
 
 /// Distinct pairs of a vertex and a normal at a file's corners; where there is none, of a vertex and a surface.
 pub(crate) struct Pairs {

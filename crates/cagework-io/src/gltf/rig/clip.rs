@@ -71,6 +71,15 @@ pub(crate) fn clips(document: &GltfDocument) -> Vec<Clip> {
 }
 
 impl Clip {
+    /// When any channel has a key, seconds, ascending.
+    pub(crate) fn times(&self) -> Vec<f32> {
+        let mut times: Vec<f32> =
+            self.tracks.iter().flat_map(|(_, track)| track.times.iter().copied()).collect();
+        times.sort_unstable_by(f32::total_cmp);
+        times.dedup();
+        times
+    }
+
     /// What each channel gives at a time, seconds.
     pub(super) fn at(&self, time: f32) -> impl Iterator<Item = (Driven, Vec<f64>)> {
         self.tracks.iter().map(move |(driven, track)| (*driven, track.at(time, *driven)))
