@@ -128,7 +128,7 @@ impl Model {
     }
 
     /// As [`Self::read_within`]; a model far from the world's origin has its positions from an [`Self::origin`] near it, without
-    /// loss. That of models with skeletons or clips is always zero.
+    /// loss. That of models with skeletons, morph targets or clips is always zero.
     ///
     /// # Errors
     /// Those of [`Self::read_within`].

@@ -1,7 +1,6 @@
 //! Models far from the origin, such as those with coordinates of a map: 32-bit floats at 4,500,000 have steps of 0.5.
 //!
-//! Such a file is read in 64 bits, and what is computed with is its distance from an origin near the model. Writers add the origin
-//! again. Other models have the origin zero, and nothing is added.
+//! Readers parse such a file in 64 bits and subtract an origin near the model; writers add it. The origin of other models is zero.
 
 use std::fmt;
 
@@ -51,7 +50,7 @@ impl Coordinate {
             .map(|(origin, from_origin)| Self { origin, from_origin })
     }
 
-    /// Whether a word of a file already says this number.
+    /// Whether this text parses to the same number.
     pub(crate) fn is(&self, word: &[u8]) -> bool {
         let word = std::str::from_utf8(word).unwrap_or_default();
         if self.origin == 0.0 {

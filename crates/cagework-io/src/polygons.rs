@@ -106,8 +106,8 @@ impl Polygons {
         }
     }
 
-    /// Ends a face that began where the last one ended; one of fewer than three corners is left out. `odd`: a corner of it that can
-    /// be no index.
+    /// Ends a face that began where the last one ended; one of fewer than three corners is left out. `odd`: a corner that
+    /// cannot be an index.
     ///
     /// # Errors
     /// When it is none.
@@ -164,7 +164,7 @@ pub(crate) fn fault(line: usize, problem: &str) -> PolygonsError {
 /// The next numbers of a line, as the words that follow; infinite ones too, which are refused with the vertex they belong to.
 ///
 /// # Errors
-/// When one is missing, or is none.
+/// When one is missing or does not parse.
 pub(crate) fn numbers<T: std::str::FromStr, const N: usize>(
     bytes: &[u8],
     line: &Line,

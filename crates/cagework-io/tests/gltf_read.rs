@@ -289,6 +289,18 @@ fn pose_of_a_welded_cage_is_found_by_its_vertices() {
     let expected: Vec<Vec3> =
         cage.cage_mesh().positions.iter().map(|p| Vec3::new(2.0 * p.x, p.y, p.z)).collect();
     assert_eq!(cage.pose_positions(&read_glb(&b)).unwrap(), expected);
+    // Blender cuts a square along its other diagonal, and takes other vertices at the same places for it.
+    let mut indices: Vec<u32> = (0..36).collect();
+    let place = |v: u32| corners[v as usize];
+    let ends = [indices[0], indices[1], indices[2]].map(place);
+    let other = (3..6).find(|&v| !ends.contains(&place(v))).unwrap();
+    // The first two triangles are the square 0 2 3 1, cut from 0 to 3; now from 2 to 1.
+    let at = |p: [f32; 3]| (6..36).find(|&v| place(v) == p).unwrap();
+    let [a, b0, c] = ends;
+    indices[..6].copy_from_slice(&[at(a), at(b0), other, at(b0), at(c), other]);
+    let indices = b.indices(&indices);
+    b.primitive(0)["indices"] = indices.into();
+    assert_eq!(cage.pose_positions(&read_glb(&b)).unwrap(), expected);
 }
 
 /// Written as it was, the attribute would name one of the accessors that are added: the fuzzer's input 2817 of seed 1795420617.

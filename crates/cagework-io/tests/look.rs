@@ -152,11 +152,18 @@ fn obj_gets_the_colours_of_its_materials() {
 }
 
 #[test]
-fn obj_texture_is_found_and_replaces_the_colour() {
+fn obj_texture_is_found_and_replaces_a_grey() {
     let mtl = b"newmtl blue\nKd 0 0 0\nmap_Kd maps\\dot.png\n";
     let look = obj(SQUARE, &[("paint box.mtl", mtl), ("maps/dot.png", &PNG)]);
     assert_eq!((look.groups[0].image, look.groups[0].base_color), (Some(0), [1.0; 4]));
     assert_eq!(look.images[0].bytes, PNG);
+    let tinted =
+        obj(SQUARE, &[("paint box.mtl", b"newmtl blue\nKd 0 0 1\nmap_Kd dot.png\n"), ("dot.png", &PNG)]);
+    assert_eq!(
+        tinted.groups[0].base_color,
+        [0.0, 0.0, 1.0, 1.0],
+        "a colour that is no grey is multiplied with it"
+    );
     assert!(obj(SQUARE, &[]).groups.is_empty(), "no file, no materials");
 }
 

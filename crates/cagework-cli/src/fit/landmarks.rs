@@ -59,8 +59,8 @@ pub(super) fn landmarks(bound: &Bound, path: &Path) -> Result<Goals, CliError> {
     let is_outside = |v: u32| bound.outside.iter().any(|o| o.vertex == v);
     for (k, said) in all.iter().enumerate() {
         let wrong = |what: String| wrong(path, &format!("landmark {k} {what}"));
-        let numbers = said.to.iter().chain(said.point.iter().flatten());
-        if let Some(x) = numbers.into_iter().find(|x| !(**x as f32).is_finite()) {
+        let numbers = said.to.iter().chain(said.point.iter().flatten()).map(|&x| x as f32);
+        if let Some(x) = numbers.into_iter().find(|x| !x.is_finite()) {
             return Err(wrong(format!("has the coordinate {x}: numbers of 32 bits end at {:e}", f32::MAX)));
         }
         if !(said.weight > 0.0 && said.weight.is_finite()) {

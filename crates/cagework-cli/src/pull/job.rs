@@ -126,7 +126,7 @@ impl Job {
         for (k, grab) in said.grabs.iter().enumerate() {
             grabs.push(handle("grab", k, grab)?);
             let target = grab.to.ok_or_else(|| wrong(format!("grab {k} has no target \"to\": [x, y, z]")))?;
-            if let Some(x) = target.iter().find(|x| !(**x as f32).is_finite()) {
+            if let Some(x) = target.map(|x| x as f32).iter().find(|x| !x.is_finite()) {
                 return Err(wrong(format!("grab {k} goes to {x}: numbers of 32 bits end at {:e}", f32::MAX)));
             }
             to.push(DVec3::from_array(target));

@@ -80,14 +80,12 @@ pub(crate) fn build_from_obj(
                     let key = Arc::as_ptr(&image.bytes);
                     *textures.entry(key).or_insert_with(|| push_texture(&mut json, &mut pack, image))
                 });
-                let [r, g, b, alpha] = found.color;
-                let [r, g, b] = if image.is_some() { [1.0; 3] } else { [r, g, b].map(linear_from_srgb) };
                 let surface = &mut made["pbrMetallicRoughness"];
-                surface["baseColorFactor"] = json!([r, g, b, alpha].map(|share| share.clamp(0.0, 1.0)));
+                surface["baseColorFactor"] = json!(found.base_color());
                 if let Some(texture) = image {
                     surface["baseColorTexture"] = json!({ "index": texture });
                 }
-                if alpha < 1.0 {
+                if found.color[3] < 1.0 {
                     made["alphaMode"] = "BLEND".into();
                 }
             }

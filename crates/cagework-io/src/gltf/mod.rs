@@ -244,9 +244,9 @@ pub(crate) fn read(
     let n_before = notices.len();
     let mut geometry = geometry::read(&document, origin.unwrap_or_default(), &mut notices)?;
     let mut near = origin.unwrap_or_default();
-    // Skeletons and clips are computed with in world space.
+    // Rigs and clips are computed in world space.
     let is_still =
-        document.root.skins.is_empty() && document.json["animations"].as_array().is_none_or(Vec::is_empty);
+        !Rig::is_needed(&document) && document.json["animations"].as_array().is_none_or(Vec::is_empty);
     if origin.is_none() && is_still {
         near = origin_near(&geometry.positions);
         if near != DVec3::ZERO {

@@ -96,23 +96,26 @@ impl Model {
 
     /// The vertex of a pose for each vertex of this cage.
     fn order_of(&self, pose: &Self) -> Result<Vec<u32>, PoseError> {
-        let is_welded = matches!(self.document, Document::Gltf(_));
+        let welded = matches!(self.document, Document::Gltf(_)).then(|| weld(&self.positions));
         let (n, given) = (self.positions.len(), pose.positions.len());
-        let first = if is_welded { weld(&self.positions).first } else { (0..n as u32).collect() };
+        let first = welded.as_ref().map_or_else(|| (0..n as u32).collect(), |welded| welded.first.clone());
         let is_unwelded = given == n;
         if !is_unwelded && given != first.len() {
             let (pose, cage) = (pose.name.clone(), self.name.clone());
             return Err(PoseError::Count { pose, given, cage, expected: first.len() });
         }
-        let faces = |model: &Self| match &model.document {
-            Document::Gltf(_) if is_unwelded => model.triangles.iter().map(|t| t.to_vec()).collect(),
-            _ => model.cage_mesh().faces,
+        let mut posed = match &pose.document {
+            Document::Obj(_) => pose.cage_mesh().faces,
+            Document::Gltf(_) => pose.triangles.iter().map(|t| t.to_vec()).collect(),
         };
-        if let Some(edge) = foreign_edge(&faces(self), &faces(pose), given) {
-            let hint = if pose.keeps_order_in(ModelFormat::Obj) && pose.format != ModelFormat::Stl {
-                "export it from the cage itself, with the settings of the cage's export"
-            } else {
-                "write it as OBJ, PLY or OFF, which keep the order"
+        if let Some(welded) = welded.filter(|_| is_unwelded) {
+            // Which of the vertices at one place a triangle has depends on how its polygon is cut.
+            posed.iter_mut().flatten().for_each(|v| *v = welded.unique_of[*v as usize]);
+        }
+        if let Some(edge) = foreign_edge(&self.cage_mesh().faces, &posed, first.len()) {
+            let hint = match pose.format {
+                ModelFormat::Gltf | ModelFormat::Stl => "write it as OBJ, PLY or OFF, which keep the order",
+                _ => "export it from the cage itself, with the settings of the cage's export",
             };
             return Err(PoseError::Order { pose: pose.name.clone(), edge, cage: self.name.clone(), hint });
         }

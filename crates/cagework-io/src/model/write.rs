@@ -43,7 +43,7 @@ impl Model {
                     && !keeps(&[ModelFormat::Gltf, ModelFormat::Ply, ModelFormat::Off]);
                 texcoords = !document.texcoords.is_empty() && !keeps(&[ModelFormat::Gltf]);
                 materials = !document.materials.is_empty() && !keeps(&[ModelFormat::Gltf]);
-                names = !document.groups.is_empty() && !is_same;
+                names = document.groups.len() > 1 && !is_same;
                 rig = false;
             }
             Document::Gltf(document) => {

@@ -20,6 +20,17 @@ pub(crate) struct Material {
     pub(crate) image: Option<Image>,
 }
 
+impl Material {
+    /// Factor of the base colour, linear RGBA. A texture is multiplied by it; a grey beside one is a program's default, often black,
+    /// and is replaced.
+    pub(crate) fn base_color(&self) -> [f32; 4] {
+        let [r, g, b, alpha] = self.color;
+        let is_default = self.image.is_some() && r == g && g == b;
+        let [r, g, b] = if is_default { [1.0; 3] } else { [r, g, b].map(linear_from_srgb) };
+        [r, g, b, alpha].map(|share| share.clamp(0.0, 1.0))
+    }
+}
+
 /// Reads the materials of a `.mtl` file by name, with their textures.
 pub(crate) fn read_materials(
     bytes: &[u8],
@@ -97,14 +108,11 @@ pub(crate) fn look(document: &ObjDocument, positions: &[Vec3]) -> Look {
                         look.images.len() as u32 - 1
                     })
                 });
-                let [r, g, b, alpha] = found.color;
-                // A texture replaces the colour, as programs that write black beside a texture mean it.
-                let base = if image.is_some() { [1.0; 3] } else { [r, g, b].map(linear_from_srgb) };
                 look.groups.push(LookGroup {
                     triangles: range,
-                    base_color: [base[0], base[1], base[2], alpha.clamp(0.0, 1.0)],
+                    base_color: found.base_color(),
                     image,
-                    alpha: if alpha < 1.0 { LookAlpha::Blend } else { LookAlpha::Opaque },
+                    alpha: if found.color[3] < 1.0 { LookAlpha::Blend } else { LookAlpha::Opaque },
                     double_sided: true,
                     ..LookGroup::default()
                 });
