@@ -7,6 +7,7 @@ use thiserror::Error;
 use crate::error::WriteError;
 use crate::gltf::{self, Clip, JointPoint, Named, Played, Player, ReshapeOptions, ReshapeReport, Rig};
 use crate::model::{Document, Model};
+use crate::origin::relative;
 use crate::shown::shown;
 
 /// Most frames of a clip that a cage is made around, and most vertices of all of them: fewer frames of a large model.
@@ -64,7 +65,7 @@ impl Model {
     /// [`WriteError`] when a part of the rig cannot be read.
     pub fn extra_points(&self) -> Result<Vec<Vec3>, WriteError> {
         let bound = self.rig()?.map_or_else(Vec::new, |rig| rig.bound());
-        let extras: Vec<Vec3> = bound.iter().map(|p| p.as_vec3()).collect();
+        let extras: Vec<Vec3> = bound.iter().map(|&p| relative(p, self.origin)).collect();
         Ok(self.up.turned(&extras).into_owned())
     }
 
@@ -87,7 +88,7 @@ impl Model {
     fn rig(&self) -> Result<Option<Rig<'_>>, WriteError> {
         match &self.document {
             Document::Gltf(document) if Rig::is_needed(document) => {
-                Ok(Some(Rig::new(document, &self.positions_in_file())?))
+                Ok(Some(Rig::new(document, &self.positions_in_file(), self.origin)?))
             }
             _ => Ok(None),
         }
@@ -143,7 +144,7 @@ impl Model {
     ) -> Result<(Vec<u8>, ReshapeReport), WriteError> {
         let Document::Gltf(document) = &self.document else { return Err(WriteError::NoRig) };
         let rest = self.positions_in_file();
-        let rig = Rig::new(document, &rest)?;
+        let rig = Rig::new(document, &rest, self.origin)?;
         let n = self.positions.len() + rig.bound().len();
         let turned = |by: &[DVec3]| -> Result<Vec<DVec3>, WriteError> {
             if by.len() != n {

@@ -244,9 +244,9 @@ pub(crate) fn read(
     let n_before = notices.len();
     let mut geometry = geometry::read(&document, origin.unwrap_or_default(), &mut notices)?;
     let mut near = origin.unwrap_or_default();
-    // Rigs and clips are computed in world space.
-    let is_still =
-        !Rig::is_needed(&document) && document.json["animations"].as_array().is_none_or(Vec::is_empty);
+    // Skins, morph targets and clips are played in world space.
+    let is_still = !Rig::has_skin_or_targets(&document)
+        && document.json["animations"].as_array().is_none_or(Vec::is_empty);
     if origin.is_none() && is_still {
         near = origin_near(&geometry.positions);
         if near != DVec3::ZERO {

@@ -31,6 +31,7 @@ use super::geometry::{Frame, attribute, vectors};
 use super::patch::is_flat;
 use super::scene::{Instance, Worlds};
 use super::{GltfDocument, GltfError, skin};
+use crate::origin::relative;
 
 pub use clip::Clip;
 pub(crate) use clip::clips;
@@ -116,7 +117,7 @@ impl Part {
 impl<'a> Rig<'a> {
     /// # Errors
     /// A part that cannot be read; those that the model shows were read before.
-    pub(crate) fn new(document: &'a GltfDocument, rest: &[Vec3]) -> Result<Self, GltfError> {
+    pub(crate) fn new(document: &'a GltfDocument, rest: &[Vec3], origin: DVec3) -> Result<Self, GltfError> {
         let worlds = Worlds::new(&document.root)?;
         let mut rig = Self {
             document,
@@ -152,7 +153,8 @@ impl<'a> Rig<'a> {
             }
             seen.insert(key);
         }
-        let states: Vec<Vec3> = rest.iter().copied().chain(rig.extras.iter().map(|p| p.as_vec3())).collect();
+        let states: Vec<Vec3> =
+            rest.iter().copied().chain(rig.extras.iter().map(|&p| relative(p, origin))).collect();
         rig.diagonal = Bounds::of(&states).map_or(0.0, |b| f64::from(b.diagonal()));
         rig.add_nodes();
         rig.hold_without_skins();
