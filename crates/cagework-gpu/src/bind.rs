@@ -71,11 +71,15 @@ pub async fn bind_on<'a>(
         return Err(GpuError::Solver(options.solver));
     }
     let watch = Watch::new(progress);
-    let prepared = Prepared::new(positions, controls.into(), options, FieldsOn::Device, &watch)?;
+    let mut prepared = Prepared::new(positions, controls.into(), options, FieldsOn::Device, &watch)?;
     let (hierarchy, stencils) = (prepared.hierarchy(), prepared.stencils());
     let limit = options.memory_limit;
     let plan = Plan::new(hierarchy, stencils, options.solver, context.max_binding_bytes, limit)?;
-    let solved = solve_and_sample(&prepared, options, &plan, &watch, context).await?;
+    let mut solved = solve_and_sample(&prepared, options, &plan, &watch, context).await?;
+    if solved.report.stalled {
+        // Conjugate gradients run on the processor only.
+        solved = prepared.solve_on_host(&watch)?;
+    }
     Ok(prepared.finish(solved, &watch)?)
 }
 
@@ -137,6 +141,9 @@ async fn multigrid(
             .await?;
         solve_ms += stream.now_ms() - began;
         reports.push(report);
+        if reports.iter().any(|report| report.stalled) {
+            break;
+        }
         sampler.sample(stream, multigrid.field(), first_column, blocks).await?;
     }
     let report = SolveReport::together(&reports);

@@ -122,7 +122,8 @@ impl Multigrid {
         &self.levels[0].field
     }
 
-    /// Solves the batch that starts at `first_column`. `cycle_done(stream, cycle, delta)` is told of each cycle.
+    /// Solves the batch that starts at `first_column`, or returns a report of cycles that stalled. Calls
+    /// `cycle_done(stream, cycle, delta)` after each cycle.
     ///
     /// # Errors
     /// Cancelled, or the GPU failed.
@@ -163,7 +164,7 @@ impl Multigrid {
             let done = convergence.cycle_done(delta / f64::from(coarse.max(1)), residual);
             let (cycle, delta) = convergence.latest();
             cycle_done(stream, cycle, delta);
-            if done {
+            if done || convergence.stalls() {
                 return Ok(convergence.into_report());
             }
         }

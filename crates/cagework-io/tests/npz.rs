@@ -200,8 +200,13 @@ fn part() -> (PartOf, Part) {
         },
         positions: vec![Vec3::X, Vec3::new(0.1, -0.2, 0.3), Vec3::X],
     };
-    let report =
-        SolveReport { deltas: vec![0.1, 1e-7], residuals: vec![], converged: true, at_round_off: false };
+    let report = SolveReport {
+        deltas: vec![0.1, 1e-7],
+        residuals: vec![],
+        converged: true,
+        at_round_off: false,
+        stalled: false,
+    };
     (of, Part { columns: 1..3, samples: vec![0.1, -1e-9, 0.25, 0.5], report })
 }
 

@@ -49,7 +49,7 @@ pub(crate) struct SolveArgs {
     /// Stop when delta (the paper's Eq. 2; multigrid and cg: the error that is expected to remain) falls below this.
     #[arg(long, default_value = "1e-5", value_parser = number::<f32>(options::TAU))]
     tau: f32,
-    /// Stop after this many Jacobi sweeps, V-cycles or steps of cg in any case.
+    /// Stop after this many Jacobi sweeps or steps of cg, and after at most 60 V-cycles.
     #[arg(long, default_value_t = 20_000, value_name = "N", value_parser = number::<u32>(options::MAX_ITERATIONS))]
     max_iterations: u32,
     /// Drop the smallest weights of a row as long as their sum is not above this, then restore its sum and rest position; 0

@@ -103,9 +103,12 @@ pub(super) fn estimate(
     let on_levels = |finest_rows: f64| {
         threads as f64 * row * (finest_rows + 2.0 * COARSER * n_unknowns) + transfers * (1.0 + COARSER)
     };
+    // V-cycles may stall at parts inside, and conjugate gradients take over: five fields.
+    let of_rescue =
+        if controls.surface().component_of_face().iter().any(|&part| part > 0) { 5.0 } else { 0.0 };
     let fields = match options.solver {
         _ if threads == 0 => 0.0,
-        Solver::Multigrid => on_levels(1.5 * n_unknowns + n_cut),
+        Solver::Multigrid => on_levels((1.5 + of_rescue) * n_unknowns + n_cut),
         // Five fields; the V-cycle that preconditions has another two and a half.
         Solver::ConjugateGradient if options.needs_coarse_levels() => on_levels(7.5 * n_unknowns + n_cut),
         Solver::ConjugateGradient => threads as f64 * row * (5.0 * n_unknowns + n_cut),

@@ -29,6 +29,10 @@ use super::voxels::{Gridded, Voxels};
 use super::watch::Watch;
 use super::{BindError, Binding};
 
+/// What a user should know when conjugate gradients took over.
+const STALLED: &str = "Multigrid converged slowly, as it does around many small parts or controls inside the cage: conjugate \
+                       gradients finished the solve on the processor.";
+
 /// Where the fields of a solve live: what counts towards the limit on working memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FieldsOn {
@@ -107,9 +111,7 @@ pub(super) fn run(
 ) -> Result<Binding, BindError> {
     let watch = Watch::new(progress);
     let prepared = Prepared::new(positions, controls, options, FieldsOn::Host, &watch)?;
-    let (hierarchy, team) = (prepared.hierarchy(), &prepared.gridded.team);
-    let all = 0..hierarchy.n_batches();
-    let solved = solve_and_sample(hierarchy, all, &prepared.stencils, options, team, &watch)?;
+    let solved = prepared.solve(&watch)?;
     prepared.finish(solved, &watch)
 }
 
@@ -179,6 +181,25 @@ impl<'a> Prepared<'a> {
         &self.stencils
     }
 
+    fn solve(&self, watch: &Watch<'_>) -> Result<Solved, BindError> {
+        let (hierarchy, team) = (self.hierarchy(), &self.gridded.team);
+        let all = 0..hierarchy.n_batches();
+        Ok(solve_and_sample(hierarchy, all, &self.stencils, self.options, team, watch)?)
+    }
+
+    /// Solves and samples all columns in this process, where they were to be solved on a device.
+    ///
+    /// # Errors
+    /// Memory above the limit, or cancelled.
+    pub fn solve_on_host(&mut self, watch: &Watch<'_>) -> Result<Solved, BindError> {
+        let (vertices, n_columns) = (self.mesh.count(), self.controls.n_controls());
+        let (grid, threads) = (&self.hierarchy().levels[0].grid, self.gridded.team.n_threads());
+        let needed = estimate(self.controls, grid, vertices, threads, n_columns, self.options);
+        needed.check(vertices, n_columns, self.options.memory_limit)?;
+        self.estimated = needed.bytes;
+        self.solve(watch)
+    }
+
     /// Makes weights and report of the sampled columns.
     ///
     /// # Errors
@@ -232,6 +253,7 @@ impl<'a> Prepared<'a> {
         notices.extend(team.notice(options.threads).into_iter().chain(voxels.notices.iter().cloned()));
         notices.extend(notices_of(controls, &level.grid, options.grid));
         notices.extend(oversized(cage.bounds(), &positions[..n_vertices], &weights));
+        notices.extend(solved.report.stalled.then(|| STALLED.to_owned()));
         let is_vertex = |o: &&(u32, OutsideVertex)| (o.1.vertex as usize) < n_vertices;
         // Vertices inside of a control, or next to one, are not outside.
         let near_cage = |facet: u32| controls.cage_face(cage.face_of_facet()[facet as usize]).is_some();

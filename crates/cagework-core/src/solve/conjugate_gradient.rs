@@ -6,13 +6,16 @@
 //! Delta is the error that is expected to remain: changes of the solution fall geometrically but for a ripple, so that what is
 //! left is the latest change times `rate / (1 - rate)`, with the rate of the last `WINDOW` steps.
 //!
+//! A V-cycle that diverges for some errors may be indefinite as a preconditioner; a step whose preconditioned residual does not
+//! descend takes the residual itself.
+//!
 //! Sources: Hestenes, Stiefel 1952; Notay 2000, "Flexible conjugate gradients".
 
 use super::BatchSolver;
 use super::hierarchy::Hierarchy;
 use super::multigrid::Workspace;
 use super::operator;
-use super::rows::{LANES, Row, ZERO};
+use super::rows::{LANES, Rhs, Row, ZERO};
 use super::stop::{SolveReport, StopRule};
 use crate::simd::dispatch;
 
@@ -21,6 +24,9 @@ const WINDOW: usize = 10;
 
 /// Largest rate that is believed: a solve of a thousand steps.
 const SLOWEST: f64 = 0.99;
+
+/// A preconditioned solve ends as converged if this many steps bring no smaller delta near the resolution of f32.
+const MAX_STALLED: usize = 8;
 
 /// Rows whose products are summed in f32 before they are added in f64.
 const ROWS_PER_SUM: usize = 1024;
@@ -58,10 +64,89 @@ impl ConjugateGradient {
         }
     }
 
-    fn precondition(&mut self, hierarchy: &Hierarchy) {
-        match &mut self.multigrid {
+    /// Goes on from the field of a workspace whose cycles stalled, and leaves the solution there. `rhs`: one row per cut cell;
+    /// `report`: of the cycles, which count for the limit on iterations.
+    pub(super) fn resume(
+        &mut self,
+        hierarchy: &Hierarchy,
+        workspace: &mut Workspace,
+        rhs: &[Row],
+        rule: StopRule,
+        report: SolveReport,
+        done: &mut dyn FnMut(u32, f64) -> bool,
+    ) -> Option<SolveReport> {
+        workspace.swap_field(&mut self.u);
+        operator::residual(&hierarchy.levels[0], &self.u, Rhs::Cut(rhs), &mut self.residual);
+        let report = self.iterate(hierarchy, Some(workspace), rule.of_cycles(), report, done);
+        workspace.swap_field(&mut self.u);
+        report
+    }
+
+    /// Preconditions the residual. Returns `r . z` and `r . r`.
+    fn precondition(&mut self, hierarchy: &Hierarchy, cycle: &mut Option<&mut Workspace>) -> [Lanes; 2] {
+        match cycle {
             None => self.z.copy_from_slice(&self.residual),
             Some(workspace) => workspace.precondition(hierarchy, &mut self.residual, &mut self.z),
+        }
+        let [descent, squares] = [&self.z, &self.residual].map(|other| products(&self.residual, other));
+        let climbs: [bool; LANES] = std::array::from_fn(|k| descent[k] <= 0.0 && squares[k] > 0.0);
+        if !climbs.contains(&true) {
+            return [descent, squares];
+        }
+        for (z, r) in self.z.iter_mut().zip(&self.residual) {
+            for k in (0..LANES).filter(|&k| climbs[k]) {
+                z[k] = r[k];
+            }
+        }
+        [products(&self.residual, &self.z), squares]
+    }
+
+    /// Steps from `u` and its residual until the rule holds.
+    fn iterate(
+        &mut self,
+        hierarchy: &Hierarchy,
+        mut cycle: Option<&mut Workspace>,
+        rule: StopRule,
+        mut report: SolveReport,
+        done: &mut dyn FnMut(u32, f64) -> bool,
+    ) -> Option<SolveReport> {
+        let level = &hierarchy.levels[0];
+        let n_unknowns = level.n_unknowns().max(1) as f64;
+        let (is_preconditioned, mut changes) = (cycle.is_some(), Vec::new());
+        // After cycles that diverged, the first step takes out what they enlarged, and says nothing of the rest.
+        let unlike = usize::from(report.stalled);
+        let [mut descent, mut squares] = self.precondition(hierarchy, &mut cycle);
+        self.direction.copy_from_slice(&self.z);
+        loop {
+            operator::apply(level, &self.direction, &mut self.image);
+            let curvature = products(&self.direction, &self.image);
+            let step = quotients(&descent, &curvature);
+            add(&mut self.u, &step, &self.direction);
+            add(&mut self.residual, &step.map(|s| -s), &self.image);
+
+            let lengths = products(&self.direction, &self.direction);
+            let change: f64 = step.iter().zip(&lengths).map(|(s, length)| s * s * length).sum();
+            changes.push(change / n_unknowns);
+            let residual = (squares.iter().sum::<f64>() / n_unknowns).sqrt();
+            let error = expected_error(&changes[unlike.min(changes.len() - 1)..]);
+            let is_done = report.iteration_done(&rule, error, Some(residual));
+            let is_last = is_done || is_preconditioned && report.ends_at_round_off(MAX_STALLED);
+            let (iteration, delta) = report.latest();
+            if !done(iteration, delta) {
+                return None;
+            }
+            if is_last {
+                return Some(report);
+            }
+
+            let before = descent;
+            [descent, squares] = self.precondition(hierarchy, &mut cycle);
+            let overlap = products(&self.z, &self.image);
+            // z . (r - r_before), where r - r_before = -step image.
+            let conjugate: Lanes = std::array::from_fn(|k| -step[k] * overlap[k]);
+            let share = quotients(&conjugate, &before);
+            scale(&mut self.direction, &share);
+            add(&mut self.direction, &[1.0; LANES], &self.z);
         }
     }
 }
@@ -75,48 +160,17 @@ impl BatchSolver for ConjugateGradient {
         done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<SolveReport> {
         let level = &hierarchy.levels[0];
-        let n_unknowns = level.n_unknowns().max(1) as f64;
         hierarchy.fill_cut_rhs(batch, &mut self.cut_rhs);
         self.u.fill(ZERO);
         self.residual.fill(ZERO);
         for (number, row) in self.cut_rhs.iter().enumerate() {
             self.residual[level.row_of_cut(number)] = *row;
         }
-        self.precondition(hierarchy);
-        self.direction.copy_from_slice(&self.z);
-        let mut descent = products(&self.residual, &self.z);
-        let mut squares = products(&self.residual, &self.residual);
-        let (mut report, mut changes) = (SolveReport::default(), Vec::new());
-        loop {
-            operator::apply(level, &self.direction, &mut self.image);
-            let curvature = products(&self.direction, &self.image);
-            let step = quotients(&descent, &curvature);
-            add(&mut self.u, &step, &self.direction);
-            add(&mut self.residual, &step.map(|s| -s), &self.image);
-
-            let lengths = products(&self.direction, &self.direction);
-            let change: f64 = step.iter().zip(&lengths).map(|(s, length)| s * s * length).sum();
-            changes.push(change / n_unknowns);
-            let residual = (squares.iter().sum::<f64>() / n_unknowns).sqrt();
-            let is_last = report.iteration_done(&rule, expected_error(&changes), Some(residual));
-            let (iteration, delta) = report.latest();
-            if !done(iteration, delta) {
-                return None;
-            }
-            if is_last {
-                return Some(report);
-            }
-
-            self.precondition(hierarchy);
-            squares = products(&self.residual, &self.residual);
-            let [before, overlap] = [descent, products(&self.z, &self.image)];
-            descent = products(&self.residual, &self.z);
-            // z . (r - r_before), where r - r_before = -step image.
-            let conjugate: Lanes = std::array::from_fn(|k| -step[k] * overlap[k]);
-            let share = quotients(&conjugate, &before);
-            scale(&mut self.direction, &share);
-            add(&mut self.direction, &[1.0; LANES], &self.z);
-        }
+        let mut workspace = self.multigrid.take();
+        let rule = if workspace.is_some() { rule.of_cycles() } else { rule };
+        let report = self.iterate(hierarchy, workspace.as_mut(), rule, SolveReport::default(), done);
+        self.multigrid = workspace;
+        report
     }
 
     fn field(&self) -> &[Row] {

@@ -11,6 +11,9 @@
 //! Armadillo's 14 batches instead of 43, the later ones cheaper, and 4e-6 of error left at the end instead of 7e-6 (5e-6 with the
 //! shorter last cycle, `SPARE`).
 //!
+//! Coarse grids do not see balls and cavities smaller than their cells, and correct too much there. If cycles converge slowly or
+//! diverge ([`Convergence::stalls`]), conjugate gradients that they precondition go on from the latest iterate.
+//!
 //! All passes between two restrictions are one stream through memory (`stream`): the coarse correction, the sweep after it,
 //! the next cycle's two sweeps and the residual of the red cells follow each other one z-plane apart.
 
@@ -20,6 +23,7 @@ mod stream;
 pub use convergence::Convergence;
 
 use super::BatchSolver;
+use super::conjugate_gradient::ConjugateGradient;
 use super::hierarchy::Hierarchy;
 use super::rows::{LANES, Rhs, Row, ZERO, over_relax_plane, relax_plane, restrict_residual};
 use super::stop::{SolveReport, StopRule};
@@ -52,6 +56,8 @@ pub struct Workspace {
     residual: Vec<Row>,
     /// Whether `f[0]` has one row per cell.
     is_finest_dense: bool,
+    /// Takes over when cycles stall; allocated then.
+    rescue: Option<Box<ConjugateGradient>>,
 }
 
 impl Workspace {
@@ -67,6 +73,7 @@ impl Workspace {
             f,
             residual: vec![ZERO; hierarchy.levels[0].first_row(1)],
             is_finest_dense: false,
+            rescue: None,
         }
     }
 
@@ -78,6 +85,11 @@ impl Workspace {
         self.cycle(hierarchy, 0, DOWN_FROM_ZERO);
         std::mem::swap(&mut self.f[0], r);
         std::mem::swap(&mut self.u[0], z);
+    }
+
+    /// Exchanges the finest level's field with another of its length.
+    pub(super) fn swap_field(&mut self, u: &mut Vec<Row>) {
+        std::mem::swap(&mut self.u[0], u);
     }
 
     /// One full relaxation of the finest level, both colours, as the solver does it: the unit in which a solve's
@@ -172,8 +184,21 @@ impl BatchSolver for Workspace {
             if !cycle_done(cycle, delta) {
                 return None;
             }
-            if done {
+            let stalls = !done && convergence.stalls();
+            if done || stalls {
                 self.up(hierarchy, 0, UP);
+            }
+            if stalls {
+                let mut rescue =
+                    self.rescue.take().unwrap_or_else(|| Box::new(ConjugateGradient::new(hierarchy, false)));
+                let rhs = std::mem::take(&mut self.f[0]);
+                let report =
+                    rescue.resume(hierarchy, self, &rhs, rule, convergence.into_report(), cycle_done);
+                self.f[0] = rhs;
+                self.rescue = Some(rescue);
+                return report;
+            }
+            if done {
                 return Some(convergence.into_report());
             }
             start = match coarsest {
@@ -190,7 +215,7 @@ impl BatchSolver for Workspace {
 
     fn bytes(&self) -> usize {
         let rows = self.u.iter().chain(&self.f).map(Vec::len).sum::<usize>() + self.residual.len();
-        rows * size_of::<Row>()
+        rows * size_of::<Row>() + self.rescue.as_ref().map_or(0, |rescue| rescue.bytes())
     }
 }
 

@@ -14,7 +14,16 @@ pub struct StopRule {
     pub max_iterations: u32,
 }
 
+/// Most V-cycles, alone or as preconditioner, of a batch: halving 60 times is beyond f32.
+pub const MAX_CYCLES: u32 = 60;
+
 impl StopRule {
+    /// The rule for a solver by V-cycles: see [`MAX_CYCLES`].
+    #[must_use]
+    pub fn of_cycles(self) -> Self {
+        Self { max_iterations: self.max_iterations.min(MAX_CYCLES), ..self }
+    }
+
     /// The rule for one of `n_batches` that are solved one by one. Deltas add up in squares: each may keep its share.
     #[must_use]
     pub fn of_batch(self, n_batches: usize) -> Self {
@@ -33,6 +42,9 @@ pub struct SolveReport {
     pub converged: bool,
     /// Whether it was f32 that ended it, above the tolerance.
     pub at_round_off: bool,
+    /// Whether V-cycles converged slowly or diverged, so that conjugate gradients took over.
+    #[serde(default)]
+    pub stalled: bool,
 }
 
 /// Below this delta f32 may have no more digits to give: what is left of changes is rounding (3e-8 to 1e-7 on a C-shaped
@@ -81,6 +93,7 @@ impl SolveReport {
             residuals: history(|r| &r.residuals),
             converged: batches.iter().all(|r| r.converged),
             at_round_off: batches.iter().any(|r| r.at_round_off),
+            stalled: batches.iter().any(|r| r.stalled),
         }
     }
 }

@@ -9,6 +9,15 @@ const CONTRACTION: f64 = 0.12;
 /// tau that asks for more is never met.
 const STALLED: f64 = 0.5;
 
+/// Cycles that leave more than this share of the error are slower than conjugate gradients that they precondition.
+const SLOW: f64 = 0.5;
+
+/// Cycles before contraction is judged by [`SLOW`].
+const CYCLES_TO_JUDGE: usize = 4;
+
+/// Largest contraction that is believed when the remaining error is extrapolated.
+const SLOWEST: f64 = 0.99;
+
 /// See [`STALLED`]: one such cycle may be chance.
 const MAX_STALLED: u32 = 2;
 
@@ -30,6 +39,7 @@ impl Convergence {
     #[must_use]
     pub fn new(rule: StopRule) -> Self {
         let report = SolveReport::default();
+        let rule = rule.of_cycles();
         Self { rule, report, correction: f64::INFINITY, ratio: CONTRACTION, stalled: 0 }
     }
 
@@ -38,7 +48,12 @@ impl Convergence {
     pub fn cycle_done(&mut self, correction_square: f64, residual_square: f64) -> bool {
         let correction = correction_square.sqrt();
         let ratio = correction / self.correction;
-        let delta = ratio.clamp(CONTRACTION, 1.0) * correction;
+        // A correction is the error before the cycle less the error after it: `1 - ratio` of the former.
+        let ahead = ratio.min(SLOWEST);
+        let extrapolated =
+            if correction < ROUND_OFF { ratio.min(1.0) } else { (1.0 - CONTRACTION) * ahead / (1.0 - ahead) };
+        // No weight is off by more than 1.
+        let delta = (extrapolated.max(CONTRACTION) * correction).min(1.0);
         let done = self.report.iteration_done(&self.rule, delta, Some(residual_square.sqrt()));
         let stalls = correction < ROUND_OFF && correction > STALLED * self.correction;
         self.stalled = if stalls { self.stalled + 1 } else { 0 };
@@ -49,6 +64,13 @@ impl Convergence {
             (self.report.converged, self.report.at_round_off) = (true, true);
         }
         done || self.report.at_round_off
+    }
+
+    /// Whether conjugate gradients should take over.
+    #[must_use]
+    pub fn stalls(&self) -> bool {
+        let is_judged = self.report.deltas.len() >= CYCLES_TO_JUDGE && self.correction > ROUND_OFF;
+        is_judged && self.ratio > SLOW && !self.report.converged
     }
 
     /// Whether the next cycle is expected to meet the tolerance with this factor to spare.
@@ -66,7 +88,7 @@ impl Convergence {
     /// The report.
     #[must_use]
     pub fn into_report(self) -> SolveReport {
-        self.report
+        SolveReport { stalled: self.stalls(), ..self.report }
     }
 }
 
@@ -81,5 +103,23 @@ mod tests {
         assert_eq!(last, Some(3));
         let report = convergence.into_report();
         assert!(report.converged && report.at_round_off);
+    }
+
+    /// Corrections that fall by 0.8 a cycle sum up to four times the latest: 0.8 + 0.64 + ... = 0.8 / (1 - 0.8). Conjugate
+    /// gradients should take over then, but not at a contraction of 0.4.
+    #[test]
+    fn slow_cycles_are_seen_and_their_remainder_is_extrapolated() {
+        for (contraction, stalls) in [(0.8, true), (1.5, true), (0.4, false)] {
+            let mut convergence = Convergence::new(StopRule { tolerance: 1e-9, max_iterations: 99 });
+            for cycle in 0..4 {
+                assert!(!convergence.stalls());
+                assert!(!convergence.cycle_done(1e-4 * f64::powi(contraction, 2 * cycle), 0.0));
+            }
+            assert_eq!(convergence.stalls(), stalls);
+            let left = 1e-2 * f64::powi(contraction, 4) / (1.0 - contraction);
+            let delta = convergence.latest().1;
+            // The first cycles' usual contraction, 0.12, is taken off.
+            assert!(contraction > 1.0 || (0.88 * left - delta).abs() < 1e-9, "{delta}, not {left}");
+        }
     }
 }
