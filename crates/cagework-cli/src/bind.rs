@@ -53,7 +53,7 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
         save_cage(args, cage, &model)?;
         return print(&written);
     }
-    let weights = weights_bytes(points.len(), controls.n_controls(), options.sparsify);
+    let weights = weights_bytes(points.len(), controls.n_controls());
     let npz = if args.weights.is_some() { weights } else { 0 };
     let output = args.output.as_ref().map_or(0, |output| model.bytes_to_write(output.format));
     let to_write = check_memory(&options, points.len(), controls, npz.max(output))?;
@@ -119,7 +119,7 @@ pub(crate) fn check_memory(
     to_write: u64,
 ) -> Result<u64, BindError> {
     let (limit, columns) = (options.memory_limit, controls.n_controls());
-    let needed = options.held + weights_bytes(points, columns, options.sparsify) + to_write;
+    let needed = options.held + weights_bytes(points, columns) + to_write;
     if needed > limit { Err(BindError::WeightsMemory { needed, limit, points, columns }) } else { Ok(needed) }
 }
 

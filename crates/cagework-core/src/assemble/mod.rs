@@ -82,7 +82,7 @@ pub fn assemble(
     team: &Team,
 ) -> Assembled {
     let columns = Columns::new(controls);
-    if team.n_threads() == 1 {
+    if team.n_threads() == 1 && options.threshold == 0.0 {
         return assemble_alone(controls, &columns, blocks, points, options, &is_outside);
     }
     let mut runs = runs_of(blocks, points, VERTEX_RUN);
@@ -134,8 +134,8 @@ pub fn assemble(
     Assembled { weights: Weights::from_parts(controls.n_controls() as u32, indptr, indices, data), facts }
 }
 
-/// The same on one thread, where rows can be put one after the other without counting them first: a third less memory
-/// is written.
+/// The same on one thread without a threshold, where rows are nearly full and can be put one after the other without counting
+/// them first: a third less memory is written.
 fn assemble_alone(
     controls: Controls<'_>,
     columns: &Columns,
@@ -145,20 +145,14 @@ fn assemble_alone(
     is_outside: &impl Fn(usize) -> bool,
 ) -> Assembled {
     let mut runs = runs_of(blocks, points, points.len().max(1));
-    let most = points.len() * controls.n_controls();
-    // Dense rows are nearly full; of sparse ones nobody knows.
-    let room = if options.threshold > 0.0 { 0 } else { most };
+    let room = points.len() * controls.n_controls();
     for run in &mut runs {
         run.entries = Entries::All { indices: Vec::with_capacity(room), data: Vec::with_capacity(room) };
         dispatch(
             #[inline(always)]
             || {
                 run.correct(columns, options, is_outside, |run, v, row| {
-                    let length = if options.threshold > 0.0 {
-                        run.entries.put_row(row, |batch| row[batch].map(|w| w != 0.0))
-                    } else {
-                        run.entries.put_row(row, |batch| run.blocks[batch][v].map(|w| w > 0.0))
-                    };
+                    let length = run.entries.put_row(row, |batch| run.blocks[batch][v].map(|w| w > 0.0));
                     run.lengths.push(length);
                 });
             },

@@ -34,14 +34,11 @@ const POINT_BYTES: f64 = 470.0;
 /// What a cell of the grid takes while lines and levels are made.
 const CELL_BYTES: f64 = 30.0;
 
-/// Weights that a vertex keeps when small ones are dropped: a third of the columns at most (Armadillo at 1e-5: 30 %).
-const SPARSE_SHARE: f64 = 0.5;
-
-/// Bytes of the weights of `n_rows` vertices.
+/// Bytes of the weights of `n_rows` vertices if none is dropped: how many of a row's weights are small is not known before the
+/// solve (a third of 110 columns is kept at a threshold of 1e-5, all of 8).
 #[must_use]
-pub fn weights_bytes(n_rows: usize, n_columns: usize, sparsify: f32) -> u64 {
-    let share = if sparsify > 0.0 { SPARSE_SHARE } else { 1.0 };
-    (n_rows as f64 * (share * n_columns as f64 * 8.0 + 4.0)) as u64
+pub fn weights_bytes(n_rows: usize, n_columns: usize) -> u64 {
+    n_rows as u64 * (n_columns as u64 * 8 + 4)
 }
 
 /// How many vertices a bind has.
@@ -117,7 +114,7 @@ pub(super) fn estimate(
         }
     };
     let Vertices { rows, points } = vertices;
-    let bytes_of = |n| weights_bytes(n, n_columns, options.sparsify) as f64;
+    let bytes_of = |n| weights_bytes(n, n_columns) as f64;
     let blocks = points as f64 * n_batches * row;
     // Rows of points that several vertices share are copied once all of them are there.
     let copies = if rows > points { bytes_of(rows) } else { blocks };
@@ -156,8 +153,10 @@ fn volume_and_area(cage: &Cage) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bind::bind;
     use crate::cage_gen::subdivided_box;
     use crate::mesh::Bounds;
+    use crate::progress::Silent;
     use glam::Vec3;
 
     #[test]
@@ -167,5 +166,21 @@ mod tests {
         let (volume, area) = volume_and_area(&cage);
         // 2 x 3 x 4
         assert!((volume - 24.0).abs() < 1e-4 && (area - 52.0).abs() < 1e-4, "{volume} {area}");
+    }
+
+    /// A threshold that drops nothing leaves as many weights as none does. An estimate for half of them was a quarter too low.
+    #[test]
+    fn binds_with_a_threshold_stay_below_their_estimate() {
+        let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+        let cage = Cage::new(&subdivided_box(bounds, 0.0, [8, 8, 8])).unwrap();
+        let at = |k: usize| Vec3::new((k % 20) as f32, (k / 20 % 20) as f32, (k / 400) as f32) / 21.0 + 0.02;
+        let points: Vec<Vec3> = (0..8000).map(at).collect();
+        for threads in [1, 2] {
+            let options = BindOptions { grid: 16, sparsify: 1e-9, threads, ..BindOptions::default() };
+            let memory = bind(&points, &cage, &options, &Silent).unwrap().report.memory_bytes;
+            assert!(memory.peak <= memory.estimated, "{memory:?}");
+            let tight = BindOptions { memory_limit: memory.peak - 1, ..options };
+            assert!(matches!(bind(&points, &cage, &tight, &Silent), Err(BindError::WeightsMemory { .. })));
+        }
     }
 }

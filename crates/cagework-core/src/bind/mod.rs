@@ -123,7 +123,7 @@ pub fn bind<'a>(
 }
 
 /// Bytes of working memory that a bind of `n_points` vertices on the CPU would need, before anything is allocated; high by 5
-/// to 40 %.
+/// to 40 %, and more where a threshold drops most of the weights.
 ///
 /// # Errors
 /// [`BindError::Option`] when an option is out of range.
