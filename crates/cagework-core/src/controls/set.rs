@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use glam::{DVec3, Vec3};
 
 use super::inner::{ControlError, InnerControls, InnerElement};
-use super::shapes::{self, Shape};
+use super::shapes::{self, Shape, Size};
 use super::{Controls, Origin};
 use crate::cage::{Cage, MAX_FACES};
 use crate::contact::{Corners, each_meeting};
@@ -120,8 +120,19 @@ impl ControlSet {
             return Err(ControlError::TooMany { elements: inner.elements.len(), faces: n_faces });
         }
         self.check_inside(&inner)?;
-        let walls = Walls::new(&inner, &self.cage, f64::from(inner.radius_in(extent.max_element())))?;
-        walls.check_apart(&inner)?;
+        let radius = f64::from(inner.radius_in(extent.max_element()));
+        let mut sizes = vec![Size::Equal; inner.elements.len()];
+        let mut walls = Walls::new(&inner, &self.cage, radius, &sizes)?;
+        let meeting = walls.meeting(&inner);
+        if !meeting.is_empty() {
+            // Meshes meet before balls and tubes do.
+            meeting.iter().flatten().for_each(|&element| sizes[element as usize] = Size::Within);
+            walls = Walls::new(&inner, &self.cage, radius, &sizes)?;
+            if let Some(&elements) = walls.meeting(&inner).first() {
+                let what = elements.map(|element| inner.elements[element as usize].name());
+                return Err(ControlError::Overlap { what, elements });
+            }
+        }
 
         let n_cage = self.rest.len() as u32;
         let first = self.surface.n_vertices() as u32;
@@ -206,18 +217,19 @@ struct Walls {
 }
 
 impl Walls {
-    fn new(inner: &InnerControls, cage: &Cage, radius: f64) -> Result<Self, ControlError> {
+    /// `sizes`: of each element's mesh.
+    fn new(inner: &InnerControls, cage: &Cage, radius: f64, sizes: &[Size]) -> Result<Self, ControlError> {
         let mut walls = Self::default();
         let at = |i: u32| inner.positions[i as usize].as_dvec3();
         let n_cage = cage.n_vertices() as u32;
         let parts = parts(inner);
         for (number, element) in (0u32..).zip(&inner.elements) {
-            let part = parts[number as usize];
+            let (part, size) = (parts[number as usize], sizes[number as usize]);
             match element {
                 // A ball alone does not tell how it is turned: the cage beside it does.
                 InnerElement::Point(i) => {
                     walls.add(
-                        shapes::ball(at(*i), radius),
+                        shapes::ball(at(*i), radius, size),
                         [*i, *i],
                         number,
                         part,
@@ -234,7 +246,7 @@ impl Walls {
                         let beside = nearest_triangle(cage, a.midpoint(b));
                         let third = beside.into_iter().max_by(|i, j| off_line(i).total_cmp(&off_line(j)));
                         let frame = [n_cage + pair[0], n_cage + pair[1], third.unwrap_or(0)];
-                        walls.add(shapes::tube(a, b, radius), [pair[0], pair[1]], number, part, frame);
+                        walls.add(shapes::tube(a, b, radius, size), [pair[0], pair[1]], number, part, frame);
                     }
                 }
                 InnerElement::Face(corners) => {
@@ -277,8 +289,8 @@ impl Walls {
         self.frames.push(frame);
     }
 
-    /// Whether elements that do not hang together keep apart.
-    fn check_apart(&self, inner: &InnerControls) -> Result<(), ControlError> {
+    /// Elements that do not hang together and whose meshes meet, in pairs. Where thousands lie on each other, not all pairs.
+    fn meeting(&self, inner: &InnerControls) -> Vec<[u32; 2]> {
         let (mut triangles, mut element_of) = (Vec::new(), Vec::new());
         for (face, &element) in self.faces.iter().zip(&self.element_of) {
             for k in 2..face.len() {
@@ -288,7 +300,7 @@ impl Walls {
             }
         }
         let parts = parts(inner);
-        let mut wrong = None;
+        let mut meeting = Vec::new();
         each_meeting(&triangles, |pair| {
             let elements = pair.map(|t| element_of[t as usize]);
             let [a, b] = elements.map(|element| parts[element as usize]);
@@ -296,16 +308,10 @@ impl Walls {
                 return ControlFlow::Continue(());
             }
             let [low, high] = [elements[0].min(elements[1]), elements[0].max(elements[1])];
-            wrong = Some([low, high]);
-            ControlFlow::Break(())
+            meeting.push([low, high]);
+            if meeting.len() < triangles.len() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
-        match wrong {
-            Some(elements) => {
-                let what = elements.map(|element| inner.elements[element as usize].name());
-                Err(ControlError::Overlap { what, elements })
-            }
-            None => Ok(()),
-        }
+        meeting
     }
 }
 

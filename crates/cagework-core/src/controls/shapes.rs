@@ -13,6 +13,15 @@ const RINGS: usize = 2;
 pub(super) const BALL_FACES: usize = 80;
 pub(super) const TUBE_FACES: usize = SIDES * (1 + 2 * (RINGS + 1));
 
+/// How large a mesh is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Size {
+    /// With the volume of its ball, or the cross-section of its tube; its corners stick out by up to 5 % of the radius.
+    Equal,
+    /// Within the radius, for neighbours that are closer than that.
+    Within,
+}
+
 /// Points around a control and faces between them.
 pub(super) struct Shape {
     /// Places, and how far along the tube their foot is: 0 to 1.
@@ -20,8 +29,8 @@ pub(super) struct Shape {
     pub(super) faces: Vec<Vec<u32>>,
 }
 
-/// A ball: an icosahedron whose faces are cut into four, with the ball's volume.
-pub(super) fn ball(center: DVec3, radius: f64) -> Shape {
+/// A ball: an icosahedron whose faces are cut into four.
+pub(super) fn ball(center: DVec3, radius: f64, size: Size) -> Shape {
     let golden = f64::midpoint(1.0, 5.0_f64.sqrt());
     let corner = |k: usize| {
         let sign = |bit: usize| if k >> bit & 1 == 0 { 1.0 } else { -1.0 };
@@ -64,14 +73,16 @@ pub(super) fn ball(center: DVec3, radius: f64) -> Shape {
             a.dot(c.cross(b)) / 6.0
         })
         .sum();
-    let size = radius * (4.0 / 3.0 * PI / volume).cbrt();
+    let larger = if size == Size::Equal { (4.0 / 3.0 * PI / volume).cbrt() } else { 1.0 };
+    let size = radius * larger;
     Shape { points: points.into_iter().map(|p| (center + size * p, 0.0)).collect(), faces }
 }
 
-/// A tube from `a` to `b` with rounded ends; its cross-section has a circle's area.
-pub(super) fn tube(a: DVec3, b: DVec3, radius: f64) -> Shape {
+/// A tube from `a` to `b` with rounded ends.
+pub(super) fn tube(a: DVec3, b: DVec3, radius: f64, size: Size) -> Shape {
     let turn = DQuat::from_rotation_arc(DVec3::Z, (b - a).normalize());
-    let size = radius * (TAU / (SIDES as f64 * (TAU / SIDES as f64).sin())).sqrt();
+    let larger = (TAU / (SIDES as f64 * (TAU / SIDES as f64).sin())).sqrt();
+    let size = if size == Size::Equal { radius * larger } else { radius };
     // From the tip at a to the tip at b: height over the end, radius, end.
     let rings = (0..=RINGS).rev().map(|k| (k, a, -1.0, 0.0)).chain((0..=RINGS).map(|k| (k, b, 1.0, 1.0)));
     let mut points = vec![(a - turn * (size * DVec3::Z), 0.0)];
@@ -112,11 +123,11 @@ mod tests {
     /// A ball has 4/3 pi r^3; a tube of length l has l pi r^2 and, at its ends, a ball or a little less.
     #[test]
     fn balls_and_tubes_look_inwards_and_have_their_volumes() {
-        let ball = ball(DVec3::new(3.0, 2.0, 1.0), 0.5);
+        let ball = ball(DVec3::new(3.0, 2.0, 1.0), 0.5, Size::Equal);
         assert_eq!((ball.points.len(), ball.faces.len()), (42, BALL_FACES));
         assert!((volume(&ball) + 4.0 / 3.0 * PI * 0.125).abs() < 1e-9, "{}", volume(&ball));
         let (a, b) = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(2.0, 4.0, 5.0));
-        let tube = tube(a, b, 0.5);
+        let tube = tube(a, b, 0.5, Size::Equal);
         assert_eq!(tube.faces.len(), TUBE_FACES);
         let side = 3.0 * PI * 0.25;
         let excess = (-volume(&tube) - side) / (4.0 / 3.0 * PI * 0.125);

@@ -94,3 +94,24 @@ fn surface_follows_its_controls() {
     let radius = set.inner().radius_in(controls.surface().bounds().extent().max_element());
     assert!(posed[posed.len() - 42..].iter().all(|p| (p.distance(by) / radius - 1.0).abs() < 0.1));
 }
+
+/// Balls and tubes of radius 0.05 whose distance is 2.004 radii do not overlap, though meshes of their volume would; at
+/// 1.8 radii they do.
+#[test]
+fn elements_that_nearly_touch_are_taken() {
+    use InnerElement::{Line, Point};
+    let cage = Cage::new(&cube()).unwrap();
+    let set = |way: [f32; 3], radii: f32, line: bool| {
+        let way = Vec3::from(way).normalize();
+        let start = Vec3::splat(0.45);
+        let positions = vec![start, start + 0.05 * radii * way, start + 0.3 * way.any_orthonormal_vector()];
+        let elements = vec![if line { Line(vec![0, 2]) } else { Point(0) }, Point(1)];
+        ControlSet::new(&cage, 0, InnerControls { positions, elements, radius: Some(0.05) })
+    };
+    for way in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 2.0, 3.0], [-1.0, 0.6, 0.2], [0.5, -0.5, 0.7]] {
+        for line in [false, true] {
+            assert!(set(way, 2.004, line).is_ok(), "{way:?} {line}");
+            assert!(matches!(set(way, 1.8, line), Err(ControlError::Overlap { .. })), "{way:?} {line}");
+        }
+    }
+}
