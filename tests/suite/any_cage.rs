@@ -231,7 +231,10 @@ pub(crate) fn weights_are_continuous_in_a_cages_corners(back_end: &BackEnd) {
 pub(crate) fn what_the_grid_cannot_resolve_is_said(back_end: &BackEnd) {
     let fine = cage(&sphere(4));
     let fin = cage(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.6, 0.55 / 16.0)));
-    for (cage, grid) in [(fine, 16), (fin, 16)] {
+    // A turned bar: lines leave it through its other sides, too.
+    let turn = Random::new(79).rotation();
+    let bar = cage(&moved(&cuboid(Vec3::ZERO, Vec3::new(1.0, 0.035, 0.035)), |p| turn * p));
+    for (cage, grid) in [(fine, 16), (fin, 16), (bar, 16)] {
         let points = points::inside(&cage, 50, 78);
         let said = |grid: u32| {
             let report = back_end.bind_with(&points, &cage, |o| (o.grid, o.tau) = (grid, 1e-5)).report;

@@ -20,6 +20,9 @@ const ENOUGH_CELLS: f64 = 1.0;
 /// Lines that meet a face on average, for it to be sure that one does.
 const ENOUGH_LINES: f64 = 4.0;
 
+/// Lines that meet a face, for it to be judged by all of them.
+const SURE_LINES: u32 = 8;
+
 /// What lines say of a face.
 #[derive(Clone, Default)]
 struct Thin {
@@ -28,6 +31,9 @@ struct Thin {
     thin: u32,
     /// The sum of how thick the cage is there, in cells.
     thickness: f64,
+    /// How deep below the face the cage reaches along any of the lines, in cells: of a bar, whose lines may leave through any of its
+    /// sides, at most its thickness.
+    depth: f64,
 }
 
 /// What a user should know about it, if anything. `cells`: along the cage's longest side. A face of a smooth cage is met where
@@ -72,11 +78,12 @@ pub fn notice(controls: Controls<'_>, grid: &Grid, lines: &[Lines; 3], cells: u3
             let [enters, leaves] = [pair[0], pair[1]].map(|hit| normals[hit.triangle as usize]);
             let thickness = (pair[1].t - pair[0].t) * enters[axis].abs().min(leaves[axis].abs());
             let is_thin = thickness < ENOUGH_CELLS && enters.dot(leaves) < OPPOSITE;
-            for hit in pair {
+            for (hit, normal) in pair.iter().zip([enters, leaves]) {
                 let part = surface.face_of_facet()[hit.triangle as usize];
                 let Some(face) = controls.cage_face(part) else { continue };
                 let face = &mut faces[face as usize];
                 face.lines += 1;
+                face.depth = face.depth.max((pair[1].t - pair[0].t) * normal[axis].abs());
                 if is_thin {
                     face.thin += 1;
                     face.thickness += thickness;
@@ -89,6 +96,9 @@ pub fn notice(controls: Controls<'_>, grid: &Grid, lines: &[Lines; 3], cells: u3
         if 2 * face.thin > face.lines {
             *unresolved = true;
             finer = finer.max(ENOUGH_CELLS * f64::from(face.thin) / face.thickness);
+        } else if face.lines >= SURE_LINES && face.depth < ENOUGH_CELLS {
+            *unresolved = true;
+            finer = finer.max(ENOUGH_CELLS / face.depth);
         }
     }
     let first = unresolved.iter().position(|&is| is)?;
