@@ -1,6 +1,6 @@
 //! A frame of a drag: rotations of the groups, then the cage that fits them.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DQuat, DVec3, Vec3};
 use nalgebra::{DMatrix, DVector};
 
 use super::drag::{Drag, smooth};
@@ -15,6 +15,11 @@ const STEPS: usize = 4;
 const SAME: f64 = 1e-9;
 /// Length of a drag, over the model's size, at which parts within reach are as relaxed as asked for.
 const RELAXED: f64 = 0.1;
+
+/// Grabs that turn by more in a frame, radians, go in steps along arcs: straight ways of half a turn meet in one place.
+const TURN: f64 = 0.5;
+/// How firmly a turn of grabs that do not tell it, as of two about the line between them, is taken for none.
+const NO_ROLL: f64 = 1e-3;
 
 impl Drag {
     /// One frame: the grabs go towards `to` (`[n_grabs]`, object units). Targets that are not finite are ignored, and the pose
@@ -33,6 +38,16 @@ impl Drag {
             self.targets.set_row(0, &nalgebra::RowVector3::from(to[0].to_array()));
             return;
         }
+        let from: Vec<DVec3> = (0..to.len()).map(|h| self.target(h)).collect();
+        let way = Way::new(&from, to);
+        let n = (way.angle() / TURN).ceil().max(1.0);
+        for k in 1..n as u32 {
+            self.frame_straight(&way.at(f64::from(k) / n));
+        }
+        self.frame_straight(to);
+    }
+
+    fn frame_straight(&mut self, to: &[DVec3]) {
         self.set_targets(to);
         for _ in 0..STEPS {
             let image = self.step();
@@ -49,12 +64,16 @@ impl Drag {
         }
     }
 
-    /// The grabs go straight from where they were taken to `to` (`[n_grabs]`, object units), in so many frames.
+    /// The grabs go from where they were taken to `to` (`[n_grabs]`, object units) in so many frames: straight, or along arcs if
+    /// together they turn far.
     pub fn go(&mut self, to: &[DVec3], frames: u32) {
-        let from = self.start.clone();
+        if to.len() != self.start.len() || !to.iter().all(|t| t.is_finite()) {
+            return;
+        }
+        let start = self.start.clone();
+        let way = Way::new(&start, to);
         for k in 1..=frames {
-            let share = f64::from(k) / f64::from(frames);
-            self.frame(&from.iter().zip(to).map(|(a, b)| a.lerp(*b, share)).collect::<Vec<_>>());
+            self.frame(&way.at(f64::from(k) / f64::from(frames)));
         }
     }
 
@@ -80,6 +99,10 @@ impl Drag {
         to.iter().zip(beside).map(|(to, beside)| to.as_dvec3() - beside).collect()
     }
 
+    fn target(&self, h: usize) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|x| self.targets[(h, x)]))
+    }
+
     fn set_targets(&mut self, to: &[DVec3]) {
         let is_same = |h: usize| (0..3).all(|x| (self.targets[(h, x)] - to[h][x]).abs() <= SAME * self.size);
         if (0..to.len()).all(is_same) {
@@ -103,6 +126,45 @@ impl Drag {
         let pulled = &self.targets - &self.handles * &free;
         let fitted = free + &self.spread * (&self.hold * pulled);
         DVector::from_column_slice(fitted.as_slice())
+    }
+}
+
+/// The ways of some grabs from one place to another.
+struct Way<'a> {
+    from: &'a [DVec3],
+    to: &'a [DVec3],
+    /// Means of both, and the rotation about them that is nearest to the grabs' own.
+    middles: [DVec3; 2],
+    turn: DQuat,
+}
+
+impl<'a> Way<'a> {
+    fn new(from: &'a [DVec3], to: &'a [DVec3]) -> Self {
+        let middles = [from, to].map(|places| places.iter().sum::<DVec3>() / places.len() as f64);
+        let pairs = || from.iter().zip(to).map(|(a, b)| (*a - middles[0], *b - middles[1]));
+        let size: f64 = pairs().map(|(a, b)| a.length() * b.length()).sum();
+        let of_pair = |(a, b): (DVec3, DVec3)| DMat3::from_cols(b * a.x, b * a.y, b * a.z);
+        let covariance =
+            pairs().map(of_pair).fold(DMat3::from_diagonal(DVec3::splat(NO_ROLL * size)), |m, p| m + p);
+        Self { from, to, middles, turn: DQuat::from_mat3(&nearest_rotation(covariance)) }
+    }
+
+    fn angle(&self) -> f64 {
+        self.turn.angle_between(DQuat::IDENTITY)
+    }
+
+    /// Where the grabs are after a share of the way.
+    fn at(&self, share: f64) -> Vec<DVec3> {
+        let straight = |(a, b): (&DVec3, &DVec3)| a.lerp(*b, share);
+        if self.angle() <= TURN {
+            return self.from.iter().zip(self.to).map(straight).collect();
+        }
+        let (part, [first, last]) = (DQuat::IDENTITY.slerp(self.turn, share), self.middles);
+        let arc = |(a, b): (&DVec3, &DVec3)| {
+            let (arm, off) = (*a - first, *b - last - self.turn * (*a - first));
+            first.lerp(last, share) + part * arm + share * off
+        };
+        self.from.iter().zip(self.to).map(arc).collect()
     }
 }
 
