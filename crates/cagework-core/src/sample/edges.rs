@@ -43,9 +43,9 @@ struct Edge {
 pub(super) struct Passage {
     /// Distance along the ray, in cells.
     pub(super) distance: f64,
-    /// The axis along which the edge is beside the ray there, and how far: positive above.
-    pub(super) across: usize,
-    pub(super) offset: f64,
+    /// The way from the ray to the edge: an axis and how far along it, positive upwards; then the other axis, which is 0 but
+    /// for rays that pass beyond the edge's end.
+    pub(super) steps: [(usize, f64); 2],
     /// Share of the ray that ends here.
     pub(super) share: f64,
     /// The place on the edge.
@@ -126,27 +126,25 @@ impl EdgeLists {
             let Some(across) = edge.across[axis] else { continue };
             let [a, b] = edge.ends;
             let along = 3 - axis - across;
-            let s = (p[along] - a[along]) / (b[along] - a[along]);
-            if !(0.0..=1.0).contains(&s) {
-                continue;
-            }
+            // Beyond its end, an edge stops less and less of the ray: a spike's edges end in its tip, a sheet's in a corner.
+            let s = ((p[along] - a[along]) / (b[along] - a[along])).clamp(0.0, 1.0);
             let beside = a + s * (b - a) - p;
             let distance = if up { beside[axis] } else { -beside[axis] };
             // Right beside an edge, only one of the two rays passes it; on a wall that ends at the edge, none.
             let ahead = distance > 0.0 || up && distance == 0.0;
-            let offset = beside[across];
+            let steps = [across, along].map(|axis| (axis, beside[axis]));
+            let apart = beside[across].hypot(beside[along]);
             let fading = match (distance < end - ON_EDGE, is_wall) {
                 (true, _) => 1.0,
                 (false, true) => 0.0,
                 (false, false) => fade((distance - end).max(0.0) / beyond),
             };
-            let share = fading * fade(offset.abs() / REACH);
+            let share = fading * fade(apart / REACH);
             if ahead && share > 0.0 {
                 let mut barycentric = [0.0; 3];
                 (barycentric[edge.corners[0]], barycentric[edge.corners[1]]) = (1.0 - s, s);
                 let at = passages.partition_point(|p: &Passage| p.distance <= distance);
-                passages
-                    .insert(at, Passage { distance, across, offset, share, facet: edge.facet, barycentric });
+                passages.insert(at, Passage { distance, steps, share, facet: edge.facet, barycentric });
             }
         }
         passages

@@ -254,23 +254,34 @@ impl<'a> Sampler<'a> {
                     Stop::End => self.follow(At { weight, ..at }, side, ends[side], scratch),
                     Stop::Wall(wall) => self.meet(wall, side, weight, scratch),
                     Stop::Beside(passage) => {
-                        self.descend_beside(along(p, axis, side, length), passage, weight, scratch);
+                        let place = along(p, axis, side, length);
+                        self.descend_beside(place, passage, &passage.steps, weight, scratch);
                     }
                 }
             }
         }
     }
 
-    /// The value at `p`, beside an edge: interpolated between the edge and the place one cell away from it, on the other
-    /// side of `p`. That place depends on nothing but `p`, be it in another cube or not.
-    fn descend_beside(&self, p: DVec3, passage: &Passage, weight: f64, scratch: &mut Scratch) {
-        let Passage { across: axis, offset, .. } = *passage;
-        if offset.abs() <= ON_EDGE {
+    /// The value at `p`, beside an edge that `steps` lead to: interpolated along the first step's axis between the edge and the
+    /// place one cell away from it, on the other side of `p`. That place depends on nothing but `p`, be it in another cube or not.
+    fn descend_beside(
+        &self,
+        p: DVec3,
+        passage: &Passage,
+        steps: &[(usize, f64)],
+        weight: f64,
+        scratch: &mut Scratch,
+    ) {
+        let Some((&(axis, offset), steps)) = steps.split_first() else {
             return self.add_wall(passage.facet, passage.barycentric, weight, scratch);
+        };
+        if offset.abs() <= ON_EDGE {
+            return self.descend_beside(p, passage, steps, weight, scratch);
         }
         let side = usize::from(offset > 0.0);
-        let mut away = p;
+        let (mut away, mut beside) = (p, p);
         away[axis] += offset - 1f64.copysign(offset);
+        beside[axis] += offset;
         let low = self.cube_of(away);
         self.lists.in_cube(low, &mut scratch.other);
         self.lists.in_cube(self.cube_of(p), &mut scratch.here);
@@ -279,10 +290,6 @@ impl<'a> Sampler<'a> {
         reach[side] = offset.abs() - ON_EDGE;
         let ends = self.ends(p, axis, reach, [&scratch.here, &scratch.other]);
         let t = share(ends[side].0, ends[1 - side].0);
-        match ends[side].1 {
-            None => self.add_wall(passage.facet, passage.barycentric, weight * (1.0 - t), scratch),
-            Some(wall) => self.meet(wall, side, weight * (1.0 - t), scratch),
-        }
         match ends[1 - side].1 {
             None => {
                 std::mem::swap(&mut scratch.near, &mut scratch.other);
@@ -292,6 +299,10 @@ impl<'a> Sampler<'a> {
                 std::mem::swap(&mut scratch.near, &mut scratch.other);
             }
             Some(wall) => self.meet(wall, 1 - side, weight * t, scratch),
+        }
+        match ends[side].1 {
+            None => self.descend_beside(beside, passage, steps, weight * (1.0 - t), scratch),
+            Some(wall) => self.meet(wall, side, weight * (1.0 - t), scratch),
         }
     }
 
