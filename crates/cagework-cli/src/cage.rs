@@ -115,6 +115,9 @@ fn text(made: &Made) -> String {
             report.vertices, report.target, report.voxels
         ));
     }
+    for notice in &report.notices {
+        text.push_str(&format!("\nnote: {notice}"));
+    }
     text
 }
 

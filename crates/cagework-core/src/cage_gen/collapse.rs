@@ -12,6 +12,7 @@ use glam::DVec3;
 
 use super::guarded::Guarded;
 use super::quadric::Quadric;
+use super::shell::Limb;
 use crate::contact::Corners;
 use crate::progress::Cancelled;
 
@@ -29,6 +30,9 @@ const MAX_VALENCE: usize = 11;
 
 /// An edge waits again if it costs more than this times what was expected.
 const MAX_COST_RATIO: f64 = 1.2;
+
+/// Largest distance from ring to ring along a limb over its thickness, within the budget.
+const MAX_RING_DISTANCE: f64 = 1.3;
 
 /// Collapses from one check whether the work was cancelled to the next.
 const COLLAPSES_PER_CHECK: usize = 64;
@@ -66,6 +70,8 @@ pub(super) struct Collapser<'g, 'a> {
     planes: Vec<Quadric>,
     /// Most of that, voxels; none for as far as need be.
     pub(super) budget: Option<f64>,
+    /// The limb that each vertex is on.
+    limbs: Vec<Option<Limb>>,
     version: Vec<u32>,
     heap: BinaryHeap<Waiting>,
     /// Vertices of the whole surface, both halves.
@@ -92,7 +98,7 @@ pub(super) fn quality(t: &[DVec3; 3]) -> f64 {
 
 impl<'g, 'a> Collapser<'g, 'a> {
     /// Prepares a surface.
-    pub(super) fn new(surface: &'g mut Guarded<'a>) -> Self {
+    pub(super) fn new(surface: &'g mut Guarded<'a>, limbs: Vec<Option<Limb>>) -> Self {
         let n = surface.positions.len();
         let mut quadrics = vec![Quadric::default(); n];
         let mut planes = quadrics.clone();
@@ -113,6 +119,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
             quadrics,
             planes,
             budget: None,
+            limbs,
             version: vec![0; n],
             heap: BinaryHeap::new(),
             count,
@@ -332,15 +339,31 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.surface.may_stand(new, gone)
     }
 
-    /// Whether a vertex there would be farther from the hull than may be: root mean square to the planes, by area.
+    /// Whether a vertex there would be farther from the hull than may be (root mean square to the planes, by area), or from
+    /// its neighbours along a limb.
     fn is_over_budget(&self, a: u32, b: u32, at: DVec3) -> bool {
+        let Some(budget) = self.budget else { return false };
         let planes = self.planes[a as usize].plus(&self.planes[b as usize]);
-        self.budget.is_some_and(|budget| (planes.at(at) / planes.area.max(1e-12)).sqrt() > budget)
+        let is_off = (planes.at(at) / planes.area.max(1e-12)).sqrt() > budget;
+        is_off
+            || self.limb_of(a, b).is_some_and(|limb| {
+                let reach = MAX_RING_DISTANCE * limb.thickness;
+                let star =
+                    self.scratch.star.iter().flat_map(|(corners, _)| corners.index.iter().zip(corners.at));
+                star.filter(|&(&i, _)| i != a && i != b).any(|(_, p)| limb.along.dot(p - at).abs() > reach)
+            })
+    }
+
+    /// The thinner of the limbs of two vertices.
+    fn limb_of(&self, a: u32, b: u32) -> Option<Limb> {
+        let limbs = [a, b].into_iter().filter_map(|v| self.limbs[v as usize]);
+        limbs.min_by(|a, b| a.thickness.total_cmp(&b.thickness))
     }
 
     fn collapse(&mut self, a: u32, b: u32, at: DVec3) {
         let (kept, gone) = self.ordered(a, b);
         self.planes[kept as usize] = self.planes[a as usize].plus(&self.planes[b as usize]);
+        self.limbs[kept as usize] = self.limb_of(a, b);
         let (axis, both) = (self.surface.mirror, self.surface.on_mirror[gone as usize]);
         self.count -= if axis.is_some() && !both { 2 } else { 1 };
         self.surface.merge(kept, gone, at);

@@ -11,6 +11,9 @@ use crate::contact::{Corners, meet};
 /// Parts of the cage that are not neighbours stay this far apart, in voxels.
 const MIN_GAP: f64 = 0.05;
 
+/// How much smaller than a voxel those of a gap's sheet are: walls beside it may graze it.
+const SHEET_SHRINKAGE: f64 = 0.4;
+
 /// Vertices beside the mirror plane stay this far from it, in voxels.
 const MIN_MIRROR_DISTANCE: f64 = 0.1;
 
@@ -24,18 +27,18 @@ pub(super) struct Obstacle {
 }
 
 impl Obstacle {
-    /// Whether a triangle (centred coordinates) keeps its distance and, if there is a band, stays in it.
-    pub(super) fn is_clear(&self, triangle: [DVec3; 3], band: Option<&Voxels>) -> bool {
-        let dims = self.voxels.dims;
-        let half = DVec3::from_array(dims.map(|n| 0.5 * n as f64));
-        if band.is_some() && triangle.iter().any(|p| p.abs().cmpge(half).any()) {
-            return false;
-        }
-        !any_run(triangle.map(|p| p + half), self.clearance, dims, |y, z, first, last| {
-            self.voxels.has_run(y, z, first, last)
-                || band.is_some_and(|band| !band.covers_run(y, z, first, last))
-        })
+    /// Whether a triangle (centred coordinates) keeps its distance.
+    pub(super) fn is_clear(&self, triangle: [DVec3; 3]) -> bool {
+        !overlaps(&self.voxels, triangle, self.clearance)
     }
+}
+
+/// Whether a triangle (centred coordinates) overlaps a voxel of a set, each grown by `grow` on all sides.
+fn overlaps(voxels: &Voxels, triangle: [DVec3; 3], grow: f64) -> bool {
+    let half = DVec3::from_array(voxels.dims.map(|n| 0.5 * n as f64));
+    any_run(triangle.map(|p| p + half), grow, voxels.dims, |y, z, first, last| {
+        voxels.has_run(y, z, first, last)
+    })
 }
 
 /// A surface under change. Triangles and vertices that go away leave gaps in the numbering.
@@ -48,8 +51,11 @@ pub(super) struct Guarded<'a> {
     pub(super) on_mirror: Vec<bool>,
     pub(super) mirror: Option<usize>,
     obstacle: &'a Obstacle,
-    /// Where triangles may be at all: keeps them from spanning gaps that the model leaves open.
-    band: Option<Voxels>,
+    /// What no triangle may come near: the solid and, if there is a band, everything outside the band.
+    keep_out: Voxels,
+    has_band: bool,
+    /// Sheets of gaps, which no triangle may cross.
+    sheets: Option<Voxels>,
     buckets: Buckets,
     bounds: Vec<Option<(DVec3, DVec3)>>,
     near: Vec<u32>,
@@ -67,7 +73,9 @@ impl<'a> Guarded<'a> {
             on_mirror: surface.on_mirror,
             mirror: surface.mirror,
             obstacle,
-            band: None,
+            keep_out: obstacle.voxels.clone(),
+            has_band: false,
+            sheets: None,
             buckets: Buckets::new(half, n),
             bounds: vec![None; n],
             near: Vec::new(),
@@ -82,13 +90,32 @@ impl<'a> Guarded<'a> {
     }
 
     /// Sets the band within which triangles may change from now on; none: anywhere.
-    pub(super) fn set_band(&mut self, band: Option<Voxels>) {
-        self.band = band;
+    pub(super) fn set_band(&mut self, band: Option<&Voxels>) {
+        self.has_band = band.is_some();
+        self.keep_out = self.obstacle.voxels.clone();
+        if let Some(band) = band {
+            self.keep_out.unite(&band.complement());
+        }
+    }
+
+    /// Sets the sheets that no triangle may cross from now on.
+    pub(super) fn set_sheets(&mut self, sheets: Option<Voxels>) {
+        self.sheets = sheets;
+    }
+
+    /// Whether a triangle is clear of the solid, stays in the band and crosses no sheet.
+    fn is_clear(&self, triangle: [DVec3; 3]) -> bool {
+        let half = DVec3::from_array(self.keep_out.dims.map(|n| 0.5 * n as f64));
+        let leaves = self.has_band && triangle.iter().any(|p| p.abs().cmpge(half).any());
+        let crosses = |sheets| overlaps(sheets, triangle, -SHEET_SHRINKAGE);
+        !leaves
+            && !overlaps(&self.keep_out, triangle, self.obstacle.clearance)
+            && !self.sheets.as_ref().is_some_and(crosses)
     }
 
     /// Whether there is a band.
     pub(super) fn has_band(&self) -> bool {
-        self.band.is_some()
+        self.has_band
     }
 
     /// The surface as it is now, without gaps.
@@ -133,7 +160,7 @@ impl<'a> Guarded<'a> {
                 return false;
             }
         }
-        if new.iter().any(|t| !self.obstacle.is_clear(t.at, self.band.as_ref())) {
+        if new.iter().any(|t| !self.is_clear(t.at)) {
             return false;
         }
         if new.iter().enumerate().any(|(k, a)| new[..k].iter().any(|b| meet(a, b, MIN_GAP))) {

@@ -13,6 +13,7 @@
 mod buckets;
 mod collapse;
 pub(crate) mod footprint;
+mod gaps;
 mod guarded;
 mod lattice;
 mod options;
@@ -54,8 +55,20 @@ const MAX_TARGET_RATIO: f64 = 1.1;
 /// as far as possible it spans no gap. At last anywhere.
 const BAND_LAYERS: [Option<usize>; 5] = [Some(1), Some(2), Some(3), Some(5), None];
 
+/// Gaps that stay open, one share after the other until the target is met: of the largest one's volume.
+const KEPT_GAPS: [f64; 3] = [0.0, 0.3, f64::INFINITY];
+
 /// Of these, those in which a cage takes the shape that the budget allows.
 const NARROW_BANDS: usize = 3;
+
+/// Vertices that a gap costs, nearly: a ring on each side.
+const VERTICES_PER_GAP: usize = 10;
+
+/// Most vertices of a hull, or of its half in a mirror, on a lattice that is refined for gaps: two seconds of collapses.
+const MAX_HULL: usize = 20_000;
+
+/// Gaps that a report names.
+const MAX_NOTICES: usize = 3;
 
 /// Rounds in which quads that break the promise become triangles again.
 const MAX_SPLITS: usize = 4;
@@ -89,21 +102,46 @@ fn generate_plain(
     let bounds = options::check(positions, triangles, options)?;
     let began = progress.now_ms();
     let target = options.target as usize;
-    let mut voxels = if options.voxels > 0 { options.voxels as usize } else { first_voxels(target) };
-    let mut best: Option<GeneratedCage> = None;
-    let mut tried = Vec::new();
-    for attempt in 0..MAX_LATTICES {
-        tried.push(voxels);
+    let base = first_voxels(target);
+    let gaps = match (options.shape, options.smooth) {
+        // A smooth surface is kept clear of the model by its distance, which a finer lattice would halve.
+        (Shape::Follow, 0) => gaps::narrow_gaps(positions, triangles, bounds, base, &|_| {
+            let event = ProgressEvent { stage: Stage::Voxelize, fraction: 0.0, iteration: 0, delta: None };
+            if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
+        })?,
+        _ => Vec::new(),
+    };
+    // As fine as the gaps need, if there are vertices for them.
+    let for_gaps = if gaps.len() * VERTICES_PER_GAP <= target { gaps.as_slice() } else { &[] };
+    let finest = for_gaps.iter().map(|gap| gap.voxels).fold(base, usize::max).min(MAX_VOXELS);
+    let mut voxels = if options.voxels > 0 { options.voxels as usize } else { finest };
+    for attempt in 1..=MAX_LATTICES {
         let go_on = |stage: Stage, share: f32| {
-            let fraction = (attempt as f32 + share) / (attempt + 1) as f32;
-            let event = ProgressEvent { stage, fraction, iteration: attempt as u32, delta: None };
+            let fraction = (attempt as f32 - 1.0 + share) / attempt as f32;
+            let event = ProgressEvent { stage, fraction, iteration: attempt as u32 - 1, delta: None };
             if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
         };
         let shell = Shell::new(positions, triangles, bounds, voxels, options, &|share| {
             go_on(Stage::Voxelize, 0.4 * share)
         })?;
-        let n_hull = shell.hull.n_whole();
-        let (cage, hull) = simplified(&shell, options, &|share| go_on(Stage::Simplify, 0.4 + 0.6 * share))?;
+        // The solid's handles and gaps may need more vertices than asked for: a coarser lattice closes them.
+        let may_coarsen = attempt < MAX_LATTICES && voxels > MIN_VOXELS;
+        let n_half = shell.hull.positions.len();
+        if options.voxels == 0 && voxels > base && may_coarsen && n_half > MAX_HULL {
+            let shrunk = voxels as f64 * (0.9 * MAX_HULL as f64 / n_half as f64).sqrt();
+            voxels = (shrunk as usize).max(base);
+            continue;
+        }
+        let simplify = |share| go_on(Stage::Simplify, 0.4 + 0.6 * share);
+        let (cage, hull) = match simplified(&shell, options, may_coarsen, &simplify)? {
+            Simplified::Cage(cage, hull) => (*cage, hull),
+            Simplified::TooMany(left) => {
+                let ratio = (target as f64 / left as f64).sqrt().clamp(0.4, 0.7);
+                let least = if voxels > base { base } else { MIN_VOXELS };
+                voxels = ((ratio * voxels as f64) as usize).max(least);
+                continue;
+            }
+        };
         let report = CageReport {
             target: options.target,
             vertices: cage.n_vertices() as u32,
@@ -114,31 +152,21 @@ fn generate_plain(
             voxel_size: shell.lattice.cell as f32,
             clearance: shell.clearance as f32,
             mirror: shell.hull.mirror.map(Mirror::of_axis),
+            notices: gaps
+                .iter()
+                .filter_map(|gap| gap.notice(&cage, voxels, options))
+                .take(MAX_NOTICES)
+                .collect(),
             parts: n_parts(&cage),
             separate: shell.separate as u32,
-            hull_vertices: n_hull as u32,
+            hull_vertices: shell.hull.n_whole() as u32,
             hull,
-            attempts: attempt as u32 + 1,
+            attempts: attempt as u32,
             elapsed_ms: progress.now_ms() - began,
         };
-        let made = GeneratedCage { cage, report };
-        let met = made.report.target_met;
-        if best.as_ref().is_none_or(|b| made.cage.n_vertices() < b.cage.n_vertices()) {
-            best = Some(made);
-        }
-        if met {
-            break;
-        }
-        // The solid's handles and gaps need more vertices than asked for: a coarser lattice closes them.
-        voxels = (voxels * 3 / 4).max(MIN_VOXELS);
-        if tried.contains(&voxels) {
-            break;
-        }
+        return Ok(GeneratedCage { cage, report });
     }
-    let mut made = best.ok_or(CageGenError::Empty)?;
-    made.report.attempts = tried.len() as u32;
-    made.report.elapsed_ms = progress.now_ms() - began;
-    Ok(made)
+    Err(CageGenError::Unresolved)
 }
 
 /// Voxels along the longest side for a target: a cage of few vertices cannot follow small gaps anyway.
@@ -146,44 +174,60 @@ fn first_voxels(target: usize) -> usize {
     ((4.0 * (target as f64).sqrt()).round() as usize).clamp(MIN_VOXELS, MAX_VOXELS)
 }
 
-/// The verified cage: as few vertices as its shape needs and at most as many as asked for, if that can be; and whether it is
-/// the hull itself.
+/// What became of a hull.
+enum Simplified {
+    /// The verified cage, and whether it is the hull itself.
+    Cage(Box<Cage>, bool),
+    /// So many vertices are left that a coarser lattice should be tried.
+    TooMany(usize),
+}
+
+/// The verified cage: as few vertices as its shape needs and at most as many as asked for, if that can be.
 fn simplified(
     shell: &Shell,
     options: &CageOptions,
+    may_coarsen: bool,
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-) -> Result<(Cage, bool), CageGenError> {
+) -> Result<Simplified, CageGenError> {
     let n_hull = shell.hull.n_whole();
     let mut target = options.target as usize;
     // The lattice may be coarser than the first one: the budget is the model's, not the lattice's.
     let mut budget = Some(f64::from(options.detail) * shell.longest / shell.lattice.cell);
     while target < n_hull {
         let mut guarded = Guarded::new(shell.hull.clone(), &shell.obstacle);
-        let mut collapser = Collapser::new(&mut guarded);
+        let mut collapser = Collapser::new(&mut guarded, shell.limbs());
         let mut left = n_hull;
         // First as far as the budget goes, in narrow bands; then on to the count, in any.
-        let narrow = BAND_LAYERS[..NARROW_BANDS].iter().map(|&layers| (layers, budget, MIN_TARGET as usize));
-        let wide = BAND_LAYERS.iter().map(|&layers| (layers, None, target));
-        let n_passes = (NARROW_BANDS + BAND_LAYERS.len()) as f32;
-        for (k, (layers, budget, aim)) in narrow.chain(wide).enumerate() {
-            if left <= aim || (budget.is_none() && left <= target) {
+        let narrow =
+            BAND_LAYERS[..NARROW_BANDS].iter().map(|&layers| (layers, budget, MIN_TARGET as usize, 0.0));
+        let wide = KEPT_GAPS
+            .iter()
+            .flat_map(|&least| BAND_LAYERS.iter().map(move |&layers| (layers, None, target, least)));
+        let n_passes = (NARROW_BANDS + KEPT_GAPS.len() * BAND_LAYERS.len()) as f32;
+        for (k, (layers, budget, aim, least)) in narrow.chain(wide).enumerate() {
+            let is_repeated = least > 0.0 && shell.gaps.is_empty();
+            if left <= aim || is_repeated || (budget.is_none() && left <= target) {
                 continue;
             }
-            collapser.surface.set_band(layers.map(|layers| shell.band(layers)));
+            collapser.surface.set_band(layers.map(|layers| shell.band(layers)).as_ref());
+            collapser.surface.set_sheets(shell.sheets(least));
             collapser.budget = budget;
             let from = 0.6 * k as f32 / n_passes;
             left = collapser.run(aim, &|share| go_on(from + 0.6 * share / n_passes))?;
         }
+        if may_coarsen && left as f64 > MAX_TARGET_RATIO * f64::from(options.target) {
+            return Ok(Simplified::TooMany(left));
+        }
         let quadrics = collapser.quadrics;
         if let Some(cage) = relaxed(shell, guarded, &quadrics, options.quads, go_on)? {
-            return Ok((cage, false));
+            return Ok(Simplified::Cage(Box::new(cage), false));
         }
         target = left.max(target) * 2;
         budget = budget.map(|budget| 0.5 * budget);
     }
     for surface in [&shell.hull, &shell.stairs] {
         if let Some(cage) = verified(shell, surface) {
-            return Ok((cage, true));
+            return Ok(Simplified::Cage(Box::new(cage), true));
         }
     }
     Err(CageGenError::Unresolved)

@@ -178,6 +178,8 @@ pub struct CageReport {
     pub clearance: f32,
     /// The mirror that maps the cage onto itself.
     pub mirror: Option<Mirror>,
+    /// Gaps of the model that the cage closes, and what would keep each open: a sentence each.
+    pub notices: Vec<String>,
     /// Closed parts.
     pub parts: u32,
     /// Parts that the model's own gaps leave apart: more than `parts` if they were bridged.

@@ -8,24 +8,67 @@ use std::collections::VecDeque;
 
 use glam::{DVec3, Vec3};
 
+use super::gaps::{Gap, gaps};
 use super::guarded::{Guarded, Obstacle};
 use super::lattice::Lattice;
 use super::surface::{SMOOTHING_REACH, Surface};
 use super::voxels::Voxels;
-use super::{CageOptions, Shape, Symmetry};
+use super::{CageOptions, Shape, Symmetry, VERTICES_PER_GAP};
 use crate::progress::Cancelled;
 
-/// Smallest share of the solid's voxels with an image within one voxel for which a mirror is taken.
+/// Smallest share of the solid's voxels with an image for which a mirror is taken.
 const MIN_MIRROR_SHARE: f64 = 0.985;
 
+/// Distance of an image from its voxel, over the model's longest side; at least a voxel.
+const MIRROR_TOLERANCE: f64 = 1.0 / 36.0;
+
+/// Largest extent of a cluster of voxels without an image, over the model's longest side: a larger one is a part that only
+/// one side has.
+const MAX_UNMATCHED: f64 = 0.08;
+
 /// Voxels between the solid's box and the lattice's, apart from dilation: the outermost layer stays empty.
-const MARGIN_VOXELS: usize = 6;
+pub(super) const MARGIN_VOXELS: usize = 6;
+
+/// Half the width of the widest gaps that are looked for, over the model's longest side.
+const MAX_GAP_HALF: f64 = 0.12;
 
 /// Clearance in voxels unless the caller asks for more.
 const DEFAULT_CLEARANCE: f64 = 0.5;
 
 /// Clearance in voxels of a hull one voxel off: what smoothing leaves, less rounding.
 const HULL_CLEARANCE: f64 = 1.0 - SMOOTHING_REACH - 1e-3;
+
+/// Least length of a limb over its thickness.
+const MIN_LIMB_RATIO: f64 = 2.2;
+
+/// Largest cosine between a limb's direction and those across it.
+const MAX_ACROSS_COSINE: f64 = 0.3;
+
+/// Directions in which the length and thickness of limbs are measured: to neighbours on the lattice, one of each pair.
+const DIRECTIONS: [DVec3; 13] = [
+    DVec3::new(1.0, 0.0, 0.0),
+    DVec3::new(0.0, 1.0, 0.0),
+    DVec3::new(0.0, 0.0, 1.0),
+    DVec3::new(1.0, 1.0, 0.0),
+    DVec3::new(1.0, -1.0, 0.0),
+    DVec3::new(1.0, 0.0, 1.0),
+    DVec3::new(1.0, 0.0, -1.0),
+    DVec3::new(0.0, 1.0, 1.0),
+    DVec3::new(0.0, 1.0, -1.0),
+    DVec3::new(1.0, 1.0, 1.0),
+    DVec3::new(1.0, 1.0, -1.0),
+    DVec3::new(1.0, -1.0, 1.0),
+    DVec3::new(-1.0, 1.0, 1.0),
+];
+
+/// How the hull runs at a place that is longer than thick.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limb {
+    /// The direction in which it is longest, of unit length.
+    pub(super) along: DVec3,
+    /// Its mean extent across, voxels.
+    pub(super) thickness: f64,
+}
 
 /// A solid in a lattice and the hull around it.
 #[derive(Debug)]
@@ -47,6 +90,8 @@ pub(super) struct Shell {
     pub(super) parts: Vec<[usize; 3]>,
     /// Distance that the hull keeps from the model along each axis, object units.
     pub(super) clearance: f64,
+    /// Gaps that the hull leaves open, the largest first: as many as there are vertices for.
+    pub(super) gaps: Vec<Gap>,
 }
 
 impl Shell {
@@ -71,7 +116,7 @@ impl Shell {
             Shape::Hull => slab_hull(&lattice, positions),
         };
         let mut solid = touched.filled();
-        let mirror = find_mirror(&solid, options.symmetry);
+        let mirror = find_mirror(&solid, n, options.symmetry);
         if let Some(axis) = mirror {
             let image = solid.mirrored(axis);
             solid.unite(&image);
@@ -99,7 +144,11 @@ impl Shell {
         let obstacle = Obstacle { voxels: keep_out, clearance: clearance - whole };
         let hull = smoothed(&stairs, &obstacle);
         let parts = solid.parts();
+        let reach = (MAX_GAP_HALF * n as f64).ceil() as usize;
+        let mut gaps = gaps(&solid, &filled, reach);
+        gaps.truncate(options.target as usize / VERTICES_PER_GAP);
         Ok(Self {
+            gaps,
             clearance: clearance * lattice.cell,
             longest: (max - min).max_element(),
             lattice,
@@ -117,6 +166,46 @@ impl Shell {
     /// The hull and layers of voxels around it.
     pub(super) fn band(&self, layers: usize) -> Voxels {
         (0..layers).fold(self.filled.clone(), |band, _| band.dilated())
+    }
+
+    /// How the hull runs at each of its vertices, where it is a limb: longer than it is thick.
+    pub(super) fn limbs(&self) -> Vec<Option<Limb>> {
+        let mut normals = vec![DVec3::ZERO; self.hull.positions.len()];
+        for t in &self.hull.triangles {
+            let [a, b, c] = t.map(|i| self.hull.positions[i as usize]);
+            t.iter().for_each(|&i| normals[i as usize] += (b - a).cross(c - a));
+        }
+        // Length of the run of hull voxels from a point (lattice coordinates) on.
+        let run = |from: DVec3, along: DVec3| {
+            let is_inside = |k: usize| {
+                let p = from + k as f64 * along;
+                let v = p.to_array().map(|x| x as usize);
+                p.min_element() >= 0.0 && (0..3).all(|k| v[k] < self.filled.dims[k]) && self.filled.has(v)
+            };
+            (0..).take_while(|&k| is_inside(k)).count() as f64
+        };
+        let half = self.lattice.half();
+        let limb = |(&p, normal): (&DVec3, &DVec3)| {
+            let inward = -normal.normalize_or_zero();
+            let below = p + half + 0.7 * inward;
+            let center = below + 0.5 * run(below, inward) * inward;
+            let chord = |along: DVec3| run(center, along) + run(center, -along);
+            let chords = DIRECTIONS.map(|along| (along.normalize(), chord(along.normalize())));
+            let (along, length) = chords.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let across = chords.iter().filter(|(other, _)| other.dot(along).abs() < MAX_ACROSS_COSINE);
+            let thickness = across.clone().map(|(_, chord)| chord).sum::<f64>() / across.count() as f64;
+            (length > MIN_LIMB_RATIO * thickness).then_some(Limb { along, thickness })
+        };
+        self.hull.positions.iter().zip(&normals).map(limb).collect()
+    }
+
+    /// The sheets of gaps of at least this share of the largest one's area.
+    pub(super) fn sheets(&self, least: f64) -> Option<Voxels> {
+        let largest = self.gaps.first()?.area;
+        let mut sheets = Voxels::new(self.filled.dims);
+        let kept = self.gaps.iter().filter(|gap| gap.area >= least * largest);
+        kept.flat_map(|gap| &gap.voxels).for_each(|&v| sheets.add(v));
+        Some(sheets)
     }
 }
 
@@ -156,16 +245,31 @@ fn smoothed(stairs: &Surface, obstacle: &Obstacle) -> Surface {
     }
 }
 
-/// The axis of the mirror to use: the one asked for, or the first (x, z, y) in which the solid is its own image.
-fn find_mirror(solid: &Voxels, symmetry: Symmetry) -> Option<usize> {
+/// The axis of the mirror to use: the one asked for, or the first (x, z, y) in which the solid is its own image, apart from
+/// scattered voxels. `longest`: voxels along the model's longest side.
+fn find_mirror(solid: &Voxels, longest: usize, symmetry: Symmetry) -> Option<usize> {
     match symmetry {
         Symmetry::None => None,
         Symmetry::X => Some(0),
         Symmetry::Y => Some(1),
         Symmetry::Z => Some(2),
         Symmetry::Auto => [0, 2, 1].into_iter().find(|&axis| {
-            let image = solid.mirrored(axis).dilated();
-            solid.overlap(&image) as f64 >= MIN_MIRROR_SHARE * solid.count() as f64
+            let tolerance = (MIRROR_TOLERANCE * longest as f64).round().max(1.0) as usize;
+            let image = (0..tolerance).fold(solid.mirrored(axis), |image, _| image.dilated());
+            let unmatched = solid.without(&image);
+            let most = (1.0 - MIN_MIRROR_SHARE) * solid.count() as f64;
+            let extent = |island: &Vec<[usize; 3]>| {
+                let side = |k: usize| {
+                    let at = || island.iter().map(|v| v[k]);
+                    at().max().unwrap_or(0) - at().min().unwrap_or(0)
+                };
+                (0..3).map(side).max().unwrap_or(0)
+            };
+            unmatched.count() as f64 <= most
+                && unmatched
+                    .islands()
+                    .iter()
+                    .all(|island| (extent(island) as f64) < MAX_UNMATCHED * longest as f64)
         }),
     }
 }

@@ -4,10 +4,13 @@ use glam::{Vec3, vec3};
 use proptest::prelude::*;
 
 use super::{CageGenError, CageOptions, CageReport, GeneratedCage, Mirror, Shape, Symmetry, generate};
+use crate::bind::bind;
 use crate::cage::Cage;
 use crate::contact::{Corners, meeting};
+use crate::deform::displacements;
 use crate::geometry::winding_number;
-use crate::options::OutOfRange;
+use crate::mesh::Bounds;
+use crate::options::{BindOptions, OutOfRange};
 use crate::progress::{ProgressEvent, Silent};
 use crate::smooth::subdivide;
 
@@ -122,6 +125,84 @@ fn cage_goes_into_the_gap_between_legs() {
         let between = winding(&made.cage, vec3(0.0, -0.6, 0.0));
         assert!(between.abs() < WINDING_TOLERANCE, "with {target} vertices the legs are webbed: {between}");
     }
+}
+
+/// Trunk, two legs with feet, two arms: 1.8 high. `gap` between the legs, their `radius`.
+fn mannequin(gap: f32, radius: f32) -> Soup {
+    let x = 0.5 * gap + radius;
+    let limb = |a: Vec3, b: Vec3, radius: f32| tube(&segment(a, b), radius, false);
+    let mut parts = vec![limb(vec3(0.0, 0.9, 0.0), vec3(0.0, 1.8, 0.0), 0.15)];
+    for side in [-1.0, 1.0] {
+        parts.push(limb(vec3(side * x, 1.0, 0.0), vec3(side * x, 0.0, 0.0), radius));
+        parts.push(limb(vec3(side * x, 0.05, 0.0), vec3(side * x, 0.05, 0.15), 0.05));
+        parts.push(limb(vec3(side * 0.1, 1.5, 0.0), vec3(side * 0.8, 1.4, 0.0), 0.05));
+    }
+    join(parts)
+}
+
+/// Weights of the cage's vertices at one leg's lower half sum to how much of a drag of them a foot follows: nearly all at
+/// their own, nearly nothing at the other.
+#[test]
+fn lower_vertices_of_a_leg_move_its_own_foot_alone() {
+    for (gap, radius, target) in [(0.17, 0.06, 80), (0.1, 0.06, 80), (0.08, 0.05, 120)] {
+        let (positions, triangles) = mannequin(gap, radius);
+        let cage = generate(&positions, &triangles, &options(target), &Silent).unwrap().cage;
+        let bind_options = BindOptions { grid: 40, ..BindOptions::default() };
+        let bound = bind(&positions, &cage, &bind_options, &Silent).unwrap();
+        for side in [-1.0, 1.0] {
+            let is_lower = |c: &Vec3| {
+                let near = |p: &&Vec3| p.distance_squared(*c);
+                let nearest = positions.iter().min_by(|p, q| near(p).total_cmp(&near(q))).unwrap();
+                nearest.y < 0.5 && nearest.x * side > 0.0
+            };
+            let posed: Vec<Vec3> =
+                cage.positions().iter().map(|c| if is_lower(c) { *c + Vec3::Z } else { *c }).collect();
+            let moved = displacements(&bound.weights, &bound.outside, cage.positions(), &posed);
+            let mean = |side: f32| {
+                let foot = positions.iter().zip(&moved).filter(|(p, _)| p.y < 0.1 && p.x * side > 0.0);
+                let (sum, n) = foot.fold((0.0, 0.0), |(sum, n), (_, by)| (sum + by.z, n + 1.0));
+                sum / n
+            };
+            let (own, other) = (mean(side), mean(-side));
+            assert!(own > 0.8 && other < 0.02, "gap {gap}, radius {radius}: own {own}, other {other}");
+        }
+    }
+}
+
+#[test]
+fn a_gap_that_no_lattice_resolves_is_named() {
+    let (positions, triangles) = mannequin(0.02, 0.08);
+    let report = generate(&positions, &triangles, &options(80), &Silent).unwrap().report;
+    let named = report.notices.iter().any(|notice| notice.contains("closes the gap"));
+    assert!(named, "{:?}", report.notices);
+    let open = mannequin(0.17, 0.06);
+    assert_eq!(generate(&open.0, &open.1, &options(80), &Silent).unwrap().report.notices, [""; 0]);
+}
+
+/// A sword in one hand has less than 1.5 % of the model's voxels.
+#[test]
+fn an_accessory_on_one_side_gets_no_twin() {
+    let sword = tube(&segment(vec3(0.8, 1.4, 0.0), vec3(0.8, 1.4, 0.8)), 0.02, false);
+    let soup = join([mannequin(0.17, 0.06), sword]);
+    let made = make(&soup, &options(80));
+    assert_eq!(made.report.mirror, None);
+    assert!(winding(&made.cage, vec3(-0.8, 1.4, 0.7)).abs() < WINDING_TOLERANCE);
+    assert_eq!(make(&mannequin(0.17, 0.06), &options(80)).report.mirror, Some(Mirror::X));
+}
+
+/// Of a straight bar, twelve vertices keep the distance; a bend needs rings, every 1.3 of its hull's thickness at most.
+#[test]
+fn limbs_have_rings_and_compact_models_few_vertices() {
+    let bar = tube(&segment(vec3(0.0, 0.0, 0.0), vec3(0.0, 6.0, 0.0)), 0.4, false);
+    let made = make(&bar, &options(80));
+    let mut heights: Vec<f32> = made.cage.positions().iter().map(|p| p.y).collect();
+    heights.sort_by(f32::total_cmp);
+    let widest = heights.windows(2).map(|w| w[1] - w[0]).fold(0.0, f32::max);
+    assert!(widest < 2.5, "rings are {widest} apart");
+    let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    let cube = super::subdivided_box(bounds, 0.0, [1; 3]);
+    let triangles = cube.faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
+    assert!(make(&(cube.positions, triangles), &options(80)).report.vertices < 24);
 }
 
 #[test]

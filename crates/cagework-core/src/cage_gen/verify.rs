@@ -54,7 +54,7 @@ pub(super) fn verified_faces(
         (&corners(cage.facets(), &points), cage.face_of_facet(), MIN_FACET_CLEARANCE_SHARE),
     ] {
         obstacle.clearance = share * shell.obstacle.clearance;
-        let touching = triangles.iter().zip(face_of).filter(|(t, _)| !obstacle.is_clear(t.at, None));
+        let touching = triangles.iter().zip(face_of).filter(|(t, _)| !obstacle.is_clear(t.at));
         wrong.extend(touching.map(|(_, &face)| face));
         wrong.extend(meeting(triangles).into_iter().flatten().map(|t| face_of[t as usize]));
     }

@@ -49,12 +49,6 @@ impl Voxels {
         (first / WORD..=last / WORD).any(|w| row[w] & run_mask(w, first, last) != 0)
     }
 
-    /// Whether all of the voxels `first..=last` of a row are in the set.
-    pub(super) fn covers_run(&self, y: usize, z: usize, first: usize, last: usize) -> bool {
-        let row = self.row(y, z);
-        (first / WORD..=last / WORD).all(|w| !row[w] & run_mask(w, first, last) == 0)
-    }
-
     /// Voxels in the set.
     pub(super) fn count(&self) -> usize {
         self.bits.iter().map(|w| w.count_ones() as usize).sum()
@@ -80,9 +74,14 @@ impl Voxels {
         }
     }
 
-    /// How many voxels two sets have in common.
-    pub(super) fn overlap(&self, other: &Self) -> usize {
-        self.bits.iter().zip(&other.bits).map(|(a, b)| (a & b).count_ones() as usize).sum()
+    /// All other voxels of the box.
+    pub(super) fn complement(&self) -> Self {
+        Self { bits: self.bits.iter().map(|w| !w).collect(), ..*self }
+    }
+
+    /// The voxels that are not in another set in the same box.
+    pub(super) fn without(&self, other: &Self) -> Self {
+        Self { bits: self.bits.iter().zip(&other.bits).map(|(a, b)| a & !b).collect(), ..*self }
     }
 
     /// The set seen in a mirror halfway along `axis`.
@@ -251,26 +250,32 @@ impl Voxels {
 
     /// One voxel of every part that hangs together through faces.
     pub(super) fn parts(&self) -> Vec<[usize; 3]> {
+        self.islands().iter().map(|voxels| voxels[0]).collect()
+    }
+
+    /// The voxels of every part that hangs together through faces.
+    pub(super) fn islands(&self) -> Vec<Vec<[usize; 3]>> {
         let mut seen = Self::new(self.dims);
-        let mut parts = Vec::new();
-        let mut stack = Vec::new();
+        let mut islands = Vec::new();
         self.for_each(|seed| {
             if seen.has(seed) {
                 return;
             }
-            parts.push(seed);
             seen.add(seed);
-            stack.push(seed);
-            while let Some(voxel) = stack.pop() {
+            let mut island = vec![seed];
+            let mut done = 0;
+            while let Some(&voxel) = island.get(done) {
+                done += 1;
                 for next in self.neighbours(voxel) {
                     if self.has(next) && !seen.has(next) {
                         seen.add(next);
-                        stack.push(next);
+                        island.push(next);
                     }
                 }
             }
+            islands.push(island);
         });
-        parts
+        islands
     }
 
     /// The up to six voxels that share a face with one.
