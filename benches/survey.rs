@@ -363,6 +363,10 @@ fn bent(model: &TriMesh, cage: &Cage) -> [f64; 2] {
         let [a, b, c] = t.map(|v| at[v as usize].as_dvec3());
         (b - a).cross(c - a)
     };
-    let over = model.triangles.iter().filter(|t| normal(&moved, t).dot(normal(&right, t)) < 0.0);
+    let smallest = 1e-6 * f64::from(bounds.diagonal()).powi(2);
+    let over = model.triangles.iter().filter(|t| {
+        let right = normal(&right, t);
+        right.length() > smallest && normal(&moved, t).dot(right) < 0.0
+    });
     [f64::from(off / bounds.diagonal()), over.count() as f64]
 }

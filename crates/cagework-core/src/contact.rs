@@ -51,6 +51,12 @@ impl Corners {
         (self.at[1] - self.at[0]).cross(self.at[2] - self.at[0])
     }
 
+    /// Cosine of the turn from this triangle to one that shares an edge with it, if it does.
+    pub(crate) fn fold_cosine(&self, other: &Self) -> Option<f64> {
+        let shared = self.index.iter().filter(|i| other.index.contains(i)).count();
+        (shared == 2).then(|| self.normal().normalize_or_zero().dot(other.normal().normalize_or_zero()))
+    }
+
     /// The triangle with a vertex elsewhere.
     pub(crate) fn with_corner(&self, vertex: u32, at: DVec3) -> Self {
         let mut moved = *self;

@@ -17,6 +17,9 @@ const SHEET_SHRINKAGE: f64 = 0.4;
 /// Vertices beside the mirror plane stay this far from it, in voxels.
 const MIN_MIRROR_DISTANCE: f64 = 0.1;
 
+/// Smallest cosine of the turn between neighbours, 120 degrees: sharper folds turn a model over when they are bent.
+pub(super) const MIN_FOLD_COSINE: f64 = -0.5;
+
 /// What the surface must keep away from.
 #[derive(Debug)]
 pub(super) struct Obstacle {
@@ -50,6 +53,8 @@ pub(super) struct Guarded<'a> {
     pub(super) around: Vec<Vec<u32>>,
     pub(super) on_mirror: Vec<bool>,
     pub(super) mirror: Option<usize>,
+    /// Whether it may fold more than [`MIN_FOLD_COSINE`] allows.
+    pub(super) may_fold: bool,
     obstacle: &'a Obstacle,
     /// What no triangle may come near: the solid and, if there is a band, everything outside the band.
     keep_out: Voxels,
@@ -72,6 +77,7 @@ impl<'a> Guarded<'a> {
             triangles: surface.triangles,
             on_mirror: surface.on_mirror,
             mirror: surface.mirror,
+            may_fold: false,
             obstacle,
             keep_out: obstacle.voxels.clone(),
             has_band: false,
@@ -151,8 +157,22 @@ impl<'a> Guarded<'a> {
         self.buckets.add(triangle, min, max);
     }
 
+    /// Smallest cosine of the turn from one of the triangles to another one, to `others` or across the mirror.
+    fn sharpest(&self, triangles: &[Corners], others: &[Corners]) -> f64 {
+        let across = |t: &Corners| {
+            let axis = self.mirror?;
+            let is_beside = t.index.iter().filter(|&&i| self.on_mirror[i as usize]).count() == 2;
+            is_beside.then(|| 1.0 - 2.0 * t.normal().normalize_or_zero()[axis].powi(2))
+        };
+        let folds = triangles.iter().enumerate().flat_map(|(k, t)| {
+            let beside = triangles[..k].iter().chain(others);
+            beside.filter_map(|other| t.fold_cosine(other)).chain(across(t))
+        });
+        folds.fold(1.0, f64::min)
+    }
+
     /// Whether `new` triangles may stand where those numbered `gone` were: clear of the obstacle, of the rest of the
-    /// surface and of each other.
+    /// surface and of each other, and not folded more than [`MIN_FOLD_COSINE`] allows or than those were.
     pub(super) fn may_stand(&mut self, new: &[Corners], gone: &[u32]) -> bool {
         if let Some(axis) = self.mirror {
             let beside = |i: u32, p: DVec3| self.on_mirror[i as usize] || p[axis] >= MIN_MIRROR_DISTANCE;
@@ -171,16 +191,22 @@ impl<'a> Guarded<'a> {
         let mut near = std::mem::take(&mut self.near);
         let bounds = &self.bounds;
         self.buckets.near(min, max, |t| bounds[t as usize], &mut near);
-        let clear = near.iter().filter(|t| !gone.contains(t)).all(|&t| {
-            let other = self.corners(t);
+        let others: Vec<Corners> =
+            near.iter().filter(|t| !gone.contains(t)).map(|&t| self.corners(t)).collect();
+        let clear = others.iter().all(|other| {
             let (low, high) = (other.min() - MIN_GAP, other.max() + MIN_GAP);
             new.iter().all(|corners| {
                 let apart = corners.min().cmpgt(high).any() || corners.max().cmplt(low).any();
-                apart || !meet(corners, &other, MIN_GAP)
+                apart || !meet(corners, other, MIN_GAP)
             })
         });
         self.near = near;
-        clear
+        if !clear || self.may_fold {
+            return clear;
+        }
+        let fold = self.sharpest(new, &others);
+        let before = || gone.iter().map(|&t| self.corners(t)).collect::<Vec<_>>();
+        fold >= MIN_FOLD_COSINE || fold >= self.sharpest(&before(), &others)
     }
 
     /// Pairs of triangles that meet where they should not, as vertices of both.

@@ -218,6 +218,11 @@ fn simplified(
         if may_coarsen && left as f64 > MAX_TARGET_RATIO * f64::from(options.target) {
             return Ok(Simplified::TooMany(left));
         }
+        if left > target {
+            collapser.surface.may_fold = true;
+            left = collapser.run(target, &|share| go_on(0.6 * share))?;
+            collapser.surface.may_fold = false;
+        }
         let quadrics = collapser.quadrics;
         if let Some(cage) = relaxed(shell, guarded, &quadrics, options.quads, go_on)? {
             return Ok(Simplified::Cage(Box::new(cage), false));

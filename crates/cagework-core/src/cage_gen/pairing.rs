@@ -5,12 +5,13 @@
 use glam::DVec3;
 
 use super::guarded::Guarded;
+use crate::contact::Corners;
 
 /// Corners of a quad: the vertex, and whether its mirror image is meant.
 pub(super) type Quad = [(u32, bool); 4];
 
-/// Creases stay creases: smallest cosine between the two triangles of a quad.
-const MIN_FOLD_COSINE: f64 = 0.25;
+/// Creases stay creases: smallest cosine between the two triangles of a quad, cut either way.
+const MIN_FOLD_COSINE: f64 = 0.0;
 /// Quads that are worse are none.
 const MAX_BADNESS: f64 = 4.0;
 /// Moves of the annealing, and its first temperature; quads are worth about 1.
@@ -92,12 +93,36 @@ pub(super) fn quad_of(surface: &Guarded<'_>, t: u32, partner: Partner) -> Option
     }
 }
 
+/// The triangles of two triangles' quad, cut along its other diagonal.
+pub(super) fn other_cut(surface: &Guarded<'_>, t: u32, u: u32) -> Option<[Corners; 2]> {
+    let [a, b, c, d] = quad_of(surface, t, Partner::Triangle(u))?.map(|corner| corner.0);
+    let corners = |index: [u32; 3]| Corners { index, at: index.map(|i| surface.positions[i as usize]) };
+    Some([[a, b, d], [b, c, d]].map(corners))
+}
+
+/// Whether the surface may be cut along a quad's other diagonal.
+pub(super) fn is_free(surface: &mut Guarded<'_>, t: u32, partner: Partner) -> bool {
+    let Partner::Triangle(u) = partner else { return true };
+    other_cut(surface, t, u).is_some_and(|cut| surface.may_stand(&cut, &[t, u]))
+}
+
 /// What a quad is worth; 0 for one that may not be.
-fn worth(surface: &Guarded<'_>, t: u32, partner: Partner) -> f64 {
+pub(super) fn worth(surface: &Guarded<'_>, t: u32, partner: Partner) -> f64 {
     let Some(quad) = quad_of(surface, t, partner) else { return 0.0 };
+    let [_, (b, _), _, (d, _)] = quad;
+    let on_mirror = |v: u32| surface.on_mirror[v as usize];
+    let joined =
+        |v: u32| surface.around[b as usize].iter().any(|&t| surface.triangles[t as usize].contains(&v));
+    // The other diagonal must be no edge.
+    if partner != Partner::Image && (joined(d) || on_mirror(b) && on_mirror(d)) {
+        return 0.0;
+    }
     let p = places(surface, &quad);
-    let [m, n] = [(p[1] - p[0]).cross(p[2] - p[0]), (p[2] - p[0]).cross(p[3] - p[0])];
-    let fold = m.normalize_or_zero().dot(n.normalize_or_zero());
+    let half = |k: usize| {
+        let [a, b, c] = [0, 1, 2].map(|step| p[(k + step) % 4]);
+        (b - a).cross(c - a).normalize_or_zero()
+    };
+    let fold = half(0).dot(half(2)).min(half(1).dot(half(3)));
     let badness = badness(&p);
     if fold < MIN_FOLD_COSINE || badness > MAX_BADNESS {
         return 0.0;
@@ -107,20 +132,21 @@ fn worth(surface: &Guarded<'_>, t: u32, partner: Partner) -> f64 {
     if partner == Partner::Image { 0.5 * worth } else { worth }
 }
 
-/// Pairs triangles so that quads are many and good; what was paired `before` is where it begins.
-pub(super) fn pair(surface: &Guarded<'_>, before: &Pairing) -> Pairing {
+/// Pairs triangles so that quads are many and good; what was paired `before` is where it begins. `strict`: only quads that may be cut
+/// along either diagonal.
+pub(super) fn pair(surface: &mut Guarded<'_>, before: &Pairing, strict: bool) -> Pairing {
     let n = surface.triangles.len();
     let mut near: Vec<Vec<(Partner, f64)>> = vec![Vec::new(); n];
     let mut options: Vec<(u32, Partner, f64)> = Vec::new();
-    for t in (0..n as u32).filter(|&t| surface.is_alive(t)) {
+    for t in 0..n as u32 {
         let x = surface.triangles[t as usize];
-        for k in 0..3 {
+        for k in 0..if surface.is_alive(t) { 3 } else { 0 } {
             let (a, b) = (x[k], x[(k + 1) % 3]);
             let mut others = surface.around[a as usize].iter().copied();
             let other = others.find(|&u| u != t && surface.triangles[u as usize].contains(&b));
             let partner = other.map_or(Partner::Image, Partner::Triangle);
             let worth = worth(surface, t, partner);
-            if worth > 0.0 {
+            if worth > 0.0 && (!strict || is_free(surface, t, partner)) {
                 near[t as usize].push((partner, worth));
                 if other.is_none_or(|u| u > t) {
                     options.push((t, partner, worth));
@@ -151,6 +177,7 @@ pub(super) fn pair(surface: &Guarded<'_>, before: &Pairing) -> Pairing {
             }
         }
     }
+    pairing.part_doubles(surface);
     pairing
 }
 
@@ -216,6 +243,24 @@ impl Pairing {
             }
         }
         gain
+    }
+
+    /// Two quads with the same other diagonal would share an edge that belongs to four triangles when both are cut along it, as around
+    /// a vertex with two edges: the second one's are triangles again.
+    fn part_doubles(&mut self, surface: &Guarded<'_>) {
+        let mut taken = Vec::new();
+        for t in 0..self.partner.len() as u32 {
+            let partner = self.partner[t as usize];
+            if matches!(partner, Partner::Triangle(u) if u < t) {
+                continue;
+            }
+            let Some([_, (b, _), _, (d, _)]) = quad_of(surface, t, partner) else { continue };
+            let diagonal = [b.min(d), b.max(d)];
+            if taken.contains(&diagonal) {
+                self.part(t);
+            }
+            taken.push(diagonal);
+        }
     }
 
     /// The two of a quad are triangles again.

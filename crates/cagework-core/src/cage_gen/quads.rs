@@ -5,7 +5,9 @@ use glam::DVec3;
 
 use super::collapse::quality;
 use super::guarded::Guarded;
-use super::pairing::{Pairing, Partner, Quad, badness, pair, places, quad_of, warp};
+use super::pairing::{
+    Pairing, Partner, Quad, badness, is_free, other_cut, pair, places, quad_of, warp, worth,
+};
 use super::quadric::Quadric;
 use crate::contact::Corners;
 use crate::progress::Cancelled;
@@ -17,6 +19,8 @@ const DISTANCE_WEIGHT: f64 = 0.6;
 /// Weights of the inverse quality of triangles, and of the halves of quads.
 const TRIANGLE_WEIGHT: f64 = 0.3;
 const HALF_WEIGHT: f64 = 0.01;
+/// Weight of each quad that may be cut along one diagonal only.
+const BOUND_WEIGHT: f64 = 6.0;
 /// Shares of a vertex's way that are tried.
 const STEP_SHARES: [f64; 3] = [1.0, 0.5, 0.2];
 /// A move must lower the energy by this much.
@@ -37,7 +41,7 @@ pub(super) fn quads(
 ) -> Result<Pairing, Cancelled> {
     let mut pairing = Pairing::default();
     for (k, rounds) in ROUNDS.into_iter().enumerate() {
-        pairing = pair(surface, &pairing);
+        pairing = pair(surface, &pairing, false);
         go_on((k + 1) as f32 / (ROUNDS.len() + 1) as f32)?;
         for _ in 0..rounds {
             for v in 0..surface.positions.len() as u32 {
@@ -45,6 +49,7 @@ pub(super) fn quads(
             }
         }
     }
+    pairing = pair(surface, &pairing, true);
     settle(surface, &mut pairing);
     Ok(pairing)
 }
@@ -52,6 +57,8 @@ pub(super) fn quads(
 /// What stands around a vertex: quads, triangles that are left, all triangles.
 struct Star {
     quads: Vec<Quad>,
+    /// Two triangles of each quad that does not cross the mirror.
+    pairs: Vec<[u32; 2]>,
     alone: Vec<u32>,
     all: Vec<u32>,
 }
@@ -59,18 +66,23 @@ struct Star {
 impl Star {
     fn new(surface: &Guarded<'_>, pairing: &Pairing, v: u32) -> Self {
         let all = surface.around[v as usize].clone();
-        let (mut quads, mut alone) = (Vec::new(), Vec::new());
+        let (mut quads, mut pairs, mut alone) = (Vec::new(), Vec::new(), Vec::new());
         for &t in &all {
             let partner = pairing.partner[t as usize];
             // A quad of two triangles that both touch the vertex counts once.
             let is_second = matches!(partner, Partner::Triangle(u) if u < t && all.contains(&u));
             match quad_of(surface, t, partner) {
-                Some(quad) if !is_second => quads.push(quad),
+                Some(quad) if !is_second => {
+                    quads.push(quad);
+                    if let Partner::Triangle(u) = partner {
+                        pairs.push([t, u]);
+                    }
+                }
                 Some(_) => {}
                 None => alone.push(t),
             }
         }
-        Self { quads, alone, all }
+        Self { quads, pairs, alone, all }
     }
 
     fn energy(&self, surface: &Guarded<'_>, quadric: &Quadric, v: u32) -> f64 {
@@ -79,6 +91,12 @@ impl Star {
             + self.quads.iter().map(|quad| badness(&places(surface, quad))).sum::<f64>()
             + TRIANGLE_WEIGHT * self.alone.iter().map(inverse).sum::<f64>()
             + HALF_WEIGHT * self.all.iter().map(inverse).sum::<f64>()
+    }
+
+    /// The same of quads that may not be cut along their other diagonal.
+    fn penalty(&self, surface: &mut Guarded<'_>) -> f64 {
+        let bound = self.pairs.iter().filter(|[t, u]| !is_free(surface, *t, Partner::Triangle(*u)));
+        BOUND_WEIGHT * bound.count() as f64
     }
 
     /// Places where the vertex would make better quads: parallelograms, their planes, the middle of its neighbours, the hull.
@@ -117,7 +135,7 @@ fn straighten(surface: &mut Guarded<'_>, pairing: &Pairing, quadrics: &[Quadric]
     let star = Star::new(surface, pairing, v);
     let (quadric, here) = (&quadrics[v as usize], surface.positions[v as usize]);
     let pinned = surface.mirror.filter(|_| surface.on_mirror[v as usize]);
-    let limit = star.energy(surface, quadric, v) - MIN_DECREASE;
+    let limit = star.energy(surface, quadric, v) + star.penalty(surface) - MIN_DECREASE;
     let before: Vec<Corners> = star.all.iter().map(|&t| surface.corners(t)).collect();
     let mut better: Vec<(f64, DVec3)> = Vec::new();
     for goal in star.goals(surface, quadric, v) {
@@ -135,15 +153,19 @@ fn straighten(surface: &mut Guarded<'_>, pairing: &Pairing, quadrics: &[Quadric]
     }
     surface.positions[v as usize] = here;
     better.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for (_, at) in better {
+    for (energy, at) in better {
         let moved: Vec<Corners> = before.iter().map(|t| t.with_corner(v, at)).collect();
         let turned = before.iter().zip(&moved).any(|(before, after)| {
             let (m, n) = (before.normal(), after.normal());
             m.dot(n) < MIN_MOVE_COSINE * m.length() * n.length()
         });
         if !turned && surface.may_stand(&moved, &star.all) {
-            surface.place(v, at);
-            return;
+            surface.positions[v as usize] = at;
+            if energy + star.penalty(surface) < limit {
+                surface.place(v, at);
+                return;
+            }
+            surface.positions[v as usize] = here;
         }
     }
 }
@@ -155,20 +177,18 @@ fn settle(surface: &mut Guarded<'_>, pairing: &mut Pairing) {
         let Partner::Triangle(u) = partner else { continue };
         let Some(quad) = quad_of(surface, t, partner).filter(|_| u > t) else { continue };
         let p = places(surface, &quad);
+        if worth(surface, t, partner) <= 0.0 {
+            // Its corners have moved since.
+            pairing.part(t);
+            continue;
+        }
         if p[0].distance(p[2]) <= p[1].distance(p[3]) {
             continue;
         }
-        let [a, b, c, d] = quad.map(|corner| corner.0);
-        let new = [[a, b, d], [b, c, d]];
-        let corners = new.map(|index| Corners { index, at: index.map(|i| surface.positions[i as usize]) });
-        let mut near = Vec::new();
-        surface.neighbours(b, &mut near);
-        let on_mirror = |v: u32| surface.on_mirror[v as usize];
-        let is_free = !(near.contains(&d) || on_mirror(b) && on_mirror(d));
-        if is_free && surface.may_stand(&corners, &[t, u]) {
-            surface.swap([t, u], new);
-        } else {
-            pairing.part(t);
+        let cut = other_cut(surface, t, u).filter(|cut| surface.may_stand(cut, &[t, u]));
+        match cut {
+            Some(cut) => surface.swap([t, u], cut.map(|half| half.index)),
+            None => pairing.part(t),
         }
     }
 }

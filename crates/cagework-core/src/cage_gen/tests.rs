@@ -9,7 +9,7 @@ use crate::cage::Cage;
 use crate::contact::{Corners, meeting};
 use crate::deform::displacements;
 use crate::geometry::winding_number;
-use crate::mesh::Bounds;
+use crate::mesh::{Bounds, PolygonMesh};
 use crate::options::{BindOptions, OutOfRange};
 use crate::progress::{ProgressEvent, Silent};
 use crate::smooth::subdivide;
@@ -26,19 +26,31 @@ fn winding(cage: &Cage, p: Vec3) -> f64 {
     winding_number(p.as_dvec3(), (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t)))
 }
 
-/// The promise, checked by means of its own: no voxels.
+/// A cage as other programs may cut it: quads from corner `k`.
+fn cut(mesh: &PolygonMesh, k: usize) -> PolygonMesh {
+    let cut = |f: &Vec<u32>| {
+        let f = f.clone();
+        (2..f.len()).map(move |n| [0, n - 1, n].map(|i| f[(i + k) % f.len()]).to_vec())
+    };
+    PolygonMesh { positions: mesh.positions.clone(), faces: mesh.faces.iter().flat_map(cut).collect() }
+}
+
+/// The promise, checked by means of its own: no voxels. It holds along whichever diagonal quads are cut.
 fn assert_promise((positions, _): &Soup, made: &GeneratedCage) {
     let cage = &made.cage;
-    let again = Cage::new(&cage.to_polygon_mesh()).unwrap();
-    assert_eq!(again.notices(), [], "closed, oriented, manifold, no vertex unused");
-    let triangles: Vec<Corners> = (0..cage.triangles().len())
-        .map(|t| Corners { index: cage.triangles()[t], at: cage.triangle_corners(t as u32) })
-        .collect();
-    assert_eq!(meeting(&triangles), Vec::<[u32; 2]>::new(), "it meets itself");
-    let step = (positions.len() / 200).max(1);
-    for &p in positions.iter().step_by(step) {
-        let w = winding(cage, p);
-        assert!((w - 1.0).abs() < WINDING_TOLERANCE, "{p} has winding number {w}");
+    let mesh = cage.to_polygon_mesh();
+    for (way, mesh) in [cut(&mesh, 0), cut(&mesh, 1), mesh].iter().enumerate() {
+        let again = Cage::new(mesh).unwrap_or_else(|error| panic!("cut {way}: {error}"));
+        assert_eq!(again.notices(), [], "closed, oriented, manifold, no vertex unused");
+        let triangles: Vec<Corners> = (0..again.triangles().len())
+            .map(|t| Corners { index: again.triangles()[t], at: again.triangle_corners(t as u32) })
+            .collect();
+        assert_eq!(meeting(&triangles), Vec::<[u32; 2]>::new(), "cut {way}: it meets itself");
+        let step = (positions.len() / 200).max(1);
+        for &p in positions.iter().step_by(step) {
+            let w = winding(&again, p);
+            assert!((w - 1.0).abs() < WINDING_TOLERANCE, "cut {way}: {p} has winding number {w}");
+        }
     }
     assert_eq!(made.report.vertices as usize, cage.n_vertices());
     assert_eq!(
@@ -211,6 +223,22 @@ fn cage_of_a_ring_keeps_its_hole() {
     assert!(winding(&made.cage, Vec3::ZERO).abs() < WINDING_TOLERANCE);
     // Euler characteristic of a torus: V - E + F = 0 with 2 E = 3 F.
     assert_eq!(2 * made.cage.n_vertices(), made.cage.triangles().len());
+}
+
+#[test]
+fn no_fold_is_sharper_than_120_degrees_whichever_way_quads_are_cut() {
+    for (soup, target) in [(trousers(), 40), (trousers(), 80), (ring(), 80), (ring(), 200)] {
+        let mesh = make(&soup, &options(target)).cage.to_polygon_mesh();
+        for k in 0..2 {
+            let cage = Cage::new(&cut(&mesh, k)).unwrap();
+            let triangles: Vec<Corners> = (0..cage.triangles().len())
+                .map(|t| Corners { index: cage.triangles()[t], at: cage.triangle_corners(t as u32) })
+                .collect();
+            let folds = triangles.iter().flat_map(|a| triangles.iter().filter_map(|b| a.fold_cosine(b)));
+            let sharpest = folds.fold(1.0, f64::min);
+            assert!(sharpest > -0.501, "{target}: {} degrees", sharpest.acos().to_degrees());
+        }
+    }
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! The promise of a generated cage, checked on the very numbers that are returned.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
-use super::guarded::Obstacle;
+use super::guarded::{MIN_FOLD_COSINE, Obstacle};
 use super::shell::Shell;
 use super::surface::Surface;
 use crate::cage::Cage;
@@ -41,23 +41,28 @@ pub(super) fn verified_faces(
     if !cage.notices().is_empty() {
         return Err(Vec::new());
     }
-    let corners = |indices: &[[u32; 3]], points: &[Vec3]| -> Vec<Corners> {
-        let at: Vec<DVec3> = points.iter().map(|&p| shell.lattice.centred(p)).collect();
-        indices.iter().map(|&index| Corners { index, at: index.map(|i| at[i as usize]) }).collect()
+    let corners = |index: [u32; 3], points: &[DVec3]| Corners {
+        index,
+        at: index.map(|i| shell.lattice.centred(points[i as usize].as_vec3())),
     };
     let mut obstacle = Obstacle { voxels: shell.obstacle.voxels.clone(), ..shell.obstacle };
-    let points: Vec<Vec3> = cage.facet_points().iter().map(|p| p.as_vec3()).collect();
-    let triangles = corners(cage.triangles(), cage.positions());
-    let mut wrong = Vec::new();
-    for (triangles, face_of, share) in [
-        (&triangles, cage.face_of_triangle(), MIN_CLEARANCE_SHARE),
-        (&corners(cage.facets(), &points), cage.face_of_facet(), MIN_FACET_CLEARANCE_SHARE),
-    ] {
+    let mut is_clear = |t: &Corners, share: f64| {
         obstacle.clearance = share * shell.obstacle.clearance;
-        let touching = triangles.iter().zip(face_of).filter(|(t, _)| !obstacle.is_clear(t.at));
-        wrong.extend(touching.map(|(_, &face)| face));
-        wrong.extend(meeting(triangles).into_iter().flatten().map(|t| face_of[t as usize]));
+        obstacle.is_clear(t.at)
+    };
+    let cut = Cut::new(&cage, |index| corners(index, cage.facet_points()));
+    let mut wrong = cut.wrong();
+    for (t, corners) in cut.triangles.iter().enumerate() {
+        let share = if cut.is_ours[t] { MIN_CLEARANCE_SHARE } else { MIN_FACET_CLEARANCE_SHARE };
+        if !is_clear(corners, share) {
+            wrong.push(cut.face_of[t]);
+        }
     }
+    let facets: Vec<Corners> = cage.facets().iter().map(|&f| corners(f, cage.facet_points())).collect();
+    let of_facet = |f: usize| cage.face_of_facet()[f];
+    let touching = (0..facets.len()).filter(|&f| !is_clear(&facets[f], MIN_FACET_CLEARANCE_SHARE));
+    wrong.extend(touching.map(of_facet));
+    wrong.extend(meeting(&facets).into_iter().flatten().map(|f| of_facet(f as usize)));
     if !wrong.is_empty() {
         wrong.sort_unstable();
         wrong.dedup();
@@ -66,7 +71,68 @@ pub(super) fn verified_faces(
     let half = shell.lattice.half();
     let around = shell.parts.iter().all(|&voxel| {
         let p = DVec3::from_array(voxel.map(|x| x as f64 + 0.5)) - half;
-        (winding_number(p, triangles.iter().map(|t| t.at)) - 1.0).abs() < WINDING_TOLERANCE
+        [true, false].into_iter().all(|is_ours| {
+            let triangles = cut.triangles.iter().enumerate().filter(|&(t, _)| cut.is_of(t, is_ours));
+            (winding_number(p, triangles.map(|(_, t)| t.at)) - 1.0).abs() < WINDING_TOLERANCE
+        })
     });
     if around { Ok(cage) } else { Err(Vec::new()) }
+}
+
+/// The faces of a cage as triangles, quads as all four that other programs may cut them into.
+struct Cut {
+    triangles: Vec<Corners>,
+    face_of: Vec<u32>,
+    /// Whether each is one of the cage's own.
+    is_ours: Vec<bool>,
+    /// Whether each is half a quad.
+    is_half: Vec<bool>,
+}
+
+impl Cut {
+    fn new(cage: &Cage, corners: impl Fn([u32; 3]) -> Corners) -> Self {
+        let mut cut =
+            Self { triangles: Vec::new(), face_of: Vec::new(), is_ours: Vec::new(), is_half: Vec::new() };
+        for (&f, own) in cage.face_of_triangle().iter().zip(cage.triangles()) {
+            let face = &cage.faces()[f as usize];
+            let is_quad = face.len() == 4;
+            if cut.face_of.last() == Some(&f) && is_quad {
+                continue;
+            }
+            for k in 0..if is_quad { 4 } else { 1 } {
+                let index = if is_quad { [0, 1, 2].map(|step| face[(k + step) % 4]) } else { *own };
+                cut.triangles.push(corners(index));
+                cut.face_of.push(f);
+                cut.is_ours.push([index[0], index[2]].iter().all(|i| own.contains(i)));
+                cut.is_half.push(is_quad);
+            }
+        }
+        cut
+    }
+
+    /// Whether a triangle is there when all quads are cut as the cage does, or all along their other diagonals.
+    fn is_of(&self, t: usize, ours: bool) -> bool {
+        !self.is_half[t] || self.is_ours[t] == ours
+    }
+
+    /// Faces that meet others where they should not, or make a sharp fold with them when they are cut the other way. Of two that meet,
+    /// one that is cut the other way if there is one.
+    fn wrong(&self) -> Vec<u32> {
+        let mut wrong = Vec::new();
+        for pair in meeting(&self.triangles) {
+            let [f, g] = pair.map(|t| self.face_of[t as usize]);
+            if f != g {
+                let [a, b] = pair.map(|t| self.is_ours[t as usize]);
+                wrong.extend([(f, !a || b), (g, a)].into_iter().filter(|face| face.1).map(|face| face.0));
+            }
+        }
+        for (a, x) in self.triangles.iter().enumerate().filter(|&(a, _)| !self.is_ours[a]) {
+            let sharp = |y: &Corners| x.fold_cosine(y).is_some_and(|fold| fold < MIN_FOLD_COSINE);
+            let mut others = self.triangles.iter().zip(&self.face_of);
+            if others.any(|(y, face)| *face != self.face_of[a] && sharp(y)) {
+                wrong.push(self.face_of[a]);
+            }
+        }
+        wrong
+    }
 }
