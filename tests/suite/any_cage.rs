@@ -135,7 +135,7 @@ pub(crate) fn overlapping_parts_are_bound_as_one(back_end: &BackEnd) {
         let binding = back_end.bind_with(&points, &both, |o| o.grid = 64);
         assert_eq!(binding.report.outside_vertices, 0);
         let notices = &binding.report.notices;
-        assert!(notices.iter().any(|n| n.contains("Components 0 and 1 of the cage overlap")), "{notices:?}");
+        assert!(notices.iter().any(|n| n.contains("Parts of the cage overlap")), "{notices:?}");
         let mut random = Random::new(74);
         let weights = dense(&binding.weights);
         for (v, p) in points.iter().enumerate() {

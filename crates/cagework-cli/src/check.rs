@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use cagework_core::cage_check::{CageCheck, Fix, Repair, Severity, check_smooth, repair_smooth};
+use cagework_core::cage_check::{CageCheck, Code, Fix, Repair, Severity, check_smooth, repair_smooth};
 use cagework_io::{UpAxis, shown};
 use serde::Serialize;
 
@@ -117,8 +117,11 @@ fn text(checked: &Checked) -> String {
     out
 }
 
-/// The first place of a problem in words.
+/// The first place of a problem in words, if its sentence names none.
 fn place(p: &cagework_core::cage_check::Problem) -> Option<String> {
+    if p.code == Code::SelfIntersection {
+        return None;
+    }
     let places = &p.places;
     if let Some([a, b]) = places.edges.first() {
         return Some(format!("edge {a}-{b}"));

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
+use cagework_core::cage_check::notices;
 use cagework_core::mesh::weld;
 use cagework_core::{Bounds, Cage};
 use cagework_io::{Clip, Model, ModelFormat, escaped, read_inner_controls, shown};
@@ -110,11 +111,7 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
         Bounds::of(&model.positions).ok_or_else(|| CliError::file(file.as_ref(), "has no vertices"))?;
     let welded = weld(&model.positions);
     let cage = match cage_mesh(model).and_then(|mesh| Cage::new(&mesh)) {
-        Ok(cage) => CageInfo {
-            valid: true,
-            problem: None,
-            notices: cage.notices().iter().map(ToString::to_string).collect(),
-        },
+        Ok(cage) => CageInfo { valid: true, problem: None, notices: notices(&cage) },
         Err(error) => CageInfo { valid: false, problem: Some(error.to_string()), notices: vec![] },
     };
     Ok(Info {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use cagework_core::cage_check::check_smooth;
+use cagework_core::cage_check::{check_smooth, notices};
 use cagework_core::cage_gen::{CageReport, generate};
 use cagework_core::options::{GRID, SMOOTH};
 use cagework_core::{Cage as CoreCage, CageOptions, ControlSet, Controls, InnerControls, PolygonMesh};
@@ -125,7 +125,7 @@ impl Cage {
     /// What was mended or is worth knowing, a sentence each.
     #[getter]
     fn notices(&self) -> Vec<String> {
-        self.set.cage().notices().iter().map(ToString::to_string).collect()
+        notices(self.set.cage())
     }
 
     /// What a check of the cage alone says: valid, vertices, faces, components, thickness (object units), problems.

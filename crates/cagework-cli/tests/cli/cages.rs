@@ -68,6 +68,34 @@ fn check_names_the_fault_and_repair_mends_it() {
     assert_eq!(sandbox.json("info mended.obj --json")["cage"]["notices"].as_array().unwrap().len(), 0);
 }
 
+/// `info` called it valid, `check` unusable, and `bind` bound it.
+#[test]
+fn cage_through_itself_is_bound_with_the_warning_that_info_and_check_give() {
+    let sandbox = Sandbox::with_sphere_in_box();
+    sandbox.run("cage mesh.obj -o box.obj --kind box --divisions 3").success();
+    let text = String::from_utf8(sandbox.read("box.obj")).unwrap();
+    let mut is_pushed = false;
+    // A vertex in the middle of one side, out through the side across.
+    let pushed = text.lines().map(|line| {
+        let p: Vec<f64> = line.split(' ').skip(1).filter_map(|x| x.parse().ok()).collect();
+        if is_pushed || !line.starts_with("v ") || p[1].abs().max(p[2].abs()) > -0.5 * p[0] {
+            return format!("{line}\n");
+        }
+        is_pushed = true;
+        format!("v {} {} {}\n", -2.0 * p[0], p[1], p[2])
+    });
+    sandbox.write("through.obj", pushed.collect::<String>());
+    let check = sandbox.json("check through.obj --json");
+    let problem = &check["problems"][0];
+    assert_eq!((&check["valid"], problem["severity"].as_str()), (&true.into(), Some("warning")));
+    let said = problem["message"].as_str().unwrap();
+    assert!(said.contains("goes through itself") && said.contains("the first of faces"), "{said}");
+    let info = &sandbox.json("info through.obj --json")["cage"];
+    assert_eq!((&info["valid"], &info["notices"]), (&true.into(), &serde_json::json!([said])));
+    let bound = sandbox.json("bind mesh.obj --cage through.obj -g 16 --json");
+    assert!(bound["notices"].as_array().unwrap().contains(&said.into()), "{}", bound["notices"]);
+}
+
 #[test]
 fn small_cage_grows_around_the_model() {
     let sandbox = Sandbox::with_sphere_in_box();

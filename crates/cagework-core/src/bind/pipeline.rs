@@ -9,6 +9,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use crate::assemble::{Assembled, RowOptions, assemble};
+use crate::cage_check;
 use crate::controls::Controls;
 use crate::deform::{OutsideVertex, triangle_frame};
 use crate::grid::Grid;
@@ -249,7 +250,7 @@ impl<'a> Prepared<'a> {
         let n_vertices = positions.len().saturating_sub(options.extra_points);
         let solve_ms = (sampled - stencils_made) * solved.solve_share;
         let level = &voxels.hierarchy.levels[0];
-        let mut notices: Vec<String> = controls.cage().notices().iter().map(ToString::to_string).collect();
+        let mut notices = cage_check::notices(controls.cage());
         notices.extend(team.notice(options.threads).into_iter().chain(voxels.notices.iter().cloned()));
         notices.extend(notices_of(controls, &level.grid, options.grid));
         notices.extend(oversized(cage.bounds(), &positions[..n_vertices], &weights));

@@ -187,7 +187,7 @@ pub fn check_smooth(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32
     edges::report_vertices(mesh, &sound, &mut found);
     let components = orient::report(mesh, &sound, &edges, &mut found);
     let cage = Cage::new(mesh);
-    shape::report_crossings(mesh, cage.as_ref().ok(), &sound, &mut found);
+    found.extend(cage.as_ref().map_or_else(|_| shape::crossings(mesh, None, &sound), crossings));
     if let Err(error) = &cage
         && !found.iter().any(|p| p.severity == Severity::Error)
     {
@@ -225,6 +225,18 @@ pub fn check_smooth(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32
         thickness,
         problems,
     }
+}
+
+/// What a user should know of a cage that is bound, a sentence each: what was mended, and where it goes through itself.
+#[must_use]
+pub fn notices(cage: &Cage) -> Vec<String> {
+    let crossing = crossings(cage).map(|problem| problem.message);
+    cage.notices().iter().map(ToString::to_string).chain(crossing).collect()
+}
+
+fn crossings(cage: &Cage) -> Option<Problem> {
+    let all: Vec<u32> = (0..cage.faces().len() as u32).collect();
+    shape::crossings(&cage.to_polygon_mesh(), Some(cage.component_of_face()), &all)
 }
 
 /// Vertices of the model that the cage does not enclose; whether there are none.

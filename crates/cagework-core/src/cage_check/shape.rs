@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 
 use super::{Code, Fix, MAX_PLACES, Places, Problem, Repair, Severity, diagonal, problem, sentences};
-use crate::cage::{Cage, face_triangles};
+use crate::cage::face_triangles;
 use crate::contact::{Corners, each_meeting};
 use crate::controls::Controls;
 use crate::mesh::PolygonMesh;
@@ -105,14 +105,8 @@ fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
     (triangles, face_of)
 }
 
-/// Reports faces that go through each other: an error, but where they belong to different parts of a `cage`.
-pub(super) fn report_crossings(
-    mesh: &PolygonMesh,
-    cage: Option<&Cage>,
-    sound: &[u32],
-    found: &mut Vec<Problem>,
-) {
-    let parts = cage.map(Cage::component_of_face);
+/// Faces that go through each other; `parts`: the part of each face of a cage.
+pub(super) fn crossings(mesh: &PolygonMesh, parts: Option<&[u32]>, sound: &[u32]) -> Option<Problem> {
     let mut of_parts = parts.is_some();
     let (triangles, face_of) = triangles(mesh, sound);
     let mut pairs = Vec::new();
@@ -128,22 +122,20 @@ pub(super) fn report_crossings(
         }
         ControlFlow::Continue(())
     });
-    // A search that ended early and found nothing says nothing.
-    if count == 0 {
-        return;
-    }
     pairs.sort_unstable();
+    // A search that ended early and found nothing says nothing.
+    let first = *pairs.first()?;
     let mut faces: Vec<u32> = pairs.iter().flatten().map(|&t| face_of[t as usize]).collect();
     faces.sort_unstable();
     faces.dedup();
     let point =
         |&[a, b]: &[u32; 2]| between(&triangles[a as usize], &triangles[b as usize]).as_vec3().to_array();
-    let severity = if of_parts { Severity::Warning } else { Severity::Error };
-    found.push(Problem {
+    let place = (first.map(|t| face_of[t as usize]), point(&first));
+    Some(Problem {
         places: Places { faces, points: pairs.iter().map(point).collect(), ..Places::default() },
-        message: sentences::crossing(pairs.len(), count - pairs.len(), complete, of_parts),
-        ..problem(Code::SelfIntersection, severity, count)
-    });
+        message: sentences::crossing([pairs.len(), count], complete, of_parts, place),
+        ..problem(Code::SelfIntersection, Severity::Warning, count)
+    })
 }
 
 /// A point near where two triangles meet: the middle of where their boxes overlap.

@@ -1,10 +1,13 @@
 use glam::{Vec3, vec3};
 use proptest::prelude::*;
 
-use super::{Code, Fix, MAX_PLACES, Repair, Severity, check, check_smooth, repair, repair_smooth};
+use super::{Code, Fix, MAX_PLACES, Repair, Severity, check, check_smooth, notices, repair, repair_smooth};
+use crate::bind::bind;
 use crate::cage::Cage;
 use crate::cage_gen::subdivided_box;
 use crate::mesh::{Bounds, PolygonMesh};
+use crate::options::BindOptions;
+use crate::progress::Silent;
 use crate::words::grouped;
 
 fn box_mesh(divisions: u32) -> PolygonMesh {
@@ -109,8 +112,15 @@ fn crossing_faces_are_found_where_they_cross() {
     let through = pushed.positions.iter().position(|p| p.x < -0.99 && p.y.abs() < 0.5 && p.z.abs() < 0.5);
     pushed.positions[through.unwrap()].x = 2.0;
     let crossing = check(&pushed, None, None);
-    assert!(!crossing.valid, "Cage::new does not look for it, this does");
+    assert!(crossing.valid, "it is bound");
+    let cage = Cage::new(&pushed).unwrap();
+    let said = &crossing.problem(Code::SelfIntersection).unwrap().message;
+    assert!(said.starts_with("The cage goes through itself: "), "{said}");
+    assert_eq!(notices(&cage), [said.as_str()]);
+    let bound = bind(&[Vec3::ZERO], &cage, &BindOptions { grid: 16, ..BindOptions::default() }, &Silent);
+    assert!(bound.unwrap().report.notices.contains(said));
     let problem = found.problem(Code::SelfIntersection).unwrap();
+    assert!(problem.message.contains(&format!("near {:?}", problem.places.points[0])), "{}", problem.message);
     for p in &problem.places.points {
         assert!((-0.3..=1.3).contains(&p[0]), "{p:?} is not where the boxes overlap");
     }
@@ -230,7 +240,7 @@ proptest! {
         }
         let mesh = PolygonMesh { positions, faces };
         let found = check(&mesh, Some(&[Vec3::ZERO]), Some(32));
-        prop_assert!(!found.valid || Cage::new(&mesh).is_ok());
+        prop_assert_eq!(found.valid, Cage::new(&mesh).is_ok());
         let all = [Repair::Weld, Repair::DropDegenerate, Repair::FillHoles, Repair::Flip];
         let repaired = repair(&mesh, &all, None).unwrap();
         let again = check(&repaired.mesh, None, None);
@@ -295,7 +305,7 @@ fn crossings_are_counted_and_listed_up_to_a_limit() {
     let found = check(&star(200), None, None);
     let crossing = found.problem(Code::SelfIntersection).unwrap();
     let said = format!(
-        "{} pairs of triangles meet, and {} more.",
+        "{} pairs of triangles meet, and {} more, the first of faces ",
         grouped(MAX_PLACES),
         grouped(crossing.count - MAX_PLACES)
     );

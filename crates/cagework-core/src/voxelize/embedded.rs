@@ -67,8 +67,7 @@ impl Embedding {
     #[must_use]
     pub fn notices(&self, controls: Controls<'_>, cells: u32) -> Vec<String> {
         let grid = &self.levels[0].grid;
-        let unresolved = resolution::notice(controls, grid, &self.lines, cells);
-        self.overlaps().notice().into_iter().chain(unresolved).collect()
+        resolution::notice(controls, grid, &self.lines, cells).into_iter().collect()
     }
 
     /// Where parts of the cage overlap: only the walls of their union count.

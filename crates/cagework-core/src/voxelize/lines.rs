@@ -59,25 +59,6 @@ impl Default for Overlaps {
 }
 
 impl Overlaps {
-    /// What a user should know about them, if anything.
-    #[must_use]
-    pub fn notice(&self) -> Option<String> {
-        let &[a, b] = self.parts.iter().min()?;
-        let more = match self.parts.len() - 1 {
-            0 => String::new(),
-            n => format!(" (and {n} more such pairs)"),
-        };
-        Some(if a == b {
-            format!(
-                "Component {a} of the cage goes through itself{more}: what it encloses twice counts as inside."
-            )
-        } else {
-            format!(
-                "Components {a} and {b} of the cage overlap{more}: they are bound as one, without walls inside."
-            )
-        })
-    }
-
     /// Adds a wall that lies inside, and the parts that overlap there.
     fn add(&mut self, parts: Option<[u32; 2]>, wall: DVec3) {
         (self.low, self.high) = (self.low.min(wall), self.high.max(wall));
