@@ -17,7 +17,7 @@ pub(crate) fn bound() -> Sandbox {
     let wider = |line: &str| {
         let Some(xyz) = line.strip_prefix("v ") else { return line.to_owned() };
         let [x, y, z] = [0, 1, 2].map(|k| xyz.split(' ').nth(k).unwrap().parse::<f64>().unwrap());
-        format!("v {} {y} {z}", if y > 1.0 { 1.3 * x } else { x })
+        format!("v {} {y} {z}", if y > 0.8 { 1.3 * x } else { x })
     };
     let cage = String::from_utf8(sandbox.read("cage.obj")).unwrap();
     sandbox.write("wide.obj", cage.lines().map(wider).collect::<Vec<_>>().join("\n"));
