@@ -198,30 +198,31 @@ fn simplified(
         let mut collapser = Collapser::new(&mut guarded, shell.limbs());
         let mut left = n_hull;
         // First as far as the budget goes, in narrow bands; then on to the count, in any.
-        let narrow =
-            BAND_LAYERS[..NARROW_BANDS].iter().map(|&layers| (layers, budget, MIN_TARGET as usize, 0.0));
-        let wide = KEPT_GAPS
+        let narrow = BAND_LAYERS[..NARROW_BANDS]
             .iter()
-            .flat_map(|&least| BAND_LAYERS.iter().map(move |&layers| (layers, None, target, least)));
-        let n_passes = (NARROW_BANDS + KEPT_GAPS.len() * BAND_LAYERS.len()) as f32;
-        for (k, (layers, budget, aim, least)) in narrow.chain(wide).enumerate() {
+            .map(|&layers| (layers, budget, MIN_TARGET as usize, 0.0, false));
+        // A sharp fold is better than a closed gap.
+        let passes_of_gaps = |&least| {
+            let plain = BAND_LAYERS.iter().map(move |&layers| (layers, None, target, least, false));
+            plain.chain([(None, None, target, least, true)])
+        };
+        let wide = KEPT_GAPS.iter().flat_map(passes_of_gaps);
+        let n_passes = (NARROW_BANDS + KEPT_GAPS.len() * (BAND_LAYERS.len() + 1)) as f32;
+        for (k, (layers, budget, aim, least, may_fold)) in narrow.chain(wide).enumerate() {
             let is_repeated = least > 0.0 && shell.gaps.is_empty();
             if left <= aim || is_repeated || (budget.is_none() && left <= target) {
                 continue;
             }
             collapser.surface.set_band(layers.map(|layers| shell.band(layers)).as_ref());
             collapser.surface.set_sheets(shell.sheets(least));
+            collapser.surface.may_fold = may_fold;
             collapser.budget = budget;
             let from = 0.6 * k as f32 / n_passes;
             left = collapser.run(aim, &|share| go_on(from + 0.6 * share / n_passes))?;
         }
+        collapser.surface.may_fold = false;
         if may_coarsen && left as f64 > MAX_TARGET_RATIO * f64::from(options.target) {
             return Ok(Simplified::TooMany(left));
-        }
-        if left > target {
-            collapser.surface.may_fold = true;
-            left = collapser.run(target, &|share| go_on(0.6 * share))?;
-            collapser.surface.may_fold = false;
         }
         let quadrics = collapser.quadrics;
         if let Some(cage) = relaxed(shell, guarded, &quadrics, options.quads, go_on)? {

@@ -188,7 +188,7 @@ fn a_gap_that_no_lattice_resolves_is_named() {
     let named = report.notices.iter().any(|notice| notice.contains("closes the gap"));
     assert!(named, "{:?}", report.notices);
     let open = mannequin(0.17, 0.06);
-    assert_eq!(generate(&open.0, &open.1, &options(80), &Silent).unwrap().report.notices, [""; 0]);
+    assert_eq!(generate(&open.0, &open.1, &options(120), &Silent).unwrap().report.notices, [""; 0]);
 }
 
 /// A sword in one hand has less than 1.5 % of the model's voxels.
@@ -227,7 +227,7 @@ fn cage_of_a_ring_keeps_its_hole() {
 
 #[test]
 fn no_fold_is_sharper_than_120_degrees_whichever_way_quads_are_cut() {
-    for (soup, target) in [(trousers(), 40), (trousers(), 80), (ring(), 80), (ring(), 200)] {
+    for (soup, target) in [(trousers(), 80), (trousers(), 120), (ring(), 80), (ring(), 200)] {
         let mesh = make(&soup, &options(target)).cage.to_polygon_mesh();
         for k in 0..2 {
             let cage = Cage::new(&cut(&mesh, k)).unwrap();
