@@ -11,13 +11,12 @@ use cagework_io::{Model, ModelFormat, ReshapeOptions, write_weights_npz};
 use glam::{DVec3, Vec3};
 
 use crate::args::{BindArgs, CageSource, ModelOutput};
-use crate::cage::write_cage;
 use crate::card;
 use crate::columns;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, refuse_files_read, write};
 use crate::gpu;
-use crate::load::{load_cage, load_model};
+use crate::load::{generated_model, load_cage, load_model};
 use crate::progress::Bar;
 use crate::rig;
 
@@ -105,7 +104,8 @@ pub(crate) fn bind_model(model: &Model, cage: &Cage, options: &BindOptions) -> R
 fn save_cage(args: &BindArgs, cage: &Cage, model: &Model) -> Result<(), CliError> {
     let Some(path) = &args.save_cage else { return Ok(()) };
     let mesh = model.up().mesh_turned_back(&cage.to_polygon_mesh());
-    write_cage(&ModelOutput { path: path.clone(), format: ModelFormat::Obj }, &mesh, model.origin())
+    let made = generated_model("cage.obj", &mesh, model.origin())?;
+    write(path, &made.write(ModelFormat::Obj, &mesh.positions).map_err(|e| CliError::file(path, e))?)
 }
 
 /// Bytes that are in use at once while a file is written that takes so many: what is held, the weights, and that.
