@@ -180,7 +180,7 @@ impl Model {
         let (mut positions, mut triangles) = (self.positions.clone(), self.triangles.clone());
         if let Ok(Some(rig)) = self.rig() {
             let ends: Vec<Vec3> =
-                rig.shown_ends().map(|end| end.as_vec3()).filter(|end| end.is_finite()).collect();
+                rig.shown_ends().map(DVec3::as_vec3).filter(|end| end.is_finite()).collect();
             positions.extend_from_slice(&self.up.turned(&ends));
         }
         let Some(asked) = clip else { return Ok((positions, triangles)) };

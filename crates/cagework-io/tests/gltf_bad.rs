@@ -155,7 +155,7 @@ fn attributes_of_another_count_than_the_vertices_name_both() {
         "{message}"
     );
     let message = fault_of(|b| {
-        b.json["accessors"][0] = json!({ "componentType": F32, "count": 1 << 24, "type": "VEC3" })
+        b.json["accessors"][0] = json!({ "componentType": F32, "count": 1 << 24, "type": "VEC3" });
     });
     assert!(message.contains("accessor 0 has 16777216 elements that no byte of the file holds"), "{message}");
     let mut b = skinned();

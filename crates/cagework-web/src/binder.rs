@@ -23,8 +23,7 @@ use crate::arrays::{flat, points, polygon_mesh};
 use crate::clock::Listener;
 use crate::controls::{CageControls, control_set, said};
 use crate::error::{Answer, ErrorName, Fault};
-use crate::loaded::READ_LIMIT;
-use crate::options::{BindAsked, CageAsked, Coordinates, taken};
+use crate::options::{BindAsked, CageAsked, Coordinates, READ_LIMIT, taken};
 use crate::problems::{self, Check};
 use crate::views::object;
 

@@ -15,7 +15,7 @@ use crate::arrays::flat;
 use crate::binder::Polygons;
 use crate::error::{Answer, Fault};
 use crate::models::MemberSettings;
-use crate::options::taken;
+use crate::options::{READ_LIMIT, taken};
 use crate::settings::{controls_of, has_controls, member_settings};
 
 /// A model with its looks, and what else was in its file.
@@ -155,9 +155,6 @@ impl Loaded {
         self.settings.clone()
     }
 }
-
-/// Bytes that reading a file may take: a tab has 4 GiB, of which drawing and binding take their part.
-pub(crate) const READ_LIMIT: u64 = 1 << 30;
 
 impl Loaded {
     fn from_bytes(name: &str, bytes: &[u8], sibling: &Function) -> Answer<Self> {

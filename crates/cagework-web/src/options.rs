@@ -11,6 +11,9 @@ use wasm_bindgen::JsValue;
 
 use crate::error::Answer;
 
+/// Bytes that reading a file, or coordinates by formula, may take: a tab has 4 GiB, of which drawing and binding take their part.
+pub(crate) const READ_LIMIT: u64 = 1 << 30;
+
 /// `BindOptions`: those of the core, and where to compute.
 #[derive(Clone, Copy, Deserialize)]
 #[cfg_attr(test, derive(serde::Serialize, ts_rs::TS))]

@@ -11,8 +11,8 @@ use super::Engine;
 use crate::arrays::points;
 use crate::controls::{CageControls, InnerKind, MadeCage};
 use crate::error::Fault;
-use crate::loaded::READ_LIMIT;
 use crate::models::Models;
+use crate::options::READ_LIMIT;
 use crate::options::taken;
 use crate::views::object;
 

@@ -44,8 +44,9 @@ enum Interpolation {
 /// The numbers of an accessor, shared by all tracks that use it.
 type Numbers = Arc<[f32]>;
 
-/// Accessors that were decoded, with the width of an element; `None` if that failed.
-type Decoded = HashMap<(u32, usize), Option<Numbers>>;
+/// Accessors that were decoded, with the width of an element: their numbers, and whether these ascend. `None` if that failed, or one
+/// is not finite. Looked at once, however many channels use them.
+type Decoded = HashMap<(u32, usize), Option<(Numbers, bool)>>;
 
 /// The clips of a document; channels that cannot be read are left out.
 pub(crate) fn clips(document: &GltfDocument) -> Vec<Clip> {
@@ -90,16 +91,20 @@ impl Track {
     fn read(document: &GltfDocument, sampler: &Value, driven: Driven, decoded: &mut Decoded) -> Option<Self> {
         let mut numbers = |key: &str, width: usize| {
             let accessor = sampler[key].as_u64()? as u32;
-            let read = || numbers(document, accessor, width).ok();
+            let read = || {
+                let numbers = numbers(document, accessor, width).ok()?;
+                let is_sorted = numbers.is_sorted();
+                numbers.iter().all(|x| x.is_finite()).then_some((numbers, is_sorted))
+            };
             decoded.entry((accessor, width)).or_insert_with(read).clone()
         };
-        let times = numbers("input", 1)?;
+        let (times, is_sorted) = numbers("input", 1)?;
         let width = match driven {
             Driven::Translation(_) | Driven::Scale(_) => 3,
             Driven::Rotation(_) => 4,
             Driven::Weights(_) | Driven::MeshWeights(_) => 1,
         };
-        let values = numbers("output", width)?;
+        let (values, _) = numbers("output", width)?;
         let interpolation = match sampler["interpolation"].as_str() {
             Some("STEP") => Interpolation::Step,
             Some("CUBICSPLINE") => Interpolation::Cubic,
@@ -108,11 +113,8 @@ impl Track {
         let per_key = if interpolation == Interpolation::Cubic { 3 } else { 1 };
         // A key has one weight for each morph target.
         let width = if width == 1 { values.len() / (per_key * times.len()).max(1) } else { width };
-        let is_right = !times.is_empty()
-            && width > 0
-            && values.len() == width * per_key * times.len()
-            && times.is_sorted()
-            && values.iter().chain(times.iter()).all(|x| x.is_finite());
+        let is_right =
+            !times.is_empty() && width > 0 && values.len() == width * per_key * times.len() && is_sorted;
         is_right.then_some(Self { times, values, width, interpolation })
     }
 
