@@ -24,14 +24,18 @@ pub(crate) fn relative(position: DVec3, origin: DVec3) -> Vec3 {
     (position - origin).as_vec3()
 }
 
-/// What to say of positions so far from the origin that numbers of 32 bits have coarse steps there.
+/// Steps of 32-bit coordinates that are worth a notice, over the model's extent.
+const COARSE: f32 = 1e-5;
+
+/// The notice on positions so far from the origin that numbers of 32 bits have coarse steps there, if they have.
 #[must_use]
 pub fn far_notice(positions: &[Vec3]) -> Option<String> {
+    let extent = Bounds::of(positions)?.extent().max_element();
     let far = origin_near(positions).abs().max_element() as f32;
-    (far > 0.0).then(|| {
+    let step = far.next_up() - far;
+    (extent > 0.0 && step > COARSE * extent).then(|| {
         format!(
-            "the model is so far from the origin that its coordinates have steps of {:e}: move it nearer",
-            far.next_up() - far
+            "the model is so far from the origin that its coordinates have steps of {step:e}: move it nearer"
         )
     })
 }
