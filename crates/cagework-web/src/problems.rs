@@ -36,13 +36,14 @@ fn view(problem: &Problem) -> views::Problem {
             views::Fix { label: format!("Bind with {cells} cells"), mend: Mend::Grid { cells } }
         }
     });
+    let has_no_repair = problem.severity == Severity::Error || problem.code == Code::SelfIntersection;
     let regenerate = || views::Fix { label: "Make a new cage".to_owned(), mend: Mend::Regenerate };
     views::Problem {
         code: problem.code,
         severity: problem.severity,
         message: problem.message.clone(),
         count: n,
-        fix: fix.or_else(|| (problem.severity == Severity::Error).then(regenerate)),
+        fix: fix.or_else(|| has_no_repair.then(regenerate)),
     }
 }
 

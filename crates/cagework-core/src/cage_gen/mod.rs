@@ -92,13 +92,26 @@ pub fn generate(
     generate_plain(positions, triangles, options, progress)
 }
 
-/// A cage whose faces enclose the model as they are.
+/// A cage whose faces enclose the model as they are. Its gaps stay open if the vertices suffice for most of them; otherwise it
+/// follows the model without regard to gaps, because those that are kept take the vertices from everything else.
 fn generate_plain(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
     options: &CageOptions,
     progress: &dyn Progress,
 ) -> Result<GeneratedCage, CageGenError> {
+    let (made, is_worth_it) = generate_once(positions, triangles, options, true, progress)?;
+    Ok(if is_worth_it { made } else { generate_once(positions, triangles, options, false, progress)?.0 })
+}
+
+/// A cage, and whether it keeps at least half of the model's narrow gaps, and all if some are too narrow for any lattice.
+fn generate_once(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    options: &CageOptions,
+    keeps_gaps: bool,
+    progress: &dyn Progress,
+) -> Result<(GeneratedCage, bool), CageGenError> {
     let bounds = options::check(positions, triangles, options)?;
     let began = progress.now_ms();
     let target = options.target as usize;
@@ -112,7 +125,7 @@ fn generate_plain(
         _ => Vec::new(),
     };
     // As fine as the gaps need, if there are vertices for them.
-    let for_gaps = if gaps.len() * VERTICES_PER_GAP <= target { gaps.as_slice() } else { &[] };
+    let for_gaps = if keeps_gaps && gaps.len() * VERTICES_PER_GAP <= target { gaps.as_slice() } else { &[] };
     let finest = for_gaps.iter().map(|gap| gap.voxels).fold(base, usize::max).min(MAX_VOXELS);
     let mut voxels = if options.voxels > 0 { options.voxels as usize } else { finest };
     for attempt in 1..=MAX_LATTICES {
@@ -121,9 +134,12 @@ fn generate_plain(
             let event = ProgressEvent { stage, fraction, iteration: attempt as u32 - 1, delta: None };
             if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
         };
-        let shell = Shell::new(positions, triangles, bounds, voxels, options, &|share| {
+        let mut shell = Shell::new(positions, triangles, bounds, voxels, options, &|share| {
             go_on(Stage::Voxelize, 0.4 * share)
         })?;
+        if !keeps_gaps {
+            shell.gaps.clear();
+        }
         // The solid's handles and gaps may need more vertices than asked for: a coarser lattice closes them.
         let may_coarsen = attempt < MAX_LATTICES && voxels > MIN_VOXELS;
         let n_half = shell.hull.positions.len();
@@ -142,6 +158,9 @@ fn generate_plain(
                 continue;
             }
         };
+        let closed: Vec<String> = gaps.iter().filter_map(|gap| gap.notice(&cage, voxels, options)).collect();
+        let is_too_narrow = gaps.iter().any(|gap| gap.voxels > MAX_VOXELS);
+        let is_worth_it = closed.is_empty() || (2 * closed.len() <= gaps.len() && !is_too_narrow);
         let report = CageReport {
             target: options.target,
             vertices: cage.n_vertices() as u32,
@@ -152,11 +171,7 @@ fn generate_plain(
             voxel_size: shell.lattice.cell as f32,
             clearance: shell.clearance as f32,
             mirror: shell.hull.mirror.map(Mirror::of_axis),
-            notices: gaps
-                .iter()
-                .filter_map(|gap| gap.notice(&cage, voxels, options))
-                .take(MAX_NOTICES)
-                .collect(),
+            notices: closed.into_iter().take(MAX_NOTICES).collect(),
             parts: n_parts(&cage),
             separate: shell.separate as u32,
             hull_vertices: shell.hull.n_whole() as u32,
@@ -164,7 +179,7 @@ fn generate_plain(
             attempts: attempt as u32,
             elapsed_ms: progress.now_ms() - began,
         };
-        return Ok(GeneratedCage { cage, report });
+        return Ok((GeneratedCage { cage, report }, is_worth_it));
     }
     Err(CageGenError::Unresolved)
 }
