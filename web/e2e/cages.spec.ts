@@ -89,7 +89,7 @@ test("a gap stays open as the vertices allow, and when asked for", async ({ page
   await shoot(page, "cage-gap");
 
   await test.step("a cage of more vertices than wanted says so", async () => {
-    await gaps.fill("16");
+    await gaps.fill("64");
     await drop(page, [{ name: "spring.obj", bytes: spring() }]);
     await expect(page.getByText(/need \d+ vertices instead of 80/)).toBeVisible();
     await bound(page);
