@@ -72,7 +72,7 @@ describe("dropped files", () => {
   it("say what can be opened when nothing fits", () => {
     expect(planDrop(["notes.txt"])).toEqual({
       kind: "unknown",
-      sentence: "Cagework opens .glb, .vrm, .gltf, .obj, .ply, and .stl files.",
+      sentence: "Cagework opens .glb, .vrm, .gltf, .obj, .ply, .stl, and .off files.",
     });
     expect(planDrop([]).kind).toBe("nothing");
   });

@@ -99,7 +99,8 @@ export function createExports(ctx: Context, project: Project): Exports {
       const isVrm = /\.vrm$/i.test(source) && (kind === "glb" || kind === "poses");
       const file = other(isVrm ? full.replace(/glb$/, "vrm") : full, files);
       const blob = new Blob([new Uint8Array(ownBytes(kind, id))]);
-      for (const notice of ctx.session().engine.rigNotices()) notices.add(notice);
+      if (kind === "glb" || kind === "shape")
+        for (const notice of ctx.session().engine.rigNotices()) notices.add(notice);
       if (files.length > 0) await new Promise((resolve) => setTimeout(resolve, BETWEEN_MS));
       download(blob, file);
       files.push(file);

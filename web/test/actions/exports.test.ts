@@ -55,7 +55,7 @@ it("each file has the model's name, and its size is said", async () => {
   exports.shapeIn("stl");
   await exports.save("shape");
   expect(downloads.at(-1), "its shape is another file").toBe("someone-posed.stl");
-  expect(said.at(-1)).toContain("(3 byte)");
+  expect(said.at(-2)).toContain("(3 byte)");
 });
 
 it("several models leave as a file each, or one of them alone", async () => {
