@@ -12,7 +12,6 @@ mod defects;
 mod hats;
 mod orient;
 mod patch;
-mod pieces;
 mod polygon;
 #[cfg(test)]
 pub(crate) mod shapes;
@@ -30,7 +29,7 @@ use glam::{DVec2, DVec3, Vec3};
 use crate::mesh::{Bounds, PolygonMesh};
 
 pub use defects::{CageError, CageNotice, FaceDefect};
-use polygon::{Hats, Polygon};
+use polygon::Polygon;
 use topology::Surface;
 
 /// Smallest diagonal of a cage, object units: squares and cubes of lengths stay far from the end of f32 and f64.
@@ -282,13 +281,11 @@ impl Cage {
     /// [`Self::facets`] and barycentric coordinates in it. Calls `each(cage vertex, value)` for every vertex whose
     /// value is not zero; the values sum to 1 and reproduce the point (on a bent face, to 2 % of its bend).
     ///
-    /// Linear on triangles; Meyer et al. 2002 on convex planar polygons (bilinear on a rectangle). Other planar polygons
-    /// are cut into convex pieces, each with the coordinates of its own corners, because mean value coordinates of the
-    /// whole are negative next to a re-entrant corner and reach across the gap of a C; they serve for pieces with
-    /// straight corners. A bent face is a patch over the plane that fits it best, where its outline is convex, with the
-    /// coordinates of that outline: they change continuously as a flat face is bent. Where the outline is not convex, it
-    /// is split into triangles, and hats are linear on each. All are linear along edges, so neighbouring faces agree; none
-    /// is negative.
+    /// Linear on triangles; Meyer et al. 2002 on planar quads (bilinear on a rectangle), blended with the following
+    /// where a corner is nearly straight. On all other polygons the hats are pseudo-harmonic coordinates (after Gordon and
+    /// Wixom 1974; means over the chords through the point), which change continuously with the corners. A bent face is a patch over the plane
+    /// that fits it best, with the coordinates of its outline there. All are linear along edges, so neighbouring faces agree;
+    /// none is negative.
     ///
     /// # Panics
     /// If there is no such facet.
@@ -296,29 +293,27 @@ impl Cage {
         let f = self.face_of_facet[facet as usize] as usize;
         let (face, polygon) = (&self.faces[f], &self.polygons[f]);
         let rank = (facet - self.first_facet[f]) as usize;
-        let piece = polygon.piece_of_facet.get(rank).map(|&piece| &polygon.pieces[piece as usize]);
-        let Some(piece) = piece.filter(|piece| piece.hats != Hats::Linear) else {
+        if polygon.outline.is_empty() {
             for (&i, b) in self.facets[facet as usize].iter().zip(barycentric) {
                 if b != 0.0 {
                     each(i, b);
                 }
             }
             return;
-        };
+        }
         let corners = polygon.facets[rank].map(|k| polygon.outline[k as usize]);
         let point = corners.iter().zip(barycentric).fold(DVec2::ZERO, |p, (&q, b)| p + b * q);
-        let n = piece.corners.len();
-        let (mut stack, mut heap);
-        let both: &mut [f64] = if n <= STACK_CORNERS {
-            stack = [0.0; 2 * STACK_CORNERS];
-            &mut stack[..2 * n]
+        let (mut stack, mut heap) = ([0.0; STACK_CORNERS], Vec::new());
+        let values = if let Some(values) = stack.get_mut(..face.len()) {
+            values
         } else {
-            heap = vec![0.0; 2 * n];
-            &mut heap
+            heap.resize(face.len(), 0.0);
+            heap.as_mut_slice()
         };
-        for (&k, &value) in piece.corners.iter().zip(piece.values(point, both)) {
+        polygon.values(point, values);
+        for (&i, &value) in face.iter().zip(values.iter()) {
             if value != 0.0 {
-                each(face[k as usize], value);
+                each(i, value);
             }
         }
     }

@@ -1,10 +1,14 @@
 //! Barycentric coordinates of planar polygons, robust on sides and corners: the hats' values on faces.
 //!
 //! Sources: Meyer, Lee, Barr, Desbrun 2002, "Generalized barycentric coordinates on irregular polygons" (Wachspress
-//! coordinates), and Hormann, Floater 2006, "Mean value coordinates for arbitrary planar polygons".
+//! coordinates); Gordon, Wixom 1974, "Pseudo-harmonic interpolation on convex domains"; Manson, Li, Schaefer 2011,
+//! "Positive Gordon-Wixom coordinates".
 //!
 //! Changes versus the papers: Meyer's quotients are multiplied by all distances, so that nothing is divided by zero on
-//! a side; of the two formulas for the tangent of half an angle, the one without cancellation is used.
+//! a side. Chords end at the nearest sides, which are found by a sweep, and have other weights; their mean is taken by
+//! quadrature, which keeps the sum, the sign and linear precision because every chord has them.
+
+use std::f64::consts::PI;
 
 use glam::DVec2;
 
@@ -12,6 +16,9 @@ use super::triangulate::cross;
 
 /// Distances below this fraction of the polygon are zero: on the corner or side. A few roundings of f64.
 const ON_OUTLINE: f64 = 1e-15;
+
+/// Nodes of Gauss quadrature on `[0, 1]`: `(1 ± 1 / sqrt(3)) / 2`.
+const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// Coordinates of `point` in a strictly convex counter-clockwise polygon. `values`: `[n]`, non-negative, sum 1; `areas`:
 /// `[n]`, scratch space. Outside by rounding, a point is treated as if on the side.
@@ -44,33 +51,77 @@ pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64], ar
     normalize(values);
 }
 
-/// Mean value coordinates of `point` in a simple counter-clockwise polygon; defined in the whole plane.
-/// `values`: `[n]`, sum 1, possibly negative if the polygon is not convex.
-pub(super) fn mean_value(outline: &[DVec2], point: DVec2, values: &mut [f64]) {
+/// Pseudo-harmonic coordinates of `point` in a simple counter-clockwise polygon that it lies in: the mean, over all chords
+/// through the point, of the linear interpolation between the chord's ends, weighted by `1 / (r s sqrt(r + s))`, where `r` and
+/// `s` are the distances to the ends. On a circle, `1 / (r s)` would make them harmonic; the root reduces the weights of far
+/// corners. `values`: `[n]`, non-negative, sum 1. `O(n (log n + c))`, where a line through the point crosses `c` sides.
+pub(super) fn pseudo_harmonic(outline: &[DVec2], point: DVec2, values: &mut [f64]) {
     let n = outline.len();
+    let next = |k: usize| if k + 1 == n { 0 } else { k + 1 };
+    let to = |k: usize| outline[k] - point;
+    let side = |k: usize| outline[next(k)] - outline[k];
     let extent = outline.iter().map(|q| q.length()).fold(0.0, f64::max);
     values.fill(0.0);
-    if let Some(k) = outline.iter().position(|&q| q.distance(point) <= ON_OUTLINE * extent) {
-        values[k] = 1.0;
-        return;
-    }
+    let mut nearest = (f64::INFINITY, 0, 0.0);
     for k in 0..n {
-        let next = if k + 1 == n { 0 } else { k + 1 };
-        let (s, t) = (outline[k] - point, outline[next] - point);
-        let (r, q) = (s.length(), t.length());
-        let (sine, cosine) = (s.perp_dot(t), s.dot(t));
-        if cosine < 0.0 && sine.abs() <= ON_OUTLINE * (r + q) * (r + q) {
-            values.fill(0.0);
-            values[k] = q / (r + q);
-            values[next] = r / (r + q);
-            return;
+        let share = (-to(k).dot(side(k)) / side(k).length_squared()).clamp(0.0, 1.0);
+        let distance = (to(k) + share * side(k)).length();
+        if distance < nearest.0 {
+            nearest = (distance, k, share);
         }
-        // tan(angle / 2), where r q is the product of the lengths in sine and cosine.
-        let tangent = if cosine < 0.0 { (r * q - cosine) / sine } else { sine / (r * q + cosine) };
-        values[k] += tangent / r;
-        values[next] += tangent / q;
     }
-    normalize(values);
+    let on_side = |values: &mut [f64]| {
+        values.fill(0.0);
+        values[nearest.1] = 1.0 - nearest.2;
+        values[next(nearest.1)] = nearest.2;
+    };
+    if nearest.0 <= ON_OUTLINE * extent {
+        return on_side(values);
+    }
+    // Rotate a line about the point by half a turn. It crosses the same sides from one corner to the next.
+    let is_above = |k: usize| to(k).y > 0.0 || to(k).y == 0.0 && to(k).x > 0.0;
+    let angle = |k: usize| if is_above(k) { to(k).y.atan2(to(k).x) } else { (-to(k).y).atan2(-to(k).x) };
+    let mut corners: Vec<(f64, usize)> = (0..n).map(|k| (angle(k), k)).collect();
+    corners.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let mut crossed: Vec<usize> = (0..n).filter(|&k| is_above(k) != is_above(next(k))).collect();
+    for (rank, &(start, corner)) in corners.iter().enumerate() {
+        for side in [if corner == 0 { n - 1 } else { corner - 1 }, corner] {
+            match crossed.iter().position(|&k| k == side) {
+                Some(place) => drop(crossed.swap_remove(place)),
+                None => crossed.push(side),
+            }
+        }
+        let end = corners.get(rank + 1).map_or(corners[0].0 + PI, |&(end, _)| end);
+        let width = end - start;
+        let ways = GAUSS.map(|node| DVec2::from_angle(start + node * width));
+        // The nearest side ahead of the point, and the nearest behind it.
+        let (mut ends, mut distances) = ([None; 2], [f64::INFINITY; 2]);
+        for &k in &crossed {
+            let distance = to(k).perp_dot(side(k)) / ways[0].perp_dot(side(k));
+            let which = usize::from(distance < 0.0);
+            if distance.abs() < distances[which] {
+                (ends[which], distances[which]) = (Some(k), distance.abs());
+            }
+        }
+        let [Some(ahead), Some(behind)] = ends else { continue };
+        for way in ways {
+            let hits = [ahead, behind].map(|k| {
+                let share = (to(k).perp_dot(way) / way.perp_dot(side(k))).clamp(0.0, 1.0);
+                (k, share, (to(k) + share * side(k)).length())
+            });
+            let chord = hits[0].2 + hits[1].2;
+            for (k, share, distance) in hits {
+                let weight = width / (distance * chord * chord.sqrt());
+                // NaN along a side, in a sector without width.
+                if weight * share >= 0.0 {
+                    values[k] += weight * (1.0 - share);
+                    values[next(k)] += weight * share;
+                }
+            }
+        }
+    }
+    // A point outside by rounding may lie on no chord.
+    if values.iter().sum::<f64>().is_normal() { normalize(values) } else { on_side(values) }
 }
 
 /// Scales `values` to the sum 1.

@@ -21,7 +21,7 @@ pub(super) struct Facets {
 }
 
 /// Cuts a strictly convex polygon, counter-clockwise.
-pub(super) fn facets(outline: &[DVec2]) -> Facets {
+pub(super) fn rings(outline: &[DVec2]) -> Facets {
     let n = outline.len();
     let middle = outline.iter().sum::<DVec2>() / n as f64;
     let mut inner = Vec::new();
@@ -48,6 +48,36 @@ pub(super) fn facets(outline: &[DVec2]) -> Facets {
             }
             facets.push([ring(RINGS.len() - 1, place), ring(RINGS.len() - 1, place + 1), last]);
         }
+    }
+    Facets { inner, facets }
+}
+
+/// Cuts a simple polygon of which `triangles` are given: each into a fan around its middle, with its diagonals halved.
+pub(super) fn fans(outline: &[DVec2], triangles: &[[u32; 3]]) -> Facets {
+    let n = outline.len() as u32;
+    let (mut inner, mut facets) = (Vec::new(), Vec::new());
+    let mut halved: Vec<([u32; 2], u32)> = Vec::new();
+    for triangle in triangles {
+        let corners = triangle.map(|k| outline[k as usize]);
+        let mut rim = Vec::new();
+        for k in 0..3 {
+            let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
+            rim.push(a);
+            if (a + 1) % n == b {
+                continue;
+            }
+            let ends = [a.min(b), a.max(b)];
+            let half = halved.iter().find(|(known, _)| *known == ends).map(|&(_, half)| half);
+            rim.push(half.unwrap_or_else(|| {
+                let half = n + inner.len() as u32;
+                inner.push(0.5 * (corners[k] + corners[(k + 1) % 3]));
+                halved.push((ends, half));
+                half
+            }));
+        }
+        let middle = n + inner.len() as u32;
+        inner.push(corners.iter().sum::<DVec2>() / 3.0);
+        facets.extend((0..rim.len()).map(|k| [rim[k], rim[(k + 1) % rim.len()], middle]));
     }
     Facets { inner, facets }
 }

@@ -5,7 +5,6 @@ use glam::{DVec2, DVec3};
 use super::defects::FaceDefect;
 use super::hats;
 use super::patch::{self, Facets};
-use super::pieces::{Pieces, convex_pieces};
 use super::triangulate::{cross, ear_clip};
 
 /// A face lower than this fraction of the cage's diagonal has no area: it is lost in the rounding of f32 coordinates
@@ -16,75 +15,33 @@ pub(super) const FLAT_HEIGHT: f64 = 1e-7;
 /// an OBJ file move the corners of a model of unit size by so much, and the rest pose can be off by no more.
 pub(super) const PLANAR: f64 = 2e-6;
 
-/// Smallest sine of a convex corner's turn for Meyer's formula: at a straight corner its hat vanishes, which would
-/// not fit the neighbouring faces; mean value coordinates have no trouble there, and are not negative either.
+/// Smallest sine of the turn at a corner of an outline that is cut as a convex one.
 const MIN_TURN: f64 = 1e-3;
 
-/// Most corners for Meyer's formula, a product of one factor an edge: more could underflow.
-const MAX_CONVEX_CORNERS: usize = 32;
+/// Quads whose smallest turn has at least this sine (14 degrees) have Meyer's coordinates alone. At a straight corner Meyer's
+/// hat vanishes, so below it they are blended with pseudo-harmonic ones, which the quad has when the corner is straight.
+const MEYER_TURN: f64 = 0.25;
+
+/// Smaller shares of Meyer's coordinates are set to 0: at a straight corner their quotient is 0 / 0.
+const MIN_SHARE: f64 = 1e-6;
 
 /// Most corners of a face: cutting it takes the square of them, or the cube at worst.
 pub(super) const MAX_CORNERS: usize = 1000;
-
-/// How boundary values are interpolated on a face.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Hats {
-    /// Linear on each triangle.
-    Linear,
-    /// Meyer et al. 2002.
-    Convex,
-    /// Hormann & Floater 2006: pieces with straight corners or very many.
-    MeanValue,
-}
 
 /// A face in its plane.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Polygon {
     /// Corners in the plane, counter-clockwise seen from outside, then the patch's inner points; empty if hats are linear
-    /// everywhere.
+    /// on each facet.
     pub(super) outline: Vec<DVec2>,
-    /// What carries hats of its own; empty if hats are linear everywhere.
-    pub(super) pieces: Vec<Piece>,
+    /// Share of Meyer's coordinates in the hats; the rest is pseudo-harmonic coordinates. 0 unless the face is a quad.
+    meyer: f64,
     /// Triangles that cover the face, as corners of it, turned like it.
     pub(super) triangles: Vec<[u32; 3]>,
     /// The surface on which hats are prescribed: the triangles, or those of a patch, as corners and inner points.
     pub(super) facets: Vec<[u32; 3]>,
-    /// The piece that each facet lies in; empty if hats are linear everywhere.
-    pub(super) piece_of_facet: Vec<u32>,
     /// The hats of the patch's inner points. `[n_inner][n_corners]`
     pub(super) inner: Vec<Vec<f64>>,
-}
-
-/// A convex part of a face.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Piece {
-    pub(super) hats: Hats,
-    /// Corners of the face, counter-clockwise.
-    pub(super) corners: Vec<u32>,
-    /// The same in the plane.
-    pub(super) outline: Vec<DVec2>,
-}
-
-impl Piece {
-    fn new(outline: &[DVec2], corners: Vec<u32>) -> Self {
-        let outline: Vec<DVec2> = corners.iter().map(|&k| outline[k as usize]).collect();
-        let hats = match corners.len() {
-            3 => Hats::Linear,
-            4..=MAX_CONVEX_CORNERS if is_convex(&outline) => Hats::Convex,
-            _ => Hats::MeanValue,
-        };
-        Self { hats, corners, outline }
-    }
-
-    /// Values of its corners' hats at a point. `both`: scratch space, `[2][n_corners]`; returns its first half.
-    pub(super) fn values<'a>(&self, point: DVec2, both: &'a mut [f64]) -> &'a [f64] {
-        let (values, areas) = both.split_at_mut(self.corners.len());
-        match self.hats {
-            Hats::Convex => hats::wachspress(&self.outline, point, values, areas),
-            Hats::Linear | Hats::MeanValue => hats::mean_value(&self.outline, point, values),
-        }
-        values
-    }
 }
 
 impl Polygon {
@@ -108,51 +65,68 @@ impl Polygon {
         let normal = normal.normalize();
         let outline = project(&arms, normal);
         let height = arms.iter().map(|p| p.dot(normal).abs()).fold(0.0, f64::max);
-        if height > PLANAR * diagonal {
-            let triangles = if n == 4 { split_quad(&arms, normal) } else { ear_clip(&outline)? };
-            return Ok(if is_convex(&outline) {
-                Self::patch(outline, triangles)
-            } else {
-                Self::linear(triangles)
-            });
-        }
-        let Pieces { corners, triangles, piece_of_triangle } = if is_convex(&outline) {
-            Pieces {
-                corners: vec![(0..n as u32).collect()],
-                triangles: (2..n as u32).map(|k| [0, k - 1, k]).collect(),
-                piece_of_triangle: vec![0; n - 2],
-            }
-        } else if crosses_itself(&outline) {
+        let (is_bent, is_convex) = (height > PLANAR * diagonal, is_convex(&outline));
+        let crosses = !is_convex && crosses_itself(&outline);
+        if crosses && !is_bent {
             return Err(FaceDefect::CrossesItself);
-        } else {
-            convex_pieces(&outline)?
+        }
+        let triangles = match n {
+            4 if is_bent => split_quad(&arms, normal),
+            _ if is_convex && !is_bent => (2..n as u32).map(|k| [0, k - 1, k]).collect(),
+            _ => ear_clip(&outline)?,
         };
-        let pieces = corners.into_iter().map(|corners| Piece::new(&outline, corners)).collect();
-        let facets = triangles.clone();
-        Ok(Self { outline, pieces, triangles, facets, piece_of_facet: piece_of_triangle, inner: Vec::new() })
+        if crosses {
+            return Ok(Self::linear(triangles));
+        }
+        let Facets { inner: points, facets } = match (is_bent, is_convex) {
+            (false, _) => Facets { inner: Vec::new(), facets: triangles.clone() },
+            (true, true) => patch::rings(&outline),
+            (true, false) => patch::fans(&outline, &triangles),
+        };
+        let meyer = if n == 4 { meyer_share(&outline) } else { 0.0 };
+        let mut polygon = Self { outline, meyer, triangles, facets, inner: Vec::new() };
+        for &point in &points {
+            let mut hats = vec![0.0; n];
+            polygon.values(point, &mut hats);
+            polygon.inner.push(hats);
+        }
+        polygon.outline.extend(points);
+        Ok(polygon)
     }
 
     fn linear(triangles: Vec<[u32; 3]>) -> Self {
-        Self {
-            outline: Vec::new(),
-            pieces: Vec::new(),
-            facets: triangles.clone(),
-            triangles,
-            piece_of_facet: Vec::new(),
-            inner: Vec::new(),
-        }
+        let facets = triangles.clone();
+        Self { outline: Vec::new(), meyer: 0.0, facets, triangles, inner: Vec::new() }
     }
 
-    /// A bent face whose outline, seen along its normal, is convex.
-    fn patch(mut outline: Vec<DVec2>, triangles: Vec<[u32; 3]>) -> Self {
-        let Facets { inner: points, facets } = patch::facets(&outline);
-        let piece = Piece::new(&outline, (0..outline.len() as u32).collect());
-        let mut both = vec![0.0; 2 * outline.len()];
-        let inner = points.iter().map(|&p| piece.values(p, &mut both).to_vec()).collect();
-        outline.extend(points);
-        let piece_of_facet = vec![0; facets.len()];
-        Self { outline, pieces: vec![piece], triangles, facets, piece_of_facet, inner }
+    /// Values of the corners' hats at a point of the plane, not negative. `values`: `[n_corners]`, zeros.
+    pub(super) fn values(&self, point: DVec2, values: &mut [f64]) {
+        let outline = &self.outline[..values.len()];
+        if self.meyer < 1.0 {
+            hats::pseudo_harmonic(outline, point, values);
+        }
+        if self.meyer > 0.0 {
+            let (mut meyer, mut areas) = ([0.0; 4], [0.0; 4]);
+            hats::wachspress(outline, point, &mut meyer, &mut areas);
+            for (value, meyer) in values.iter_mut().zip(meyer) {
+                *value += self.meyer * (meyer - *value);
+            }
+        }
     }
+}
+
+/// Share of Meyer's coordinates on a quad: from 0 at a straight corner to 1 at [`MEYER_TURN`], by `3 x^2 - 2 x^3`.
+fn meyer_share(quad: &[DVec2]) -> f64 {
+    let turns = (0..4).map(|k| {
+        let [before, after] =
+            [quad[k] - quad[(k + 3) % 4], quad[(k + 1) % 4] - quad[k]].map(DVec2::normalize_or_zero);
+        let sine = before.perp_dot(after);
+        // Turns above 90 degrees are far from straight.
+        if sine > 0.0 && before.dot(after) < 0.0 { 1.0 } else { sine }
+    });
+    let x = (turns.fold(1.0, f64::min) / MEYER_TURN).clamp(0.0, 1.0);
+    let share = x * x * (3.0 - 2.0 * x);
+    if share < MIN_SHARE { 0.0 } else { share }
 }
 
 /// Coordinates in the plane with this normal, one axis along the longest side, so that a rectangle stays one.
@@ -182,7 +156,7 @@ fn is_convex(outline: &[DVec2]) -> bool {
 }
 
 /// Sine of the turn at `b` on the way from `a` to `c`; positive to the left.
-pub(super) fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
+fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     (b - a).normalize_or_zero().perp_dot((c - b).normalize_or_zero())
 }
 

@@ -57,7 +57,7 @@ fn hats_reproduce_points_on_bent_faces_to_two_per_cent_of_the_bend() {
         mesh.positions[7] += Vec3::splat(by);
         assert_linear_reproduction(&Cage::new(&mesh).unwrap(), 0.02 * f64::from(by));
     }
-    // A bent pentagon, whose sides are wider apart, and a bent concave face, which is split into triangles.
+    // A bent pentagon, whose sides are wider apart, and a bent concave face, whose facets are larger.
     let pentagon: Vec<[f32; 2]> =
         (0..5).map(|k| (k as f32 * std::f32::consts::TAU / 5.0).sin_cos()).map(|(y, x)| [x, y]).collect();
     let mut mesh = prism(&pentagon, 1.0);
@@ -67,7 +67,7 @@ fn hats_reproduce_points_on_bent_faces_to_two_per_cent_of_the_bend() {
     assert_linear_reproduction(&cage, 0.04 * 0.1);
     let mut mesh = prism(&[[0.0, 0.0], [2.0, 0.0], [0.5, 0.5], [0.0, 2.0]], 1.0);
     mesh.positions[7].z += 0.1;
-    assert_linear_reproduction(&Cage::new(&mesh).unwrap(), ROUNDING);
+    assert_linear_reproduction(&Cage::new(&mesh).unwrap(), 0.08 * 0.1);
 }
 
 /// A cube with one corner pulled out, so that three of its quads are not planar.
@@ -146,26 +146,127 @@ fn rotated_faces_count_as_planar() {
         *p = turn * *p * 0.37 + Vec3::new(5.0, -3.0, 2.0);
     }
     let cage = Cage::new(&mesh).unwrap();
-    assert!(cage.polygons.iter().all(|p| !p.pieces.is_empty()), "a face was split as if it were not planar");
+    assert!(cage.polygons.iter().all(|p| p.inner.is_empty()), "a face was cut as if it were not planar");
     // f32 moves the corners out of their planes, and hats reproduce what is in the plane.
     assert_linear_reproduction(&cage, 2.0 * polygon::PLANAR * f64::from(cage.diagonal()));
 }
 
-/// In the C's caps no hat of one arm's end reaches the other arm, and none is negative: mean value coordinates of the
-/// whole polygon, of which both were once made, did either by a few per cent.
+/// In the C's caps a hat of one arm's end is below 1e-3 in the other arm, whose chords past the re-entrant corner end on the
+/// back (harmonic coordinates have 2e-4), and 0 at that arm's end. None is negative.
 #[test]
-fn hats_of_a_concave_face_are_positive_and_do_not_reach_across() {
+fn hats_of_a_concave_face_are_positive_and_hardly_reach_across() {
     let cage = Cage::new(&c_shape()).unwrap();
     for t in 0..cage.facets().len() as u32 {
         for b in barycentrics() {
             let [p, q, r] = cage.facet_corners(t);
-            let y = (b[0] * p + b[1] * q + b[2] * r).y;
+            let DVec3 { x, y, .. } = b[0] * p + b[1] * q + b[2] * r;
             for (i, value) in hats(&cage, t, b).into_iter().enumerate() {
                 let corner = cage.positions()[i];
                 assert!(value >= 0.0, "hat {i} is {value} in triangle {t} at {b:?}");
-                let other_arm = corner.x == 3.0 && if corner.y <= 1.0 { y >= 2.0 } else { y <= 1.0 };
-                assert!(!other_arm || value <= ROUNDING, "hat {i} is {value} in the other arm, {b:?}");
+                let other_arm = x >= 1.0 && if corner.y <= 1.0 { y >= 2.0 } else { y <= 1.0 };
+                let most = if x > 2.0 { ROUNDING } else { 1e-3 };
+                assert!(corner.x < 3.0 || !other_arm || value <= most, "hat {i} is {value} at {x} {y}");
             }
+        }
+    }
+}
+
+/// A pentagon and a quad whose corner 1 is straight at `d = 0`, and a star whose re-entrant corner 1 moves by `d`.
+fn nearly_straight(d: f64) -> [Vec<DVec2>; 3] {
+    let star = (0..10).map(|k| DVec2::from_angle(k as f64 * 0.2 * std::f64::consts::PI));
+    let star = star
+        .enumerate()
+        .map(|(k, p)| {
+            if k % 2 == 0 {
+                p
+            } else if k == 1 {
+                (0.4 - d) * p
+            } else {
+                0.4 * p
+            }
+        })
+        .collect();
+    let corners = |list: &[[f64; 2]]| list.iter().map(|&p| p.into()).collect();
+    let (pentagon, quad) = (
+        [[0.0, 0.0], [0.5, -d], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
+        [[0.0, 0.0], [0.5, -d], [1.0, 0.0], [0.4, 1.0]],
+    );
+    [corners(&pentagon), corners(&quad), star]
+}
+
+/// Hats of a flat face at points given by weights of its corners. `[n_points][n]`
+fn face_values(outline: &[DVec2], points: &[DVec2]) -> Vec<Vec<f64>> {
+    let corners: Vec<DVec3> = outline.iter().map(|p| p.extend(0.0)).collect();
+    let polygon = Polygon::new(&corners, outline[0].length() + 1.0).unwrap();
+    let [from, to] = [outline, &polygon.outline].map(|p| p[1] - p[0]);
+    let turn = DVec2::new(from.dot(to), from.perp_dot(to)).normalize();
+    let of = |&point: &DVec2| {
+        let mut values = vec![0.0; outline.len()];
+        polygon.values(turn.rotate(point - outline[0]) + polygon.outline[0], &mut values);
+        values
+    };
+    points.iter().map(of).collect()
+}
+
+fn largest_difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
+    a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// Points between the middle and each corner.
+fn points_inside(outline: &[DVec2]) -> Vec<DVec2> {
+    let middle = outline.iter().sum::<DVec2>() / outline.len() as f64;
+    outline.iter().flat_map(|&corner| [0.1, 0.5, 0.9, 0.98].map(|t| middle + t * (corner - middle))).collect()
+}
+
+/// A corner that moves by `e` changes no hat by more than `20 e / size`, also where it turns from convex to concave, and
+/// where its turn is 1e-3 (`d = 2.5e-4`).
+#[test]
+fn hats_are_continuous_in_the_corners() {
+    for (e, d) in [(1e-5, 0.2), (1e-3, 3e-2), (2e-5, 2.6e-4), (2e-5, 1e-5), (2e-5, -2.4e-4), (1e-5, -0.1)] {
+        for (before, after) in nearly_straight(d).iter().zip(nearly_straight(d - e)) {
+            let points = points_inside(before);
+            let change = largest_difference(&face_values(before, &points), &face_values(&after, &points));
+            let size = before.iter().map(|p| p.distance(before[0])).fold(0.0, f64::max);
+            assert!(change <= 20.0 * e / size, "{change} for {e} at {d}, {} corners", before.len());
+        }
+    }
+}
+
+/// Hats do not depend on which corner is first, on the unit, or on the side that a mirror shows.
+#[test]
+fn hats_depend_on_the_shape_of_a_face_alone() {
+    for outline in nearly_straight(-1e-3) {
+        let points = points_inside(&outline);
+        let expected = face_values(&outline, &points);
+        let n = outline.len();
+        for first in 0..n {
+            let at = |k: usize| (k + first) % n;
+            let turned: Vec<DVec2> = (0..n).map(|k| 7.3 * outline[at(k)]).collect();
+            let mirrored: Vec<DVec2> =
+                (0..n).map(|k| outline[at(n - 1 - k)] * DVec2::new(-1.0, 1.0)).collect();
+            let [large, flipped] = [7.3 * DVec2::ONE, DVec2::new(-1.0, 1.0)]
+                .map(|by| points.iter().map(|&p| p * by).collect::<Vec<_>>());
+            let (turned, mirrored) = (face_values(&turned, &large), face_values(&mirrored, &flipped));
+            for (p, expected) in expected.iter().enumerate() {
+                for k in 0..n {
+                    let off = [turned[p][k] - expected[at(k)], mirrored[p][k] - expected[at(n - 1 - k)]];
+                    assert!(off.iter().all(|off| off.abs() < 1e-9), "corner {k} of {n}: {off:?}");
+                }
+            }
+        }
+    }
+}
+
+/// The outline touches itself: corners 4 and 0 are in one place.
+#[test]
+fn face_with_a_slit_has_hats() {
+    let mut mesh = l_shape();
+    mesh.positions[10] = mesh.positions[6];
+    let cage = Cage::new(&mesh).unwrap();
+    for t in 0..cage.facets().len() as u32 {
+        for b in barycentrics() {
+            let sum: f64 = hats(&cage, t, b).iter().sum();
+            assert!((sum - 1.0).abs() <= ROUNDING, "{sum} in triangle {t} at {b:?}");
         }
     }
 }
@@ -216,13 +317,16 @@ proptest! {
     }
 
     #[test]
-    fn mean_value_is_linear_on_any_polygon(
+    fn pseudo_harmonic_is_linear_on_any_polygon(
         outline in outlines(0.3..1.0), u in 0.0..1.0f64, v in 0.0..1.0f64, k in 0..4usize,
     ) {
-        let (a, b) = (outline[k], outline[(k + 1) % outline.len()]);
+        let n = outline.len();
+        // The outline winds around the origin, from which all of it is visible.
+        prop_assume!((0..n).all(|k| outline[k].perp_dot(outline[(k + 1) % n]) > 1e-3));
+        let (a, b) = (outline[k], outline[(k + 1) % n]);
         let point = u * (v * a + (1.0 - v) * b);
         let mut values = vec![0.0; outline.len()];
-        hats::mean_value(&outline, point, &mut values);
+        hats::pseudo_harmonic(&outline, point, &mut values);
         assert_coordinates(&outline, point, &values);
     }
 
