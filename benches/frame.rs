@@ -137,7 +137,7 @@ fn main() {
         cage.n_vertices(),
         binding.weights.data().len()
     );
-    let weights = block_on(GpuWeights::new(&gpu, &binding.weights, &binding.outside)).expect("they fit");
+    let weights = block_on(GpuWeights::new(&gpu, &binding.weights, &binding.frames)).expect("they fit");
     let deformer = block_on(Deformer::new(&gpu, &weights, &triangles)).expect("it fits");
     let deform = (0..FRAMES).map(|frame| {
         let pose = posed(&cage, frame);
@@ -151,7 +151,7 @@ fn main() {
     let mut session = Session::new(context());
     block_on(session.set_model(DrawModel::plain(positions, triangles))).expect("it fits");
     block_on(session.set_cage(&cage)).expect("it fits");
-    block_on(session.adopt(binding.weights, binding.outside)).expect("they belong to it");
+    block_on(session.adopt(binding.weights, binding.frames)).expect("they belong to it");
     session.frame_all();
     let frame = (0..FRAMES / 4).map(|frame| {
         let pose = posed(&cage, frame);

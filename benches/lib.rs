@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use cagework_core::bind::bind;
 use cagework_core::grid::Grid;
-use cagework_core::options::{BindOptions, Method, Solver};
+use cagework_core::options::{BindOptions, Method, OutsidePolicy, Solver};
 use cagework_core::progress::Silent;
 use cagework_core::sample::Stencils;
 use cagework_core::sample::embedded::Sampler;
@@ -79,7 +79,8 @@ impl Input {
     #[must_use]
     pub fn stencils(&self, hierarchy: &Hierarchy) -> Stencils {
         let overlaps = Overlaps::default();
-        let sampler = Sampler::new((&self.cage).into(), &hierarchy.levels[0], &overlaps);
+        let sampler =
+            Sampler::new((&self.cage).into(), &hierarchy.levels[0], &overlaps, OutsidePolicy::Extend);
         sampler.stencils(self.points.iter().map(|p| p.as_dvec3()))
     }
 }

@@ -81,7 +81,7 @@ fn sample(criterion: &mut Criterion, input: &Input, grid: u32) {
         b.iter(|| stencils.sample_weights(0, workspace.field(), &mut block));
     });
     let team = Team::new(1);
-    let options = RowOptions { threshold: 0.0, preserve_affine: true, may_miss: false };
+    let options = RowOptions { threshold: 0.0, preserve_affine: true };
     group.bench_function(BenchmarkId::new("assemble rows", grid), |b| {
         b.iter_batched(
             || blocks.clone(),

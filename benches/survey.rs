@@ -356,7 +356,7 @@ fn bent(model: &TriMesh, cage: &Cage) -> [f64; 2] {
     let options = BindOptions { grid: GRID, ..BindOptions::default() };
     let Ok(binding) = bind(&model.positions, cage, &options, &Silent) else { return [f64::INFINITY; 2] };
     let posed: Vec<Vec3> = cage.positions().iter().map(bend).collect();
-    let moved = deform_bound(&binding.weights, &binding.outside, &posed);
+    let moved = deform_bound(&binding.weights, &binding.frames, &posed);
     let right: Vec<Vec3> = model.positions.iter().map(bend).collect();
     let off = moved.iter().zip(&right).map(|(p, q)| p.distance(*q)).fold(0.0, f32::max);
     let normal = |at: &[Vec3], t: &[u32; 3]| {

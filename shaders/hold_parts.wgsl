@@ -1,5 +1,5 @@
 // Parts of a model that the cage does not bend: what stays goes back to its place, rigid pieces move by the nearest rotation. One
-// invocation per vertex, in place, after deform_vertices and offset_outside. Twin: cagework_core::parts::hold_parts.
+// invocation per vertex, in place, after deform_vertices. Twin: cagework_core::parts::hold_parts.
 
 @group(0) @binding(0) var<uniform> work: Work;
 /// Where each vertex rests, and how much of it stays there.

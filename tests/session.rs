@@ -7,7 +7,7 @@ use cagework_core::deform::{deform_bound, deform_vertices};
 use cagework_core::green::{green_controls, green_weights};
 use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::progress::{ProgressEvent, Silent};
-use cagework_core::{Binding, Bounds, Cage, Parts, Weights, subdivided_box};
+use cagework_core::{Binding, Bounds, Cage, Frames, Parts, Weights, subdivided_box};
 use cagework_gpu::render::{DrawModel, DrawVertex, MeshStyle, SceneOptions};
 use cagework_gpu::{ContextOptions, GpuContext, GpuError, PlanError, Session};
 use cagework_tests::cages::cage;
@@ -84,7 +84,7 @@ fn session_equals_the_cpu() {
             assert_close(&dense(weights(&session)), &dense(&cpu.weights), WEIGHT_TOLERANCE);
             session.pose(&pose);
             let positions = block_on(session.read_positions()).expect("they come back");
-            let expected = deform_bound(&cpu.weights, &cpu.outside, &pose);
+            let expected = deform_bound(&cpu.weights, &cpu.frames, &pose);
             assert_close(&flat(&positions), &flat(&expected), POSITION_TOLERANCE * cage.diagonal());
         }
     }
@@ -95,11 +95,11 @@ fn adopted_weights_move_the_mesh_as_on_the_cpu() {
     let mut session = session();
     let (_, cage) = input();
     let cpu = on_cpu(&options(Method::Embedded, Solver::Multigrid));
-    block_on(session.adopt(cpu.weights.clone(), cpu.outside.clone())).expect("they belong to it");
+    block_on(session.adopt(cpu.weights.clone(), cpu.frames.clone())).expect("they belong to it");
     let pose = posed(cage.positions());
     session.pose(&pose);
     let positions = block_on(session.read_positions()).expect("they come back");
-    let expected = deform_bound(&cpu.weights, &cpu.outside, &pose);
+    let expected = deform_bound(&cpu.weights, &cpu.frames, &pose);
     // The same weights on both sides: f32 sums of dozens of products of size 10 are all that differs.
     assert_close(&flat(&positions), &flat(&expected), 2e-5);
 }
@@ -114,12 +114,12 @@ fn parts_are_held_as_an_export_holds_them() {
     // One vertex in five stays, whole or by half; two pieces keep their shape.
     let stays = (0..n).map(|v| [0.0, 1.0, 0.0, 0.5, 0.0][v as usize % 5]).collect();
     let parts = Parts { stays, rigid: vec![(0..n / 4).collect(), (n / 2..n / 2 + 9).collect()] };
-    let expected = parts.hold(&rest, &deform_bound(&cpu.weights, &cpu.outside, &pose));
+    let expected = parts.hold(&rest, &deform_bound(&cpu.weights, &cpu.frames, &pose));
     for draws_only in [false, true] {
         let options = ContextOptions { draws_only, ..ContextOptions::default() };
         let mut session = session_with(&options);
         block_on(session.set_parts(parts.clone())).expect("they are of this model");
-        block_on(session.adopt(cpu.weights.clone(), cpu.outside.clone())).expect("they belong to it");
+        block_on(session.adopt(cpu.weights.clone(), cpu.frames.clone())).expect("they belong to it");
         session.pose(&pose);
         let held = block_on(session.read_positions()).expect("they come back");
         assert_close(&flat(&held), &flat(&expected), 2e-5);
@@ -130,7 +130,7 @@ fn parts_are_held_as_an_export_holds_them() {
         assert_close(&flat(&held), &flat(&expected), 2e-5);
         block_on(again.set_parts(Parts::default())).expect("none is fine");
         let free = block_on(again.read_positions()).expect("they come back");
-        let moved = deform_bound(&cpu.weights, &cpu.outside, &pose);
+        let moved = deform_bound(&cpu.weights, &cpu.frames, &pose);
         assert_close(&flat(&free), &flat(&moved), 2e-5);
         let astray = Parts { rigid: vec![vec![n]], ..Parts::default() };
         let error = block_on(again.set_parts(astray)).unwrap_err().to_string();
@@ -151,7 +151,7 @@ fn green_coordinates_move_the_mesh_as_on_the_cpu() {
     for draws_only in [false, true] {
         let mut session = session_with(&ContextOptions { draws_only, ..ContextOptions::default() });
         block_on(session.set_cage(&cage)).expect("the cage is good");
-        let error = block_on(session.adopt(green.clone(), Vec::new())).unwrap_err().to_string();
+        let error = block_on(session.adopt(green.clone(), Frames::default())).unwrap_err().to_string();
         assert!(error.contains("controls"), "{error}");
         block_on(session.adopt_green(green.clone())).expect("they belong to it");
         session.pose(&pose);
@@ -173,7 +173,7 @@ fn session_that_only_draws_equals_the_cpu() {
     assert_eq!(weights(&session), &cpu.weights);
     let pose = posed(cage.positions());
     session.pose(&pose);
-    let expected = deform_bound(&cpu.weights, &cpu.outside, &pose);
+    let expected = deform_bound(&cpu.weights, &cpu.frames, &pose);
     assert_eq!(block_on(session.read_positions()).expect("they are here"), expected);
 
     let computing = block_on(session.recover(context(&ContextOptions::default()))).expect("it recovers");
@@ -272,7 +272,7 @@ fn what_is_missing_is_named() {
 fn what_does_not_belong_together_is_named() {
     let mut session = session();
     let few = Weights::new(2, vec![0, 1], vec![0], vec![1.0]).expect("one row");
-    let error = block_on(session.adopt(few, Vec::new())).unwrap_err().to_string();
+    let error = block_on(session.adopt(few, Frames::default())).unwrap_err().to_string();
     assert!(error.contains("1 vertices and 2 controls"), "{error}");
     let mut model = DrawModel::plain(vec![Vec3::ZERO], Vec::new());
     model.vertices.push(DrawVertex::plain(9));
@@ -290,6 +290,6 @@ fn another_cage_drops_the_weights() {
     block_on(session.bind(&options(Method::Embedded, Solver::Multigrid), &Silent)).expect("it binds");
     let (positions, cage) = input();
     block_on(session.set_cage(&cage)).expect("the cage is good");
-    assert!(session.weights().is_none() && session.outside().is_empty());
+    assert!(session.weights().is_none() && session.frames().is_none());
     assert_eq!(block_on(session.read_positions()).expect("at rest"), positions);
 }

@@ -92,7 +92,7 @@ fn smooth_bind_is_the_bind_to_the_refined_cage_times_its_rows() {
         let options = BindOptions { grid: 32, tau: 1e-7, ..BindOptions::default() };
         let by_route = bind(&points, &fine, &options, &Silent).unwrap();
         let smooth = bound(&points, &set, |options| options.grid = 32);
-        assert_eq!(smooth.weights.n_columns(), cage.n_vertices());
+        assert_eq!(smooth.weights.n_columns() - smooth.frames.n_columns(), cage.n_vertices());
         let outside: Vec<u32> = by_route.outside.iter().map(|o| o.vertex).collect();
         assert_eq!(smooth.outside.iter().map(|o| o.vertex).collect::<Vec<_>>(), outside);
         assert!(points.len() - outside.len() > 100, "{} outside", outside.len());
@@ -100,7 +100,8 @@ fn smooth_bind_is_the_bind_to_the_refined_cage_times_its_rows() {
         for v in 0..points.len() {
             let mut expected = vec![0.0; cage.n_vertices()];
             let (columns, weights) = by_route.weights.row(v);
-            for (&k, &w) in columns.iter().zip(weights) {
+            // Further columns are offsets.
+            for (&k, &w) in columns.iter().zip(weights).filter(|(k, _)| (**k as usize) < rows.len()) {
                 for (sum, share) in expected.iter_mut().zip(&rows[k as usize]) {
                     *sum += f64::from(w) * share;
                 }
@@ -110,7 +111,7 @@ fn smooth_bind_is_the_bind_to_the_refined_cage_times_its_rows() {
                 let w = columns.iter().position(|&c| c as usize == i).map_or(0.0, |k| f64::from(weights[k]));
                 worst = worst.max((w - expected).abs());
                 sum += (w - expected).abs();
-                assert!(w >= 0.0);
+                assert!(w >= 0.0 || outside.contains(&(v as u32)));
             }
         }
         let mean = sum / (points.len() * cage.n_vertices()) as f64;
@@ -154,21 +155,23 @@ fn samples_of_a_smooth_cage_are_those_of_the_refined_cage_times_its_rows() {
     }
 }
 
-/// Vertices outside the smooth surface follow a rigid motion as the rest does.
+/// Vertices just outside the smooth surface follow a rigid motion as the rest does; those further away do so in part.
 #[test]
 fn smooth_cage_keeps_the_rest_pose_and_rigid_motions() {
     let cage = cage(&l_shape());
     let set = ControlSet::new(&cage, 2, InnerControls::default()).unwrap();
     let points = scattered(400, Vec3::splat(0.02), Vec3::new(1.98, 1.98, 0.98));
     let binding = bound(&points, &set, |options| options.grid = 24);
-    assert!(!binding.outside.is_empty());
+    assert!(binding.outside.iter().any(|o| o.share == 1.0));
+    let in_part: Vec<u32> = binding.outside.iter().filter(|o| o.share < 1.0).map(|o| o.vertex).collect();
+    assert!(in_part.len() < 150, "{} of 400", in_part.len());
     let turn = glam::Quat::from_euler(glam::EulerRot::XYZ, 0.4, -0.9, 1.3);
     for moved in [|_: glam::Quat, p: Vec3| p, |turn: glam::Quat, p: Vec3| turn * p + Vec3::new(3.0, 2.0, 1.0)]
     {
         let controls: Vec<Vec3> = Controls::from(&set).rest().iter().map(|&p| moved(turn, p)).collect();
-        let posed = deform_bound(&binding.weights, &binding.outside, &controls);
-        for (p, at) in points.iter().zip(posed) {
-            assert!(at.distance(moved(turn, *p)) < 1e-6 * cage.diagonal() * 3.0, "{p}: {at}");
+        let posed = deform_bound(&binding.weights, &binding.frames, &controls);
+        for (_, (p, at)) in (0..).zip(points.iter().zip(posed)).filter(|(v, _)| !in_part.contains(v)) {
+            assert!(at.distance(moved(turn, *p)) < 1e-5 * cage.diagonal(), "{p}: {at}");
         }
     }
 }

@@ -49,7 +49,7 @@ test("a bind shows its progress and can be cancelled, on both", async ({ page })
         tau: 1e-7,
         max_iterations: 20000,
         sparsify: 0,
-        outside: "closest_point",
+        outside: "extend",
         memory_limit: 2 ** 32,
       } as const;
       let steps = 0;

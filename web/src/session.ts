@@ -191,9 +191,9 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
       const options = possible({ ...BIND_DEFAULTS, grid });
       return chain(
         ofNow(client.run("lattice", { cage: cage(), options })),
-        ({ indptr, indices, data, outside, offsets }) => {
+        ({ indptr, indices, data, offsets }) => {
           engine.requireCurrent(revision);
-          engine.takeLattice(indptr, indices, data, outside, offsets);
+          engine.takeLattice(indptr, indices, data, offsets);
         },
       );
     },

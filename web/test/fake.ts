@@ -134,6 +134,8 @@ export function reportOf(patch: Partial<BindReport> = {}): BindReport {
     smooth: 0,
     held_vertices: 0,
     outside_vertices: 0,
+    staying_vertices: 0,
+    outside_distance: 0,
     ambiguous_cells: 0,
     notices: [],
     ...patch,

@@ -63,7 +63,10 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     if let Some(path) = &args.weights {
         let extra_points = &points[model.positions.len()..];
         let inner = &controls.rest()[cage.n_vertices()..];
-        write(path, &write_weights_npz(&binding.weights, &binding.outside, extra_points, inner))?;
+        write(
+            path,
+            &write_weights_npz(&binding.weights, &binding.frames, &binding.outside, extra_points, inner),
+        )?;
     }
     if let Some(output) = &args.output {
         let rest = deform(&binding, controls.rest());
@@ -157,7 +160,7 @@ pub(crate) fn bind_on(
 
 /// Where the bound vertices go for posed controls. `[n_vertices]`, object units.
 pub(crate) fn deform(binding: &Binding, cage_positions: &[Vec3]) -> Vec<Vec3> {
-    deform_bound(&binding.weights, &binding.outside, cage_positions)
+    deform_bound(&binding.weights, &binding.frames, cage_positions)
 }
 
 /// The model's own document with new positions, in the format that the output asks for.

@@ -167,7 +167,10 @@ pub(crate) fn merge(args: &MergeArgs, as_json: bool) -> Result<(), CliError> {
     drop(bar);
     let (_, extra_points) = of.positions.split_at(of.positions.len() - of.extra_points);
     let inner = &controls.rest()[cage.n_vertices()..];
-    write(&args.output, &write_weights_npz(&binding.weights, &binding.outside, extra_points, inner))?;
+    write(
+        &args.output,
+        &write_weights_npz(&binding.weights, &binding.frames, &binding.outside, extra_points, inner),
+    )?;
     if as_json {
         return print(&json(&binding.report));
     }

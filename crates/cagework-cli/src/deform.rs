@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use cagework_core::Cage;
-use cagework_core::deform::displacements;
+use cagework_core::deform::{displacements, outside_in_words};
 use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, read_weights_npz, shown};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
@@ -26,6 +26,8 @@ struct Deformed {
     /// Controls inside the cage.
     inner_controls: usize,
     outside_vertices: usize,
+    /// Of them, those that stay where they are.
+    staying_vertices: usize,
     poses: Vec<String>,
     /// What became of skeleton, morph targets and animations, if there are any and they are kept.
     #[serde(flatten)]
@@ -92,16 +94,19 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     )?;
     let rest = rest_of(&cage.cage, &saved);
     let options = args.rig.options(&model, &args.mesh)?;
-    let outside_vertices = saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices).count();
+    let outside = || saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices);
+    let outside_vertices = outside().count();
+    let staying_vertices = outside().filter(|o| o.share == 0.0).count();
     // Times of one file: those of several files have nothing to do with each other.
     let is_timed = args.pose.len() == 1 && seconds.len() == poses.len();
     let seconds = if is_timed { seconds } else { Vec::new() };
+    let mut notices = model.notices.clone();
+    notices.extend(outside_in_words(outside(), cage.cage.diagonal()));
     let poses = Poses { names, seconds, rest, positions: poses };
     let started = Instant::now();
     let posed = Posed::new(&model, saved, &poses, format, (&options, args.rig.plain));
     let deform_ms = started.elapsed().as_secs_f64() * 1e3;
     let (bytes, rig) = posed.into_file(&model, (&poses.names, &poses.seconds), &args.output, &options)?;
-    let mut notices = model.notices.clone();
     if rig.is_some() && !poses.seconds.is_empty() {
         notices.push(
             "the poses are played one second each, beside the model's own clips; their names say their times"
@@ -118,6 +123,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         cage_vertices: n_cage,
         inner_controls: n_inner,
         outside_vertices,
+        staying_vertices,
         poses: poses.names,
         rig,
         deform_ms,
@@ -156,12 +162,12 @@ impl Posed {
         (options, plain): (&ReshapeOptions, bool),
     ) -> Self {
         if format == ModelFormat::Gltf && model.is_rigged() && !plain {
-            let by = |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.outside, &poses.rest, pose);
+            let by = |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.frames, &poses.rest, pose);
             let by = poses.positions.iter().map(by).collect();
             return Self::Rigged { by, outside: saved.outside.iter().map(|o| o.vertex).collect() };
         }
         let saved = saved.of_vertices();
-        let bound = (&saved.weights, saved.outside.as_slice());
+        let bound = (&saved.weights, &saved.frames);
         let posed = |pose: &Vec<Vec3>| model.deformed(bound, (&poses.rest, pose), &options.parts);
         Self::Plain(poses.positions.iter().map(posed).collect())
     }
@@ -212,7 +218,8 @@ pub(crate) fn load_weights(
 ) -> Result<SavedWeights, CliError> {
     let saved = read_weights_npz(&read(path)?, memory.bytes()).map_err(|e| CliError::file(path, e))?;
     let (n_vertices, n_cage) = (model.positions.len(), cage.n_vertices());
-    let n_bound = saved.weights.n_columns() - saved.inner_controls.len();
+    let n_bound =
+        (saved.weights.n_columns() - saved.frames.n_columns()).saturating_sub(saved.inner_controls.len());
     if (saved.n_vertices(), n_bound) == (n_vertices, n_cage) {
         return Ok(saved);
     }

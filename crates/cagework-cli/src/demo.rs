@@ -40,7 +40,10 @@ pub(crate) fn run(args: &DemoArgs, as_json: bool) -> Result<(), CliError> {
 
     files.write(&format!("{sample}.obj"), &write_cage_obj(&mesh))?;
     files.write("cage.obj", &write_cage_obj(&cage.to_polygon_mesh()))?;
-    files.write("weights.npz", &write_weights_npz(&binding.weights, &binding.outside, &[], &[]))?;
+    files.write(
+        "weights.npz",
+        &write_weights_npz(&binding.weights, &binding.frames, &binding.outside, &[], &[]),
+    )?;
     files.write("report.json", json(&binding.report).as_bytes())?;
     files.write_glb("rest.glb", &model, &deform(&binding, cage.positions()))?;
     let mut poses = Vec::new();

@@ -62,7 +62,7 @@ pub(crate) fn run(args: &DeformArgs, clip: &str, as_json: bool) -> Result<(), Cl
         BindOptions { held: model.bytes(), memory_limit: args.read.memory.bytes(), ..BindOptions::default() };
     let binding = bind_positions(&lattice.points(), cage.controls(), false, &options)?;
     let rest = cage.cage.positions();
-    let field = DisplacementField::new(lattice, &binding.weights, &binding.outside, rest, &posed);
+    let field = DisplacementField::new(lattice, &binding.weights, &binding.frames, rest, &posed);
     let mut at_rest = model.positions.clone();
     frames.iter_mut().chain([&mut at_rest]).for_each(|frame| bend_vertices(&field, frame));
     let n = frames.len();

@@ -109,11 +109,13 @@ impl CliError {
                 Some("a cage is a closed mesh around the model; `--cage auto` makes one")
             }
             Self::Bind(BindError::Outside { .. }) | Self::Gpu(GpuError::Bind(BindError::Outside { .. })) => {
-                Some("`--outside closest-point` binds such vertices to the closest point of the cage")
+                Some(
+                    "`--outside extend` lets such vertices follow the cage near it, `--outside stay` leaves them where they are",
+                )
             }
             Self::Bind(BindError::NoneInside { .. })
             | Self::Gpu(GpuError::Bind(BindError::NoneInside { .. })) => Some(
-                "`--outside closest-point` cannot help: it is for vertices next to others that are inside; `--cage auto` makes a cage that fits",
+                "`--outside` cannot help: it is for vertices next to others that are inside; `--cage auto` makes a cage that fits",
             ),
             Self::Gpu(GpuError::NoAdapter { .. }) => Some(
                 "a bind does not need one: leave out `--backend gpu`; CAGEWORK_ADAPTER chooses among several",

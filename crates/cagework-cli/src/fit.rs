@@ -133,9 +133,9 @@ fn vertices(bound: &Bound, target: Model, areas: &[f64]) -> Result<Goals, CliErr
     bound.outside.iter().for_each(|o| shares[o.vertex as usize] = 0.0);
     if !bound.outside.is_empty() {
         let n = bound.outside.len();
-        notices.push(format!("{n} vertices outside the cage are left out: they follow its closest point"));
+        notices.push(format!("{n} vertices outside the cage are left out"));
     }
-    Ok(Goals { weights: bound.weights.clone(), shares, to: target.positions, notices })
+    Ok(Goals { weights: bound.rows(), shares, to: target.positions, notices })
 }
 
 /// Root of the mean squared distance of points from their targets, and the largest one, over `size`.

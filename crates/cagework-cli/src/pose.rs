@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use cagework_core::Frames;
 use cagework_core::deform::OutsideVertex;
 use cagework_core::progress::Silent;
 use cagework_core::pull::{Probes, Pull};
@@ -20,10 +21,16 @@ pub(crate) struct Bound {
     pub(crate) model: Model,
     pub(crate) cage: LoadedCage,
     pub(crate) weights: Weights,
+    pub(crate) frames: Frames,
     pub(crate) outside: Vec<OutsideVertex>,
 }
 
 impl Bound {
+    /// Rows that are linear in the controls: what is solved with.
+    pub(crate) fn rows(&self) -> Weights {
+        self.frames.folded(&self.weights)
+    }
+
     /// Reads all three; `others` are read besides, and must not be written over either.
     ///
     /// # Errors
@@ -44,7 +51,7 @@ impl Bound {
         let model = load_model(&args.mesh, args.read.axis(), args.read.memory)?;
         let cage = load_cage(&args.cage, &model, args.read.memory, &args.controls)?;
         cage.require_order_in(&args.output)?;
-        let SavedWeights { weights, outside, inner_controls, .. } =
+        let SavedWeights { weights, frames, outside, inner_controls, .. } =
             load_weights(&args.weights, &model, &cage.cage, args.read.memory)?.of_vertices();
         let inner = &cage.controls().rest()[cage.cage.n_vertices()..];
         if inner_controls != inner {
@@ -58,7 +65,7 @@ impl Bound {
                 hint: "give the --controls and --smooth of `cagework bind`",
             });
         }
-        Ok(Self { model, cage, weights, outside })
+        Ok(Self { model, cage, weights, frames, outside })
     }
 }
 
@@ -72,8 +79,8 @@ pub(crate) fn pull(model: &Model, controls: Controls<'_>, args: &PoseArgs) -> Re
     let probes = Probes::new(&mesh, controls).map_err(wrong)?;
     let options =
         BindOptions { grid: args.grid, memory_limit: args.read.memory.bytes(), ..BindOptions::default() };
-    let of_probes = bind(probes.points(), controls, &options, &Silent)?.weights;
-    Pull::new(&mesh, controls, probes, &of_probes).map_err(wrong)
+    let bound = bind(probes.points(), controls, &options, &Silent)?;
+    Pull::new(&mesh, controls, probes, &bound.frames.folded(&bound.weights)).map_err(wrong)
 }
 
 /// Writes a pose of the cage, and of the controls inside if they are asked for. `pose`: `[n_controls]`.

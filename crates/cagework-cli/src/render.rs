@@ -7,7 +7,7 @@ use std::time::Instant;
 use cagework_core::bind::Binding;
 use cagework_core::green::green_weights;
 use cagework_core::slice::Slice;
-use cagework_core::{BindOptions, Controls, Weights, mean_value_weights};
+use cagework_core::{BindOptions, Controls, Frames, Weights, mean_value_weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{MeshStyle, Projection, SceneOptions, Selection, SliceView, check_layers};
 use cagework_io::{Model, shown};
@@ -79,13 +79,13 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
             Compared::MeanValue => {
                 let weights = mean_value_weights(&model.positions, &cage.cage, limit, &Bar::start())?
                     .widened(n_controls);
-                pollster::block_on(twin.adopt(weights, Vec::new()))?;
+                pollster::block_on(twin.adopt(weights, Frames::default()))?;
             }
             Compared::Plain => {
                 let options = args.solve.options(args.grid, args.read.memory);
-                let Binding { weights, outside, .. } =
+                let Binding { weights, frames, .. } =
                     bind_positions(&model.positions, (&cage.cage).into(), args.solve.on_gpu(), &options)?;
-                pollster::block_on(twin.adopt(weights.widened(n_controls), outside))?;
+                pollster::block_on(twin.adopt(weights.widened(n_controls), frames))?;
             }
             Compared::Green => {
                 let weights = green_weights(&model.positions, &cage.cage, limit, &Bar::start())?;
@@ -218,20 +218,20 @@ fn prepare(
         || args.pose.is_some()
         || matches!(args.show, Show::Wireframe | Show::Weights | Show::Error);
     if needs_weights {
-        let (weights, outside) = match &args.weights {
+        let (weights, frames) = match &args.weights {
             Some(path) => {
                 let saved = load_weights(path, model, &cage.cage, args.read.memory)?.of_vertices();
-                (saved.weights, saved.outside)
+                (saved.weights, saved.frames)
             }
             None => {
                 let held = model.bytes();
                 let options = BindOptions { held, ..args.solve.options(args.grid, args.read.memory) };
-                let Binding { weights, outside, .. } =
+                let Binding { weights, frames, .. } =
                     bind_positions(&model.positions, controls, args.solve.on_gpu(), &options)?;
-                (weights, outside)
+                (weights, frames)
             }
         };
-        pollster::block_on(session.adopt(weights, outside))?;
+        pollster::block_on(session.adopt(weights, frames))?;
     }
     let mut places = controls.rest().to_vec();
     if let Some(path) = &args.pose {

@@ -241,18 +241,6 @@ impl Cage {
         self.triangles[triangle as usize].map(|i| self.positions[i as usize].as_dvec3())
     }
 
-    /// The one of [`Self::triangles`] in whose frame points near a facet are kept.
-    ///
-    /// # Panics
-    /// If there is no such facet.
-    #[must_use]
-    pub fn triangle_near(&self, facet: u32) -> [u32; 3] {
-        let f = self.face_of_facet[facet as usize] as usize;
-        let (face, polygon) = (&self.faces[f], &self.polygons[f]);
-        let rank = (facet - self.first_facet[f]) as usize;
-        polygon.triangles[rank * polygon.triangles.len() / polygon.facets.len()].map(|k| face[k as usize])
-    }
-
     /// Bounding box of the surface (vertices of no face do not count), object units.
     #[must_use]
     pub fn bounds(&self) -> Bounds {

@@ -18,15 +18,6 @@ use crate::weights::Weights;
 pub use inner::{ControlError, InnerControls, InnerElement, MAX_RADIUS};
 pub use set::ControlSet;
 
-/// Where a face of the surface comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Origin {
-    /// The face of the cage that it is part of; none for a wall inside.
-    pub(crate) cage_face: Option<u32>,
-    /// Three controls in whose frame points near it are kept.
-    pub(crate) frame: [u32; 3],
-}
-
 /// The controls of a bind.
 #[derive(Clone, Copy, Debug)]
 pub struct Controls<'a> {
@@ -35,8 +26,8 @@ pub struct Controls<'a> {
     surface: &'a Cage,
     /// None for the identity.
     rows: Option<&'a Weights>,
-    /// Of each face of the surface; none where it is the cage's own.
-    origins: Option<&'a [Origin]>,
+    /// The face of the cage that each face of the surface is part of, none for a wall inside; or none where all are the cage's own.
+    origins: Option<&'a [Option<u32>]>,
     set: Option<&'a ControlSet>,
 }
 
@@ -109,19 +100,7 @@ impl<'a> Controls<'a> {
     /// The face of the cage that a face of the surface is part of; none for a wall inside.
     #[must_use]
     pub fn cage_face(&self, face: u32) -> Option<u32> {
-        self.origins.map_or(Some(face), |origins| origins[face as usize].cage_face)
-    }
-
-    /// Three controls in whose frame points near a facet of the surface are kept.
-    ///
-    /// # Panics
-    /// If there is no such facet.
-    #[must_use]
-    pub fn frame_near(&self, facet: u32) -> [u32; 3] {
-        match self.origins {
-            None => self.surface.triangle_near(facet),
-            Some(origins) => origins[self.surface.face_of_facet()[facet as usize] as usize].frame,
-        }
+        self.origins.map_or(Some(face), |origins| origins[face as usize])
     }
 
     /// Dirichlet values at a point of the surface, given by one of its triangles and barycentric coordinates in it. Calls
@@ -173,7 +152,7 @@ mod tests {
         let data = surface.positions().iter().flat_map(|&p| trilinear(p)).collect();
         let rows = Weights::new(8, indptr, (0..n).flat_map(|_| 0..8).collect(), data).unwrap();
         let cage = Cage::new(&subdivided_box(bounds, 0.0, [1, 1, 1])).unwrap();
-        let origins = vec![Origin { cage_face: Some(0), frame: [0, 1, 2] }; surface.faces().len()];
+        let origins = vec![Some(0); surface.faces().len()];
         let controls = Controls {
             cage: &cage,
             rest: &rest,

@@ -1,13 +1,14 @@
 //! Dynamic binding (Joshi et al. 2007): the skeleton moves the model first, and the cage bends what has moved.
 //!
 //! Coordinates are then needed wherever a vertex comes by. A pose of the cage is one vector field, so that is what is kept: on a
-//! lattice around the cage, interpolated linearly between its nodes. Inside, a node moves as a vertex there would. Close to the
-//! cage it moves as the closest point does. Further out the field is smooth (Laplace's equation) and ends at the lattice's edge.
+//! lattice around the cage, interpolated linearly between its nodes. Inside and close to the cage, a node moves as a vertex
+//! there would. Further out the field is smooth (Laplace's equation) and ends at the lattice's edge.
 
 use glam::{UVec3, Vec3, Vec4};
 
 use crate::cage::Cage;
-use crate::deform::{OutsideVertex, displacements};
+use crate::deform::displacements;
+use crate::frames::Frames;
 use crate::geometry::closest_point_on_triangle;
 use crate::weights::Weights;
 
@@ -15,7 +16,7 @@ use crate::weights::Weights;
 const CELLS: u32 = 48;
 /// Cells on each side of it: where the field ends.
 const MARGIN: u32 = 16;
-/// Nodes that follow the closest point of the cage are at most so many cells from it.
+/// Nodes that are bound are at most so many cells from the cage.
 const NEAR: u32 = 2;
 /// Strides of the lattices that the outer field is found on, each from the one before; and sweeps on each.
 const STRIDES: [(u32, usize); 4] = [(8, 40), (4, 12), (2, 8), (1, 8)];
@@ -118,31 +119,18 @@ pub struct DisplacementField {
 }
 
 impl DisplacementField {
-    /// The field of a pose. `weights`, `outside`: of [`Lattice::points`]; `rest`, `posed`: `[n_cage]`, object units.
+    /// The field of a pose. `weights`, `frames`: of [`Lattice::points`]; `rest`, `posed`: `[n_cage]`, object units.
     ///
     /// # Panics
     /// If there is not one row per point, or one position per column.
     #[must_use]
-    pub fn new(
-        lattice: Lattice,
-        weights: &Weights,
-        outside: &[OutsideVertex],
-        rest: &[Vec3],
-        posed: &[Vec3],
-    ) -> Self {
-        // The closest point's own displacement: the frame of its triangle would turn in jumps from one triangle to the next.
-        let by = displacements(weights, &[], rest, posed);
-        let mut is_known = vec![true; by.len()];
-        for o in outside {
-            is_known[o.vertex as usize] = o.offset.length() <= NEAR as f32 * lattice.cell;
-        }
+    pub fn new(lattice: Lattice, weights: &Weights, frames: &Frames, rest: &[Vec3], posed: &[Vec3]) -> Self {
+        let by = displacements(weights, frames, rest, posed);
         let mut values = vec![Vec4::ZERO; lattice.dims.element_product() as usize];
         let mut is_free = vec![true; values.len()];
-        for ((&node, by), is_known) in lattice.bound.iter().zip(by).zip(is_known) {
-            if is_known {
-                values[node as usize] = by.as_vec3().extend(0.0);
-                is_free[node as usize] = false;
-            }
+        for (&node, by) in lattice.bound.iter().zip(by) {
+            values[node as usize] = by.as_vec3().extend(0.0);
+            is_free[node as usize] = false;
         }
         let mut field = Self { lattice, values };
         for (level, (stride, sweeps)) in STRIDES.into_iter().enumerate() {

@@ -41,6 +41,18 @@ pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> ClosestP
     ClosestPoint { point: u * a + v * b + w * c, barycentric }
 }
 
+/// How far from `from` along a unit vector a triangle is met from either side, object units; nothing behind or beside.
+///
+/// Source: Moeller, Trumbore 1997, "Fast, minimum storage ray-triangle intersection".
+#[must_use]
+pub fn distance_along(from: DVec3, way: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
+    let (ab, ac, to) = (b - a, c - a, from - a);
+    let (p, q) = (way.cross(ac), to.cross(ab));
+    let determinant = ab.dot(p);
+    let [u, v, s] = [to.dot(p), way.dot(q), ac.dot(q)].map(|x| x / determinant);
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && s >= 0.0).then_some(s)
+}
+
 /// Barycentric coordinates of the projection of `point`, if it is in the triangle and the triangle has an area.
 fn projection_inside(point: DVec3, [a, b, c]: [DVec3; 3]) -> Option<[f64; 3]> {
     let (ab, ac, ap) = (b - a, c - a, point - a);

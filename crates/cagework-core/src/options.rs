@@ -115,9 +115,12 @@ choice! {
 choice! {
     /// What happens to a mesh vertex outside the cage.
     OutsidePolicy {
-        /// Bound to the closest point of the cage, with a rigid offset in that triangle's frame.
+        /// Near the cage, within 5 % of its diagonal, weights are extended linearly. Further out vertices follow less and less; from 15 %
+        /// on they stay where they are.
         #[default]
-        ClosestPoint = "closest_point",
+        Extend = "extend",
+        /// It stays where it is.
+        Stay = "stay",
         /// The bind ends in an error.
         Refuse = "refuse",
     }
@@ -258,7 +261,7 @@ pub struct BindOptions {
     pub sparsify: f32,
     /// Refuse to start above this many bytes of memory, `held` ones included. Default 4 GiB; 2 GiB in wasm.
     pub memory_limit: u64,
-    /// Default closest point.
+    /// Default extend.
     pub outside: OutsidePolicy,
     /// Bytes that the caller holds meanwhile, a model and its document: they count towards the limit. Default 0.
     #[serde(skip)]
@@ -337,7 +340,7 @@ mod tests {
         assert_words::<DeltaNorm>();
         assert_words::<OutsidePolicy>();
         assert_words::<Backend>();
-        assert_eq!(OutsidePolicy::ClosestPoint.to_string(), "closest-point");
+        assert_eq!(OutsidePolicy::Extend.to_string(), "extend");
         let unknown = "gauss".parse::<Solver>().unwrap_err();
         assert_eq!(unknown.to_string(), r#""gauss" is not one of jacobi, multigrid, cg"#);
     }

@@ -78,7 +78,13 @@ pub struct BindReport {
     pub smooth: u32,
     /// Mesh vertices outside the cage.
     pub outside_vertices: u64,
-    /// Mesh vertices inside of controls, or so close to one that an offset keeps them in place.
+    /// Those of them that stay where they are.
+    #[serde(default)]
+    pub staying_vertices: u64,
+    /// How far the furthest of them is from the cage, object units.
+    #[serde(default)]
+    pub outside_distance: f32,
+    /// Mesh vertices inside of controls.
     #[serde(default)]
     pub held_vertices: u64,
     /// Cells about which the three axes disagreed whether they are inside.

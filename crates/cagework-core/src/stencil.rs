@@ -15,12 +15,11 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::deform::triangle_frame;
 use crate::grid::NO_CELL;
 use crate::options::DeltaNorm;
 use crate::solve::rows::Prolong;
 use crate::transfer::{RESTRICT_CENTRE, RESTRICT_EDGE};
-use tables::{BUNDLE, LevelTable, NormalTable, OutsideTable, SLICE, SamplingTable, SlicedWeights};
+use tables::{BUNDLE, LevelTable, NormalTable, SLICE, SamplingTable, SlicedWeights};
 
 /// Changes of a weight below this do not count: their squares would be denormal.
 const NEGLIGIBLE: f32 = 1e-18;
@@ -198,14 +197,6 @@ pub fn deform_vertices(weights: &SlicedWeights, cage: &[Vec3], positions: &mut [
             }
         }
         bundle.copy_from_slice(&sums[..bundle.len()]);
-    }
-}
-
-/// Adds the rigid offsets of vertices outside the cage. GPU twin: `shaders/offset_outside.wgsl`.
-pub fn offset_outside(outside: &OutsideTable, cage: &[Vec3], positions: &mut [Vec3]) {
-    for (&[vertex, a, b, c], offset) in outside.corners.iter().zip(&outside.offsets) {
-        let frame = triangle_frame([a, b, c].map(|i| cage[i as usize]));
-        positions[vertex as usize] += frame * offset.truncate();
     }
 }
 

@@ -138,6 +138,37 @@ impl Weights {
         Self { n_columns: self.n_columns.max(n_columns as u32), ..self }
     }
 
+    /// Some of the columns, counted from the first of them.
+    #[must_use]
+    pub fn columns(&self, range: std::ops::Range<u32>) -> Self {
+        let mut made = Self::with_room(range.len() as u32, self.n_rows(), 0);
+        for (indices, data) in self.rows() {
+            let own = indices.iter().zip(data).filter(|(c, _)| range.contains(c));
+            let (indices, data): (Vec<u32>, Vec<f32>) = own.map(|(c, w)| (c - range.start, *w)).unzip();
+            made.indices.extend(indices);
+            made.data.extend(data);
+            made.indptr.push(made.indices.len() as u32);
+        }
+        made
+    }
+
+    /// The same rows with those of another matrix behind them, as more columns.
+    ///
+    /// # Panics
+    /// If the other one has other rows.
+    #[must_use]
+    pub fn beside(&self, more: &Self) -> Self {
+        assert_eq!(self.n_rows(), more.n_rows(), "rows are the same");
+        let n = self.n_columns;
+        let mut made = Self::with_room(n + more.n_columns, self.n_rows(), self.data.len() + more.data.len());
+        for ((a, x), (b, y)) in self.rows().zip(more.rows()) {
+            made.indices.extend(a.iter().copied().chain(b.iter().map(|c| n + c)));
+            made.data.extend(x.iter().chain(y));
+            made.indptr.push(made.indices.len() as u32);
+        }
+        made
+    }
+
     /// Adds the rows of another matrix after its own.
     ///
     /// # Panics
@@ -219,5 +250,6 @@ mod tests {
             made.append(&whole.with_rows(&range.collect::<Vec<u32>>()));
         }
         assert_eq!(made, whole);
+        assert_eq!(whole.columns(0..1).beside(&whole.columns(1..3)), whole);
     }
 }

@@ -52,7 +52,7 @@ pub async fn bind_gpu<'a>(
     context: &GpuContext,
 ) -> Result<(Binding, GpuWeights), GpuError> {
     let binding = bind_on(positions, controls, options, progress, context).await?;
-    let weights = GpuWeights::new(context, &binding.weights, &binding.outside).await?;
+    let weights = GpuWeights::new(context, &binding.weights, &binding.frames).await?;
     Ok((binding, weights))
 }
 

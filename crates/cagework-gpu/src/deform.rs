@@ -2,9 +2,8 @@
 //! vertex buffers that are drawn.
 
 use bytemuck::Pod;
-use cagework_core::Weights;
-use cagework_core::deform::OutsideVertex;
-use cagework_core::stencil::tables::{BUNDLE, NormalTable, OutsideTable, SLICE, SlicedWeights};
+use cagework_core::stencil::tables::{BUNDLE, NormalTable, SLICE, SlicedWeights};
+use cagework_core::{Frames, Weights};
 use futures_channel::oneshot;
 use glam::{Vec3, Vec4};
 
@@ -28,9 +27,7 @@ const PART: u32 = 1 << 19;
 pub struct GpuWeights {
     /// Each of a whole number of slices.
     parts: Vec<Part>,
-    corners: wgpu::Buffer,
-    offsets: wgpu::Buffer,
-    n_outside: u32,
+    frames: Frames,
     n_vertices: u32,
     n_columns: u32,
     bytes: u64,
@@ -46,20 +43,13 @@ struct Part {
 }
 
 impl GpuWeights {
-    /// Uploads weights and outside vertices.
+    /// Uploads weights, whose columns are the controls and then `frames`.
     ///
     /// # Errors
     /// As [`Allocator::zeros`] and [`Allocator::settle`].
-    pub async fn new(
-        context: &GpuContext,
-        weights: &Weights,
-        outside: &[OutsideVertex],
-    ) -> Result<Self, GpuError> {
+    pub async fn new(context: &GpuContext, weights: &Weights, frames: &Frames) -> Result<Self, GpuError> {
         let n_vertices = weights.n_rows();
         let mut allocator = Allocator::new(context, "the weights");
-        let table = OutsideTable::new(outside);
-        let corners = allocator.table("corners for outside vertices", &table.corners)?;
-        let offsets = allocator.table("offsets of outside vertices", &table.offsets)?;
         // Where lists differ most, a weight takes a place in each bundle of its slice.
         let most = PART.min((context.max_binding_bytes / (SLICE * size_of::<[f32; BUNDLE]>()) as u64) as u32);
         let (mut parts, mut bytes, mut begin) = (Vec::new(), 0, 0);
@@ -84,9 +74,7 @@ impl GpuWeights {
         }
         Ok(Self {
             parts,
-            corners,
-            offsets,
-            n_outside: outside.len() as u32,
+            frames: frames.clone(),
             n_vertices: n_vertices as u32,
             n_columns: weights.n_columns() as u32,
             bytes: bytes + allocator.settle().await?,
@@ -113,6 +101,7 @@ pub struct Deformer {
     steps: Vec<Step>,
     /// What comes before the normals.
     holder: Option<Holder>,
+    frames: Frames,
     n_vertices: u32,
     n_columns: u32,
 }
@@ -140,26 +129,29 @@ impl Deformer {
         let table = NormalTable::new(n_vertices as usize, triangles);
         let starts = allocator.table("starts of triangle lists", &table.starts)?;
         let others = allocator.table("triangle lists", &table.others)?;
-        let n_steps = weights.parts.len() as u64 + 2;
+        let n_steps = weights.parts.len() as u64 + 1;
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let works = allocator.zeros("work parameters", n_steps * WORK_STRIDE, usage)?;
 
         let launch = |kernel, buffers: &[&wgpu::Buffer]| {
             context.pipelines.launch(&context.device, kernel, &works, buffers)
         };
-        let mut deformer =
-            Self { cage, positions, normals, steps: Vec::new(), holder: None, n_vertices, n_columns };
+        let mut deformer = Self {
+            cage,
+            positions,
+            normals,
+            steps: Vec::new(),
+            holder: None,
+            frames: weights.frames.clone(),
+            n_vertices,
+            n_columns,
+        };
         let (cage, positions) = (deformer.cage.clone(), deformer.positions.clone());
         for part in &weights.parts {
             let buffers = [&part.slices, &part.columns, &part.weights, &cage, &positions];
             let launch = launch(&kernels::DEFORM_VERTICES, &buffers);
             let n_bundles = part.n_vertices.div_ceil(BUNDLE as u32);
             deformer.add(context, &works, launch, part.first_vertex, n_bundles);
-        }
-        if weights.n_outside > 0 {
-            let buffers = [&weights.corners, &weights.offsets, &cage, &positions];
-            let launch = launch(&kernels::OFFSET_OUTSIDE, &buffers);
-            deformer.add(context, &works, launch, 0, weights.n_outside);
         }
         let launch = launch(&kernels::VERTEX_NORMALS, &[&starts, &others, &positions, &deformer.normals]);
         deformer.add(context, &works, launch, 0, n_vertices);
@@ -187,8 +179,9 @@ impl Deformer {
     /// # Panics
     /// If there is not one position per cage vertex.
     pub fn pose(&self, context: &GpuContext, cage_positions: &[Vec3]) {
-        assert_eq!(cage_positions.len(), self.n_columns as usize, "one position per cage vertex");
-        let padded: Vec<Vec4> = cage_positions.iter().map(|p| p.extend(1.0)).collect();
+        let columns = self.frames.columns(cage_positions);
+        assert_eq!(columns.len(), self.n_columns as usize, "one position per cage vertex");
+        let padded: Vec<Vec4> = columns.iter().map(|p| p.extend(1.0)).collect();
         context.queue.write_buffer(&self.cage, 0, bytemuck::cast_slice(&padded));
         if let Some(holder) = &self.holder {
             holder.pose(context, cage_positions);

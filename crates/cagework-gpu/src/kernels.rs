@@ -72,8 +72,6 @@ kernels! {
     SAMPLE_WEIGHTS = "sample_weights" + ["work"], 64, 70, &[Uniform, Read, Read, Read, Read, ReadWrite];
     /// Deformed positions.
     DEFORM_VERTICES = "deform_vertices" + ["work"], 64, 900, &[Uniform, Read, Read, Read, Read, ReadWrite];
-    /// Rigid offsets of vertices outside the cage.
-    OFFSET_OUTSIDE = "offset_outside" + ["work"], 64, 24, &[Uniform, Read, Read, Read, ReadWrite];
     /// Parts that the cage does not bend.
     HOLD_PARTS = "hold_parts" + ["work"], 64, 16, &[Uniform, Read, Read, Read, ReadWrite];
     /// Positions of a clip.

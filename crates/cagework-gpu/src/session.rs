@@ -12,11 +12,10 @@ mod playing;
 
 use std::sync::Arc;
 
-use cagework_core::deform::OutsideVertex;
 use cagework_core::deform::{deform_bound, vertex_normals};
 use cagework_core::options::BindOptions;
 use cagework_core::parts::{BoundParts, Parts};
-use cagework_core::{BindReport, Bounds, Cage, ControlSet, Controls, Progress, Weights};
+use cagework_core::{BindReport, Bounds, Cage, ControlSet, Controls, Frames, Progress, Weights};
 use glam::{Vec2, Vec3};
 
 use crate::bind::bind_gpu;
@@ -54,7 +53,7 @@ pub struct Session {
 #[derive(Debug)]
 struct Bound {
     weights: Weights,
-    outside: Vec<OutsideVertex>,
+    frames: Frames,
     /// Columns are the cage's triangles, too.
     is_green: bool,
     mover: Mover,
@@ -147,12 +146,12 @@ impl Session {
         let (model, controls) = self.parts()?;
         if self.context.draws_only() {
             let binding = cagework_core::bind(&model.positions, controls, options, progress)?;
-            self.bound(binding.weights, binding.outside, false, None).await?;
+            self.bound(binding.weights, binding.frames, false, None).await?;
             return Ok(binding.report);
         }
         let (binding, weights) =
             bind_gpu(&model.positions, controls, options, progress, &self.context).await?;
-        self.bound(binding.weights, binding.outside, false, Some(weights)).await?;
+        self.bound(binding.weights, binding.frames, false, Some(weights)).await?;
         Ok(binding.report)
     }
 
@@ -161,17 +160,15 @@ impl Session {
     /// # Errors
     /// [`GpuError::NotReady`] without model or cage, [`GpuError::Model`] if the weights belong to others; otherwise as
     /// [`crate::buffers::Allocator::zeros`].
-    pub async fn adopt(&mut self, weights: Weights, outside: Vec<OutsideVertex>) -> Result<(), GpuError> {
+    pub async fn adopt(&mut self, weights: Weights, frames: Frames) -> Result<(), GpuError> {
         let (model, controls) = self.parts()?;
         let (rows, columns) = (model.positions.len(), controls.n_controls());
-        check_size(&weights, rows, columns)?;
-        let astray =
-            |o: &OutsideVertex| o.vertex as usize >= rows || o.corners.iter().any(|&c| c as usize >= columns);
-        if outside.iter().any(astray) {
-            let reason = "a vertex outside the cage, or its triangle, does not exist".to_owned();
+        if !frames.fits(columns) {
+            let reason = "the frames beside the weights name controls that do not exist".to_owned();
             return Err(GpuError::Model { reason });
         }
-        self.bound(weights, outside, false, None).await
+        check_size(&weights, rows, columns + frames.n_columns())?;
+        self.bound(weights, frames, false, None).await
     }
 
     fn parts(&self) -> Result<(&Arc<DrawModel>, Controls<'_>), GpuError> {
@@ -185,16 +182,16 @@ impl Session {
     async fn bound(
         &mut self,
         weights: Weights,
-        outside: Vec<OutsideVertex>,
+        frames: Frames,
         is_green: bool,
         on_gpu: Option<GpuWeights>,
     ) -> Result<(), GpuError> {
         let (model, _) = self.parts()?;
-        let mover = Mover::new(&self.context, model, &weights, &outside, on_gpu).await?;
+        let mover = Mover::new(&self.context, model, &weights, &frames, on_gpu).await?;
         mover.pose(&self.context, &self.columns(is_green, &self.pose));
         self.renderer.set_vertices(&self.context, Some(mover.tables()));
         self.playing = None;
-        self.bound = Some(Bound { weights, outside, is_green, mover, parts: None });
+        self.bound = Some(Bound { weights, frames, is_green, mover, parts: None });
         self.hold().await?;
         self.write_values();
         Ok(())
@@ -212,10 +209,10 @@ impl Session {
         self.bound.as_ref().map(|b| &b.weights)
     }
 
-    /// Vertices outside the cage, once there are weights.
+    /// The columns of the weights after those of the controls, once there are weights.
     #[must_use]
-    pub fn outside(&self) -> &[OutsideVertex] {
-        self.bound.as_ref().map_or(&[], |b| &b.outside)
+    pub fn frames(&self) -> Option<&Frames> {
+        self.bound.as_ref().map(|b| &b.frames)
     }
 
     /// Moves the cage; the next frame shows it and the mesh that follows. Uploads the cage and nothing else.
@@ -288,7 +285,7 @@ impl Session {
             MeshStyle::Weights { column } => bound.weights.column(column).collect(),
             MeshStyle::Errors => {
                 let at_rest = self.columns(bound.is_green, Controls::from(set).rest());
-                let rebuilt = deform_bound(&bound.weights, &bound.outside, &at_rest);
+                let rebuilt = deform_bound(&bound.weights, &bound.frames, &at_rest);
                 let scale = 1.0 / set.cage().diagonal();
                 rebuilt.iter().zip(&model.positions).map(|(a, b)| scale * a.distance(*b)).collect()
             }

@@ -224,13 +224,13 @@ fn deformed_mesh_equals_the_cpus() {
         .iter()
         .map(|p| Vec3::new(p.x + 0.3 * p.y * p.y, p.y * 1.2, p.z - 0.2 * p.x))
         .collect();
-    let expected = deform_bound(&binding.weights, &binding.outside, &posed);
+    let expected = deform_bound(&binding.weights, &binding.frames, &posed);
     let normals = vertex_normals(&expected, &mesh.triangles);
     // Whole, and in parts of a few slices each.
     for max_binding_bytes in [None, Some(64 << 10)] {
         let context = gpu_with(&ContextOptions { max_binding_bytes, ..ContextOptions::default() });
         block_on(async {
-            let weights = GpuWeights::new(&context, &binding.weights, &binding.outside).await.unwrap();
+            let weights = GpuWeights::new(&context, &binding.weights, &binding.frames).await.unwrap();
             let deformer = Deformer::new(&context, &weights, &mesh.triangles).await.unwrap();
             deformer.pose(&context, &posed);
             deformer.run(&context).await.unwrap();

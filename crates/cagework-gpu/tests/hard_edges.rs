@@ -71,7 +71,7 @@ fn drawn(model: DrawModel) -> ([Vec<u8>; 2], Vec<Vec3>) {
     session.set_scene(SceneOptions { cage_lines: false, handles: false, ..SceneOptions::default() });
     session.frame_all();
     let rest = block_on(session.picture(SIZE, 1.0)).expect("it is drawn");
-    block_on(session.adopt(binding.weights, binding.outside)).expect("the weights are taken");
+    block_on(session.adopt(binding.weights, binding.frames)).expect("the weights are taken");
     let twisted: Vec<Vec3> =
         cage.positions().iter().map(|p| glam::Quat::from_rotation_y(0.5 * p.y) * *p).collect();
     session.pose(&twisted);

@@ -1,17 +1,18 @@
 //! Weights as NumPy `.npz`, the layout of `scipy.sparse.save_npz`.
 //!
-//! Arrays: `format` (`b"csr"`), `shape` (int64), `indptr`, `indices` (int32), `data` (float32); with vertices outside
-//! the cage also `outside_vertex` (int32), `outside_corners` (int32, [n, 3]) and `outside_offset` (float32, [n, 3]),
-//! which SciPy ignores; of a rigged model also `extra_points` (float32, [n, 3]): the last n rows are theirs; with controls inside
+//! Arrays: `format` (`b"csr"`), `shape` (int64), `indptr`, `indices` (int32), `data` (float32), of the controls' columns; with
+//! vertices outside the cage also `outside_vertex` (int32), `outside_distance` (float32, object units) and `outside_share` (float32);
+//! with offsets also `offset_indptr`, `offset_indices` and `offset_data`, the columns of [`Frames`], and of those `frame_whole` (float32, [n_cage, 3]), `frame_joints`
+//! (int32), `frame_bones` (int32, [n, 2]) and `frame_plain` (float32, [n_joints x n_cage, 4]); of a rigged model also `extra_points` (float32, [n, 3]): the last n rows are theirs; with controls inside
 //! the cage also `inner_controls` (float32, [n, 3]): the last n columns are theirs.
 //! Reading takes what SciPy writes too: deflated, 32- or 64-bit indices, 32- or 64-bit floats.
 
 mod arrays;
 mod part;
 
-use cagework_core::Weights;
 use cagework_core::deform::OutsideVertex;
 use cagework_core::weights::WeightsError;
+use cagework_core::{Frames, Weights};
 use glam::Vec3;
 use thiserror::Error;
 use zip::result::ZipError;
@@ -36,6 +37,9 @@ pub enum NpzError {
     /// A part of a bind where all of it is asked for.
     #[error("holds some columns of the weights only: put all parts together with `cagework merge`")]
     Part,
+    /// Offsets as they were kept by versions that wrote `outside_corners`.
+    #[error("holds offsets of an earlier version, in frames that jumped and rolled: bind again")]
+    Old,
     /// No part of a bind where one is asked for.
     #[error("is no part of a bind: `cagework bind --columns A:B --weights` writes such files")]
     NoPart,
@@ -66,6 +70,8 @@ impl From<ZipError> for NpzError {
 pub struct SavedWeights {
     /// A row for each vertex, then one for each extra point.
     pub weights: Weights,
+    /// Its columns after those of the controls.
+    pub frames: Frames,
     /// Rows outside the cage.
     pub outside: Vec<OutsideVertex>,
     /// Points of the model's rig that were bound with it, object units.
@@ -99,25 +105,35 @@ impl SavedWeights {
 #[must_use]
 pub fn write_weights_npz(
     weights: &Weights,
+    frames: &Frames,
     outside: &[OutsideVertex],
     extra_points: &[Vec3],
     inner_controls: &[Vec3],
 ) -> Vec<u8> {
-    let n = outside.len();
-    let shape = [weights.n_rows() as i64, weights.n_columns() as i64];
-    let bytes = weights.bytes() + size_of_val(outside);
+    let bytes = weights.bytes() + size_of_val(outside) + size_of_val(frames.plain.as_slice());
+    let n_controls = (weights.n_columns() - frames.n_columns()) as u32;
+    let split = frames
+        .is_used()
+        .then(|| [weights.columns(0..n_controls), weights.columns(n_controls..weights.n_columns() as u32)]);
+    let own = split.as_ref().map_or(weights, |[own, _]| own);
+    let shape = [own.n_rows() as i64, i64::from(n_controls)];
     let mut zip = NpzWriter::new(bytes, 4 * weights.data().len());
     zip.put("format", "|S3", &[], [*b"csr"]);
     zip.put("shape", "<i8", &[2], shape.map(i64::to_le_bytes));
-    zip.put("indptr", "<i4", &[weights.indptr().len()], weights.indptr().iter().map(|x| x.to_le_bytes()));
-    zip.put("indices", "<i4", &[weights.indices().len()], weights.indices().iter().map(|x| x.to_le_bytes()));
-    zip.put("data", "<f4", &[weights.data().len()], weights.data().iter().map(|x| x.to_le_bytes()));
+    put_rows(&mut zip, ["indptr", "indices", "data"], own);
+    let n = outside.len();
     if n > 0 {
         zip.put("outside_vertex", "<i4", &[n], outside.iter().map(|o| o.vertex.to_le_bytes()));
-        let corners = outside.iter().flat_map(|o| o.corners).map(u32::to_le_bytes);
-        zip.put("outside_corners", "<i4", &[n, 3], corners);
-        let offsets = outside.iter().flat_map(|o| o.offset.to_array()).map(f32::to_le_bytes);
-        zip.put("outside_offset", "<f4", &[n, 3], offsets);
+        zip.put("outside_distance", "<f4", &[n], outside.iter().map(|o| o.distance.to_le_bytes()));
+        zip.put("outside_share", "<f4", &[n], outside.iter().map(|o| o.share.to_le_bytes()));
+    }
+    if let Some([_, offsets]) = &split {
+        put_rows(&mut zip, OFFSETS, offsets);
+        let Frames { whole, joints, bones, plain } = frames;
+        zip.put("frame_whole", "<f4", &[whole.len(), 3], whole.iter().flatten().map(|x| x.to_le_bytes()));
+        zip.put("frame_joints", "<i4", &[joints.len()], joints.iter().map(|x| x.to_le_bytes()));
+        zip.put("frame_bones", "<i4", &[bones.len(), 2], bones.iter().flatten().map(|x| x.to_le_bytes()));
+        zip.put("frame_plain", "<f4", &[plain.len(), 4], plain.iter().flatten().map(|x| x.to_le_bytes()));
     }
     for (name, points) in [("extra_points", extra_points), ("inner_controls", inner_controls)] {
         if !points.is_empty() {
@@ -125,6 +141,15 @@ pub fn write_weights_npz(
         }
     }
     zip.finish()
+}
+
+/// The arrays of the columns after those of the controls.
+const OFFSETS: [&str; 3] = ["offset_indptr", "offset_indices", "offset_data"];
+
+fn put_rows(zip: &mut NpzWriter, [indptr, indices, data]: [&str; 3], rows: &Weights) {
+    zip.put(indptr, "<i4", &[rows.indptr().len()], rows.indptr().iter().map(|x| x.to_le_bytes()));
+    zip.put(indices, "<i4", &[rows.indices().len()], rows.indices().iter().map(|x| x.to_le_bytes()));
+    zip.put(data, "<f4", &[rows.data().len()], rows.data().iter().map(|x| x.to_le_bytes()));
 }
 
 /// Reads weights and the vertices outside the cage within `memory_limit` bytes, besides those of the file.
@@ -151,18 +176,20 @@ pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<SavedWeights,
             problem: format!("has {} values, not 2", shape.len()),
         });
     };
-    let indptr = required(&mut zip, "indptr")?.rows_of(&[])?.unsigned()?;
-    if indptr.len() as u64 != u64::from(rows) + 1 {
-        let problem = format!("has {} values for {rows} rows; it must have one more than rows", indptr.len());
-        return Err(NpzError::Array { array: "indptr", problem });
+    if zip.has("outside_corners") {
+        return Err(NpzError::Old);
     }
-    let indices = required(&mut zip, "indices")?.rows_of(&[])?.unsigned()?;
-    let data = required(&mut zip, "data")?.rows_of(&[])?.floats()?;
-    let weights = Weights::new(columns, indptr, indices, data)?;
-    let outside = read_outside(&mut zip, rows, columns)?;
+    let own = read_rows(&mut zip, ["indptr", "indices", "data"], (rows, columns))?;
+    let frames = read_frames(&mut zip, columns)?;
+    let weights = if frames.is_used() {
+        own.beside(&read_rows(&mut zip, OFFSETS, (rows, frames.n_columns() as u32))?)
+    } else {
+        own
+    };
+    let outside = read_outside(&mut zip, rows)?;
     let extra_points = read_points(&mut zip, "extra_points", (rows, "rows"))?;
     let inner_controls = read_points(&mut zip, "inner_controls", (columns, "columns"))?;
-    Ok(SavedWeights { weights, outside, extra_points, inner_controls })
+    Ok(SavedWeights { weights, frames, outside, extra_points, inner_controls })
 }
 
 /// An array of points, of which there are at most so many of something; empty if it is not there.
@@ -180,33 +207,51 @@ fn read_points(
     Err(NpzError::Array { array, problem })
 }
 
-fn read_outside(zip: &mut Archive<'_>, rows: u32, columns: u32) -> Result<Vec<OutsideVertex>, NpzError> {
+/// A matrix of so many rows and columns.
+fn read_rows(
+    zip: &mut Archive<'_>,
+    [name, indices, data]: [&'static str; 3],
+    (rows, columns): (u32, u32),
+) -> Result<Weights, NpzError> {
+    let indptr = required(zip, name)?.rows_of(&[])?.unsigned()?;
+    if indptr.len() as u64 != u64::from(rows) + 1 {
+        let problem = format!("has {} values for {rows} rows; it must have one more than rows", indptr.len());
+        return Err(NpzError::Array { array: name, problem });
+    }
+    let indices = required(zip, indices)?.rows_of(&[])?.unsigned()?;
+    let data = required(zip, data)?.rows_of(&[])?.floats()?;
+    Ok(Weights::new(columns, indptr, indices, data)?)
+}
+
+fn read_frames(zip: &mut Archive<'_>, columns: u32) -> Result<Frames, NpzError> {
+    if !zip.has(OFFSETS[0]) {
+        return Ok(Frames::default());
+    }
+    let whole = required(zip, "frame_whole")?.rows_of(&[3])?.floats()?.as_chunks().0.to_vec();
+    let joints = required(zip, "frame_joints")?.rows_of(&[])?.unsigned()?;
+    let bones = required(zip, "frame_bones")?.rows_of(&[2])?.unsigned()?.as_chunks().0.to_vec();
+    let plain = required(zip, "frame_plain")?.rows_of(&[4])?.floats()?.as_chunks().0.to_vec();
+    let frames = Frames { whole, joints, bones, plain };
+    if frames.is_used() && frames.fits(columns as usize) {
+        return Ok(frames);
+    }
+    let problem = format!("does not belong to {columns} columns and the joints and bones beside it");
+    Err(NpzError::Array { array: "frame_plain", problem })
+}
+
+fn read_outside(zip: &mut Archive<'_>, rows: u32) -> Result<Vec<OutsideVertex>, NpzError> {
     let Some(vertices) = array(zip, "outside_vertex")? else { return Ok(Vec::new()) };
     let vertices = vertices.rows_of(&[])?.unsigned()?;
-    let corners = required(zip, "outside_corners")?.rows_of(&[3])?.unsigned()?;
-    let offsets = required(zip, "outside_offset")?.rows_of(&[3])?.floats()?;
+    let distances = required(zip, "outside_distance")?.rows_of(&[])?.floats()?;
+    let shares = required(zip, "outside_share")?.rows_of(&[])?.floats()?;
     let fault = |array, problem: String| Err(NpzError::Array { array, problem });
     let n = vertices.len();
-    if corners.len() != 3 * n || offsets.len() != 3 * n {
-        return fault("outside_corners", format!("{n} vertices need {n} x 3 corners and offsets"));
+    if distances.len() != n || shares.len() != n {
+        return fault("outside_share", format!("{n} vertices need {n} distances and shares"));
     }
     if let Some(v) = vertices.iter().find(|&&v| v >= rows) {
         return fault("outside_vertex", format!("names vertex {v}, but there are {rows}"));
     }
-    if let Some(c) = corners.iter().find(|&&c| c >= columns) {
-        return fault("outside_corners", format!("names cage vertex {c}, but there are {columns}"));
-    }
-    if offsets.iter().any(|x| !x.is_finite()) {
-        return fault("outside_offset", "has a value that is not a finite number".into());
-    }
-    let triples = corners.chunks_exact(3).zip(offsets.chunks_exact(3));
-    Ok(vertices
-        .iter()
-        .zip(triples)
-        .map(|(&vertex, (c, o))| OutsideVertex {
-            vertex,
-            corners: [c[0], c[1], c[2]],
-            offset: Vec3::from_slice(o),
-        })
-        .collect())
+    let of = |((vertex, distance), share)| OutsideVertex { vertex, distance, share };
+    Ok(vertices.into_iter().zip(distances).zip(shares).map(of).collect())
 }

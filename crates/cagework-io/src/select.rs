@@ -1,8 +1,8 @@
 //! Parts of a model by the names that its file gives them.
 
-use cagework_core::Weights;
-use cagework_core::deform::{OutsideVertex, deform_bound};
+use cagework_core::deform::deform_bound;
 use cagework_core::parts::{Parts, pieces};
+use cagework_core::{Frames, Weights};
 use glam::Vec3;
 use thiserror::Error;
 
@@ -61,21 +61,21 @@ impl Model {
     /// Where the vertices go with a posed cage, and `parts` as they are held; exactly where they are if no control has moved, which
     /// sums of weighted controls are not.
     ///
-    /// `weights`, `outside` of the vertices; `rest`, `posed`: `[n_controls]`, object units. Returns `[n_vertices]`.
+    /// `weights`, `frames` of the vertices; `rest`, `posed`: `[n_controls]`, object units. Returns `[n_vertices]`.
     ///
     /// # Panics
     /// As [`deform_bound`].
     #[must_use]
     pub fn deformed(
         &self,
-        (weights, outside): (&Weights, &[OutsideVertex]),
+        (weights, frames): (&Weights, &Frames),
         (rest, posed): (&[Vec3], &[Vec3]),
         parts: &Parts,
     ) -> Vec<Vec3> {
         if posed == rest {
             return self.positions.clone();
         }
-        let deformed = deform_bound(weights, outside, posed);
+        let deformed = deform_bound(weights, frames, posed);
         if parts.is_empty() { deformed } else { parts.hold(&self.positions, &deformed) }
     }
 

@@ -8,7 +8,7 @@ use cagework_core::bind::Part;
 use cagework_core::deform::OutsideVertex;
 use cagework_core::options::BindOptions;
 use cagework_core::solve::stop::SolveReport;
-use cagework_core::{InnerControls, InnerElement, PolygonMesh, Weights};
+use cagework_core::{Frames, InnerControls, InnerElement, PolygonMesh, Weights};
 use cagework_io::{PartOf, SavedWeights, read_part_npz, read_weights_npz, write_part_npz, write_weights_npz};
 use glam::Vec3;
 use zip::write::SimpleFileOptions;
@@ -17,36 +17,41 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 /// Of memory, bytes.
 const LIMIT: u64 = 1 << 20;
 
-fn sample() -> (Weights, Vec<OutsideVertex>) {
+/// Two rows of five controls; offsets in three columns that do not turn, three of the cage and six of a bone's ends; a row outside.
+fn sample() -> (Weights, Frames, Vec<OutsideVertex>) {
+    let indices = vec![0, 6, 1, 2, 3, 16];
     let weights =
-        Weights::new(5, vec![0, 2, 2, 5], vec![0, 4, 1, 2, 3], vec![0.25, 0.75, 0.5, 0.375, 0.125]).unwrap();
-    let outside = OutsideVertex { vertex: 2, corners: [1, 2, 4], offset: Vec3::new(0.5, -1.0, 2.0) };
-    (weights, vec![outside])
+        Weights::new(17, vec![0, 2, 2, 6], indices, vec![0.25, 0.75, 0.5, 0.375, 0.125, 0.5]).unwrap();
+    let plain = vec![[0.5, -1.0, 2.0, 0.25]; 2];
+    let frames = Frames { whole: vec![[0.5, 0.25, -2.0]], joints: vec![1, 0], bones: vec![[0, 1]], plain };
+    (weights, frames, vec![OutsideVertex { vertex: 2, distance: 0.5, share: 0.25 }])
 }
 
-fn saved((weights, outside): (Weights, Vec<OutsideVertex>)) -> SavedWeights {
-    SavedWeights { weights, outside, extra_points: vec![], inner_controls: vec![] }
+fn saved((weights, frames, outside): (Weights, Frames, Vec<OutsideVertex>)) -> SavedWeights {
+    SavedWeights { weights, frames, outside, extra_points: vec![], inner_controls: vec![] }
 }
 
 #[test]
 fn points_of_a_rig_are_the_last_rows() {
-    let (weights, outside) = sample();
+    let (weights, frames, outside) = sample();
     let points = [Vec3::X, Vec3::new(0.5, -2.0, 8.0)];
-    let read = read_weights_npz(&write_weights_npz(&weights, &outside, &points, &points), LIMIT).unwrap();
+    let read =
+        read_weights_npz(&write_weights_npz(&weights, &frames, &outside, &points, &points), LIMIT).unwrap();
     assert_eq!((read.n_vertices(), read.extra_points.as_slice()), (1, points.as_slice()));
     let of_vertices = read.of_vertices();
     assert_eq!(of_vertices.weights, weights.with_rows(&[0]));
     assert!(of_vertices.outside.is_empty() && of_vertices.extra_points.is_empty());
     let too_many = [Vec3::X; 4];
-    let message =
-        read_weights_npz(&write_weights_npz(&weights, &[], &too_many, &[]), LIMIT).unwrap_err().to_string();
+    let message = read_weights_npz(&write_weights_npz(&weights, &frames, &[], &too_many, &[]), LIMIT)
+        .unwrap_err()
+        .to_string();
     assert_eq!(message, "array 'extra_points': has 4 points, but there are 3 rows");
 }
 
 /// The file with each array passed through `change`; deflated, as SciPy writes it.
 fn rewritten(change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) -> Vec<u8> {
-    let (weights, outside) = sample();
-    let bytes = write_weights_npz(&weights, &outside, &[], &[]);
+    let (weights, frames, outside) = sample();
+    let bytes = write_weights_npz(&weights, &frames, &outside, &[], &[]);
     let mut from = ZipArchive::new(Cursor::new(bytes.as_slice())).unwrap();
     let mut to = ZipWriter::new(Cursor::new(Vec::new()));
     for i in 0..from.len() {
@@ -64,18 +69,19 @@ fn rewritten(change: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) -> Vec<u8> {
 
 #[test]
 fn weights_survive_and_bytes_repeat() {
-    let (weights, outside) = sample();
-    let bytes = write_weights_npz(&weights, &outside, &[], &[]);
-    assert_eq!(bytes, write_weights_npz(&weights, &outside, &[], &[]));
-    assert_eq!(read_weights_npz(&bytes, LIMIT).unwrap(), saved((weights.clone(), outside)));
-    let bytes = write_weights_npz(&weights, &[], &[], &[]);
-    assert_eq!(read_weights_npz(&bytes, LIMIT).unwrap(), saved((weights, vec![])));
+    let (weights, frames, outside) = sample();
+    let bytes = write_weights_npz(&weights, &frames, &outside, &[], &[]);
+    assert_eq!(bytes, write_weights_npz(&weights, &frames, &outside, &[], &[]));
+    assert_eq!(read_weights_npz(&bytes, LIMIT).unwrap(), saved((weights.clone(), frames, outside)));
+    let (plain, none) = (weights.columns(0..5), Frames::default());
+    let bytes = write_weights_npz(&plain, &none, &[], &[], &[]);
+    assert_eq!(read_weights_npz(&bytes, LIMIT).unwrap(), saved((plain, none, vec![])));
 }
 
 #[test]
 fn headers_are_what_numpy_writes() {
-    let (weights, _) = sample();
-    let bytes = write_weights_npz(&weights, &[], &[], &[]);
+    let (weights, frames, _) = sample();
+    let bytes = write_weights_npz(&weights, &frames, &[], &[], &[]);
     let mut zip = ZipArchive::new(Cursor::new(bytes.as_slice())).unwrap();
     let mut data = Vec::new();
     zip.by_name("indptr.npy").unwrap().read_to_end(&mut data).unwrap();
@@ -123,7 +129,7 @@ fn faults_are_named() {
     let csc = rewritten(|n, d| Some(if n == "format.npy" { [&d[..128], b"csc"].concat() } else { d }));
     assert!(message(&csc).contains("tocsr"));
     let cut = rewritten(|n, d| Some(if n == "data.npy" { d[..d.len() - 2].to_vec() } else { d }));
-    assert!(message(&cut).contains("18 bytes"));
+    assert!(message(&cut).contains("14 bytes"));
     let high = rewritten(|n, d| {
         Some(if n == "indices.npy" { [&d[..d.len() - 4], &9_i32.to_le_bytes()].concat() } else { d })
     });
@@ -143,13 +149,13 @@ fn faults_are_named() {
 #[test]
 fn shapes_that_the_data_do_not_have_are_refused() {
     for (name, from, to) in [
-        ("indices.npy", "(5,), }", "(6,), }"),
-        ("data.npy", "(5,), }", "(4,), }"),
-        ("data.npy", "(5,), }", "(5, 1)}"),
+        ("indices.npy", "(4,), }", "(6,), }"),
+        ("data.npy", "(4,), }", "(3,), }"),
+        ("data.npy", "(4,), }", "(4, 1)}"),
         ("indptr.npy", "(4,), }", "(2, 2)}"),
         ("shape.npy", "(2,), }", "(), }  "),
-        ("outside_corners.npy", "(1, 3), }", "(3, 1), }"),
-        ("outside_offset.npy", "(1, 3), }", "(3,), }  "),
+        ("frame_bones.npy", "(1, 2), }", "(2, 1), }"),
+        ("frame_plain.npy", "(2, 4), }", "(8,), }  "),
         // Whose product is 4 again in 64 bits.
         ("indptr.npy", "(4,), }                               ", "(4611686018427387905, 4), }           "),
     ] {
@@ -231,9 +237,10 @@ fn a_part_is_no_weights_and_weights_are_no_part() {
         message,
         "holds some columns of the weights only: put all parts together with `cagework merge`"
     );
-    let (weights, outside) = sample();
-    let message =
-        read_part_npz(&write_weights_npz(&weights, &outside, &[], &[]), LIMIT).unwrap_err().to_string();
+    let (weights, frames, outside) = sample();
+    let message = read_part_npz(&write_weights_npz(&weights, &frames, &outside, &[], &[]), LIMIT)
+        .unwrap_err()
+        .to_string();
     assert_eq!(message, "is no part of a bind: `cagework bind --columns A:B --weights` writes such files");
     let wrong = Part { columns: 1..2, ..part };
     let said = |of: &PartOf, part: &Part| {

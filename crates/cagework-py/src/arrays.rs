@@ -1,7 +1,6 @@
 //! NumPy arrays as the core's arrays and back.
 
-use cagework_core::Weights;
-use cagework_core::deform::OutsideVertex;
+use cagework_core::{Binding, Frames, Weights};
 use cagework_io::far_notice;
 use glam::{DVec3, Vec3};
 use numpy::{
@@ -12,6 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::error;
+use crate::options::{dictionary, from_dictionary};
 
 /// Points of an array: lent where it holds 32-bit floats in rows, otherwise converted.
 pub(crate) enum Points<'py> {
@@ -189,37 +189,43 @@ pub(crate) fn weights(value: &Bound<'_, PyAny>) -> PyResult<Weights> {
         .map_err(|e| error::array(format!("weights: {e}")))
 }
 
-/// What a report says of vertices outside, as arrays.
+/// What a report says beside the weights of the controls, which are returned: points outside, and the offsets with their frames.
 ///
 /// # Errors
 /// None in practice.
-pub(crate) fn outside_of<'py>(py: Python<'py>, outside: &[OutsideVertex]) -> PyResult<Bound<'py, PyDict>> {
+pub(crate) fn put_beside<'py>(report: &Bound<'py, PyAny>, binding: Binding) -> PyResult<Weights> {
+    let (py, Binding { weights, frames, outside, .. }) = (report.py(), binding);
     let said = PyDict::new(py);
-    let corners: Vec<[u32; 3]> = outside.iter().map(|o| o.corners).collect();
     said.set_item("vertex", PyArray1::from_iter(py, outside.iter().map(|o| o.vertex as i32)))?;
-    said.set_item("corners", triples(py, &corners)?)?;
-    said.set_item("offset", array_of(py, outside.iter().map(|o| o.offset).collect())?)?;
-    Ok(said)
+    said.set_item("distance", PyArray1::from_iter(py, outside.iter().map(|o| o.distance)))?;
+    said.set_item("share", PyArray1::from_iter(py, outside.iter().map(|o| o.share)))?;
+    report.set_item("outside", said)?;
+    report.set_item("frames", dictionary(py, &frames)?)?;
+    if !frames.is_used() {
+        return Ok(weights);
+    }
+    let n = weights.n_columns() as u32;
+    let n_controls = n - frames.n_columns() as u32;
+    report.set_item("offsets", matrix_of(py, weights.columns(n_controls..n))?)?;
+    Ok(weights.columns(0..n_controls))
 }
 
-/// The way back from [`outside_of`], for weights of so many rows and columns.
+/// The way back from [`put_beside`].
 ///
 /// # Errors
 /// `ArrayError`; `KeyError` when it is not what a bind reports.
-pub(crate) fn outside(report: &Bound<'_, PyAny>, weights: &Weights) -> PyResult<Vec<OutsideVertex>> {
-    let said = report.get_item("outside")?;
-    let vertices = list("outside vertices", &said.get_item("vertex")?)?;
-    let corners = triangles(&said.get_item("corners")?)?;
-    let offsets = points("offsets", &said.get_item("offset")?, Some(vertices.len()))?;
-    let fits = |(vertex, corners): (&u32, &[u32; 3])| {
-        (*vertex as usize) < weights.n_rows() && corners.iter().all(|&i| (i as usize) < weights.n_columns())
-    };
-    if corners.len() != vertices.len() || !vertices.iter().zip(&corners).all(fits) {
-        let [rows, columns] = [weights.n_rows(), weights.n_columns()];
+pub(crate) fn with_beside(report: Option<&Bound<'_, PyAny>>, own: Weights) -> PyResult<(Weights, Frames)> {
+    let Some(report) = report else { return Ok((own, Frames::default())) };
+    let frames: Frames = from_dictionary(&report.get_item("frames")?)?;
+    if !frames.is_used() {
+        return Ok((own, frames));
+    }
+    let offsets = weights(&report.get_item("offsets")?)?;
+    let [rows, columns] = [own.n_rows(), own.n_columns()];
+    if offsets.n_rows() != rows || offsets.n_columns() != frames.n_columns() || !frames.fits(columns) {
         return Err(error::array(format!(
             "the report is not of these weights, which have shape [{rows}, {columns}]"
         )));
     }
-    let of = |((vertex, corners), &offset)| OutsideVertex { vertex, corners, offset };
-    Ok(vertices.into_iter().zip(corners).zip(offsets.as_slice()).map(of).collect())
+    Ok((own.beside(&offsets), frames))
 }

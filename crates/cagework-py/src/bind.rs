@@ -32,12 +32,13 @@ pub(crate) fn bind_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<BindOp
 ///
 /// Returns weights, a scipy.sparse.csr_array [n_points, n_cage] of float32, dimensionless, each row summing to 1, and a dict:
 /// iterations, converged, timings_ms, memory_bytes, rest_error (object units), notices and so on, as `cagework bind --report`
-/// writes it, and outside: vertex [k], corners [k, 3], offset [k, 3] of points outside the cage, which deform needs.
+/// writes it, and outside: vertex [k], distance [k] (object units), share [k] of points outside the cage; where points need offsets beside their
+/// weights (outside, near controls inside), offsets, a csr_array, and its frames, which deform needs.
 ///
 /// Options, as of `cagework bind`: grid=64 (cells along the longest side, 8 to 512), method="embedded" or "classic",
 /// solver="multigrid", "jacobi" or "cg", preconditioner="none" or "v_cycle", cell_shape="box" or "cubic",
 /// delta_norm="euclidean" or "literal", threads=0 (all), tau=1e-5, max_iterations=20000, sparsify=0.0, memory_limit=4 << 30
-/// (bytes), outside="closest_point" or "refuse".
+/// (bytes), outside="extend", "stay" or "refuse".
 ///
 /// Raises BindError (no point inside, memory), OptionError, ArrayError; Ctrl-C ends it.
 #[pyfunction]
@@ -92,14 +93,14 @@ type Returned<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 
 fn returned(py: Python<'_>, binding: Binding) -> PyResult<Returned<'_>> {
     let report = dictionary(py, &binding.report)?;
-    report.set_item("outside", arrays::outside_of(py, &binding.outside)?)?;
-    Ok((arrays::matrix_of(py, binding.weights)?, report))
+    let weights = arrays::put_beside(&report, binding)?;
+    Ok((arrays::matrix_of(py, weights)?, report))
 }
 
 /// Points of a posed cage: deform(weights, posed, report=None) -> [n_points, 3] float32, object units
 ///
 /// weights: a sparse matrix [n_points, n_cage]; posed: [n_cage, 3] float32 or float64, object units; report: what bind
-/// returned: points outside the cage keep their offset from it. Without it this is weights @ posed, summed in 64 bits.
+/// returned, for points that need offsets. Without it this is weights @ posed, summed in 64 bits.
 ///
 /// Raises ArrayError.
 #[pyfunction]
@@ -112,7 +113,7 @@ pub(crate) fn deform<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let weights = arrays::weights(weights)?;
     let posed = arrays::points("posed", posed, Some(weights.n_columns()))?;
-    let outside = report.map(|report| arrays::outside(report, &weights)).transpose()?.unwrap_or_default();
+    let (weights, frames) = arrays::with_beside(report, weights)?;
     let posed = posed.as_slice();
-    arrays::array_of(py, work::run(py, |_| deform_bound(&weights, &outside, posed))?)
+    arrays::array_of(py, work::run(py, |_| deform_bound(&weights, &frames, posed))?)
 }

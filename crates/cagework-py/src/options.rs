@@ -44,6 +44,15 @@ fn json(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
     })
 }
 
+/// The way back from [`dictionary`].
+///
+/// # Errors
+/// `ArrayError` when it is not what [`dictionary`] made.
+pub(crate) fn from_dictionary<T: DeserializeOwned>(said: &Bound<'_, PyAny>) -> PyResult<T> {
+    let text: String = said.py().import("json")?.call_method1("dumps", (said,))?.extract()?;
+    serde_json::from_str(&text).map_err(error::array)
+}
+
 /// A report as a dictionary.
 ///
 /// # Errors

@@ -22,7 +22,7 @@ const FRAMES: u32 = 30;
 /// -> [n_cage, 3] float64, object units: the posed cage
 ///
 /// vertices: [n, 3], triangles: [m, 3], weights: [n, n_cage], as bind made them; grabs: [k] numbers of vertices, to: [k, 3] where
-/// they go; pins: [l] vertices that stay; report: of bind, for points outside; start: [n_cage, 3] to begin with (the cage at
+/// they go; pins: [l] vertices that stay; report: of bind, for points that need offsets; start: [n_cage, 3] to begin with (the cage at
 /// rest); reach: how far the drag reaches over the model's size, None by its area, math.inf for all of it; relax: 0 to 1, how much
 /// parts within reach go back to their shape at rest; options: of the bind of the model's samples.
 ///
@@ -46,12 +46,12 @@ pub(crate) fn pull<'py>(
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     // Some samples lie beside the model, and outside of the cage where that is close.
-    let options = BindOptions { outside: OutsidePolicy::ClosestPoint, ..bind_options(options)? };
+    let options = BindOptions { outside: OutsidePolicy::Extend, ..bind_options(options)? };
     let controls = cage.get().controls();
     let positions = arrays::points("vertices", vertices, None)?.as_slice().to_vec();
     let mesh = TriMesh { positions, triangles: arrays::triangles(triangles)? };
     let weights = arrays::weights(weights)?;
-    let outside = report.map(|report| arrays::outside(report, &weights)).transpose()?.unwrap_or_default();
+    let (weights, frames) = arrays::with_beside(report, weights)?;
     let handles = |name, value| -> PyResult<Vec<Handle>> {
         Ok(arrays::list(name, value)?.into_iter().map(Handle::Vertex).collect())
     };
@@ -72,16 +72,18 @@ pub(crate) fn pull<'py>(
     let posed = work::run(py, |progress| -> PyResult<Vec<DVec3>> {
         let probes = Probes::new(&mesh, controls).map_err(error::pull)?;
         let of_probes = bind_points(probes.points(), controls, &options, progress).map_err(error::bind)?;
-        let pull = Pull::new(&mesh, controls, probes, &of_probes.weights).map_err(error::pull)?;
+        let pull = Pull::new(&mesh, controls, probes, &of_probes.frames.folded(&of_probes.weights))
+            .map_err(error::pull)?;
+        let rows = frames.folded(&weights);
         let grips = |handles: &[Handle]| -> PyResult<Vec<Grip>> {
-            let grips = handles.iter().map(|&h| Grip::new(h, &pull, &mesh.triangles, &weights));
+            let grips = handles.iter().map(|&h| Grip::new(h, &pull, &mesh.triangles, &rows));
             grips.collect::<Result<_, _>>().map_err(error::pull)
         };
         let from: Vec<DVec3> = start.iter().map(|p| p.as_dvec3()).collect();
         let drag_options = DragOptions { reach, relax, symmetry: None };
         let drag = Drag::new(&pull, &from, &grips(&grabs)?, &grips(&pins)?, drag_options);
         let mut drag = drag.map_err(error::pull)?;
-        let to = drag.targets(&grabs, &to, &deform_bound(&weights, &outside, &start));
+        let to = drag.targets(&grabs, &to, &deform_bound(&weights, &frames, &start));
         drag.go(&to, FRAMES);
         drag.settle(&to);
         Ok(drag.cage())

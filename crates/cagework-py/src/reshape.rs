@@ -68,12 +68,12 @@ pub(crate) fn reshape<'py>(
         let options = BindOptions { held, extra_points: extra.len(), ..options };
         let bound = bind(&points, controls, &options, progress).map_err(error::bind)?;
         if keeps_rig && model.format() == ModelFormat::Gltf {
-            let by = displacements(&bound.weights, &bound.outside, controls.rest(), posed);
+            let by = displacements(&bound.weights, &bound.frames, controls.rest(), posed);
             let outside: Vec<u32> = bound.outside.iter().map(|o| o.vertex).collect();
             let written = model.write_reshaped(&by, &outside, &[], &of_rig);
             return Ok(written.map_err(error::model)?.0);
         }
-        let (weights, poses) = ((&bound.weights, bound.outside.as_slice()), (controls.rest(), posed));
+        let (weights, poses) = ((&bound.weights, &bound.frames), (controls.rest(), posed));
         let deformed = model.deformed(weights, poses, &of_rig.parts);
         model.write(model.format(), &deformed).map_err(error::model)
     })??;

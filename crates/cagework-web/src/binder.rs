@@ -27,6 +27,7 @@ use crate::options::{BindAsked, CageAsked, Coordinates, READ_LIMIT, taken};
 use crate::problems::{self, Check};
 use crate::views::object;
 
+pub(crate) use results::Offsets;
 pub use results::{Bound, BuiltSample, Polygons};
 
 /// Vertices of the model that are bound along with a cage, so that some lie inside.
@@ -83,7 +84,11 @@ impl Binder {
         drop(positions);
         let binding = self.run(&at, &set, asked, progress).await?;
         let report = object(&binding.report)?;
-        Ok(Bound { weights: binding.weights, outside: binding.outside, report })
+        Ok(Bound {
+            weights: binding.weights,
+            offsets: Offsets { frames: binding.frames, outside: binding.outside },
+            report,
+        })
     }
 
     /// Coordinates by formula, mean value or Green, of the cage alone; the arrays are those of `bind`.
@@ -110,7 +115,7 @@ impl Binder {
             }
         };
         let weights = by_formula(&points(positions), set.cage(), READ_LIMIT, &Silent).map_err(Fault::from)?;
-        Ok(Bound { weights, outside: Vec::new(), report: JsValue::UNDEFINED })
+        Ok(Bound { weights, offsets: Offsets::default(), report: JsValue::UNDEFINED })
     }
 
     /// Coordinates at the centres of a slice's cells: rows for `Engine.takeSlice`. Takes the cage's arrays, the axis,
@@ -141,8 +146,9 @@ impl Binder {
             Err(fault) if fault.is(ErrorName::NoneInside) => return Ok(None),
             ran => ran?,
         };
-        let (weights, outside) = (binding.weights, Vec::new());
-        Ok(Some(Bound { weights, outside, report: JsValue::UNDEFINED }))
+        let n_controls = Controls::from(&set).n_controls() as u32;
+        let (weights, offsets) = (binding.weights.columns(0..n_controls), Offsets::default());
+        Ok(Some(Bound { weights, offsets, report: JsValue::UNDEFINED }))
     }
 
     /// Coordinates of a lattice around a cage, for `Engine.takeLattice`; arguments as for `bind`.
@@ -159,12 +165,12 @@ impl Binder {
         #[wasm_bindgen(unchecked_param_type = "(event: Progress) => boolean")] progress: Function,
     ) -> Result<Bound, JsValue> {
         let mut asked: BindAsked = taken(options)?;
-        asked.options.outside = OutsidePolicy::ClosestPoint;
+        asked.options.outside = OutsidePolicy::Extend;
         let set = control_set(&cage, &corners, controls)?;
         let lattice = Lattice::new(Controls::from(&set).surface());
         let binding = self.run(&lattice.points(), &set, asked, progress).await?;
-        let (weights, outside) = (binding.weights, binding.outside);
-        Ok(Bound { weights, outside, report: JsValue::UNDEFINED })
+        let offsets = Offsets { frames: binding.frames, outside: Vec::new() };
+        Ok(Bound { weights: binding.weights, offsets, report: JsValue::UNDEFINED })
     }
 
     /// A cage for a model: `CageOptions` of contract.ts, and after how many steps of subdivision it encloses the model. `progress`
@@ -214,7 +220,7 @@ impl Binder {
         let bound = cagework_core::bind(&at, &set, &BindOptions::default(), &Silent).map_err(Fault::from)?;
         let poses = points(poses);
         let carried = poses.chunks_exact(n_old).flat_map(|pose| {
-            let moved = deform_bound(&bound.weights, &bound.outside, pose);
+            let moved = deform_bound(&bound.weights, &bound.frames, pose);
             flat(&moved[..n_new])
         });
         Ok(carried.collect())

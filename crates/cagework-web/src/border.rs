@@ -8,6 +8,7 @@ use cagework_core::cage_check::{Code, Repair, Severity};
 use cagework_core::cage_gen::{
     CageOptions, DETAILS, MAX_CLEARANCE, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Shape,
 };
+use cagework_core::deform::OutsideVertex;
 use cagework_core::edit::{Element, GestureKind, Pivot, SelectMode};
 use cagework_core::options::{
     Backend, CellShape, DeltaNorm, MAX_GRID, MIN_GRID, Method, OutsidePolicy, Preconditioner, Solver,
@@ -15,11 +16,12 @@ use cagework_core::options::{
 use cagework_core::report::{
     BindReport, CellCounts, MeanMax, MemoryBytes, RawError, RestError, Timings, WeightStats,
 };
-use cagework_core::{BindOptions, InnerElement, Stage};
+use cagework_core::{BindOptions, Frames, InnerElement, Stage};
 use cagework_io::{ModelFormat, UpAxis};
 use serde::Serialize;
 use ts_rs::{Config, TS};
 
+use crate::binder::Offsets;
 use crate::clock::Event;
 use crate::controls::{CageControls, InnerKind};
 use crate::error::ErrorName;
@@ -71,6 +73,9 @@ fn the_page_has_the_types_of_rust() {
         BindAsked,
         Stage,
         Event,
+        Frames,
+        OutsideVertex,
+        Offsets,
         BindReport,
         CellCounts,
         Timings,

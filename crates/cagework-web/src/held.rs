@@ -1,7 +1,7 @@
 //! What a hand holds of the models, and where they are now.
 
-use cagework_core::Weights;
 use cagework_core::edit::pick_surface;
+use cagework_core::{Frames, Weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::Marks;
 use glam::{Vec2, Vec3};
@@ -39,11 +39,16 @@ impl State {
     }
 
     /// How a point of the model follows the cage.
-    pub(crate) fn grip_of(&self, point: SurfacePoint, weights: &Weights) -> Option<Grip> {
+    pub(crate) fn grip_of(
+        &self,
+        point: SurfacePoint,
+        (weights, frames): (&Weights, &Frames),
+    ) -> Option<Grip> {
         let corners = self.models.corners(point.triangle)?;
-        let mut row = vec![0.0; weights.n_columns()];
-        for (v, share) in corners.into_iter().zip(point.bary) {
-            let (columns, values) = weights.row(v as usize);
+        let rows = frames.folded(&weights.with_rows(&corners));
+        let mut row = vec![0.0; rows.n_columns()];
+        for (k, share) in point.bary.into_iter().enumerate() {
+            let (columns, values) = rows.row(k);
             columns
                 .iter()
                 .zip(values)

@@ -1,13 +1,11 @@
 //! What the worker has bound, taken over by the page's module a little at a time: a page answers meanwhile.
 
 use cagework_core::Weights;
-use cagework_core::deform::OutsideVertex;
 use js_sys::{Float32Array, Promise, Uint32Array};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen_futures::JsFuture;
 
-use crate::arrays::points;
 use crate::error::Answer;
 
 /// Weights that are copied and looked at between two turns of the page: a few milliseconds of its main thread.
@@ -50,15 +48,4 @@ pub(crate) async fn weights(
         }
     }
     Ok(weights)
-}
-
-/// Vertices outside the cage: for each of them itself and the corners of its frame, and its offset.
-pub(crate) fn outside(frames: &[u32], offsets: &[f32]) -> Vec<OutsideVertex> {
-    let frames = frames.as_chunks::<4>().0.iter();
-    let outside = frames.zip(points(offsets)).map(|(&[vertex, a, b, c], offset)| OutsideVertex {
-        vertex,
-        corners: [a, b, c],
-        offset,
-    });
-    outside.collect()
 }

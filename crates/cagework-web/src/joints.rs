@@ -1,7 +1,8 @@
 //! Joints of bound models, where they would be in an export.
 
+use cagework_core::Frames;
 use cagework_core::Weights;
-use cagework_core::deform::{OutsideVertex, displacements};
+use cagework_core::deform::displacements;
 use cagework_io::JointPoint;
 use glam::Vec3;
 
@@ -17,16 +18,17 @@ pub(crate) struct JointDots {
     pub(crate) at: Vec<Vec3>,
     /// How they follow the cage; a row each.
     weights: Weights,
+    frames: Frames,
     /// Those outside the cage, ascending.
-    outside: Vec<OutsideVertex>,
+    outside: Vec<usize>,
 }
 
 impl JointDots {
-    /// `weights`, `outside`: of all points of the rigs.
+    /// `weights`, `frames`: of all points of the rigs; `outside`: those outside the cage, ascending.
     ///
     /// # Errors
     /// When the rig cannot be read.
-    pub(crate) fn new(models: &Models, weights: &Weights, outside: &[OutsideVertex]) -> Answer<Self> {
+    pub(crate) fn new(models: &Models, weights: &Weights, frames: Frames, outside: &[u32]) -> Answer<Self> {
         let (mut joints, mut of_joints, mut points) = (Vec::new(), Vec::new(), Vec::new());
         for member in models.iter() {
             let (first_joint, first_point) = (joints.len(), points.len());
@@ -40,12 +42,11 @@ impl JointDots {
             points.extend(member.model.extra_points()?);
         }
         let rows: Vec<u32> = joints.iter().map(|joint| joint.point as u32).collect();
-        let found = |row: &u32| outside.iter().find(|o| o.vertex == *row);
-        let of_joint = |(k, row): (u32, &u32)| found(row).map(|&o| OutsideVertex { vertex: k, ..o });
         Ok(Self {
             at: joints.iter().map(|joint| points[joint.point]).collect(),
             weights: weights.with_rows(&rows),
-            outside: (0..).zip(&rows).filter_map(of_joint).collect(),
+            outside: (0..rows.len()).filter(|&k| outside.binary_search(&rows[k]).is_ok()).collect(),
+            frames,
             joints,
             models: of_joints,
         })
@@ -53,12 +54,12 @@ impl JointDots {
 
     /// Whether one is outside the cage.
     pub(crate) fn is_outside(&self, joint: usize) -> bool {
-        self.outside.iter().any(|o| o.vertex as usize == joint)
+        self.outside.contains(&joint)
     }
 
     /// Where they are in a pose of the cage.
     pub(crate) fn posed(&self, rest: &[Vec3], posed: &[Vec3]) -> Vec<Vec3> {
-        let mut by = displacements(&self.weights, &self.outside, rest, posed);
+        let mut by = displacements(&self.weights, &self.frames, rest, posed);
         for (k, joint) in self.joints.iter().enumerate() {
             if self.is_outside(k) && !joint.holds {
                 by[k] = joint.parent.map_or(glam::DVec3::ZERO, |parent| by[parent]);

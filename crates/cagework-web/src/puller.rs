@@ -111,8 +111,8 @@ impl Puller {
 impl Puller {
     fn of(mesh: &TriMesh, set: &ControlSet) -> Answer<Self> {
         let probes = Probes::new(mesh, set)?;
-        let weights = bind(probes.points(), set, &BindOptions::default(), &Silent)?.weights;
-        let pull = Pull::new(mesh, set, probes, &weights)?;
+        let bound = bind(probes.points(), set, &BindOptions::default(), &Silent)?;
+        let pull = Pull::new(mesh, set, probes, &bound.frames.folded(&bound.weights))?;
         Ok(Self { pull, symmetry: Symmetry::new(Controls::from(set).rest()), drag: None })
     }
 

@@ -1,7 +1,7 @@
 //! For the npm package: models in, models out, and weights without a picture.
 
-use cagework_core::deform::{OutsideVertex, deform_bound, displacements};
-use cagework_core::{Controls, Parts, Weights};
+use cagework_core::deform::{deform_bound, displacements};
+use cagework_core::{Controls, Frames, Parts, Weights};
 use cagework_io::{Model, ModelFormat, ReshapeOptions};
 use glam::Vec3;
 use js_sys::{Array, Float32Array, Function, Uint32Array};
@@ -9,10 +9,9 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::arrays::{flat, points};
-use crate::binder::Binder;
+use crate::binder::{Binder, Offsets};
 use crate::controls::control_set;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::incoming;
 use crate::loaded::Loaded;
 use crate::options::{BindAsked, RigAsked, taken};
 
@@ -74,12 +73,12 @@ impl Binder {
         asked.options.held = model.bytes() + model.bytes_to_write(model.format());
         let bound = self.run(&at, &set, asked, progress).await?;
         if keeps_rig && model.format() == ModelFormat::Gltf {
-            let by = displacements(&bound.weights, &bound.outside, &rest, &posed);
+            let by = displacements(&bound.weights, &bound.frames, &rest, &posed);
             let outside: Vec<u32> = bound.outside.iter().map(|o| o.vertex).collect();
             let written = model.write_reshaped(&by, &outside, &[], &of_rig).map_err(Fault::from)?;
             return Ok(written.0);
         }
-        let deformed = model.deformed((&bound.weights, &bound.outside), (&rest, &posed), &of_rig.parts);
+        let deformed = model.deformed((&bound.weights, &bound.frames), (&rest, &posed), &of_rig.parts);
         Ok(model.write(model.format(), &deformed).map_err(Fault::from)?)
     }
 }
@@ -110,13 +109,14 @@ fn pose(name: &str, flat: &[f32], n: usize) -> Answer<Vec<Vec3>> {
 /// Weights at hand, for pose after pose.
 #[wasm_bindgen]
 pub struct Deformer {
+    n_controls: usize,
     weights: Weights,
-    outside: Vec<OutsideVertex>,
+    frames: Frames,
 }
 
 #[wasm_bindgen]
 impl Deformer {
-    /// Of the arrays of a `Bound`, whose rows are of `n_controls` columns.
+    /// Of the arrays of a `Bound`, of `n_controls` controls.
     ///
     /// # Errors
     /// When they do not belong together.
@@ -126,10 +126,10 @@ impl Deformer {
         indptr: Vec<u32>,
         indices: Vec<u32>,
         data: Vec<f32>,
-        outside: &[u32],
-        offsets: &[f32],
+        #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
     ) -> Result<Self, JsValue> {
-        Ok(Self::of(n_controls, indptr, indices, data, outside, offsets)?)
+        let Offsets { frames, .. } = taken(offsets)?;
+        Ok(Self::of(n_controls, indptr, indices, data, frames)?)
     }
 
     /// Where the points are in a pose, `[n_controls, 3]`. `[n_points, 3]`
@@ -137,8 +137,8 @@ impl Deformer {
     /// # Errors
     /// When the pose has another number of points.
     pub fn deform(&self, posed: &[f32]) -> Result<Vec<f32>, JsValue> {
-        let posed = pose("posed", posed, self.weights.n_columns())?;
-        Ok(flat(&deform_bound(&self.weights, &self.outside, &posed)))
+        let posed = pose("posed", posed, self.n_controls)?;
+        Ok(flat(&deform_bound(&self.weights, &self.frames, &posed)))
     }
 }
 
@@ -148,23 +148,15 @@ impl Deformer {
         indptr: Vec<u32>,
         indices: Vec<u32>,
         data: Vec<f32>,
-        frames: &[u32],
-        offsets: &[f32],
+        frames: Frames,
     ) -> Answer<Self> {
-        let weights = Weights::new(n_controls, indptr, indices, data)?;
-        let (n_rows, n_columns) = (weights.n_rows() as u32, n_controls);
-        let rows = frames.as_chunks::<4>().0;
-        let fit = 4 * offsets.len() == 3 * frames.len() && 4 * rows.len() == frames.len();
-        let within = |&[vertex, a, b, c]: &[u32; 4]| vertex < n_rows && a.max(b).max(c) < n_columns;
-        if !fit || !rows.iter().all(within) {
-            let message = format!(
-                "outside has {} numbers and offsets {}; four and three are needed for each point outside the cage, whose vertex and corners there are",
-                frames.len(),
-                offsets.len()
-            );
+        if !frames.fits(n_controls as usize) {
+            let message =
+                format!("offsets has frames of more than {n_controls} controls, or joints without bones");
             return Err(Fault::new(ErrorName::Error, message));
         }
-        Ok(Self { weights, outside: incoming::outside(frames, offsets) })
+        let weights = Weights::new(n_controls + frames.n_columns() as u32, indptr, indices, data)?;
+        Ok(Self { n_controls: n_controls as usize, weights, frames })
     }
 }
 
@@ -181,12 +173,14 @@ mod tests {
 
     #[test]
     fn frames_that_name_no_column_are_refused() {
-        let of = |frames: &[u32], offsets: &[f32]| {
-            Deformer::of(3, vec![0, 1], vec![2], vec![1.0], frames, offsets).map(drop)
+        let of = |joints: Vec<u32>, column: u32| {
+            let plain = vec![[0.0; 4]; 3 * joints.len()];
+            let frames = Frames { joints, plain, whole: vec![[0.0; 3]; 3], ..Frames::default() };
+            Deformer::of(3, vec![0, 1], vec![column], vec![1.0], frames).map(drop)
         };
-        assert!(of(&[0, 0, 1, 2], &[0.0; 3]).is_ok());
-        assert!(of(&[0, 0, 1, 3], &[0.0; 3]).is_err(), "a corner");
-        assert!(of(&[1, 0, 1, 2], &[0.0; 3]).is_err(), "a row");
-        assert!(of(&[0, 0, 1, 2], &[]).is_err(), "an offset");
+        // Three controls, three axes, three columns of the whole cage and three of the one joint.
+        assert!(of(vec![2], 11).is_ok());
+        assert!(of(vec![2], 12).is_err(), "a column");
+        assert!(of(vec![3], 2).is_err(), "a joint");
     }
 }

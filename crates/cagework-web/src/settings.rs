@@ -195,7 +195,7 @@ mod tests {
             "bind": {
                 "grid": 64, "method": "embedded", "solver": "multigrid", "preconditioner": "none",
                 "backend": "gpu", "cell_shape": "box", "delta_norm": "euclidean", "tau": 1e-5,
-                "max_iterations": 20_000, "sparsify": 0, "outside": "closest_point", "memory_limit": 2 * GIB,
+                "max_iterations": 20_000, "sparsify": 0, "outside": "extend", "memory_limit": 2 * GIB,
             },
             "cage": {
                 "vertices": 80, "margin": 0, "symmetry": "auto", "voxels": 0, "shape": "follow",

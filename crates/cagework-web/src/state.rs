@@ -7,7 +7,7 @@ use cagework_core::dynamic::Lattice;
 use cagework_core::edit::{Element, Gesture, Pivot, Pull, Selection, SharedPull, Symmetry, Topology};
 use cagework_core::enclosure::Enclosure;
 use cagework_core::slice::Slice;
-use cagework_core::{Bounds, ControlSet, PolygonMesh, Weights};
+use cagework_core::{Bounds, ControlSet, Frames, PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::{Camera, GizmoPart};
 use cagework_io::{Model, UpAxis};
@@ -48,10 +48,12 @@ pub(crate) struct State {
     pub(crate) rig_notices: Vec<String>,
     /// The clip that plays, in place of the cage.
     pub(crate) playing: Option<Playing>,
-    /// What is needed for the cage to bend the moving model: a lattice around it, weights of its points, those outside.
-    pub(crate) lattice: Option<(Lattice, Weights, Vec<OutsideVertex>)>,
-    /// Weights of the points of the model's rig, and those of them outside the cage.
-    pub(crate) rig: Option<(Weights, Vec<OutsideVertex>)>,
+    /// What is needed for the cage to bend the moving model: a lattice around it, weights of its points, their frames.
+    pub(crate) lattice: Option<(Lattice, Weights, Frames)>,
+    /// Weights of the points of the model's rig.
+    pub(crate) rig: Option<Weights>,
+    /// Vertices outside the cage, then points of the rig that are, counted after all vertices.
+    pub(crate) outside: Vec<OutsideVertex>,
     /// The joints among them; none before the model is bound.
     pub(crate) joints: Option<JointDots>,
     /// What there are weights of to compare with.
@@ -141,6 +143,7 @@ impl State {
         self.playing = None;
         self.lattice = None;
         (self.is_bound, self.rig, self.joints) = (false, None, None);
+        self.outside.clear();
         self.others.clear();
         self.revision += 1;
         self.is_moved = true;

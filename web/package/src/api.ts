@@ -88,8 +88,8 @@ export function createApi(open: () => Promise<Runtime>): Api {
       const { pkg } = await runtime();
       let deformer = deformers.get(weights);
       if (!deformer) {
-        const { controls, indptr, indices, data, outside, offsets } = weights;
-        deformer = new pkg.Deformer(controls, indptr, indices, data, outside, offsets);
+        const { controls, indptr, indices, data, offsets } = weights;
+        deformer = new pkg.Deformer(controls, indptr, indices, data, offsets);
         deformers.set(weights, deformer);
       }
       return deformer.deform(pose);

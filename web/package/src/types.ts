@@ -1,6 +1,7 @@
 /** The package's functions and what they take and give: all that a user's compiler reads. */
 
 import type {
+  Offsets,
   BindOptions,
   BindReport,
   CageControls,
@@ -50,11 +51,9 @@ export interface Weights {
   readonly indices: Uint32Array;
   /** `[n_nonzeros]`, dimensionless. */
   readonly data: Float32Array;
-  /** For each point outside the cage: the point, and the corners of its frame. `[n_outside, 4]` */
-  readonly outside: Uint32Array;
-  /** Where it is in that frame. `[n_outside, 3]` */
-  readonly offsets: Float32Array;
-  /** Columns. */
+  /** The columns from `controls` on, which carry offsets, and the points outside the cage. */
+  readonly offsets: Offsets;
+  /** Columns of controls: the first. */
   readonly controls: number;
 }
 

@@ -224,11 +224,11 @@ function Advanced({ app }: { app: App }) {
           />
         </div>
       )}
-      <Toggle
+      <Segments<BindOptions["outside"]>
         label={T.bind.outside}
-        sentence={T.bind.outsideSentence}
-        on={options.outside === "closest_point"}
-        onChange={(on) => set({ outside: on ? "closest_point" : "refuse" })}
+        choices={(["extend", "stay", "refuse"] as const).map((value) => ({ value, label: T.bind.outsides[value] }))}
+        value={options.outside}
+        onChange={(outside) => set({ outside })}
       />
     </Fold>
   );

@@ -62,7 +62,8 @@ pub(crate) struct SolveArgs {
     /// How Eq. 2 is read: as a Euclidean norm, or to the letter.
     #[arg(long, default_value_t, value_parser = words::<DeltaNorm>())]
     delta: DeltaNorm,
-    /// What to do with vertices outside the cage: bind them to its closest point, or end with an error.
+    /// What to do with vertices outside the cage: `extend` the weights within 5 % of its diagonal, fading to nothing at 15 %, so that
+    /// the rest of a model stays where it is (a cage may be around an arm alone); let them `stay`; or `refuse`, an error.
     #[arg(long, default_value_t, value_parser = words::<OutsidePolicy>())]
     outside: OutsidePolicy,
     /// Where to compute; CAGEWORK_ADAPTER chooses among several GPUs by part of a name.

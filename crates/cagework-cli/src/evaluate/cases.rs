@@ -1,7 +1,7 @@
 //! What is run: the paper's cases, and ours beside them.
 
+use cagework_core::Frames;
 use cagework_core::bind::Binding;
-use cagework_core::deform::OutsideVertex;
 use cagework_core::options::{BindOptions, Method, Solver};
 use cagework_core::{BindReport, Cage, Weights};
 use cagework_gpu::{GpuContext, GpuError};
@@ -142,7 +142,7 @@ pub(super) struct Reconstruction {
     pub(super) caption: String,
     pub(super) report: BindReport,
     pub(super) weights: Weights,
-    pub(super) outside: Vec<OutsideVertex>,
+    pub(super) frames: Frames,
 }
 
 /// Everything that was run.
@@ -254,8 +254,8 @@ impl Evaluation {
             .into_iter()
             .map(|(figure, what, way, grid, tau)| {
                 let caption = format!("g = {grid}, tau = {tau:e}{what}");
-                let Binding { weights, outside, report } = bind(way, grid, tau)?;
-                Ok(Reconstruction { figure, caption, report, weights, outside })
+                let Binding { weights, frames, report, .. } = bind(way, grid, tau)?;
+                Ok(Reconstruction { figure, caption, report, weights, frames })
             })
             .collect::<Result<_, CliError>>()?;
         Ok(Self {

@@ -44,7 +44,7 @@ pub(super) fn all(
     let mut pictures = Vec::new();
     session.set_scene(SceneOptions { mesh: MeshStyle::Clay, base_wireframe: true, ..bare.clone() });
     for r in &evaluation.reconstructions {
-        block_on(session.adopt(r.weights.clone(), r.outside.clone()))?;
+        block_on(session.adopt(r.weights.clone(), r.frames.clone()))?;
         let rgba = block_on(session.picture(SIZE, 1.0))?;
         pictures.push((format!("{}.png", r.figure), png(rgba, SIZE)?));
     }

@@ -53,10 +53,11 @@ pub(super) fn landmarks(bound: &Bound, path: &Path) -> Result<Goals, CliError> {
     let model = &bound.model;
     let up = model.up();
     let from_origin = |p: [f64; 3]| (DVec3::from_array(p) - model.origin()).as_vec3();
-    let n = bound.weights.n_columns();
     let (mut indptr, mut indices, mut data) = (vec![0], Vec::new(), Vec::new());
     let (mut shares, mut to, mut n_outside) = (Vec::new(), Vec::new(), 0);
-    let is_outside = |v: u32| bound.outside.iter().any(|o| o.vertex == v);
+    let is_outside = |v: u32| bound.outside.iter().any(|o| o.vertex == v && o.share < 1.0);
+    let rows = bound.rows();
+    let n = rows.n_columns();
     for (k, said) in all.iter().enumerate() {
         let wrong = |what: String| wrong(path, &format!("landmark {k} {what}"));
         let numbers = said.to.iter().chain(said.point.iter().flatten()).map(|&x| x as f32);
@@ -71,7 +72,7 @@ pub(super) fn landmarks(bound: &Bound, path: &Path) -> Result<Goals, CliError> {
             usize::from(corners.iter().zip(shares_of).any(|(&v, share)| share > 0.0 && is_outside(v)));
         let mut row = vec![0.0; n];
         for (&v, share) in corners.iter().zip(shares_of).filter(|(_, share)| *share > 0.0) {
-            let (columns, weights) = bound.weights.row(v as usize);
+            let (columns, weights) = rows.row(v as usize);
             columns.iter().zip(weights).for_each(|(&c, &w)| row[c as usize] += share * f64::from(w));
         }
         for (column, weight) in row.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
@@ -85,7 +86,7 @@ pub(super) fn landmarks(bound: &Bound, path: &Path) -> Result<Goals, CliError> {
     let weights = Weights::new(n as u32, indptr, indices, data).map_err(|e| CliError::file(path, e))?;
     let notices = (n_outside > 0).then(|| {
         format!(
-            "{n_outside} landmarks are outside the cage: the closest point of it is brought to their targets"
+            "{n_outside} landmarks are so far outside the cage that they follow it in part: they miss their targets"
         )
     });
     let few = (to.len() < FEW).then(|| {

@@ -55,7 +55,7 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let job = Job::read(&given.job)?;
     let inputs = [Some(given.job.as_path()), job.start.as_deref()];
     let args = &given.pose;
-    let Bound { model, cage, weights, outside } = Bound::load(args, inputs.into_iter().flatten())?;
+    let Bound { model, cage, weights, frames, .. } = Bound::load(args, inputs.into_iter().flatten())?;
     let (controls, output) = (cage.controls(), &args.output.path);
     let inner = &controls.rest()[cage.cage.n_vertices()..];
     let start = match &job.start {
@@ -71,8 +71,9 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let begun = Instant::now();
     let from: Vec<DVec3> = start.iter().copied().map(Vec3::as_dvec3).collect();
     let drag_options = DragOptions { reach: job.reach, relax: job.relax, symmetry: None };
+    let rows = frames.folded(&weights);
     let grips = |handles: &[Handle]| {
-        let grips = handles.iter().map(|&h| Grip::new(h, &pull, &model.triangles, &weights));
+        let grips = handles.iter().map(|&h| Grip::new(h, &pull, &model.triangles, &rows));
         grips.collect::<Result<Vec<_>, _>>().map_err(wrong)
     };
     let mut drag =
@@ -80,7 +81,7 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let grab_ms = since(begun);
 
     let pose = |drag: &Drag| drag.cage().iter().map(|p| p.as_vec3()).collect::<Vec<Vec3>>();
-    let deformed = |cage: &[Vec3]| deform_bound(&weights, &outside, cage);
+    let deformed = |cage: &[Vec3]| deform_bound(&weights, &frames, cage);
     let before = deformed(&start);
     let to = drag.targets(&job.grabs, &model.up().turned(&job.to(model.origin())), &before);
     let grabbed = drag.start().to_vec();

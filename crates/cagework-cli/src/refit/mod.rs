@@ -213,11 +213,12 @@ impl Binder<'_> {
             if is_static { (model.positions.clone(), 0) } else { rig::points(&model, path)? };
         let (options, missing) = args.rig.options_of_one(&model, path)?;
         let held = model.bytes();
-        let Binding { weights, outside, report } = self.bind(&points, held, extra_points)?;
+        let Binding { weights, frames, outside, report } = self.bind(&points, held, extra_points)?;
         let bound = BindOptions { held: held + self.held(), ..self.options() };
         check_memory(&bound, points.len(), *controls, model.bytes_to_write(format))?;
         let saved = SavedWeights {
             weights,
+            frames,
             outside,
             extra_points: points[model.positions.len()..].to_vec(),
             inner_controls: inner.to_vec(),

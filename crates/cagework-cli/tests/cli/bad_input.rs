@@ -135,14 +135,14 @@ fn cage_elsewhere_or_in_another_unit_is_refused_whatever_is_to_be_done_outside()
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.write("far.obj", box_obj(&CORNERS.map(|[x, y, z]| [x + 10_001.7, y, z])));
     sandbox.write("small.obj", box_obj(&CORNERS.map(|c| c.map(|x| 0.01 * x))));
-    for policy in ["closest-point", "refuse"] {
+    for policy in ["extend", "stay", "refuse"] {
         for (cage, said) in [
             // From 0.7 to 10,000.7.
             ("far.obj", "none of the model's 178 vertices is inside the cage; the cage is 1e4 away from it"),
             ("small.obj", "the cage is 70 times smaller than the model"),
         ] {
             let args = format!("bind mesh.obj --cage {cage} -g 8 --outside {policy}");
-            assert_refused(&sandbox, &args, &[said, "`--outside closest-point` cannot help"]);
+            assert_refused(&sandbox, &args, &[said, "`--outside` cannot help"]);
         }
     }
 }

@@ -3,8 +3,7 @@
 //! The correction is the smallest one relative to the weights themselves: among all corrections d of the row w that
 //! restore the four sums, it minimises `sum d_i^2 / w_i`. Its solution is `d_i = w_i phi_i . lambda` with the 4 x 4
 //! system `(sum w_i phi_i phi_i^T) lambda = e_1 - sum w_i phi_i`, `phi_i = (1, (c_i - v) / s)`, s the cage's diagonal.
-//! Zero weights stay zero, so the row stays as sparse as it was. Weights of balls and tubes inside, which are off their own place
-//! by the radius, are left as they are (their i is in no sum but the last). Each weight is multiplied by a factor that is linear in
+//! Zero weights stay zero, so the row stays as sparse as it was. Each weight is multiplied by a factor that is linear in
 //! the control's position: next to 1, and the row not negative, as long as the sums miss by little. Nothing here bounds the
 //! factors; who drops weights must look at them.
 
@@ -43,8 +42,6 @@ pub struct Columns {
     exact: [Vec<[f64; LANES]>; 3],
     center: DVec3,
     diagonal: f64,
-    /// 1 for columns that may be corrected, 0 for others; none if all may. `[n_batches]`
-    free: Option<Vec<Row>>,
 }
 
 /// Sums over a row: 1; x, y, z; xx, xy, xz, yy, yz, zz of the columns' distances from the target, each weighted.
@@ -70,19 +67,7 @@ impl Columns {
                 .collect::<Vec<_>>()
         });
         let scaled = exact.each_ref().map(|e| e.iter().map(|lanes| lanes.map(|x| x as f32)).collect());
-        let free = controls.inner().filter(|inner| inner.has_radius()).map(|inner| {
-            let n_cage = controls.cage().n_vertices();
-            let is_free = |column: usize| column < n_cage || !inner.is_rounded(column - n_cage);
-            let of_columns: Vec<f32> =
-                (0..controls.n_controls()).map(|column| f32::from(u8::from(is_free(column)))).collect();
-            let batch = |lanes: &[f32]| {
-                let mut row = ZERO;
-                row[..lanes.len()].copy_from_slice(lanes);
-                row
-            };
-            of_columns.chunks(LANES).map(batch).collect()
-        });
-        Self { scaled, exact, center, diagonal, free }
+        Self { scaled, exact, center, diagonal }
     }
 
     /// Batches of lanes that a row has.
@@ -132,27 +117,16 @@ impl Columns {
     /// before, to f32.
     #[inline(always)]
     pub fn restore_affine(&self, row: &mut [Row], target: DVec3) -> Sums {
-        let all = self.moments(row.iter().copied(), target);
-        let m = match &self.free {
-            None => all,
-            Some(free) => {
-                let masked = row.iter().zip(free).map(|(w, free)| {
-                    let mut masked = *w;
-                    masked.iter_mut().zip(free).for_each(|(w, free)| *w *= free);
-                    masked
-                });
-                self.moments(masked, target)
-            }
-        };
+        let m = self.moments(row, target);
         let matrix = DMat4::from_cols(
             DVec4::new(m[0], m[1], m[2], m[3]),
             DVec4::new(m[1], m[4], m[5], m[6]),
             DVec4::new(m[2], m[5], m[7], m[8]),
             DVec4::new(m[3], m[6], m[8], m[9]),
         );
-        let sums = DVec4::new(all[0], all[1], all[2], all[3]);
-        let point_off = DVec3::new(all[1], all[2], all[3]) + (all[0] - 1.0) * target;
-        let before = Sums { sum: all[0], miss: point_off.length() };
+        let sums = DVec4::new(m[0], m[1], m[2], m[3]);
+        let point_off = DVec3::new(m[1], m[2], m[3]) + (m[0] - 1.0) * target;
+        let before = Sums { sum: m[0], miss: point_off.length() };
         let ridge = RIDGE * (m[0] + m[4] + m[7] + m[9]);
         let lambda = (matrix + DMat4::from_diagonal(DVec4::splat(ridge))).inverse() * (DVec4::X - sums);
         if !lambda.is_finite() {
@@ -160,15 +134,10 @@ impl Columns {
         }
         let (l, t) = (lambda.as_vec4(), target.as_vec3());
         let [x, y, z] = &self.scaled;
-        for (batch, (((w, x), y), z)) in row.iter_mut().zip(x).zip(y).zip(z).enumerate() {
+        for (((w, x), y), z) in row.iter_mut().zip(x).zip(y).zip(z) {
             let mut change = ZERO;
             for k in 0..LANES {
                 change[k] = l.x + l.y * (x[k] - t.x) + l.z * (y[k] - t.y) + l.w * (z[k] - t.z);
-            }
-            if let Some(free) = &self.free {
-                for k in 0..LANES {
-                    change[k] *= free[batch][k];
-                }
             }
             for k in 0..LANES {
                 w[k] *= 1.0 + change[k];
@@ -178,13 +147,13 @@ impl Columns {
     }
 
     #[inline(always)]
-    fn moments(&self, row: impl Iterator<Item = Row>, target: DVec3) -> Moments {
+    fn moments(&self, row: &[Row], target: DVec3) -> Moments {
         let t = target.as_vec3();
         let [x, y, z] = &self.scaled;
         // In variables of their own, not in an array: they stay in registers.
         let (mut s, mut sx, mut sy, mut sz) = (ZERO, ZERO, ZERO, ZERO);
         let (mut sxx, mut sxy, mut sxz, mut syy, mut syz, mut szz) = (ZERO, ZERO, ZERO, ZERO, ZERO, ZERO);
-        for (((w, x), y), z) in row.zip(x).zip(y).zip(z) {
+        for (((w, x), y), z) in row.iter().zip(x).zip(y).zip(z) {
             for k in 0..LANES {
                 let (dx, dy, dz) = (x[k] - t.x, y[k] - t.y, z[k] - t.z);
                 let (wx, wy, wz) = (w[k] * dx, w[k] * dy, w[k] * dz);

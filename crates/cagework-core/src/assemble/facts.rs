@@ -9,7 +9,7 @@ use super::affine::Sums;
 /// What was found out about a row of weights.
 #[derive(Clone, Copy, Debug)]
 pub struct RowFacts {
-    /// Distance between `sum w c` and the vertex over the cage's diagonal; none for those that an offset keeps in place.
+    /// Distance between `sum w c` and the vertex over the cage's diagonal; none until it is known what its offset makes up for.
     pub error: Option<f32>,
     /// How far its sum is from 1.
     pub sum_error: f32,
@@ -17,7 +17,7 @@ pub struct RowFacts {
     pub low: f32,
     /// Its largest weight.
     pub high: f32,
-    /// Before it was restored; none for those that an offset keeps in place.
+    /// Before it was restored; none for those that are not.
     pub raw: Option<RawRow>,
 }
 

@@ -46,9 +46,6 @@ pub struct RowOptions {
     pub threshold: f32,
     /// Restore sum and rest position of every row. Off for the classic method, which shows its errors.
     pub preserve_affine: bool,
-    /// Rows that cannot be restored without negative weights only get their sum back: next to a ball or tube, which has one
-    /// value all around, no weights have a point's place. An offset keeps it.
-    pub may_miss: bool,
 }
 
 /// A matrix of weights and what was found out about its rows.
@@ -72,18 +69,19 @@ struct Run<'a> {
 }
 
 /// Makes the matrix of weights. `blocks[batch][vertex]`: sampled values (used up as scratch space); `points`: rest
-/// positions; `is_outside(vertex)`: whether a vertex lies outside the cage.
+/// positions; `is_apart(vertex)`: whether its row is
+/// left as it is sampled, because an offset makes up for what it misses.
 pub fn assemble(
     controls: Controls<'_>,
     blocks: &mut [Vec<Row>],
     points: &[Vec3],
     options: RowOptions,
-    is_outside: impl Fn(usize) -> bool + Sync,
+    is_apart: impl Fn(usize) -> bool + Sync,
     team: &Team,
 ) -> Assembled {
     let columns = Columns::new(controls);
     if team.n_threads() == 1 && options.threshold == 0.0 {
-        return assemble_alone(controls, &columns, blocks, points, options, &is_outside);
+        return assemble_alone(controls, &columns, blocks, points, options, &is_apart);
     }
     let mut runs = runs_of(blocks, points, VERTEX_RUN);
     // Without a threshold it is known beforehand which weights are stored: rows are corrected on their way into the
@@ -94,7 +92,7 @@ pub fn assemble(
             #[inline(always)]
             || {
                 if corrected_first {
-                    run.correct(&columns, options, &is_outside, |run, v, row| {
+                    run.correct(&columns, options, &is_apart, |run, v, row| {
                         run.lengths.push(row.iter().flatten().map(|&w| u32::from(w != 0.0)).sum());
                         run.keep(v, row);
                     });
@@ -123,7 +121,7 @@ pub fn assemble(
                 if corrected_first {
                     run.store_kept();
                 } else {
-                    run.correct(&columns, options, &is_outside, |run, v, row| {
+                    run.correct(&columns, options, &is_apart, |run, v, row| {
                         run.entries.put_row(row, |batch| run.blocks[batch][v].map(|w| w > 0.0));
                     });
                 }
@@ -142,7 +140,7 @@ fn assemble_alone(
     blocks: &mut [Vec<Row>],
     points: &[Vec3],
     options: RowOptions,
-    is_outside: &impl Fn(usize) -> bool,
+    is_apart: &impl Fn(usize) -> bool,
 ) -> Assembled {
     let mut runs = runs_of(blocks, points, points.len().max(1));
     let room = points.len() * controls.n_controls();
@@ -151,7 +149,7 @@ fn assemble_alone(
         dispatch(
             #[inline(always)]
             || {
-                run.correct(columns, options, is_outside, |run, v, row| {
+                run.correct(columns, options, is_apart, |run, v, row| {
                     let length = run.entries.put_row(row, |batch| run.blocks[batch][v].map(|w| w > 0.0));
                     run.lengths.push(length);
                 });
@@ -233,18 +231,18 @@ impl Run<'_> {
         &mut self,
         columns: &Columns,
         options: RowOptions,
-        is_outside: &impl Fn(usize) -> bool,
+        is_apart: &impl Fn(usize) -> bool,
         take: impl Fn(&mut Self, usize, &[Row]),
     ) {
         let mut row = vec![ZERO; self.blocks.len()];
         for (v, point) in self.points.iter().enumerate() {
             let target = columns.scale(point.as_dvec3());
-            let outside = is_outside(self.first + v);
+            let apart = is_apart(self.first + v);
             let lowest = self.load(v, 0.0, &mut row);
-            let (raw, mut stored) = if options.preserve_affine && !outside {
+            let (raw, stored) = if options.preserve_affine && !apart {
                 self.restore_row(v, columns, options.threshold, &mut row, target)
             } else if options.threshold > 0.0 {
-                // Errors, and the place of a vertex outside, are not sparsification's to change.
+                // Errors, and what an offset makes up for, are not sparsification's to change.
                 let raw = columns.sums(&row, target);
                 let goal = columns.combined(&row).1;
                 self.restore_row(v, columns, options.threshold, &mut row, goal);
@@ -253,16 +251,7 @@ impl Run<'_> {
                 let raw = columns.sums(&row, target);
                 (raw, raw)
             };
-            let misses = options.may_miss
-                && !outside
-                && (stored.miss > NOT_RESTORED || row.iter().flatten().any(|&w| w < 0.0));
-            if misses {
-                self.load(v, 0.0, &mut row);
-                let sum = columns.sums(&row, target).sum as f32;
-                row.iter_mut().flatten().for_each(|w| *w /= sum);
-                stored = columns.sums(&row, target);
-            }
-            let raw = (!outside && !misses).then_some(RawRow { sums: raw, lowest });
+            let raw = (!apart).then_some(RawRow { sums: raw, lowest });
             self.facts.push(RowFacts::of(&row, stored, raw));
             take(self, v, &row);
         }

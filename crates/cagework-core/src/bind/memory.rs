@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use super::BindError;
+use super::offsets::needs_all;
 use crate::cage::Cage;
 use crate::controls::Controls;
 use crate::grid::Grid;
@@ -30,6 +31,10 @@ const ROW_BYTES: f64 = 44.0;
 /// What a different position takes: its sampling stencil (up to 8 rows and a dozen Dirichlet values of 8 bytes), which is
 /// there twice while threads' parts are joined, and facts about its row.
 const POINT_BYTES: f64 = 470.0;
+
+/// What a row of offsets takes: three entries for each of four holds. (The bind of the joints to the cage alone, on an eighth of the
+/// cells, begins when the fields of this one are gone.)
+const OFFSET_BYTES: f64 = 3.0 * 4.0 * 8.0;
 
 /// What a cell of the grid takes while lines and levels are made.
 const CELL_BYTES: f64 = 30.0;
@@ -120,7 +125,8 @@ pub(super) fn estimate(
     let copies = if rows > points { bytes_of(rows) } else { blocks };
     let assembled = bytes_of(points) + copies.max(blocks);
     let (weights, fields) = if blocks + fields > assembled { (blocks, fields) } else { (assembled, 0.0) };
-    let of_points = ROW_BYTES * rows as f64 + POINT_BYTES * points as f64 + weights;
+    let offsets = if needs_all(controls, options) { OFFSET_BYTES } else { 0.0 };
+    let of_points = (ROW_BYTES + offsets) * rows as f64 + (POINT_BYTES + offsets) * points as f64 + weights;
     let of_grid = voxels * (1.0 + COARSER) + lines + stencils * (1.0 + 2.0 * COARSER) + fields;
     let bytes = options.held as f64 + of_points + of_grid;
     Needed { bytes: bytes as u64, of_points: of_points as u64 }

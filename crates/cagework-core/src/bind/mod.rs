@@ -2,6 +2,7 @@
 
 mod many;
 mod memory;
+mod offsets;
 mod outside;
 mod parts;
 pub mod pipeline;
@@ -20,6 +21,7 @@ use thiserror::Error;
 
 use crate::controls::Controls;
 use crate::deform::OutsideVertex;
+use crate::frames::Frames;
 use crate::options::{BindOptions, OutOfRange};
 use crate::progress::{Cancelled, Progress};
 use crate::report::BindReport;
@@ -29,10 +31,11 @@ use crate::words::grouped;
 /// The result of a bind.
 #[derive(Clone, Debug)]
 pub struct Binding {
-    /// One row per mesh vertex in the caller's order, one column per control. A row of a vertex outside the cage
-    /// holds the weights of the closest point on the cage.
+    /// One row per mesh vertex in the caller's order, one column per control and, where offsets are needed, those of `frames`.
     pub weights: Weights,
-    /// Vertices that an offset keeps in place, ascending: those outside the cage, and those inside of a control or next to one.
+    /// What carries the offsets of vertices outside the cage and near controls inside.
+    pub frames: Frames,
+    /// Vertices outside the cage, ascending.
     pub outside: Vec<OutsideVertex>,
     /// What was measured.
     pub report: BindReport,

@@ -98,7 +98,7 @@ pub(super) fn refuse_outside(
     }
 }
 
-/// [`BindError::NoneInside`]: the cage holds none of the model, and nothing would follow it but by its closest point. `positions`,
+/// [`BindError::NoneInside`]: the cage holds none of the model, and nothing of it would follow. `positions`,
 /// of which there are some: of the file.
 fn none_inside(cage: &Cage, positions: &[Vec3]) -> BindError {
     let model = Bounds::of(positions).unwrap_or(cage.bounds());
@@ -107,14 +107,20 @@ fn none_inside(cage: &Cage, positions: &[Vec3]) -> BindError {
 
 /// What to say of a cage that is so much larger than the model that all vertices have nearly the same weights. `positions`: of the
 /// model, the first rows of `weights`.
-pub(super) fn oversized(cage: Bounds, positions: &[Vec3], weights: &Weights) -> Option<String> {
+pub(super) fn oversized(
+    cage: Bounds,
+    positions: &[Vec3],
+    weights: &Weights,
+    n_controls: usize,
+) -> Option<String> {
     let larger = 1.0 / Misfit::of(cage, Bounds::of(positions)?).ratio;
     if !(LARGE..f64::INFINITY).contains(&larger) {
         return None;
     }
-    let mut ranges = vec![(f32::INFINITY, f32::NEG_INFINITY, 0_usize); weights.n_columns()];
+    let mut ranges = vec![(f32::INFINITY, f32::NEG_INFINITY, 0_usize); n_controls];
     let rows = weights.rows().take(positions.len());
-    for (&column, &weight) in rows.flat_map(|(columns, data)| columns.iter().zip(data)) {
+    let entries = rows.flat_map(|(columns, data)| columns.iter().zip(data));
+    for (&column, &weight) in entries.filter(|(column, _)| (**column as usize) < n_controls) {
         let (low, high, count) = &mut ranges[column as usize];
         (*low, *high, *count) = (low.min(weight), high.max(weight), *count + 1);
     }

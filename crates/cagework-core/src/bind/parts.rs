@@ -232,7 +232,7 @@ mod tests {
                 merge.add(&bind_columns(&points, &cage, &options, columns, &Silent).unwrap()).unwrap();
             }
             let merged = merge.finish().unwrap();
-            assert!(merged.weights == whole.weights && merged.outside == whole.outside, "{options:?}");
+            assert!(merged.weights == whole.weights && merged.frames == whole.frames, "{options:?}");
             let said = |b: &Binding| (b.report.iterations, b.report.converged, b.report.rest_error);
             assert_eq!(said(&merged), said(&whole));
         }

@@ -3,27 +3,28 @@
 //! Everything but the middle is the same for every back end: [`Prepared::new`], then whoever solves makes a
 //! [`Solved`], then [`Prepared::finish`].
 
-use std::cell::LazyCell;
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use crate::assemble::{Assembled, RowOptions, assemble};
 use crate::cage_check;
 use crate::controls::Controls;
-use crate::deform::{OutsideVertex, triangle_frame};
+use crate::deform::{OutsideVertex, outside_in_words};
+use crate::frames::Frames;
 use crate::grid::Grid;
 use crate::mesh::{Weld, weld};
-use crate::options::{Backend, BindOptions, Method};
+use crate::options::{Backend, BindOptions, Method, OutsidePolicy};
 use crate::progress::{Progress, Stage};
 use crate::report::{BindReport, MemoryBytes, Timings, WeightStats};
-use crate::sample::{ClosestOnCage, Outside, Stencils};
+use crate::sample::{Outside, Stencils};
 use crate::solve::hierarchy::Hierarchy;
 use crate::solve::rows::Row;
 use crate::solve::stop::SolveReport;
 use crate::team::{Team, VERTEX_RUN};
 
 use super::memory::{Vertices, estimate};
+use super::offsets::{Offsets, needs_all};
 use super::outside::{oversized, refuse_outside};
 use super::solving::solve_and_sample;
 use super::voxels::{Gridded, Voxels};
@@ -164,7 +165,7 @@ impl<'a> Prepared<'a> {
         watch: &Watch<'_>,
     ) -> Result<Self, BindError> {
         let voxelized = watch.now_ms();
-        let stencils = sampling_stencils(controls, &gridded, &mesh.points, watch)?;
+        let stencils = sampling_stencils(controls, &gridded, &mesh.points, options.outside, watch)?;
         refuse_outside(controls, &mesh, &stencils, options)?;
         let times_ms = [began, voxelized, watch.now_ms()];
         Ok(Self { mesh, controls, options, gridded, stencils, estimated, times_ms })
@@ -211,20 +212,22 @@ impl<'a> Prepared<'a> {
         let row_options = RowOptions {
             threshold: self.options.sparsify,
             preserve_affine: self.options.method == Method::Embedded,
-            may_miss: self.options.method == Method::Embedded && self.controls.inner().is_some(),
         };
-        let is_outside = |vertex| self.stencils.is_outside(vertex);
+        let all = needs_all(self.controls, self.options);
+        let is_apart = |point| all || self.stencils.is_outside(point);
         let blocks_bytes: usize = solved.blocks.iter().map(|b| size_of_val(b.as_slice())).sum();
         let (points, team) = (&self.mesh.points, &self.gridded.team);
-        let rows = assemble(self.controls, &mut solved.blocks, points, row_options, is_outside, team);
+        let offsets = Offsets::new(self.controls, &self.stencils, &solved.blocks, self.options, watch)?;
+        let rows = assemble(self.controls, &mut solved.blocks, points, row_options, is_apart, team);
         drop(std::mem::take(&mut solved.blocks));
-        self.reported(rows, blocks_bytes, solved, sampled, watch)
+        let (rows, frames) = offsets.add_to(rows, points, is_apart);
+        self.reported((rows, frames), blocks_bytes, solved, sampled, watch)
     }
 
     /// The weights of all vertices, and the report. `sampled`: when the samples were there, on the watcher's clock.
     fn reported(
         self,
-        rows: Assembled,
+        (rows, frames): (Assembled, Frames),
         blocks_bytes: usize,
         solved: Solved,
         sampled: f64,
@@ -235,7 +238,6 @@ impl<'a> Prepared<'a> {
         let [began, voxelized, stencils_made] = self.times_ms;
         let cage = controls.surface();
         let (rest_error, raw_error, weight_stats) = rows.statistics(f64::from(cage.diagonal()));
-        let kept = at_vertices(&kept_by_offsets(controls, &stencils.outside, &rows, &points), &welded);
         let held =
             options.held as usize + size_of_val(welded.unique_of.as_slice()) + size_of_val(points.as_slice());
         let held = held + voxels.bytes + stencils.bytes();
@@ -253,17 +255,11 @@ impl<'a> Prepared<'a> {
         let mut notices = cage_check::notices(controls.cage());
         notices.extend(team.notice(options.threads).into_iter().chain(voxels.notices.iter().cloned()));
         notices.extend(notices_of(controls, &level.grid, options.grid));
-        notices.extend(oversized(cage.bounds(), &positions[..n_vertices], &weights));
+        notices.extend(oversized(cage.bounds(), &positions[..n_vertices], &weights, controls.n_controls()));
         notices.extend(solved.report.stalled.then(|| STALLED.to_owned()));
-        let is_vertex = |o: &&(u32, OutsideVertex)| (o.1.vertex as usize) < n_vertices;
-        // Vertices inside of a control, or next to one, are not outside.
-        let near_cage = |facet: u32| controls.cage_face(cage.face_of_facet()[facet as usize]).is_some();
-        let near_cage = |o: &&(u32, OutsideVertex)| {
-            let point = welded.unique_of[o.1.vertex as usize];
-            near_cage(o.0) && stencils.is_outside(point as usize)
-        };
-        let held_vertices = kept.iter().filter(is_vertex).count();
-        let outside_vertices = kept.iter().filter(is_vertex).filter(near_cage).count();
+        let (outside, held_vertices) = outside_of(controls, &stencils.outside, &welded, n_vertices);
+        let of_vertices = || outside.iter().filter(|o| (o.vertex as usize) < n_vertices);
+        notices.extend(outside_in_words(of_vertices(), cage.diagonal()));
         let narrow = |history: Vec<f64>| history.into_iter().map(|x| x as f32).collect();
         let report = BindReport {
             method: options.method,
@@ -300,13 +296,14 @@ impl<'a> Prepared<'a> {
             cage_vertices: controls.cage().n_vertices() as u64,
             inner_controls: (controls.n_controls() - controls.cage().n_vertices()) as u64,
             smooth: controls.smooth(),
-            outside_vertices: outside_vertices as u64,
-            held_vertices: (held_vertices - outside_vertices) as u64,
+            outside_vertices: of_vertices().count() as u64,
+            staying_vertices: of_vertices().filter(|o| o.share == 0.0).count() as u64,
+            outside_distance: of_vertices().map(|o| o.distance).fold(0.0, f32::max),
+            held_vertices,
             ambiguous_cells: voxels.ambiguous,
             notices,
         };
-        let outside = kept.into_iter().map(|(_, o)| o).collect();
-        Ok(Binding { weights, outside, report })
+        Ok(Binding { weights, frames, outside, report })
     }
 }
 
@@ -315,9 +312,10 @@ fn sampling_stencils(
     controls: Controls<'_>,
     gridded: &Gridded,
     points: &[Vec3],
+    policy: OutsidePolicy,
     watch: &Watch<'_>,
 ) -> Result<Stencils, BindError> {
-    let sampler = gridded.voxels.sampler(controls);
+    let sampler = gridded.voxels.sampler(controls, policy);
     let runs: Vec<&[Vec3]> = points.chunks(VERTEX_RUN).collect();
     let parts = gridded.team.share(
         runs.len(),
@@ -337,51 +335,26 @@ fn sampling_stencils(
     Ok(stencils)
 }
 
-/// Points that an offset keeps in place, ascending, and the facet near each: those outside the cage or inside of a control, and
-/// those next to a ball or tube whose rows could not be restored. Their `vertex` is a row of `rows`.
-fn kept_by_offsets(
+/// Rows outside the cage, and how many of the first `n_vertices` are inside of a control.
+fn outside_of(
     controls: Controls<'_>,
-    outside: &[Outside],
-    rows: &Assembled,
-    points: &[Vec3],
-) -> Vec<(u32, OutsideVertex)> {
-    let is_outside = |point: u32| outside.binary_search_by_key(&point, |o| o.vertex).is_ok();
-    let closest = LazyCell::new(|| ClosestOnCage::new(controls.surface()));
-    let near = |point: u32| closest.find(points[point as usize].as_dvec3()).triangle;
-    let mut near: Vec<(u32, u32)> = (0u32..)
-        .zip(&rows.facts)
-        .filter(|(point, facts)| facts.error.is_none() && !is_outside(*point))
-        .map(|(point, _)| (point, near(point)))
-        .chain(outside.iter().map(|o| (o.vertex, o.triangle)))
-        .collect();
-    near.sort_unstable();
-    let kept = near.into_iter().map(|(point, facet)| {
-        let (columns, weights) = rows.weights.row(point as usize);
-        let place: DVec3 = columns
-            .iter()
-            .zip(weights)
-            .map(|(&c, &w)| f64::from(w) * controls.rest()[c as usize].as_dvec3())
-            .sum();
-        let corners = controls.frame_near(facet);
-        let frame = triangle_frame(corners.map(|c| controls.rest()[c as usize]));
-        let offset = frame.transpose() * (points[point as usize].as_dvec3() - place).as_vec3();
-        (facet, OutsideVertex { vertex: point, corners, offset })
-    });
-    kept.collect()
-}
-
-/// Every input vertex at one of some points. `[n_kept]`, ascending.
-fn at_vertices(kept: &[(u32, OutsideVertex)], welded: &Weld) -> Vec<(u32, OutsideVertex)> {
-    if kept.is_empty() {
-        return Vec::new();
+    points: &[Outside],
+    welded: &Weld,
+    n_vertices: usize,
+) -> (Vec<OutsideVertex>, u64) {
+    let (mut outside, mut n_held) = (Vec::new(), 0);
+    let of_point = |point: u32| points.binary_search_by_key(&point, |o| o.vertex).ok().map(|k| points[k]);
+    let found =
+        (0u32..).zip(&welded.unique_of).filter_map(|(vertex, &point)| Some((vertex, of_point(point)?)));
+    for (vertex, o) in found {
+        let face = controls.surface().face_of_facet()[o.triangle as usize];
+        if controls.cage_face(face).is_some() {
+            outside.push(OutsideVertex { vertex, distance: o.distance as f32, share: o.share as f32 });
+        } else if (vertex as usize) < n_vertices {
+            n_held += 1;
+        }
     }
-    let of_point = |point: u32| kept.binary_search_by_key(&point, |(_, o)| o.vertex).ok().map(|k| kept[k]);
-    (0u32..)
-        .zip(&welded.unique_of)
-        .filter_map(|(vertex, &point)| {
-            of_point(point).map(|(facet, o)| (facet, OutsideVertex { vertex, ..o }))
-        })
-        .collect()
+    (outside, n_held)
 }
 
 /// What a user should know about controls inside in a grid of `cells` along the longest side.

@@ -8,7 +8,7 @@ use crate::cage::Cage;
 use crate::controls::Controls;
 use crate::grid::Grid;
 use crate::levels::{Boundary as _, Level, coarsened_until_few};
-use crate::options::{BindOptions, Method};
+use crate::options::{BindOptions, Method, OutsidePolicy};
 use crate::progress::Stage;
 use crate::report::CellCounts;
 use crate::sample::embedded::Sampler;
@@ -65,7 +65,7 @@ impl Gridded {
 
 /// A sampler of either method.
 pub(super) enum AnySampler<'a> {
-    Classic(Controls<'a>, &'a ClassicCells, &'a Level),
+    Classic(Controls<'a>, &'a ClassicCells, &'a Level, OutsidePolicy),
     Embedded(Box<Sampler<'a>>),
 }
 
@@ -141,11 +141,11 @@ impl Voxels {
         }
     }
 
-    pub(super) fn sampler<'a>(&'a self, controls: Controls<'a>) -> AnySampler<'a> {
+    pub(super) fn sampler<'a>(&'a self, controls: Controls<'a>, policy: OutsidePolicy) -> AnySampler<'a> {
         let level = &self.hierarchy.levels[0];
         match &self.classic {
-            Some(cells) => AnySampler::Classic(controls, cells, level),
-            None => AnySampler::Embedded(Box::new(Sampler::new(controls, level, &self.overlaps))),
+            Some(cells) => AnySampler::Classic(controls, cells, level, policy),
+            None => AnySampler::Embedded(Box::new(Sampler::new(controls, level, &self.overlaps, policy))),
         }
     }
 }
@@ -154,7 +154,9 @@ impl AnySampler<'_> {
     /// Stencils of points.
     pub(super) fn stencils(&self, points: impl Iterator<Item = DVec3>) -> Stencils {
         match self {
-            Self::Classic(controls, cells, level) => classic::stencils(*controls, cells, level, points),
+            Self::Classic(controls, cells, level, policy) => {
+                classic::stencils(*controls, cells, level, *policy, points)
+            }
             Self::Embedded(sampler) => sampler.stencils(points),
         }
     }

@@ -55,7 +55,7 @@ pub(super) fn of(code: Code, n: usize) -> String {
 /// Vertices of a model of `all` are outside.
 pub(super) fn outside(n: usize, all: usize) -> String {
     format!(
-        "{n} of {} {} outside the cage: {} would follow its closest point rigidly.",
+        "{n} of {} {} outside the cage: {} would follow it less and less with distance.",
         counted(all, "model vertex", "model vertices"),
         if n == 1 { "is" } else { "are" },
         if n == 1 { "it" } else { "they" },

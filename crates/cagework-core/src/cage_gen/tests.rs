@@ -169,7 +169,7 @@ fn lower_vertices_of_a_leg_move_its_own_foot_alone() {
             };
             let posed: Vec<Vec3> =
                 cage.positions().iter().map(|c| if is_lower(c) { *c + Vec3::Z } else { *c }).collect();
-            let moved = displacements(&bound.weights, &bound.outside, cage.positions(), &posed);
+            let moved = displacements(&bound.weights, &bound.frames, cage.positions(), &posed);
             let mean = |side: f32| {
                 let foot = positions.iter().zip(&moved).filter(|(p, _)| p.y < 0.1 && p.x * side > 0.0);
                 let (sum, n) = foot.fold((0.0, 0.0), |(sum, n), (_, by)| (sum + by.z, n + 1.0));

@@ -3,7 +3,7 @@
 //! A point or a line has no capacity in space: on a grid its influence would depend on the size of a cell. So a point is a ball
 //! and a line a tube, with a radius.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -165,6 +165,24 @@ impl InnerControls {
     pub(crate) fn is_rounded(&self, control: usize) -> bool {
         let rounded = self.elements.iter().filter(|element| !matches!(element, InnerElement::Face(_)));
         rounded.flat_map(InnerElement::corners).any(|&i| i as usize == control)
+    }
+
+    /// The foot of a place inside of balls and tubes, on the nearest of their points and lines: controls and their shares. Nothing
+    /// without balls and tubes.
+    pub(crate) fn foot(&self, place: DVec3) -> Option<[(u32, f64); 2]> {
+        let at = |i: u32| self.positions[i as usize].as_dvec3();
+        let rounded = self.elements.iter().filter(|element| !matches!(element, InnerElement::Face(_)));
+        let ends = rounded.flat_map(|element| match element.corners() {
+            &[only] => vec![[only, only]],
+            corners => corners.windows(2).map(|pair| [pair[0], pair[1]]).collect(),
+        });
+        let feet = ends.map(|[a, b]| {
+            let (from, way) = (at(a), at(b) - at(a));
+            let share =
+                ((place - from).dot(way) / way.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            (place.distance_squared(from + share * way), [(a, 1.0 - share), (b, share)])
+        });
+        feet.min_by(|(d, _), (e, _)| d.total_cmp(e)).map(|(_, shares)| shares)
     }
 
     /// Vertices of no element, which move nothing.

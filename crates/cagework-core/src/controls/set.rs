@@ -5,9 +5,9 @@ use std::ops::ControlFlow;
 
 use glam::{DVec3, Vec3};
 
+use super::Controls;
 use super::inner::{ControlError, InnerControls, InnerElement};
 use super::shapes::{self, Shape, Size};
-use super::{Controls, Origin};
 use crate::cage::{Cage, MAX_FACES};
 use crate::contact::{Corners, each_meeting};
 use crate::deform::deform_vertices;
@@ -32,8 +32,8 @@ pub struct ControlSet {
     surface: Cage,
     /// `[n_surface, n_controls]`; none for the identity.
     rows: Option<Weights>,
-    /// `[n_surface_faces]`
-    origins: Vec<Origin>,
+    /// As in [`Controls`]. `[n_surface_faces]`
+    origins: Vec<Option<u32>>,
 }
 
 impl<'a> From<&'a ControlSet> for Controls<'a> {
@@ -57,7 +57,7 @@ impl ControlSet {
             rest: cage.positions().to_vec(),
             surface: cage.clone(),
             rows: None,
-            origins: (0..cage.faces().len() as u32).map(|f| origin(cage, f)).collect(),
+            origins: (0..cage.faces().len() as u32).map(Some).collect(),
         }
     }
 
@@ -115,7 +115,8 @@ impl ControlSet {
     fn add(&mut self, inner: InnerControls) -> Result<(), ControlError> {
         let extent = self.surface.bounds().extent();
         inner.check(extent.max_element())?;
-        let n_faces = self.surface.faces().len() + inner.elements.iter().map(faces_of).sum::<usize>();
+        let n_faces = self.surface.faces().len()
+            + inner.elements.iter().map(|e| faces_of(e, steps_of(&inner))).sum::<usize>();
         if n_faces > MAX_FACES {
             return Err(ControlError::TooMany { elements: inner.elements.len(), faces: n_faces });
         }
@@ -154,7 +155,7 @@ impl ControlSet {
         }
         let n_columns = n_cage + inner.positions.len() as u32;
         self.rows = Some(Weights::from_parts(n_columns, indptr, indices, data));
-        self.origins.extend(walls.frames.iter().map(|&frame| Origin { cage_face: None, frame }));
+        self.origins.resize(self.origins.len() + faces.len(), None);
         self.rest.extend(&inner.positions);
         self.surface = surface;
         self.inner = inner;
@@ -184,16 +185,14 @@ impl ControlSet {
     }
 }
 
-/// A face of the cage as an origin: the frame is that of its first triangle.
-fn origin(cage: &Cage, face: u32) -> Origin {
-    let first = cage.face_of_triangle().partition_point(|&f| f < face);
-    Origin { cage_face: Some(face), frame: cage.triangles()[first] }
+fn steps_of(inner: &InnerControls) -> u32 {
+    shapes::ball_steps(inner.elements.iter().filter(|e| matches!(e, InnerElement::Point(_))).count())
 }
 
-/// Faces that an element needs; of a face inside, its triangles from both sides.
-fn faces_of(element: &InnerElement) -> usize {
+/// Faces that an element needs, a ball's cut so often; of a face inside, its triangles from both sides.
+fn faces_of(element: &InnerElement, steps: u32) -> usize {
     match element {
-        InnerElement::Point(_) => shapes::BALL_FACES,
+        InnerElement::Point(_) => shapes::ball_faces(steps),
         InnerElement::Line(corners) => (corners.len() - 1) * shapes::TUBE_FACES,
         InnerElement::Face(corners) => 2 * (corners.len() - 2),
     }
@@ -210,8 +209,6 @@ struct Walls {
     /// Element, and part of elements that hang together, of each face.
     element_of: Vec<u32>,
     part_of: Vec<u32>,
-    /// As in [`Origin`].
-    frames: Vec<[u32; 3]>,
     /// Corners of sheets: vertices of the surface by control.
     corners: BTreeMap<u32, u32>,
 }
@@ -221,32 +218,18 @@ impl Walls {
     fn new(inner: &InnerControls, cage: &Cage, radius: f64, sizes: &[Size]) -> Result<Self, ControlError> {
         let mut walls = Self::default();
         let at = |i: u32| inner.positions[i as usize].as_dvec3();
-        let n_cage = cage.n_vertices() as u32;
         let parts = parts(inner);
         for (number, element) in (0u32..).zip(&inner.elements) {
             let (part, size) = (parts[number as usize], sizes[number as usize]);
             match element {
-                // A ball alone does not tell how it is turned: the cage beside it does.
                 InnerElement::Point(i) => {
-                    walls.add(
-                        shapes::ball(at(*i), radius, size),
-                        [*i, *i],
-                        number,
-                        part,
-                        nearest_triangle(cage, at(*i)),
-                    );
+                    let shape = shapes::ball(at(*i), radius, steps_of(inner), size);
+                    walls.add(shape, [*i, *i], number, part);
                 }
                 InnerElement::Line(corners) => {
                     for pair in corners.windows(2) {
                         let [a, b] = [at(pair[0]), at(pair[1])];
-                        let off_line = |i: &u32| {
-                            let p = cage.positions()[*i as usize].as_dvec3() - a;
-                            p.reject_from((b - a).normalize()).length()
-                        };
-                        let beside = nearest_triangle(cage, a.midpoint(b));
-                        let third = beside.into_iter().max_by(|i, j| off_line(i).total_cmp(&off_line(j)));
-                        let frame = [n_cage + pair[0], n_cage + pair[1], third.unwrap_or(0)];
-                        walls.add(shapes::tube(a, b, radius, size), [pair[0], pair[1]], number, part, frame);
+                        walls.add(shapes::tube(a, b, radius, size), [pair[0], pair[1]], number, part);
                     }
                 }
                 InnerElement::Face(corners) => {
@@ -255,9 +238,8 @@ impl Walls {
                     let flat = |_| ControlError::Degenerate { what: "face", element: number, why: "no area" };
                     let points: Vec<u32> = corners.iter().map(|&i| walls.corner(i, at(i))).collect();
                     for [a, b, c] in triangles.map_err(flat)? {
-                        let frame = [a, b, c].map(|k| n_cage + corners[k as usize]);
                         for side in [[a, b, c], [c, b, a]] {
-                            walls.face(side.map(|k| points[k as usize]).to_vec(), number, part, frame);
+                            walls.face(side.map(|k| points[k as usize]).to_vec(), number, part);
                         }
                     }
                 }
@@ -274,19 +256,18 @@ impl Walls {
         })
     }
 
-    fn add(&mut self, shape: Shape, [a, b]: [u32; 2], element: u32, part: u32, frame: [u32; 3]) {
+    fn add(&mut self, shape: Shape, [a, b]: [u32; 2], element: u32, part: u32) {
         let first = self.points.len() as u32;
         self.points.extend(shape.points.into_iter().map(|(p, share)| (p, [(a, 1.0 - share), (b, share)])));
         for face in shape.faces {
-            self.face(face.into_iter().map(|i| first + i).collect(), element, part, frame);
+            self.face(face.into_iter().map(|i| first + i).collect(), element, part);
         }
     }
 
-    fn face(&mut self, face: Vec<u32>, element: u32, part: u32, frame: [u32; 3]) {
+    fn face(&mut self, face: Vec<u32>, element: u32, part: u32) {
         self.faces.push(face);
         self.element_of.push(element);
         self.part_of.push(part);
-        self.frames.push(frame);
     }
 
     /// Elements that do not hang together and whose meshes meet, in pairs. Where thousands lie on each other, not all pairs.

@@ -15,7 +15,7 @@ fn field_of(id: &str, posed: impl Fn(&samples::Sample) -> Vec<Vec3>) -> (Vec<Vec
     let lattice = Lattice::new(&cage);
     let binding = bind(&lattice.points(), &cage, &BindOptions::default(), &Silent).unwrap();
     let (rest, posed) = (cage.positions(), posed(&sample));
-    let field = DisplacementField::new(lattice, &binding.weights, &binding.outside, rest, &posed);
+    let field = DisplacementField::new(lattice, &binding.weights, &binding.frames, rest, &posed);
     (sample.mesh.positions, cage, field)
 }
 
@@ -31,7 +31,7 @@ fn vertices_inside_move_as_their_exact_coordinates_move_them() {
     let (positions, cage, field) = field_of("strider", |sample| sample.poses[0].1.clone());
     let posed = &samples::build("strider").unwrap().poses[0].1;
     let binding = bind(&positions, &cage, &BindOptions::default(), &Silent).unwrap();
-    let exact = deform_bound(&binding.weights, &binding.outside, posed);
+    let exact = deform_bound(&binding.weights, &binding.frames, posed);
     let mut bent = positions.clone();
     bend_vertices(&field, &mut bent);
     let error = |v: usize| bent[v].distance(exact[v]) / cage.diagonal();

@@ -6,7 +6,7 @@
 use glam::{DMat3, DVec3, Vec3, Vec4};
 
 use super::{Motion, Parts, outer};
-use crate::deform::{OutsideVertex, turned_offset};
+use crate::frames::Frames;
 use crate::weights::Weights;
 
 /// What of a bound model the cage does not bend, ready for any pose.
@@ -17,8 +17,9 @@ pub struct BoundParts {
     /// The rigid piece of each vertex, counted from 1; 0 for none. `[n_vertices]`
     pub piece_of: Vec<u32>,
     pieces: Vec<PieceSums>,
-    /// Where the controls rest.
-    controls: Vec<Vec3>,
+    /// Where the columns of the weights rest.
+    columns: Vec<Vec3>,
+    frames: Frames,
 }
 
 /// How a rigid piece moves: a vertex at `x` moves by `rows * (x, 1)`.
@@ -34,23 +35,15 @@ struct PieceSums {
     n: f64,
     /// For each control that moves it: itself, the sum of its weights, and the sum of its weights times `from`.
     columns: Vec<(u32, f64, DVec3)>,
-    /// Vertices outside of the cage, whose offsets turn, and their `from`.
-    outside: Vec<(OutsideVertex, DVec3)>,
 }
 
 impl BoundParts {
-    /// `rest`: the model's vertices; `weights`, `outside`: of them; `controls`: where the columns of the weights rest.
+    /// `rest`: the model's vertices; `weights`, `frames`: of them; `controls`: at rest.
     ///
     /// # Panics
-    /// If a vertex is none of `rest`, or there is not one row per vertex and one control per column.
+    /// If there is not one row per vertex.
     #[must_use]
-    pub fn new(
-        parts: &Parts,
-        rest: &[Vec3],
-        weights: &Weights,
-        outside: &[OutsideVertex],
-        controls: &[Vec3],
-    ) -> Self {
+    pub fn new(parts: &Parts, rest: &[Vec3], weights: &Weights, frames: &Frames, controls: &[Vec3]) -> Self {
         assert_eq!(weights.n_rows(), rest.len(), "one row per vertex");
         assert!(parts.stays.is_empty() || parts.stays.len() == rest.len(), "one amount per vertex");
         let stays = |v: usize| parts.stays.get(v).copied().unwrap_or(0.0);
@@ -58,15 +51,12 @@ impl BoundParts {
         for (piece, number) in parts.rigid.iter().zip(1..) {
             piece.iter().for_each(|&v| piece_of[v as usize] = number);
         }
-        let sums = |piece: &Vec<u32>, number| {
-            let of_piece = outside.iter().filter(|o| piece_of[o.vertex as usize] == number);
-            PieceSums::new(piece, rest, weights, of_piece)
-        };
         Self {
             rest: rest.iter().enumerate().map(|(v, p)| p.extend(stays(v))).collect(),
-            pieces: parts.rigid.iter().zip(1..).map(|(piece, number)| sums(piece, number)).collect(),
+            pieces: parts.rigid.iter().map(|piece| PieceSums::new(piece, rest, weights)).collect(),
             piece_of,
-            controls: controls.to_vec(),
+            columns: frames.columns(controls).into_owned(),
+            frames: frames.clone(),
         }
     }
 
@@ -82,18 +72,14 @@ impl BoundParts {
     /// If there is not one position per control.
     #[must_use]
     pub fn motions(&self, posed: &[Vec3]) -> Vec<PieceMotion> {
-        assert_eq!(posed.len(), self.controls.len(), "one position per control");
-        self.pieces.iter().map(|piece| piece.motion(&self.controls, posed)).collect()
+        let posed = self.frames.columns(posed);
+        assert_eq!(posed.len(), self.columns.len(), "one position per control");
+        self.pieces.iter().map(|piece| piece.motion(&self.columns, &posed)).collect()
     }
 }
 
 impl PieceSums {
-    fn new<'a>(
-        piece: &[u32],
-        rest: &[Vec3],
-        weights: &Weights,
-        outside: impl Iterator<Item = &'a OutsideVertex>,
-    ) -> Self {
+    fn new(piece: &[u32], rest: &[Vec3], weights: &Weights) -> Self {
         let at = |v: u32| rest[v as usize].as_dvec3();
         let n = piece.len() as f64;
         let centre = piece.iter().map(|&v| at(v)).sum::<DVec3>() / n;
@@ -115,7 +101,6 @@ impl PieceSums {
             moments,
             n,
             columns: used.map(|(column, (sum, moment))| (column, sum, moment)).collect(),
-            outside: outside.map(|&o| (o, at(o.vertex) - centre)).collect(),
         }
     }
 
@@ -125,11 +110,6 @@ impl PieceSums {
             let by = posed[column as usize].as_dvec3() - rest[column as usize].as_dvec3();
             shift += sum * by;
             moments += outer(by, moment);
-        }
-        for &(o, from) in &self.outside {
-            let by = turned_offset(&o, rest, posed);
-            shift += by;
-            moments += outer(by, from);
         }
         // At rest nothing is rounded.
         if shift == DVec3::ZERO && moments == DMat3::ZERO {
@@ -173,8 +153,8 @@ mod tests {
         (0..n).map(move |k| ((k.wrapping_add(seed).wrapping_mul(2_654_435_761) >> 8) % 1000) as f32 / 1000.0)
     }
 
-    /// Vertices with random rows over eight corners of a cube, two of them outside.
-    fn bound() -> (Vec<Vec3>, Weights, Vec<OutsideVertex>, Vec<Vec3>) {
+    /// Vertices with random rows over eight corners of a cube, two of them with an offset that stays as it is.
+    fn bound() -> (Vec<Vec3>, Weights, Frames, Vec<Vec3>) {
         let cube: Vec<Vec3> =
             (0..8).map(|k| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32)).collect();
         let n = 40;
@@ -183,27 +163,34 @@ mod tests {
             let sum: f32 = row.iter().sum();
             row.iter_mut().for_each(|w| *w /= sum);
         }
-        let weights =
-            Weights::new(8, (0..=n).map(|k| 8 * k).collect(), (0..n).flat_map(|_| 0..8).collect(), data);
-        let weights = weights.expect("rows are whole");
-        let offset = Vec3::new(0.05, -0.1, 0.2);
-        let outside = [3, 17].map(|vertex| OutsideVertex { vertex, corners: [0, 1, 2], offset }).to_vec();
-        (deform_bound(&weights, &outside, &cube), weights, outside, cube)
+        let (mut indptr, mut indices, mut all) = (vec![0], Vec::new(), Vec::new());
+        for (v, row) in data.chunks_exact(8).enumerate() {
+            indices.extend(0..8);
+            all.extend(row);
+            if [3, 17].contains(&v) {
+                indices.extend(8..11);
+                all.extend([0.05, -0.1, 0.2]);
+            }
+            indptr.push(indices.len() as u32);
+        }
+        let weights = Weights::new(14, indptr, indices, all).expect("rows are whole");
+        let frames = Frames::of_cage(&cube);
+        (deform_bound(&weights, &frames, &cube), weights, frames, cube)
     }
 
     #[test]
     fn a_frame_moves_vertices_where_parts_hold_them() {
-        let (rest, weights, outside, cube) = bound();
+        let (rest, weights, frames, cube) = bound();
         let mut stays = vec![0.0; rest.len()];
         stays[..6].copy_from_slice(&[1.0, 0.5, 0.25, 0.0, 1.0, 0.75]);
         let parts = Parts { stays, rigid: vec![(2..15).collect(), vec![17, 20, 21, 30]] };
-        let ready = BoundParts::new(&parts, &rest, &weights, &outside, &cube);
+        let ready = BoundParts::new(&parts, &rest, &weights, &frames, &cube);
         let turn = Quat::from_axis_angle(Vec3::new(1.0, -1.0, 0.5).normalize(), 0.8);
         let posed: Vec<Vec3> = cube
             .iter()
             .map(|&p| turn * p * Vec3::new(1.5, 1.0, 0.8) + Vec3::splat(0.5) * p.x * p.y)
             .collect();
-        let mut frame = deform_bound(&weights, &outside, &posed);
+        let mut frame = deform_bound(&weights, &frames, &posed);
         let expected = parts.hold(&rest, &frame);
         let moved = frame.clone();
         hold_parts(&ready.rest, &ready.piece_of, &ready.motions(&posed), &mut frame);
@@ -216,9 +203,9 @@ mod tests {
 
     #[test]
     fn at_rest_nothing_moves() {
-        let (rest, weights, outside, cube) = bound();
+        let (rest, weights, frames, cube) = bound();
         let parts = Parts { stays: Vec::new(), rigid: vec![(0..20).collect()] };
-        let ready = BoundParts::new(&parts, &rest, &weights, &outside, &cube);
+        let ready = BoundParts::new(&parts, &rest, &weights, &frames, &cube);
         assert_eq!(ready.motions(&cube), [[Vec4::ZERO; 3]]);
     }
 }

@@ -17,7 +17,7 @@ const PROBES_APART: f32 = 64.0;
 /// Points of a sample.
 const PROBES: usize = 7;
 
-/// A probe that has left the cage was bound to the closest point of it: its gradient is off by more than this.
+/// A probe far outside the cage stays where it is: its gradient is off by more than this.
 const OFF: f64 = 0.5;
 
 /// Samples of a model, and the points where their gradients come from.

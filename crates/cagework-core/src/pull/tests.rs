@@ -28,7 +28,10 @@ fn bound(id: &str) -> Bound {
     let sample = samples::build(id).unwrap();
     let (mesh, cage) = (sample.mesh, Cage::new(&sample.cage).unwrap());
     let options = BindOptions { grid: 32, ..BindOptions::default() };
-    let weights = |points: &[Vec3]| bind(points, &cage, &options, &Silent).unwrap().weights;
+    let weights = |points: &[Vec3]| {
+        let bound = bind(points, &cage, &options, &Silent).unwrap();
+        bound.frames.folded(&bound.weights)
+    };
     let probes = Probes::new(&mesh, &cage).unwrap();
     let of_probes = weights(probes.points());
     let pull = Pull::new(&mesh, &cage, probes, &of_probes).unwrap();
@@ -335,7 +338,10 @@ fn a_model_of_one_triangle_or_of_one_point_is_pulled() {
         (vec![Vec3::ZERO, 0.5 * Vec3::X], vec![[0, 1, 1]]),
     ] {
         let mesh = TriMesh { positions, triangles };
-        let weights = |points: &[Vec3]| bind(points, &cage, &options, &Silent).unwrap().weights;
+        let weights = |points: &[Vec3]| {
+            let bound = bind(points, &cage, &options, &Silent).unwrap();
+            bound.frames.folded(&bound.weights)
+        };
         let probes = Probes::new(&mesh, &cage).unwrap();
         let of_probes = weights(probes.points());
         let pull = Pull::new(&mesh, &cage, probes, &of_probes).unwrap();

@@ -8,9 +8,11 @@ use glam::DVec3;
 
 use crate::controls::Controls;
 use crate::levels::Level;
+use crate::options::OutsidePolicy;
 use crate::voxelize::classic::{CellKind, ClassicCells};
 
-use super::{ClosestOnCage, Stencils};
+use super::beyond::Beyond;
+use super::{Stencil, Stencils};
 
 /// Stencils of points (object units): one cell each.
 #[must_use]
@@ -18,12 +20,10 @@ pub fn stencils(
     controls: Controls<'_>,
     cells: &ClassicCells,
     level: &Level,
+    policy: OutsidePolicy,
     points: impl Iterator<Item = DVec3>,
 ) -> Stencils {
-    let mut stencils = Stencils::new();
-    let mut stencil = super::Stencil::default();
-    let closest = LazyCell::new(|| ClosestOnCage::new(controls.surface()));
-    for point in points {
+    let inside = |point: DVec3, stencil: &mut Stencil| {
         stencil.clear();
         let p = level.grid.to_grid(point).round();
         let in_grid = (0..3).all(|a| p[a] >= 0.0 && p[a] < f64::from(level.grid.dims[a]));
@@ -37,9 +37,19 @@ pub fn stencils(
                     stencil.add_hat(column, f64::from(value));
                 }
             }
-            _ => stencils.push_outside(controls, closest.find(point), &mut stencil),
+            _ => return false,
         }
-        stencils.push(&stencil);
+        true
+    };
+    let (mut stencils, mut stencil) = (Stencils::new(), Stencil::default());
+    let beyond = LazyCell::new(|| Beyond::new(controls, policy));
+    for point in points {
+        if inside(point, &mut stencil) {
+            stencils.push(&stencil);
+        } else {
+            let found = beyond.fill(point, &mut stencil, inside);
+            stencils.push_outside(controls, found, &stencil);
+        }
     }
     stencils
 }

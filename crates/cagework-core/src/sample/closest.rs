@@ -31,11 +31,16 @@ impl<'a> ClosestOnCage<'a> {
         Self { cage, faces }
     }
 
-    /// The point closest to `point`, on the facet of lowest number if there are several; `vertex` is left 0.
+    /// The point closest to `point`, on the facet of lowest number if there are several; `vertex` is left 0, `share` 1.
     #[must_use]
     pub fn find(&self, point: DVec3) -> Outside {
-        let mut best =
-            Outside { vertex: 0, triangle: 0, barycentric: [1.0, 0.0, 0.0], distance: f64::INFINITY };
+        let mut best = Outside {
+            vertex: 0,
+            triangle: 0,
+            barycentric: [1.0, 0.0, 0.0],
+            distance: f64::INFINITY,
+            share: 1.0,
+        };
         let to_box = |[low, high]: &[DVec3; 2]| point.distance(point.clamp(*low, *high));
         let mut distances: Vec<f64> = self.faces.iter().map(|(_, bounds)| to_box(bounds)).collect();
         loop {
@@ -49,7 +54,13 @@ impl<'a> ClosestOnCage<'a> {
                 let closest = closest_point_on_triangle(point, self.cage.facet_corners(triangle));
                 let distance = closest.point.distance(point);
                 if distance < best.distance || distance == best.distance && triangle < best.triangle {
-                    best = Outside { vertex: 0, triangle, barycentric: closest.barycentric, distance };
+                    best = Outside {
+                        vertex: 0,
+                        triangle,
+                        barycentric: closest.barycentric,
+                        distance,
+                        share: 1.0,
+                    };
                 }
             }
         }

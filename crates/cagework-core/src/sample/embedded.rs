@@ -17,11 +17,13 @@ use crate::controls::Controls;
 use crate::geometry::{closest_point_on_triangle, winding_number};
 use crate::grid::{Grid, NO_CELL};
 use crate::levels::Level;
+use crate::options::OutsidePolicy;
 use crate::voxelize::lines::Overlaps;
 
+use super::beyond::Beyond;
 use super::edges::{EdgeLists, ON_EDGE, Passage};
 use super::triangles::TriangleLists;
-use super::{ClosestOnCage, Stencil, Stencils};
+use super::{Stencil, Stencils};
 
 /// Orders of the axes; their mean has no preferred direction. All six orders cost twice as much and change the error
 /// against finite elements by less than 1 % (Armadillo, g = 32, 64, 128).
@@ -47,7 +49,8 @@ pub struct Sampler<'a> {
     edges: EdgeLists,
     overlaps: &'a Overlaps,
     /// Made for the first point outside.
-    closest: OnceLock<ClosestOnCage<'a>>,
+    beyond: OnceLock<Beyond<'a>>,
+    policy: OutsidePolicy,
     /// Faces no further apart than this, in cells, are in one place.
     same: f64,
 }
@@ -98,12 +101,17 @@ enum Stop<'a> {
 impl<'a> Sampler<'a> {
     /// A sampler for the finest level.
     #[must_use]
-    pub fn new(controls: Controls<'a>, level: &'a Level, overlaps: &'a Overlaps) -> Self {
+    pub fn new(
+        controls: Controls<'a>,
+        level: &'a Level,
+        overlaps: &'a Overlaps,
+        policy: OutsidePolicy,
+    ) -> Self {
         let (surface, grid) = (controls.surface(), &level.grid);
         let lists = TriangleLists::new(surface, grid);
         let edges = EdgeLists::new(surface, grid, &lists);
         let same = ON_CAGE * f64::from(surface.diagonal()) / grid.cell.max_element();
-        Self { controls, level, lists, edges, overlaps, closest: OnceLock::new(), same }
+        Self { controls, level, lists, edges, overlaps, beyond: OnceLock::new(), policy, same }
     }
 
     /// Stencils of points (object units). Points outside the cage are listed in `outside`.
@@ -112,11 +120,19 @@ impl<'a> Sampler<'a> {
         let mut stencils = Stencils::new();
         let mut scratch = Scratch::default();
         for p in points {
-            if !self.stencil(p, &mut scratch) {
-                let closest = self.closest.get_or_init(|| ClosestOnCage::new(self.controls.surface()));
-                stencils.push_outside(self.controls, closest.find(p), &mut scratch.stencil);
+            if self.stencil(p, &mut scratch) {
+                stencils.push(&scratch.stencil);
+                continue;
             }
-            stencils.push(&scratch.stencil);
+            let beyond = self.beyond.get_or_init(|| Beyond::new(self.controls, self.policy));
+            let mut stencil = std::mem::take(&mut scratch.stencil);
+            let found = beyond.fill(p, &mut stencil, |q, other| {
+                let is_inside = self.stencil(q, &mut scratch);
+                std::mem::swap(other, &mut scratch.stencil);
+                is_inside
+            });
+            stencils.push_outside(self.controls, found, &stencil);
+            scratch.stencil = stencil;
         }
         stencils
     }

@@ -3,6 +3,7 @@
 //! A vertex's *stencil* (rows of the field with weights, and Dirichlet values with weights) depends on geometry only:
 //! it is computed once per bind and applied to every batch of columns.
 
+mod beyond;
 pub mod classic;
 mod closest;
 mod edges;
@@ -27,16 +28,18 @@ pub struct Outside {
     pub barycentric: [f64; 3],
     /// Distance, object units.
     pub distance: f64,
+    /// How much of the cage's motion it follows, 0 to 1.
+    pub share: f64,
 }
 
-/// Sampling stencils of all vertices. The weights of a stencil are positive and sum to 1.
+/// Sampling stencils of all vertices. The weights of a stencil are positive and sum to 1, but for vertices outside the cage.
 #[derive(Clone, Debug, Default)]
 pub struct Stencils {
     node_start: Vec<u32>,
     nodes: Vec<(u32, f32)>,
     hat_start: Vec<u32>,
     hats: Vec<(u32, f32)>,
-    /// Vertices outside the cage, ascending; their stencil is that of the closest point on the cage.
+    /// Vertices outside the cage or inside of a control, ascending.
     pub outside: Vec<Outside>,
 }
 
@@ -105,15 +108,12 @@ impl Stencils {
         self.hat_start.push(self.hats.len() as u32);
     }
 
-    /// Makes `stencil` that of the closest point on the cage, and lists the next vertex as outside unless it is on it.
-    pub fn push_outside(&mut self, controls: Controls<'_>, closest: Outside, stencil: &mut Stencil) {
-        stencil.clear();
-        controls.values_at(closest.triangle, closest.barycentric, &mut |column, value| {
-            stencil.add_hat(column, value);
-        });
-        if closest.distance > ON_CAGE * f64::from(controls.surface().diagonal()) {
-            self.outside.push(Outside { vertex: self.len() as u32, ..closest });
+    /// Appends the stencil of a vertex that is outside, and lists it unless it is on the cage.
+    pub fn push_outside(&mut self, controls: Controls<'_>, found: Outside, stencil: &Stencil) {
+        if found.distance > ON_CAGE * f64::from(controls.surface().diagonal()) {
+            self.outside.push(Outside { vertex: self.len() as u32, ..found });
         }
+        self.push(stencil);
     }
 
     /// Appends all of another's vertices.

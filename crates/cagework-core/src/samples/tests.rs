@@ -59,8 +59,10 @@ fn the_last_pose_of_each_sample_is_what_one_pull_makes() {
         let Sample { mesh, cage, poses, .. } = build(info.id).unwrap();
         let (rest, pulled) = (cage.positions.clone(), recipe.pulled);
         let cage = Cage::new(&cage).unwrap();
-        let weights =
-            |points: &[Vec3]| bind(points, &cage, &BindOptions::default(), &Silent).unwrap().weights;
+        let weights = |points: &[Vec3]| {
+            let bound = bind(points, &cage, &BindOptions::default(), &Silent).unwrap();
+            bound.frames.folded(&bound.weights)
+        };
         let probes = Probes::new(&mesh, &cage).unwrap();
         let of_probes = weights(probes.points());
         let pull = Pull::new(&mesh, &cage, probes, &of_probes).unwrap();

@@ -2,9 +2,6 @@
 
 use std::ops::Range;
 
-use glam::Vec4;
-
-use crate::deform::OutsideVertex;
 use crate::grid::NO_CELL;
 use crate::levels::Level;
 use crate::sample::Stencils;
@@ -65,15 +62,6 @@ pub struct SlicedWeights {
     pub columns: Vec<u32>,
     /// Their weights for the bundle's rows. `[slice][k][lane]`
     pub weights: Vec<[f32; BUNDLE]>,
-}
-
-/// Offsets of vertices outside the cage.
-#[derive(Clone, Debug, Default)]
-pub struct OutsideTable {
-    /// (mesh vertex, three cage vertices)
-    pub corners: Vec<[u32; 4]>,
-    /// Offset in the triangle's frame, object units; w is 0.
-    pub offsets: Vec<Vec4>,
 }
 
 /// Each vertex's triangles.
@@ -215,17 +203,6 @@ impl SlicedWeights {
             sliced.slices.push((sliced.columns.len() / SLICE) as u32);
         }
         sliced
-    }
-}
-
-impl OutsideTable {
-    /// The table of a bind's outside vertices.
-    #[must_use]
-    pub fn new(outside: &[OutsideVertex]) -> Self {
-        Self {
-            corners: outside.iter().map(|o| [o.vertex, o.corners[0], o.corners[1], o.corners[2]]).collect(),
-            offsets: outside.iter().map(|o| o.offset.extend(0.0)).collect(),
-        }
     }
 }
 

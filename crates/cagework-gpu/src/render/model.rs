@@ -1,11 +1,9 @@
 //! What is drawn of a model: corners with texture coordinates and colours, material groups, decoded textures.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use cagework_core::Weights;
-use cagework_core::deform::OutsideVertex;
 use glam::Vec3;
 
 /// Base colour without a material, linear: a light, slightly warm grey, as of unfired clay.
@@ -177,23 +175,10 @@ impl DrawModel {
         values.iter().copied().chain(self.copies.iter().map(|&v| values[v as usize])).collect()
     }
 
-    /// Weights and outside vertices with those of the copies; nothing if there are none.
-    pub(crate) fn moved_with_copies(
-        &self,
-        weights: &Weights,
-        outside: &[OutsideVertex],
-    ) -> Option<(Weights, Vec<OutsideVertex>)> {
-        if self.copies.is_empty() {
-            return None;
-        }
-        let n = self.positions.len() as u32;
-        let rows: Vec<u32> = (0..n).chain(self.copies.iter().copied()).collect();
-        let mut outside = outside.to_vec();
-        let known: HashMap<u32, OutsideVertex> = outside.iter().map(|o| (o.vertex, *o)).collect();
-        for (vertex, source) in (n..).zip(&self.copies) {
-            outside.extend(known.get(source).map(|o| OutsideVertex { vertex, ..*o }));
-        }
-        Some((weights.with_rows(&rows), outside))
+    /// Weights with those of the copies; nothing if there are none.
+    pub(crate) fn rows_with_copies(&self, weights: &Weights) -> Option<Weights> {
+        let rows = || (0..self.positions.len() as u32).chain(self.copies.iter().copied()).collect::<Vec<_>>();
+        (!self.copies.is_empty()).then(|| weights.with_rows(&rows()))
     }
 
     /// Triangles as indices into `positions` and `copies`: what normals are made of. `[n_triangles]`
@@ -263,14 +248,11 @@ mod tests {
         assert_eq!(model.with_copies(&[10, 11, 12]), [10, 11, 12, 12, 10]);
         let weights = Weights::new(2, vec![0, 1, 2, 4], vec![0, 1, 0, 1], vec![1.0, 1.0, 0.25, 0.75]);
         let weights = weights.expect("they are weights");
-        let outside = OutsideVertex { vertex: 2, corners: [0, 1, 0], offset: Vec3::X };
-        let (all, outside) = model.moved_with_copies(&weights, &[outside]).expect("there are copies");
+        let all = model.rows_with_copies(&weights).expect("there are copies");
         for (row, source) in [0, 1, 2, 2, 0].into_iter().enumerate() {
             assert_eq!(all.row(row), weights.row(source));
         }
-        let vertices: Vec<u32> = outside.iter().map(|o| o.vertex).collect();
-        assert_eq!(vertices, [2, 3], "the first copy lies outside as its vertex does");
-        assert!(triangle().moved_with_copies(&weights, &outside).is_none());
+        assert!(triangle().rows_with_copies(&weights).is_none());
     }
 
     #[test]

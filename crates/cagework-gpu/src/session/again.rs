@@ -44,7 +44,7 @@ impl Session {
             if bound.is_green {
                 session.adopt_green(bound.weights).await?;
             } else {
-                session.adopt(bound.weights, bound.outside).await?;
+                session.adopt(bound.weights, bound.frames).await?;
             }
         }
         if !self.pose.is_empty() {

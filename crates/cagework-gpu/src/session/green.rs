@@ -18,7 +18,7 @@ impl Session {
         let (model, controls) = self.parts()?;
         let cage = controls.cage();
         check_size(&weights, model.positions.len(), cage.n_vertices() + cage.triangles().len())?;
-        self.bound(weights, Vec::new(), true, None).await
+        self.bound(weights, cagework_core::Frames::default(), true, None).await
     }
 
     /// What the columns of weights stand for where the controls are at `positions`: them, and for Green coordinates, of plain

@@ -4,12 +4,11 @@
 
 use std::sync::Arc;
 
-use cagework_core::Weights;
-use cagework_core::deform::OutsideVertex;
 use cagework_core::deform::vertex_normals;
 use cagework_core::dynamic::DisplacementField;
 use cagework_core::parts::BoundParts;
 use cagework_core::skin::Skin;
+use cagework_core::{Frames, Weights};
 use glam::{Vec3, Vec4};
 
 use crate::buffers::Allocator;
@@ -36,7 +35,7 @@ impl Mover {
         context: &GpuContext,
         model: &Arc<DrawModel>,
         weights: &Weights,
-        outside: &[OutsideVertex],
+        frames: &Frames,
         on_gpu: Option<GpuWeights>,
     ) -> Result<Self, GpuError> {
         let triangles = model.shading_triangles();
@@ -48,10 +47,10 @@ impl Mover {
             allocator.settle().await?;
             return Ok(Self::Processor { model: Arc::clone(model), triangles, tables: [positions, normals] });
         }
-        let on_gpu = match (model.moved_with_copies(weights, outside), on_gpu) {
-            (Some((weights, outside)), _) => GpuWeights::new(context, &weights, &outside).await?,
+        let on_gpu = match (model.rows_with_copies(weights), on_gpu) {
+            (Some(weights), _) => GpuWeights::new(context, &weights, frames).await?,
             (None, Some(on_gpu)) => on_gpu,
-            (None, None) => GpuWeights::new(context, weights, outside).await?,
+            (None, None) => GpuWeights::new(context, weights, frames).await?,
         };
         let deformer = Deformer::new(context, &on_gpu, &triangles).await?;
         let tables = [deformer.positions(), deformer.normals()].map(|b| Table::Buffer(b.clone()));

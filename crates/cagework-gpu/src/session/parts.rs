@@ -38,7 +38,7 @@ impl Session {
         let columns = self.columns(bound.is_green, &self.pose).into_owned();
         let ready = (!is_nothing).then(|| {
             let at_rest = self.columns(bound.is_green, Controls::from(set).rest());
-            Arc::new(BoundParts::new(&self.parts, &model.positions, &bound.weights, &bound.outside, &at_rest))
+            Arc::new(BoundParts::new(&self.parts, &model.positions, &bound.weights, &bound.frames, &at_rest))
         });
         if let Some(bound) = &mut self.bound {
             bound.mover.hold(&self.context, model, ready.clone()).await?;
@@ -57,7 +57,7 @@ impl Session {
     pub fn deformed(&self, pose: &[Vec3]) -> Option<Vec<Vec3>> {
         let bound = self.bound.as_ref()?;
         let columns = self.columns(bound.is_green, pose);
-        let mut positions = deform_bound(&bound.weights, &bound.outside, &columns);
+        let mut positions = deform_bound(&bound.weights, &bound.frames, &columns);
         if let Some(parts) = &bound.parts {
             hold_parts(&parts.rest, &parts.piece_of, &parts.motions(&columns), &mut positions);
         }

@@ -1,10 +1,9 @@
 //! What is done for each frame: vertices follow the cage, those outside it too, and normals follow vertices.
 
-use cagework_core::deform::OutsideVertex;
 use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
 use cagework_core::parts::{PieceMotion, hold_parts};
 use cagework_core::skin::{Skin, skin_vertices};
-use cagework_core::stencil::tables::{BUNDLE, NormalTable, OutsideTable, SlicedWeights};
+use cagework_core::stencil::tables::{BUNDLE, NormalTable, SlicedWeights};
 use cagework_core::{Cage, PolygonMesh, TriMesh, Weights, stencil};
 use cagework_gpu::kernels;
 use cagework_gpu::skin::{SkinTables, field_table};
@@ -144,32 +143,6 @@ fn hold_parts_matches_cpu() {
     let result = run(&kernels::HOLD_PARTS, ROWS, n, &inputs);
     hold_parts(&rest, &piece_of, &motions, &mut moved);
     assert_close(&unpadded(&result), &flat(&moved), POINT_TOLERANCE);
-}
-
-#[test]
-fn offset_outside_matches_cpu() {
-    let mut seeded = Seeded(13);
-    let posed: Vec<Vec3> = (0..9).map(|_| seeded.point()).collect();
-    let outside: Vec<OutsideVertex> = (0..67u32)
-        .map(|k| OutsideVertex {
-            vertex: 2 * k + 1,
-            // Every seventh triangle has no area.
-            corners: [k % 9, (k + 1) % 9, if k % 7 == 0 { k % 9 } else { (k + 5) % 9 }],
-            offset: seeded.point() - 0.5,
-        })
-        .collect();
-    let table = OutsideTable::new(&outside);
-    let mut expected: Vec<Vec3> = (0..140).map(|_| seeded.point()).collect();
-    let inputs = [
-        bytes(&table.corners).to_vec(),
-        bytes(&table.offsets).to_vec(),
-        bytes(&padded(&posed, 1.0)).to_vec(),
-        bytes(&padded(&expected, 1.0)).to_vec(),
-    ];
-    let inputs: Vec<&[u8]> = inputs.iter().map(Vec::as_slice).collect();
-    let result = run(&kernels::OFFSET_OUTSIDE, ROWS, outside.len() as u32, &inputs);
-    stencil::offset_outside(&table, &posed, &mut expected);
-    assert_close(&unpadded(&result), &flat(&expected), POINT_TOLERANCE);
 }
 
 #[test]

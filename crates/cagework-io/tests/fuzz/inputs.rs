@@ -4,7 +4,7 @@ use cagework_core::bind::Part;
 use cagework_core::deform::OutsideVertex;
 use cagework_core::mesh::Bounds;
 use cagework_core::solve::stop::SolveReport;
-use cagework_core::{BindOptions, InnerControls, PolygonMesh, Weights, subdivided_box};
+use cagework_core::{BindOptions, Frames, InnerControls, PolygonMesh, Weights, subdivided_box};
 use cagework_io::{PartOf, encode_pose, write_cage_obj, write_part_npz, write_project, write_weights_npz};
 use glam::Vec3;
 use proptest::prelude::*;
@@ -50,13 +50,19 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     let model = read("cube.obj", CUBE_OBJ.as_bytes()).expect("it is one");
     let bent: Vec<Vec3> = cube().into_iter().map(twist).collect();
     let weights = Weights::new(5, vec![0, 2, 2, 5], vec![0, 4, 1, 2, 3], vec![0.25, 0.75, 0.5, 0.375, 0.125]);
-    let outside = OutsideVertex { vertex: 2, corners: [1, 2, 4], offset: Vec3::ONE };
+    let outside = OutsideVertex { vertex: 2, distance: 1.0, share: 0.5 };
     samples.push(CUBE_OBJ.as_bytes().to_vec());
     samples.push(
         write_project(&[&model, &model], &model.cage_mesh(), &[("bent".into(), bent.clone())], "{}")
             .expect("it fits"),
     );
-    samples.push(write_weights_npz(&weights.expect("they are"), &[outside], &[Vec3::ONE], &[Vec3::ONE]));
+    samples.push(write_weights_npz(
+        &weights.expect("they are"),
+        &Frames::default(),
+        &[outside],
+        &[Vec3::ONE],
+        &[Vec3::ONE],
+    ));
     samples.push(encode_pose(&cube(), &bent));
     samples.push(part(model.cage_mesh()));
     // Controls inside of that cube.

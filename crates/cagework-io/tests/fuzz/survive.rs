@@ -49,8 +49,13 @@ const LIMIT: u64 = 1 << 28;
 /// Reads `bytes` as each kind of file, and goes on with whatever comes of it.
 pub(crate) fn survive(bytes: &[u8]) {
     if let Ok(saved) = read_weights_npz(bytes, LIMIT) {
-        let written =
-            write_weights_npz(&saved.weights, &saved.outside, &saved.extra_points, &saved.inner_controls);
+        let written = write_weights_npz(
+            &saved.weights,
+            &saved.frames,
+            &saved.outside,
+            &saved.extra_points,
+            &saved.inner_controls,
+        );
         let again = read_weights_npz(&written, LIMIT).expect("what was written can be read");
         assert_eq!((again.n_vertices(), again.outside.len()), (saved.n_vertices(), saved.outside.len()));
     }
@@ -61,7 +66,7 @@ pub(crate) fn survive(bytes: &[u8]) {
     }
     if let Ok(pose) = decode_pose(&cube(), bytes) {
         let _ = encode_pose(&cube(), &pose);
-        let _ = deform_bound(&REST.binding.weights, &REST.binding.outside, &pose);
+        let _ = deform_bound(&REST.binding.weights, &REST.binding.frames, &pose);
     }
     let choice = bytes.iter().fold(0_u32, |h, &b| h.wrapping_mul(31).wrapping_add(b.into())) >> 7;
     if let Ok(inner) = read_inner_controls(bytes, LIMIT) {
@@ -98,7 +103,7 @@ fn as_controls(inner: InnerControls, choice: u32) {
     let Ok(set) = ControlSet::new(&REST.closed, choice % 3, inner) else { return };
     let options = BindOptions { grid: GRID, tau: 1e-3, ..BindOptions::default() };
     let Ok(binding) = bind(&REST.points, &set, &options, &Silent) else { return };
-    let rest = deform_bound(&binding.weights, &binding.outside, Controls::from(&set).rest());
+    let rest = deform_bound(&binding.weights, &binding.frames, Controls::from(&set).rest());
     for (p, at) in REST.points.iter().zip(rest) {
         assert!(p.distance(at) < 1e-4, "{p} is put at {at}");
     }
@@ -151,7 +156,7 @@ fn as_rig(model: &Model, choice: u32) {
 
 fn as_pose(model: &Model) {
     if let Ok(pose) = REST.cage.pose_positions(model) {
-        let _ = deform_bound(&REST.binding.weights, &REST.binding.outside, &pose);
+        let _ = deform_bound(&REST.binding.weights, &REST.binding.frames, &pose);
     }
 }
 
@@ -205,7 +210,7 @@ fn bind_to(mesh: &PolygonMesh, points: &[Vec3], choice: u32) {
     let Ok(cage) = Cage::new(mesh) else { return };
     if let Ok(binding) = bind(points, &cage, &bind_options(choice), &Silent) {
         assert!(binding.weights.data().iter().all(|w| w.is_finite()));
-        let _ = deform_bound(&binding.weights, &binding.outside, cage.positions());
+        let _ = deform_bound(&binding.weights, &binding.frames, cage.positions());
     }
 }
 
@@ -214,7 +219,7 @@ fn bind_options(choice: u32) -> BindOptions {
         grid: GRID,
         method: if choice & 16 == 0 { Method::Embedded } else { Method::Classic },
         solver: if choice & 96 == 96 { Solver::Jacobi } else { Solver::Multigrid },
-        outside: if choice & 128 == 0 { OutsidePolicy::ClosestPoint } else { OutsidePolicy::Refuse },
+        outside: if choice & 128 == 0 { OutsidePolicy::Extend } else { OutsidePolicy::Refuse },
         threads: 1,
         ..BindOptions::default()
     }

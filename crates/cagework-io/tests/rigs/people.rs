@@ -33,7 +33,7 @@ fn by_cage(
     points.extend(model.extra_points().unwrap());
     let binding = bind(&points, cage, &BindOptions::default(), &Silent).unwrap();
     let posed: Vec<Vec3> = cage.positions().iter().map(|&p| moved(p)).collect();
-    let by = displacements(&binding.weights, &binding.outside, cage.positions(), &posed);
+    let by = displacements(&binding.weights, &binding.frames, cage.positions(), &posed);
     let outside: Vec<u32> = binding.outside.iter().map(|o| o.vertex).collect();
     let options = ReshapeOptions { joints, ..ReshapeOptions::default() };
     let (bytes, report) = model.write_reshaped(&by, &outside, &[], &options).unwrap();

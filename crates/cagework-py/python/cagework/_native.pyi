@@ -24,7 +24,7 @@ class BindOptions(TypedDict, total=False):
     max_iterations: int
     sparsify: float
     memory_limit: int
-    outside: Literal["closest_point", "refuse"]
+    outside: Literal["extend", "stay", "refuse"]
 
 class CageOptions(TypedDict, total=False):
     target: int

@@ -1,8 +1,9 @@
 //! What the worker sends to the page, an array each.
 
 use cagework_core::deform::OutsideVertex;
-use cagework_core::{PolygonMesh, Weights};
+use cagework_core::{Frames, PolygonMesh, Weights};
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -10,11 +11,21 @@ use crate::arrays::{corners, flat};
 use crate::controls::CageControls;
 use crate::views::object;
 
-/// Weights on their way to the page: compressed sparse rows, and the vertices outside the cage.
+/// Offsets of a bind: what weights of controls alone miss.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) struct Offsets {
+    /// The columns of the weights after those of the controls.
+    pub(crate) frames: Frames,
+    /// Points outside the cage.
+    pub(crate) outside: Vec<OutsideVertex>,
+}
+
+/// Weights on their way to the page: compressed sparse rows, and the columns of offsets.
 #[wasm_bindgen]
 pub struct Bound {
     pub(super) weights: Weights,
-    pub(super) outside: Vec<OutsideVertex>,
+    pub(super) offsets: Offsets,
     pub(super) report: JsValue,
 }
 
@@ -52,7 +63,7 @@ impl Bound {
         self.weights.indptr().to_vec()
     }
 
-    /// Columns: cage vertices. `[n_nonzeros]`
+    /// Columns: controls, then frames. `[n_nonzeros]`
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn indices(&self) -> Vec<u32> {
@@ -66,18 +77,13 @@ impl Bound {
         self.weights.data().to_vec()
     }
 
-    /// For each vertex outside the cage: the vertex and the three corners of its frame. `[n_outside, 4]`
-    #[wasm_bindgen(getter)]
-    #[must_use]
-    pub fn outside(&self) -> Vec<u32> {
-        self.outside.iter().flat_map(|o| [o.vertex, o.corners[0], o.corners[1], o.corners[2]]).collect()
-    }
-
-    /// Offsets of the vertices outside the cage in their frames. `[n_outside, 3]`
-    #[wasm_bindgen(getter)]
-    #[must_use]
-    pub fn offsets(&self) -> Vec<f32> {
-        self.outside.iter().flat_map(|o| o.offset.to_array()).collect()
+    /// The frames after the controls, and the points outside the cage.
+    ///
+    /// # Errors
+    /// Never.
+    #[wasm_bindgen(getter, unchecked_return_type = "Offsets")]
+    pub fn offsets(&self) -> Result<JsValue, JsValue> {
+        Ok(object(&self.offsets)?)
     }
 
     /// The bind report; undefined for coordinates by formula and slices.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use cagework_core::deform::{OutsideVertex, displacements};
 use cagework_core::dynamic::bend_vertices;
-use cagework_core::{ControlSet, InnerControls, PolygonMesh, Weights};
+use cagework_core::{ControlSet, Frames, InnerControls, PolygonMesh, Weights};
 use cagework_gpu::Session;
 use cagework_io::{
     Clip, Model, ModelFormat, ReshapeReport, write_cage_obj, write_inner_controls, write_project,
@@ -143,15 +143,13 @@ impl Engine {
     pub fn export_weights(&self, id: u32) -> Result<Vec<u8>, JsValue> {
         Ok(self.with_session(|session| {
             self.read(|state| {
-                let Some(Own { mut weights, mut outside, rig }) = state.own_rows(id, session)? else {
+                let Some(Own { mut weights, frames, outside, rig }) = state.own_rows(id, session)? else {
                     return Err(Fault::missing("weights", "bind the model first"));
                 };
                 let inner = state.made.inner_positions();
-                let n = weights.n_rows() as u32;
-                weights.append(&rig.0);
-                outside.extend(rig.1.iter().map(|&o| OutsideVertex { vertex: o.vertex + n, ..o }));
+                weights.append(&rig);
                 let points = state.models.get(id)?.model.extra_points()?;
-                Ok(write_weights_npz(&weights, &outside, &points, inner))
+                Ok(write_weights_npz(&weights, &frames, &outside, &points, inner))
             })
         })?)
     }
@@ -281,19 +279,15 @@ impl Engine {
                 let (member, rest) = (state.models.get(id)?, &state.rest().positions);
                 let (model, own) = (&member.model, state.own_rows(id, session)?);
                 let by = |pose: &[Vec3]| match &own {
-                    Some(Own { weights, outside, rig }) if pose.len() == rest.len() => {
-                        let mut by = displacements(weights, outside, rest, pose);
-                        by.extend(displacements(&rig.0, &rig.1, rest, pose));
+                    Some(Own { weights, frames, rig, .. }) if pose.len() == rest.len() => {
+                        let mut by = displacements(weights, frames, rest, pose);
+                        by.extend(displacements(rig, frames, rest, pose));
                         Ok(by)
                     }
                     Some(_) => Err(Fault::new(ErrorName::Error, "a pose belongs to another cage")),
                     None => Ok(vec![DVec3::ZERO; model.positions.len() + model.extra_points()?.len()]),
                 };
-                let n = model.positions.len() as u32;
-                let outside = own.as_ref().map_or_else(Vec::new, |own| {
-                    let of_rig = own.rig.1.iter().map(|o| o.vertex + n);
-                    own.outside.iter().map(|o| o.vertex).chain(of_rig).collect()
-                });
+                let outside: Vec<u32> = own.iter().flat_map(|own| &own.outside).map(|o| o.vertex).collect();
                 let by_poses = poses
                     .iter()
                     .map(|(name, pose)| Ok((name.clone(), by(pose)?)))
@@ -314,12 +308,13 @@ impl Engine {
             self.read(|state| (state.models.positions.clone(), state.rest().positions.clone()));
         self.with_session(|session| {
             let Some(weights) = session.weights() else { return Ok(vec![rest; poses.len()]) };
+            let n_frames = session.frames().map_or(0, Frames::n_columns);
             let deformed = |pose: &Vec<Vec3>| {
                 // Exactly: sums of weighted controls are rounded.
                 if *pose == controls {
                     return Ok(rest.clone());
                 }
-                let fits = pose.len() == weights.n_columns();
+                let fits = pose.len() + n_frames == weights.n_columns();
                 let other = || Fault::new(ErrorName::Error, "a pose belongs to another cage");
                 session.deformed(pose).filter(|_| fits).ok_or_else(other)
             };
@@ -331,20 +326,33 @@ impl Engine {
 /// What is bound of one model: rows of its vertices and of its rig's points, numbered as its own.
 struct Own {
     weights: Weights,
+    frames: Frames,
+    /// Vertices, then points of the rig.
     outside: Vec<OutsideVertex>,
-    rig: (Weights, Vec<OutsideVertex>),
+    rig: Weights,
 }
 
 impl State {
     /// Rows of one model; none before there are weights.
     fn own_rows(&self, id: u32, session: &Session) -> Answer<Option<Own>> {
         let Some(all) = session.weights() else { return Ok(None) };
-        let (weights, outside) = rows_of(all, session.outside(), self.models.get(id)?.vertices.clone());
+        let n = self.models.positions.len();
+        let (own, of_rig) = (self.models.get(id)?.vertices.clone(), self.models.extra_of(id)?);
         let rig = match &self.rig {
-            Some((rows, outside)) => rows_of(rows, outside, self.models.extra_of(id)?),
-            None => (Weights::with_room(all.n_columns() as u32, 0, 0), Vec::new()),
+            Some(rows) => rows_of(rows, of_rig.clone()),
+            None => Weights::with_room(all.n_columns() as u32, 0, 0),
         };
-        Ok(Some(Own { weights, outside, rig }))
+        let numbered = |o: &OutsideVertex| {
+            let v = o.vertex as usize;
+            let in_own = own.contains(&v).then(|| v - own.start);
+            let in_rig =
+                || v.checked_sub(n).filter(|v| of_rig.contains(v)).map(|v| v - of_rig.start + own.len());
+            in_own.or_else(in_rig).map(|v| OutsideVertex { vertex: v as u32, ..*o })
+        };
+        let outside = self.outside.iter().filter_map(numbered).collect();
+        let frames = session.frames().cloned().unwrap_or_default();
+        let weights = rows_of(all, own.clone());
+        Ok(Some(Own { weights, frames, outside, rig }))
     }
 
     /// The cage, which a bind needs.
@@ -353,10 +361,7 @@ impl State {
     }
 }
 
-/// Some of the rows, and vertices outside among them, counted from the first.
-fn rows_of(all: &Weights, outside: &[OutsideVertex], range: Range<usize>) -> (Weights, Vec<OutsideVertex>) {
-    let first = range.start as u32;
-    let own = outside.iter().filter(|o| range.contains(&(o.vertex as usize)));
-    let outside = own.map(|&o| OutsideVertex { vertex: o.vertex - first, ..o }).collect();
-    (all.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>()), outside)
+/// Some of the rows.
+fn rows_of(all: &Weights, range: Range<usize>) -> Weights {
+    all.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>())
 }

@@ -21,8 +21,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use async_lock::Mutex;
-use cagework_core::Weights;
-use cagework_core::deform::OutsideVertex;
+use cagework_core::{Frames, Weights};
 use cagework_gpu::Session;
 use cagework_gpu::render::check_layers;
 use js_sys::{Float32Array, Function, Uint32Array};
@@ -31,6 +30,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen_futures::spawn_local;
 use web_sys::HtmlCanvasElement;
 
+use crate::binder::Offsets;
 use crate::controls::MadeCage;
 use crate::error::{Answer, ErrorName, Fault};
 use crate::gpu::{Gpu, SharedGpu};
@@ -88,8 +88,7 @@ impl Engine {
         Ok(self.info()?)
     }
 
-    /// Takes what the worker has bound: rows, columns and weights; for each vertex outside the cage the vertex and the
-    /// corners of its frame, `[n_outside, 4]`, and its offset, `[n_outside, 3]`.
+    /// Takes what the worker has bound: rows, columns and weights, and the columns of offsets.
     ///
     /// # Errors
     /// When the arrays do not fit model and cage, or the GPU has no room for them; `Cancelled` when another cage came meanwhile.
@@ -98,28 +97,31 @@ impl Engine {
         indptr: Vec<u32>,
         indices: Uint32Array,
         data: Float32Array,
-        outside: Vec<u32>,
-        offsets: Vec<f32>,
+        #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
     ) -> Result<(), JsValue> {
         let (revision, n_columns) = self.read(|state| (state.revision, state.rest().positions.len() as u32));
         let n_vertices = self.read(|state| state.models.positions.len());
+        let Offsets { frames, outside } = taken(offsets)?;
+        let n_columns = n_columns + frames.n_columns() as u32;
         let all = incoming::weights(n_columns, &indptr, &indices, &data).await?;
-        let (weights, outside, rig) = split(all, incoming::outside(&outside, &offsets), n_vertices);
+        let (weights, rig) = split(all, n_vertices);
         let is_current = || self.read(|state| state.require(revision));
         let mut gpu = self.gpu.lock().await;
         let gpu = gpu.as_mut().ok_or_else(lost)?;
         // The cage may still be waiting for its turn, and would take the weights away again.
         upload_cage(&self.state, gpu).await?;
         is_current()?;
-        gpu.main.adopt(weights, outside).await.map_err(Fault::from)?;
+        gpu.main.adopt(weights, frames.clone()).await.map_err(Fault::from)?;
         is_current()?;
         self.change(|state| {
             state.is_bound = true;
-            state.joints = rig.as_ref().and_then(|(weights, outside)| {
+            state.joints = rig.as_ref().and_then(|weights| {
+                let of_rig = outside.iter().filter_map(|o| o.vertex.checked_sub(n_vertices as u32));
+                let of_rig: Vec<u32> = of_rig.collect();
                 // What is wrong with a rig is said when it is exported.
-                JointDots::new(&state.models, weights, outside).ok()
+                JointDots::new(&state.models, weights, frames, &of_rig).ok()
             });
-            state.rig = rig;
+            (state.rig, state.outside) = (rig, outside);
             state.playing = None;
             (state.is_moved, state.is_changed) = (true, true);
         });
@@ -152,7 +154,7 @@ impl Engine {
         let mut other = gpu.main.twin().await.map_err(Fault::from)?;
         match kind {
             Coordinates::Green => other.adopt_green(weights).await,
-            _ => other.adopt(weights, Vec::new()).await,
+            _ => other.adopt(weights, Frames::default()).await,
         }
         .map_err(Fault::from)?;
         self.read(|state| state.require(revision))?;
@@ -282,25 +284,15 @@ impl Engine {
     }
 }
 
-/// Weights with the rows outside the cage.
-type Rows = (Weights, Vec<OutsideVertex>);
-
 /// Weights of the vertices, and apart from them those of the rig's points, if there are any.
-fn split(
-    weights: Weights,
-    outside: Vec<OutsideVertex>,
-    n_vertices: usize,
-) -> (Weights, Vec<OutsideVertex>, Option<Rows>) {
+fn split(weights: Weights, n_vertices: usize) -> (Weights, Option<Weights>) {
     let n = weights.n_rows();
     if n <= n_vertices {
-        return (weights, outside, None);
+        return (weights, None);
     }
     let rows =
         |range: std::ops::Range<usize>| weights.with_rows(&range.map(|row| row as u32).collect::<Vec<_>>());
-    let (of_vertices, of_rig) = outside.into_iter().partition(|o| (o.vertex as usize) < n_vertices);
-    let moved = |o: OutsideVertex| OutsideVertex { vertex: o.vertex - n_vertices as u32, ..o };
-    let of_rig = Vec::into_iter(of_rig).map(moved).collect();
-    (rows(0..n_vertices), of_vertices, Some((rows(n_vertices..n), of_rig)))
+    (rows(0..n_vertices), Some(rows(n_vertices..n)))
 }
 
 /// Sees to it that the GPU has the cage of the moment; weights for the one before are dropped.

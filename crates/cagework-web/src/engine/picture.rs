@@ -1,6 +1,6 @@
 //! Frames, pictures, and what was computed on the GPU.
 
-use cagework_core::{Bounds, Cage, Weights, subdivided_box};
+use cagework_core::{Bounds, Cage, Frames, Weights, subdivided_box};
 use cagework_gpu::Session;
 use cagework_gpu::render::DrawModel;
 use glam::{Vec2, Vec3};
@@ -57,7 +57,7 @@ impl Engine {
         let model = DrawModel::plain(cage.positions().to_vec(), cage.triangles().to_vec());
         session.set_model(model).await.map_err(Fault::from)?;
         session.set_cage(&cage).await.map_err(Fault::from)?;
-        session.adopt(identity.map_err(Fault::from)?, Vec::new()).await.map_err(Fault::from)?;
+        session.adopt(identity.map_err(Fault::from)?, Frames::default()).await.map_err(Fault::from)?;
         session.frame_all();
         let view = target.create_view(&wgpu::TextureViewDescriptor::default());
         Ok(session.frame(&view, format, [SMALL; 2], 1.0).map_err(Fault::from)?)

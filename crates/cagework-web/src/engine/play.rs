@@ -8,8 +8,8 @@ use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use super::{Engine, lost};
+use crate::binder::Offsets;
 use crate::error::{Answer, ErrorName, Fault};
-use crate::incoming;
 use crate::options::{RigAsked, taken};
 use crate::playing::{Part, Playing, SharedClip};
 
@@ -92,19 +92,18 @@ impl Engine {
         indptr: Vec<u32>,
         indices: Vec<u32>,
         data: Vec<f32>,
-        outside: &[u32],
-        offsets: &[f32],
+        #[wasm_bindgen(unchecked_param_type = "Offsets")] offsets: JsValue,
     ) -> Result<(), JsValue> {
         let lattice = self.read(|state| {
             let controls = Controls::from(state.the_set()?);
             let lattice = Lattice::new(controls.surface());
-            let weights = Weights::new(controls.n_controls() as u32, indptr, indices, data)?;
-            let outside = incoming::outside(outside, offsets);
-            let n = weights.n_rows();
-            if n != lattice.points().len() || outside.iter().any(|o| o.vertex as usize >= n) {
+            let Offsets { frames, .. } = taken(offsets)?;
+            let n_columns = controls.n_controls() + frames.n_columns();
+            let weights = Weights::new(n_columns as u32, indptr, indices, data)?;
+            if weights.n_rows() != lattice.points().len() || !frames.fits(controls.n_controls()) {
                 return Err(Fault::new(ErrorName::Error, "the weights are those of another cage's lattice"));
             }
-            Answer::Ok((lattice, weights, outside))
+            Answer::Ok((lattice, weights, frames))
         })?;
         self.state.borrow_mut().lattice = Some(lattice);
         Ok(())
@@ -150,11 +149,11 @@ impl Engine {
     /// When no lattice has come.
     pub(super) fn field(&self) -> Answer<DisplacementField> {
         self.read(|state| {
-            let Some((lattice, weights, outside)) = &state.lattice else {
+            let Some((lattice, weights, frames)) = &state.lattice else {
                 return Err(Fault::missing("lattice", "bind it first"));
             };
             let (rest, posed) = (&state.rest().positions, &state.positions);
-            Ok(DisplacementField::new(lattice.clone(), weights, outside, rest, posed))
+            Ok(DisplacementField::new(lattice.clone(), weights, frames, rest, posed))
         })
     }
 }

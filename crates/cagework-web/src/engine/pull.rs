@@ -55,7 +55,7 @@ impl Engine {
     ) -> Result<JsValue, JsValue> {
         let point: SurfacePoint = taken(point)?;
         let grip = self.posed(|state, session| {
-            Ok(session.weights().and_then(|weights| state.grip_of(point, weights)))
+            Ok(session.weights().zip(session.frames()).and_then(|bound| state.grip_of(point, bound)))
         })?;
         Ok(grip.map_or(Ok(JsValue::UNDEFINED), |grip| object(&grip))?)
     }

@@ -31,7 +31,7 @@ export type DeltaNorm = "euclidean" | "literal";
 /**
  * What happens to a mesh vertex outside the cage.
  */
-export type OutsidePolicy = "closest_point" | "refuse";
+export type OutsidePolicy = "extend" | "stay" | "refuse";
 /**
  * `BindOptions`: those of the core, and where to compute.
  */
@@ -77,7 +77,7 @@ sparsify: number,
  */
 memory_limit: number,
 /**
- * Default closest point.
+ * Default extend.
  */
 outside: OutsidePolicy, };
 /**
@@ -88,6 +88,55 @@ export type Stage = "voxelize" | "solve" | "sample" | "simplify";
  * A [`ProgressEvent`].
  */
 export type Progress = { stage: Stage, fraction: number, iteration: number, delta: number | null, };
+/**
+ * The columns of a bind's weights after those of its controls.
+ */
+export type Frames = {
+/**
+ * What each vertex of the cage adds to the matrix of the whole cage's motion, per object unit; nothing where there are no frames.
+ * `[n_cage]`
+ */
+whole: Array<[number, number, number]>,
+/**
+ * The control of each joint. `[n_joints]`
+ */
+joints: Array<number>,
+/**
+ * The two joints of each bone, counted in `joints`; those of one line in order. `[n_bones]`
+ */
+bones: Array<[number, number]>,
+/**
+ * Weight and gradient (per object unit) of each vertex of the cage at each joint. `[n_joints, n_cage]`
+ */
+plain: Array<[number, number, number, number]>, };
+/**
+ * A mesh vertex outside the cage.
+ */
+export type OutsideVertex = {
+/**
+ * Mesh vertex.
+ */
+vertex: number,
+/**
+ * How far it is from the cage, object units.
+ */
+distance: number,
+/**
+ * How much of the cage's motion it follows: 1 near the cage, 0 where it stays.
+ */
+share: number, };
+/**
+ * Offsets of a bind: what weights of controls alone miss.
+ */
+export type Offsets = {
+/**
+ * The columns of the weights after those of the controls.
+ */
+frames: Frames,
+/**
+ * Points outside the cage.
+ */
+outside: Array<OutsideVertex>, };
 /**
  * Everything worth knowing about one bind.
  */
@@ -216,7 +265,15 @@ smooth: number,
  */
 outside_vertices: number,
 /**
- * Mesh vertices inside of controls, or so close to one that an offset keeps them in place.
+ * Those of them that stay where they are.
+ */
+staying_vertices: number,
+/**
+ * How far the furthest of them is from the cage, object units.
+ */
+outside_distance: number,
+/**
+ * Mesh vertices inside of controls.
  */
 held_vertices: number,
 /**
@@ -692,7 +749,7 @@ export type GizmoHandle = "x" | "y" | "z" | "plane_x" | "plane_y" | "plane_z" | 
  * Edits of the rest cage, on the selection.
  */
 export type RestEdit = "split_edge" | "collapse_edge" | "extrude_face" | "delete_vertex" | "delete_face";
-export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"closest_point"};
+export const BIND_DEFAULTS: BindOptions = {"backend":"gpu","grid":64,"method":"embedded","solver":"multigrid","preconditioner":"none","cell_shape":"box","delta_norm":"euclidean","tau":0.00001,"max_iterations":20000,"sparsify":0.0,"memory_limit":2147483648,"outside":"extend"};
 export const CAGE_DEFAULTS: CageOptions = {"vertices":80,"detail":0.028,"quads":true,"margin":0.0,"symmetry":"auto","voxels":0,"shape":"follow","per_component":false};
 export const RIG_DEFAULTS: RigOptions = {"joints":"follow","keep_travel":false,"rigid":[],"plain":false,"dynamic":false};
 export const SCENE_DEFAULTS: SceneOptions = {"theme":"dark","model":true,"base_wireframe":false,"cage":true,"floor":true,"original":false,"colour":"material","weights_to_one":false,"slice":"off","gizmo":"none","pull":true,"compare":["harmonic"],"problems":true,"joints":null};

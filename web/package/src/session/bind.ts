@@ -57,10 +57,10 @@ export function startBind(start: BindStart): Job<BindReport> {
 
   async function once(pass: Pass, asked: BindOptions): Promise<BindReport> {
     job = client.run("bind", { positions, extra, cage, options: asked }, step(pass));
-    const { indptr, indices, data, outside, offsets, report } = await job.done;
+    const { indptr, indices, data, offsets, report } = await job.done;
     if (isCancelled || !report) throw named("Cancelled", "cancelled");
     engine.requireCurrent(revision);
-    await engine.adopt(indptr, indices, data, outside, offsets);
+    await engine.adopt(indptr, indices, data, offsets);
     if (isCancelled) throw named("Cancelled", "cancelled");
     const whole = report.backend === "gpu" ? { ...report, adapter } : report;
     listener({ kind: "adopted", pass, report: whole });

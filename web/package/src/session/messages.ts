@@ -1,6 +1,7 @@
 /** What page and worker say to each other. */
 
 import type {
+  Offsets,
   BindOptions,
   BindReport,
   CageArrays,
@@ -40,13 +41,12 @@ export interface ReadModel extends Bytes {
   readonly took: number;
 }
 
-/** Weights as compressed sparse rows, and vertices outside the cage. */
+/** Weights as compressed sparse rows, and the columns of offsets. */
 export interface BoundArrays {
   readonly indptr: Uint32Array;
   readonly indices: Uint32Array;
   readonly data: Float32Array;
-  readonly outside: Uint32Array;
-  readonly offsets: Float32Array;
+  readonly offsets: Offsets;
   readonly report: BindReport | undefined;
 }
 

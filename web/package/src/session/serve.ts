@@ -168,9 +168,9 @@ function createWork(pkg: Package): Work {
 
 /** Arrays of what was bound; its memory in the module is given back. */
 function taken(bound: Bound): BoundArrays {
-  const { indptr, indices, data, outside, offsets, report } = bound;
+  const { indptr, indices, data, offsets, report } = bound;
   bound.free();
-  return { indptr, indices, data, outside, offsets, report };
+  return { indptr, indices, data, offsets, report };
 }
 
 /** Buffers of all typed arrays in a result, each once: handed over, not copied. */

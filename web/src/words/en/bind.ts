@@ -42,8 +42,8 @@ export const bind = {
   cellShapes: { box: "As the cage's box", cubic: "Cubes" },
   norm: "How Eq. 2 is read",
   norms: { euclidean: "As meant", literal: "As printed" },
-  outside: "Vertices outside follow the cage",
-  outsideSentence: "They keep their place beside the closest point of the cage. Off: the bind refuses them.",
+  outside: "Vertices outside the cage",
+  outsides: { extend: "Follow nearby", stay: "Stay", refuse: "Refuse" },
   stages: {
     simplify: "Making a cage",
     voxelize: "Sorting grid cells",

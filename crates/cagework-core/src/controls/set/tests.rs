@@ -92,7 +92,7 @@ fn surface_follows_its_controls() {
     }
     // A ball's vertices stay around its control, by 1/32 of the smooth cage's side.
     let radius = set.inner().radius_in(controls.surface().bounds().extent().max_element());
-    assert!(posed[posed.len() - 42..].iter().all(|p| (p.distance(by) / radius - 1.0).abs() < 0.1));
+    assert!(posed[posed.len() - 642..].iter().all(|p| (p.distance(by) / radius - 1.0).abs() < 0.1));
 }
 
 /// Balls and tubes of radius 0.05 whose distance is 2.004 radii do not overlap, though meshes of their volume would; at

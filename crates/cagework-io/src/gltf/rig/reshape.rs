@@ -39,13 +39,13 @@ pub struct ReshapeReport {
     pub joints: usize,
     /// Of them, those whose transform was written anew.
     pub joints_moved: usize,
-    /// Outside the cage, although they hold vertices: they follow its closest point.
+    /// Outside the cage, although they hold vertices: they follow it as its policy for points outside says.
     pub joints_outside: usize,
     /// Outside the cage and without vertices: they go with their parent.
     pub joints_loose: usize,
     /// Vertices in states of morph targets, besides the rest shape.
     pub morph_ends: usize,
-    /// Of them, those outside the cage: they follow its closest point.
+    /// Of them, those outside the cage: they follow it as its policy for points outside says.
     pub morph_ends_outside: usize,
     /// Points of the lattice that they are read from where they are too many to be bound one by one; otherwise 0.
     pub lattice_points: usize,
@@ -77,14 +77,15 @@ impl ReshapeReport {
         say(
             *joints_outside,
             format!(
-                "{joints_outside} joints or other nodes that hold vertices are outside the cage: they follow its closest point"
+                "{joints_outside} joints or other nodes that hold vertices are outside the cage: near it they follow, far away they \
+                 stay"
             ),
         );
         say(
             *morph_ends_outside,
             format!(
-                "{morph_ends_outside} of {morph_ends} vertices of morph targets leave the cage: they follow its closest \
-                 point; make a cage around them"
+                "{morph_ends_outside} of {morph_ends} vertices of morph targets leave the cage: near it they follow, far \
+                 away they stay; make a cage around them"
             ),
         );
         let (n, cell) = (self.lattice_points, 100.0 * self.lattice_cell);

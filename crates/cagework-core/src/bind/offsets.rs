@@ -1,0 +1,202 @@
+//! Offsets that make up for what weights miss: of points outside the cage, and around balls and tubes.
+
+use std::ops::ControlFlow;
+
+use glam::{DVec3, Vec3};
+
+use super::{BindError, Watch, pipeline};
+use crate::assemble::Assembled;
+use crate::controls::{ControlSet, Controls, InnerControls, InnerElement};
+use crate::frames::{Frames, WHOLE};
+use crate::options::{BindOptions, Method, OutsidePolicy};
+use crate::progress::{Progress, ProgressEvent, Stage};
+use crate::sample::Stencils;
+use crate::solve::rows::{LANES, Row};
+use crate::weights::Weights;
+
+/// A rest vector shorter than this, over the cage's diagonal, is rounding.
+const ROUNDED: f64 = 1e-7;
+
+/// A bind within another, of whose progress it is no part.
+struct Within<'a>(&'a Watch<'a>);
+
+impl Progress for Within<'_> {
+    fn report(&self, _: ProgressEvent) -> ControlFlow<()> {
+        match self.0.report(Stage::Sample, 0.0, 0, None) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(_) => ControlFlow::Break(()),
+        }
+    }
+
+    fn now_ms(&self) -> f64 {
+        self.0.now_ms()
+    }
+}
+
+/// What offsets a bind needs.
+pub(super) struct Offsets<'a> {
+    controls: Controls<'a>,
+    /// Points outside, how much they follow, and their sampled rows, `[n_batches]`.
+    outside: Vec<(u32, f64, Vec<Row>)>,
+    frames: Frames,
+    /// Length of each bone at rest, object units.
+    lengths: Vec<f64>,
+    radius: f64,
+}
+
+/// Whether all rows have a rest vector: those of balls and tubes do not reproduce places, and are not bent until they do.
+pub(super) fn needs_all(controls: Controls<'_>, options: &BindOptions) -> bool {
+    options.method == Method::Embedded && controls.inner().is_some_and(InnerControls::has_radius)
+}
+
+impl<'a> Offsets<'a> {
+    /// `blocks`: sampled values, `[n_batches][n_points]`.
+    ///
+    /// # Errors
+    /// Those of a bind of the joints to the cage alone.
+    pub(super) fn new(
+        controls: Controls<'a>,
+        stencils: &Stencils,
+        blocks: &[Vec<Row>],
+        options: &BindOptions,
+        watch: &Watch<'_>,
+    ) -> Result<Self, BindError> {
+        let of_cage = |triangle: u32| {
+            controls.cage_face(controls.surface().face_of_facet()[triangle as usize]).is_some()
+        };
+        let outside = stencils.outside.iter().filter(|o| of_cage(o.triangle));
+        let row = |point: u32| blocks.iter().map(|block| block[point as usize]).collect();
+        let outside = outside.map(|o| (o.vertex, o.share, row(o.vertex))).collect();
+        let rounded = controls.inner().filter(|inner| inner.has_radius());
+        let mut all = Self { controls, outside, frames: Frames::default(), lengths: Vec::new(), radius: 0.0 };
+        if let Some(inner) = rounded {
+            all.radius = f64::from(inner.radius_in(controls.surface().bounds().extent().max_element()));
+            all.frames = frames(controls, inner, all.radius as f32, options, watch)?;
+            let at = |joint: u32| controls.rest()[all.frames.joints[joint as usize] as usize];
+            let length = |&[a, b]: &[u32; 2]| f64::from(at(a).distance(at(b)));
+            all.lengths = all.frames.bones.iter().map(length).collect();
+        } else if !all.outside.is_empty() {
+            all.frames = Frames::of_cage(controls.cage().positions());
+        }
+        Ok(all)
+    }
+
+    /// Rows with columns of the frames after those of the controls, and the frames. `is_apart`: as for `assemble`.
+    pub(super) fn add_to(
+        self,
+        rows: Assembled,
+        points: &[Vec3],
+        is_apart: impl Fn(usize) -> bool,
+    ) -> (Assembled, Frames) {
+        let Assembled { weights, mut facts } = rows;
+        if !self.frames.is_used() {
+            return (Assembled { weights, facts }, self.frames);
+        }
+        let n_controls = weights.n_columns();
+        let columns = self.frames.columns(self.controls.rest());
+        let diagonal = f64::from(self.controls.surface().diagonal());
+        let n_columns = columns.len() as u32;
+        let mut made = Weights::with_room(n_columns, points.len(), weights.data().len());
+        let mut outside = self.outside.iter().peekable();
+        for (v, (point, facts)) in points.iter().zip(&mut facts).enumerate() {
+            let (indices, data) = weights.row(v);
+            let mut row: Vec<(u32, f32)> = indices.iter().copied().zip(data.iter().copied()).collect();
+            let beyond = outside.next_if(|(point, ..)| *point as usize == v);
+            if let Some((_, _, sampled)) = beyond {
+                let values = (0..n_controls).map(|c| (c as u32, sampled[c / LANES][c % LANES]));
+                row = values.filter(|(_, w)| *w != 0.0).collect();
+                (facts.low, facts.high) = (f32::INFINITY, 0.0);
+            }
+            if is_apart(v) {
+                let expected = beyond.map_or(1.0, |(_, share, _)| *share);
+                let sum: f64 = row.iter().map(|(_, w)| f64::from(*w)).sum();
+                row.iter_mut().for_each(|(_, w)| *w = (f64::from(*w) * expected / sum) as f32);
+                facts.sum_error = 0.0;
+                let place = |row: &[(u32, f32)]| -> DVec3 {
+                    row.iter().map(|&(c, w)| f64::from(w) * columns[c as usize].as_dvec3()).sum()
+                };
+                let point = point.as_dvec3();
+                let rest = point - place(&row);
+                let mut put = |column: usize, offset: DVec3| {
+                    let column = (n_controls + column) as u32;
+                    let entries = (column..).zip(offset.to_array());
+                    row.extend(entries.map(|(c, x)| (c, x as f32)).filter(|(_, x)| *x != 0.0));
+                };
+                if let Some((_, share, _)) = beyond {
+                    let stays = (1.0 - share) * point;
+                    put(0, stays);
+                    put(WHOLE, rest - stays);
+                } else if rest.length() <= ROUNDED * diagonal {
+                    put(WHOLE, rest);
+                } else {
+                    let weights = self.of_joints(indices, data);
+                    let put = |column: usize, share: f64| put(column, share * rest);
+                    self.frames.shares(&weights, &self.lengths, self.radius, put);
+                }
+                facts.error = Some((place(&row).distance(point) / diagonal) as f32);
+            }
+            let (indices, data): (Vec<u32>, Vec<f32>) = row.into_iter().unzip();
+            made.append(&Weights::from_parts(n_columns, vec![0, indices.len() as u32], indices, data));
+        }
+        (Assembled { weights: made, facts }, self.frames)
+    }
+
+    /// A row's weights of the joints.
+    fn of_joints(&self, indices: &[u32], data: &[f32]) -> Vec<f64> {
+        let of =
+            |control: &u32| indices.iter().position(|c| c == control).map_or(0.0, |k| f64::from(data[k]));
+        self.frames.joints.iter().map(of).collect()
+    }
+}
+
+/// The frames of balls and tubes: coordinates of the cage alone at their joints, and differences of them a radius to each side.
+fn frames(
+    controls: Controls<'_>,
+    inner: &InnerControls,
+    radius: f32,
+    options: &BindOptions,
+    watch: &Watch<'_>,
+) -> Result<Frames, BindError> {
+    let joints: Vec<u32> =
+        (0..inner.positions.len()).filter(|&i| inner.is_rounded(i)).map(|i| i as u32).collect();
+    let number = |i: u32| joints.partition_point(|&j| j < i) as u32;
+    let lines = inner.elements.iter().filter(|e| matches!(e, InnerElement::Line(_)));
+    let bones: Vec<[u32; 2]> =
+        lines.flat_map(|e| e.corners().windows(2)).map(|w| [number(w[0]), number(w[1])]).collect();
+    let steps = Vec3::AXES.map(|axis| radius * axis);
+    let around = |at: Vec3| {
+        [at, at + steps[0], at - steps[0], at + steps[1], at - steps[1], at + steps[2], at - steps[2]]
+    };
+    let points: Vec<Vec3> = joints.iter().flat_map(|&j| around(inner.positions[j as usize])).collect();
+
+    // Half the cells along each side are an eighth of the work.
+    let options = BindOptions {
+        grid: (options.grid / 2).max(8),
+        sparsify: 0.0,
+        outside: OutsidePolicy::Extend,
+        extra_points: points.len(),
+        ..*options
+    };
+    let plain = match controls.smooth() {
+        0 => ControlSet::plain(controls.cage()),
+        steps => ControlSet::new(controls.cage(), steps, InnerControls::default())
+            .unwrap_or_else(|_| ControlSet::plain(controls.cage())),
+    };
+    let bound = pipeline::run(&points, Controls::from(&plain), &options, &Within(watch))?;
+    let n_cage = controls.cage().n_vertices();
+    let dense = |row: usize| {
+        let mut dense = vec![0.0; n_cage];
+        let (columns, values) = bound.weights.row(row);
+        let of_cage = columns.iter().zip(values).filter(|(c, _)| (**c as usize) < n_cage);
+        of_cage.for_each(|(&c, &w)| dense[c as usize] = w);
+        dense
+    };
+    let mut plain = Vec::with_capacity(joints.len() * n_cage);
+    for joint in 0..joints.len() {
+        let rows: [Vec<f32>; 7] = std::array::from_fn(|k| dense(7 * joint + k));
+        let slope = |axis: usize, c: usize| (rows[1 + 2 * axis][c] - rows[2 + 2 * axis][c]) / (2.0 * radius);
+        plain.extend((0..n_cage).map(|c| [rows[0][c], slope(0, c), slope(1, c), slope(2, c)]));
+    }
+    let joints = joints.iter().map(|j| n_cage as u32 + j).collect();
+    Ok(Frames { joints, bones, plain, ..Frames::of_cage(controls.cage().positions()) })
+}

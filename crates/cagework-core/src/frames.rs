@@ -1,0 +1,315 @@
+//! Offsets that posed controls carry: what keeps vertices in place where their weights alone do not.
+//!
+//! A vertex moves to `sum_i w_i c_i' + sum_f x_f e_f'`. The columns `e_f'` follow from the posed controls: first the three unit
+//! vectors, whose entries `x` are an offset that never turns; then the columns of the matrix of the affine map that is nearest to the
+//! motion of the whole cage (least squares over its vertices); then those of the matrix of each *hold*. Entries of matrices are a share
+//! of the vertex's rest vector `d = x - sum_i w_i c_i`.
+//!
+//! A hold is a joint (a point inside the cage, or a corner of a polyline) with one of its bones, or alone. Its matrix is `R F`.
+//! `F = sum_j c_j' grad w_j`, by the coordinates of the cage without controls inside, is the motion of the cage at the joint. `R`
+//! belongs to the bone: the smallest rotation to where its direction is posed from where the cage alone and the bone before it on the
+//! line would take it, so that nothing rolls. With all controls moved by one affine map, `F` is its matrix and `R` the identity.
+
+use std::borrow::Cow;
+
+use glam::{DMat3, DQuat, DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::weights::Weights;
+
+/// A share of a vertex's rest vector below this, of the largest, is left to the others.
+const LEAST_SHARE: f64 = 1e-3;
+
+/// The first column of the whole cage's matrix, counted from the first frame; the unit vectors come before.
+pub(crate) const WHOLE: usize = 3;
+/// The first column of the first hold.
+const HOLDS: usize = 6;
+
+/// The columns of a bind's weights after those of its controls.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub struct Frames {
+    /// What each vertex of the cage adds to the matrix of the whole cage's motion, per object unit; nothing where there are no frames.
+    /// `[n_cage]`
+    pub whole: Vec<[f32; 3]>,
+    /// The control of each joint. `[n_joints]`
+    pub joints: Vec<u32>,
+    /// The two joints of each bone, counted in `joints`; those of one line in order. `[n_bones]`
+    pub bones: Vec<[u32; 2]>,
+    /// Weight and gradient (per object unit) of each vertex of the cage at each joint. `[n_joints, n_cage]`
+    pub plain: Vec<[f32; 4]>,
+}
+
+impl Frames {
+    /// Frames without holds, of a cage with its vertices at `rest`, object units.
+    #[must_use]
+    pub fn of_cage(rest: &[Vec3]) -> Self {
+        let rest = || rest.iter().map(|p| p.as_dvec3());
+        let mean = rest().sum::<DVec3>() / rest().count() as f64;
+        // The matrix of sum |A (c - mean) - (c' - mean')|^2 at its least: (sum c' (c - mean)^T) M^-1.
+        let spread = rest().map(|c| c - mean).map(|d| DMat3::from_cols(d * d.x, d * d.y, d * d.z));
+        let inverse = spread.fold(DMat3::ZERO, |sum, one| sum + one).inverse();
+        Self {
+            whole: rest().map(|c| (inverse * (c - mean)).as_vec3().to_array()).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// Whether there are any.
+    #[must_use]
+    pub fn is_used(&self) -> bool {
+        !self.whole.is_empty()
+    }
+
+    /// Whether numbers that come from elsewhere belong to this many controls.
+    #[must_use]
+    pub fn fits(&self, n_controls: usize) -> bool {
+        let n = self.joints.len();
+        let of_cage = self.plain.len().checked_div(n).unwrap_or(0);
+        of_cage * n == self.plain.len()
+            && self.whole.len() <= n_controls
+            && (n == 0 || of_cage == self.whole.len())
+            && self.joints.iter().all(|&c| (c as usize) < n_controls)
+            && self.bones.iter().flatten().all(|&j| (j as usize) < n)
+            && self.plain.iter().flatten().chain(self.whole.iter().flatten()).all(|x| x.is_finite())
+    }
+
+    /// Columns after those of the controls.
+    #[must_use]
+    pub fn n_columns(&self) -> usize {
+        if self.is_used() { HOLDS + 3 * self.holds().count() } else { 0 }
+    }
+
+    /// Joints, each alone or with each of its bones.
+    fn holds(&self) -> impl Iterator<Item = (usize, Option<usize>)> {
+        (0..self.joints.len()).flat_map(move |joint| {
+            let of_joint = move |bone: &usize| self.bones[*bone].contains(&(joint as u32));
+            let bones = (0..self.bones.len()).filter(of_joint);
+            let alone = !self.bones.iter().flatten().any(|&j| j as usize == joint);
+            alone.then_some((joint, None)).into_iter().chain(bones.map(move |bone| (joint, Some(bone))))
+        })
+    }
+
+    /// Where all columns are with the controls at `controls`, `[n_controls]`, object units: the controls, then the frames.
+    ///
+    /// # Panics
+    /// If the controls are fewer than these frames name.
+    #[must_use]
+    pub fn columns<'a>(&self, controls: &'a [Vec3]) -> Cow<'a, [Vec3]> {
+        if !self.is_used() {
+            return Cow::Borrowed(controls);
+        }
+        let mut columns = controls.to_vec();
+        columns.extend(Vec3::AXES);
+        let column = |axis: usize| {
+            let of_vertex = |(g, c): (&[f32; 3], &Vec3)| f64::from(g[axis]) * c.as_dvec3();
+            self.whole.iter().zip(controls).map(of_vertex).sum::<DVec3>().as_vec3()
+        };
+        columns.extend([0, 1, 2].map(column));
+        let moved: Vec<(DVec3, DMat3)> = (0..self.joints.len()).map(|k| self.moved(k, controls)).collect();
+        let turns = self.turns(&moved, controls);
+        for (joint, bone) in self.holds() {
+            let matrix = bone.map_or(DMat3::IDENTITY, |bone| turns[bone]) * moved[joint].1;
+            columns.extend([matrix.x_axis, matrix.y_axis, matrix.z_axis].map(DVec3::as_vec3));
+        }
+        Cow::Owned(columns)
+    }
+
+    /// Where the cage alone takes a joint, and its motion there.
+    fn moved(&self, joint: usize, controls: &[Vec3]) -> (DVec3, DMat3) {
+        let n = self.plain.len() / self.joints.len();
+        let (mut at, mut matrix) = (DVec3::ZERO, DMat3::ZERO);
+        for (row, c) in self.plain[joint * n..][..n].iter().zip(controls) {
+            let (c, [w, x, y, z]) = (c.as_dvec3(), row.map(f64::from));
+            at += w * c;
+            matrix += DMat3::from_cols(x * c, y * c, z * c);
+        }
+        (at, matrix)
+    }
+
+    /// The rotation of each bone.
+    fn turns(&self, moved: &[(DVec3, DMat3)], controls: &[Vec3]) -> Vec<DMat3> {
+        let mut turns: Vec<DMat3> = Vec::with_capacity(self.bones.len());
+        for (number, [a, b]) in self.bones.iter().map(|bone| bone.map(|j| j as usize)).enumerate() {
+            let meets = |bone: &[u32; 2]| bone.iter().any(|&j| [a, b].contains(&(j as usize)));
+            let before = self.bones[..number].iter().position(meets).map_or(DMat3::IDENTITY, |k| turns[k]);
+            let [from, to] = [a, b].map(|j| controls[self.joints[j] as usize].as_dvec3());
+            let goes = before * (moved[b].0 - moved[a].0);
+            turns.push(match (goes.try_normalize(), (to - from).try_normalize()) {
+                (Some(goes), Some(posed)) => DMat3::from_quat(DQuat::from_rotation_arc(goes, posed)) * before,
+                // A bone without length has no direction.
+                _ => before,
+            });
+        }
+        turns
+    }
+
+    /// Rows of the controls alone that move vertices as these weights do as long as no bone turns: for what solves for controls.
+    /// Offsets that do not turn are left out.
+    ///
+    /// # Panics
+    /// If the weights have fewer columns than these frames.
+    #[must_use]
+    pub fn folded(&self, weights: &Weights) -> Weights {
+        let n_controls = weights.n_columns() - self.n_columns();
+        if !self.is_used() {
+            return weights.clone();
+        }
+        let holds: Vec<usize> = self.holds().map(|(joint, _)| joint).collect();
+        let n = self.plain.len().checked_div(self.joints.len()).unwrap_or(0);
+        let (mut indptr, mut all, mut data) = (vec![0], Vec::new(), Vec::new());
+        for (indices, values) in weights.rows() {
+            let mut row = vec![0.0; n_controls];
+            for (&column, &x) in indices.iter().zip(values) {
+                match (column as usize).checked_sub(n_controls) {
+                    None => row[column as usize] += x,
+                    Some(0..3) => {}
+                    Some(frame @ 3..HOLDS) => {
+                        self.whole.iter().zip(&mut row).for_each(|(s, w)| *w += x * s[frame % 3]);
+                    }
+                    Some(frame) => {
+                        let slopes = &self.plain[holds[(frame - HOLDS) / 3] * n..][..n];
+                        slopes.iter().zip(&mut row).for_each(|(s, w)| *w += x * s[1 + frame % 3]);
+                    }
+                }
+            }
+            let stored = (0u32..).zip(row).filter(|(_, w)| *w != 0.0);
+            stored.for_each(|(column, w)| {
+                all.push(column);
+                data.push(w);
+            });
+            indptr.push(all.len() as u32);
+        }
+        Weights::from_parts(n_controls as u32, indptr, all, data)
+    }
+
+    /// Shares of a vertex's rest vector by hold, for its weights of the joints: `each(column, share)` with the hold's first column,
+    /// counted from the first frame. They sum to 1; with no weight of any joint all goes with the whole cage.
+    ///
+    /// Along a line the share passes from bone to bone within about a radius of the joint. `lengths`: of the bones at rest.
+    pub(crate) fn shares(
+        &self,
+        weights: &[f64],
+        lengths: &[f64],
+        radius: f64,
+        mut each: impl FnMut(usize, f64),
+    ) {
+        let total: f64 = weights.iter().sum();
+        if total <= 0.0 {
+            return each(WHOLE, 1.0);
+        }
+        // How far along a bone the vertex is from one of its ends.
+        let along = |joint: usize, bone: usize| {
+            let [a, b] = self.bones[bone];
+            let other = if a as usize == joint { b } else { a };
+            (lengths[bone] * weights[other as usize] / total + radius).powi(4)
+        };
+        let share = |(joint, bone): (usize, Option<usize>)| {
+            let of_joint = weights[joint] / total;
+            bone.map_or(of_joint, |bone| {
+                let of = (0..self.bones.len()).filter(|&k| self.bones[k].contains(&(joint as u32)));
+                of_joint * along(joint, bone) / of.map(|k| along(joint, k)).sum::<f64>()
+            })
+        };
+        let shares: Vec<f64> = self.holds().map(share).collect();
+        let least = LEAST_SHARE * shares.iter().copied().fold(0.0, f64::max);
+        let kept: f64 = shares.iter().filter(|&&s| s > least).sum();
+        for (hold, s) in shares.into_iter().enumerate().filter(|(_, s)| *s > least) {
+            each(HOLDS + 3 * hold, s / kept);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+
+    use super::*;
+
+    /// A unit cube's corners and a line of three joints in it, by the cube's trilinear coordinates.
+    fn line() -> (Frames, Vec<Vec3>) {
+        let cube = (0..8).map(|k| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32));
+        let joints = [0.2, 0.5, 0.8].map(|z| Vec3::new(0.5, 0.5, z));
+        let controls: Vec<Vec3> = cube.chain(joints).collect();
+        let row = |p: Vec3, corner: Vec3| {
+            let factor = |a: usize| if corner[a] > 0.0 { p[a] } else { 1.0 - p[a] };
+            let slope = |a: usize| (2.0 * corner[a] - 1.0) * factor((a + 1) % 3) * factor((a + 2) % 3);
+            [factor(0) * factor(1) * factor(2), slope(0), slope(1), slope(2)]
+        };
+        let plain = joints.iter().flat_map(|&p| controls[..8].iter().map(move |&c| row(p, c))).collect();
+        let frames = Frames {
+            joints: vec![8, 9, 10],
+            bones: vec![[0, 1], [1, 2]],
+            plain,
+            ..Frames::of_cage(&controls[..8])
+        };
+        (frames, controls)
+    }
+
+    /// Matrices of the axes, of the whole cage, and of the holds.
+    fn matrices(columns: &[Vec3]) -> Vec<DMat3> {
+        let of = |c: &[Vec3]| DMat3::from_cols(c[0].as_dvec3(), c[1].as_dvec3(), c[2].as_dvec3());
+        columns[11..].chunks_exact(3).map(of).collect()
+    }
+
+    #[test]
+    fn one_affine_map_of_all_controls_is_the_matrix_of_each_hold() {
+        let (frames, rest) = line();
+        let matrix = DMat3::from_cols_array(&[1.2, 0.4, 0.1, -0.3, 0.9, 0.2, 0.5, -0.1, 1.1]);
+        let posed: Vec<Vec3> = rest.iter().map(|p| (matrix * p.as_dvec3()).as_vec3() + 3.0).collect();
+        let columns = frames.columns(&posed);
+        assert_eq!((columns.len(), &columns[11..14]), (11 + frames.n_columns(), &Vec3::AXES[..]));
+        // The first three of the axes do not turn; then the whole cage and four holds.
+        let holds = &matrices(&columns)[1..];
+        assert_eq!(holds.len(), 5);
+        for hold in holds {
+            assert!(hold.abs_diff_eq(matrix, 2e-6), "{hold}");
+        }
+    }
+
+    /// A bone bent at its middle joint turns what it holds by the same rotation in every direction, and the other bone not at all.
+    #[test]
+    fn a_bent_bone_turns_by_the_smallest_rotation() {
+        let (frames, rest) = line();
+        for (way, degrees) in [(0.0_f32, 5.0_f32), (1.6, 20.0), (3.5, 60.0), (5.0, 120.0)] {
+            let axis = Vec3::new(way.cos(), way.sin(), 0.0);
+            let turn = Quat::from_axis_angle(axis, degrees.to_radians());
+            let mut posed = rest.clone();
+            posed[10] = rest[9] + turn * (rest[10] - rest[9]);
+            let holds = &matrices(&frames.columns(&posed))[2..];
+            let expected = DMat3::from_quat(turn.as_dquat());
+            for (hold, expected) in holds.iter().zip([DMat3::IDENTITY, DMat3::IDENTITY, expected, expected]) {
+                assert!(hold.abs_diff_eq(expected, 2e-6), "{degrees}: {hold}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bone_turns_on_from_the_one_before_it() {
+        let (frames, rest) = line();
+        // All of the line turns about x and z by 90 degrees: the first bone's smallest rotation serves the second too.
+        let turn = Quat::from_rotation_z(1.0) * Quat::from_rotation_x(1.5);
+        let mut posed = rest.clone();
+        for k in 8..11 {
+            posed[k] = rest[9] + turn * (rest[k] - rest[9]);
+        }
+        let holds = &matrices(&frames.columns(&posed))[2..];
+        assert!(holds.iter().all(|hold| hold.abs_diff_eq(holds[0], 2e-6)), "{holds:?}");
+    }
+
+    #[test]
+    fn shares_sum_to_one_and_pass_from_bone_to_bone_at_the_joint() {
+        let (frames, _) = line();
+        let of_bones = |weights: [f64; 3]| {
+            let mut all = [0.0; 6];
+            frames.shares(&weights, &[0.3, 0.3], 0.02, |column, share| all[column / 3] += share);
+            assert!((all.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            // Axes, the whole cage, and holds: joint 0 with bone 0, joint 1 with both, joint 2 with bone 1.
+            [all[1], all[2] + all[3], all[4] + all[5]]
+        };
+        assert_eq!(of_bones([0.0, 0.7, 0.0]), [0.0, 0.5, 0.5]);
+        let beyond = of_bones([0.0, 0.4, 0.4]);
+        assert!(beyond[2] > 0.98, "{beyond:?}");
+        assert_eq!(of_bones([0.0; 3]), [1.0, 0.0, 0.0]);
+    }
+}

@@ -1,0 +1,97 @@
+//! Weights of points outside the cage.
+//!
+//! Near the cage they are extended linearly through the closest point p of the cage: `w(x) = (1 + t) w(p) - t w(q)`, with q mirrored
+//! inwards at p and t = 1. Both rows reproduce places, so this one does. Where the cage is thin, q is at
+//! most in the middle of it. Where there is no inside behind p, at an edge of the cage that is sharper than the angle at which x lies to it, the row is that of p,
+//! and an offset that goes with the whole cage makes up for the rest (`bind/offsets.rs`). With distance all this fades.
+
+use glam::DVec3;
+
+use super::{ClosestOnCage, Outside, Stencil};
+use crate::cage::ON_CAGE;
+use crate::controls::Controls;
+use crate::geometry::distance_along;
+use crate::options::OutsidePolicy;
+
+/// Shares of the cage's diagonal between which a point follows the cage less and less.
+const FADES: [f64; 2] = [0.05, 0.15];
+
+/// Makes stencils of points outside.
+#[derive(Debug)]
+pub(super) struct Beyond<'a> {
+    controls: Controls<'a>,
+    closest: ClosestOnCage<'a>,
+    policy: OutsidePolicy,
+}
+
+impl<'a> Beyond<'a> {
+    pub(super) fn new(controls: Controls<'a>, policy: OutsidePolicy) -> Self {
+        Self { controls, closest: ClosestOnCage::new(controls.surface()), policy }
+    }
+
+    /// Fills the stencil of a point outside the surface; one inside of a control takes the values of the closest point.
+    /// `inside(q, stencil)`: fills the stencil of a point, or says that it is outside. `vertex` of what is returned is left 0.
+    pub(super) fn fill(
+        &self,
+        point: DVec3,
+        stencil: &mut Stencil,
+        inside: impl FnOnce(DVec3, &mut Stencil) -> bool,
+    ) -> Outside {
+        let surface = self.controls.surface();
+        let mut found = self.closest.find(point);
+        stencil.clear();
+        self.controls.values_at(found.triangle, found.barycentric, &mut |column, value| {
+            stencil.add_hat(column, value);
+        });
+        let (distance, diagonal) = (found.distance, f64::from(surface.diagonal()));
+        let of_cage = self.controls.cage_face(surface.face_of_facet()[found.triangle as usize]).is_some();
+        if distance <= ON_CAGE * diagonal {
+            return found;
+        }
+        if !of_cage {
+            // Where tubes meet, the closest facet may be one inside of another tube.
+            if let Some(shares) = self.controls.inner().and_then(|inner| inner.foot(point)) {
+                stencil.clear();
+                let first = self.controls.cage().n_vertices() as u32;
+                shares.into_iter().for_each(|(control, share)| stencil.add_hat(first + control, share));
+            }
+            return found;
+        }
+        found.share = self.share(distance / diagonal);
+        if found.share == 0.0 {
+            stencil.clear();
+            return found;
+        }
+        let corners = surface.facet_corners(found.triangle);
+        let at: DVec3 = corners.iter().zip(found.barycentric).map(|(&c, b)| b * c).sum();
+        let inwards = (at - point) / distance;
+        let walls = (0..surface.facets().len() as u32)
+            .filter_map(|facet| distance_along(at, inwards, surface.facet_corners(facet)));
+        let open = walls.filter(|&s| s > ON_CAGE * diagonal).fold(f64::INFINITY, f64::min);
+        let step = distance.min(0.5 * open);
+        let (at, mut other) = (at + step * inwards, Stencil::default());
+        if inside(at, &mut other) {
+            // Next to a wall beside it, q has that wall's values: as at an edge that is too sharp.
+            let depth = self.closest.find(at).distance;
+            let t = distance.min(open) / step * (2.0 * depth / step).min(1.0);
+            for (_, w) in stencil.nodes.iter_mut().chain(&mut stencil.hats) {
+                *w *= 1.0 + t;
+            }
+            other.nodes.iter().for_each(|&(row, w)| stencil.add_node(row, -t * w));
+            other.hats.iter().for_each(|&(column, w)| stencil.add_hat(column, -t * w));
+        }
+        for (_, w) in stencil.nodes.iter_mut().chain(&mut stencil.hats) {
+            *w *= found.share;
+        }
+        found
+    }
+
+    /// How much a point follows the cage at a distance over the cage's diagonal.
+    fn share(&self, distance: f64) -> f64 {
+        if self.policy == OutsidePolicy::Stay {
+            return 0.0;
+        }
+        let far = ((distance - FADES[0]) / (FADES[1] - FADES[0])).clamp(0.0, 1.0);
+        1.0 - far * far * (3.0 - 2.0 * far)
+    }
+}
