@@ -104,7 +104,7 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     const { settings } = loaded;
     const poses = loaded.poseNames().map((name, k) => ({ name, positions: loaded.posePositions(k) }));
     let info: ModelInfo = await engine.open(loaded);
-    for (const next of further) info = await engine.add(next);
+    if (further.length > 0) info = await engine.add(further);
     // A project of a model that has no cage yet has an empty one.
     const cage = read.cage?.positions.length ? takeCage(read.cage) : null;
     const model = { ...info, notices: [...info.notices, ...read.notices] };
@@ -118,14 +118,33 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     lack,
     samples: samples(pkg),
     readFiles: (files, hear) => reading("read", { files, up: undefined }, hear),
+    shareReader: reading.share,
     open: (read: ReadFile) => openRead(read as ReadModel).finally(begin),
-    async add(read: ReadFile) {
-      // A project brings its models, and leaves its cage.
-      let info: ModelInfo | undefined;
-      for (const next of await load(pkg, read as ReadModel)) info = await engine.add(next);
-      if (!info) throw named("Error", "there is no model in the file");
-      const { notices } = read as ReadModel;
-      return { ...info, notices: [...info.notices, ...notices] };
+    add(reads: readonly ReadFile[], hear) {
+      let isGivenUp = false;
+      const work = async () => {
+        const all: Awaited<ReturnType<typeof load>>[number][] = [];
+        try {
+          for (const [k, read] of reads.entries()) {
+            if (isGivenUp) throw named("Cancelled", "cancelled");
+            hear?.(k);
+            // A project brings its models, and leaves its cage.
+            all.push(...(await load(pkg, read as ReadModel)));
+          }
+        } catch (error) {
+          for (const loaded of all) loaded.free();
+          throw error;
+        }
+        const info: ModelInfo = await engine.add(all);
+        const notices = reads.flatMap((read) => (read as ReadModel).notices);
+        return { ...info, notices: [...info.notices, ...notices] };
+      };
+      return {
+        done: work(),
+        cancel() {
+          isGivenUp = true;
+        },
+      };
     },
     async openSample(id) {
       const { glb, cage, poses } = await buildSample(id);

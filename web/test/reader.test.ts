@@ -38,6 +38,23 @@ it("each file is read by a worker that ends with it", async () => {
   expect(opened.length).toBe(2);
 });
 
+it("many files share a worker until it breaks, and it ends with them", async () => {
+  const { opened, open } = workers();
+  const apart = createApart(open);
+  const release = apart.share();
+  const read = () => apart("read", { files: [file("a.obj")], up: undefined });
+  const first = read();
+  opened[0]?.answer({ name: "a.obj" });
+  await first.done;
+  const again = read();
+  expect([(await again.done).name, opened.length, opened[0]?.closed]).toEqual(["a.obj", 1, 0]);
+  release();
+  expect(opened[0]?.closed).toBe(1);
+  const alone = read();
+  opened[1]?.fail(named("Worker", "unreachable"));
+  await expect(alone.done).rejects.toThrow("reading it broke off");
+});
+
 it("Cancel and another file end what is being read", async () => {
   const { opened, open } = workers();
   const apart = createApart(open);

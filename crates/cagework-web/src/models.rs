@@ -77,16 +77,26 @@ pub(crate) struct Models {
 
 impl Models {
     /// A model in a cage of its own. `settings`: a project's.
-    pub(crate) fn one(model: Model, draw: DrawModel, settings: Option<&MemberSettings>) -> Self {
+    pub(crate) fn one(model: Model, draw: DrawModel, settings: Option<MemberSettings>) -> Self {
         let mut models = Self::default();
-        models.add(model, draw, settings);
+        models.add([(model, draw, settings)]);
         models
     }
 
-    /// Puts another one into the cage.
-    pub(crate) fn add(&mut self, model: Model, draw: DrawModel, settings: Option<&MemberSettings>) {
-        let next =
-            self.all.iter().map(|m| m.first_triangle + m.model.triangles.len() as u32).max().unwrap_or(0);
+    /// Puts others into the cage, each with what a project says of it.
+    pub(crate) fn add(
+        &mut self,
+        others: impl IntoIterator<Item = (Model, DrawModel, Option<MemberSettings>)>,
+    ) {
+        for (model, draw, settings) in others {
+            self.push(model, draw, settings);
+        }
+        self.join();
+    }
+
+    fn push(&mut self, model: Model, draw: DrawModel, settings: Option<MemberSettings>) {
+        // They ascend.
+        let next = self.all.last().map_or(0, |m| m.first_triangle + m.model.triangles.len() as u32);
         let mut member = Member {
             id: self.all.len() as u32,
             options: PartOptions::default(),
@@ -94,7 +104,7 @@ impl Models {
             draw: Arc::new(draw),
             is_binned: false,
             // Never below what is there: points of the surface mean one triangle.
-            first_triangle: settings.map_or(0, |s| s.first_triangle).min(MAX_FIRST).max(next),
+            first_triangle: settings.as_ref().map_or(0, |s| s.first_triangle).min(MAX_FIRST).max(next),
             vertices: 0..0,
             triangles: 0..0,
             model: Arc::new(model),
@@ -113,20 +123,19 @@ impl Models {
             }
         }
         self.all.push(member);
-        self.join();
     }
 
-    /// Takes one out, or brings it back.
+    /// Takes some out, or brings them back.
     ///
     /// # Errors
-    /// When there is no such model, or it is the last one.
-    pub(crate) fn bin(&mut self, id: u32, is_binned: bool) -> Answer<()> {
-        let is_last = self.iter().all(|member| member.id == id);
-        let member = self.all.get_mut(id as usize).ok_or_else(no_model)?;
-        if is_binned && is_last {
+    /// When there is no such model, or none would be left; then some may be out already.
+    pub(crate) fn bin(&mut self, ids: &[u32], is_binned: bool) -> Answer<()> {
+        for &id in ids {
+            self.all.get_mut(id as usize).ok_or_else(no_model)?.is_binned = is_binned;
+        }
+        if self.iter().next().is_none() {
             return Err(Fault::new(ErrorName::Error, "this is the only model in the cage: open another one"));
         }
-        member.is_binned = is_binned;
         self.join();
         Ok(())
     }
@@ -365,9 +374,14 @@ mod tests {
         for (name, at) in [("body.obj", 0.0), ("shirt.obj", 10.0), ("hat.obj", 20.0)] {
             let model = model(name, at);
             let draw = draw(&model);
-            models.add(model, draw, None);
+            models.add([(model, draw, None)]);
         }
         models
+    }
+
+    /// A model as a project that kept it brings it.
+    fn again((member, settings): (&Member, &MemberSettings)) -> (Model, DrawModel, Option<MemberSettings>) {
+        ((*member.model).clone(), draw(&member.model), Some(settings.clone()))
     }
 
     fn names(models: &Models) -> Vec<&str> {
@@ -380,21 +394,19 @@ mod tests {
         let of_hat = 7;
         let at = |models: &Models| models.corners(of_hat).map(|c| c.map(|v| models.positions[v as usize]));
         let before = at(&models).unwrap();
-        models.bin(1, true).unwrap();
+        models.bin(&[1], true).unwrap();
         assert_eq!((names(&models), models.triangles.len()), (vec!["body.obj", "hat.obj"], 6));
         assert_eq!(at(&models).unwrap(), before);
         assert_eq!(models.counted(4), of_hat, "the hat's second triangle is the fifth of the mesh now");
         assert_eq!(models.corners(4), None, "the shirt is not in the cage");
-        models.bin(1, false).unwrap();
+        models.bin(&[1], false).unwrap();
         assert_eq!(names(&models), ["body.obj", "shirt.obj", "hat.obj"]);
         assert_eq!((at(&models).unwrap(), models.counted(of_hat)), (before, of_hat));
         // A project has only what is in the cage; its points are counted as they were.
-        models.bin(0, true).unwrap();
+        models.bin(&[0], true).unwrap();
         let saved = models.settings();
         let mut opened = Models::default();
-        for (member, settings) in models.iter().zip(&saved) {
-            opened.add((*member.model).clone(), draw(&member.model), Some(settings));
-        }
+        opened.add(models.iter().zip(&saved).map(again));
         assert_eq!(at(&opened).unwrap(), before);
     }
 
@@ -403,7 +415,7 @@ mod tests {
     fn choices_that_were_made_meanwhile_are_kept() {
         let mut now = three();
         let mut later = now.clone();
-        later.bin(1, true).unwrap();
+        later.bin(&[1], true).unwrap();
         now.get_mut(2).unwrap().options.shown = false;
         now.get_mut(0).unwrap().painted = vec![255, 0, 0, 0];
         later.take_choices(&now);
@@ -415,11 +427,11 @@ mod tests {
     #[test]
     fn the_last_model_stays() {
         let mut models = three();
-        models.bin(0, true).unwrap();
-        models.bin(2, true).unwrap();
-        let error = models.bin(1, true).unwrap_err();
+        models.bin(&[0], true).unwrap();
+        models.bin(&[2], true).unwrap();
+        let error = models.bin(&[1], true).unwrap_err();
         assert!(error.message().contains("only model"), "{}", error.message());
-        assert!(models.bin(9, true).is_err());
+        assert!(models.bin(&[9], true).is_err());
         assert_eq!(names(&models), ["shirt.obj"]);
     }
 
@@ -446,18 +458,16 @@ mod tests {
         let text = serde_json::to_string(&models.settings()).unwrap();
         let saved: Vec<MemberSettings> = serde_json::from_str(&text).unwrap();
         let mut opened = Models::default();
-        for (member, settings) in models.iter().zip(&saved) {
-            opened.add((*member.model).clone(), draw(&member.model), Some(settings));
-        }
+        opened.add(models.iter().zip(&saved).map(again));
         assert_eq!(opened.parts(), parts);
         assert_eq!(opened.settings(), saved);
         // What another program wrote is left out as far as it does not fit.
         let odd = r#"{"first_triangle": 4294967295, "options": {"rigid": ["nobody"]}, "painted": [[255, 4000000000]]}"#;
         let mut other = Models::default();
         let odd: MemberSettings = serde_json::from_str(odd).unwrap();
-        other.add(model("a.obj", 0.0), draw(&model("a.obj", 0.0)), Some(&odd));
+        other.add([(model("a.obj", 0.0), draw(&model("a.obj", 0.0)), Some(odd.clone()))]);
         // A second one once ended in a panic: it is counted on from the first.
-        other.add(model("b.obj", 0.0), draw(&model("b.obj", 0.0)), Some(&odd));
+        other.add([(model("b.obj", 0.0), draw(&model("b.obj", 0.0)), Some(odd.clone()))]);
         assert!(other.parts().is_empty());
         assert_eq!(other.settings().len(), 2);
         assert_eq!([MAX_FIRST, MAX_FIRST + 3].map(|t| other.corners(t)), [Some([0, 2, 1]), Some([4, 6, 5])]);
@@ -466,7 +476,7 @@ mod tests {
     #[test]
     fn one_model_has_nothing_to_keep() {
         let mut models = Models::default();
-        models.add(model("a.obj", 0.0), draw(&model("a.obj", 0.0)), None);
+        models.add([(model("a.obj", 0.0), draw(&model("a.obj", 0.0)), None)]);
         assert_eq!(models.settings(), Vec::new());
     }
 }

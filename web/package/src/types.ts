@@ -1,11 +1,11 @@
 /** The package's functions and what they take and give: all that a user's compiler reads. */
 
 import type {
-  Offsets,
   BindOptions,
   BindReport,
   CageControls,
   CageOptions,
+  Offsets,
   Problem,
   Progress,
   RigOptions,

@@ -26,8 +26,8 @@ export interface Follow {
   loadCage(files: readonly NamedFile[]): Promise<boolean>;
   loadControls(files: readonly NamedFile[]): Promise<boolean>;
   bind(): Promise<boolean>;
-  /** Puts another model into the cage that there will be; says what does not work. */
-  join(other: Named): Promise<unknown>;
+  /** Puts other models into the cage that there will be; says what does not work. */
+  join(others: readonly Named[], signal: AbortSignal): Promise<unknown>;
   /** Takes a project's settings, before the bind. */
   applySettings(settings: Partial<Settings>): void;
   /** And its pose. */
@@ -42,14 +42,17 @@ export interface Follow {
   leave(): void;
 }
 
+/** What comes along with a model. */
+interface Along {
+  readonly others: readonly Named[];
+  readonly cageFiles: readonly NamedFile[] | undefined;
+  readonly signal: AbortSignal;
+}
+
 export function createFiles(ctx: Context, follow: Follow): Files {
   const { store } = ctx;
-  const take = async (
-    opened: Opened,
-    sample: string | null,
-    others: readonly Named[] = [],
-    cageFiles?: readonly NamedFile[],
-  ) => {
+  const take = async (opened: Opened, sample: string | null, along?: Along) => {
+    const others = along?.others ?? [];
     // Nobody needs the weights of what was open.
     ctx.queue.cancel("bind");
     const settings = settingsOf(opened);
@@ -82,12 +85,12 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     for (const notice of opened.model.notices) ctx.tell.say(sentence(notice));
     if (settings.notices.length > 0) ctx.tell.say(settings.notices.join(" "));
     // Before there is a cage: it encloses all of them.
-    for (const other of others) await follow.join(other);
+    if (along && others.length > 0) await follow.join(others, along.signal);
     store.set({ busy: null });
     const { length } = store.get().model?.members ?? [];
     const showList = { label: T.models.showList, run: () => store.set({ step: "model" }) };
     if (others.length > 0 && length > 1) ctx.tell.say(T.models.together(length), showList);
-    void prepare(cageFiles, sample !== null || opened.project !== null);
+    void prepare(along?.cageFiles, sample !== null || opened.project !== null);
   };
 
   const settingsOf = (opened: Opened): Settings => {
@@ -130,17 +133,12 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     });
 
   /** Opens something else; what is open until then stays kept. */
-  const replace = async (
-    open: () => Promise<Opened>,
-    sample: string | null,
-    others?: readonly Named[],
-    cageFiles?: readonly NamedFile[],
-  ) => {
+  const replace = async (open: () => Promise<Opened>, sample: string | null, along?: Along) => {
     follow.settle();
     await follow.keep(sample);
     const opened = await open();
     follow.leave();
-    await take(opened, sample, others, cageFiles);
+    await take(opened, sample, along);
   };
 
   return {
@@ -166,7 +164,8 @@ export function createFiles(ctx: Context, follow: Follow): Files {
         // The others open: another file is for their cage.
         const another = models.length > 1 ? "add" : "file";
         const [first, ...others] = await readModels(ctx, signal, models, another);
-        if (first) await replace(() => ctx.session().open(first.read), null, others, second && [second]);
+        const along = { others, cageFiles: second && [second], signal };
+        if (first) await replace(() => ctx.session().open(first.read), null, along);
       });
     },
     turn(up) {

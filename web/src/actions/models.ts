@@ -5,7 +5,7 @@ import { planDrop } from "../drop";
 import type { Store } from "../signals";
 import { T } from "../words";
 import type { CageActions } from "./cage";
-import { attempt, type Context, report } from "./context";
+import { attempt, type Context, report, waitFor } from "./context";
 import { modelsOf, type Named, readModels } from "./read";
 
 /** What a part may do instead of following the cage. */
@@ -14,8 +14,8 @@ export type How = "rigid" | "stays";
 export interface Models {
   /** Puts models of files into the cage that is open. */
   add(files: readonly NamedFile[]): Promise<boolean>;
-  /** The same with one that was read, before there is a cage; not a step of the history. */
-  join(other: Named): Promise<boolean>;
+  /** The same with those that were read, before there is a cage; not a step of the history. Can be cancelled. */
+  join(others: readonly Named[], signal: AbortSignal): Promise<boolean>;
   /** Takes a model out of the cage. */
   bin(id: number): Promise<boolean>;
   /** Shows or hides it; no step of the history, as nothing else of the view is. */
@@ -63,9 +63,8 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
   /** Some come, or go; `looked`: the cage was looked at again. */
   const turn = async (ids: readonly number[], binned: boolean, others: ReturnType<typeof now>) => {
     settle();
-    let info: ModelInfo | undefined;
-    for (const id of ids) info = await engine().bin(id, binned);
-    const looked = info && changed(info);
+    const info = await engine().bin(Uint32Array.from(ids), binned);
+    const looked = changed(info);
     // What adopts a cage takes it for another one than the sample's.
     store.set({ sample: others.sample, sampleCage: others.sampleCage });
     return { looked };
@@ -97,7 +96,7 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
           const reads = await readModels(ctx, signal, modelsOf(files, plan), "add");
           settle();
           const n = members().length;
-          for (const other of reads) await models.join(other);
+          await models.join(reads, signal);
           store.set({ busy: null });
           const { model } = store.get();
           const ids = members()
@@ -108,7 +107,7 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
           const after = { sample: null, sampleCage: false };
           ctx.history.push({
             label: T.did.addModels(ids.length),
-            undo: () => turnBack([...ids].reverse(), true, before),
+            undo: () => turnBack(ids, true, before),
             redo: () => turnBack(ids, false, after),
           });
           void changed(model).then((isOut) => {
@@ -120,11 +119,18 @@ export function createModels(ctx: Context, { cage, openFiles, settle }: ModelNee
       const second = files[plan.second ?? -1];
       return second && went ? cage.load([second], true) : went;
     },
-    join: (other) =>
-      attempt(ctx, T.failed.open(other.name), async () => {
-        store.set({ busy: T.opening.file(other.name) });
-        take(await ctx.session().add(other.read));
-      }),
+    join(others, signal) {
+      const [first] = others;
+      if (!first) return Promise.resolve(true);
+      const title = others.length > 1 ? T.models.notAdded : T.failed.open(first.name);
+      const say = (k: number) =>
+        store.set({ busy: T.opening.fileOf(others[k]?.name ?? "", k, others.length) });
+      return attempt(ctx, title, async () => {
+        const reads = others.map(({ read }) => read);
+        const what = T.opening.fileOf(first.name, 0, others.length);
+        take(await waitFor(ctx, signal, what, () => ctx.session().add(reads, say)));
+      });
+    },
     bin(id) {
       const label = T.did.binModel(nameOf(id));
       const work = async () => {

@@ -1,10 +1,12 @@
 /** Reading models that came together: what goes wrong with one of them is said, and the others are read. */
 
-import type { NamedFile, ReadFile } from "../contract";
+import type { Job, NamedFile, ReadFile, Reading } from "../contract";
 import type { DropPlan } from "../drop";
 import { isCancelled } from "../strings";
 import { T } from "../words";
 import { type Context, report, waitFor } from "./context";
+
+const cancelled = (message: string) => Object.assign(new Error(message), { name: "Cancelled" });
 
 /** A model that was read, and the name of its file. */
 export interface Named {
@@ -20,31 +22,59 @@ export function modelsOf(files: readonly NamedFile[], plan: DropPlan): (readonly
   return models.map((model) => [model, ...companions]);
 }
 
-/** Reads them in turn. Ends as if it were cancelled when there is nothing left to open. `another`: what helps. */
+/** Reads them in turn, and can be cancelled. Ends as if it were when there is nothing left to open. `another`: what helps. */
 export async function readModels(
   ctx: Context,
   signal: AbortSignal,
   models: readonly (readonly NamedFile[])[],
   another: "file" | "add",
 ): Promise<Named[]> {
-  const reads: Named[] = [];
-  for (const own of models) {
-    const name = own[0]?.name ?? "";
-    if (own[0]?.file.size === 0) {
-      const explained = { title: T.opening.empty, message: T.opening.noContent(name) };
-      ctx.tell.problem(explained, ctx.fixFor(another));
-      continue;
-    }
-    try {
-      const what = T.opening.file(name);
-      const read = await waitFor(ctx, signal, what, (hear) => ctx.session().readFiles(own, hear));
-      reads.push({ name, read });
-      ctx.store.set({ busy: what });
-    } catch (error) {
-      if (isCancelled(error)) throw error;
-      report(ctx, T.failed.open(name), error, another);
-    }
-  }
-  if (reads.length === 0) throw Object.assign(new Error("there is nothing to open"), { name: "Cancelled" });
+  const what = T.opening.fileOf(models[0]?.[0]?.name ?? "", 0, models.length);
+  const { reads } = await waitFor(ctx, signal, what, (hear) => readAll(ctx, models, hear, another));
+  if (reads.length === 0) throw cancelled("there is nothing to open");
+  ctx.store.set({ busy: what });
   return reads;
+}
+
+function readAll(
+  ctx: Context,
+  models: readonly (readonly NamedFile[])[],
+  hear: (progress: Reading) => void,
+  another: "file" | "add",
+): Job<{ reads: Named[]; took: number }> {
+  const release = ctx.session().shareReader();
+  let isGivenUp = false;
+  let cancelOne = () => {};
+  const work = async () => {
+    const reads: Named[] = [];
+    let took = 0;
+    for (const [k, own] of models.entries()) {
+      if (isGivenUp) throw cancelled("cancelled");
+      const name = own[0]?.name ?? "";
+      ctx.store.set({ busy: T.opening.fileOf(name, k, models.length) });
+      if (own[0]?.file.size === 0) {
+        const explained = { title: T.opening.empty, message: T.opening.noContent(name) };
+        ctx.tell.problem(explained, ctx.fixFor(another));
+        continue;
+      }
+      try {
+        const job = ctx.session().readFiles(own, hear);
+        cancelOne = job.cancel;
+        const read = await job.done;
+        took = Math.max(took, read.took);
+        reads.push({ name, read });
+      } catch (error) {
+        if (isCancelled(error)) throw error;
+        report(ctx, T.failed.open(name), error, another);
+      }
+    }
+    return { reads, took };
+  };
+  return {
+    done: work().finally(release),
+    cancel() {
+      isGivenUp = true;
+      cancelOne();
+    },
+  };
 }

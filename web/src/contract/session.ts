@@ -51,8 +51,10 @@ export interface Session {
   readFiles(files: readonly NamedFile[], hear?: (progress: Reading) => void): Job<ReadFile>;
   /** Opens what was read, once; a project's cage and poses are open afterwards too. */
   open(read: ReadFile): Promise<Opened>;
-  /** Another model into the cage that is open: cage and pose stay, weights are dropped. */
-  add(read: ReadFile): Promise<ModelInfo>;
+  /** Until what it returns is called, files are read by one worker as long as it does not break. */
+  shareReader(): () => void;
+  /** Other models into the cage that is open: cage and pose stay, weights are dropped. `hear` is told which is next. */
+  add(reads: readonly ReadFile[], hear?: (next: number) => void): Job<ModelInfo>;
   openSample(id: string): Promise<Opened>;
   /** Opens a project again with another axis up: model, cage and poses are turned. */
   turn(project: Uint8Array, up: UpAxis): Promise<Opened>;

@@ -24,9 +24,10 @@ function page() {
       steps.push(`load ${list[0]?.name}`);
       return true;
     },
-    async join({ name }) {
-      steps.push(`join ${name}`);
-      fake.store.set({ model: modelOf([memberOf(0, "body.glb"), memberOf(1, name)]) });
+    async join(others) {
+      for (const { name } of others) steps.push(`join ${name}`);
+      const added = others.map(({ name }, k) => memberOf(k + 1, name));
+      fake.store.set({ model: modelOf([memberOf(0, "body.glb"), ...added]) });
     },
     async bind() {
       steps.push("bind");

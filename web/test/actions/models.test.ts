@@ -18,7 +18,10 @@ function page() {
     return info();
   };
   fake.teach({
-    bin: async (id: number, binned: boolean) => patch(id, { binned }),
+    async bin(ids: Uint32Array, binned: boolean) {
+      for (const id of ids) patch(id, { binned });
+      return info();
+    },
     setParts(id: number, options: PartOptions) {
       if (options.rigid.includes("node:Gone")) throw new Error("body.glb has no node called Gone");
       return patch(id, { options });
@@ -117,15 +120,34 @@ it("several are one step; one that cannot be read is named, and the others come"
   asked.at(-1)?.resolve({ took: 0 });
   await settled();
   await read("hat.glb", 1);
-  asked.at(-1)?.reject(new Error("too many vertices"));
   await added;
+  expect(asked.at(-1)).toMatchObject({ kind: "add", input: { length: 2 } });
   expect(names()).toEqual(["body.glb", "hat.glb"]);
   expect(problems.map(({ title, fix }) => [title, fix])).toEqual([
     ["bad.glb could not be opened", "add"],
     ["This file is empty", "add"],
-    ["hat.glb could not be opened", undefined],
   ]);
   await ctx.history.undo();
+  expect([names(), ctx.history.undoLabel]).toEqual([["body.glb"], undefined]);
+});
+
+it("files that are being read can be cancelled, and nothing is added; nor is it when there is no room", async () => {
+  const { models, asked, store, names, problems, ctx } = page();
+  const cancelled = models.add([file("shirt.glb"), file("hat.glb")]);
+  await settled();
+  expect(store.get().busy).toBe("Opening shirt.glb (1 of 2)");
+  store.get().cancelBusy?.();
+  asked.at(-1)?.resolve({ took: 0 });
+  expect([await cancelled, store.get().busy, problems]).toEqual([false, null, []]);
+  const refused = models.add([file("shirt.glb"), file("hat.glb")]);
+  for (const _ of [1, 2]) {
+    await settled();
+    asked.at(-1)?.resolve({ took: 0 });
+  }
+  await settled();
+  asked.at(-1)?.reject(new Error("too many vertices"));
+  await refused;
+  expect(problems.map(({ title }) => title)).toEqual(["Nothing was added"]);
   expect([names(), ctx.history.undoLabel]).toEqual([["body.glb"], undefined]);
 });
 

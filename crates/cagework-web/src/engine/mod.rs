@@ -73,7 +73,7 @@ impl Engine {
         let draw = loaded.draw_model();
         let settings = loaded.member_settings();
         page_turn().await;
-        let models = Models::one(loaded.model, draw, settings.as_ref());
+        let models = Models::one(loaded.model, draw, settings);
         {
             let mut gpu = self.gpu.lock().await;
             let gpu = gpu.as_mut().ok_or_else(lost)?;

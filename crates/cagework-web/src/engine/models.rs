@@ -27,29 +27,34 @@ const FULL: f32 = 0.5;
 
 #[wasm_bindgen]
 impl Engine {
-    /// Puts the model of a file that was read into the cage that is open. Cage and pose stay, weights are dropped. The file's handle is
-    /// used up.
+    /// Puts the models of files that were read into the cage that is open. Cage and pose stay, weights are dropped. The files' handles
+    /// are used up.
     ///
     /// # Errors
     /// As `open`; nothing changes then.
     #[wasm_bindgen(unchecked_return_type = "ModelInfo")]
-    pub async fn add(&self, mut loaded: Loaded) -> Result<JsValue, JsValue> {
-        loaded.turn_to(self.read(State::up));
-        let (draw, settings) = (loaded.draw_model(), loaded.member_settings());
+    pub async fn add(&self, loaded: Vec<Loaded>) -> Result<JsValue, JsValue> {
+        let up = self.read(State::up);
+        let prepare = |mut loaded: Loaded| {
+            loaded.turn_to(up);
+            let (draw, settings) = (loaded.draw_model(), loaded.member_settings());
+            (loaded.model, draw, settings)
+        };
+        let others: Vec<_> = loaded.into_iter().map(prepare).collect();
         let add = |models: &mut Models| {
-            models.add(loaded.model, draw, settings.as_ref());
+            models.add(others);
             Ok(())
         };
         Ok(self.show_models(add).await?)
     }
 
-    /// Takes a model out of the cage, or brings it back. Cage and pose stay, weights are dropped.
+    /// Takes models out of the cage, or brings them back. Cage and pose stay, weights are dropped.
     ///
     /// # Errors
-    /// When it is the only one, or the GPU has no room for it; nothing changes then.
+    /// When none would be left, or the GPU has no room for them; nothing changes then.
     #[wasm_bindgen(unchecked_return_type = "ModelInfo")]
-    pub async fn bin(&self, id: u32, binned: bool) -> Result<JsValue, JsValue> {
-        Ok(self.show_models(|models| models.bin(id, binned)).await?)
+    pub async fn bin(&self, ids: Vec<u32>, binned: bool) -> Result<JsValue, JsValue> {
+        Ok(self.show_models(|models| models.bin(&ids, binned)).await?)
     }
 
     /// What of a model is shown, keeps its shape, or stays as it is. Weights stay.

@@ -88,7 +88,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
     const read = await run(reading("read", { files: [{ name, path: name, file }], up: undefined }));
     const [first, ...further] = await load(pkg, read);
     let model = await engine.open(first);
-    for (const next of further) model = await engine.add(next);
+    if (further.length > 0) model = await engine.add(further);
     engine.frameAll();
     let cage = read.cage;
     if (!cage) {

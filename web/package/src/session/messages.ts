@@ -1,7 +1,6 @@
 /** What page and worker say to each other. */
 
 import type {
-  Offsets,
   BindOptions,
   BindReport,
   CageArrays,
@@ -12,6 +11,7 @@ import type {
   Grabbed,
   GrabInput,
   NamedFile,
+  Offsets,
   Progress,
   PullFrame,
   Reading,

@@ -10,22 +10,35 @@ import { furtherOf } from "./reading";
 
 export type Hear = ((progress: Reading) => void) | undefined;
 
-/** One job at a time, each in a worker that ends with it. */
-export type Apart = <K extends "read" | "readCage" | "check" | "repair">(
+type RunApart = <K extends "read" | "readCage" | "check" | "repair">(
   job: K,
   input: Jobs[K]["input"],
   hear?: Hear,
 ) => Job<Jobs[K]["output"]>;
 
+/** One job at a time, each in a worker that ends with it. */
+export type Apart = RunApart & {
+  /** Until what it returns is called, a job that ends well leaves its worker to the next: many small files need one. */
+  share(): () => void;
+};
+
 /** Work on what a user brought: what it does to its worker is gone with it, and so is its memory. Another one ends it. */
 export function createApart(open: () => Client): Apart {
-  let stop = () => {};
-  return (job, input, hear) => {
-    stop();
+  let isShared = false;
+  let running: Client | undefined;
+  let idle: Client | undefined;
+  const apart: RunApart = (job, input, hear) => {
+    running?.close();
     const refused = "files" in input ? tooLarge(input.files) : undefined;
     if (refused) return { done: Promise.reject(refused), cancel: () => {} };
-    const client = open();
-    stop = client.close;
+    const client = idle ?? open();
+    running = client;
+    idle = undefined;
+    const end = (isGood: boolean) => {
+      if (running === client) running = undefined;
+      if (isGood && isShared && !idle) idle = client;
+      else client.close();
+    };
     const what = "files" in input ? "reading it" : "looking at the cage";
     const done = client.run(job, input, hear).done.catch((error: Error) => {
       if (error.name !== "Worker") throw error;
@@ -34,14 +47,42 @@ export function createApart(open: () => Client): Apart {
         `${what} broke off: it is damaged in a way that nobody foresaw, or needs more memory than this browser gives`,
       );
     });
-    return { done: done.finally(client.close), cancel: client.close };
+    const ended = done.then(
+      (output) => {
+        end(true);
+        return output;
+      },
+      (error: Error) => {
+        end(false);
+        throw error;
+      },
+    );
+    return { done: ended, cancel: client.close };
   };
+  const share = () => {
+    isShared = true;
+    return () => {
+      isShared = false;
+      idle?.close();
+      idle = undefined;
+    };
+  };
+  return Object.assign(apart, { share });
 }
 
-/** Events and frames that wait have their turn. */
-const pause = () => new Promise((resolve) => setTimeout(resolve));
+/** The main thread may be held for so long, ms. */
+const HELD = 30;
 
-/** A file that was read before: for `Engine.open`, and a project's further models for `Engine.add`. */
+let paused = 0;
+
+/** Events and frames that wait have their turn, if none had one lately. */
+async function pause(): Promise<void> {
+  if (performance.now() - paused < HELD) return;
+  await new Promise((resolve) => setTimeout(resolve));
+  paused = performance.now();
+}
+
+/** A file that was read before: for `Engine.open`, and further models for `Engine.add`. */
 export async function load(pkg: Package, read: ReadModel): Promise<[Loaded, ...Loaded[]]> {
   const loaded = pkg.Loaded.read(read.name, read.bytes, siblingOf(read.siblings));
   if (read.up) loaded.setUp(read.up);

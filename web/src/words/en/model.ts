@@ -1,6 +1,6 @@
 /** Step Model, and how a file is opened. */
 
-import { duration, endings, percent, plural } from "../../format";
+import { count, duration, endings, percent, plural } from "../../format";
 
 export const model = {
   title: "Choose a model",
@@ -37,6 +37,8 @@ export const model = {
 export const opening = {
   starting: "Starting",
   file: (name: string) => `Opening ${name}`,
+  fileOf: (name: string, k: number, n: number) =>
+    n > 1 ? `Opening ${name} (${count(k + 1)} of ${count(n)})` : `Opening ${name}`,
   turning: "Turning the model",
   repairing: "Repairing the cage",
   stages: {
