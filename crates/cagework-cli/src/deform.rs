@@ -93,26 +93,21 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         args.read.memory,
     )?;
     let rest = rest_of(&cage.cage, &saved);
-    let options = args.rig.options(&model, &args.mesh)?;
+    let mut options = args.rig.options(&model, &args.mesh)?;
     let outside = || saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices);
     let outside_vertices = outside().count();
     let staying_vertices = outside().filter(|o| o.share == 0.0).count();
     // Times of one file: those of several files have nothing to do with each other.
-    let is_timed = args.pose.len() == 1 && seconds.len() == poses.len();
-    let seconds = if is_timed { seconds } else { Vec::new() };
+    if args.pose.len() == 1 && seconds.len() == poses.len() {
+        options.pose_seconds = seconds;
+    }
     let mut notices = model.notices.clone();
     notices.extend(outside_in_words(outside(), cage.cage.diagonal()));
-    let poses = Poses { names, seconds, rest, positions: poses };
+    let poses = Poses { names, rest, positions: poses };
     let started = Instant::now();
     let posed = Posed::new(&model, saved, &poses, format, (&options, args.rig.plain));
     let deform_ms = started.elapsed().as_secs_f64() * 1e3;
-    let (bytes, rig) = posed.into_file(&model, (&poses.names, &poses.seconds), &args.output, &options)?;
-    if rig.is_some() && !poses.seconds.is_empty() {
-        notices.push(
-            "the poses are played one second each, beside the model's own clips; their names say their times"
-                .into(),
-        );
-    }
+    let (bytes, rig) = posed.into_file(&model, &poses.names, &args.output, &options)?;
     notices.extend(rig.iter().flat_map(ReshapeReport::notices));
     notices.extend(model.lost_in(format));
     write(output, &bytes)?;
@@ -136,8 +131,6 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
 pub(crate) struct Poses {
     /// What they are called.
     pub(crate) names: Vec<String>,
-    /// When each is to be shown, if that is known.
-    pub(crate) seconds: Vec<f32>,
     /// All controls at rest. `[n_controls]`, object units
     pub(crate) rest: Vec<Vec3>,
     /// All controls in each pose. `[n_poses][n_controls]`, object units
@@ -179,7 +172,7 @@ impl Posed {
     pub(crate) fn into_file(
         self,
         model: &Model,
-        (names, seconds): (&[String], &[f32]),
+        names: &[String],
         output: &ModelOutput,
         options: &ReshapeOptions,
     ) -> Result<(Vec<u8>, Option<ReshapeReport>), CliError> {
@@ -193,10 +186,10 @@ impl Posed {
                     export(model, only, output)?
                 } else {
                     let named: Vec<(String, Vec<Vec3>)> = names.iter().cloned().zip(posed).collect();
-                    let glb = if seconds.is_empty() {
+                    let glb = if options.pose_seconds.is_empty() {
                         model.write_glb_poses(&model.positions, &named)
                     } else {
-                        model.write_glb_poses_at(&model.positions, &named, seconds)
+                        model.write_glb_poses_at(&model.positions, &named, &options.pose_seconds)
                     };
                     glb.map_err(|e| CliError::file(&output.path, e))?
                 };

@@ -290,7 +290,7 @@ impl RigAsked {
             JointsAsked::Turn => Joints::Turn,
         };
         let (keep_travel, rigid) = (self.keep_travel, self.rigid.clone());
-        ReshapeOptions { joints, keep_travel, rigid, parts: Parts::default() }
+        ReshapeOptions { joints, keep_travel, rigid, ..ReshapeOptions::default() }
     }
 }
 

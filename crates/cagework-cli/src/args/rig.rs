@@ -108,6 +108,6 @@ impl RigArgs {
         let (rigid, others): (Vec<_>, Vec<_>) =
             parts.rigid.iter().cloned().partition(|name| props.contains(name));
         let parts = model.parts(&parts.mask, &others).map_err(|e| CliError::file(path, e))?;
-        Ok(ReshapeOptions { joints, keep_travel: self.keep_travel, rigid, parts })
+        Ok(ReshapeOptions { joints, keep_travel: self.keep_travel, rigid, parts, pose_seconds: Vec::new() })
     }
 }

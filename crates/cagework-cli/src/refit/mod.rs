@@ -94,7 +94,6 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     let pose = cage.load_pose(&args.pose)?;
     let poses = Poses {
         names: vec![pose_name(&args.pose)],
-        seconds: Vec::new(),
         rest: controls.rest().to_vec(),
         positions: with_inner(vec![pose], args.pose_controls.as_slice(), inner, (up, cage.origin()), memory)?,
     };
@@ -305,7 +304,7 @@ impl Bound<'_> {
 
     fn write(self, names: &[String]) -> Outcome {
         let Self { job, model, posed, options, mut written, started } = self;
-        let made = posed.into_file(&model, (names, &[]), &job.output, &options);
+        let made = posed.into_file(&model, names, &job.output, &options);
         match made.and_then(|(bytes, rig)| write(&job.output.path, &bytes).map(|()| rig)) {
             Err(error) => Outcome::of_error(&error, &job.model),
             Ok(rig) => {

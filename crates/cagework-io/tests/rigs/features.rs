@@ -362,6 +362,27 @@ fn primitives_with_fewer_targets_are_posed_as_the_others() {
     assert_near(&posed, &moved, 4.0 * ROUNDED, "the pose");
 }
 
+/// Poses of a clip keep its times, beside the model's own clips.
+#[test]
+fn poses_are_played_at_their_times() {
+    let rig = rigged();
+    let model = read(&rig.glb());
+    let by = by(&model);
+    let still = vec![DVec3::ZERO; by.len()];
+    let poses = [("rest".to_owned(), still.clone()), ("bent".to_owned(), by)];
+    let options = ReshapeOptions { pose_seconds: vec![0.25, 0.75], ..ReshapeOptions::default() };
+    let (bytes, _) = model.write_reshaped(&still, &[], &poses, &options).unwrap();
+    let written = read(&bytes);
+    let clip = written.clips().iter().position(|clip| clip.name.as_deref() == Some("poses")).unwrap();
+    assert_eq!(written.clips()[clip].seconds, 0.75);
+    let player = player(&written);
+    let at = |seconds: f32| shown(&player, Some(clip), seconds, &[]);
+    let (before, bent) = (at(0.1), at(0.75));
+    let half: Vec<Vec3> = before.iter().zip(&bent).map(|(a, b)| a.midpoint(*b)).collect();
+    assert!(before.iter().zip(&bent).any(|(a, b)| a.distance(*b) > 0.1));
+    assert_near(&at(0.5), &half, 4.0 * ROUNDED, "half-way");
+}
+
 #[test]
 fn bind_matrices_that_are_no_numbers_name_their_skin() {
     let mut rig = rigged();

@@ -14,12 +14,13 @@ use crate::error::WriteError;
 use crate::gltf::animate::SECONDS_PER_POSE;
 use crate::gltf::pack::push;
 
-/// Appends a morph target for each pose to every mesh, and an animation that plays them. `rigid`: nodes whose meshes keep their shape, and which points are outside the cage.
+/// Appends a morph target for each pose to every mesh, and an animation that plays them. `seconds`: as in
+/// [`super::ReshapeOptions::pose_seconds`]; `rigid`: nodes whose meshes keep their shape, and which points are outside the cage.
 pub(super) fn append(
     rig: &Rig<'_>,
     edit: &mut Edit<'_>,
     triangles: &[[u32; 3]],
-    poses: &[Named<'_>],
+    (poses, seconds): (&[Named<'_>], &[f32]),
     rigid: (&[u32], &[bool]),
 ) -> Result<(), WriteError> {
     if poses.is_empty() {
@@ -118,7 +119,7 @@ pub(super) fn append(
             edit.json["animations"][a]["samplers"][sampler]["output"] = accessor.into();
         }
     }
-    play(rig, edit, &meshes, poses.len());
+    play(rig, edit, &meshes, poses.len(), seconds);
     Ok(())
 }
 
@@ -149,10 +150,18 @@ fn pad(weights: &mut Value, n_before: usize, n_poses: usize) {
     *weights = all.into();
 }
 
-/// An animation from rest through all poses back to rest. Targets that were there keep their defaults.
-fn play(rig: &Rig<'_>, edit: &mut Edit<'_>, meshes: &BTreeMap<usize, usize>, n_poses: usize) {
-    let n_keys = n_poses + 2;
-    let times: Vec<[f32; 1]> = (0..n_keys).map(|k| [k as f32 * SECONDS_PER_POSE]).collect();
+/// An animation through all poses: at their times, or from rest and back to rest. Targets that were there keep their defaults.
+fn play(
+    rig: &Rig<'_>,
+    edit: &mut Edit<'_>,
+    meshes: &BTreeMap<usize, usize>,
+    n_poses: usize,
+    seconds: &[f32],
+) {
+    let is_timed = seconds.len() == n_poses;
+    let (n_keys, before) = if is_timed { (n_poses, 0) } else { (n_poses + 2, 1) };
+    let time = |k: usize| if is_timed { seconds[k] } else { k as f32 * SECONDS_PER_POSE };
+    let times: Vec<[f32; 1]> = (0..n_keys).map(|k| [time(k)]).collect();
     let input = edit.write(None, &times, false, true);
     let (mut samplers, mut channels) = (Vec::new(), Vec::new());
     let shapes: HashSet<_> = rig.parts.iter().map(|part| key_of(&part.instance)).collect();
@@ -163,7 +172,7 @@ fn play(rig: &Rig<'_>, edit: &mut Edit<'_>, meshes: &BTreeMap<usize, usize>, n_p
         let default = |k: usize| defaults.and_then(|w| w.get(k)).copied().unwrap_or(0.0);
         let values: Vec<[f32; 1]> = (0..n_keys)
             .flat_map(|key| {
-                let of_poses = (0..n_poses).map(move |pose| if key == pose + 1 { 1.0 } else { 0.0 });
+                let of_poses = (0..n_poses).map(move |pose| if key == pose + before { 1.0 } else { 0.0 });
                 (0..n_before).map(default).chain(of_poses).map(|w| [w])
             })
             .collect();

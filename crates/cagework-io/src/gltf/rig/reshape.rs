@@ -30,6 +30,8 @@ pub struct ReshapeOptions {
     pub rigid: Vec<String>,
     /// Vertices that the cage does not bend, in every state of theirs.
     pub parts: Parts,
+    /// When each pose is shown, seconds; none: one after the other, a second each, from rest to rest.
+    pub pose_seconds: Vec<f32>,
 }
 
 /// What was moved.
@@ -181,7 +183,7 @@ pub(crate) fn reshape(
         tracks::rescale(document, &mut edit, &moved.changes, &mut report);
         vrm::write(rig, &given, &moved.world, &mut edit.json);
     }
-    poses::append(rig, &mut edit, triangles, poses, (&rigid, is_outside))?;
+    poses::append(rig, &mut edit, triangles, (poses, &options.pose_seconds), (&rigid, is_outside))?;
     Ok((edit.finish()?, report))
 }
 
