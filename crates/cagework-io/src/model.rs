@@ -99,6 +99,13 @@ pub(crate) enum Document {
 }
 
 impl Model {
+    /// Takes the compressed file that this model was decoded from before it was read: where nothing has moved it is what is written.
+    pub fn set_packed(&mut self, file: Vec<u8>) {
+        if let Document::Gltf(document) = &mut self.document {
+            document.set_packed(file);
+        }
+    }
+
     /// Reads an OBJ, glTF, GLB, PLY, STL or OFF file; the content decides which, `name` helps with the error if it is none of them.
     ///
     /// `resolve` is asked for sibling files (buffers and textures of a `.gltf`, materials and textures of an OBJ) by

@@ -122,6 +122,23 @@ fn draco_is_decoded_and_written_plain() {
     assert_plain(&model, &bytes);
 }
 
+/// A page decodes files before they are read; what it exports where nothing has moved is the file that came.
+#[test]
+fn model_that_was_decoded_before_is_written_as_it_came() {
+    let plain = plain_cube();
+    let mut model = read("x.glb", &plain.glb()).unwrap();
+    let packed = draco(&draco_stream()).glb();
+    model.set_packed(packed.clone());
+    assert!(model.write_glb(&model.positions).unwrap() == packed);
+    let moved: Vec<Vec3> = model.positions.iter().map(|p| *p + Vec3::X).collect();
+    assert!(model.write_glb(&moved).unwrap() != packed);
+    // One whose streams are in another file says nothing without it.
+    let mut apart = plain_cube();
+    apart.json["buffers"][0]["uri"] = "x.bin".into();
+    model.set_packed(apart.glb());
+    assert!(model.write_glb(&model.positions).unwrap() == plain.glb());
+}
+
 /// What a coder rounds and renumbers is not what the document says of it.
 #[test]
 fn bounds_and_weights_are_those_of_what_was_decoded() {

@@ -73,6 +73,12 @@ impl Loaded {
         Ok(())
     }
 
+    /// Takes the compressed file that the model was decoded from: the export of a model that nothing has moved.
+    #[wasm_bindgen(js_name = setPacked)]
+    pub fn set_packed(&mut self, file: Vec<u8>) {
+        self.model.set_packed(file);
+    }
+
     /// The next of a project's further models, which share its cage; undefined when there is no more.
     #[wasm_bindgen(js_name = takeNext)]
     #[must_use]

@@ -177,6 +177,8 @@ pub(crate) struct GltfDocument {
     pub(crate) images: Vec<Option<Image>>,
     /// The JSON chunk of a GLB whose buffers are in it, as it was.
     pub(crate) text: Option<Vec<u8>>,
+    /// The GLB that the caller decoded this one from, if its buffers are in it.
+    pub(crate) packed: Option<Vec<u8>>,
     /// Whether its geometry was compressed; the first buffer is still that of the file.
     pub(crate) is_decoded: bool,
     /// Meshes shown, in vertex order.
@@ -230,6 +232,7 @@ pub(crate) fn read(
         buffers: loaded.buffers,
         images: loaded.images,
         text: loaded.text,
+        packed: None,
         is_decoded: loaded.is_decoded,
         instances,
         elsewhere,

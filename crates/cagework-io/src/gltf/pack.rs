@@ -205,8 +205,20 @@ fn write_chunks(text: &[u8], bin: &[u8]) -> Result<Vec<u8>, WriteError> {
 }
 
 impl GltfDocument {
+    /// Takes the file that this document was decoded from, if it is a GLB that holds its buffers.
+    pub(crate) fn set_packed(&mut self, file: Vec<u8>) {
+        let json =
+            Glb::from_slice(&file).ok().and_then(|glb| serde_json::from_slice::<Value>(&glb.json).ok());
+        let buffers = json.as_ref().and_then(|json| json["buffers"].as_array());
+        let is_whole = buffers.is_some_and(|all| all.iter().all(|buffer| buffer.get("uri").is_none()));
+        self.packed = is_whole.then_some(file);
+    }
+
     /// The file as it was read, byte for byte; none if it was not a GLB that holds its buffers.
     pub(super) fn as_read(&self) -> Option<Result<Vec<u8>, WriteError>> {
+        if let Some(packed) = &self.packed {
+            return Some(Ok(packed.clone()));
+        }
         Some(write_chunks(self.text.as_deref()?, self.buffers.first()?))
     }
 }

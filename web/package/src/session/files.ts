@@ -15,6 +15,8 @@ export interface Bytes {
   readonly bytes: Uint8Array;
   /** What lies beside it, by name and by path from its folder. */
   readonly siblings: ReadonlyMap<string, Uint8Array>;
+  /** The compressed file that the bytes were decoded from. */
+  readonly packed?: Uint8Array;
 }
 
 /** Finds a sibling by the path that the model has for it. */

@@ -85,6 +85,7 @@ async function pause(): Promise<void> {
 /** A file that was read before: for `Engine.open`, and further models for `Engine.add`. */
 export async function load(pkg: Package, read: ReadModel): Promise<[Loaded, ...Loaded[]]> {
   const loaded = pkg.Loaded.read(read.name, read.bytes, siblingOf(read.siblings));
+  if (read.packed) loaded.setPacked(read.packed);
   if (read.up) loaded.setUp(read.up);
   await pause();
   const all: [Loaded, ...Loaded[]] = [loaded, ...furtherOf(loaded)];

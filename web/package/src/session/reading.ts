@@ -118,6 +118,7 @@ export async function read(
     if (!(error instanceof Error) || error.name !== "Compressed") throw error;
     say(tell, "decompress");
     const { decompress } = await import("../decode");
-    return timed(await decompress(file.name, file.bytes, sibling));
+    const { loaded, bytes } = timed(await decompress(file.name, file.bytes, sibling));
+    return { loaded, bytes: { ...bytes, packed: file.bytes } };
   }
 }
