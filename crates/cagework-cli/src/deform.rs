@@ -5,7 +5,9 @@ use std::time::Instant;
 
 use cagework_core::Cage;
 use cagework_core::deform::{displacements, outside_in_words};
-use cagework_io::{Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, read_weights_npz, shown};
+use cagework_io::{
+    MemoryError, Model, ModelFormat, ReshapeOptions, ReshapeReport, SavedWeights, read_weights_npz, shown,
+};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
@@ -85,6 +87,9 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         }
     }
     require_room(poses.len())?;
+    let to_write = model.bytes_to_write(format) + model.bytes_of_poses(poses.len());
+    MemoryError::check(model.bytes() + saved.weights.bytes() as u64 + to_write, args.read.memory.bytes())
+        .map_err(|e| CliError::file(output, format!("for {} poses {e}", poses.len())))?;
     let poses = with_inner(
         poses,
         &args.pose_controls,

@@ -21,7 +21,7 @@ const MIB: u64 = 1 << 20;
 impl MemoryError {
     /// # Errors
     /// [`MemoryError`] if `needed` is more than `limit`.
-    pub(crate) fn check(needed: u64, limit: u64) -> Result<(), Self> {
+    pub fn check(needed: u64, limit: u64) -> Result<(), Self> {
         if needed > limit { Err(Self { needed, limit }) } else { Ok(()) }
     }
 }

@@ -268,6 +268,14 @@ impl Model {
         }
     }
 
+    /// Bytes in use while so many poses are written as morph targets, besides [`Self::bytes_to_write`].
+    #[must_use]
+    pub fn bytes_of_poses(&self, n_poses: usize) -> u64 {
+        /// Position and normal of a vertex: how far they move, and in the file, twice each. 103 measured.
+        const POSED_VERTEX_BYTES: u64 = 130;
+        POSED_VERTEX_BYTES.saturating_mul(n_poses as u64 * self.positions.len() as u64)
+    }
+
     /// What points up in the file; Y unless said otherwise.
     #[must_use]
     pub fn up(&self) -> UpAxis {

@@ -61,6 +61,16 @@ fn several_poses_become_morph_targets_and_an_animation() {
     assert_eq!(document["animations"].as_array().unwrap().len(), 1);
 }
 
+/// Poses were multiplied out by nobody: 3,000 of a model of 15,000 vertices took 5 GB.
+#[test]
+fn more_poses_than_memory_holds_are_refused_before_they_are_computed() {
+    let many = " --pose lifted.obj".repeat(300);
+    bound()
+        .run(&format!("deform mesh.obj --cage cage.obj --weights w.npz{many} -o out.glb --memory-limit 4"))
+        .code(1)
+        .stderr(contains("out.glb: for 300 poses it needs about").and(contains("limit of 4 MiB")));
+}
+
 #[test]
 fn one_pose_makes_a_plain_glb() {
     let sandbox = bound();
