@@ -23,6 +23,15 @@ const OPEN_GAP: f64 = 4.0;
 /// Area of the smallest gap for which the lattice is refined, over the square of the model's longest side.
 const MIN_GAP_AREA: f64 = 0.003;
 
+/// How many times thinner voxels are across narrow gaps.
+const STRETCH: f64 = 3.0;
+
+/// Voxels along the longest side that gaps need, over those of the target, above which voxels are thinner instead of smaller.
+const MIN_REFINEMENT: f64 = 2.0;
+
+/// Most voxels along the longest side of thinner voxels, over those of cubes that leave the same gaps open.
+const MAX_STRETCHED_SHARE: f64 = 0.66;
+
 /// Points of a sheet that decide whether a cage closes its gap.
 const SAMPLES: usize = 32;
 
@@ -37,6 +46,8 @@ pub(super) struct Gap {
     pub(super) area: f64,
     /// Mean distance from wall to wall, voxels.
     width: f64,
+    /// Mean squares of the components of the unit vectors from wall to wall.
+    across: DVec3,
 }
 
 /// A large gap of the model.
@@ -46,38 +57,68 @@ pub(super) struct ModelGap {
     points: Vec<Vec3>,
     /// Mean distance from wall to wall, object units.
     width: f64,
-    /// Voxels along the model's longest side that leave it open.
+    /// Mean squares of the components of the unit vectors from wall to wall.
+    across: DVec3,
+    /// Voxels along the model's longest side that leave it open, cubes.
+    least_voxels: f64,
+    /// The same of the lattice that is taken.
     pub(super) voxels: usize,
 }
 
-/// The large gaps of a model that a lattice of `base` voxels closes, or nearly.
+/// The large gaps of a model that a lattice of `base` voxels closes, or nearly. How many times thinner voxels are along each axis in a
+/// lattice that leaves them open, if there are at most `most`.
 ///
 /// # Errors
 /// When `go_on` says so.
 pub(super) fn narrow_gaps(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
-    [min, max]: [DVec3; 2],
-    base: usize,
+    bounds: [DVec3; 2],
+    [base, most]: [usize; 2],
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-) -> Result<Vec<ModelGap>, Cancelled> {
-    let lattice = Lattice::around(min, max, MAX_VOXELS, MARGIN_VOXELS);
+) -> Result<(Vec<ModelGap>, DVec3), Cancelled> {
+    let lattice = Lattice::around(bounds, MAX_VOXELS, DVec3::ONE, MARGIN_VOXELS);
     let solid = lattice.touched(positions, triangles, go_on)?.filled();
     let n = MAX_VOXELS as f64;
     let reach = (0.5 * OPEN_GAP * n / base as f64).ceil() as usize;
     let mut found = gaps(&solid, &solid, reach);
-    found.retain(|gap| gap.area >= MIN_GAP_AREA * n * n);
-    let point =
-        |v: &[usize; 3]| lattice.object(DVec3::from_array(v.map(|x| x as f64 + 0.5)) - lattice.half());
+    found.retain(|gap| gap.area >= MIN_GAP_AREA * n * n && !gap.is_hollow(&lattice, positions, triangles));
     let of_model = |gap: Gap| ModelGap {
-        points: gap.voxels.iter().step_by(gap.voxels.len().div_ceil(SAMPLES)).map(point).collect(),
+        points: gap
+            .voxels
+            .iter()
+            .step_by(gap.voxels.len().div_ceil(SAMPLES))
+            .map(|&v| center(&lattice, v))
+            .collect(),
         width: gap.width * lattice.cell,
-        voxels: (OPEN_GAP * n / gap.width).ceil() as usize,
+        across: gap.across,
+        least_voxels: OPEN_GAP * n / gap.width,
+        voxels: 0,
     };
-    Ok(found.into_iter().map(of_model).collect())
+    let mut found: Vec<ModelGap> = found.into_iter().map(of_model).collect();
+    let stretch = if found.len() > most { DVec3::ONE } else { stretch(&found, base) };
+    found.iter_mut().for_each(|gap| gap.voxels = gap.voxels_of(stretch));
+    Ok((found, stretch))
+}
+
+/// How many times thinner voxels should be along each axis. Thinner ones across most gaps leave them open with fewer voxels than
+/// smaller cubes.
+fn stretch(gaps: &[ModelGap], base: usize) -> DVec3 {
+    let finest = |stretch: DVec3| gaps.iter().map(|gap| gap.voxels_of(stretch)).fold(base, usize::max);
+    let thinner = DVec3::AXES.map(|axis| DVec3::ONE + (STRETCH - 1.0) * axis);
+    let best = thinner.into_iter().min_by_key(|&stretch| finest(stretch)).unwrap_or(DVec3::ONE);
+    let of_cubes = finest(DVec3::ONE) as f64;
+    let is_worth_it =
+        of_cubes > MIN_REFINEMENT * base as f64 && (finest(best) as f64) < MAX_STRETCHED_SHARE * of_cubes;
+    if is_worth_it { best } else { DVec3::ONE }
 }
 
 impl ModelGap {
+    /// Voxels along the model's longest side that leave it open.
+    fn voxels_of(&self, stretch: DVec3) -> usize {
+        (self.least_voxels * (self.across / (stretch * stretch)).element_sum().sqrt()).ceil() as usize
+    }
+
     /// Where the gap is and what would keep it open, if a cage made on a lattice of `voxels` closes it.
     pub(super) fn notice(&self, cage: &Cage, voxels: usize, options: &CageOptions) -> Option<String> {
         let triangles = || (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
@@ -100,6 +141,23 @@ impl ModelGap {
             "the cage closes the gap of about {width:.3} at ({x:.3}, {y:.3}, {z:.3}); to keep it open, {remedy}"
         ))
     }
+}
+
+impl Gap {
+    /// Whether it lies within a hollow part, such as an open sleeve, and separates nothing.
+    pub(super) fn is_hollow(&self, lattice: &Lattice, positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
+        let n = self.voxels.len();
+        let is_inside = |k: usize| {
+            let corners = triangles.iter().map(|t| t.map(|i| positions[i as usize].as_dvec3()));
+            winding_number(center(lattice, self.voxels[k * n / 4]).as_dvec3(), corners).abs() > 0.5
+        };
+        (1..4).filter(|&k| is_inside(k)).count() > 1
+    }
+}
+
+/// The centre of a voxel, object units.
+fn center(lattice: &Lattice, voxel: [usize; 3]) -> Vec3 {
+    lattice.object(DVec3::from_array(voxel.map(|x| x as f64 + 0.5)) - lattice.half())
 }
 
 /// The number of a voxel, x fastest.
@@ -147,7 +205,9 @@ pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
         let n = voxels.len() as f64;
         let width = voxels.iter().map(|&v| width[number(dims, v)]).sum::<f64>() / n;
         // A sheet is two voxels thick.
-        Gap { voxels, area: 0.5 * n, width }
+        let across = |&v: &[usize; 3]| to_wall(number(dims, v)).normalize_or_zero().powf(2.0);
+        let across = voxels.iter().map(across).sum::<DVec3>() / n;
+        Gap { voxels, area: 0.5 * n, width, across }
     };
     let mut gaps: Vec<Gap> = deep.islands().into_iter().map(of_island).collect();
     gaps.sort_by(|a, b| b.area.total_cmp(&a.area));

@@ -59,8 +59,8 @@ pub(super) struct Guarded<'a> {
     /// What no triangle may come near: the solid and, if there is a band, everything outside the band.
     keep_out: Voxels,
     has_band: bool,
-    /// Sheets of gaps, which no triangle may cross.
-    sheets: Option<Voxels>,
+    /// Sheets of gaps, which no triangle may cross, and the corners of their box (centred coordinates).
+    sheets: Option<(Voxels, [DVec3; 2])>,
     buckets: Buckets,
     bounds: Vec<Option<(DVec3, DVec3)>>,
     near: Vec<u32>,
@@ -106,14 +106,26 @@ impl<'a> Guarded<'a> {
 
     /// Sets the sheets that no triangle may cross from now on.
     pub(super) fn set_sheets(&mut self, sheets: Option<Voxels>) {
-        self.sheets = sheets;
+        self.sheets = sheets.map(|sheets| {
+            let half = DVec3::from_array(sheets.dims.map(|n| 0.5 * n as f64));
+            let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+            sheets.for_each(|v| {
+                let corner = DVec3::from_array(v.map(|x| x as f64)) - half;
+                (min, max) = (min.min(corner), max.max(corner + 1.0));
+            });
+            (sheets, [min, max])
+        });
     }
 
     /// Whether a triangle is clear of the solid, stays in the band and crosses no sheet.
     fn is_clear(&self, triangle: [DVec3; 3]) -> bool {
         let half = DVec3::from_array(self.keep_out.dims.map(|n| 0.5 * n as f64));
         let leaves = self.has_band && triangle.iter().any(|p| p.abs().cmpge(half).any());
-        let crosses = |sheets| overlaps(sheets, triangle, -SHEET_SHRINKAGE);
+        let [a, b, c] = triangle;
+        let crosses = |(sheets, [min, max]): &(Voxels, [DVec3; 2])| {
+            let is_beside = a.max(b).max(c).cmplt(*min).any() || a.min(b).min(c).cmpgt(*max).any();
+            !is_beside && overlaps(sheets, triangle, -SHEET_SHRINKAGE)
+        };
         !leaves
             && !overlaps(&self.keep_out, triangle, self.obstacle.clearance)
             && !self.sheets.as_ref().is_some_and(crosses)

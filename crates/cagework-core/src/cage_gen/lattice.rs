@@ -16,20 +16,22 @@ const MIN_VOXEL_RATIO: f64 = 2e-5;
 /// Triangles from one check whether the work was cancelled to the next.
 const TRIANGLES_PER_CHECK: usize = 4096;
 
-/// A lattice of cubic voxels. Lattice coordinates count voxels from the box's corner; *centred* ones from its centre.
+/// A lattice of voxels: cubes, or boxes that are thinner along one axis. Lattice coordinates count voxels from the box's corner; *centred* ones from its centre.
 #[derive(Clone, Debug)]
 pub(super) struct Lattice {
     /// Centre of the box, object units.
     center: DVec3,
-    /// Edge of a voxel, object units.
+    /// Longest edge of a voxel, object units.
     pub(super) cell: f64,
+    /// The longest edge over the edge along x, y, z.
+    stretch: DVec3,
     /// Voxels along x, y, z: even numbers.
     pub(super) dims: [usize; 3],
 }
 
 impl Lattice {
-    /// `n` voxels along the longest side of `min`..`max`, and `pad` more on every side.
-    pub(super) fn around(min: DVec3, max: DVec3, n: usize, pad: usize) -> Self {
+    /// Voxels of which `n` longest edges are as long as the longest side of `min`..`max`, and `pad` voxels more on every side.
+    pub(super) fn around([min, max]: [DVec3; 2], n: usize, stretch: DVec3, pad: usize) -> Self {
         let extent = max - min;
         let largest = min.abs().max(max.abs()).max_element();
         // A model of one point has no size of its own: take the unit of length.
@@ -37,8 +39,14 @@ impl Lattice {
         let cell = (VOXEL_ENLARGEMENT * extent.max_element() / n as f64)
             .max(MIN_VOXEL_RATIO * largest)
             .max(smallest);
-        let dims = extent.to_array().map(|e| 2 * ((0.5 * e / cell).ceil() as usize).max(1) + 2 * pad);
-        Self { center: 0.5 * (min + max), cell, dims }
+        let dims =
+            (extent * stretch).to_array().map(|e| 2 * ((0.5 * e / cell).ceil() as usize).max(1) + 2 * pad);
+        Self { center: 0.5 * (min + max), cell, stretch, dims }
+    }
+
+    /// Shortest edge of a voxel, object units.
+    pub(super) fn shortest(&self) -> f64 {
+        self.cell / self.stretch.max_element()
     }
 
     /// Half the box in voxels: lattice coordinates of the centre.
@@ -48,17 +56,17 @@ impl Lattice {
 
     /// Lattice coordinates of a point in object units.
     pub(super) fn lattice(&self, p: Vec3) -> DVec3 {
-        (p.as_dvec3() - self.center) / self.cell + self.half()
+        self.centred(p) + self.half()
     }
 
     /// Centred coordinates of a point in object units.
     pub(super) fn centred(&self, p: Vec3) -> DVec3 {
-        (p.as_dvec3() - self.center) / self.cell
+        (p.as_dvec3() - self.center) * self.stretch / self.cell
     }
 
     /// Object units of a point in centred coordinates.
     pub(super) fn object(&self, p: DVec3) -> Vec3 {
-        (self.center + p * self.cell).as_vec3()
+        (self.center + p * self.cell / self.stretch).as_vec3()
     }
 
     /// All voxels that a triangle or a vertex touches.

@@ -92,40 +92,28 @@ pub fn generate(
     generate_plain(positions, triangles, options, progress)
 }
 
-/// A cage whose faces enclose the model as they are. Its gaps stay open if the vertices suffice for most of them; otherwise it
-/// follows the model without regard to gaps, because those that are kept take the vertices from everything else.
+/// A cage whose faces enclose the model as they are.
 fn generate_plain(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
     options: &CageOptions,
     progress: &dyn Progress,
 ) -> Result<GeneratedCage, CageGenError> {
-    let (made, is_worth_it) = generate_once(positions, triangles, options, true, progress)?;
-    Ok(if is_worth_it { made } else { generate_once(positions, triangles, options, false, progress)?.0 })
-}
-
-/// A cage, and whether it keeps at least half of the model's narrow gaps, and all if some are too narrow for any lattice.
-fn generate_once(
-    positions: &[Vec3],
-    triangles: &[[u32; 3]],
-    options: &CageOptions,
-    keeps_gaps: bool,
-    progress: &dyn Progress,
-) -> Result<(GeneratedCage, bool), CageGenError> {
     let bounds = options::check(positions, triangles, options)?;
     let began = progress.now_ms();
     let target = options.target as usize;
     let base = first_voxels(target);
-    let gaps = match (options.shape, options.smooth) {
+    let most_gaps = target / VERTICES_PER_GAP;
+    let (gaps, stretch) = match (options.shape, options.smooth) {
         // A smooth surface is kept clear of the model by its distance, which a finer lattice would halve.
-        (Shape::Follow, 0) => gaps::narrow_gaps(positions, triangles, bounds, base, &|_| {
+        (Shape::Follow, 0) => gaps::narrow_gaps(positions, triangles, bounds, [base, most_gaps], &|_| {
             let event = ProgressEvent { stage: Stage::Voxelize, fraction: 0.0, iteration: 0, delta: None };
             if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
         })?,
-        _ => Vec::new(),
+        _ => (Vec::new(), DVec3::ONE),
     };
     // As fine as the gaps need, if there are vertices for them.
-    let for_gaps = if keeps_gaps && gaps.len() * VERTICES_PER_GAP <= target { gaps.as_slice() } else { &[] };
+    let for_gaps = if gaps.len() <= most_gaps { gaps.as_slice() } else { &[] };
     let finest = for_gaps.iter().map(|gap| gap.voxels).fold(base, usize::max).min(MAX_VOXELS);
     let mut voxels = if options.voxels > 0 { options.voxels as usize } else { finest };
     for attempt in 1..=MAX_LATTICES {
@@ -134,10 +122,10 @@ fn generate_once(
             let event = ProgressEvent { stage, fraction, iteration: attempt as u32 - 1, delta: None };
             if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
         };
-        let mut shell = Shell::new(positions, triangles, bounds, voxels, options, &|share| {
+        let mut shell = Shell::new(positions, triangles, bounds, (voxels, stretch), options, &|share| {
             go_on(Stage::Voxelize, 0.4 * share)
         })?;
-        if !keeps_gaps {
+        if gaps.len() > most_gaps {
             shell.gaps.clear();
         }
         // The solid's handles and gaps may need more vertices than asked for: a coarser lattice closes them.
@@ -159,8 +147,6 @@ fn generate_once(
             }
         };
         let closed: Vec<String> = gaps.iter().filter_map(|gap| gap.notice(&cage, voxels, options)).collect();
-        let is_too_narrow = gaps.iter().any(|gap| gap.voxels > MAX_VOXELS);
-        let is_worth_it = closed.is_empty() || (2 * closed.len() <= gaps.len() && !is_too_narrow);
         let report = CageReport {
             target: options.target,
             vertices: cage.n_vertices() as u32,
@@ -179,7 +165,7 @@ fn generate_once(
             attempts: attempt as u32,
             elapsed_ms: progress.now_ms() - began,
         };
-        return Ok((GeneratedCage { cage, report }, is_worth_it));
+        return Ok(GeneratedCage { cage, report });
     }
     Err(CageGenError::Unresolved)
 }
@@ -239,7 +225,8 @@ fn simplified(
         if may_coarsen && left as f64 > MAX_TARGET_RATIO * f64::from(options.target) {
             return Ok(Simplified::TooMany(left));
         }
-        let quadrics = collapser.quadrics;
+        // Relaxing weighs distances from the hull against shape as on the lattice that the target asks for.
+        let quadrics: Vec<_> = collapser.quadrics.iter().map(|q| q.in_units(shell.fineness)).collect();
         if let Some(cage) = relaxed(shell, guarded, &quadrics, options.quads, go_on)? {
             return Ok(Simplified::Cage(Box::new(cage), false));
         }

@@ -52,6 +52,12 @@ impl Quadric {
         }
     }
 
+    /// The same of distances in a unit that is `unit` times as long.
+    pub(super) fn in_units(&self, unit: f64) -> Self {
+        let scale = 1.0 / (unit * unit);
+        Self { a: self.a * scale, b: self.b * scale, c: self.c * scale, area: self.area }
+    }
+
     /// The sum of two.
     pub(super) fn plus(&self, other: &Self) -> Self {
         Self { a: self.a + other.a, b: self.b + other.b, c: self.c + other.c, area: self.area + other.area }

@@ -23,6 +23,8 @@ const HALF_WEIGHT: f64 = 0.01;
 const BOUND_WEIGHT: f64 = 6.0;
 /// Shares of a vertex's way that are tried.
 const STEP_SHARES: [f64; 3] = [1.0, 0.5, 0.2];
+/// Step outward that is tried, over the mean distance of a vertex's neighbours.
+const OUTWARD_STEP: f64 = 0.3;
 /// A move must lower the energy by this much.
 const MIN_DECREASE: f64 = 1e-3;
 /// A quad that is bent by less is flat.
@@ -99,7 +101,8 @@ impl Star {
         BOUND_WEIGHT * bound.count() as f64
     }
 
-    /// Places where the vertex would make better quads: parallelograms, their planes, the middle of its neighbours, the hull.
+    /// Places where the vertex would make better quads: parallelograms, their planes, the middle of its neighbours, the hull, and
+    /// farther out, where the model is not in the way of either diagonal.
     fn goals(&self, surface: &Guarded<'_>, quadric: &Quadric, v: u32) -> Vec<DVec3> {
         let here = surface.positions[v as usize];
         let mut goals = Vec::new();
@@ -123,6 +126,10 @@ impl Star {
             goals.push(here + (home - here).clamp_length_max(2.0));
         }
         goals.push(goals.iter().sum::<DVec3>() / goals.len() as f64);
+        let normals = self.all.iter().map(|&t| surface.corners(t).normal());
+        let side = near.iter().map(|&w| surface.positions[w as usize].distance(here)).sum::<f64>();
+        let outward = normals.sum::<DVec3>().normalize_or_zero();
+        goals.push(here + OUTWARD_STEP * side / near.len() as f64 * outward);
         goals
     }
 }

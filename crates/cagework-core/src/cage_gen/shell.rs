@@ -13,7 +13,7 @@ use super::guarded::{Guarded, Obstacle};
 use super::lattice::Lattice;
 use super::surface::{SMOOTHING_REACH, Surface};
 use super::voxels::Voxels;
-use super::{CageOptions, Shape, Symmetry, VERTICES_PER_GAP};
+use super::{CageOptions, Shape, Symmetry, VERTICES_PER_GAP, first_voxels};
 use crate::progress::Cancelled;
 
 /// Smallest share of the solid's voxels with an image for which a mirror is taken.
@@ -74,6 +74,8 @@ pub(super) struct Limb {
 #[derive(Debug)]
 pub(super) struct Shell {
     pub(super) lattice: Lattice,
+    /// Voxels along the model's longest side, over those that the target asks for.
+    pub(super) fineness: f64,
     /// Longest side of the model's box, object units.
     pub(super) longest: f64,
     /// What the cage must not meet.
@@ -95,28 +97,34 @@ pub(super) struct Shell {
 }
 
 impl Shell {
-    /// The hull of a model on a lattice of `n` voxels. `diagonal` of the model's box; `go_on` may end it.
+    /// The hull of a model on a lattice of `n` voxels, thinner ones along the axes of `stretch`. `go_on` may end it.
     pub(super) fn new(
         positions: &[Vec3],
         triangles: &[[u32; 3]],
-        [min, max]: [DVec3; 2],
-        n: usize,
+        bounds: [DVec3; 2],
+        (n, stretch): (usize, DVec3),
         options: &CageOptions,
         go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
     ) -> Result<Self, Cancelled> {
+        let [min, max] = bounds;
         let asked = f64::from(options.clearance) * max.distance(min);
         // Layers of voxels between solid and hull: enough for the clearance that was asked for.
         let layers_for =
             |cell: f64| ((asked / cell).max(DEFAULT_CLEARANCE) + 1.0 - HULL_CLEARANCE).ceil() as usize;
-        let rough = Lattice::around(min, max, n, MARGIN_VOXELS);
-        let layers = layers_for(rough.cell);
-        let lattice = Lattice::around(min, max, n, MARGIN_VOXELS + layers);
+        let rough = Lattice::around(bounds, n, stretch, MARGIN_VOXELS);
+        let layers = layers_for(rough.shortest());
+        let lattice = Lattice::around(bounds, n, stretch, MARGIN_VOXELS + layers);
         let touched = match options.shape {
             Shape::Follow => lattice.touched(positions, triangles, &|f| go_on(0.5 * f))?,
             Shape::Hull => slab_hull(&lattice, positions),
         };
         let mut solid = touched.filled();
-        let mirror = find_mirror(&solid, n, options.symmetry);
+        let mirror = if stretch == DVec3::ONE {
+            find_mirror(&solid, n, options.symmetry)
+        } else {
+            let cubes = Lattice::around(bounds, n, DVec3::ONE, MARGIN_VOXELS);
+            find_mirror(&cubes.touched(positions, triangles, go_on)?.filled(), n, options.symmetry)
+        };
         if let Some(axis) = mirror {
             let image = solid.mirrored(axis);
             solid.unite(&image);
@@ -134,7 +142,7 @@ impl Shell {
         go_on(0.8)?;
         let stairs = Surface::of(&hull, mirror);
         let filled = hull;
-        let clearance = (asked / lattice.cell).max(DEFAULT_CLEARANCE);
+        let clearance = (asked / lattice.shortest()).max(DEFAULT_CLEARANCE);
         // Whole voxels of it by dilation, the rest as distance.
         let whole = clearance.floor();
         let mut keep_out = solid.clone();
@@ -145,11 +153,13 @@ impl Shell {
         let hull = smoothed(&stairs, &obstacle);
         let parts = solid.parts();
         let reach = (MAX_GAP_HALF * n as f64).ceil() as usize;
-        let mut gaps = gaps(&solid, &filled, reach);
-        gaps.truncate(options.target as usize / VERTICES_PER_GAP);
+        let most = options.target as usize / VERTICES_PER_GAP;
+        let found = gaps(&solid, &filled, reach).into_iter();
+        let gaps = found.filter(|gap| !gap.is_hollow(&lattice, positions, triangles)).take(most).collect();
         Ok(Self {
             gaps,
-            clearance: clearance * lattice.cell,
+            clearance: clearance * lattice.shortest(),
+            fineness: n as f64 / first_voxels(options.target as usize) as f64,
             longest: (max - min).max_element(),
             lattice,
             obstacle,

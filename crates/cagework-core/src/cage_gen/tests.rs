@@ -156,7 +156,7 @@ fn mannequin(gap: f32, radius: f32) -> Soup {
 /// their own, nearly nothing at the other.
 #[test]
 fn lower_vertices_of_a_leg_move_its_own_foot_alone() {
-    for (gap, radius, target) in [(0.17, 0.06, 80), (0.1, 0.06, 80), (0.08, 0.05, 120)] {
+    for (gap, radius, target) in [(0.17, 0.06, 80), (0.1, 0.06, 80), (0.08, 0.05, 120), (0.03, 0.07, 80)] {
         let (positions, triangles) = mannequin(gap, radius);
         let cage = generate(&positions, &triangles, &options(target), &Silent).unwrap().cage;
         let bind_options = BindOptions { grid: 40, ..BindOptions::default() };
@@ -183,7 +183,7 @@ fn lower_vertices_of_a_leg_move_its_own_foot_alone() {
 
 #[test]
 fn a_gap_that_no_lattice_resolves_is_named() {
-    let (positions, triangles) = mannequin(0.02, 0.08);
+    let (positions, triangles) = mannequin(0.004, 0.08);
     let report = generate(&positions, &triangles, &options(80), &Silent).unwrap().report;
     let named = report.notices.iter().any(|notice| notice.contains("closes the gap"));
     assert!(named, "{:?}", report.notices);
