@@ -194,7 +194,7 @@ impl Binder {
         let made = generate(&points(positions), &triangles, &options, &listener);
         let GeneratedCage { cage, report } = made.map_err(Fault::from)?;
         let bridged = if report.separate > report.parts { report.separate } else { 0 };
-        Ok(Polygons { mesh: cage.to_polygon_mesh(), bridged, controls: None })
+        Ok(Polygons { mesh: cage.to_polygon_mesh(), bridged, notices: report.notices, controls: None })
     }
 
     /// Poses of a cage for another one around the same model: where harmonic coordinates in the old cage bring the new one's

@@ -82,10 +82,15 @@ export function createCage(ctx: Context, does: CageNeeds): CageActions {
     const { cage, check } = ctx.store.get();
     if (!cage) return undefined;
     const controls = engine.cageControls();
-    return { positions: engine.restPositions(), corners: engine.cageCorners(), controls, check };
+    const { notices } = cage.info;
+    return { positions: engine.restPositions(), corners: engine.cageCorners(), controls, check, notices };
   };
 
-  const set = (cage: CheckedCage) => void adopt(ctx.session().takeCage(cage), cage.check);
+  const set = (cage: CheckedCage) => {
+    const state = ctx.session().takeCage(cage);
+    const notices = [...new Set([...state.info.notices, ...(cage.notices ?? [])])];
+    adopt({ ...state, info: { ...state.info, notices } }, cage.check);
+  };
 
   const posedNow = (): Posed | undefined => {
     const cage = now();

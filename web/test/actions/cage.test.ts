@@ -102,6 +102,15 @@ it("more vertices than wanted are said", async () => {
   expect(said).toEqual(["The model's holes and gaps need 100 vertices instead of 80."]);
 });
 
+it("gaps that a made cage closes are named with it", async () => {
+  const { cage, asked, store } = page();
+  const made = cage.make();
+  await settled();
+  asked[0]?.resolve({ ...cageOf(8), notices: ["the cage closes the gap"] });
+  await made;
+  expect(store.get().cage?.info.notices).toEqual(["the cage closes the gap"]);
+});
+
 it("a cage that joins separate parts offers one for each", async () => {
   const fake = createFake();
   const { asked, said, store } = fake;

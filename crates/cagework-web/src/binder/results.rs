@@ -35,13 +35,15 @@ pub struct Polygons {
     pub(crate) mesh: PolygonMesh,
     /// Separate parts of the model that one made cage joins; 0 if there is one, or no cage was made.
     pub(crate) bridged: u32,
+    /// Gaps of the model that a made cage closes, and what would keep each open.
+    pub(crate) notices: Vec<String>,
     /// A project's.
     pub(crate) controls: Option<CageControls>,
 }
 
 impl From<PolygonMesh> for Polygons {
     fn from(mesh: PolygonMesh) -> Self {
-        Self { mesh, bridged: 0, controls: None }
+        Self { mesh, bridged: 0, notices: Vec::new(), controls: None }
     }
 }
 
@@ -124,6 +126,13 @@ impl Polygons {
     #[must_use]
     pub fn bridged(&self) -> u32 {
         self.bridged
+    }
+
+    /// Gaps of the model that a made cage closes, and what would keep each open: a sentence each.
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn notices(&self) -> Vec<String> {
+        self.notices.clone()
     }
 }
 

@@ -25,4 +25,6 @@ export interface CheckedCage extends CageArrays {
   readonly check: Check | null;
   /** Separate parts of the model that it joins, if it was made so. */
   readonly bridged?: number;
+  /** Gaps of the model that it closes, if it was made so, and what would keep each open. */
+  readonly notices?: readonly string[];
 }

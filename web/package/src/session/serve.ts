@@ -124,8 +124,8 @@ function createWork(pkg: Package): Work {
     },
     async cage({ positions, triangles, model, options, smooth }, step) {
       const cage = (await binder(false)).generateCage(positions, triangles, options, smooth, step);
-      const { bridged } = cage;
-      return { ...checked(pkg, cage, model, smooth), bridged };
+      const { bridged, notices } = cage;
+      return { ...checked(pkg, cage, model, smooth), bridged, notices };
     },
     read: (input, step) => readModel(pkg, input, step),
     readCage: (input, step) => readCage(pkg, input, step),
