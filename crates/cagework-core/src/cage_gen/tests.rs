@@ -353,7 +353,7 @@ fn runs_are_alike() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(32))]
+    #![proptest_config(ProptestConfig::with_cases(12))]
 
     #[test]
     fn any_soup_gets_a_verified_cage(
