@@ -14,12 +14,12 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use serde_json::{Value, json};
 
 use crate::common::{
-    Builder, CUBE_OBJ, cube, glb, instanced, json_of, plain_cube, quantized, read, rigged, skinned,
+    Builder, CUBE_OBJ, U8, cube, glb, instanced, json_of, plain_cube, quantized, read, rigged, skinned,
     textured_square, twist,
 };
 
 /// Samples that are GLBs come first.
-const N_GLB: usize = 6;
+const N_GLB: usize = 7;
 
 /// All inputs of a seed.
 pub(crate) struct Inputs {
@@ -45,12 +45,12 @@ impl Inputs {
 
 /// What is damaged: small files of every kind, so that every byte has its turn.
 pub(crate) fn samples() -> Vec<Vec<u8>> {
-    let builders = [plain_cube(), textured_square(), instanced(), skinned(), quantized(), rigged()];
+    let builders = [plain_cube(), textured_square(), instanced(), skinned(), quantized(), rigged(), shared()];
     let mut samples: Vec<Vec<u8>> = builders.iter().map(Builder::glb).collect();
     let model = read("cube.obj", CUBE_OBJ.as_bytes()).expect("it is one");
     let bent: Vec<Vec3> = cube().into_iter().map(twist).collect();
     let weights = Weights::new(5, vec![0, 2, 2, 5], vec![0, 4, 1, 2, 3], vec![0.25, 0.75, 0.5, 0.375, 0.125]);
-    let outside = OutsideVertex { vertex: 2, distance: 1.0, share: 0.5 };
+    let outside = OutsideVertex { vertex: 1, distance: 1.0, share: 0.5 };
     samples.push(CUBE_OBJ.as_bytes().to_vec());
     samples.push(
         write_project(&[&model, &model], &model.cage_mesh(), &[("bent".into(), bent.clone())], "{}")
@@ -63,6 +63,16 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
         &[Vec3::ONE],
         &[Vec3::ONE],
     ));
+    // Eight controls, their frames of one joint with a bone to another, and entries of all kinds.
+    let frames = Frames {
+        joints: vec![6, 7],
+        bones: vec![[0, 1]],
+        plain: vec![[0.25; 4]; 12],
+        ..Frames::of_cage(&cube()[..6])
+    };
+    let n = 8 + frames.n_columns() as u32;
+    let weights = Weights::new(n, vec![0, 3, 5], vec![0, 8, 11, 7, n - 1], vec![0.5, 0.25, 1.0, 0.75, 0.5]);
+    samples.push(write_weights_npz(&weights.expect("they are"), &frames, &[outside], &[], &[]));
     samples.push(encode_pose(&cube(), &bent));
     samples.push(part(model.cage_mesh()));
     // Controls inside of that cube.
@@ -86,6 +96,29 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
         b"# c\nCOFF 3 1 0\n0 0 0 9 9 9 255\n1 0 0 9 9 9 255\n0 1 0 255 0 9 255\n3 0 1 2 1 0 0\n".to_vec(),
     );
     samples
+}
+
+/// A rig whose data many things use: a second mesh and clip of the same accessors, channels of one sampler, sparse positions.
+fn shared() -> Builder {
+    let mut rig = rigged();
+    let (places, values) = (rig.view(&[0, 7]), rig.view(&[0; 24]));
+    let position = rig.primitive(0)["attributes"]["POSITION"].as_u64().expect("it has positions") as usize;
+    rig.json["accessors"][position]["sparse"] = json!({
+        "count": 2,
+        "indices": { "bufferView": places, "componentType": U8 },
+        "values": { "bufferView": values },
+    });
+    for list in ["meshes", "animations"] {
+        let again = rig.json[list][0].clone();
+        rig.push(list, again);
+    }
+    rig.push("nodes", json!({ "mesh": 1, "skin": 0 }));
+    rig.json["scenes"][0]["nodes"] = json!([0, 4, 5]);
+    let channels = rig.json["animations"][0]["channels"].as_array_mut().expect("it moves");
+    let mut other = channels[0].clone();
+    other["target"]["node"] = 3.into();
+    channels.push(other);
+    rig
 }
 
 /// Two columns of eight at three positions in a cage.

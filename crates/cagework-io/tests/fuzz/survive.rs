@@ -58,6 +58,11 @@ pub(crate) fn survive(bytes: &[u8]) {
         );
         let again = read_weights_npz(&written, LIMIT).expect("what was written can be read");
         assert_eq!((again.n_vertices(), again.outside.len()), (saved.n_vertices(), saved.outside.len()));
+        let controls: Vec<Vec3> = cube().into_iter().map(twist).collect();
+        if saved.weights.n_columns() == controls.len() + saved.frames.n_columns() {
+            let _ = deform_bound(&saved.weights, &saved.frames, &controls);
+            let _ = saved.frames.folded(&saved.weights);
+        }
     }
     if let Ok((of, part)) = read_part_npz(bytes, LIMIT) {
         let again = read_part_npz(&write_part_npz(&of, &part), LIMIT).expect("what was written can be read");
