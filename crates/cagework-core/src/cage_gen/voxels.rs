@@ -117,15 +117,26 @@ impl Voxels {
 
     /// The set with everything that cannot be reached from the box's corner through faces: cavities filled.
     pub(super) fn filled(&self) -> Self {
+        let mut all = Self::new(self.dims);
+        for z in 0..self.dims[2] {
+            for y in 0..self.dims[1] {
+                all.add_run(y, z, 0, self.dims[0] - 1);
+            }
+        }
         let mut reached = Self::new(self.dims);
-        reached.add([0, 0, 0]);
-        let rows = self.dims[1] * self.dims[2];
-        let mut waiting = vec![false; rows];
-        let mut queue = vec![0];
-        waiting[0] = true;
+        let mut waiting = vec![false; self.dims[1] * self.dims[2]];
+        all.without(self).reach([0, 0, 0], &mut reached, &mut waiting);
+        all.without(&reached)
+    }
+
+    /// Adds a voxel, and those of this set that hang together with it through faces, to `reached`; a row at a time. `waiting`: false for
+    /// each row.
+    fn reach(&self, from: [usize; 3], reached: &mut Self, waiting: &mut [bool]) {
+        reached.add(from);
+        let mut queue = vec![from[2] * self.dims[1] + from[1]];
         while let Some(row) = queue.pop() {
             waiting[row] = false;
-            self.spread_along_row(&mut reached, row);
+            self.spread_along_row(reached, row);
             let (y, z) = (row % self.dims[1], row / self.dims[1]);
             let neighbours = [
                 (y > 0).then(|| row - 1),
@@ -136,7 +147,7 @@ impl Voxels {
             for next in neighbours.into_iter().flatten() {
                 let mut grew = false;
                 for w in 0..self.words {
-                    let free = reached.bits[row * self.words + w] & !self.bits[next * self.words + w];
+                    let free = reached.bits[row * self.words + w] & self.bits[next * self.words + w];
                     let there = &mut reached.bits[next * self.words + w];
                     grew |= free & !*there != 0;
                     *there |= free;
@@ -147,25 +158,14 @@ impl Voxels {
                 }
             }
         }
-        let mut filled = Self::new(self.dims);
-        for z in 0..self.dims[2] {
-            for y in 0..self.dims[1] {
-                filled.add_run(y, z, 0, self.dims[0] - 1);
-            }
-        }
-        for (solid, free) in filled.bits.iter_mut().zip(&reached.bits) {
-            *solid &= !free;
-        }
-        filled
     }
 
-    /// Spreads what was reached of a row to all free voxels beside it in the row.
+    /// Spreads what was reached of a row to all voxels of this set beside it in the row.
     fn spread_along_row(&self, reached: &mut Self, row: usize) {
         let range = row * self.words..(row + 1) * self.words;
-        let (solid, reached) = (&self.bits[range.clone()], &mut reached.bits[range]);
+        let (free, reached) = (&self.bits[range.clone()], &mut reached.bits[range]);
         let mut carry = 0;
-        for (r, s) in reached.iter_mut().zip(solid) {
-            let free = !s;
+        for (r, free) in reached.iter_mut().zip(free) {
             *r |= carry & free;
             let mut step = *r;
             while step != 0 {
@@ -175,8 +175,7 @@ impl Voxels {
             carry = *r >> (WORD - 1);
         }
         carry = 0;
-        for (r, s) in reached.iter_mut().zip(solid).rev() {
-            let free = !s;
+        for (r, free) in reached.iter_mut().zip(free).rev() {
             *r |= carry & free;
             let mut step = *r;
             while step != 0 {
@@ -250,7 +249,18 @@ impl Voxels {
 
     /// One voxel of every part that hangs together through faces.
     pub(super) fn parts(&self) -> Vec<[usize; 3]> {
-        self.islands().iter().map(|voxels| voxels[0]).collect()
+        let (mut seen, mut waiting) = (Self::new(self.dims), vec![false; self.dims[1] * self.dims[2]]);
+        let mut parts = Vec::new();
+        for (k, &word) in self.bits.iter().enumerate() {
+            let row = k / self.words;
+            while word & !seen.bits[k] != 0 {
+                let x = k % self.words * WORD + (word & !seen.bits[k]).trailing_zeros() as usize;
+                let part = [x, row % self.dims[1], row / self.dims[1]];
+                self.reach(part, &mut seen, &mut waiting);
+                parts.push(part);
+            }
+        }
+        parts
     }
 
     /// The voxels of every part that hangs together through faces.
