@@ -27,12 +27,19 @@ pub(super) struct Obstacle {
     pub(super) voxels: Voxels,
     /// Distance along each axis to keep from its voxels, in voxels.
     pub(super) clearance: f64,
+    /// How many times thinner voxels are along each axis.
+    pub(super) stretch: DVec3,
 }
 
 impl Obstacle {
     /// Whether a triangle (centred coordinates) keeps its distance.
     pub(super) fn is_clear(&self, triangle: [DVec3; 3]) -> bool {
         !overlaps(&self.voxels, triangle, self.clearance)
+    }
+
+    /// A triangle (centred coordinates) with the angles that it has in object units.
+    pub(super) fn unstretched(&self, triangle: &Corners) -> Corners {
+        Corners { at: triangle.at.map(|p| p / self.stretch), ..*triangle }
     }
 }
 
@@ -171,13 +178,16 @@ impl<'a> Guarded<'a> {
 
     /// Smallest cosine of the turn from one of the triangles to another one, to `others` or across the mirror.
     fn sharpest(&self, triangles: &[Corners], others: &[Corners]) -> f64 {
+        let real = |t: &Corners| self.obstacle.unstretched(t);
+        let triangles: Vec<Corners> = triangles.iter().map(real).collect();
+        let others: Vec<Corners> = others.iter().map(real).collect();
         let across = |t: &Corners| {
             let axis = self.mirror?;
             let is_beside = t.index.iter().filter(|&&i| self.on_mirror[i as usize]).count() == 2;
             is_beside.then(|| 1.0 - 2.0 * t.normal().normalize_or_zero()[axis].powi(2))
         };
         let folds = triangles.iter().enumerate().flat_map(|(k, t)| {
-            let beside = triangles[..k].iter().chain(others);
+            let beside = triangles[..k].iter().chain(&others);
             beside.filter_map(|other| t.fold_cosine(other)).chain(across(t))
         });
         folds.fold(1.0, f64::min)

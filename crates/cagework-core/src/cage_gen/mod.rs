@@ -61,6 +61,13 @@ const KEPT_GAPS: [f64; 3] = [0.0, 0.3, f64::INFINITY];
 /// Of these, those in which a cage takes the shape that the budget allows.
 const NARROW_BANDS: usize = 3;
 
+/// Vertices that the budget leaves over those asked for, above which a coarser lattice is tried at once for a model in pieces: the
+/// bridges between them cannot be collapsed.
+const MAX_FIRST_RATIO: f64 = 5.0;
+
+/// Vertices that the budget leaves over those left at the end, of such models.
+const LATER_RATIO: f64 = 3.7;
+
 /// Vertices that a gap costs, nearly: a ring on each side.
 const VERTICES_PER_GAP: usize = 10;
 
@@ -211,6 +218,11 @@ fn simplified(
         let n_passes = (NARROW_BANDS + KEPT_GAPS.len() * (BAND_LAYERS.len() + 1)) as f32;
         for (k, (layers, budget, aim, least, may_fold)) in narrow.chain(wide).enumerate() {
             let is_repeated = least > 0.0 && shell.gaps.is_empty();
+            let is_far = left as f64 > MAX_FIRST_RATIO * f64::from(options.target);
+            let is_in_pieces = shell.separate > options.target as usize / 10;
+            if k == NARROW_BANDS && may_coarsen && is_far && is_in_pieces {
+                return Ok(Simplified::TooMany((left as f64 / LATER_RATIO) as usize));
+            }
             if left <= aim || is_repeated || (budget.is_none() && left <= target) {
                 continue;
             }

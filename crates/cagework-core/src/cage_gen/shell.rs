@@ -149,7 +149,7 @@ impl Shell {
         for _ in 0..whole as usize {
             keep_out = keep_out.dilated();
         }
-        let obstacle = Obstacle { voxels: keep_out, clearance: clearance - whole };
+        let obstacle = Obstacle { voxels: keep_out, clearance: clearance - whole, stretch };
         let hull = smoothed(&stairs, &obstacle);
         let parts = solid.parts();
         let reach = (MAX_GAP_HALF * n as f64).ceil() as usize;

@@ -51,7 +51,7 @@ pub(super) fn verified_faces(
         obstacle.is_clear(t.at)
     };
     let cut = Cut::new(&cage, |index| corners(index, cage.facet_points()));
-    let mut wrong = cut.wrong();
+    let mut wrong = cut.wrong(&shell.obstacle);
     for (t, corners) in cut.triangles.iter().enumerate() {
         let share = if cut.is_ours[t] { MIN_CLEARANCE_SHARE } else { MIN_FACET_CLEARANCE_SHARE };
         if !is_clear(corners, share) {
@@ -117,7 +117,7 @@ impl Cut {
 
     /// Faces that meet others where they should not, or make a sharp fold with them when they are cut the other way. Of two that meet,
     /// one that is cut the other way if there is one.
-    fn wrong(&self) -> Vec<u32> {
+    fn wrong(&self, obstacle: &Obstacle) -> Vec<u32> {
         let mut wrong = Vec::new();
         for pair in meeting(&self.triangles) {
             let [f, g] = pair.map(|t| self.face_of[t as usize]);
@@ -126,9 +126,10 @@ impl Cut {
                 wrong.extend([(f, !a || b), (g, a)].into_iter().filter(|face| face.1).map(|face| face.0));
             }
         }
-        for (a, x) in self.triangles.iter().enumerate().filter(|&(a, _)| !self.is_ours[a]) {
+        let real: Vec<Corners> = self.triangles.iter().map(|t| obstacle.unstretched(t)).collect();
+        for (a, x) in real.iter().enumerate().filter(|&(a, _)| !self.is_ours[a]) {
             let sharp = |y: &Corners| x.fold_cosine(y).is_some_and(|fold| fold < MIN_FOLD_COSINE);
-            let mut others = self.triangles.iter().zip(&self.face_of);
+            let mut others = real.iter().zip(&self.face_of);
             if others.any(|(y, face)| *face != self.face_of[a] && sharp(y)) {
                 wrong.push(self.face_of[a]);
             }
