@@ -306,3 +306,23 @@ impl<'a> Guarded<'a> {
         out.dedup();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of two sheets that open by 2 atan(0.2), by the formula -(1 - 0.2^2) / (1 + 0.2^2).
+    #[test]
+    fn a_fold_is_measured_in_object_units() {
+        let stretch = DVec3::new(3.0, 1.0, 1.0);
+        let obstacle = Obstacle { voxels: Voxels::new([8; 3]), clearance: 0.0, stretch };
+        let guarded = Guarded::new(Surface::default(), &obstacle);
+        let points = [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.0, 1.0], [-0.2, 0.0, 1.0]];
+        let triangle = |index: [u32; 3]| {
+            let at = index.map(|i| stretch * DVec3::from_array(points[i as usize]));
+            Corners { index, at }
+        };
+        let fold = guarded.sharpest(&[triangle([0, 1, 2])], &[triangle([1, 0, 3])]);
+        assert!((fold + 0.96 / 1.04).abs() < 1e-12, "{fold}");
+    }
+}
