@@ -128,12 +128,17 @@ impl Models {
     /// Takes some out, or brings them back.
     ///
     /// # Errors
-    /// When there is no such model, or none would be left; then some may be out already.
+    /// When there is no such model, or none would be left; nothing changes then.
     pub(crate) fn bin(&mut self, ids: &[u32], is_binned: bool) -> Answer<()> {
+        if ids.iter().any(|&id| id as usize >= self.all.len()) {
+            return Err(no_model());
+        }
+        let before: Vec<bool> = self.all.iter().map(|member| member.is_binned).collect();
         for &id in ids {
-            self.all.get_mut(id as usize).ok_or_else(no_model)?.is_binned = is_binned;
+            self.all[id as usize].is_binned = is_binned;
         }
         if self.iter().next().is_none() {
+            self.all.iter_mut().zip(before).for_each(|(member, before)| member.is_binned = before);
             return Err(Fault::new(ErrorName::Error, "this is the only model in the cage: open another one"));
         }
         self.join();
