@@ -271,9 +271,9 @@ impl Cage {
     ///
     /// Linear on triangles; Meyer et al. 2002 on planar quads (bilinear on a rectangle), blended with the following
     /// where a corner is nearly straight. On all other polygons the hats are pseudo-harmonic coordinates (after Gordon and
-    /// Wixom 1974; means over the chords through the point), which change continuously with the corners. A bent face is a patch over the plane
-    /// that fits it best, with the coordinates of its outline there. All are linear along edges, so neighbouring faces agree;
-    /// none is negative.
+    /// Wixom 1974; means over the chords through the point), which change continuously with the corners. A bent face is a
+    /// patch over the plane that fits it best, with the coordinates of its outline there. All are linear along edges, so
+    /// neighbouring faces agree; none is negative.
     ///
     /// # Panics
     /// If there is no such facet.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::frames::Frames;
 use crate::weights::Weights;
-use crate::words::grouped;
+use crate::words::{counted, grouped};
 
 /// A mesh vertex outside the cage.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,14 +31,20 @@ pub fn outside_in_words<'a>(
         n_staying += usize::from(o.share == 0.0);
         distance = distance.max(o.distance);
     }
+    if n == 0 {
+        return None;
+    }
+    let is = if n == 1 { "is" } else { "are" };
     let most = 100.0 * distance / diagonal;
-    (n > 0).then(|| {
-        format!(
-            "{} vertices are outside the cage, up to {most:.2} % of its diagonal; {} of them stay where they are.",
-            grouped(n),
-            grouped(n_staying)
-        )
-    })
+    let staying = match n_staying {
+        0 => String::new(),
+        1 => "; 1 of them stays where it is".into(),
+        n => format!("; {} of them stay where they are", grouped(n)),
+    };
+    Some(format!(
+        "{} {is} outside the cage, up to {most:.2} % of its diagonal{staying}.",
+        counted(n, "vertex", "vertices")
+    ))
 }
 
 /// Positions of all mesh vertices for a posed cage: `v' = sum_i w_i(v) c_i'` (Joshi et al. 2007, Eq. 1).
@@ -117,6 +123,18 @@ mod tests {
     fn weights() -> Weights {
         // The middle of an edge, and a corner.
         Weights::new(3, vec![0, 2, 3], vec![0, 2, 1], vec![0.5, 0.5, 1.0]).unwrap()
+    }
+
+    #[test]
+    fn vertices_outside_are_counted_in_one_sentence() {
+        let at = |distance, share| OutsideVertex { vertex: 0, distance, share };
+        let said = |outside: &[OutsideVertex]| outside_in_words(outside.iter(), 4.0);
+        assert_eq!(said(&[]), None);
+        let one = "1 vertex is outside the cage, up to 2.50 % of its diagonal.";
+        assert_eq!(said(&[at(0.1, 1.0)]).unwrap(), one);
+        let some =
+            "2 vertices are outside the cage, up to 25.00 % of its diagonal; 1 of them stays where it is.";
+        assert_eq!(said(&[at(0.1, 1.0), at(1.0, 0.0)]).unwrap(), some);
     }
 
     #[test]

@@ -2,8 +2,8 @@
 //!
 //! Arrays: `format` (`b"csr"`), `shape` (int64), `indptr`, `indices` (int32), `data` (float32), of the controls' columns; with
 //! vertices outside the cage also `outside_vertex` (int32), `outside_distance` (float32, object units) and `outside_share` (float32);
-//! with offsets also `offset_indptr`, `offset_indices` and `offset_data`, the columns of [`Frames`], and of those `frame_whole` (float32, [n_cage, 3]), `frame_joints`
-//! (int32), `frame_bones` (int32, [n, 2]) and `frame_plain` (float32, [n_joints x n_cage, 4]); of a rigged model also `extra_points` (float32, [n, 3]): the last n rows are theirs; with controls inside
+//! with offsets also `offset_indptr`, `offset_indices` and `offset_data`, the columns of [`Frames`], and of those `frame_whole`
+//! (float32, [n_cage, 3]), `frame_joints` (int32), `frame_bones` (int32, [n, 2]) and `frame_plain` (float32, [n_joints x n_cage, 4]); of a rigged model also `extra_points` (float32, [n, 3]): the last n rows are theirs; with controls inside
 //! the cage also `inner_controls` (float32, [n, 3]): the last n columns are theirs.
 //! Reading takes what SciPy writes too: deflated, 32- or 64-bit indices, 32- or 64-bit floats.
 
@@ -38,7 +38,7 @@ pub enum NpzError {
     #[error("holds some columns of the weights only: put all parts together with `cagework merge`")]
     Part,
     /// Offsets as they were kept by versions that wrote `outside_corners`.
-    #[error("holds offsets of an earlier version, in frames that jumped and rolled: bind again")]
+    #[error("holds offsets as an earlier version wrote them, which are not read any more: bind again")]
     Old,
     /// No part of a bind where one is asked for.
     #[error("is no part of a bind: `cagework bind --columns A:B --weights` writes such files")]

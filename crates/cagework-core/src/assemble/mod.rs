@@ -69,19 +69,18 @@ struct Run<'a> {
 }
 
 /// Makes the matrix of weights. `blocks[batch][vertex]`: sampled values (used up as scratch space); `points`: rest
-/// positions; `is_apart(vertex)`: whether its row is
-/// left as it is sampled, because an offset makes up for what it misses.
+/// positions; `has_offset(vertex)`: whether an offset makes up for what its row misses, so that it stays as it is sampled.
 pub fn assemble(
     controls: Controls<'_>,
     blocks: &mut [Vec<Row>],
     points: &[Vec3],
     options: RowOptions,
-    is_apart: impl Fn(usize) -> bool + Sync,
+    has_offset: impl Fn(usize) -> bool + Sync,
     team: &Team,
 ) -> Assembled {
     let columns = Columns::new(controls);
     if team.n_threads() == 1 && options.threshold == 0.0 {
-        return assemble_alone(controls, &columns, blocks, points, options, &is_apart);
+        return assemble_alone(controls, &columns, blocks, points, options, &has_offset);
     }
     let mut runs = runs_of(blocks, points, VERTEX_RUN);
     // Without a threshold it is known beforehand which weights are stored: rows are corrected on their way into the
@@ -92,7 +91,7 @@ pub fn assemble(
             #[inline(always)]
             || {
                 if corrected_first {
-                    run.correct(&columns, options, &is_apart, |run, v, row| {
+                    run.correct(&columns, options, &has_offset, |run, v, row| {
                         run.lengths.push(row.iter().flatten().map(|&w| u32::from(w != 0.0)).sum());
                         run.keep(v, row);
                     });
@@ -121,7 +120,7 @@ pub fn assemble(
                 if corrected_first {
                     run.store_kept();
                 } else {
-                    run.correct(&columns, options, &is_apart, |run, v, row| {
+                    run.correct(&columns, options, &has_offset, |run, v, row| {
                         run.entries.put_row(row, |batch| run.blocks[batch][v].map(|w| w > 0.0));
                     });
                 }
@@ -140,7 +139,7 @@ fn assemble_alone(
     blocks: &mut [Vec<Row>],
     points: &[Vec3],
     options: RowOptions,
-    is_apart: &impl Fn(usize) -> bool,
+    has_offset: &impl Fn(usize) -> bool,
 ) -> Assembled {
     let mut runs = runs_of(blocks, points, points.len().max(1));
     let room = points.len() * controls.n_controls();
@@ -149,7 +148,7 @@ fn assemble_alone(
         dispatch(
             #[inline(always)]
             || {
-                run.correct(columns, options, is_apart, |run, v, row| {
+                run.correct(columns, options, has_offset, |run, v, row| {
                     let length = run.entries.put_row(row, |batch| run.blocks[batch][v].map(|w| w > 0.0));
                     run.lengths.push(length);
                 });
@@ -231,15 +230,15 @@ impl Run<'_> {
         &mut self,
         columns: &Columns,
         options: RowOptions,
-        is_apart: &impl Fn(usize) -> bool,
+        has_offset: &impl Fn(usize) -> bool,
         take: impl Fn(&mut Self, usize, &[Row]),
     ) {
         let mut row = vec![ZERO; self.blocks.len()];
         for (v, point) in self.points.iter().enumerate() {
             let target = columns.scale(point.as_dvec3());
-            let apart = is_apart(self.first + v);
+            let has_offset = has_offset(self.first + v);
             let lowest = self.load(v, 0.0, &mut row);
-            let (raw, stored) = if options.preserve_affine && !apart {
+            let (raw, stored) = if options.preserve_affine && !has_offset {
                 self.restore_row(v, columns, options.threshold, &mut row, target)
             } else if options.threshold > 0.0 {
                 // Errors, and what an offset makes up for, are not sparsification's to change.
@@ -251,7 +250,7 @@ impl Run<'_> {
                 let raw = columns.sums(&row, target);
                 (raw, raw)
             };
-            let raw = (!apart).then_some(RawRow { sums: raw, lowest });
+            let raw = (!has_offset).then_some(RawRow { sums: raw, lowest });
             self.facts.push(RowFacts::of(&row, stored, raw));
             take(self, v, &row);
         }

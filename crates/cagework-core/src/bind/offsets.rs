@@ -81,12 +81,12 @@ impl<'a> Offsets<'a> {
         Ok(all)
     }
 
-    /// Rows with columns of the frames after those of the controls, and the frames. `is_apart`: as for `assemble`.
+    /// Rows with columns of the frames after those of the controls, and the frames. `has_offset`: as for `assemble`.
     pub(super) fn add_to(
         self,
         rows: Assembled,
         points: &[Vec3],
-        is_apart: impl Fn(usize) -> bool,
+        has_offset: impl Fn(usize) -> bool,
     ) -> (Assembled, Frames) {
         let Assembled { weights, mut facts } = rows;
         if !self.frames.is_used() {
@@ -107,7 +107,7 @@ impl<'a> Offsets<'a> {
                 row = values.filter(|(_, w)| *w != 0.0).collect();
                 (facts.low, facts.high) = (f32::INFINITY, 0.0);
             }
-            if is_apart(v) {
+            if has_offset(v) {
                 let expected = beyond.map_or(1.0, |(_, share, _)| *share);
                 let sum: f64 = row.iter().map(|(_, w)| f64::from(*w)).sum();
                 row.iter_mut().for_each(|(_, w)| *w = (f64::from(*w) * expected / sum) as f32);

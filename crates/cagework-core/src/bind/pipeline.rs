@@ -214,13 +214,13 @@ impl<'a> Prepared<'a> {
             preserve_affine: self.options.method == Method::Embedded,
         };
         let all = needs_all(self.controls, self.options);
-        let is_apart = |point| all || self.stencils.is_outside(point);
+        let has_offset = |point| all || self.stencils.is_outside(point);
         let blocks_bytes: usize = solved.blocks.iter().map(|b| size_of_val(b.as_slice())).sum();
         let (points, team) = (&self.mesh.points, &self.gridded.team);
         let offsets = Offsets::new(self.controls, &self.stencils, &solved.blocks, self.options, watch)?;
-        let rows = assemble(self.controls, &mut solved.blocks, points, row_options, is_apart, team);
+        let rows = assemble(self.controls, &mut solved.blocks, points, row_options, has_offset, team);
         drop(std::mem::take(&mut solved.blocks));
-        let (rows, frames) = offsets.add_to(rows, points, is_apart);
+        let (rows, frames) = offsets.add_to(rows, points, has_offset);
         self.reported((rows, frames), blocks_bytes, solved, sampled, watch)
     }
 

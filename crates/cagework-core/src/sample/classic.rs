@@ -11,7 +11,7 @@ use crate::levels::Level;
 use crate::options::OutsidePolicy;
 use crate::voxelize::classic::{CellKind, ClassicCells};
 
-use super::beyond::Beyond;
+use super::outside::OutsideSampler;
 use super::{Stencil, Stencils};
 
 /// Stencils of points (object units): one cell each.
@@ -42,7 +42,7 @@ pub fn stencils(
         true
     };
     let (mut stencils, mut stencil) = (Stencils::new(), Stencil::default());
-    let beyond = LazyCell::new(|| Beyond::new(controls, policy));
+    let beyond = LazyCell::new(|| OutsideSampler::new(controls, policy));
     for point in points {
         if inside(point, &mut stencil) {
             stencils.push(&stencil);

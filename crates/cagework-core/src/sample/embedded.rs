@@ -20,8 +20,8 @@ use crate::levels::Level;
 use crate::options::OutsidePolicy;
 use crate::voxelize::lines::Overlaps;
 
-use super::beyond::Beyond;
 use super::edges::{EdgeLists, ON_EDGE, Passage};
+use super::outside::OutsideSampler;
 use super::triangles::TriangleLists;
 use super::{Stencil, Stencils};
 
@@ -49,7 +49,7 @@ pub struct Sampler<'a> {
     edges: EdgeLists,
     overlaps: &'a Overlaps,
     /// Made for the first point outside.
-    beyond: OnceLock<Beyond<'a>>,
+    beyond: OnceLock<OutsideSampler<'a>>,
     policy: OutsidePolicy,
     /// Faces no further apart than this, in cells, are in one place.
     same: f64,
@@ -124,7 +124,7 @@ impl<'a> Sampler<'a> {
                 stencils.push(&scratch.stencil);
                 continue;
             }
-            let beyond = self.beyond.get_or_init(|| Beyond::new(self.controls, self.policy));
+            let beyond = self.beyond.get_or_init(|| OutsideSampler::new(self.controls, self.policy));
             let mut stencil = std::mem::take(&mut scratch.stencil);
             let found = beyond.fill(p, &mut stencil, |q, other| {
                 let is_inside = self.stencil(q, &mut scratch);

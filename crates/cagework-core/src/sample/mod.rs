@@ -3,11 +3,11 @@
 //! A vertex's *stencil* (rows of the field with weights, and Dirichlet values with weights) depends on geometry only:
 //! it is computed once per bind and applied to every batch of columns.
 
-mod beyond;
 pub mod classic;
 mod closest;
 mod edges;
 pub mod embedded;
+mod outside;
 pub mod triangles;
 
 use crate::cage::ON_CAGE;

@@ -1,9 +1,10 @@
 //! Weights of points outside the cage.
 //!
-//! Near the cage they are extended linearly through the closest point p of the cage: `w(x) = (1 + t) w(p) - t w(q)`, with q mirrored
-//! inwards at p and t = 1. Both rows reproduce places, so this one does. Where the cage is thin, q is at
-//! most in the middle of it. Where there is no inside behind p, at an edge of the cage that is sharper than the angle at which x lies to it, the row is that of p,
-//! and an offset that goes with the whole cage makes up for the rest (`bind/offsets.rs`). With distance all this fades.
+//! Near the cage they are extended linearly through the closest point p of the cage: `w(x) = (1 + t) w(p) - t w(q)`, with q
+//! mirrored inwards at p and t = 1. Both rows reproduce places, so this one does. Where the cage is thin, q is at most in its
+//! middle. Where there is no inside behind p, at an edge of the cage that is sharper than the angle at which x lies to it, the
+//! row is that of p, and an offset that goes with the whole cage makes up for the rest (`bind/offsets.rs`). With distance all
+//! this fades.
 
 use glam::DVec3;
 
@@ -18,13 +19,13 @@ const FADES: [f64; 2] = [0.05, 0.15];
 
 /// Makes stencils of points outside.
 #[derive(Debug)]
-pub(super) struct Beyond<'a> {
+pub(super) struct OutsideSampler<'a> {
     controls: Controls<'a>,
     closest: ClosestOnCage<'a>,
     policy: OutsidePolicy,
 }
 
-impl<'a> Beyond<'a> {
+impl<'a> OutsideSampler<'a> {
     pub(super) fn new(controls: Controls<'a>, policy: OutsidePolicy) -> Self {
         Self { controls, closest: ClosestOnCage::new(controls.surface()), policy }
     }
