@@ -12,7 +12,7 @@ import { Comparison } from "../ui/see";
 import { T } from "../words";
 import { TOUR } from "../words/tour";
 import type { Guide } from "./guide";
-import { BONE, GRIDS, isOf, ofPaper, type StopName, solvers, STEPS, stopsOf, TAUS } from "./stops";
+import { BONE, GRIDS, isOf, ofPaper, STEPS, type StopName, solvers, stopsOf, TAUS } from "./stops";
 
 interface Figure {
   app: App;
@@ -34,7 +34,7 @@ export function TourFigure({
   ) : null;
 }
 
-const FIGURES: Partial<Record<StopName, (figure: Figure) => preact.JSX.Element>> = {
+const FIGURES: Partial<Record<StopName, (figure: Figure) => preact.JSX.Element | null>> = {
   grid: Grid,
   paper: ByGrid,
   smoothing: ByTau,
@@ -69,8 +69,16 @@ function Grid({ app }: Figure) {
 }
 
 /** Mean rest errors of what was bound here, one a row. */
-function RestErrors({ reports, name }: { reports: readonly BindReport[]; name: (report: BindReport) => string }) {
-  return <Facts rows={reports.map((report) => [name(report), scientific(report.rest_error.mean_rel)] as const)} />;
+function RestErrors({
+  reports,
+  name,
+}: {
+  reports: readonly BindReport[];
+  name: (report: BindReport) => string;
+}) {
+  return (
+    <Facts rows={reports.map((report) => [name(report), scientific(report.rest_error.mean_rel)] as const)} />
+  );
 }
 
 function ByGrid({ app, guide, reports }: Figure) {
@@ -210,7 +218,7 @@ function Errors({ app, guide, reports }: Figure) {
 /** Steps of subdivision, and a bone inside; both are the page's own actions. */
 function Smooth({ app }: Figure) {
   const { cage } = app.store.get();
-  if (!cage) return <></>;
+  if (!cage) return null;
   const { smooth, inner } = cage.controls;
   return (
     <>

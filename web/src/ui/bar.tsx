@@ -46,7 +46,12 @@ export function Bar({ app, showSheet }: { app: App; showSheet: () => void }) {
           onClick={() => app.run("redo")}
         />
         <span class="gap" />
-        <IconButton icon="tour" label={T.tour.begin} shortcut={app.key("tour")} onClick={() => app.run("tour")} />
+        <IconButton
+          icon="tour"
+          label={T.tour.begin}
+          shortcut={app.key("tour")}
+          onClick={() => app.run("tour")}
+        />
         <IconButton icon="share" label={T.bar.share} onClick={app.share} />
         <IconButton
           icon={THEME_ICON[theme]}

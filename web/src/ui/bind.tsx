@@ -3,9 +3,9 @@
 import type { App } from "../app";
 import type { BindOptions } from "../contract";
 import { BIND_DEFAULTS, PAPER_DEFAULTS } from "../defaults";
+import { cageBroken } from "../derived";
 import { timeLeft } from "../eta";
 import { percent } from "../format";
-import { cageBroken } from "../derived";
 import type { BindRun } from "../state";
 import { T } from "../words";
 import { Button, Fold, Head, NumberField, Section, Segments, Slider, Toggle } from "./controls";
@@ -226,7 +226,10 @@ function Advanced({ app }: { app: App }) {
       )}
       <Segments<BindOptions["outside"]>
         label={T.bind.outside}
-        choices={(["extend", "stay", "refuse"] as const).map((value) => ({ value, label: T.bind.outsides[value] }))}
+        choices={(["extend", "stay", "refuse"] as const).map((value) => ({
+          value,
+          label: T.bind.outsides[value],
+        }))}
         value={options.outside}
         onChange={(outside) => set({ outside })}
       />

@@ -26,7 +26,6 @@ export function Clips({ app }: { app: App }) {
           >
             <option value="">{T.clips.rest}</option>
             {clips.map(({ name, seconds }, k) => (
-              // biome-ignore lint/suspicious/noArrayIndexKey: clips have no other identity, and never change places
               <option key={k} value={k}>
                 {T.clips.named(name, duration(1000 * seconds))}
               </option>
@@ -80,7 +79,6 @@ export function Clips({ app }: { app: App }) {
           <div class="stack">
             {model.targets.map(({ name, default: atRest }, k) => (
               <Slider
-                // biome-ignore lint/suspicious/noArrayIndexKey: names may repeat, and never change places
                 key={k}
                 label={name}
                 min={0}

@@ -47,8 +47,8 @@ export function askAfterCrash(crash: Crash, startFresh: () => void): void {
 function Report({ crash: { report } }: { crash: Crash }) {
   return (
     // biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached by keys
-    <pre class="report" tabIndex={0} aria-label={T.crash.report}>
-      {report}
-    </pre>
+    <section class="report" tabIndex={0} aria-label={T.crash.report}>
+      <pre>{report}</pre>
+    </section>
   );
 }

@@ -14,9 +14,7 @@ export function Hover({ app }: { app: App }) {
       <div class="drop-card">
         <Icon name="upload" />
         <strong>{T.opening.dropTo[to]}</strong>
-        <p>
-          {to === "page" ? hoverSentence(files, model !== null, step === "cage") : T.opening.becomes[to]}
-        </p>
+        <p>{to === "page" ? hoverSentence(files, model !== null, step === "cage") : T.opening.becomes[to]}</p>
       </div>
     </div>
   );

@@ -38,7 +38,8 @@ export function createLost(freshCanvas: () => HTMLCanvasElement, recovered: () =
       const now = performance.now();
       const isAgain = now - last < AGAIN_MS;
       last = now;
-      if (isAgain) message.value = { title: T.lost.again, text: T.lost.others(sentence(reason)), retry: true };
+      if (isAgain)
+        message.value = { title: T.lost.again, text: T.lost.others(sentence(reason)), retry: true };
       else void recover();
     });
   };

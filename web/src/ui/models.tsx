@@ -134,8 +134,8 @@ function Parts({ app, member, isAlone = false }: { app: App; member: MemberInfo;
         </>
       )}
       {kinds.map((kind) => (
-        <div class="stack tight" key={kind} role="group" aria-label={T.models.kinds[kind] ?? kind}>
-          <span class="legend-text">{T.models.kinds[kind] ?? kind}</span>
+        <fieldset class="stack tight" key={kind}>
+          <legend class="legend-text">{T.models.kinds[kind] ?? kind}</legend>
           {member.parts
             .filter((part) => split(part)[0] === kind)
             .map((part) => (
@@ -144,7 +144,7 @@ function Parts({ app, member, isAlone = false }: { app: App; member: MemberInfo;
                 <Ways app={app} member={member} part={part} label={split(part)[1]} disabled={isWhole} />
               </div>
             ))}
-        </div>
+        </fieldset>
       ))}
       <Paint app={app} member={member} />
     </Fold>
@@ -171,7 +171,7 @@ function Paint({ app, member: { id, painted } }: { app: App; member: MemberInfo 
       </div>
     );
   return (
-    <div class="stack" role="group" aria-label={T.models.paint}>
+    <fieldset class="stack" aria-label={T.models.paint}>
       <p class="hint">{T.models.paintSentence}</p>
       <Segments
         label={T.models.brush}
@@ -192,6 +192,6 @@ function Paint({ app, member: { id, painted } }: { app: App; member: MemberInfo 
         <Button label={T.models.done} icon="check" kind="small" onClick={() => app.painting.on(null)} />
         {clear}
       </div>
-    </div>
+    </fieldset>
   );
 }

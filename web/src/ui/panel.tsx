@@ -67,9 +67,7 @@ function cageAction(state: AppState, app: App): Action | undefined {
   if (!state.cage) return make(T.panel.makeCage);
   if (!cageBroken(state)) return undefined;
   const fix = state.check?.problems.find((problem) => problem.severity === "error" && problem.fix)?.fix;
-  return fix
-    ? { label: fix.label, icon: "patch", run: () => app.cage.mend(fix) }
-    : make(T.panel.newCage);
+  return fix ? { label: fix.label, icon: "patch", run: () => app.cage.mend(fix) } : make(T.panel.newCage);
 }
 
 const BODIES: Record<StepName, (props: { app: App }) => preact.JSX.Element> = {

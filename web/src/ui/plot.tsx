@@ -61,7 +61,10 @@ export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number })
     return HEIGHT - BOTTOM - Math.min(1, Math.max(0, share)) * (HEIGHT - TOP - BOTTOM);
   };
   const stride = Math.ceil((highest - lowest) / 5);
-  const powers = Array.from({ length: Math.floor((highest - lowest) / stride) + 1 }, (_, k) => lowest + k * stride);
+  const powers = Array.from(
+    { length: Math.floor((highest - lowest) / stride) + 1 },
+    (_, k) => lowest + k * stride,
+  );
   const now = curves.find((curve) => curve.kind === "now")?.points.at(-1);
   const bottom = HEIGHT - 8;
   const middle = (LEFT + WIDTH - RIGHT) / 2;
@@ -115,7 +118,17 @@ export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number })
   );
 }
 
-function Label({ x, y, text, anchor }: { x: number; y: number; text: string; anchor: "start" | "middle" | "end" }) {
+function Label({
+  x,
+  y,
+  text,
+  anchor,
+}: {
+  x: number;
+  y: number;
+  text: string;
+  anchor: "start" | "middle" | "end";
+}) {
   return (
     <text x={x} y={y} text-anchor={anchor}>
       {text}

@@ -2,8 +2,8 @@
 
 import type { App } from "../app";
 import type { Pivot, Pose } from "../contract";
-import { coordinate, percent } from "../format";
 import { fittingPoses } from "../derived";
+import { coordinate, percent } from "../format";
 import { T } from "../words";
 import { Clips } from "./clips";
 import { Button, Head, IconButton, NumberInput, Section, Segments, Slider, Toggle } from "./controls";
@@ -65,7 +65,15 @@ function Selection({ app }: { app: App }) {
   };
   return (
     <div class="stack">
-      <p class="hint">{count === 0 ? T.pose.none : count === 1 ? (inner < 0 ? one(last) : T.pose.inner(inner + 1)) : T.pose.middle(count)}</p>
+      <p class="hint">
+        {count === 0
+          ? T.pose.none
+          : count === 1
+            ? inner < 0
+              ? one(last)
+              : T.pose.inner(inner + 1)
+            : T.pose.middle(count)}
+      </p>
       {count > 1 && (
         <Segments<Pivot>
           label={T.pose.pivot}

@@ -10,7 +10,13 @@ import { Button, IconButton, Section, Segments, Slider, Toggle } from "./control
 
 const COLOURS = ["material", "clay", "weight", "error"] as const satisfies SceneOptions["colour"][];
 const SLICES = ["off", "kinds", "value"] as const satisfies SceneOptions["slice"][];
-const PARTS = ["model", "cage", "base_wireframe", "floor", "problems"] as const satisfies (keyof SceneOptions)[];
+const PARTS = [
+  "model",
+  "cage",
+  "base_wireframe",
+  "floor",
+  "problems",
+] as const satisfies (keyof SceneOptions)[];
 
 export function See({ app }: { app: App }) {
   const { seeOpen, ortho } = app.store.get();
@@ -110,7 +116,9 @@ export function Comparison({ app }: { app: App }) {
               type="checkbox"
               checked={compare.includes(kind)}
               // What would be left alone are harmonic ones, or nothing that could be pulled.
-              disabled={compare.includes(kind) && String(without(kind)) !== "harmonic" && !isComparison(without(kind))}
+              disabled={
+                compare.includes(kind) && String(without(kind)) !== "harmonic" && !isComparison(without(kind))
+              }
               onChange={() => void app.view.compare(toggled(kind))}
             />
             <span>{T.coordinates[kind]}</span>

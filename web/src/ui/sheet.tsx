@@ -16,7 +16,7 @@ export function Sheet({ app, isOpen, onClose }: { app: App; isOpen: boolean; onC
   return (
     <Dialog title={T.sheet.title} isOpen={isOpen} onClose={onClose} onKeyDown={byItsKey}>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached by keys */}
-      <div class="sheet-body" tabIndex={0} role="group" aria-label={T.sheet.all}>
+      <section class="sheet-body" tabIndex={0} aria-label={T.sheet.all}>
         <section class="keys">
           <Button
             label={T.tour.begin}
@@ -49,7 +49,7 @@ export function Sheet({ app, isOpen, onClose }: { app: App; isOpen: boolean; onC
             ])}
           </dl>
         </section>
-      </div>
+      </section>
     </Dialog>
   );
 }

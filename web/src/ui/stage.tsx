@@ -3,7 +3,7 @@
 import { useLayoutEffect, useState } from "preact/hooks";
 import { isComparison } from "../actions/view";
 import type { App } from "../app";
-import type { CageState, Element as CageElement, SceneOptions } from "../contract";
+import type { Element as CageElement, CageState, SceneOptions } from "../contract";
 import type { Command } from "../input/shortcuts";
 import { sentence } from "../strings";
 import { T } from "../words";
@@ -31,7 +31,9 @@ export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
         <div class="compare-labels" aria-hidden="true">
           {scene.compare.map((kind) => (
             <span key={kind}>
-              {kind === "harmonic" || isPlain(cage) ? T.coordinates[kind] : T.view.ofPlain(T.coordinates[kind])}
+              {kind === "harmonic" || isPlain(cage)
+                ? T.coordinates[kind]
+                : T.view.ofPlain(T.coordinates[kind])}
             </span>
           ))}
         </div>

@@ -37,7 +37,14 @@ export function createToasts(): { Toasts: () => preact.JSX.Element; tell: Tell }
   };
 
   return {
-    Toasts: () => <Stack said={said.value} problems={problems.value} closeSaid={closing(said)} closeProblem={closing(problems)} />,
+    Toasts: () => (
+      <Stack
+        said={said.value}
+        problems={problems.value}
+        closeSaid={closing(said)}
+        closeProblem={closing(problems)}
+      />
+    ),
     tell: {
       say: (text, ...fixes) => add(said, { text, fixes }),
       problem: ({ title, message }, fix) => add(problems, { title, text: message, fixes: fix ? [fix] : [] }),

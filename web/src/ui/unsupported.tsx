@@ -93,10 +93,10 @@ export function WaysDialog({ app }: { app: App }) {
       kind="ways"
     >
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached by keys */}
-      <div class="sheet-body" tabIndex={0} role="group" aria-label={T.without.steps}>
+      <section class="sheet-body" tabIndex={0} aria-label={T.without.steps}>
         <p>{`${sayLack(lack ?? "NoWebGPU", isSecureContext)} ${T.without.different}`}</p>
         <Ways />
-      </div>
+      </section>
     </Dialog>
   );
 }
