@@ -1,11 +1,10 @@
-use cagework_core::bind::bind_columns;
 use cagework_core::deform::deform_bound;
 use cagework_core::progress::Silent;
 use cagework_core::{BindOptions, Cage, ControlSet, Controls, InnerControls, PolygonMesh, bind};
 use cagework_tests::cages::{cage, cuboid, l_shape};
 use glam::Vec3;
 
-use crate::support::{bound, scattered};
+use crate::support::{bound, samples, scattered};
 
 /// Catmull-Clark's rules for one number at each vertex, from faces' neighbourhoods found by search: slow and plain, not the
 /// route of the core. Vertices, then edges by their ends, then faces.
@@ -137,17 +136,13 @@ fn samples_of_a_smooth_cage_are_those_of_the_refined_cage_times_its_rows() {
         let is_inside = |v: usize| !outside.iter().any(|o| o.vertex as usize == v);
         let points: Vec<Vec3> = (0..300).filter(|&v| is_inside(v)).map(|v| scattered[v]).collect();
         assert!(points.len() > 100, "{} inside", points.len());
-        let samples = |controls: Controls<'_>| {
-            let n = controls.n_controls();
-            (n, bind_columns(&points, controls, &options, 0..n, &Silent).unwrap().samples)
-        };
-        let ((n, smooth), (n_fine, of_fine)) =
-            (samples(Controls::from(&set)), samples(Controls::from(&fine)));
+        let [smooth, of_fine] = [Controls::from(&set), Controls::from(&fine)]
+            .map(|controls| samples(&points, controls, &options));
         let mut worst = 0.0_f64;
-        for (ours, theirs) in smooth.chunks(n).zip(of_fine.chunks(n_fine)) {
-            for (column, &ours) in ours.iter().enumerate() {
+        for (column, ours) in smooth.iter().enumerate() {
+            for (point, &ours) in ours.iter().enumerate() {
                 let expected: f64 =
-                    theirs.iter().zip(&rows).map(|(&w, row)| f64::from(w) * row[column]).sum();
+                    of_fine.iter().zip(&rows).map(|(w, row)| f64::from(w[point]) * row[column]).sum();
                 worst = worst.max((f64::from(ours) - expected).abs());
             }
         }

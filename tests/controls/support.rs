@@ -1,7 +1,10 @@
 //! Binds and points that these tests share.
 
+use cagework_core::bind::Watch;
+use cagework_core::bind::pipeline::{FieldsOn, Prepared};
 use cagework_core::progress::Silent;
-use cagework_core::{BindOptions, Binding, ControlSet, bind};
+use cagework_core::solve::rows::LANES;
+use cagework_core::{BindOptions, Binding, ControlSet, Controls, bind};
 use glam::Vec3;
 
 /// Binds points on the processor; `edit`ed options.
@@ -9,6 +12,18 @@ pub(crate) fn bound(points: &[Vec3], set: &ControlSet, edit: impl FnOnce(&mut Bi
     let mut options = BindOptions { tau: 1e-7, ..BindOptions::default() };
     edit(&mut options);
     bind(points, set, &options, &Silent).expect("points inside are bound")
+}
+
+/// Samples of one column after the other at different points inside, before rows are restored. `[n_controls][n_points]`
+pub(crate) fn samples(points: &[Vec3], controls: Controls<'_>, options: &BindOptions) -> Vec<Vec<f32>> {
+    let watch = Watch::new(&Silent);
+    let mut prepared =
+        Prepared::new(points, controls, options, FieldsOn::Host, &watch).expect("they are inside");
+    let blocks = prepared.solve_on_host(&watch).expect("nobody cancels").blocks;
+    let lanes = blocks
+        .iter()
+        .flat_map(|block| (0..LANES).map(move |lane| block.iter().map(|row| row[lane]).collect()));
+    lanes.take(controls.n_controls()).collect()
 }
 
 /// Points inside a box, on no plane of symmetry.

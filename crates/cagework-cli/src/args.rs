@@ -9,7 +9,6 @@ mod rig;
 mod solve;
 
 use std::error::Error;
-use std::ops::Range;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -20,7 +19,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, Type
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub(crate) use controls::{ControlArgs, SmoothArgs};
-pub(crate) use many::{MergeArgs, RefitArgs};
+pub(crate) use many::RefitArgs;
 pub(crate) use pose::{FitArgs, PoseArgs};
 pub(crate) use render::{Compared, RenderArgs, Show};
 pub(crate) use rig::RigArgs;
@@ -57,8 +56,6 @@ pub(crate) enum Command {
     Deform(DeformArgs),
     /// Let many models follow one cage: the cage is solved for once, each model is sampled and written.
     Refit(RefitArgs),
-    /// Put the parts of a bind together that `bind --columns` wrote.
-    Merge(MergeArgs),
     /// Take the model by the hand: points of it go where they are pulled to, and the cage is solved for.
     Pull(PullArgs),
     /// Find the pose of the cage that brings a model to a target: another model with the same vertices, or landmarks.
@@ -115,10 +112,6 @@ pub(crate) struct BindArgs {
     /// Write the weights (.npz; one row per vertex of the mesh file, one column per cage vertex, then one per control inside).
     #[arg(long, value_name = "FILE", value_parser = npz_output)]
     pub(crate) weights: Option<PathBuf>,
-    /// Bind these columns of the weights alone, from A to before B: a part of the weights file, for `merge`. Multiples of
-    /// 8 cost nothing twice.
-    #[arg(long, value_name = "A:B", requires = "weights", conflicts_with_all = ["output", "report"], value_parser = many::columns)]
-    pub(crate) columns: Option<Range<usize>>,
     /// Of a rigged model, bind and write the shape alone, without joints and morph targets; then deform needs --static as well.
     #[arg(long = "static")]
     pub(crate) plain: bool,

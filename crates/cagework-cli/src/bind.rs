@@ -12,7 +12,6 @@ use glam::{DVec3, Vec3};
 
 use crate::args::{BindArgs, CageSource, ModelOutput};
 use crate::card;
-use crate::columns;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, refuse_files_read, write};
 use crate::gpu;
@@ -47,11 +46,6 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
         if args.plain { (model.positions.clone(), 0) } else { rig::points(&model, &args.mesh)? };
     let options =
         BindOptions { held: model.bytes(), extra_points, ..args.solve.options(args.grid, args.read.memory) };
-    if let Some(columns) = &args.columns {
-        let written = columns::bind(args, &loaded, &points, &options, columns.clone(), as_json)?;
-        save_cage(args, cage, &model)?;
-        return print(&written);
-    }
     let weights = weights_bytes(points.len(), controls.n_controls());
     let npz = if args.weights.is_some() { weights } else { 0 };
     let output = args.output.as_ref().map_or(0, |output| model.bytes_to_write(output.format));

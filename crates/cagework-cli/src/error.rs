@@ -4,7 +4,7 @@ use std::error::Error;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use cagework_core::bind::{BindError, PartError};
+use cagework_core::bind::BindError;
 use cagework_core::cage::CageError;
 use cagework_core::cage_check::RepairError;
 use cagework_core::cage_gen::CageGenError;
@@ -46,9 +46,6 @@ pub(crate) enum CliError {
     /// The bind did not come about.
     #[error(transparent)]
     Bind(#[from] BindError),
-    /// Columns cannot be bound apart, or parts are no whole.
-    #[error(transparent)]
-    Part(PartError),
     /// The GPU, or a bind on it.
     #[error(transparent)]
     Gpu(#[from] GpuError),

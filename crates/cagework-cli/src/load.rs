@@ -183,11 +183,6 @@ impl LoadedCage {
         Ok(Self { cage, model, up, memory, set })
     }
 
-    /// The cage as it was read, before faces are turned outward.
-    pub(crate) fn mesh(&self) -> PolygonMesh {
-        self.model.cage_mesh()
-    }
-
     /// What its positions are seen from, in the axes of its file.
     pub(crate) fn origin(&self) -> DVec3 {
         self.model.origin()

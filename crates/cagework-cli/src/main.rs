@@ -8,7 +8,6 @@ mod bind;
 mod cage;
 mod card;
 mod check;
-mod columns;
 mod controls;
 mod deform;
 mod demo;
@@ -46,7 +45,6 @@ fn main() -> ExitCode {
         Command::Bind(args) => bind::run(args, cli.json),
         Command::Deform(args) => deform::run(args, cli.json),
         Command::Refit(args) => refit::run(args, cli.json),
-        Command::Merge(args) => columns::merge(args, cli.json),
         Command::Pull(args) => pull::run(args, cli.json),
         Command::Fit(args) => fit::run(args, cli.json),
         Command::Render(args) => render::run(args, cli.json),

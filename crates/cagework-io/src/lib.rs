@@ -43,9 +43,7 @@ pub use gltf::{
 pub use look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, LookWrap};
 pub use memory::MemoryError;
 pub use model::{Model, PoseState, ReadError};
-pub use npz::{
-    NpzError, PartOf, SavedWeights, read_part_npz, read_weights_npz, write_part_npz, write_weights_npz,
-};
+pub use npz::{NpzError, SavedWeights, read_weights_npz, write_weights_npz};
 pub use obj::{ObjError, read_inner_controls, write_cage_obj, write_inner_controls};
 pub use origin::far_notice;
 pub use part_kind::PartKind;

@@ -8,7 +8,6 @@
 //! Reading takes what SciPy writes too: deflated, 32- or 64-bit indices, 32- or 64-bit floats.
 
 mod arrays;
-mod part;
 
 use cagework_core::deform::OutsideVertex;
 use cagework_core::weights::WeightsError;
@@ -21,8 +20,6 @@ use crate::memory::MemoryError;
 use crate::shown::shown;
 use arrays::{Archive, NpzWriter, array, required};
 
-pub use part::{PartOf, read_part_npz, write_part_npz};
-
 /// Why a weights file could not be read.
 #[derive(Debug, Error)]
 pub enum NpzError {
@@ -34,15 +31,9 @@ pub enum NpzError {
         "array '{0}' is missing: is this a sparse matrix written by scipy.sparse.save_npz or cagework bind?"
     )]
     Missing(&'static str),
-    /// A part of a bind where all of it is asked for.
-    #[error("holds some columns of the weights only: put all parts together with `cagework merge`")]
-    Part,
     /// Offsets as they were kept by versions that wrote `outside_corners`.
     #[error("holds offsets as an earlier version wrote them, which are not read any more: bind again")]
     Old,
-    /// No part of a bind where one is asked for.
-    #[error("is no part of a bind: `cagework bind --columns A:B --weights` writes such files")]
-    NoPart,
     /// An array is not what it must be.
     #[error("array '{array}': {problem}")]
     Array {
@@ -159,9 +150,6 @@ fn put_rows(zip: &mut NpzWriter, [indptr, indices, data]: [&str; 3], rows: &Weig
 /// matrix.
 pub fn read_weights_npz(bytes: &[u8], memory_limit: u64) -> Result<SavedWeights, NpzError> {
     let mut zip = Archive::new(bytes, memory_limit)?;
-    if zip.has(part::HEAD) {
-        return Err(NpzError::Part);
-    }
     let format = required(&mut zip, "format")?;
     if format.data != b"csr" {
         let found = shown(&String::from_utf8_lossy(&format.data));

@@ -4,12 +4,9 @@
 
 use std::io::{Cursor, Read as _, Write as _};
 
-use cagework_core::bind::Part;
 use cagework_core::deform::OutsideVertex;
-use cagework_core::options::BindOptions;
-use cagework_core::solve::stop::SolveReport;
-use cagework_core::{Frames, InnerControls, InnerElement, PolygonMesh, Weights};
-use cagework_io::{PartOf, SavedWeights, read_part_npz, read_weights_npz, write_part_npz, write_weights_npz};
+use cagework_core::{Frames, Weights};
+use cagework_io::{SavedWeights, read_weights_npz, write_weights_npz};
 use glam::Vec3;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
@@ -186,70 +183,4 @@ fn entries_are_unpacked_as_far_as_their_shapes_need() {
     });
     let message = read_weights_npz(&honest, LIMIT).unwrap_err().to_string();
     assert!(message.contains("needs about 77 MiB of memory, more than the limit of 1 MiB"), "{message}");
-}
-
-/// Two of three columns at two different positions of three.
-fn part() -> (PartOf, Part) {
-    let of = PartOf {
-        version: "1".into(),
-        options: BindOptions { grid: 20, tau: 1.1e-6, ..BindOptions::default() },
-        extra_points: 1,
-        cage: PolygonMesh {
-            positions: vec![Vec3::new(0.1, 1.0 / 3.0, 1e-30)],
-            faces: vec![vec![0, 1], vec![]],
-        },
-        smooth: 2,
-        inner: InnerControls {
-            positions: vec![Vec3::splat(0.7)],
-            elements: vec![InnerElement::Point(0)],
-            radius: Some(0.3),
-        },
-        positions: vec![Vec3::X, Vec3::new(0.1, -0.2, 0.3), Vec3::X],
-    };
-    let report = SolveReport {
-        deltas: vec![0.1, 1e-7],
-        residuals: vec![],
-        converged: true,
-        at_round_off: false,
-        stalled: false,
-    };
-    (of, Part { columns: 1..3, samples: vec![0.1, -1e-9, 0.25, 0.5], report })
-}
-
-#[test]
-fn a_part_comes_back_as_it_was() {
-    let (of, part) = part();
-    let written = write_part_npz(&of, &part);
-    let (of_read, part_read) = read_part_npz(&written, LIMIT).unwrap();
-    assert_eq!((&of_read, &part_read), (&of, &part));
-    assert_eq!(of_read.difference(&of), None);
-    let other = PartOf { options: BindOptions { grid: 21, ..of.options }, ..of.clone() };
-    assert_eq!(of.difference(&other), Some("set of options"));
-    let moved = PartOf { positions: vec![Vec3::X; 3], ..of.clone() };
-    assert_eq!(of.difference(&moved), Some("mesh"));
-}
-
-#[test]
-fn a_part_is_no_weights_and_weights_are_no_part() {
-    let (of, part) = part();
-    let message = read_weights_npz(&write_part_npz(&of, &part), LIMIT).unwrap_err().to_string();
-    assert_eq!(
-        message,
-        "holds some columns of the weights only: put all parts together with `cagework merge`"
-    );
-    let (weights, frames, outside) = sample();
-    let message = read_part_npz(&write_weights_npz(&weights, &frames, &outside, &[], &[]), LIMIT)
-        .unwrap_err()
-        .to_string();
-    assert_eq!(message, "is no part of a bind: `cagework bind --columns A:B --weights` writes such files");
-    let wrong = Part { columns: 1..2, ..part };
-    let said = |of: &PartOf, part: &Part| {
-        read_part_npz(&write_part_npz(of, part), LIMIT).map(drop).map_err(|e| e.to_string())
-    };
-    // One column at four positions: the mesh says later that it has only two.
-    assert_eq!(said(&of, &wrong), Ok(()));
-    let many = PartOf { extra_points: 4, ..of.clone() };
-    assert_eq!(said(&many, &wrong).unwrap_err(), "array 'positions': has fewer points than the 4 of the rig");
-    let broken = Part { samples: vec![f32::NAN], ..wrong };
-    assert_eq!(said(&of, &broken).unwrap_err(), "array 'samples': has a value that is not a finite number");
 }

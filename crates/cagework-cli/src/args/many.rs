@@ -1,12 +1,11 @@
-//! Many models in one cage, and one bind on many machines.
+//! Many models in one cage.
 
-use std::ops::Range;
 use std::path::PathBuf;
 
 use cagework_core::options;
 use clap::Args;
 
-use super::{ControlArgs, MemoryArgs, ReadArgs, RigArgs, SolveArgs, npz_output, number};
+use super::{ControlArgs, ReadArgs, RigArgs, SolveArgs, number};
 
 /// `cagework refit`
 #[derive(Args, Debug)]
@@ -50,35 +49,4 @@ pub(crate) struct RefitArgs {
     pub(crate) controls: ControlArgs,
     #[command(flatten)]
     pub(crate) solve: SolveArgs,
-}
-
-/// `cagework merge`
-#[derive(Args, Debug)]
-#[command(after_help = "The weights are those of one bind of all columns, to the bit.\n\n\
-    Example:\n  \
-    cagework bind horse.glb --cage cage.obj -g 256 --columns 0:400 --weights part1.npz\n  \
-    cagework bind horse.glb --cage cage.obj -g 256 --columns 400:812 --weights part2.npz\n  \
-    cagework merge part1.npz part2.npz -o weights.npz")]
-pub(crate) struct MergeArgs {
-    /// The parts, in any order (.npz): together all columns, each once.
-    #[arg(value_name = "PART", required = true)]
-    pub(crate) parts: Vec<PathBuf>,
-    /// Weights file to write (.npz).
-    #[arg(short, long, value_name = "FILE", value_parser = npz_output)]
-    pub(crate) output: PathBuf,
-    /// Threads; 0 for all.
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    pub(crate) threads: usize,
-    #[command(flatten)]
-    pub(crate) memory: MemoryArgs,
-}
-
-/// A half-open range such as `0:40`.
-pub(super) fn columns(text: &str) -> Result<Range<usize>, String> {
-    let wrong = || "not two whole numbers A:B with A below B".to_owned();
-    let (begin, end) = text.split_once(':').ok_or_else(wrong)?;
-    match (begin.parse(), end.parse()) {
-        (Ok(begin), Ok(end)) if begin < end => Ok(begin..end),
-        _ => Err(wrong()),
-    }
 }

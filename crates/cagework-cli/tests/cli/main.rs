@@ -7,7 +7,6 @@ mod bench_and_demo;
 mod bind;
 mod cage_and_info;
 mod cages;
-mod columns;
 mod controls;
 mod deform;
 mod evaluate;

@@ -7,7 +7,7 @@ use crate::support::Sandbox;
 fn version_and_help_succeed() {
     let sandbox = Sandbox::new();
     sandbox.run("--version").success().stdout(contains(env!("CARGO_PKG_VERSION")));
-    for command in ["", "info", "bind", "deform", "refit", "merge", "cage", "bench", "demo"] {
+    for command in ["", "info", "bind", "deform", "refit", "cage", "bench", "demo"] {
         sandbox
             .run(&format!("{command} --help"))
             .success()
@@ -39,9 +39,6 @@ fn wrong_command_line_exits_with_2() {
         "deform mesh.obj --cage cage.obj --weights w.npz -o out.glb",
         "cage mesh.obj -o cage2.fbx",
         "refit --cage cage.obj --pose cage.obj -o out",
-        "bind mesh.obj --cage cage.obj --columns 0:4",
-        "bind mesh.obj --cage cage.obj --columns 4:4 --weights w.npz",
-        "merge part.npz",
         "bench mesh.obj",
     ] {
         sandbox.run(args).code(2).stdout("").stderr(contains("Usage").or(contains("--help")));

@@ -47,8 +47,8 @@ impl<'a> SolvedCage<'a> {
         let team = Team::new(options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
         let grid = Voxels::grid(controls.surface(), &options);
-        let (none, n_columns) = (Vertices { rows: 0, points: 0 }, controls.n_controls());
-        let solving = estimate(controls, &grid, none, team.n_threads(), n_columns, &options).bytes;
+        let none = Vertices { rows: 0, points: 0 };
+        let solving = estimate(controls, &grid, none, team.n_threads(), &options).bytes;
         // Jacobi keeps all fields in any case.
         let kept = if options.solver == Solver::Jacobi { 0 } else { field_bytes(controls, &grid) };
         let (needed, limit) = (solving + kept, options.memory_limit / 2);
@@ -90,10 +90,9 @@ impl<'a> SolvedCage<'a> {
         let options = BindOptions { held: held + self.bytes(), extra_points, ..self.options };
         let mesh = Points::new(positions)?;
         let grid = Voxels::grid(self.controls.surface(), &options);
-        let n_columns = self.controls.n_controls();
         // Fields are there already.
-        let needed = estimate(self.controls, &grid, mesh.count(), 0, n_columns, &options);
-        needed.check(mesh.count(), n_columns, options.memory_limit)?;
+        let needed = estimate(self.controls, &grid, mesh.count(), 0, &options);
+        needed.check(mesh.count(), self.controls.n_controls(), options.memory_limit)?;
         let gridded = Arc::clone(&self.gridded);
         let prepared =
             Prepared::in_grid(mesh, self.controls, &options, gridded, needed.bytes, began, &watch)?;

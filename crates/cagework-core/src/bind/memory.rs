@@ -78,17 +78,17 @@ impl Needed {
     }
 }
 
-/// Bytes that a bind of `n_columns` of the controls will need at once. `threads` 0: fields are kept elsewhere.
+/// Bytes that a bind will need at once. `threads` 0: fields are kept elsewhere.
 pub(super) fn estimate(
     controls: Controls<'_>,
     grid: &Grid,
     vertices: Vertices,
     threads: usize,
-    n_columns: usize,
     options: &BindOptions,
 ) -> Needed {
     let n_cells = grid.n_cells() as f64;
     let (n_unknowns, n_cut) = unknowns(controls, grid);
+    let n_columns = controls.n_controls();
     let n_batches = n_columns.div_ceil(LANES) as f64;
     let row = size_of::<Row>() as f64;
     // A thread without a batch has no fields.

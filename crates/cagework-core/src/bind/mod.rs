@@ -4,7 +4,6 @@ mod many;
 mod memory;
 mod offsets;
 mod outside;
-mod parts;
 pub mod pipeline;
 mod solving;
 mod voxels;
@@ -13,7 +12,6 @@ mod watch;
 pub use many::SolvedCage;
 pub use memory::weights_bytes;
 pub use outside::Misfit;
-pub use parts::{Merge, Part, PartError, bind_columns};
 pub use watch::Watch;
 
 use glam::Vec3;
@@ -139,6 +137,5 @@ pub fn estimate_memory<'a>(
     let controls = controls.into();
     let grid = voxels::Voxels::grid(controls.surface(), options);
     let vertices = memory::Vertices { rows: n_points, points: n_points };
-    let (threads, n_columns) = (options.threads.max(1), controls.n_controls());
-    Ok(memory::estimate(controls, &grid, vertices, threads, n_columns, options).bytes)
+    Ok(memory::estimate(controls, &grid, vertices, options.threads.max(1), options).bytes)
 }

@@ -129,18 +129,6 @@ impl<'a> Prepared<'a> {
         fields: FieldsOn,
         watch: &Watch<'_>,
     ) -> Result<Self, BindError> {
-        Self::for_columns(positions, controls, options, fields, controls.n_controls(), watch)
-    }
-
-    /// As [`Self::new`], with memory for so many of the columns.
-    pub(super) fn for_columns(
-        positions: &'a [Vec3],
-        controls: Controls<'a>,
-        options: &'a BindOptions,
-        fields: FieldsOn,
-        n_columns: usize,
-        watch: &Watch<'_>,
-    ) -> Result<Self, BindError> {
         options.check()?;
         let began = watch.now_ms();
         let mesh = Points::new(positions)?;
@@ -148,8 +136,8 @@ impl<'a> Prepared<'a> {
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
         let grid = Voxels::grid(controls.surface(), options);
         let field_threads = if fields == FieldsOn::Host { team.n_threads() } else { 0 };
-        let needed = estimate(controls, &grid, mesh.count(), field_threads, n_columns, options);
-        needed.check(mesh.count(), n_columns, options.memory_limit)?;
+        let needed = estimate(controls, &grid, mesh.count(), field_threads, options);
+        needed.check(mesh.count(), controls.n_controls(), options.memory_limit)?;
         let gridded = Arc::new(Gridded::new(controls, grid, options, team, watch)?);
         Self::in_grid(mesh, controls, options, gridded, needed.bytes, began, watch)
     }
@@ -184,9 +172,7 @@ impl<'a> Prepared<'a> {
     }
 
     fn solve(&self, watch: &Watch<'_>) -> Result<Solved, BindError> {
-        let (hierarchy, team) = (self.hierarchy(), &self.gridded.team);
-        let all = 0..hierarchy.n_batches();
-        Ok(solve_and_sample(hierarchy, all, &self.stencils, self.options, team, watch)?)
+        Ok(solve_and_sample(self.hierarchy(), &self.stencils, self.options, &self.gridded.team, watch)?)
     }
 
     /// Solves and samples all columns in this process, where they were to be solved on a device.
@@ -194,10 +180,10 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// Memory above the limit, or cancelled.
     pub fn solve_on_host(&mut self, watch: &Watch<'_>) -> Result<Solved, BindError> {
-        let (vertices, n_columns) = (self.mesh.count(), self.controls.n_controls());
-        let (grid, threads) = (&self.hierarchy().levels[0].grid, self.gridded.team.n_threads());
-        let needed = estimate(self.controls, grid, vertices, threads, n_columns, self.options);
-        needed.check(vertices, n_columns, self.options.memory_limit)?;
+        let (vertices, threads) = (self.mesh.count(), self.gridded.team.n_threads());
+        let needed =
+            estimate(self.controls, &self.hierarchy().levels[0].grid, vertices, threads, self.options);
+        needed.check(vertices, self.controls.n_controls(), self.options.memory_limit)?;
         self.estimated = needed.bytes;
         self.solve(watch)
     }

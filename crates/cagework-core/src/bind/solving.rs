@@ -1,6 +1,5 @@
 //! Solve batch after batch, sample each and keep only the samples; or keep the fields, for many models.
 
-use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::options::{BindOptions, Preconditioner, Solver};
@@ -21,13 +20,12 @@ use super::watch::Watch;
 /// Delta falls roughly by this factor from the first sweep to tau: for the progress bar only.
 const JACOBI_DECADES: f64 = 4.0;
 
-/// Solves the columns of some batches and samples them. Jacobi, whose stop rule couples all columns, solves all batches.
+/// Solves all columns and samples them.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub(super) fn solve_and_sample(
     hierarchy: &Hierarchy,
-    batches: Range<usize>,
     stencils: &Stencils,
     options: &BindOptions,
     team: &Team,
@@ -44,7 +42,7 @@ pub(super) fn solve_and_sample(
         return Ok(solved);
     }
     let take = |batch, field: &[Row]| sample(stencils, batch, field);
-    let (blocks, solved) = solve_batches(hierarchy, batches, options, team, watch, take)?;
+    let (blocks, solved) = solve_batches(hierarchy, options, team, watch, take)?;
     Ok(Solved { blocks, ..solved })
 }
 
@@ -61,8 +59,7 @@ pub(super) fn solve_fields(
     if options.solver == Solver::Jacobi {
         return jacobi_fields(hierarchy, options, team, watch);
     }
-    let all = 0..hierarchy.n_batches();
-    solve_batches(hierarchy, all, options, team, watch, |_, field: &[Row]| field.to_vec())
+    solve_batches(hierarchy, options, team, watch, |_, field: &[Row]| field.to_vec())
 }
 
 /// Samples of all batches. `[n_batches][n_points]`
@@ -73,25 +70,22 @@ pub(super) fn sample_fields(stencils: &Stencils, fields: &[Vec<Row>], team: &Tea
 /// Solves batch after batch and keeps what `take(batch, field)` makes of each.
 fn solve_batches<T: Send>(
     hierarchy: &Hierarchy,
-    batches: Range<usize>,
     options: &BindOptions,
     team: &Team,
     watch: &Watch<'_>,
     take: impl Fn(usize, &[Row]) -> T + Sync,
 ) -> Result<(Vec<T>, Solved), Cancelled> {
-    let n_batches = batches.len();
-    // Its share of the error is that of a bind of all columns, whoever solves the others.
-    let rule = options.stop_rule().of_batch(hierarchy.n_batches());
+    let n_batches = hierarchy.n_batches();
+    let rule = options.stop_rule().of_batch(n_batches);
     let (spent, bytes) = (Spent::default(), AtomicU64::new(0));
     let solved: Vec<Option<(SolveReport, T)>> = team.share(
         n_batches,
         || batch_solver(hierarchy, options),
-        |solver, piece| {
+        |solver, batch| {
             // Before the first look at a batch lies its dearest part.
             if watch.is_cancelled() {
                 return None;
             }
-            let batch = batches.start + piece;
             let begin = watch.now_ms();
             let report = solver.solve(hierarchy, batch, rule, &mut |iteration, delta| {
                 let fraction = watch.done() as f32 / n_batches as f32;

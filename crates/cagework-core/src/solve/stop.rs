@@ -3,8 +3,6 @@
 //! Delta is what the rule looks at. Jacobi: Eq. 2, the average change of a cell in a sweep. Multigrid and conjugate gradients:
 //! the error that is expected to remain, root mean square over cells, so that there tau bounds the error itself.
 
-use serde::{Deserialize, Serialize};
-
 /// When a solve is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopRule {
@@ -32,7 +30,7 @@ impl StopRule {
 }
 
 /// How a solve went.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SolveReport {
     /// Delta after each iteration.
     pub deltas: Vec<f64>,
@@ -43,7 +41,6 @@ pub struct SolveReport {
     /// Whether it was f32 that ended it, above the tolerance.
     pub at_round_off: bool,
     /// Whether V-cycles converged slowly or diverged, so that conjugate gradients took over.
-    #[serde(default)]
     pub stalled: bool,
 }
 

@@ -1,11 +1,9 @@
 //! Inputs by number: files of every kind that is read, damaged at random.
 
-use cagework_core::bind::Part;
 use cagework_core::deform::OutsideVertex;
 use cagework_core::mesh::Bounds;
-use cagework_core::solve::stop::SolveReport;
-use cagework_core::{BindOptions, Frames, InnerControls, PolygonMesh, Weights, subdivided_box};
-use cagework_io::{PartOf, encode_pose, write_cage_obj, write_part_npz, write_project, write_weights_npz};
+use cagework_core::{Frames, PolygonMesh, Weights, subdivided_box};
+use cagework_io::{encode_pose, write_cage_obj, write_project, write_weights_npz};
 use glam::Vec3;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
@@ -74,7 +72,6 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
     let weights = Weights::new(n, vec![0, 3, 5], vec![0, 8, 11, 7, n - 1], vec![0.5, 0.25, 1.0, 0.75, 0.5]);
     samples.push(write_weights_npz(&weights.expect("they are"), &frames, &[outside], &[], &[]));
     samples.push(encode_pose(&cube(), &bent));
-    samples.push(part(model.cage_mesh()));
     // Controls inside of that cube.
     samples.push(
         b"v .2 .2 .2\nv .5 .4 .5\nv .8 .2 .2\nv .3 .7 .5\nv .6 .7 .4\nv .5 .9 .6\nl 1 2 3\np -3\nf 4 5 6\n"
@@ -119,21 +116,6 @@ fn shared() -> Builder {
     other["target"]["node"] = 3.into();
     channels.push(other);
     rig
-}
-
-/// Two columns of eight at three positions in a cage.
-fn part(cage: PolygonMesh) -> Vec<u8> {
-    let positions = vec![Vec3::splat(0.4), Vec3::splat(0.5), Vec3::splat(0.6)];
-    let of = PartOf {
-        version: "1".into(),
-        options: BindOptions::default(),
-        extra_points: 1,
-        cage,
-        smooth: 0,
-        inner: InnerControls::default(),
-        positions,
-    };
-    write_part_npz(&of, &Part { columns: 2..4, samples: vec![0.125; 6], report: SolveReport::default() })
 }
 
 /// Closed meshes: quads, a concave polygon, and a cavity.

@@ -2,7 +2,6 @@
 
 use std::sync::LazyLock;
 
-use cagework_core::bind::{Merge, Part};
 use cagework_core::cage_check::{Repair, check, repair};
 use cagework_core::cage_gen::{CageOptions, Shape, Symmetry, generate};
 use cagework_core::deform::deform_bound;
@@ -12,8 +11,8 @@ use cagework_core::progress::Silent;
 use cagework_core::skin::skin_vertices;
 use cagework_core::{Binding, Cage, ControlSet, Controls, InnerControls, PolygonMesh, bind};
 use cagework_io::{
-    Joints, Model, ModelFormat, PartOf, ReshapeOptions, decode_pose, encode_pose, read_inner_controls,
-    read_part_npz, read_project, read_weights_npz, write_inner_controls, write_part_npz, write_weights_npz,
+    Joints, Model, ModelFormat, ReshapeOptions, decode_pose, encode_pose, read_inner_controls, read_project,
+    read_weights_npz, write_inner_controls, write_weights_npz,
 };
 use glam::{DVec3, Vec3};
 
@@ -64,11 +63,6 @@ pub(crate) fn survive(bytes: &[u8]) {
             let _ = saved.frames.folded(&saved.weights);
         }
     }
-    if let Ok((of, part)) = read_part_npz(bytes, LIMIT) {
-        let again = read_part_npz(&write_part_npz(&of, &part), LIMIT).expect("what was written can be read");
-        assert_eq!(again.1.columns, part.columns);
-        as_part(of, &part);
-    }
     if let Ok(pose) = decode_pose(&cube(), bytes) {
         let _ = encode_pose(&cube(), &pose);
         let _ = deform_bound(&REST.binding.weights, &REST.binding.frames, &pose);
@@ -89,17 +83,6 @@ pub(crate) fn survive(bytes: &[u8]) {
         as_pose(&model);
         as_model(&model, choice);
         as_cage(&model.cage_mesh(), choice);
-    }
-}
-
-/// A part alone is no bind.
-fn as_part(of: PartOf, part: &Part) {
-    let Ok(cage) = Cage::new(&of.cage) else { return };
-    let Ok(set) = ControlSet::new(&cage, of.smooth.min(1), of.inner) else { return };
-    let options = BindOptions { grid: GRID, memory_limit: LIMIT, ..of.options };
-    if let Ok(mut merge) = Merge::new(&of.positions, Controls::from(&set), &options, &Silent) {
-        let _ = merge.add(part);
-        let _ = merge.finish();
     }
 }
 
