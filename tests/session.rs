@@ -250,6 +250,11 @@ fn lost_device_is_an_error_and_everything_comes_back_on_another() {
         assert!(matches!(error, GpuError::DeviceLost { .. }), "{error}");
     }
 
+    // The first device that takes its place is lost, too: nothing is, and the next attempt succeeds.
+    let broken = context(&ContextOptions::default());
+    broken.device.destroy();
+    let error = block_on(session.recover(broken)).map(drop).unwrap_err();
+    assert!(matches!(error, GpuError::DeviceLost { .. }), "{error}");
     let mut session = block_on(session.recover(context(&ContextOptions::default()))).expect("it recovers");
     assert_eq!(session.cage_positions(), pose);
     assert_eq!(block_on(session.picture(size, 1.0)).expect("it is drawn"), before);

@@ -57,8 +57,11 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
   const possible = (options: BindOptions): BindOptions =>
     lack || options.solver === "cg" ? { ...options, backend: "cpu" } : options;
   /** WebGL2 tells the canvas, and nobody else, that it was lost. */
+  let guarded: HTMLCanvasElement;
   const guard = (canvas: HTMLCanvasElement) => {
-    canvas.addEventListener("webglcontextlost", () => engine.lose());
+    guarded = canvas;
+    // One that a failed recovery has left behind says nothing of the device in use.
+    canvas.addEventListener("webglcontextlost", () => guarded === canvas && engine.lose());
   };
   guard(canvas);
   const losses = new Set<(reason: string) => void>();

@@ -52,8 +52,9 @@ pub struct Session {
 /// A bind, here and on the GPU.
 #[derive(Debug)]
 struct Bound {
-    weights: Weights,
-    frames: Frames,
+    /// Shared, because a session that is made again on another device takes them without a copy.
+    weights: Arc<Weights>,
+    frames: Arc<Frames>,
     /// Columns are the cage's triangles, too.
     is_green: bool,
     mover: Mover,
@@ -146,12 +147,12 @@ impl Session {
         let (model, controls) = self.parts()?;
         if self.context.draws_only() {
             let binding = cagework_core::bind(&model.positions, controls, options, progress)?;
-            self.bound(binding.weights, binding.frames, false, None).await?;
+            self.bound(binding.weights.into(), binding.frames.into(), false, None).await?;
             return Ok(binding.report);
         }
         let (binding, weights) =
             bind_gpu(&model.positions, controls, options, progress, &self.context).await?;
-        self.bound(binding.weights, binding.frames, false, Some(weights)).await?;
+        self.bound(binding.weights.into(), binding.frames.into(), false, Some(weights)).await?;
         Ok(binding.report)
     }
 
@@ -168,7 +169,7 @@ impl Session {
             return Err(GpuError::Model { reason });
         }
         check_size(&weights, rows, columns + frames.n_columns())?;
-        self.bound(weights, frames, false, None).await
+        self.bound(weights.into(), frames.into(), false, None).await
     }
 
     fn parts(&self) -> Result<(&Arc<DrawModel>, Controls<'_>), GpuError> {
@@ -181,8 +182,8 @@ impl Session {
 
     async fn bound(
         &mut self,
-        weights: Weights,
-        frames: Frames,
+        weights: Arc<Weights>,
+        frames: Arc<Frames>,
         is_green: bool,
         on_gpu: Option<GpuWeights>,
     ) -> Result<(), GpuError> {
@@ -206,13 +207,13 @@ impl Session {
     /// The weights, once there are some.
     #[must_use]
     pub fn weights(&self) -> Option<&Weights> {
-        self.bound.as_ref().map(|b| &b.weights)
+        self.bound.as_ref().map(|b| b.weights.as_ref())
     }
 
     /// The columns of the weights after those of the controls, once there are weights.
     #[must_use]
     pub fn frames(&self) -> Option<&Frames> {
-        self.bound.as_ref().map(|b| &b.frames)
+        self.bound.as_ref().map(|b| b.frames.as_ref())
     }
 
     /// Moves the cage; the next frame shows it and the mesh that follows. Uploads the cage and nothing else.

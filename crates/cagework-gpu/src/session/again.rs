@@ -26,31 +26,29 @@ impl Session {
         Ok(twin)
     }
 
-    /// Everything again on another device, after this one was lost: model, cage, weights, pose, scene, camera.
+    /// The same on another device, after this one was lost: model, cage, weights, pose, scene, camera. This session stays as it is,
+    /// so that a device without enough memory leaves it for the next attempt.
     ///
     /// # Errors
     /// As the calls that set them.
-    pub async fn recover(self, context: GpuContext) -> Result<Self, GpuError> {
+    pub async fn recover(&self, context: GpuContext) -> Result<Self, GpuError> {
         let mut session = Self::new(context);
         session.camera = self.camera;
-        if let Some(model) = self.model {
-            session.set_shared_model(model).await?;
-            session.parts = self.parts;
+        if let Some(model) = &self.model {
+            session.set_shared_model(Arc::clone(model)).await?;
+            session.parts.clone_from(&self.parts);
         }
         if let Some(controls) = &self.controls {
             session.set_cage(controls).await?;
         }
-        if let Some(bound) = self.bound {
-            if bound.is_green {
-                session.adopt_green(bound.weights).await?;
-            } else {
-                session.adopt(bound.weights, bound.frames).await?;
-            }
+        if let Some(bound) = &self.bound {
+            let (weights, frames) = (Arc::clone(&bound.weights), Arc::clone(&bound.frames));
+            session.bound(weights, frames, bound.is_green, None).await?;
         }
         if !self.pose.is_empty() {
             session.pose(&self.pose);
         }
-        session.set_scene(self.scene);
+        session.set_scene(self.scene.clone());
         Ok(session)
     }
 }

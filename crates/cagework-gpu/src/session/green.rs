@@ -1,6 +1,7 @@
 //! Weights whose columns are not the cage's vertices alone.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use cagework_core::Weights;
 use cagework_core::green::green_controls;
@@ -18,7 +19,7 @@ impl Session {
         let (model, controls) = self.parts()?;
         let cage = controls.cage();
         check_size(&weights, model.positions.len(), cage.n_vertices() + cage.triangles().len())?;
-        self.bound(weights, cagework_core::Frames::default(), true, None).await
+        self.bound(weights.into(), Arc::default(), true, None).await
     }
 
     /// What the columns of weights stand for where the controls are at `positions`: them, and for Green coordinates, of plain

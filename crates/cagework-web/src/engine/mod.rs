@@ -223,7 +223,7 @@ impl Engine {
         }
     }
 
-    /// Everything again on a new device.
+    /// Everything again on a new device. After an error it can be called again.
     ///
     /// # Errors
     /// `NoAdapter`, `NoDevice`: try again later; or the GPU has no room for the model.
@@ -231,9 +231,11 @@ impl Engine {
         let (surface, context) = Surface::open(canvas).await?;
         {
             let mut shared = self.gpu.lock().await;
-            let Gpu { main, .. } = shared.take().ok_or_else(lost)?;
-            let main = main.recover(context).await.map_err(Fault::from)?;
-            *shared = Some(Gpu { main, others: Vec::new(), surface });
+            let gpu = shared.as_mut().ok_or_else(lost)?;
+            let main = gpu.main.recover(context).await.map_err(Fault::from)?;
+            *gpu = Gpu { main, others: Vec::new(), surface };
+            // A cage may have come while there was no device to take it.
+            upload_cage(&self.state, gpu).await?;
         }
         self.change(|state| {
             state.others.clear();
