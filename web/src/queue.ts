@@ -7,36 +7,53 @@ export type Kind = "open" | "cage" | "check" | "bind" | "carry" | "compare" | "p
 export interface Queue {
   /** Runs `work` when the work of its kind that was asked for before has ended. */
   add<T>(kind: Kind, work: (signal: AbortSignal) => Promise<T>): Promise<T>;
-  /** The same, and what was asked for before is cancelled. */
+  /** The same, and all work of its kind that was asked for before is cancelled. */
   replace<T>(kind: Kind, work: (signal: AbortSignal) => Promise<T>): Promise<T>;
+  /** Cancels the work of a kind that runs, and all that waits. */
   cancel(kind: Kind): void;
 }
 
+interface Line {
+  /** Of the work that has not ended. */
+  readonly stops: Set<AbortController>;
+  last: Promise<unknown>;
+}
+
 export function createQueue(): Queue {
-  const last = new Map<Kind, { readonly stop: AbortController; readonly done: Promise<unknown> }>();
+  const lines = new Map<Kind, Line>();
   const queue: Queue = {
     add(kind, work) {
+      const line = lines.get(kind) ?? { stops: new Set(), last: Promise.resolve() };
+      lines.set(kind, line);
       const stop = new AbortController();
+      line.stops.add(stop);
       const start = () => {
         if (stop.signal.aborted) throw Object.assign(new Error("cancelled"), { name: "Cancelled" });
         return work(stop.signal);
       };
-      const before = last.get(kind)?.done ?? Promise.resolve();
-      const done = before.then(start, start);
-      last.set(kind, { stop, done });
+      const done = line.last.then(start, start).finally(() => line.stops.delete(stop));
+      line.last = done;
       return done;
     },
     replace(kind, work) {
       queue.cancel(kind);
       return queue.add(kind, work);
     },
-    cancel: (kind) => last.get(kind)?.stop.abort(),
+    cancel(kind) {
+      for (const stop of lines.get(kind)?.stops ?? []) stop.abort();
+    },
   };
   return queue;
 }
 
+/** Calls `stop` when the signal is aborted: at once if it already is. */
+export function onAbort(signal: AbortSignal, stop: () => void): void {
+  if (signal.aborted) stop();
+  else signal.addEventListener("abort", stop, { once: true });
+}
+
 /** A job's result; the job is cancelled by the signal. */
 export function follow<T>(signal: AbortSignal, job: Job<T>): Promise<T> {
-  signal.addEventListener("abort", job.cancel, { once: true });
+  onAbort(signal, job.cancel);
   return job.done;
 }

@@ -46,4 +46,29 @@ describe("the queue", () => {
     expect(await last).toBe("last");
     expect(cancelled).toEqual(["first"]);
   });
+
+  it("cancels the work that runs and all that waits, and leaves other kinds alone", async () => {
+    const queue = createQueue();
+    const first = held();
+    const cancelled: string[] = [];
+    const job = { done: first.done, cancel: () => void cancelled.push("first") };
+    const running = queue.add("compare", (signal) => follow(signal, job));
+    const waiting = [queue.add("compare", async () => "second"), queue.add("compare", async () => "third")];
+    const other = queue.add("carry", async () => "other kind");
+    await Promise.resolve();
+    queue.cancel("compare");
+    expect(cancelled).toEqual(["first"]);
+    first.end();
+    await running;
+    for (const work of waiting) await expect(work).rejects.toMatchObject({ name: "Cancelled" });
+    expect([await other, await queue.add("compare", async () => "next")]).toEqual(["other kind", "next"]);
+  });
+
+  it("cancels a job that starts when its signal is already aborted", async () => {
+    const stop = new AbortController();
+    stop.abort();
+    const cancelled: string[] = [];
+    await follow(stop.signal, { done: Promise.resolve(), cancel: () => void cancelled.push("job") });
+    expect(cancelled).toEqual(["job"]);
+  });
 });

@@ -3,7 +3,7 @@
 import type { Job, ReadFile, Reading, Session } from "../contract";
 import { isFatal } from "../crash";
 import type { History } from "../history";
-import type { Queue } from "../queue";
+import { onAbort, type Queue } from "../queue";
 import type { Store } from "../signals";
 import { type Explained, explain, isCancelled } from "../strings";
 import { T } from "../words";
@@ -63,8 +63,8 @@ export async function waitFor<T extends object>(
   const job = work(({ stage, fraction }) =>
     store.set({ busyStep: T.opening.far(T.opening.stages[stage], fraction) }),
   );
-  signal.addEventListener("abort", () => cancelBusy(), { once: true });
   let cancelBusy = job.cancel;
+  onAbort(signal, () => cancelBusy());
   store.set({ busy: what, busyStep: "", cancelBusy });
   try {
     const read = await job.done;
