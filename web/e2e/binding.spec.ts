@@ -88,13 +88,14 @@ test("the bind panel compares the paper's method with ours", async ({ page }) =>
   await expect(page.locator(".plot polyline")).toHaveCount(2);
   await shoot(page, "bind-panel");
 
-  await test.step("a cancelled bind leaves the one before, and its settings", async () => {
+  await test.step("a cancelled bind leaves the previous one; the settings just chosen are marked", async () => {
     await grid("128").check({ force: true });
     await page.keyboard.press("Control+Enter");
     await expect(page.locator(".plot polyline"), "its chart is its own").toHaveCount(1);
     await page.getByRole("button", { name: "Cancel" }).click();
-    await expect(page.getByText("The bind from before is kept, and its settings.")).toBeVisible();
-    await expect(grid("32")).toBeChecked();
+    await expect(page.getByText("Cancelled. The previous bind is still active.")).toBeVisible();
+    await expect(grid("128")).toBeChecked();
+    await expect(page.getByText("Not applied yet: bind again to use these settings.")).toBeVisible();
     await bound(page);
   });
 });

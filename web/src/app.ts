@@ -116,6 +116,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
     edit.end(true);
     edit.settle();
     edit.setEditingRest(false);
+    if (store.get().placing) controls.arm(null);
   };
   const models = createModels(ctx, { cage, openFiles: (list) => files.openFiles(list), settle });
   const painting = createPainting(ctx, settle);
@@ -141,7 +142,7 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
         ...(settings.rig ? { rigOptions: settings.rig } : {}),
       });
       view.symmetry(settings.symmetry ?? store.get().symmetry);
-      store.set({ pins: settings.pins ?? [] });
+      if (settings.pins) store.set({ pins: settings.pins });
     },
     applyPose(settings) {
       const pose = poseOf(settings);

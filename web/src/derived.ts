@@ -1,6 +1,6 @@
 /** What follows from the state of the page. */
 
-import type { Pose, RigOptions, SceneOptions } from "./contract";
+import type { BindOptions, Element as CageElement, Pose, RigOptions, SceneOptions } from "./contract";
 import type { AppState } from "./state";
 
 /** What becomes of the rig of the model that is open. */
@@ -34,4 +34,20 @@ export function controlCount({ cage }: Pick<AppState, "cage">): number {
 export function fittingPoses(state: AppState): readonly Pose[] {
   const n = controlCount(state) * 3;
   return state.poses.filter((pose) => pose.positions.length === n);
+}
+
+/** What clicks select: pulling takes single vertices, whatever is selected while reshaping. */
+export function elementInUse({ element, scene, editingRest }: AppState): CageElement {
+  return scene.pull && !editingRest ? "vertex" : element;
+}
+
+/** The options of a bind that follows a changed cage, and of a saved project: chosen ones count once a bind has used them. */
+export function optionsInUse({ appliedOptions, bindOptions }: AppState): BindOptions {
+  return appliedOptions ?? bindOptions;
+}
+
+/** Whether options were chosen that no bind has used yet. */
+export function hasUnappliedOptions({ appliedOptions: applied, bindOptions: chosen }: AppState): boolean {
+  if (applied === null) return false;
+  return (Object.keys(chosen) as (keyof BindOptions)[]).some((key) => chosen[key] !== applied[key]);
 }

@@ -47,13 +47,13 @@ export function startUp({ app, stage, crashes }: Start): void {
     document.title = share === null ? name : `${percent(share)} - ${name}`;
   });
   effect(() => {
-    const { model, cage, poses, posed, selected, bindOptions, symmetry } = store.get();
+    const { model, cage, poses, posed, selected, appliedOptions, symmetry } = store.get();
     const { bound, undoLabel, sampleCage, tour } = store.get();
     // A sample that nobody has touched is no work to come back to.
     const isUntouched = sampleCage && undoLabel === null;
     const isWork = bound && !isUntouched && tour === null;
     // Each of them is part of the work, or says that some of it has changed.
-    if (isWork && [model, cage, poses, posed, selected, bindOptions, symmetry])
+    if (isWork && [model, cage, poses, posed, selected, appliedOptions, symmetry])
       untracked(() => app.works.touch());
   });
   effect(() => {

@@ -31,6 +31,7 @@ export interface BindRun {
   pass: "coarse" | "fine";
   /** Of the engine: what the bind is for. */
   revision: number;
+  options: BindOptions;
   stage: Stage;
   /** Of the pass, 0 to 1. */
   fraction: number;
@@ -89,7 +90,10 @@ export interface AppState {
   boxDivisions: number;
   /** Share of the cage generation done; null when none runs. */
   cageProgress: number | null;
+  /** As the panel shows them. */
   bindOptions: BindOptions;
+  /** Those of the last bind that ended; null before the first. */
+  appliedOptions: BindOptions | null;
   bindRun: BindRun | null;
   report: BindReport | null;
   /** Reports of earlier binds of this cage, latest first: to compare methods. */
@@ -137,6 +141,8 @@ export interface AppState {
   painting: Painting | null;
   /** The clip that is shown in place of the cage's pose. */
   clip: ClipState;
+  /** The one of several models whose files are exported; null for all. */
+  exportOnly: number | null;
   /** What becomes of the model's skeleton. */
   rigOptions: RigOptions;
   /** Name of the pose that is played towards, null for the rest pose. */
@@ -168,15 +174,8 @@ export const NO_CLIP: ClipState = {
   targets: [],
 };
 
-export const INITIAL: AppState = {
-  step: "model",
-  adapter: "",
-  lack: null,
-  samples: [],
-  busy: T.opening.starting,
-  busyStep: "",
-  cancelBusy: null,
-  goOn: null,
+/** What belongs to the model that is open, as it is for the next one: see docs/page.md. */
+export const MODEL_STATE = {
   model: null,
   sample: null,
   cage: null,
@@ -188,13 +187,12 @@ export const INITIAL: AppState = {
   boxDivisions: 2,
   cageProgress: null,
   bindOptions: BIND_DEFAULTS,
+  appliedOptions: null,
   bindRun: null,
   report: null,
   earlier: [],
   bound: false,
   memory: 0,
-  scene: SCENE_DEFAULTS,
-  seeOpen: false,
   legend: null,
   slice: { axis: 2, position: 0.5, busy: false },
   editingRest: false,
@@ -202,10 +200,6 @@ export const INITIAL: AppState = {
   selected: { count: 0, last: -1, center: null },
   symmetry: false,
   unmatched: 0,
-  proportional: 0.2,
-  proportionalOn: false,
-  additive: false,
-  pivot: "middle",
   boxArmed: false,
   placing: null,
   ortho: false,
@@ -220,12 +214,33 @@ export const INITIAL: AppState = {
   playing: false,
   painting: null,
   clip: NO_CLIP,
+  exportOnly: null,
   rigOptions: RIG_DEFAULTS,
   playingPose: null,
   undoLabel: null,
   redoLabel: null,
-  theme: "auto",
   savedAt: null,
+} satisfies Partial<AppState>;
+
+type ModelState = Pick<AppState, keyof typeof MODEL_STATE>;
+
+/** What stays when another model is opened: the person's choices, and what the page itself is doing. */
+export const PERSON_STATE: Omit<AppState, keyof ModelState> = {
+  step: "model",
+  adapter: "",
+  lack: null,
+  samples: [],
+  busy: T.opening.starting,
+  busyStep: "",
+  cancelBusy: null,
+  goOn: null,
+  scene: SCENE_DEFAULTS,
+  seeOpen: false,
+  proportional: 0.2,
+  proportionalOn: false,
+  additive: false,
+  pivot: "middle",
+  theme: "auto",
   works: [],
   worksOpen: false,
   tour: null,
@@ -233,6 +248,13 @@ export const INITIAL: AppState = {
   waysOpen: false,
   hovering: null,
 };
+
+export const INITIAL: AppState = { ...PERSON_STATE, ...MODEL_STATE };
+
+/** The model's part of the state for another model. Where a bind is computed and how much memory it may take is the computer's. */
+export function stateOfNextModel({ bindOptions: { backend, memory_limit } }: AppState): ModelState {
+  return { ...MODEL_STATE, bindOptions: { ...BIND_DEFAULTS, backend, memory_limit } };
+}
 
 /** A stop of the tour. */
 export interface TourState {

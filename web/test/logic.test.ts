@@ -6,7 +6,6 @@ import { freshName } from "../src/actions/poses";
 import { poseOf } from "../src/actions/project";
 import { nextAmount } from "../src/amount";
 import type { BindReport, CageState } from "../src/contract";
-import { BIND_DEFAULTS } from "../src/defaults";
 import { drawn } from "../src/derived";
 import { rectangle } from "../src/input/pointer";
 import { INITIAL, type StepName } from "../src/state";
@@ -87,7 +86,6 @@ describe("the plot", () => {
     const jacobi = report("jacobi", [0.5, ...Array<number>(99).fill(1e-3)]);
     const state = {
       bindRun: null,
-      bindOptions: BIND_DEFAULTS,
       report: report("multigrid", [1e-3, 1e-5]),
       earlier: [report("multigrid", [1e-2]), report("cg", [1e-1, 1e-2]), jacobi],
     };

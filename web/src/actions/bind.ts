@@ -13,7 +13,7 @@ import { attempt, type Context } from "./context";
 export interface BindActions {
   /** True when it ended with weights. Problems on screen stay when nobody asked for this bind: they are about
    * something else. */
-  start(unasked?: boolean): Promise<boolean>;
+  start(unasked?: boolean, options?: BindOptions): Promise<boolean>;
   cancel(): void;
   /** Whether the cage that is open is bound or about to be. */
   covers(): boolean;
@@ -27,9 +27,6 @@ const EARLIER = 4;
 
 export function createBind(ctx: Context): BindActions {
   const { store } = ctx;
-  /** Options of the last bind that ended. */
-  let kept: BindOptions | undefined;
-
   const estimate = () => {
     const { model, cage, bindOptions } = store.get();
     if (!model || !cage?.usable) return;
@@ -60,22 +57,23 @@ export function createBind(ctx: Context): BindActions {
     store.set({ legend: engine.legend() ?? null });
   };
 
-  const bind = async (revision: number, signal: AbortSignal) => {
+  const bind = async (revision: number, signal: AbortSignal, options: BindOptions) => {
     const session = ctx.session();
     session.engine.requireCurrent(revision);
     let eta: Eta = createEta(performance.now());
-    let run: BindRun = start("coarse", revision);
+    let run: BindRun = start("coarse", revision, options);
     const hear = (event: BindEvent) => {
       switch (event.kind) {
         case "progress": {
           if (event.pass !== run.pass) {
-            run = start(event.pass, revision);
+            run = start(event.pass, revision, options);
             eta = createEta(performance.now());
           }
           const own = eta.update(event.fraction, performance.now());
           run = {
             pass: event.pass,
             revision,
+            options,
             stage: event.stage,
             fraction: event.fraction,
             etaMs: event.etaMs ?? own ?? null,
@@ -96,23 +94,22 @@ export function createBind(ctx: Context): BindActions {
           event satisfies never;
       }
     };
-    const asked = store.get().bindOptions;
-    const report = await follow(signal, session.bind(asked, hear));
+    const report = await follow(signal, session.bind(options, hear));
     adopted(report, "fine");
-    kept = asked;
+    store.set({ appliedOptions: options });
     if (!report.converged) {
       ctx.tell.say(T.bind.stopped);
     }
   };
 
   return {
-    async start(unasked = false) {
+    async start(unasked = false, options = store.get().bindOptions) {
       if (!store.get().cage || cageBroken(store.get())) return false;
       if (!unasked) ctx.tell.clear();
       const { revision } = ctx.session().engine;
-      store.set({ bindRun: start("coarse", revision) });
+      store.set({ bindRun: start("coarse", revision, options) });
       const ok = await attempt(ctx, T.failed.bind, () =>
-        ctx.queue.replace("bind", (signal) => bind(revision, signal)),
+        ctx.queue.replace("bind", (signal) => bind(revision, signal, options)),
       );
       // One for another cage may wait by now.
       if (store.get().bindRun?.revision === revision) store.set({ bindRun: null });
@@ -121,9 +118,7 @@ export function createBind(ctx: Context): BindActions {
     cancel() {
       const { bindRun, bound } = store.get();
       ctx.queue.cancel("bind");
-      if (!bindRun || !bound || !kept) return;
-      store.set({ bindOptions: kept });
-      ctx.tell.say(T.bind.cancelled);
+      if (bindRun && bound && !isCoarse) ctx.tell.say(T.bind.cancelled);
     },
     covers() {
       const { bound, bindRun } = store.get();
@@ -148,10 +143,11 @@ export function createBind(ctx: Context): BindActions {
   };
 }
 
-function start(pass: BindRun["pass"], revision: number): BindRun {
+function start(pass: BindRun["pass"], revision: number, options: BindOptions): BindRun {
   return {
     pass,
     revision,
+    options,
     stage: "voxelize",
     fraction: 0,
     etaMs: null,

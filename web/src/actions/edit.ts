@@ -85,7 +85,8 @@ export function createEdit(ctx: Context, adopt: (state: CageState, check: Check 
   const setEditingRest = (on: boolean) => {
     if (ctx.store.get().editingRest === on) return;
     engine().setEditingRest(on);
-    ctx.store.set({ editingRest: on });
+    // Edges and faces are selected for reshaping.
+    ctx.store.set({ editingRest: on, ...(on ? {} : { element: "vertex" }) });
     sync();
   };
 

@@ -22,8 +22,6 @@ export interface Exports {
   pictureOf(scale: number, alone: boolean): void;
   /** The format of the next shape. */
   shapeIn(format: ShapeFormatName): void;
-  /** Which of several models the next files are of; null for each of them. */
-  only(id: number | null): void;
 }
 
 /** Files of which each model has its own. */
@@ -40,7 +38,6 @@ const LONGEST_SIDE = 8192;
 export function createExports(ctx: Context, project: Project): Exports {
   let scale = 2;
   let alone = false;
-  let which: number | null = null;
   let format: ShapeFormatName = SHAPE_FORMATS[0];
 
   const ownBytes = (kind: OwnKind, id: number): Uint8Array => {
@@ -87,7 +84,8 @@ export function createExports(ctx: Context, project: Project): Exports {
   const saveOwn = async (kind: OwnKind, model: ModelInfo) => {
     if (kind === "glb") await loadLattice(ctx);
     const { members } = model;
-    const chosen = members.filter(({ id }) => id === which);
+    const { exportOnly } = ctx.store.get();
+    const chosen = members.filter(({ id }) => id === exportOnly);
     const notices = new Set<string>();
     const files: string[] = [];
     let size = 0;
@@ -146,9 +144,6 @@ export function createExports(ctx: Context, project: Project): Exports {
     },
     shapeIn(chosen) {
       format = chosen;
-    },
-    only(id) {
-      which = id;
     },
   };
   return exports;

@@ -1,18 +1,18 @@
 /** Opening: samples, files and projects. What is opened gets a cage and is bound without further questions. */
 
-import type { NamedFile, Opened, Sample, Settings, UpAxis } from "../contract";
+import type { BindOptions, NamedFile, Opened, Sample, Settings, UpAxis } from "../contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS } from "../defaults";
 import { planDrop } from "../drop";
 import { stem } from "../format";
-import type { StepName } from "../state";
-import { NO_CLIP } from "../state";
+import { type StepName, stateOfNextModel } from "../state";
 import { sentence } from "../strings";
 import { T } from "../words";
 import { attempt, type Context } from "./context";
 import { modelsOf, type Named, readModels } from "./read";
 
 export interface Files {
-  openSample(id: string): Promise<boolean>;
+  /** `bind`: how it is bound, in place of the usual options. */
+  openSample(id: string, bind?: BindOptions): Promise<boolean>;
   /** Files of a drop or a file button; names and kinds decide. */
   openFiles(files: readonly NamedFile[]): Promise<boolean>;
   /** The model with another axis up; its cage and poses turn with it. */
@@ -47,15 +47,16 @@ interface Along {
   readonly others: readonly Named[];
   readonly cageFiles: readonly NamedFile[] | undefined;
   readonly signal: AbortSignal;
+  readonly bind: BindOptions | undefined;
 }
 
 export function createFiles(ctx: Context, follow: Follow): Files {
   const { store } = ctx;
-  const take = async (opened: Opened, sample: string | null, along?: Along) => {
-    const others = along?.others ?? [];
-    // Nobody needs the weights of what was open.
-    ctx.queue.cancel("bind");
-    const settings = settingsOf(opened);
+  const take = async (opened: Opened, sample: string | null, along: Partial<Along> = {}) => {
+    const { others = [], cageFiles, signal, bind } = along;
+    // Nobody needs the cage and the weights of what was open.
+    for (const kind of ["bind", "cage"] as const) ctx.queue.cancel(kind);
+    const settings = { ...settingsOf(opened), ...(bind ? { bind } : {}) };
     const of = settings.pose_pins;
     const poses =
       opened.project?.poses.map((pose, k) => (of ? { ...pose, pins: of[k] ?? [] } : pose)) ??
@@ -63,18 +64,11 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       [];
     ctx.history.clear();
     store.set({
+      ...stateOfNextModel(store.get()),
       model: { ...opened.model, name: shownName(opened, sample, store.get().samples) },
       sample,
       poses,
       shares: poses.map(() => 0),
-      editingRest: false,
-      cageSource: "auto",
-      playing: false,
-      clip: NO_CLIP,
-      rigOptions: RIG_DEFAULTS,
-      cageClip: null,
-      gesture: null,
-      painting: null,
       busy: others.length > 0 ? store.get().busy : null,
     });
     follow.applySettings(settings);
@@ -85,12 +79,12 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     for (const notice of opened.model.notices) ctx.tell.say(sentence(notice));
     if (settings.notices.length > 0) ctx.tell.say(settings.notices.join(" "));
     // Before there is a cage: it encloses all of them.
-    if (along && others.length > 0) await follow.join(others, along.signal);
+    if (signal && others.length > 0) await follow.join(others, signal);
     store.set({ busy: null });
     const { length } = store.get().model?.members ?? [];
     const showList = { label: T.models.showList, run: () => store.set({ step: "model" }) };
     if (others.length > 0 && length > 1) ctx.tell.say(T.models.together(length), showList);
-    void prepare(along?.cageFiles, sample !== null || opened.project !== null);
+    void prepare(cageFiles, sample !== null || opened.project !== null);
   };
 
   const settingsOf = (opened: Opened): Settings => {
@@ -133,7 +127,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
     });
 
   /** Opens something else; what is open until then stays kept. */
-  const replace = async (open: () => Promise<Opened>, sample: string | null, along?: Along) => {
+  const replace = async (open: () => Promise<Opened>, sample: string | null, along: Partial<Along>) => {
     follow.settle();
     await follow.keep(sample);
     const opened = await open();
@@ -142,12 +136,12 @@ export function createFiles(ctx: Context, follow: Follow): Files {
   };
 
   return {
-    openSample(id) {
+    openSample(id, bind) {
       const label = store.get().samples.find((sample) => sample.id === id)?.label ?? id;
       // Its worker is the one that binds.
       for (const kind of ["bind", "cage"] as const) ctx.queue.cancel(kind);
       return busy(T.opening.file(label), T.failed.sample, () =>
-        replace(() => ctx.session().openSample(id), id),
+        replace(() => ctx.session().openSample(id), id, { bind }),
       );
     },
     openFiles(files) {

@@ -1,6 +1,7 @@
 /** What follows when the cage at rest has changed: the page looks again, and the model is bound again. */
 
 import { effect, untracked } from "@preact/signals";
+import { optionsInUse } from "../derived";
 import type { BindActions } from "./bind";
 import type { Context } from "./context";
 import type { Edit } from "./edit";
@@ -24,10 +25,11 @@ export function followCage({ store }: Context, { bind, edit, view, pull }: Follo
   const bindSoon = (pause: number) => {
     clearTimeout(soon);
     soon = setTimeout(() => {
-      const { cage, bindOptions } = store.get();
+      const { cage } = store.get();
+      const options = optionsInUse(store.get());
       // A gesture may end without a change, and then nobody else would ask for the bind.
       if (edit.active()) bindSoon(PAUSE_MS);
-      else if (cage?.usable && !bind.covers() && bindOptions.grid <= FINEST) void bind.start(true);
+      else if (cage?.usable && !bind.covers() && options.grid <= FINEST) void bind.start(true, options);
     }, pause);
   };
   let isFirst = true;

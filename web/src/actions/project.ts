@@ -1,6 +1,7 @@
 /** What is open as a project file and as a link. */
 
 import type { SceneOptions, Settings } from "../contract";
+import { optionsInUse } from "../derived";
 import { stem } from "../format";
 import { encodeShare, fromBase64Url, toBase64Url } from "../share";
 import type { Context } from "./context";
@@ -23,7 +24,7 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]): P
     const pose = state.posed ? toBase64Url(ctx.session().engine.encodePose()) : undefined;
     const models = ctx.session().engine.memberSettings();
     const all: Omit<Settings, "notices"> = {
-      bind: state.bindOptions,
+      bind: optionsInUse(state),
       cage: state.cageOptions,
       ...(state.model?.rigged ? { rig: state.rigOptions } : {}),
       symmetry: state.symmetry,

@@ -1,11 +1,12 @@
 /** What is drawn and from where. */
 
+import { effect } from "@preact/signals";
 import type { Element as CageElement, Coordinates, Pivot, SceneOptions } from "../contract";
 import { SCENE_DEFAULTS } from "../defaults";
-import { drawn } from "../derived";
+import { drawn, elementInUse } from "../derived";
 import { follow } from "../queue";
 import type { Seen } from "../share";
-import type { Slice } from "../state";
+import { MODEL_STATE, type Slice } from "../state";
 import { saveTheme, type Theme } from "../store";
 import { T } from "../words";
 import type { BindActions } from "./bind";
@@ -80,6 +81,14 @@ export function createView(
     if (store.get().theme === "auto") scene({ theme: shown("auto") });
   });
 
+  let engineElement: CageElement = MODEL_STATE.element;
+  effect(() => {
+    const element = elementInUse(store.get());
+    if (element === engineElement) return;
+    engineElement = element;
+    engine().setElement(element);
+  });
+
   const loadSlice = async (signal: AbortSignal) => {
     const { slice, scene: now, bindOptions, cage } = store.get();
     if (now.slice === "off" || !cage?.usable) return;
@@ -133,8 +142,9 @@ export function createView(
       store.set({ proportionalOn: on, proportional: next });
     },
     element(element) {
-      engine().setElement(element);
       store.set({ element });
+      // Who wants edges or faces in a pose does not pull.
+      if (elementInUse(store.get()) !== element) scene({ pull: false });
     },
     pivot(pivot) {
       engine().setPivot(pivot);

@@ -3,7 +3,7 @@
 import { report } from "../actions/context";
 import type { App } from "../app";
 import type { Element as CageElement, Gesture } from "../contract";
-import { controlCount } from "../derived";
+import { controlCount, elementInUse } from "../derived";
 import { T } from "../words";
 import type { Command } from "./shortcuts";
 
@@ -114,7 +114,7 @@ export function createCommands(app: App): Record<Command, () => void> {
     boxSelect: () => {
       if (hasCage()) store.set({ boxArmed: !store.get().boxArmed });
     },
-    elementMode: () => view.element(NEXT_ELEMENT[store.get().element]),
+    elementMode: () => view.element(NEXT_ELEMENT[elementInUse(store.get())]),
     previousVertex: neighbour(-1),
     nextVertex: neighbour(1),
 

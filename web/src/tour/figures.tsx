@@ -135,7 +135,7 @@ function Choice({
 function Delta({ app, guide, reports }: Figure) {
   const { bindOptions } = app.store.get();
   const [report = null, ...earlier] = [...reports].reverse();
-  const curves = curvesOf({ bindRun: null, report, earlier, bindOptions });
+  const curves = curvesOf({ bindRun: null, report, earlier });
   const iterations = (name: string) => reports.find((one) => solverName(one) === name)?.iterations ?? 0;
   return (
     <>

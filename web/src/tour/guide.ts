@@ -83,7 +83,7 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
     edit.settle();
     if (isOpened(sample)) return true;
     opening = sample;
-    const isOpen = await files.openSample(sample);
+    const isOpen = await files.openSample(sample, store.get().bindOptions);
     if (mine !== turn) return false;
     opening = null;
     opened = isOpen ? { sample, poses: store.get().poses } : undefined;
@@ -218,7 +218,7 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
       if (was.work) await works.open({ ...was.work, where: "nowhere" });
       else if (was.sample !== null || !(await works.restore())) {
         if (isStill) await bind.start(true);
-        else await files.openSample(sample);
+        else await files.openSample(sample, was.settings.bindOptions);
       }
       store.set({ step: was.settings.step });
       ctx.session().engine.frameAll();

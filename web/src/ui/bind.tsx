@@ -3,7 +3,7 @@
 import type { App } from "../app";
 import type { BindOptions } from "../contract";
 import { BIND_DEFAULTS, PAPER_DEFAULTS } from "../defaults";
-import { cageBroken } from "../derived";
+import { cageBroken, hasUnappliedOptions } from "../derived";
 import { timeLeft } from "../eta";
 import { percent } from "../format";
 import type { BindRun } from "../state";
@@ -34,6 +34,12 @@ export function BindPanel({ app }: { app: App }) {
       </div>
       <Figure app={app} />
       <Section title={T.bind.how}>
+        {hasUnappliedOptions(app.store.get()) && !bindRun && (
+          <p class="memory">
+            <Icon name="info" />
+            {T.bind.unapplied}
+          </p>
+        )}
         <Ways app={app} />
         <Place app={app} />
         <Memory app={app} />
@@ -65,7 +71,7 @@ function Figure({ app }: { app: App }) {
   const curves = curvesOf(state).filter((curve) => curve.points.length > 0);
   const last = curves[0]?.points.at(-1);
   if (!last) return null;
-  const tau = state.bindRun ? state.bindOptions.tau : (state.report?.tau ?? state.bindOptions.tau);
+  const tau = state.bindRun?.options.tau ?? state.report?.tau ?? state.bindOptions.tau;
   return (
     <figure class="figure">
       <figcaption class="section-title">{T.bind.change}</figcaption>

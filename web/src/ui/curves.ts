@@ -7,10 +7,10 @@ import { type Curve, historyPoints, KINDS } from "./plot";
 import { solverName } from "./report";
 
 /** Curves, the one of the moment first; of each solver the latest beside it. */
-export function curvesOf({ bindRun, report, earlier, bindOptions }: CurveState): Curve[] {
+export function curvesOf({ bindRun, report, earlier }: CurveState): Curve[] {
   const reports = report ? [report, ...earlier] : [];
   const now = bindRun
-    ? { name: bindRun.pass === "coarse" ? T.bind.coarse : solverName(bindOptions), points: bindRun.curve }
+    ? { name: bindRun.pass === "coarse" ? T.bind.coarse : solverName(bindRun.options), points: bindRun.curve }
     : reports.slice(0, 1).map(pointsOf)[0];
   if (!now) return [];
   if (bindRun) return [{ ...now, kind: "now" }];
@@ -20,7 +20,7 @@ export function curvesOf({ bindRun, report, earlier, bindOptions }: CurveState):
   return shown.map((curve, k) => ({ ...curve, kind: KINDS[k] ?? "now" }));
 }
 
-export type CurveState = Pick<AppState, "bindRun" | "report" | "earlier" | "bindOptions">;
+export type CurveState = Pick<AppState, "bindRun" | "report" | "earlier">;
 
 function pointsOf(report: BindReport) {
   return {

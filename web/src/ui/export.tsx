@@ -80,15 +80,15 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
 
 /** Of which of several models the files are. */
 function Which({ app }: { app: App }) {
-  const [chosen, setChosen] = useState("");
-  const members = app.store.get().model?.members ?? [];
-  const which = members.find(({ id }) => String(id) === chosen)?.id ?? null;
-  useEffect(() => app.exports.only(which), [app, which]);
+  const { model, exportOnly } = app.store.get();
+  const members = model?.members ?? [];
   if (members.length < 2) return null;
+  const which = members.find(({ id }) => id === exportOnly)?.id ?? "";
+  const choose = (id: string) => app.store.set({ exportOnly: id === "" ? null : Number(id) });
   return (
     <label class="stack tight">
       <span class="legend-text">{T.exports.which}</span>
-      <select value={which ?? ""} onChange={({ currentTarget: { value } }) => setChosen(value)}>
+      <select value={which} onChange={({ currentTarget: { value } }) => choose(value)}>
         <option value="">{T.exports.all(members.length)}</option>
         {members.map(({ id, name }) => (
           <option key={id} value={id}>

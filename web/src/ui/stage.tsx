@@ -4,6 +4,7 @@ import { useLayoutEffect, useState } from "preact/hooks";
 import { isComparison } from "../actions/view";
 import type { App } from "../app";
 import type { Element as CageElement, CageState, SceneOptions } from "../contract";
+import { elementInUse } from "../derived";
 import type { Command } from "../input/shortcuts";
 import { sentence } from "../strings";
 import { T } from "../words";
@@ -102,7 +103,8 @@ const GIZMOS: readonly (readonly [Exclude<SceneOptions["gizmo"], "none">, IconNa
 const ELEMENTS: readonly CageElement[] = ["vertex", "edge", "face"];
 
 function Tools({ app }: { app: App }) {
-  const { scene, element, boxArmed, additive, symmetry, proportionalOn } = app.store.get();
+  const { scene, boxArmed, additive, symmetry, proportionalOn } = app.store.get();
+  const element = elementInUse(app.store.get());
   const command = (icon: IconName, label: string, run: Command, pressed: boolean) => (
     <IconButton
       icon={icon}

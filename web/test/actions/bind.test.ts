@@ -1,6 +1,7 @@
 import { named } from "@cagework/core/session/client";
 import { expect, it } from "vitest";
 import { createBind } from "../../src/actions/bind";
+import { hasUnappliedOptions, optionsInUse } from "../../src/derived";
 import { cageOf, createFake, MODEL, reportOf, settled } from "../fake";
 
 /** A page with a model in a cage. */
@@ -46,20 +47,27 @@ it("a second bind ends the first, silently, and each solver's report is kept bes
   ]);
 });
 
-it("a cancelled bind says that the one before is kept, with its settings", async () => {
+it("a cancelled bind leaves the previous one, and the settings just chosen are marked as not applied", async () => {
   const { bind, asked, store, said, problems } = page();
   const first = bind.start();
   await settled();
   asked[0]?.resolve(reportOf());
   await first;
+  expect(hasUnappliedOptions(store.get())).toBe(false);
   bind.setOptions({ grid: 256 });
   const second = bind.start();
   await settled();
   bind.cancel();
   await second;
-  expect(said).toEqual(["The bind from before is kept, and its settings."]);
-  expect(store.get()).toMatchObject({ bound: true, bindRun: null, bindOptions: { grid: 64 } });
+  expect(said).toEqual(["Cancelled. The previous bind is still active."]);
+  expect(store.get()).toMatchObject({ bound: true, bindRun: null, bindOptions: { grid: 256 } });
+  expect([hasUnappliedOptions(store.get()), optionsInUse(store.get()).grid]).toEqual([true, 64]);
   expect(problems).toEqual([]);
+  const third = bind.start();
+  await settled();
+  asked[2]?.resolve(reportOf({ grid: 256 }));
+  await third;
+  expect([hasUnappliedOptions(store.get()), optionsInUse(store.get()).grid]).toEqual([false, 256]);
 });
 
 it("an error is a problem with the fix that it has", async () => {

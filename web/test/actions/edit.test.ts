@@ -42,6 +42,14 @@ it("reshaping begins at rest: the pose before comes back by undo, with its share
   expect([store.get().shares, height(), store.get().editingRest]).toEqual([[1], 1, false]);
 });
 
+it("faces are selected for reshaping: leaving it ends that", () => {
+  const { edit, store } = page();
+  edit.setEditingRest(true);
+  store.set({ element: "face" });
+  edit.setEditingRest(false);
+  expect(store.get().element).toBe("vertex");
+});
+
 it("a gesture is one step, and one that is given up is none", async () => {
   const { edit, ctx, store, height } = page();
   expect(edit.begin("grab", 0, 0)).toBe(true);

@@ -1,6 +1,8 @@
 import { named } from "@cagework/core/session/client";
 import { expect, it } from "vitest";
 import { createFiles } from "../../src/actions/files";
+import { BIND_DEFAULTS } from "../../src/defaults";
+import { MODEL_STATE, PERSON_STATE } from "../../src/state";
 import { cageOf, createFake, MODEL, memberOf, modelOf, OPENED, settled } from "../fake";
 
 const file = (name: string, content = "v") => ({ name, path: name, file: new Blob([content]) });
@@ -175,4 +177,43 @@ it("a sample that cannot be built is said by its name", async () => {
     "The sample could not be opened",
     null,
   ]);
+});
+
+it("a model's settings end with it; the person's, and where and in how much memory binds run, stay", async () => {
+  const { files, asked, store } = page();
+  const { scene, cageOptions, rigOptions, bindOptions } = store.get();
+  store.set({
+    pullWhole: true,
+    symmetry: true,
+    ortho: true,
+    element: "face",
+    boxDivisions: 5,
+    exportOnly: 1,
+    slice: { axis: 0, position: 0.9, busy: false },
+    cageOptions: { ...cageOptions, vertices: 222, margin: 0.1, per_component: true },
+    rigOptions: { ...rigOptions, plain: !rigOptions.plain },
+    bindOptions: { ...bindOptions, grid: 32, tau: 1e-3, backend: "cpu", memory_limit: 7 },
+    theme: "light",
+    pivot: "last",
+    proportional: 0.5,
+    scene: { ...scene, gizmo: "scale", floor: false },
+  });
+  const { step: _, busy: __, ...person } = PERSON_STATE;
+  const keys = Object.keys(person) as (keyof typeof person)[];
+  const persons = () => keys.map((key) => [key, store.get()[key]]);
+  const before = persons();
+  const opened = files.openFiles([file("cube.obj")]);
+  await settled();
+  asked[0]?.resolve({ took: 0 });
+  await settled();
+  asked[1]?.resolve(OPENED);
+  await opened;
+  expect(persons()).toEqual(before);
+  expect(store.get()).toMatchObject({
+    ...MODEL_STATE,
+    model: MODEL,
+    cage: expect.anything(),
+    check: expect.anything(),
+    bindOptions: { ...BIND_DEFAULTS, backend: "cpu", memory_limit: 7 },
+  });
 });

@@ -1,5 +1,7 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import { followCage } from "../../src/actions/follow";
+import type { BindOptions } from "../../src/contract";
+import { BIND_DEFAULTS } from "../../src/defaults";
 import { cageOf, createFake } from "../fake";
 
 beforeEach(() => {
@@ -13,11 +15,12 @@ afterEach(() => {
 function page() {
   const fake = createFake();
   const count = { looks: 0, binds: 0 };
-  const state = { isActive: false, covers: false };
+  const state = { isActive: false, covers: false, grid: 0 };
   const bind = {
     covers: () => state.covers,
-    start: () => {
+    start: (_unasked = false, options: Partial<BindOptions> = {}) => {
       count.binds += 1;
+      state.grid = options.grid ?? 0;
       return Promise.resolve(true);
     },
   };
@@ -76,4 +79,12 @@ it("who has ended reshaping waits no longer", () => {
   store.set({ editingRest: false });
   vi.advanceTimersByTime(1);
   expect(count.binds).toBe(1);
+});
+
+it("settings that no bind has used yet wait for the user's word", () => {
+  const { store, state, change } = page();
+  store.set({ bindOptions: { ...BIND_DEFAULTS, grid: 128 }, appliedOptions: { ...BIND_DEFAULTS, grid: 32 } });
+  change();
+  vi.advanceTimersByTime(200);
+  expect(state.grid).toBe(32);
 });

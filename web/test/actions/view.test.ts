@@ -16,11 +16,16 @@ function page(canCompare = true) {
   const dark = Object.assign(new EventTarget(), { matches: true }) as MediaQueryList;
   const scenes: SceneOptions[] = [];
   const zooms: number[] = [];
-  fake.teach({ setScene: (scene) => scenes.push(scene), zoomAt: (_x, _y, factor) => zooms.push(factor) });
+  const elements: string[] = [];
+  fake.teach({
+    setScene: (scene) => scenes.push(scene),
+    zoomAt: (_x, _y, factor) => zooms.push(factor),
+    setElement: (element) => elements.push(element),
+  });
   const view = createView(fake.ctx, async () => canCompare, dark);
   const { positions, corners } = cageOf(8);
   fake.store.set({ cage: fake.engine.setCage(positions, corners) });
-  return { ...fake, view, scenes, zooms };
+  return { ...fake, view, scenes, zooms, elements };
 }
 
 it("the theme follows the system unless it is chosen", () => {
@@ -69,6 +74,19 @@ it("pictures side by side hold a smaller model each, and go when there is nothin
   const other = page(false);
   await other.view.compare(["harmonic", "green"]);
   expect(other.store.get().scene.compare).toEqual(["harmonic"]);
+});
+
+it("pulling takes single vertices, whatever was selected while reshaping", () => {
+  const { view, store, elements } = page();
+  store.set({ editingRest: true });
+  view.element("face");
+  expect(elements.at(-1)).toBe("face");
+  store.set({ editingRest: false });
+  expect([store.get().scene.pull, elements.at(-1)]).toEqual([true, "vertex"]);
+  view.element("edge");
+  expect([store.get().scene.pull, elements.at(-1)], "another tool than Pull").toEqual([false, "edge"]);
+  view.scene({ pull: true });
+  expect(elements.at(-1)).toBe("vertex");
 });
 
 it("proportional editing stays within its range and keeps its radius", () => {

@@ -72,7 +72,8 @@ export const bind = {
   cgOnCpu: "Conjugate gradients are computed on the processor, also when the graphics card is chosen.",
   card: (adapter: string) => `Graphics card: ${adapter}`,
   stopped: "The solver stopped at its iteration limit, before the change fell below the threshold.",
-  cancelled: "The bind from before is kept, and its settings.",
+  cancelled: "Cancelled. The previous bind is still active.",
+  unapplied: "Not applied yet: bind again to use these settings.",
 };
 
 export const report = {
