@@ -166,7 +166,13 @@ async function start({ artifact, module, canvas, adapter, lack, fresh }: Start):
     readSettings: (text, defaults) => pkg.readSettings(text, JSON.stringify(defaults)),
     readCage(files, hear) {
       const { smooth } = engine.cageControls();
-      const input = { files, up: engine.up(), model: engine.modelPositions(), smooth };
+      const input = {
+        files,
+        up: engine.up(),
+        origin: engine.origin(),
+        model: engine.modelPositions(),
+        smooth,
+      };
       return reading("readCage", input, hear);
     },
     boxCage: (divisions) => polygons(engine.boxCage(divisions)),

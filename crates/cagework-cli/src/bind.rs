@@ -15,7 +15,7 @@ use crate::card;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, refuse_files_read, write};
 use crate::gpu;
-use crate::load::{generated_model, load_cage, load_model};
+use crate::load::{load_cage, load_model};
 use crate::progress::Bar;
 use crate::rig;
 
@@ -101,7 +101,7 @@ pub(crate) fn bind_model(model: &Model, cage: &Cage, options: &BindOptions) -> R
 fn save_cage(args: &BindArgs, cage: &Cage, model: &Model) -> Result<(), CliError> {
     let Some(path) = &args.save_cage else { return Ok(()) };
     let mesh = model.up().mesh_turned_back(&cage.to_polygon_mesh());
-    let made = generated_model("cage.obj", &mesh, model.origin())?;
+    let made = Model::of_mesh("cage.obj", &mesh, model.origin())?;
     write(path, &made.write(ModelFormat::Obj, &mesh.positions).map_err(|e| CliError::file(path, e))?)
 }
 

@@ -2,7 +2,7 @@
 
 use cagework_core::PolygonMesh;
 use cagework_core::cage_gen::CageReport;
-use cagework_io::shown;
+use cagework_io::{Model, shown};
 use glam::DVec3;
 use serde::Serialize;
 
@@ -10,7 +10,7 @@ use crate::args::{CageArgs, DEFAULT_DIVISIONS, KindArg, ModelOutput};
 use crate::bind::export;
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, write};
-use crate::load::{box_mesh, generate_for, generated_model, load_model};
+use crate::load::{box_mesh, generate_for, load_model};
 
 /// What was made; its JSON is the output of `--json`.
 #[derive(Debug, Serialize)]
@@ -72,7 +72,7 @@ pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
 /// # Errors
 /// When it cannot be written.
 pub(crate) fn write_cage(output: &ModelOutput, cage: &PolygonMesh, origin: DVec3) -> Result<(), CliError> {
-    write(&output.path, &export(&generated_model("cage.obj", cage, origin)?, &cage.positions, output)?)
+    write(&output.path, &export(&Model::of_mesh("cage.obj", cage, origin)?, &cage.positions, output)?)
 }
 
 /// A length of a model of any size, to three digits.

@@ -45,8 +45,8 @@ fn load_inner(
     (up, origin): (UpAxis, DVec3),
     memory: MemoryArgs,
 ) -> Result<InnerControls, CliError> {
-    let mut inner = read_inner_controls(&read(path)?, memory.bytes()).map_err(|e| CliError::file(path, e))?;
-    inner.positions.iter_mut().for_each(|p| *p = (p.as_dvec3() - origin).as_vec3());
+    let inner = read_inner_controls(&read(path)?, origin, memory.bytes());
+    let mut inner = inner.map_err(|e| CliError::file(path, e))?;
     inner.positions = up.turned(&inner.positions).into_owned();
     Ok(inner)
 }

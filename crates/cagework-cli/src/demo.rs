@@ -6,7 +6,7 @@ use std::time::Instant;
 use cagework_core::options::BindOptions;
 use cagework_core::{BindReport, PolygonMesh};
 use cagework_io::{Model, write_cage_obj, write_weights_npz};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::args::DemoArgs;
@@ -38,8 +38,8 @@ pub(crate) fn run(args: &DemoArgs, as_json: bool) -> Result<(), CliError> {
     let BuiltIn { name: sample, mesh, model, cage, poses: cage_poses } = built_in()?;
     let binding = bind_model(&model, &cage, &BindOptions::default())?;
 
-    files.write(&format!("{sample}.obj"), &write_cage_obj(&mesh))?;
-    files.write("cage.obj", &write_cage_obj(&cage.to_polygon_mesh()))?;
+    files.write(&format!("{sample}.obj"), &write_cage_obj(&mesh, DVec3::ZERO))?;
+    files.write("cage.obj", &write_cage_obj(&cage.to_polygon_mesh(), DVec3::ZERO))?;
     files.write(
         "weights.npz",
         &write_weights_npz(&binding.weights, &binding.frames, &binding.outside, &[], &[]),
@@ -54,7 +54,7 @@ pub(crate) fn run(args: &DemoArgs, as_json: bool) -> Result<(), CliError> {
         files.write_glb(&format!("{stem}.glb"), &model, &deformed)?;
         let cage = PolygonMesh { positions: posed, ..cage.to_polygon_mesh() };
         let file = format!("{stem}-cage.obj");
-        files.write(&file, &write_cage_obj(&cage))?;
+        files.write(&file, &write_cage_obj(&cage, DVec3::ZERO))?;
         posed_cage.get_or_insert(file);
         poses.push((name, deformed));
     }

@@ -7,7 +7,7 @@ use cagework_core::cage_check::notices;
 use cagework_core::mesh::weld;
 use cagework_core::{Bounds, Cage};
 use cagework_io::{Clip, Model, ModelFormat, escaped, read_inner_controls, shown};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::args::InfoArgs;
@@ -96,7 +96,7 @@ fn inner_info(args: &InfoArgs) -> Result<Option<InnerInfo>, CliError> {
     if ModelFormat::of_export(&args.model.to_string_lossy()) != Some(ModelFormat::Obj) {
         return Ok(None);
     }
-    let Ok(inner) = read_inner_controls(&read(&args.model)?, args.read.memory.bytes()) else {
+    let Ok(inner) = read_inner_controls(&read(&args.model)?, DVec3::ZERO, args.read.memory.bytes()) else {
         return Ok(None);
     };
     let count = |name| inner.elements.iter().filter(|element| element.name() == name).count();

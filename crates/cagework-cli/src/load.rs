@@ -9,7 +9,7 @@ use cagework_core::{
     Bounds, Cage, CageError, CageOptions, ControlSet, Controls, InnerControls, PolygonMesh, TriMesh,
     subdivided_box,
 };
-use cagework_io::{Model, PoseState, UpAxis, write_cage_obj};
+use cagework_io::{Model, PoseState, UpAxis};
 use glam::{DVec3, Vec3};
 
 use crate::args::{CageSource, ControlArgs, DEFAULT_MARGIN, MemoryArgs, ModelOutput};
@@ -57,18 +57,8 @@ fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliErr
     let bytes = read(path)?;
     let name = path.display().to_string();
     let mut beside = |relative: &str| read_beside(path, relative);
-    let mut model = Model::read_near(&name, &bytes, &mut beside, memory.bytes())?;
+    let mut model = Model::read_within(&name, &bytes, &mut beside, memory.bytes())?;
     model.set_up(up);
-    Ok(model)
-}
-
-/// A mesh that was made, its positions from an origin, as the model that its OBJ file would be.
-///
-/// # Errors
-/// When it has no vertices.
-pub(crate) fn generated_model(name: &str, mesh: &PolygonMesh, origin: DVec3) -> Result<Model, CliError> {
-    let mut model = Model::read(name, &write_cage_obj(mesh), &mut |_| None)?;
-    model.set_origin(origin);
     Ok(model)
 }
 
@@ -97,7 +87,7 @@ pub(crate) fn built_in() -> Result<BuiltIn, CliError> {
     let Sample { mesh, cage, poses, .. } = samples::build(id).ok_or_else(missing)?;
     let TriMesh { positions, triangles } = mesh;
     let mesh = PolygonMesh { positions, faces: triangles.iter().map(|t| t.to_vec()).collect() };
-    let model = generated_model(&format!("{id}.obj"), &mesh, DVec3::ZERO)?;
+    let model = Model::of_mesh(&format!("{id}.obj"), &mesh, DVec3::ZERO)?;
     let cage = Cage::new(&cage).map_err(|source| CliError::Cage { name: id.into(), source })?;
     Ok(BuiltIn { name: id.to_owned(), mesh, model, cage, poses })
 }
@@ -118,11 +108,11 @@ pub(crate) fn load_cage(
         }
         CageSource::Box { divisions } => {
             let mesh = box_mesh(&around.positions, *divisions, DEFAULT_MARGIN)?;
-            generated_model("box cage", &mesh, around.origin())?
+            Model::of_mesh("box cage", &mesh, around.origin())?
         }
         CageSource::Auto(options) => {
             let options = CageOptions { smooth: controls.smooth.smooth, ..*options };
-            generated_model("generated cage", &generate_for(around, None, &options)?.0, around.origin())?
+            Model::of_mesh("generated cage", &generate_for(around, None, &options)?.0, around.origin())?
         }
     };
     LoadedCage::new(model, around.up(), memory, controls)

@@ -96,9 +96,9 @@ pub(crate) fn write_pose(
     let (of_cage, of_inner) = pose.split_at(cage.cage.n_vertices());
     write(&args.output.path, &cage.write_pose(of_cage, &args.output)?)?;
     if let (Some(path), Some(inner)) = (&args.save_controls, cage.inner()) {
-        let mut positions = model.up().turned_back(of_inner).into_owned();
-        positions.iter_mut().for_each(|p| *p = (p.as_dvec3() + model.origin()).as_vec3());
-        write(path, &write_inner_controls(&InnerControls { positions, ..inner.clone() }))?;
+        let positions = model.up().turned_back(of_inner).into_owned();
+        let posed = InnerControls { positions, ..inner.clone() };
+        write(path, &write_inner_controls(&posed, model.origin()))?;
     }
     Ok(())
 }

@@ -45,7 +45,7 @@ pub use memory::MemoryError;
 pub use model::{Model, PoseState, ReadError};
 pub use npz::{NpzError, SavedWeights, read_weights_npz, write_weights_npz};
 pub use obj::{ObjError, read_inner_controls, write_cage_obj, write_inner_controls};
-pub use origin::far_notice;
+pub use origin::origin_near;
 pub use part_kind::PartKind;
 pub use polygons::PolygonsError;
 pub use pose_code::{PoseCodeError, decode_pose, encode_pose};

@@ -7,7 +7,7 @@ pub use cage::PoseState;
 
 use std::borrow::Cow;
 
-use cagework_core::TriMesh;
+use cagework_core::{PolygonMesh, TriMesh};
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
@@ -107,6 +107,7 @@ impl Model {
     }
 
     /// Reads an OBJ, glTF, GLB, PLY, STL or OFF file; the content decides which, `name` helps with the error if it is none of them.
+    /// A model far from the world's origin has its positions from an [`Self::origin`] near it, without loss.
     ///
     /// `resolve` is asked for sibling files (buffers and textures of a `.gltf`, materials and textures of an OBJ) by
     /// relative path, each once; `data:` URIs are decoded here. A buffer that is not read is an error, anything else a
@@ -129,27 +130,17 @@ impl Model {
         resolve: &mut Resolve<'_>,
         memory_limit: u64,
     ) -> Result<Self, ReadError> {
-        let mut model = Self::read_from(name, bytes, resolve, memory_limit, false)?;
-        model.notices.extend(far_notice(&model.positions));
-        Ok(model)
+        Self::read_from(name, bytes, resolve, memory_limit, true)
     }
 
-    /// As [`Self::read_within`]; a model far from the world's origin has its positions from an [`Self::origin`] near it, without
-    /// loss. That of models with skeletons, morph targets or clips is always zero.
+    /// A mesh that was made, its positions as seen from an origin, as the model that its OBJ file would be.
     ///
     /// # Errors
-    /// Those of [`Self::read_within`].
-    pub fn read_near(
-        name: &str,
-        bytes: &[u8],
-        resolve: &mut Resolve<'_>,
-        memory_limit: u64,
-    ) -> Result<Self, ReadError> {
-        let mut model = Self::read_from(name, bytes, resolve, memory_limit, true)?;
-        if model.origin == DVec3::ZERO {
-            model.notices.extend(far_notice(&model.positions));
-        }
-        Ok(model)
+    /// [`ReadError`] when it has no vertices.
+    pub fn of_mesh(name: &str, mesh: &PolygonMesh, origin: DVec3) -> Result<Self, ReadError> {
+        let text = obj::write_cage_obj(mesh, DVec3::ZERO);
+        let model = Self::read_from(name, &text, &mut |_| None, u64::MAX, false)?;
+        Ok(Self { origin, ..model })
     }
 
     fn read_from(
@@ -288,25 +279,22 @@ impl Model {
         self.up = up;
     }
 
-    /// What the positions are seen from, in the file's axes: zero but for models far away that [`Self::read_near`] read.
+    /// What the positions are seen from, in the file's axes: zero unless the model is far away.
     #[must_use]
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
 
-    /// Sees the positions from another origin, in the file's axes: a cage and its poses from that of their model.
+    /// Sees the positions from another origin, in the file's axes: a cage and its poses from that of their model. Adds a notice
+    /// if the model is so far from it that positions are rounded.
     pub fn see_from(&mut self, origin: DVec3) {
         if origin != self.origin {
             let from = |p: &Vec3| relative(self.origin + p.as_dvec3(), origin);
             let positions: Vec<Vec3> = self.positions_in_file().iter().map(from).collect();
             self.positions = self.up.turned(&positions).into_owned();
             self.origin = origin;
+            self.notices.extend(far_notice(&self.positions));
         }
-    }
-
-    /// Says what the positions are seen from, and leaves them as they are: of a model that was made, not read.
-    pub fn set_origin(&mut self, origin: DVec3) {
-        self.origin = origin;
     }
 
     /// Positions at rest as they are in the file, as seen from the origin.

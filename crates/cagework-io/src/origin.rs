@@ -10,13 +10,20 @@ use glam::{DVec3, Vec3};
 /// Coordinates that are larger than this many times the model's extent lose more than a millionth of it to rounding.
 const FAR: f32 = 16.0;
 
-/// An origin near a model, representable in 32 bits: zero along each axis where that is near enough.
-pub(crate) fn origin_near(positions: &[Vec3]) -> DVec3 {
+/// An origin near a model, object units, representable in 32 bits: zero along each axis where that is near enough.
+#[must_use]
+pub fn origin_near(positions: &[Vec3]) -> DVec3 {
     let Some(bounds) = Bounds::of(positions) else { return DVec3::ZERO };
     let (center, extent) = (bounds.center(), bounds.extent().max_element());
     let of_axis = |x: f32| if x.is_finite() && x.abs() > FAR * extent { x } else { 0.0 };
     // A single point, or a model that rounding has flattened to one, is near itself.
     Vec3::from_array(center.to_array().map(of_axis)).as_dvec3()
+}
+
+/// An origin as the translation of a node, of 32 bits, and the rest of it.
+pub(crate) fn translation(origin: DVec3) -> ([f32; 3], DVec3) {
+    let narrow = origin.as_vec3();
+    (narrow.to_array(), origin - narrow.as_dvec3())
 }
 
 /// As seen from an origin.
@@ -28,8 +35,7 @@ pub(crate) fn relative(position: DVec3, origin: DVec3) -> Vec3 {
 const COARSE: f32 = 1e-5;
 
 /// The notice on positions so far from the origin that numbers of 32 bits have coarse steps there, if they have.
-#[must_use]
-pub fn far_notice(positions: &[Vec3]) -> Option<String> {
+pub(crate) fn far_notice(positions: &[Vec3]) -> Option<String> {
     let extent = Bounds::of(positions)?.extent().max_element();
     let far = origin_near(positions).abs().max_element() as f32;
     let step = far.next_up() - far;

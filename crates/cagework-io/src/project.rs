@@ -7,7 +7,7 @@
 //! viewers do not see. Weights are not kept: they are made again from the same settings.
 
 use cagework_core::PolygonMesh;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
 use thiserror::Error;
 
@@ -15,12 +15,15 @@ use crate::error::WriteError;
 use crate::format::ModelFormat;
 use crate::gltf::{self, PROJECT_EXTENSION as EXTENSION, Pack, push};
 use crate::model::{Document, Model, ReadError};
+use crate::origin::translation;
 use crate::shown::shown;
 use crate::up::UpAxis;
 
-/// Version that is written for one model; those for several have the next one, which older programs cannot read.
+/// Version that is written for one model. Older programs cannot read the next two: those of several models, and of models far
+/// from the origin.
 const VERSION: u64 = 1;
 const VERSION_OF_SEVERAL: u64 = 2;
+const VERSION_OF_FAR: u64 = 3;
 
 /// What a project holds.
 #[derive(Clone, Debug)]
@@ -43,7 +46,7 @@ pub enum ProjectError {
     Model(#[from] ReadError),
     /// From another version of this program.
     #[error(
-        "{} is a project of version {found}, but this program reads versions up to {VERSION_OF_SEVERAL}: update it",
+        "{} is a project of version {found}, but this program reads versions up to {VERSION_OF_FAR}: update it",
         shown(name)
     )]
     Version {
@@ -62,7 +65,7 @@ pub enum ProjectError {
     },
 }
 
-/// Everything as one GLB. `models`: in one cage, all with the same axis up; `poses`: cage positions, `[n_cage]` each.
+/// Everything as one GLB. `models`: in one cage, all with the same axis up and the same origin, which cage and poses share; `poses`: cage positions, `[n_cage]` each.
 ///
 /// # Errors
 /// [`WriteError`] when there is no model, a document cannot be written or the file would be too large.
@@ -90,12 +93,16 @@ pub fn write_project(
     gltf::embed_images(document, &mut json, &mut pack);
     let up = model.up();
     let cage = &up.mesh_turned_back(cage);
-    let node = add_cage(&mut json, &mut pack, cage);
+    let node = add_cage(&mut json, &mut pack, cage, model.origin);
     let mut view =
         |json: &mut Value, bytes: Vec<u8>| json!({ "bufferView": pack.push_view(json, bytes, None) });
     let version = if more.is_empty() { VERSION } else { VERSION_OF_SEVERAL };
+    let version = if model.origin == DVec3::ZERO { version } else { VERSION_OF_FAR };
     let mut project = json!({ "version": version, "name": model.name, "node": node, "settings": settings });
     project["up"] = up.name().into();
+    if version == VERSION_OF_FAR {
+        project["origin"] = json!(model.origin.to_array());
+    }
     if let Some(source) = source {
         project["source"] = view(&mut json, source);
     }
@@ -143,7 +150,7 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         .map_err(|source| ReadError::Gltf { name: name.into(), source })?;
     let Some(project) = take_project(&mut json) else { return Ok(None) };
     let found = project["version"].as_u64().unwrap_or(0);
-    if !(VERSION..=VERSION_OF_SEVERAL).contains(&found) {
+    if !(VERSION..=VERSION_OF_FAR).contains(&found) {
         return Err(ProjectError::Version { name: name.into(), found });
     }
     let views = json["bufferViews"].clone();
@@ -155,6 +162,16 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
     let model_name = project["name"].as_str().unwrap_or(name);
     // Projects from before the choice have none.
     let up = project["up"].as_str().and_then(UpAxis::named).unwrap_or_default();
+    // Projects of models near the origin have none.
+    let origin: Option<[f64; 3]> = serde_json::from_value(project["origin"].clone())
+        .map_err(|_| damaged("its origin is not three numbers"))?;
+    let origin = DVec3::from_array(origin.unwrap_or_default());
+    let place = |model: &mut Model| {
+        model.see_from(origin);
+        model.set_up(up);
+        let is_finite = model.positions.iter().all(|p| p.is_finite());
+        is_finite.then_some(()).ok_or(damaged("its origin is too far from its models"))
+    };
     let positions_of = |bytes: &[u8]| Some(up.turned(&positions_of(bytes)?).into_owned());
     let cage = &project["cage"];
     let positions = view(&cage["positions"]).and_then(positions_of).ok_or(damaged("its cage is cut off"))?;
@@ -174,7 +191,7 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         let plain = gltf::glb_of(&json, &bin).map_err(|_| damaged("it cannot be put together again"))?;
         Model::read_within(model_name, &plain, &mut |_| None, memory_limit)?
     };
-    model.set_up(up);
+    place(&mut model)?;
     let mut models = vec![model];
     for part in project["more"].as_array().into_iter().flatten() {
         let bytes = view(part).ok_or(damaged("one of its models is cut off"))?;
@@ -183,7 +200,7 @@ pub fn read_project(name: &str, bytes: &[u8], memory_limit: u64) -> Result<Optio
         let name = part["name"].as_str().unwrap_or("model");
         let mut model = Model::read_within(name, bytes, &mut |_| None, left)?;
         model.require_faces()?;
-        model.set_up(up);
+        place(&mut model)?;
         models.push(model);
     }
     Ok(Some(Project { models, cage: PolygonMesh { positions, faces }, poses, settings }))
@@ -220,7 +237,7 @@ fn take_project(json: &mut Value) -> Option<Value> {
 }
 
 /// The cage as lines at a node of its own; the node.
-fn add_cage(json: &mut Value, pack: &mut Pack<'_>, cage: &PolygonMesh) -> Option<usize> {
+fn add_cage(json: &mut Value, pack: &mut Pack<'_>, cage: &PolygonMesh, origin: DVec3) -> Option<usize> {
     /// Mode of a primitive: lines.
     const LINES: u32 = 1;
     let mut edges: Vec<[u32; 2]> = Vec::new();
@@ -243,6 +260,9 @@ fn add_cage(json: &mut Value, pack: &mut Pack<'_>, cage: &PolygonMesh) -> Option
     });
     let mesh = push(json, "meshes", json!({ "name": "cage", "primitives": [primitive] }));
     let node = push(json, "nodes", json!({ "name": "cage", "mesh": mesh }));
+    if origin != DVec3::ZERO {
+        json["nodes"][node]["translation"] = json!(translation(origin).0);
+    }
     if json["scenes"].as_array().is_none_or(Vec::is_empty) {
         return Some(node);
     }

@@ -94,14 +94,15 @@ impl Model {
         }
     }
 
-    /// The model with its skeleton, morph targets and clips, to be played; its vertices have the file's axes. None of a format
+    /// The model with its skeleton, morph targets and clips, to be played; its vertices have the file's axes and this model's
+    /// [`Self::origin`]. None of a format
     /// without any.
     ///
     /// # Errors
     /// [`WriteError`] when a part of them cannot be read.
     pub fn player(&self) -> Result<Option<Player>, WriteError> {
         match &self.document {
-            Document::Gltf(document) => Ok(Some(Player::new(document, document)?)),
+            Document::Gltf(document) => Ok(Some(Player::new(document, document, self.origin)?)),
             Document::Obj(_) => Ok(None),
         }
     }
@@ -111,12 +112,9 @@ impl Model {
     /// # Errors
     /// [`WriteError`] when it is none.
     pub fn player_of(&self, export: &[u8]) -> Result<Player, WriteError> {
-        let wrong = |e: String| WriteError::Document(e);
-        let read = Self::read("export.glb", export, &mut |_| None).map_err(|e| wrong(e.to_string()))?;
-        match (&read.document, &self.document) {
-            (Document::Gltf(of), Document::Gltf(like)) => Ok(Player::new(of, like)?),
-            _ => Err(WriteError::NoRig),
-        }
+        let Document::Gltf(like) = &self.document else { return Err(WriteError::NoRig) };
+        let read = gltf::read("export.glb", export, &mut |_| None, u64::MAX, Some(self.origin))?;
+        Ok(Player::new(&read.document, like, self.origin)?)
     }
 
     /// The animation clips of the file.
@@ -179,8 +177,7 @@ impl Model {
     pub fn states(&self, clip: Option<&str>) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), NoClip> {
         let (mut positions, mut triangles) = (self.positions.clone(), self.triangles.clone());
         if let Ok(Some(rig)) = self.rig() {
-            let ends: Vec<Vec3> =
-                rig.shown_ends().map(DVec3::as_vec3).filter(|end| end.is_finite()).collect();
+            let ends: Vec<Vec3> = rig.shown_ends().filter(|end| end.is_finite()).collect();
             positions.extend_from_slice(&self.up.turned(&ends));
         }
         let Some(asked) = clip else { return Ok((positions, triangles)) };

@@ -54,7 +54,7 @@ fn file(format: ModelFormat) -> String {
 }
 
 fn read_near(name: &str, bytes: &[u8]) -> Model {
-    Model::read_near(name, bytes, &mut |_| None, u64::MAX).unwrap()
+    Model::read(name, bytes, &mut |_| None).unwrap()
 }
 
 /// Places of all corners of triangles, in 64 bits.
@@ -91,9 +91,9 @@ fn texts_far_from_the_origin_are_read_and_written_without_loss() {
             let written = read_near("moved", &model.write(to, &moved).unwrap());
             assert_near(&places(&written), &expected, 3.0 * TOLERANCE);
         }
-        // Not asked for it, 32 bits are kept, and their steps are named.
-        let rounded = read("x", text.as_bytes()).unwrap();
-        assert_eq!(rounded.origin(), DVec3::ZERO);
+        // Seen from far away it is rounded, and the steps are named.
+        let mut rounded = read_near("x", text.as_bytes());
+        rounded.see_from(DVec3::ZERO);
         assert_eq!(
             rounded.notices,
             ["the model is so far from the origin that its coordinates have steps of 5e-1: move it nearer"]

@@ -6,7 +6,7 @@ mod common;
 
 use cagework_io::{ModelFormat, UpAxis, write_cage_obj};
 use common::{CUBE_OBJ, cube, plain_cube, read, twist, volume};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 
 /// Message of a failed read.
@@ -59,7 +59,7 @@ fn cage_keeps_its_polygons() {
     assert_eq!(cage.positions, cube());
     assert_eq!(cage.faces[0], [0, 2, 3, 1]);
     assert_eq!(cage.faces.len(), 6);
-    let again = read("y.obj", &write_cage_obj(&cage)).unwrap().cage_mesh();
+    let again = read("y.obj", &write_cage_obj(&cage, DVec3::ZERO)).unwrap().cage_mesh();
     assert_eq!(again, cage);
 }
 
@@ -258,7 +258,7 @@ fn wrong_positions_are_refused() {
 #[test]
 fn smoothing_is_kept_in_an_obj_and_shown_by_a_glb() {
     let cube = read("x.obj", CUBE_OBJ.as_bytes()).unwrap().cage_mesh();
-    let smooth = String::from_utf8(write_cage_obj(&cube)).unwrap();
+    let smooth = String::from_utf8(write_cage_obj(&cube, DVec3::ZERO)).unwrap();
     let flat = smooth.replacen("f ", "s off\nf ", 1);
     let model = read("x.obj", flat.as_bytes()).unwrap();
     assert_eq!(String::from_utf8(model.write_obj(&model.positions).unwrap()).unwrap(), flat);

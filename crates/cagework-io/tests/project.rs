@@ -5,9 +5,11 @@
 mod common;
 
 use cagework_core::{PolygonMesh, subdivided_box};
-use cagework_io::{Look, Model, ModelFormat, Project, ProjectError, UpAxis, read_project, write_project};
+use cagework_io::{
+    Look, Model, ModelFormat, Project, ProjectError, UpAxis, read_project, write_cage_obj, write_project,
+};
 use common::{CUBE_OBJ, PNG, glb, instanced, json_of, plain_cube, quantized, read, skinned, textured_square};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde_json::json;
 
 const SETTINGS: &str = r#"{"grid":128,"name":"Überpose"}"#;
@@ -91,6 +93,37 @@ fn several_models_in_one_cage_come_back_in_their_order() {
     let again: Vec<&Model> = project.models.iter().collect();
     let twice = write_project(&again, &cage, &poses(&cage), SETTINGS).unwrap();
     assert!(twice.len() <= once.len() + 64, "{} then {}", once.len(), twice.len());
+}
+
+/// Cage and poses are kept as seen from the models' origin, without rounding; other programs see the cage around the model.
+#[test]
+fn projects_far_from_the_origin_keep_their_origin() {
+    let place = DVec3::new(500_000.25, 0.0, -4_500_000.5);
+    let mut b = plain_cube();
+    b.json["nodes"][0]["translation"] = json!(place.to_array());
+    let cube = read("x.glb", &b.glb()).unwrap();
+    let text = String::from_utf8(write_cage_obj(&cube.cage_mesh(), cube.origin())).unwrap();
+    for mut model in [cube.clone(), read("x.obj", text.as_bytes()).unwrap()] {
+        model.see_from(cube.origin());
+        let cage = cage(&model);
+        let bytes = write_project(&[&model, &cube], &cage, &poses(&cage), SETTINGS).unwrap();
+        let project = reopened(&bytes);
+        assert_eq!((&project.cage, &project.poses), (&cage, &poses(&cage)));
+        for (back, model) in project.models.iter().zip([&model, &cube]) {
+            assert_eq!((back.origin(), &back.positions), (model.origin(), &model.positions));
+        }
+        let json = json_of(&bytes);
+        assert_eq!(json["extensions"]["CAGEWORK_project"]["version"], json!(3));
+        let lines = json["nodes"].as_array().unwrap().last().unwrap();
+        assert_eq!(lines["translation"], json!(cube.origin().to_array()));
+        for origin in [json!([1.0, 2.0]), json!([f64::MAX, 0.0, 0.0])] {
+            let mut json = json.clone();
+            json["extensions"]["CAGEWORK_project"]["origin"] = origin;
+            let bin = &bytes[bytes.len() - json["buffers"][0]["byteLength"].as_u64().unwrap() as usize..];
+            let damaged = read_project("saved.glb", &glb(&json, Some(bin)), u64::MAX);
+            assert!(damaged.unwrap_err().to_string().contains("its origin is"));
+        }
+    }
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! NumPy arrays as the core's arrays and back.
 
 use cagework_core::{Binding, Frames, Weights};
-use cagework_io::far_notice;
+use cagework_io::origin_near;
 use glam::{DVec3, Vec3};
 use numpy::{
     PyArray1, PyArray2, PyArrayDescrMethods as _, PyArrayDyn, PyArrayMethods as _, PyReadonlyArray2,
@@ -20,7 +20,7 @@ pub(crate) enum Points<'py> {
 }
 
 impl Points<'_> {
-    /// `[n]`
+    /// As seen from an origin. `[n]`
     pub(crate) fn as_slice(&self) -> &[Vec3] {
         match self {
             Self::Lent(array) => bytemuck::cast_slice(array.as_slice().expect("rows were asked for")),
@@ -41,27 +41,50 @@ fn wrong(name: &str, array: &Bound<'_, PyUntypedArray>, needed: &str) -> PyErr {
     error::array(format!("{name}: {dtype} of shape {shape:?} came; {needed} is needed"))
 }
 
-/// Points `[n, 3]`, as many as `n` says, if it does.
+/// Points `[n, 3]` as seen from an origin; as many as `n` says, if it does.
 ///
 /// # Errors
 /// `ArrayError` names type and shape that came, and those that are needed.
-pub(crate) fn points<'py>(name: &str, value: &Bound<'py, PyAny>, n: Option<usize>) -> PyResult<Points<'py>> {
+pub(crate) fn points<'py>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+    n: Option<usize>,
+    origin: DVec3,
+) -> PyResult<Points<'py>> {
     let array = in_rows(value)?;
     let fits = matches!(*array.shape(), [rows, 3] if n.is_none_or(|n| n == rows));
     match (fits, array.cast::<PyArray2<f32>>(), array.cast::<PyArray2<f64>>()) {
-        (true, Ok(array), _) => Ok(Points::Lent(array.try_readonly()?)),
+        (true, Ok(array), _) if origin == DVec3::ZERO => Ok(Points::Lent(array.try_readonly()?)),
+        (true, Ok(array), _) => {
+            let array = array.try_readonly()?;
+            let rows = array.as_slice().expect("rows were asked for").as_chunks::<3>().0;
+            let from = |&p: &[f32; 3]| (Vec3::from_array(p).as_dvec3() - origin).as_vec3();
+            Ok(Points::Converted(rows.iter().map(from).collect()))
+        }
         (true, _, Ok(array)) => {
             let array = array.try_readonly()?;
             let rows = array.as_slice().expect("rows were asked for").as_chunks::<3>().0;
-            let points: Vec<Vec3> = rows.iter().map(|&p| DVec3::from_array(p).as_vec3()).collect();
-            far_notice(&points).map_or(Ok(()), |said| error::warn(value.py(), &format!("{name}: {said}")))?;
-            Ok(Points::Converted(points))
+            Ok(Points::Converted(rows.iter().map(|&p| (DVec3::from_array(p) - origin).as_vec3()).collect()))
         }
         _ => {
             let n = n.map_or("n".to_owned(), |n| n.to_string());
             Err(wrong(name, &array, &format!("float32 or float64 of shape [{n}, 3]")))
         }
     }
+}
+
+/// Points `[n, 3]` as seen from an origin near them, and that origin: zero unless they are far away.
+///
+/// # Errors
+/// As [`points`].
+pub(crate) fn placed<'py>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+    n: Option<usize>,
+) -> PyResult<(Points<'py>, DVec3)> {
+    let world = points(name, value, n, DVec3::ZERO)?;
+    let origin = origin_near(world.as_slice());
+    if origin == DVec3::ZERO { Ok((world, origin)) } else { Ok((points(name, value, n, origin)?, origin)) }
 }
 
 /// Indices of an array of whole numbers.
@@ -117,14 +140,17 @@ pub(crate) fn faces(value: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<u32>>> {
     }
 }
 
-/// Points as an array `[n, 3]` of 32-bit floats.
+/// Points as seen from an origin as an array `[n, 3]` of 32-bit floats, or of 64-bit ones far away.
 ///
 /// # Errors
 /// None in practice.
-pub(crate) fn array_of<'py>(py: Python<'py>, points: Vec<Vec3>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+pub(crate) fn array_of(py: Python<'_>, points: Vec<Vec3>, origin: DVec3) -> PyResult<Bound<'_, PyAny>> {
+    if origin != DVec3::ZERO {
+        return Ok(wide_array_of(py, points.iter().map(|p| origin + p.as_dvec3()))?.into_any());
+    }
     let n = points.len();
     let flat = points.into_iter().map(|p| p.to_array()).collect::<Vec<_>>().into_flattened();
-    PyArray1::from_vec(py, flat).reshape([n, 3])
+    Ok(PyArray1::from_vec(py, flat).reshape([n, 3])?.into_any())
 }
 
 /// Points as an array `[n, 3]` of 64-bit floats.

@@ -4,7 +4,6 @@ use cagework_core::bind::{BindError, Binding, SolvedCage};
 use cagework_core::deform::deform_bound;
 use cagework_core::{BindOptions, bind as bind_points};
 use glam::Vec3;
-use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -50,7 +49,7 @@ pub(crate) fn bind<'py>(
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Returned<'py>> {
     let (options, controls) = (bind_options(options)?, cage.get().controls());
-    let points = arrays::points("points", points, None)?;
+    let points = arrays::points("points", points, None, cage.get().origin())?;
     let positions = points.as_slice();
     let options = BindOptions { held: size_of_val(positions) as u64, ..options };
     let binding = work::run(py, |progress| bind_points(positions, controls, &options, progress))?;
@@ -74,8 +73,8 @@ pub(crate) fn bind_many<'py>(
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Vec<Returned<'py>>> {
     let (options, controls) = (bind_options(options)?, cage.get().controls());
-    let points: Vec<_> =
-        models.iter().map(|points| arrays::points("points", points, None)).collect::<PyResult<_>>()?;
+    let of = |points| arrays::points("points", points, None, cage.get().origin());
+    let points: Vec<_> = models.iter().map(of).collect::<PyResult<_>>()?;
     let positions: Vec<_> = points.iter().map(arrays::Points::as_slice).collect();
     let all = work::run(py, |progress| {
         let solved = SolvedCage::new(controls, &options, progress)?;
@@ -97,7 +96,8 @@ fn returned(py: Python<'_>, binding: Binding) -> PyResult<Returned<'_>> {
     Ok((arrays::matrix_of(py, weights)?, report))
 }
 
-/// Points of a posed cage: deform(weights, posed, report=None) -> [n_points, 3] float32, object units
+/// Points of a posed cage: deform(weights, posed, report=None) -> [n_points, 3] float32, object units;
+/// float64 where posed is so far from the origin that 32 bits would round it
 ///
 /// weights: a sparse matrix [n_points, n_cage]; posed: [n_cage, 3] float32 or float64, object units; report: what bind
 /// returned, for points that need offsets. Without it this is weights @ posed, summed in 64 bits.
@@ -110,10 +110,10 @@ pub(crate) fn deform<'py>(
     weights: &Bound<'py, PyAny>,
     posed: &Bound<'py, PyAny>,
     report: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyArray2<f32>>> {
+) -> PyResult<Bound<'py, PyAny>> {
     let weights = arrays::weights(weights)?;
-    let posed = arrays::points("posed", posed, Some(weights.n_columns()))?;
+    let (posed, origin) = arrays::placed("posed", posed, Some(weights.n_columns()))?;
     let (weights, frames) = arrays::with_beside(report, weights)?;
     let posed = posed.as_slice();
-    arrays::array_of(py, work::run(py, |_| deform_bound(&weights, &frames, posed))?)
+    arrays::array_of(py, work::run(py, |_| deform_bound(&weights, &frames, posed))?, origin)
 }

@@ -7,6 +7,7 @@ use cagework_core::cage_gen::{CageReport, generate};
 use cagework_core::options::{GRID, SMOOTH};
 use cagework_core::{Cage as CoreCage, CageOptions, ControlSet, Controls, InnerControls, PolygonMesh};
 use cagework_io::write_cage_obj;
+use glam::DVec3;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
@@ -20,24 +21,38 @@ use crate::{arrays, error, files, work};
 ///
 /// vertices: [n_cage, 3] float32 or float64, object units; faces: whole numbers of shape [n, 3] or [n, 4], or a list of
 /// arrays of any lengths, counter-clockwise seen from outside (the other way round is mended, see notices); smooth: 0 to 3 steps of
-/// Catmull-Clark subdivision between the cage and its surface. Numbers are kept in 32 bits.
+/// Catmull-Clark subdivision between the cage and its surface. Numbers are kept in 32 bits, as seen from an
+/// origin near the cage if it is far away.
 ///
 /// Raises CageError, which names the face, edge or vertex that is wrong, and ArrayError.
 #[pyclass(frozen, module = "cagework")]
 pub(crate) struct Cage {
     set: ControlSet,
+    /// What it is seen from.
+    origin: DVec3,
     /// `[n_cage, 3]`, not writeable: poses are copies.
     vertices: Py<PyArray2<f64>>,
     report: Option<CageReport>,
 }
 
 impl Cage {
-    fn of(py: Python<'_>, mesh: &PolygonMesh, smooth: u32, report: Option<CageReport>) -> PyResult<Self> {
+    /// Of a mesh as seen from an origin.
+    fn of(
+        py: Python<'_>,
+        (mesh, origin): (&PolygonMesh, DVec3),
+        smooth: u32,
+        report: Option<CageReport>,
+    ) -> PyResult<Self> {
         let cage = CoreCage::new(mesh).map_err(error::cage)?;
         let set = ControlSet::new(&cage, smooth, InnerControls::default()).map_err(error::cage)?;
-        let vertices = arrays::wide_array_of(py, cage.positions().iter().map(|p| p.as_dvec3()))?;
+        let vertices = arrays::wide_array_of(py, cage.positions().iter().map(|p| origin + p.as_dvec3()))?;
         vertices.call_method1("setflags", (false,))?;
-        Ok(Self { set, vertices: vertices.unbind(), report })
+        Ok(Self { set, origin, vertices: vertices.unbind(), report })
+    }
+
+    /// What it is seen from: zero unless it is far away.
+    pub(crate) fn origin(&self) -> DVec3 {
+        self.origin
     }
 
     /// What a model is bound to.
@@ -67,8 +82,9 @@ impl Cage {
         smooth: f64,
     ) -> PyResult<Self> {
         let smooth = steps(smooth)?;
-        let positions = arrays::points("vertices", vertices, None)?.as_slice().to_vec();
-        Self::of(py, &PolygonMesh { positions, faces: arrays::faces(faces)? }, smooth, None)
+        let (positions, origin) = arrays::placed("vertices", vertices, None)?;
+        let positions = positions.as_slice().to_vec();
+        Self::of(py, (&PolygonMesh { positions, faces: arrays::faces(faces)? }, origin), smooth, None)
     }
 
     /// A cage from a file, faces of any size: .obj, .ply, .off, .stl, .gltf or .glb; vertices of the last three are joined where their
@@ -81,7 +97,7 @@ impl Cage {
         let smooth = steps(smooth)?;
         let model = files::Source::File(path).read()?;
         model.require_faces().map_err(error::model)?;
-        Self::of(py, &model.cage_mesh(), smooth, None)
+        Self::of(py, (&model.cage_mesh(), model.origin()), smooth, None)
     }
 
     /// Writes the cage as an OBJ file, at rest or in a pose: vertices [n_cage, 3], float32 or float64, object units.
@@ -92,9 +108,9 @@ impl Cage {
         let mut mesh = self.mesh();
         if let Some(vertices) = vertices {
             let n = mesh.positions.len();
-            mesh.positions = arrays::points("vertices", vertices, Some(n))?.as_slice().to_vec();
+            mesh.positions = arrays::points("vertices", vertices, Some(n), self.origin)?.as_slice().to_vec();
         }
-        files::write(&path.extract::<PathBuf>()?, &write_cage_obj(&mesh))
+        files::write(&path.extract::<PathBuf>()?, &write_cage_obj(&mesh, self.origin))
     }
 
     /// [n_cage, 3] float64, object units; read-only, because a cage does not change: poses begin as cage.vertices.copy().
@@ -171,11 +187,12 @@ pub(crate) fn generate_cage(
 ) -> PyResult<Cage> {
     let options: CageOptions = self::options(options)?;
     options.check().map_err(error::option)?;
-    let (points, triangles) = (arrays::points("vertices", vertices, None)?, arrays::triangles(triangles)?);
+    let (points, origin) = arrays::placed("vertices", vertices, None)?;
+    let triangles = arrays::triangles(triangles)?;
     let positions = points.as_slice();
     let made = work::run(py, |progress| generate(positions, &triangles, &options, progress))?;
     let made = made.map_err(error::cage)?;
-    Cage::of(py, &made.cage.to_polygon_mesh(), options.smooth, Some(made.report))
+    Cage::of(py, (&made.cage.to_polygon_mesh(), origin), options.smooth, Some(made.report))
 }
 
 /// Everything that is wrong with a cage: check_cage(cage, points=None, grid=64, smooth=None) -> list of dict
@@ -198,11 +215,11 @@ pub(crate) fn check_cage<'py>(
     GRID.check(grid).map_err(error::option)?;
     let own = cage.cast::<Cage>().map_or(0, |cage| cage.get().smooth());
     let smooth = smooth.map_or(Ok(own), steps)?;
-    let mesh = PolygonMesh {
-        positions: arrays::points("vertices", &cage.getattr("vertices")?, None)?.as_slice().to_vec(),
-        faces: arrays::faces(&cage.getattr("faces")?)?,
-    };
-    let points = points.map(|points| arrays::points("points", points, None)).transpose()?;
+    let vertices = cage.getattr("vertices")?;
+    let (positions, origin) = arrays::placed("vertices", &vertices, None)?;
+    let positions = positions.as_slice().to_vec();
+    let mesh = PolygonMesh { positions, faces: arrays::faces(&cage.getattr("faces")?)? };
+    let points = points.map(|points| arrays::points("points", points, None, origin)).transpose()?;
     let inside = points.as_ref().map(arrays::Points::as_slice);
     let check = work::run(py, |_| check_smooth(&mesh, inside, Some(grid as u32), smooth))?;
     dictionary(py, &check.problems)

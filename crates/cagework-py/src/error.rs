@@ -1,10 +1,8 @@
 //! Errors of core and io as Python's exceptions, with their sentences. The classes are in `python/cagework/_errors.py`.
 
-use std::ffi::CString;
 use std::fmt::Display;
 
-use pyo3::exceptions::PyUserWarning;
-use pyo3::{PyErr, PyResult, PyTypeInfo as _, Python};
+use pyo3::PyErr;
 
 /// A class of Python and the function that makes one of an error.
 macro_rules! exceptions {
@@ -31,13 +29,4 @@ exceptions! {
     option: OptionError,
     /// Nothing that can be pulled.
     pull: PullError,
-}
-
-/// A warning, which Python may be told to raise.
-///
-/// # Errors
-/// The warning.
-pub(crate) fn warn(py: Python<'_>, sentence: &str) -> PyResult<()> {
-    let sentence = CString::new(sentence.replace('\0', " ")).unwrap_or_default();
-    PyErr::warn(py, &PyUserWarning::type_object(py), &sentence, 1)
 }

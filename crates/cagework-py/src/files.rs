@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use cagework_core::BindOptions;
-use cagework_io::{Model, far_notice};
+use cagework_io::Model;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -52,9 +52,7 @@ impl Source {
                 )
             }
         };
-        let model = model.map_err(error::model)?;
-        far_notice(&model.positions).map_or(Ok(()), |said| Python::attach(|py| error::warn(py, &said)))?;
-        Ok(model)
+        model.map_err(error::model)
     }
 }
 
@@ -83,7 +81,7 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
 }
 
 /// Vertices and triangles of a model: read_model(model, states=False, clip=None) -> (vertices [n, 3] float32, triangles [m, 3]
-/// int32)
+/// int32); vertices so far from the origin that 32 bits would round them, such as those of a map, are float64
 ///
 /// model: path of a .glb, .gltf, .vrm, .obj, .ply, .stl or .off, or its bytes. Vertices are in world space, object units, in the file's order, split
 /// at seams as the file has them: those that reshape moves. A file without faces is read, too: a pose of a cage is one.
@@ -94,21 +92,21 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> PyResult<()> {
 /// Raises OSError, ModelError.
 #[pyfunction]
 #[pyo3(signature = (model, states = false, clip = None))]
-#[expect(clippy::type_complexity, reason = "two arrays, as Python gets them")]
 pub(crate) fn read_model<'py>(
     py: Python<'py>,
     model: &Bound<'py, PyAny>,
     states: bool,
     clip: Option<String>,
-) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<i32>>)> {
+) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyArray2<i32>>)> {
     let source = Source::of(model)?;
-    let (positions, triangles) = work::run(py, move |_| {
+    let ((positions, triangles), origin) = work::run(py, move |_| -> PyResult<_> {
         let model = source.read()?;
+        let origin = model.origin();
         if states {
-            model.states(clip.as_deref()).map_err(error::model)
+            Ok((model.states(clip.as_deref()).map_err(error::model)?, origin))
         } else {
-            Ok((model.positions, model.triangles))
+            Ok(((model.positions, model.triangles), origin))
         }
     })??;
-    Ok((arrays::array_of(py, positions)?, arrays::triples(py, &triangles)?))
+    Ok((arrays::array_of(py, positions, origin)?, arrays::triples(py, &triangles)?))
 }

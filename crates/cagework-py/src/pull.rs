@@ -47,8 +47,8 @@ pub(crate) fn pull<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     // Some samples lie beside the model, and outside of the cage where that is close.
     let options = BindOptions { outside: OutsidePolicy::Extend, ..bind_options(options)? };
-    let controls = cage.get().controls();
-    let positions = arrays::points("vertices", vertices, None)?.as_slice().to_vec();
+    let (controls, origin) = (cage.get().controls(), cage.get().origin());
+    let positions = arrays::points("vertices", vertices, None, origin)?.as_slice().to_vec();
     let mesh = TriMesh { positions, triangles: arrays::triangles(triangles)? };
     let weights = arrays::weights(weights)?;
     let (weights, frames) = arrays::with_beside(report, weights)?;
@@ -57,12 +57,12 @@ pub(crate) fn pull<'py>(
     };
     let grabs = handles("grabs", grabs)?;
     let pins = pins.map(|pins| handles("pins", pins)).transpose()?.unwrap_or_default();
-    let to = arrays::points("to", to, Some(grabs.len()))?.as_slice().to_vec();
+    let to = arrays::points("to", to, Some(grabs.len()), origin)?.as_slice().to_vec();
     if let Some(at) = to.iter().find(|at| !at.is_finite()) {
         return Err(error::pull(format!("a grab goes to {at}: it must be finite numbers of 32 bits")));
     }
     let n = controls.n_controls();
-    let start = start.map(|start| arrays::points("start", start, Some(n))).transpose()?;
+    let start = start.map(|start| arrays::points("start", start, Some(n), origin)).transpose()?;
     let start: Vec<Vec3> = start.map_or_else(|| controls.rest().to_vec(), |start| start.as_slice().to_vec());
     let reach = match reach {
         None => Reach::Automatic,
@@ -88,5 +88,5 @@ pub(crate) fn pull<'py>(
         drag.settle(&to);
         Ok(drag.cage())
     })??;
-    arrays::wide_array_of(py, posed.into_iter())
+    arrays::wide_array_of(py, posed.into_iter().map(|p| origin + p))
 }

@@ -51,10 +51,12 @@ pub(crate) fn reshape<'py>(
         return Err(error::option(format!("the mask of {name:?} is {amount}; it must be from 0 to 1")));
     }
     let (options, controls, source) = (bind_options(options)?, cage.get().controls(), Source::of(model)?);
-    let posed = arrays::points("posed", posed, Some(controls.n_controls()))?;
+    let origin = cage.get().origin();
+    let posed = arrays::points("posed", posed, Some(controls.n_controls()), origin)?;
     let posed = posed.as_slice();
     let bytes = work::run(py, move |progress| -> PyResult<Vec<u8>> {
-        let model = source.read_within(options.memory_limit)?;
+        let mut model = source.read_within(options.memory_limit)?;
+        model.see_from(origin);
         model.require_faces().map_err(error::model)?;
         let props = if r#static { Vec::new() } else { model.props().map_err(error::model)? };
         let (rigid, others): (Vec<_>, Vec<_>) = rigid.into_iter().partition(|name| props.contains(name));

@@ -72,7 +72,28 @@ def test_200_000_points_are_bound_without_copies_of_them():
     assert allocated(lambda: cw.bind(np.asfortranarray(points), CUBE, grid=8))[0] > points.nbytes
 
 
-def test_numbers_that_lose_digits_far_from_the_origin_are_named():
-    vertices, faces = box()
-    with pytest.warns(UserWarning, match="vertices: the model is so far from the origin that its coordinates have steps of 5e-1"):
-        cw.Cage(np.asarray(vertices, float) + [0, 0, 4.5e6], faces)
+def test_coordinates_of_a_map_keep_their_digits(tmp_path):
+    """32-bit floats have steps of 0.5 there; all is compared with the same work at the origin."""
+    place = np.array([500_000.25, 0, 4_500_000.5])
+    model, faces = box(4)
+    model, near = 0.8 * model, cw.Cage(*box())
+    far = cw.Cage(near.vertices + place, near.faces)
+    assert np.abs(far.vertices - place - near.vertices).max() < 1e-9
+    (weights, report), (expected, _) = cw.bind(model + place, far, grid=8), cw.bind(model, near, grid=8)
+    assert report["rest_error"]["max"] < 1e-6 and abs(weights - expected).max() < 1e-6
+    posed = cw.deform(weights, far.vertices + [0, 0.5, 0])
+    assert posed.dtype == np.float64 and np.abs(posed - place - model - [0, 0.5, 0]).max() < 1e-6
+    triangles = [[a, b, c] for f in faces for a, b, c in ((f[0], f[1], f[2]), (f[0], f[2], f[3]))]
+    made = cw.generate_cage(model + place, triangles)
+    assert (np.abs(made.vertices - place) < 1.5).all()
+    assert not [p for p in cw.check_cage(made, model + place) if p["severity"] == "error"]
+    grabbed = cw.pull(model + place, triangles, far, weights, [0], [model[0] + place - [0.2, 0, 0]], grid=8)
+    assert 0.1 < np.abs(grabbed - far.vertices).max() < 1
+
+    far.save(tmp_path / "cage.obj")
+    assert np.abs(cw.Cage.load(tmp_path / "cage.obj").vertices - far.vertices).max() < 1e-6
+    lines = ["v %.6f %.6f %.6f" % tuple(p) for p in model + place] + ["f %d %d %d" % tuple(np.add(t, 1)) for t in triangles]
+    file = "\n".join(lines).encode()
+    assert cw.reshape(file, far, far.vertices, grid=8) == file
+    moved, _ = cw.read_model(cw.reshape(file, far, far.vertices + [0, 0.5, 0], grid=8))
+    assert moved.dtype == np.float64 and np.abs(moved - model - place - [0, 0.5, 0]).max() < 2e-6

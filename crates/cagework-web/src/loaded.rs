@@ -6,14 +6,14 @@ use std::sync::Arc;
 use cagework_core::PolygonMesh;
 use cagework_gpu::render::{Alpha, DrawGroup, DrawModel, DrawTexture, DrawVertex, Wrap};
 use cagework_io::{Look, LookAlpha, LookWrap, Model, UpAxis, read_project};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use js_sys::{Function, Uint8Array};
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast as _, JsValue};
 
 use crate::arrays::flat;
 use crate::binder::Polygons;
-use crate::error::{Answer, Fault};
+use crate::error::{Answer, ErrorName, Fault};
 use crate::models::MemberSettings;
 use crate::options::{READ_LIMIT, taken};
 use crate::settings::{controls_of, has_controls, member_settings};
@@ -71,6 +71,28 @@ impl Loaded {
     ) -> Result<(), JsValue> {
         self.turn_to(taken(up)?);
         Ok(())
+    }
+
+    /// What model, cage and poses are seen from, in the file's axes: zero unless they are far away. `[3]`
+    #[wasm_bindgen(getter)]
+    #[must_use]
+    pub fn origin(&self) -> Vec<f64> {
+        self.model.origin().to_array().to_vec()
+    }
+
+    /// Sees a model or a cage from the origin of what it goes with. `[3]`
+    ///
+    /// # Errors
+    /// When it is not three numbers, or the file is too far from it.
+    #[wasm_bindgen(js_name = seeFrom)]
+    pub fn see_from(&mut self, origin: &[f64]) -> Result<(), JsValue> {
+        let origin: [f64; 3] =
+            origin.try_into().map_err(|_| Fault::new(ErrorName::Error, "origin must be three numbers"))?;
+        self.model.see_from(DVec3::from_array(origin));
+        if self.model.positions.iter().all(|p| p.is_finite()) {
+            return Ok(());
+        }
+        Err(Fault::new(ErrorName::Error, "origin is too far from the model").into())
     }
 
     /// Takes the compressed file that the model was decoded from: the export of a model that nothing has moved.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use cagework_core::Parts;
 use cagework_gpu::render::DrawModel;
 use cagework_io::{Model, UpAxis};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Answer, ErrorName, Fault};
@@ -196,6 +196,22 @@ impl Models {
         self.iter().next().ok_or_else(no_model)
     }
 
+    /// What all positions are seen from, in the files' axes: that of the first model, even if it is taken out later.
+    pub(crate) fn origin(&self) -> DVec3 {
+        self.all.first().map_or(DVec3::ZERO, |member| member.model.origin())
+    }
+
+    /// What the page should say of an origin that is not the world's.
+    pub(crate) fn place_notice(&self) -> Option<String> {
+        let [x, y, z] = self.up().vector_turned(self.origin()).to_array();
+        (self.origin() != DVec3::ZERO).then(|| {
+            format!(
+                "the model is far from the world's origin: coordinates are shown as seen from {x}, {y}, {z}, and files keep \
+                 those of the world"
+            )
+        })
+    }
+
     /// What points up in the files: in all of them the same.
     pub(crate) fn up(&self) -> UpAxis {
         self.iter().next().map_or_else(UpAxis::default, |member| member.model.up())
@@ -367,7 +383,9 @@ mod tests {
             text += &format!("v {} {y} {z}\n", x + at);
         }
         text += "usemtl skin\nf 1 3 2\nusemtl cloth\nf 1 2 4\nf 2 3 4\n";
-        Model::read(name, text.as_bytes(), &mut |_| None).unwrap()
+        let mut model = Model::read(name, text.as_bytes(), &mut |_| None).unwrap();
+        model.see_from(DVec3::ZERO);
+        model
     }
 
     fn draw(model: &Model) -> DrawModel {
@@ -438,6 +456,28 @@ mod tests {
         assert!(error.message().contains("only model"), "{}", error.message());
         assert!(models.bin(&[9], true).is_err());
         assert_eq!(names(&models), ["shirt.obj"]);
+    }
+
+    #[test]
+    fn models_in_one_cage_have_the_origin_of_the_first() {
+        let at = |name: &str, x: f64| {
+            let text = format!("v {} 0 0\nv {} 0 0\nv {x} 1 0\nf 1 2 3\n", x + 0.25, x + 1.0);
+            Model::read(name, text.as_bytes(), &mut |_| None).unwrap()
+        };
+        let mut models = Models::default();
+        assert_eq!((models.origin(), models.place_notice()), (DVec3::ZERO, None));
+        for mut one in [at("a.obj", 4.5e6), at("b.obj", 4.6e6)] {
+            if !models.positions.is_empty() {
+                one.see_from(models.origin());
+            }
+            let draw = draw(&one);
+            models.add([(one, draw, None)]);
+        }
+        let origin = models.origin();
+        assert_eq!(models.positions[3].as_dvec3().x + origin.x, 4.6e6 + 0.25);
+        models.bin(&[0], true).unwrap();
+        assert_eq!(models.origin(), origin, "the cage stays where it is");
+        assert!(models.place_notice().unwrap().contains("seen from 4500000.5, 0, 0"));
     }
 
     #[test]

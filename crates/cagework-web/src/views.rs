@@ -117,7 +117,7 @@ impl ModelInfo {
             props: all().flat_map(|model| model.props().unwrap_or_default()).collect(),
             rigged: all().any(Model::is_rigged),
             bounds: BoundsView::of(Bounds::of(&models.positions)),
-            notices: all().flat_map(|model| model.notices.clone()).collect(),
+            notices: all().flat_map(|model| model.notices.clone()).chain(models.place_notice()).collect(),
             members: models.iter().map(MemberInfo::of).collect(),
         })
     }

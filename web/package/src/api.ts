@@ -1,6 +1,6 @@
 /** What the package does, over whatever opens a worker: in a browser, or in Node. */
 
-import { indicesOf, optionsOf, pointsOf, poseOf, requireKnown, trianglesOf } from "./check";
+import { indicesOf, optionsOf, originOf, pointsOf, poseOf, requireKnown, trianglesOf } from "./check";
 import type { BindOptions, CageArrays, NamedFile } from "./contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, RIG_DEFAULTS } from "./contract/generated";
 import type { Deformer } from "./pkg/cagework";
@@ -76,8 +76,11 @@ export function createApi(open: () => Promise<Runtime>): Api {
       const triangles = trianglesOf("triangles", mesh.triangles);
       const asked = optionsOf(CAGE_DEFAULTS, options);
       const input = { positions, triangles, model: positions, options: asked, smooth: 0 };
+      const { origin } = mesh;
+      if (origin) originOf("origin", origin);
       const made = await run("cage", input, options);
       return {
+        ...(origin ? { origin } : {}),
         positions: made.positions,
         corners: made.corners,
         problems: made.check?.problems ?? [],
@@ -100,6 +103,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
       const arrays = cageOf(cage);
       const input = {
         files: [fileOf(model, options)],
+        origin: originOf("cage.origin", cage.origin ?? [0, 0, 0]),
         cage: arrays,
         posed: poseOf(posed, arrays.positions),
         options: bindOptions(options),

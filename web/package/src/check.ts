@@ -45,6 +45,13 @@ function requireTriples(name: string, length: number, what: string): void {
   throw wrong(`${name} has ${length} numbers; three for each ${what} are needed, so ${next - 3} or ${next}`);
 }
 
+/** Three finite numbers. */
+export function originOf(name: string, given: ArrayLike<number>): Float64Array {
+  if (lengthOf(name, given) === 3 && Array.from(given).every(Number.isFinite))
+    return Float64Array.from(given);
+  throw wrong(`${name} is ${Array.from(given).join(", ")}; it must be three finite numbers`);
+}
+
 /** A pose has as many points as the cage. */
 export function poseOf(given: ArrayLike<number>, cage: Float32Array): Float32Array {
   const posed = pointsOf("posed", given);

@@ -19,14 +19,29 @@ export interface Follow {
   readonly onProgress?: ((progress: Progress | Reading) => void) | undefined;
 }
 
+/**
+ * What 32-bit positions are seen from, `[3]`, object units: the origin of a model far from the world's, as coordinates of a map are;
+ * `[0, 0, 0]` unless told. A model, its cage, poses and points have the same one.
+ */
+export interface Placed {
+  readonly origin?: ArrayLike<number> | undefined;
+}
+
 /** Vertices `[n, 3]` in object units, and triangles `[n, 3]`, flattened. */
-export interface Mesh {
+export interface Mesh extends Placed {
   readonly positions: ArrayLike<number>;
   readonly triangles: ArrayLike<number>;
 }
 
+/** A mesh of a file. */
+export interface ModelMesh extends Mesh {
+  readonly positions: Float32Array;
+  readonly triangles: Uint32Array;
+  readonly origin: Float64Array;
+}
+
 /** A closed mesh of polygons. */
-export interface Cage {
+export interface Cage extends Placed {
   /** Vertices `[n_cage, 3]`, object units; a pose is another array of that length. */
   readonly positions: ArrayLike<number>;
   /** For each face the number of its corners, then them, counter-clockwise seen from outside. */
@@ -92,5 +107,5 @@ export interface Api {
     posed: ArrayLike<number>,
     options?: ReshapeAsked,
   ): Promise<Uint8Array<ArrayBuffer>>;
-  readModel(model: File, options?: ReadAsked): Promise<{ positions: Float32Array; triangles: Uint32Array }>;
+  readModel(model: File, options?: ReadAsked): Promise<ModelMesh>;
 }

@@ -138,6 +138,29 @@ test("at rest the file is what it was", async () => {
   );
 });
 
+test("a model far from the world's origin is followed as one near it", async () => {
+  const [x, z] = [500000.25, 4500000.5];
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [x + (k & 1), (k >> 1) & 1, z + (k >> 2) / 8]);
+  const text = ({ place }) =>
+    `${corners.map((p) => `v ${place(p).join(" ")}`).join("\n")}\nf 1 2 4 3\nf 5 6 8 7\n`;
+  const file = new TextEncoder().encode(text({ place: (p) => p }));
+  const far = await readModel(file, { name: "far.obj" });
+  assert.ok(far.origin[0] > 5e5 && far.origin[1] === 0 && far.origin[2] > 4e6);
+  const around = await generateCage(far);
+  const up = around.positions.map((x, k) => (k % 3 === 1 ? x + 0.5 : x));
+  const raised = await reshape(file, around, up, { name: "far.obj", grid: 12 });
+  const numbers = (bytes) =>
+    new TextDecoder().decode(bytes).split(/[\s]+/).map(Number).filter(Number.isFinite);
+  const wanted = numbers(new TextEncoder().encode(text({ place: ([x, y, z]) => [x, y + 0.5, z] })));
+  const off = numbers(raised).map((found, k) => Math.abs(found - wanted[k]));
+  assert.ok(off.length === wanted.length && Math.max(...off) < 1e-6, `${Math.max(...off)}`);
+  assert.ok(
+    Buffer.from(await reshape(file, around, around.positions, { name: "far.obj", grid: 12 })).equals(
+      Buffer.from(file),
+    ),
+  );
+});
+
 test("what a cage should enclose are the vertices, those of morph targets and of a clip", async () => {
   const states = await readModel(glb, { states: true });
   assert.deepEqual([...states.positions.subarray(0, mesh.positions.length)], [...mesh.positions]);

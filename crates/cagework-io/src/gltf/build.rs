@@ -13,6 +13,7 @@ use super::pack::{Pack, VERTICES, push};
 use crate::error::WriteError;
 use crate::look::linear_from_srgb;
 use crate::obj::{NONE, ObjDocument};
+use crate::origin::translation;
 use crate::siblings::Image;
 
 /// A GLB with the OBJ's shape at rest, as seen from an origin, where its node is, and for each of its vertices the `v` line it came from.
@@ -34,8 +35,9 @@ pub(crate) fn build_from_obj(
         "nodes": [{ "name": name, "mesh": 0 }],
         "meshes": [{ "name": name, "primitives": [] }],
     });
+    let (at, beside) = translation(origin);
     if origin != DVec3::ZERO {
-        json["nodes"][0]["translation"] = json!(origin.as_vec3().to_array());
+        json["nodes"][0]["translation"] = json!(at);
     }
     let mut pack = Pack::empty();
     let mut sources = Vec::new();
@@ -46,7 +48,9 @@ pub(crate) fn build_from_obj(
             let (pair, vt) = (pairs.of_corner[corner as usize], document.corners[corner as usize].vt);
             part.add(pair, vt);
         }
-        let position = |&(pair, _): &(u32, u32)| rest[pairs.shading.vertex[pair as usize] as usize];
+        let position = |&(pair, _): &(u32, u32)| {
+            (rest[pairs.shading.vertex[pair as usize] as usize].as_dvec3() + beside).as_vec3()
+        };
         let positions: Vec<Vec3> = part.vertices.iter().map(position).collect();
         let normals: Vec<Vec3> =
             part.vertices.iter().map(|&(pair, _)| pairs.shading.normal[pair as usize]).collect();

@@ -247,10 +247,7 @@ pub(crate) fn read(
     let n_before = notices.len();
     let mut geometry = geometry::read(&document, origin.unwrap_or_default(), &mut notices)?;
     let mut near = origin.unwrap_or_default();
-    // Skins, morph targets and clips are played in world space.
-    let is_still = !Rig::has_skin_or_targets(&document)
-        && document.json["animations"].as_array().is_none_or(Vec::is_empty);
-    if origin.is_none() && is_still {
+    if origin.is_none() {
         near = origin_near(&geometry.positions);
         if near != DVec3::ZERO {
             notices.truncate(n_before);

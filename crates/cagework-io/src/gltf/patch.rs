@@ -21,6 +21,7 @@ use super::scene::{Instance, name_of};
 use super::{GltfDocument, GltfError, Rig, Slot};
 use crate::error::WriteError;
 use crate::normals::Shading;
+use crate::origin::translation;
 
 /// A determinant this small against its columns' lengths cannot be undone in f32.
 const FLAT: f64 = 1e-9;
@@ -156,10 +157,13 @@ fn place_meshes(document: &GltfDocument, json: &mut Value, origin: DVec3) -> Vec
             _ => detach(document, json, instance),
         };
         json["nodes"][node]["mesh"] = mesh.into();
-        if detached && origin != DVec3::ZERO {
-            json["nodes"][node]["translation"] = json!(origin.as_vec3().to_array());
+        if detached {
+            let (at, rest) = translation(origin);
+            mesh_from_world = DMat4::from_translation(rest);
+            if origin != DVec3::ZERO {
+                json["nodes"][node]["translation"] = json!(at);
+            }
         }
-        let mesh_from_world = if detached { DMat4::IDENTITY } else { mesh_from_world };
         places.push(Place { mesh, node, original, detached, mesh_from_world });
     }
     places

@@ -11,7 +11,6 @@ use crate::error::{PoseError, WriteError};
 use crate::format::ModelFormat;
 use crate::gltf::Clip;
 use crate::memory::MemoryError;
-use crate::origin::relative;
 
 /// Bytes of all states of a pose's file.
 const MOST_STATES_BYTES: u64 = 512 << 20;
@@ -71,10 +70,11 @@ impl Model {
         let order = self.order_of(pose)?;
         let faulty = |source| PoseError::States { pose: pose.name.clone(), source };
         let Some(player) = pose.player().map_err(faulty)? else { return Ok(Vec::new()) };
-        let origin = self.up.vector_turned(self.origin);
+        let between = self.up.vector_turned(pose.origin - self.origin);
         let state = |name: String, seconds: Option<f32>, clip, targets: &[f32]| {
             let all = pose.shown_at(&player, clip, seconds.unwrap_or(0.0), targets);
-            let positions = order.iter().map(|&v| relative(all[v as usize].as_dvec3(), origin)).collect();
+            let at = |&v: &u32| (all[v as usize].as_dvec3() + between).as_vec3();
+            let positions = order.iter().map(at).collect();
             PoseState { name, seconds, positions }
         };
         let times = player.clips().first().map_or(Vec::new(), Clip::times);

@@ -92,7 +92,10 @@ impl Model {
             }
             Document::Obj(_) => {
                 let faces = self.cage_mesh().faces;
-                Ok(obj::write_mesh(&PolygonMesh { positions: positions.into_owned(), faces }, self.origin))
+                Ok(obj::write_cage_obj(
+                    &PolygonMesh { positions: positions.into_owned(), faces },
+                    self.origin,
+                ))
             }
             Document::Gltf(document) => {
                 let rest = Rest { positions: &rest, origin: self.origin, triangles: &self.triangles };

@@ -1,23 +1,28 @@
 //! Controls inside a cage, from the elements of an OBJ file: `p` points, `l` polylines, `f` faces of sheets.
 
 use cagework_core::{InnerControls, InnerElement};
-use glam::Vec3;
+use glam::DVec3;
 
 use super::error::ObjError;
 use super::lex::{lines, shown, tokens};
-use super::read::{check_count, integer, number, resolve};
+use super::read::{check_count, integer, resolve, wide_number};
 use crate::memory::MemoryError;
+use crate::origin::{Coordinate, relative};
 
 /// Bytes that a vertex and an element with its corners take, at most and about.
 const VERTEX_BYTES: u64 = 24;
 const ELEMENT_BYTES: u64 = 80;
 
-/// Reads controls inside a cage: every `v` line a control, in the file's own axes; other lines than `v`, `p`, `l` and `f` are
+/// Reads controls inside a cage: every `v` line a control, in the file's own axes, as seen from an origin; other lines than `v`, `p`, `l` and `f` are
 /// left out. A `p` line may name several points. The radius is left open.
 ///
 /// # Errors
 /// [`ObjError`] when a line cannot be read or names a vertex that does not exist, or the memory does not suffice.
-pub fn read_inner_controls(bytes: &[u8], memory_limit: u64) -> Result<InnerControls, ObjError> {
+pub fn read_inner_controls(
+    bytes: &[u8],
+    origin: DVec3,
+    memory_limit: u64,
+) -> Result<InnerControls, ObjError> {
     let mut inner = InnerControls::default();
     let mut lines_of = Vec::new();
     let mut n_corners = 0;
@@ -30,15 +35,15 @@ pub fn read_inner_controls(bytes: &[u8], memory_limit: u64) -> Result<InnerContr
         MemoryError::check(bytes.len() as u64 + needed, memory_limit)?;
         match &bytes[keyword] {
             b"v" => {
-                let mut p = [0.0; 3];
+                let mut p = [0.0_f64; 3];
                 for (value, axis) in p.iter_mut().zip(['x', 'y', 'z']) {
                     let token = words.next();
-                    *value = token.clone().and_then(|t| number(&bytes[t])).ok_or_else(|| {
+                    *value = token.clone().and_then(|t| wide_number(&bytes[t])).ok_or_else(|| {
                         let found = token.map_or("missing".into(), |t| format!("'{}'", shown(&bytes[t])));
                         ObjError::Coordinate { line: line.number, axis, found }
                     })?;
                 }
-                inner.positions.push(Vec3::from_array(p));
+                inner.positions.push(relative(DVec3::from_array(p), origin));
                 check_count(inner.positions.len(), line.number)?;
             }
             kind @ (b"p" | b"l" | b"f") => {
@@ -80,10 +85,13 @@ pub fn read_inner_controls(bytes: &[u8], memory_limit: u64) -> Result<InnerContr
     Ok(inner)
 }
 
-/// Controls inside a cage as an OBJ file: what [`read_inner_controls`] reads.
+/// Controls inside a cage, as seen from an origin, as an OBJ file: what [`read_inner_controls`] reads.
 #[must_use]
-pub fn write_inner_controls(inner: &InnerControls) -> Vec<u8> {
-    let vertices = inner.positions.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
+pub fn write_inner_controls(inner: &InnerControls, origin: DVec3) -> Vec<u8> {
+    let vertices = inner.positions.iter().map(|&p| {
+        let [x, y, z] = Coordinate::of(origin, p);
+        format!("v {x} {y} {z}\n")
+    });
     let elements = inner.elements.iter().map(|element| {
         let kind = &element.name()[..1];
         let corners = element.corners().iter().map(|&i| format!(" {}", u64::from(i) + 1));
@@ -101,7 +109,7 @@ mod tests {
     #[test]
     fn elements_of_all_kinds_are_read_with_any_indices() {
         let text = b"# controls\nv 0 0 0\nv 1 0 0\nv 1 1 0\np 1 -1\nl 1 2 3\nf 1/1 2//2 3\nusemtl red\n";
-        let inner = read_inner_controls(text, LIMIT).unwrap();
+        let inner = read_inner_controls(text, DVec3::ZERO, LIMIT).unwrap();
         assert_eq!(inner.positions.len(), 3);
         let expected = [
             InnerElement::Point(0),
@@ -110,7 +118,10 @@ mod tests {
             InnerElement::Face(vec![0, 1, 2]),
         ];
         assert_eq!((inner.elements.as_slice(), inner.radius), (&expected[..], None));
-        assert_eq!(read_inner_controls(&write_inner_controls(&inner), LIMIT).unwrap(), inner);
+        assert_eq!(
+            read_inner_controls(&write_inner_controls(&inner, DVec3::ZERO), DVec3::ZERO, LIMIT).unwrap(),
+            inner
+        );
     }
 
     #[test]
@@ -122,10 +133,15 @@ mod tests {
             ("v 0 0 0\nl 1 x\n", "line 2: corner 'x' is not an index"),
             ("v 0 0 0\np\n", "line 2: corner '' is not an index"),
         ] {
-            let said = read_inner_controls(text.as_bytes(), LIMIT).unwrap_err().to_string();
+            let said = read_inner_controls(text.as_bytes(), DVec3::ZERO, LIMIT).unwrap_err().to_string();
             assert!(said.starts_with(expected), "{said}");
         }
         let many = "v 0 0 0\n".repeat(10_000);
-        assert!(read_inner_controls(many.as_bytes(), 100_000).unwrap_err().to_string().contains("memory"));
+        assert!(
+            read_inner_controls(many.as_bytes(), DVec3::ZERO, 100_000)
+                .unwrap_err()
+                .to_string()
+                .contains("memory")
+        );
     }
 }

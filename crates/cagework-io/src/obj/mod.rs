@@ -20,4 +20,4 @@ pub(crate) use look::{look, rest_of};
 pub(crate) use read::{Corner, NONE, ObjDocument, positions_near, read};
 pub(crate) use select::Group;
 pub use write::write_cage_obj;
-pub(crate) use write::{ObjPart, patch, write_mesh, write_new};
+pub(crate) use write::{ObjPart, patch, write_new};

@@ -422,6 +422,12 @@ pub(super) fn number(token: &[u8]) -> Option<f32> {
     std::str::from_utf8(token).ok()?.parse::<f32>().ok().filter(|x| x.is_finite())
 }
 
+/// A number that 32 bits have room for, in 64.
+pub(super) fn wide_number(token: &[u8]) -> Option<f64> {
+    number(token)?;
+    std::str::from_utf8(token).ok()?.parse().ok()
+}
+
 pub(super) fn integer(token: &[u8]) -> Option<i64> {
     std::str::from_utf8(token).ok()?.parse().ok()
 }

@@ -208,14 +208,9 @@ pub(crate) fn write_new(positions: &[Vec3], origin: DVec3, parts: &[ObjPart]) ->
     text.into_bytes()
 }
 
-/// A cage as an OBJ file: its vertices and polygons in order.
+/// A cage, its positions as seen from an origin, as an OBJ file: vertices and polygons in order.
 #[must_use]
-pub fn write_cage_obj(cage: &PolygonMesh) -> Vec<u8> {
-    write_mesh(cage, DVec3::ZERO)
-}
-
-/// The same, with positions from an origin.
-pub(crate) fn write_mesh(cage: &PolygonMesh, origin: DVec3) -> Vec<u8> {
+pub fn write_cage_obj(cage: &PolygonMesh, origin: DVec3) -> Vec<u8> {
     let mut text = String::with_capacity(64 * cage.positions.len());
     for p in &cage.positions {
         let [x, y, z] = Coordinate::of(origin, *p);

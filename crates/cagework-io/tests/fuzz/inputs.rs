@@ -4,7 +4,7 @@ use cagework_core::deform::OutsideVertex;
 use cagework_core::mesh::Bounds;
 use cagework_core::{Frames, PolygonMesh, Weights, subdivided_box};
 use cagework_io::{encode_pose, write_cage_obj, write_project, write_weights_npz};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
 use proptest::strategy::ValueTree as _;
@@ -77,7 +77,7 @@ pub(crate) fn samples() -> Vec<Vec<u8>> {
         b"v .2 .2 .2\nv .5 .4 .5\nv .8 .2 .2\nv .3 .7 .5\nv .6 .7 .4\nv .5 .9 .6\nl 1 2 3\np -3\nf 4 5 6\n"
             .to_vec(),
     );
-    samples.extend(cages().iter().map(write_cage_obj));
+    samples.extend(cages().iter().map(|cage| write_cage_obj(cage, DVec3::ZERO)));
     let text = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
         property uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_index\nend_header\n\
         0 0 0 9 9 9\n1 0 0 9 9 9\n0 1 0 255 0 9\n3 0 1 2\n";
@@ -140,7 +140,7 @@ fn files() -> BoxedStrategy<Vec<u8>> {
     let samples = samples();
     let glbs = samples[..N_GLB].to_vec();
     let texts: Vec<String> =
-        cages().iter().map(|c| String::from_utf8(write_cage_obj(c)).expect("text")).collect();
+        cages().iter().map(|c| String::from_utf8(write_cage_obj(c, DVec3::ZERO)).expect("text")).collect();
     let magic: Vec<&[u8]> =
         vec![b"", b"glTF\x02\0\0\0", b"{\"asset\":{\"version\":\"2.0\"},", b"PK\x03\x04", b"v 0 0 0\nf "];
     prop_oneof![
@@ -273,7 +273,10 @@ fn soup() -> impl Strategy<Value = Vec<u8>> {
     (points, faces).prop_map(|(points, faces)| {
         let corner = |i: &Index| i.index(points.len()) as u32;
         let faces = faces.iter().map(|f| f.iter().map(corner).collect()).collect();
-        write_cage_obj(&PolygonMesh { positions: points.iter().map(|&p| p.into()).collect(), faces })
+        write_cage_obj(
+            &PolygonMesh { positions: points.iter().map(|&p| p.into()).collect(), faces },
+            DVec3::ZERO,
+        )
     })
 }
 

@@ -68,8 +68,8 @@ pub(crate) fn survive(bytes: &[u8]) {
         let _ = deform_bound(&REST.binding.weights, &REST.binding.frames, &pose);
     }
     let choice = bytes.iter().fold(0_u32, |h, &b| h.wrapping_mul(31).wrapping_add(b.into())) >> 7;
-    if let Ok(inner) = read_inner_controls(bytes, LIMIT) {
-        let written = read_inner_controls(&write_inner_controls(&inner), LIMIT);
+    if let Ok(inner) = read_inner_controls(bytes, DVec3::ZERO, LIMIT) {
+        let written = read_inner_controls(&write_inner_controls(&inner, DVec3::ZERO), DVec3::ZERO, LIMIT);
         assert!(written.is_ok(), "{written:?}");
         as_controls(inner, choice);
     }

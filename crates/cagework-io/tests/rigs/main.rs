@@ -72,6 +72,50 @@ fn unmoved_cage_gives_the_bytes_of_the_input() {
     }
 }
 
+/// The same model at coordinates of a map is reshaped, played and baked as it is at the origin: 32-bit floats have steps of 0.5 there.
+#[test]
+fn rigs_far_from_the_origin_are_as_exact_as_near_it() {
+    let place = vec3(500_000.25, 0.0, 4_500_000.5);
+    let at_place = |bytes: &[u8]| {
+        let mut model = read(bytes);
+        model.see_from(place.as_dvec3());
+        model
+    };
+    let mut b = rigged();
+    let near = read(&b.glb());
+    b.push("nodes", serde_json::json!({ "translation": place.to_array(), "children": [0, 4] }));
+    b.json["scenes"][0]["nodes"] = serde_json::json!([5]);
+    let far = at_place(&b.glb());
+    assert_eq!(far.notices, near.notices);
+    assert_near(&far.positions, &near.positions, ROUNDED, "read");
+    assert_near(&far.extra_points().unwrap(), &near.extra_points().unwrap(), ROUNDED, "points of the rig");
+    let states = |model: &Model| model.states(Some("walk")).unwrap().0;
+    assert_near(&states(&far), &states(&near), ROUNDED, "what a cage should enclose");
+    let still = vec![DVec3::ZERO; far.positions.len() + far.extra_points().unwrap().len()];
+    let unmoved = far.write_reshaped(&still, &[], &[], &ReshapeOptions::default()).unwrap().0;
+    assert!(unmoved == b.glb(), "what did not move keeps its bytes");
+    let rigid = far.parts(&[], &["bar".to_owned()]).unwrap();
+    for (joints, parts) in [Joints::Follow, Joints::Stay, Joints::Turn, Joints::Follow].into_iter().zip([
+        Default::default(),
+        Default::default(),
+        Default::default(),
+        rigid,
+    ]) {
+        let options = ReshapeOptions { joints, parts, ..ReshapeOptions::default() };
+        let [far, near] =
+            [&far, &near].map(|model| model.write_reshaped(&by(&near), &[], &[], &options).unwrap().0);
+        assert_eq!(json_of(&far)["nodes"][5], b.json["nodes"][5]);
+        let [far, near] = [at_place(&far), read(&near)].map(|model| player(&model));
+        for (clip, targets) in [(None, &[1.0, 0.5]), (Some(0), &[0.25, 0.0])] {
+            let [far, near] = [&far, &near].map(|player| shown(player, clip, 0.7, targets));
+            assert_near(&far, &near, 2.0 * ROUNDED, "reshaped");
+        }
+    }
+    let baked = |model: &Model| model.write_baked(0, &near.positions, near.frames(0).unwrap()).unwrap();
+    let [far, near] = [at_place(&baked(&far)), read(&baked(&near))].map(|model| player(&model));
+    assert_near(&shown(&far, Some(0), 0.7, &[]), &shown(&near, Some(0), 0.7, &[]), ROUNDED, "baked");
+}
+
 #[test]
 fn rest_and_every_target_alone_are_where_the_cage_brings_them() {
     let model = read(&rigged().glb());

@@ -74,7 +74,8 @@ impl Engine {
     #[wasm_bindgen(js_name = readControls, unchecked_return_type = "CageState")]
     pub fn read_controls(&self, bytes: &[u8]) -> Result<JsValue, JsValue> {
         let InnerControls { positions, elements, .. } =
-            read_inner_controls(bytes, READ_LIMIT).map_err(Fault::from)?;
+            read_inner_controls(bytes, self.read(|state| state.models.origin()), READ_LIMIT)
+                .map_err(Fault::from)?;
         if elements.is_empty() {
             return Err(Fault::from(ControlError::Empty).into());
         }

@@ -116,7 +116,8 @@ impl Engine {
         if mesh.faces.is_empty() {
             return Err(Fault::missing("cage", "make one first").into());
         }
-        Ok(write_cage_obj(&self.read(State::up).mesh_turned_back(&mesh)))
+        let (up, origin) = self.read(|state| (state.up(), state.models.origin()));
+        Ok(write_cage_obj(&up.mesh_turned_back(&mesh), origin))
     }
 
     /// Controls inside as OBJ, in the pose of the moment.
@@ -131,7 +132,8 @@ impl Engine {
             }
             let positions = state.up().turned_back(&state.positions[state.made.n_cage()..]).into_owned();
             let elements = state.made.controls.elements.clone();
-            Ok(write_inner_controls(&InnerControls { positions, elements, radius: None }))
+            let controls = InnerControls { positions, elements, radius: None };
+            Ok(write_inner_controls(&controls, state.models.origin()))
         })?)
     }
 
@@ -179,6 +181,12 @@ impl Engine {
     #[wasm_bindgen(unchecked_return_type = "UpAxis")]
     pub fn up(&self) -> Result<JsValue, JsValue> {
         Ok(self.read(|state| object(&state.up()))?)
+    }
+
+    /// What all positions are seen from, in the axes of the models' files: zero unless they are far away. `[3]`
+    #[must_use]
+    pub fn origin(&self) -> Vec<f64> {
+        self.read(|state| state.models.origin().to_array().to_vec())
     }
 
     /// The models' vertices at rest, one model after the other. `[n_vertices, 3]`

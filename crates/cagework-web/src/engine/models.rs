@@ -34,9 +34,10 @@ impl Engine {
     /// As `open`; nothing changes then.
     #[wasm_bindgen(unchecked_return_type = "ModelInfo")]
     pub async fn add(&self, loaded: Vec<Loaded>) -> Result<JsValue, JsValue> {
-        let up = self.read(State::up);
+        let (up, origin) = self.read(|state| (state.up(), state.models.origin()));
         let prepare = |mut loaded: Loaded| {
             loaded.turn_to(up);
+            loaded.model.see_from(origin);
             let (draw, settings) = (loaded.draw_model(), loaded.member_settings());
             (loaded.model, draw, settings)
         };

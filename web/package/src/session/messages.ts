@@ -74,12 +74,14 @@ export interface Jobs {
     /** `states`: what a cage should enclose, with the frames of a clip if one is named. */
     input: { files: readonly NamedFile[]; states: boolean; clip: string | undefined };
     step: Reading;
-    output: { positions: Float32Array; triangles: Uint32Array };
+    output: { positions: Float32Array; triangles: Uint32Array; origin: Float64Array };
   };
   /** A model's file as it follows a posed cage. */
   reshape: {
     input: {
       files: readonly NamedFile[];
+      /** What cage and pose are seen from. */
+      origin: Float64Array;
       cage: CageArrays;
       posed: Float32Array;
       options: BindOptions;
@@ -111,9 +113,15 @@ export interface Jobs {
     step: Reading;
     output: ReadModel;
   };
-  /** `model`: the vertices to be enclosed, `[n_vertices, 3]`. */
+  /** `model`: the vertices to be enclosed, `[n_vertices, 3]`, as seen from `origin`. */
   readCage: {
-    input: { files: readonly NamedFile[]; up: UpAxis; model: Float32Array; smooth: number };
+    input: {
+      files: readonly NamedFile[];
+      up: UpAxis;
+      origin: Float64Array;
+      model: Float32Array;
+      smooth: number;
+    };
     step: Reading;
     output: CheckedCage;
   };

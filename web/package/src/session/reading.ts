@@ -63,10 +63,11 @@ function flat(arrays: readonly Float32Array[]): Float32Array {
 /** Reads a file as a cage and checks it. */
 export async function readCage(
   pkg: Package,
-  { files, up, model, smooth }: Jobs["readCage"]["input"],
+  { files, up, origin, model, smooth }: Jobs["readCage"]["input"],
   tell: Tell,
 ): Promise<CheckedCage> {
   const { loaded } = await read(pkg, files, tell);
+  loaded.seeFrom(origin);
   loaded.setUp(up);
   say(tell, "check");
   return checked(pkg, loaded.asCage(), model, smooth);

@@ -99,18 +99,21 @@ function createWork(pkg: Package): Work {
       const { loaded } = await read(pkg, files, step);
       try {
         const [positions, triangles] = states ? loaded.states(clip) : [loaded.positions, loaded.triangles];
-        return { positions, triangles };
+        return { positions, triangles, origin: loaded.origin };
       } finally {
         loaded.free();
       }
     },
-    async reshape({ files, cage, posed, options, rig }, step) {
+    async reshape({ files, origin, cage, posed, options, rig }, step) {
       const { loaded } = await read(pkg, files, step);
-      const by = await binder(options.backend === "gpu");
-      const { positions, corners, controls } = cage;
-      return by
-        .reshape(loaded, positions, corners, controls, posed, options, rig, step)
-        .finally(() => loaded.free());
+      try {
+        loaded.seeFrom(origin);
+        const by = await binder(options.backend === "gpu");
+        const { positions, corners, controls } = cage;
+        return await by.reshape(loaded, positions, corners, controls, posed, options, rig, step);
+      } finally {
+        loaded.free();
+      }
     },
     async slice({ cage, axis, fraction, options }, step) {
       const by = await binder(options.backend === "gpu");

@@ -63,6 +63,8 @@ pub(crate) struct Rig<'a> {
     on_skeleton: Vec<bool>,
     spots: Vec<Spot>,
     n_vertices: usize,
+    /// What the model's positions are seen from, in world space; all else here is not.
+    origin: DVec3,
     /// Diagonal of the box of all states, object units.
     diagonal: f64,
     /// World space, as the file has it.
@@ -128,6 +130,7 @@ impl<'a> Rig<'a> {
             on_skeleton: vec![false; document.root.nodes.len()],
             spots: Vec::new(),
             n_vertices: rest.len(),
+            origin,
             diagonal: 0.0,
             extras: Vec::new(),
             n_ends: 0,
@@ -166,7 +169,7 @@ impl<'a> Rig<'a> {
         // Nothing can be bound that is no number: such a point stays where it is.
         for point in &mut rig.extras {
             if !point.as_vec3().is_finite() {
-                *point = DVec3::ZERO;
+                *point = origin;
             }
         }
         rig.lattice = rig.lattice();
@@ -189,11 +192,12 @@ impl<'a> Rig<'a> {
         document.instances.iter().any(|i| i.skin.is_some() || morphs(i.mesh))
     }
 
-    /// The vertices that the shown meshes' morph targets move, with each target at 0 and at 1. World space.
-    pub(crate) fn shown_ends(&self) -> impl Iterator<Item = DVec3> {
+    /// The vertices that the shown meshes' morph targets move, with each target at 0 and at 1, as seen from the origin.
+    pub(crate) fn shown_ends(&self) -> impl Iterator<Item = Vec3> {
         let shown = self.parts.iter().filter(|part| part.slot.is_some());
         let ends = shown.flat_map(lattice::ends);
-        ends.flat_map(|(target, first)| self.extras[self.range(target, first)].iter().copied())
+        let ends = ends.flat_map(|(target, first)| &self.extras[self.range(target, first)]);
+        ends.map(|&end| relative(end, self.origin))
     }
 
     /// How far points move with what the cage does not bend. `by`: of all points.
@@ -207,7 +211,7 @@ impl<'a> Rig<'a> {
             for (target, first) in lattice::ends(part) {
                 let ends = &self.extras[self.range(target, first)];
                 for ((&v, &end), by) in target.moved.iter().zip(ends).zip(&mut by[first..]) {
-                    *by = held.by(part.first as u32 + v, end, *by);
+                    *by = held.by(part.first as u32 + v, end - self.origin, *by);
                 }
             }
         }

@@ -4,13 +4,14 @@ use std::collections::HashMap;
 
 use ::gltf::json::scene::{Node, UnitQuaternion};
 use cagework_core::skin::Skin;
-use glam::{DMat4, Mat4, Vec3};
+use glam::{DMat4, DVec3, Mat4, Vec3};
 
 use super::clip::{Clip, clips, quaternion, vector};
 use super::tracks::Driven;
 use crate::gltf::geometry::{attribute, vectors};
 use crate::gltf::scene::{Worlds, local};
 use crate::gltf::{GltfDocument, GltfError, Slot, skin};
+use crate::origin::relative;
 use ::gltf::json::mesh::Semantic;
 
 /// A model with its skeleton, morph targets and clips.
@@ -29,22 +30,28 @@ pub struct Player {
     of_nodes: HashMap<usize, usize>,
     of_meshes: HashMap<usize, Vec<usize>>,
     names: Vec<String>,
+    /// What everything is seen from, in world space.
+    origin: DVec3,
 }
 
 /// What the vertices are posed by.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posed {
-    /// World from mesh space. `[n_palette]`
+    /// World, as seen from the model's origin, from mesh space. `[n_palette]`
     pub palette: Vec<Mat4>,
     /// Weights of the morph targets. `[n_targets]`
     pub targets: Vec<f32>,
-    /// Where the nodes are. `[n_nodes]`, world space
+    /// Where the nodes are, as seen from the model's origin. `[n_nodes]`, world space
     pub origins: Vec<Vec3>,
 }
 
 impl Player {
     /// `like`: the document in whose order the vertices are; the same, or the one that this is an export of.
-    pub(crate) fn new(document: &GltfDocument, like: &GltfDocument) -> Result<Self, GltfError> {
+    pub(crate) fn new(
+        document: &GltfDocument,
+        like: &GltfDocument,
+        origin: DVec3,
+    ) -> Result<Self, GltfError> {
         let worlds = Worlds::new(&document.root)?;
         let mut player = Self {
             skin: Skin { joint_starts: vec![0], delta_starts: vec![0], ..Skin::default() },
@@ -56,6 +63,7 @@ impl Player {
             of_nodes: HashMap::new(),
             of_meshes: HashMap::new(),
             names: Vec::new(),
+            origin,
         };
         let mut of_skins: HashMap<u32, usize> = HashMap::new();
         let mut first_targets = Vec::new();
@@ -116,7 +124,7 @@ impl Player {
                 let number = (first_targets[slot.instance as usize] + k) as u32;
                 let all = vectors(document, accessor.value() as u32, "POSITION")?;
                 for (of_vertex, delta) in deltas.iter_mut().zip(all) {
-                    if delta != glam::DVec3::ZERO {
+                    if delta != DVec3::ZERO {
                         of_vertex.push((number, delta.as_vec3()));
                     }
                 }
@@ -189,10 +197,11 @@ impl Player {
             let above = parent.map_or(DMat4::IDENTITY, |p| world[p as usize]);
             world[node as usize] = above * local(&nodes[node as usize]);
         }
+        let seen = DMat4::from_translation(-self.origin);
         let matrix = |&(node, bind): &(Option<u32>, DMat4)| {
-            node.map_or(DMat4::IDENTITY, |n| world[n as usize] * bind).as_mat4()
+            (seen * node.map_or(DMat4::IDENTITY, |n| world[n as usize] * bind)).as_mat4()
         };
-        let origins = world.iter().map(|w| w.w_axis.truncate().as_vec3()).collect();
+        let origins = world.iter().map(|w| relative(w.w_axis.truncate(), self.origin)).collect();
         Posed { palette: self.palette.iter().map(matrix).collect(), targets: weights, origins }
     }
 }

@@ -4,6 +4,8 @@ use glam::{DMat3, DVec3, Vec3};
 
 use cagework_core::mesh::weld;
 
+use crate::origin::{origin_near, relative};
+
 /// Below this a gradient counts as flat, and nothing turns.
 const FLAT: f64 = 1e-9;
 
@@ -21,7 +23,9 @@ pub(super) struct Surface {
 impl Surface {
     /// Vertices go `from` a place `to` another; `triangles` of them.
     pub(super) fn new(from: &[DVec3], to: &[DVec3], triangles: Vec<[u32; 3]>) -> Self {
-        let places: Vec<Vec3> = from.iter().map(|p| p.as_vec3()).collect();
+        let world: Vec<Vec3> = from.iter().map(|p| p.as_vec3()).collect();
+        let origin = origin_near(&world);
+        let places: Vec<Vec3> = from.iter().map(|&p| relative(p, origin)).collect();
         let welded = weld(&places);
         let mut normals = vec![DVec3::ZERO; from.len()];
         for triangle in &triangles {
