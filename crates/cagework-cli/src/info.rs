@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
-use cagework_core::cage_check::notices;
+use cagework_core::crossing::notices;
 use cagework_core::mesh::weld;
 use cagework_core::{Bounds, Cage};
 use cagework_io::{Clip, Model, ModelFormat, escaped, read_inner_controls, shown};

@@ -15,13 +15,13 @@ mod patch;
 mod polygon;
 #[cfg(test)]
 pub(crate) mod shapes;
+mod subdivided_box;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
 mod tests_hats;
 mod topology;
 
-pub(crate) use topology::{Side, sides_of};
 mod triangulate;
 
 use glam::{DVec2, DVec3, Vec3};
@@ -30,7 +30,9 @@ use crate::mesh::{Bounds, PolygonMesh};
 
 pub use defects::{CageError, CageNotice, FaceDefect};
 use polygon::Polygon;
+pub use subdivided_box::subdivided_box;
 use topology::Surface;
+pub use topology::{Side, sides_of};
 
 /// Smallest diagonal of a cage, object units: squares and cubes of lengths stay far from the end of f32 and f64.
 pub const MIN_DIAGONAL: f64 = 1e-12;
@@ -308,7 +310,7 @@ impl Cage {
 }
 
 /// Triangles that cover a face, as corners of it; `diagonal` of the cage.
-pub(crate) fn face_triangles(corners: &[DVec3], diagonal: f64) -> Result<Vec<[u32; 3]>, FaceDefect> {
+pub fn face_triangles(corners: &[DVec3], diagonal: f64) -> Result<Vec<[u32; 3]>, FaceDefect> {
     Polygon::new(corners, diagonal).map(|polygon| polygon.triangles)
 }
 

@@ -28,37 +28,37 @@ const COMPARISONS_OF_TRIANGLES: u64 = 40;
 
 /// A triangle with its corners' vertex numbers, which say what it shares with others.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Corners {
+pub struct Corners {
     /// Vertex numbers, three different ones.
-    pub(crate) index: [u32; 3],
+    pub index: [u32; 3],
     /// Their positions.
-    pub(crate) at: [DVec3; 3],
+    pub at: [DVec3; 3],
 }
 
 impl Corners {
     /// Smallest corner of the bounding box.
-    pub(crate) fn min(&self) -> DVec3 {
+    pub fn min(&self) -> DVec3 {
         self.at[0].min(self.at[1]).min(self.at[2])
     }
 
     /// Largest corner of the bounding box.
-    pub(crate) fn max(&self) -> DVec3 {
+    pub fn max(&self) -> DVec3 {
         self.at[0].max(self.at[1]).max(self.at[2])
     }
 
     /// Normal, not normalised: twice the area long.
-    pub(crate) fn normal(&self) -> DVec3 {
+    pub fn normal(&self) -> DVec3 {
         (self.at[1] - self.at[0]).cross(self.at[2] - self.at[0])
     }
 
     /// Cosine of the turn from this triangle to one that shares an edge with it, if it does.
-    pub(crate) fn fold_cosine(&self, other: &Self) -> Option<f64> {
+    pub fn fold_cosine(&self, other: &Self) -> Option<f64> {
         let shared = self.index.iter().filter(|i| other.index.contains(i)).count();
         (shared == 2).then(|| self.normal().normalize_or_zero().dot(other.normal().normalize_or_zero()))
     }
 
     /// The triangle with a vertex elsewhere.
-    pub(crate) fn with_corner(&self, vertex: u32, at: DVec3) -> Self {
+    pub fn with_corner(&self, vertex: u32, at: DVec3) -> Self {
         let mut moved = *self;
         for (i, p) in moved.index.iter().zip(&mut moved.at) {
             if *i == vertex {
@@ -76,7 +76,7 @@ impl Corners {
 
 /// Whether two triangles of a surface meet anywhere but in the vertices and edges that they share. Triangles that
 /// share nothing must be more than `gap` apart.
-pub(crate) fn meet(a: &Corners, b: &Corners, gap: f64) -> bool {
+pub fn meet(a: &Corners, b: &Corners, gap: f64) -> bool {
     debug_assert!([a, b].iter().all(|Corners { index: [i, j, k], .. }| i != j && j != k && k != i));
     let mut shared = [(0, 0); 3];
     let mut n = 0;
@@ -109,7 +109,7 @@ fn ascending(x: f64, number: u32) -> [u32; 3] {
 
 /// Pairs of triangles of one surface that meet where they should not, each once, in order. `[n_triangles]` given. It stops
 /// at [`MAX_PAIRS`].
-pub(crate) fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
+pub fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
     each_meeting(triangles, |pair| {
         pairs.push(pair);
@@ -123,7 +123,7 @@ pub(crate) fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
 /// whether those were all: `each` may end the search, and so do [`MAX_COMPARISONS`].
 ///
 /// Sweep along x: `n log n` for surfaces whose triangles are small against the whole.
-pub(crate) fn each_meeting(triangles: &[Corners], mut each: impl FnMut([u32; 2]) -> ControlFlow<()>) -> bool {
+pub fn each_meeting(triangles: &[Corners], mut each: impl FnMut([u32; 2]) -> ControlFlow<()>) -> bool {
     let mut order: Vec<[u32; 3]> = (0u32..).zip(triangles).map(|(t, c)| ascending(c.min().x, t)).collect();
     order.sort_unstable();
     let mut active: Vec<u32> = Vec::new();

@@ -82,7 +82,8 @@ impl<'a> Controls<'a> {
     }
 
     /// Edges of the controls inside, and three from each of them to the cage beside it, so that none is alone.
-    pub(crate) fn inner_edges(&self) -> Vec<[u32; 2]> {
+    #[must_use]
+    pub fn inner_edges(&self) -> Vec<[u32; 2]> {
         let Some(inner) = self.inner() else { return Vec::new() };
         let first = self.cage.n_vertices() as u32;
         let mut edges: Vec<[u32; 2]> = inner
@@ -124,7 +125,7 @@ impl<'a> Controls<'a> {
 mod tests {
     use super::*;
     use crate::bind::bind;
-    use crate::cage_gen::subdivided_box;
+    use crate::cage::subdivided_box;
     use crate::mesh::Bounds;
     use crate::options::BindOptions;
     use crate::progress::Silent;

@@ -106,7 +106,7 @@ pub fn winding_number(point: DVec3, triangles: &[[DVec3; 3]]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cage_gen::subdivided_box;
+    use crate::cage::subdivided_box;
     use crate::geometry;
     use crate::mesh::PolygonMesh;
 

@@ -63,6 +63,16 @@ pub struct PolygonMesh {
     pub faces: Vec<Vec<u32>>,
 }
 
+impl PolygonMesh {
+    /// Diagonal of the box of all finite vertices of faces, object units: that of a cage as far as there is one.
+    #[must_use]
+    pub fn diagonal(&self) -> f64 {
+        let used = self.faces.iter().flatten().filter_map(|&i| self.positions.get(i as usize));
+        let finite: Vec<Vec3> = used.copied().filter(|p| p.is_finite()).collect();
+        Bounds::of(&finite).map_or(0.0, |b| b.max.as_dvec3().distance(b.min.as_dvec3()))
+    }
+}
+
 /// Which vertices share one position, so that a vertex split at a UV or normal seam is bound once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Weld {

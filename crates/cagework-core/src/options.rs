@@ -16,7 +16,8 @@ pub trait Choice: Copy + 'static {
     const ALL: &'static [(&'static str, Self)];
 }
 
-/// Defines an enum, its words in serde, [`Choice`], `FromStr` (which takes `-` for `_`) and `Display` (which writes `-`).
+/// Defines an enum, its words in serde, [`Choice`](crate::options::Choice), `FromStr` (which takes `-` for `_`) and `Display` (which writes `-`).
+#[macro_export]
 macro_rules! choice {
     ($(#[$about:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $word:literal,)+ }) => {
         $(#[$about])*
@@ -42,7 +43,6 @@ macro_rules! choice {
         }
     };
 }
-pub(crate) use choice;
 
 choice! {
     /// How the cage meets the grid.
@@ -151,7 +151,7 @@ pub struct UnknownWord {
 ///
 /// # Errors
 /// [`UnknownWord`] names those there are.
-pub(crate) fn choose<T: Choice>(text: &str) -> Result<T, UnknownWord> {
+pub fn choose<T: Choice>(text: &str) -> Result<T, UnknownWord> {
     let word = text.replace('-', "_");
     let found = T::ALL.iter().find(|(known, _)| *known == word).map(|(_, value)| *value);
     found.ok_or_else(|| UnknownWord {
@@ -175,9 +175,12 @@ pub struct OutOfRange {
 /// An option whose value is a number.
 #[derive(Clone, Copy, Debug)]
 pub struct Number {
-    pub(crate) name: &'static str,
-    pub(crate) allowed: &'static str,
-    pub(crate) is_allowed: fn(f64) -> bool,
+    /// Its name.
+    pub name: &'static str,
+    /// What it may be, in words.
+    pub allowed: &'static str,
+    /// Whether it may be this.
+    pub is_allowed: fn(f64) -> bool,
 }
 
 /// Cells along the longest side.

@@ -10,7 +10,7 @@ const STEPS: usize = 40;
 /// Its quaternion belongs to the largest eigenvalue of a symmetric 4 x 4 matrix (Horn 1987, "Closed-form solution of absolute
 /// orientation using unit quaternions"; Higham and Noferini 2016 find the polar factor by the same matrix), which Newton's method
 /// finds on the characteristic polynomial, from above (Theobald 2005). Where several rotations are as near, one of them.
-pub(crate) fn nearest_rotation(m: DMat3) -> DMat3 {
+pub fn nearest_rotation(m: DMat3) -> DMat3 {
     let size = m.x_axis.abs().max(m.y_axis.abs()).max(m.z_axis.abs()).max_element();
     if size == 0.0 || !size.is_finite() {
         return DMat3::IDENTITY;

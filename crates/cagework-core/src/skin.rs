@@ -1,6 +1,6 @@
 //! Linear blend skinning and morph targets: what plays a clip.
 
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Quat, Vec3};
 
 /// Vertices with their joints and morph targets, in compressed rows.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,6 +15,34 @@ pub struct Skin {
     pub delta_starts: Vec<u32>,
     /// Target, and what it adds at weight 1, in the mesh's own space.
     pub deltas: Vec<(u32, Vec3)>,
+}
+
+/// A skeleton with a clip, its joints turned as the world at rest.
+#[derive(Clone, Debug)]
+pub struct Rig {
+    /// Parents before children, the root first.
+    pub joints: Vec<Joint>,
+    /// Joints of each vertex, and their weights. `[n_vertices]`
+    pub influences: Vec<[(u32, f32); 4]>,
+    /// Name of the clip.
+    pub clip: &'static str,
+    /// Of the keys, seconds.
+    pub times: Vec<f32>,
+    /// Rotation of each joint against its rest. `[n_joints, n_keys]`
+    pub turns: Vec<Vec<Quat>>,
+    /// Place of the root, object units. `[n_keys]`
+    pub root: Vec<Vec3>,
+}
+
+/// A joint.
+#[derive(Clone, Copy, Debug)]
+pub struct Joint {
+    /// Its name.
+    pub name: &'static str,
+    /// Where it is at rest, object units.
+    pub at: Vec3,
+    /// The joint it hangs on.
+    pub parent: Option<usize>,
 }
 
 impl Skin {

@@ -151,7 +151,7 @@ impl Slice {
 mod tests {
     use super::*;
     use crate::cage::Cage;
-    use crate::cage_gen::subdivided_box;
+    use crate::cage::subdivided_box;
     use crate::mesh::Bounds;
     use crate::progress::Silent;
 

@@ -1,7 +1,7 @@
 //! Counts in sentences.
 
 /// A count with commas: `15,002`.
-pub(crate) fn grouped(n: usize) -> String {
+pub fn grouped(n: usize) -> String {
     let digits = n.to_string();
     let mut grouped = String::new();
     for (k, digit) in digits.chars().enumerate() {
@@ -14,6 +14,6 @@ pub(crate) fn grouped(n: usize) -> String {
 }
 
 /// `1 edge`, `2 edges`.
-pub(crate) fn counted(n: usize, one: &str, many: &str) -> String {
+pub fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{} {}", grouped(n), if n == 1 { one } else { many })
 }

@@ -274,7 +274,7 @@ impl Binder<'_> {
     fn report(&self, models: Vec<Entry>) -> Refitted {
         let count = |is: fn(&Outcome) -> bool| models.iter().filter(|entry| is(&entry.outcome)).count();
         let n_cage = self.controls.cage().n_vertices();
-        let mut notices = cagework_core::cage_check::notices(self.controls.cage());
+        let mut notices = cagework_core::crossing::notices(self.controls.cage());
         if matches!(self.solved.get(), Some(None)) {
             notices.push(format!(
                 "The fields of this grid are too large to be kept in half of {} MiB: the cage was solved for anew for each \

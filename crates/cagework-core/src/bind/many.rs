@@ -106,7 +106,7 @@ mod tests {
     use super::*;
     use crate::bind::bind;
     use crate::cage::Cage;
-    use crate::cage_gen::subdivided_box;
+    use crate::cage::subdivided_box;
     use crate::controls::{ControlSet, InnerControls, InnerElement};
     use crate::mesh::Bounds;
     use crate::options::Method;

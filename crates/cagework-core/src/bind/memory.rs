@@ -160,7 +160,7 @@ fn volume_and_area(cage: &Cage) -> (f64, f64) {
 mod tests {
     use super::*;
     use crate::bind::bind;
-    use crate::cage_gen::subdivided_box;
+    use crate::cage::subdivided_box;
     use crate::mesh::Bounds;
     use crate::progress::Silent;
     use glam::Vec3;

@@ -139,7 +139,7 @@ pub(super) fn oversized(
 mod tests {
     use super::*;
     use crate::bind::bind;
-    use crate::cage_gen::subdivided_box;
+    use crate::cage::subdivided_box;
     use crate::options::BindOptions;
     use crate::progress::Silent;
 

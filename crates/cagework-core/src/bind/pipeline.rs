@@ -8,8 +8,8 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use crate::assemble::{Assembled, RowOptions, assemble};
-use crate::cage_check;
 use crate::controls::Controls;
+use crate::crossing;
 use crate::deform::{OutsideVertex, outside_in_words};
 use crate::frames::Frames;
 use crate::grid::Grid;
@@ -238,7 +238,7 @@ impl<'a> Prepared<'a> {
         let n_vertices = positions.len().saturating_sub(options.extra_points);
         let solve_ms = (sampled - stencils_made) * solved.solve_share;
         let level = &voxels.hierarchy.levels[0];
-        let mut notices = cage_check::notices(controls.cage());
+        let mut notices = crossing::notices(controls.cage());
         notices.extend(team.notice(options.threads).into_iter().chain(voxels.notices.iter().cloned()));
         notices.extend(notices_of(controls, &level.grid, options.grid));
         notices.extend(oversized(cage.bounds(), &positions[..n_vertices], &weights, controls.n_controls()));

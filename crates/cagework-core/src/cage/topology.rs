@@ -10,15 +10,20 @@ use crate::mesh::{PolygonMesh, weld};
 
 /// A side of a face: the edge between `lo` and `hi`, run through from `lo` to `hi` if `forward`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Side {
-    pub(crate) lo: u32,
-    pub(crate) hi: u32,
-    pub(crate) face: u32,
-    pub(crate) forward: bool,
+pub struct Side {
+    /// Its smaller vertex.
+    pub lo: u32,
+    /// Its larger vertex.
+    pub hi: u32,
+    /// The face.
+    pub face: u32,
+    /// Whether the face runs from `lo` to `hi`.
+    pub forward: bool,
 }
 
 /// The sides of some faces, sorted by edge.
-pub(crate) fn sides_of(faces: &[Vec<u32>], some: impl Iterator<Item = u32>) -> Vec<Side> {
+#[must_use]
+pub fn sides_of(faces: &[Vec<u32>], some: impl Iterator<Item = u32>) -> Vec<Side> {
     // As numbers, three of which are sorted elsewhere too: every other kind of key is 2 kB more to download.
     let mut keys: Vec<[u32; 3]> = Vec::new();
     for f in some {

@@ -1,14 +1,10 @@
 //! Faults of the connectivity: open and crowded edges, vertices that are not joined, not used or pinched.
 
-use std::collections::HashMap;
-
 use super::mirror::Plane;
-use super::{Code, Fix, Places, Problem, Repair, Severity, diagonal, problem};
+use super::{Code, Fix, Places, Problem, Repair, Severity, problem};
 use crate::cage::{Side, sides_of};
+use crate::crossing::same_places;
 use crate::mesh::PolygonMesh;
-
-/// Vertices nearer than this fraction of the diagonal are at one place: the rounding of six decimals in a file.
-pub(super) const WELD_DISTANCE: f64 = 2e-6;
 
 /// All sides of sound faces, sorted by edge.
 #[derive(Debug)]
@@ -68,41 +64,6 @@ impl Edges {
             });
         }
     }
-}
-
-/// For each vertex the first one at the same place, and how many have an earlier one.
-pub(super) fn same_places(mesh: &PolygonMesh) -> (Vec<u32>, usize) {
-    let reach = WELD_DISTANCE * diagonal(mesh);
-    let size = (2.0 * reach).max(f64::MIN_POSITIVE);
-    let mut at_place: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
-    let mut first: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-    let mut joined = 0;
-    for (v, p) in mesh.positions.iter().enumerate() {
-        if !p.is_finite() {
-            continue;
-        }
-        let p = p.as_dvec3();
-        let cell = (p / size).floor().to_array().map(|x| x as i64);
-        let mut found = None;
-        for k in 0..27 {
-            // Coordinates of a mesh without extent saturate: they may wrap, equal places still meet.
-            let key = [0, 1, 2].map(|a| cell[a].wrapping_add(k / [1, 3, 9][a] % 3 - 1));
-            let near = at_place.get(&key).into_iter().flatten();
-            for &w in near {
-                if mesh.positions[w as usize].as_dvec3().distance(p) <= reach && found.is_none_or(|f| w < f) {
-                    found = Some(w);
-                }
-            }
-        }
-        match found {
-            Some(w) => {
-                first[v] = w;
-                joined += 1;
-            }
-            None => at_place.entry(cell).or_default().push(v as u32),
-        }
-    }
-    (first, joined)
 }
 
 /// Reports vertices that are not joined, not used, or pinch the surface.

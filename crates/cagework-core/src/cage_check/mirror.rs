@@ -1,6 +1,5 @@
 //! Half a cage, as it is modelled with a mirror that was not applied: all its open edges lie in one plane across an axis.
 
-use super::diagonal;
 use crate::mesh::PolygonMesh;
 
 /// Open edges this near to one plane are in it, of the diagonal: a modeller's rounding.
@@ -16,7 +15,7 @@ pub(super) struct Plane {
 impl Plane {
     /// The plane of all `open` edges, if the whole mesh is on one side of it.
     pub(super) fn of(mesh: &PolygonMesh, open: &[[u32; 2]]) -> Option<Self> {
-        let reach = (IN_PLANE * diagonal(mesh)) as f32;
+        let reach = (IN_PLANE * mesh.diagonal()) as f32;
         let first = mesh.positions[open.first()?[0] as usize];
         (0..3).find_map(|axis| {
             let at = if first[axis].abs() <= reach { 0.0 } else { first[axis] };
@@ -68,8 +67,8 @@ mod tests {
 
     use super::*;
     use crate::cage::Cage;
+    use crate::cage::subdivided_box;
     use crate::cage_check::{Code, Fix, Repair, check, repair};
-    use crate::cage_gen::subdivided_box;
     use crate::mesh::Bounds;
 
     /// The half of a box of side 2 on one side of a plane, its middle at the origin.

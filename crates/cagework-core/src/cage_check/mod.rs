@@ -4,7 +4,6 @@
 //! mark every place and a command can list them. [`repair`] does what can be done without asking.
 
 mod edges;
-mod fill;
 mod grow;
 mod mirror;
 mod orient;
@@ -19,15 +18,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::cage::{Cage, CageError, MAX_FACES};
 use crate::controls::{ControlSet, Controls, InnerControls};
+use crate::crossing::{Crossings, MAX_PLACES, crossings, crossings_of};
 use crate::enclosure::Enclosure;
-use crate::mesh::{Bounds, PolygonMesh};
+use crate::mesh::PolygonMesh;
 
-pub(crate) use fill::{loops, triangulate};
 pub(crate) use grow::grow;
 pub use repair::{Repair, RepairError, Repaired, repair, repair_smooth};
-
-/// Most places that a problem lists of each kind; `count` is the full number.
-pub const MAX_PLACES: usize = 2000;
 
 /// What is wrong. The names are stable: programs may rely on them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -187,7 +183,8 @@ pub fn check_smooth(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32
     edges::report_vertices(mesh, &sound, &mut found);
     let components = orient::report(mesh, &sound, &edges, &mut found);
     let cage = Cage::new(mesh);
-    found.extend(cage.as_ref().map_or_else(|_| shape::crossings(mesh, None, &sound), crossings));
+    let crossings = cage.as_ref().map_or_else(|_| crossings(mesh, None, &sound), crossings_of);
+    found.extend(crossings.map(crossing));
     if let Err(error) = &cage
         && !found.iter().any(|p| p.severity == Severity::Error)
     {
@@ -227,16 +224,13 @@ pub fn check_smooth(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32
     }
 }
 
-/// What a user should know of a cage that is bound, a sentence each: what was mended, and where it goes through itself.
-#[must_use]
-pub fn notices(cage: &Cage) -> Vec<String> {
-    let crossing = crossings(cage).map(|problem| problem.message);
-    cage.notices().iter().map(ToString::to_string).chain(crossing).collect()
-}
-
-fn crossings(cage: &Cage) -> Option<Problem> {
-    let all: Vec<u32> = (0..cage.faces().len() as u32).collect();
-    shape::crossings(&cage.to_polygon_mesh(), Some(cage.component_of_face()), &all)
+/// The problem that faces go through each other, if they do.
+fn crossing(found: Crossings) -> Problem {
+    Problem {
+        places: Places { faces: found.faces, points: found.points, ..Places::default() },
+        message: found.message,
+        ..problem(Code::SelfIntersection, Severity::Warning, found.count)
+    }
 }
 
 /// Vertices of the model that the cage does not enclose; whether there are none.
@@ -260,11 +254,4 @@ fn report_outside(cage: &Cage, model: &[Vec3], found: &mut Vec<Problem>) -> bool
 fn problem(code: Code, severity: Severity, count: usize) -> Problem {
     let message = sentences::of(code, count);
     Problem { code, severity, count, places: Places::default(), message, fixes: Vec::new() }
-}
-
-/// Diagonal of the box of all finite vertices of faces, object units: [`Cage::diagonal`] as far as there is one.
-fn diagonal(mesh: &PolygonMesh) -> f64 {
-    let used = mesh.faces.iter().flatten().filter_map(|&i| mesh.positions.get(i as usize));
-    let finite: Vec<Vec3> = used.copied().filter(|p| p.is_finite()).collect();
-    Bounds::of(&finite).map_or(0.0, |b| b.max.as_dvec3().distance(b.min.as_dvec3()))
 }

@@ -6,12 +6,14 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::edges::{Edges, same_places};
+use super::edges::Edges;
 use super::grow;
 use super::mirror::Plane;
-use super::{fill, orient, shape};
+use super::{orient, shape};
 use crate::cage::CageError;
 use crate::controls::ControlError;
+use crate::crossing::same_places;
+use crate::fill;
 use crate::mesh::PolygonMesh;
 
 /// A repair.

@@ -1,7 +1,7 @@
 //! What the problems of a cage say, in English: another language is another file like this one.
 
 use super::Code;
-use crate::words::{counted, grouped};
+use crate::words::counted;
 
 /// For the problems of which the number says all there is.
 pub(super) fn of(code: Code, n: usize) -> String {
@@ -74,33 +74,6 @@ pub(super) fn flipped(component: usize, n: usize, all: usize) -> String {
 /// Faces of a component cannot be turned consistently.
 pub(super) fn one_sided(component: usize) -> String {
     format!("Component {component} has no inside: its faces cannot be turned consistently.")
-}
-
-/// Pairs of triangles meet: so many are listed, so many there are (at least, if not `complete`); the first one's faces and where.
-pub(super) fn crossing(
-    [listed, all]: [usize; 2],
-    complete: bool,
-    of_parts: bool,
-    ([f, g], at): ([u32; 2], [f32; 3]),
-) -> String {
-    let more = match (all - listed, complete) {
-        (0, true) => String::new(),
-        (n, true) => format!(", and {} more", grouped(n)),
-        (n, false) => format!(", and at least {} more", grouped(n)),
-    };
-    let listed = counted(listed, "pair of triangles", "pairs of triangles");
-    let (what, then) = if of_parts {
-        (
-            "Parts of the cage overlap or touch",
-            "Where they overlap they are bound as one, without the walls inside.",
-        )
-    } else {
-        (
-            "The cage goes through itself",
-            "What it encloses twice counts as inside; move their vertices apart.",
-        )
-    };
-    format!("{what}: {listed} meet{more}, the first of faces {f} and {g} near {at:?}. {then}")
 }
 
 /// Places are thinner than a cell; `cells` along the longest side would do, if a grid may have so many.

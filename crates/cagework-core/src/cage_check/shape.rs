@@ -1,13 +1,11 @@
-//! Faults of faces and of the shape: faces without area, faces through each other, thin parts.
+//! Faults of faces and of the shape: faces without area, thin parts.
 
 use std::collections::HashMap;
-use std::ops::ControlFlow;
 
 use glam::DVec3;
 
-use super::{Code, Fix, MAX_PLACES, Places, Problem, Repair, Severity, diagonal, problem, sentences};
+use super::{Code, Fix, Places, Problem, Repair, Severity, problem, sentences};
 use crate::cage::face_triangles;
-use crate::contact::{Corners, each_meeting};
 use crate::controls::Controls;
 use crate::mesh::PolygonMesh;
 use crate::options::MAX_GRID;
@@ -36,7 +34,7 @@ pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u
             ..problem(Code::NotFinite, Severity::Error, count)
         });
     }
-    let diagonal = diagonal(mesh);
+    let diagonal = mesh.diagonal();
     let (mut sound, mut bad, mut degenerate, mut twice) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut outlines: HashMap<Vec<u32>, u32> = HashMap::new();
     for (f, face) in mesh.faces.iter().enumerate() {
@@ -73,74 +71,6 @@ pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u
         }
     }
     sound
-}
-
-/// Sound faces as triangles with the face that each was cut from.
-fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
-    let diagonal = diagonal(mesh);
-    let (mut triangles, mut face_of) = (Vec::new(), Vec::new());
-    for &f in sound {
-        let face = &mesh.faces[f as usize];
-        let corners: Vec<DVec3> = face.iter().map(|&i| mesh.positions[i as usize].as_dvec3()).collect();
-        for t in face_triangles(&corners, diagonal).unwrap_or_default() {
-            triangles
-                .push(Corners { index: t.map(|k| face[k as usize]), at: t.map(|k| corners[k as usize]) });
-            face_of.push(f);
-        }
-    }
-    // Vertices at one place count as one, so that neighbours across a seam do not seem to meet; but not the corners of one
-    // triangle, as where the mesh is that small against its diagonal.
-    let (mut first, _) = super::edges::same_places(mesh);
-    for Corners { index, .. } in &triangles {
-        let named = index.map(|i| first[i as usize]);
-        for (k, &i) in index.iter().enumerate() {
-            if named[(k + 1) % 3] == named[k] || named[(k + 2) % 3] == named[k] {
-                first[i as usize] = i;
-            }
-        }
-    }
-    for corners in &mut triangles {
-        corners.index = corners.index.map(|i| first[i as usize]);
-    }
-    (triangles, face_of)
-}
-
-/// Faces that go through each other; `parts`: the part of each face of a cage.
-pub(super) fn crossings(mesh: &PolygonMesh, parts: Option<&[u32]>, sound: &[u32]) -> Option<Problem> {
-    let mut of_parts = parts.is_some();
-    let (triangles, face_of) = triangles(mesh, sound);
-    let mut pairs = Vec::new();
-    let mut count = 0;
-    let complete = each_meeting(&triangles, |[a, b]| {
-        let [f, g] = [a, b].map(|t| face_of[t as usize] as usize);
-        if f != g {
-            of_parts = of_parts && parts.is_some_and(|part| part[f] != part[g]);
-            count += 1;
-            if pairs.len() < MAX_PLACES {
-                pairs.push([a, b]);
-            }
-        }
-        ControlFlow::Continue(())
-    });
-    pairs.sort_unstable();
-    // A search that ended early and found nothing says nothing.
-    let first = *pairs.first()?;
-    let mut faces: Vec<u32> = pairs.iter().flatten().map(|&t| face_of[t as usize]).collect();
-    faces.sort_unstable();
-    faces.dedup();
-    let point =
-        |&[a, b]: &[u32; 2]| between(&triangles[a as usize], &triangles[b as usize]).as_vec3().to_array();
-    let place = (first.map(|t| face_of[t as usize]), point(&first));
-    Some(Problem {
-        places: Places { faces, points: pairs.iter().map(point).collect(), ..Places::default() },
-        message: sentences::crossing([pairs.len(), count], complete, of_parts, place),
-        ..problem(Code::SelfIntersection, Severity::Warning, count)
-    })
-}
-
-/// A point near where two triangles meet: the middle of where their boxes overlap.
-fn between(a: &Corners, b: &Corners) -> DVec3 {
-    0.5 * (a.min().max(b.min()) + a.max().min(b.max()))
 }
 
 /// Measures from the middle of faces straight inwards, to faces about opposite; reports where that is less than a cell of the

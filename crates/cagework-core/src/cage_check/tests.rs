@@ -1,10 +1,11 @@
 use glam::{Vec3, vec3};
 use proptest::prelude::*;
 
-use super::{Code, Fix, MAX_PLACES, Repair, Severity, check, check_smooth, notices, repair, repair_smooth};
+use super::{Code, Fix, MAX_PLACES, Repair, Severity, check, check_smooth, repair, repair_smooth};
 use crate::bind::bind;
 use crate::cage::Cage;
-use crate::cage_gen::subdivided_box;
+use crate::cage::subdivided_box;
+use crate::crossing::notices;
 use crate::mesh::{Bounds, PolygonMesh};
 use crate::options::BindOptions;
 use crate::progress::Silent;

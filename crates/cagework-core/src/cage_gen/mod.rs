@@ -23,7 +23,6 @@ mod quads;
 mod relax;
 mod shell;
 mod smooth;
-mod subdivided_box;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -42,7 +41,6 @@ pub use options::{
 };
 use quads::Faces;
 use shell::Shell;
-pub use subdivided_box::subdivided_box;
 use verify::{verified, verified_faces};
 
 /// Most lattices that are tried until the target is met.

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::cage::{Cage, MAX_DIAGONAL};
-use crate::options::{Number, OutOfRange, SMOOTH, choice};
+use crate::choice;
+use crate::options::{Number, OutOfRange, SMOOTH};
 use crate::progress::Cancelled;
 
 /// Fewest vertices that can be asked for.

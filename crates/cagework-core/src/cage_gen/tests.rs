@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::{CageGenError, CageOptions, CageReport, GeneratedCage, Mirror, Shape, Symmetry, generate};
 use crate::bind::bind;
-use crate::cage::Cage;
+use crate::cage::{Cage, subdivided_box};
 use crate::contact::{Corners, meeting};
 use crate::deform::displacements;
 use crate::geometry::winding_number;
@@ -212,7 +212,7 @@ fn limbs_have_rings_and_compact_models_few_vertices() {
     let widest = heights.windows(2).map(|w| w[1] - w[0]).fold(0.0, f32::max);
     assert!(widest < 2.5, "rings are {widest} apart");
     let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
-    let cube = super::subdivided_box(bounds, 0.0, [1; 3]);
+    let cube = subdivided_box(bounds, 0.0, [1; 3]);
     let triangles = cube.faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
     assert!(make(&(cube.positions, triangles), &options(80)).report.vertices < 24);
 }

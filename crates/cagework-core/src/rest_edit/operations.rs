@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{Edited, RestEditError, finish};
-use crate::cage_check::{loops, triangulate};
+use crate::fill::{loops, triangulate};
 use crate::mesh::PolygonMesh;
 
 /// Puts vertices elsewhere: (vertex, new position in object units).

@@ -3,8 +3,8 @@ use proptest::prelude::*;
 
 use super::{Edited, RestEditError, collapse_edge, delete_faces, extrude_face, move_vertices, split_edge};
 use crate::cage::Cage;
-use crate::cage_check::{Code, check};
-use crate::cage_gen::subdivided_box;
+use crate::cage::subdivided_box;
+use crate::crossing::{crossings_of, notices};
 use crate::mesh::{Bounds, PolygonMesh};
 
 /// Positions of the order of 1 in f32.
@@ -155,11 +155,11 @@ fn cage_that_meets_itself_already_can_still_be_mended() {
     let mut mesh = cube();
     mesh.positions.extend(cube().positions.iter().map(|p| *p + vec3(1.5, 0.3, 0.2)));
     mesh.faces.extend(cube().faces.iter().map(|f| f.iter().map(|i| i + 8).collect::<Vec<_>>()));
-    assert!(check(&mesh, None, None).problem(Code::SelfIntersection).is_some());
+    assert!(crossings_of(&Cage::new(&mesh).unwrap()).is_some());
     let apart: Vec<(u32, Vec3)> =
         (8..16).map(|v| (v, mesh.positions[v as usize] + vec3(2.0, 0.0, 0.0))).collect();
     let edited = move_vertices(&mesh, &apart).unwrap();
-    assert_eq!(check(&edited.mesh, None, None).problems, []);
+    assert_eq!(notices(&Cage::new(&edited.mesh).unwrap()), Vec::<String>::new());
 }
 
 proptest! {
@@ -186,8 +186,8 @@ proptest! {
             if let Ok(edited) = edited {
                 prop_assert_eq!(edited.vertex_of.len(), mesh.positions.len());
                 mesh = edited.mesh;
-                let found = check(&mesh, None, None);
-                prop_assert!(found.valid, "{:?}", found.problems);
+                let cage = Cage::new(&mesh);
+                prop_assert!(cage.is_ok(), "{cage:?}");
             }
         }
     }

@@ -6,8 +6,9 @@ use glam::{Quat, Vec3, vec3};
 
 use super::sdf::{Body, Solid};
 use super::skeleton::Skeleton;
-use super::{CageRecipe, Pulled, Recipe, Rig, SampleInfo};
+use super::{CageRecipe, Pulled, Recipe, SampleInfo};
 use crate::cage_gen::CageOptions;
+use crate::skin::Rig;
 
 pub(super) const INFO: SampleInfo = SampleInfo {
     id: "humanoid",

@@ -11,12 +11,13 @@ mod sdf;
 mod skeleton;
 mod strider;
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 use serde::Serialize;
 
 use crate::cage_gen::{CageOptions, generate};
 use crate::mesh::{PolygonMesh, TriMesh};
 use crate::progress::Silent;
+use crate::skin::Rig;
 
 use sdf::Body;
 
@@ -46,34 +47,6 @@ pub struct Sample {
     pub poses: Vec<(String, Vec<Vec3>)>,
     /// Its skeleton, if it has one, with a clip.
     pub rig: Option<Rig>,
-}
-
-/// A skeleton with a clip, its joints turned as the world at rest.
-#[derive(Clone, Debug)]
-pub struct Rig {
-    /// Parents before children, the root first.
-    pub joints: Vec<Joint>,
-    /// Joints of each vertex, and their weights. `[n_vertices]`
-    pub influences: Vec<[(u32, f32); 4]>,
-    /// Name of the clip.
-    pub clip: &'static str,
-    /// Of the keys, seconds.
-    pub times: Vec<f32>,
-    /// Rotation of each joint against its rest. `[n_joints, n_keys]`
-    pub turns: Vec<Vec<Quat>>,
-    /// Place of the root, object units. `[n_keys]`
-    pub root: Vec<Vec3>,
-}
-
-/// A joint.
-#[derive(Clone, Copy, Debug)]
-pub struct Joint {
-    /// Its name.
-    pub name: &'static str,
-    /// Where it is at rest, object units.
-    pub at: Vec3,
-    /// The joint it hangs on.
-    pub parent: Option<usize>,
 }
 
 const SAMPLES: [SampleInfo; 4] = [rat::INFO, humanoid::INFO, clamp::INFO, strider::INFO];

@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, Quat, Vec3};
 
-use super::{Joint, Rig};
+use crate::skin::{Joint, Rig};
 
 /// How fast a bone's say falls off with distance.
 const SHARPNESS: i32 = 6;

@@ -1,7 +1,7 @@
 use super::*;
 use crate::bind::Watch;
 use crate::bind::pipeline::{FieldsOn, Prepared};
-use crate::cage_gen::subdivided_box;
+use crate::cage::subdivided_box;
 use crate::mesh::Bounds;
 use crate::options::BindOptions;
 use crate::progress::Silent;

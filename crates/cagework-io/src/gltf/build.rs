@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cagework_core::TriMesh;
 use cagework_core::deform::vertex_normals;
-use cagework_core::samples::Rig;
+use cagework_core::skin::Rig;
 use glam::{DVec3, Mat4, Quat, Vec3};
 use serde_json::{Value, json};
 

@@ -8,7 +8,7 @@ use glam::DVec3;
 const MAX_EDGES: usize = 64;
 
 /// Closed outlines made of edges, each run through as most of its edges are; edges that lead nowhere are left out.
-pub(crate) fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
+pub fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
     // Both ways: a face next to the hole may be turned the wrong way.
     let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for &[from, to] in edges {
@@ -59,7 +59,7 @@ const FOLDED: f64 = 0.99;
 /// around the hole. `None` if the outline has too many corners.
 ///
 /// Source: Barequet, Sharir 1995, "Filling gaps in the boundary of a polyhedron" (dynamic programming).
-pub(crate) fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<Vec<[u32; 3]>> {
+pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<Vec<[u32; 3]>> {
     let n = outline.len();
     if !(3..=MAX_EDGES).contains(&n) {
         return None;
