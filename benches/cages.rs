@@ -4,13 +4,13 @@
 //! `cargo bench -p cagework-benches --bench cages -- horse.glb cow.obj`
 
 use cagework_benches::read;
+use cagework_cage::check::check;
+use cagework_cage::generate::{CageOptions, generate};
+use cagework_cage::samples;
 use cagework_core::bind::bind;
-use cagework_core::cage_check::check;
-use cagework_core::cage_gen::{CageOptions, generate};
 use cagework_core::mesh::TriMesh;
 use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
-use cagework_core::samples;
 
 /// Vertices asked for: few, the default, many.
 const TARGETS: [u32; 3] = [24, 80, 200];

@@ -7,14 +7,15 @@
 use std::slice;
 use std::time::Instant;
 
+use cagework_cage::samples;
 use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
-use cagework_core::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
 use cagework_core::skin::Skin;
-use cagework_core::{Cage, TriMesh, bind, samples};
+use cagework_core::{Cage, TriMesh, bind};
 use cagework_gpu::render::DrawModel;
 use cagework_gpu::{ContextOptions, Deformer, GpuContext, GpuWeights, Session};
 use cagework_io::{Model, write_mesh_glb};
+use cagework_pose::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
 use cagework_tests::creature::{creature, creature_cage};
 use glam::{DVec3, Mat4, Quat, Vec3};
 use pollster::block_on;

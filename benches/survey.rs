@@ -12,9 +12,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f32::consts::{PI, TAU};
 
 use cagework_benches::fastest_ms;
+use cagework_cage::check::{Code, check};
+use cagework_cage::generate::{CageOptions, generate};
 use cagework_core::bind::bind;
-use cagework_core::cage_check::{Code, check};
-use cagework_core::cage_gen::{CageOptions, generate};
 use cagework_core::deform::deform_bound;
 use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;

@@ -1,7 +1,7 @@
 //! `cagework cage`: a cage for a model.
 
+use cagework_cage::generate::CageReport;
 use cagework_core::PolygonMesh;
-use cagework_core::cage_gen::CageReport;
 use cagework_io::{Model, shown};
 use glam::DVec3;
 use serde::Serialize;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use cagework_core::cage_check::{CageCheck, Code, Fix, Repair, Severity, check_smooth, repair_smooth};
+use cagework_cage::check::{CageCheck, Code, Fix, Repair, Severity, check_smooth, repair_smooth};
 use cagework_io::{UpAxis, shown};
 use serde::Serialize;
 
@@ -118,7 +118,7 @@ fn text(checked: &Checked) -> String {
 }
 
 /// The first place of a problem in words, if its sentence names none.
-fn place(p: &cagework_core::cage_check::Problem) -> Option<String> {
+fn place(p: &cagework_cage::check::Problem) -> Option<String> {
     if p.code == Code::SelfIntersection {
         return None;
     }

@@ -4,10 +4,10 @@ use std::error::Error;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use cagework_cage::check::RepairError;
+use cagework_cage::generate::CageGenError;
 use cagework_core::bind::BindError;
 use cagework_core::cage::CageError;
-use cagework_core::cage_check::RepairError;
-use cagework_core::cage_gen::CageGenError;
 use cagework_core::{ClosedFormError, ControlError};
 use cagework_gpu::GpuError;
 use cagework_io::{GltfError, ObjError, ReadError, shown};

@@ -4,9 +4,9 @@ mod landmarks;
 
 use std::time::Instant;
 
-use cagework_core::pull::FitOptions;
 use cagework_core::{Bounds, Weights};
 use cagework_io::{Model, shown};
+use cagework_pose::pull::FitOptions;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 

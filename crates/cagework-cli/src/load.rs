@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
+use cagework_cage::CageOptions;
+use cagework_cage::generate::{CageReport, generate};
+use cagework_cage::samples::{self, Sample};
 use cagework_core::cage::MAX_FACES;
-use cagework_core::cage_gen::{CageReport, generate};
-use cagework_core::samples::{self, Sample};
 use cagework_core::{
-    Bounds, Cage, CageError, CageOptions, ControlSet, Controls, InnerControls, PolygonMesh, TriMesh,
-    subdivided_box,
+    Bounds, Cage, CageError, ControlSet, Controls, InnerControls, PolygonMesh, TriMesh, subdivided_box,
 };
 use cagework_io::{Model, PoseState, UpAxis};
 use glam::{DVec3, Vec3};

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use cagework_core::Frames;
 use cagework_core::deform::OutsideVertex;
 use cagework_core::progress::Silent;
-use cagework_core::pull::{Probes, Pull};
 use cagework_core::{BindOptions, Controls, InnerControls, Weights, bind};
 use cagework_io::{Model, SavedWeights, write_inner_controls};
+use cagework_pose::pull::{Probes, Pull};
 use glam::Vec3;
 
 use crate::args::{CageSource, PoseArgs};

@@ -198,6 +198,3 @@ pub fn bend_vertices(field: &DisplacementField, positions: &mut [Vec3]) {
         *position += along_y(0).lerp(along_y(1), share.z).truncate();
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cagework_core::parts::BoundParts;
+use cagework_pose::parts::BoundParts;
 use glam::Vec3;
 
 use crate::buffers::Allocator;

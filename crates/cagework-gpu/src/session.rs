@@ -14,8 +14,8 @@ use std::sync::Arc;
 
 use cagework_core::deform::{deform_bound, vertex_normals};
 use cagework_core::options::BindOptions;
-use cagework_core::parts::{BoundParts, Parts};
 use cagework_core::{BindReport, Bounds, Cage, ControlSet, Controls, Frames, Progress, Weights};
+use cagework_pose::parts::{BoundParts, Parts};
 use glam::{Vec2, Vec3};
 
 use crate::bind::bind_gpu;

@@ -1,8 +1,8 @@
 //! Parts of a model by the names that its file gives them.
 
 use cagework_core::deform::deform_bound;
-use cagework_core::parts::{Parts, pieces};
 use cagework_core::{Frames, Weights};
+use cagework_pose::parts::{Parts, pieces};
 use glam::Vec3;
 use thiserror::Error;
 

@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
-use cagework_core::cage_check::check_smooth;
-use cagework_core::cage_gen::{CageReport, generate};
+use cagework_cage::CageOptions;
+use cagework_cage::check::check_smooth;
+use cagework_cage::generate::{CageReport, generate};
 use cagework_core::crossing::notices;
 use cagework_core::options::{GRID, SMOOTH};
-use cagework_core::{Cage as CoreCage, CageOptions, ControlSet, Controls, InnerControls, PolygonMesh};
+use cagework_core::{Cage as CoreCage, ControlSet, Controls, InnerControls, PolygonMesh};
 use cagework_io::write_cage_obj;
 use glam::DVec3;
 use numpy::{PyArray1, PyArray2};

@@ -3,8 +3,8 @@
 use cagework_core::bind as bind_points;
 use cagework_core::deform::deform_bound;
 use cagework_core::options::OutsidePolicy;
-use cagework_core::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull, Reach};
 use cagework_core::{BindOptions, TriMesh};
+use cagework_pose::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull, Reach};
 use glam::{DVec3, Vec3};
 use numpy::PyArray2;
 use pyo3::prelude::*;

@@ -4,15 +4,16 @@
 
 mod results;
 
-use cagework_core::cage_check::repair_smooth;
-use cagework_core::cage_gen::{CageOptions, GeneratedCage, generate};
+use cagework_cage::check::repair_smooth;
+use cagework_cage::generate::{CageOptions, GeneratedCage, generate};
+use cagework_cage::samples;
 use cagework_core::deform::deform_bound;
 use cagework_core::dynamic::Lattice;
 use cagework_core::green::green_weights;
 use cagework_core::options::OutsidePolicy;
 use cagework_core::progress::Silent;
 use cagework_core::slice::Slice;
-use cagework_core::{BindOptions, Binding, ControlSet, Controls, PolygonMesh, mean_value_weights, samples};
+use cagework_core::{BindOptions, Binding, ControlSet, Controls, PolygonMesh, mean_value_weights};
 use cagework_gpu::{ContextOptions, GpuContext, bind_on};
 use glam::Vec3;
 use js_sys::Function;

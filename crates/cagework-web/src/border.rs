@@ -4,8 +4,8 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use cagework_core::cage_check::{Code, Repair, Severity};
-use cagework_core::cage_gen::{
+use cagework_cage::check::{Code, Repair, Severity};
+use cagework_cage::generate::{
     CageOptions, DETAILS, MAX_CLEARANCE, MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Shape,
 };
 use cagework_core::deform::OutsideVertex;

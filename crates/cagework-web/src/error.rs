@@ -2,17 +2,17 @@
 
 use std::fmt::Display;
 
+use cagework_cage::check::RepairError;
+use cagework_cage::generate::CageGenError;
 use cagework_core::cage::CageError;
-use cagework_core::cage_check::RepairError;
-use cagework_core::cage_gen::CageGenError;
 use cagework_core::edit::PoseError;
-use cagework_core::pull::PullError;
 use cagework_core::rest_edit::RestEditError;
 use cagework_core::slice::SliceError;
 use cagework_core::weights::WeightsError;
 use cagework_core::{BindError, ClosedFormError, ControlError};
 use cagework_gpu::GpuError;
 use cagework_io::{GltfError, NpzError, ObjError, PoseCodeError, ProjectError, ReadError, WriteError};
+use cagework_pose::pull::PullError;
 use serde::Serialize;
 use wasm_bindgen::JsValue;
 

@@ -6,9 +6,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use cagework_core::Parts;
 use cagework_gpu::render::DrawModel;
 use cagework_io::{Model, UpAxis};
+use cagework_pose::Parts;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 

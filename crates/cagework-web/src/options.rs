@@ -1,10 +1,11 @@
 //! What JavaScript asks for: the option types of contract.ts.
 
-use cagework_core::cage_gen::{CageOptions, Shape, Symmetry};
+use cagework_cage::generate::{CageOptions, Shape, Symmetry};
+use cagework_core::BindOptions;
 use cagework_core::options::{Backend, Solver};
-use cagework_core::{BindOptions, Parts};
 use cagework_gpu::render::Theme;
 use cagework_io::{Joints, ReshapeOptions};
+use cagework_pose::Parts;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::JsValue;

@@ -1,7 +1,7 @@
 //! What is wrong with a cage, as the page lists it and draws it.
 
+use cagework_cage::check::{CageCheck, Code, Fix, Places, Problem, Repair, Severity, check_smooth};
 use cagework_core::PolygonMesh;
-use cagework_core::cage_check::{CageCheck, Code, Fix, Places, Problem, Repair, Severity, check_smooth};
 use cagework_gpu::render::Marks;
 use glam::Vec3;
 use wasm_bindgen::JsValue;

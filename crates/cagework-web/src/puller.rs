@@ -2,8 +2,8 @@
 
 use cagework_core::edit::Symmetry;
 use cagework_core::progress::Silent;
-use cagework_core::pull::{Drag, DragOptions, Grip, Probes, Pull, Reach};
 use cagework_core::{BindOptions, ControlSet, Controls, TriMesh, bind};
+use cagework_pose::pull::{Drag, DragOptions, Grip, Probes, Pull, Reach};
 use glam::{DVec3, Vec3};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -150,7 +150,8 @@ impl Puller {
 
 #[cfg(test)]
 mod tests {
-    use cagework_core::{Cage, samples};
+    use cagework_cage::samples;
+    use cagework_core::Cage;
 
     use super::*;
 

@@ -1,8 +1,9 @@
 //! For the npm package: models in, models out, and weights without a picture.
 
 use cagework_core::deform::{deform_bound, displacements};
-use cagework_core::{Controls, Frames, Parts, Weights};
+use cagework_core::{Controls, Frames, Weights};
 use cagework_io::{Model, ModelFormat, ReshapeOptions};
+use cagework_pose::Parts;
 use glam::Vec3;
 use js_sys::{Array, Float32Array, Function, Uint32Array};
 use wasm_bindgen::JsValue;

@@ -2,10 +2,11 @@
 
 use std::mem::discriminant;
 
+use cagework_cage::generate::{CLEARANCE, CageOptions, DETAIL, TARGET, VOXELS};
+use cagework_cage::samples;
 use cagework_core::BindOptions;
-use cagework_core::cage_gen::{CLEARANCE, CageOptions, DETAIL, TARGET, VOXELS};
+use cagework_core::PolygonMesh;
 use cagework_core::options::{GRID, MAX_ITERATIONS, Number, SPARSIFY, TAU};
-use cagework_core::{PolygonMesh, samples};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use wasm_bindgen::JsValue;

@@ -1,7 +1,7 @@
 //! What JavaScript is told about things, as plain objects: the types of contract.ts.
 
+use cagework_cage::check::{Code, Repair, Severity};
 use cagework_core::cage::CageNotice;
-use cagework_core::cage_check::{Code, Repair, Severity};
 use cagework_core::edit::Topology;
 use cagework_core::{Bounds, ControlSet};
 use cagework_io::{Model, ModelFormat, UpAxis};

@@ -59,19 +59,11 @@ pub(crate) fn check() -> Result<(), String> {
     deny::check()?;
     one_version()?;
     // Names what a package lacks; `cargo publish --dry-run` builds them as well, once before a release.
-    let package = [
-        "package",
-        "--quiet",
-        "--no-verify",
-        "--allow-dirty",
-        "--locked",
-        "-p",
-        "cagework-core",
-        "-p",
-        "cagework-io",
-        "-p",
-    ];
-    run("cargo", &[&package[..], &["cagework-gpu"]].concat(), &[])?;
+    let mut package = vec!["package", "--quiet", "--no-verify", "--allow-dirty", "--locked"];
+    for name in ["cagework-core", "cagework-cage", "cagework-pose", "cagework-io", "cagework-gpu"] {
+        package.extend(["-p", name]);
+    }
+    run("cargo", &package, &[])?;
     site::check_types()?;
     exec(&["biome", "ci", "--error-on-warnings"])
 }

@@ -52,8 +52,10 @@ const ARTIFACTS: [Artifact; 2] = [
 const RUSTFLAGS: &str = "-C target-feature=+simd128 -C passes=slp-vectorizer";
 
 /// What the packages are made of.
-const SOURCES: [&str; 7] = [
+const SOURCES: [&str; 9] = [
     "crates/cagework-core",
+    "crates/cagework-cage",
+    "crates/cagework-pose",
     "crates/cagework-io",
     "crates/cagework-gpu",
     "crates/cagework-web",

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use cagework_core::cage_check::Repair;
-use cagework_core::cage_gen::{CageOptions, DETAIL, MAX_TARGET, MIN_TARGET, Shape, Symmetry};
+use cagework_cage::check::Repair;
+use cagework_cage::generate::{CageOptions, DETAIL, MAX_TARGET, MIN_TARGET, Shape, Symmetry};
 use clap::{Args, ValueEnum};
 
 use super::{MemoryArgs, ModelOutput, ReadArgs, SmoothArgs, fraction, positive};

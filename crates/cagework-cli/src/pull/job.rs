@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use cagework_core::pull::{Handle, Reach};
 use cagework_io::shown;
+use cagework_pose::pull::{Handle, Reach};
 use glam::{DVec3, Vec3};
 use serde::Deserialize;
 

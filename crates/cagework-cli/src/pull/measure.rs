@@ -1,7 +1,7 @@
 //! How a pulled model looks, in numbers.
 
-use cagework_core::pull::Drag;
 use cagework_io::Model;
+use cagework_pose::pull::Drag;
 use glam::Vec3;
 use serde::Serialize;
 

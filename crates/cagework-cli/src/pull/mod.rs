@@ -7,8 +7,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use cagework_core::deform::deform_bound;
-use cagework_core::pull::{Drag, DragOptions, Grip, Handle};
 use cagework_io::shown;
+use cagework_pose::pull::{Drag, DragOptions, Grip, Handle};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 

@@ -1,6 +1,6 @@
 //! A rigged model through the commands: the humanoid, who walks.
 
-use cagework_core::samples;
+use cagework_cage::samples;
 use cagework_io::{Model, write_mesh_glb};
 use predicates::str::contains;
 

@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use cagework_core::deform::vertex_normals;
 use cagework_core::dynamic::DisplacementField;
-use cagework_core::parts::BoundParts;
 use cagework_core::skin::Skin;
 use cagework_core::{Frames, Weights};
+use cagework_pose::parts::BoundParts;
 use glam::{Vec3, Vec4};
 
 use crate::buffers::Allocator;

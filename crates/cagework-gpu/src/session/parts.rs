@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cagework_core::Controls;
 use cagework_core::deform::deform_bound;
-use cagework_core::parts::{BoundParts, Parts, hold_parts};
+use cagework_pose::parts::{BoundParts, Parts, hold_parts};
 use glam::Vec3;
 
 use super::Session;

@@ -1,12 +1,12 @@
 //! What is done for each frame: vertices follow the cage, those outside it too, and normals follow vertices.
 
 use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
-use cagework_core::parts::{PieceMotion, hold_parts};
 use cagework_core::skin::{Skin, skin_vertices};
 use cagework_core::stencil::tables::{BUNDLE, NormalTable, SlicedWeights};
 use cagework_core::{Cage, PolygonMesh, TriMesh, Weights, stencil};
 use cagework_gpu::kernels;
 use cagework_gpu::skin::{SkinTables, field_table};
+use cagework_pose::parts::{PieceMotion, hold_parts};
 use glam::{Mat4, Quat, Vec3, Vec4};
 
 use super::support::{Seeded, assert_close, egg, flat};

@@ -2,8 +2,8 @@
 
 use std::sync::LazyLock;
 
-use cagework_core::cage_check::{Repair, check, repair};
-use cagework_core::cage_gen::{CageOptions, Shape, Symmetry, generate};
+use cagework_cage::check::{Repair, check, repair};
+use cagework_cage::generate::{CageOptions, Shape, Symmetry, generate};
 use cagework_core::deform::deform_bound;
 use cagework_core::mesh::Bounds;
 use cagework_core::options::{BindOptions, Method, OutsidePolicy, Solver};

@@ -1,10 +1,11 @@
 //! The sample that walks, shaped by its own cage: whole ways from cage to clip.
 
+use cagework_cage::generate::{CageOptions, generate};
+use cagework_cage::samples;
 use cagework_core::bind::bind;
-use cagework_core::cage_gen::{CageOptions, generate};
 use cagework_core::deform::displacements;
 use cagework_core::progress::Silent;
-use cagework_core::{BindOptions, Cage, samples};
+use cagework_core::{BindOptions, Cage};
 use cagework_io::{Joints, Model, Player, ReshapeOptions, ReshapeReport, write_mesh_glb};
 use glam::{Mat3, Mat4, Vec3, vec3};
 

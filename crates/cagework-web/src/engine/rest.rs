@@ -1,6 +1,6 @@
 //! Editing the cage itself: faults, repairs, and its edges and faces.
 
-use cagework_core::cage_check::Places;
+use cagework_cage::check::Places;
 use cagework_core::edit::SelectMode;
 use cagework_core::enclosure::Enclosure;
 use cagework_core::rest_edit::{Edited, collapse_edge, delete_faces, extrude_face, split_edge};

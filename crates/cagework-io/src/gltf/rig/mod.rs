@@ -24,7 +24,8 @@ mod vrm;
 use std::collections::{HashMap, HashSet};
 
 use ::gltf::json::mesh::{Primitive, Semantic};
-use cagework_core::{Bounds, Parts as Unbent};
+use cagework_core::Bounds;
+use cagework_pose::Parts as Unbent;
 use glam::{DMat4, DVec3, Vec3};
 
 use super::geometry::{Frame, attribute, vectors};

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use ::gltf::json::Index;
 use ::gltf::json::scene::{Node, UnitQuaternion};
-use cagework_core::parts::Motion;
+use cagework_pose::parts::Motion;
 use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use cagework_core::Parts;
+use cagework_pose::Parts;
 use glam::{DMat4, DVec3, Mat4, Vec3};
 use serde::Serialize;
 use serde_json::Value;

@@ -1,0 +1,142 @@
+//! Faults of the connectivity: open and crowded edges, vertices that are not joined, not used or pinched.
+
+use super::mirror::Plane;
+use super::{Code, Fix, Places, Problem, Repair, Severity, problem};
+use cagework_core::cage::{Side, sides_of};
+use cagework_core::crossing::same_places;
+use cagework_core::mesh::PolygonMesh;
+
+/// All sides of sound faces, sorted by edge.
+#[derive(Debug)]
+pub(super) struct Edges {
+    sides: Vec<Side>,
+}
+
+impl Edges {
+    pub(super) fn of(mesh: &PolygonMesh, sound: &[u32]) -> Self {
+        Self { sides: sides_of(&mesh.faces, sound.iter().copied()) }
+    }
+
+    /// The sides of every edge.
+    pub(super) fn groups(&self) -> impl Iterator<Item = &[Side]> {
+        self.sides.chunk_by(|a, b| (a.lo, a.hi) == (b.lo, b.hi))
+    }
+
+    /// Edges of exactly one face, run through as the missing neighbour would have to.
+    pub(super) fn open(&self) -> Vec<[u32; 2]> {
+        self.groups()
+            .filter(|g| g.len() == 1)
+            .map(|g| if g[0].forward { [g[0].hi, g[0].lo] } else { [g[0].lo, g[0].hi] })
+            .collect()
+    }
+
+    /// Reports edges that do not belong to two faces.
+    pub(super) fn report(&self, mesh: &PolygonMesh, found: &mut Vec<Problem>) {
+        let open = self.open();
+        if !open.is_empty() {
+            // Vertices that were split at a seam leave open edges, too: welding is tried first.
+            let (_, joined) = same_places(mesh);
+            let is_half = joined == 0 && Plane::of(mesh, &open).is_some_and(Plane::is_central);
+            let fixes = [Repair::Weld, Repair::Mirror, Repair::FillHoles].into_iter();
+            let fixes =
+                fixes.filter(|&r| (r != Repair::Weld || joined > 0) && (r != Repair::Mirror || is_half));
+            found.push(Problem {
+                places: Places {
+                    edges: open.iter().map(|&[a, b]| [a.min(b), a.max(b)]).collect(),
+                    ..Places::default()
+                },
+                fixes: fixes.map(|repair| Fix::Repair { repair }).collect(),
+                ..problem(Code::OpenEdge, Severity::Error, open.len())
+            });
+        }
+        let crowded: Vec<&[Side]> = self.groups().filter(|g| g.len() > 2).collect();
+        if !crowded.is_empty() {
+            let mut faces: Vec<u32> = crowded.iter().flat_map(|g| g.iter().map(|s| s.face)).collect();
+            faces.sort_unstable();
+            faces.dedup();
+            found.push(Problem {
+                places: Places {
+                    edges: crowded.iter().map(|g| [g[0].lo, g[0].hi]).collect(),
+                    faces,
+                    ..Places::default()
+                },
+                ..problem(Code::NonManifoldEdge, Severity::Error, crowded.len())
+            });
+        }
+    }
+}
+
+/// Reports vertices that are not joined, not used, or pinch the surface.
+pub(super) fn report_vertices(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec<Problem>) {
+    let (first, joined) = same_places(mesh);
+    if joined > 0 {
+        let vertices = first.iter().enumerate().filter(|(v, f)| *v as u32 != **f).map(|(v, _)| v as u32);
+        found.push(Problem {
+            places: Places { vertices: vertices.collect(), ..Places::default() },
+            fixes: vec![Fix::Repair { repair: Repair::Weld }],
+            ..problem(Code::DuplicateVertex, Severity::Note, joined)
+        });
+    }
+    let mut used = vec![false; mesh.positions.len()];
+    for &i in mesh.faces.iter().flatten() {
+        if let Some(used) = used.get_mut(i as usize) {
+            *used = true;
+        }
+    }
+    let unused: Vec<u32> = (0..used.len() as u32).filter(|&v| !used[v as usize]).collect();
+    if !unused.is_empty() {
+        let count = unused.len();
+        found.push(Problem {
+            places: Places { vertices: unused, ..Places::default() },
+            fixes: vec![Fix::Repair { repair: Repair::DropDegenerate }],
+            ..problem(Code::UnusedVertex, Severity::Note, count)
+        });
+    }
+    let pinched = pinched(mesh, sound);
+    if !pinched.is_empty() {
+        let count = pinched.len();
+        found.push(Problem {
+            places: Places { vertices: pinched, ..Places::default() },
+            ..problem(Code::NonManifoldVertex, Severity::Note, count)
+        });
+    }
+}
+
+/// Vertices around which the faces form more than one fan.
+fn pinched(mesh: &PolygonMesh, sound: &[u32]) -> Vec<u32> {
+    // Corners by vertex, with the neighbours in their face.
+    let mut corners: Vec<[u32; 3]> = Vec::new();
+    for &f in sound {
+        let face = &mesh.faces[f as usize];
+        let n = face.len();
+        corners.extend((0..n).map(|k| [face[k], face[(k + n - 1) % n], face[(k + 1) % n]]));
+    }
+    corners.sort_unstable();
+    let mut pinched = Vec::new();
+    for around in corners.chunk_by(|a, b| a[0] == b[0]) {
+        // Corners hang together if they share a neighbour.
+        let mut neighbours: Vec<[u32; 2]> =
+            (0u32..).zip(around).flat_map(|(k, c)| [[c[1], k], [c[2], k]]).collect();
+        neighbours.sort_unstable();
+        let mut root: Vec<u32> = (0..around.len() as u32).collect();
+        let mut fans = around.len();
+        for pair in neighbours.windows(2).filter(|pair| pair[0][0] == pair[1][0]) {
+            let [a, b] = [pair[0][1], pair[1][1]].map(|k| find(&mut root, k));
+            root[a as usize] = b;
+            fans -= usize::from(a != b);
+        }
+        if fans > 1 {
+            pinched.push(around[0][0]);
+        }
+    }
+    pinched
+}
+
+/// What stands for all that `k` hangs together with; later searches are shorter.
+fn find(root: &mut [u32], mut k: u32) -> u32 {
+    while root[k as usize] != k {
+        root[k as usize] = root[root[k as usize] as usize];
+        k = root[k as usize];
+    }
+    k
+}

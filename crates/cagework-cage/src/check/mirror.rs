@@ -1,0 +1,109 @@
+//! Half a cage, as it is modelled with a mirror that was not applied: all its open edges lie in one plane across an axis.
+
+use cagework_core::mesh::PolygonMesh;
+
+/// Open edges this near to one plane are in it, of the diagonal: a modeller's rounding.
+const IN_PLANE: f64 = 1e-4;
+
+/// The plane in which a cage ends, across an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Plane {
+    axis: usize,
+    at: f32,
+}
+
+impl Plane {
+    /// The plane of all `open` edges, if the whole mesh is on one side of it.
+    pub(super) fn of(mesh: &PolygonMesh, open: &[[u32; 2]]) -> Option<Self> {
+        let reach = (IN_PLANE * mesh.diagonal()) as f32;
+        let first = mesh.positions[open.first()?[0] as usize];
+        (0..3).find_map(|axis| {
+            let at = if first[axis].abs() <= reach { 0.0 } else { first[axis] };
+            // Faces may name vertices that are not there.
+            let from_plane = |v: u32| mesh.positions.get(v as usize).map_or(0.0, |p| p[axis] - at);
+            let is_border = open.as_flattened().iter().all(|&v| from_plane(v).abs() <= reach);
+            let mut sides = mesh.faces.iter().flatten().map(|&v| from_plane(v)).filter(|x| x.abs() > reach);
+            let side = sides.next()?;
+            (is_border && sides.all(|x| (x > 0.0) == (side > 0.0))).then_some(Self { axis, at })
+        })
+    }
+
+    /// Whether it goes through the origin, as the plane of a mirror does.
+    pub(super) fn is_central(self) -> bool {
+        self.at == 0.0
+    }
+
+    /// Adds the other half: vertices of open edges are shared, and moved into the plane.
+    pub(super) fn mirror(self, mesh: &mut PolygonMesh, open: &[[u32; 2]]) -> String {
+        let Self { axis, at } = self;
+        let mut other: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+        let mut is_used = vec![false; other.len()];
+        for &v in mesh.faces.iter().flatten().filter(|v| (**v as usize) < other.len()) {
+            is_used[v as usize] = true;
+        }
+        for &v in open.as_flattened() {
+            mesh.positions[v as usize][axis] = at;
+            is_used[v as usize] = false;
+        }
+        for v in (0..other.len()).filter(|&v| is_used[v]) {
+            other[v] = mesh.positions.len() as u32;
+            let mut p = mesh.positions[v];
+            p[axis] = 2.0 * at - p[axis];
+            mesh.positions.push(p);
+        }
+        let mirrored = |face: &Vec<u32>| {
+            face.iter().rev().map(|&v| other.get(v as usize).copied().unwrap_or(v)).collect()
+        };
+        let faces: Vec<Vec<u32>> = mesh.faces.iter().map(mirrored).collect();
+        let n = faces.len();
+        mesh.faces.extend(faces);
+        format!("Mirrored {n} faces across {} = {at}.", ["x", "y", "z"][axis])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::check::{Code, Fix, Repair, check, repair};
+    use cagework_core::cage::Cage;
+    use cagework_core::cage::subdivided_box;
+    use cagework_core::mesh::Bounds;
+
+    /// The half of a box of side 2 on one side of a plane, its middle at the origin.
+    fn half(axis: usize, at: f32) -> PolygonMesh {
+        let mut mesh = subdivided_box(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }, 0.0, [2; 3]);
+        mesh.faces.retain(|face| face.iter().all(|&v| mesh.positions[v as usize][axis] <= 0.0));
+        mesh.positions.iter_mut().for_each(|p| p[axis] += at);
+        mesh
+    }
+
+    #[test]
+    fn half_a_cage_is_completed() {
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let mesh = half(axis, 0.0);
+            let fixes = check(&mesh, None, None).problem(Code::OpenEdge).unwrap().fixes.clone();
+            assert_eq!(fixes[0], Fix::Repair { repair: Repair::Mirror });
+            let mended = repair(&mesh, &[Repair::DropDegenerate, Repair::Mirror], None).unwrap();
+            assert_eq!(mended.done[1], format!("Mirrored 12 faces across {name} = 0."));
+            let cage = Cage::new(&mended.mesh).unwrap();
+            // Of the whole box: 27 points but for the one in its middle, 6 sides of 4 faces.
+            assert_eq!((cage.n_vertices(), cage.faces().len(), cage.notices().len()), (26, 24, 0));
+            assert_eq!((cage.bounds().min, cage.bounds().max), (Vec3::splat(-1.0), Vec3::ONE));
+        }
+        let beside = half(0, 3.0);
+        let fixes = check(&beside, None, None).problem(Code::OpenEdge).unwrap().fixes.clone();
+        assert_eq!(
+            fixes,
+            [Fix::Repair { repair: Repair::FillHoles }],
+            "no mirror stands there, but it may be asked for"
+        );
+        let mended = repair(&beside, &[Repair::Mirror], None).unwrap();
+        assert_eq!(mended.done, ["Mirrored 12 faces across x = 3."]);
+        // A hole that is bent, and one with faces on both sides of it: nothing to mirror.
+        let mut bent = half(0, 0.0);
+        bent.positions.iter_mut().filter(|p| p.x == 0.0 && p.y > 0.5).for_each(|p| p.x = 0.25);
+        assert_eq!(repair(&bent, &[Repair::Mirror], None).unwrap().done, [""; 0]);
+    }
+}

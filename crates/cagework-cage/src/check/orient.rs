@@ -1,0 +1,144 @@
+//! Which faces point the wrong way.
+
+use std::collections::VecDeque;
+
+use glam::DVec3;
+
+use super::edges::Edges;
+use super::{Code, Fix, Places, Problem, Repair, Severity, problem, sentences};
+use cagework_core::enclosure::winding_number;
+use cagework_core::mesh::PolygonMesh;
+
+/// Faces of one part of the surface.
+#[derive(Clone, Debug)]
+pub(super) struct Component {
+    pub(super) faces: Vec<u32>,
+    /// Whether each of `faces` must be turned for all to point away from the solid.
+    pub(super) turn: Vec<bool>,
+    /// An edge at which faces cannot agree.
+    pub(super) one_sided: Option<[u32; 2]>,
+}
+
+/// The parts of the surface, in order of first faces, and how their faces should be turned.
+pub(super) fn components(mesh: &PolygonMesh, sound: &[u32], edges: &Edges) -> Vec<Component> {
+    let n = mesh.faces.len();
+    let mut neighbours: Vec<Vec<(u32, bool, [u32; 2])>> = vec![Vec::new(); n];
+    for group in edges.groups().filter(|g| g.len() == 2) {
+        let against = group[0].forward == group[1].forward;
+        for (a, b) in [(0, 1), (1, 0)] {
+            neighbours[group[a].face as usize].push((group[b].face, against, [group[a].lo, group[a].hi]));
+        }
+    }
+    let mut turn: Vec<Option<bool>> = vec![None; n];
+    let mut components = Vec::new();
+    for &seed in sound {
+        if turn[seed as usize].is_some() {
+            continue;
+        }
+        let mut component = Component { faces: Vec::new(), turn: Vec::new(), one_sided: None };
+        turn[seed as usize] = Some(false);
+        let mut queue = VecDeque::from([(seed, false)]);
+        while let Some((f, turned)) = queue.pop_front() {
+            component.faces.push(f);
+            component.turn.push(turned);
+            for &(g, against, edge) in &neighbours[f as usize] {
+                match turn[g as usize] {
+                    None => {
+                        turn[g as usize] = Some(turned != against);
+                        queue.push_back((g, turned != against));
+                    }
+                    Some(other) if other != (turned != against) => component.one_sided = Some(edge),
+                    Some(_) => {}
+                }
+            }
+        }
+        components.push(component);
+    }
+    turn_outward(mesh, &mut components);
+    components
+}
+
+/// Fewest triangles that go more than half around a point.
+const ENCLOSING: usize = 3;
+
+fn corners_of_box(triangles: &[[DVec3; 3]]) -> [DVec3; 2] {
+    let corners = || triangles.iter().flatten().copied();
+    [corners().fold(DVec3::INFINITY, DVec3::min), corners().fold(DVec3::NEG_INFINITY, DVec3::max)]
+}
+
+/// Turns whole components whose volume has the wrong sign: negative, or positive for one inside another.
+fn turn_outward(mesh: &PolygonMesh, components: &mut [Component]) {
+    let solids: Vec<Vec<[DVec3; 3]>> = components.iter().map(|c| triangles(mesh, c)).collect();
+    // A soup may have as many components as faces: only those that can have something inside are looked at.
+    let around: Vec<(usize, [DVec3; 2])> = solids
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| s.len() >= ENCLOSING)
+        .map(|(j, s)| (j, corners_of_box(s)))
+        .collect();
+    for (k, component) in components.iter_mut().enumerate() {
+        let Some(first) = solids[k].first() else { continue };
+        let center = solids[k].iter().flatten().sum::<DVec3>() / (3 * solids[k].len()) as f64;
+        let volume: f64 =
+            solids[k].iter().map(|t| t.map(|p| p - center)).map(|[a, b, c]| a.dot(b.cross(c))).sum();
+        let probe = (first[0] + first[1] + first[2]) / 3.0;
+        let depth = around
+            .iter()
+            .filter(|(j, [min, max])| {
+                *j != k
+                    && probe.cmpge(*min).all()
+                    && probe.cmple(*max).all()
+                    && winding_number(probe, &solids[*j]).abs() > 0.5
+            })
+            .count();
+        if (volume < 0.0) != (depth % 2 == 1) {
+            for turn in &mut component.turn {
+                *turn = !*turn;
+            }
+        }
+    }
+}
+
+/// A component as triangles (fans: enough for volumes), its faces turned alike.
+fn triangles(mesh: &PolygonMesh, component: &Component) -> Vec<[DVec3; 3]> {
+    let mut triangles = Vec::new();
+    for (&f, &turned) in component.faces.iter().zip(&component.turn) {
+        let face = &mesh.faces[f as usize];
+        for k in 1..face.len() - 1 {
+            let mut t = [face[0], face[k], face[k + 1]];
+            if turned {
+                t.swap(1, 2);
+            }
+            triangles.push(t.map(|i| mesh.positions[i as usize].as_dvec3()));
+        }
+    }
+    triangles
+}
+
+/// Reports faces that point the wrong way; returns the number of components.
+pub(super) fn report(mesh: &PolygonMesh, sound: &[u32], edges: &Edges, found: &mut Vec<Problem>) -> usize {
+    let components = components(mesh, sound, edges);
+    for (k, component) in components.iter().enumerate() {
+        if let Some(edge) = component.one_sided {
+            found.push(Problem {
+                places: Places { edges: vec![edge], ..Places::default() },
+                message: sentences::one_sided(k),
+                ..problem(Code::OneSided, Severity::Error, 1)
+            });
+            continue;
+        }
+        let turned: Vec<u32> =
+            component.faces.iter().zip(&component.turn).filter(|(_, t)| **t).map(|(f, _)| *f).collect();
+        if turned.is_empty() {
+            continue;
+        }
+        let (count, all) = (turned.len(), component.faces.len());
+        found.push(Problem {
+            places: Places { faces: turned, ..Places::default() },
+            fixes: vec![Fix::Repair { repair: Repair::Flip }],
+            message: sentences::flipped(k, count, all),
+            ..problem(Code::Flipped, Severity::Note, count)
+        });
+    }
+    components.len()
+}

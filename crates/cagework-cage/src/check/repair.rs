@@ -1,0 +1,225 @@
+//! What can be mended without asking.
+
+use std::collections::{HashMap, HashSet};
+
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::edges::Edges;
+use super::grow;
+use super::mirror::Plane;
+use super::{orient, shape};
+use cagework_core::cage::CageError;
+use cagework_core::controls::ControlError;
+use cagework_core::crossing::same_places;
+use cagework_core::fill;
+use cagework_core::mesh::PolygonMesh;
+
+/// A repair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
+pub enum Repair {
+    /// Joins vertices at one place.
+    Weld,
+    /// Drops faces without area, faces with the corners of another one, corners named twice, and unused vertices.
+    DropDegenerate,
+    /// Adds the other half of a cage that ends in a plane across an axis.
+    Mirror,
+    /// Closes holes of up to 64 edges.
+    FillHoles,
+    /// Turns faces outward.
+    Flip,
+    /// Moves vertices outward until all of the model is inside.
+    Grow,
+}
+
+/// A mended cage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Repaired {
+    /// The mesh.
+    pub mesh: PolygonMesh,
+    /// For every old vertex the new one that stands for it, if any. `[n_old]`
+    pub vertex_of: Vec<Option<u32>>,
+    /// What was done, a sentence each; empty if there was nothing to do.
+    pub done: Vec<String>,
+}
+
+/// Why a repair did not come about.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum RepairError {
+    /// Growing needs the model.
+    #[error("growing the cage needs the model that should be inside: give it")]
+    NoModel,
+    /// Growing needs a cage.
+    #[error("the cage cannot grow before it is one: {0}")]
+    NotACage(#[from] CageError),
+    /// Nor before its smooth surface is one.
+    #[error(transparent)]
+    NotSmooth(#[from] ControlError),
+    /// Growing did not help.
+    #[error("{left} model vertices are still outside after growing: make a new cage")]
+    StillOutside {
+        /// How many.
+        left: usize,
+    },
+}
+
+/// Repairs a mesh: in the order weld, drop, mirror, fill, flip, grow, whichever of them are asked for. Faces keep their order.
+///
+/// # Errors
+/// [`RepairError`], all about growing; the other repairs do what they can.
+pub fn repair(
+    mesh: &PolygonMesh,
+    repairs: &[Repair],
+    model: Option<&[Vec3]>,
+) -> Result<Repaired, RepairError> {
+    repair_smooth(mesh, repairs, model, 0)
+}
+
+/// [`repair`] of a cage that is subdivided `smooth` times: it grows until the model is inside its smooth surface.
+///
+/// # Errors
+/// As [`repair`].
+pub fn repair_smooth(
+    mesh: &PolygonMesh,
+    repairs: &[Repair],
+    model: Option<&[Vec3]>,
+    smooth: u32,
+) -> Result<Repaired, RepairError> {
+    let mut repaired = Repaired {
+        mesh: mesh.clone(),
+        vertex_of: (0..mesh.positions.len() as u32).map(Some).collect(),
+        done: Vec::new(),
+    };
+    let asked = |r| repairs.contains(&r);
+    if asked(Repair::Weld) {
+        weld(&mut repaired);
+    }
+    if asked(Repair::DropDegenerate) {
+        drop_degenerate(&mut repaired);
+    }
+    if asked(Repair::Mirror) {
+        let mesh = &mut repaired.mesh;
+        let open = Edges::of(mesh, &shape::sound_faces(mesh, &mut Vec::new())).open();
+        repaired.done.extend(Plane::of(mesh, &open).map(|plane| plane.mirror(mesh, &open)));
+    }
+    if asked(Repair::FillHoles) {
+        fill_holes(&mut repaired);
+    }
+    if asked(Repair::Flip) {
+        flip(&mut repaired);
+    }
+    if asked(Repair::Grow) {
+        let moved = grow(&mut repaired.mesh, model.ok_or(RepairError::NoModel)?, smooth)?;
+        if moved > 0 {
+            repaired.done.push(format!("Moved {moved} vertices outward."));
+        }
+    }
+    Ok(repaired)
+}
+
+impl Repaired {
+    /// Leaves only vertices for which `keep` holds, in their order.
+    fn keep_vertices(&mut self, keep: &[bool]) {
+        let mut number = vec![None; keep.len()];
+        let mut positions = Vec::new();
+        for (v, _) in keep.iter().enumerate().filter(|(_, k)| **k) {
+            number[v] = Some(positions.len() as u32);
+            positions.push(self.mesh.positions[v]);
+        }
+        self.mesh.positions = positions;
+        for i in self.mesh.faces.iter_mut().flatten() {
+            *i = number.get(*i as usize).copied().flatten().unwrap_or(*i);
+        }
+        for v in &mut self.vertex_of {
+            *v = v.and_then(|v| number[v as usize]);
+        }
+    }
+}
+
+fn weld(repaired: &mut Repaired) {
+    let (first, joined) = same_places(&repaired.mesh);
+    if joined == 0 {
+        return;
+    }
+    let n = first.len() as u32;
+    for i in repaired.mesh.faces.iter_mut().flatten().filter(|i| **i < n) {
+        *i = first[*i as usize];
+    }
+    for v in repaired.vertex_of.iter_mut().flatten() {
+        *v = first[*v as usize];
+    }
+    let keep: Vec<bool> = first.iter().enumerate().map(|(v, &f)| v as u32 == f).collect();
+    repaired.keep_vertices(&keep);
+    repaired.done.push(format!("Joined {joined} vertices with others at the same place."));
+}
+
+fn drop_degenerate(repaired: &mut Repaired) {
+    let n = repaired.mesh.positions.len() as u32;
+    let before = repaired.mesh.faces.len();
+    for face in &mut repaired.mesh.faces {
+        face.dedup();
+        while face.len() > 1 && face.first() == face.last() {
+            face.pop();
+        }
+    }
+    // A corner named twice cuts an outline into two: keep what lies between, if that is a face.
+    let sound = shape::sound_faces(&repaired.mesh, &mut Vec::new());
+    let keep: HashSet<u32> = sound.into_iter().collect();
+    let mut number = 0..;
+    repaired.mesh.faces.retain(|_| number.next().is_some_and(|f: u32| keep.contains(&f)));
+    let mut used = vec![false; n as usize];
+    for &i in repaired.mesh.faces.iter().flatten() {
+        used[i as usize] = true;
+    }
+    let unused = used.iter().filter(|u| !**u).count();
+    if unused > 0 {
+        repaired.keep_vertices(&used);
+        repaired.done.push(format!("Dropped {unused} vertices of no face."));
+    }
+    let dropped = before - repaired.mesh.faces.len();
+    if dropped > 0 {
+        repaired.done.push(format!("Dropped {dropped} faces without area or with the corners of others."));
+    }
+}
+
+fn fill_holes(repaired: &mut Repaired) {
+    let mesh = &mut repaired.mesh;
+    let sound = shape::sound_faces(mesh, &mut Vec::new());
+    let edges = Edges::of(mesh, &sound);
+    let behind: HashMap<[u32; 2], u32> =
+        edges.groups().filter(|g| g.len() == 1).map(|g| ([g[0].lo, g[0].hi], g[0].face)).collect();
+    let at: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
+    let mut filled = 0;
+    for outline in fill::loops(&edges.open()) {
+        let sides = outline.iter().zip(outline.iter().cycle().skip(1));
+        let around = sides.filter_map(|(&a, &b)| behind.get(&[a.min(b), a.max(b)]));
+        let around: Vec<Vec<u32>> = around.map(|&f| mesh.faces[f as usize].clone()).collect();
+        if let Some(triangles) = fill::triangulate(&outline, &at, &around) {
+            mesh.faces.extend(triangles.into_iter().map(|t| t.to_vec()));
+            filled += 1;
+        }
+    }
+    if filled > 0 {
+        repaired.done.push(format!("Filled {filled} {}.", if filled == 1 { "hole" } else { "holes" }));
+    }
+}
+
+fn flip(repaired: &mut Repaired) {
+    let mesh = &mut repaired.mesh;
+    let sound = shape::sound_faces(mesh, &mut Vec::new());
+    let edges = Edges::of(mesh, &sound);
+    let mut turned = 0;
+    for component in orient::components(mesh, &sound, &edges) {
+        let faces = component.faces.iter().zip(&component.turn).filter(|(_, turn)| **turn);
+        for (&f, _) in faces {
+            mesh.faces[f as usize][1..].reverse();
+            turned += 1;
+        }
+    }
+    if turned > 0 {
+        repaired.done.push(format!("Turned {turned} faces outward."));
+    }
+}

@@ -1,0 +1,141 @@
+//! Faults of faces and of the shape: faces without area, thin parts.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use super::{Code, Fix, Places, Problem, Repair, Severity, problem, sentences};
+use cagework_core::cage::face_triangles;
+use cagework_core::controls::Controls;
+use cagework_core::mesh::PolygonMesh;
+use cagework_core::options::MAX_GRID;
+
+/// Triangles up to which the thickness is looked at everywhere; of more, every n-th is a place to measure from.
+const MEASURED: usize = 1500;
+
+/// A part this many cells thick is thick enough: one cell has no unknown of its own in the worst case.
+const ENOUGH_CELLS: f64 = 1.0;
+
+/// Two faces bound a thin part if they lean towards each other by less than some 70 degrees (this is the cosine; a regular
+/// tetrahedron's still count). Steeper ones make a corner: near it they are as close as one likes, however thick the part.
+const OPPOSITE: f64 = 0.3;
+
+/// Faces that name existing, finite vertices, none twice, and have an area. The others are reported.
+pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u32> {
+    let n = mesh.positions.len();
+    if mesh.faces.is_empty() || n == 0 {
+        found.push(problem(Code::Empty, Severity::Error, 1));
+    }
+    let broken: Vec<u32> = (0..n as u32).filter(|&v| !mesh.positions[v as usize].is_finite()).collect();
+    if !broken.is_empty() {
+        let count = broken.len();
+        found.push(Problem {
+            places: Places { vertices: broken, ..Places::default() },
+            ..problem(Code::NotFinite, Severity::Error, count)
+        });
+    }
+    let diagonal = mesh.diagonal();
+    let (mut sound, mut bad, mut degenerate, mut twice) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut outlines: HashMap<Vec<u32>, u32> = HashMap::new();
+    for (f, face) in mesh.faces.iter().enumerate() {
+        let f = f as u32;
+        if face.iter().any(|&i| i as usize >= n) {
+            bad.push(f);
+            continue;
+        }
+        let corners: Vec<DVec3> = face.iter().map(|&i| mesh.positions[i as usize].as_dvec3()).collect();
+        if corners.iter().any(|p| !p.is_finite()) {
+            continue;
+        }
+        let mut sorted = face.clone();
+        sorted.sort_unstable();
+        sorted.dedup();
+        if sorted.len() < face.len() || face.len() < 3 || face_triangles(&corners, diagonal).is_err() {
+            degenerate.push(f);
+            continue;
+        }
+        if outlines.insert(sorted, f).is_some() {
+            twice.push(f);
+            continue;
+        }
+        sound.push(f);
+    }
+    let dropped = [(Code::BadIndex, bad), (Code::DegenerateFace, degenerate), (Code::DuplicateFace, twice)];
+    for (code, faces) in dropped.into_iter().filter(|(_, faces)| !faces.is_empty()) {
+        found.push(Problem {
+            fixes: vec![Fix::Repair { repair: Repair::DropDegenerate }],
+            ..problem(code, Severity::Error, faces.len())
+        });
+        if let Some(problem) = found.last_mut() {
+            problem.places.faces = faces;
+        }
+    }
+    sound
+}
+
+/// Measures from the middle of faces straight inwards, to faces about opposite; reports where that is less than a cell of the
+/// grid.
+pub(super) fn report_thickness(
+    controls: Controls<'_>,
+    grid: Option<u32>,
+    found: &mut Vec<Problem>,
+) -> Option<f32> {
+    let cage = controls.surface();
+    let n = cage.triangles().len();
+    let triangles: Vec<[DVec3; 3]> = (0..n as u32).map(|t| cage.triangle_corners(t)).collect();
+    let cell = grid.map(|g| f64::from(cage.bounds().extent().max_element()) / f64::from(g.max(1)));
+    let facing = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize_or_zero();
+    let mut thinnest = f64::INFINITY;
+    let (mut faces, mut points) = (Vec::new(), Vec::new());
+    for t in (0..n).step_by(n.div_ceil(MEASURED).max(1)) {
+        let [a, b, c] = triangles[t];
+        let normal = facing(triangles[t]);
+        let middle = (a + b + c) / 3.0;
+        let (mut way, mut nearest) = (f64::INFINITY, t);
+        for (other, corners) in triangles.iter().enumerate().filter(|(other, _)| *other != t) {
+            if let Some(distance) = distance_along(middle, -normal, corners).filter(|d| *d < way) {
+                (way, nearest) = (distance, other);
+            }
+        }
+        if normal.dot(facing(triangles[nearest])) > -OPPOSITE {
+            // Past a corner.
+            continue;
+        }
+        thinnest = thinnest.min(way);
+        if cell.is_some_and(|cell| way < ENOUGH_CELLS * cell) {
+            faces.extend(controls.cage_face(cage.face_of_triangle()[t]));
+            points.push((middle - 0.5 * way * normal).as_vec3().to_array());
+        }
+    }
+    faces.dedup();
+    if let (Some(cell), Some(grid), false) = (cell, grid, points.is_empty()) {
+        let cells = (f64::from(grid) * cell / thinnest.max(1e-30)).ceil() * ENOUGH_CELLS;
+        let cells = (cells <= f64::from(MAX_GRID)).then_some(cells as u32);
+        let count = points.len();
+        found.push(Problem {
+            places: Places { faces, points, ..Places::default() },
+            fixes: cells.map(|cells| Fix::Grid { cells }).into_iter().collect(),
+            message: sentences::thin(count, cells),
+            ..problem(Code::ThinPart, Severity::Warning, count)
+        });
+    }
+    thinnest.is_finite().then_some(thinnest as f32)
+}
+
+/// Distance from a point along a unit direction to a triangle, if the ray meets it.
+///
+/// Source: Moeller, Trumbore 1997.
+fn distance_along(from: DVec3, direction: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<f64> {
+    let (ab, ac) = (*b - *a, *c - *a);
+    let p = direction.cross(ac);
+    let determinant = ab.dot(p);
+    if determinant.abs() < 1e-12 * ab.length() * ac.length() {
+        return None;
+    }
+    let s = (from - *a) / determinant;
+    let u = s.dot(p);
+    let q = s.cross(ab);
+    let v = direction.dot(q);
+    let distance = ac.dot(q);
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some(distance)
+}

@@ -1,0 +1,380 @@
+//! Edge collapses, cheapest first, as far as the target or as the obstacle allows.
+//!
+//! Source: Garland, Heckbert 1997 for the cost. Changes: the merged vertex goes where the quadric is smallest, or, if
+//! the solid is in the way, further out along the normal until its triangles are clear, so that a coarse cage bulges
+//! around the model as a progressive hull (Sander et al. 2000) does; an edge whose place costs more than expected
+//! waits for its turn.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use glam::DVec3;
+
+use super::guarded::Guarded;
+use super::quadric::Quadric;
+use super::shell::Limb;
+use cagework_core::contact::Corners;
+use cagework_core::progress::Cancelled;
+
+/// Where the merged vertex is tried, voxels along the normal.
+const NORMAL_OFFSETS: [f64; 8] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.1, 2.8, 3.6];
+
+/// Smallest cosine between a triangle's normals before and after.
+const MIN_COLLAPSE_COSINE: f64 = 0.15;
+
+/// Smallest quality (4 sqrt(3) area over summed squared edges; 1 for an equilateral triangle) of a new triangle.
+const MIN_QUALITY: f64 = 0.12;
+
+/// Most triangles around a vertex.
+const MAX_VALENCE: usize = 11;
+
+/// An edge waits again if it costs more than this times what was expected.
+const MAX_COST_RATIO: f64 = 1.2;
+
+/// Largest distance from ring to ring along a limb over its thickness, within the budget.
+const MAX_RING_DISTANCE: f64 = 1.3;
+
+/// Collapses from one check whether the work was cancelled to the next.
+const COLLAPSES_PER_CHECK: usize = 64;
+
+/// An edge waiting to be collapsed.
+#[derive(Debug, PartialEq)]
+struct Waiting {
+    cost: f64,
+    edge: [u32; 2],
+    /// State of both vertices when the cost was found; it is out of date if either has changed.
+    version: [u32; 2],
+}
+
+impl Eq for Waiting {}
+
+impl PartialOrd for Waiting {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Waiting {
+    /// The cheapest edge is the greatest; equal ones by number, so that runs are alike.
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.cost.total_cmp(&self.cost).then_with(|| other.edge.cmp(&self.edge))
+    }
+}
+
+/// A surface with the quadric of every vertex.
+#[derive(Debug)]
+pub(super) struct Collapser<'g, 'a> {
+    pub(super) surface: &'g mut Guarded<'a>,
+    pub(super) quadrics: Vec<Quadric>,
+    /// The same of planes alone: how far a vertex is from the hull that it stands for.
+    planes: Vec<Quadric>,
+    /// Most of that, voxels; none for as far as need be.
+    pub(super) budget: Option<f64>,
+    /// The limb that each vertex is on.
+    limbs: Vec<Option<Limb>>,
+    version: Vec<u32>,
+    heap: BinaryHeap<Waiting>,
+    /// Vertices of the whole surface, both halves.
+    count: usize,
+    scratch: Scratch,
+}
+
+#[derive(Debug, Default)]
+struct Scratch {
+    near_a: Vec<u32>,
+    near_b: Vec<u32>,
+    /// Triangles that a collapse changes, with their corners and normals before.
+    star: Vec<(Corners, DVec3)>,
+    gone: Vec<u32>,
+    new: Vec<Corners>,
+}
+
+/// Quality of a triangle: 1 if equilateral, 0 if flat.
+pub(super) fn quality(t: &[DVec3; 3]) -> f64 {
+    let edges =
+        (t[1] - t[0]).length_squared() + (t[2] - t[1]).length_squared() + (t[0] - t[2]).length_squared();
+    2.0 * 3.0_f64.sqrt() * (t[1] - t[0]).cross(t[2] - t[0]).length() / edges.max(1e-300)
+}
+
+impl<'g, 'a> Collapser<'g, 'a> {
+    /// Prepares a surface.
+    pub(super) fn new(surface: &'g mut Guarded<'a>, limbs: Vec<Option<Limb>>) -> Self {
+        let n = surface.positions.len();
+        let mut quadrics = vec![Quadric::default(); n];
+        let mut planes = quadrics.clone();
+        for t in 0..surface.triangles.len() as u32 {
+            let corners = surface.corners(t);
+            let normal = corners.normal();
+            for (&i, &p) in corners.index.iter().zip(&corners.at) {
+                let quadric = &mut quadrics[i as usize];
+                *quadric = quadric.plus(&Quadric::of_corner(p, normal));
+                let plane = &mut planes[i as usize];
+                *plane = plane.plus(&Quadric::of_plane(p, normal));
+            }
+        }
+        let on_mirror = surface.on_mirror.iter().filter(|&&on| on).count();
+        let count = if surface.mirror.is_some() { 2 * n - on_mirror } else { n };
+        Self {
+            surface,
+            quadrics,
+            planes,
+            budget: None,
+            limbs,
+            version: vec![0; n],
+            heap: BinaryHeap::new(),
+            count,
+            scratch: Scratch::default(),
+        }
+    }
+
+    /// Enters every edge.
+    fn wait_for_all(&mut self) {
+        let mut near = Vec::new();
+        for v in 0..self.surface.positions.len() as u32 {
+            self.surface.neighbours(v, &mut near);
+            for &w in near.iter().filter(|&&w| w > v) {
+                self.wait([v, w]);
+            }
+        }
+    }
+
+    /// Collapses edges until `target` vertices are left or no edge can be collapsed; returns the vertices left.
+    ///
+    /// # Errors
+    /// When `go_on` says so; it hears the share that is done.
+    pub(super) fn run(
+        &mut self,
+        target: usize,
+        go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
+    ) -> Result<usize, Cancelled> {
+        self.heap.clear();
+        self.wait_for_all();
+        let before = self.count;
+        let (mut steps, mut count_then) = (0, before);
+        while self.count > target {
+            let Some(waiting) = self.heap.pop() else {
+                if self.count == count_then || self.surface.has_band() {
+                    break;
+                }
+                // Edges that had no place may have one now that their surroundings have changed. (With a band
+                // they get their chance in the next, wider one.)
+                count_then = self.count;
+                self.wait_for_all();
+                continue;
+            };
+            let [a, b] = waiting.edge;
+            if [a, b].map(|v| self.version[v as usize]) != waiting.version || !self.is_allowed(a, b) {
+                continue;
+            }
+            steps += 1;
+            if steps % COLLAPSES_PER_CHECK == 0 {
+                go_on((before - self.count) as f32 / (before - target) as f32)?;
+            }
+            let Some((at, cost)) = self.place_of(a, b) else { continue };
+            if self.is_over_budget(a, b, at) {
+                continue;
+            }
+            let next = self.heap.peek().map_or(f64::INFINITY, |next| next.cost);
+            if cost > MAX_COST_RATIO * waiting.cost + 1e-9 && cost > next {
+                self.heap.push(Waiting { cost, ..waiting });
+                continue;
+            }
+            self.collapse(a, b, at);
+        }
+        Ok(self.count)
+    }
+
+    /// The vertex that stays: the one on the mirror plane.
+    fn ordered(&self, a: u32, b: u32) -> (u32, u32) {
+        if self.surface.on_mirror[b as usize] { (b, a) } else { (a, b) }
+    }
+
+    /// The mirror axis, if the merged vertex lies on the plane.
+    fn pinned(&self, kept: u32) -> Option<usize> {
+        self.surface.mirror.filter(|_| self.surface.on_mirror[kept as usize])
+    }
+
+    fn merged_quadric(&self, a: u32, b: u32) -> Quadric {
+        self.quadrics[a as usize].plus(&self.quadrics[b as usize])
+    }
+
+    /// Where the quadric of an edge is smallest, if that is anywhere near the edge; its middle otherwise.
+    fn optimum(&self, a: u32, b: u32) -> DVec3 {
+        let (kept, _) = self.ordered(a, b);
+        let pinned = self.pinned(kept);
+        let [p, q] = [a, b].map(|v| self.surface.positions[v as usize]);
+        let mut middle = 0.5 * (p + q);
+        if let Some(axis) = pinned {
+            middle[axis] = 0.0;
+        }
+        let reach = 1.5 * (p - q).length() + 0.5;
+        self.merged_quadric(a, b).minimum(pinned).filter(|o| o.distance(middle) < reach).unwrap_or(middle)
+    }
+
+    /// Enters an edge with the cost that it has if nothing is in the way.
+    fn wait(&mut self, edge: [u32; 2]) {
+        let [a, b] = edge;
+        let cost = self.merged_quadric(a, b).cost(self.optimum(a, b));
+        let version = edge.map(|v| self.version[v as usize]);
+        self.heap.push(Waiting { cost, edge, version });
+    }
+
+    /// Whether the surface stays a manifold (and, with a mirror, a half of one) without the edge: the link condition
+    /// of Dey et al. 1999.
+    fn is_allowed(&mut self, a: u32, b: u32) -> bool {
+        let Scratch { near_a, near_b, .. } = &mut self.scratch;
+        let surface = &*self.surface;
+        surface.neighbours(a, near_a);
+        surface.neighbours(b, near_b);
+        let on_mirror = |v: u32| surface.on_mirror[v as usize];
+        let around = surface.around[a as usize].iter().map(|&t| surface.triangles[t as usize]);
+        let sides: Vec<u32> = around
+            .filter(|t| t.contains(&b))
+            .filter_map(|t| t.into_iter().find(|&i| i != a && i != b))
+            .collect();
+        let common = near_a.iter().filter(|v| near_b.binary_search(v).is_ok()).count();
+        if sides.is_empty() || common != sides.len() {
+            return false;
+        }
+        if near_a.len() + near_b.len() - 2 - common > MAX_VALENCE {
+            return false;
+        }
+        if on_mirror(a) && on_mirror(b) && sides.len() != 1 {
+            return false;
+        }
+        // A tip loses a triangle: it must keep enough of them to be a corner of a solid.
+        let least = |v: u32| if on_mirror(v) { 2 } else { 3 };
+        if sides.iter().any(|&tip| surface.around[tip as usize].len() <= least(tip)) {
+            return false;
+        }
+        let (kept, gone) = if on_mirror(b) { (b, a) } else { (a, b) };
+        if !on_mirror(kept) {
+            return true;
+        }
+        if !on_mirror(gone) {
+            // No new edge may join two vertices of the mirror plane: its image would lie on it.
+            let (near_kept, near_gone) = if kept == a { (&*near_a, &*near_b) } else { (&*near_b, &*near_a) };
+            if near_gone.iter().any(|&v| v != kept && on_mirror(v) && near_kept.binary_search(&v).is_err()) {
+                return false;
+            }
+        }
+        // Nor may a triangle lie in the plane.
+        surface.around[gone as usize]
+            .iter()
+            .map(|&t| surface.triangles[t as usize])
+            .all(|t| t.contains(&kept) || !t.iter().all(|&i| i == gone || on_mirror(i)))
+    }
+
+    /// Where the merged vertex may go, and what it costs there.
+    fn place_of(&mut self, a: u32, b: u32) -> Option<(DVec3, f64)> {
+        let (kept, gone) = self.ordered(a, b);
+        let surface = &*self.surface;
+        let Scratch { star, gone: removed, .. } = &mut self.scratch;
+        star.clear();
+        removed.clear();
+        let mut outward = DVec3::ZERO;
+        for (v, other) in [(kept, gone), (gone, kept)] {
+            for &t in &surface.around[v as usize] {
+                let corners = surface.corners(t);
+                let normal = corners.normal();
+                outward += normal;
+                if !corners.index.contains(&other) {
+                    let index = corners.index.map(|i| if i == gone { kept } else { i });
+                    star.push((Corners { index, ..corners }, normal));
+                    removed.push(t);
+                } else if v == kept {
+                    removed.push(t);
+                }
+            }
+        }
+        let quadric = self.merged_quadric(a, b);
+        let pinned = self.pinned(kept);
+        if let Some(axis) = pinned {
+            outward[axis] = 0.0;
+        }
+        let outward = outward.normalize_or_zero();
+        let optimum = self.optimum(a, b);
+        let [p, q] = [kept, gone].map(|v| self.surface.positions[v as usize]);
+        let middle =
+            if pinned.is_some() && !self.surface.on_mirror[gone as usize] { p } else { 0.5 * (p + q) };
+        let mut candidates = Vec::with_capacity(2 * NORMAL_OFFSETS.len() + 2);
+        for push in NORMAL_OFFSETS {
+            candidates.push(optimum + push * outward);
+            candidates.push(middle + push * outward);
+        }
+        candidates.push(p);
+        if pinned.is_none() || self.surface.on_mirror[gone as usize] {
+            candidates.push(q);
+        }
+        let mut priced: Vec<(f64, DVec3)> = candidates.into_iter().map(|c| (quadric.cost(c), c)).collect();
+        // The cheapest place that will do, of equal ones the first; mostly that is the first that is looked at.
+        while let Some(k) = (0..priced.len()).min_by(|&x, &y| priced[x].0.total_cmp(&priced[y].0)) {
+            let (cost, place) = priced.remove(k);
+            if self.is_place(kept, place) {
+                return Some((place, cost));
+            }
+        }
+        None
+    }
+
+    /// Whether the star found by [`Self::place_of`] may have its vertex `kept` at `p`.
+    fn is_place(&mut self, kept: u32, p: DVec3) -> bool {
+        let Scratch { star, gone, new, .. } = &mut self.scratch;
+        new.clear();
+        for (corners, before) in star.iter() {
+            let mut moved = *corners;
+            for (i, at) in moved.index.iter().zip(&mut moved.at) {
+                if *i == kept {
+                    *at = p;
+                }
+            }
+            let after = moved.normal();
+            if quality(&moved.at) < MIN_QUALITY
+                || before.dot(after) < MIN_COLLAPSE_COSINE * before.length() * after.length()
+            {
+                return false;
+            }
+            new.push(moved);
+        }
+        self.surface.may_stand(new, gone)
+    }
+
+    /// Whether a vertex there would be farther from the hull than may be (root mean square to the planes, by area), or from
+    /// its neighbours along a limb.
+    fn is_over_budget(&self, a: u32, b: u32, at: DVec3) -> bool {
+        let Some(budget) = self.budget else { return false };
+        let planes = self.planes[a as usize].plus(&self.planes[b as usize]);
+        let is_off = (planes.at(at) / planes.area.max(1e-12)).sqrt() > budget;
+        is_off
+            || self.limb_of(a, b).is_some_and(|limb| {
+                let reach = MAX_RING_DISTANCE * limb.thickness;
+                let star =
+                    self.scratch.star.iter().flat_map(|(corners, _)| corners.index.iter().zip(corners.at));
+                star.filter(|&(&i, _)| i != a && i != b).any(|(_, p)| limb.along.dot(p - at).abs() > reach)
+            })
+    }
+
+    /// The thinner of the limbs of two vertices.
+    fn limb_of(&self, a: u32, b: u32) -> Option<Limb> {
+        let limbs = [a, b].into_iter().filter_map(|v| self.limbs[v as usize]);
+        limbs.min_by(|a, b| a.thickness.total_cmp(&b.thickness))
+    }
+
+    fn collapse(&mut self, a: u32, b: u32, at: DVec3) {
+        let (kept, gone) = self.ordered(a, b);
+        self.planes[kept as usize] = self.planes[a as usize].plus(&self.planes[b as usize]);
+        self.limbs[kept as usize] = self.limb_of(a, b);
+        let (axis, both) = (self.surface.mirror, self.surface.on_mirror[gone as usize]);
+        self.count -= if axis.is_some() && !both { 2 } else { 1 };
+        self.surface.merge(kept, gone, at);
+        self.quadrics[kept as usize] = self.merged_quadric(a, b);
+        self.version[kept as usize] += 1;
+        self.version[gone as usize] += 1;
+        let mut near = std::mem::take(&mut self.scratch.near_a);
+        self.surface.neighbours(kept, &mut near);
+        for &v in &near {
+            self.wait([kept.min(v), kept.max(v)]);
+        }
+        self.scratch.near_a = near;
+    }
+}

@@ -1,0 +1,270 @@
+//! Gaps between parts of a model: sheets of outside voxels halfway between two walls that face each other. A cage that
+//! crosses no sheet leaves its gap open.
+
+use glam::{DVec3, Vec3};
+
+use super::lattice::Lattice;
+use super::shell::MARGIN_VOXELS;
+use super::voxels::Voxels;
+use super::{CageOptions, MAX_VOXELS};
+use cagework_core::cage::Cage;
+use cagework_core::geometry::winding_number;
+use cagework_core::progress::Cancelled;
+
+/// Largest cosine between the directions from a sheet to its two walls: creases wider than 60 degrees are not gaps.
+const MAX_WALL_COSINE: f64 = -0.5;
+
+/// Smallest distance of a sheet from the crease where its walls meet, over the distance between the walls.
+const MIN_DEPTH: f64 = 1.0;
+
+/// Voxels across the narrowest gap that a hull leaves open: three, and room for flat walls beside round limbs.
+const OPEN_GAP: f64 = 4.0;
+
+/// Area of the smallest gap for which the lattice is refined, over the square of the model's longest side.
+const MIN_GAP_AREA: f64 = 0.003;
+
+/// How many times thinner voxels are across narrow gaps.
+const STRETCH: f64 = 3.0;
+
+/// Voxels along the longest side that gaps need, over those of the target, above which voxels are thinner instead of smaller.
+const MIN_REFINEMENT: f64 = 2.0;
+
+/// Most voxels along the longest side of thinner voxels, over those of cubes that leave the same gaps open.
+const MAX_STRETCHED_SHARE: f64 = 0.66;
+
+/// Points of a sheet that decide whether a cage closes its gap.
+const SAMPLES: usize = 32;
+
+/// Stands for no wall within reach.
+const NONE: u32 = u32::MAX;
+
+/// The sheet of one gap.
+#[derive(Clone, Debug)]
+pub(super) struct Gap {
+    pub(super) voxels: Vec<[usize; 3]>,
+    /// Area of the sheet, voxels squared.
+    pub(super) area: f64,
+    /// Mean distance from wall to wall, voxels.
+    width: f64,
+    /// Mean squares of the components of the unit vectors from wall to wall.
+    across: DVec3,
+}
+
+/// A large gap of the model.
+#[derive(Clone, Debug)]
+pub(super) struct ModelGap {
+    /// Points of its sheet, object units.
+    points: Vec<Vec3>,
+    /// Mean distance from wall to wall, object units.
+    width: f64,
+    /// Mean squares of the components of the unit vectors from wall to wall.
+    across: DVec3,
+    /// Voxels along the model's longest side that leave it open, cubes.
+    least_voxels: f64,
+    /// The same of the lattice that is taken.
+    pub(super) voxels: usize,
+}
+
+/// The large gaps of a model that a lattice of `base` voxels closes, or nearly. How many times thinner voxels are along each axis in a
+/// lattice that leaves them open, if there are at most `most`.
+///
+/// # Errors
+/// When `go_on` says so.
+pub(super) fn narrow_gaps(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    bounds: [DVec3; 2],
+    [base, most]: [usize; 2],
+    go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
+) -> Result<(Vec<ModelGap>, DVec3), Cancelled> {
+    let lattice = Lattice::around(bounds, MAX_VOXELS, DVec3::ONE, MARGIN_VOXELS);
+    let solid = lattice.touched(positions, triangles, go_on)?.filled();
+    let n = MAX_VOXELS as f64;
+    let reach = (0.5 * OPEN_GAP * n / base as f64).ceil() as usize;
+    let mut found = gaps(&solid, &solid, reach);
+    found.retain(|gap| gap.area >= MIN_GAP_AREA * n * n && !gap.is_hollow(&lattice, positions, triangles));
+    let of_model = |gap: Gap| ModelGap {
+        points: gap
+            .voxels
+            .iter()
+            .step_by(gap.voxels.len().div_ceil(SAMPLES))
+            .map(|&v| center(&lattice, v))
+            .collect(),
+        width: gap.width * lattice.cell,
+        across: gap.across,
+        least_voxels: OPEN_GAP * n / gap.width,
+        voxels: 0,
+    };
+    let mut found: Vec<ModelGap> = found.into_iter().map(of_model).collect();
+    let stretch = if found.len() > most { DVec3::ONE } else { stretch(&found, base) };
+    found.iter_mut().for_each(|gap| gap.voxels = gap.voxels_of(stretch));
+    Ok((found, stretch))
+}
+
+/// How many times thinner voxels should be along each axis. Thinner ones across most gaps leave them open with fewer voxels than
+/// smaller cubes.
+fn stretch(gaps: &[ModelGap], base: usize) -> DVec3 {
+    let finest = |stretch: DVec3| gaps.iter().map(|gap| gap.voxels_of(stretch)).fold(base, usize::max);
+    let thinner = DVec3::AXES.map(|axis| DVec3::ONE + (STRETCH - 1.0) * axis);
+    let best = thinner.into_iter().min_by_key(|&stretch| finest(stretch)).unwrap_or(DVec3::ONE);
+    let of_cubes = finest(DVec3::ONE) as f64;
+    let is_worth_it =
+        of_cubes > MIN_REFINEMENT * base as f64 && (finest(best) as f64) < MAX_STRETCHED_SHARE * of_cubes;
+    if is_worth_it { best } else { DVec3::ONE }
+}
+
+impl ModelGap {
+    /// Voxels along the model's longest side that leave it open.
+    fn voxels_of(&self, stretch: DVec3) -> usize {
+        (self.least_voxels * (self.across / (stretch * stretch)).element_sum().sqrt()).ceil() as usize
+    }
+
+    /// Where the gap is and what would keep it open, if a cage made on a lattice of `voxels` closes it.
+    pub(super) fn notice(&self, cage: &Cage, voxels: usize, options: &CageOptions) -> Option<String> {
+        let triangles = || (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
+        let inside = self.points.iter().filter(|p| winding_number(p.as_dvec3(), triangles()) > 0.5).count();
+        if 2 * inside <= self.points.len() {
+            return None;
+        }
+        let remedy = if voxels < self.voxels.min(MAX_VOXELS) {
+            format!("take {} voxels instead of {voxels}", self.voxels.min(MAX_VOXELS))
+        } else if self.voxels > MAX_VOXELS {
+            "move its two sides apart: no lattice is fine enough".to_owned()
+        } else if 10 * cage.n_vertices() > 9 * options.target as usize {
+            format!("allow more than {} vertices", options.target)
+        } else {
+            format!("take a smaller detail than {}", options.detail)
+        };
+        let Vec3 { x, y, z } = self.points.iter().sum::<Vec3>() / self.points.len() as f32;
+        let width = self.width;
+        Some(format!(
+            "the cage closes the gap of about {width:.3} at ({x:.3}, {y:.3}, {z:.3}); to keep it open, {remedy}"
+        ))
+    }
+}
+
+impl Gap {
+    /// Whether it lies within a hollow part, such as an open sleeve, and separates nothing.
+    pub(super) fn is_hollow(&self, lattice: &Lattice, positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
+        let n = self.voxels.len();
+        let is_inside = |k: usize| {
+            let corners = triangles.iter().map(|t| t.map(|i| positions[i as usize].as_dvec3()));
+            winding_number(center(lattice, self.voxels[k * n / 4]).as_dvec3(), corners).abs() > 0.5
+        };
+        (1..4).filter(|&k| is_inside(k)).count() > 1
+    }
+}
+
+/// The centre of a voxel, object units.
+fn center(lattice: &Lattice, voxel: [usize; 3]) -> Vec3 {
+    lattice.object(DVec3::from_array(voxel.map(|x| x as f64 + 0.5)) - lattice.half())
+}
+
+/// The number of a voxel, x fastest.
+fn number(dims: [usize; 3], [x, y, z]: [usize; 3]) -> usize {
+    (z * dims[1] + y) * dims[0] + x
+}
+
+/// The voxel of a number.
+fn voxel(dims: [usize; 3], i: usize) -> [usize; 3] {
+    [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]]
+}
+
+/// The gaps of a solid that are at most `2 * reach` voxels wide, the largest first. Voxels of `closed` belong to none.
+pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
+    let dims = solid.dims;
+    let wall = nearest(solid, reach);
+    let to_wall = |i: usize| {
+        let at = |i: usize| DVec3::from_array(voxel(dims, i).map(|x| x as f64));
+        at(wall[i] as usize) - at(i)
+    };
+    let is_free = |i: usize| wall[i] != NONE && !closed.has(voxel(dims, i));
+    let mut width = vec![0.0; wall.len()];
+    let mut sheet = Voxels::new(dims);
+    for i in (0..wall.len()).filter(|&i| is_free(i)) {
+        let (v, to) = (voxel(dims, i), to_wall(i));
+        let after = solid.neighbours(v).map(|next| number(dims, next)).filter(|&next| next > i);
+        for next in after.filter(|&next| is_free(next)) {
+            let across = to_wall(next);
+            if to.dot(across) < MAX_WALL_COSINE * to.length() * across.length() {
+                (width[i], width[next]) = (to.length() + across.length(), to.length() + across.length());
+                sheet.add(v);
+                sheet.add(voxel(dims, next));
+            }
+        }
+    }
+    let depth = depths(&sheet, closed, &to_wall);
+    let mut deep = Voxels::new(dims);
+    sheet.for_each(|v| {
+        let i = number(dims, v);
+        if depth[i] as f64 >= MIN_DEPTH * width[i] {
+            deep.add(v);
+        }
+    });
+    let of_island = |voxels: Vec<[usize; 3]>| {
+        let n = voxels.len() as f64;
+        let width = voxels.iter().map(|&v| width[number(dims, v)]).sum::<f64>() / n;
+        // A sheet is two voxels thick.
+        let across = |&v: &[usize; 3]| to_wall(number(dims, v)).normalize_or_zero().powf(2.0);
+        let across = voxels.iter().map(across).sum::<DVec3>() / n;
+        Gap { voxels, area: 0.5 * n, width, across }
+    };
+    let mut gaps: Vec<Gap> = deep.islands().into_iter().map(of_island).collect();
+    gaps.sort_by(|a, b| b.area.total_cmp(&a.area));
+    gaps
+}
+
+/// The voxel of the solid nearest to each voxel outside, up to `reach` away; [`NONE`] elsewhere. Passed on from voxel to
+/// voxel, so that it may be the second nearest.
+fn nearest(solid: &Voxels, reach: usize) -> Vec<u32> {
+    let dims = solid.dims;
+    let square = |i: u32, v: [usize; 3]| {
+        let wall = voxel(dims, i as usize);
+        (0..3).map(|k| wall[k].abs_diff(v[k]).pow(2)).sum::<usize>()
+    };
+    let mut wall = vec![NONE; dims.iter().product()];
+    let mut front = Vec::new();
+    solid.for_each(|v| front.push((v, number(dims, v) as u32)));
+    while !front.is_empty() {
+        let mut ahead = Vec::new();
+        for (v, from) in front {
+            for next in solid.neighbours(v) {
+                let (i, far) = (number(dims, next), square(from, next));
+                let is_farther = wall[i] != NONE && square(wall[i], next) <= far;
+                if far <= reach * reach && !is_farther && !solid.has(next) {
+                    wall[i] = from;
+                    ahead.push((next, from));
+                }
+            }
+        }
+        front = ahead;
+    }
+    wall
+}
+
+/// Steps within a sheet from each of its voxels to the crease where its walls meet; the largest number if they do not.
+fn depths(sheet: &Voxels, closed: &Voxels, to_wall: &dyn Fn(usize) -> DVec3) -> Vec<usize> {
+    let dims = sheet.dims;
+    let mut depth = vec![usize::MAX; dims.iter().product()];
+    let mut waiting = Vec::new();
+    sheet.for_each(|v| {
+        let i = number(dims, v);
+        let to = to_wall(i).abs();
+        let is_along = |next: [usize; 3]| (0..3).all(|k| next[k] == v[k] || to[k] < 0.7 * to.max_element());
+        if sheet.neighbours(v).any(|next| is_along(next) && closed.has(next)) {
+            depth[i] = 0;
+            waiting.push(v);
+        }
+    });
+    let mut done = 0;
+    while let Some(&v) = waiting.get(done) {
+        done += 1;
+        for next in sheet.neighbours(v) {
+            if sheet.has(next) && depth[number(dims, next)] == usize::MAX {
+                depth[number(dims, next)] = depth[number(dims, v)] + 1;
+                waiting.push(next);
+            }
+        }
+    }
+    depth
+}

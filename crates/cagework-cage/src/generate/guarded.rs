@@ -1,0 +1,328 @@
+//! A surface that changes only in ways that keep it apart from the solid and from itself.
+
+use glam::DVec3;
+
+use super::buckets::Buckets;
+use super::footprint::any_run;
+use super::surface::Surface;
+use super::voxels::Voxels;
+use cagework_core::contact::{Corners, meet};
+
+/// Parts of the cage that are not neighbours stay this far apart, in voxels.
+const MIN_GAP: f64 = 0.05;
+
+/// How much smaller than a voxel those of a gap's sheet are: walls beside it may graze it.
+const SHEET_SHRINKAGE: f64 = 0.4;
+
+/// Vertices beside the mirror plane stay this far from it, in voxels.
+const MIN_MIRROR_DISTANCE: f64 = 0.1;
+
+/// Smallest cosine of the turn between neighbours, 120 degrees: sharper folds turn a model over when they are bent.
+pub(super) const MIN_FOLD_COSINE: f64 = -0.5;
+
+/// What the surface must keep away from.
+#[derive(Debug)]
+pub(super) struct Obstacle {
+    /// The solid.
+    pub(super) voxels: Voxels,
+    /// Distance along each axis to keep from its voxels, in voxels.
+    pub(super) clearance: f64,
+    /// How many times thinner voxels are along each axis.
+    pub(super) stretch: DVec3,
+}
+
+impl Obstacle {
+    /// Whether a triangle (centred coordinates) keeps its distance.
+    pub(super) fn is_clear(&self, triangle: [DVec3; 3]) -> bool {
+        !overlaps(&self.voxels, triangle, self.clearance)
+    }
+
+    /// A triangle (centred coordinates) with the angles that it has in object units.
+    pub(super) fn unstretched(&self, triangle: &Corners) -> Corners {
+        Corners { at: triangle.at.map(|p| p / self.stretch), ..*triangle }
+    }
+}
+
+/// Whether a triangle (centred coordinates) overlaps a voxel of a set, each grown by `grow` on all sides.
+fn overlaps(voxels: &Voxels, triangle: [DVec3; 3], grow: f64) -> bool {
+    let half = DVec3::from_array(voxels.dims.map(|n| 0.5 * n as f64));
+    any_run(triangle.map(|p| p + half), grow, voxels.dims, |y, z, first, last| {
+        voxels.has_run(y, z, first, last)
+    })
+}
+
+/// A surface under change. Triangles and vertices that go away leave gaps in the numbering.
+#[derive(Debug)]
+pub(super) struct Guarded<'a> {
+    pub(super) positions: Vec<DVec3>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Triangles around each vertex; none once it is gone.
+    pub(super) around: Vec<Vec<u32>>,
+    pub(super) on_mirror: Vec<bool>,
+    pub(super) mirror: Option<usize>,
+    /// Whether it may fold more than [`MIN_FOLD_COSINE`] allows.
+    pub(super) may_fold: bool,
+    obstacle: &'a Obstacle,
+    /// What no triangle may come near: the solid and, if there is a band, everything outside the band.
+    keep_out: Voxels,
+    has_band: bool,
+    /// Sheets of gaps, which no triangle may cross, and the corners of their box (centred coordinates).
+    sheets: Option<(Voxels, [DVec3; 2])>,
+    buckets: Buckets,
+    bounds: Vec<Option<(DVec3, DVec3)>>,
+    near: Vec<u32>,
+}
+
+impl<'a> Guarded<'a> {
+    /// Takes over a surface that is clear of the obstacle and of itself.
+    pub(super) fn new(surface: Surface, obstacle: &'a Obstacle) -> Self {
+        let half = DVec3::from_array(obstacle.voxels.dims.map(|n| 0.5 * n as f64));
+        let n = surface.triangles.len();
+        let mut guarded = Self {
+            around: vec![Vec::new(); surface.positions.len()],
+            positions: surface.positions,
+            triangles: surface.triangles,
+            on_mirror: surface.on_mirror,
+            mirror: surface.mirror,
+            may_fold: false,
+            obstacle,
+            keep_out: obstacle.voxels.clone(),
+            has_band: false,
+            sheets: None,
+            buckets: Buckets::new(half, n),
+            bounds: vec![None; n],
+            near: Vec::new(),
+        };
+        for t in 0..n {
+            for i in guarded.triangles[t] {
+                guarded.around[i as usize].push(t as u32);
+            }
+            guarded.note(t as u32);
+        }
+        guarded
+    }
+
+    /// Sets the band within which triangles may change from now on; none: anywhere.
+    pub(super) fn set_band(&mut self, band: Option<&Voxels>) {
+        self.has_band = band.is_some();
+        self.keep_out = self.obstacle.voxels.clone();
+        if let Some(band) = band {
+            self.keep_out.unite(&band.complement());
+        }
+    }
+
+    /// Sets the sheets that no triangle may cross from now on.
+    pub(super) fn set_sheets(&mut self, sheets: Option<Voxels>) {
+        self.sheets = sheets.map(|sheets| {
+            let half = DVec3::from_array(sheets.dims.map(|n| 0.5 * n as f64));
+            let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+            sheets.for_each(|v| {
+                let corner = DVec3::from_array(v.map(|x| x as f64)) - half;
+                (min, max) = (min.min(corner), max.max(corner + 1.0));
+            });
+            (sheets, [min, max])
+        });
+    }
+
+    /// Whether a triangle is clear of the solid, stays in the band and crosses no sheet.
+    fn is_clear(&self, triangle: [DVec3; 3]) -> bool {
+        let half = DVec3::from_array(self.keep_out.dims.map(|n| 0.5 * n as f64));
+        let leaves = self.has_band && triangle.iter().any(|p| p.abs().cmpge(half).any());
+        let [a, b, c] = triangle;
+        let crosses = |(sheets, [min, max]): &(Voxels, [DVec3; 2])| {
+            let is_beside = a.max(b).max(c).cmplt(*min).any() || a.min(b).min(c).cmpgt(*max).any();
+            !is_beside && overlaps(sheets, triangle, -SHEET_SHRINKAGE)
+        };
+        !leaves
+            && !overlaps(&self.keep_out, triangle, self.obstacle.clearance)
+            && !self.sheets.as_ref().is_some_and(crosses)
+    }
+
+    /// Whether there is a band.
+    pub(super) fn has_band(&self) -> bool {
+        self.has_band
+    }
+
+    /// The surface as it is now, without gaps.
+    pub(super) fn surface(&self) -> Surface {
+        let mut number = vec![u32::MAX; self.positions.len()];
+        let mut surface = Surface { mirror: self.mirror, ..Surface::default() };
+        for (v, _) in self.around.iter().enumerate().filter(|(_, around)| !around.is_empty()) {
+            number[v] = surface.positions.len() as u32;
+            surface.positions.push(self.positions[v]);
+            surface.on_mirror.push(self.on_mirror[v]);
+        }
+        let alive = self.triangles.iter().zip(&self.bounds).filter(|(_, bounds)| bounds.is_some());
+        surface.triangles = alive.map(|(t, _)| t.map(|i| number[i as usize])).collect();
+        surface
+    }
+
+    /// Whether a triangle is still part of the surface.
+    pub(super) fn is_alive(&self, triangle: u32) -> bool {
+        self.bounds[triangle as usize].is_some()
+    }
+
+    /// A triangle's corners.
+    pub(super) fn corners(&self, triangle: u32) -> Corners {
+        let index = self.triangles[triangle as usize];
+        Corners { index, at: index.map(|i| self.positions[i as usize]) }
+    }
+
+    /// Enters a triangle's place.
+    fn note(&mut self, triangle: u32) {
+        let corners = self.corners(triangle);
+        let (min, max) = (corners.min(), corners.max());
+        self.bounds[triangle as usize] = Some((min, max));
+        self.buckets.add(triangle, min, max);
+    }
+
+    /// Smallest cosine of the turn from one of the triangles to another one, to `others` or across the mirror.
+    fn sharpest(&self, triangles: &[Corners], others: &[Corners]) -> f64 {
+        let real = |t: &Corners| self.obstacle.unstretched(t);
+        let triangles: Vec<Corners> = triangles.iter().map(real).collect();
+        let others: Vec<Corners> = others.iter().map(real).collect();
+        let across = |t: &Corners| {
+            let axis = self.mirror?;
+            let is_beside = t.index.iter().filter(|&&i| self.on_mirror[i as usize]).count() == 2;
+            is_beside.then(|| 1.0 - 2.0 * t.normal().normalize_or_zero()[axis].powi(2))
+        };
+        let folds = triangles.iter().enumerate().flat_map(|(k, t)| {
+            let beside = triangles[..k].iter().chain(&others);
+            beside.filter_map(|other| t.fold_cosine(other)).chain(across(t))
+        });
+        folds.fold(1.0, f64::min)
+    }
+
+    /// Whether `new` triangles may stand where those numbered `gone` were: clear of the obstacle, of the rest of the
+    /// surface and of each other, and not folded more than [`MIN_FOLD_COSINE`] allows or than those were.
+    pub(super) fn may_stand(&mut self, new: &[Corners], gone: &[u32]) -> bool {
+        if let Some(axis) = self.mirror {
+            let beside = |i: u32, p: DVec3| self.on_mirror[i as usize] || p[axis] >= MIN_MIRROR_DISTANCE;
+            if new.iter().any(|t| t.index.iter().zip(t.at).any(|(&i, p)| !beside(i, p))) {
+                return false;
+            }
+        }
+        if new.iter().any(|t| !self.is_clear(t.at)) {
+            return false;
+        }
+        if new.iter().enumerate().any(|(k, a)| new[..k].iter().any(|b| meet(a, b, MIN_GAP))) {
+            return false;
+        }
+        let min = new.iter().fold(DVec3::INFINITY, |m, t| m.min(t.min())) - MIN_GAP;
+        let max = new.iter().fold(DVec3::NEG_INFINITY, |m, t| m.max(t.max())) + MIN_GAP;
+        let mut near = std::mem::take(&mut self.near);
+        let bounds = &self.bounds;
+        self.buckets.near(min, max, |t| bounds[t as usize], &mut near);
+        let others: Vec<Corners> =
+            near.iter().filter(|t| !gone.contains(t)).map(|&t| self.corners(t)).collect();
+        let clear = others.iter().all(|other| {
+            let (low, high) = (other.min() - MIN_GAP, other.max() + MIN_GAP);
+            new.iter().all(|corners| {
+                let apart = corners.min().cmpgt(high).any() || corners.max().cmplt(low).any();
+                apart || !meet(corners, other, MIN_GAP)
+            })
+        });
+        self.near = near;
+        if !clear || self.may_fold {
+            return clear;
+        }
+        let fold = self.sharpest(new, &others);
+        let before = || gone.iter().map(|&t| self.corners(t)).collect::<Vec<_>>();
+        fold >= MIN_FOLD_COSINE || fold >= self.sharpest(&before(), &others)
+    }
+
+    /// Pairs of triangles that meet where they should not, as vertices of both.
+    pub(super) fn offenders(&mut self) -> Vec<u32> {
+        let mut offenders = Vec::new();
+        for t in 0..self.triangles.len() as u32 {
+            let corners = self.corners(t);
+            let mut near = std::mem::take(&mut self.near);
+            let bounds = &self.bounds;
+            self.buckets.near(corners.min(), corners.max(), |t| bounds[t as usize], &mut near);
+            for &other in near.iter().filter(|&&other| other > t) {
+                let other = self.corners(other);
+                if meet(&corners, &other, MIN_GAP) {
+                    offenders.extend(corners.index);
+                    offenders.extend(other.index);
+                }
+            }
+            self.near = near;
+        }
+        offenders.sort_unstable();
+        offenders.dedup();
+        offenders
+    }
+
+    /// Puts a vertex elsewhere.
+    pub(super) fn place(&mut self, vertex: u32, at: DVec3) {
+        self.positions[vertex as usize] = at;
+        for k in 0..self.around[vertex as usize].len() {
+            self.note(self.around[vertex as usize][k]);
+        }
+    }
+
+    /// Merges `gone` into `kept`, which moves to `at`.
+    pub(super) fn merge(&mut self, kept: u32, gone: u32, at: DVec3) {
+        for t in std::mem::take(&mut self.around[gone as usize]) {
+            let corners = &mut self.triangles[t as usize];
+            if corners.contains(&kept) {
+                for i in *corners {
+                    self.around[i as usize].retain(|&other| other != t);
+                }
+                self.bounds[t as usize] = None;
+            } else {
+                for i in corners.iter_mut().filter(|i| **i == gone) {
+                    *i = kept;
+                }
+                self.around[kept as usize].push(t);
+            }
+        }
+        self.place(kept, at);
+    }
+
+    /// Replaces the two triangles of the edge `a`-`b` by two of the edge between their tips.
+    pub(super) fn swap(&mut self, pair: [u32; 2], new: [[u32; 3]; 2]) {
+        for t in pair {
+            for i in self.triangles[t as usize] {
+                self.around[i as usize].retain(|&other| other != t);
+            }
+        }
+        for (t, corners) in pair.into_iter().zip(new) {
+            self.triangles[t as usize] = corners;
+            for i in corners {
+                self.around[i as usize].push(t);
+            }
+            self.note(t);
+        }
+    }
+
+    /// Vertices that share an edge with one, each once.
+    pub(super) fn neighbours(&self, vertex: u32, out: &mut Vec<u32>) {
+        out.clear();
+        for &t in &self.around[vertex as usize] {
+            out.extend(self.triangles[t as usize].iter().filter(|&&i| i != vertex));
+        }
+        out.sort_unstable();
+        out.dedup();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of two sheets that open by 2 atan(0.2), by the formula -(1 - 0.2^2) / (1 + 0.2^2).
+    #[test]
+    fn a_fold_is_measured_in_object_units() {
+        let stretch = DVec3::new(3.0, 1.0, 1.0);
+        let obstacle = Obstacle { voxels: Voxels::new([8; 3]), clearance: 0.0, stretch };
+        let guarded = Guarded::new(Surface::default(), &obstacle);
+        let points = [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.0, 1.0], [-0.2, 0.0, 1.0]];
+        let triangle = |index: [u32; 3]| {
+            let at = index.map(|i| stretch * DVec3::from_array(points[i as usize]));
+            Corners { index, at }
+        };
+        let fold = guarded.sharpest(&[triangle([0, 1, 2])], &[triangle([1, 0, 3])]);
+        assert!((fold + 0.96 / 1.04).abs() < 1e-12, "{fold}");
+    }
+}

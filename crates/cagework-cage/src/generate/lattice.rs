@@ -1,0 +1,102 @@
+//! Where the voxels are: a lattice of cubes centred on the model, so that a mirror through its centre maps voxels onto
+//! voxels.
+
+use glam::{DVec3, Vec3};
+
+use super::footprint::Footprint;
+use super::voxels::Voxels;
+use cagework_core::progress::Cancelled;
+
+/// Edge of a voxel over the model's length divided by their number: its ends lie inside voxels, not between two.
+const VOXEL_ENLARGEMENT: f64 = 1.002;
+
+/// Smallest edge of a voxel over the largest coordinate: f32 positions can tell its parts apart.
+const MIN_VOXEL_RATIO: f64 = 2e-5;
+
+/// Triangles from one check whether the work was cancelled to the next.
+const TRIANGLES_PER_CHECK: usize = 4096;
+
+/// A lattice of voxels: cubes, or boxes that are thinner along one axis. Lattice coordinates count voxels from the box's corner; *centred* ones from its centre.
+#[derive(Clone, Debug)]
+pub(super) struct Lattice {
+    /// Centre of the box, object units.
+    center: DVec3,
+    /// Longest edge of a voxel, object units.
+    pub(super) cell: f64,
+    /// The longest edge over the edge along x, y, z.
+    stretch: DVec3,
+    /// Voxels along x, y, z: even numbers.
+    pub(super) dims: [usize; 3],
+}
+
+impl Lattice {
+    /// Voxels of which `n` longest edges are as long as the longest side of `min`..`max`, and `pad` voxels more on every side.
+    pub(super) fn around([min, max]: [DVec3; 2], n: usize, stretch: DVec3, pad: usize) -> Self {
+        let extent = max - min;
+        let largest = min.abs().max(max.abs()).max_element();
+        // A model of one point has no size of its own: take the unit of length.
+        let smallest = if extent.max_element() > 0.0 { f64::from(f32::MIN_POSITIVE) } else { 1.0 / n as f64 };
+        let cell = (VOXEL_ENLARGEMENT * extent.max_element() / n as f64)
+            .max(MIN_VOXEL_RATIO * largest)
+            .max(smallest);
+        let dims =
+            (extent * stretch).to_array().map(|e| 2 * ((0.5 * e / cell).ceil() as usize).max(1) + 2 * pad);
+        Self { center: 0.5 * (min + max), cell, stretch, dims }
+    }
+
+    /// Shortest edge of a voxel, object units.
+    pub(super) fn shortest(&self) -> f64 {
+        self.cell / self.stretch.max_element()
+    }
+
+    /// Half the box in voxels: lattice coordinates of the centre.
+    pub(super) fn half(&self) -> DVec3 {
+        DVec3::from_array(self.dims.map(|n| 0.5 * n as f64))
+    }
+
+    /// Lattice coordinates of a point in object units.
+    pub(super) fn lattice(&self, p: Vec3) -> DVec3 {
+        self.centred(p) + self.half()
+    }
+
+    /// Centred coordinates of a point in object units.
+    pub(super) fn centred(&self, p: Vec3) -> DVec3 {
+        (p.as_dvec3() - self.center) * self.stretch / self.cell
+    }
+
+    /// Object units of a point in centred coordinates.
+    pub(super) fn object(&self, p: DVec3) -> Vec3 {
+        (self.center + p * self.cell / self.stretch).as_vec3()
+    }
+
+    /// All voxels that a triangle or a vertex touches.
+    ///
+    /// # Errors
+    /// When `go_on` says so.
+    pub(super) fn touched(
+        &self,
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
+    ) -> Result<Voxels, Cancelled> {
+        let points: Vec<DVec3> = positions.iter().map(|&p| self.lattice(p)).collect();
+        let mut voxels = Voxels::new(self.dims);
+        let voxel_of = |p: DVec3| p.floor().to_array().map(|x| x as usize);
+        for &p in &points {
+            voxels.add(voxel_of(p));
+        }
+        for (k, t) in triangles.iter().enumerate() {
+            if k % TRIANGLES_PER_CHECK == 0 {
+                go_on(k as f32 / triangles.len() as f32)?;
+            }
+            let corners = t.map(|i| points[i as usize]);
+            let voxel = voxel_of(corners[0]);
+            if voxel == voxel_of(corners[1]) && voxel == voxel_of(corners[2]) {
+                continue;
+            }
+            Footprint::new(corners, 0.0)
+                .for_each_run(self.dims, |y, z, first, last| voxels.add_run(y, z, first, last));
+        }
+        Ok(voxels)
+    }
+}

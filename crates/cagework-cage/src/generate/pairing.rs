@@ -1,0 +1,272 @@
+//! Which triangles become quads: a matching of neighbours, by simulated annealing.
+//!
+//! An exact matching gives no more quads: seven times the moves gave none either (`docs/notes/cage-generator.md`).
+
+use glam::DVec3;
+
+use super::guarded::Guarded;
+use cagework_core::contact::Corners;
+
+/// Corners of a quad: the vertex, and whether its mirror image is meant.
+pub(super) type Quad = [(u32, bool); 4];
+
+/// Creases stay creases: smallest cosine between the two triangles of a quad, cut either way.
+const MIN_FOLD_COSINE: f64 = 0.0;
+/// Quads that are worse are none.
+const MAX_BADNESS: f64 = 4.0;
+/// Moves of the annealing, and its first temperature; quads are worth about 1.
+const MOVES: usize = 15_000;
+const TEMPERATURE: f64 = 0.25;
+/// Seed of the pseudo-random moves: runs are alike.
+const SEED: u64 = 0x9E37_79B9_7F4A_7C15;
+
+/// What a triangle is paired with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Partner {
+    /// Nothing: it stays a triangle.
+    #[default]
+    None,
+    /// Its own image across the mirror plane.
+    Image,
+    /// Another triangle.
+    Triangle(u32),
+}
+
+/// Partners of all triangles.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Pairing {
+    pub(super) partner: Vec<Partner>,
+    weight: Vec<f64>,
+}
+
+/// Where the corners are.
+pub(super) fn places(surface: &Guarded<'_>, quad: &Quad) -> [DVec3; 4] {
+    quad.map(|(v, is_image)| {
+        let mut p = surface.positions[v as usize];
+        if let (true, Some(axis)) = (is_image, surface.mirror) {
+            p[axis] = -p[axis];
+        }
+        p
+    })
+}
+
+/// How far a quad is from flat: half the distance between its diagonals over its mean side.
+pub(super) fn warp(p: &[DVec3; 4]) -> f64 {
+    let normal = (p[2] - p[0]).cross(p[3] - p[1]).normalize_or_zero();
+    let side = 0.25 * (0..4).map(|k| p[k].distance(p[(k + 1) % 4])).sum::<f64>();
+    normal.dot(p[0] - p[1] + p[2] - p[3]).abs() / (2.0 * side.max(1e-12))
+}
+
+/// 0 for a rectangle; more for what is bent, slanted, tapered or not convex.
+pub(super) fn badness(p: &[DVec3; 4]) -> f64 {
+    let normal = (p[2] - p[0]).cross(p[3] - p[1]).normalize_or_zero();
+    let (mut slant, mut dent) = (0.0, 0.0);
+    for k in 0..4 {
+        let [next, before] = [(k + 1) % 4, (k + 3) % 4].map(|other| (p[other] - p[k]).normalize_or_zero());
+        slant += 0.25 * next.dot(before).powi(2);
+        dent += 4.0 * (0.35 - next.cross(before).dot(normal)).max(0.0).powi(2);
+    }
+    let side = |k: usize| p[k].distance(p[(k + 1) % 4]).max(1e-9);
+    let taper = (side(0) / side(2)).ln().powi(2) + (side(1) / side(3)).ln().powi(2);
+    1.5 * slant + 3.0 * warp(p).powi(2) + dent + 0.15 * taper
+}
+
+/// The quad of a triangle and its partner; none if they do not touch as they should.
+pub(super) fn quad_of(surface: &Guarded<'_>, t: u32, partner: Partner) -> Option<Quad> {
+    let x = surface.triangles[t as usize];
+    let edge = |is_shared: &dyn Fn(u32, u32, u32) -> bool| {
+        (0..3).map(|k| [x[k], x[(k + 1) % 3], x[(k + 2) % 3]]).find(|&[a, b, c]| is_shared(a, b, c))
+    };
+    match partner {
+        Partner::None => None,
+        Partner::Image => {
+            let on_mirror = |v: u32| surface.on_mirror[v as usize];
+            let [a, b, c] = edge(&|a, b, c| on_mirror(a) && on_mirror(b) && !on_mirror(c))?;
+            Some([(a, false), (c, true), (b, false), (c, false)])
+        }
+        Partner::Triangle(u) => {
+            let y = surface.triangles[u as usize];
+            let [a, b, c] = edge(&|a, b, _| y.contains(&a) && y.contains(&b))?;
+            let d = y.into_iter().find(|&i| i != a && i != b)?;
+            Some([a, d, b, c].map(|v| (v, false)))
+        }
+    }
+}
+
+/// The triangles of two triangles' quad, cut along its other diagonal.
+pub(super) fn other_cut(surface: &Guarded<'_>, t: u32, u: u32) -> Option<[Corners; 2]> {
+    let [a, b, c, d] = quad_of(surface, t, Partner::Triangle(u))?.map(|corner| corner.0);
+    let corners = |index: [u32; 3]| Corners { index, at: index.map(|i| surface.positions[i as usize]) };
+    Some([[a, b, d], [b, c, d]].map(corners))
+}
+
+/// Whether the surface may be cut along a quad's other diagonal.
+pub(super) fn is_free(surface: &mut Guarded<'_>, t: u32, partner: Partner) -> bool {
+    let Partner::Triangle(u) = partner else { return true };
+    other_cut(surface, t, u).is_some_and(|cut| surface.may_stand(&cut, &[t, u]))
+}
+
+/// What a quad is worth; 0 for one that may not be.
+pub(super) fn worth(surface: &Guarded<'_>, t: u32, partner: Partner) -> f64 {
+    let Some(quad) = quad_of(surface, t, partner) else { return 0.0 };
+    let [_, (b, _), _, (d, _)] = quad;
+    let on_mirror = |v: u32| surface.on_mirror[v as usize];
+    let joined =
+        |v: u32| surface.around[b as usize].iter().any(|&t| surface.triangles[t as usize].contains(&v));
+    // The other diagonal must be no edge.
+    if partner != Partner::Image && (joined(d) || on_mirror(b) && on_mirror(d)) {
+        return 0.0;
+    }
+    let p = places(surface, &quad);
+    let half = |k: usize| {
+        let [a, b, c] = [0, 1, 2].map(|step| p[(k + step) % 4]);
+        (b - a).cross(c - a).normalize_or_zero()
+    };
+    let fold = half(0).dot(half(2)).min(half(1).dot(half(3)));
+    let badness = badness(&p);
+    if fold < MIN_FOLD_COSINE || badness > MAX_BADNESS {
+        return 0.0;
+    }
+    let worth = 0.25 + 1.0 / (1.0 + badness) + 0.3 * fold;
+    // Half of it is the other half's.
+    if partner == Partner::Image { 0.5 * worth } else { worth }
+}
+
+/// Pairs triangles so that quads are many and good; what was paired `before` is where it begins. `strict`: only quads that may be cut
+/// along either diagonal.
+pub(super) fn pair(surface: &mut Guarded<'_>, before: &Pairing, strict: bool) -> Pairing {
+    let n = surface.triangles.len();
+    let mut near: Vec<Vec<(Partner, f64)>> = vec![Vec::new(); n];
+    let mut options: Vec<(u32, Partner, f64)> = Vec::new();
+    for t in 0..n as u32 {
+        let x = surface.triangles[t as usize];
+        for k in 0..if surface.is_alive(t) { 3 } else { 0 } {
+            let (a, b) = (x[k], x[(k + 1) % 3]);
+            let mut others = surface.around[a as usize].iter().copied();
+            let other = others.find(|&u| u != t && surface.triangles[u as usize].contains(&b));
+            let partner = other.map_or(Partner::Image, Partner::Triangle);
+            let worth = worth(surface, t, partner);
+            if worth > 0.0 && (!strict || is_free(surface, t, partner)) {
+                near[t as usize].push((partner, worth));
+                if other.is_none_or(|u| u > t) {
+                    options.push((t, partner, worth));
+                }
+            }
+        }
+    }
+    let mut pairing = Pairing { partner: vec![Partner::None; n], weight: vec![0.0; n] };
+    for (t, &partner) in before.partner.iter().enumerate() {
+        if let Some(&(_, worth)) = near[t].iter().find(|option| option.0 == partner) {
+            (pairing.partner[t], pairing.weight[t]) = (partner, worth);
+        }
+    }
+    let mut random = SEED;
+    let mut undo = Vec::new();
+    for k in 0..if options.is_empty() { 0 } else { MOVES } {
+        let temperature = TEMPERATURE * (1.0 - k as f64 / MOVES as f64).powi(2) + 1e-4;
+        let (t, partner, worth) = options[(next(&mut random) % options.len() as u64) as usize];
+        if pairing.partner[t as usize] == partner {
+            continue;
+        }
+        undo.clear();
+        let gain = pairing.exchange(t, partner, worth, &near, &mut undo);
+        let chance = (next(&mut random) >> 11) as f64 / (1_u64 << 53) as f64;
+        if gain < 0.0 && (gain / temperature).exp() < chance {
+            for &(t, partner, weight) in undo.iter().rev() {
+                (pairing.partner[t as usize], pairing.weight[t as usize]) = (partner, weight);
+            }
+        }
+    }
+    pairing.part_doubles(surface);
+    pairing
+}
+
+/// A pseudo-random number (Marsaglia 2003, "Xorshift RNGs").
+fn next(state: &mut u64) -> u64 {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    *state
+}
+
+impl Pairing {
+    fn set(&mut self, t: u32, partner: Partner, weight: f64, undo: &mut Vec<(u32, Partner, f64)>) {
+        undo.push((t, self.partner[t as usize], self.weight[t as usize]));
+        (self.partner[t as usize], self.weight[t as usize]) = (partner, weight);
+    }
+
+    /// Puts a quad in; whose partners it takes away find others if they can. What is gained.
+    fn exchange(
+        &mut self,
+        t: u32,
+        partner: Partner,
+        worth: f64,
+        near: &[Vec<(Partner, f64)>],
+        undo: &mut Vec<(u32, Partner, f64)>,
+    ) -> f64 {
+        let mut gain = worth;
+        let mut left = Vec::new();
+        let both = match partner {
+            Partner::Triangle(u) => vec![t, u],
+            Partner::Image | Partner::None => vec![t],
+        };
+        for &x in &both {
+            let old = self.partner[x as usize];
+            if old != Partner::None {
+                gain -= self.weight[x as usize];
+                self.set(x, Partner::None, 0.0, undo);
+            }
+            if let Partner::Triangle(y) = old {
+                self.set(y, Partner::None, 0.0, undo);
+                left.push(y);
+            }
+        }
+        for (k, &x) in both.iter().enumerate() {
+            let other = if k == 0 { partner } else { Partner::Triangle(t) };
+            self.set(x, other, worth, undo);
+        }
+        for x in left {
+            if self.partner[x as usize] != Partner::None {
+                continue;
+            }
+            let is_free = |partner: Partner| match partner {
+                Partner::Triangle(y) => self.partner[y as usize] == Partner::None,
+                Partner::Image | Partner::None => true,
+            };
+            let free = near[x as usize].iter().copied().filter(|option| is_free(option.0));
+            if let Some((other, worth)) = free.max_by(|a, b| a.1.total_cmp(&b.1)) {
+                gain += worth;
+                self.set(x, other, worth, undo);
+                if let Partner::Triangle(y) = other {
+                    self.set(y, Partner::Triangle(x), worth, undo);
+                }
+            }
+        }
+        gain
+    }
+
+    /// Two quads with the same other diagonal would share an edge that belongs to four triangles when both are cut along it, as around
+    /// a vertex with two edges: the second one's are triangles again.
+    fn part_doubles(&mut self, surface: &Guarded<'_>) {
+        let mut taken = Vec::new();
+        for t in 0..self.partner.len() as u32 {
+            let partner = self.partner[t as usize];
+            if matches!(partner, Partner::Triangle(u) if u < t) {
+                continue;
+            }
+            let Some([_, (b, _), _, (d, _)]) = quad_of(surface, t, partner) else { continue };
+            let diagonal = [b.min(d), b.max(d)];
+            if taken.contains(&diagonal) {
+                self.part(t);
+            }
+            taken.push(diagonal);
+        }
+    }
+
+    /// The two of a quad are triangles again.
+    pub(super) fn part(&mut self, t: u32) {
+        if let Partner::Triangle(u) = std::mem::take(&mut self.partner[t as usize]) {
+            self.partner[u as usize] = Partner::None;
+        }
+    }
+}

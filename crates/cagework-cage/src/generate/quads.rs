@@ -1,0 +1,265 @@
+//! Quads from the triangles of a collapsed surface: paired, made rectangular under the guard, split where the cage will split
+//! them.
+
+use glam::DVec3;
+
+use super::collapse::quality;
+use super::guarded::Guarded;
+use super::pairing::{
+    Pairing, Partner, Quad, badness, is_free, other_cut, pair, places, quad_of, warp, worth,
+};
+use super::quadric::Quadric;
+use cagework_core::contact::Corners;
+use cagework_core::progress::Cancelled;
+
+/// Rounds of relaxing between two pairings, and after the last one.
+const ROUNDS: [usize; 3] = [2, 2, 3];
+/// Weight of the mean squared distance from the hull (voxels squared) against the badness of quads.
+const DISTANCE_WEIGHT: f64 = 0.6;
+/// Weights of the inverse quality of triangles, and of the halves of quads.
+const TRIANGLE_WEIGHT: f64 = 0.3;
+const HALF_WEIGHT: f64 = 0.01;
+/// Weight of each quad that may be cut along one diagonal only.
+const BOUND_WEIGHT: f64 = 6.0;
+/// Shares of a vertex's way that are tried.
+const STEP_SHARES: [f64; 3] = [1.0, 0.5, 0.2];
+/// Step outward that is tried, over the mean distance of a vertex's neighbours.
+const OUTWARD_STEP: f64 = 0.3;
+/// A move must lower the energy by this much.
+const MIN_DECREASE: f64 = 1e-3;
+/// A quad that is bent by less is flat.
+const FLAT: f64 = 1e-2;
+/// Smallest cosine between a triangle's normals before and after a move.
+const MIN_MOVE_COSINE: f64 = 0.3;
+
+/// Pairs the triangles of a surface, and moves its vertices so that quads are better.
+///
+/// # Errors
+/// When `go_on` says so; it hears the share that is done.
+pub(super) fn quads(
+    surface: &mut Guarded<'_>,
+    quadrics: &[Quadric],
+    go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
+) -> Result<Pairing, Cancelled> {
+    let mut pairing = Pairing::default();
+    for (k, rounds) in ROUNDS.into_iter().enumerate() {
+        pairing = pair(surface, &pairing, false);
+        go_on((k + 1) as f32 / (ROUNDS.len() + 1) as f32)?;
+        for _ in 0..rounds {
+            for v in 0..surface.positions.len() as u32 {
+                straighten(surface, &pairing, quadrics, v);
+            }
+        }
+    }
+    pairing = pair(surface, &pairing, true);
+    settle(surface, &mut pairing);
+    Ok(pairing)
+}
+
+/// What stands around a vertex: quads, triangles that are left, all triangles.
+struct Star {
+    quads: Vec<Quad>,
+    /// Two triangles of each quad that does not cross the mirror.
+    pairs: Vec<[u32; 2]>,
+    alone: Vec<u32>,
+    all: Vec<u32>,
+}
+
+impl Star {
+    fn new(surface: &Guarded<'_>, pairing: &Pairing, v: u32) -> Self {
+        let all = surface.around[v as usize].clone();
+        let (mut quads, mut pairs, mut alone) = (Vec::new(), Vec::new(), Vec::new());
+        for &t in &all {
+            let partner = pairing.partner[t as usize];
+            // A quad of two triangles that both touch the vertex counts once.
+            let is_second = matches!(partner, Partner::Triangle(u) if u < t && all.contains(&u));
+            match quad_of(surface, t, partner) {
+                Some(quad) if !is_second => {
+                    quads.push(quad);
+                    if let Partner::Triangle(u) = partner {
+                        pairs.push([t, u]);
+                    }
+                }
+                Some(_) => {}
+                None => alone.push(t),
+            }
+        }
+        Self { quads, pairs, alone, all }
+    }
+
+    fn energy(&self, surface: &Guarded<'_>, quadric: &Quadric, v: u32) -> f64 {
+        let inverse = |t: &u32| 1.0 / quality(&surface.corners(*t).at).max(1e-6);
+        DISTANCE_WEIGHT * quadric.at(surface.positions[v as usize]) / quadric.area.max(1e-12)
+            + self.quads.iter().map(|quad| badness(&places(surface, quad))).sum::<f64>()
+            + TRIANGLE_WEIGHT * self.alone.iter().map(inverse).sum::<f64>()
+            + HALF_WEIGHT * self.all.iter().map(inverse).sum::<f64>()
+    }
+
+    /// The same of quads that may not be cut along their other diagonal.
+    fn penalty(&self, surface: &mut Guarded<'_>) -> f64 {
+        let bound = self.pairs.iter().filter(|[t, u]| !is_free(surface, *t, Partner::Triangle(*u)));
+        BOUND_WEIGHT * bound.count() as f64
+    }
+
+    /// Places where the vertex would make better quads: parallelograms, their planes, the middle of its neighbours, the hull, and
+    /// farther out, where the model is not in the way of either diagonal.
+    fn goals(&self, surface: &Guarded<'_>, quadric: &Quadric, v: u32) -> Vec<DVec3> {
+        let here = surface.positions[v as usize];
+        let mut goals = Vec::new();
+        let mut corners = Vec::new();
+        for quad in &self.quads {
+            let Some(k) = quad.iter().position(|&corner| corner == (v, false)) else { continue };
+            let p = places(surface, quad);
+            let [before, next, opposite] = [3, 1, 2].map(|step| p[(k + step) % 4]);
+            corners.push(before + next - opposite);
+            let normal = (before - opposite).cross(next - opposite).normalize_or_zero();
+            goals.push(here - normal * normal.dot(here - opposite));
+        }
+        if !corners.is_empty() {
+            goals.push(corners.iter().sum::<DVec3>() / corners.len() as f64);
+        }
+        let mut near = Vec::new();
+        surface.neighbours(v, &mut near);
+        goals.push(near.iter().map(|&w| surface.positions[w as usize]).sum::<DVec3>() / near.len() as f64);
+        let pinned = surface.mirror.filter(|_| surface.on_mirror[v as usize]);
+        if let Some(home) = quadric.minimum(pinned) {
+            goals.push(here + (home - here).clamp_length_max(2.0));
+        }
+        goals.push(goals.iter().sum::<DVec3>() / goals.len() as f64);
+        let normals = self.all.iter().map(|&t| surface.corners(t).normal());
+        let side = near.iter().map(|&w| surface.positions[w as usize].distance(here)).sum::<f64>();
+        let outward = normals.sum::<DVec3>().normalize_or_zero();
+        goals.push(here + OUTWARD_STEP * side / near.len() as f64 * outward);
+        goals
+    }
+}
+
+/// Moves a vertex where its quads are better.
+fn straighten(surface: &mut Guarded<'_>, pairing: &Pairing, quadrics: &[Quadric], v: u32) {
+    if surface.around[v as usize].is_empty() {
+        return;
+    }
+    let star = Star::new(surface, pairing, v);
+    let (quadric, here) = (&quadrics[v as usize], surface.positions[v as usize]);
+    let pinned = surface.mirror.filter(|_| surface.on_mirror[v as usize]);
+    let limit = star.energy(surface, quadric, v) + star.penalty(surface) - MIN_DECREASE;
+    let before: Vec<Corners> = star.all.iter().map(|&t| surface.corners(t)).collect();
+    let mut better: Vec<(f64, DVec3)> = Vec::new();
+    for goal in star.goals(surface, quadric, v) {
+        for step in STEP_SHARES {
+            let mut at = here + step * (goal - here);
+            if let Some(axis) = pinned {
+                at[axis] = 0.0;
+            }
+            surface.positions[v as usize] = at;
+            let energy = star.energy(surface, quadric, v);
+            if energy < limit {
+                better.push((energy, at));
+            }
+        }
+    }
+    surface.positions[v as usize] = here;
+    better.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (energy, at) in better {
+        let moved: Vec<Corners> = before.iter().map(|t| t.with_corner(v, at)).collect();
+        let turned = before.iter().zip(&moved).any(|(before, after)| {
+            let (m, n) = (before.normal(), after.normal());
+            m.dot(n) < MIN_MOVE_COSINE * m.length() * n.length()
+        });
+        if !turned && surface.may_stand(&moved, &star.all) {
+            surface.positions[v as usize] = at;
+            if energy + star.penalty(surface) < limit {
+                surface.place(v, at);
+                return;
+            }
+            surface.positions[v as usize] = here;
+        }
+    }
+}
+
+/// A cage splits its quads along the shorter diagonal: what is guarded must be that split, or triangles.
+fn settle(surface: &mut Guarded<'_>, pairing: &mut Pairing) {
+    for t in 0..surface.triangles.len() as u32 {
+        let partner = pairing.partner[t as usize];
+        let Partner::Triangle(u) = partner else { continue };
+        let Some(quad) = quad_of(surface, t, partner).filter(|_| u > t) else { continue };
+        let p = places(surface, &quad);
+        if worth(surface, t, partner) <= 0.0 {
+            // Its corners have moved since.
+            pairing.part(t);
+            continue;
+        }
+        if p[0].distance(p[2]) <= p[1].distance(p[3]) {
+            continue;
+        }
+        let cut = other_cut(surface, t, u).filter(|cut| surface.may_stand(cut, &[t, u]));
+        match cut {
+            Some(cut) => surface.swap([t, u], cut.map(|half| half.index)),
+            None => pairing.part(t),
+        }
+    }
+}
+
+/// A whole surface, both halves.
+pub(super) struct Faces {
+    pub(super) positions: Vec<DVec3>,
+    pub(super) faces: Vec<Vec<u32>>,
+    /// The triangle of the half that each face comes from, or its first one.
+    pub(super) first: Vec<u32>,
+}
+
+/// The faces of a surface whose triangles are paired.
+pub(super) fn faces(surface: &Guarded<'_>, pairing: &Pairing) -> Faces {
+    let mut positions = Vec::new();
+    // Of each vertex and its image.
+    let mut number = vec![[u32::MAX; 2]; surface.positions.len()];
+    for (v, &p) in surface.positions.iter().enumerate() {
+        if surface.around[v].is_empty() {
+            continue;
+        }
+        number[v] = [positions.len() as u32; 2];
+        positions.push(p);
+        if let Some(axis) = surface.mirror.filter(|_| !surface.on_mirror[v]) {
+            number[v][1] = positions.len() as u32;
+            let mut image = p;
+            image[axis] = -p[axis];
+            positions.push(image);
+        }
+    }
+    let of = |corners: &[(u32, bool)], is_image: bool| {
+        let numbers = corners.iter().map(|&(v, image)| number[v as usize][usize::from(image != is_image)]);
+        let mut face: Vec<u32> = numbers.collect();
+        if is_image {
+            face.reverse();
+        }
+        face
+    };
+    let (mut faces, mut first) = (Vec::new(), Vec::new());
+    for t in (0..surface.triangles.len() as u32).filter(|&t| surface.is_alive(t)) {
+        let partner = pairing.partner[t as usize];
+        let quad = quad_of(surface, t, partner).filter(|quad| {
+            let p = places(surface, quad);
+            // Nobody guards the other diagonal of a quad across the mirror; where it is flat, that is the same.
+            let is_guarded = partner != Partner::Image || p[0].distance(p[2]) <= p[1].distance(p[3]);
+            is_guarded || warp(&p) <= FLAT
+        });
+        let corners: Vec<(u32, bool)> = match (quad, partner) {
+            // The other half writes it.
+            (Some(_), Partner::Triangle(u)) if u < t => continue,
+            (Some(quad), Partner::Image) => {
+                faces.push(of(&quad, false));
+                first.push(t);
+                continue;
+            }
+            (Some(quad), _) => quad.to_vec(),
+            (None, _) => surface.triangles[t as usize].map(|v| (v, false)).to_vec(),
+        };
+        faces.push(of(&corners, false));
+        first.push(t);
+        if surface.mirror.is_some() {
+            faces.push(of(&corners, true));
+            first.push(t);
+        }
+    }
+    Faces { positions, faces, first }
+}

@@ -1,0 +1,149 @@
+//! Better triangles for the same cage: vertices slide towards the middle of their neighbours and back towards the
+//! hull that they stand for, edges are swapped, and nothing is done that the obstacle or the cage itself forbids.
+
+use glam::DVec3;
+
+use super::collapse::quality;
+use super::guarded::Guarded;
+use super::quadric::Quadric;
+use cagework_core::contact::Corners;
+use cagework_core::progress::Cancelled;
+
+/// Rounds over all vertices and edges; after six, pictures no longer change.
+const ROUNDS: usize = 6;
+
+/// Weight of the mean squared distance from the hull (voxels squared) against the inverse quality of triangles.
+const DISTANCE_WEIGHT: f64 = 1.5;
+
+/// Shares of a vertex's way that are tried.
+const STEP_SHARES: [f64; 3] = [0.8, 0.4, 0.15];
+
+/// A change must lower the energy (dimensionless) by this much.
+const MIN_DECREASE: f64 = 1e-3;
+
+/// Smallest cosine between a triangle's normals before and after a move.
+const MIN_MOVE_COSINE: f64 = 0.5;
+
+/// Smallest cosine between the two triangles of a swapped edge and each of those before.
+const MIN_SWAP_COSINE: f64 = 0.6;
+
+/// Most triangles around a vertex after a swap.
+const MAX_VALENCE: usize = 9;
+
+/// Improves the surface under its own constraints.
+///
+/// # Errors
+/// When `go_on` says so; it hears the share that is done.
+pub(super) fn relax(
+    surface: &mut Guarded<'_>,
+    quadrics: &[Quadric],
+    go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
+) -> Result<(), Cancelled> {
+    for round in 0..ROUNDS {
+        go_on(round as f32 / ROUNDS as f32)?;
+        for v in 0..surface.positions.len() as u32 {
+            if !surface.around[v as usize].is_empty() {
+                slide(surface, quadrics, v);
+            }
+        }
+        for t in 0..surface.triangles.len() as u32 {
+            for k in 0..3 {
+                if surface.is_alive(t) {
+                    swap(surface, quadrics, t, k);
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn fit(quadric: &Quadric, p: DVec3) -> f64 {
+    DISTANCE_WEIGHT * quadric.at(p) / quadric.area.max(1e-12)
+}
+
+fn shape<'t>(triangles: impl Iterator<Item = &'t Corners>) -> f64 {
+    triangles.map(|t| 1.0 / quality(&t.at).max(1e-6)).sum()
+}
+
+/// Moves a vertex where its triangles are better.
+fn slide(surface: &mut Guarded<'_>, quadrics: &[Quadric], v: u32) {
+    let gone = surface.around[v as usize].clone();
+    let star: Vec<Corners> = gone.iter().map(|&t| surface.corners(t)).collect();
+    let p = surface.positions[v as usize];
+    let quadric = &quadrics[v as usize];
+    let normal = star.iter().map(Corners::normal).sum::<DVec3>().normalize_or_zero();
+    let mut near = Vec::new();
+    surface.neighbours(v, &mut near);
+    let mean = near.iter().map(|&w| surface.positions[w as usize]).sum::<DVec3>() / near.len() as f64;
+    let tangential = (mean - p) - normal * normal.dot(mean - p);
+    let pinned = surface.mirror.filter(|_| surface.on_mirror[v as usize]);
+    let home = quadric.minimum(pinned).map_or(DVec3::ZERO, |o| (o - p).clamp_length_max(2.0));
+    let energy = fit(quadric, p) + shape(star.iter());
+    for direction in [home + tangential, tangential, home, normal * normal.dot(home), mean - p] {
+        for step in STEP_SHARES {
+            let mut q = p + step * direction;
+            if let Some(axis) = pinned {
+                q[axis] = 0.0;
+            }
+            let moved: Vec<Corners> = star.iter().map(|t| t.with_corner(v, q)).collect();
+            if fit(quadric, q) + shape(moved.iter()) > energy - MIN_DECREASE {
+                continue;
+            }
+            let turned = star.iter().zip(&moved).any(|(before, after)| {
+                let (m, n) = (before.normal(), after.normal());
+                m.dot(n) < MIN_MOVE_COSINE * m.length() * n.length()
+            });
+            if !turned && surface.may_stand(&moved, &gone) {
+                surface.place(v, q);
+                return;
+            }
+        }
+    }
+}
+
+/// Swaps the edge from corner `k` of a triangle if that makes better triangles.
+fn swap(surface: &mut Guarded<'_>, quadrics: &[Quadric], t: u32, k: usize) {
+    let first = surface.triangles[t as usize];
+    let (a, b, c) = (first[k], first[(k + 1) % 3], first[(k + 2) % 3]);
+    if a > b {
+        return;
+    }
+    let other = surface.around[a as usize]
+        .iter()
+        .copied()
+        .find(|&u| u != t && surface.triangles[u as usize].contains(&b));
+    let Some(other) = other else { return };
+    let Some(d) = surface.triangles[other as usize].into_iter().find(|&i| i != a && i != b) else { return };
+    let mut near = Vec::new();
+    surface.neighbours(c, &mut near);
+    let on_mirror = |v: u32| surface.on_mirror[v as usize];
+    let triangles_of = |v: u32| surface.around[v as usize].len();
+    let least = |v: u32| if on_mirror(v) { 2 } else { 3 };
+    if c == d
+        || near.contains(&d)
+        || (on_mirror(c) && on_mirror(d))
+        || [a, b].iter().any(|&v| triangles_of(v) <= least(v))
+        || [c, d].iter().any(|&v| triangles_of(v) >= MAX_VALENCE)
+    {
+        return;
+    }
+    let at = |v: u32| surface.positions[v as usize];
+    let corners = |index: [u32; 3]| Corners { index, at: index.map(at) };
+    let (before, after) = ([[a, b, c], [b, a, d]].map(corners), [[a, d, c], [d, b, c]].map(corners));
+    let edge = |v: u32, w: u32| {
+        let quadric = quadrics[v as usize].plus(&quadrics[w as usize]);
+        fit(&quadric, 0.5 * (at(v) + at(w)))
+    };
+    if edge(c, d) + shape(after.iter()) > edge(a, b) + shape(before.iter()) - MIN_DECREASE {
+        return;
+    }
+    let bent = before.iter().any(|m| {
+        after.iter().any(|n| {
+            let (m, n) = (m.normal(), n.normal());
+            m.dot(n) < MIN_SWAP_COSINE * m.length() * n.length()
+        })
+    });
+    if !bent && surface.may_stand(&after, &[t, other]) {
+        surface.swap([t, other], after.map(|t| t.index));
+    }
+}

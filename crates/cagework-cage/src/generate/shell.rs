@@ -1,0 +1,409 @@
+//! From a triangle soup to the solid it stands for and a hull around it: the part that works for any input.
+//!
+//! Source: Xian, Lin, Gao 2009, "Automatic generation of coarse bounding cages from dense meshes", for voxels,
+//! flood fill and hull. Changes: the hull is dilated for clearance, its boundary is made a 2-manifold by filling
+//! voxels, and separate parts are bridged if one cage is asked for.
+
+use std::collections::VecDeque;
+
+use glam::{DVec3, Vec3};
+
+use super::gaps::{Gap, gaps};
+use super::guarded::{Guarded, Obstacle};
+use super::lattice::Lattice;
+use super::surface::{SMOOTHING_REACH, Surface};
+use super::voxels::Voxels;
+use super::{CageOptions, Shape, Symmetry, VERTICES_PER_GAP, first_voxels};
+use cagework_core::progress::Cancelled;
+
+/// Smallest share of the solid's voxels with an image for which a mirror is taken.
+const MIN_MIRROR_SHARE: f64 = 0.985;
+
+/// Distance of an image from its voxel, over the model's longest side; at least a voxel.
+const MIRROR_TOLERANCE: f64 = 1.0 / 36.0;
+
+/// Largest extent of a cluster of voxels without an image, over the model's longest side: a larger one is a part that only
+/// one side has.
+const MAX_UNMATCHED: f64 = 0.08;
+
+/// Voxels between the solid's box and the lattice's, apart from dilation: the outermost layer stays empty.
+pub(super) const MARGIN_VOXELS: usize = 6;
+
+/// Half the width of the widest gaps that are looked for, over the model's longest side.
+const MAX_GAP_HALF: f64 = 0.12;
+
+/// Clearance in voxels unless the caller asks for more.
+const DEFAULT_CLEARANCE: f64 = 0.5;
+
+/// Clearance in voxels of a hull one voxel off: what smoothing leaves, less rounding.
+const HULL_CLEARANCE: f64 = 1.0 - SMOOTHING_REACH - 1e-3;
+
+/// Least length of a limb over its thickness.
+const MIN_LIMB_RATIO: f64 = 2.2;
+
+/// Largest cosine between a limb's direction and those across it.
+const MAX_ACROSS_COSINE: f64 = 0.3;
+
+/// Directions in which the length and thickness of limbs are measured: to neighbours on the lattice, one of each pair.
+const DIRECTIONS: [DVec3; 13] = [
+    DVec3::new(1.0, 0.0, 0.0),
+    DVec3::new(0.0, 1.0, 0.0),
+    DVec3::new(0.0, 0.0, 1.0),
+    DVec3::new(1.0, 1.0, 0.0),
+    DVec3::new(1.0, -1.0, 0.0),
+    DVec3::new(1.0, 0.0, 1.0),
+    DVec3::new(1.0, 0.0, -1.0),
+    DVec3::new(0.0, 1.0, 1.0),
+    DVec3::new(0.0, 1.0, -1.0),
+    DVec3::new(1.0, 1.0, 1.0),
+    DVec3::new(1.0, 1.0, -1.0),
+    DVec3::new(1.0, -1.0, 1.0),
+    DVec3::new(-1.0, 1.0, 1.0),
+];
+
+/// How the hull runs at a place that is longer than thick.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limb {
+    /// The direction in which it is longest, of unit length.
+    pub(super) along: DVec3,
+    /// Its mean extent across, voxels.
+    pub(super) thickness: f64,
+}
+
+/// A solid in a lattice and the hull around it.
+#[derive(Debug)]
+pub(super) struct Shell {
+    pub(super) lattice: Lattice,
+    /// Voxels along the model's longest side, over those that the target asks for.
+    pub(super) fineness: f64,
+    /// Longest side of the model's box, object units.
+    pub(super) longest: f64,
+    /// What the cage must not meet.
+    pub(super) obstacle: Obstacle,
+    /// The hull as voxels.
+    filled: Voxels,
+    /// The smoothed hull: clear of the obstacle and of itself.
+    pub(super) hull: Surface,
+    /// The hull with its stairs: right by construction.
+    pub(super) stairs: Surface,
+    /// Separate parts of the hull before they were bridged.
+    pub(super) separate: usize,
+    /// One voxel of every part of the solid.
+    pub(super) parts: Vec<[usize; 3]>,
+    /// Distance that the hull keeps from the model along each axis, object units.
+    pub(super) clearance: f64,
+    /// Gaps that the hull leaves open, the largest first: as many as there are vertices for.
+    pub(super) gaps: Vec<Gap>,
+}
+
+impl Shell {
+    /// The hull of a model on a lattice of `n` voxels, thinner ones along the axes of `stretch`. `go_on` may end it.
+    pub(super) fn new(
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        bounds: [DVec3; 2],
+        (n, stretch): (usize, DVec3),
+        options: &CageOptions,
+        go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
+    ) -> Result<Self, Cancelled> {
+        let [min, max] = bounds;
+        let asked = f64::from(options.clearance) * max.distance(min);
+        // Layers of voxels between solid and hull: enough for the clearance that was asked for.
+        let layers_for =
+            |cell: f64| ((asked / cell).max(DEFAULT_CLEARANCE) + 1.0 - HULL_CLEARANCE).ceil() as usize;
+        let rough = Lattice::around(bounds, n, stretch, MARGIN_VOXELS);
+        let layers = layers_for(rough.shortest());
+        let lattice = Lattice::around(bounds, n, stretch, MARGIN_VOXELS + layers);
+        let touched = match options.shape {
+            Shape::Follow => lattice.touched(positions, triangles, &|f| go_on(0.5 * f))?,
+            Shape::Hull => slab_hull(&lattice, positions),
+        };
+        let mut solid = touched.filled();
+        let mirror = if stretch == DVec3::ONE {
+            find_mirror(&solid, n, options.symmetry)
+        } else {
+            let cubes = Lattice::around(bounds, n, DVec3::ONE, MARGIN_VOXELS);
+            find_mirror(&cubes.touched(positions, triangles, go_on)?.filled(), n, options.symmetry)
+        };
+        if let Some(axis) = mirror {
+            let image = solid.mirrored(axis);
+            solid.unite(&image);
+            solid = solid.filled();
+        }
+        go_on(0.6)?;
+        let mut hull = grown(&solid, layers, mirror);
+        let separate = hull.parts().len();
+        if !options.per_component {
+            while bridge(&mut solid, &hull, layers, mirror) {
+                go_on(0.7)?;
+                hull = grown(&solid, layers, mirror);
+            }
+        }
+        go_on(0.8)?;
+        let stairs = Surface::of(&hull, mirror);
+        let filled = hull;
+        let clearance = (asked / lattice.shortest()).max(DEFAULT_CLEARANCE);
+        // Whole voxels of it by dilation, the rest as distance.
+        let whole = clearance.floor();
+        let mut keep_out = solid.clone();
+        for _ in 0..whole as usize {
+            keep_out = keep_out.dilated();
+        }
+        let obstacle = Obstacle { voxels: keep_out, clearance: clearance - whole, stretch };
+        let hull = smoothed(&stairs, &obstacle);
+        let parts = solid.parts();
+        let reach = (MAX_GAP_HALF * n as f64).ceil() as usize;
+        let most = options.target as usize / VERTICES_PER_GAP;
+        let found = gaps(&solid, &filled, reach).into_iter();
+        let gaps = found.filter(|gap| !gap.is_hollow(&lattice, positions, triangles)).take(most).collect();
+        Ok(Self {
+            gaps,
+            clearance: clearance * lattice.shortest(),
+            fineness: n as f64 / first_voxels(options.target as usize) as f64,
+            longest: (max - min).max_element(),
+            lattice,
+            obstacle,
+            filled,
+            hull,
+            stairs,
+            separate,
+            parts,
+        })
+    }
+}
+
+impl Shell {
+    /// The hull and layers of voxels around it.
+    pub(super) fn band(&self, layers: usize) -> Voxels {
+        (0..layers).fold(self.filled.clone(), |band, _| band.dilated())
+    }
+
+    /// How the hull runs at each of its vertices, where it is a limb: longer than it is thick.
+    pub(super) fn limbs(&self) -> Vec<Option<Limb>> {
+        let mut normals = vec![DVec3::ZERO; self.hull.positions.len()];
+        for t in &self.hull.triangles {
+            let [a, b, c] = t.map(|i| self.hull.positions[i as usize]);
+            t.iter().for_each(|&i| normals[i as usize] += (b - a).cross(c - a));
+        }
+        // Length of the run of hull voxels from a point (lattice coordinates) on.
+        let run = |from: DVec3, along: DVec3| {
+            let is_inside = |k: usize| {
+                let p = from + k as f64 * along;
+                let v = p.to_array().map(|x| x as usize);
+                p.min_element() >= 0.0 && (0..3).all(|k| v[k] < self.filled.dims[k]) && self.filled.has(v)
+            };
+            (0..).take_while(|&k| is_inside(k)).count() as f64
+        };
+        let half = self.lattice.half();
+        let limb = |(&p, normal): (&DVec3, &DVec3)| {
+            let inward = -normal.normalize_or_zero();
+            let below = p + half + 0.7 * inward;
+            let center = below + 0.5 * run(below, inward) * inward;
+            let chord = |along: DVec3| run(center, along) + run(center, -along);
+            let chords = DIRECTIONS.map(|along| (along.normalize(), chord(along.normalize())));
+            let (along, length) = chords.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let across = chords.iter().filter(|(other, _)| other.dot(along).abs() < MAX_ACROSS_COSINE);
+            let thickness = across.clone().map(|(_, chord)| chord).sum::<f64>() / across.count() as f64;
+            (length > MIN_LIMB_RATIO * thickness).then_some(Limb { along, thickness })
+        };
+        self.hull.positions.iter().zip(&normals).map(limb).collect()
+    }
+
+    /// The sheets of gaps of at least this share of the largest one's area.
+    pub(super) fn sheets(&self, least: f64) -> Option<Voxels> {
+        let largest = self.gaps.first()?.area;
+        let mut sheets = Voxels::new(self.filled.dims);
+        let kept = self.gaps.iter().filter(|gap| gap.area >= least * largest);
+        kept.flat_map(|gap| &gap.voxels).for_each(|&v| sheets.add(v));
+        Some(sheets)
+    }
+}
+
+/// The solid with layers of voxels around it, cavities filled, its boundary a 2-manifold.
+fn grown(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
+    let mut hull = solid.clone();
+    for _ in 0..layers {
+        hull = hull.dilated();
+    }
+    hull = hull.filled();
+    loop {
+        hull.compose(mirror);
+        // The repair may have closed a cavity off.
+        let filled = hull.filled();
+        if filled == hull {
+            return hull;
+        }
+        hull = filled;
+    }
+}
+
+/// The stairs smoothed; vertices whose triangles then meet others go back until none do.
+fn smoothed(stairs: &Surface, obstacle: &Obstacle) -> Surface {
+    let mut smooth = stairs.clone();
+    smooth.smooth();
+    loop {
+        let offenders = Guarded::new(smooth.clone(), obstacle).offenders();
+        let mut moved = false;
+        for v in offenders {
+            let (now, before) = (&mut smooth.positions[v as usize], stairs.positions[v as usize]);
+            moved |= *now != before;
+            *now = before;
+        }
+        if !moved {
+            return smooth;
+        }
+    }
+}
+
+/// The axis of the mirror to use: the one asked for, or the first (x, z, y) in which the solid is its own image, apart from
+/// scattered voxels. `longest`: voxels along the model's longest side.
+fn find_mirror(solid: &Voxels, longest: usize, symmetry: Symmetry) -> Option<usize> {
+    match symmetry {
+        Symmetry::None => None,
+        Symmetry::X => Some(0),
+        Symmetry::Y => Some(1),
+        Symmetry::Z => Some(2),
+        Symmetry::Auto => [0, 2, 1].into_iter().find(|&axis| {
+            let tolerance = (MIRROR_TOLERANCE * longest as f64).round().max(1.0) as usize;
+            let image = (0..tolerance).fold(solid.mirrored(axis), |image, _| image.dilated());
+            let unmatched = solid.without(&image);
+            let most = (1.0 - MIN_MIRROR_SHARE) * solid.count() as f64;
+            let extent = |island: &Vec<[usize; 3]>| {
+                let side = |k: usize| {
+                    let at = || island.iter().map(|v| v[k]);
+                    at().max().unwrap_or(0) - at().min().unwrap_or(0)
+                };
+                (0..3).map(side).max().unwrap_or(0)
+            };
+            unmatched.count() as f64 <= most
+                && unmatched
+                    .islands()
+                    .iter()
+                    .all(|island| (extent(island) as f64) < MAX_UNMATCHED * longest as f64)
+        }),
+    }
+}
+
+/// Joins the parts of the hull by paths of voxels in the solid, each grown from what is joined already to the nearest
+/// part that is not; false if there is only one part. `layers` of voxels will come around the paths.
+fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirror: Option<usize>) -> bool {
+    let parts = hull.parts();
+    if parts.len() < 2 {
+        return false;
+    }
+    let mut joined = Joined { hull, from: vec![[usize::MAX; 3]; hull.dims.iter().product()] };
+    let mut queue = VecDeque::new();
+    joined.add_part(parts[0], &mut queue);
+    while let Some(voxel) = queue.pop_front() {
+        for next in hull.neighbours(voxel) {
+            // The outermost layer stays empty.
+            let edge = (0..3).any(|k| next[k] <= layers || next[k] + layers + 1 >= hull.dims[k]);
+            if edge || joined.has(next) {
+                continue;
+            }
+            let index = joined.index(next);
+            joined.from[index] = voxel;
+            if !hull.has(next) {
+                queue.push_back(next);
+                continue;
+            }
+            let mut path = voxel;
+            while joined.from[joined.index(path)] != path {
+                solid.add(path);
+                let before = joined.from[joined.index(path)];
+                let index = joined.index(path);
+                joined.from[index] = path;
+                queue.push_back(path);
+                path = before;
+            }
+            solid.add(path);
+            solid.add(next);
+            let index = joined.index(next);
+            joined.from[index] = [usize::MAX; 3];
+            joined.add_part(next, &mut queue);
+        }
+    }
+    if let Some(axis) = mirror {
+        let image = solid.mirrored(axis);
+        solid.unite(&image);
+    }
+    true
+}
+
+/// Voxels that are joined or have been reached from there.
+struct Joined<'a> {
+    hull: &'a Voxels,
+    /// Where each voxel was reached from; what is joined was reached from itself.
+    from: Vec<[usize; 3]>,
+}
+
+impl Joined<'_> {
+    fn index(&self, v: [usize; 3]) -> usize {
+        (v[2] * self.hull.dims[1] + v[1]) * self.hull.dims[0] + v[0]
+    }
+
+    fn has(&self, voxel: [usize; 3]) -> bool {
+        self.from[self.index(voxel)][0] != usize::MAX
+    }
+
+    /// Takes in a part of the hull.
+    fn add_part(&mut self, seed: [usize; 3], queue: &mut VecDeque<[usize; 3]>) {
+        let mut stack = vec![seed];
+        let index = self.index(seed);
+        self.from[index] = seed;
+        while let Some(voxel) = stack.pop() {
+            queue.push_back(voxel);
+            for next in self.hull.neighbours(voxel) {
+                if self.hull.has(next) && !self.has(next) {
+                    let index = self.index(next);
+                    self.from[index] = next;
+                    stack.push(next);
+                }
+            }
+        }
+    }
+}
+
+/// Voxels that overlap the model's hull of 26 planes (faces, edges and corners of a cube).
+///
+/// Source: Klosowski et al. 1998, k-DOPs.
+fn slab_hull(lattice: &Lattice, positions: &[Vec3]) -> Voxels {
+    let mut axes = Vec::new();
+    for x in -1..=1 {
+        for y in -1..=1 {
+            for z in 0..=1 {
+                let axis = [x, y, z];
+                // One of each pair of opposite directions.
+                if axis.iter().rev().find(|&&k| k != 0) == Some(&1) {
+                    axes.push(DVec3::from_array(axis.map(f64::from)));
+                }
+            }
+        }
+    }
+    let mut slabs: Vec<(DVec3, f64, f64)> =
+        axes.into_iter().map(|axis| (axis, f64::INFINITY, f64::NEG_INFINITY)).collect();
+    for &p in positions {
+        let p = lattice.lattice(p);
+        for (axis, low, high) in &mut slabs {
+            let at = axis.dot(p);
+            *low = low.min(at);
+            *high = high.max(at);
+        }
+    }
+    let mut voxels = Voxels::new(lattice.dims);
+    for z in 0..lattice.dims[2] {
+        for y in 0..lattice.dims[1] {
+            for x in 0..lattice.dims[0] {
+                let center = DVec3::new(x as f64, y as f64, z as f64) + 0.5;
+                let inside = slabs.iter().all(|&(axis, low, high)| {
+                    let reach = 0.5 * (axis.x.abs() + axis.y.abs() + axis.z.abs());
+                    (low - reach..=high + reach).contains(&axis.dot(center))
+                });
+                if inside {
+                    voxels.add([x, y, z]);
+                }
+            }
+        }
+    }
+    voxels
+}

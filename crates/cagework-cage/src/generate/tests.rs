@@ -1,0 +1,391 @@
+use std::ops::ControlFlow;
+
+use glam::{Vec3, vec3};
+use proptest::prelude::*;
+
+use super::{CageGenError, CageOptions, CageReport, GeneratedCage, Mirror, Shape, Symmetry, generate};
+use cagework_core::bind::bind;
+use cagework_core::cage::{Cage, subdivided_box};
+use cagework_core::contact::{Corners, meeting};
+use cagework_core::deform::displacements;
+use cagework_core::geometry::winding_number;
+use cagework_core::mesh::{Bounds, PolygonMesh};
+use cagework_core::options::{BindOptions, OutOfRange};
+use cagework_core::progress::{ProgressEvent, Silent};
+use cagework_core::smooth::subdivide;
+
+/// Positions of the order of 1, rounded to f32 and mirrored.
+const ROUNDING: f32 = 1e-6;
+
+type Soup = (Vec<Vec3>, Vec<[u32; 3]>);
+
+/// Winding numbers of closed surfaces are whole, apart from rounding of angles.
+const WINDING_TOLERANCE: f64 = 1e-6;
+
+fn winding(cage: &Cage, p: Vec3) -> f64 {
+    winding_number(p.as_dvec3(), (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t)))
+}
+
+/// A cage as other programs may cut it: quads from corner `k`.
+fn cut(mesh: &PolygonMesh, k: usize) -> PolygonMesh {
+    let cut = |f: &Vec<u32>| {
+        let f = f.clone();
+        (2..f.len()).map(move |n| [0, n - 1, n].map(|i| f[(i + k) % f.len()]).to_vec())
+    };
+    PolygonMesh { positions: mesh.positions.clone(), faces: mesh.faces.iter().flat_map(cut).collect() }
+}
+
+/// The promise, checked by means of its own: no voxels. It holds along whichever diagonal quads are cut.
+fn assert_promise((positions, _): &Soup, made: &GeneratedCage) {
+    let cage = &made.cage;
+    let mesh = cage.to_polygon_mesh();
+    for (way, mesh) in [cut(&mesh, 0), cut(&mesh, 1), mesh].iter().enumerate() {
+        let again = Cage::new(mesh).unwrap_or_else(|error| panic!("cut {way}: {error}"));
+        assert_eq!(again.notices(), [], "closed, oriented, manifold, no vertex unused");
+        let triangles: Vec<Corners> = (0..again.triangles().len())
+            .map(|t| Corners { index: again.triangles()[t], at: again.triangle_corners(t as u32) })
+            .collect();
+        assert_eq!(meeting(&triangles), Vec::<[u32; 2]>::new(), "cut {way}: it meets itself");
+        let step = (positions.len() / 200).max(1);
+        for &p in positions.iter().step_by(step) {
+            let w = winding(&again, p);
+            assert!((w - 1.0).abs() < WINDING_TOLERANCE, "cut {way}: {p} has winding number {w}");
+        }
+    }
+    assert_eq!(made.report.vertices as usize, cage.n_vertices());
+    assert_eq!(
+        made.report.target_met,
+        f64::from(made.report.vertices) <= 1.1 * f64::from(made.report.target)
+    );
+}
+
+fn make(soup: &Soup, options: &CageOptions) -> GeneratedCage {
+    let made = generate(&soup.0, &soup.1, options, &Silent).unwrap();
+    assert_promise(soup, &made);
+    made
+}
+
+fn options(target: u32) -> CageOptions {
+    CageOptions { target, ..CageOptions::default() }
+}
+
+/// A tube of quads cut in two, along a line of points with one radius; `closed` joins its ends. No caps: open ends.
+fn tube(line: &[Vec3], radius: f32, closed: bool) -> Soup {
+    const SIDES: u32 = 12;
+    let n = line.len();
+    let mut soup: Soup = (Vec::new(), Vec::new());
+    for k in 0..n {
+        let (before, after) = if closed {
+            (line[(k + n - 1) % n], line[(k + 1) % n])
+        } else {
+            (line[k.saturating_sub(1)], line[(k + 1).min(n - 1)])
+        };
+        let along = (after - before).normalize();
+        let u = along.cross(vec3(0.31, 0.17, 0.94)).normalize();
+        let v = along.cross(u);
+        for s in 0..SIDES {
+            let (sin, cos) = (std::f32::consts::TAU * s as f32 / SIDES as f32).sin_cos();
+            soup.0.push(line[k] + radius * (u * cos + v * sin));
+        }
+    }
+    let rings = if closed { n } else { n - 1 } as u32;
+    for k in 0..rings {
+        for s in 0..SIDES {
+            let at = |k: u32, s: u32| k % n as u32 * SIDES + s % SIDES;
+            soup.1.push([at(k, s), at(k, s + 1), at(k + 1, s)]);
+            soup.1.push([at(k + 1, s), at(k, s + 1), at(k + 1, s + 1)]);
+        }
+    }
+    soup
+}
+
+fn join(soups: impl IntoIterator<Item = Soup>) -> Soup {
+    soups.into_iter().fold((Vec::new(), Vec::new()), |mut all: Soup, (positions, triangles)| {
+        let first = all.0.len() as u32;
+        all.0.extend(positions);
+        all.1.extend(triangles.into_iter().map(|t| t.map(|i| i + first)));
+        all
+    })
+}
+
+fn segment(a: Vec3, b: Vec3) -> Vec<Vec3> {
+    (0..=8).map(|k| a.lerp(b, k as f32 / 8.0)).collect()
+}
+
+/// Two legs below a bar, overlapping open tubes: symmetric about x = 0.
+fn trousers() -> Soup {
+    join([
+        tube(&segment(vec3(-0.3, 1.0, 0.0), vec3(0.3, 1.0, 0.0)), 0.2, false),
+        tube(&segment(vec3(-0.3, 1.0, 0.0), vec3(-0.3, -1.0, 0.0)), 0.12, false),
+        tube(&segment(vec3(0.3, 1.0, 0.0), vec3(0.3, -1.0, 0.0)), 0.12, false),
+    ])
+}
+
+fn ring() -> Soup {
+    let circle = |k: usize| {
+        let (sin, cos) = (std::f32::consts::TAU * k as f32 / 48.0).sin_cos();
+        vec3(cos, 0.0, sin)
+    };
+    tube(&(0..48).map(circle).collect::<Vec<_>>(), 0.15, true)
+}
+
+#[test]
+fn cage_goes_into_the_gap_between_legs() {
+    for target in [40, 80, 200] {
+        let made = make(&trousers(), &options(target));
+        assert!(made.report.target_met, "{:?}", made.report);
+        let between = winding(&made.cage, vec3(0.0, -0.6, 0.0));
+        assert!(between.abs() < WINDING_TOLERANCE, "with {target} vertices the legs are webbed: {between}");
+    }
+}
+
+/// Trunk, two legs with feet, two arms: 1.8 high. `gap` between the legs, their `radius`.
+fn mannequin(gap: f32, radius: f32) -> Soup {
+    let x = 0.5 * gap + radius;
+    let limb = |a: Vec3, b: Vec3, radius: f32| tube(&segment(a, b), radius, false);
+    let mut parts = vec![limb(vec3(0.0, 0.9, 0.0), vec3(0.0, 1.8, 0.0), 0.15)];
+    for side in [-1.0, 1.0] {
+        parts.push(limb(vec3(side * x, 1.0, 0.0), vec3(side * x, 0.0, 0.0), radius));
+        parts.push(limb(vec3(side * x, 0.05, 0.0), vec3(side * x, 0.05, 0.15), 0.05));
+        parts.push(limb(vec3(side * 0.1, 1.5, 0.0), vec3(side * 0.8, 1.4, 0.0), 0.05));
+    }
+    join(parts)
+}
+
+/// Weights of the cage's vertices at one leg's lower half sum to how much of a drag of them a foot follows: nearly all at
+/// their own, nearly nothing at the other.
+#[test]
+fn lower_vertices_of_a_leg_move_its_own_foot_alone() {
+    for (gap, radius, target) in [(0.17, 0.06, 80), (0.1, 0.06, 80), (0.08, 0.05, 120), (0.03, 0.07, 80)] {
+        let (positions, triangles) = mannequin(gap, radius);
+        let cage = generate(&positions, &triangles, &options(target), &Silent).unwrap().cage;
+        let bind_options = BindOptions { grid: 40, ..BindOptions::default() };
+        let bound = bind(&positions, &cage, &bind_options, &Silent).unwrap();
+        for side in [-1.0, 1.0] {
+            let is_lower = |c: &Vec3| {
+                let near = |p: &&Vec3| p.distance_squared(*c);
+                let nearest = positions.iter().min_by(|p, q| near(p).total_cmp(&near(q))).unwrap();
+                nearest.y < 0.5 && nearest.x * side > 0.0
+            };
+            let posed: Vec<Vec3> =
+                cage.positions().iter().map(|c| if is_lower(c) { *c + Vec3::Z } else { *c }).collect();
+            let moved = displacements(&bound.weights, &bound.frames, cage.positions(), &posed);
+            let mean = |side: f32| {
+                let foot = positions.iter().zip(&moved).filter(|(p, _)| p.y < 0.1 && p.x * side > 0.0);
+                let (sum, n) = foot.fold((0.0, 0.0), |(sum, n), (_, by)| (sum + by.z, n + 1.0));
+                sum / n
+            };
+            let (own, other) = (mean(side), mean(-side));
+            assert!(own > 0.8 && other < 0.02, "gap {gap}, radius {radius}: own {own}, other {other}");
+        }
+    }
+}
+
+#[test]
+fn a_gap_that_no_lattice_resolves_is_named() {
+    let (positions, triangles) = mannequin(0.004, 0.08);
+    let report = generate(&positions, &triangles, &options(80), &Silent).unwrap().report;
+    let named = report.notices.iter().any(|notice| notice.contains("closes the gap"));
+    assert!(named, "{:?}", report.notices);
+    let open = mannequin(0.17, 0.06);
+    assert_eq!(generate(&open.0, &open.1, &options(120), &Silent).unwrap().report.notices, [""; 0]);
+}
+
+/// A sword in one hand has less than 1.5 % of the model's voxels.
+#[test]
+fn an_accessory_on_one_side_gets_no_twin() {
+    let sword = tube(&segment(vec3(0.8, 1.4, 0.0), vec3(0.8, 1.4, 0.8)), 0.02, false);
+    let soup = join([mannequin(0.17, 0.06), sword]);
+    let made = make(&soup, &options(80));
+    assert_eq!(made.report.mirror, None);
+    assert!(winding(&made.cage, vec3(-0.8, 1.4, 0.7)).abs() < WINDING_TOLERANCE);
+    assert_eq!(make(&mannequin(0.17, 0.06), &options(80)).report.mirror, Some(Mirror::X));
+}
+
+/// Of a straight bar, twelve vertices keep the distance; a bend needs rings, every 1.3 of its hull's thickness at most.
+#[test]
+fn limbs_have_rings_and_compact_models_few_vertices() {
+    let bar = tube(&segment(vec3(0.0, 0.0, 0.0), vec3(0.0, 6.0, 0.0)), 0.4, false);
+    let made = make(&bar, &options(80));
+    let mut heights: Vec<f32> = made.cage.positions().iter().map(|p| p.y).collect();
+    heights.sort_by(f32::total_cmp);
+    let widest = heights.windows(2).map(|w| w[1] - w[0]).fold(0.0, f32::max);
+    assert!(widest < 2.5, "rings are {widest} apart");
+    let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    let cube = subdivided_box(bounds, 0.0, [1; 3]);
+    let triangles = cube.faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
+    assert!(make(&(cube.positions, triangles), &options(80)).report.vertices < 24);
+}
+
+#[test]
+fn cage_of_a_ring_keeps_its_hole() {
+    let made = make(&ring(), &options(80));
+    assert!(winding(&made.cage, Vec3::ZERO).abs() < WINDING_TOLERANCE);
+    // Euler characteristic of a torus: V - E + F = 0 with 2 E = 3 F.
+    assert_eq!(2 * made.cage.n_vertices(), made.cage.triangles().len());
+}
+
+#[test]
+fn no_fold_is_sharper_than_120_degrees_whichever_way_quads_are_cut() {
+    for (soup, target) in [(trousers(), 80), (trousers(), 120), (ring(), 80), (ring(), 200)] {
+        let mesh = make(&soup, &options(target)).cage.to_polygon_mesh();
+        for k in 0..2 {
+            let cage = Cage::new(&cut(&mesh, k)).unwrap();
+            let triangles: Vec<Corners> = (0..cage.triangles().len())
+                .map(|t| Corners { index: cage.triangles()[t], at: cage.triangle_corners(t as u32) })
+                .collect();
+            let folds = triangles.iter().flat_map(|a| triangles.iter().filter_map(|b| a.fold_cosine(b)));
+            let sharpest = folds.fold(1.0, f64::min);
+            assert!(sharpest > -0.501, "{target}: {} degrees", sharpest.acos().to_degrees());
+        }
+    }
+}
+
+#[test]
+fn symmetric_model_gets_a_symmetric_cage() {
+    let made = make(&trousers(), &options(80));
+    assert_eq!(made.report.mirror, Some(Mirror::X));
+    let (points, center) = (made.cage.positions(), made.cage.bounds().center());
+    for p in points {
+        let image = vec3(2.0 * center.x - p.x, p.y, p.z);
+        let off = points.iter().map(|q| q.distance(image)).fold(f32::MAX, f32::min);
+        assert!(off < ROUNDING, "{p} has no image: the next is {off} away");
+    }
+    let without = CageOptions { symmetry: Symmetry::None, ..options(80) };
+    assert_eq!(make(&trousers(), &without).report.mirror, None);
+}
+
+#[test]
+fn lopsided_model_gets_no_mirror_unless_asked_for() {
+    let soup = tube(&segment(vec3(-1.0, 0.0, 0.3), vec3(1.0, 0.7, -0.4)), 0.1, false);
+    assert_eq!(make(&soup, &options(40)).report.mirror, None);
+    let asked = CageOptions { symmetry: Symmetry::Y, ..options(40) };
+    assert_eq!(make(&soup, &asked).report.mirror, Some(Mirror::Y));
+}
+
+#[test]
+fn scattered_parts_get_one_cage_or_one_each() {
+    let places = [vec3(0.0, 0.0, 0.0), vec3(3.0, 0.5, 0.0), vec3(1.0, 2.5, 1.0)];
+    let soup = join(places.map(|p| tube(&segment(p, p + vec3(0.3, 0.0, 0.4)), 0.3, false)));
+    let CageReport { parts, separate, .. } = make(&soup, &options(80)).report;
+    assert_eq!((parts, separate), (1, 3), "bridged");
+    let each = CageOptions { per_component: true, ..options(80) };
+    assert_eq!(make(&soup, &each).report.parts, 3);
+}
+
+#[test]
+fn hull_is_coarse_and_convex_in_the_large() {
+    let hull = CageOptions { shape: Shape::Hull, ..options(16) };
+    let made = make(&trousers(), &hull);
+    assert!(made.report.target_met);
+    assert!(
+        (winding(&made.cage, vec3(0.0, -0.6, 0.0)) - 1.0).abs() < WINDING_TOLERANCE,
+        "no gap between the legs"
+    );
+}
+
+#[test]
+fn clearance_is_kept() {
+    let soup = trousers();
+    for clearance in [0.0, 0.02, 0.1] {
+        let made = make(&soup, &CageOptions { clearance, ..options(60) });
+        assert!(made.report.clearance >= clearance * 2.0, "the diagonal is longer than 2");
+        // Every cage triangle keeps it along some axis, so cage vertices are at least that far from mesh vertices.
+        for c in made.cage.positions() {
+            let nearest = soup.0.iter().map(|p| p.distance(*c)).fold(f32::MAX, f32::min);
+            assert!(nearest >= 0.97 * made.report.clearance, "{nearest} < {}", made.report.clearance);
+        }
+    }
+}
+
+#[test]
+fn flat_straight_and_single_point_models_are_enclosed() {
+    let square = vec![Vec3::ZERO, Vec3::X, vec3(1.0, 1.0, 0.0), Vec3::Y];
+    make(&(square, vec![[0, 1, 2], [0, 2, 3]]), &options(24));
+    make(&(vec![Vec3::ZERO, Vec3::ONE, 0.3 * Vec3::ONE], vec![[0, 1, 2]]), &options(24));
+    make(&(vec![vec3(5.0, -3.0, 2.0)], vec![]), &options(12));
+    make(&(vec![Vec3::ZERO], vec![]), &options(12));
+}
+
+#[test]
+fn far_from_the_origin_the_cage_is_coarser_but_right() {
+    let far = trousers().0.iter().map(|&p| p + vec3(3e4, -1e4, 0.0)).collect();
+    make(&(far, trousers().1), &options(60));
+}
+
+#[test]
+fn bad_input_is_refused_in_words() {
+    let (positions, triangles) = trousers();
+    let refused = |p: &[Vec3], t: &[[u32; 3]], o: &CageOptions| generate(p, t, o, &Silent).unwrap_err();
+    assert_eq!(refused(&[], &[], &options(80)), CageGenError::Empty);
+    let mut broken = positions.clone();
+    broken[7].y = f32::NAN;
+    assert_eq!(refused(&broken, &triangles, &options(80)), CageGenError::NotFinite { vertex: 7 });
+    let error = refused(&positions, &[[0, 1, 9999]], &options(80));
+    assert!(matches!(error, CageGenError::Index { triangle: 0, vertex: 9999, .. }));
+    assert!(matches!(
+        refused(&positions, &triangles, &options(5)),
+        CageGenError::Option(OutOfRange { option: "target", .. })
+    ));
+    let wide = CageOptions { clearance: 0.5, ..options(80) };
+    assert!(matches!(
+        refused(&positions, &triangles, &wide),
+        CageGenError::Option(OutOfRange { option: "clearance", .. })
+    ));
+    let huge: Vec<Vec3> = positions.iter().map(|&p| p * 1e30).collect();
+    assert!(matches!(refused(&huge, &triangles, &options(80)), CageGenError::Size { .. }));
+}
+
+#[test]
+fn cancelling_ends_the_work() {
+    let (positions, triangles) = trousers();
+    let cancel = |_: ProgressEvent| ControlFlow::Break(());
+    let error = generate(&positions, &triangles, &options(80), &cancel).unwrap_err();
+    assert!(matches!(error, CageGenError::Cancelled(_)));
+}
+
+#[test]
+fn runs_are_alike() {
+    let soup = trousers();
+    let once = make(&soup, &options(60)).cage;
+    let twice = make(&soup, &options(60)).cage;
+    assert_eq!((once.positions(), once.faces()), (twice.positions(), twice.faces()));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn any_soup_gets_a_verified_cage(
+        points in prop::collection::vec(prop::array::uniform3(-1.0_f32..1.0), 1..40),
+        picks in prop::collection::vec(prop::array::uniform3(0_usize..1000), 0..60),
+        stretch in prop::array::uniform3(prop_oneof![Just(0.0_f32), Just(1.0), 0.01_f32..3.0]),
+        scale in prop_oneof![Just(1.0_f32), Just(1e-6), Just(1e6)],
+        target in 12_u32..150,
+        symmetry in prop_oneof![Just(Symmetry::Auto), Just(Symmetry::None), Just(Symmetry::Z)],
+        per_component in any::<bool>(),
+    ) {
+        let positions: Vec<Vec3> =
+            points.iter().map(|&p| Vec3::from_array(p) * Vec3::from_array(stretch) * scale).collect();
+        let triangles: Vec<[u32; 3]> =
+            picks.iter().map(|t| t.map(|i| (i % positions.len()) as u32)).collect();
+        let soup = (positions, triangles);
+        make(&soup, &CageOptions { target, symmetry, per_component, ..CageOptions::default() });
+    }
+}
+
+/// The promise of a smooth cage, of its surface and by winding numbers; the cage itself need only be one.
+#[test]
+fn smooth_surface_of_a_cage_holds_the_model() {
+    for (soup, smooth) in [(trousers(), 1), (trousers(), 2), (ring(), 2)] {
+        for symmetry in [Symmetry::Auto, Symmetry::None] {
+            let options = CageOptions { smooth, symmetry, ..options(80) };
+            let made = generate(&soup.0, &soup.1, &options, &Silent).unwrap();
+            let fine = subdivide(&made.cage.to_polygon_mesh(), smooth).mesh;
+            let surface = Cage::new(&fine).unwrap();
+            let outside = soup.0.iter().filter(|&&p| winding(&surface, p) < 0.5).count();
+            assert_eq!(outside, 0, "{} vertices, {symmetry:?}", made.report.vertices);
+            assert_eq!(made.report.mirror.is_some(), symmetry == Symmetry::Auto);
+        }
+    }
+}

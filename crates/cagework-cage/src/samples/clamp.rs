@@ -1,0 +1,126 @@
+//! A clamp in the shape of a C, its jaws almost closed: what coordinates do that look straight across.
+
+use glam::{Quat, Vec3, vec3};
+
+use super::sdf::{Body, Solid};
+use super::{CageRecipe, Pulled, Recipe, SampleInfo};
+use cagework_core::mesh::PolygonMesh;
+
+pub(super) const INFO: SampleInfo = SampleInfo {
+    id: "clamp",
+    label: "Clamp",
+    sentence: "The lower jaw opens and the upper one, a finger's breadth away, keeps its place; with mean value \
+               coordinates, which look straight across the gap, it would be dragged along. Take hold of the tip of a jaw.",
+};
+
+const STEEL: [u8; 3] = [84, 104, 128];
+const BRASS: [u8; 3] = [198, 156, 76];
+
+/// Half the cage's thickness along z.
+const THICKNESS: f32 = 0.27;
+
+/// The hinge of the poses: the middle of the back.
+const HINGE: Vec3 = vec3(-0.8, 0.0, 0.0);
+
+pub(super) fn recipe() -> Recipe {
+    Recipe {
+        body: body(),
+        cell: 0.0135,
+        cage: CageRecipe::Made(cage()),
+        poses: vec![("Lower jaw open", Box::new(open))],
+        pulled: Pulled {
+            name: "Lower jaw pulled down",
+            at: vec3(0.95, -0.3, 0.18),
+            by: vec3(-0.1, -0.4, 0.0),
+            bytes: include_bytes!("pulled/clamp.bin"),
+        },
+        rig: None,
+    }
+}
+
+fn body() -> Body {
+    let mut body = Body::default();
+    let block = |x: f32, y: f32, w: f32, h: f32| Solid::Block {
+        center: vec3(x, y, 0.0),
+        half: vec3(w, h, 0.18),
+        round: 0.07,
+    };
+    for side in [-1.0, 1.0] {
+        body.add(block(0.3, 0.30 * side, 0.62, 0.135), 0.0, STEEL);
+        body.add(
+            Solid::Block { center: vec3(0.84, 0.165 * side, 0.0), half: vec3(0.10, 0.05, 0.15), round: 0.03 },
+            0.02,
+            BRASS,
+        );
+    }
+    body.add(block(-0.62, 0.0, 0.30, 0.435), 0.1, STEEL);
+    for (y, r) in [(0.25, 0.10), (-0.25, 0.10)] {
+        body.add(
+            Solid::Ellipsoid { center: vec3(-0.6, y, 0.17), radii: vec3(r, r, 0.05), turn: Quat::IDENTITY },
+            0.02,
+            BRASS,
+        );
+    }
+    body
+}
+
+/// The cage: a bent beam of quads.
+fn cage() -> PolygonMesh {
+    let mut mesh = PolygonMesh::default();
+    // Outlines of the C at the two sides, in the plane: outer and inner rim, from the lower tip to the upper one.
+    let outer = [
+        (1.04, -0.52),
+        (0.50, -0.52),
+        (-0.05, -0.54),
+        (-0.55, -0.54),
+        (-1.02, -0.54),
+        (-1.02, 0.0),
+        (-1.02, 0.54),
+        (-0.55, 0.54),
+        (-0.05, 0.54),
+        (0.50, 0.52),
+        (1.04, 0.52),
+    ];
+    let inner = [
+        (1.04, -0.05),
+        (0.50, -0.05),
+        (0.12, -0.06),
+        (-0.10, -0.07),
+        (-0.20, -0.06),
+        (-0.22, 0.0),
+        (-0.20, 0.06),
+        (-0.10, 0.07),
+        (0.12, 0.06),
+        (0.50, 0.05),
+        (1.04, 0.05),
+    ];
+    for ((ox, oy), (ix, iy)) in outer.into_iter().zip(inner) {
+        for (x, y, z) in
+            [(ox, oy, THICKNESS), (ix, iy, THICKNESS), (ix, iy, -THICKNESS), (ox, oy, -THICKNESS)]
+        {
+            mesh.positions.push(vec3(x, y, z));
+        }
+    }
+    let n = outer.len() as u32;
+    for s in 0..n - 1 {
+        for k in 0..4 {
+            let (a, b) = (4 * s + k, 4 * s + (k + 1) % 4);
+            mesh.faces.push(vec![a, b, b + 4, a + 4]);
+        }
+    }
+    mesh.faces.push(vec![3, 2, 1, 0]);
+    mesh.faces.push([0, 1, 2, 3].map(|k| 4 * (n - 1) + k).to_vec());
+    mesh
+}
+
+/// How much a point belongs to the lower jaw: 0 on the back and above, 1 along the jaw.
+fn share_of_jaw(p: Vec3) -> f32 {
+    if p.y >= -0.01 {
+        return 0.0;
+    }
+    ((p.x + 0.6) / 0.55).clamp(0.0, 1.0)
+}
+
+fn open(cage: &[Vec3]) -> Vec<Vec3> {
+    cage.iter().map(|&p| HINGE + Quat::from_rotation_z(-0.5 * share_of_jaw(p)) * (p - HINGE)).collect()
+}

@@ -1,0 +1,152 @@
+use crate::check::{Severity, check};
+use glam::{DVec3, Vec3};
+
+use super::{PULLED_UNIT, Recipe, Sample, all, build};
+use cagework_core::bind::bind;
+use cagework_core::cage::Cage;
+use cagework_core::geometry::winding_number;
+use cagework_core::options::BindOptions;
+use cagework_core::progress::Silent;
+use cagework_pose::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
+
+/// Mean distance between rest pose and reconstruction over the diagonal: f32 round-off of the corrected rows.
+const REST_ERROR: f64 = 2e-6;
+
+fn recipes() -> [Recipe; 4] {
+    [super::rat::recipe(), super::humanoid::recipe(), super::clamp::recipe(), super::strider::recipe()]
+}
+
+#[test]
+fn every_sample_is_enclosed_by_its_cage_and_bound_exactly() {
+    for info in all() {
+        let sample = build(info.id).unwrap();
+        let n = sample.mesh.positions.len();
+        assert!((10_000..=40_000).contains(&n), "{}: {n} vertices", info.id);
+        assert_eq!(sample.colours.len(), n);
+        assert!(sample.cage.faces.len() < 500);
+        let cage = Cage::new(&sample.cage).unwrap();
+        assert_eq!(cage.notices(), [], "{}", info.id);
+        for p in sample.mesh.positions.iter().step_by(29) {
+            let triangles = (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
+            let winding = winding_number(p.as_dvec3(), triangles);
+            assert!((winding - 1.0).abs() < 1e-6, "{}: {p} has winding number {winding}", info.id);
+        }
+        let binding = bind(&sample.mesh.positions, &cage, &BindOptions::default(), &Silent).unwrap();
+        assert_eq!(binding.outside.len(), 0, "{}", info.id);
+        let error = binding.report.rest_error.mean_rel;
+        assert!(error <= REST_ERROR, "{}: {error:e}", info.id);
+    }
+}
+
+#[test]
+fn poses_move_some_of_the_cage_and_keep_its_vertices() {
+    for info in all() {
+        let sample = build(info.id).unwrap();
+        assert!(!sample.poses.is_empty());
+        for (name, pose) in &sample.poses {
+            assert_eq!(pose.len(), sample.cage.positions.len());
+            let farthest =
+                pose.iter().zip(&sample.cage.positions).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+            assert!(pose.iter().all(|p| p.is_finite()) && farthest > 0.1, "{}: {name}", info.id);
+        }
+    }
+}
+
+/// Where stored poses are made: when a sample's model, cage or pull has changed, this writes them anew and fails once.
+#[test]
+fn the_last_pose_of_each_sample_is_what_one_pull_makes() {
+    for (info, recipe) in all().iter().zip(recipes()) {
+        let Sample { mesh, cage, poses, .. } = build(info.id).unwrap();
+        let (rest, pulled) = (cage.positions.clone(), recipe.pulled);
+        let cage = Cage::new(&cage).unwrap();
+        let weights = |points: &[Vec3]| {
+            let bound = bind(points, &cage, &BindOptions::default(), &Silent).unwrap();
+            bound.frames.folded(&bound.weights)
+        };
+        let probes = Probes::new(&mesh, &cage).unwrap();
+        let of_probes = weights(probes.points());
+        let pull = Pull::new(&mesh, &cage, probes, &of_probes).unwrap();
+        let nearest = |v: &u32| mesh.positions[*v as usize].distance(pulled.at);
+        let held = (0..mesh.positions.len() as u32).min_by(|a, b| nearest(a).total_cmp(&nearest(b))).unwrap();
+        let grip =
+            Grip::new(Handle::Vertex(held), &pull, &mesh.triangles, &weights(&mesh.positions)).unwrap();
+        let start: Vec<DVec3> = rest.iter().map(|p| p.as_dvec3()).collect();
+        let mut drag = Drag::new(&pull, &start, &[grip], &[], DragOptions::default()).unwrap();
+        for _ in 0..30 {
+            drag.frame(&[(mesh.positions[held as usize] + pulled.by).as_dvec3()]);
+        }
+        let made: Vec<Vec3> = drag.cage().iter().map(|p| p.as_vec3()).collect();
+        let stored = &poses.last().unwrap().1;
+        let off = made.iter().zip(stored).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+        if stored.len() != made.len() || off > 1e-3 {
+            let number = |x: f32| ((x / PULLED_UNIT).round() as i16).to_le_bytes();
+            let offsets = made.iter().zip(&rest).flat_map(|(p, r)| (*p - *r).to_array());
+            let path = format!("{}/src/samples/pulled/{}.bin", env!("CARGO_MANIFEST_DIR"), info.id);
+            std::fs::write(&path, offsets.flat_map(number).collect::<Vec<u8>>()).unwrap();
+            panic!("{path} was {off} off and has been written anew: run again");
+        }
+    }
+}
+
+#[test]
+fn samples_are_closed_surfaces_that_face_outward() {
+    for info in all() {
+        let mesh = build(info.id).unwrap().mesh;
+        let mut sides: Vec<[u32; 2]> =
+            mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+        sides.sort_unstable();
+        for &[a, b] in &sides {
+            assert!(sides.binary_search(&[b, a]).is_ok(), "{}: edge {a}-{b} is open", info.id);
+        }
+        let volume: f32 = mesh
+            .triangles
+            .iter()
+            .map(|t| t.map(|i| mesh.positions[i as usize]))
+            .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+            .sum();
+        assert!(volume > 0.0, "{}", info.id);
+    }
+}
+
+#[test]
+fn unknown_samples_are_none() {
+    assert!(build("unicorn").is_none());
+}
+
+#[test]
+fn what_is_left_out_of_a_body_changes_no_distance_and_no_colour() {
+    let reach = 0.1;
+    for recipe in recipes() {
+        let body = recipe.body;
+        let [min, max] = body.bounds();
+        let steps = |n: u32| (0..=n).map(move |k| k as f32 / n as f32);
+        let lattice =
+            steps(9).flat_map(|x| steps(9).flat_map(move |y| steps(9).map(move |z| Vec3::new(x, y, z))));
+        for middle in lattice.map(|share| min + share * (max - min)) {
+            let near = body.near(middle, reach);
+            for corner in 0..8 {
+                let side =
+                    Vec3::from_array([0, 1, 2].map(|axis| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 }));
+                let p = middle + reach / 3.0_f32.sqrt() * side;
+                assert_eq!(near.distance(p), body.distance(p), "at {p}");
+                assert_eq!(near.colour(p), body.colour(p), "at {p}");
+            }
+        }
+    }
+}
+
+/// The page opens with one of them: nothing of it may look broken.
+#[test]
+fn no_sample_has_a_fault() {
+    for info in all() {
+        let sample = build(info.id).unwrap();
+        let found = check(&sample.cage, Some(&sample.mesh.positions), Some(BindOptions::default().grid));
+        let faults: Vec<_> = found.problems.iter().filter(|p| p.severity != Severity::Note).collect();
+        assert!(
+            faults.is_empty(),
+            "{}: {:?}",
+            info.id,
+            faults.iter().map(|p| &p.message).collect::<Vec<_>>()
+        );
+    }
+}

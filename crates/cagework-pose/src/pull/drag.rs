@@ -1,0 +1,356 @@
+//! One drag: the factorisation at the grab, then frames as the pointer moves.
+
+use glam::{DMat3, DVec3};
+use nalgebra::{DMatrix, DVector};
+
+use super::anderson::Anderson;
+use super::energy::Pull;
+use super::frame::group_matrices;
+use super::grip::{Grip, check as check_index};
+use super::{MAX_HANDLES, PullError};
+use cagework_core::edit::Symmetry;
+use cagework_core::rotation::nearest_rotation;
+
+/// Weight of the cage's own part; flat from 0.02 to 0.4. With less the cage spikes where the model does not mind.
+pub(super) const CAGE: f64 = 0.1;
+/// The same while a vertex of the cage is dragged: below, its neighbours move against the drag.
+const CAGE_GRABBED: f64 = 3.0;
+/// How firmly samples beyond the reach stay; flat from 100 to 300.
+const STAY: f64 = 200.0;
+/// Share of the reach within which nothing is held.
+const FREE: f64 = 0.75;
+/// Share of the model's area within the automatic reach of one grab.
+const REACH_AREA: f64 = 0.15;
+/// Least and most of it, over the model's size.
+const REACHES: [f64; 2] = [0.15, 0.5];
+/// Reach over the greatest distance between two grabs.
+const BETWEEN: f64 = 1.2;
+/// Radius of the patch that a pin holds, over the model's size: about a bare point the rest would roll.
+const PIN_RADIUS: f64 = 0.05;
+/// How firmly.
+const PIN: f64 = 2e4;
+/// How firmly grabs and pins hold, over the mean of the whole matrix's diagonal.
+const HOLD: f64 = 1e3;
+/// What keeps the matrix regular, over the mean of the diagonal without what stays.
+pub(super) const REGULAR: f64 = 1e-6;
+/// A frame that moves the cage by less, over the model's size, is the last one: above 1e-4 a pull of the whole model ends 5 % early.
+const SETTLED: f64 = 2e-5;
+
+/// How far a drag reaches along the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Reach {
+    /// As far as a share of the model's area lies.
+    #[default]
+    Automatic,
+    /// Over the model's size.
+    Of(f64),
+    /// Everywhere: nothing stays but pins.
+    Whole,
+}
+
+/// How a drag is made.
+#[derive(Clone, Copy, Debug)]
+pub struct DragOptions<'a> {
+    /// How far it reaches.
+    pub reach: Reach,
+    /// How much parts within reach go back to their shape at rest as the drag grows, 0 to 1. Default 0.5.
+    pub relax: f64,
+    /// Mirror images stay mirror images: of the cage's vertices.
+    pub symmetry: Option<&'a Symmetry>,
+}
+
+impl Default for DragOptions<'_> {
+    fn default() -> Self {
+        Self { reach: Reach::Automatic, relax: 0.5, symmetry: None }
+    }
+}
+
+/// A drag under way.
+pub struct Drag {
+    pub(super) n: usize,
+    pub(super) n_groups: usize,
+    pub(super) size: f64,
+    reach: f64,
+    pub(super) relax: f64,
+    /// Columns x, y, z one after the other. `[3 n]`
+    pub(super) cage: DVector<f64>,
+    /// Rows of grabs, then of pins. `[n_handles, n]`
+    pub(super) handles: DMatrix<f64>,
+    /// Where they are to be. `[n_handles, 3]`
+    pub(super) targets: DMatrix<f64>,
+    /// Where the grabs were. `[n_grabs]`
+    pub(super) start: Vec<DVec3>,
+    /// `A^-1`, `A^-1 Q^T`, `(Q A^-1 Q^T + 1 / mu)^-1`.
+    pub(super) inverse: DMatrix<f64>,
+    pub(super) spread: DMatrix<f64>,
+    pub(super) hold: DMatrix<f64>,
+    /// What stays wherever the groups turn. `[n, 3]`
+    pub(super) constant: DMatrix<f64>,
+    /// Moments of the pose at the grab, what is added to them when all is relaxed, and those of the moment.
+    pub(super) posed: Vec<f64>,
+    pub(super) relaxing: Vec<f64>,
+    pub(super) moments: Vec<f64>,
+    /// How far each vertex of the model is from the nearest grab, along the surface, object units. `[n_vertices]`
+    walks: Vec<f32>,
+    /// Whether one grab alone moves all there is: then it is moved as it is.
+    pub(super) is_shift: bool,
+    pub(super) anderson: Anderson,
+    pub(super) moved: f64,
+    pub(super) mirror: Option<(f64, Vec<Option<u32>>)>,
+}
+
+impl Drag {
+    /// Grabs where they are in the pose `start`, and holds pins where they are. `start`: `[n]`, object units.
+    ///
+    /// # Errors
+    /// [`PullError`]: a handle that is not there, too many of them, a number out of range, a pose that is not finite.
+    pub fn new(
+        pull: &Pull,
+        start: &[DVec3],
+        grabs: &[Grip],
+        pins: &[Grip],
+        options: DragOptions<'_>,
+    ) -> Result<Self, PullError> {
+        check(pull, start, grabs, pins, options)?;
+        let n = pull.n_cage();
+        let cage_grabbed = grabs.iter().any(|grab| grab.is_cage);
+        let gamma = if cage_grabbed { CAGE_GRABBED } else { CAGE };
+        let grips: Vec<&Grip> = grabs.iter().chain(pins).collect();
+        let handles = DMatrix::from_fn(grips.len(), n, |h, i| grips[h].row[i]);
+        let cage = DMatrix::from_fn(n, 3, |i, x| start[i][x]);
+        let targets = &handles * &cage;
+
+        let seeds: Vec<u32> = grips.iter().map(|grip| grip.seed).collect();
+        let walks: Vec<Vec<f32>> =
+            seeds[..grabs.len()].iter().map(|&s| pull.geodesic.from(s, f32::INFINITY)).collect();
+        let reach = reach_of(pull, options.reach, &walks, &seeds[..grabs.len()]);
+        let samples = &pull.probes.samples;
+        let walks: Vec<f32> = (0..pull.n_vertices)
+            .map(|v| walks.iter().map(|walk| walk[v]).fold(f32::INFINITY, f32::min))
+            .collect();
+        let stays: Vec<f64> = samples.iter().map(|&s| stays(walks[s as usize], reach)).collect();
+        let mut holds: Vec<f64> = stays.iter().map(|stay| STAY * stay).collect();
+        let patch = PIN_RADIUS * pull.size;
+        for &seed in &seeds[grabs.len()..] {
+            let walk = pull.geodesic.from(seed, patch as f32);
+            for (hold, &s) in holds.iter_mut().zip(samples) {
+                *hold += PIN * (1.0 - smooth(f64::from(walk[s as usize]) / patch));
+            }
+        }
+        let mut held = pull.sample_rows.clone();
+        for ((mut row, hold), share) in held.row_iter_mut().zip(holds).zip(&pull.probes.shares) {
+            row *= hold * share / (pull.size * pull.size);
+        }
+        let held = held.transpose();
+
+        let matrix = pull.matrix(gamma);
+        let mean = matrix.trace() / n as f64;
+        let mut matrix = matrix + &held * &pull.sample_rows;
+        for i in 0..n {
+            matrix[(i, i)] += REGULAR * mean;
+        }
+        // Firm beside what holds: a coarse cage bends all of it at once.
+        let firm = HOLD * matrix.trace() / n as f64;
+        let constant = &held * (&pull.sample_rows * &cage) + REGULAR * mean * &cage;
+        let inverse = matrix.cholesky().ok_or(PullError::Singular)?.inverse();
+        let spread = &inverse * handles.transpose();
+        let mut hold = &handles * &spread;
+        for i in 0..hold.nrows() {
+            hold[(i, i)] += 1.0 / firm;
+        }
+        let hold = hold.cholesky().ok_or(PullError::Singular)?.inverse();
+
+        // References: the pose as it was grabbed, and what it would be if each group were rotated from its shape at rest.
+        let posed = pull.references(start);
+        let rest = pull.references(&pull.cage);
+        let of_rest = pull.moments(&rest, gamma);
+        let rotations: Vec<DMat3> = group_matrices(&of_rest, &flat(start), pull.n_groups())
+            .into_iter()
+            .map(nearest_rotation)
+            .collect();
+        let relaxed: Vec<DVec3> = pull
+            .groups()
+            .zip(&rest)
+            .zip(&posed)
+            .map(|((r, rest), posed)| rotations[r] * *rest - *posed)
+            .collect();
+        let posed = pull.moments(&posed, gamma);
+        let follows: Vec<f64> = stays.iter().map(|stay| 1.0 - stay).collect();
+        let mut relaxing = pull.moments(&relaxed, gamma);
+        let local = locality(pull, &follows);
+        let width = 3 * pull.n_groups();
+        for (k, moment) in relaxing.iter_mut().enumerate() {
+            *moment *= local[k % width / 3];
+        }
+        let start_of = |h: usize| DVec3::new(targets[(h, 0)], targets[(h, 1)], targets[(h, 2)]);
+        Ok(Self {
+            n,
+            n_groups: pull.n_groups(),
+            size: pull.size,
+            reach,
+            relax: options.relax,
+            cage: flat(start),
+            start: (0..grabs.len()).map(start_of).collect(),
+            handles,
+            targets,
+            inverse,
+            spread,
+            hold,
+            constant,
+            moments: posed.clone(),
+            posed,
+            relaxing,
+            walks,
+            is_shift: reach.is_infinite() && grips.len() == 1 && !cage_grabbed,
+            anderson: Anderson::default(),
+            moved: 0.0,
+            mirror: options
+                .symmetry
+                .map(|s| (f64::from(s.plane()), (0..n as u32).map(|i| s.partner(i)).collect())),
+        })
+    }
+
+    /// Where the grabs were when they were taken. `[n_grabs]`, object units
+    #[must_use]
+    pub fn start(&self) -> &[DVec3] {
+        &self.start
+    }
+
+    /// How far the drag reaches, over the model's size; infinite for the whole model.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        self.reach / self.size
+    }
+
+    /// The same, object units.
+    #[must_use]
+    pub fn reach_length(&self) -> f64 {
+        self.reach
+    }
+
+    /// How far each vertex of the model is from the nearest grab, along the surface, object units. `[n_vertices]`
+    #[must_use]
+    pub fn walks(&self) -> &[f32] {
+        &self.walks
+    }
+
+    /// How much a vertex of the model stays where it is: 0 within reach, 1 beyond.
+    #[must_use]
+    pub fn stays(&self, vertex: u32) -> f64 {
+        stays(self.walks[vertex as usize], self.reach)
+    }
+
+    /// The cage. `[n]`, object units
+    #[must_use]
+    pub fn cage(&self) -> Vec<DVec3> {
+        let [x, y, z] = [0, 1, 2].map(|k| self.cage.rows(k * self.n, self.n));
+        (0..self.n).map(|i| DVec3::new(x[i], y[i], z[i])).collect()
+    }
+
+    /// Whether the last frame moved it so little that another one need not be asked for.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        self.moved < SETTLED
+    }
+
+    /// How far the grabs and pins are from their targets, at most, over the model's size.
+    #[must_use]
+    pub fn error(&self) -> f64 {
+        let cage = DMatrix::from_column_slice(self.n, 3, self.cage.as_slice());
+        let off = &self.handles * cage - &self.targets;
+        off.row_iter().map(|row| row.norm()).fold(0.0, f64::max) / self.size
+    }
+}
+
+fn check(
+    pull: &Pull,
+    start: &[DVec3],
+    grabs: &[Grip],
+    pins: &[Grip],
+    options: DragOptions<'_>,
+) -> Result<(), PullError> {
+    if grabs.is_empty() {
+        return Err(PullError::NoGrab);
+    }
+    let handles = grabs.len() + pins.len();
+    if handles > MAX_HANDLES {
+        return Err(PullError::Handles(handles));
+    }
+    for grip in grabs.iter().chain(pins) {
+        check_index("vertex of the model", grip.seed, pull.n_vertices)?;
+        if grip.row.len() != pull.n_cage() {
+            let (rows, columns, vertices) = (1, grip.row.len(), 1);
+            return Err(PullError::Shape { rows, columns, vertices, cage: pull.n_cage() });
+        }
+        if let Some(&value) = grip.row.iter().find(|w| !w.is_finite()) {
+            return Err(PullError::Value { what: "a weight", value, range: "finite" });
+        }
+    }
+    if start.len() != pull.n_cage() {
+        return Err(PullError::Start { given: start.len(), cage: pull.n_cage() });
+    }
+    let not_finite = start.iter().flat_map(DVec3::to_array).find(|x| !x.is_finite());
+    if let Some(value) = not_finite {
+        return Err(PullError::Value { what: "a coordinate of the start", value, range: "finite" });
+    }
+    if !(0.0..=1.0).contains(&options.relax) {
+        return Err(PullError::Value { what: "relax", value: options.relax, range: "from 0 to 1" });
+    }
+    match options.reach {
+        Reach::Of(value) if !(value > 0.0 && value.is_finite()) => {
+            Err(PullError::Value { what: "the reach", value, range: "positive, over the model's size" })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// How far a drag reaches, object units. Automatic: far enough to hold a share of the area (twice as much with two grabs), and
+/// all between the grabs.
+fn reach_of(pull: &Pull, reach: Reach, walks: &[Vec<f32>], seeds: &[u32]) -> f64 {
+    match reach {
+        Reach::Whole => return f64::INFINITY,
+        Reach::Of(share) => return share * pull.size,
+        Reach::Automatic => {}
+    }
+    let wanted = REACH_AREA * walks.len().min(2) as f64;
+    let holding = |walk: &Vec<f32>| {
+        let mut order: Vec<u32> = (0..walk.len() as u32).collect();
+        order.sort_unstable_by(|&a, &b| walk[a as usize].total_cmp(&walk[b as usize]));
+        let mut area = 0.0;
+        let last = order.iter().find(|&&v| {
+            area += pull.probes.areas[v as usize];
+            area >= wanted
+        });
+        last.or(order.last()).map_or(0.0, |&v| f64::from(walk[v as usize]))
+    };
+    let [least, most] = REACHES.map(|share| share * pull.size);
+    let reach = walks.iter().map(holding).fold(0.0, f64::max).clamp(least, most);
+    let between = walks.iter().flat_map(|walk| seeds.iter().map(|&s| f64::from(walk[s as usize])));
+    reach.max(BETWEEN * between.fold(0.0, f64::max))
+}
+
+/// How much stays at a distance from the grabs.
+fn stays(walk: f32, reach: f64) -> f64 {
+    if reach.is_infinite() { 0.0 } else { smooth((f64::from(walk) / reach - FREE) / (1.0 - FREE)) }
+}
+
+/// How much each group is within reach, 0 to 1: a cage vertex as much as the samples that follow it. `[n_groups]`
+fn locality(pull: &Pull, follows: &[f64]) -> Vec<f64> {
+    let shares = DVector::from_column_slice(&pull.probes.shares);
+    let followed =
+        DVector::from_iterator(follows.len(), follows.iter().zip(&pull.probes.shares).map(|(f, v)| f * v));
+    let (part, whole) = (pull.sample_rows.tr_mul(&followed), pull.sample_rows.tr_mul(&shares));
+    let of_cage = part.iter().zip(whole.iter()).map(|(part, whole)| part / whole.max(1e-12));
+    follows.iter().copied().chain(of_cage).collect()
+}
+
+/// Columns x, y, z one after the other.
+pub(super) fn flat(cage: &[DVec3]) -> DVector<f64> {
+    DVector::from_iterator(3 * cage.len(), (0..3).flat_map(|x| cage.iter().map(move |p| p[x])))
+}
+
+/// 0 below 0, 1 above 1, smooth between.
+pub(super) fn smooth(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}

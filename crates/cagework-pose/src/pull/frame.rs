@@ -1,0 +1,222 @@
+//! A frame of a drag: rotations of the groups, then the cage that fits them.
+
+use glam::{DMat3, DQuat, DVec3, Vec3};
+use nalgebra::{DMatrix, DVector};
+
+use super::drag::{Drag, smooth};
+use super::grip::Handle;
+use cagework_core::rotation::nearest_rotation;
+
+/// Most frames after the last target, until nothing moves any more.
+const SETTLING: u32 = 60;
+/// Steps of a frame.
+const STEPS: usize = 4;
+/// A target that moves by less, over the model's size, has not moved.
+const SAME: f64 = 1e-9;
+/// Length of a drag, over the model's size, at which parts within reach are as relaxed as asked for.
+const RELAXED: f64 = 0.1;
+
+/// Grabs that turn by more in a frame, radians, go in steps along arcs: straight ways of half a turn meet in one place.
+const TURN: f64 = 0.5;
+/// How firmly a turn of grabs that do not tell it, as of two about the line between them, is taken for none.
+const NO_ROLL: f64 = 1e-3;
+
+impl Drag {
+    /// One frame: the grabs go towards `to` (`[n_grabs]`, object units). Targets that are not finite are ignored, and the pose
+    /// stays finite.
+    pub fn frame(&mut self, to: &[DVec3]) {
+        if to.len() != self.start.len() || !to.iter().all(|t| t.is_finite()) {
+            return;
+        }
+        if self.is_shift {
+            let row = self.handles.row(0).transpose();
+            for (x, target) in to[0].to_array().into_iter().enumerate() {
+                let mut column = self.cage.rows_mut(x * self.n, self.n);
+                let shift = target - row.dot(&column);
+                column.add_scalar_mut(shift);
+            }
+            self.targets.set_row(0, &nalgebra::RowVector3::from(to[0].to_array()));
+            return;
+        }
+        let from: Vec<DVec3> = (0..to.len()).map(|h| self.target(h)).collect();
+        let way = Way::new(&from, to);
+        let n = (way.angle() / TURN).ceil().max(1.0);
+        for k in 1..n as u32 {
+            self.frame_straight(&way.at(f64::from(k) / n));
+        }
+        self.frame_straight(to);
+    }
+
+    fn frame_straight(&mut self, to: &[DVec3]) {
+        self.set_targets(to);
+        for _ in 0..STEPS {
+            let image = self.step();
+            if image.iter().any(|x| !x.is_finite()) {
+                self.anderson.forget();
+                return;
+            }
+            self.moved = (&image - &self.cage).amax() / self.size;
+            let mut next = self.anderson.next(&self.cage, image);
+            if let Some((plane, partners)) = &self.mirror {
+                average(&mut next, *plane, partners);
+            }
+            self.cage = next;
+        }
+    }
+
+    /// The grabs go from where they were taken to `to` (`[n_grabs]`, object units) in so many frames: straight, or along arcs if
+    /// together they turn far.
+    pub fn go(&mut self, to: &[DVec3], frames: u32) {
+        if to.len() != self.start.len() || !to.iter().all(|t| t.is_finite()) {
+            return;
+        }
+        let start = self.start.clone();
+        let way = Way::new(&start, to);
+        for k in 1..=frames {
+            self.frame(&way.at(f64::from(k) / f64::from(frames)));
+        }
+    }
+
+    /// Frames with the grabs at `to` until nothing moves any more, 60 at most. Returns how many.
+    pub fn settle(&mut self, to: &[DVec3]) -> u32 {
+        let mut frames = 0;
+        while frames == 0 || frames < SETTLING && !self.is_settled() {
+            self.frame(to);
+            frames += 1;
+        }
+        frames
+    }
+
+    /// Targets for the handles that were grabbed, which are to go to `to`. A vertex outside the cage is beside what its weights
+    /// give, and its target is moved by as much. `deformed`: the model at the start of the drag. `[n_vertices]`, object units
+    #[must_use]
+    pub fn targets(&self, grabs: &[Handle], to: &[Vec3], deformed: &[Vec3]) -> Vec<DVec3> {
+        let beside = |(grab, start): (&Handle, &DVec3)| match grab {
+            Handle::Vertex(v) => deformed[*v as usize].as_dvec3() - *start,
+            Handle::Triangle(..) | Handle::Cage(_) => DVec3::ZERO,
+        };
+        let beside = grabs.iter().zip(&self.start).map(beside);
+        to.iter().zip(beside).map(|(to, beside)| to.as_dvec3() - beside).collect()
+    }
+
+    fn target(&self, h: usize) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|x| self.targets[(h, x)]))
+    }
+
+    fn set_targets(&mut self, to: &[DVec3]) {
+        let is_same = |h: usize| (0..3).all(|x| (self.targets[(h, x)] - to[h][x]).abs() <= SAME * self.size);
+        if (0..to.len()).all(is_same) {
+            return;
+        }
+        for (h, target) in to.iter().enumerate() {
+            (0..3).for_each(|x| self.targets[(h, x)] = target[x]);
+        }
+        // Another map: what was learnt of the one before misleads.
+        self.anderson.forget();
+        let drag = to.iter().zip(&self.start).map(|(to, from)| to.distance(*from)).fold(0.0, f64::max);
+        let relax = self.relax * smooth(drag / (RELAXED * self.size));
+        let parts = self.posed.iter().zip(&self.relaxing);
+        self.moments.iter_mut().zip(parts).for_each(|(m, (posed, more))| *m = posed + relax * more);
+    }
+
+    /// One local step (rotations) and one global step (the cage that fits them).
+    fn step(&self) -> DVector<f64> {
+        let right = turned(&self.moments, &self.cage, self.n_groups) + &self.constant;
+        let free = &self.inverse * right;
+        let pulled = &self.targets - &self.handles * &free;
+        let fitted = free + &self.spread * (&self.hold * pulled);
+        DVector::from_column_slice(fitted.as_slice())
+    }
+}
+
+/// The ways of some grabs from one place to another.
+struct Way<'a> {
+    from: &'a [DVec3],
+    to: &'a [DVec3],
+    /// Means of both, and the rotation about them that is nearest to the grabs' own.
+    middles: [DVec3; 2],
+    turn: DQuat,
+}
+
+impl<'a> Way<'a> {
+    fn new(from: &'a [DVec3], to: &'a [DVec3]) -> Self {
+        let middles = [from, to].map(|places| places.iter().sum::<DVec3>() / places.len() as f64);
+        let pairs = || from.iter().zip(to).map(|(a, b)| (*a - middles[0], *b - middles[1]));
+        let size: f64 = pairs().map(|(a, b)| a.length() * b.length()).sum();
+        let of_pair = |(a, b): (DVec3, DVec3)| DMat3::from_cols(b * a.x, b * a.y, b * a.z);
+        let covariance =
+            pairs().map(of_pair).fold(DMat3::from_diagonal(DVec3::splat(NO_ROLL * size)), |m, p| m + p);
+        Self { from, to, middles, turn: DQuat::from_mat3(&nearest_rotation(covariance)) }
+    }
+
+    fn angle(&self) -> f64 {
+        self.turn.angle_between(DQuat::IDENTITY)
+    }
+
+    /// Where the grabs are after a share of the way.
+    fn at(&self, share: f64) -> Vec<DVec3> {
+        let straight = |(a, b): (&DVec3, &DVec3)| a.lerp(*b, share);
+        if self.angle() <= TURN {
+            return self.from.iter().zip(self.to).map(straight).collect();
+        }
+        let (part, [first, last]) = (DQuat::IDENTITY.slerp(self.turn, share), self.middles);
+        let arc = |(a, b): (&DVec3, &DVec3)| {
+            let (arm, off) = (*a - first, *b - last - self.turn * (*a - first));
+            first.lerp(last, share) + part * arm + share * off
+        };
+        self.from.iter().zip(self.to).map(arc).collect()
+    }
+}
+
+/// `sum_r B_r R_r^T`, with the rotations that are nearest to a cage. `[n, 3]`
+pub(super) fn turned(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> DMatrix<f64> {
+    let width = 3 * n_groups;
+    let mut turned = vec![0.0; 3 * width];
+    for (r, matrix) in group_matrices(moments, cage, n_groups).into_iter().enumerate() {
+        let rotation = nearest_rotation(matrix);
+        for x in 0..3 {
+            turned[x * width + 3 * r..][..3].copy_from_slice(&rotation.row(x).to_array());
+        }
+    }
+    let rows: Vec<&[f64]> = moments.chunks_exact(width).collect();
+    DMatrix::from_fn(rows.len(), 3, |i, x| dot(rows[i], &turned[x * width..][..width]))
+}
+
+/// `c^T B_r` of each group r: how its references lie to what they have become.
+pub(super) fn group_matrices(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> Vec<DMat3> {
+    let width = 3 * n_groups;
+    let n = moments.len() / width;
+    let mut sums = vec![0.0; 3 * width];
+    for (x, sums) in sums.chunks_exact_mut(width).enumerate() {
+        for (i, row) in moments.chunks_exact(width).enumerate() {
+            let c = cage[x * n + i];
+            sums.iter_mut().zip(row).for_each(|(sum, m)| *sum += c * m);
+        }
+    }
+    let column = |r: usize, k: usize| DVec3::from_array([0, 1, 2].map(|x| sums[x * width + 3 * r + k]));
+    (0..n_groups).map(|r| DMat3::from_cols(column(r, 0), column(r, 1), column(r, 2))).collect()
+}
+
+/// In eight sums, which a processor makes side by side.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
+    let mut sums = [0.0; 8];
+    for (a, b) in a.iter().zip(b) {
+        (0..8).for_each(|k| sums[k] += a[k] * b[k]);
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
+}
+
+/// The mean of a pose and its mirror image.
+fn average(cage: &mut DVector<f64>, plane: f64, partners: &[Option<u32>]) {
+    let n = partners.len();
+    let before = cage.clone();
+    for (i, partner) in partners.iter().enumerate() {
+        let Some(p) = partner.map(|p| p as usize) else { continue };
+        cage[i] = 0.5 * (before[i] + 2.0 * plane - before[p]);
+        for x in 1..3 {
+            cage[x * n + i] = 0.5 * (before[x * n + i] + before[x * n + p]);
+        }
+    }
+}

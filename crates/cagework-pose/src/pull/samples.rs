@@ -1,0 +1,161 @@
+//! Points of the model at which a pull measures it, and where the field is probed for gradients there.
+
+use glam::{DMat3, DVec3, Vec3};
+use nalgebra::DMatrix;
+
+use super::{MAX_CAGE, PullError};
+use cagework_core::controls::Controls;
+use cagework_core::mesh::{Bounds, TriMesh};
+use cagework_core::weights::Weights;
+
+/// Samples of a model: of 100, 200, 300 and 600 the third has all but 1 % of the last one's energy.
+const SAMPLES: usize = 300;
+
+/// Cells of a grid whose edge is the distance of a probe from its sample.
+const PROBES_APART: f32 = 64.0;
+
+/// Points of a sample.
+const PROBES: usize = 7;
+
+/// A probe far outside the cage stays where it is: its gradient is off by more than this.
+const OFF: f64 = 0.5;
+
+/// Samples of a model, and the points where their gradients come from.
+#[derive(Clone, Debug)]
+pub struct Probes {
+    /// Vertices of the model, far from each other. `[n_samples]`
+    pub(super) samples: Vec<u32>,
+    /// Share of the model's area that each of them stands for; they sum to 1. `[n_samples]`
+    pub(super) shares: Vec<f64>,
+    /// Share of the area at each vertex of the model; they sum to 1. `[n_vertices]`
+    pub(super) areas: Vec<f64>,
+    /// Distance of the probes from their sample, object units.
+    step: f32,
+    /// Each sample, then six around it: along x, y, z, then against. `[7 * n_samples]`
+    points: Vec<Vec3>,
+}
+
+impl Probes {
+    /// Of a model and the controls at rest.
+    ///
+    /// # Errors
+    /// [`PullError::Empty`], [`PullError::Cage`], [`PullError::Missing`] for a corner of a triangle.
+    pub fn new<'a>(mesh: &TriMesh, controls: impl Into<Controls<'a>>) -> Result<Self, PullError> {
+        let controls = controls.into();
+        if controls.n_controls() > MAX_CAGE {
+            return Err(PullError::Cage { cage: controls.n_controls() });
+        }
+        let cage = controls.cage();
+        let positions = &mesh.positions;
+        let last = positions.len().checked_sub(1).ok_or(PullError::Empty)?;
+        if let Some(&index) = mesh.triangles.as_flattened().iter().find(|&&v| v as usize > last) {
+            return Err(PullError::Missing { what: "vertex", index, last });
+        }
+        let areas = areas(mesh);
+        let (samples, nearest) = farthest_points(positions).ok_or(PullError::Empty)?;
+        let mut shares = vec![0.0; samples.len()];
+        for (area, sample) in areas.iter().zip(nearest) {
+            shares[sample as usize] += area;
+        }
+        let step = cage.bounds().extent().max_element() / PROBES_APART;
+        let around = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
+        let points =
+            samples.iter().flat_map(|&s| around.map(|way| positions[s as usize] + step * way)).collect();
+        Ok(Self { samples, shares, areas, step, points })
+    }
+
+    /// Points to bind to the cage, `[7 * n_samples]`: their weights are what [`super::Pull::new`] asks for.
+    #[must_use]
+    pub fn points(&self) -> &[Vec3] {
+        &self.points
+    }
+
+    /// Rows of the weights at the samples. `[n_samples, n]`
+    pub(super) fn rows(&self, weights: &Weights) -> DMatrix<f64> {
+        let rows: Vec<_> = (0..self.samples.len()).map(|s| dense(weights, PROBES * s)).collect();
+        DMatrix::from_fn(rows.len(), weights.n_columns(), |s, i| rows[s][i])
+    }
+
+    /// Gradients of the weights at the samples, by central differences, made exact for linear functions: `cage` (`[n]`, at
+    /// rest) has the identity as its gradient. Row `3 s + x` is d/dx at sample s; zero, with a share of zero, where a probe
+    /// has left the cage. `[3 * n_samples, n]`
+    pub(super) fn gradients(&mut self, weights: &Weights, cage: &[DVec3]) -> Vec<Vec<f64>> {
+        let n = cage.len();
+        let scale = 0.5 / f64::from(self.step);
+        let mut all = Vec::with_capacity(3 * self.samples.len());
+        for s in 0..self.samples.len() {
+            let raw = [0, 1, 2].map(|x| {
+                let [after, before] = [1, 4].map(|first| dense(weights, PROBES * s + first + x));
+                after.iter().zip(before).map(|(a, b)| scale * (a - b)).collect::<Vec<f64>>()
+            });
+            // Row x of the Jacobian: d/dx of the position.
+            let jacobian = raw.each_ref().map(|g| g.iter().zip(cage).map(|(&w, &c)| w * c).sum::<DVec3>());
+            let off = jacobian.iter().zip(DMat3::IDENTITY.to_cols_array_2d());
+            let is_near = |(a, b): (&DVec3, [f64; 3])| (*a - DVec3::from(b)).abs().max_element() <= OFF;
+            if !off.into_iter().all(is_near) {
+                self.shares[s] = 0.0;
+                all.extend([const { Vec::new() }; 3].map(|_: Vec<f64>| vec![0.0; n]));
+                continue;
+            }
+            let inverse = DMat3::from_cols(jacobian[0], jacobian[1], jacobian[2]).transpose().inverse();
+            // G <- (G C)^-1 G
+            all.extend([0, 1, 2].map(|x| {
+                let mix = inverse.row(x);
+                (0..n)
+                    .map(|i| mix.x * raw[0][i] + mix.y * raw[1][i] + mix.z * raw[2][i])
+                    .collect::<Vec<f64>>()
+            }));
+        }
+        all
+    }
+}
+
+/// A row of sparse weights. `[n]`
+pub(super) fn dense(weights: &Weights, row: usize) -> Vec<f64> {
+    let mut dense = vec![0.0; weights.n_columns()];
+    let (columns, values) = weights.row(row);
+    columns.iter().zip(values).for_each(|(&c, &w)| dense[c as usize] = f64::from(w));
+    dense
+}
+
+/// Share of the area at each vertex: a third of its triangles'. A model without area has as much everywhere.
+fn areas(mesh: &TriMesh) -> Vec<f64> {
+    let mut areas = vec![0.0; mesh.positions.len()];
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|v| mesh.positions[v as usize].as_dvec3());
+        let area = (b - a).cross(c - a).length();
+        triangle.iter().for_each(|&v| areas[v as usize] += area);
+    }
+    let most = areas.iter().copied().fold(0.0, f64::max);
+    let least = if most > 0.0 { 1e-12 * most } else { 1.0 };
+    areas.iter_mut().for_each(|area| *area += least);
+    let sum: f64 = areas.iter().sum();
+    areas.iter_mut().for_each(|area| *area /= sum);
+    areas
+}
+
+/// Vertices each of which is farthest from those before (Gonzalez 1985), and for each vertex the nearest of them. None without
+/// vertices.
+fn farthest_points(positions: &[Vec3]) -> Option<(Vec<u32>, Vec<u32>)> {
+    let center = Bounds::of(positions)?.center();
+    let farthest = |distances: &[f32]| {
+        distances.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(&a.0))).map(|(i, _)| i)
+    };
+    let mut distances: Vec<f32> = positions.iter().map(|p| p.distance_squared(center)).collect();
+    let mut next = farthest(&distances)?;
+    distances.fill(f32::INFINITY);
+    let mut nearest = vec![0; positions.len()];
+    let mut samples = Vec::with_capacity(SAMPLES);
+    while samples.len() < SAMPLES && distances[next] > 0.0 {
+        let (number, at) = (samples.len() as u32, positions[next]);
+        samples.push(next as u32);
+        for ((p, distance), nearest) in positions.iter().zip(&mut distances).zip(&mut nearest) {
+            let squared = p.distance_squared(at);
+            if squared < *distance {
+                (*distance, *nearest) = (squared, number);
+            }
+        }
+        next = farthest(&distances)?;
+    }
+    Some((samples, nearest))
+}

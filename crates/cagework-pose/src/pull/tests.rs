@@ -1,0 +1,359 @@
+//! Properties of `pull.md` section 8, on the samples; figures on other models are in `docs/notes/pull.md`.
+
+mod fit;
+
+use std::sync::OnceLock;
+
+use std::f64::consts::PI;
+
+use glam::{DMat3, DVec3, Vec3};
+
+use super::*;
+use cagework_cage::samples;
+use cagework_core::cage::Cage;
+use cagework_core::edit::Symmetry;
+use cagework_core::mesh::{Bounds, TriMesh};
+use cagework_core::progress::Silent;
+use cagework_core::{BindOptions, Weights, bind, subdivided_box};
+
+struct Bound {
+    mesh: TriMesh,
+    weights: Weights,
+    cage: Cage,
+    pull: Pull,
+    size: f64,
+}
+
+fn bound(id: &str) -> Bound {
+    let sample = samples::build(id).unwrap();
+    let (mesh, cage) = (sample.mesh, Cage::new(&sample.cage).unwrap());
+    let options = BindOptions { grid: 32, ..BindOptions::default() };
+    let weights = |points: &[Vec3]| {
+        let bound = bind(points, &cage, &options, &Silent).unwrap();
+        bound.frames.folded(&bound.weights)
+    };
+    let probes = Probes::new(&mesh, &cage).unwrap();
+    let of_probes = weights(probes.points());
+    let pull = Pull::new(&mesh, &cage, probes, &of_probes).unwrap();
+    let (size, weights) = (pull.size, weights(&mesh.positions));
+    Bound { mesh, weights, cage, pull, size }
+}
+
+/// The humanoid, bound once.
+fn humanoid() -> &'static Bound {
+    static BOUND: OnceLock<Bound> = OnceLock::new();
+    BOUND.get_or_init(|| bound("humanoid"))
+}
+
+impl Bound {
+    fn rest(&self) -> Vec<DVec3> {
+        self.cage.positions().iter().copied().map(Vec3::as_dvec3).collect()
+    }
+
+    /// The vertex of the model that is farthest along a direction.
+    fn farthest(&self, way: Vec3) -> Handle {
+        let all = self.mesh.positions.iter().enumerate();
+        Handle::Vertex(all.max_by(|a, b| a.1.dot(way).total_cmp(&b.1.dot(way))).unwrap().0 as u32)
+    }
+
+    fn hand(&self) -> Handle {
+        self.farthest(Vec3::X)
+    }
+
+    fn drag(&self, start: &[DVec3], grabs: &[Handle], pins: &[Handle], reach: Reach) -> Drag {
+        let options = DragOptions { reach, ..DragOptions::default() };
+        self.try_drag(start, grabs, pins, options).unwrap()
+    }
+
+    fn grip(&self, handle: Handle) -> Result<Grip, PullError> {
+        Grip::new(handle, &self.pull, &self.mesh.triangles, &self.weights)
+    }
+
+    fn try_drag(
+        &self,
+        start: &[DVec3],
+        grabs: &[Handle],
+        pins: &[Handle],
+        options: DragOptions<'_>,
+    ) -> Result<Drag, PullError> {
+        let [grabs, pins] =
+            [grabs, pins].map(|list| list.iter().map(|&h| self.grip(h)).collect::<Result<Vec<_>, _>>());
+        Drag::new(&self.pull, start, &grabs?, &pins?, options)
+    }
+
+    /// How a handle moves with the cage.
+    fn moved(&self, handle: Handle, cage: &[DVec3]) -> DVec3 {
+        let row = self.grip(handle).unwrap().row;
+        row.iter().zip(cage.iter().zip(self.rest())).map(|(w, (c, r))| *w * (*c - r)).sum()
+    }
+
+    /// Largest distance between two cages, over the model's size.
+    fn apart(&self, a: &[DVec3], b: &[DVec3]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max) / self.size
+    }
+}
+
+/// Frames of a drag in a straight line, then until it has settled.
+fn pulled(drag: &mut Drag, by: DVec3, frames: u32) -> Vec<DVec3> {
+    let from: Vec<DVec3> = drag.start().to_vec();
+    let to = |share: f64| from.iter().map(|f| *f + share * by).collect::<Vec<_>>();
+    (1..=frames).for_each(|k| drag.frame(&to(f64::from(k) / f64::from(frames))));
+    for _ in 0..200 {
+        drag.frame(&to(1.0));
+        if drag.is_settled() {
+            break;
+        }
+    }
+    drag.cage()
+}
+
+#[test]
+fn a_pull_of_nothing_moves_nothing() {
+    let b = humanoid();
+    let bent: Vec<DVec3> = b
+        .rest()
+        .iter()
+        .map(|p| *p + 0.05 * b.size * DVec3::new((9.0 * p.y).sin(), 0.0, (7.0 * p.x).cos()))
+        .collect();
+    for start in [b.rest(), bent] {
+        let mut drag = b.drag(&start, &[b.hand()], &[], Reach::Automatic);
+        let at = drag.start().to_vec();
+        drag.frame(&at);
+        assert!(b.apart(&drag.cage(), &start) < 1e-12, "{}", b.apart(&drag.cage(), &start));
+    }
+}
+
+#[test]
+fn a_grab_is_where_it_is_pulled_to_and_far_parts_stay() {
+    let b = humanoid();
+    let foot = b.farthest(Vec3::new(-0.3, -1.0, 0.0));
+    let by = b.size * DVec3::new(-0.1, 0.15, 0.05);
+    let mut drag = b.drag(&b.rest(), &[b.hand()], &[], Reach::Automatic);
+    let cage = pulled(&mut drag, by, 30);
+    assert!(drag.error() < 5e-4, "{}", drag.error());
+    let moved = b.moved(foot, &cage);
+    assert!(moved.length() < 5e-3 * by.length(), "{moved}");
+}
+
+#[test]
+fn the_answer_turns_with_the_question() {
+    let b = humanoid();
+    let by = b.size * DVec3::new(-0.05, 0.1, 0.1);
+    let turn = DMat3::from_rotation_z(0.7) * DMat3::from_rotation_x(0.4);
+    let placed = |p: &DVec3| turn * *p + DVec3::new(1.0, 2.0, 3.0);
+    let straight = pulled(&mut b.drag(&b.rest(), &[b.hand()], &[], Reach::Automatic), by, 10);
+    let start: Vec<DVec3> = b.rest().iter().map(placed).collect();
+    let turned = pulled(&mut b.drag(&start, &[b.hand()], &[], Reach::Automatic), turn * by, 10);
+    let expected: Vec<DVec3> = straight.iter().map(placed).collect();
+    assert!(b.apart(&turned, &expected) < 1e-4, "{}", b.apart(&turned, &expected));
+}
+
+#[test]
+fn grabs_that_move_rigidly_move_all_rigidly() {
+    let b = humanoid();
+    let grabs = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y].map(|way| b.farthest(way));
+    let mut drag = b.drag(&b.rest(), &grabs, &[], Reach::Whole);
+    let turn = DMat3::from_rotation_y(0.5);
+    let to: Vec<DVec3> = drag.start().iter().map(|p| turn * *p).collect();
+    (0..300).for_each(|_| drag.frame(&to));
+    let expected: Vec<DVec3> = b.rest().iter().map(|p| turn * *p).collect();
+    assert!(b.apart(&drag.cage(), &expected) < 1e-3, "{}", b.apart(&drag.cage(), &expected));
+}
+
+/// Half a turn in one frame or in a few: on straight ways all grabs meet in the middle, and the model collapses.
+#[test]
+fn grabs_that_turn_half_round_turn_all() {
+    let b = humanoid();
+    let grabs = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y].map(|way| b.farthest(way));
+    for (turn, frames) in
+        [(DMat3::from_rotation_y(PI), 1), (DMat3::from_rotation_z(PI), 4), (DMat3::from_rotation_x(3.0), 1)]
+    {
+        let mut drag = b.drag(&b.rest(), &grabs, &[], Reach::Whole);
+        let to: Vec<DVec3> = drag.start().iter().map(|p| turn * *p).collect();
+        drag.go(&to, frames);
+        drag.settle(&to);
+        let expected: Vec<DVec3> = b.rest().iter().map(|p| turn * *p).collect();
+        assert!(b.apart(&drag.cage(), &expected) < 1e-2, "{}", b.apart(&drag.cage(), &expected));
+    }
+}
+
+#[test]
+fn a_grab_of_the_whole_model_without_pins_moves_it_as_it_is() {
+    let b = humanoid();
+    let mut drag = b.drag(&b.rest(), &[b.hand()], &[], Reach::Whole);
+    let by = b.size * DVec3::new(0.3, 0.2, 0.1);
+    let cage = pulled(&mut drag, by, 3);
+    let expected: Vec<DVec3> = b.rest().iter().map(|p| *p + by).collect();
+    // Rows of f32 sum to 1 to seven digits.
+    assert!(b.apart(&cage, &expected) < 1e-6);
+}
+
+#[test]
+fn the_way_to_a_target_does_not_matter() {
+    let b = humanoid();
+    let by = b.size * DVec3::new(-0.05, 0.1, 0.05);
+    let drag = || b.drag(&b.rest(), &[b.hand()], &[], Reach::Automatic);
+    let slowly = pulled(&mut drag(), by, 30);
+    let at_once = b.apart(&pulled(&mut drag(), by, 1), &slowly);
+    assert!(at_once < 1e-3, "{at_once}");
+    let mut away = drag();
+    pulled(&mut away, 50.0 * by, 5);
+    pulled(&mut away, DVec3::ZERO, 5);
+    // Where a page asks for no more frames, 2e-5 a step are still to go.
+    let back = pulled(&mut away, DVec3::ZERO, 30);
+    assert!(b.apart(&back, &b.rest()) < 1e-4, "{}", b.apart(&back, &b.rest()));
+}
+
+#[test]
+fn pins_hold() {
+    let b = humanoid();
+    let other = b.farthest(Vec3::NEG_X);
+    let by = b.size * DVec3::new(0.0, 0.2, 0.1);
+    let moved = |pins: &[Handle]| {
+        let mut drag = b.drag(&b.rest(), &[b.hand()], pins, Reach::Whole);
+        let cage = pulled(&mut drag, by, 10);
+        b.moved(other, &cage).length() / b.size
+    };
+    let (free, pinned) = (moved(&[]), moved(&[other]));
+    assert!(free > 0.1 && pinned < 1e-3, "{free} {pinned}");
+}
+
+#[test]
+fn neighbours_of_a_cage_vertex_come_along() {
+    let b = humanoid();
+    let hand = b.grip(b.hand()).unwrap().row;
+    let vertex = (0..hand.len()).max_by(|&i, &j| hand[i].total_cmp(&hand[j])).unwrap() as u32;
+    let by = b.size * DVec3::new(0.0, 0.1, 0.0);
+    let mut drag = b.drag(&b.rest(), &[Handle::Cage(vertex)], &[], Reach::Automatic);
+    let cage = pulled(&mut drag, by, 10);
+    let mut neighbours: Vec<u32> = b
+        .cage
+        .triangles()
+        .iter()
+        .filter(|t| t.contains(&vertex))
+        .flatten()
+        .copied()
+        .filter(|&i| i != vertex)
+        .collect();
+    neighbours.sort_unstable();
+    neighbours.dedup();
+    let along = |i: u32| (cage[i as usize] - b.rest()[i as usize]).dot(by) / by.length_squared();
+    let mean = neighbours.iter().map(|&i| along(i)).sum::<f64>() / neighbours.len() as f64;
+    assert!(mean > 0.2 && (along(vertex) - 1.0).abs() < 1e-2, "{mean} {}", along(vertex));
+}
+
+#[test]
+fn symmetric_pulls_are_symmetric() {
+    let b = humanoid();
+    let symmetry = Symmetry::new(b.cage.positions());
+    assert!(symmetry.is_complete());
+    let grabs = [b.hand(), b.farthest(Vec3::NEG_X)];
+    let options = DragOptions { symmetry: Some(&symmetry), ..DragOptions::default() };
+    let mut drag = b.try_drag(&b.rest(), &grabs, &[], options).unwrap();
+    let (mirror, by) = (DVec3::new(-1.0, 1.0, 1.0), b.size * DVec3::new(-0.05, 0.1, 0.05));
+    let to = [drag.start()[0] + by, drag.start()[1] + mirror * by];
+    (0..30).for_each(|_| drag.frame(&to));
+    let cage = drag.cage();
+    for i in 0..cage.len() {
+        let image = cage[symmetry.partner(i as u32).unwrap() as usize];
+        let expected = DVec3::new(2.0 * f64::from(symmetry.plane()) - image.x, image.y, image.z);
+        assert!(cage[i].distance(expected) < 1e-6 * b.size, "{i}");
+    }
+}
+
+/// Targets that cannot all be had end in a finite pose near where they were.
+#[test]
+fn jobs_that_ask_for_too_much_stay_finite() {
+    let b = humanoid();
+    let hand = b.hand();
+    let near = Handle::Triangle(0, [0.2, 0.3, 0.5]);
+    let Handle::Vertex(v) = hand else { unreachable!() };
+    let all: Vec<Handle> = (0..MAX_HANDLES as u32 - 1).map(Handle::Vertex).collect();
+    let cases: [(&[Handle], &[Handle], f64); 5] = [
+        (&[hand, hand], &[], 0.2),
+        (&[near, Handle::Triangle(0, [0.3, 0.2, 0.5])], &[], 0.2),
+        (&[hand], &[Handle::Vertex(v)], 0.2),
+        (&[hand], &all, 0.3),
+        (&[hand], &[], 1e6),
+    ];
+    for (grabs, pins, far) in cases {
+        let mut drag = b.drag(&b.rest(), grabs, pins, Reach::Automatic);
+        let ways = [DVec3::Y, DVec3::NEG_Y];
+        let to: Vec<DVec3> = drag.start().iter().zip(ways).map(|(p, way)| *p + far * b.size * way).collect();
+        (0..60).for_each(|_| drag.frame(&to));
+        let moved = b.apart(&drag.cage(), &b.rest());
+        assert!(moved < 10.0 * far.max(1.0), "{grabs:?}: {moved}");
+        let before = drag.cage();
+        drag.frame(&vec![DVec3::NAN; grabs.len()]);
+        assert_eq!(drag.cage(), before);
+    }
+}
+
+#[test]
+fn gradients_are_exact_for_linear_functions_and_only_shifts_are_free() {
+    let b = humanoid();
+    let n = b.pull.n_cage();
+    let references = b.pull.references(&b.pull.cage);
+    for (s, rows) in references[..3 * b.pull.n_samples()].as_chunks::<3>().0.iter().enumerate() {
+        let expected = if b.pull.probes.shares[s] > 0.0 { DMat3::IDENTITY } else { DMat3::ZERO };
+        assert!(
+            DMat3::from_cols_slice(&rows.map(|r| r.to_array()).concat()).abs_diff_eq(expected, 1e-9),
+            "{s}"
+        );
+    }
+    let values = b.pull.matrix(0.0).symmetric_eigenvalues();
+    let mean = values.mean();
+    assert_eq!(values.iter().filter(|v| **v < 1e-6 * mean).count(), 1, "of {n}");
+}
+
+#[test]
+fn what_is_no_handle_is_an_error_with_its_number() {
+    let b = humanoid();
+    let last = b.mesh.positions.len() - 1;
+    let start = b.rest();
+    let made = |grabs: &[Handle], pins: &[Handle], options| {
+        b.try_drag(&start, grabs, pins, options).err().map(|e| e.to_string())
+    };
+    let plain = DragOptions::default();
+    let missing = made(&[Handle::Vertex(1_000_000)], &[], plain).unwrap();
+    assert!(missing.contains("1000000") && missing.contains(&last.to_string()), "{missing}");
+    assert!(made(&[Handle::Triangle(9_999_999, [1.0, 0.0, 0.0])], &[], plain).unwrap().contains("triangle"));
+    assert!(made(&[Handle::Triangle(0, [1.0, 1.0, f64::NAN])], &[], plain).unwrap().contains("NaN"));
+    assert!(made(&[Handle::Cage(5000)], &[], plain).unwrap().contains("5000"));
+    assert_eq!(made(&[], &[], plain), Some(PullError::NoGrab.to_string()));
+    let pins: Vec<Handle> = (0..MAX_HANDLES as u32).map(Handle::Vertex).collect();
+    assert!(made(&[b.hand()], &pins, plain).unwrap().contains("201"));
+    assert!(made(&[b.hand()], &[], DragOptions { relax: 2.0, ..plain }).unwrap().contains('2'));
+    let far = DragOptions { reach: Reach::Of(f64::NAN), ..plain };
+    assert!(made(&[b.hand()], &[], far).unwrap().contains("NaN"));
+}
+
+#[test]
+fn a_model_of_one_triangle_or_of_one_point_is_pulled() {
+    let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    let cage = Cage::new(&subdivided_box(bounds, 0.0, [1; 3])).unwrap();
+    let options = BindOptions { grid: 16, ..BindOptions::default() };
+    for (positions, triangles) in [
+        (vec![Vec3::ZERO, 0.3 * Vec3::X, 0.3 * Vec3::Y], vec![[0, 1, 2]]),
+        (vec![Vec3::ZERO], vec![]),
+        (vec![Vec3::ZERO, 0.5 * Vec3::X], vec![[0, 1, 1]]),
+    ] {
+        let mesh = TriMesh { positions, triangles };
+        let weights = |points: &[Vec3]| {
+            let bound = bind(points, &cage, &options, &Silent).unwrap();
+            bound.frames.folded(&bound.weights)
+        };
+        let probes = Probes::new(&mesh, &cage).unwrap();
+        let of_probes = weights(probes.points());
+        let pull = Pull::new(&mesh, &cage, probes, &of_probes).unwrap();
+        let weights = weights(&mesh.positions);
+        let grip = Grip::new(Handle::Vertex(0), &pull, &mesh.triangles, &weights).unwrap();
+        let start: Vec<DVec3> = cage.positions().iter().copied().map(Vec3::as_dvec3).collect();
+        let mut drag = Drag::new(&pull, &start, &[grip], &[], DragOptions::default()).unwrap();
+        // Eight corners cannot bend a triangle: what stays and what is pulled share the difference.
+        (0..30).for_each(|_| drag.frame(&[DVec3::new(0.1, 0.0, 0.0)]));
+        assert!(drag.cage().iter().all(|p| p.is_finite()) && drag.error() < 0.1, "{}", drag.error());
+    }
+    let none = Probes::new(&TriMesh::default(), &cage).unwrap_err();
+    assert_eq!(none, PullError::Empty);
+}
