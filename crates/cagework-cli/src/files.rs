@@ -17,7 +17,7 @@ use crate::error::CliError;
 pub(crate) use crate::error::shown_path;
 
 use outputs::Named;
-pub(crate) use outputs::{check_outputs, refuse_files_read, write};
+pub(crate) use outputs::{check_outputs, refuse_files_named, refuse_files_read, write};
 pub(crate) use whole::abandon;
 
 /// Largest file that is read, bytes: above it the model's arrays would not fit a 32-bit index any more.

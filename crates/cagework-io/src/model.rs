@@ -106,6 +106,21 @@ impl Model {
         }
     }
 
+    /// Names of the files that [`Self::read`] asks `resolve` for. Only materials of an OBJ are asked for here, with their textures;
+    /// a file that cannot be read names none.
+    pub fn named_files(
+        name: &str,
+        bytes: &[u8],
+        resolve: &mut Resolve<'_>,
+        memory_limit: u64,
+    ) -> Vec<String> {
+        match ModelFormat::of_file(name, bytes) {
+            Ok(ModelFormat::Gltf) => gltf::named_files(bytes, memory_limit),
+            Ok(ModelFormat::Obj) => obj::named_files(bytes, resolve, memory_limit),
+            _ => Vec::new(),
+        }
+    }
+
     /// Reads an OBJ, glTF, GLB, PLY, STL or OFF file; the content decides which, `name` helps with the error if it is none of them.
     /// A model far from the world's origin has its positions from an [`Self::origin`] near it, without loss.
     ///

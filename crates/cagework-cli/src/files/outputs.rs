@@ -8,9 +8,10 @@ use std::time::SystemTime;
 
 use cagework_core::bind::BindError;
 use cagework_core::progress::Cancelled;
+use cagework_io::Model;
 
 use super::whole::replace;
-use super::{READ, folder_of, reason};
+use super::{READ, folder_of, read, read_beside, reason};
 use crate::error::{CliError, shown_path};
 use crate::signals;
 
@@ -60,6 +61,45 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
 pub(crate) fn refuse_files_read(outputs: &[&Path]) -> Result<(), CliError> {
     let read = READ.lock().unwrap_or_else(PoisonError::into_inner);
     outputs.iter().try_for_each(|output| refuse_inputs(&Named::new(output), &read))
+}
+
+/// Checks, before anything is written, that no output is a file that one of several models names: it may be read later.
+///
+/// # Errors
+/// Names the output and the model.
+pub(crate) fn refuse_files_named(
+    models: &[&Path],
+    outputs: &[&Path],
+    memory_limit: u64,
+) -> Result<(), CliError> {
+    let outputs: Vec<Named> = outputs.iter().map(|path| Named::new(path)).collect();
+    for model in models {
+        // What a model names is in its folder or below it.
+        let folder = fs::canonicalize(folder_of(model)).unwrap_or_default();
+        let is_below =
+            |output: &&Named| output.place.as_ref().is_some_and(|place| place.starts_with(&folder));
+        let beside: Vec<&Named> = outputs.iter().filter(is_below).collect();
+        if beside.is_empty() {
+            continue;
+        }
+        // A model that cannot be read is an error of its own, in its turn.
+        let Ok(bytes) = read(model) else { continue };
+        let mut resolve = |name: &str| read_beside(model, name);
+        for name in Model::named_files(&model.to_string_lossy(), &bytes, &mut resolve, memory_limit) {
+            let named = Named::new(&folder_of(model).join(name));
+            if let Some(output) = beside.iter().find(|output| output.is(&named)) {
+                return Err(CliError::Mismatch {
+                    message: format!(
+                        "{}: would be overwritten, but {} names it",
+                        shown_path(&output.path),
+                        shown_path(model)
+                    ),
+                    hint: "choose another folder for the output",
+                });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Writes a whole file, or leaves the older one as it was. A symbolic link stays, and the file that it leads to is

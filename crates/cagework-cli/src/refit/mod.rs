@@ -20,7 +20,9 @@ use crate::bind::{bind_positions, check_memory};
 use crate::controls::with_inner;
 use crate::deform::{Posed, Poses, pose_name};
 use crate::error::CliError;
-use crate::files::{check_outputs, is_newer, json, make_folder, print, read, shown_path, write};
+use crate::files::{
+    check_outputs, is_newer, json, make_folder, print, read, refuse_files_named, shown_path, write,
+};
 use crate::load::{load_cage_file, load_model};
 use crate::progress::Bar;
 use crate::rig;
@@ -81,9 +83,11 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
         [Some(&args.cage), Some(&args.pose), args.pose_controls.as_ref(), args.controls.controls.as_ref()];
     let shared: Vec<&Path> = shared.into_iter().flatten().map(AsRef::as_ref).collect();
     let outputs: Vec<&Path> = jobs.iter().map(|job| job.output.path.as_path()).collect();
-    let models = jobs.iter().map(|job| job.model.as_path());
-    let inputs: Vec<&Path> = shared.iter().copied().chain(models).chain(args.manifest.as_deref()).collect();
+    let models: Vec<&Path> = jobs.iter().map(|job| job.model.as_path()).collect();
+    let named = shared.iter().chain(&models).copied();
+    let inputs: Vec<&Path> = named.clone().chain(args.manifest.as_deref()).collect();
     check_outputs(&outputs, &inputs)?;
+    refuse_files_named(&named.collect::<Vec<_>>(), &outputs, args.read.memory.bytes())?;
 
     // From here on Ctrl-C ends the work after what is being written.
     let _asking = Asking::start();

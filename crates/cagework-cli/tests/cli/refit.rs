@@ -153,6 +153,47 @@ fn outputs_that_meet_are_refused_before_anything_starts() {
     assert_eq!(sandbox.read("b.obj"), sphere_obj(0.5).as_bytes());
 }
 
+/// The first model was written over a buffer or material of the second one, which was read after that.
+#[test]
+fn outputs_over_files_that_later_models_name_are_refused_before_anything_is_written() {
+    let sandbox = spheres();
+    std::fs::create_dir_all(sandbox.path("kit/out")).unwrap();
+    let named = "newmtl m\nKd 1 0 0\nmap_Kd out/a.obj\n";
+    let scene = |uri: &str| {
+        format!(r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":4,"uri":"{uri}"}}]}}"#)
+    };
+    let obj = |library: &str| format!("mtllib {library}\n{}", sphere_obj(0.3));
+    std::os::unix::fs::symlink("out/a.obj", sandbox.path("kit/link.bin")).unwrap();
+    for (model, content) in [
+        ("kit/b.obj", obj("out/a.obj")),
+        ("kit/b.obj", obj(".//x/../out/./a.obj")),
+        ("kit/b.obj", obj("textured.mtl")),
+        ("kit/b.gltf", scene("out/%61.obj")),
+        ("kit/b.gltf", scene("link.bin")),
+    ] {
+        std::fs::create_dir_all(sandbox.path("kit/x")).unwrap();
+        sandbox.write("kit/textured.mtl", named);
+        sandbox.write("kit/out/a.obj", named);
+        sandbox.write(model, &content);
+        let refit = format!("{} a.obj {model}", REFIT.replace("-o out", "-o kit/out"));
+        sandbox.run(&refit).code(1).stdout("").stderr(contains(format!(
+            "error: kit/out/a.obj: would be overwritten, but {model} names it\nhint: "
+        )));
+        assert_eq!(sandbox.read("kit/out/a.obj"), named.as_bytes(), "{content}");
+        std::fs::remove_file(sandbox.path(model)).unwrap();
+    }
+    // Through a link at the output's name, too; a file of that name in another folder is none of this.
+    sandbox.write("kit/b.obj", obj("textured.mtl"));
+    sandbox.write("kit/textured.mtl", "newmtl m\nmap_Kd a.obj\n");
+    sandbox.run(&format!("{REFIT} a.obj kit/b.obj")).success();
+    std::fs::remove_file(sandbox.path("out/a.obj")).unwrap();
+    std::os::unix::fs::symlink("../kit/textured.mtl", sandbox.path("out/a.obj")).unwrap();
+    sandbox
+        .run(&format!("{REFIT} a.obj kit/b.obj"))
+        .code(1)
+        .stderr(contains("out/a.obj: would be overwritten, but kit/b.obj names it"));
+}
+
 #[test]
 fn resume_leaves_what_is_newer_than_its_inputs() {
     let sandbox = spheres();

@@ -91,6 +91,16 @@ pub(crate) fn load(
     Ok(Loaded { json, text, is_decoded, root, buffers, images, bytes: held })
 }
 
+/// Names of the buffers and images outside the file, none if it cannot be read.
+pub(crate) fn named_files(bytes: &[u8], memory_limit: u64) -> Vec<String> {
+    let Ok((json, _)) = split(bytes) else { return Vec::new() };
+    let fits = MemoryError::check(bytes_of_json(&json) + bytes.len() as u64, memory_limit).is_ok();
+    let json = if fits { parsed(&json).unwrap_or_default() } else { Value::Null };
+    let items = ["buffers", "images"].into_iter().filter_map(|list| json[list].as_array()).flatten();
+    let uris = items.filter_map(|item| item["uri"].as_str()).filter(|uri| !is_data(uri));
+    uris.map(|uri| decoded(uri).into_owned()).collect()
+}
+
 /// Takes out attributes that only pictures need and whose accessor is not there. Accessors that are written later would take
 /// its number.
 fn drop_missing(json: &mut Value, notices: &mut Vec<String>) {
@@ -409,12 +419,16 @@ pub(super) fn view_bytes<'a>(root: &Root, buffers: &'a [Arc<Vec<u8>>], view: u64
     buffers.get(view.buffer.value())?.get(start..end)
 }
 
+fn is_data(uri: &str) -> bool {
+    uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:"))
+}
+
 /// The bytes of a `data:` URI; nothing for any other URI.
 ///
 /// # Errors
 /// That it cannot be decoded.
 fn data_of(uri: &str) -> Option<Result<Arc<Vec<u8>>, Absent>> {
-    if !uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
+    if !is_data(uri) {
         return None;
     }
     // Of base64; growing by doubling would take as much again.

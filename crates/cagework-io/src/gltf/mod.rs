@@ -40,7 +40,7 @@ use scene::{Instance, Worlds};
 pub(crate) use animate::Played;
 pub(crate) use build::build_from_obj;
 pub use build::write_mesh_glb;
-pub(crate) use container::{glb_of, glb_parts};
+pub(crate) use container::{glb_of, glb_parts, named_files};
 pub(crate) use export::write_obj;
 pub(crate) use look::look;
 pub use pack::PROJECT_EXTENSION;

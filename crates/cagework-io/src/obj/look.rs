@@ -1,6 +1,6 @@
 //! Materials of an OBJ: its `.mtl` files, as far as colours go.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use super::lex::{lines, tokens};
@@ -9,7 +9,7 @@ use glam::Vec3;
 use super::{NONE, ObjDocument};
 use crate::look::{Look, LookAlpha, LookGroup, LookImage, LookVertex, linear_from_srgb};
 use crate::normals::Shading;
-use crate::siblings::{Image, Siblings};
+use crate::siblings::{Image, Resolve, Siblings};
 
 /// One material of a `.mtl` file.
 #[derive(Clone, Debug)]
@@ -66,6 +66,29 @@ pub(crate) fn read_materials(
             _ => {}
         }
     }
+}
+
+/// Names of the material files of an OBJ and of their textures.
+pub(crate) fn named_files(bytes: &[u8], resolve: &mut Resolve<'_>, memory_limit: u64) -> Vec<String> {
+    let (mut names, mut libraries) = (Vec::new(), HashSet::new());
+    let mut note = |name: &str| {
+        names.push(name.to_owned());
+        resolve(name)
+    };
+    let mut siblings = Siblings::new(&mut note, memory_limit);
+    for line in lines(bytes) {
+        let keyword = tokens(bytes, line.range.clone()).next();
+        if keyword.is_none_or(|keyword| &bytes[keyword] != b"mtllib") {
+            continue;
+        }
+        let name = rest_of(&bytes[line.range], b"mtllib").replace('\\', "/");
+        if libraries.insert(name.clone())
+            && let Ok(file) = siblings.file(&name)
+        {
+            read_materials(&file, &mut siblings, &mut Vec::new(), &mut HashMap::new());
+        }
+    }
+    names
 }
 
 /// What stands after the keyword: names may have blanks.

@@ -16,7 +16,7 @@ mod write;
 pub use error::ObjError;
 pub use inner::{read_inner_controls, write_inner_controls};
 pub(crate) use lex::{Line, lines, shown as shown_token, tokens};
-pub(crate) use look::{look, rest_of};
+pub(crate) use look::{look, named_files, rest_of};
 pub(crate) use read::{Corner, NONE, ObjDocument, positions_near, read};
 pub(crate) use select::Group;
 pub use write::write_cage_obj;
