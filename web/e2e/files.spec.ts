@@ -68,7 +68,7 @@ test("a model with Z up is turned with its cage and pose, and files keep their a
   await drag(page, 30, -20);
   const lying = await cagePositions(page);
   await page.getByRole("button", { name: "Model", exact: false }).first().click();
-  const choice = page.getByRole("group", { name: "Up in the file" });
+  const choice = page.getByRole("group", { name: "Up axis" });
   await choice.getByRole("radio", { name: "Z" }).click();
   // By -90 degrees about x. A kept pose has 16 bits for the longest way of a vertex.
   const TOLERANCE = 1e-3;

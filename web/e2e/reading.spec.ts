@@ -55,7 +55,7 @@ test("a file that breaks the worker that reads it costs a message, as a model an
     ]);
     const alert = page.locator("#toasts [role=alert]");
     await expect(alert).toContainText("This cage cannot be used");
-    await expect(alert).toContainText("Reading it broke off");
+    await expect(alert).toContainText("Reading this file failed unexpectedly");
     await alert.getByRole("button", { name: /close/i }).click();
     expect(await cagePositions(page)).toEqual(before);
   });
@@ -63,7 +63,7 @@ test("a file that breaks the worker that reads it costs a message, as a model an
     await drop(page, [hostile]);
     const alert = page.locator("#toasts [role=alert]");
     await expect(alert).toContainText("hostile.glb could not be opened");
-    await expect(alert).toContainText("Reading it broke off");
+    await expect(alert).toContainText("Reading this file failed unexpectedly");
     await alert.getByRole("button", { name: /close/i }).click();
   }
   await isAlive(page, before);

@@ -32,7 +32,7 @@ const FAULTS: readonly Fault[] = [
   {
     name: "a face that points inwards",
     cage: { ...cube, faces: cube.faces.map((face, k) => (k === 2 ? [...face].reverse() : face)) },
-    says: /wrong way/,
+    says: /inwards/,
     button: /Turn them outward/,
     vertices: 8,
   },

@@ -115,7 +115,7 @@ test("each stop shows what it says", async ({ page }) => {
     await arrived(page, 1);
     const nCage = (await cagePositions(page)).length / 3;
     await expect(card(page)).toContainText(
-      `${n.toLocaleString("en")} points is a mix of the cage's ${nCage}`,
+      `the cage's ${nCage} vertices and the rat's ${n.toLocaleString("en")} points follow`,
     );
     expect(largestMove(rest, await modelPositions(page)), "at rest it is where it was").toBeLessThan(1e-5);
   });

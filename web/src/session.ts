@@ -21,7 +21,15 @@ declare global {
 const LONGEST_EMPTY = 3000;
 
 /** What a file of the page's own has: nothing that anybody would have to look for. */
-const OWN = { siblings: new Map(), up: undefined, textures: [], cage: undefined, notices: [], took: 0 };
+const OWN = {
+  siblings: new Map(),
+  up: undefined,
+  textures: [],
+  cage: undefined,
+  notices: [],
+  took: 0,
+  vertices: 0,
+};
 
 /** Opens the page: see `openOn`. `fresh`: whether the first sample is what will be opened first. */
 export function openSession(canvases: Canvases, fresh: Promise<boolean>): Promise<Session> {

@@ -52,7 +52,7 @@ it("many files share a worker until it breaks, and it ends with them", async () 
   expect(opened[0]?.closed).toBe(1);
   const alone = read();
   opened[1]?.fail(named("Worker", "unreachable"));
-  await expect(alone.done).rejects.toThrow("reading it broke off");
+  await expect(alone.done).rejects.toThrow("reading this file failed unexpectedly");
 });
 
 it("Cancel and another file end what is being read", async () => {
@@ -71,7 +71,7 @@ it("a worker that broke is a sentence, an error of the file stays what it is", a
   const apart = createApart(open);
   const broken = apart("read", { files: [file("a.obj")], up: undefined });
   opened[0]?.fail(named("Worker", "unreachable"));
-  await expect(broken.done).rejects.toThrow("reading it broke off");
+  await expect(broken.done).rejects.toThrow("reading this file failed unexpectedly");
   const bad = apart("read", { files: [file("b.obj")], up: undefined });
   opened[1]?.fail(named("Format", "not a GLB"));
   await expect(bad.done).rejects.toMatchObject({ name: "Format", message: "not a GLB" });

@@ -38,7 +38,11 @@ fn damaged_headers_are_errors() {
     assert!(fault(&with(0, 0)).contains("not a GLB"));
     assert!(fault(&with(4, 1)).contains("version 1"));
     assert!(fault(&with(8, 3)).contains("says it has 3 bytes"));
-    assert!(fault(&with(8, u32::MAX)).contains("cut off"));
+    let half = &plain_cube().glb()[..400];
+    let all = u32::from_le_bytes(half[8..12].try_into().expect("four bytes"));
+    assert!(fault(half).contains(&format!("it is cut off: 400 of {all} bytes are there. Export")));
+    assert!(fault(&with(8, 236_008)).contains(&format!("cut off: {} of 236 kB", good.len() / 1000)));
+    assert!(fault(&with(8, u32::MAX)).contains("cut off: 0 of 4294 MB"));
     assert!(fault(&with(12, u32::MAX)).contains("not a readable GLB"));
     assert!(fault(&with(16, 0)).contains("not a readable GLB"));
     assert!(fault(&with(12, u32::MAX)).contains("one of its chunks ends after the file"));
@@ -260,7 +264,7 @@ fn missing_files_are_named() {
     let expected = GltfError::MissingFile { uri: "far away.bin".into(), problem: "is not there".into() };
     assert_eq!(error, ReadError::Gltf { name: "x.gltf".into(), source: expected });
     let short = Model::read("x.gltf", &text, &mut |_| Some(Ok(vec![0; 10]))).unwrap_err().to_string();
-    assert!(short.contains("buffer 0 says it has 100 bytes but has 10"), "{short}");
+    assert!(short.contains("buffer 0 is cut off: 10 of 100 bytes are there"), "{short}");
 }
 
 /// Found by the fuzz test: lists that are there but empty.

@@ -219,7 +219,11 @@ fn skinned_mesh_stands_in_its_rest_pose() {
     let expected: Vec<Vec3> =
         cube().iter().map(|p| *p + Vec3::Z * if p.z > 0.5 { 2.0 } else { 0.0 }).collect();
     assert_cube(&model, &expected);
-    assert!(model.notices.iter().any(|n| n.contains("'body' is skinned")), "{:?}", model.notices);
+    assert!(
+        model.notices.iter().any(|n| n == "rigged model: opened in its rest pose"),
+        "{:?}",
+        model.notices
+    );
     assert_eq!((model.counts.skins, model.counts.animations, model.counts.morph_targets), (1, 2, 1));
 }
 

@@ -49,7 +49,7 @@ export async function attempt(
   }
 }
 
-/** A page that would not answer for longer asks before, ms. */
+/** A page that would freeze for longer asks before, ms. */
 const LONG_MS = 4000;
 
 /** While a file is read the page waits, says how far it is, and lets the user give it up. */
@@ -68,11 +68,11 @@ export async function waitFor<T extends object>(
   store.set({ busy: what, busyStep: "", cancelBusy });
   try {
     const read = await job.done;
-    const took = "took" in read ? (read as ReadFile).took : 0;
+    const { took = 0, vertices = 0 } = read as Partial<ReadFile>;
     if (took > LONG_MS) {
       await new Promise<void>((goOn, giveUp) => {
         cancelBusy = () => giveUp(Object.assign(new Error("cancelled"), { name: "Cancelled" }));
-        const busyStep = T.opening.noAnswer(took);
+        const busyStep = T.opening.freezes(vertices, took);
         store.set({ busyStep, goOn, cancelBusy });
       });
     }

@@ -131,7 +131,8 @@ export function createExports(ctx: Context, project: Project): Exports {
     async share() {
       const link = await project.link();
       if (!link) {
-        ctx.tell.say(T.exports.noLink, {
+        const { sample } = ctx.store.get();
+        ctx.tell.say(sample ? T.exports.noLinkChanged : T.exports.noLink, {
           label: T.exports.saveProject,
           run: () => void exports.save("project"),
         });

@@ -41,13 +41,13 @@ function readAll(
   models: readonly (readonly NamedFile[])[],
   hear: (progress: Reading) => void,
   another: "file" | "add",
-): Job<{ reads: Named[]; took: number }> {
+): Job<{ reads: Named[] } & ReadFile> {
   const release = ctx.session().shareReader();
   let isGivenUp = false;
   let cancelOne = () => {};
   const work = async () => {
     const reads: Named[] = [];
-    let took = 0;
+    let longest: ReadFile = { took: 0, vertices: 0 };
     for (const [k, own] of models.entries()) {
       if (isGivenUp) throw cancelled("cancelled");
       const name = own[0]?.name ?? "";
@@ -61,14 +61,14 @@ function readAll(
         const job = ctx.session().readFiles(own, hear);
         cancelOne = job.cancel;
         const read = await job.done;
-        took = Math.max(took, read.took);
+        if (read.took > longest.took) longest = read;
         reads.push({ name, read });
       } catch (error) {
         if (isCancelled(error)) throw error;
         report(ctx, T.failed.open(name), error, another);
       }
     }
-    return { reads, took };
+    return { reads, took: longest.took, vertices: longest.vertices };
   };
   return {
     done: work().finally(release),

@@ -130,8 +130,9 @@ export interface Sample {
 
 /** A file that a worker has read without harm. */
 export interface ReadFile {
-  /** How long the page will not answer while it is opened, about, ms. */
+  /** How long the page freezes while it is opened, about, ms. */
   readonly took: number;
+  readonly vertices: number;
 }
 
 export interface Opened {

@@ -229,7 +229,7 @@ function Busy({ app }: { app: App }) {
       <p class="hint">{busyStep}</p>
       <div class="row">
         {cancelBusy && <Button label={T.cancel} onClick={cancelBusy} icon="stop" kind="small" />}
-        {goOn && <Button label={T.opening.allTheSame} onClick={goOn} kind="small primary" />}
+        {goOn && <Button label={T.opening.anyway} onClick={goOn} kind="small primary" />}
       </div>
     </div>
   );

@@ -120,10 +120,10 @@ it("who would wait for seconds is asked, and may give it up", async () => {
   const { files, asked, store, problems } = page();
   const opened = files.openFiles([file("large.glb")]);
   await settled();
-  asked[0]?.resolve({ took: 9000 });
+  asked[0]?.resolve({ took: 5400, vertices: 631_000 });
   await settled();
   expect([store.get().busyStep, store.get().goOn]).toEqual([
-    "The page will not answer for 9 sec",
+    "Large model (631,000 vertices): the page will freeze for about 5 seconds.",
     expect.any(Function),
   ]);
   store.get().cancelBusy?.();

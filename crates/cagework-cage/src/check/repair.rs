@@ -15,6 +15,7 @@ use cagework_core::controls::ControlError;
 use cagework_core::crossing::same_places;
 use cagework_core::fill;
 use cagework_core::mesh::PolygonMesh;
+use cagework_core::words::counted;
 
 /// A repair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -114,7 +115,7 @@ pub fn repair_smooth(
     if asked(Repair::Grow) {
         let moved = grow(&mut repaired.mesh, model.ok_or(RepairError::NoModel)?, smooth)?;
         if moved > 0 {
-            repaired.done.push(format!("Moved {moved} vertices outward."));
+            repaired.done.push(format!("Moved {} outward.", counted(moved, "vertex", "vertices")));
         }
     }
     Ok(repaired)
@@ -211,15 +212,15 @@ fn flip(repaired: &mut Repaired) {
     let mesh = &mut repaired.mesh;
     let sound = shape::sound_faces(mesh, &mut Vec::new());
     let edges = Edges::of(mesh, &sound);
-    let mut turned = 0;
+    let mut flipped = 0;
     for component in orient::components(mesh, &sound, &edges) {
         let faces = component.faces.iter().zip(&component.turn).filter(|(_, turn)| **turn);
         for (&f, _) in faces {
             mesh.faces[f as usize][1..].reverse();
-            turned += 1;
+            flipped += 1;
         }
     }
-    if turned > 0 {
-        repaired.done.push(format!("Turned {turned} faces outward."));
+    if flipped > 0 {
+        repaired.done.push(format!("Flipped {}.", counted(flipped, "face", "faces")));
     }
 }

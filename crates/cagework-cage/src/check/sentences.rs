@@ -67,8 +67,8 @@ pub(super) fn flipped(component: usize, n: usize, all: usize) -> String {
     if n == all {
         return format!("Component {component} is inside out: all its {all} faces point into the solid.");
     }
-    let faces = counted(n, "face points", "faces point");
-    format!("In component {component} {faces} of {all} the wrong way.")
+    let points = if n == 1 { "points" } else { "point" };
+    format!("In component {component}, {n} of {all} faces {points} inwards.")
 }
 
 /// Faces of a component cannot be turned consistently.

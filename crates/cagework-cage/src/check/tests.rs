@@ -95,8 +95,12 @@ fn turned_faces_are_found_by_component_and_turned_back() {
     let turned: Vec<_> = found.problems.iter().filter(|p| p.code == Code::Flipped).collect();
     assert_eq!(turned.len(), 2, "one for each component");
     assert_eq!(turned[0].places.faces, [2]);
+    assert_eq!(turned[0].message, "In component 0, 1 of 6 faces points inwards.");
     assert_eq!(turned[1].count, 6);
     assert_eq!(Cage::new(&mended(&mesh, &[Repair::Flip])).unwrap().notices(), []);
+    mesh = inner;
+    mesh.faces[2].reverse();
+    assert_eq!(repair(&mesh, &[Repair::Flip], None).unwrap().done, ["Flipped 1 face."]);
 }
 
 #[test]

@@ -192,12 +192,14 @@ impl fmt::Display for CageNotice {
                 counted(vertices, "vertex", "vertices")
             ),
             Self::Flipped { component, faces, of } if faces == of => {
-                write!(f, "Component {component} of the cage was inside out: all its {of} faces were turned.")
+                write!(
+                    f,
+                    "Component {component} of the cage was inside out: all its {of} faces were flipped."
+                )
             }
             Self::Flipped { component, faces, of } => write!(
                 f,
-                "In component {component} of the cage {} of {of} pointed the wrong way: they were turned.",
-                counted(faces, "face", "faces")
+                "In component {component} of the cage, {faces} of {of} faces pointed inwards: flipped."
             ),
             Self::Cavity { component } => {
                 write!(f, "Component {component} of the cage lies inside another one: it bounds a cavity.")

@@ -70,7 +70,7 @@ fn inside_out_cage_is_turned_with_a_notice() {
     assert_eq!(volume6(&cage), 18.0);
     assert_eq!(
         cage.notices()[0].to_string(),
-        "Component 0 of the cage was inside out: all its 8 faces were turned."
+        "Component 0 of the cage was inside out: all its 8 faces were flipped."
     );
 }
 

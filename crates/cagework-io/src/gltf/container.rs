@@ -155,11 +155,11 @@ fn split(bytes: &[u8]) -> Result<Chunks<'_>, GltfError> {
     }
     // The library subtracts the header's length without a check, and stumbles over bytes after the end.
     let length = length as usize;
-    if length < GLB_HEADER || length > bytes.len() {
-        return Err(fault(format!(
-            "it says it has {length} bytes but has {}: it is cut off or damaged",
-            bytes.len()
-        )));
+    if length < GLB_HEADER {
+        return Err(fault(format!("it says it has {length} bytes; the header alone has {GLB_HEADER}")));
+    }
+    if length > bytes.len() {
+        return Err(GltfError::CutOff { declared: length as u64, found: bytes.len() as u64 });
     }
     let glb = Glb::from_slice(&bytes[..length]).map_err(|e| {
         use ::gltf::binary::Error::{ChunkType, UnknownChunkType};

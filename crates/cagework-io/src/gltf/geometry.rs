@@ -9,10 +9,9 @@ use ::gltf::json::validation::Checked;
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
 use super::accessor::Source;
-use super::scene::{Instance, name_of};
+use super::scene::Instance;
 use super::{GltfDocument, GltfError, Slot, skin};
 use crate::origin::relative;
-use crate::shown::{MAX_NAME_CHARS, shown_start};
 
 pub(crate) struct Geometry {
     pub(crate) positions: Vec<Vec3>,
@@ -45,7 +44,7 @@ pub(crate) fn read(
 ) -> Result<Geometry, GltfError> {
     let mut geometry = Geometry { positions: Vec::new(), triangles: Vec::new(), slots: Vec::new() };
     let (mut skipped, mut morphed, mut ragged) = (0, 0, 0);
-    let (mut skinned, mut repeated) = (Vec::new(), Vec::new());
+    let (mut is_rigged, mut repeated) = (false, Vec::new());
     let mut loose: BTreeMap<u32, usize> = BTreeMap::new();
     for (number, instance) in document.instances.iter().enumerate() {
         let mesh = &document.root.meshes[instance.mesh as usize];
@@ -88,20 +87,15 @@ pub(crate) fn read(
                 triangles: first..geometry.triangles.len(),
             });
         }
-        if instance.skin.is_some() {
-            skinned.push(instance.node);
-        }
+        is_rigged |= instance.skin.is_some();
         if let Some(node) = instance.node
             && document.json["nodes"][node as usize]["extensions"].get("EXT_mesh_gpu_instancing").is_some()
         {
             repeated.push(node);
         }
     }
-    if let Some(first) = skinned.first() {
-        let name = first.map_or_else(String::new, |n| name_of(&document.json, "nodes", n, "node"));
-        let name = shown_start(&name, MAX_NAME_CHARS);
-        let others = others(skinned.len());
-        notices.push(format!("'{name}'{others} is skinned: bound in its rest pose"));
+    if is_rigged {
+        notices.push("rigged model: opened in its rest pose".to_owned());
     }
     for (skin, n) in loose {
         notices.push(format!(

@@ -49,12 +49,29 @@ pub(crate) use patch::{Pose, Rest, embed_images, patch};
 pub use rig::{Clip, JointPoint, Joints, Player, Posed, ReshapeOptions, ReshapeReport};
 pub(crate) use rig::{Named, Rig, clips, reshape};
 
+/// "30 of 236 kB", in the largest unit that tells the two apart.
+fn there(found: u64, declared: u64) -> String {
+    let (unit, name) = [(1_000_000, "MB"), (1000, "kB")]
+        .into_iter()
+        .find(|(unit, _)| declared / unit >= 10 && found / unit < declared / unit)
+        .unwrap_or((1, "bytes"));
+    format!("{} of {} {name}", found / unit, declared / unit)
+}
+
 /// Why a glTF file could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum GltfError {
     /// The binary container is damaged.
     #[error("not a readable GLB: {}", shown(.0))]
     Container(String),
+    /// The file is shorter than its header says.
+    #[error("it is cut off: {} are there. Export or download it again", there(*.found, *.declared))]
+    CutOff {
+        /// Bytes that its header says.
+        declared: u64,
+        /// Bytes it has.
+        found: u64,
+    },
     /// The JSON is damaged or not glTF 2.0.
     #[error("not readable as glTF 2.0: {}", shown(.0))]
     Json(String),
@@ -85,7 +102,7 @@ pub enum GltfError {
         problem: String,
     },
     /// A buffer has too few bytes.
-    #[error("buffer {buffer} says it has {declared} bytes but has {found}: the file is cut off")]
+    #[error("buffer {buffer} is cut off: {} are there. Export or download it again", there(*.found, *.declared))]
     Buffer {
         /// The buffer.
         buffer: usize,

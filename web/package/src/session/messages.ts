@@ -39,6 +39,8 @@ export interface ReadModel extends Bytes {
   readonly notices: readonly string[];
   /** What the module needed for it, ms: as long as the page will need. */
   readonly took: number;
+  /** Of its models. */
+  readonly vertices: number;
 }
 
 /** Weights as compressed sparse rows, and the columns of offsets. */

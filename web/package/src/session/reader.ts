@@ -39,12 +39,12 @@ export function createApart(open: () => Client): Apart {
       if (isGood && isShared && !idle) idle = client;
       else client.close();
     };
-    const what = "files" in input ? "reading it" : "looking at the cage";
+    const what = "files" in input ? "reading this file" : "checking the cage";
     const done = client.run(job, input, hear).done.catch((error: Error) => {
       if (error.name !== "Worker") throw error;
       throw named(
         "Worker",
-        `${what} broke off: it is damaged in a way that nobody foresaw, or needs more memory than this browser gives`,
+        `${what} failed unexpectedly: it may be damaged, or need more memory than this browser gives. Your work is unchanged. Please report it with the file if you can.`,
       );
     });
     const ended = done.then(

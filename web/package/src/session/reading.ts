@@ -32,7 +32,9 @@ export async function readModel(
   const notice = `this browser cannot decode ${many}: the material's plain colour is shown, exports keep the file`;
   say(tell, "check");
   const mesh = loaded.cage;
-  const cage = mesh && checked(pkg, mesh, flat(all.map(({ positions }) => positions)));
+  const positions = all.map((one) => one.positions);
+  const vertices = positions.reduce((sum, { length }) => sum + length / 3, 0);
+  const cage = mesh && checked(pkg, mesh, flat(positions));
   return {
     ...bytes,
     up,
@@ -40,6 +42,7 @@ export async function readModel(
     cage,
     notices: failed > 0 ? [notice] : [],
     took,
+    vertices,
   };
 }
 

@@ -13,7 +13,7 @@ export const clips = {
   time: "Time",
   seconds: (seconds: number) => `${seconds.toFixed(2)} s`,
   speed: "Speed",
-  loop: "Again and again",
+  loop: "Loop",
   targets: (n: number) => plural(n, "morph target"),
   follow: "Joints follow the cage",
   followSentence: "Off keeps the skeleton as it is, for clips and files that share it.",

@@ -3,7 +3,7 @@
 import { bytes, list, plural } from "../../format";
 
 export const exports = {
-  title: "Take it along",
+  title: "Export",
   sentence: "Files for Blender, Unity, Unreal, three.js, Python, and for this page.",
   items: {
     glb: ["Posed model", "GLB as you see it. Materials, textures and parts are those of your file."],
@@ -32,8 +32,8 @@ export const exports = {
   all: (n: number) => `All ${n}, each to its own file`,
   saved: (files: readonly string[], size: number) =>
     `${list(files)} ${files.length === 1 ? "is" : "are"} in your downloads (${bytes(size)}).`,
-  noLink:
-    "A link holds a sample in its own cage and pose: no files of yours, and not what keeps its shape or stays. Save a project file to pass this on.",
+  noLink: "Links work for samples only. Save a project to share your own model.",
+  noLinkChanged: "Links work for samples only in their own cage, where all parts follow it. Save a project to share this one.",
   saveProject: "Save the project",
   copied: "Link copied. Whoever opens it sees this sample in this pose, as you see it.",
   inAddress: "The link is in the address bar; copy it from there.",

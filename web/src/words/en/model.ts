@@ -1,6 +1,6 @@
 /** Step Model, and how a file is opened. */
 
-import { count, duration, endings, percent, plural } from "../../format";
+import { count, endings, percent, plural } from "../../format";
 
 export const model = {
   title: "Choose a model",
@@ -11,7 +11,7 @@ export const model = {
   openFolder: "Open a folder",
   kept: (n: number) => `Kept in this browser (${n})`,
   samples: "Samples",
-  up: "Up in the file",
+  up: "Up axis",
   upY: "As glTF prescribes",
   upZ: "Turn a model that lies on its back",
   licences: "Licences",
@@ -49,8 +49,9 @@ export const opening = {
     check: "Checking the cage",
   },
   far: (stage: string, fraction: number) => (fraction > 0 ? `${stage}, ${percent(fraction)}` : stage),
-  allTheSame: "Open it all the same",
-  noAnswer: (ms: number) => `The page will not answer for ${duration(ms)}`,
+  anyway: "Open anyway",
+  freezes: (vertices: number, ms: number) =>
+    `Large model (${plural(vertices, "vertex", "vertices")}): the page will freeze for about ${plural(Math.round(ms / 1000), "second")}.`,
   nothing: "Nothing to open",
   empty: "This file is empty",
   noContent: (name: string) => `${name} has no content. Export it again, or choose another file.`,

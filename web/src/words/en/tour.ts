@@ -32,7 +32,9 @@ export const EN_TOUR = {
     cage: {
       title: "What a cage does",
       claim: ([report]: Reports) =>
-        `${report ? `Each of the rat's ${count(report.vertices)} points is a mix of the cage's ${count(report.cage_vertices)}` : "Each of the rat's points is a mix of the cage's"}: whoever moves a few of these moves all of them, smoothly.`,
+        report
+          ? `Move a few of the cage's ${count(report.cage_vertices)} vertices and the rat's ${count(report.vertices)} points follow.`
+          : "Move a few of the cage's vertices and the rat's points follow.",
       task: "take the rat by the nose and pull. The cage goes along, the feet stay.",
     },
     weight: {
@@ -56,7 +58,7 @@ export const EN_TOUR = {
     smoothing: {
       title: "Too little smoothing",
       claim: () =>
-        "A sweep carries heat one cell further: who stops as soon as a sweep changes less than 1e-3 stops before the heat is everywhere, and the rat does not fill its wires.",
+        "A sweep carries heat one cell further. Stop at 1e-3 and the heat has not spread everywhere yet: the rat does not fill its wires.",
       task: "go on until a sweep changes less than 1e-5.",
     },
     delta: {
