@@ -12,7 +12,7 @@ use glam::DVec3;
 
 use super::guarded::Guarded;
 use super::quadric::Quadric;
-use super::shell::Limb;
+use super::shell::Spacing;
 use cagework_core::contact::Corners;
 use cagework_core::progress::Cancelled;
 
@@ -30,9 +30,6 @@ const MAX_VALENCE: usize = 11;
 
 /// An edge waits again if it costs more than this times what was expected.
 const MAX_COST_RATIO: f64 = 1.2;
-
-/// Largest distance from ring to ring along a limb over its thickness, within the budget.
-const MAX_RING_DISTANCE: f64 = 1.3;
 
 /// Collapses from one check whether the work was cancelled to the next.
 const COLLAPSES_PER_CHECK: usize = 64;
@@ -70,8 +67,10 @@ pub(super) struct Collapser<'g, 'a> {
     planes: Vec<Quadric>,
     /// Most of that, voxels; none for as far as need be.
     pub(super) budget: Option<f64>,
-    /// The limb that each vertex is on.
-    limbs: Vec<Option<Limb>>,
+    /// Whether vertices on plates stay near each other.
+    pub(super) keeps_plates: bool,
+    /// How far each vertex may be from its neighbours.
+    spacings: Vec<Option<Spacing>>,
     version: Vec<u32>,
     heap: BinaryHeap<Waiting>,
     /// Vertices of the whole surface, both halves.
@@ -98,7 +97,7 @@ pub(super) fn quality(t: &[DVec3; 3]) -> f64 {
 
 impl<'g, 'a> Collapser<'g, 'a> {
     /// Prepares a surface.
-    pub(super) fn new(surface: &'g mut Guarded<'a>, limbs: Vec<Option<Limb>>) -> Self {
+    pub(super) fn new(surface: &'g mut Guarded<'a>, spacings: Vec<Option<Spacing>>) -> Self {
         let n = surface.positions.len();
         let mut quadrics = vec![Quadric::default(); n];
         let mut planes = quadrics.clone();
@@ -119,7 +118,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
             quadrics,
             planes,
             budget: None,
-            limbs,
+            keeps_plates: false,
+            spacings,
             version: vec![0; n],
             heap: BinaryHeap::new(),
             count,
@@ -340,30 +340,32 @@ impl<'g, 'a> Collapser<'g, 'a> {
     }
 
     /// Whether a vertex there would be farther from the hull than may be (root mean square to the planes, by area), or from
-    /// its neighbours along a limb.
+    /// its neighbours on a limb or plate. Limbs keep their rings only while there is a budget.
     fn is_over_budget(&self, a: u32, b: u32, at: DVec3) -> bool {
-        let Some(budget) = self.budget else { return false };
         let planes = self.planes[a as usize].plus(&self.planes[b as usize]);
-        let is_off = (planes.at(at) / planes.area.max(1e-12)).sqrt() > budget;
-        is_off
-            || self.limb_of(a, b).is_some_and(|limb| {
-                let reach = MAX_RING_DISTANCE * limb.thickness;
-                let star =
-                    self.scratch.star.iter().flat_map(|(corners, _)| corners.index.iter().zip(corners.at));
-                star.filter(|&(&i, _)| i != a && i != b).any(|(_, p)| limb.along.dot(p - at).abs() > reach)
-            })
+        let is_off = |budget: f64| (planes.at(at) / planes.area.max(1e-12)).sqrt() > budget;
+        let is_too_far = |spacing: &Spacing| {
+            let length = |d: DVec3| spacing.along.map_or_else(|| d.length(), |along| along.dot(d).abs());
+            let star = self.scratch.star.iter().flat_map(|(corners, _)| corners.index.iter().zip(corners.at));
+            star.filter(|&(&i, _)| i != a && i != b).any(|(_, p)| length(p - at) > spacing.distance)
+        };
+        let spacings = || [a, b].into_iter().filter_map(|v| self.spacings[v as usize].as_ref());
+        self.budget.is_some_and(is_off)
+            || (self.budget.is_some() && self.spacing_of(a, b).as_ref().is_some_and(is_too_far))
+            || (self.keeps_plates && spacings().filter(|spacing| spacing.along.is_none()).any(is_too_far))
     }
 
-    /// The thinner of the limbs of two vertices.
-    fn limb_of(&self, a: u32, b: u32) -> Option<Limb> {
-        let limbs = [a, b].into_iter().filter_map(|v| self.limbs[v as usize]);
-        limbs.min_by(|a, b| a.thickness.total_cmp(&b.thickness))
+    /// Of the spacings at two vertices that of a plate, which limits all directions, or the smaller one.
+    fn spacing_of(&self, a: u32, b: u32) -> Option<Spacing> {
+        let spacings = [a, b].into_iter().filter_map(|v| self.spacings[v as usize]);
+        spacings
+            .min_by(|x, y| x.along.is_some().cmp(&y.along.is_some()).then(x.distance.total_cmp(&y.distance)))
     }
 
     fn collapse(&mut self, a: u32, b: u32, at: DVec3) {
         let (kept, gone) = self.ordered(a, b);
         self.planes[kept as usize] = self.planes[a as usize].plus(&self.planes[b as usize]);
-        self.limbs[kept as usize] = self.limb_of(a, b);
+        self.spacings[kept as usize] = self.spacing_of(a, b);
         let (axis, both) = (self.surface.mirror, self.surface.on_mirror[gone as usize]);
         self.count -= if axis.is_some() && !both { 2 } else { 1 };
         self.surface.merge(kept, gone, at);

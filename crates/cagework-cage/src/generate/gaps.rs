@@ -23,8 +23,20 @@ const OPEN_GAP: f64 = 4.0;
 /// Area of the smallest gap for which the lattice is refined, over the square of the model's longest side.
 const MIN_GAP_AREA: f64 = 0.003;
 
-/// How many times thinner voxels are across narrow gaps.
-const STRETCH: f64 = 3.0;
+/// How many times thinner voxels are across narrow gaps, and across those that need more than [`MAX_RESOLUTION`] of them.
+const STRETCHES: [f64; 2] = [3.0, 8.0];
+
+/// Voxels along the longest side, if they were as thin in all directions, above which they are as thin as can be.
+const MAX_RESOLUTION: f64 = 250.0;
+
+/// Voxels across the narrow tenth of a gap that stays open in a lattice of thin voxels.
+const OPEN_NARROWS: f64 = 7.0;
+
+/// Share of a gap's sheet that is its narrow part.
+const NARROW_SHARE: f64 = 0.1;
+
+/// Smallest mean square of the component, along the axis of thin voxels, of the unit vectors across a gap that they are for.
+const MIN_ACROSS: f64 = 0.7;
 
 /// Voxels along the longest side that gaps need, over those of the target, above which voxels are thinner instead of smaller.
 const MIN_REFINEMENT: f64 = 2.0;
@@ -46,6 +58,8 @@ pub(super) struct Gap {
     pub(super) area: f64,
     /// Mean distance from wall to wall, voxels.
     width: f64,
+    /// Distance that its narrow part stays below, voxels.
+    narrow_width: f64,
     /// Mean squares of the components of the unit vectors from wall to wall.
     across: DVec3,
 }
@@ -65,8 +79,18 @@ pub(super) struct ModelGap {
     pub(super) voxels: usize,
 }
 
-/// The large gaps of a model that a lattice of `base` voxels closes, or nearly. How many times thinner voxels are along each axis in a
-/// lattice that leaves them open, if there are at most `most`.
+/// The narrow gaps of a model and the lattice for them.
+#[derive(Debug)]
+pub(super) struct NarrowGaps {
+    pub(super) gaps: Vec<ModelGap>,
+    /// How many times thinner voxels are along each axis.
+    pub(super) stretch: DVec3,
+    /// Voxels along the model's longest side.
+    pub(super) voxels: usize,
+}
+
+/// The large gaps of a model that a lattice of `base` voxels closes, or nearly, and a lattice that leaves them open, if there are at
+/// most `most`.
 ///
 /// # Errors
 /// When `go_on` says so.
@@ -76,7 +100,7 @@ pub(super) fn narrow_gaps(
     bounds: [DVec3; 2],
     [base, most]: [usize; 2],
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-) -> Result<(Vec<ModelGap>, DVec3), Cancelled> {
+) -> Result<NarrowGaps, Cancelled> {
     let lattice = Lattice::around(bounds, MAX_VOXELS, DVec3::ONE, MARGIN_VOXELS);
     let solid = lattice.touched(positions, triangles, go_on)?.filled();
     let n = MAX_VOXELS as f64;
@@ -96,21 +120,66 @@ pub(super) fn narrow_gaps(
         voxels: 0,
     };
     let mut found: Vec<ModelGap> = found.into_iter().map(of_model).collect();
-    let stretch = if found.len() > most { DVec3::ONE } else { stretch(&found, base) };
+    let mut stretch = if found.len() > most { DVec3::ONE } else { stretch(&found, base) };
+    let mut voxels = base;
+    if stretch != DVec3::ONE {
+        let resolution = resolution_of_narrows(positions, triangles, bounds, stretch, go_on)?;
+        if resolution > MAX_RESOLUTION {
+            stretch = stretch.map(|times| if times > 1.0 { STRETCHES[1] } else { 1.0 });
+        }
+        voxels = voxels.max((resolution / stretch.max_element()).ceil() as usize);
+    }
     found.iter_mut().for_each(|gap| gap.voxels = gap.voxels_of(stretch));
-    Ok((found, stretch))
+    let needed = found.iter().map(|gap| gap.voxels).filter(|&n| n <= most_voxels(stretch));
+    let voxels = if found.len() > most { base } else { needed.fold(voxels, usize::max) };
+    Ok(NarrowGaps { gaps: found, stretch, voxels: voxels.min(MAX_VOXELS) })
+}
+
+/// Voxels along the longest side, if all were as thin as those of `stretch`, that leave the narrow parts of the large gaps across its
+/// axis open.
+fn resolution_of_narrows(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    bounds: [DVec3; 2],
+    stretch: DVec3,
+    go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
+) -> Result<f64, Cancelled> {
+    let lattice = Lattice::around(bounds, MAX_VOXELS, stretch, MARGIN_VOXELS);
+    let solid = lattice.touched(positions, triangles, go_on)?.filled();
+    let axis = stretch.max_position();
+    let n = MAX_VOXELS as f64;
+    let reach = (OPEN_NARROWS * stretch.max_element()).ceil() as usize;
+    let mut found = gaps(&solid, &solid, reach);
+    found.retain(|gap| {
+        gap.area >= MIN_GAP_AREA * n * n
+            && gap.across[axis] > MIN_ACROSS
+            && !gap.is_hollow(&lattice, positions, triangles)
+    });
+    let narrowest = found.iter().map(|gap| gap.narrow_width).fold(f64::INFINITY, f64::min);
+    Ok(n * stretch.max_element() * OPEN_NARROWS / narrowest)
+}
+
+/// Most voxels along the longest side of a lattice that is refined for gaps.
+fn most_voxels(stretch: DVec3) -> usize {
+    if stretch == DVec3::ONE { usize::MAX } else { (MAX_STRETCHED_SHARE * MAX_VOXELS as f64) as usize }
 }
 
 /// How many times thinner voxels should be along each axis. Thinner ones across most gaps leave them open with fewer voxels than
 /// smaller cubes.
 fn stretch(gaps: &[ModelGap], base: usize) -> DVec3 {
-    let finest = |stretch: DVec3| gaps.iter().map(|gap| gap.voxels_of(stretch)).fold(base, usize::max);
-    let thinner = DVec3::AXES.map(|axis| DVec3::ONE + (STRETCH - 1.0) * axis);
-    let best = thinner.into_iter().min_by_key(|&stretch| finest(stretch)).unwrap_or(DVec3::ONE);
-    let of_cubes = finest(DVec3::ONE) as f64;
-    let is_worth_it =
-        of_cubes > MIN_REFINEMENT * base as f64 && (finest(best) as f64) < MAX_STRETCHED_SHARE * of_cubes;
-    if is_worth_it { best } else { DVec3::ONE }
+    // Gaps that stay closed, and voxels for the others.
+    let closed_and_finest = |stretch: DVec3| {
+        let most = most_voxels(stretch).min(MAX_VOXELS);
+        let needed = || gaps.iter().map(|gap| gap.voxels_of(stretch));
+        (needed().filter(|&n| n > most).count(), needed().filter(|&n| n <= most).fold(base, usize::max))
+    };
+    let thinner = DVec3::AXES.map(|axis| DVec3::ONE + (STRETCHES[0] - 1.0) * axis);
+    let best = thinner.into_iter().min_by_key(|&stretch| closed_and_finest(stretch)).unwrap_or(DVec3::ONE);
+    let (closed, finest) = closed_and_finest(best);
+    let (closed_by_cubes, of_cubes) = closed_and_finest(DVec3::ONE);
+    let is_coarser = of_cubes as f64 > MIN_REFINEMENT * base as f64
+        && (finest as f64) < MAX_STRETCHED_SHARE * of_cubes as f64;
+    if closed < closed_by_cubes || (closed == closed_by_cubes && is_coarser) { best } else { DVec3::ONE }
 }
 
 impl ModelGap {
@@ -203,11 +272,14 @@ pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
     });
     let of_island = |voxels: Vec<[usize; 3]>| {
         let n = voxels.len() as f64;
-        let width = voxels.iter().map(|&v| width[number(dims, v)]).sum::<f64>() / n;
+        let mut widths: Vec<f64> = voxels.iter().map(|&v| width[number(dims, v)]).collect();
+        widths.sort_by(f64::total_cmp);
+        let width = widths.iter().sum::<f64>() / n;
+        let narrow_width = widths[(NARROW_SHARE * n) as usize];
         // A sheet is two voxels thick.
         let across = |&v: &[usize; 3]| to_wall(number(dims, v)).normalize_or_zero().powf(2.0);
         let across = voxels.iter().map(across).sum::<DVec3>() / n;
-        Gap { voxels, area: 0.5 * n, width, across }
+        Gap { voxels, area: 0.5 * n, width, narrow_width, across }
     };
     let mut gaps: Vec<Gap> = deep.islands().into_iter().map(of_island).collect();
     gaps.sort_by(|a, b| b.area.total_cmp(&a.area));

@@ -34,6 +34,7 @@ use glam::{DVec3, Vec3};
 use cagework_core::cage::Cage;
 use cagework_core::progress::{Cancelled, Progress, ProgressEvent, Stage};
 use collapse::Collapser;
+use gaps::NarrowGaps;
 use guarded::Guarded;
 pub use options::{
     CLEARANCE, CageGenError, CageOptions, CageReport, DETAIL, DETAILS, GeneratedCage, MAX_CLEARANCE,
@@ -81,7 +82,7 @@ const MAX_SPLITS: usize = 4;
 /// Makes a cage that encloses a model strictly.
 ///
 /// `positions`: `[n_vertices]`, object units; vertices of no triangle are enclosed, too. `triangles`:
-/// `[n_triangles]`, any soup. 0.2 to 0.8 s for a figure and 80 vertices on one core, most of it for the gaps between limbs.
+/// `[n_triangles]`, any soup. 0.2 to 1.5 s for a figure and 80 vertices on one core, most of it for the gaps between limbs.
 ///
 /// # Errors
 /// [`CageGenError`]: nothing to enclose, numbers or options out of range, cancelled.
@@ -109,17 +110,14 @@ fn generate_plain(
     let target = options.target as usize;
     let base = first_voxels(target);
     let most_gaps = target / VERTICES_PER_GAP;
-    let (gaps, stretch) = match (options.shape, options.smooth) {
+    let NarrowGaps { gaps, stretch, voxels: finest } = match (options.shape, options.smooth) {
         // A smooth surface is kept clear of the model by its distance, which a finer lattice would halve.
         (Shape::Follow, 0) => gaps::narrow_gaps(positions, triangles, bounds, [base, most_gaps], &|_| {
             let event = ProgressEvent { stage: Stage::Voxelize, fraction: 0.0, iteration: 0, delta: None };
             if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
         })?,
-        _ => (Vec::new(), DVec3::ONE),
+        _ => NarrowGaps { gaps: Vec::new(), stretch: DVec3::ONE, voxels: base },
     };
-    // As fine as the gaps need, if there are vertices for them.
-    let for_gaps = if gaps.len() <= most_gaps { gaps.as_slice() } else { &[] };
-    let finest = for_gaps.iter().map(|gap| gap.voxels).fold(base, usize::max).min(MAX_VOXELS);
     let mut voxels = if options.voxels > 0 { options.voxels as usize } else { finest };
     for attempt in 1..=MAX_LATTICES {
         let go_on = |stage: Stage, share: f32| {
@@ -201,21 +199,25 @@ fn simplified(
     let mut budget = Some(f64::from(options.detail) * shell.longest / shell.lattice.cell);
     while target < n_hull {
         let mut guarded = Guarded::new(shell.hull.clone(), &shell.obstacle);
-        let mut collapser = Collapser::new(&mut guarded, shell.limbs());
+        let spacings = shell.spacings();
+        let has_plates = spacings.iter().flatten().any(|spacing| spacing.along.is_none());
+        let mut collapser = Collapser::new(&mut guarded, spacings);
         let mut left = n_hull;
         // First as far as the budget goes, in narrow bands; then on to the count, in any.
         let narrow = BAND_LAYERS[..NARROW_BANDS]
             .iter()
-            .map(|&layers| (layers, budget, MIN_TARGET as usize, 0.0, false));
-        // A sharp fold is better than a closed gap.
+            .map(|&layers| (layers, budget, MIN_TARGET as usize, 0.0, false, true));
+        // A sharp fold is better than a closed gap, and a plate that bends badly better than a fold.
         let passes_of_gaps = |&least| {
-            let plain = BAND_LAYERS.iter().map(move |&layers| (layers, None, target, least, false));
-            plain.chain([(None, None, target, least, true)])
+            let plates = BAND_LAYERS.iter().map(move |&layers| (layers, None, target, least, false, true));
+            let plain = BAND_LAYERS.iter().map(move |&layers| (layers, None, target, least, false, false));
+            plates.chain(plain).chain([(None, None, target, least, true, false)])
         };
         let wide = KEPT_GAPS.iter().flat_map(passes_of_gaps);
-        let n_passes = (NARROW_BANDS + KEPT_GAPS.len() * (BAND_LAYERS.len() + 1)) as f32;
-        for (k, (layers, budget, aim, least, may_fold)) in narrow.chain(wide).enumerate() {
-            let is_repeated = least > 0.0 && shell.gaps.is_empty();
+        let n_passes = (NARROW_BANDS + KEPT_GAPS.len() * (2 * BAND_LAYERS.len() + 1)) as f32;
+        for (k, (layers, budget, aim, least, may_fold, keeps_plates)) in narrow.chain(wide).enumerate() {
+            let is_repeated =
+                (least > 0.0 && shell.gaps.is_empty()) || (budget.is_none() && keeps_plates && !has_plates);
             let is_far = left as f64 > MAX_FIRST_RATIO * f64::from(options.target);
             let is_in_pieces = shell.separate > options.target as usize / 10;
             if k == NARROW_BANDS && may_coarsen && is_far && is_in_pieces {
@@ -228,6 +230,7 @@ fn simplified(
             collapser.surface.set_sheets(shell.sheets(least));
             collapser.surface.may_fold = may_fold;
             collapser.budget = budget;
+            collapser.keeps_plates = keeps_plates;
             let from = 0.6 * k as f32 / n_passes;
             left = collapser.run(aim, &|share| go_on(from + 0.6 * share / n_passes))?;
         }

@@ -44,6 +44,21 @@ const MIN_LIMB_RATIO: f64 = 2.2;
 /// Largest cosine between a limb's direction and those across it.
 const MAX_ACROSS_COSINE: f64 = 0.3;
 
+/// Largest distance from ring to ring along a limb over its thickness, within the budget.
+const MAX_RING_DISTANCE: f64 = 1.3;
+
+/// Least length of a plate over its thickness.
+const MIN_PLATE_RATIO: f64 = 5.0;
+
+/// Least width of a plate over its length.
+const MIN_PLATE_WIDTH: f64 = 0.5;
+
+/// Largest distance between vertices on a plate over its length, within the budget.
+const MAX_PLATE_SPACING: f64 = 0.5;
+
+/// Least share of a hull's vertices on plates.
+const MIN_PLATE_SHARE: f64 = 0.25;
+
 /// Directions in which the length and thickness of limbs are measured: to neighbours on the lattice, one of each pair.
 const DIRECTIONS: [DVec3; 13] = [
     DVec3::new(1.0, 0.0, 0.0),
@@ -61,13 +76,13 @@ const DIRECTIONS: [DVec3; 13] = [
     DVec3::new(-1.0, 1.0, 1.0),
 ];
 
-/// How the hull runs at a place that is longer than thick.
+/// How far apart the vertices of a cage may be, within the budget, so that it can bend a place of the hull.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Limb {
-    /// The direction in which it is longest, of unit length.
-    pub(super) along: DVec3,
-    /// Its mean extent across, voxels.
-    pub(super) thickness: f64,
+pub(super) struct Spacing {
+    /// The direction in which they may not be farther apart, of unit length: along a limb. None: in any, on a plate.
+    pub(super) along: Option<DVec3>,
+    /// Largest distance, voxels.
+    pub(super) distance: f64,
 }
 
 /// A solid in a lattice and the hull around it.
@@ -178,8 +193,8 @@ impl Shell {
         (0..layers).fold(self.filled.clone(), |band, _| band.dilated())
     }
 
-    /// How the hull runs at each of its vertices, where it is a limb: longer than it is thick.
-    pub(super) fn limbs(&self) -> Vec<Option<Limb>> {
+    /// The spacing of rings along limbs and of vertices on plates, at each vertex of the hull that is on one.
+    pub(super) fn spacings(&self) -> Vec<Option<Spacing>> {
         let mut normals = vec![DVec3::ZERO; self.hull.positions.len()];
         for t in &self.hull.triangles {
             let [a, b, c] = t.map(|i| self.hull.positions[i as usize]);
@@ -195,7 +210,7 @@ impl Shell {
             (0..).take_while(|&k| is_inside(k)).count() as f64
         };
         let half = self.lattice.half();
-        let limb = |(&p, normal): (&DVec3, &DVec3)| {
+        let spacing = |(&p, normal): (&DVec3, &DVec3)| {
             let inward = -normal.normalize_or_zero();
             let below = p + half + 0.7 * inward;
             let center = below + 0.5 * run(below, inward) * inward;
@@ -203,10 +218,25 @@ impl Shell {
             let chords = DIRECTIONS.map(|along| (along.normalize(), chord(along.normalize())));
             let (along, length) = chords.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
             let across = chords.iter().filter(|(other, _)| other.dot(along).abs() < MAX_ACROSS_COSINE);
-            let thickness = across.clone().map(|(_, chord)| chord).sum::<f64>() / across.count() as f64;
-            (length > MIN_LIMB_RATIO * thickness).then_some(Limb { along, thickness })
+            let across: Vec<f64> = across.map(|&(_, chord)| chord).collect();
+            let (least, most) = across.iter().fold((length, 0.0), |(a, b), &x| (x.min(a), x.max(b)));
+            let thickness = across.iter().sum::<f64>() / across.len() as f64;
+            if length > MIN_PLATE_RATIO * least && most > MIN_PLATE_WIDTH * length {
+                Some(Spacing { along: None, distance: MAX_PLATE_SPACING * length })
+            } else if length > MIN_LIMB_RATIO * thickness {
+                Some(Spacing { along: Some(along), distance: MAX_RING_DISTANCE * thickness })
+            } else {
+                None
+            }
         };
-        self.hull.positions.iter().zip(&normals).map(limb).collect()
+        let mut spacings: Vec<_> = self.hull.positions.iter().zip(&normals).map(spacing).collect();
+        let is_on_plate = |spacing: &Option<Spacing>| spacing.is_some_and(|spacing| spacing.along.is_none());
+        let on_plates = spacings.iter().filter(|&spacing| is_on_plate(spacing)).count();
+        // Less is where wires cross.
+        if (on_plates as f64) < MIN_PLATE_SHARE * spacings.len() as f64 {
+            spacings.iter_mut().filter(|spacing| is_on_plate(spacing)).for_each(|spacing| *spacing = None);
+        }
+        spacings
     }
 
     /// The sheets of gaps of at least this share of the largest one's area.

@@ -156,7 +156,9 @@ fn mannequin(gap: f32, radius: f32) -> Soup {
 /// their own, nearly nothing at the other.
 #[test]
 fn lower_vertices_of_a_leg_move_its_own_foot_alone() {
-    for (gap, radius, target) in [(0.17, 0.06, 80), (0.1, 0.06, 80), (0.08, 0.05, 120), (0.03, 0.07, 80)] {
+    for (gap, radius, target) in
+        [(0.17, 0.06, 80), (0.1, 0.06, 80), (0.08, 0.05, 120), (0.03, 0.07, 80), (0.025, 0.07, 80)]
+    {
         let (positions, triangles) = mannequin(gap, radius);
         let cage = generate(&positions, &triangles, &options(target), &Silent).unwrap().cage;
         let bind_options = BindOptions { grid: 40, ..BindOptions::default() };
@@ -215,6 +217,19 @@ fn limbs_have_rings_and_compact_models_few_vertices() {
     let cube = subdivided_box(bounds, 0.0, [1; 3]);
     let triangles = cube.faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
     assert!(make(&(cube.positions, triangles), &options(80)).report.vertices < 24);
+}
+
+/// A plate has vertices in its middle, on both sides, without which a cage could not bend it.
+#[test]
+fn plates_have_vertices_in_the_middle() {
+    let bounds = Bounds { min: vec3(-1.0, -0.04, -0.8), max: vec3(1.0, 0.04, 0.8) };
+    let plate = Cage::new(&super::subdivided_box(bounds, 0.0, [1; 3])).unwrap();
+    let made = make(&(plate.positions().to_vec(), plate.triangles().to_vec()), &options(80));
+    for side in [-1.0, 1.0] {
+        let is_in_the_middle = |p: &&Vec3| p.y * side > 0.0 && p.x.hypot(p.z) < 0.6;
+        let n = made.cage.positions().iter().filter(is_in_the_middle).count();
+        assert!((1..9).contains(&n), "{n} vertices in the middle");
+    }
 }
 
 #[test]
