@@ -149,6 +149,8 @@ export function createApp({ store, session, tell, viewport }: Needs): App {
       try {
         if (pose) session().engine.decodePose(pose);
       } catch {
+        // The cage is at rest, and no pose has a share in that.
+        store.set({ shares: store.get().shares.map(() => 0) });
         tell.say(T.opening.damagedPose);
       }
       edit.sync();

@@ -25,19 +25,29 @@ export function createHistory(changed: () => void, limit = LIMIT): History {
   const done: Step[] = [];
   const undone: Step[] = [];
   let queue: Promise<unknown> = Promise.resolve();
+  /** Count pushes, and times that the history was cleared. */
+  let pushes = 0;
+  let clears = 0;
 
-  const go = (from: Step[], to: Step[], way: "undo" | "redo"): Promise<Step | undefined> => {
+  const go = (way: "undo" | "redo"): Promise<Step | undefined> => {
     const result = queue.then(async () => {
-      const step = from.pop();
+      const step = (way === "undo" ? done : undone).pop();
       if (!step) return undefined;
+      const before = { pushes, clears, place: done.length };
+      // A step may take time; others may be pushed meanwhile, or another model opened.
+      const put = (isDone: boolean) => {
+        if (clears !== before.clears) return;
+        if (isDone) done.splice(before.place, 0, step);
+        else if (pushes === before.pushes) undone.push(step);
+        changed();
+      };
       try {
         await step[way]();
       } catch (error) {
-        from.push(step);
+        put(way === "undo");
         throw error;
       }
-      to.push(step);
-      changed();
+      put(way === "redo");
       return step;
     });
     queue = result.catch(() => undefined);
@@ -49,11 +59,13 @@ export function createHistory(changed: () => void, limit = LIMIT): History {
       done.push(step);
       if (done.length > limit) done.shift();
       undone.length = 0;
+      pushes += 1;
       changed();
     },
-    undo: () => go(done, undone, "undo"),
-    redo: () => go(undone, done, "redo"),
+    undo: () => go("undo"),
+    redo: () => go("redo"),
     clear() {
+      clears += 1;
       done.length = 0;
       undone.length = 0;
       changed();

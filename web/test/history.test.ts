@@ -58,6 +58,76 @@ describe("history", () => {
     expect(order).toEqual(["second", "first"]);
   });
 
+  /** A step that ends when it is told to, well or badly. */
+  function open(label: string) {
+    let end = { well: () => {}, badly: () => {} };
+    const go = () =>
+      new Promise<void>((resolve, reject) => {
+        end = { well: resolve, badly: () => reject(new Error("no")) };
+      });
+    return { step: { label, undo: go, redo: go }, end: () => end };
+  }
+  const labels = async (history: ReturnType<typeof createHistory>) => {
+    const all: string[] = [];
+    while (history.undoLabel) {
+      all.push(history.undoLabel);
+      await history.undo();
+    }
+    return all;
+  };
+
+  it("does not bring back an undone step when another one is pushed meanwhile", async () => {
+    const history = createHistory(() => undefined);
+    const { step, end } = open("Remove a model");
+    history.push(step);
+    const undone = history.undo();
+    await Promise.resolve();
+    history.push(numbers().add(1));
+    end().well();
+    await undone;
+    expect(history.redoLabel).toBeUndefined();
+    expect(await labels(history)).toEqual(["Add 1"]);
+  });
+
+  it("keeps the order when an undo fails or a redo ends after another step", async () => {
+    const history = createHistory(() => undefined);
+    const { step, end } = open("Remove a model");
+    history.push(step);
+    const failing = history.undo();
+    await Promise.resolve();
+    history.push(numbers().add(1));
+    end().badly();
+    await expect(failing).rejects.toThrow("no");
+    await history.undo();
+    const undoing = history.undo();
+    await Promise.resolve();
+    end().well();
+    await undoing;
+    const redoing = history.redo();
+    await Promise.resolve();
+    history.push(numbers().add(2));
+    end().well();
+    await redoing;
+    expect(history.undoLabel).toBe("Add 2");
+    await history.undo();
+    expect(history.undoLabel).toBe("Remove a model");
+  });
+
+  it("stays clear when it is cleared while a step is undone", async () => {
+    const history = createHistory(() => undefined);
+    for (const isWell of [true, false]) {
+      const { step, end } = open("Remove a model");
+      history.push(step);
+      const undone = history.undo();
+      await Promise.resolve();
+      history.clear();
+      if (isWell) end().well();
+      else end().badly();
+      await undone.catch(() => undefined);
+      expect([history.undoLabel, history.redoLabel]).toEqual([undefined, undefined]);
+    }
+  });
+
   it("keeps a step whose undo failed", async () => {
     const history = createHistory(() => undefined);
     history.push({

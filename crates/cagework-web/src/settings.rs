@@ -68,6 +68,10 @@ pub(crate) struct Settings {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[cfg_attr(test, ts(optional, as = "Option<Vec<Vec<SurfacePoint>>>"))]
     pose_pins: Vec<Vec<SurfacePoint>>,
+    /// Share of each pose of the project in the blend that `pose` is made of, 0 to 1, in turn.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(test, ts(optional, as = "Option<Vec<f32>>"))]
+    pose_shares: Vec<f32>,
     /// What of its models the cage does not bend: read with the models.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[cfg_attr(test, ts(optional, as = "Option<Vec<MemberSettings>>"))]
@@ -106,12 +110,12 @@ pub(crate) fn controls_of(settings: Option<&str>, cage: &PolygonMesh) -> Option<
 /// What a project says of its models; nothing of what cannot be read.
 pub(crate) fn member_settings(settings: Option<&str>) -> Vec<MemberSettings> {
     let given = settings.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
-    points(&given, "models")
+    list(&given, "models")
 }
 
-/// Points of the surface in settings; none if they cannot be read.
-fn points<T: serde::de::DeserializeOwned + Default>(given: &Map<String, Value>, key: &str) -> T {
-    given.get(key).and_then(|points| serde_json::from_value(points.clone()).ok()).unwrap_or_default()
+/// A list in settings; empty if it cannot be read.
+fn list<T: serde::de::DeserializeOwned + Default>(given: &Map<String, Value>, key: &str) -> T {
+    given.get(key).and_then(|list| serde_json::from_value(list.clone()).ok()).unwrap_or_default()
 }
 
 impl Settings {
@@ -132,8 +136,10 @@ impl Settings {
         let word = |key: &str| given.get(key).and_then(Value::as_str).map(str::to_owned);
         settings.pose = word("pose");
         settings.sample = word("sample").filter(|id| samples::all().iter().any(|sample| sample.id == id));
-        settings.pins = points(&given, "pins");
-        settings.pose_pins = points(&given, "pose_pins");
+        settings.pins = list(&given, "pins");
+        settings.pose_pins = list(&given, "pose_pins");
+        settings.pose_shares = list::<Vec<f32>>(&given, "pose_shares");
+        settings.pose_shares.iter_mut().for_each(|share| *share = share.clamp(0.0, 1.0));
         settings.symmetry = given.get("symmetry").and_then(Value::as_bool);
         settings
     }
@@ -220,7 +226,7 @@ mod tests {
         saved["bind"]["tau"] = json!(0.001);
         saved["cage"]["vertices"] = json!(120);
         saved["rig"] = json!({ "joints": "stay", "keep_travel": true, "rigid": ["hat"], "plain": false, "dynamic": true });
-        let rest = json!({ "symmetry": true, "pose": "AAEC", "sample": "rat" });
+        let rest = json!({ "symmetry": true, "pose": "AAEC", "pose_shares": [0.0, 0.5], "sample": "rat" });
         saved.extend(rest.as_object().cloned().unwrap());
         let settings = read(&Value::Object(saved.clone()));
         assert_eq!(settings.notices, Vec::<String>::new());
@@ -273,6 +279,13 @@ mod tests {
                 assert_eq!(settings["bind"]["grid"], 32);
             }
         }
+    }
+
+    #[test]
+    fn shares_of_poses_are_from_0_to_1() {
+        let shares = |given: Value| read(&json!({ "pose_shares": given })).pose_shares;
+        assert_eq!(shares(json!([0.25, -3, 1e300])), [0.25, 0.0, 1.0]);
+        assert_eq!(shares(json!(["half"])), [0.0; 0]);
     }
 
     #[test]

@@ -68,7 +68,7 @@ export function createFiles(ctx: Context, follow: Follow): Files {
       model: { ...opened.model, name: shownName(opened, sample, store.get().samples) },
       sample,
       poses,
-      shares: poses.map(() => 0),
+      shares: poses.map((_, k) => settings.pose_shares?.[k] ?? 0),
       busy: others.length > 0 ? store.get().busy : null,
     });
     follow.applySettings(settings);

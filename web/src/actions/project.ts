@@ -32,6 +32,7 @@ export function createProject(ctx: Context, shared: ControlActions["shared"]): P
       ...(state.poses.some((pose) => pose.pins?.length)
         ? { pose_pins: state.poses.map(({ pins }) => [...(pins ?? [])]) }
         : {}),
+      ...(pose && state.shares.some((share) => share !== 0) ? { pose_shares: [...state.shares] } : {}),
       ...(state.sample && state.sampleCage ? { sample: state.sample } : {}),
       ...(models.length > 0 ? { models } : {}),
       ...(pose ? { pose } : {}),

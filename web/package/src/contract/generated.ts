@@ -580,6 +580,10 @@ pins?: Array<SurfacePoint>,
  */
 pose_pins?: Array<Array<SurfacePoint>>,
 /**
+ * Share of each pose of the project in the blend that `pose` is made of, 0 to 1, in turn.
+ */
+pose_shares?: Array<number>,
+/**
  * What of its models the cage does not bend: read with the models.
  */
 models?: Array<MemberSettings>,
