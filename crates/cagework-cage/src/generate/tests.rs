@@ -223,7 +223,7 @@ fn limbs_have_rings_and_compact_models_few_vertices() {
 #[test]
 fn plates_have_vertices_in_the_middle() {
     let bounds = Bounds { min: vec3(-1.0, -0.04, -0.8), max: vec3(1.0, 0.04, 0.8) };
-    let plate = Cage::new(&super::subdivided_box(bounds, 0.0, [1; 3])).unwrap();
+    let plate = Cage::new(&subdivided_box(bounds, 0.0, [1; 3])).unwrap();
     let made = make(&(plate.positions().to_vec(), plate.triangles().to_vec()), &options(80));
     for side in [-1.0, 1.0] {
         let is_in_the_middle = |p: &&Vec3| p.y * side > 0.0 && p.x.hypot(p.z) < 0.6;

@@ -1,7 +1,8 @@
 //! Mutated files through everything that reads them: each ends in a result or an error, within seconds, and without a panic.
 //!
 //! `cargo xtask fuzz --minutes 60` takes a seed from the clock and says which; `--seed 1` gives the same inputs in every run.
-//! What fails is written to `target/fuzz`, and `cargo xtask fuzz FILE` does it again.
+//! What fails is written to `target/fuzz`, and `cargo xtask fuzz FILE` does it again. Without arguments the files in `found`, which
+//! failed once, are tried first.
 //!
 //! Inputs are tried in a process of its own, because a stack that overflows and memory that runs out end one. It says the number
 //! of each input before it tries it; when it ends, or falls silent, the number is known and so is the input.
@@ -52,7 +53,10 @@ fn main() -> ExitCode {
             }
             ExitCode::SUCCESS
         }
-        [] => fuzz(1.0, None),
+        [] => match try_files(&found()) {
+            ExitCode::SUCCESS => fuzz(1.0, None),
+            failure => failure,
+        },
         ["--minutes", minutes] => minutes.parse().map_or_else(|_| usage(), |m| fuzz(m, None)),
         ["--minutes", minutes, "--seed", seed] => match (minutes.parse(), seed.parse()) {
             (Ok(minutes), Ok(seed)) => fuzz(minutes, Some(seed)),
@@ -61,6 +65,13 @@ fn main() -> ExitCode {
         [first, ..] if first.starts_with("--") => usage(),
         files => try_files(files),
     }
+}
+
+/// Damaged files that once failed, in `found`.
+fn found() -> Vec<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/found");
+    let entries = std::fs::read_dir(folder).expect("the folder is there");
+    entries.map(|entry| entry.expect("it can be read").path().display().to_string()).collect()
 }
 
 fn usage() -> ExitCode {
@@ -153,7 +164,7 @@ impl Trial {
 }
 
 /// Tries what `target/fuzz` or anybody else has kept.
-fn try_files(files: &[&str]) -> ExitCode {
+fn try_files(files: &[impl AsRef<Path> + std::fmt::Display]) -> ExitCode {
     let mut outcome = ExitCode::SUCCESS;
     for file in files {
         let path = root().join(file);

@@ -169,10 +169,16 @@ pub(crate) fn reshape(
             let frame = rig.frame(part, &moved.world, &binds)?;
             let Some(shape) = rig.shape(part, &turned, &frame)? else { continue };
             let states = shape.targets.iter().map(|target| &target.positions).chain([&shape.positions]);
-            if states.flatten().any(|p| !p.as_vec3().is_finite()) {
+            // As a reader will see them, after rounding.
+            let is_seen = |(v, p): (usize, &DVec3)| {
+                frame.world(v).transform_point3(p.as_vec3().as_dvec3()).as_vec3().is_finite()
+            };
+            if states.flatten().any(|p| !p.as_vec3().is_finite())
+                || !shape.positions.iter().enumerate().all(is_seen)
+            {
                 return Err(WriteError::Document(format!(
-                    "mesh {}: its skin shrinks vertices so much that their new places are beyond numbers of 32 bits; write it \
-                     without its rig (--static)",
+                    "mesh {}: its skin shrinks or stretches vertices so much that their new places are beyond numbers of 32 bits; \
+                     write it without its rig (--static)",
                     part.instance.mesh
                 )));
             }
