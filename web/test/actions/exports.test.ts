@@ -150,7 +150,10 @@ it("a project holds the page's settings", async () => {
 it("a link is for samples in their own cage; others are told what to do instead", async () => {
   const { exports, store, said, teach } = page();
   await exports.share();
-  expect([copied, said[0]]).toEqual([[], "Links work for samples only. Save a project to share your own model."]);
+  expect([copied, said[0]]).toEqual([
+    [],
+    "Links work for samples only. Save a project to share your own model.",
+  ]);
   store.set({ sample: "rat", sampleCage: true });
   await exports.share();
   expect(copied).toEqual([expect.stringMatching(/^https:\/\/cagework\.example\/#.*rat/)]);

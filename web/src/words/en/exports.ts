@@ -33,7 +33,8 @@ export const exports = {
   saved: (files: readonly string[], size: number) =>
     `${list(files)} ${files.length === 1 ? "is" : "are"} in your downloads (${bytes(size)}).`,
   noLink: "Links work for samples only. Save a project to share your own model.",
-  noLinkChanged: "Links work for samples only in their own cage, where all parts follow it. Save a project to share this one.",
+  noLinkChanged:
+    "Links work for samples only in their own cage, where all parts follow it. Save a project to share this one.",
   saveProject: "Save the project",
   copied: "Link copied. Whoever opens it sees this sample in this pose, as you see it.",
   inAddress: "The link is in the address bar; copy it from there.",
