@@ -8,6 +8,7 @@ use super::BindError;
 use super::pipeline::Points;
 use crate::cage::Cage;
 use crate::controls::Controls;
+use crate::deform::OutsideVertex;
 use crate::mesh::Bounds;
 use crate::options::{BindOptions, OutsidePolicy};
 use crate::sample::{Outside, Stencils};
@@ -17,8 +18,11 @@ use crate::weights::Weights;
 /// least; a cage is seldom twice as large as its model.
 const OTHER_UNIT: f64 = 3.0;
 
-/// A cage that is larger by this factor or more is worth a remark: metres and centimetres differ by 100, and a cage is up to twice as
-/// large as its model.
+/// Differences of weights over a model below which it hardly bends.
+const FLAT: f32 = 1e-3;
+
+/// A cage that is larger by this factor or more may have another unit: metres and centimetres differ by 100, and a cage is up to
+/// twice as large as its model. Weights of a cage of few vertices differ by less than its inverse then.
 const LARGE: f64 = 50.0;
 
 /// How a cage and a model lie to each other.
@@ -105,32 +109,44 @@ fn none_inside(cage: &Cage, positions: &[Vec3]) -> BindError {
     BindError::NoneInside { vertices: positions.len(), misfit: Misfit::of(cage.bounds(), model) }
 }
 
-/// What to say of a cage that is so much larger than the model that all vertices have nearly the same weights. `positions`: of the
-/// model, the first rows of `weights`.
+/// What to say of a cage that is so much larger than what it holds of the model that all of that has nearly the same weights.
+/// `positions`: of the model, the first rows of `weights`; those `outside` do not count.
 pub(super) fn oversized(
     cage: Bounds,
     positions: &[Vec3],
+    outside: &[OutsideVertex],
     weights: &Weights,
     n_controls: usize,
 ) -> Option<String> {
-    let larger = 1.0 / Misfit::of(cage, Bounds::of(positions)?).ratio;
-    if !(LARGE..f64::INFINITY).contains(&larger) {
+    let mut is_inside = vec![true; positions.len()];
+    for vertex in outside.iter().map(|o| o.vertex as usize).filter(|&v| v < positions.len()) {
+        is_inside[vertex] = false;
+    }
+    let inside = || (0..positions.len()).filter(|&v| is_inside[v]);
+    let held = inside().count();
+    let none = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+    let [min, max] = inside().fold(none, |[min, max], v| [min.min(positions[v]), max.max(positions[v])]);
+    let larger = 1.0 / Misfit::of(cage, Bounds { min, max }).ratio;
+    // One point has no size.
+    if held == 0 || larger.is_infinite() {
         return None;
     }
     let mut ranges = vec![(f32::INFINITY, f32::NEG_INFINITY, 0_usize); n_controls];
-    let rows = weights.rows().take(positions.len());
-    let entries = rows.flat_map(|(columns, data)| columns.iter().zip(data));
+    let entries = inside().flat_map(|v| {
+        let (columns, data) = weights.row(v);
+        columns.iter().zip(data)
+    });
     for (&column, &weight) in entries.filter(|(column, _)| (**column as usize) < n_controls) {
         let (low, high, count) = &mut ranges[column as usize];
         (*low, *high, *count) = (low.min(weight), high.max(weight), *count + 1);
     }
     // What a row does not store is 0.
-    let spread =
-        |&(low, high, n): &(f32, f32, usize)| if n < positions.len() { high.max(0.0) } else { high - low };
+    let spread = |&(low, high, n): &(f32, f32, usize)| if n < held { high.max(0.0) } else { high - low };
     let spread = ranges.iter().map(spread).fold(0.0, f32::max);
-    Some(format!(
-        "The cage is {} times larger than the model, and weights differ by {spread:.0e} over it at most: it hardly bends. Are both in \
-         the same unit?",
+    let is_flat = spread < FLAT || larger >= LARGE && f64::from(spread) < 1.0 / LARGE;
+    is_flat.then(|| format!(
+        "The cage is {} times larger than what it holds of the model, and weights differ by {spread:.0e} over it at most: it hardly \
+         bends. Are both in the same unit?",
         about(larger)
     ))
 }
@@ -140,6 +156,7 @@ mod tests {
     use super::*;
     use crate::bind::bind;
     use crate::cage::subdivided_box;
+    use crate::mesh::PolygonMesh;
     use crate::options::BindOptions;
     use crate::progress::Silent;
 
@@ -179,12 +196,47 @@ mod tests {
         };
         let large = bound(100.0).unwrap();
         // Root of 3 times 100 over root of 2.
-        let rest = large.strip_prefix("The cage is 120 times larger than the model, and weights differ by ");
+        let large_by = "The cage is 120 times larger than what it holds of the model, and weights differ by ";
+        let rest = large.strip_prefix(large_by);
         let spread: f64 = rest.and_then(|rest| rest.split(' ').next()?.parse().ok()).unwrap();
         // Trilinear: the corner at (1, 0, 0) has 0.41 * 0.6 * 0.6 at X and 0.4 * 0.59 * 0.6 at Y.
         assert!((spread - 6e-3).abs() < 2e-3, "{large}");
         assert_eq!(bound(20.0), None);
         let beside = said(Vec3::new(0.1, 0.1, -0.4), 0.8);
         assert!(beside.contains("beside what the cage encloses"), "{beside}");
+    }
+
+    /// What is said comes from the weights of what the cage holds, whatever else makes the model or the cage large.
+    #[test]
+    fn cages_are_large_for_what_they_hold() {
+        let box_of = |center: f32, size: f32, cuts: u32| {
+            let half = Vec3::splat(size / 2.0);
+            let bounds = Bounds { min: Vec3::X * center - half, max: Vec3::X * center + half };
+            subdivided_box(bounds, 0.0, [cuts; 3])
+        };
+        let said = |parts: &[PolygonMesh], points: &[Vec3]| {
+            let mut mesh = PolygonMesh::default();
+            for part in parts {
+                let first = mesh.positions.len() as u32;
+                mesh.positions.extend(&part.positions);
+                mesh.faces
+                    .extend(part.faces.iter().map(|f| f.iter().map(|v| first + v).collect::<Vec<u32>>()));
+            }
+            let grid = if parts.len() > 1 { 64 } else { 24 };
+            let options = BindOptions { grid, ..BindOptions::default() };
+            let binding = bind(points, &Cage::new(&mesh).unwrap(), &options, &Silent).unwrap();
+            binding.report.notices.into_iter().find(|said| said.starts_with("The cage is "))
+        };
+        let tiny = [Vec3::ZERO, 0.3 * Vec3::X, 0.3 * Vec3::Y];
+        let with = |p: Vec3| [&tiny[..], &[p]].concat();
+        // 45 times larger, but of so many vertices that none has a weight of size in the middle.
+        let fine = said(&[box_of(0.0, 11.0, 12)], &tiny).unwrap();
+        assert!(fine.starts_with("The cage is 45 times larger than what it holds"), "{fine}");
+        // A second part of the model, outside, hid that; one inside bends.
+        assert!(said(&[box_of(0.0, 30.0, 1)], &with(Vec3::X * 200.0)).is_some());
+        assert_eq!(said(&[box_of(0.0, 30.0, 1)], &with(Vec3::X * 12.0)), None);
+        // The model lies in a large part of a cage, or in a small one beside a large one.
+        assert!(said(&[box_of(0.0, 30.0, 1), box_of(40.0, 1.0, 1)], &tiny).is_some());
+        assert_eq!(said(&[box_of(0.0, 2.0, 1), box_of(40.0, 30.0, 1)], &tiny), None);
     }
 }

@@ -241,9 +241,10 @@ impl<'a> Prepared<'a> {
         let mut notices = crossing::notices(controls.cage());
         notices.extend(team.notice(options.threads).into_iter().chain(voxels.notices.iter().cloned()));
         notices.extend(notices_of(controls, &level.grid, options.grid));
-        notices.extend(oversized(cage.bounds(), &positions[..n_vertices], &weights, controls.n_controls()));
-        notices.extend(solved.report.stalled.then(|| STALLED.to_owned()));
         let (outside, held_vertices) = outside_of(controls, &stencils.outside, &welded, n_vertices);
+        let vertices = &positions[..n_vertices];
+        notices.extend(oversized(cage.bounds(), vertices, &outside, &weights, controls.n_controls()));
+        notices.extend(solved.report.stalled.then(|| STALLED.to_owned()));
         let of_vertices = || outside.iter().filter(|o| (o.vertex as usize) < n_vertices);
         notices.extend(outside_in_words(of_vertices(), cage.diagonal()));
         let narrow = |history: Vec<f64>| history.into_iter().map(|x| x as f32).collect();
