@@ -52,7 +52,7 @@ pub use pose_code::{PoseCodeError, decode_pose, encode_pose};
 pub use project::{Project, ProjectError, read_project, write_project};
 pub use rigged::NoClip;
 pub use select::SelectError;
-pub use shown::{escaped, shown};
+pub use shown::{escaped, json_fault, shown, value_fault};
 pub use siblings::Resolve;
 pub use up::UpAxis;
 

@@ -1,5 +1,10 @@
 //! Names and words of files in messages.
 
+use serde_json::error::Category;
+
+/// Bytes before a place in a text that show where it is.
+const MAX_BEFORE: usize = 40;
+
 /// Most characters of a text of others in a message.
 const MAX_CHARS: usize = 200;
 
@@ -28,6 +33,40 @@ pub fn escaped(text: &str) -> String {
     out
 }
 
+/// What is wrong with a name or a value that a format does not have, without the words of the parser. `error`: its sentence, with
+/// names and values in quotes.
+#[must_use]
+pub fn value_fault(error: &str) -> String {
+    let mut words = error.split(['`', '"']).skip(1).step_by(2).map(shown);
+    let error = error.strip_prefix("Error: ").unwrap_or(error);
+    match words.next() {
+        Some(word) if error.starts_with("unknown") => {
+            format!("'{word}' is not known; it must be one of {}", words.collect::<Vec<_>>().join(", "))
+        }
+        Some(word) if error.starts_with("missing") => format!("'{word}' is missing"),
+        Some(word) => format!("'{word}' is of another kind than is needed"),
+        None => "a value is of another kind than is needed".to_owned(),
+    }
+}
+
+/// What is wrong with JSON that does not say what it must, where that is, and what stands before it.
+#[must_use]
+pub fn json_fault(text: &[u8], error: &serde_json::Error) -> String {
+    let what = match error.classify() {
+        Category::Eof => "its JSON ends too early: it is cut off".to_owned(),
+        Category::Data => value_fault(&error.to_string()),
+        _ if error.to_string().starts_with("number out of range") => "a number is out of range".to_owned(),
+        _ => "its JSON is damaged".to_owned(),
+    };
+    let (line, column) = (error.line(), error.column());
+    let of_line = text.split(|&byte| byte == b'\n').nth(line.saturating_sub(1)).unwrap_or_default();
+    let before = String::from_utf8_lossy(
+        &of_line[column.saturating_sub(MAX_BEFORE).min(of_line.len())..column.min(of_line.len())],
+    )
+    .into_owned();
+    format!("{what}, at line {line}, column {column}, after '{}'", escaped(before.trim()))
+}
+
 /// The first `max_chars` characters of a text, as [`shown`]: a file may have megabytes where a name belongs.
 pub(crate) fn shown_start(text: &str, max_chars: usize) -> String {
     escaped(&text.chars().take(max_chars).collect::<String>())
@@ -38,7 +77,32 @@ pub(crate) const MAX_NAME_CHARS: usize = 120;
 
 #[cfg(test)]
 mod tests {
-    use super::shown;
+    use serde_json::{Value, from_slice};
+
+    use super::{json_fault, shown, value_fault};
+
+    #[test]
+    fn faults_of_json_are_said_in_our_words() {
+        let said =
+            |text: &str| json_fault(text.as_bytes(), &from_slice::<Value>(text.as_bytes()).unwrap_err());
+        assert_eq!(said("[1,"), "its JSON ends too early: it is cut off, at line 1, column 3, after '[1,'");
+        assert_eq!(
+            said(&format!("{}\u{1b}\n\t{{\"a\": 1 b", " ".repeat(50))),
+            "its JSON is damaged, at line 1, column 51, after '\\u{1b}'"
+        );
+        let kinds = [
+            (
+                "unknown variant `run`, expected `follow` or `stay`",
+                "'run' is not known; it must be one of follow, stay",
+            ),
+            ("Error: missing field `to`", "'to' is missing"),
+            ("invalid type: floating point `64.5`, expected u32", "'64.5' is of another kind than is needed"),
+            ("invalid type: map, expected a sequence", "a value is of another kind than is needed"),
+        ];
+        for (error, ours) in kinds {
+            assert_eq!(value_fault(error), ours);
+        }
+    }
 
     #[test]
     fn long_text_keeps_its_ends() {

@@ -238,4 +238,7 @@ fn damaged_streams_are_errors() {
     }
     let message = read("x.glb", &with_fallback(&b)).unwrap_err().to_string();
     assert!(message.contains("could not be decoded"), "{message}");
+    // In our own words.
+    let message = read("x.glb", &draco(&stream[..stream.len() / 2]).glb()).unwrap_err().to_string();
+    assert!(message.contains("could not be decoded: its stream is damaged, or of a version"), "{message}");
 }

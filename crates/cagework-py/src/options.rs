@@ -1,5 +1,6 @@
 //! Keyword arguments as options of the core, and reports as dictionaries.
 
+use cagework_io::{json_fault, value_fault};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
@@ -16,7 +17,8 @@ use crate::error;
 pub(crate) fn options<T: Default + Serialize + DeserializeOwned>(
     given: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<T> {
-    let wrong = |name: &str, e: serde_json::Error| error::option(format!("{name}: {e}"));
+    let wrong =
+        |name: &str, e: serde_json::Error| error::option(format!("{name}: {}", value_fault(&e.to_string())));
     let mut all = serde_json::to_value(T::default()).map_err(|e| wrong("defaults", e))?;
     for (name, value) in given.into_iter().flatten() {
         let name: String = name.extract()?;
@@ -50,7 +52,7 @@ fn json(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
 /// `ArrayError` when it is not what [`dictionary`] made.
 pub(crate) fn from_dictionary<T: DeserializeOwned>(said: &Bound<'_, PyAny>) -> PyResult<T> {
     let text: String = said.py().import("json")?.call_method1("dumps", (said,))?.extract()?;
-    serde_json::from_str(&text).map_err(error::array)
+    serde_json::from_str(&text).map_err(|e| error::array(json_fault(text.as_bytes(), &e)))
 }
 
 /// A report as a dictionary.

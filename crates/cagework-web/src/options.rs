@@ -4,13 +4,13 @@ use cagework_cage::generate::{CageOptions, Shape, Symmetry};
 use cagework_core::BindOptions;
 use cagework_core::options::{Backend, Solver};
 use cagework_gpu::render::Theme;
-use cagework_io::{Joints, ReshapeOptions};
+use cagework_io::{Joints, ReshapeOptions, value_fault};
 use cagework_pose::Parts;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::JsValue;
 
-use crate::error::Answer;
+use crate::error::{Answer, ErrorName, Fault};
 
 /// Bytes that reading a file, or coordinates by formula, may take: a tab has 4 GiB, of which drawing and binding take their part.
 pub(crate) const READ_LIMIT: u64 = 1 << 30;
@@ -313,5 +313,6 @@ impl Default for RigAsked {
 /// # Errors
 /// `Argument` when it is something else: the page and the wasm file are of different versions.
 pub(crate) fn taken<T: DeserializeOwned>(said: JsValue) -> Answer<T> {
-    Ok(serde_wasm_bindgen::from_value(said)?)
+    serde_wasm_bindgen::from_value(said)
+        .map_err(|error| Fault::new(ErrorName::Error, value_fault(&error.to_string())))
 }

@@ -7,6 +7,7 @@ use cagework_cage::samples;
 use cagework_core::BindOptions;
 use cagework_core::PolygonMesh;
 use cagework_core::options::{GRID, MAX_ITERATIONS, Number, SPARSIFY, TAU};
+use cagework_io::value_fault;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use wasm_bindgen::JsValue;
@@ -163,7 +164,7 @@ impl Settings {
                 // A word's name as the key of an object would pass for the word.
                 Ok(()) if discriminant(value) != discriminant(default) => Some(String::new()),
                 Ok(()) => match serde_json::from_value(Value::Object(taken.clone())) {
-                    Err(error) => Some(format!(" ({error})")),
+                    Err(error) => Some(format!(" ({})", value_fault(&error.to_string()))),
                     Ok(asked) => check(asked).err().map(|allowed| format!("; it must be {allowed}")),
                 },
             };
@@ -257,15 +258,15 @@ mod tests {
             ("bind", "tau", json!(0), "a number above 0"),
             // Above 0 in 64 bits; in the 32 of the solver it is not.
             ("bind", "tau", json!(1e-60), "a number above 0"),
-            ("bind", "max_iterations", json!(1e300), "expected u32"),
+            ("bind", "max_iterations", json!(1e300), "is of another kind"),
             ("bind", "sparsify", json!(0.5), "a threshold below 0.1"),
-            ("bind", "solver", json!("gauss"), "expected one of `jacobi`"),
+            ("bind", "solver", json!("gauss"), "one of jacobi"),
             ("bind", "backend", json!({ "gpu": null }), "is taken instead"),
             ("cage", "vertices", json!(9_000_000_000_u64), "a whole number from 8 to 400"),
             ("cage", "vertices", json!("many"), "a whole number from 8 to 400"),
             ("cage", "margin", json!(-0.1), "from 0 to 0.25"),
             ("cage", "voxels", json!(4), "8 to 128"),
-            ("rig", "joints", json!("dance"), "expected one of `follow`"),
+            ("rig", "joints", json!("dance"), "one of follow"),
             ("rig", "rigid", json!([7]), "is taken instead"),
         ] {
             let mut given = json!({ "bind": { "grid": 32 }, "cage": { "vertices": 100 }, "rig": {} });

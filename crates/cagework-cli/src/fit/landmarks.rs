@@ -4,6 +4,7 @@ use std::path::Path;
 
 use cagework_core::Weights;
 use cagework_core::geometry::closest_point_on_triangle;
+use cagework_io::json_fault;
 use glam::DVec3;
 use serde::Deserialize;
 
@@ -46,7 +47,9 @@ type Place = ([u32; 3], [f64; 3]);
 /// # Errors
 /// When the file cannot be read, is no JSON, or names what there is not.
 pub(super) fn landmarks(bound: &Bound, path: &Path) -> Result<Goals, CliError> {
-    let all: Vec<Said> = serde_json::from_slice(&read(path)?).map_err(|e| CliError::file(path, e))?;
+    let bytes = read(path)?;
+    let all: Vec<Said> =
+        serde_json::from_slice(&bytes).map_err(|e| CliError::file(path, json_fault(&bytes, &e)))?;
     if !(1..=MAX).contains(&all.len()) {
         return Err(wrong(path, &format!("{} landmarks; there must be 1 to {MAX}", all.len())));
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cagework_io::shown;
+use cagework_io::{json_fault, shown};
 use cagework_pose::pull::{Handle, Reach};
 use glam::{DVec3, Vec3};
 use serde::Deserialize;
@@ -94,7 +94,7 @@ impl Job {
             )));
         }
         let said: Said = serde_json::from_slice(&bytes)
-            .map_err(|e| wrong(format!("is no job: {}", shown(&e.to_string()))))?;
+            .map_err(|e| wrong(format!("is no job: {}", json_fault(&bytes, &e))))?;
         let handle = |list: &str, k: usize, said: &HandleSaid| match said {
             HandleSaid { vertex: Some(v), triangle: None, bary: None, cage: None, .. } => {
                 Ok(Handle::Vertex(*v))

@@ -83,7 +83,7 @@ fn what_cannot_be_fitted_is_said_and_nothing_written() {
         .stderr(contains("lambda is -1; it must be a number from 0 on"));
     for (landmarks, said) in [
         ("[]", "bad.json: 0 landmarks; there must be 1 to 10000"),
-        ("{}", "bad.json: invalid type"),
+        ("{}", "bad.json: a value is of another kind than is needed, at line 1, column 0"),
         ("[{\"vertex\": 178, \"to\": [0, 0, 0]}]", "landmark 0 names vertex 178: they count from 0 to 177"),
         ("[{\"to\": [0, 0, 0]}]", "landmark 0 must name one of vertex, triangle (with bary) and point"),
         ("[{\"triangle\": 0, \"bary\": [1, 1, 1], \"to\": [0, 0, 0]}]", "which is no point of a triangle"),

@@ -56,8 +56,12 @@ fn a_vertex_goes_where_it_is_pulled_to_and_a_pin_stays() {
 fn a_job_that_cannot_be_done_says_what_is_wrong_and_writes_nothing() {
     let sandbox = bound();
     for (job, said) in [
-        ("grab it", "job.json: is no job: expected value"),
-        ("[]", "job.json: is no job: invalid"),
+        ("grab it", "job.json: is no job: its JSON is damaged, at line 1, column 1, after 'g'"),
+        ("[]", "job.json: is no job: a value is of another kind"),
+        (
+            "{\"grabs\": [],\n \"pin\": []}",
+            "'pin' is not known; it must be one of grabs, pins, reach, start, relax, frames, at line 2, column 6, after '\"pin\"'",
+        ),
         (r#"{"grabs": []}"#, "nothing is grabbed"),
         (
             r#"{"grabs": [{"vertex": 100000, "to": [0, 0, 0]}]}"#,
@@ -73,7 +77,7 @@ fn a_job_that_cannot_be_done_says_what_is_wrong_and_writes_nothing() {
         (r#"{"grabs": [{"vertex": 0}]}"#, "grab 0 has no target"),
         (r#"{"grabs": [{"to": [0, 0, 0]}]}"#, "one of vertex, triangle"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 1e300, 0]}]}"#, "grab 0 goes to inf"),
-        (r#"{"grabs": [{"vertex": 0, "to": [0, 1e999, 0]}]}"#, "number out of range"),
+        (r#"{"grabs": [{"vertex": 0, "to": [0, 1e999, 0]}]}"#, "a number is out of range, at line 1"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "reach": -1}"#, "the reach is -1"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "reach": "far"}"#, "the reach is 'far'"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "relax": 3}"#, "relax is 3"),

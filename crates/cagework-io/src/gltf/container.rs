@@ -13,7 +13,7 @@ use serde_json::{Map, Value, json};
 use super::GltfError;
 use crate::look::sniff_image;
 use crate::memory::MemoryError;
-use crate::shown::{MAX_NAME_CHARS, shown, shown_start};
+use crate::shown::{MAX_NAME_CHARS, json_fault, shown, shown_start};
 use crate::siblings::{Absent, Image, NO_IMAGE, Resolve, Siblings};
 
 /// Extensions that hide geometry from a reader without their decoder; meshopt's has the same streams by both names.
@@ -186,10 +186,7 @@ fn unpadded(json: &[u8]) -> &[u8] {
 }
 
 fn parsed(json: &[u8]) -> Result<Value, GltfError> {
-    serde_json::from_slice(json).map_err(|e| {
-        let how = if e.is_eof() { "ends too early: it is cut off" } else { "is damaged" };
-        GltfError::Json(format!("its JSON {how}, at line {}, column {}", e.line(), e.column()))
-    })
+    serde_json::from_slice(json).map_err(|e| GltfError::Json(json_fault(json, &e)))
 }
 
 /// JSON and binary chunk of a GLB, nothing resolved.

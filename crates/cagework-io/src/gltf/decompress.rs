@@ -6,7 +6,9 @@ use ::gltf::json::accessor::Accessor;
 use ::gltf::json::mesh::Semantic;
 use ::gltf::json::validation::Checked;
 use ::gltf::json::{Index, Root};
-use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointIndex};
+use draco_core::{
+    DataType, DecodeLimits, DecoderBuffer, ErrorKind, Mesh, MeshDecoder, PointAttribute, PointIndex,
+};
 use meshoptimizer_rs::Workspace;
 use meshoptimizer_rs::codec::{BufferView, Filter, Mode};
 use serde_json::{Map, Value, json};
@@ -202,7 +204,7 @@ fn meshopt(packed: &Value, buffers: &Buffers, left: u64) -> Result<Vec<u8>, Stri
         BufferView::new(mode, filter, number("count"), number("byteStride"))?
             .decode(source, &mut Workspace::default())
     };
-    decode().map_err(|error| error.to_string())
+    decode().map_err(|_| "its stream is damaged, or of a mode that is not known".to_owned())
 }
 
 /// Puts the mesh of a Draco stream into the accessors of its primitive.
@@ -221,7 +223,10 @@ fn draco(
         .with_max_decoded_bytes(left);
     let mut stream = DecoderBuffer::new(source.ok_or("its stream is cut off")?).with_limits(limits);
     let mut mesh = Mesh::new();
-    MeshDecoder::new().decode(&mut stream, &mut mesh).map_err(|error| error.to_string())?;
+    MeshDecoder::new().decode(&mut stream, &mut mesh).map_err(|error| match error.kind() {
+        ErrorKind::LimitExceeded => format!("all streams together become more than {} MiB", MAX_BYTES >> 20),
+        _ => "its stream is damaged, or of a version that is not read".to_owned(),
+    })?;
 
     let primitive = json.pointer(place).and_then(Value::as_object).cloned().unwrap_or_default();
     for (name, id) in packed["attributes"].as_object().into_iter().flatten() {

@@ -137,7 +137,7 @@ pub(super) fn array(archive: &mut Archive<'_>, name: &'static str) -> Result<Opt
     let bad = || fault("is not in NumPy's .npy format".into());
     let mut unpack = |most: u64, into: &mut Vec<u8>| {
         let unpacked = entry.by_ref().take(most).read_to_end(into);
-        unpacked.map_err(|e| fault(format!("cannot be unpacked: {e}")))
+        unpacked.map_err(|_| fault("cannot be unpacked: the file is damaged".into()))
     };
     let mut bytes = Vec::new();
     unpack(START_BYTES, &mut bytes)?;
