@@ -1,4 +1,4 @@
-//! Files that ask for endless work or memory: small ones of every kind, through four commands, within limits that the
+//! Files that ask for endless work or memory: small ones of every kind, through five commands, within limits that the
 //! system enforces. The table of what each took is printed (`--nocapture`).
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
@@ -248,6 +248,7 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
         ),
         ("chain.glb", glb(|d| nodes(d, 2000, true))),
         ("nodes.glb", glb(|d| nodes(d, 300_000, false))),
+        ("instances.glb", glb(|d| nodes(d, 40_000, false))),
         (
             "nodes_x1000.glb",
             glb(|d| {
@@ -326,6 +327,7 @@ fn every_command_ends_with_a_result_or_a_sentence() {
     for (name, _) in models {
         for command in [
             "info FILE",
+            "cage FILE -o ../cage.obj",
             "check FILE",
             "bind FILE --cage box:2 -g 16 -o ../out.glb --weights ../out.npz",
             "render FILE -o ../out.png --size 64x64",

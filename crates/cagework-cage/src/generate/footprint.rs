@@ -6,6 +6,8 @@
 
 use glam::DVec3;
 
+use super::voxels::Voxels;
+
 /// Widening of voxels, in voxels, above f64's rounding.
 const ROUNDING_MARGIN: f64 = 1e-6;
 
@@ -77,13 +79,23 @@ impl Footprint {
         }
     }
 
-    /// Calls `each(y, z, first, last)` for the run of every row.
-    pub(crate) fn for_each_run(&self, dims: [usize; 3], mut each: impl FnMut(usize, usize, usize, usize)) {
+    /// Rows of its box.
+    pub(crate) fn n_rows(&self, dims: [usize; 3]) -> usize {
         let [_, ys, zs] = rows(self.min, self.max, dims);
+        ys[1].saturating_sub(ys[0]) * zs[1].saturating_sub(zs[0])
+    }
+
+    /// Adds the run of every row; rows in which `voxels` has all of its box are passed over.
+    pub(crate) fn add_to(&self, voxels: &mut Voxels) {
+        let [xs, ys, zs] = rows(self.min, self.max, voxels.dims);
+        // Runs may begin and end a voxel further out, by rounding.
+        let (from, to) = (xs[0].saturating_sub(1), xs[1].min(voxels.dims[0] - 1));
         for z in zs[0]..zs[1] {
             for y in ys[0]..ys[1] {
-                if let Some((first, last)) = self.run(y, z, dims[0]) {
-                    each(y, z, first, last);
+                if !voxels.has_whole_run(y, z, from, to)
+                    && let Some((first, last)) = self.run(y, z, voxels.dims[0])
+                {
+                    voxels.add_run(y, z, first, last);
                 }
             }
         }
@@ -160,13 +172,11 @@ mod tests {
             let triangle = [[9.3, 8.2, 5.0 + off], [9.3, 2.4, 5.0], [9.3, 2.4, 3.6]].map(DVec3::from_array);
             for turn in 0..3 {
                 let corners = triangle.map(|p| DVec3::from_array([0, 1, 2].map(|k| p[(k + turn) % 3])));
-                let mut voxels = std::collections::BTreeSet::new();
-                Footprint::new(corners, 0.0).for_each_run([16; 3], |y, z, first, last| {
-                    voxels.extend((first..=last).map(|x| [x, y, z].map(|v| v as i32)));
-                });
+                let mut voxels = Voxels::new([16; 3]);
+                Footprint::new(corners, 0.0).add_to(&mut voxels);
                 let mut there = [[9, 2, 4], [9, 7, 4], [9, 2, 3], [9, 4, 3]];
                 there.iter_mut().for_each(|v| v.rotate_left(turn));
-                assert!(there.iter().all(|v| voxels.contains(v)), "{off:e}, {turn}: {voxels:?}");
+                assert!(there.iter().all(|&v| voxels.has(v)), "{off:e}, {turn}: {voxels:?}");
             }
         }
     }

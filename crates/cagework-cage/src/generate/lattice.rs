@@ -1,6 +1,8 @@
 //! Where the voxels are: a lattice of cubes centred on the model, so that a mirror through its centre maps voxels onto
 //! voxels.
 
+use std::collections::HashSet;
+
 use glam::{DVec3, Vec3};
 
 use super::footprint::Footprint;
@@ -15,6 +17,9 @@ const MIN_VOXEL_RATIO: f64 = 2e-5;
 
 /// Triangles from one check whether the work was cancelled to the next.
 const TRIANGLES_PER_CHECK: usize = 4096;
+
+/// Rows of a triangle's box above which triangles at one place, such as instances, are looked for and added once.
+const FEW_ROWS: usize = 64;
 
 /// A lattice of voxels: cubes, or boxes that are thinner along one axis. Lattice coordinates count voxels from the box's corner; *centred* ones from its centre.
 #[derive(Clone, Debug)]
@@ -85,6 +90,7 @@ impl Lattice {
         for &p in &points {
             voxels.add(voxel_of(p));
         }
+        let mut large = HashSet::new();
         for (k, t) in triangles.iter().enumerate() {
             if k % TRIANGLES_PER_CHECK == 0 {
                 go_on(k as f32 / triangles.len() as f32)?;
@@ -94,8 +100,11 @@ impl Lattice {
             if voxel == voxel_of(corners[1]) && voxel == voxel_of(corners[2]) {
                 continue;
             }
-            Footprint::new(corners, 0.0)
-                .for_each_run(self.dims, |y, z, first, last| voxels.add_run(y, z, first, last));
+            let footprint = Footprint::new(corners, 0.0);
+            let is_large = footprint.n_rows(self.dims) > FEW_ROWS;
+            if !is_large || large.insert(corners.map(|p| p.to_array().map(f64::to_bits))) {
+                footprint.add_to(&mut voxels);
+            }
         }
         Ok(voxels)
     }

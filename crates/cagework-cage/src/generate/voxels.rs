@@ -49,6 +49,12 @@ impl Voxels {
         (first / WORD..=last / WORD).any(|w| row[w] & run_mask(w, first, last) != 0)
     }
 
+    /// Whether all of `first..=last` of a row is set.
+    pub(super) fn has_whole_run(&self, y: usize, z: usize, first: usize, last: usize) -> bool {
+        let row = self.row(y, z);
+        (first / WORD..=last / WORD).all(|w| !row[w] & run_mask(w, first, last) == 0)
+    }
+
     /// Voxels in the set.
     pub(super) fn count(&self) -> usize {
         self.bits.iter().map(|w| w.count_ones() as usize).sum()

@@ -6,9 +6,9 @@ use super::camera::Camera;
 use crate::device::GpuContext;
 use crate::error::GpuError;
 
-/// Most pixels, counted for each triangle that covers them, that an adapter made of processor cores draws: some 10 s for a
-/// picture; in a browser some 3 s for a rough one, of which opening a model waits for several.
-const SOFTWARE_PIXELS: f64 = if cfg!(target_family = "wasm") { 1e8 } else { 2e8 };
+/// Most pixels, counted for each triangle that covers them, that an adapter made of processor cores draws: 10 s of one core for a
+/// picture in llvmpipe; in a browser some 3 s for a rough one, of which opening a model waits for several.
+const SOFTWARE_PIXELS: f64 = 1e8;
 
 /// What each pixel of a triangle's longest side counts for beside the triangle's area: slivers have hardly any. Measured
 /// on a fan of 100,000 of them, in SwiftShader (which browsers have) and in llvmpipe.
