@@ -1,8 +1,8 @@
 //! Mutated files through everything that reads them: each ends in a result or an error, within seconds, and without a panic.
 //!
 //! `cargo xtask fuzz --minutes 60` takes a seed from the clock and says which; `--seed 1` gives the same inputs in every run.
-//! What fails is written to `target/fuzz`, and `cargo xtask fuzz FILE` does it again. Without arguments the files in `found`, which
-//! failed once, are tried first.
+//! What fails is written to `target/fuzz`, and `cargo xtask fuzz FILE` does it again. Files that
+//! failed once are kept in `found` and tried first.
 //!
 //! Inputs are tried in a process of its own, because a stack that overflows and memory that runs out end one. It says the number
 //! of each input before it tries it; when it ends, or falls silent, the number is known and so is the input.
@@ -53,10 +53,7 @@ fn main() -> ExitCode {
             }
             ExitCode::SUCCESS
         }
-        [] => match try_files(&found()) {
-            ExitCode::SUCCESS => fuzz(1.0, None),
-            failure => failure,
-        },
+        [] => fuzz(1.0, None),
         ["--minutes", minutes] => minutes.parse().map_or_else(|_| usage(), |m| fuzz(m, None)),
         ["--minutes", minutes, "--seed", seed] => match (minutes.parse(), seed.parse()) {
             (Ok(minutes), Ok(seed)) => fuzz(minutes, Some(seed)),
@@ -188,6 +185,9 @@ fn fuzz(minutes: f64, seed: Option<u64>) -> ExitCode {
     let clock = || std::time::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs());
     let seed = seed.unwrap_or_else(clock);
     println!("fuzz: seed {seed}, {minutes} minutes");
+    if try_files(&found()) != ExitCode::SUCCESS {
+        return ExitCode::FAILURE;
+    }
     let began = Instant::now();
     let until = began + Duration::from_secs_f64(60.0 * minutes.clamp(0.0, 1e5));
     let (mut next, mut failures, mut said) = (0, 0, began);
