@@ -5,7 +5,6 @@ use cagework_core::BindOptions;
 use cagework_core::options::{Backend, Solver};
 use cagework_gpu::render::Theme;
 use cagework_io::{Joints, ReshapeOptions, value_fault};
-use cagework_pose::Parts;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::JsValue;
