@@ -9,6 +9,7 @@ mod cage_and_info;
 mod cages;
 mod controls;
 mod deform;
+mod documents;
 mod evaluate;
 mod fit;
 #[cfg(unix)]
