@@ -48,15 +48,15 @@ pub(crate) struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Say what is in a model, and whether it would do as a cage.
+    /// Describe a model, and whether it is valid as a cage.
     Info(InfoArgs),
     /// Compute the weights that tie a mesh to a cage.
     Bind(BindArgs),
     /// Move the cage, and the mesh with it.
     Deform(DeformArgs),
-    /// Let many models follow one cage: the cage is solved for once, each model is sampled and written.
+    /// Deform many models with one cage and one pose: one solve, and a file for each model.
     Refit(RefitArgs),
-    /// Take the model by the hand: points of it go where they are pulled to, and the cage is solved for.
+    /// Move points of the model to given places, and solve for the pose of the cage.
     Pull(PullArgs),
     /// Find the pose of the cage that brings a model to a target: another model with the same vertices, or landmarks.
     Fit(FitArgs),
@@ -64,13 +64,13 @@ pub(crate) enum Command {
     Render(RenderArgs),
     /// Make a cage for a model: one that follows it, its convex hull, or a subdivided box.
     Cage(CageArgs),
-    /// Say everything that is wrong with a cage, and mend what can be mended.
+    /// List the faults of a cage and repair them.
     Check(CheckArgs),
-    /// Time the paper's way against the default, on one thread and on all.
+    /// Time the published method against the default, on one thread and on all.
     Bench(BenchArgs),
-    /// Run the paper's evaluation anew: times, errors and reconstructions, as CSV, SVG, GLB and words.
+    /// Repeat the paper's evaluation: times, errors and reconstructions, as CSV, SVG, GLB and text.
     Evaluate(EvaluateArgs),
-    /// Bind and deform the built-in sample, and say what happened.
+    /// Bind and deform the built-in sample, and print what happened.
     Demo(DemoArgs),
 }
 
