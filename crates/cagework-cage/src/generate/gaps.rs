@@ -3,8 +3,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::lattice::Lattice;
-use super::shell::MARGIN_VOXELS;
+use super::lattice::{Lattice, MARGIN_VOXELS};
 use super::voxels::Voxels;
 use super::{CageOptions, MAX_VOXELS};
 use cagework_core::cage::Cage;

@@ -12,6 +12,9 @@ use cagework_core::progress::Cancelled;
 /// Edge of a voxel over the model's length divided by their number: its ends lie inside voxels, not between two.
 const VOXEL_ENLARGEMENT: f64 = 1.002;
 
+/// Voxels between the solid's box and the lattice's, apart from dilation: the outermost layer stays empty.
+pub(super) const MARGIN_VOXELS: usize = 6;
+
 /// Smallest edge of a voxel over the largest coordinate: f32 positions can tell its parts apart.
 const MIN_VOXEL_RATIO: f64 = 2e-5;
 

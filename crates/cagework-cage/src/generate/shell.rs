@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 
 use super::gaps::{Gap, gaps};
 use super::guarded::{Guarded, Obstacle};
-use super::lattice::Lattice;
+use super::lattice::{Lattice, MARGIN_VOXELS};
 use super::surface::{SMOOTHING_REACH, Surface};
 use super::voxels::Voxels;
 use super::{CageOptions, Shape, Symmetry, VERTICES_PER_GAP, first_voxels};
@@ -25,9 +25,6 @@ const MIRROR_TOLERANCE: f64 = 1.0 / 36.0;
 /// Largest extent of a cluster of voxels without an image, over the model's longest side: a larger one is a part that only
 /// one side has.
 const MAX_UNMATCHED: f64 = 0.08;
-
-/// Voxels between the solid's box and the lattice's, apart from dilation: the outermost layer stays empty.
-pub(super) const MARGIN_VOXELS: usize = 6;
 
 /// Half the width of the widest gaps that are looked for, over the model's longest side.
 const MAX_GAP_HALF: f64 = 0.12;

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::memory::{Vertices, estimate, field_bytes};
-use super::pipeline::{Points, Prepared, Solved};
-use super::solving::{sample_fields, solve_fields};
+use super::pipeline::Prepared;
+use super::points::Points;
+use super::solving::{Solved, sample_fields, solve_fields};
 use super::voxels::{Gridded, Voxels};
 use super::{BindError, Binding, Watch};
 use crate::controls::Controls;

@@ -5,6 +5,7 @@ mod memory;
 mod offsets;
 mod outside;
 pub mod pipeline;
+mod points;
 mod solving;
 mod voxels;
 mod watch;

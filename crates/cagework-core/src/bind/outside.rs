@@ -5,7 +5,7 @@ use std::fmt;
 use glam::{DVec3, Vec3};
 
 use super::BindError;
-use super::pipeline::Points;
+use super::points::Points;
 use crate::cage::Cage;
 use crate::controls::Controls;
 use crate::deform::OutsideVertex;

@@ -13,19 +13,19 @@ use crate::crossing;
 use crate::deform::{OutsideVertex, outside_in_words};
 use crate::frames::Frames;
 use crate::grid::Grid;
-use crate::mesh::{Weld, weld};
+use crate::mesh::Weld;
 use crate::options::{Backend, BindOptions, Method, OutsidePolicy};
 use crate::progress::{Progress, Stage};
 use crate::report::{BindReport, MemoryBytes, Timings, WeightStats};
 use crate::sample::{Outside, Stencils};
 use crate::solve::hierarchy::Hierarchy;
-use crate::solve::rows::Row;
-use crate::solve::stop::SolveReport;
 use crate::team::{Team, VERTEX_RUN};
 
-use super::memory::{Vertices, estimate};
+use super::memory::estimate;
 use super::offsets::{Offsets, needs_all};
 use super::outside::{oversized, refuse_outside};
+use super::points::Points;
+pub use super::solving::Solved;
 use super::solving::solve_and_sample;
 use super::voxels::{Gridded, Voxels};
 use super::watch::Watch;
@@ -54,55 +54,6 @@ pub struct Prepared<'a> {
     estimated: u64,
     /// On the watcher's clock: the beginning, voxels made, stencils made.
     times_ms: [f64; 3],
-}
-
-/// The vertices of a model, and their different positions.
-pub(super) struct Points<'a> {
-    pub(super) positions: &'a [Vec3],
-    pub(super) welded: Weld,
-    points: Vec<Vec3>,
-}
-
-impl<'a> Points<'a> {
-    /// # Errors
-    /// When there are none, or one is not a finite number.
-    pub(super) fn new(positions: &'a [Vec3]) -> Result<Self, BindError> {
-        if positions.is_empty() {
-            return Err(BindError::EmptyMesh);
-        }
-        if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
-            return Err(BindError::NotFinite { vertex: vertex as u32 });
-        }
-        let welded = weld(positions);
-        let points = welded.first.iter().map(|&v| positions[v as usize]).collect();
-        Ok(Self { positions, welded, points })
-    }
-
-    /// How many there are of both.
-    pub(super) fn count(&self) -> Vertices {
-        Vertices { rows: self.positions.len(), points: self.points.len() }
-    }
-}
-
-/// The sampled columns and how the solve went.
-#[derive(Clone, Debug, Default)]
-pub struct Solved {
-    /// `[n_batches][n_points]` rows of lanes.
-    pub blocks: Vec<Vec<Row>>,
-    /// How the solve of all columns went.
-    pub report: SolveReport,
-    /// Sweeps, V-cycles or steps.
-    pub iterations: u32,
-    /// Iterations between two of the report's deltas: 1 but for the GPU's Jacobi sweeps.
-    pub delta_interval: u32,
-    /// Bytes of fields alive at once.
-    pub field_bytes: usize,
-    /// Bytes planned for them on a device, which the estimate made here leaves out; 0 in this process.
-    pub planned_bytes: u64,
-    /// Share of the stage's time that went into solving; the rest is sampling.
-    pub solve_share: f64,
-    /// Name of the GPU; none for the CPU.
-    pub adapter: Option<String>,
 }
 
 pub(super) fn run(

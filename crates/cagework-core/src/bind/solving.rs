@@ -14,11 +14,31 @@ use crate::solve::rows::Row;
 use crate::solve::stop::{SolveReport, StopRule};
 use crate::team::Team;
 
-use super::pipeline::Solved;
 use super::watch::Watch;
 
 /// Delta falls roughly by this factor from the first sweep to tau: for the progress bar only.
 const JACOBI_DECADES: f64 = 4.0;
+
+/// The sampled columns and how the solve went.
+#[derive(Clone, Debug, Default)]
+pub struct Solved {
+    /// `[n_batches][n_points]` rows of lanes.
+    pub blocks: Vec<Vec<Row>>,
+    /// How the solve of all columns went.
+    pub report: SolveReport,
+    /// Sweeps, V-cycles or steps.
+    pub iterations: u32,
+    /// Iterations between two of the report's deltas: 1 but for the GPU's Jacobi sweeps.
+    pub delta_interval: u32,
+    /// Bytes of fields alive at once.
+    pub field_bytes: usize,
+    /// Bytes planned for them on a device, which the estimate made here leaves out; 0 in this process.
+    pub planned_bytes: u64,
+    /// Share of the stage's time that went into solving; the rest is sampling.
+    pub solve_share: f64,
+    /// Name of the GPU; none for the CPU.
+    pub adapter: Option<String>,
+}
 
 /// Solves all columns and samples them.
 ///

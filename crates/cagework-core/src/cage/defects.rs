@@ -4,9 +4,11 @@ use std::fmt;
 
 use thiserror::Error;
 
-use super::polygon::MAX_CORNERS;
 use super::{MAX_DIAGONAL, MAX_FACES, MIN_DIAGONAL};
 use crate::words::{counted, grouped};
+
+/// Most corners of a face: cutting it takes the square of them, or the cube at worst.
+pub(super) const MAX_CORNERS: usize = 1000;
 
 /// Why a polygon mesh is not a cage. Vertices and faces are counted from 0.
 #[derive(Clone, Debug, PartialEq, Error)]

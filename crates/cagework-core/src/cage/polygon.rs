@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::defects::FaceDefect;
+use super::defects::{FaceDefect, MAX_CORNERS};
 use super::hats;
 use super::patch::{self, Facets};
 use super::triangulate::{cross, ear_clip};
@@ -24,9 +24,6 @@ const MEYER_TURN: f64 = 0.25;
 
 /// Smaller shares of Meyer's coordinates are set to 0: at a straight corner their quotient is 0 / 0.
 const MIN_SHARE: f64 = 1e-6;
-
-/// Most corners of a face: cutting it takes the square of them, or the cube at worst.
-pub(super) const MAX_CORNERS: usize = 1000;
 
 /// A face in its plane.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,7 +5,6 @@ use nalgebra::{DMatrix, DVector};
 
 use super::anderson::Anderson;
 use super::energy::Pull;
-use super::frame::group_matrices;
 use super::grip::{Grip, check as check_index};
 use super::{MAX_HANDLES, PullError};
 use cagework_core::edit::Symmetry;
@@ -353,4 +352,19 @@ pub(super) fn flat(cage: &[DVec3]) -> DVector<f64> {
 pub(super) fn smooth(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
+}
+
+/// `c^T B_r` of each group r: how its references lie to what they have become.
+pub(super) fn group_matrices(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> Vec<DMat3> {
+    let width = 3 * n_groups;
+    let n = moments.len() / width;
+    let mut sums = vec![0.0; 3 * width];
+    for (x, sums) in sums.chunks_exact_mut(width).enumerate() {
+        for (i, row) in moments.chunks_exact(width).enumerate() {
+            let c = cage[x * n + i];
+            sums.iter_mut().zip(row).for_each(|(sum, m)| *sum += c * m);
+        }
+    }
+    let column = |r: usize, k: usize| DVec3::from_array([0, 1, 2].map(|x| sums[x * width + 3 * r + k]));
+    (0..n_groups).map(|r| DMat3::from_cols(column(r, 0), column(r, 1), column(r, 2))).collect()
 }

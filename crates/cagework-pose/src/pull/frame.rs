@@ -3,7 +3,7 @@
 use glam::{DMat3, DQuat, DVec3, Vec3};
 use nalgebra::{DMatrix, DVector};
 
-use super::drag::{Drag, smooth};
+use super::drag::{Drag, group_matrices, smooth};
 use super::grip::Handle;
 use cagework_core::rotation::nearest_rotation;
 
@@ -180,21 +180,6 @@ pub(super) fn turned(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> D
     }
     let rows: Vec<&[f64]> = moments.chunks_exact(width).collect();
     DMatrix::from_fn(rows.len(), 3, |i, x| dot(rows[i], &turned[x * width..][..width]))
-}
-
-/// `c^T B_r` of each group r: how its references lie to what they have become.
-pub(super) fn group_matrices(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> Vec<DMat3> {
-    let width = 3 * n_groups;
-    let n = moments.len() / width;
-    let mut sums = vec![0.0; 3 * width];
-    for (x, sums) in sums.chunks_exact_mut(width).enumerate() {
-        for (i, row) in moments.chunks_exact(width).enumerate() {
-            let c = cage[x * n + i];
-            sums.iter_mut().zip(row).for_each(|(sum, m)| *sum += c * m);
-        }
-    }
-    let column = |r: usize, k: usize| DVec3::from_array([0, 1, 2].map(|x| sums[x * width + 3 * r + k]));
-    (0..n_groups).map(|r| DMat3::from_cols(column(r, 0), column(r, 1), column(r, 2))).collect()
 }
 
 /// In eight sums, which a processor makes side by side.
