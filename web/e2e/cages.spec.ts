@@ -89,8 +89,12 @@ test("a gap stays open as the vertices allow, and when asked for", async ({ page
   await shoot(page, "cage-gap");
 
   await test.step("a cage of more vertices than wanted says so", async () => {
-    await gaps.fill("64");
     await drop(page, [{ name: "spring.obj", bytes: spring() }]);
+    await expect(page).toHaveTitle(/spring/);
+    await bound(page);
+    await page.getByRole("button", { name: /^Cage/ }).first().click();
+    await gaps.fill("64");
+    await page.getByRole("button", { name: "Make this cage" }).click();
     await expect(page.getByText(/need \d+ vertices instead of 80/)).toBeVisible();
     await bound(page);
     await shoot(page, "cage-more");
