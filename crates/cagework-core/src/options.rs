@@ -260,7 +260,7 @@ pub struct BindOptions {
     pub tau: f32,
     /// Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. Default 20,000.
     pub max_iterations: u32,
-    /// Weights below it are dropped (then sum and rest pose are restored); 0 = keep all. Default 0.
+    /// In each row the smallest weights, up to this total, are dropped; then sum and rest position are restored. 0 keeps all. Default 0.
     pub sparsify: f32,
     /// Refuse to start above this many bytes of memory, `held` ones included. Default 4 GiB; 2 GiB in wasm.
     pub memory_limit: u64,
