@@ -108,7 +108,7 @@ fn ascending(x: f64, number: u32) -> [u32; 3] {
 }
 
 /// Pairs of triangles of one surface that meet where they should not, each once, in order. `[n_triangles]` given. It stops
-/// at [`MAX_PAIRS`].
+/// after 100,000 pairs.
 pub fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
     each_meeting(triangles, |pair| {
@@ -120,7 +120,7 @@ pub fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
 }
 
 /// Calls `each` with every pair of triangles of one surface that meet where they should not, lower number first. Returns
-/// whether those were all: `each` may end the search, and so do [`MAX_COMPARISONS`].
+/// whether those were all: `each` may end the search, and 2^29 comparisons do.
 ///
 /// Sweep along x: `n log n` for surfaces whose triangles are small against the whole.
 pub fn each_meeting(triangles: &[Corners], mut each: impl FnMut([u32; 2]) -> ControlFlow<()>) -> bool {
