@@ -69,7 +69,7 @@ tau: number,
  */
 max_iterations: number,
 /**
- * Weights below it are dropped (then sum and rest pose are restored); 0 = keep all. Default 0.
+ * In each row the smallest weights, up to this total, are dropped; then sum and rest position are restored. 0 keeps all. Default 0.
  */
 sparsify: number,
 /**
