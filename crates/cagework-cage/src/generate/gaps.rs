@@ -22,19 +22,20 @@ const OPEN_GAP: f64 = 4.0;
 /// Area of the smallest gap for which the lattice is refined, over the square of the model's longest side.
 const MIN_GAP_AREA: f64 = 0.003;
 
-/// How many times thinner voxels are across narrow gaps, and across those that need more than [`MAX_RESOLUTION`] of them.
+/// Length of a voxel over its thickness across narrow gaps: the first one, or the second one where the first would need more than
+/// [`MAX_RESOLUTION`] thicknesses.
 const STRETCHES: [f64; 2] = [3.0, 8.0];
 
-/// Voxels along the longest side, if they were as thin in all directions, above which they are as thin as can be.
+/// Most thicknesses of a voxel along the model's longest side with the first of [`STRETCHES`].
 const MAX_RESOLUTION: f64 = 250.0;
 
-/// Voxels across the narrow tenth of a gap that stays open in a lattice of thin voxels.
+/// Thin voxels across the narrow part of a gap that a hull leaves open: six bridged one of two figures.
 const OPEN_NARROWS: f64 = 7.0;
 
 /// Share of a gap's sheet that is its narrow part.
 const NARROW_SHARE: f64 = 0.1;
 
-/// Smallest mean square of the component, along the axis of thin voxels, of the unit vectors across a gap that they are for.
+/// Smallest mean of `cos^2` of the angle between a gap's direction across and the thin axis for which the gap is measured again.
 const MIN_ACROSS: f64 = 0.7;
 
 /// Voxels along the longest side that gaps need, over those of the target, above which voxels are thinner instead of smaller.
@@ -134,8 +135,11 @@ pub(super) fn narrow_gaps(
     Ok(NarrowGaps { gaps: found, stretch, voxels: voxels.min(MAX_VOXELS) })
 }
 
-/// Voxels along the longest side, if all were as thin as those of `stretch`, that leave the narrow parts of the large gaps across its
-/// axis open.
+/// Thicknesses of a voxel along the model's longest side that leave the narrow parts of the large gaps across the thin axis of `stretch`
+/// open; 0 without such gaps.
+///
+/// # Errors
+/// When `go_on` says so.
 fn resolution_of_narrows(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
