@@ -70,14 +70,14 @@ async function isInside(page: Page, [px, py, pz]: readonly [number, number, numb
   return below % 2 === 1;
 }
 
-test("a gap stays open as the vertices allow, and when asked for", async ({ page }) => {
+test("a gap stays open as the vertex count allows, and when asked for", async ({ page }) => {
   await open(page);
   await drop(page, [{ name: "legs.obj", bytes: legs() }]);
   await expect(page).toHaveTitle(/legs/);
   await bound(page);
   await page.getByRole("button", { name: /^Cage/ }).first().click();
   const gaps = page.getByLabel("Gaps that stay open");
-  await expect(gaps).toHaveAttribute("aria-valuetext", "as the vertices allow");
+  await expect(gaps).toHaveAttribute("aria-valuetext", "as the vertex count allows");
   expect(await isInside(page, IN_A_LEG)).toBe(true);
   expect(await isInside(page, IN_THE_GAP)).toBe(false);
   await gaps.fill("128");

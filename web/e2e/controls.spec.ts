@@ -70,7 +70,7 @@ test("a smooth surface and controls inside are bound, posed, undone and kept", a
   const plain = await modelPositions(page);
 
   await test.step("smooth: bound again, in the same pose, with other weights", async () => {
-    await page.getByRole("switch", { name: /Round its surface/ }).click();
+    await page.getByRole("switch", { name: /Smooth its surface/ }).click();
     await boundTo(page, 2, 0);
     const smooth = await modelPositions(page);
     // The corner's weight of the B-spline is smaller than that of the box.

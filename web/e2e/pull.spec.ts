@@ -99,7 +99,7 @@ test("a visit that pulls the model", async ({ page }) => {
   await test.step("a project brings the pins back", async () => {
     const project = await download(page, "project");
     await page.getByRole("button", { name: "Pose", exact: false }).first().click();
-    await page.getByRole("button", { name: "Take all pins away" }).click();
+    await page.getByRole("button", { name: "Remove all pins" }).click();
     await expect(page.getByText("1 pin on the model")).toHaveCount(0);
     await drop(page, [project]);
     await expect(page.getByText("1 pin on the model")).toBeVisible({ timeout: 60_000 });

@@ -125,7 +125,7 @@ test("models in turn, then a panic, then a good model: it opens", async ({ page,
   await expect.poll(() => savedSince(page, before, "model3"), { timeout: 60_000 }).toBe(true);
   await crash(page, "panic");
   const alert = page.locator("#toasts [role=alert]");
-  await expect(alert).toContainText("Cagework stopped, and was begun anew", { timeout: 60_000 });
+  await expect(alert).toContainText("Cagework stopped and was restarted", { timeout: 60_000 });
   await expect(page, "the last one is back").toHaveTitle(/model3/);
   await dropBox(page, "good");
   await drag(page, 20, 10);

@@ -61,7 +61,7 @@ for (const how of ["panic", "out of memory"] as const) {
     await expect.poll(() => savedSince(page, before)).toBe(true);
     await crash(page, how);
     const alert = page.locator("#toasts [role=alert]");
-    await expect(alert).toContainText("Cagework stopped, and was begun anew", { timeout: 60_000 });
+    await expect(alert).toContainText("Cagework stopped and was restarted", { timeout: 60_000 });
     await expect(alert).toContainText("It happened with Rat open.");
     await bound(page);
     expect(largestMove(posed, await cagePositions(page)), "the pose is back").toBeLessThan(1e-3);
@@ -121,7 +121,7 @@ test("kept work that the page stops with twice is not opened a third time, and s
   await page.getByRole("button", { name: "Model", exact: false }).first().click();
   await page.getByRole("button", { name: /^Kept in this browser/ }).click();
   await expect(page.getByRole("dialog", { name: "Kept in this browser" })).toContainText(
-    "Cagework stopped with it the last time.",
+    "Cagework stopped the last time this was open.",
   );
   complaints.length = 0;
 });

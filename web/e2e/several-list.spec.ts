@@ -27,7 +27,7 @@ test("clothes are added to a sample, dropped on the list, and said when they rea
   await expect(page.getByRole("alert").getByText("notes.obj could not be opened")).toBeVisible();
   await expect(page.getByRole("button", { name: "Add another file" })).toBeVisible();
   await expect(rows(page)).toHaveCount(3);
-  await expect(page.getByText(/What was added reaches outside/)).toBeVisible();
+  await expect(page.getByText(/The added model reaches outside/)).toBeVisible();
   await shoot(page, "several-outside");
   await press(page, "Make a cage around all");
   await bound(page);
@@ -56,12 +56,12 @@ test("the list is legible on every screen, and axe finds nothing", async ({ page
     await row(page, "body.glb").scrollIntoViewIfNeeded();
     await calm(page);
     await shot("list");
-    const fold = row(page, "body.glb").getByText("What follows the cage");
+    const fold = row(page, "body.glb").getByText("How parts follow the cage");
     await fold.click();
     await press(page, "Trousers stays as it is");
     await row(page, "body.glb").getByText("Trousers").scrollIntoViewIfNeeded();
     await shot("parts");
-    await row(page, "body.glb").getByRole("button", { name: "Paint what stays" }).click();
+    await row(page, "body.glb").getByRole("button", { name: "Paint fixed areas" }).click();
     await row(page, "body.glb").getByRole("slider").scrollIntoViewIfNeeded();
     await calm(page);
     await shot("painting");

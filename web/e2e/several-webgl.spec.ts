@@ -18,9 +18,9 @@ test("two models follow, keep their shape and stay as they are exported", async 
     await page.evaluate(() => Array.from(globalThis.cagework?.engine.modelPositions() ?? [])),
   );
   await press(page, "buckle.glb keeps its shape");
-  await row(page, "body.glb").getByText("What follows the cage").click();
+  await row(page, "body.glb").getByText("How parts follow the cage").click();
   await press(page, "Trousers stays as it is");
-  await row(page, "body.glb").getByRole("button", { name: "Paint what stays" }).click();
+  await row(page, "body.glb").getByRole("button", { name: "Paint fixed areas" }).click();
   await page.getByRole("slider", { name: "Size of the brush" }).fill("0.15");
   await pull(page, await paintable(page, 0), 10, 10);
   await shoot(page, "several-webgl");

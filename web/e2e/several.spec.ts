@@ -101,7 +101,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
     expect(worst(apart(await modelPositions(page)).buckle)).toBeGreaterThan(0.01);
     await page.keyboard.press("Control+y");
 
-    await row(page, "body.glb").getByText("What follows the cage").click();
+    await row(page, "body.glb").getByText("How parts follow the cage").click();
     await press(page, "Trousers stays as it is");
     expect(still(apart(await modelPositions(page)).body, own.body)).toEqual([expect.any(Number), 1]);
     await undo(page);
@@ -110,7 +110,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
   });
 
   await test.step("a stroke of the brush stays, another takes some of it back", async () => {
-    await row(page, "body.glb").getByRole("button", { name: "Paint what stays" }).click();
+    await row(page, "body.glb").getByRole("button", { name: "Paint fixed areas" }).click();
     await page.getByRole("slider", { name: "Size of the brush" }).fill("0.15");
     const before = still(apart(await modelPositions(page)).body, own.body)[0];
     const place = await paintable(page, 0);
@@ -130,13 +130,13 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
     await undo(page);
     expect(still(apart(await modelPositions(page)).body, own.body)[0]).toBe(before);
     await page.keyboard.press("Control+y");
-    await page.getByRole("radio", { name: "Follows again" }).check({ force: true });
+    await page.getByRole("radio", { name: "Follow again" }).check({ force: true });
     // What stays has gone back to where it rests: another place is under the pointer.
     await pull(page, await paintable(page, 0), 2, 6);
     expect(still(apart(await modelPositions(page)).body, own.body)[0]).toBeLessThan(painted);
     await undo(page);
     await page.keyboard.press("Escape");
-    await expect(row(page, "body.glb").getByRole("button", { name: "Paint what stays" })).toBeVisible();
+    await expect(row(page, "body.glb").getByRole("button", { name: "Paint fixed areas" })).toBeVisible();
   });
 
   const exported = await test.step("each leaves as its own file", async () => {

@@ -73,7 +73,7 @@ test("opens bound, follows a handle, shows colours, exports, and survives a lost
   await test.step("a smooth cage with a point inside is bound on the processor", async () => {
     await page.getByRole("button", { name: "Cage", exact: false }).first().click();
     const { x, y } = await grip(page);
-    await page.getByRole("switch", { name: /Round its surface/ }).click();
+    await page.getByRole("switch", { name: /Smooth its surface/ }).click();
     await page.getByRole("button", { name: "Point", exact: true }).click();
     await page.mouse.click(x, y);
     await expect
@@ -112,7 +112,7 @@ test("says once what is different, and how to get WebGPU", async ({ page }) => {
   await page.getByRole("button", { name: "Bind", exact: false }).first().click();
   await expect(page.getByRole("radio", { name: "Graphics card" })).toBeDisabled();
   await expect(page.getByRole("radio", { name: "Processor" })).toBeChecked();
-  await expect(page.getByText(/compute through WebGPU only/)).toBeVisible();
+  await expect(page.getByText(/graphics card needs WebGPU/)).toBeVisible();
   for (const scheme of ["light", "dark"] as const) {
     await page.emulateMedia({ colorScheme: scheme });
     await calm(page);

@@ -104,7 +104,7 @@ test("a second model keeps the first, one click brings it back, and Delete takes
   await expect(list.getByRole("listitem")).toHaveText([/workA\.obj.*open here/, /workB\.obj/]);
   await list.getByRole("button", { name: "Delete workB.obj", exact: true }).click();
   await expect(list.getByRole("listitem")).toHaveCount(2);
-  await list.getByRole("button", { name: "Really delete workB.obj" }).click();
+  await list.getByRole("button", { name: "Confirm delete workB.obj" }).click();
   await expect(list.getByRole("listitem")).toHaveText([/workA\.obj/]);
   await page.reload();
   await bound(page);
@@ -140,7 +140,9 @@ test("damaged work is deleted, and a sentence says so", async ({ page }) => {
   // It goes away by itself: a slow page may still be binding by then.
   await Promise.all([
     open(page),
-    expect(page.locator("#toasts")).toContainText("The work on workA.obj that this browser kept was damaged"),
+    expect(page.locator("#toasts")).toContainText(
+      "Your work on workA.obj, kept in this browser, was damaged",
+    ),
   ]);
   await expect(page).toHaveTitle(/Rat/);
   expect(await savedSince(page, 0)).toBe(false);

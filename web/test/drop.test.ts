@@ -85,7 +85,7 @@ describe("dropped files", () => {
   it("announce what will happen while they hover", () => {
     expect(hoverSentence(1, false, false)).toContain("gets a cage");
     expect(hoverSentence(1, true, true)).toContain("Cage panel");
-    expect(hoverSentence(1, true, false)).toContain("On the list of models it is added");
+    expect(hoverSentence(1, true, false)).toContain("To add it instead, drop it on the list of models");
     expect(hoverSentence(3, true, false)).toContain("share one cage");
   });
 });

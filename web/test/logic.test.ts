@@ -125,8 +125,10 @@ describe("the verdict on a bind", () => {
     rest_error: { mean: 0, p99: 0, max: 0, mean_rel: 0, max_rel },
   });
   it("calls nothing exact that was made so after the solve", () => {
-    expect(verdict(report(1e-8))).toMatch(/weights are restored .* The solver error is/);
-    expect(verdict(report(1e-2))).toBe("At rest the model is off by up to 1 % of the cage's size.");
+    expect(verdict(report(1e-8))).toMatch(/weights are corrected .* The solver error is/);
+    expect(verdict(report(1e-2))).toBe(
+      "With the cage at rest, the model is off by up to 1 % of the cage's size.",
+    );
   });
 });
 

@@ -1,3 +1,3 @@
-/** What the tour says, in the language of the page; apart from the rest, because only who takes it needs it. */
+/** The tour's sentences. Not in index.ts, so that they are downloaded only when the tour starts. */
 
 export { EN_TOUR as TOUR } from "./en/tour";

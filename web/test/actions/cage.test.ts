@@ -52,7 +52,7 @@ it("undo of another cage brings pose and blend back", async () => {
   await settled();
   asked[1]?.resolve(cageOf(12, 2));
   await second;
-  expect(said).toEqual(["Pose and poses belong to the cage before, and are kept with it."]);
+  expect(said).toEqual(["The pose and saved poses belong to the previous cage and are kept with it."]);
   store.set({ shares: [0] });
   await ctx.history.undo();
   expect([engine.cagePositions()[0], engine.restPositions()[0], store.get().shares]).toEqual([7, 1, [0.5]]);
@@ -139,7 +139,7 @@ it("a button beside a problem repairs, refines the grid, or makes another cage",
   expect([asked[0]?.input, store.get().busy]).toEqual(["grow", "Repairing the cage"]);
   asked[0]?.reject(named("Error", "growing did not help"));
   await settled();
-  expect(problems).toMatchObject([{ title: "The repair did not work", message: "Growing did not help." }]);
+  expect(problems).toMatchObject([{ title: "The repair failed", message: "Growing did not help." }]);
   expect(store.get().busy).toBeNull();
   cage.mend({ kind: "repair", repair: "weld" });
   await settled();

@@ -140,7 +140,7 @@ it("the cage bends the moving model once the space around it is ready, which is 
   teach({ hasLattice: false });
   const chosen = clips.choose(0);
   await settled();
-  expect([starts(), said.at(-1)]).toEqual([0, "Getting the space around the cage ready"]);
+  expect([starts(), said.at(-1)]).toEqual([0, "Preparing the space around the cage"]);
   asked.at(-1)?.resolve(undefined);
   teach({ hasLattice: true });
   await chosen;

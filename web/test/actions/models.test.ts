@@ -158,7 +158,7 @@ it("what reaches outside of the cage is said once, with the way to another cage"
   await settled();
   await all.read("skirt.glb", 1);
   await added;
-  expect(all.said).toEqual(["What was added reaches outside of this cage."]);
+  expect(all.said).toEqual(["The added model reaches outside the cage."]);
   all.offer()?.run();
   expect(all.steps).toEqual(["settle", "cage body-cage.obj", "cage around all"]);
 });
@@ -226,7 +226,7 @@ it("the last model cannot be taken out, which is said", async () => {
   teach({ bin: () => Promise.reject(new Error("this is the only model in the cage")) });
   expect(await models.bin(0)).toBe(false);
   expect([problems[0]?.title, names(), ctx.history.undoLabel]).toEqual([
-    "The model could not be taken out",
+    "The model could not be removed",
     ["body.glb"],
     undefined,
   ]);

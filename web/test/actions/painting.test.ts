@@ -61,7 +61,7 @@ it("the brush takes away as well, and keeps its size for the next time", async (
   painting.begin(15, 150);
   painting.end(true);
   expect([amounts().slice(0, 3), new Set(dabs)]).toEqual([[255, 0, 255], new Set([0.2])]);
-  expect(ctx.history.undoLabel).toBe("Paint what follows");
+  expect(ctx.history.undoLabel).toBe("Erase fixed areas");
   painting.on(null);
   expect(store.get().painting).toBeNull();
   painting.on(1);
@@ -79,7 +79,7 @@ it("a stroke that is given up leaves nothing, and clearing is a step", async () 
   painting.begin(5, 150);
   painting.end(true);
   painting.clear(0);
-  expect([amounts(), ctx.history.undoLabel]).toEqual([[], "Clear what is painted"]);
+  expect([amounts(), ctx.history.undoLabel]).toEqual([[], "Clear painted areas"]);
   await ctx.history.undo();
   expect(amounts()[0]).toBe(255);
 });

@@ -121,7 +121,7 @@ it("reset goes back to rest, and what cannot be played is said", () => {
   poses.reset();
   expect(height()).toBe(0);
   poses.togglePlay();
-  expect([store.get().playing, said]).toEqual([false, ["Save a pose first; then it can be played."]]);
+  expect([store.get().playing, said]).toEqual([false, ["Save a pose first, then play it."]]);
 });
 
 it("a new pose has a name of its own", () => {

@@ -130,7 +130,7 @@ it("damaged work is deleted, and a sentence says so", async () => {
   expect([kept.size, opened, said[0]]).toEqual([
     0,
     [],
-    expect.stringContaining("was damaged, and is deleted"),
+    expect.stringContaining("was damaged and has been deleted"),
   ]);
 });
 

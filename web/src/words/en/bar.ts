@@ -1,4 +1,4 @@
-/** The bar of steps, and the button at the foot of each panel. */
+/** The step bar, and the buttons at the foot of each panel. */
 
 export const bar = {
   steps: "Steps",
@@ -11,12 +11,12 @@ export const bar = {
   redoOf: (what: string | null) => (what ? `Redo: ${what}` : "Nothing to redo"),
   share: "Copy a link to this pose",
   sheet: "Keyboard shortcuts",
-  theme: { auto: "Theme: as the system", dark: "Theme: dark", light: "Theme: light" },
+  theme: { auto: "Theme: system", dark: "Theme: dark", light: "Theme: light" },
 };
 
 export const panel = {
   step: (name: string) => `Step: ${name}`,
-  size: "Make the panel larger or smaller",
+  size: "Resize the panel",
   open: "Open a file",
   pose: "Pose it",
   next: "Next: the cage",
@@ -32,8 +32,8 @@ export const panel = {
   newCage: "Make a new cage",
 };
 
-/** The way to the tour; what it says itself is in tour.ts. */
+/** Entry points of the tour. Its own sentences are in tour.ts. */
 export const tour = {
   begin: "Take the tour",
-  copied: "Link copied. Whoever opens it begins the tour at this stop.",
+  copied: "Link copied. It opens the tour at this stop.",
 };

@@ -1,13 +1,13 @@
-/** A rigged model's clips and morph targets. */
+/** Clips and morph targets of a rigged model. */
 
 import { plural } from "../../format";
 
 export const clips = {
-  title: "Its own movement",
+  title: "Animation",
   clip: "Clip",
-  rest: "None: the cage poses it",
+  rest: "None: pose with the cage",
   named: (name: string, length: string) => `${name}, ${length}`,
-  posing: "While a clip is shown, a drag looks around. To pose the model, choose none.",
+  posing: "While a clip is shown, dragging turns the view. To pose the model, choose None.",
   play: "Play the clip",
   pause: "Pause the clip",
   time: "Time",
@@ -16,16 +16,16 @@ export const clips = {
   loop: "Loop",
   targets: (n: number) => plural(n, "morph target"),
   follow: "Joints follow the cage",
-  followSentence: "Off keeps the skeleton as it is, for clips and files that share it.",
+  followSentence: "Off: the skeleton stays as it is, for clips and files that share it.",
   joints: "Show joints",
   jointsSentence: "Dots inside the cage, rings outside.",
   rigid: (kept: number, all: number) => `Parts that keep their shape (${kept} of ${all})`,
-  rigidSentence: "Buckles, eyes, weapons: they hang on a bone, and go along without bending.",
+  rigidSentence: "Buckles, eyes, weapons: each moves with its bone and does not bend.",
   advanced: "More about joints",
   turn: "Bones turn with the shape",
-  turnSentence: "For shapes that are poses. Rotations of clips are written anew.",
-  travel: "Keep how far it travels",
-  travelSentence: "Off: longer legs go further.",
+  turnSentence: "For shapes that are poses. The rotations in clips are rewritten.",
+  travel: "Keep travel distance",
+  travelSentence: "Off: longer legs walk farther.",
   keep: "Keep skeleton, targets and clips",
   keepSentence: (joints: number, targets: number, clips: number) =>
     [
@@ -37,9 +37,9 @@ export const clips = {
       .join(", "),
   dynamic: "The cage bends the moving model",
   dynamicSentence:
-    "Experimental: the skeleton first, then the cage, as for squash and stretch. Best with a cage around the clip (step Cage).",
-  preparing: "Getting the space around the cage ready",
+    "Experimental: the skeleton moves the model, then the cage bends it, for example for squash and stretch. Works best with a cage around the clip (step Cage).",
+  preparing: "Preparing the space around the cage",
   baked: (name: string) =>
-    `The cage bends the moving model: the frames of ${name ? `“${name}”` : "its clip"} become morph targets, without skeleton.`,
-  bindFirst: "Bind the model first: what plays is the shape that the cage gives it.",
+    `The cage bends the moving model: the frames of ${name ? `“${name}”` : "its clip"} are exported as morph targets, without a skeleton.`,
+  bindFirst: "Bind the model first: clips play on the deformed shape.",
 };

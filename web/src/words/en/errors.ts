@@ -1,4 +1,4 @@
-/** Errors, and what can be done about them. */
+/** Errors and their remedies. */
 
 export const fixes = {
   coarser: "Use a coarser grid",
@@ -24,9 +24,9 @@ export const failed = {
   clip: "The clip cannot be played",
   noCage: "No cage could be made",
   cageFile: "This cage cannot be used",
-  repair: "The repair did not work",
+  repair: "The repair failed",
   shape: "The cage cannot have this shape",
-  controls: "This does not fit",
+  controls: "The control could not be placed",
   controlsFile: "These controls cannot be used",
   edit: (what: string) => `${what}: not possible here`,
   write: "The file could not be written",
@@ -35,25 +35,25 @@ export const failed = {
   open: (name: string) => `${name} could not be opened`,
   turn: "The model could not be turned",
   link: "This link is damaged",
-  tour: "The tour could not be begun",
-  undo: "Undo did not work",
-  redo: "Redo did not work",
+  tour: "The tour could not start",
+  undo: "Undo failed",
+  redo: "Redo failed",
 };
 
 export const lost = {
   title: "The graphics device was lost",
-  back: "Bringing everything back…",
-  notBack: "The graphics device did not come back",
+  back: "Restoring everything…",
+  notBack: "The graphics device could not be restored",
   kept: (reason: string) => `${reason} Your work is kept in this browser.`,
   again: "The graphics device was lost again",
   others: (reason: string) => `${reason} Close other programs that use it, then try again.`,
 };
 
 export const crash = {
-  title: "Cagework stopped, and was begun anew",
+  title: "Cagework stopped and was restarted",
   again: "Cagework stopped again",
-  second: (during: string) => `${during} It was the second time, so nothing is opened again by itself.`,
-  fresh: "Start fresh begins with a sample. The work stays kept, and opens only when you ask for it.",
+  second: (during: string) => `${during} It was the second time, so your work is not reopened automatically.`,
+  fresh: "“Start fresh” opens a sample. Your work is still kept; open it from the list when you want it.",
   report: "Report",
   showReport: "Show the report",
   while: (busy: string) => `It happened while ${busy}.`,

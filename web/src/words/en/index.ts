@@ -1,5 +1,5 @@
-/** Every sentence of the page in English, a file for each panel. Another language is another folder like this one, and its lines in ../index.ts
- * and ../tour.ts. */
+/** Every sentence of the page in English, one file per panel. To add a language, copy this folder and list it in ../index.ts and
+ * ../tour.ts. */
 
 import { bar, panel, tour } from "./bar";
 import { bind, report } from "./bind";
@@ -56,5 +56,5 @@ export const EN = {
   tour,
 };
 
-/** What a language has to say. */
+/** The keys that each language must define. */
 export type Words = typeof EN;

@@ -1,19 +1,19 @@
-/** Step Model, and how a file is opened. */
+/** Step Model and opening of files. */
 
 import { count, endings, percent, plural } from "../../format";
 
 export const model = {
   title: "Choose a model",
   sentence:
-    "A cage is a lattice that fits the shape of a model. What you see is already bound to its own: pull it anywhere, and the cage moves along. Or drop a file on this page.",
+    "A cage is a coarse mesh around a model that deforms it. The sample is already bound to its cage: pull it anywhere, or drop your own file on this page.",
   drop: "Drop models here",
-  kinds: `${endings("disjunction")}, with the files that they name; a folder works too. Several share one cage.`,
+  kinds: `${endings("disjunction")}, together with the files they refer to, or a whole folder. Several models share one cage.`,
   openFolder: "Open a folder",
   kept: (n: number) => `Kept in this browser (${n})`,
   samples: "Samples",
   up: "Up axis",
-  upY: "As glTF prescribes",
-  upZ: "Turn a model that lies on its back",
+  upY: "The standard of glTF",
+  upZ: "For models that otherwise lie on their back",
   licences: "Licences",
   isOpen: "The model that is open",
   open: "Open",
@@ -27,10 +27,10 @@ export const model = {
   clips: (n: number) => plural(n, "clip"),
   morphTargets: (n: number) => plural(n, "morph target"),
   tips: {
-    rat: "The paper's rat. Take it by the nose and turn its head: the feet stay.",
-    humanoid: "Take a knee and lift it: the other leg, a hand's breadth away, stays.",
+    rat: "The paper's rat. Pull its nose to turn its head: the feet stay.",
+    humanoid: "Lift a knee: the other leg, a hand's breadth away, stays.",
     clamp: "Pull the lower jaw open, then compare with mean value and Green coordinates.",
-    strider: "Legs as thin as a grid cell. Take one by the foot: the others keep still.",
+    strider: "Legs as thin as a grid cell. Pull one foot: the other legs stay.",
   } as Record<string, string>,
 };
 
@@ -43,7 +43,7 @@ export const opening = {
   repairing: "Repairing the cage",
   stages: {
     bytes: "Reading the file",
-    decompress: "Decompressing it",
+    decompress: "Decompressing",
     geometry: "Finding vertices and faces",
     textures: "Decoding textures",
     check: "Checking the cage",
@@ -57,7 +57,7 @@ export const opening = {
   noContent: (name: string) => `${name} has no content. Export it again, or choose another file.`,
   dropped: "Nothing was dropped.",
   kinds: `Cagework opens ${endings("conjunction")} files.`,
-  companions: "These files belong to a .gltf or .obj file: drop that one together with them.",
+  companions: "These files belong to a .gltf or .obj file. Drop that file together with them.",
   damagedPose: "The pose in this project is damaged; it opens at rest.",
   dropTo: {
     page: "Drop to open",
@@ -66,11 +66,11 @@ export const opening = {
   },
   becomes: {
     cage: "A closed mesh around the model.",
-    list: "Clothes, hair, gear: all in this cage follow it together.",
+    list: "Clothes, hair, gear: all models in this cage follow it together.",
   },
   asControls: (name: string) => `Puts the controls of ${name} inside the cage.`,
-  together: "Models dropped together share one cage; their textures and a cage of theirs come along.",
-  onCageStep: "It becomes the model; to use it as the cage, drop it on the Cage panel.",
-  replaces: "It takes the place of what is open. On the list of models it is added instead.",
+  together: "Models dropped together share one cage. Their textures and a cage file are read too.",
+  onCageStep: "It replaces the model. To use it as the cage, drop it on the Cage panel.",
+  replaces: "It replaces the open model. To add it instead, drop it on the list of models.",
   getsCage: "It gets a cage and can be posed at once.",
 };

@@ -1,43 +1,43 @@
-/** Step Pose, pulling, and the steps of the history. */
+/** Step Pose, pulling, and the names of undo steps. */
 
 import { plural } from "../../format";
 
 export const pose = {
   title: "Pose it",
-  sentence: "Take the model by the hand, or drag the handles of its cage.",
+  sentence: "Pull the model itself, or drag the handles of its cage.",
   cage: "The cage",
-  none: "Nothing selected. Click a handle in the view, or press ] to go from one to the next.",
+  none: "Nothing selected. Click a handle in the view, or press ] to step through them.",
   vertex: (i: number) => `Vertex ${i} of the cage`,
   inner: (i: number) => `Control ${i} inside`,
   vertexAtRest: (i: number) => `Vertex ${i} of the cage at rest`,
   middle: (n: number) => `Middle of ${plural(n, "vertex", "vertices")}`,
   axis: (axis: string) => `Selection, ${axis}`,
-  help: "Help with moving",
+  help: "Move options",
   mirror: "Mirror across X",
-  mirrorSentence: "What you move on one side moves on the other.",
+  mirrorSentence: "The other side moves in mirror image.",
   unmatched: (n: number) =>
     `${plural(n, "vertex has", "vertices have")} no mirror image and ${n === 1 ? "moves" : "move"} alone.`,
   proportional: "Proportional editing",
   proportionalSentence:
-    "Vertices nearby follow, less the farther they are. While dragging, the wheel sets how far.",
-  far: "How far",
+    "Nearby vertices follow, less with distance. While dragging, the wheel sets the reach.",
+  far: "Reach",
   ofCage: (share: string) => `${share} of the cage`,
   pivot: "Turn and scale about",
   pivots: { middle: "Middle", border: "Border", last: "Last" },
   pivotTips: {
-    middle: "The middle of what is selected",
+    middle: "The middle of the selection",
     border: "Where the selection meets the rest: a knee turns about it",
-    last: "The vertex that was selected last",
+    last: "The last selected vertex",
   },
   poses: "Poses",
   empty:
-    "No poses yet. Drag the cage, then save what you see; saved poses can be mixed, played and exported as morph targets.",
+    "No poses yet. Drag the cage, then save the pose. Saved poses can be blended, played and exported as morph targets.",
   save: "Save this pose",
   blend: "Blend",
   blendOf: (name: string) => `Blend of ${name}`,
   nameOf: (name: string) => `Name of ${name}`,
   show: "Show",
-  showTip: (name: string, undo: string) => `Show ${name}; ${undo} brings back what is shown now`,
+  showTip: (name: string, undo: string) => `Show ${name}; ${undo} returns to the current pose`,
   delete: (name: string) => `Delete ${name}`,
   play: "Play",
   stop: "Stop",
@@ -48,30 +48,30 @@ export const pose = {
   backToCage: "Back to that cage",
   carry: "Carry over",
   saved: (name: string) => `Saved as "${name}".`,
-  savedRest: (name: string) => `Saved as "${name}": it is the rest pose.`,
-  saveFirst: "Save a pose first; then it can be played.",
-  selectFirst: "Select something first: click a handle of the cage, or press A for all.",
+  savedRest: (name: string) => `Saved as "${name}". It is the rest pose.`,
+  saveFirst: "Save a pose first, then play it.",
+  selectFirst: "Select something first: click a handle of the cage, or press A to select all.",
 };
 
 export const pull = {
   title: "Pull the model",
-  tool: "Pull the model: take it by the hand",
+  tool: "Pull the model",
   sentence: (pin: string) =>
-    `Drag any point of the model. Parts in grey stay; the wheel sets how far the pull reaches. Shift-click, a long press or ${pin} pins a point.`,
+    `Drag any point of the model. Grey areas stay; the wheel sets how far the pull reaches. Shift-click, a long press or ${pin} pins a point.`,
   whole: "The whole model follows",
-  wholeSentence: "Nothing stays but the pins: good for turning a body with its feet pinned.",
+  wholeSentence: "Only pins stay: good for turning a body with its feet pinned.",
   pins: (n: number) => `${plural(n, "pin")} on the model`,
-  unpinAll: "Take all pins away",
-  pulling: "Pulling; Esc puts it back",
-  nothingThere: "There is no model in the middle of the view: point at it and press an arrow key again.",
+  unpinAll: "Remove all pins",
+  pulling: "Pulling; Esc cancels",
+  nothingThere: "No model in the middle of the view. Point at the model and press an arrow key again.",
 };
 
-/** Steps of the history. */
+/** Undo steps. */
 export const did = {
-  carry: "Carry the poses over",
+  carry: "Carry poses over",
   pull: "Pull",
   pin: "Pin",
-  unpin: "Take pins away",
+  unpin: "Remove pins",
   grab: "Move",
   rotate: "Rotate",
   scale: "Scale",
@@ -101,10 +101,10 @@ export const did = {
   loadControls: "Load controls inside",
   repairCage: "Repair the cage",
   addModels: (n: number) => (n === 1 ? "Add a model" : `Add ${n} models`),
-  binModel: (name: string) => `Take ${name} out`,
-  parts: (name: string) => `What of ${name} follows`,
-  paint: "Paint what stays",
-  erase: "Paint what follows",
-  clearPaint: "Clear what is painted",
+  binModel: (name: string) => `Remove ${name}`,
+  parts: (name: string) => `Change how ${name} follows`,
+  paint: "Paint fixed areas",
+  erase: "Erase fixed areas",
+  clearPaint: "Clear painted areas",
   poseName: (n: number) => `Pose ${n}`,
 };

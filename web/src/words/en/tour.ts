@@ -1,4 +1,4 @@
-/** The tour: not among the rest, because only who takes it needs it. */
+/** The tour. A separate chunk: it is downloaded when the tour starts. */
 
 import type { BindReport } from "../../contract";
 import { count, duration, scientific } from "../../format";
@@ -22,7 +22,7 @@ export const EN_TOUR = {
   tau: "Stop below (tau)",
   ofTau: (tau: number) => `tau = ${scientific(tau)}`,
   errorOf: (what: string) => `Rest error, mean, ${what}`,
-  meanError: "Mean rest error of the paper's method, of the cage's size",
+  meanError: "Mean rest error of the paper's method, relative to the cage's size",
   showError: (grid: number, tau: number, error: number) =>
     `${scientific(error)}: show ${grid} cells, tau = ${scientific(tau)}`,
   iterations: (name: string, n: number) => `${name}: ${count(n)}`,
@@ -35,65 +35,65 @@ export const EN_TOUR = {
         report
           ? `Move a few of the cage's ${count(report.cage_vertices)} vertices and the rat's ${count(report.vertices)} points follow.`
           : "Move a few of the cage's vertices and the rat's points follow.",
-      task: "take the rat by the nose and pull. The cage goes along, the feet stay.",
+      task: "pull the rat's nose. The cage follows, the feet stay.",
     },
     weight: {
       title: "One weight",
       claim: () =>
-        "How much each point follows one vertex of the cage is that vertex's weight: never below 0, never above 1, and fading with the way through the inside, not through the air.",
-      task: "choose another handle (click, tap, or the keys [ and ]) and look how far its weight reaches.",
+        "The weight of a cage vertex is how much each point follows it: between 0 and 1, fading with distance through the inside of the cage, not through the air.",
+      task: "choose another handle (click, tap, or the keys [ and ]) and see how far its weight reaches.",
     },
     grid: {
       title: "The grid",
       claim: () =>
-        "A weight is a temperature: the cage is kept at 1 in this vertex and at 0 in all others, and inside, in the cells of a grid, each place becomes the mean of its neighbours.",
+        "A weight is a temperature: this cage vertex is held at 1 and all others at 0. Inside, each cell of a grid settles at the mean of its neighbours.",
       task: "move the slice through the rat, then look at the cells themselves.",
     },
     paper: {
-      title: "The paper's way, with 16 cells",
+      title: "The paper's method, with 16 cells",
       claim: () =>
-        "The paper gives every point the weights of the cell that it lies in: with 16 cells along each side, all points of a cell land on one spot (the wires are where they should be).",
-      task: "take 32 cells. The steps get smaller, but there are still steps.",
+        "The paper gives every point the weights of its grid cell. With 16 cells along each side, all points of a cell land on one spot (the wireframe shows where they should be).",
+      task: "choose 32 cells. The steps get smaller but do not vanish.",
     },
     smoothing: {
       title: "Too little smoothing",
       claim: () =>
-        "A sweep carries heat one cell further. Stop at 1e-3 and the heat has not spread everywhere yet: the rat does not fill its wires.",
-      task: "go on until a sweep changes less than 1e-5.",
+        "A sweep carries heat one cell further. Stop at 1e-3 and the heat has not spread everywhere yet: the rat does not fill its wireframe.",
+      task: "continue until a sweep changes less than 1e-5.",
     },
     delta: {
       title: "Three ways to the same weights",
       claim: () =>
-        "The same equations solved in three ways: Jacobi needs hundreds of sweeps, conjugate gradients dozens of steps, multigrid a handful of cycles.",
-      task: "take half as many cells, 16. Whose number stays?",
+        "Three solvers for the same equations: Jacobi needs hundreds of sweeps, conjugate gradients dozens of steps, multigrid a handful of cycles.",
+      task: "halve the grid to 16 cells. Which number stays the same?",
     },
     times: {
       title: "Times on this computer",
       claim: (reports: Reports) => {
         const [paper, ours] = reports;
         return paper && ours
-          ? `With 32 cells the paper's way took ${duration(paper.timings_ms.total)} here just now, ours ${duration(ours.timings_ms.total)}.`
-          : "The paper's way and ours, measured here and now.";
+          ? `With 32 cells, the paper's method just took ${duration(paper.timings_ms.total)} here and ours ${duration(ours.timings_ms.total)}.`
+          : "The paper's method and ours, timed on this computer.";
       },
-      task: "close what else is running, and measure again.",
+      task: "close other programs and measure again.",
     },
     error: {
       title: "Error over grid and tau",
       claim: () =>
         "A finer grid needs a smaller tau: stopped at 1e-3, the rat comes out worse with 32 cells than with 16.",
-      task: "choose a number to see the rat that it stands for.",
+      task: "choose a number to see the rat it belongs to.",
     },
     coordinates: {
       title: "Harmonic, mean value, Green",
       claim: () =>
-        "The lower jaw opens: with harmonic coordinates the upper one stays, with mean value coordinates, which look across the gap, it is dragged along, and with Green coordinates it moves a little, but details keep their shape best.",
-      task: "pull the upper jaw up, and see who follows.",
+        "The lower jaw opens. With harmonic coordinates the upper jaw stays. Mean value coordinates act across the gap and drag it along. With Green coordinates it moves a little, but details keep their shape best.",
+      task: "pull the upper jaw up and see what follows.",
     },
     smooth: {
       title: "A smooth cage, and a bone inside",
       claim: () =>
-        "A cage of flat faces leaves its edges on the model where it bends; with the same handles, a surface that subdivision makes smooth leaves none, and a bone inside is one handle more, in the middle of things.",
-      task: "take 2 steps and watch the bend, then put the bone in and pull it down.",
+        "Where it bends, a cage of flat faces leaves its edges on the model. A smooth subdivision surface with the same handles does not. A bone inside adds a handle in the middle of the model.",
+      task: "choose 2 steps and watch the bend, then put the bone in and pull it down.",
     },
   },
 };

@@ -1,10 +1,10 @@
-/** The view, and what is said beneath it. */
+/** The view and its status line. */
 
 import { plural } from "../../format";
 
 export const view = {
   name: "3-D view",
-  help: "Square brackets go from one cage vertex to the next, arrow keys move it, question mark lists all keys. Tab leaves the view.",
+  help: "Square brackets select the previous and next cage vertex, arrow keys move it, the question mark lists all keys. Tab leaves the view.",
   tools: "Tools",
   looks: "View",
   mode: "What dragging changes",
@@ -17,7 +17,7 @@ export const view = {
     scale: "Scale gizmo",
   },
   elements: { vertex: "Select vertices", edge: "Select edges", face: "Select faces" },
-  box: "Select by a box",
+  box: "Select with a box",
   add: "Add to the selection",
   addKey: "Shift+click",
   see: "See: colours, grid, comparison",
@@ -28,19 +28,19 @@ export const view = {
 };
 
 export const status = {
-  original: "The original, while Space is held",
-  boxArmed: "Drag a box around what you want to select",
+  original: "Showing the original while Space is held",
+  boxArmed: "Drag a box to select",
   playing: (pose: string) => `Playing: ${pose}`,
   rest: "the rest pose",
-  broken: "The cage has faults; the Cage step says which",
+  broken: "The cage has faults; step Cage lists them",
   selected: (last: number) => `Cage vertex ${last} selected`,
   innerSelected: (last: number) => `Control ${last} inside selected`,
   placing: {
-    point: "Click into the model to put a point there",
-    line: "Click from joint to joint, then Done",
-    face: "Click into the model to put a sheet there",
+    point: "Click the model to put a point there",
+    line: "Click each joint, then Done",
+    face: "Click the model to put a sheet there",
   },
-  /** Of the cage, inside it, or both. */
+  /** Handles: cage vertices and controls inside. */
   manySelected: (n: number) => `${plural(n, "handle", "handles")} selected`,
   reshaping: "Reshaping the cage",
   ready: "Ready",
@@ -48,15 +48,15 @@ export const status = {
 };
 
 export const hints = {
-  clip: "A clip is shown: drag to turn, scroll to zoom. To pose the model, choose none.",
+  clip: "A clip is shown: drag to turn, scroll to zoom. To pose the model, choose None.",
   noCage: "A model needs a cage around it before it can be posed.",
-  placing: "It goes into the middle of the model, under the pointer. Drag to turn the view.",
+  placing: "It is placed in the middle of the model, under the pointer. Drag to turn the view.",
   restTouch: "Drag a handle to reshape the cage; the model stays still.",
-  rest: "Drag a handle to reshape the cage; the model stays still. Tab goes back to posing.",
-  binding: "The model is being bound: posing waits until it is.",
-  unbound: "Bind the model, then it follows its cage.",
-  touch: "Pull the model with a finger. Beside it one finger turns, two move and zoom.",
-  pose: "Pull the model, or drag a handle · drag beside it to turn · right-drag to move · scroll to zoom · ? for keys",
+  rest: "Drag a handle to reshape the cage; the model stays still. Tab returns to posing.",
+  binding: "The model is being bound. You can pose it afterwards.",
+  unbound: "Bind the model so that it follows its cage.",
+  touch: "Pull the model with a finger. On the background, one finger turns, two move and zoom.",
+  pose: "Pull the model, or drag a handle · drag the background to turn · right-drag to move · scroll to zoom · ? for keys",
 };
 
 export const toast = { close: "Close message" };

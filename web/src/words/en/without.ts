@@ -1,4 +1,4 @@
-/** A browser without WebGPU. */
+/** Browsers without WebGPU. */
 
 export const without = {
   different:
@@ -10,8 +10,8 @@ export const without = {
   },
   reasons: {
     NoWebGPU: "This browser does not offer WebGPU, or it is switched off.",
-    NoAdapter: "This browser has WebGPU, but found no graphics card that it may use.",
-    NoDevice: "The graphics card was found, but did not start.",
+    NoAdapter: "This browser has WebGPU but found no graphics card that it may use.",
+    NoDevice: "The graphics card was found but did not start.",
   },
   insecure: "This page was not opened over https or from localhost; browsers offer WebGPU only there.",
   notice: (short: string) => `${short}: drawn with WebGL2, computed on the processor. `,
@@ -20,10 +20,9 @@ export const without = {
   steps: "Steps",
   closeNotice: "Close this notice",
   needs: "Cagework needs WebGPU",
-  noWebGl: (why: string) =>
-    `${why} WebGL2, which would do instead, is missing as well. It takes a minute to put right:`,
+  noWebGl: (why: string) => `${why} The alternative, WebGL2, is missing as well. Fixing this takes a minute:`,
   command:
-    " Without a browser that works: the cagework command does the same on the processor, see the project's README.",
+    " If no browser works, use the cagework command, which does the same on the processor. See the project's README.",
   others: "Other browsers",
   thatWork: "Browsers that work",
   ways: {
@@ -32,7 +31,7 @@ export const without = {
       steps: [
         "Update to version 121 or newer: menu, Help, About.",
         'Open chrome://settings/system and switch on "Use graphics acceleration when available".',
-        "Close the browser and open this page again. If it still fails, chrome://gpu says what is wrong with WebGPU.",
+        "Close the browser and open this page again. If it still fails, chrome://gpu shows what is wrong with WebGPU.",
       ],
     },
     chromeLinux: {
