@@ -1,8 +1,7 @@
-// Builds the npm package into web/package/dist, from its sources and from what `cargo xtask wasm` has made.
+// Builds the npm package into web/package/dist, from its sources and the output of `cargo xtask wasm`.
 //
-// Every module stays a file of its own with addresses that browsers, Node and bundlers read alike: what a bundler makes of the
-// user's project finds workers and wasm by itself. Only what decodes compressed files is bundled, so that nothing is installed
-// with the package.
+// Modules are not bundled, and refer to workers and wasm files in the form that browsers, Node and bundlers all understand. Only
+// the decoders of compressed files are bundled, so that the package has no dependencies.
 
 import { execFileSync } from "node:child_process";
 import { copyFileSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
@@ -25,12 +24,12 @@ for (const [folder, name] of [
   }
 }
 
-/** Browsers and Node want the whole name of a file, TypeScript's sources leave the ending out. */
+/** Adds the file extensions that browsers and Node need and TypeScript's sources omit. */
 const whole = (text) =>
   text
     .replace(/(\bfrom |\bimport\(|\bimport )"(\.{1,2}\/[^"]+?)(?:\.js)?"/g, '$1"$2.js"')
     .replace(/(new URL\("\.{1,2}\/[^"]+)\.ts"/g, '$1.js"');
-/** What is said of the inside is of no use, and would have to be right in every project. */
+/** Only types of the public interface are published. */
 const isPublic = (path) => /^(index|element|types|contract\/(generated|work))\.d\.ts$/.test(path);
 for (const entry of readdirSync(dist, { recursive: true, withFileTypes: true })) {
   if (!/\.(js|d\.ts)$/.test(entry.name)) continue;
@@ -46,7 +45,7 @@ await build({
   configFile: false,
   root: here,
   logLevel: "error",
-  // Draco's decoder would look for its files where Node has them; it is given what it needs.
+  // Without `process`, Draco's decoder does not look for its files in Node's folders.
   define: { process: "undefined" },
   build: {
     outDir: dist,

@@ -1,6 +1,6 @@
 import { defineConfig } from "@playwright/test";
 
-/** Serves the blank project that the package is installed in. */
+/** Serves the blank project in which the package is installed. */
 const BASE = `http://127.0.0.1:${process.env.E2E_PORT ?? 4181}/`;
 
 export default defineConfig({
@@ -13,7 +13,7 @@ export default defineConfig({
   timeout: 90_000,
   expect: { timeout: 60_000 },
   reporter: [["list"]],
-  // Small: every pixel is computed by the processor.
+  // Small, because the tests draw on the processor.
   use: { baseURL: BASE, viewport: { width: 480, height: 360 } },
   webServer: {
     command: "node ../e2e/server.mjs",

@@ -1,4 +1,4 @@
-/** What the package does, over whatever opens a worker: in a browser, or in Node. */
+/** The package's functions, for any runtime that can open workers: browser or Node. */
 
 import { indicesOf, optionsOf, originOf, pointsOf, poseOf, requireKnown, trianglesOf } from "./check";
 import type { BindOptions, CageArrays, NamedFile } from "./contract";
@@ -10,11 +10,11 @@ import { type Client, named } from "./session/client";
 import type { JobKind, Jobs } from "./session/messages";
 import type { Api, Cage, File, Follow, Named, Weights } from "./types";
 
-/** The module, ready on this thread, and workers. */
+/** The initialised module on this thread, and a way to open workers. */
 export interface Runtime {
   readonly pkg: Package;
   openClient(): Client;
-  /** Jobs at a time. */
+  /** Limit of parallel jobs. */
   readonly most: number;
   readonly hasGpu: boolean;
 }
@@ -27,7 +27,10 @@ export function createApi(open: () => Promise<Runtime>): Api {
     const { openClient, most } = await runtime();
     return createPool(openClient, most);
   });
-  /** A job in a worker. Who gives it up waits neither for its turn nor for the module; so does who fails to hear of it. */
+  /**
+   * Runs a job in a worker. An abort rejects at once, even while the job is queued or the module loads; so does an error thrown
+   * by `onProgress`.
+   */
   const run = <K extends JobKind>(job: K, input: Jobs[K]["input"], { signal, onProgress }: Follow) =>
     new Promise<Jobs[K]["output"]>((resolve, reject) => {
       const ended = new AbortController();
@@ -120,7 +123,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
   };
 }
 
-/** What failed, a download perhaps, is tried again by the next call. */
+/** Opens once. After a failure, such as a failed download, the next call tries again. */
 function once<T>(open: () => Promise<T>): () => Promise<T> {
   let opening: Promise<T> | undefined;
   return () => {
@@ -134,7 +137,7 @@ function once<T>(open: () => Promise<T>): () => Promise<T> {
 
 const BIND_ON_CPU: BindOptions = { ...BIND_DEFAULTS, backend: "cpu" };
 
-/** The classic method comes with its own solver, as in the command. */
+/** The classic method defaults to the Jacobi solver, as in the command. */
 function bindOptions(given: Partial<BindOptions>): BindOptions {
   const solver = given.method === "classic" ? "jacobi" : BIND_ON_CPU.solver;
   return optionsOf({ ...BIND_ON_CPU, solver }, given);

@@ -1,8 +1,7 @@
-/** Arguments of the package's functions: what is not as it must be is said with its name. */
+/** Checks the arguments of the package's functions. Errors name the argument, its value and the expected one. */
 
 import { named } from "./session/client";
 
-/** The largest number of 32 bits. */
 const MOST = 0xffffffff;
 
 function wrong(message: string): Error {
@@ -16,25 +15,25 @@ function lengthOf(name: string, given: unknown): number {
   throw wrong(`${name} is ${given === null ? "null" : typeof given}; it must be an array of numbers`);
 }
 
-/** Three numbers for each point, flattened. */
+/** Points, three numbers each, flattened. */
 export function pointsOf(name: string, given: ArrayLike<number>): Float32Array {
   requireTriples(name, lengthOf(name, given), "point");
   return given instanceof Float32Array ? given : Float32Array.from(given);
 }
 
-/** Three vertices for each triangle, flattened. */
+/** Triangles, three indices each, flattened. */
 export function trianglesOf(name: string, given: ArrayLike<number>): Uint32Array {
   requireTriples(name, lengthOf(name, given), "triangle");
   return indicesOf(name, given);
 }
 
-/** Whole numbers from 0 on. */
+/** Non-negative integers. */
 export function indicesOf(name: string, given: ArrayLike<number>): Uint32Array {
   lengthOf(name, given);
   if (given instanceof Uint32Array) return given;
   const wrongOne = Array.from(given).findIndex((x) => !Number.isInteger(x) || x < 0 || x > MOST);
   if (wrongOne >= 0) {
-    throw wrong(`${name} has ${given[wrongOne]} at ${wrongOne}; it must be whole numbers from 0 on`);
+    throw wrong(`${name} has ${given[wrongOne]} at ${wrongOne}; it must contain non-negative integers`);
   }
   return Uint32Array.from(given);
 }
@@ -52,18 +51,18 @@ export function originOf(name: string, given: ArrayLike<number>): Float64Array {
   throw wrong(`${name} is ${Array.from(given).join(", ")}; it must be three finite numbers`);
 }
 
-/** A pose has as many points as the cage. */
+/** A pose, with as many points as the cage. */
 export function poseOf(given: ArrayLike<number>, cage: Float32Array): Float32Array {
   const posed = pointsOf("posed", given);
   if (posed.length !== cage.length) {
-    throw wrong(`posed has ${posed.length} numbers; it must have as many as the cage, ${cage.length}`);
+    throw wrong(`posed has ${posed.length} numbers; the cage has ${cage.length}`);
   }
   const wrongOne = posed.findIndex((x) => !Number.isFinite(x));
   if (wrongOne < 0) return posed;
-  throw wrong(`posed has ${posed[wrongOne]} at ${wrongOne}; it must be finite numbers of 32 bits`);
+  throw wrong(`posed has ${posed[wrongOne]} at ${wrongOne}; it must contain finite 32-bit numbers`);
 }
 
-/** Those of the options that belong to a set, over its defaults; what words and numbers may be is Rust's to say. */
+/** The given options that `defaults` contains, over `defaults`. Checks their types only; Rust checks values. */
 export function optionsOf<T extends object>(defaults: T, given: object): T {
   const known = Object.entries(given).filter(([name, value]) => name in defaults && value !== undefined);
   for (const [name, value] of known) {
@@ -73,9 +72,9 @@ export function optionsOf<T extends object>(defaults: T, given: object): T {
   return { ...defaults, ...Object.fromEntries(known) };
 }
 
-/** A word that no set knows is a slip of the pen. */
+/** Rejects option names that none of the sets contains. */
 export function requireKnown(given: object, ...sets: readonly object[]): void {
   const names = sets.flatMap((set) => Object.keys(set));
   const unknown = Object.keys(given).find((name) => !names.includes(name));
-  if (unknown !== undefined) throw wrong(`there is no option ${unknown}; there are ${names.join(", ")}`);
+  if (unknown !== undefined) throw wrong(`unknown option ${unknown}; the options are ${names.join(", ")}`);
 }

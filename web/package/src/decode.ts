@@ -1,4 +1,4 @@
-/** Draco and meshopt: compressed GLBs to plain ones. Loaded only when such a file is opened. */
+/** Decompresses GLBs with Draco or meshopt. Loaded only when such a file is opened. */
 
 import { type Document, WebIO } from "@gltf-transform/core";
 import { ALL_EXTENSIONS, EXTMeshoptCompression, KHRDracoMeshCompression } from "@gltf-transform/extensions";
@@ -10,10 +10,10 @@ import { named } from "./session/client";
 
 const GLB = 0x46546c67;
 const JSON_CHUNK = 0x4e4f534a;
-/** Sums of four weights in 32 bits are off by less. */
+/** Largest rounding error of a sum of four 32-bit weights. */
 const ROUNDED = 1e-6;
 
-/** A plain GLB of a compressed GLB or glTF. */
+/** Decompresses a GLB or glTF to a plain GLB. */
 export async function decompress(
   name: string,
   bytes: Uint8Array,
@@ -42,7 +42,7 @@ export async function decompress(
   }
 }
 
-/** Lets the weights of each vertex sum to 1, and names no joints of weight 0: a coder's rounding has changed both. */
+/** Restores what quantisation changed: scales each vertex's weights to sum to 1, and sets the joints of zero weights to 0. */
 function normaliseWeights(document: Document): void {
   for (const primitive of document
     .getRoot()
@@ -96,7 +96,7 @@ function mentions(bytes: Uint8Array, word: string): boolean {
   return new TextDecoder().decode(bytes.subarray(...head)).includes(word);
 }
 
-/** Where the JSON is. */
+/** Byte range of the JSON. */
 function jsonRange(bytes: Uint8Array): [number, number] {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const isGlb =
@@ -104,7 +104,10 @@ function jsonRange(bytes: Uint8Array): [number, number] {
   return isGlb ? [20, 20 + view.getUint32(12, true)] : [0, bytes.length];
 }
 
-/** The ratified name of meshopt's extension is newer than the library; the streams are the same, and so is its length. */
+/**
+ * Renames KHR_meshopt_compression to EXT_meshopt_compression, the only name that the library knows. Both names have the same
+ * length and the streams are the same.
+ */
 function renamed(bytes: Uint8Array): Uint8Array<ArrayBuffer> {
   const copy = new Uint8Array(bytes);
   const [from, to] = jsonRange(copy);

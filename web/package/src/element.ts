@@ -1,4 +1,6 @@
-/** `<cage-deformer src="fox.glb">`: a model in a cage whose vertices are dragged. custom-elements.json says all of it. */
+/**
+ * `<cage-deformer src="fox.glb">`: shows a model in a cage whose vertices can be dragged. Documented in custom-elements.json.
+ */
 
 import { poseOf } from "./check";
 import { CAGE_DEFAULTS, RIG_DEFAULTS } from "./contract/generated";
@@ -6,9 +8,9 @@ import { attachPointer } from "./element/pointer";
 import { openView, type Ready, sceneOf, type View } from "./element/view";
 import { named } from "./session/client";
 
-/** Sharper than this nobody sees, and it costs four times the pixels. */
+/** Limit of the device pixel ratio: higher ratios are hardly visible and cost four times the pixels. */
 const MOST_SHARP = 2;
-/** Cells along the cage's longest side, unless told. */
+/** Default number of cells along the cage's longest side. */
 const GRID = 64;
 
 const STYLE = `
@@ -21,21 +23,21 @@ const STYLE = `
     pointer-events: none; text-align: center; text-wrap: balance; }
 `;
 
-// Where there is no page, as on a server, the module can be imported, and defines nothing.
+// On a server there is no HTMLElement: the module can be imported, but defines no element.
 const Base: typeof HTMLElement = globalThis.HTMLElement ?? (class {} as typeof HTMLElement);
 
 export class CageDeformer extends Base {
   static readonly observedAttributes = ["src", "vertices", "grid", "theme"];
 
   #view: Promise<View> | undefined;
-  /** The view, while it is there. */
+  /** The view, once it is open. */
   #shown: View | undefined;
-  /** Counts what was asked to be opened: what comes late is of no interest. */
+  /** Incremented whenever something is opened or closed. Results with an older value are dropped. */
   #asked = 0;
   #bound: Promise<Ready> | undefined;
   #canvas: HTMLCanvasElement | undefined;
   #said: HTMLElement | undefined;
-  /** Ends what a hand is at. */
+  /** Cancels the drag in progress. */
   #release: (() => void) | undefined;
   readonly #sizes = globalThis.ResizeObserver && new ResizeObserver(() => this.#resize());
 
@@ -47,7 +49,7 @@ export class CageDeformer extends Base {
   }
 
   disconnectedCallback(): void {
-    // One that is only moved within the page keeps its model.
+    // Moving an element within the page disconnects and reconnects it: keep its model in that case.
     queueMicrotask(() => {
       if (this.isConnected) return;
       this.#sizes.disconnect();
@@ -59,11 +61,10 @@ export class CageDeformer extends Base {
     if (before === now) return;
     if (name === "theme") this.#shown?.engine.setScene(sceneOf(now));
     else if (this.isConnected && this.shadowRoot) this.#open();
-    // Not there yet, or on its way to another place of the page: that opens it.
+    // The element is not connected yet, or is being moved; connecting it opens the model.
     else this.#bound = undefined;
   }
 
-  /** The file that is shown. */
   get src(): string | null {
     return this.getAttribute("src");
   }
@@ -72,25 +73,27 @@ export class CageDeformer extends Base {
     else this.setAttribute("src", src);
   }
 
-  /** The cage's vertices, `[n_cage, 3]`, object units; null while there is no cage. A pose of that length can be set. */
+  /**
+   * Positions of the cage's vertices, `[n_cage, 3]`, object units; null while there is no cage. Set it to an array of that
+   * length to pose, or to null for the rest pose.
+   */
   get pose(): Float32Array | null {
     const positions = this.#shown?.engine.cagePositions();
     return positions?.length ? positions : null;
   }
   set pose(posed: ArrayLike<number> | null) {
     const engine = this.#shown?.engine;
-    if (!engine?.bound) throw named("Missing", "there is no cage yet: wait for the event ready");
+    if (!engine?.bound) throw named("Missing", "there is no cage yet: wait for the `ready` event");
     const rest = engine.restPositions();
-    // Null is the rest pose.
     engine.setCagePositions(posed === null ? rest : poseOf(posed, rest));
   }
 
-  /** The model as it is posed, as a GLB; rig, clips, morph targets and materials are kept. */
+  /** The posed model as a GLB, with its rig, clips, morph targets and materials. */
   async export(): Promise<Uint8Array<ArrayBuffer>> {
     if (!this.#bound) throw named("Missing", "there is nothing to export: the element has no src");
     await this.#bound;
     const engine = this.#shown?.engine;
-    if (!engine) throw named("Missing", "there is nothing to export any more");
+    if (!engine) throw named("Missing", "the element was closed before it could export");
     return engine.exportGlb(0, RIG_DEFAULTS, 0) as Uint8Array<ArrayBuffer>;
   }
 
@@ -99,7 +102,7 @@ export class CageDeformer extends Base {
     const root = this.attachShadow({ mode: "open" });
     const style = new CSSStyleSheet();
     style.replaceSync(STYLE);
-    // Not an element, which a page's Content-Security-Policy may forbid.
+    // A constructed style sheet: a Content-Security-Policy may forbid style elements.
     root.adoptedStyleSheets = [style];
     this.#said = document.createElement("p");
     this.#said.setAttribute("role", "status");
@@ -149,7 +152,7 @@ export class CageDeformer extends Base {
     const number = (name: string, usual: number) => Number(this.getAttribute(name) ?? usual);
     const address = new URL(src, this.baseURI);
     const [view, file] = await Promise.all([this.#opened(), download(address)]);
-    if (asked !== this.#asked) throw named("Cancelled", "something else was opened");
+    if (asked !== this.#asked) throw named("Cancelled", "another file was opened");
     const name = decodeURIComponent(address.pathname.split("/").at(-1) ?? "") || "model.glb";
     const wanted = {
       name,
@@ -190,7 +193,7 @@ export class CageDeformer extends Base {
     const view = this.#view;
     this.#view = this.#shown = this.#bound = undefined;
     view?.then((view) => view.close()).catch(() => undefined);
-    // A canvas that had one device cannot have another.
+    // A canvas cannot be used with a second device.
     this.#freshCanvas();
   }
 

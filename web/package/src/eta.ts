@@ -1,18 +1,17 @@
-/** How long it will still take, from the share done so far. */
+/** Estimates the time left from the fraction done. */
 
-/** Share of each new estimate; stages differ in speed, so that old speed must be forgotten, but not at every step. */
+/** Weight of a new speed measurement in the moving average. Stages differ in speed, so that old measurements must fade. */
 const SMOOTHING = 0.25;
-/** No estimate before this share: the first steps say little. */
+/** No estimate below this fraction: the first steps vary too much. */
 const FIRST_SHARE = 0.04;
-/** Nor before this time, ms. */
+/** No estimate before this time, ms. */
 const FIRST_MS = 250;
 
 export interface Eta {
-  /** Hears of a share of 0 to 1 at a time; returns the time left in ms, or undefined while nobody can know. */
+  /** Records a fraction done, 0 to 1. Returns the time left in ms, or undefined while there is no estimate. */
   update(share: number, now: number): number | undefined;
 }
 
-/** An estimate that starts at `start`, ms. */
 export function createEta(start: number): Eta {
   let lastShare = 0;
   let lastTime = start;

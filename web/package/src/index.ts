@@ -1,11 +1,11 @@
-/** The package in a browser: each function in a worker but `deform`. */
+/** The package in a browser. Every function except `deform` runs in a worker. */
 
 import { createApi } from "./api";
 import { compile } from "./session/artifact";
 import { createClient } from "./session/client";
 import type { Api } from "./types";
 
-/** Binds take a core each; more than these would only take memory. */
+/** Limit of parallel workers: each bind uses a core, and more of them would only use memory. */
 const MOST = 4;
 
 const api = /* @__PURE__ */ createApi(async () => {
@@ -17,19 +17,25 @@ const api = /* @__PURE__ */ createApi(async () => {
   return { pkg: WEBGPU.pkg, openClient, most, hasGpu: "gpu" in navigator };
 });
 
-// Each with its sentence: editors show what stands at the name that is imported.
+// Documented here, because editors show the comment of the imported name.
 /**
- * Binds points, `[n, 3]`, to a cage by harmonic coordinates. On the processor, with the command's numbers; `backend: "gpu"`
- * takes WebGPU. A promise here is rejected with an error whose `name` is an `ErrorName`, or with the signal's reason.
+ * Binds points, `[n, 3]`, to a cage by harmonic coordinates. Runs on the processor, or with `backend: "gpu"` through WebGPU.
+ * Rejects with an error whose `name` is an `ErrorName`, or with the signal's reason.
  */
 export const bind: Api["bind"] = api.bind;
-/** A cage that encloses a model strictly; the model may be any triangle soup. */
+/** Generates a cage that strictly encloses a model. The model may be any triangle soup. */
 export const generateCage: Api["generateCage"] = api.generateCage;
-/** Where the points are in a pose of the cage, `[n_points, 3]`: on this thread, once the module is there. */
+/** Positions of the points in a pose of the cage, `[n_points, 3]`. Runs on the calling thread. */
 export const deform: Api["deform"] = api.deform;
-/** The file of a model as it follows a posed cage: a glTF keeps rig, clips, morph targets and materials, as a GLB. */
+/**
+ * Deforms the file of a model with a posed cage. A glTF keeps its rig, clips, morph targets and materials and is returned as a
+ * GLB.
+ */
 export const reshape: Api["reshape"] = api.reshape;
-/** Vertices and triangles of a file, in the order that `reshape` binds them in; with `states` what a cage should enclose. */
+/**
+ * Vertices and triangles of a file, in the order in which `reshape` binds them. With `states`, also the vertices of its morph
+ * targets, for a cage that encloses them.
+ */
 export const readModel: Api["readModel"] = api.readModel;
 
 export type {

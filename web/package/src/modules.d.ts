@@ -1,6 +1,5 @@
-// Packages without types of their own: what is used of them.
+// Types of packages that ship none, as far as they are used here.
 
 declare module "draco3dgltf/draco_decoder_gltf_nodejs.js" {
-  /** Opens the decoder with its wasm file. */
   export default function createDecoder(options: { wasmBinary: ArrayBuffer }): Promise<unknown>;
 }

@@ -1,4 +1,4 @@
-/** What files are, by their names. */
+/** File types, by extension. */
 
 import { MODEL_ENDINGS } from "./contract/generated";
 
@@ -9,12 +9,11 @@ export function extension(name: string): string {
   return dot < 0 ? "" : base.slice(dot + 1).toLowerCase();
 }
 
-/** The place of a name's ending among those of models, the best of which are first; -1 if it is none of them. */
+/** Rank of a model format, 0 for the one that keeps most; -1 if the file is not a model. */
 export function rankOf(name: string): number {
   return (MODEL_ENDINGS as readonly string[]).indexOf(extension(name));
 }
 
-/** Whether a name's ending is that of a model. */
 export function isModel(name: string): boolean {
   return rankOf(name) >= 0;
 }

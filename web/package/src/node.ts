@@ -1,4 +1,4 @@
-/** The package in Node: as in a browser, with threads for workers. */
+/** The package in Node, with threads as workers. */
 
 import { readFile } from "node:fs/promises";
 import { availableParallelism } from "node:os";
@@ -19,7 +19,7 @@ const { bind, generateCage, deform, reshape, readModel } = api;
 
 export { bind, deform, generateCage, readModel, reshape };
 
-/** A thread that looks like a browser's worker. It keeps the process alive only while it has something to do. */
+/** Gives a thread the interface of a browser's worker. It keeps the process alive only while it runs jobs. */
 function openThread(): Worker {
   const thread = new Thread(new URL("./worker-node.ts", import.meta.url));
   const target = new EventTarget();

@@ -1,10 +1,10 @@
-/** Workers, each with one job at a time: a job that is given up takes its worker with it, and no other job. */
+/** A pool of workers with one job each. Aborting a job terminates its worker and affects no other job. */
 
 import type { Client } from "./session/client";
 import type { JobKind, Jobs } from "./session/messages";
 
 export interface Pool {
-  /** The signal takes the worker away from the job, or the job out of the queue. */
+  /** Runs a job. Aborting the signal terminates the worker, or removes the job from the queue. */
   run<K extends JobKind>(
     job: K,
     input: Jobs[K]["input"],
@@ -13,7 +13,7 @@ export interface Pool {
   ): Promise<Jobs[K]["output"]>;
 }
 
-/** `most` of them at a time, others wait; one without work is kept for the next. */
+/** Runs at most `most` jobs in parallel. One idle worker is kept for the next job. */
 export function createPool(open: () => Client, most: number): Pool {
   const waiting: (() => void)[] = [];
   let idle: Client | undefined;

@@ -1,4 +1,4 @@
-/** The package's functions and what they take and give: all that a user's compiler reads. */
+/** Public types of the package. */
 
 import type {
   BindOptions,
@@ -12,16 +12,16 @@ import type {
 } from "./contract/generated";
 import type { Reading } from "./contract/work";
 
-/** What can be followed, and given up. */
+/** Options of every long call. */
 export interface Follow {
-  /** Ends the work at once; the promise is rejected with the signal's reason. */
+  /** Cancels the call at once; the promise is rejected with the signal's reason. */
   readonly signal?: AbortSignal | undefined;
   readonly onProgress?: ((progress: Progress | Reading) => void) | undefined;
 }
 
 /**
- * What 32-bit positions are seen from, `[3]`, object units: the origin of a model far from the world's, as coordinates of a map are;
- * `[0, 0, 0]` unless told. A model, its cage, poses and points have the same one.
+ * Origin to which 32-bit positions are relative, `[3]`, object units. It is not zero for models far from the world's origin,
+ * such as those in map coordinates. A model, its cage, poses and points must have the same origin. Default `[0, 0, 0]`.
  */
 export interface Placed {
   readonly origin?: ArrayLike<number> | undefined;
@@ -33,7 +33,7 @@ export interface Mesh extends Placed {
   readonly triangles: ArrayLike<number>;
 }
 
-/** A mesh of a file. */
+/** A mesh read from a file. */
 export interface ModelMesh extends Mesh {
   readonly positions: Float32Array;
   readonly triangles: Uint32Array;
@@ -42,23 +42,23 @@ export interface ModelMesh extends Mesh {
 
 /** A closed mesh of polygons. */
 export interface Cage extends Placed {
-  /** Vertices `[n_cage, 3]`, object units; a pose is another array of that length. */
+  /** Vertices `[n_cage, 3]`, object units. A pose is another array of this length. */
   readonly positions: ArrayLike<number>;
-  /** For each face the number of its corners, then them, counter-clockwise seen from outside. */
+  /** For each face, the number of its corners and then its vertices, counter-clockwise seen from outside. */
   readonly corners: ArrayLike<number>;
-  /** Steps of subdivision, and controls inside, whose positions come last. */
+  /** Subdivision steps, and controls inside the cage, whose positions follow those of the cage. */
   readonly controls?: CageControls | undefined;
 }
 
-/** A cage that was made for a model. */
+/** A generated cage. */
 export interface GeneratedCage extends Cage {
   readonly positions: Float32Array;
   readonly corners: Uint32Array;
-  /** What a check of it found; nothing of severity "error". */
+  /** Result of the cage check. Contains no problem of severity "error". */
   readonly problems: readonly Problem[];
 }
 
-/** Weights as compressed sparse rows: a row a point, a column a control. Each row sums to 1. */
+/** Weights as compressed sparse rows: one row per point, one column per control. Each row sums to 1. */
 export interface Weights {
   /** `[n_points + 1]` */
   readonly indptr: Uint32Array;
@@ -66,26 +66,28 @@ export interface Weights {
   readonly indices: Uint32Array;
   /** `[n_nonzeros]`, dimensionless. */
   readonly data: Float32Array;
-  /** The columns from `controls` on, which carry offsets, and the points outside the cage. */
+  /** Meaning of the columns from `controls` on, and the points outside the cage. */
   readonly offsets: Offsets;
-  /** Columns of controls: the first. */
+  /** Number of leading columns that belong to controls. */
   readonly controls: number;
 }
 
 export interface Bound {
   readonly weights: Weights;
-  /** As `cagework bind --report` writes it. */
+  /** The report that `cagework bind --report` writes. */
   readonly report: BindReport;
 }
 
-/** A file: `name` says of what kind, "model.glb" unless told. */
+/** A file; the extension of `name` determines its type. Default "model.glb". */
 export type File = Uint8Array | ArrayBuffer | Blob;
 export interface Named {
   readonly name?: string | undefined;
 }
 
-/** `states`: after the vertices also where each morph target takes them, and `clip`: the name of a clip, the frames of it: what a
- * cage should enclose. */
+/**
+ * `states`: append the vertices of each morph target and, with the name of a `clip`, of its frames, for a cage that encloses
+ * them all.
+ */
 export interface ReadAsked extends Follow, Named {
   readonly states?: boolean | undefined;
   readonly clip?: string | undefined;
@@ -93,10 +95,10 @@ export interface ReadAsked extends Follow, Named {
 
 export type BindAsked = Follow & Partial<BindOptions>;
 export type CageAsked = Follow & Partial<CageOptions>;
-/** `plain`: the shape alone, no rig. */
+/** `plain`: export the shape without its rig. */
 export type ReshapeAsked = Follow & Named & Partial<BindOptions> & Partial<Omit<RigOptions, "dynamic">>;
 
-/** What index.ts exports, and says of it. */
+/** The functions that index.ts exports and documents. */
 export interface Api {
   bind(points: ArrayLike<number>, cage: Cage, options?: BindAsked): Promise<Bound>;
   generateCage(mesh: Mesh, options?: CageAsked): Promise<GeneratedCage>;

@@ -1,4 +1,4 @@
-/** The worker in Node: a thread that is given what a browser's worker has. */
+/** Worker entry point in Node: gives the thread the globals of a browser's worker. */
 
 import { parentPort, type TransferListItem } from "node:worker_threads";
 import * as pkg from "./pkg/cagework";
@@ -11,7 +11,7 @@ Object.assign(globalThis, {
   postMessage(message: unknown, { transfer }: { transfer: TransferListItem[] }) {
     parentPort?.postMessage(message, transfer);
   },
-  // A panic ends in a trap, which the job's error tells of.
+  // A panic ends in a trap, which the job reports as its error.
   reportError: (error: unknown) => console.error(error),
 });
 serve(pkg);

@@ -1,4 +1,4 @@
-/** The worker of the build for WebGL2, where everything is computed on the processor. */
+/** The worker of the build for WebGL2, which computes everything on the processor. */
 
 import * as pkg from "./pkg-webgl/cagework_webgl";
 import type { Package } from "./session/artifact";

@@ -1,4 +1,4 @@
-/** The installed package in Chromium: a page of three.js and the element, as they are and as a bundler makes them. */
+/** The installed package in Chromium: a three.js page and the element, as they are and bundled. */
 
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -7,12 +7,12 @@ import { WITH_WEBGL, WITH_WEBGPU } from "../../e2e/browser";
 import type { CageDeformer } from "../src/element";
 import type { Bound } from "../src/types";
 
-/** Pictures, to be looked at. */
+/** Screenshots, for a look by eye. */
 const SCREENS = join(import.meta.dirname, "../../../target/screens");
 /** Rounding of 32-bit sums, over the model's size. */
 const ROUNDING = 1e-6;
 
-/** What three.html leaves for the console, as far as it is used here. */
+/** The globals of three.html that the tests use. */
 interface Example {
   camera: { projectionMatrix: { elements: number[] }; matrixWorldInverse: { elements: number[] } };
   posed: { array: Float32Array };
@@ -25,7 +25,7 @@ interface Browsers {
   webgl: Browser;
 }
 
-/** Pages whose console must stay empty. */
+/** Opens pages and fails if one writes to its console. */
 const test = base.extend<{ visit: (how: keyof Browsers, address: string) => Promise<Page> }, Browsers>({
   // biome-ignore lint/correctness/noEmptyPattern: Playwright reads what a fixture needs from its pattern.
   webgpu: [async ({}, use) => opened(WITH_WEBGPU, use), { scope: "worker" }],
@@ -62,11 +62,11 @@ for (const [how, address] of [
   ["bundled by Vite", "bundled/three.html"],
   ["bundled by webpack", "webpack/three.html"],
 ] as const) {
-  test(`a mesh of three.js follows its cage, ${how}`, async ({ visit }) => {
+  test(`a three.js mesh follows its cage, ${how}`, async ({ visit }) => {
     const page = await visit("webgl", address);
     await page.waitForFunction(() => "weights" in globalThis);
     const rest = await page.evaluate(() => Array.from((globalThis as unknown as Example).posed.array));
-    // A frame later the camera's matrices are there.
+    // Wait a frame for the camera's matrices.
     await page.waitForTimeout(200);
     const place = await page.evaluate(() => {
       const { camera, posed } = globalThis as unknown as Example;
@@ -96,7 +96,7 @@ for (const [how, address] of [
     });
     const moved = posed.flatMap((x, k) => (x === rest[k] ? [] : [Math.floor(k / 3)]));
     expect([...new Set(moved)], "the vertex that was dragged").toEqual([0]);
-    // What weights mean: each vertex is the weighted mean of the cage's.
+    // Each vertex must be the weighted mean of the cage vertices.
     const { indptr, indices, data } = weights;
     const size = Math.max(...position) - Math.min(...position);
     let worst = 0;
@@ -113,7 +113,7 @@ for (const [how, address] of [
   });
 }
 
-/** Waits until the element's model follows its cage; fails with what it says instead. */
+/** Waits until the element is bound; fails with its message otherwise. */
 async function ready(page: Page): Promise<void> {
   const element = page.locator("cage-deformer");
   await expect(element.locator("p")).not.toHaveText(/^(Opening|Making|Binding)/);
@@ -124,10 +124,10 @@ for (const [how, address] of [
   ["webgpu", "element.html"],
   ["webgl", "bundled/element.html"],
 ] as const) {
-  test(`the element's model is dragged, posed and exported by ${how}`, async ({ visit }) => {
+  test(`the element can be dragged, posed and exported with ${how}`, async ({ visit }) => {
     const page = await visit(how, address);
     await ready(page);
-    // The first place where the pointer says that there is a handle.
+    // Find a handle: the first place where the cursor is a pointer.
     const found = await page.evaluate(() => {
       const element = document.querySelector("cage-deformer");
       const events: Float32Array[] = [];
@@ -154,7 +154,7 @@ for (const [how, address] of [
     });
     expect(moved, "one vertex").toHaveLength(1);
     await page.screenshot({ path: join(SCREENS, `npm-element-${how}.png`) });
-    // A cage that is moved as a whole moves the model as a whole.
+    // Translating the cage translates the model.
     const bytes = await page.evaluate(async () => {
       const element = document.querySelector("cage-deformer");
       const { rest } = globalThis as unknown as { rest: Float32Array };
@@ -170,9 +170,7 @@ for (const [how, address] of [
   });
 }
 
-test("an element opens compressed files, says what it cannot open, and leaves nothing behind", async ({
-  visit,
-}) => {
+test("an element opens compressed files, reports unreadable ones and frees its memory", async ({ visit }) => {
   const page = await visit("webgl", "element.html");
   const open = (src: string) =>
     page.evaluate((src) => document.querySelector("cage-deformer")?.setAttribute("src", src), src);
@@ -205,14 +203,14 @@ test("an element opens compressed files, says what it cannot open, and leaves no
   });
   await expect.poll(() => page.workers().length).toBe(0);
   await page.waitForFunction(() => "freed" in globalThis);
-  // Back in the page it begins anew.
+  // Reconnected, it opens the model again.
   await page.evaluate(() => {
     const { element } = globalThis as unknown as { element: CageDeformer };
     element.src = "model.glb";
     document.body.append(element);
   });
   await ready(page);
-  // Moved within the page it keeps its model, and how that is posed.
+  // Moved within the page, it keeps its model and pose.
   const [pose, kept] = await page.evaluate(async () => {
     const { element } = globalThis as unknown as { element: CageDeformer };
     element.pose = element.pose?.map((x) => x + 1) ?? null;
@@ -222,7 +220,7 @@ test("an element opens compressed files, says what it cannot open, and leaves no
     return [pose?.join(), element.pose?.join()];
   });
   expect(kept).toBe(pose);
-  // Without an address it shows nothing; gone while it opens, it leaves nothing behind either.
+  // Without src it shows nothing. Removed while it opens, it frees everything too.
   await page.evaluate(() => {
     const { element } = globalThis as unknown as { element: CageDeformer };
     element.src = null;
@@ -243,7 +241,7 @@ test("an element opens compressed files, says what it cannot open, and leaves no
   }
 });
 
-/** Positions of the only primitive of a GLB. */
+/** Positions of the single primitive of a GLB. */
 function positionsOf(glb: Uint8Array): Float32Array {
   const view = new DataView(glb.buffer, glb.byteOffset);
   const length = view.getUint32(12, true);

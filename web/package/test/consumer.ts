@@ -1,4 +1,4 @@
-/** The package's types as a user's compiler reads them, in the blank project. */
+/** Compiled in the blank project, against the package's published types. */
 
 import { type Bound, bind, deform, generateCage, reshape } from "@cagework/core";
 import type { CageDeformer } from "@cagework/core/element";
@@ -11,7 +11,7 @@ export async function follow(glb: ArrayBuffer, positions: number[], triangles: U
   });
   const posed: Float32Array = await deform(weights, cage.positions);
   const file: Uint8Array<ArrayBuffer> = await reshape(glb, cage, posed, { joints: "turn" });
-  // @ts-expect-error There is no such word.
+  // @ts-expect-error "bend" is not a value of `joints`.
   await reshape(glb, cage, posed, { joints: "bend" });
   return report.iterations + file.length;
 }

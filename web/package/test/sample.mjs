@@ -1,11 +1,11 @@
-// The samples of the page, from the package that is installed here: models of the tests.
+// Builds the page's samples with the installed package, as models for the tests.
 
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { dirname, join } from "node:path";
 import { pathToFileURL } from "node:url";
 
-/** A sample's GLB, and its cage with its first pose; `project`: where the package is installed. */
+/** The GLB, cage and first pose of a sample. `project` is the folder in which the package is installed. */
 export async function sample(project, id) {
   const folder = dirname(createRequire(join(project, "package.json")).resolve("@cagework/core/package.json"));
   const pkg = await import(pathToFileURL(join(folder, "dist/pkg/cagework.js")).href);

@@ -1,11 +1,11 @@
-/** Models of all tests and what webpack makes, put into the blank project; the tests in Node, which come after, read models too. */
+/** Writes the models of all tests and the webpack bundles into the blank project. The Node tests, which run later, read the same models. */
 
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import webpack from "webpack";
 import { dracoGlb, meshoptGlb, torus } from "../../e2e/models";
 
-/** Few: processors draw here. */
+/** Few vertices, because the tests draw on the processor. */
 const VERTICES = 1500;
 
 export default async function setup(): Promise<void> {
@@ -17,7 +17,7 @@ export default async function setup(): Promise<void> {
   writeFileSync(join(project, "meshopt.glb"), await meshoptGlb());
 }
 
-/** The pages as webpack makes them, which takes their scripts alone. Vite takes whole pages: see vite.config.ts. */
+/** Bundles the scripts of the pages with webpack. Vite bundles whole pages: see vite.config.ts. */
 async function bundle(project: string): Promise<void> {
   const path = join(project, "webpack");
   const entry: Record<string, string> = {};

@@ -1,7 +1,7 @@
 import { join } from "node:path";
 import { defineConfig } from "vite";
 
-/** The blank project as its owner would build it. */
+/** Bundles the blank project with Vite. */
 const project = process.env.NPM_PROJECT ?? "";
 
 export default defineConfig({

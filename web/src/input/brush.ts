@@ -1,8 +1,8 @@
-/** The outline of the brush below the pointer, while somebody paints. */
+/** Outline of the brush at the pointer, while painting. */
 
 import type { App } from "../app";
 
-/** Puts it on `viewport`; stage.css shows it only while somebody paints. */
+/** Adds the outline to `viewport`; stage.css hides it unless the user is painting. */
 export function attachBrush(viewport: HTMLElement, app: App): void {
   const outline = document.createElement("div");
   outline.className = "brush";
@@ -18,7 +18,7 @@ export function attachBrush(viewport: HTMLElement, app: App): void {
     const [x, y] = [event.clientX - left, event.clientY - top];
     const radius = app.painting.radiusAt(x, y);
     if (radius === undefined) {
-      // What was shown stays until it is known.
+      // The radius is not known yet: keep the current outline and ask again.
       frame = requestAnimationFrame(() => show(event));
       return;
     }
@@ -28,7 +28,7 @@ export function attachBrush(viewport: HTMLElement, app: App): void {
   };
   const follow = (event: PointerEvent | WheelEvent) => {
     if (app.store.get().painting === null) return;
-    // A hand that turns the view does not paint.
+    // A drag that started beside the model turns the view and does not paint.
     if (event.buttons > 0 && !app.painting.active()) {
       hide();
       return;

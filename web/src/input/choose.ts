@@ -3,7 +3,7 @@
 import { named } from "../actions/exports";
 import type { NamedFile } from "../contract";
 
-/** Asks for files of some kinds, or for a folder. */
+/** Opens the file dialog for the given file types, or for a folder. */
 export function choose(accept: string, folder: boolean, then: (files: NamedFile[]) => void): void {
   const input = document.createElement("input");
   input.type = "file";

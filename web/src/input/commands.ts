@@ -1,4 +1,4 @@
-/** What each command of the table of shortcuts does. */
+/** What each command of the shortcut table does. */
 
 import { report } from "../actions/context";
 import type { App } from "../app";
@@ -7,7 +7,7 @@ import { controlCount, elementInUse } from "../derived";
 import { T } from "../words";
 import type { Command } from "./shortcuts";
 
-/** CSS pixels of an arrow key, and with Shift. */
+/** Distance of an arrow key, CSS pixels; the second one with Shift. */
 const NUDGE = 2;
 const NUDGE_FAR = 20;
 const NEXT_ELEMENT: Record<CageElement, CageElement> = { vertex: "edge", edge: "face", face: "vertex" };
@@ -127,7 +127,7 @@ export function createCommands(app: App): Record<Command, () => void> {
     viewLeft: () => view.axis(0, true),
     viewBottom: () => view.axis(1, true),
     ortho: () => view.ortho(),
-    // Held, not pressed: the keyboard calls `original` itself.
+    // The keyboard handler calls `original` directly, on key down and key up.
     original: () => undefined,
     toggleCage: () => view.scene({ cage: !store.get().scene.cage }),
     toggleWire: () => view.scene({ base_wireframe: !store.get().scene.base_wireframe }),

@@ -1,10 +1,10 @@
-/** Files dropped on the window: several at once, or a folder; while they hover, the page says what will happen. */
+/** Drag and drop of files and folders on the window. */
 
 import type { App } from "../app";
 import type { NamedFile } from "../contract";
 import type { DropPlace } from "../state";
 
-/** Files of a folder that are read at most: a drop of a whole disk must end. */
+/** Limit of the files read from dropped folders, so that dropping a whole disk ends. */
 const MOST_FILES = 2000;
 
 export function attachDrop(panel: HTMLElement, app: App): void {
@@ -39,7 +39,10 @@ export function attachDrop(panel: HTMLElement, app: App): void {
   });
 }
 
-/** All files of a drop, folders opened. Entries must be taken before the first await: the list is emptied then. */
+/**
+ * All files of a drop, including those in folders. Entries are taken before the first await, because the browser then clears
+ * the list.
+ */
 async function collect(data: DataTransfer): Promise<NamedFile[]> {
   const entries = [...data.items]
     .filter((item) => item.kind === "file")
@@ -61,7 +64,7 @@ async function walk(entry: FileSystemEntry, folder: string, into: NamedFile[]): 
   } else if (isFolder(entry)) {
     const reader = entry.createReader();
     for (;;) {
-      // A reader hands out its entries in portions; an empty one is the last.
+      // readEntries returns batches; an empty one ends the list.
       const portion = await new Promise<FileSystemEntry[]>((resolve, reject) =>
         reader.readEntries(resolve, reject),
       );

@@ -1,9 +1,9 @@
-/** Keys: looks them up in the table of shortcuts and runs what they stand for. */
+/** Keyboard handler: finds the command of a key press in the shortcut table and runs it. */
 
 import type { App } from "../app";
 import { type Command, commandOf } from "./shortcuts";
 
-/** Elements that want their keys themselves. */
+/** Elements that handle typed keys themselves. */
 function isTyping(target: EventTarget | null): boolean {
   if (!(target instanceof HTMLElement)) return false;
   if (target instanceof HTMLInputElement) return !["checkbox", "radio", "range"].includes(target.type);
@@ -12,7 +12,7 @@ function isTyping(target: EventTarget | null): boolean {
   );
 }
 
-/** Keys that controls use: arrows on sliders and radio buttons, space and enter on buttons. */
+/** Keys that controls use: arrows for sliders and radio buttons, Space and Enter for buttons. */
 function isControlKey(target: EventTarget | null, key: string): boolean {
   if (!(target instanceof HTMLElement)) return false;
   if (target.closest("dialog")) return true;
@@ -26,7 +26,7 @@ export interface KeyboardOptions {
   viewport: HTMLElement;
   app: App;
   run: (command: Command) => void;
-  /** Space is held or let go. */
+  /** Called when Space is pressed and released. */
   original: (on: boolean) => void;
 }
 
@@ -34,7 +34,7 @@ export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions
   document.addEventListener("keydown", (event) => {
     if (event.defaultPrevented || event.isComposing || isTyping(event.target)) return;
     const gesture = app.edit.active();
-    // While something moves, Enter keeps it, whichever button was pressed last.
+    // During a gesture, Enter ends the gesture even if a button has the focus.
     const mod = event.ctrlKey || event.metaKey;
     if (!gesture && !mod && isControlKey(event.target, event.key)) return;
     if (mod && event.target instanceof HTMLElement && event.target.closest("dialog")) return;
@@ -54,7 +54,7 @@ export function attachKeyboard({ viewport, app, run, original }: KeyboardOptions
     }
     const command = commandOf(event, { gesture, rest: editingRest, tour: tour !== null });
     if (!command) return;
-    // Tab moves between modes only after a click into the view; who arrived by Tab leaves by it.
+    // Tab switches the mode only if the view was focused by a click. With focus from the keyboard, Tab moves on as usual.
     if (command === "restMode") {
       const clicked = document.activeElement === viewport && !viewport.matches(":focus-visible");
       if (!clicked || event.shiftKey) return;

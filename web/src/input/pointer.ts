@@ -1,19 +1,19 @@
-/** Mouse and pen on the view, and which touches they share with: what a press means is decided here. */
+/** Mouse, pen and single-finger input on the view. `press` decides what a drag does. */
 
 import { createTouch } from "@cagework/core/session/touch";
 import type { App } from "../app";
 import type { GizmoHandle, SelectMode } from "../contract";
 import type { Stage } from "../ui/viewport";
 
-/** Pixels that tell a drag from a click. */
+/** Movement beyond this makes a press a drag instead of a click, pixels. */
 const SLOP = 4;
-/** A finger that rests so long pins, ms. */
+/** A press of a finger of this length sets a pin, ms. */
 const LONG_PRESS_MS = 500;
 const MOUSE_RADIUS = 10;
 const TOUCH_RADIUS = 24;
-/** A wheel notch is about 100 units; this makes it a seventh nearer. */
+/** Zoom per wheel unit. A wheel notch is about 100 units and zooms in by a seventh. */
 const WHEEL_RATE = 0.0015;
-/** Trackpads send pinches as wheel events with Ctrl, in much smaller units. */
+/** Zoom per unit of a trackpad pinch. Browsers send pinches as wheel events with Ctrl, in much smaller units. */
 const PINCH_RATE = 0.01;
 
 type Drag =
@@ -70,11 +70,11 @@ export function attachPointer(stage: Stage, app: App): void {
         mode: event.shiftKey || store.get().additive ? "add" : mod ? "remove" : "replace",
       };
     if (store.get().cage && store.get().scene.cage) {
-      // A vertex below a finger comes before a gizmo beside it.
+      // A vertex under the finger takes precedence over a nearby gizmo.
       const isOnVertex = engine().pick(at.x, at.y, MOUSE_RADIUS).length > 0;
       const handle = engine().gizmoAt(at.x, at.y, isOnVertex ? MOUSE_RADIUS : radiusOf(event));
       if (handle !== undefined && takeGizmo(handle, at)) return { kind: "gizmo" };
-      // On the model a finger takes the model, unless a handle is just there.
+      // On the model a finger pulls the model, unless a handle is directly under it.
       const isOnModel = store.get().scene.pull && pull.hover(at.x, at.y);
       const vertices = engine().pick(at.x, at.y, isOnModel ? MOUSE_RADIUS : radiusOf(event));
       if (vertices.length > 0) {
@@ -124,7 +124,7 @@ export function attachPointer(stage: Stage, app: App): void {
         break;
       case "handle":
         if (!drag.started && moved) {
-          // Where the cage bends a moving model: what is posed is the shape at rest.
+          // Stop the clip if the cage bends the moving model: only the rest shape can be posed.
           app.clips.stop();
           if (!drag.was || drag.mode === "replace") {
             if (!drag.was) engine().select(drag.vertices, drag.mode === "toggle" ? "add" : "replace");
@@ -132,7 +132,7 @@ export function attachPointer(stage: Stage, app: App): void {
           const [vertex = 0] = drag.vertices;
           const { scene, proportionalOn, symmetry } = store.get();
           const isOne = drag.vertices.length === 1 && engine().selection().length === 1;
-          // A handle is pulled as the model is, where nobody asked for something else.
+          // A single handle is pulled like a point of the model, unless Alt, proportional editing or mirroring is on.
           if (scene.pull && isOne && !drag.bare && !proportionalOn && !symmetry) {
             edit.sync();
             if (pull.beginCage(vertex, start.x, start.y)) {
@@ -161,7 +161,7 @@ export function attachPointer(stage: Stage, app: App): void {
     }
   };
 
-  /** A click beside everything. */
+  /** A click on the background. */
   const selectNothing = () => {
     if (!store.get().cage) return;
     engine().select(new Uint32Array(), "replace");
@@ -229,7 +229,7 @@ export function attachPointer(stage: Stage, app: App): void {
     viewport.focus({ preventScroll: true, focusVisible: false } as FocusOptions);
     const at = place(event);
     pointer = at;
-    // G, R and S follow the pointer without a button: a click keeps, the right one puts back.
+    // After G, R or S the selection follows the pointer without a button: left click keeps it, right click cancels.
     if (edit.active() && !drag) {
       edit.end(event.button !== 2);
       return;
@@ -305,7 +305,7 @@ export function attachPointer(stage: Stage, app: App): void {
   app.pointer = () => pointer;
 }
 
-/** The rectangle between two points. */
+/** The rectangle with these opposite corners. */
 export function rectangle(a: { x: number; y: number }, b: { x: number; y: number }) {
   return {
     x: Math.min(a.x, b.x),

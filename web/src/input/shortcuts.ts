@@ -1,6 +1,6 @@
-/** The one table of shortcuts: the keyboard handler, the tool tips and the `?` sheet all read it. */
+/** The shortcut table. The keyboard handler, the tool tips and the shortcut sheet read it. */
 
-/** Where a shortcut works: anywhere, while vertices are moved with G, R or S, while the rest cage is edited, or on the tour. */
+/** Where a shortcut applies: everywhere, during a gesture (G, R or S), while the rest cage is edited, or on the tour. */
 export type Scope = "page" | "gesture" | "rest" | "tour";
 
 interface Entry {
@@ -8,21 +8,21 @@ interface Entry {
   readonly label: string;
   readonly group: Group;
   readonly scope?: Scope;
-  /** Keys as the sheet shows them, where one row stands for several commands. */
+  /** Keys shown on the sheet, where one row stands for several commands. */
   readonly shown?: readonly string[];
 }
 
 export const GROUPS = ["Move", "While moving", "Select", "Look", "Cage", "Poses", "File"] as const;
 export type Group = (typeof GROUPS)[number];
 
-/** Keys are written as `keyOf` says them; `mod` is Ctrl, or Cmd on a Mac. */
+/** Keys have the form that `keyOf` returns; `mod` is Ctrl, or Cmd on a Mac. */
 const TABLE = {
   grab: { keys: ["g"], label: "Move the selection", group: "Move" },
   rotate: { keys: ["r"], label: "Rotate", group: "Move" },
   scale: { keys: ["s"], label: "Scale", group: "Move" },
   axisX: {
     keys: ["x"],
-    label: "Only along this axis; with Shift, all but it",
+    label: "Only along this axis; with Shift, along the other two",
     group: "While moving",
     scope: "gesture",
     shown: ["x", "y", "z"],
@@ -32,19 +32,28 @@ const TABLE = {
   planeX: { keys: ["shift+x"], label: "", group: "While moving", scope: "gesture" },
   planeY: { keys: ["shift+y"], label: "", group: "While moving", scope: "gesture" },
   planeZ: { keys: ["shift+z"], label: "", group: "While moving", scope: "gesture" },
-  keep: { keys: ["enter"], label: "Keep it; a click does too", group: "While moving", scope: "gesture" },
-  cancel: { keys: ["escape"], label: "Put it back; otherwise: close what is open", group: "While moving" },
+  keep: {
+    keys: ["enter"],
+    label: "Keep the move; a click does too",
+    group: "While moving",
+    scope: "gesture",
+  },
+  cancel: {
+    keys: ["escape"],
+    label: "Cancel the move; otherwise close the open panel",
+    group: "While moving",
+  },
   gizmoMove: { keys: ["w"], label: "Gizmo to move", group: "Move" },
   gizmoRotate: { keys: ["e"], label: "Gizmo to rotate", group: "Move" },
   gizmoScale: { keys: ["t"], label: "Gizmo to scale", group: "Move" },
   toolPull: { keys: ["q"], label: "Pull the model", group: "Move" },
-  pin: { keys: ["p"], label: "Pin the point under the pointer, or free it", group: "Move" },
+  pin: { keys: ["p"], label: "Pin or unpin the point under the pointer", group: "Move" },
   toolSelect: { keys: ["shift+q"], label: "Only the cage: select and drag", group: "Move" },
   symmetry: { keys: ["m"], label: "Mirror across X", group: "Move" },
-  proportional: { keys: ["o"], label: "Proportional editing; wheel: how far", group: "Move" },
+  proportional: { keys: ["o"], label: "Proportional editing; the wheel sets the reach", group: "Move" },
   nudgeLeft: {
     keys: ["arrowleft"],
-    label: "Nudge the selection, or pull the point; with Shift ten times as far",
+    label: "Nudge the selection, or pull the model; with Shift, ten times as far",
     group: "Move",
     shown: ["arrowleft", "arrowup", "arrowdown", "arrowright"],
   },
@@ -60,9 +69,9 @@ const TABLE = {
 
   selectAll: { keys: ["a"], label: "Select all", group: "Select" },
   selectNone: { keys: ["alt+a"], label: "Select nothing", group: "Select" },
-  selectLinked: { keys: ["l"], label: "Select all that is linked", group: "Select" },
-  selectInvert: { keys: ["mod+i"], label: "Select the others instead", group: "Select" },
-  boxSelect: { keys: ["b"], label: "Select by a box", group: "Select" },
+  selectLinked: { keys: ["l"], label: "Select connected vertices", group: "Select" },
+  selectInvert: { keys: ["mod+i"], label: "Invert the selection", group: "Select" },
+  boxSelect: { keys: ["b"], label: "Select with a box", group: "Select" },
   elementMode: { keys: ["v"], label: "Vertices, edges or faces", group: "Select" },
   previousVertex: { keys: ["["], label: "Previous vertex", group: "Select" },
   nextVertex: { keys: ["]"], label: "Next vertex", group: "Select" },
@@ -78,14 +87,14 @@ const TABLE = {
   ortho: { keys: ["5"], label: "Perspective or parallel", group: "Look" },
   original: { keys: [" "], label: "Hold: show the original", group: "Look" },
   toggleCage: { keys: ["h"], label: "Hide or show the cage", group: "Look" },
-  toggleWire: { keys: ["z"], label: "The model at rest, as wires", group: "Look" },
+  toggleWire: { keys: ["z"], label: "The model at rest, as wireframe", group: "Look" },
   heatMap: { keys: ["k"], label: "Weights of the selected vertex", group: "Look" },
   see: { keys: ["n"], label: "The See panel", group: "Look" },
 
   tour: { keys: ["shift+t"], label: "The tour, ten stops", group: "Look" },
   nextStop: {
     keys: ["pagedown", "."],
-    label: "Next stop of the tour, or the one before",
+    label: "Next or previous stop of the tour",
     group: "Look",
     scope: "tour",
     shown: ["pagedown", "pageup", ".", ","],
@@ -134,19 +143,19 @@ export interface KeyPress {
   readonly shiftKey: boolean;
 }
 
-/** A key press as the table writes it. With Alt, letters come from the key's place: a Mac types "å" for Alt+A. */
+/** A key press in the form of the table. With Alt, letters come from the physical key: Alt+A types "å" on a Mac. */
 export function keyOf(event: KeyPress): string {
   const place = /^(?:Key|Digit)(.)$/.exec(event.code)?.[1];
   const mod = event.ctrlKey || event.metaKey;
   const numpad = /^Numpad(\d)$/.exec(event.code)?.[1];
   const typed = event.key.toLowerCase();
   const key = numpad ?? ((event.altKey || mod) && place ? place.toLowerCase() : typed);
-  // A sign such as "?" already needs Shift on most keyboards.
+  // Signs such as "?" already need Shift on most keyboards.
   const sign = key.length === 1 && !/[a-z0-9 ]/.test(key);
   return `${event.shiftKey && !sign ? "shift+" : ""}${mod ? "mod+" : ""}${event.altKey ? "alt+" : ""}${key}`;
 }
 
-/** The command of a key press. In a gesture its own keys come first, and nothing else but these. */
+/** The command of a key press. During a gesture, only its own commands and a few others apply. */
 export function commandOf(
   event: KeyPress,
   scopes: Partial<Record<Exclude<Scope, "page">, boolean>>,
@@ -179,7 +188,7 @@ const NAMES: Record<string, string> = {
   pageup: "PgUp",
 };
 
-/** The caps of a combination: "shift+mod+z" -> ["Shift", "Ctrl", "Z"], or with Cmd on a Mac. */
+/** Key caps of a combination: "shift+mod+z" -> ["Shift", "Ctrl", "Z"], or with Cmd on a Mac. */
 export function caps(keys: string, mac: boolean): string[] {
   return keys.split("+").map((part) => {
     if (part === "mod") return mac ? "⌘" : "Ctrl";
@@ -191,13 +200,13 @@ export function caps(keys: string, mac: boolean): string[] {
   });
 }
 
-/** A command's first combination as a tool tip shows it. */
+/** The first key combination of a command, for tool tips. */
 export function shortcutText(command: Command, mac: boolean): string {
   const keys = TABLE[command].keys[0];
   return caps(keys, mac).join(mac ? "" : "+");
 }
 
-/** Whether this is a Mac, where Cmd takes the place of Ctrl. */
+/** Whether this is a Mac, which uses Cmd instead of Ctrl. */
 export function isMac(platform: string): boolean {
   return /mac|iphone|ipad/i.test(platform);
 }

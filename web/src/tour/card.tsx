@@ -1,4 +1,4 @@
-/** The tour's card: where one is, what is said there, one thing to do, and what was measured. Below the view, so that it hides nothing. */
+/** The tour's card, below the view: title, explanation, task and measurements of the current stop. */
 
 import { useLayoutEffect, useRef } from "preact/hooks";
 import type { App } from "../app";
@@ -13,7 +13,7 @@ export function Card({ app, tour, guide }: { app: App; tour: TourState; guide: G
   const { stop, reports, doing } = tour;
   const card = useRef<HTMLElement>(null);
   useLayoutEffect(() => {
-    // Who came by keys goes on by them.
+    // Focus the main button, so that the tour can continue by keyboard.
     card.current?.querySelector<HTMLElement>(".primary")?.focus();
   }, []);
   const name: StopName = STOPS[stop] ?? "cage";
@@ -57,7 +57,7 @@ export function Card({ app, tour, guide }: { app: App; tour: TourState; guide: G
   );
 }
 
-/** One dot a stop. */
+/** One dot per stop. */
 function Stops({ now, go }: { now: number; go: (stop: number) => void }) {
   return (
     <nav class="tour-stops" aria-label={TOUR.all}>

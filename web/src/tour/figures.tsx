@@ -1,4 +1,4 @@
-/** What the tour's stops measure, in numbers that the binds report, and the one thing to change there. */
+/** Measurements of the tour's binds, and the one option that each stop lets the user change. */
 
 import type { App } from "../app";
 import type { BindReport } from "../contract";
@@ -68,7 +68,7 @@ function Grid({ app }: Figure) {
   );
 }
 
-/** Mean rest errors of what was bound here, one a row. */
+/** Mean rest errors, one row per bind. */
 function RestErrors({
   reports,
   name,
@@ -172,7 +172,7 @@ function Times({ guide, reports }: Figure) {
   );
 }
 
-/** Mean rest errors of the paper's method; each number is a button that shows what it stands for. */
+/** Table of the paper's mean rest errors. Each number is a button that shows its bind in the view. */
 function Errors({ app, guide, reports }: Figure) {
   const { grid: gridNow, tau: tauNow } = app.store.get().bindOptions;
   return (
@@ -215,7 +215,7 @@ function Errors({ app, guide, reports }: Figure) {
   );
 }
 
-/** Steps of subdivision, and a bone inside; both are the page's own actions. */
+/** Subdivision steps and a bone inside, through the page's own actions. */
 function Smooth({ app }: Figure) {
   const { cage } = app.store.get();
   if (!cage) return null;

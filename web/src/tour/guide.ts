@@ -1,4 +1,4 @@
-/** The tour: ten stops that the page drives itself. What a stop does is undone when one leaves it. */
+/** Runs the tour: ten stops, each of which sets up the page. Leaving the tour restores the previous work and settings. */
 
 import type { BindActions } from "../actions/bind";
 import type { Context } from "../actions/context";
@@ -15,17 +15,17 @@ import { loadStop, saveStop } from "../store";
 import { isOf, STOPS, type Stop, type StopName, stopsOf } from "./stops";
 
 export interface Guide {
-  /** Begins at a stop, or where it was left. */
+  /** Starts at the given stop, or where the tour was left. */
   start(stop?: number): Promise<void>;
-  /** Goes to a stop; past the last one the tour is over. */
+  /** Goes to a stop. Beyond the last one the tour ends. */
   go(stop: number): Promise<void>;
-  /** Binds in other ways, in place of those of the stop that is open. */
+  /** Runs other binds, replacing the measurements of this stop. */
   measure(binds: readonly Partial<BindOptions>[]): Promise<void>;
-  /** Binds in one more way, to look at it; what was measured at this stop stays. */
+  /** Runs one more bind to show its result; the measurements of this stop stay. */
   show(way: Partial<BindOptions>): Promise<void>;
-  /** What was open before, and its settings, come back. */
+  /** Ends the tour and restores the previous work and settings. */
   end(): Promise<void>;
-  /** A sample or a file is being opened: if not by the tour itself, the settings come back for it. */
+  /** Called when a sample or file is opened. Unless the tour opened it, ends the tour and restores the settings. */
   overtaken(sample: string | null): void;
 }
 
@@ -38,7 +38,7 @@ export interface GuideNeeds {
   readonly works: Pick<WorkActions, "flush" | "open" | "restore">;
 }
 
-/** Settings that come back. */
+/** Settings that are restored. */
 const KEPT = ["step", "bindOptions", "seeOpen", "slice"] as const;
 
 interface Before {
@@ -46,18 +46,18 @@ interface Before {
   readonly scene: AppState["scene"];
   readonly work: AppState["works"][number] | undefined;
   readonly sample: string | null;
-  /** The fragment of the link that the page was opened by. */
+  /** The fragment of the link that opened the page. */
   readonly link: string;
 }
 
 export function createGuide(ctx: Context, { bind, edit, poses, view, files, works }: GuideNeeds): Guide {
   const { store } = ctx;
   let before: Before | undefined;
-  /** Counts up with each stop: what one of before still waits for is dropped. */
+  /** Incremented at each stop. Async work with an older value is dropped. */
   let turn = 0;
-  /** The sample that is open as it came, and its poses. */
+  /** The unmodified sample that is open, and its poses. */
   let opened: { readonly sample: string; readonly poses: AppState["poses"] } | undefined;
-  /** The sample that the tour itself is opening. */
+  /** The sample that the tour is opening. */
   let opening: string | null = null;
 
   const set = (patch: Partial<NonNullable<AppState["tour"]>>) => {
@@ -90,7 +90,7 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
     return isOpen;
   };
 
-  /** Takes back what a hand has done at the stop before. */
+  /** Undoes what the user did at the previous stop. */
   const rest = (pose: number | undefined) => {
     const { engine } = ctx.session();
     const all = opened?.poses ?? [];
@@ -107,7 +107,7 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
     return { ...BIND_DEFAULTS, backend, memory_limit, ...way };
   };
 
-  /** Binds in each way, and keeps what is measured. */
+  /** Runs the binds and collects their reports. */
   const run = async (binds: readonly Partial<BindOptions>[], mine: number) => {
     for (const [k, way] of binds.entries()) {
       set({ doing: [k + 1, binds.length] });
@@ -145,11 +145,11 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
     await view.compare(stop.compare ?? SCENE_DEFAULTS.compare);
     engine.frameAll();
     if (stop.pose === undefined) return;
-    // The posed cage is elsewhere.
+    // The posed cage reaches elsewhere: frame it, not the rest pose.
     engine.selectAll();
     engine.frameSelection();
     if (stop.compare) {
-      // What is leftmost would be behind the tools.
+      // Zoom out, so that the leftmost view is not behind the tools.
       const { width, height } = ctx.viewport();
       engine.zoomAt(width / stop.compare.length / 2, height / 2, 0.8);
     }
@@ -160,7 +160,7 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
   const guide: Guide = {
     async start(stop = loadStop()) {
       if (!before) {
-        // What has not been kept yet is.
+        // Save pending changes first.
         await works.flush();
         const state = store.get();
         const settings = Object.fromEntries(KEPT.map((key) => [key, state[key]])) as Before["settings"];
@@ -211,7 +211,7 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
       if (isStill) rest(undefined);
       guide.overtaken(null);
       if (was.link.includes("sample=") && !was.work) {
-        // Opened again as it was shared.
+        // Reopens the shared link.
         location.hash = was.link;
         return;
       }
@@ -227,7 +227,7 @@ export function createGuide(ctx: Context, { bind, edit, poses, view, files, work
       if (!before || (sample !== null && sample === opening)) return;
       turn += 1;
       ctx.queue.cancel("bind");
-      // What was done on the way is no work to be kept.
+      // The tour's steps are not work to keep.
       ctx.history.clear();
       store.set({ tour: null });
       putBack(before);

@@ -1,4 +1,4 @@
-/** The tour: what drives it, and its card. */
+/** Entry point of the tour's chunk. */
 
 import type { FunctionComponent } from "preact";
 import type { Context } from "../actions/context";

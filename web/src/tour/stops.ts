@@ -1,4 +1,4 @@
-/** The stops of the tour: what is open at each, how it is bound, and what is shown of it. Its words are in words/en.ts. */
+/** The stops of the tour: sample, binds and view of each. Their sentences are in words/en/tour.ts. */
 
 import type { BindOptions, BindReport, Coordinates, SceneOptions } from "../contract";
 import { PAPER_DEFAULTS } from "../defaults";
@@ -20,21 +20,21 @@ export type StopName = (typeof STOPS)[number];
 
 export interface Stop {
   readonly sample: string;
-  /** The pose of the sample that is shown; at rest without. */
+  /** Index of the sample's pose; the rest pose if undefined. */
   readonly pose?: number;
   readonly step: StepName;
-  /** Binds, one after the other, where they differ from ours; the last one stays. */
+  /** Options of each bind that differ from the defaults, in order. The last bind stays. */
   readonly binds: readonly Partial<BindOptions>[];
   readonly scene?: Partial<SceneOptions>;
-  /** The cage vertex that is selected. */
+  /** The selected cage vertex. */
   readonly vertex?: number;
   readonly slice?: Partial<Slice>;
   readonly compare?: readonly Coordinates[];
-  /** From the right side, turned by so many CSS pixels. */
+  /** Rotation of the view from the right side, as a drag in CSS pixels. */
   readonly turn?: readonly [x: number, y: number];
 }
 
-/** Grids and thresholds of the table of errors: what takes a second altogether. */
+/** Grids and thresholds of the error table. All its binds together take about a second. */
 export const GRIDS = [16, 32] as const;
 export const TAUS = [1e-3, 1e-4, 1e-5] as const;
 
@@ -42,15 +42,15 @@ const paper = (grid: number, tau: number): Partial<BindOptions> => {
   const { backend: _, memory_limit: __, ...way } = PAPER_DEFAULTS;
   return { ...way, grid, tau };
 };
-/** As the paper's figures: the model as wires, what the weights make of it as a solid. */
+/** The view of the paper's figures: the model as wireframe, its reconstruction from the weights as solid. */
 const FIGURE: Partial<SceneOptions> = { base_wireframe: true, cage: false, colour: "clay" };
 
-/** The paper's equations by each solver. */
+/** The paper's equations, solved by each solver. */
 export const solvers = (grid: number): Partial<BindOptions>[] =>
   (["jacobi", "cg", "multigrid"] as const).map((solver) => ({ ...paper(grid, 1e-5), solver }));
 export const ofPaper = (grid: number, tau: number) => [paper(grid, tau)];
 
-/** `gpu`: whether there is a graphics card to bind on. */
+/** `gpu`: whether binds can run on the graphics card. */
 export function stopsOf(gpu: boolean): Readonly<Record<StopName, Stop>> {
   const rat = { sample: "rat", turn: [90, 30] } as const;
   return {
@@ -102,17 +102,17 @@ export function stopsOf(gpu: boolean): Readonly<Record<StopName, Stop>> {
   };
 }
 
-/** Steps of subdivision to choose from, and where the bone goes: along the clamp's lower jaw, object units. */
+/** Choices of subdivision steps, and the bone along the clamp's lower jaw, object units. */
 export const STEPS = [0, 1, 2] as const;
 export const BONE = [
   [-0.15, -0.3, 0],
   [0.85, -0.3, 0],
 ] as const;
 
-/** What tells binds apart at a stop. */
+/** Options by which the binds of a stop differ. */
 const WAY = ["grid", "tau", "method", "solver", "backend"] as const;
 
-/** Whether a report is of a bind in this way, as far as the way is said. Rust's tau has 24 bits. */
+/** Whether a report belongs to a bind with these options. Numbers are compared as f32, because Rust's tau has 24 bits. */
 export function isOf(report: BindReport, way: Partial<Pick<BindOptions, (typeof WAY)[number]>>): boolean {
   const bits = (value: string | number) => (typeof value === "number" ? Math.fround(value) : value);
   return WAY.every((key) => way[key] === undefined || bits(way[key]) === bits(report[key]));

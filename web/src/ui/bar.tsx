@@ -1,4 +1,4 @@
-/** The bar on top: the product, the five steps, and what is always at hand. */
+/** The top bar: product name, the five steps, and global actions. */
 
 import type { App } from "../app";
 import { type AppState, STEPS, type StepName } from "../state";

@@ -1,4 +1,4 @@
-/** Step 3: how to bind, what it needs, how far it is, and what came out. */
+/** Step 3: bind options, memory needed, progress and report. */
 
 import type { App } from "../app";
 import type { BindOptions } from "../contract";
@@ -65,7 +65,7 @@ function Running({ run }: { run: BindRun }) {
   );
 }
 
-/** The change per iteration, of this bind and of those by other solvers. */
+/** Plot of the change per iteration for this bind and earlier ones by other solvers. */
 function Figure({ app }: { app: App }) {
   const state = app.store.get();
   const curves = curvesOf(state).filter((curve) => curve.points.length > 0);
@@ -143,7 +143,7 @@ function Ways({ app }: { app: App }) {
   );
 }
 
-/** Where a bind is computed: graphics card or processor, and why not the former. */
+/** Choice between graphics card and processor. Without WebGPU it explains why only the processor is offered. */
 function Place({ app }: { app: App }) {
   const { adapter, lack, bindOptions } = app.store.get();
   const { backend, solver } = bindOptions;
@@ -243,7 +243,7 @@ function Advanced({ app }: { app: App }) {
   );
 }
 
-/** What the chosen combination is, as a sentence. */
+/** One sentence about the chosen method and solver. */
 export function sayOptions({ method, solver, preconditioner }: BindOptions): string {
   const say = T.bind.options;
   if (solver === "cg") return preconditioner === "v_cycle" ? say.cgPreconditioned : say.cg;

@@ -1,4 +1,4 @@
-/** How a cage is made for the model. */
+/** Options of the automatic cage. */
 
 import type { App } from "../app";
 import type { CageOptions } from "../contract";
@@ -7,12 +7,12 @@ import { count, percent } from "../format";
 import { T } from "../words";
 import { Segments, Slider, Toggle } from "./controls";
 
-/** Where the slider of voxels starts: it stands for none in particular. */
+/** Lowest position of the voxel slider. It stands for 0: the vertex count determines the resolution. */
 const COARSEST = 16;
-/** Gaps narrower than so many voxels are closed. */
+/** Gaps narrower than this many voxels are closed. */
 const GAP_VOXELS = 3;
 
-/** The slider of detail goes from coarse to fine, by factors: 0 is four times the usual distance, 1 a quarter of it. */
+/** The detail slider is logarithmic: 0 is four times the default distance, 1 a quarter of it. */
 const COARSE_DETAIL = 0.112;
 const FINER = 16;
 const detailOf = (fineness: number) => COARSE_DETAIL * FINER ** -fineness;

@@ -1,4 +1,4 @@
-/** Step 2: where the cage comes from, what is wrong with it, and shaping it. */
+/** Step 2: source of the cage, its problems, and reshaping. */
 
 import type { App } from "../app";
 import type { Element as CageElement, CageState, Check, Problem, RestEdit } from "../contract";
@@ -163,7 +163,7 @@ function CageBadge({ cage, check }: { cage: CageState; check: Check | null }) {
 
 function ProblemCard({ problem, app }: { problem: Problem; app: App }) {
   const { fix } = problem;
-  // Once the grid is as fine as asked for, nothing is left to do.
+  // A finer grid is offered only while the chosen one is coarser.
   const isDone = fix?.kind === "grid" && app.store.get().bindOptions.grid >= fix.cells;
   return (
     <div class={`problem-card ${problem.severity}`}>

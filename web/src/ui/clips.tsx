@@ -1,4 +1,4 @@
-/** Clips and morph targets of a rigged model, and what becomes of its skeleton. */
+/** Clips and morph targets of a rigged model, and the options of its skeleton. */
 
 import type { App } from "../app";
 import { duration, percent } from "../format";

@@ -1,4 +1,4 @@
-/** The page's controls: labelled and keyboard-ready. */
+/** The page's form controls: labelled and usable from the keyboard. */
 
 import type { ComponentChildren } from "preact";
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
@@ -8,17 +8,17 @@ interface ButtonProps {
   label: string;
   onClick: () => void;
   icon?: IconName | undefined;
-  /** Class names of controls.css. */
+  /** Class names from controls.css. */
   kind?: string;
-  /** A tool tip, see tips.ts. */
+  /** Tool tip, see tips.ts. */
   tip?: string | undefined;
-  /** What screen readers say, where the label is not enough. */
+  /** Accessible name, where the label alone is ambiguous. */
   name?: string;
   disabled?: boolean;
   pressed?: boolean;
 }
 
-/** A button with text and perhaps an icon. */
+/** Button with text and an optional icon. */
 export function Button({ label, onClick, icon, kind = "", tip, name, disabled, pressed }: ButtonProps) {
   return (
     <button
@@ -41,7 +41,7 @@ interface IconButtonProps extends Omit<ButtonProps, "icon" | "name"> {
   shortcut?: string;
 }
 
-/** A button that shows only an icon; `label` is its name, and its tool tip with the shortcut. */
+/** Button with only an icon. `label` is its accessible name and, with the shortcut, its tool tip. */
 export function IconButton({
   icon,
   label,
@@ -69,7 +69,7 @@ export function IconButton({
 
 let next = 0;
 
-/** An id for label and input that nothing else on the page has. */
+/** An id that is unique on the page, to connect a label with its input. */
 export function useUid(): string {
   return useState(() => `control-${++next}`)[0];
 }
@@ -89,7 +89,7 @@ interface SegmentsProps<T extends string> {
   hideLabel?: boolean;
 }
 
-/** One of a few choices, side by side: radio buttons that look like segments. */
+/** A choice of one of a few: radio buttons drawn as segments. */
 export function Segments<T extends string>({ label, choices, value, onChange, hideLabel }: SegmentsProps<T>) {
   const name = useUid();
   return (
@@ -114,7 +114,7 @@ export function Segments<T extends string>({ label, choices, value, onChange, hi
   );
 }
 
-/** A switch with a name and a sentence. */
+/** A switch with a label and an explanation. */
 export function Toggle(props: {
   label: string;
   sentence?: string;
@@ -149,14 +149,14 @@ interface SliderProps {
   step: number;
   value: number;
   onInput: (value: number) => void;
-  /** Called when the finger is lifted, after the last `onInput`. */
+  /** Called on release, after the last `onInput`. */
   onCommit?: (value: number) => void;
-  /** How the value is shown and spoken. */
+  /** Text of the value, for the eye and for screen readers. */
   format?: (value: number) => string;
   name?: string;
 }
 
-/** A slider with its value beside its name. */
+/** A slider with its value next to the label. */
 export function Slider({
   label,
   min,
@@ -201,11 +201,11 @@ interface NumberInputProps {
   step?: string;
 }
 
-/** A number that is typed; `onCommit` hears it on Enter or when the field is left, and only when it is valid. */
+/** Number field. Calls `onCommit` on Enter or when the field loses focus, and only with a valid number. */
 export function NumberInput({ id, name, value, onCommit, min, max, step = "any" }: NumberInputProps) {
   const input = useRef<HTMLInputElement>(null);
   useLayoutEffect(() => {
-    // Nothing is changed under the hand that types.
+    // Do not overwrite the field while the user types in it.
     const { current } = input;
     if (current && document.activeElement !== current) current.value = String(value);
   }, [value]);
@@ -239,7 +239,6 @@ export function NumberField({ label, ...props }: Omit<NumberInputProps, "id" | "
   );
 }
 
-/** Name and value pairs. */
 export function Facts({ rows }: { rows: readonly (readonly [name: string, value: string])[] }) {
   return (
     <dl class="facts">
@@ -248,7 +247,6 @@ export function Facts({ rows }: { rows: readonly (readonly [name: string, value:
   );
 }
 
-/** A group with a heading. */
 export function Section({ title, children }: { title: string; children: ComponentChildren }) {
   return (
     <section class="section">
@@ -258,7 +256,7 @@ export function Section({ title, children }: { title: string; children: Componen
   );
 }
 
-/** A panel's heading and the sentence under it. */
+/** Heading of a panel, with a sentence below it. */
 export function Head({ title, sentence }: { title: string; sentence: string }) {
   return (
     <div class="head">
@@ -268,7 +266,7 @@ export function Head({ title, sentence }: { title: string; sentence: string }) {
   );
 }
 
-/** A word on how something stands. */
+/** Short status label. */
 export function Badge({ kind, icon, text }: { kind: "good" | "warn" | "bad"; icon: IconName; text: string }) {
   return (
     <span class={`badge ${kind}`}>
@@ -278,7 +276,7 @@ export function Badge({ kind, icon, text }: { kind: "good" | "warn" | "bad"; ico
   );
 }
 
-/** Something that can be unfolded. */
+/** Collapsible section. */
 export function Fold({ title, children }: { title: string; children: ComponentChildren }) {
   return (
     <details class="fold">

@@ -1,4 +1,4 @@
-/** What the page shows of a crash: its report, and the choice when it would come again. */
+/** Dialogs after a crash: the report, and the choice after a second crash. */
 
 import { render } from "preact";
 import type { Crash } from "../crash";
@@ -6,7 +6,7 @@ import { T } from "../words";
 import { Button } from "./controls";
 import { Dialog } from "./dialog";
 
-/** The report's text, to be read and copied. */
+/** Shows the text of the report for reading and copying. */
 export function showReport(crash: Crash): void {
   const place = document.createElement("div");
   document.body.append(place);
@@ -24,7 +24,7 @@ export function showReport(crash: Crash): void {
   );
 }
 
-/** It stopped a second time: nothing is opened until the user has chosen. Behind it there is no page that could be used. */
+/** Asks after a second crash, before anything is opened. The dialog cannot be closed: the page behind it is not usable. */
 export function askAfterCrash(crash: Crash, startFresh: () => void): void {
   const place = document.createElement("div");
   document.body.append(place);
@@ -46,7 +46,7 @@ export function askAfterCrash(crash: Crash, startFresh: () => void): void {
 
 function Report({ crash: { report } }: { crash: Crash }) {
   return (
-    // biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached by keys
+    // biome-ignore lint/a11y/noNoninteractiveTabindex: scrollable regions must be reachable by keyboard
     <section class="report" tabIndex={0} aria-label={T.crash.report}>
       <pre>{report}</pre>
     </section>

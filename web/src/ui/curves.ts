@@ -1,4 +1,4 @@
-/** Which binds' changes the plot compares: the bind of the moment, and the last ones by other solvers. */
+/** Curves of the convergence plot: the current bind and the latest bind of each other solver. */
 
 import type { BindReport } from "../contract";
 import type { AppState } from "../state";
@@ -6,7 +6,7 @@ import { T } from "../words";
 import { type Curve, historyPoints, KINDS } from "./plot";
 import { solverName } from "./report";
 
-/** Curves, the one of the moment first; of each solver the latest beside it. */
+/** The current curve comes first, then the latest of each other solver. */
 export function curvesOf({ bindRun, report, earlier }: CurveState): Curve[] {
   const reports = report ? [report, ...earlier] : [];
   const now = bindRun

@@ -1,4 +1,4 @@
-/** Dialogs: a click beside one closes it, and so does Escape. */
+/** Modal dialog. Escape and clicks on the backdrop close it. */
 
 import type { ComponentChildren } from "preact";
 import { useLayoutEffect, useRef } from "preact/hooks";
@@ -8,7 +8,7 @@ import { IconButton, useUid } from "./controls";
 interface DialogProps {
   title: string;
   isOpen: boolean;
-  /** Called when it was closed; without it the dialog cannot be left. */
+  /** Called after closing. Without it the dialog cannot be closed. */
   onClose?: () => void;
   kind?: string;
   onKeyDown?: (event: KeyboardEvent) => void;

@@ -1,4 +1,4 @@
-/** Step 5: files to take along, each with a sentence on what it is good for. */
+/** Step 5: files to download. */
 
 import { useEffect, useState } from "preact/hooks";
 import type { ExportKind, ShapeFormatName } from "../actions/exports";
@@ -23,7 +23,7 @@ const ITEMS: readonly (readonly [ExportKind, IconName])[] = [
   ["project", "save"],
 ];
 
-/** Why a file cannot be had now, or null. */
+/** Why a file cannot be exported yet, or null. */
 function missing(kind: ExportKind, state: AppState): string | null {
   const { bindFirst, cageFirst, poseFirst, modelFirst } = T.exports;
   if (kind === "picture") return state.model ? null : modelFirst;
@@ -78,7 +78,7 @@ function Item({ app, kind, icon }: { app: App; kind: ExportKind; icon: IconName 
   );
 }
 
-/** Of which of several models the files are. */
+/** Chooses one model or all of them. */
 function Which({ app }: { app: App }) {
   const { model, exportOnly } = app.store.get();
   const members = model?.members ?? [];
@@ -100,7 +100,7 @@ function Which({ app }: { app: App }) {
   );
 }
 
-/** Skeleton, morph targets and clips stay, unless the shape alone is wanted. */
+/** Options for the skeleton, morph targets and clips of the exported GLB. */
 function RigExport({ app }: { app: App }) {
   const { model, rigOptions, clip } = app.store.get();
   if (rigOf(app.store.get()).dynamic)

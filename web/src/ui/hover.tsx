@@ -1,4 +1,4 @@
-/** What will happen to files that hover over the window. */
+/** Overlay while files are dragged over the window: says what dropping them does. */
 
 import type { App } from "../app";
 import { hoverSentence } from "../drop";

@@ -1,4 +1,4 @@
-/** The page's icons: Lucide's, 24 x 24, strokes only; and the product's mark. */
+/** The page's icons (Lucide, 24 x 24, strokes only) and the product's mark. */
 
 import {
   Anchor,
@@ -125,7 +125,7 @@ const ICONS = {
 
 export type IconName = keyof typeof ICONS;
 
-/** An icon; it says nothing to screen readers, the button around it does. */
+/** An icon, hidden from screen readers: the button around it has the name. */
 export function Icon({ name }: { name: IconName }) {
   return (
     <svg viewBox="0 0 24 24" class="icon" aria-hidden="true">
@@ -134,7 +134,6 @@ export function Icon({ name }: { name: IconName }) {
   );
 }
 
-/** The product's mark: a cage. */
 export function Mark() {
   const spots = [
     [16, 3.2],

@@ -1,4 +1,4 @@
-/** A cage's smooth surface, and controls inside it. */
+/** Options of the smooth cage and of the controls inside it. */
 
 import { useState } from "preact/hooks";
 import type { App } from "../app";
@@ -8,7 +8,7 @@ import { T } from "../words";
 import { Button, Section, Segments, Slider, Toggle } from "./controls";
 import type { IconName } from "./icons";
 
-/** Steps when it is switched on: more of them change little. */
+/** Default number of subdivision steps. More steps change the surface little. */
 const USUAL_STEPS = 2;
 const STEPS = ["1", "2", "3"] as const;
 const KINDS: readonly (readonly [InnerKind, IconName])[] = [
@@ -16,7 +16,7 @@ const KINDS: readonly (readonly [InnerKind, IconName])[] = [
   ["line", "bone"],
   ["face", "face"],
 ];
-/** Radii of the slider, over the cage's longest side. */
+/** Range of the radius slider, relative to the longest side of the cage. */
 const THINNEST = 0.005;
 const THICKEST = 0.12;
 
@@ -90,7 +90,7 @@ export function Inside({ app, cage }: { app: App; cage: CageState }) {
 }
 
 function Radius({ app, cage }: { app: App; cage: CageState }) {
-  /** Under the hand; bound again when it lets go. */
+  /** Value while the slider is dragged. It is committed, and the model bound again, on release. */
   const [held, setHeld] = useState<number | null>(null);
   const { min, max } = cage.info.bounds;
   const longest = Math.max(max[0] - min[0], max[1] - min[1], max[2] - min[2]);

@@ -1,4 +1,4 @@
-/** What the colours on the view mean. */
+/** Legend of the colours in the view. */
 
 import type { App } from "../app";
 import type { SceneOptions } from "../contract";

@@ -1,4 +1,4 @@
-/** What the page shows when the graphics device is lost, and the way back. */
+/** Recovers from a lost graphics device, and shows the overlay during recovery. */
 
 import { signal } from "@preact/signals";
 import type { Session } from "../contract";
@@ -7,7 +7,7 @@ import { T } from "../words";
 import { Button } from "./controls";
 import { Icon } from "./icons";
 
-/** Twice within this time, ms, and the page asks before it tries again: the device may be broken for good. */
+/** After two losses within this time, ms, the page asks before it tries again: the device may be broken. */
 const AGAIN_MS = 10_000;
 
 interface Message {
@@ -16,7 +16,7 @@ interface Message {
   readonly retry: boolean;
 }
 
-/** Watches for it; the component shows it. */
+/** Returns the overlay, and `watch`, which starts recovery when the session reports a loss. */
 export function createLost(freshCanvas: () => HTMLCanvasElement, recovered: () => void) {
   const message = signal<Message | null>(null);
   let recover = async () => {};

@@ -1,4 +1,4 @@
-/** Step 1: what is open, how to open something else, and samples. */
+/** Step 1: the open model, opening of files, and samples. */
 
 import { useState } from "preact/hooks";
 import type { App } from "../app";
@@ -10,7 +10,7 @@ import { Badge, Button, Facts, Head, Section, Segments } from "./controls";
 import { Icon, type IconName } from "./icons";
 import { Models } from "./models";
 
-/** Until a sample's picture is there. */
+/** Placeholders until a sample's picture is loaded. */
 const ICONS: Record<string, IconName> = { rat: "spark", humanoid: "pose", clamp: "bind" };
 
 export function ModelPanel({ app }: { app: App }) {

@@ -1,4 +1,4 @@
-/** The models that share the cage, and what of each follows it. */
+/** The models that share the cage, and how their parts follow it. */
 
 import type { How } from "../actions/models";
 import type { App } from "../app";
@@ -8,7 +8,7 @@ import { T } from "../words";
 import { Button, Fold, IconButton, Section, Segments, Slider } from "./controls";
 import { Icon, type IconName } from "./icons";
 
-/** Sizes of the brush, over the model's size. */
+/** Range of the brush radius, relative to the model's size. */
 const THINNEST = 0.01;
 const THICKEST = 0.3;
 const ALL = "all";
@@ -42,7 +42,7 @@ export function Models({ app, model }: { app: App; model: ModelInfo }) {
   );
 }
 
-/** What the signs of the buttons mean: fingers see no tool tips. */
+/** Explains the icons: touch screens show no tool tips. */
 function Signs() {
   return (
     <p class="hint signs">
@@ -84,7 +84,7 @@ function Row({ app, member }: { app: App; member: MemberInfo }) {
   );
 }
 
-/** How many vertices it has, and what is not as usual. */
+/** Vertex count and options that differ from the default. */
 function about({ vertices, options, painted }: MemberInfo): string {
   const { shown, rigid, stays } = options;
   const isWhole = rigid.includes(ALL) || stays.includes(ALL);
@@ -100,7 +100,7 @@ function about({ vertices, options, painted }: MemberInfo): string {
     .join(" · ");
 }
 
-/** Two buttons: keeps its shape, stays as it is. One takes the other back. */
+/** Two toggle buttons that exclude each other: "keeps its shape" and "stays as it is". */
 function Ways(props: { app: App; member: MemberInfo; part: string; label: string; disabled?: boolean }) {
   const { app, member, part, label, disabled } = props;
   return WAYS.map(([how, icon]) => (
@@ -117,7 +117,7 @@ function Ways(props: { app: App; member: MemberInfo; part: string; label: string
   ));
 }
 
-/** Its parts by name, and the brush. */
+/** The member's parts by name, and the brush. */
 function Parts({ app, member, isAlone = false }: { app: App; member: MemberInfo; isAlone?: boolean }) {
   const { rigid, stays } = member.options;
   const isWhole = rigid.includes(ALL) || stays.includes(ALL);
@@ -151,7 +151,7 @@ function Parts({ app, member, isAlone = false }: { app: App; member: MemberInfo;
   );
 }
 
-/** "material:Cloth" */
+/** Splits "material:Cloth" into kind and name. */
 function split(part: string): [kind: string, name: string] {
   const [kind = "", ...rest] = part.split(":");
   return [kind, rest.join(":")];

@@ -1,4 +1,4 @@
-/** The page's parts in their places. */
+/** Mounts all components of the page. */
 
 import { type FunctionComponent, render } from "preact";
 import type { App } from "../app";
@@ -22,7 +22,7 @@ interface Parts {
 
 export function mount({ app, Toasts, Lost, byId }: Parts): void {
   const stage = byId("stage");
-  /** A place beside what is there, which takes no place itself. */
+  /** Appends an element with `display: contents`, so that it does not affect the layout. */
   const within = (parent: HTMLElement) => {
     const place = document.createElement("div");
     place.className = "contents";
@@ -52,7 +52,7 @@ export function mount({ app, Toasts, Lost, byId }: Parts): void {
   attachTips();
 }
 
-/** The card of the tour, where it is on. */
+/** The tour's card, while the tour is running. */
 function Tour({ app }: { app: App }) {
   const { tour } = app.store.get();
   const loaded = app.tour.loaded();

@@ -1,4 +1,4 @@
-/** The panel: one step at a time, its next action at the foot; on narrow screens a sheet that is pulled up. */
+/** The panel of the current step, with the next action at its foot. On narrow screens it is a bottom sheet. */
 
 import { useLayoutEffect, useRef } from "preact/hooks";
 import type { App } from "../app";
@@ -16,12 +16,12 @@ import { PosePanel } from "./pose";
 interface Action {
   label: string;
   icon?: IconName;
-  /** Not what the user came for: no accent. */
+  /** Without accent colour, for secondary actions such as Cancel. */
   plain?: true;
   run: () => void;
 }
 
-/** The sensible next action, and perhaps another one before it. */
+/** The next action of a step, and a second one where there is an alternative. */
 export function nextActions(state: AppState, app: App): { primary: Action; second?: Action } {
   const bind = (label: string): Action => ({ label, icon: "bind", run: () => app.run("bind") });
   const pose: Action = { label: T.panel.pose, icon: "pose", run: () => app.go("pose") };
@@ -60,7 +60,7 @@ export function nextActions(state: AppState, app: App): { primary: Action; secon
 
 const cancel = (run: () => void): Action => ({ label: T.cancel, icon: "stop", plain: true, run });
 
-/** What the cage needs before it can be bound; undefined when nothing. */
+/** What the cage still needs before it can be bound; undefined when it is ready. */
 function cageAction(state: AppState, app: App): Action | undefined {
   if (state.cageProgress !== null) return cancel(app.cage.cancel);
   const make = (label: string): Action => ({ label, icon: "cage", run: () => void app.cage.make() });
@@ -115,7 +115,7 @@ function Foot({ app }: { app: App }) {
   );
 }
 
-/** Heights the sheet rests at, shares of the window. */
+/** Heights at which the sheet snaps, as fractions of the window. */
 const RESTS = [0.12, 0.42, 0.78] as const;
 
 function attachSheet(panel: HTMLElement, handle: HTMLElement): void {

@@ -1,4 +1,4 @@
-/** The change per iteration, on a logarithmic scale: the paper's figure 7, drawn live. */
+/** Live plot of the change per iteration on a logarithmic scale, like figure 7 of the paper. */
 
 import { count } from "../format";
 import { T } from "../words";
@@ -6,14 +6,17 @@ import { T } from "../words";
 export interface Curve {
   name: string;
   points: readonly (readonly [iteration: number, delta: number])[];
-  /** Class for the colour. */
+  /** Class that sets the colour. */
   kind: (typeof KINDS)[number];
 }
 
-/** The bind of the moment, and two to compare it with. */
+/** The current bind, and two to compare it with. */
 export const KINDS = ["now", "before", "earlier"] as const;
 
-/** From so many times as many iterations on, curves are drawn over their logarithm: the short one would be a stroke. */
+/**
+ * If one curve has this many times the iterations of another, the horizontal axis is logarithmic. On a linear axis the short
+ * curve would be a vertical line.
+ */
 const FAR_APART = 20;
 
 const WIDTH = 328;
@@ -22,18 +25,18 @@ const LEFT = 38;
 const RIGHT = 8;
 const TOP = 8;
 const BOTTOM = 26;
-/** Height of a line of text. */
+/** Height of a text line. */
 const LABEL = 11;
 
 export interface Scale {
   lowest: number;
   highest: number;
   last: number;
-  /** Whether iterations are on a logarithmic scale, too. */
+  /** Whether the horizontal axis is logarithmic. */
   logarithmic: boolean;
 }
 
-/** Powers of ten and iterations that hold all points and the threshold. */
+/** Range of both axes: powers of ten that enclose all points and the threshold, and the last iteration. */
 export function scaleOf(curves: readonly Curve[], tau: number): Scale {
   const deltas = curves
     .flatMap((curve) => curve.points.map(([, delta]) => delta))
@@ -68,7 +71,8 @@ export function Plot({ curves, tau }: { curves: readonly Curve[]; tau: number })
   const now = curves.find((curve) => curve.kind === "now")?.points.at(-1);
   const bottom = HEIGHT - 8;
   const middle = (LEFT + WIDTH - RIGHT) / 2;
-  // Below its line where there is room, because curves come from above; on the side where they are still high.
+  // Curves fall from the left, so the label is placed below its line where there is room, and on the right if the axis is
+  // logarithmic.
   const tauBelow = y(tau) <= HEIGHT - BOTTOM - LABEL;
   const tauAt = logarithmic ? WIDTH - RIGHT - 4 : LEFT + 4;
   return (
@@ -136,7 +140,7 @@ function Label({
   );
 }
 
-/** A report's history as points; `interval` iterations lie between two entries. */
+/** Points of a report's history; consecutive entries are `interval` iterations apart. */
 export function historyPoints(history: readonly number[], interval: number): Curve["points"] {
   return history
     .map((delta, index) => [(index + 1) * Math.max(1, interval), delta] as const)

@@ -1,4 +1,4 @@
-/** Step 4: exact numbers for what is selected, help for moving, and poses. */
+/** Step 4: position of the selection, move options, and saved poses. */
 
 import type { App } from "../app";
 import type { Pivot, Pose } from "../contract";
@@ -53,7 +53,7 @@ function PullOptions({ app }: { app: App }) {
   );
 }
 
-/** Where what is selected is, in numbers that can be typed. */
+/** Position of the selection in number fields. */
 function Selection({ app }: { app: App }) {
   const { cage, selected, editingRest, pivot } = app.store.get();
   const { count, last, center } = selected;

@@ -1,4 +1,4 @@
-/** The result card: what a bind did and how exact it is, in words first. */
+/** The result card of a bind: a verdict in words, then the numbers. */
 
 import type { BindReport, MeanMax } from "../contract";
 import { bytes, count, duration, percent, scientific } from "../format";
@@ -6,7 +6,7 @@ import { sentence } from "../strings";
 import { T } from "../words";
 import { Badge, Facts, Fold } from "./controls";
 
-/** A largest rest error below this share of the cage's diagonal cannot be seen: a tenth of a pixel of 4K. */
+/** A largest rest error below this fraction of the cage's diagonal is invisible: a tenth of a pixel on a 4K screen. */
 const INVISIBLE = 2.5e-5;
 
 /** The verdict as one sentence. */
@@ -79,7 +79,7 @@ export function ReportCard({ report }: { report: BindReport }) {
   );
 }
 
-/** What the solver left of something. */
+/** Mean and largest solver error. */
 function rawFacts(name: string, error: MeanMax): [string, string][] {
   return [
     [T.report.mean(name), scientific(error.mean)],
@@ -87,25 +87,24 @@ function rawFacts(name: string, error: MeanMax): [string, string][] {
   ];
 }
 
-/** Solver and preconditioner, in words. */
 export function solverName(by: Pick<BindReport, "solver" | "preconditioner">): string {
   const isPreconditioned = by.solver === "cg" && by.preconditioner === "v_cycle";
   return `${T.report.solvers[by.solver]}${isPreconditioned ? T.report.vCycles : ""}`;
 }
 
-/** Method, solver, grid and place of a bind, in short. */
+/** Short name of a bind: method, solver, grid and backend. */
 function wayOf(report: BindReport): string {
   const { method, grid, backend } = report;
   return `${T.report.short[method]}, ${solverName(report)}, ${grid}, ${backend.toUpperCase()}`;
 }
 
-/** Share of the weights that is stored. */
+/** Fraction of the weight matrix that is stored. */
 export function density(report: BindReport): number {
   const all = report.vertices * (report.cage_vertices + report.inner_controls);
   return all === 0 ? 0 : report.weights.nonzeros / all;
 }
 
-/** Binds of this cage side by side. */
+/** Table of the binds of this cage. */
 export function CompareTable({ reports }: { reports: readonly BindReport[] }) {
   return (
     <table class="compare">

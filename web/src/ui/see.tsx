@@ -1,4 +1,4 @@
-/** The See panel: colours, wireframes, the grid, and coordinates side by side. */
+/** The See panel: colours, wireframes, grid slice, and coordinates side by side. */
 
 import { COORDINATES, isComparison } from "../actions/view";
 import type { App } from "../app";
@@ -100,7 +100,7 @@ function Colours({ app }: { app: App }) {
   );
 }
 
-/** Which coordinates stand side by side: any two, or all three. */
+/** Chooses the coordinates to compare: none, any two, or all three. */
 export function Comparison({ app }: { app: App }) {
   const { compare } = app.store.get().scene;
   const without = (kind: Coordinates) => compare.filter((other) => other !== kind);
@@ -115,7 +115,7 @@ export function Comparison({ app }: { app: App }) {
             <input
               type="checkbox"
               checked={compare.includes(kind)}
-              // What would be left alone are harmonic ones, or nothing that could be pulled.
+              // Do not leave a single kind other than harmonic: the view would have nothing to pull.
               disabled={
                 compare.includes(kind) && String(without(kind)) !== "harmonic" && !isComparison(without(kind))
               }

@@ -1,4 +1,4 @@
-/** The sheet of shortcuts, from the same table as the keyboard handler. */
+/** The shortcut sheet, generated from the same table as the keyboard handler. */
 
 import type { App } from "../app";
 import { caps, GROUPS, SHORTCUTS, type Shortcut } from "../input/shortcuts";
@@ -15,7 +15,7 @@ export function Sheet({ app, isOpen, onClose }: { app: App; isOpen: boolean; onC
   };
   return (
     <Dialog title={T.sheet.title} isOpen={isOpen} onClose={onClose} onKeyDown={byItsKey}>
-      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached by keys */}
+      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: scrollable regions must be reachable by keyboard */}
       <section class="sheet-body" tabIndex={0} aria-label={T.sheet.all}>
         <section class="keys">
           <Button

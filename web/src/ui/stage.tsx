@@ -1,4 +1,4 @@
-/** What lies on the view: tools, legend, status line. */
+/** Overlays of the view: tools, legend, status line. */
 
 import { useLayoutEffect, useState } from "preact/hooks";
 import { isComparison } from "../actions/view";
@@ -13,7 +13,7 @@ import { Icon, type IconName } from "./icons";
 import { LegendOfColours } from "./legend";
 import { hintOf, statusOf, underWay } from "./status";
 
-/** Everything that lies on the view; `stage` says by an attribute whether the cage at rest is shaped. */
+/** All overlays of the view. Sets `data-rest` and `data-painting` on `stage` for the style sheet. */
 export function Overlays({ app, stage }: { app: App; stage: HTMLElement }) {
   const { cage, scene, editingRest, painting } = app.store.get();
   useLayoutEffect(() => {
@@ -62,12 +62,12 @@ function Mode({ app }: { app: App }) {
   );
 }
 
-/** Whether the cage's own faces are the surface, and nothing is inside. */
+/** Whether the bound surface is the cage itself: not smoothed, and no controls inside. */
 function isPlain(cage: CageState | null): boolean {
   return !cage || (cage.controls.smooth === 0 && cage.controls.inner === 0);
 }
 
-/** Ends what clicks put inside, or painting: fingers have no Enter and no Escape. */
+/** Button that ends placing or painting, for touch screens without Enter and Escape. */
 function Placing({ app }: { app: App }) {
   const { placing, painting } = app.store.get();
   const label = placing === "line" || painting ? T.view.done : T.view.cancel;
@@ -81,7 +81,7 @@ function Placing({ app }: { app: App }) {
   );
 }
 
-/** The live check while the cage is shaped. */
+/** Live result of the cage check while the cage is reshaped. */
 function Encloses({ app }: { app: App }) {
   const { cage, check, strays } = app.store.get();
   const fault = check?.problems.find((problem) => problem.severity !== "note");
@@ -183,7 +183,7 @@ function Looks({ app }: { app: App }) {
   );
 }
 
-/** Whether fingers do what a mouse does elsewhere; it can change while the page is open. */
+/** Whether the main pointer is a finger. It can change while the page is open. */
 function useTouch(): boolean {
   const [query] = useState(() => matchMedia("(pointer: coarse)"));
   const [isTouch, setTouch] = useState(query.matches);
@@ -209,7 +209,7 @@ function BottomLine({ app }: { app: App }) {
         aria-live="polite"
         data-settled={underWay(state) === null ? "" : undefined}
       >
-        {/* Another element, so that it stays for a while each time it says something else. */}
+        {/* Keyed by its text: each new status is a new element and restarts the fade-out. */}
         {text !== "" && <span key={text}>{text}</span>}
       </p>
       <p class="hint-line" hidden={isQuiet}>
@@ -219,7 +219,7 @@ function BottomLine({ app }: { app: App }) {
   );
 }
 
-/** While the page waits for a file: how far it is, and the way out. */
+/** Progress while a file is opened, with Cancel or, before a long freeze, "Open anyway". */
 function Busy({ app }: { app: App }) {
   const { busy, busyStep, cancelBusy, goOn } = app.store.get();
   return (

@@ -1,15 +1,15 @@
-/** The status line of the view, in words. */
+/** Sentences of the status line. */
 
 import { cageBroken } from "../derived";
 import type { AppState } from "../state";
 import { T } from "../words";
 
-/** The status line: what is going on, said once. How far it is the panel and the title say. */
+/** The status line. Progress in percent is shown by the panel and the window title instead. */
 export function statusOf(state: AppState): string {
   return underWay(state) ?? settled(state);
 }
 
-/** What is going on, or must not be missed; null if nothing. */
+/** The operation in progress, or a condition that must not be missed; null otherwise. */
 export function underWay(state: AppState): string | null {
   if (state.busy) return `${state.busy}…`;
   if (state.gesture) return state.gesture;
@@ -34,7 +34,7 @@ function settled(state: AppState): string {
   return state.model ? T.status.notBound : "";
 }
 
-/** What the status line suggests when nothing else is going on. */
+/** Hint next to the status. */
 export function hintOf(state: AppState, isTouch: boolean): string {
   const { cage, bound, bindRun, editingRest, clip, placing, painting } = state;
   if (placing) return T.hints.placing;

@@ -1,10 +1,10 @@
-/** Tool tips of whatever has `data-tip`: after a rest of the pointer, at once for the keyboard, and for a finger that stays. */
+/** Tool tips of elements with `data-tip`: after hovering, on keyboard focus, and on a long press. */
 
-/** How long a pointer rests before, ms. */
+/** Hover time before a tip appears, ms. */
 const REST_MS = 500;
-/** How long a tip stays after the finger has left, ms. */
+/** Time a tip stays after the finger is lifted, ms. */
 const READ_MS = 2500;
-/** Between a tip and what it is about, and to the window's edge, CSS pixels. */
+/** Distance of a tip to its element and to the window's edge, CSS pixels. */
 const GAP = 6;
 
 export function attachTips(): void {

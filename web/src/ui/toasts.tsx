@@ -1,4 +1,7 @@
-/** Messages: short ones go away, problems stay until they are closed or fixed. Both are read aloud. */
+/**
+ * Messages. Short ones disappear after a few seconds; problems stay until they are closed or fixed. Screen readers announce
+ * both.
+ */
 
 import { signal } from "@preact/signals";
 import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
@@ -7,10 +10,10 @@ import { T } from "../words";
 import { Button, IconButton } from "./controls";
 import { Icon } from "./icons";
 
-/** Time to read a short message, ms, and more where it has a button. */
+/** Time a message is shown, ms; longer if it has a button. */
 const SHOWN_MS = 5000;
 const SHOWN_WITH_BUTTON_MS = 12_000;
-/** More at a time would hide the model. */
+/** Limit of visible messages, so that they do not hide the model. */
 const MOST = 3;
 
 interface Toast {
@@ -26,7 +29,7 @@ export function createToasts(): { Toasts: () => preact.JSX.Element; tell: Tell }
   const said = signal<readonly Toast[]>([]);
   const problems = signal<readonly Toast[]>([]);
 
-  /** What is said again takes the place of what was said. */
+  /** A repeated message replaces the earlier one. */
   const add = (list: typeof said, toast: Omit<Toast, "id">) => {
     const others = list.value.filter(({ title, text }) => title !== toast.title || text !== toast.text);
     next += 1;
@@ -68,7 +71,7 @@ function Stack({ said, problems, closeSaid, closeProblem }: StackProps) {
   useLayoutEffect(() => {
     const { current } = element;
     const isOpen = current?.matches(":popover-open");
-    // Shown anew, so that it lies above a dialog that was opened since.
+    // Reopen the popover, so that it is above a dialog opened in the meantime.
     if (isOpen && (isEmpty || document.querySelector("dialog[open]"))) current?.hidePopover();
     if (!isEmpty && !current?.matches(":popover-open")) current?.showPopover();
   }, [said, problems, isEmpty]);
@@ -113,7 +116,7 @@ function Said({ toast: { text, fixes }, close }: { toast: Toast; close: () => vo
     clearTimeout(timer.current);
     timer.current = setTimeout(close, ms);
   };
-  // Who reads or is about to click must not lose it.
+  // Do not close a message that is hovered or focused.
   const stay = () => clearTimeout(timer.current);
   useEffect(() => {
     leaveIn(fixes.length > 0 ? SHOWN_WITH_BUTTON_MS : SHOWN_MS);

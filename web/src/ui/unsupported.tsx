@@ -1,4 +1,4 @@
-/** Browsers without WebGPU: what is missing, the exact steps for the browser at hand, and the line that says so once. */
+/** Browsers without WebGPU: the reason, the steps that switch it on, and a notice that is shown once. */
 
 import { useState } from "preact/hooks";
 import type { App } from "../app";
@@ -12,7 +12,7 @@ import { Icon, Mark } from "./icons";
 export type Browser = "chrome" | "edge" | "firefox" | "safari" | "other";
 export type System = "windows" | "mac" | "linux" | "android" | "ios" | "other";
 
-/** Which browser and system a user agent names; only to choose which steps are open first. */
+/** Browser and system named by a user agent. Only used to choose which steps are shown first. */
 export function recognise(agent: string): { browser: Browser; system: System } {
   const systems: [System, RegExp][] = [
     ["android", /android/i],
@@ -35,7 +35,7 @@ export function recognise(agent: string): { browser: Browser; system: System } {
 
 type Way = keyof typeof T.without.ways;
 
-/** The steps for a browser; undefined where none are known. */
+/** The steps for a browser; undefined for an unknown one. */
 function wayOf({ browser, system }: ReturnType<typeof recognise>): Way | undefined {
   if (browser === "other") return undefined;
   if (system === "linux" && browser === "chrome") return "chromeLinux";
@@ -43,7 +43,7 @@ function wayOf({ browser, system }: ReturnType<typeof recognise>): Way | undefin
   return browser;
 }
 
-/** Why there is no WebGPU, as a sentence. */
+/** Why WebGPU is missing, as a sentence. */
 export function sayLack(lack: Lack, secure: boolean): string {
   return lack === "NoWebGPU" && !secure ? T.without.insecure : T.without.reasons[lack];
 }
@@ -58,7 +58,7 @@ function Steps({ way }: { way: Way }) {
   );
 }
 
-/** The steps for the browser at hand, those for others folded. */
+/** The steps for this browser, with those for others collapsed. */
 function Ways() {
   const mine = wayOf(recognise(navigator.userAgent));
   const all = Object.keys(T.without.ways) as Way[];
@@ -82,7 +82,7 @@ function Ways() {
   );
 }
 
-/** How to switch WebGPU on, where WebGL2 stands in. */
+/** How to switch WebGPU on, for pages that draw with WebGL2. */
 export function WaysDialog({ app }: { app: App }) {
   const { lack, waysOpen } = app.store.get();
   return (
@@ -92,7 +92,7 @@ export function WaysDialog({ app }: { app: App }) {
       onClose={() => app.store.set({ waysOpen: false })}
       kind="ways"
     >
-      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached by keys */}
+      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: scrollable regions must be reachable by keyboard */}
       <section class="sheet-body" tabIndex={0} aria-label={T.without.steps}>
         <p>{`${sayLack(lack ?? "NoWebGPU", isSecureContext)} ${T.without.different}`}</p>
         <Ways />
@@ -103,7 +103,7 @@ export function WaysDialog({ app }: { app: App }) {
 
 const NOTICE = "without-webgpu";
 
-/** What is different, in a line; nothing once that has been read and closed in this browser. */
+/** Notice about WebGL2. Not shown again after it was closed in this browser. */
 export function Notice({ app }: { app: App }) {
   const [isClosed, setClosed] = useState(() => hasSeen(NOTICE));
   const { lack } = app.store.get();
@@ -126,7 +126,7 @@ export function Notice({ app }: { app: App }) {
   );
 }
 
-/** The whole page where there is no WebGL2 to draw with either. */
+/** Replaces the page if WebGL2 is missing too. */
 export function Unsupported({ lack }: { lack: Lack }) {
   return (
     <main class="unsupported">

@@ -1,18 +1,18 @@
-/** The view: the canvas and what takes pointer and keys. */
+/** The view: its canvas and the element that receives pointer and keyboard events. */
 
 import { T } from "../words";
 
 export interface Stage {
-  /** What takes the pointer and the keys; holds the canvas. */
+  /** Receives pointer and keyboard events; contains the canvas. */
   readonly viewport: HTMLElement;
   readonly canvas: () => HTMLCanvasElement;
-  /** A canvas in place of one whose device was lost. */
+  /** Replaces the canvas after its device was lost. */
   freshCanvas(): HTMLCanvasElement;
-  /** The rubber band of a box selection; null hides it. */
+  /** Shows the rubber band of a box selection; null hides it. */
   band(box: { x: number; y: number; width: number; height: number } | null): void;
 }
 
-/** The view's element and canvas: made first, because the session opens on the canvas. */
+/** Creates the view. Called before the session opens, which needs the canvas. */
 export function createStage(element: HTMLElement): Stage {
   const make = () => {
     const made = document.createElement("canvas");

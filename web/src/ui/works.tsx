@@ -1,4 +1,4 @@
-/** The list of work that this browser keeps. */
+/** List of the work kept in this browser. */
 
 import { useEffect, useState } from "preact/hooks";
 import type { App } from "../app";
@@ -70,7 +70,7 @@ function Row({ work, open, remove }: { work: Work; open: () => void; remove: () 
   );
 }
 
-/** Deleted work does not come back: the second click counts. */
+/** Deleting cannot be undone, so it takes two clicks. */
 function Delete({ name, remove }: { name: string; remove: () => void }) {
   const [isSure, setSure] = useState(false);
   const label = isSure ? T.works.reallyDelete : T.works.delete;

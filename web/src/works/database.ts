@@ -1,4 +1,4 @@
-/** Kept work in IndexedDB: entries and their project files apart, so that a list of entries reads no file. Nothing leaves it. */
+/** Kept work in IndexedDB. Entries and project files are in separate stores, so that listing entries reads no file. */
 
 import { type Entry, isEntry, isWhole } from "./entry";
 
@@ -7,7 +7,7 @@ const VERSION = 2;
 const ENTRIES = "entries";
 const FILES = "projects";
 
-/** A name for new work; plain HTTP has no `randomUUID`. */
+/** A new id. Pages served over plain HTTP have no `randomUUID`. */
 export function newId(): string {
   return crypto.randomUUID?.() ?? Array.from(crypto.getRandomValues(new Uint32Array(4))).join("-");
 }
@@ -43,12 +43,12 @@ async function run<T>(
   }
 }
 
-/** Whether there is any work; a browser that forbids storage keeps none. */
+/** Whether any work is kept. False if the browser forbids storage. */
 export async function hasEntries(): Promise<boolean> {
   return (await run("readonly", (entries) => entries.count()).catch(() => 0)) > 0;
 }
 
-/** All entries; those that are none are deleted, `damaged` says how many. */
+/** All valid entries. Invalid ones are deleted; `damaged` counts them. */
 export async function readEntries(): Promise<{ entries: Entry[]; damaged: number }> {
   let names: IDBRequest<IDBValidKey[]> | undefined;
   const values: unknown[] = await run("readonly", (entries) => {
@@ -62,13 +62,13 @@ export async function readEntries(): Promise<{ entries: Entry[]; damaged: number
   return { entries: values.filter(isGood), damaged: damaged.length };
 }
 
-/** The project file of an entry; undefined when it is not whole. */
+/** The project file of an entry; undefined if it is incomplete. */
 export async function readFile(id: string): Promise<Uint8Array | undefined> {
   const file: unknown = await run("readonly", (_, files) => files.get(id));
   return isWhole(file) ? file : undefined;
 }
 
-/** Keeps an entry, in place of the one of that name; without a file the one that is there stays. */
+/** Writes an entry, replacing one with the same id. Without `file`, the stored file is kept. */
 export async function writeEntry(entry: Entry, file?: Uint8Array): Promise<void> {
   await run("readwrite", (entries, files) => {
     if (file) files.put(file, entry.id);

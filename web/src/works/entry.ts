@@ -1,30 +1,30 @@
-/** Work that this browser keeps: what is known of each piece, besides its file. */
+/** Entries of kept work: what is stored next to each project file. */
 
 import { LOCALE } from "../format";
 import { T } from "../words";
 
 export interface Entry {
   readonly id: string;
-  /** The model's. */
+  /** Name of the model. */
   readonly name: string;
-  /** When it was kept last, ms since 1970. */
+  /** Time of the last save, ms since 1970. */
   readonly when: number;
-  /** Of the project file, bytes. */
+  /** Size of the project file, bytes. */
   readonly size: number;
-  /** The page stopped twice with it: it is not opened by itself. */
+  /** The page crashed twice with this work open; it is not opened automatically. */
   readonly stopped?: true;
 }
 
-/** An entry, and which tab has it open: this one, another one, or none. */
+/** An entry, and whether this tab, another tab or no tab has it open. */
 export interface Work extends Entry {
   readonly where: "here" | "elsewhere" | "nowhere";
 }
 
 const DAY_MS = 86_400_000;
-/** How long work is kept after its last change. */
+/** Days from the last change until work is deleted. */
 export const KEPT_DAYS = 30;
 
-/** Text that a GLB begins with, and where its length is (glTF 2.0, section 4.4.1). */
+/** Magic number and position of the length field in a GLB header (glTF 2.0, section 4.4.1). */
 const GLB = 0x46546c67;
 const GLB_LENGTH_AT = 8;
 const GLB_HEAD = 12;
@@ -41,7 +41,7 @@ export function isEntry(value: unknown): value is Entry {
   );
 }
 
-/** Whether something is all of a project file, by its own word. */
+/** Whether this is a complete project file: a GLB whose header states the file's length. */
 export function isWhole(file: unknown): file is Uint8Array {
   if (!(file instanceof Uint8Array) || file.length < GLB_HEAD) return false;
   const view = new DataView(file.buffer, file.byteOffset, file.byteLength);
@@ -57,8 +57,8 @@ export function newestFirst<T extends Entry>(entries: readonly T[]): T[] {
 }
 
 /**
- * What a visit opens by itself: what this tab had open when it was loaded again (the page before may still hold it), or else
- * the only work that no other tab has open. Never what the page has stopped with.
+ * The work to open at the start: what this tab had open before a reload (whose lock the old page may still hold), or the only
+ * work that no other tab has open. Never work with which the page has crashed twice.
  */
 export function toOpen(works: readonly Work[], own: string | null): Work | undefined {
   const free = works.filter(({ where }) => where !== "elsewhere");
@@ -66,7 +66,7 @@ export function toOpen(works: readonly Work[], own: string | null): Work | undef
   return chosen?.stopped ? undefined : chosen;
 }
 
-/** How long ago, in words. */
+/** The elapsed time in words. */
 export function ago(ms: number): string {
   const minutes = Math.round(ms / 60_000);
   if (minutes < 1) return T.works.moment;

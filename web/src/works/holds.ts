@@ -1,14 +1,14 @@
-/** Which tab has which work open: Web Locks, which a tab that is closed or has crashed gives back by itself. */
+/** Web Locks that say which tab has which work open. The browser releases the lock when a tab closes or crashes. */
 
 const PREFIX = "cagework.work.";
 const OWN = "cagework.work";
-/** A tab that is loaded again may still hold, ms, what it had open. */
+/** Time to wait for a lock, ms: the page before a reload may still hold it. */
 const PATIENCE_MS = 1000;
 
-/** Holds work for this tab until the returned function is called; undefined when another tab has it. */
+/** Locks work for this tab until the returned function is called; undefined if another tab holds the lock. */
 export function hold(id: string): Promise<(() => void) | undefined> {
   const { locks } = navigator;
-  // Plain HTTP has no locks: nobody can tell.
+  // Pages served over plain HTTP have no locks: treat the work as free.
   if (!locks) return Promise.resolve(() => undefined);
   return new Promise((resolve) => {
     const held = () => new Promise<void>((release) => resolve(release));
@@ -17,24 +17,24 @@ export function hold(id: string): Promise<(() => void) | undefined> {
   });
 }
 
-/** What any tab holds. */
+/** Ids of the work that any tab has open. */
 export async function heldIds(): Promise<ReadonlySet<string>> {
   const held = (await navigator.locks?.query())?.held ?? [];
   const names = held.flatMap(({ name }) => (name?.startsWith(PREFIX) ? [name.slice(PREFIX.length)] : []));
   return new Set(names);
 }
 
-/** Remembers across reloads what this tab has open. */
+/** Remembers, across reloads, which work this tab has open. */
 export function rememberOwn(id: string | null): void {
   try {
     if (id === null) sessionStorage.removeItem(OWN);
     else sessionStorage.setItem(OWN, id);
   } catch {
-    // Storage is forbidden: nothing is kept either.
+    // Storage is forbidden, so no work is kept either.
   }
 }
 
-/** What this tab had open. */
+/** The id stored by `rememberOwn`. */
 export function ownId(): string | null {
   try {
     return sessionStorage.getItem(OWN);

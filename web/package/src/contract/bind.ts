@@ -1,4 +1,4 @@
-/** A bind, as it is followed. */
+/** Progress of a bind. */
 
 import type { BindReport, Stage } from "./generated";
 
@@ -7,13 +7,13 @@ export type BindEvent =
       readonly kind: "progress";
       readonly pass: "coarse" | "fine";
       readonly stage: Stage;
-      /** Of this pass, 0 to 1. */
+      /** Within this pass, 0 to 1. */
       readonly fraction: number;
       readonly etaMs: number | null;
       readonly iteration: number;
       readonly delta: number | null;
     }
-  /** Weights are in: the model can be dragged (coarse) or is final (fine). */
+  /** New weights are in use: the model can be dragged (coarse) or the result is final (fine). */
   | { readonly kind: "adopted"; readonly pass: "coarse" | "fine"; readonly report: BindReport }
-  /** The GPU could not do it and the CPU does it instead; `reason` is a sentence. */
+  /** The GPU failed and the CPU continues; `reason` is a sentence. */
   | { readonly kind: "fallback"; readonly reason: string };

@@ -1,16 +1,22 @@
-/** A cage as arrays, and what is wrong with it. */
+/** Cages as arrays, and the result of checking them. */
 
 import type { CageControls, Problem } from "./generated";
 
-/** Positions `[n_controls, 3]`: the cage's, then those of controls inside; for each face the number of its corners, then them. */
+/**
+ * `positions` is `[n_controls, 3]`: cage vertices, then controls inside. `corners` lists, for each face, the number of its
+ * corners and then their vertices.
+ */
 export interface CageArrays {
   readonly positions: Float32Array;
   readonly corners: Uint32Array;
-  /** Undefined for a cage that was just made: it takes those there are. */
+  /** Undefined for a new cage, which keeps the current controls. */
   readonly controls?: CageControls | undefined;
 }
 
-/** What is wrong with a cage, and where: in it, or in the model (`outside`). */
+/**
+ * Result of a cage check: the problems, and the vertices, edges, faces and points to mark. `outside` lists model vertices
+ * outside the cage.
+ */
 export interface Check {
   readonly problems: readonly Problem[];
   readonly vertices: Uint32Array;
@@ -20,11 +26,11 @@ export interface Check {
   readonly outside: Uint32Array;
 }
 
-/** A cage that a worker has looked at; null while it has not. */
+/** A cage and the result of its check; null if it has not been checked. */
 export interface CheckedCage extends CageArrays {
   readonly check: Check | null;
-  /** Separate parts of the model that it joins, if it was made so. */
+  /** For a generated cage: the number of separate parts of the model that it joins. */
   readonly bridged?: number;
-  /** Gaps of the model that it closes, if it was made so, and what would keep each open. */
+  /** For a generated cage: gaps of the model that it closes, and the settings that would keep them open. */
   readonly notices?: readonly string[];
 }

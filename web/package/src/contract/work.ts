@@ -1,37 +1,37 @@
-/** What is done in a worker: jobs, files, pulls. */
+/** Inputs and outputs of worker jobs. */
 
 import type { ErrorName, PullOptions } from "./generated";
 
-/** What is taken hold of, in the pose `start` of the cage and controls inside, `[n_controls, 3]`. */
+/** Start of a pull. `start` is the current pose of the cage and of the controls inside, `[n_controls, 3]`. */
 export interface GrabInput {
   readonly start: Float32Array;
-  /** Weights of the grabs, then of the pins. `[n_grips, n_controls]` */
+  /** Weights of the grabs, followed by those of the pins. `[n_grips, n_controls]` */
   readonly rows: Float64Array;
-  /** The nearest vertex of the model of each. */
+  /** The model vertex nearest to each grip. */
   readonly seeds: Uint32Array;
   readonly grabs: number;
   readonly options: PullOptions;
 }
 
 export interface Grabbed {
-  /** Where the grabs are. `[n_grabs, 3]` */
+  /** Positions of the grabs. `[n_grabs, 3]` */
   readonly place: Float32Array;
-  /** How much each vertex of the model stays. `[n_vertices]` */
+  /** How strongly each model vertex is kept in place. `[n_vertices]` */
   readonly stays: Float32Array;
-  /** Over the model's size. */
+  /** Radius of the pull, relative to the model's size. */
   readonly reach: number;
 }
 
 export interface PullFrame {
   /** `[n_controls, 3]` */
   readonly cage: Float32Array;
-  /** Another frame would be the same. */
+  /** True once further frames would not change the pose. */
   readonly settled: boolean;
-  /** How far grabs and pins are from where they should be, over the model's size. */
+  /** Distance of grabs and pins from their targets, relative to the model's size. */
   readonly error: number;
 }
 
-/** What is missing: the browser has no WebGPU, or has it and found no graphics card for it, or that did not start. */
+/** Why WebGPU cannot be used: the browser lacks it, it found no graphics card, or the device did not start. */
 export type Lack = "NoWebGPU" | Extract<ErrorName, "NoAdapter" | "NoDevice">;
 
 export interface Job<T> {
@@ -45,9 +45,9 @@ export interface NamedFile {
   readonly file: Blob;
 }
 
-/** What a worker does with a file. */
+/** Progress of reading a file. */
 export interface Reading {
   readonly stage: "bytes" | "decompress" | "geometry" | "textures" | "check";
-  /** Of the stage, 0 to 1; 0 where nobody can know. */
+  /** Within the stage, 0 to 1; 0 if unknown. */
   readonly fraction: number;
 }

@@ -1,14 +1,16 @@
-/** Pointers on the element: a handle of the cage is dragged, anything else turns the view, two fingers and the wheel zoom. */
+/**
+ * Pointer input of the element: a drag on a cage handle moves it, other drags turn the view, two fingers and the wheel zoom.
+ */
 
 import type { Engine } from "../contract";
 import { createTouch } from "../session/touch";
 
 const MOUSE_RADIUS = 10;
 const TOUCH_RADIUS = 24;
-/** A wheel notch is about 100 units; this makes it a seventh nearer. */
+/** Zoom per wheel unit. A wheel notch is about 100 units and zooms in by a seventh. */
 const WHEEL_RATE = 0.0015;
 
-/** `posed` hears of every change. What is returned ends what is under way: the element leaves the page. */
+/** Calls `posed` after every change of the pose. Returns a function that cancels the drag in progress. */
 export function attachPointer(
   element: HTMLElement,
   engineOf: () => Engine | undefined,
@@ -22,7 +24,7 @@ export function attachPointer(
   };
   const release = (keep: boolean) => {
     const isMoved = drag === "handle" && engineOf()?.endTransform(keep);
-    // What was put back was heard of as it moved.
+    // A cancelled drag restores the pose, which is a change too.
     if (isMoved || (drag === "handle" && !keep)) posed();
     drag = undefined;
   };
@@ -34,7 +36,7 @@ export function attachPointer(
     },
     interrupt: () => release(false),
   });
-  /** A handle under the pointer, selected and held. */
+  /** Selects the handle under the pointer and starts to drag it. Returns false if there is none. */
   const hold = (engine: Engine, event: PointerEvent): boolean => {
     const { x, y } = last;
     const radius = event.pointerType === "touch" ? TOUCH_RADIUS : MOUSE_RADIUS;

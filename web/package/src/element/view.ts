@@ -1,4 +1,4 @@
-/** What an element shows: an engine on a canvas, a model in it, and a cage around that. */
+/** The element's view: an engine on a canvas, with a model and its cage. */
 
 import type { BindReport, Engine, Job, ModelInfo, SceneOptions } from "../contract";
 import { BIND_DEFAULTS, CAGE_DEFAULTS, SCENE_DEFAULTS } from "../contract/generated";
@@ -13,7 +13,7 @@ import { createApart, load } from "../session/reader";
 export interface Wanted {
   readonly name: string;
   readonly file: Blob;
-  /** Vertices of the cage, at most. */
+  /** Maximum number of cage vertices. */
   readonly vertices: number;
   readonly grid: number;
 }
@@ -23,17 +23,17 @@ export interface Ready {
   readonly report: BindReport;
 }
 
-/** What is under way: a word, and the share that is done. */
+/** Called with the current stage and the fraction of it that is done. */
 export type Hear = (what: "Opening" | "Making a cage" | "Binding", fraction: number) => void;
 
 export interface View {
   readonly engine: Engine;
-  /** Opens a model, makes a cage and binds; a project brings its own cage. Ends what was under way. */
+  /** Opens a model, makes a cage and binds; projects bring their own cage. Cancels a previous `open`. */
   open(wanted: Wanted, hear: Hear): Promise<Ready>;
   close(): Promise<void>;
 }
 
-/** Opens on what the browser draws with. `lost` hears when the device is gone for good. */
+/** Opens a view with WebGPU, or WebGL2. Calls `lost` if a lost device cannot be restored. */
 export function openView(canvases: Canvases, lost: (error: unknown) => void): Promise<View> {
   return openOn(canvases, async (opened) => {
     const { artifact, module, canvas } = opened;
@@ -63,7 +63,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
   let work: Promise<unknown> = Promise.resolve();
   let isClosed = false;
 
-  /** A device that was taken away comes back on another canvas: the old one is of no use any more. */
+  /** Recovers from a lost device on a new canvas; a canvas cannot be used with a second device. */
   const watch = async (canvas: HTMLCanvasElement): Promise<void> => {
     canvas.addEventListener("webglcontextlost", () => engine.lose());
     await engine.lost();
@@ -120,9 +120,9 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
     engine,
     open(wanted, hear) {
       current?.cancel();
-      // The engine has one model at a time: the one before must have let go.
+      // The engine holds one model: wait until the previous call has stopped.
       const opening = work.then(() => {
-        if (isClosed) throw named("Cancelled", "the element was taken out of the page");
+        if (isClosed) throw named("Cancelled", "the element was removed from the page");
         frames.start(
           (sharp) => engine.drawFrame(sharp),
           () => !client.isBusy(),
@@ -137,7 +137,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
       frames.stop();
       current?.cancel();
       client.close();
-      // Rust must not be in the middle of anything when its memory is given back, and hears of nothing while it is.
+      // Free the engine only when no call is running; losing the device ends pending ones.
       engine.lose();
       await work;
       engine.lose();
@@ -147,7 +147,7 @@ function viewOf(parts: Parts, canvases: Canvases, lost: (error: unknown) => void
   };
 }
 
-/** What an element shows of the scene: handles of the cage are dragged, not the model. */
+/** Scene options of the element: drags move handles of the cage, and do not pull the model. */
 export function sceneOf(theme: string | null): SceneOptions {
   return { ...SCENE_DEFAULTS, theme: theme === "light" ? "light" : "dark", pull: false };
 }

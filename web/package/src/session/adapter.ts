@@ -1,4 +1,4 @@
-/** The GPU, before anything is downloaded for it. */
+/** Looks for a GPU before anything is downloaded. */
 
 import type { Lack } from "../contract";
 import { named } from "./client";
@@ -14,26 +14,26 @@ export async function findAdapter(): Promise<string> {
   return words ? tidy(words) : "this GPU";
 }
 
-/** Names as people write them: browsers report them in lower case. */
+/** Capitalises words: browsers report lower case. */
 function tidy(words: string): string {
   return words.replace(/\b[a-z]/g, (letter) => letter.toUpperCase());
 }
 
-/** What an error says is missing; undefined for errors of another kind. */
+/** The missing piece of WebGPU that an error names; undefined for other errors. */
 export function lackOf(error: unknown): Lack | undefined {
   const name = error instanceof Error ? error.name : "";
   return name === "NoWebGPU" || name === "NoAdapter" || name === "NoDevice" ? name : undefined;
 }
 
-/** Whether a GPU is made of processor cores: then the processor itself binds faster, and drawing does not wait for it. */
+/** Whether the GPU is emulated in software. Binding on the processor is then faster and does not block drawing. */
 export function isSoftware(adapter: string): boolean {
   return /swiftshader|llvmpipe|lavapipe|software|basic render/i.test(adapter);
 }
 
-/** Whether this browser can at least draw. */
+/** Whether the browser can draw with WebGL2. */
 export function hasWebGl2(): boolean {
   const context = document.createElement("canvas").getContext("webgl2");
-  // Browsers allow a few contexts at a time: this one was only a question.
+  // Release the context: browsers limit their number.
   context?.getExtension("WEBGL_lose_context")?.loseContext();
   return context !== null;
 }

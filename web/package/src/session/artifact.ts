@@ -1,16 +1,16 @@
-/** The module in its two builds: for WebGPU, which comes with the page, and for WebGL2, downloaded only where needed. */
+/** The module's two builds: for WebGPU, and for WebGL2, which is downloaded only when needed. */
 
-/** What both builds offer. */
+/** The exports that both builds share. */
 export type Package = typeof import("../pkg/cagework");
 
 export interface Artifact {
   readonly pkg: Package;
-  /** Where its wasm file is. */
+  /** URL of its wasm file. */
   readonly wasm: string;
   openWorker(): Worker;
 }
 
-/** Compiles while it downloads, where the server says that it is wasm. */
+/** Downloads and compiles a module; streams it if the server sends the MIME type of wasm. */
 export async function compile(url: string): Promise<WebAssembly.Module> {
   const response = await fetch(url);
   if (!response.ok) throw new Error(`${url} could not be downloaded (${response.status})`);

@@ -1,4 +1,4 @@
-/** A bind: coarse first so that the model can be dragged at once, then as asked. */
+/** Runs a bind: a coarse pass first, so that the model can be dragged soon, then one with the given options. */
 
 import type {
   BindEvent,
@@ -14,10 +14,10 @@ import { createEta } from "../eta";
 import { type Client, named } from "./client";
 import type { BoundArrays } from "./messages";
 
-/** Cells of the first pass. */
+/** Grid of the coarse pass. */
 const COARSE = 32;
 
-/** Errors that mean the GPU cannot, though the CPU may. */
+/** Errors after which the bind is repeated on the CPU. */
 const GPU_ERRORS: readonly string[] = [
   "NoAdapter",
   "NoDevice",
@@ -67,7 +67,7 @@ export function startBind(start: BindStart): Job<BindReport> {
     return whole;
   }
 
-  /** One pass; on the CPU if the GPU cannot. */
+  /** Runs one pass, and repeats it on the CPU if the GPU fails. */
   async function run(pass: Pass): Promise<BindReport> {
     const asked = () => (pass === "fine" ? options : coarse(options));
     try {
@@ -96,7 +96,7 @@ export function startBind(start: BindStart): Job<BindReport> {
   };
 }
 
-/** Quick, whatever was asked for. */
+/** The options of the coarse pass. */
 function coarse(options: BindOptions): BindOptions {
   return { ...options, grid: COARSE, solver: "multigrid" };
 }

@@ -1,13 +1,15 @@
-/** The worker as promises. */
+/** Client of a worker: jobs as promises. */
 
 import type { Job } from "../contract";
 import type { FromWorker, JobKind, Jobs, ToWorker } from "./messages";
 
-/** A cancelled job has this long to stop by itself, ms: on the CPU it hears nothing until it is done. */
+/**
+ * Time for a cancelled job to stop, ms, before its worker is terminated: on the CPU it receives no message until it is done.
+ */
 const PATIENCE = 400;
 
 interface Waiting {
-  /** To ask again: another job may take the worker with it. */
+  /** The message, to send again if the worker is replaced. */
   readonly asked: ToWorker;
   readonly done: (output: never) => void;
   readonly failed: (error: Error) => void;
@@ -20,12 +22,12 @@ export interface Client {
     input: Jobs[K]["input"],
     step?: (step: Jobs[K]["step"]) => void,
   ): Job<Jobs[K]["output"]>;
-  /** Whether a job is under way. */
+  /** Whether a job is running or queued. */
   isBusy(): boolean;
   close(): void;
 }
 
-/** An error with the name that callers look at. */
+/** An error with the name that callers check. */
 export function named(name: string, message: string): Error {
   const error = new Error(message);
   error.name = name;
@@ -34,7 +36,10 @@ export function named(name: string, message: string): Error {
 
 const closing = () => named("Cancelled", "the page is closing");
 
-/** Starts a worker with the compiled module; one that does not listen, or has stopped, is replaced when there is work again. */
+/**
+ * Starts a worker with the compiled module. A worker that stopped or does not react to a cancel is replaced when the next job
+ * needs it.
+ */
 export function createClient(module: WebAssembly.Module, open: () => Worker): Client {
   const waiting = new Map<number, Waiting>();
   let next = 0;
@@ -46,7 +51,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
     started.addEventListener("message", ({ data }: MessageEvent<FromWorker>) => hear(data));
     started.addEventListener("error", (event) => {
       event.preventDefault();
-      // One that has been replaced already may still be heard.
+      // Ignore errors of a worker that was replaced.
       if (started === worker) lose(named("Worker", event.message || "the worker stopped"));
     });
     say(started, { kind: "start", module });
@@ -66,7 +71,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
     }
     waiting.delete(message.id);
     if (message.kind === "failed" && message.name === "RuntimeError") {
-      // A trap: this instance fails with whatever it is asked next.
+      // A trap leaves the instance unusable.
       const error = named(
         "Worker",
         `the computation broke off (${message.message}): it may need too much memory`,
@@ -87,7 +92,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
     for (const job of lost) job.failed(error);
   }
 
-  /** A worker that does not hear that a job is given up is replaced, and asked the others again. */
+  /** Terminates a worker that does not react to a cancel, and sends the other jobs to a new one. */
   function replace(id: number): void {
     worker?.terminate();
     worker = undefined;
@@ -108,7 +113,7 @@ export function createClient(module: WebAssembly.Module, open: () => Worker): Cl
       if (isClosed) return { done: Promise.reject(closing()), cancel: () => undefined };
       const id = next++;
       worker ??= start();
-      // Throws what cannot be sent; then there is nothing to wait for.
+      // postMessage throws for input that cannot be cloned; the job is then not registered.
       const asked: ToWorker = { kind: "job", id, job, input };
       say(worker, asked);
       const done = new Promise<never>((resolve, reject) => {

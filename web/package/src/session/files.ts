@@ -1,25 +1,25 @@
-/** Dropped files to bytes: which one is the model, and where its siblings are. */
+/** Reads dropped files: finds the model among them, and its siblings. */
 
 import type { NamedFile } from "../contract";
 import { extension, isModel } from "../names";
 import { named } from "./client";
 
-/** Files that name others: buffers and textures, or materials and theirs. */
+/** Formats that refer to other files: buffers, textures, materials. */
 const NAMING: readonly string[] = ["gltf", "obj"];
 
-/** Larger files are refused, bytes: the browser's memory for them would be several times as much. */
+/** Size limit, bytes. Opening a file takes several times its size in memory. */
 const LARGEST = 1 << 30;
 
 export interface Bytes {
   readonly name: string;
   readonly bytes: Uint8Array;
-  /** What lies beside it, by name and by path from its folder. */
+  /** The other files, by name and by path relative to the model's folder. */
   readonly siblings: ReadonlyMap<string, Uint8Array>;
-  /** The compressed file that the bytes were decoded from. */
+  /** The compressed original, if `bytes` were decompressed. */
   readonly packed?: Uint8Array;
 }
 
-/** Finds a sibling by the path that the model has for it. */
+/** Finds a sibling by the path that the model refers to. */
 export function siblingOf(siblings: Bytes["siblings"]): (path: string) => Uint8Array | undefined {
   return (path) => {
     const plain = path.replace(/^(\.\/)+/, "");
@@ -27,7 +27,6 @@ export function siblingOf(siblings: Bytes["siblings"]): (path: string) => Uint8A
   };
 }
 
-/** The model's bytes and those of its siblings. */
 export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
   const main = files.find(({ name }) => isModel(name)) ?? files[0];
   if (!main) throw named("Empty", "there is no file to open");
@@ -44,11 +43,11 @@ export async function readFiles(files: readonly NamedFile[]): Promise<Bytes> {
   return { name: main.name, bytes, siblings };
 }
 
-/** What is said of a file that is too large; undefined when none is. */
+/** The error for a file above the size limit; undefined if all are below it. */
 export function tooLarge(files: readonly NamedFile[]): Error | undefined {
   const large = files.find(({ file }) => file.size > LARGEST);
   const size = ((large?.file.size ?? 0) / LARGEST).toFixed(1);
-  const message = `${large?.name} has ${size} GiB; files of up to 1 GiB are opened: make it smaller first`;
+  const message = `${large?.name} has ${size} GiB; the limit is 1 GiB: make it smaller first`;
   return large && named("TooLarge", message);
 }
 

@@ -1,16 +1,16 @@
-/** Frames on demand: many requests make one, and none makes none. */
+/** Draws on demand: any number of requests between two frames lead to one frame. */
 
-/** A GPU that is behind, or waiting for something, is asked again after this pause, ms. */
+/** Pause before the next attempt if the GPU is busy, ms. */
 const BUSY_PAUSE = 12;
 
-/** What a slow GPU drew roughly it draws again once nothing has moved for so long, ms. */
+/** Idle time after which a frame drawn at low resolution is drawn again at full resolution, ms. */
 const QUIET = 250;
 
 export interface Frames {
   ask(): void;
   /**
-   * Begins to draw. `draw` with or without all pixels answers whether the picture has them; undefined means: not now.
-   * `calm`: whether there is time for a picture that nobody asked for.
+   * Starts drawing. `draw` takes whether to draw at full resolution, and returns whether it did, or undefined if the GPU is
+   * busy. `calm` says whether there is time for an unrequested frame at full resolution.
    */
   start(draw: (sharp: boolean) => boolean | undefined, calm: () => boolean): void;
   listen(listener: (ms: number) => void): () => void;
@@ -29,7 +29,7 @@ export function createFrames(): Frames {
     if (stopped) return;
     clearTimeout(quiet);
     if (!asked) requestAnimationFrame(frame);
-    // Whoever wants it soon comes first: it is sharpened later.
+    // A request without delay takes precedence; the frame is sharpened later.
     asked = asked === "soon" ? asked : how;
   };
   const sharpen = () => {
@@ -45,7 +45,7 @@ export function createFrames(): Frames {
     try {
       isSharp = draw(how === "sharp");
     } catch (error) {
-      // A lost device is told by the session; anything else is for the page's handler of errors.
+      // The session reports lost devices; everything else goes to the page's error handler.
       if (!(error instanceof Error && error.name === "DeviceLost")) reportError(error);
       return;
     }

@@ -1,8 +1,8 @@
-/** Work that can be cancelled. */
+/** Cancellable jobs. */
 
 import type { Job } from "../contract";
 
-/** A job, and what is done with its result. */
+/** A job whose result is passed on to `then`. */
 export function chain<A, B>(job: Job<A>, then: (result: A) => B | Promise<B>): Job<B> {
   return { done: job.done.then(then), cancel: job.cancel };
 }

@@ -1,4 +1,4 @@
-/** What page and worker say to each other. */
+/** Messages between page and worker. */
 
 import type {
   BindOptions,
@@ -21,29 +21,29 @@ import type {
 } from "../contract";
 import type { Bytes } from "./files";
 
-/** A decoded image: red, green, blue, alpha; rows from the top. */
+/** A decoded image, RGBA, rows from top to bottom. */
 export interface Texture {
   readonly width: number;
   readonly height: number;
   readonly rgba: Uint8Array;
 }
 
-/** A file that was read once without harm. */
+/** A file that a worker has read successfully. */
 export interface ReadModel extends Bytes {
-  /** What points up in it, if that is not what the file says. */
+  /** The chosen up axis, if it differs from the file's. */
   readonly up: UpAxis | undefined;
-  /** Of each model, a project's further ones too: by number; null where there is none, or none that this browser could decode. */
+  /** Textures of each model, by index; null for those that are missing or that this browser cannot decode. */
   readonly textures: readonly (readonly (Texture | null)[])[];
-  /** A project's. */
+  /** The cage of a project. */
   readonly cage: CheckedCage | undefined;
   readonly notices: readonly string[];
-  /** What the module needed for it, ms: as long as the page will need. */
+  /** Time that the module needed, ms: an estimate of how long the page will freeze. */
   readonly took: number;
-  /** Of its models. */
+  /** Number of vertices of all models. */
   readonly vertices: number;
 }
 
-/** Weights as compressed sparse rows, and the columns of offsets. */
+/** Weights as compressed sparse rows, and the offset columns. */
 export interface BoundArrays {
   readonly indptr: Uint32Array;
   readonly indices: Uint32Array;
@@ -58,10 +58,10 @@ export interface SampleArrays {
   readonly poses: readonly { readonly name: string; readonly positions: Float32Array }[];
 }
 
-/** A job's name, what it needs, its steps, and what it results in. */
+/** Input, progress and output of each job. */
 export interface Jobs {
   bind: {
-    /** The last `extra` positions are no vertices. */
+    /** The last `extra` positions are not vertices of the model. */
     input: { positions: Float32Array; extra: number; cage: CageArrays; options: BindOptions };
     step: Progress;
     output: BoundArrays;
@@ -73,16 +73,16 @@ export interface Jobs {
   };
   /** A model's vertices and triangles. */
   model: {
-    /** `states`: what a cage should enclose, with the frames of a clip if one is named. */
+    /** `states`: append the vertices of morph targets and, if `clip` is given, of its frames. */
     input: { files: readonly NamedFile[]; states: boolean; clip: string | undefined };
     step: Reading;
     output: { positions: Float32Array; triangles: Uint32Array; origin: Float64Array };
   };
-  /** A model's file as it follows a posed cage. */
+  /** Deforms a model's file with a posed cage. */
   reshape: {
     input: {
       files: readonly NamedFile[];
-      /** What cage and pose are seen from. */
+      /** The origin of cage and pose. */
       origin: Float64Array;
       cage: CageArrays;
       posed: Float32Array;
@@ -99,7 +99,7 @@ export interface Jobs {
   };
   lattice: { input: { cage: CageArrays; options: BindOptions }; step: Progress; output: BoundArrays };
   cage: {
-    /** All that is to be enclosed, and the model at rest, which it is checked for. */
+    /** `positions` and `triangles` are what the cage must enclose; `model` is the model at rest, for the check. */
     input: {
       positions: Float32Array;
       triangles: Uint32Array;
@@ -115,7 +115,7 @@ export interface Jobs {
     step: Reading;
     output: ReadModel;
   };
-  /** `model`: the vertices to be enclosed, `[n_vertices, 3]`, as seen from `origin`. */
+  /** `model`: the vertices that the cage must enclose, `[n_vertices, 3]`, relative to `origin`. */
   readCage: {
     input: {
       files: readonly NamedFile[];
@@ -133,13 +133,13 @@ export interface Jobs {
     step: never;
     output: CheckedCage;
   };
-  /** `cage`: the new one's vertices; `poses` of the old one, one after the other, become poses of the new one. */
+  /** Carries poses of the cage `old` over to `cage`, the vertices of a new one. `poses` are concatenated. */
   carry: {
     input: { model: Float32Array; cage: Float32Array; old: CageArrays; poses: Float32Array };
     step: never;
     output: Float32Array;
   };
-  /** Makes ready to pull a model; what was being pulled is dropped. */
+  /** Prepares pulling; replaces the previous pull. */
   pullOpen: {
     input: { positions: Float32Array; triangles: Uint32Array; cage: CageArrays };
     step: never;
@@ -152,7 +152,7 @@ export interface Jobs {
 
 export type JobKind = keyof Jobs;
 
-/** One step of a job. */
+/** Progress of a job. */
 export type Step = Progress | Reading;
 
 export type ToWorker =

@@ -1,4 +1,4 @@
-/** The page's half of opening a file: a worker reads it first, and only what did it no harm is read here. */
+/** Opening a file, on the page's side: a worker reads it first, and the page only if that succeeded. */
 
 import type { Job, Reading } from "../contract";
 import type { Loaded } from "../pkg/cagework";
@@ -16,13 +16,19 @@ type RunApart = <K extends "read" | "readCage" | "check" | "repair">(
   hear?: Hear,
 ) => Job<Jobs[K]["output"]>;
 
-/** One job at a time, each in a worker that ends with it. */
+/** Runs one job at a time, each in a new worker that is closed afterwards. */
 export type Apart = RunApart & {
-  /** Until what it returns is called, a job that ends well leaves its worker to the next: many small files need one. */
+  /**
+   * Until the returned function is called, successful jobs pass their worker on to the next one, which is faster for many small
+   * files.
+   */
   share(): () => void;
 };
 
-/** Work on what a user brought: what it does to its worker is gone with it, and so is its memory. Another one ends it. */
+/**
+ * Runs jobs on untrusted files in workers of their own: a crash or its memory ends with the worker. A new job cancels the
+ * previous one.
+ */
 export function createApart(open: () => Client): Apart {
   let isShared = false;
   let running: Client | undefined;
@@ -44,7 +50,7 @@ export function createApart(open: () => Client): Apart {
       if (error.name !== "Worker") throw error;
       throw named(
         "Worker",
-        `${what} failed unexpectedly: it may be damaged, or need more memory than this browser gives. Your work is unchanged. Please report it with the file if you can.`,
+        `${what} failed unexpectedly: it may be damaged, or may need more memory than this browser allows. Your work is unchanged. Please report it with the file if you can.`,
       );
     });
     const ended = done.then(
@@ -70,19 +76,19 @@ export function createApart(open: () => Client): Apart {
   return Object.assign(apart, { share });
 }
 
-/** The main thread may be held for so long, ms. */
+/** Longest time without a pause on the main thread, ms. */
 const HELD = 30;
 
 let paused = 0;
 
-/** Events and frames that wait have their turn, if none had one lately. */
+/** Lets pending events and frames run, unless that happened recently. */
 async function pause(): Promise<void> {
   if (performance.now() - paused < HELD) return;
   await new Promise((resolve) => setTimeout(resolve));
   paused = performance.now();
 }
 
-/** A file that was read before: for `Engine.open`, and further models for `Engine.add`. */
+/** Reads, on the page, a file that a worker has read: the first model for `Engine.open`, further ones for `Engine.add`. */
 export async function load(pkg: Package, read: ReadModel): Promise<[Loaded, ...Loaded[]]> {
   const loaded = pkg.Loaded.read(read.name, read.bytes, siblingOf(read.siblings));
   if (read.packed) loaded.setPacked(read.packed);

@@ -1,4 +1,4 @@
-/** The worker's half of opening a file: whatever its bytes could make endless, or break, happens here first. */
+/** Opening a file, in the worker: a file that crashes or hangs the reader does so here, not on the page. */
 
 import type { CageArrays, Check, CheckedCage, Reading } from "../contract";
 import type { Loaded, Polygons } from "../pkg/cagework";
@@ -11,7 +11,7 @@ type Tell = (step: Reading) => void;
 
 const say = (tell: Tell, stage: Reading["stage"], fraction = 0) => tell({ stage, fraction });
 
-/** Reads a model, decompressed if need be, its textures decoded and a project's cage checked. */
+/** Reads a model: decompresses it if needed, decodes textures, and checks the cage of a project. */
 export async function readModel(
   pkg: Package,
   { files, up }: Jobs["read"]["input"],
@@ -46,13 +46,13 @@ export async function readModel(
   };
 }
 
-/** A project's further models, taken out of it. */
+/** The further models of a project. */
 export function furtherOf(loaded: Loaded): Loaded[] {
   const next = loaded.takeNext();
   return next ? [next, ...furtherOf(loaded)] : [];
 }
 
-/** One array of several. */
+/** Concatenates arrays. */
 function flat(arrays: readonly Float32Array[]): Float32Array {
   const all = new Float32Array(arrays.reduce((sum, { length }) => sum + length, 0));
   let at = 0;
@@ -76,14 +76,14 @@ export async function readCage(
   return checked(pkg, loaded.asCage(), model, smooth);
 }
 
-/** A cage as arrays, and what is wrong with it for the model's vertices where it will be subdivided so often. */
+/** A cage as arrays with the result of its check. `smooth` is the number of subdivision steps. */
 export function checked(pkg: Package, cage: Polygons, model: Float32Array, smooth = 0): CheckedCage {
   const arrays = polygons(cage);
   const controls = arrays.controls ?? { smooth, inner: 0, elements: [], radius: null };
   return { ...arrays, check: check(pkg, { ...arrays, controls }, model) };
 }
 
-/** What is wrong with a cage for the model's vertices. */
+/** Checks a cage against the model's vertices. */
 export function check(
   pkg: Package,
   { positions, corners, controls }: CageArrays,
@@ -95,7 +95,7 @@ export function check(
   return { problems, vertices, edges, faces, points, outside };
 }
 
-/** Arrays of a mesh; its memory in the module is given back. */
+/** Copies a mesh to arrays and frees its wasm memory. */
 export function polygons(mesh: Polygons): CageArrays {
   const { positions, corners, controls } = mesh;
   mesh.free();

@@ -1,11 +1,11 @@
-/** The worker: runs what takes longer than a frame, one job after the other. */
+/** The worker: runs long jobs in sequence. */
 
 import type { Binder, Bound, Puller } from "../pkg/cagework";
 import type { Package } from "./artifact";
 import type { BoundArrays, FromWorker, JobKind, Jobs, Step, ToWorker } from "./messages";
 import { check, checked, read, readCage, readModel } from "./reading";
 
-/** Steps are told at most this often, ms: a page draws no more of them. */
+/** Shortest time between two progress messages, ms: more are never drawn. */
 const STEP_PAUSE = 33;
 
 type Send = (message: FromWorker, transfer?: Transferable[]) => void;
@@ -15,14 +15,14 @@ const cancelled = new Set<number>();
 let ready: Promise<unknown> = Promise.resolve();
 let queue: Promise<unknown> = Promise.resolve();
 
-/** Answers the page from one build of the module. */
+/** Answers the page's messages with one build of the module. */
 export function serve(pkg: Package): void {
   const work = createWork(pkg);
   addEventListener("message", ({ data }: MessageEvent<ToWorker>) => {
     switch (data.kind) {
       case "start":
         ready = pkg.default({ module_or_path: data.module });
-        // Each job says so.
+        // Every job awaits `ready` and reports this error itself.
         ready.catch(() => undefined);
         break;
       case "cancel":
@@ -50,7 +50,7 @@ async function answer(work: Work, id: number, job: JobKind, input: unknown): Pro
   }
 }
 
-/** Tells the page of steps now and then; answers false once the job is cancelled. */
+/** Sends progress at intervals. Returns false once the job is cancelled. */
 function steps(id: number): (step: Step) => boolean {
   let last = Number.NEGATIVE_INFINITY;
   let stage: string | undefined;
@@ -76,7 +76,7 @@ function createWork(pkg: Package): Work {
   let shared: Binder | undefined;
   let puller: Puller | undefined;
   const opened = (): Puller => {
-    if (!puller) throw new Error("nothing is ready to be pulled: bind the model again");
+    if (!puller) throw new Error("no model is ready to be pulled: bind it again");
     return puller;
   };
   const binder = async (needsGpu: boolean): Promise<Binder> => {
@@ -169,14 +169,14 @@ function createWork(pkg: Package): Work {
   };
 }
 
-/** Arrays of what was bound; its memory in the module is given back. */
+/** Copies the arrays of a bind and frees its wasm memory. */
 function taken(bound: Bound): BoundArrays {
   const { indptr, indices, data, offsets, report } = bound;
   bound.free();
   return { indptr, indices, data, offsets, report };
 }
 
-/** Buffers of all typed arrays in a result, each once: handed over, not copied. */
+/** Buffers of all typed arrays in a result, without duplicates, to be transferred instead of copied. */
 function buffers(value: unknown): ArrayBuffer[] {
   const found = new Set<ArrayBuffer>();
   const look = (value: unknown): void => {

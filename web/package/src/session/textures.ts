@@ -1,12 +1,12 @@
-/** Textures, decoded by the browser: it knows more formats than we want to carry. */
+/** Decodes textures with the browser, which supports more formats than we would want to bundle. */
 
 import type { Loaded } from "../pkg/cagework";
 import type { Texture } from "./messages";
 
-/** Larger ones are made smaller, pixels: a preview gains nothing from more, and ten of them must fit a phone. */
+/** Textures are scaled down to this size, pixels, so that ten of them fit into a phone's memory. */
 const LARGEST = 2048;
 
-/** Decodes all textures of a file that was read, and counts those that could not be. `tell` hears the share done. */
+/** Decodes all textures of a file and counts failures. Calls `tell` with the fraction done. */
 export async function decodeTextures(
   loaded: Loaded,
   tell: (share: number) => void,
@@ -23,7 +23,7 @@ export async function decodeTextures(
       const { width, height, data } = await decode(file);
       textures[index] = { width, height, rgba: new Uint8Array(data.buffer) };
     } catch {
-      // The shape matters more: the material's plain colour stands in for a damaged image.
+      // A damaged image is replaced by the material's plain colour.
       failed += 1;
     }
   }

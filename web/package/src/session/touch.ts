@@ -1,4 +1,4 @@
-/** Fingers: one is a pointer like any other; two move and zoom the view. */
+/** Touch input: one finger acts as the pointer, two move and zoom the view. */
 
 import type { Engine } from "../contract";
 
@@ -8,17 +8,17 @@ interface Spot {
 }
 
 export interface Touch {
-  /** True when the touch belongs to a two-finger gesture, which the pointer must leave alone. */
+  /** Each returns true if the touch is part of a two-finger gesture and is not a pointer event. */
   down(id: number, at: Spot): boolean;
   move(id: number, at: Spot): boolean;
   up(id: number): boolean;
-  /** No finger is there any more. */
+  /** Forgets all fingers. */
   clear(): void;
 }
 
 export function createTouch(options: { engine: () => Engine; interrupt: () => void }): Touch {
   const fingers = new Map<number, Spot>();
-  /** From the second finger on until all are lifted: a finger that stays must not grab a handle. */
+  /** Set by the second finger until all are lifted, so that the remaining finger does not grab a handle. */
   let navigating = false;
 
   return {
@@ -55,7 +55,7 @@ export function createTouch(options: { engine: () => Engine; interrupt: () => vo
   };
 }
 
-/** What two fingers did between two moments: movement of their middle, and how much they spread. */
+/** Change between two positions of two fingers: translation of their midpoint, and zoom factor. */
 export function pinch(
   before: readonly Spot[],
   after: readonly Spot[],
