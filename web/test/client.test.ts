@@ -11,7 +11,7 @@ afterEach(() => {
 
 const MODULE = {} as WebAssembly.Module;
 
-/** Workers that answer when a test says so. */
+/** Workers that answer when the test tells them to. */
 function workers() {
   const all: { target: EventTarget; jobs: number[]; isOver: boolean }[] = [];
   const client = createClient(MODULE, () => {
@@ -37,7 +37,7 @@ function workers() {
 
 const said = (done: Promise<unknown>) => done.then(String, (error: Error) => error.name);
 
-it("a job that does not hear takes its worker with it, and no other job", async () => {
+it("a job that ignores its cancel costs its worker, and other jobs are sent again", async () => {
   const { all, answer, jobs, run } = workers();
   const [first, second] = [run("a"), run("b")];
   first.cancel();
@@ -51,7 +51,7 @@ it("a job that does not hear takes its worker with it, and no other job", async 
   expect(await said(second.done)).toBe("b");
 });
 
-it("a job that waits is given up at once, and the one before goes on", async () => {
+it("a queued job is cancelled at once and the running one continues", async () => {
   const { all, answer, run } = workers();
   const [first, second] = [run("a"), run("b")];
   second.cancel();
@@ -61,7 +61,7 @@ it("a job that waits is given up at once, and the one before goes on", async () 
   expect([await said(first.done), all.length]).toEqual(["a", 1]);
 });
 
-it("a worker that stops is started again when there is work, not before", async () => {
+it("a stopped worker is restarted by the next job", async () => {
   const { all, client, stop, run } = workers();
   const first = run("a");
   stop(0);
@@ -72,7 +72,7 @@ it("a worker that stops is started again when there is work, not before", async 
   expect(await said(second.done)).toBe("Worker");
 });
 
-it("what cannot be sent is thrown, and nothing waits for it; a closed client starts nothing", async () => {
+it("input that cannot be cloned throws; a closed client starts no job", async () => {
   const { all, client, run } = workers();
   expect(() => client.run("sample", undefined as never)).toThrow("cannot be sent");
   expect(client.isBusy()).toBe(false);

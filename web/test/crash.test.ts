@@ -4,7 +4,7 @@ import { isFatal, sayDuring, watchCrashes } from "../src/crash";
 import { createStore } from "../src/signals";
 import { INITIAL } from "../src/state";
 
-/** A browser's window and its tab's storage, as far as crashes need them. */
+/** The parts of a browser window that crash handling uses, with session storage. */
 function browser() {
   const page = new EventTarget();
   const kept = new Map<string, string>();
@@ -31,7 +31,7 @@ const trap = new WebAssembly.RuntimeError("unreachable");
 
 afterEach(() => vi.unstubAllGlobals());
 
-it("a panic and a trap are fatal, an error of the program is not", () => {
+it("panics and traps are fatal, other errors are not", () => {
   expect([trap, named("Panic", "panicked at lib.rs"), named("Memory", "needs 3 GB")].map(isFatal)).toEqual([
     true,
     true,
@@ -39,7 +39,7 @@ it("a panic and a trap are fatal, an error of the program is not", () => {
   ]);
 });
 
-it("the page is begun anew after a crash, and knows what it was", () => {
+it("the page restarts after a crash and knows its report", () => {
   const { begin, crash } = browser();
   const first = begin();
   expect(first.before).toBeUndefined();
@@ -53,7 +53,7 @@ it("the page is begun anew after a crash, and knows what it was", () => {
   expect(before?.report).toContain("unreachable");
 });
 
-it("a second crash before anything was drawn asks, so that no page begins anew for ever", () => {
+it("a second crash before the first frame asks, so that restarts cannot loop", () => {
   const { begin, crash } = browser();
   begin();
   crash(trap);
@@ -63,7 +63,7 @@ it("a second crash before anything was drawn asks, so that no page begins anew f
   expect(second.ask).toHaveBeenCalledOnce();
 });
 
-it("a crash after something was drawn is a first one again", () => {
+it("a drawn frame resets the crash count", () => {
   const { begin, crash } = browser();
   begin();
   crash(trap);
@@ -73,7 +73,7 @@ it("a crash after something was drawn is a first one again", () => {
   expect(second.restart).toHaveBeenCalledOnce();
 });
 
-it("where nothing can be kept a crash asks at once", () => {
+it("without storage the first crash asks", () => {
   const { begin, crash } = browser();
   vi.stubGlobal("sessionStorage", undefined);
   const first = begin();
@@ -81,12 +81,12 @@ it("where nothing can be kept a crash asks at once", () => {
   expect([first.restart, first.ask].map((call) => call.mock.calls.length)).toEqual([0, 1]);
 });
 
-it("what a crash happened with is named", () => {
+it("the report names the open model", () => {
   const model = { name: "horse.glb" } as unknown as typeof INITIAL.model;
   expect(sayDuring({ busy: null, model })).toBe("It happened with horse.glb open.");
 });
 
-it("a worker whose instance has trapped is replaced, and the next job goes to a new one", async () => {
+it("a worker is replaced after a trap, and the next job uses the new one", async () => {
   class FakeWorker extends EventTarget {
     readonly jobs: { id: number }[] = [];
     terminate = vi.fn();
@@ -110,7 +110,7 @@ it("a worker whose instance has trapped is replaced, and the next job goes to a 
   expect(workers[0]?.terminate).toHaveBeenCalledOnce();
   client.run("sample", { id: "clamp" });
   expect(workers[1]?.jobs.map(({ id }) => id)).toEqual([1]);
-  // The first one's error event arrives late; the second one works on.
+  // A late error event of the first worker must not affect the second.
   workers[0]?.dispatchEvent(Object.assign(new Event("error", { cancelable: true }), { message: "Panic" }));
   expect(workers[1]?.terminate).not.toHaveBeenCalled();
 });

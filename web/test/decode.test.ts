@@ -11,7 +11,7 @@ interface Json {
   extensionsRequired?: string[];
 }
 
-/** A meshopt file as .gltf: its streams in worm.bin, and a second buffer for programs without the decoder. */
+/** A meshopt .gltf: streams in worm.bin, and a fallback buffer for programs without the decoder. */
 async function twoBuffers(change: (json: Json) => void) {
   const bytes = await meshoptGlb();
   const start = GLB_HEADER + CHUNK_HEADER;
@@ -24,17 +24,17 @@ async function twoBuffers(change: (json: Json) => void) {
   return decompress("worm.gltf", new TextEncoder().encode(JSON.stringify(json)), sibling);
 }
 
-describe("a file compressed by meshopt", () => {
+describe("meshopt files", () => {
   const cases: [string, (json: Json) => void][] = [
     ["marked as fallback", () => undefined],
-    // As the extension's own sample has it: who knows no meshopt reads the second buffer.
+    // Fallback data, as in the extension's sample file.
     ["that others read", (json) => delete json.extensionsRequired],
     ["without a mark", (json) => delete json.buffers[1]?.extensions],
-    // Nobody has to fetch what is not read.
+    // A fallback buffer without a file.
     ["in a file that is not there", (json) => Object.assign(json.buffers[1] ?? {}, { uri: "fallback.bin" })],
   ];
-  // "GLB must have 0-1 buffers", it said.
-  it.each(cases)("with a second buffer %s is opened", async (_, change) => {
+  // A GLB allows one buffer: "GLB must have 0-1 buffers".
+  it.each(cases)("open with a fallback buffer %s", async (_, change) => {
     const plain = await new NodeIO().readBinary(await twoBuffers(change));
     const [mesh] = plain.getRoot().listMeshes();
     const indices = mesh?.listPrimitives()[0]?.getIndices();

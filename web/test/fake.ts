@@ -1,4 +1,4 @@
-/** A session without wasm, worker and GPU: jobs end when a test says so, a cage is two arrays. */
+/** A fake session without wasm, workers or GPU. Tests resolve its jobs; a cage is two arrays. */
 
 import { named } from "@cagework/core/session/client";
 import type { Context, Fix } from "../src/actions/context";
@@ -20,7 +20,7 @@ import { createStore, type Store } from "../src/signals";
 import { INITIAL } from "../src/state";
 import type { Explained } from "../src/strings";
 
-/** Work that was asked for. */
+/** A requested job. */
 export interface Asked {
   readonly kind: string;
   readonly input: unknown;
@@ -35,27 +35,27 @@ export interface Fake {
   readonly engine: Engine;
   readonly asked: Asked[];
   readonly said: string[];
-  /** What the last message offered. */
+  /** Buttons of the last message. */
   offered: readonly { readonly label: string; run(): void }[];
   readonly problems: (Explained & { fix?: Fix["label"] })[];
-  /** Coordinates by formula that the engine has. */
+  /** Kinds of coordinates that the engine has computed. */
   readonly others: string[];
-  /** Calls of the engine that keep nothing, by name. */
+  /** Log of engine calls without state, by name. */
   readonly calls: string[];
-  /** What the engine does in a test: replaces one of its functions. */
+  /** Replaces a function of the engine. */
   teach(functions: Partial<Engine>): void;
 }
 
 const BOUNDS: CageState["info"]["bounds"] = { min: [0, 0, 0], max: [1, 1, 1] };
 
-/** One of several models. */
+/** A model of several. */
 export function memberOf(id: number, name: string, triangles = 12): MemberInfo {
   const options = { shown: true, rigid: [], stays: [] };
   const parts = ["material:Cloth", "node:Buckle"];
   return { id, name, format: "obj", vertices: 8, triangles, rigged: false, parts, options, painted: false };
 }
 
-/** What the engine says of these models. */
+/** The engine's description of these models. */
 export function modelOf(members: readonly MemberInfo[]): ModelInfo {
   const [first, ...more] = members.map(({ name }) => name);
   const name = more.length > 0 ? `${first} and ${more.length} more` : (first ?? "");
@@ -82,7 +82,7 @@ export const MODEL: ModelInfo = {
   members: [memberOf(0, "cube.obj")],
 };
 
-/** A cage of `n` vertices, all at one height. */
+/** A cage of `n` vertices at the same height. */
 export function cageOf(n: number, height = 0): CheckedCage {
   const check = {
     problems: [],
@@ -95,12 +95,12 @@ export function cageOf(n: number, height = 0): CheckedCage {
   return { positions: new Float32Array(3 * n).fill(height), corners: Uint32Array.of(n), check };
 }
 
-/** A plain cage's. */
+/** Controls of a plain cage. */
 export const PLAIN: CageControls = { smooth: 0, inner: 0, elements: [], radius: null };
 
 export const OPENED: Opened = { model: MODEL, cage: null, check: null, project: null };
 
-/** What a bind of these options would say. */
+/** The report of a bind with these options. */
 export function reportOf(patch: Partial<BindReport> = {}): BindReport {
   const none = { mean: 0, max: 0 };
   return {
@@ -142,7 +142,7 @@ export function reportOf(patch: Partial<BindReport> = {}): BindReport {
   };
 }
 
-/** Lets promises that are done be heard. */
+/** Waits until resolved promises have run their callbacks. */
 export const settled = () => new Promise((resolve) => setTimeout(resolve));
 
 export function createFake(): Fake {
@@ -159,7 +159,7 @@ export function createFake(): Fake {
       entry = { kind, input, resolve: (output) => resolve(output as T), reject, cancelled: false };
       asked.push(entry);
     });
-    // Whoever waits for it hears of it.
+    // Awaited by the caller.
     done.catch(() => undefined);
     const cancel = () => {
       if (!entry || entry.cancelled) return;
@@ -198,7 +198,7 @@ export function createFake(): Fake {
       return revision;
     },
     requireCurrent(asked) {
-      if (asked !== revision) throw named("Cancelled", "there is another model or cage by now");
+      if (asked !== revision) throw named("Cancelled", "the model or cage was replaced");
     },
     setCage: put,
     commitRest: () => put(posed, rest.corners, rest.controls),

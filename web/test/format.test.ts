@@ -3,7 +3,7 @@ import { bytes, coordinate, count, duration, percent, plural, scientific, stem }
 
 describe("formats", () => {
   it("group thousands", () => expect(count(1234567)).toBe("1,234,567"));
-  it("say one and many", () => {
+  it("choose singular and plural", () => {
     expect(plural(1, "vertex", "vertices")).toBe("1 vertex");
     expect(plural(0, "pose")).toBe("0 poses");
   });
@@ -12,7 +12,7 @@ describe("formats", () => {
     expect(bytes(1500)).toBe("1.5 kB");
     expect(bytes(2_147_483_648)).toBe("2.1 GB");
   });
-  it("choose the unit of a duration, also where rounding reaches the next one", () => {
+  it("choose the unit of a duration after rounding", () => {
     expect(duration(0.25)).toBe("0.25 ms");
     expect(duration(45.4)).toBe("45 ms");
     expect(duration(999.7)).toBe("1 sec");
@@ -25,18 +25,18 @@ describe("formats", () => {
     expect(scientific(0.000123)).toBe("1.23e-4");
     expect(scientific(-3.456e-7)).toBe("-3.46e-7");
   });
-  it("keep percent within its bounds", () => {
+  it("clamp percentages to 0 and 100", () => {
     expect(percent(0.456)).toBe("46%");
     expect(percent(1.2)).toBe("100%");
     expect(percent(-0.1)).toBe("0%");
   });
-  it("show coordinates with five digits at every scale, and without minus zero", () => {
+  it("show coordinates with five digits at every scale, without minus zero", () => {
     expect(coordinate(-0)).toBe("0");
     expect(coordinate(-0.0000123456)).toBe("-0.000012346");
     expect(coordinate(1.23456)).toBe("1.2346");
     expect(coordinate(0.1 + 0.2)).toBe("0.3");
   });
-  it("take folder and extension from a name", () => {
+  it("strip folder and extension", () => {
     expect(stem("models/horse.v2.glb")).toBe("horse.v2");
     expect(stem(".hidden")).toBe(".hidden");
     expect(stem("horse.cagework.glb")).toBe("horse");

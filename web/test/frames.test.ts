@@ -1,10 +1,10 @@
 import { createFrames } from "@cagework/core/session/frames";
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 
-/** Between two frames, ms. */
+/** Time between two frames, ms. */
 const FRAME = 16;
 
-/** Longer than any pause after which a picture is sharpened, ms. */
+/** Longer than the pause before a frame is sharpened, ms. */
 const LONG = 2000;
 
 beforeEach(() => {
@@ -17,7 +17,7 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-/** Frames of a GPU that answers as told, and how each was asked for. */
+/** Frames of a simulated GPU, with a log of the draw calls. */
 function slow(answer: (sharp: boolean) => boolean | undefined, calm = () => true) {
   const drawn: boolean[] = [];
   const frames = createFrames();
@@ -29,7 +29,7 @@ function slow(answer: (sharp: boolean) => boolean | undefined, calm = () => true
 }
 
 describe("frames", () => {
-  it("a fast GPU draws once for many requests, and nothing more", () => {
+  it("many requests lead to one frame on a fast GPU", () => {
     const { frames, drawn } = slow(() => true);
     frames.ask();
     frames.ask();
@@ -37,7 +37,7 @@ describe("frames", () => {
     expect(drawn).toEqual([false]);
   });
 
-  it("what was drawn roughly is sharpened once nothing moves any more", () => {
+  it("a frame at low resolution is sharpened when nothing moves", () => {
     const { frames, drawn } = slow((sharp) => sharp);
     for (let k = 0; k < 50; k++) {
       frames.ask();
@@ -50,7 +50,7 @@ describe("frames", () => {
     expect(drawn.at(-1)).toBe(true);
   });
 
-  it("as long as something waits for the GPU nothing is sharpened", () => {
+  it("nothing is sharpened while a job uses the GPU", () => {
     let isCalm = false;
     const { drawn } = slow(
       (sharp) => sharp,
@@ -63,7 +63,7 @@ describe("frames", () => {
     expect(drawn).toEqual([false, true]);
   });
 
-  it("a busy GPU is asked again, as it was asked before", () => {
+  it("a busy GPU is tried again with the same request", () => {
     let isBusy = true;
     const { drawn } = slow((sharp) => (isBusy && sharp ? undefined : sharp));
     vi.advanceTimersByTime(LONG);
@@ -74,7 +74,7 @@ describe("frames", () => {
     expect(drawn).toEqual([true]);
   });
 
-  it("a request meanwhile comes before sharpness", () => {
+  it("a new request takes precedence over sharpening", () => {
     let isBusy = true;
     const { frames, drawn } = slow((sharp) => (isBusy && sharp ? undefined : sharp));
     vi.advanceTimersByTime(LONG);
@@ -87,7 +87,7 @@ describe("frames", () => {
     expect(drawn.at(-1)).toBe(true);
   });
 
-  it("once stopped nothing is drawn", () => {
+  it("nothing is drawn after stop", () => {
     const { frames, drawn } = slow((sharp) => sharp);
     frames.stop();
     frames.ask();

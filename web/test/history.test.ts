@@ -16,7 +16,7 @@ function numbers() {
 }
 
 describe("history", () => {
-  it("undoes and redoes in turn", async () => {
+  it("undoes and redoes steps in order", async () => {
     const { state, add } = numbers();
     const history = createHistory(() => undefined);
     for (const amount of [1, 10]) {
@@ -31,7 +31,7 @@ describe("history", () => {
     expect(state.value).toBe(11);
   });
 
-  it("forgets what was undone when something new is done", async () => {
+  it("drops undone steps when a new one is pushed", async () => {
     const { add } = numbers();
     const history = createHistory(() => undefined);
     history.push(add(1));
@@ -41,7 +41,7 @@ describe("history", () => {
     expect(await history.redo()).toBeUndefined();
   });
 
-  it("does steps that take time one after the other, in the order asked for", async () => {
+  it("runs asynchronous steps in sequence", async () => {
     const order: string[] = [];
     const history = createHistory(() => undefined);
     const slow = (name: string, ms: number): Step => ({
@@ -58,7 +58,7 @@ describe("history", () => {
     expect(order).toEqual(["second", "first"]);
   });
 
-  /** A step that ends when it is told to, well or badly. */
+  /** A step that the test resolves or rejects. */
   function open(label: string) {
     let end = { well: () => {}, badly: () => {} };
     const go = () =>
@@ -76,7 +76,7 @@ describe("history", () => {
     return all;
   };
 
-  it("does not bring back an undone step when another one is pushed meanwhile", async () => {
+  it("drops a step whose undo is pending when another one is pushed", async () => {
     const history = createHistory(() => undefined);
     const { step, end } = open("Remove a model");
     history.push(step);
@@ -89,7 +89,7 @@ describe("history", () => {
     expect(await labels(history)).toEqual(["Add 1"]);
   });
 
-  it("keeps the order when an undo fails or a redo ends after another step", async () => {
+  it("keeps the order if an undo fails or a redo ends late", async () => {
     const history = createHistory(() => undefined);
     const { step, end } = open("Remove a model");
     history.push(step);
@@ -113,7 +113,7 @@ describe("history", () => {
     expect(history.undoLabel).toBe("Remove a model");
   });
 
-  it("stays clear when it is cleared while a step is undone", async () => {
+  it("stays empty if it is cleared during an undo", async () => {
     const history = createHistory(() => undefined);
     for (const isWell of [true, false]) {
       const { step, end } = open("Remove a model");
@@ -150,7 +150,7 @@ describe("history", () => {
     expect(await history.undo()).toBeUndefined();
   });
 
-  it("tells of each change", async () => {
+  it("notifies on each change", async () => {
     let calls = 0;
     const { add } = numbers();
     const history = createHistory(() => {

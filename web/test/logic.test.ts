@@ -18,20 +18,20 @@ import { PLAIN } from "./fake";
 
 describe("typed amounts", () => {
   const type = (keys: string) => [...keys].reduce((typed, key) => nextAmount(typed, key) ?? typed, "");
-  it("are numbers as typed", () => expect(type("12.5")).toBe("12.5"));
-  it("have one point", () => expect(type("1.2.5")).toBe("1.25"));
-  it("turn their sign with any minus", () => {
+  it("keep digits", () => expect(type("12.5")).toBe("12.5"));
+  it("accept one decimal point", () => expect(type("1.2.5")).toBe("1.25"));
+  it("toggle the sign with minus", () => {
     expect(type("5-")).toBe("-5");
     expect(type("5--")).toBe("5");
   });
-  it("are shortened by backspace, also to nothing", () => {
+  it("delete with backspace, down to nothing", () => {
     expect(nextAmount("-", "Backspace")).toBe("");
     expect(nextAmount("", "x")).toBeUndefined();
   });
 });
 
 describe("two fingers", () => {
-  it("move by their middle and zoom by their spread", () => {
+  it("pan by their midpoint and zoom by their distance", () => {
     const before = [
       { x: 0, y: 0 },
       { x: 100, y: 0 },
@@ -42,8 +42,8 @@ describe("two fingers", () => {
     ];
     expect(pinch(before, after)).toEqual({ dx: 10, dy: 10, x: 60, y: 10, factor: 2 });
   });
-  it("do nothing when one is missing", () => expect(pinch([{ x: 0, y: 0 }], [])).toBeUndefined());
-  it("do not zoom when they lie on each other", () => {
+  it("do nothing if one is missing", () => expect(pinch([{ x: 0, y: 0 }], [])).toBeUndefined());
+  it("do not zoom if they coincide", () => {
     const same = [
       { x: 5, y: 5 },
       { x: 5, y: 5 },
@@ -52,13 +52,13 @@ describe("two fingers", () => {
   });
 });
 
-it("the pose of a project is bytes, or none when it cannot be read", () => {
+it("the pose of a project is decoded to bytes, or undefined if invalid", () => {
   expect(poseOf({ pose: "AAEC" })).toEqual(Uint8Array.of(0, 1, 2));
   expect(poseOf({ pose: "***" })).toBeUndefined();
 });
 
 describe("the plot", () => {
-  it("spans whole powers of ten and holds the threshold", () => {
+  it("spans powers of ten and includes the threshold", () => {
     const scale = scaleOf(
       [
         {
@@ -74,13 +74,13 @@ describe("the plot", () => {
     );
     expect(scale).toEqual({ lowest: -5, highest: -1, last: 9, logarithmic: false });
   });
-  it("places a history by its interval and skips zeros", () => {
+  it("places points by the report's interval and skips zeros", () => {
     expect(historyPoints([0.1, 0, 0.01], 10)).toEqual([
       [10, 0.1],
       [30, 0.01],
     ]);
   });
-  it("compares three solvers, and stretches the few iterations of one beside the many of another", () => {
+  it("compares three solvers, on a logarithmic axis if their iterations differ much", () => {
     const report = (solver: BindReport["solver"], history: number[]) =>
       ({ solver, delta_history: history, delta_interval: 1 }) as unknown as BindReport;
     const jacobi = report("jacobi", [0.5, ...Array<number>(99).fill(1e-3)]);
@@ -98,7 +98,7 @@ describe("the plot", () => {
     expect(scaleOf(curves, 1e-5)).toMatchObject({ last: 100, logarithmic: true });
     expect(scaleOf(curves.slice(0, 2), 1e-5)).toMatchObject({ last: 2, logarithmic: false });
   });
-  it("grows by new iterations only, and stays short", () => {
+  it("adds only new iterations and bounds the curve's length", () => {
     let curve = grown([], 1, 0.5);
     curve = grown(curve, 1, 0.4);
     curve = grown(curve, 2, null);
@@ -109,7 +109,7 @@ describe("the plot", () => {
   });
 });
 
-it("faults are marked in the step where they can be mended, or when they stop the bind", () => {
+it("faults are marked in step Cage, and elsewhere if they prevent a bind", () => {
   const bounds = { min: [0, 0, 0], max: [1, 1, 1] } as CageState["info"]["bounds"];
   const at = (step: StepName, usable: boolean) => {
     const info = { vertices: 8, edges: 12, faces: 6, quads: 6, triangles: 12, bounds, notices: [] };
@@ -124,7 +124,7 @@ describe("the verdict on a bind", () => {
     converged: true,
     rest_error: { mean: 0, p99: 0, max: 0, mean_rel: 0, max_rel },
   });
-  it("calls nothing exact that was made so after the solve", () => {
+  it("reports the error before the correction, not only after it", () => {
     expect(verdict(report(1e-8))).toMatch(/weights are corrected .* The solver error is/);
     expect(verdict(report(1e-2))).toBe(
       "With the cage at rest, the model is off by up to 1 % of the cage's size.",
@@ -133,14 +133,14 @@ describe("the verdict on a bind", () => {
 });
 
 describe("words", () => {
-  it("make sentences of Rust's messages", () => {
+  it("turn Rust's messages into sentences", () => {
     expect(sentence("cage is not closed: edge 12-40 has one triangle")).toBe(
       "Cage is not closed: edge 12-40 has one triangle.",
     );
     expect(sentence("  ")).toBe("Something went wrong.");
     expect(sentence("horse.glb: cut off")).toBe("horse.glb: cut off.");
   });
-  it("offer the fix of an error by its name", () => {
+  it("offer a fix by the error's name", () => {
     const error = new Error("needs 3 GB");
     error.name = "Memory";
     expect(explain(error, "No bind").fix).toBe("coarser");
@@ -150,26 +150,26 @@ describe("words", () => {
     expect(explain(error, "No bind").fix).toBe("regenerate");
     expect(explain("plain", "No bind")).toEqual({ title: "No bind", message: "Plain." });
   });
-  it("know a cancellation", () => {
+  it("recognise a cancellation", () => {
     const error = new Error("cancelled");
     error.name = "Cancelled";
     expect(isCancelled(error)).toBe(true);
   });
-  it("find a free name for a pose", () => {
+  it("choose an unused name for a pose", () => {
     const poses = ["Pose 2", "Jump"].map((name) => ({ name, positions: new Float32Array() }));
     expect(freshName(poses)).toBe("Pose 3");
     expect(freshName(poses.slice(0, 1))).toBe("Pose 3");
   });
 });
 
-it("tells software GPUs from real ones", () => {
+it("recognises software GPUs", () => {
   expect(isSoftware("ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (LLVM 10.0.0)))")).toBe(true);
   expect(isSoftware("llvmpipe (LLVM 15.0.6, 256 bits)")).toBe(true);
   expect(isSoftware("NVIDIA GeForce RTX 4070")).toBe(false);
 });
 
 describe("browsers", () => {
-  it("are told apart by their user agents", () => {
+  it("are recognised by their user agents", () => {
     const edge =
       "Mozilla/5.0 (Windows NT 10.0; Win64; x64) AppleWebKit/537.36 Chrome/140.0 Safari/537.36 Edg/140.0";
     const safari =
@@ -183,6 +183,6 @@ describe("browsers", () => {
   });
 });
 
-it("a rubber band has its corner at the top left", () => {
+it("a rubber band starts at its top left corner", () => {
   expect(rectangle({ x: 10, y: 5 }, { x: 4, y: 8 })).toEqual({ x: 4, y: 5, width: 6, height: 3 });
 });

@@ -1,9 +1,9 @@
-/** Work in order, and what is given up. */
+/** Queue of jobs, and their cancellation. */
 
 import { describe, expect, it } from "vitest";
 import { createQueue, follow } from "../src/queue";
 
-/** Work that ends when it is told to. */
+/** A job that the test resolves or rejects. */
 function held() {
   let end = () => {};
   const done = new Promise<void>((resolve) => {
@@ -13,7 +13,7 @@ function held() {
 }
 
 describe("the queue", () => {
-  it("runs work of a kind one after the other, also after one that failed", async () => {
+  it("runs jobs of a kind in sequence, also after a failure", async () => {
     const queue = createQueue();
     const first = held();
     const order: string[] = [];
@@ -30,13 +30,13 @@ describe("the queue", () => {
     expect(order).toEqual(["other kind", "first", "second"]);
   });
 
-  it("cancels what is under way and never starts what waits", async () => {
+  it("cancels the running job and drops queued ones", async () => {
     const queue = createQueue();
     const first = held();
     const cancelled: string[] = [];
     const job = { done: first.done, cancel: () => void cancelled.push("first") };
     const running = queue.add("bind", (signal) => follow(signal, job));
-    // It has to begin before it can be given up.
+    // Let the job start before cancelling it.
     await Promise.resolve();
     const waiting = queue.replace("bind", async () => cancelled.push("never"));
     const last = queue.replace("bind", async () => "last");
@@ -47,7 +47,7 @@ describe("the queue", () => {
     expect(cancelled).toEqual(["first"]);
   });
 
-  it("cancels the work that runs and all that waits, and leaves other kinds alone", async () => {
+  it("cancels the running and queued jobs of one kind only", async () => {
     const queue = createQueue();
     const first = held();
     const cancelled: string[] = [];

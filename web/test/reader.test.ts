@@ -7,7 +7,7 @@ import { T } from "../src/words";
 
 const file = (name: string, size = 10): NamedFile => ({ name, path: name, file: { size } as Blob });
 
-/** A worker that answers when it is told to, and how it was treated. */
+/** A worker that the test answers for, with a log of its use. */
 function workers() {
   const opened: { closed: number; answer: (output: object) => void; fail: (error: Error) => void }[] = [];
   const open = (): Client => {
@@ -26,7 +26,7 @@ function workers() {
   return { opened, open };
 }
 
-it("each file is read by a worker that ends with it", async () => {
+it("each file is read by a worker of its own", async () => {
   const { opened, open } = workers();
   const apart = createApart(open);
   for (const k of [0, 1]) {
@@ -38,7 +38,7 @@ it("each file is read by a worker that ends with it", async () => {
   expect(opened.length).toBe(2);
 });
 
-it("many files share a worker until it breaks, and it ends with them", async () => {
+it("shared reading uses one worker until it breaks or sharing ends", async () => {
   const { opened, open } = workers();
   const apart = createApart(open);
   const release = apart.share();
@@ -55,7 +55,7 @@ it("many files share a worker until it breaks, and it ends with them", async () 
   await expect(alone.done).rejects.toThrow("reading this file failed unexpectedly");
 });
 
-it("Cancel and another file end what is being read", async () => {
+it("cancel and another file end the current read", async () => {
   const { opened, open } = workers();
   const apart = createApart(open);
   const first = apart("read", { files: [file("a.obj")], up: undefined });
@@ -66,7 +66,7 @@ it("Cancel and another file end what is being read", async () => {
   await expect(second.done).rejects.toMatchObject({ name: "Cancelled" });
 });
 
-it("a worker that broke is a sentence, an error of the file stays what it is", async () => {
+it("a broken worker becomes a readable error; errors of the file are passed on", async () => {
   const { opened, open } = workers();
   const apart = createApart(open);
   const broken = apart("read", { files: [file("a.obj")], up: undefined });
@@ -77,7 +77,7 @@ it("a worker that broke is a sentence, an error of the file stays what it is", a
   await expect(bad.done).rejects.toMatchObject({ name: "Format", message: "not a GLB" });
 });
 
-it("a file too large for a browser gets no worker", async () => {
+it("a file above the size limit starts no worker", async () => {
   const { opened, open } = workers();
   const job = createApart(open)("read", {
     files: [file("a.glb"), file("huge.bin", 5 * 2 ** 30)],
@@ -87,13 +87,13 @@ it("a file too large for a browser gets no worker", async () => {
   expect(opened.length).toBe(0);
 });
 
-it("how far reading is, is said with a share where there is one", () => {
+it("progress shows a percentage if the stage has one", () => {
   const { far, stages } = T.opening;
   expect(far(stages.geometry, 0)).toBe("Finding vertices and faces");
   expect(far(stages.textures, 0.4)).toBe("Decoding textures, 40%");
 });
 
-it("an OBJ and a glTF find the files that lie beside them, other formats take none", async () => {
+it("OBJ and glTF read their sibling files, other formats none", async () => {
   const dropped = (name: string) => ({ name, path: `fox/${name}`, file: new Blob([name]) });
   const beside = [dropped("fox.mtl"), { ...dropped("fur.png"), path: "fox/textures/fur.png" }];
   const text = (bytes: Uint8Array | undefined) => bytes && new TextDecoder().decode(bytes);
@@ -101,6 +101,6 @@ it("an OBJ and a glTF find the files that lie beside them, other formats take no
     const find = siblingOf((await readFiles([dropped(name), ...beside])).siblings);
     expect([text(find("./fox.mtl")), text(find("textures/fur.png"))]).toEqual(["fox.mtl", "fur.png"]);
   }
-  // Once an OBJ was shown without its colours: only glTFs had their files read.
+  // Regression: an OBJ was shown without its colours, because only glTF siblings were read.
   expect((await readFiles([dropped("fox.stl"), ...beside])).siblings.size).toBe(0);
 });

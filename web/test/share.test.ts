@@ -4,12 +4,12 @@ import { decodeShare, encodeShare, fromBase64Url, toBase64Url } from "../src/sha
 const pose = Uint8Array.from({ length: 480 }, (_, i) => (i * 7919) % 256);
 
 describe("share links", () => {
-  it("bring sample and pose back", async () => {
+  it("restore sample and pose", async () => {
     const link = await encodeShare({ sample: "rat", pose });
     expect(await decodeShare(link)).toEqual({ sample: "rat", pose });
   });
 
-  it("bring a smooth surface and controls inside back", async () => {
+  it("restore a smooth surface and controls inside", async () => {
     const controls = {
       controls: { smooth: 2, inner: 2, elements: [{ line: [0, 1] }], radius: null },
       inner: [0, 0.5, 0, 0, 1, 0],
@@ -21,21 +21,21 @@ describe("share links", () => {
     await expect(decodeShare("#sample=rat&controls=****")).rejects.toThrow("its controls cannot be read");
   });
 
-  it("use only letters that an address allows", async () => {
+  it("use only characters allowed in a URL", async () => {
     expect(await encodeShare({ sample: "rat", pose })).toMatch(/^#sample=rat&pose=[A-Za-z0-9_-]+$/);
   });
 
-  it("leave a rest pose out", async () => {
+  it("omit a rest pose", async () => {
     expect(await encodeShare({ sample: "clamp" })).toBe("#sample=clamp");
     expect(await decodeShare("#sample=clamp")).toEqual({ sample: "clamp" });
   });
 
-  it("are not every fragment", async () => {
+  it("ignore other fragments", async () => {
     expect(await decodeShare("")).toBeUndefined();
     expect(await decodeShare("#top")).toBeUndefined();
   });
 
-  it("that are damaged are an error that says how", async () => {
+  it("report damaged links", async () => {
     await expect(decodeShare("#sample=rat&pose=****")).rejects.toThrow("its pose cannot be read");
     await expect(decodeShare(`#sample=rat&pose=${"A".repeat(20_000)}`)).rejects.toThrow("16384 letters");
     await expect(decodeShare("#sample=&pose=AAAA")).rejects.toThrow("which sample");

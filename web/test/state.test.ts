@@ -4,7 +4,7 @@ import { createStore } from "../src/signals";
 import { INITIAL } from "../src/state";
 
 describe("store", () => {
-  it("tells who reads a key of its changes, and nobody else", () => {
+  it("notifies only readers of the changed key", () => {
     const store = createStore(INITIAL);
     const heard: string[] = [];
     effect(() => void heard.push(store.get().step));

@@ -6,7 +6,7 @@ import { createGuide } from "../src/tour/guide";
 import { isOf, STOPS } from "../src/tour/stops";
 import { cageOf, createFake, MODEL, reportOf } from "./fake";
 
-/** A page with the rat as it came, and a tour that binds at once. */
+/** A page with the unmodified rat, and a tour whose binds end at once. */
 function page() {
   const fake = createFake();
   const { store, engine } = fake;
@@ -52,7 +52,7 @@ function page() {
   return { ...fake, guide, opened, binds };
 }
 
-it("what the user had set comes back, and the sample that was open", async () => {
+it("leaving the tour restores the user's settings and sample", async () => {
   const { guide, store, opened, binds } = page();
   const own: BindOptions = { ...store.get().bindOptions, grid: 128, tau: 1e-7 };
   store.set({ bindOptions: own, step: "cage", seeOpen: true });
@@ -72,7 +72,7 @@ it("what the user had set comes back, and the sample that was open", async () =>
   expect(binds.every(({ memory_limit }) => memory_limit === own.memory_limit)).toBe(true);
 });
 
-it("a file that is opened on the way ends it with the user's own settings", async () => {
+it("opening a file ends the tour and restores the settings", async () => {
   const { guide, store, opened } = page();
   const own = store.get().bindOptions;
   await guide.start(STOPS.indexOf("smoothing"));
@@ -82,7 +82,7 @@ it("a file that is opened on the way ends it with the user's own settings", asyn
   expect(opened, "nothing else is opened").toEqual([]);
 });
 
-it("links count stops from 1, and a bad number is the first one", () => {
+it("links count stops from 1; invalid numbers mean the first one", () => {
   expect(["#tour=1", "#tour=10", "#tour=x", "#tour=-4", "#sample=rat"].map(stopOf)).toEqual([
     0,
     9,
@@ -92,7 +92,7 @@ it("links count stops from 1, and a bad number is the first one", () => {
   ]);
 });
 
-it("a report is of the bind that was asked for, although Rust's tau has fewer digits", () => {
+it("reports match their bind although Rust's tau has fewer digits", () => {
   const report = reportOf({ grid: 32, tau: Math.fround(1e-3) });
   expect(isOf(report, { grid: 32, tau: 1e-3 })).toBe(true);
   expect(isOf(report, { grid: 32, tau: 1e-4 })).toBe(false);

@@ -16,7 +16,7 @@ const DAY = 86_400_000;
 const entry = (id: string, when: number): Entry => ({ id, name: `${id}.obj`, when, size: 100 });
 const work = (id: string, where: Work["where"] = "nowhere"): Work => ({ ...entry(id, 0), where });
 
-/** A GLB of nothing but its head: magic, version 2, length. */
+/** A GLB that consists of its header: magic, version 2, length. */
 function glb(length: number): Uint8Array {
   const bytes = new Uint8Array(length);
   const view = new DataView(bytes.buffer);
@@ -25,28 +25,28 @@ function glb(length: number): Uint8Array {
 }
 
 describe("entries", () => {
-  it("say how long ago", () => {
+  it("give their age in words", () => {
     expect(ago(10_000)).toBe("a moment ago");
     expect(ago(60_000)).toBe("1 minute ago");
     expect(ago(7_200_000)).toBe("2 hours ago");
     expect(ago(3 * DAY)).toBe("3 days ago");
   });
-  it("stand newest first, and the list that was given stays", () => {
+  it("are sorted newest first, in a new list", () => {
     const list = [entry("a", 10), entry("b", 30), entry("c", 20)];
     expect(newestFirst(list).map(({ id }) => id)).toEqual(["b", "c", "a"]);
     expect(list[0]?.id).toBe("a");
   });
-  it("are over after 30 days", () => {
+  it("expire after 30 days", () => {
     expect(isExpired(entry("a", 0), 30 * DAY)).toBe(false);
     expect(isExpired(entry("a", 0), 30 * DAY + 1)).toBe(true);
   });
-  it("are told from what is none", () => {
+  it("are validated", () => {
     expect(isEntry(entry("a", 5))).toBe(true);
     const bad = [null, "a", {}, { ...entry("a", 5), when: Number.NaN }, { ...entry("a", 5), size: -1 }];
     expect(bad.map(isEntry)).toEqual(bad.map(() => false));
     expect(isEntry({ ...entry("a", 5), name: 7 })).toBe(false);
   });
-  it("have a file that is whole", () => {
+  it("need a complete file", () => {
     expect(isWhole(glb(40))).toBe(true);
     expect([glb(40).slice(0, 30), new Uint8Array(40), glb(40).buffer, undefined].map(isWhole)).toEqual([
       false,
@@ -54,27 +54,27 @@ describe("entries", () => {
       false,
       false,
     ]);
-    // A view into something larger.
+    // A view into a larger buffer.
     const larger = new Uint8Array(60);
     larger.set(glb(40), 8);
     expect(isWhole(larger.subarray(8, 48))).toBe(true);
   });
 });
 
-describe("what a visit opens by itself", () => {
+describe("the work opened at the start", () => {
   const opened = (works: Work[], own: string | null = null) => toOpen(works, own)?.id;
-  it("is the only work there is", () => expect(opened([work("a")])).toBe("a"));
-  it("is nothing where there is a choice", () => expect(opened([work("a"), work("b")])).toBeUndefined());
-  it("is what this tab had open, whatever else there is", () =>
+  it("is the only work", () => expect(opened([work("a")])).toBe("a"));
+  it("is undefined if there are several", () => expect(opened([work("a"), work("b")])).toBeUndefined());
+  it("is what this tab had open, even if there are several", () =>
     expect(opened([work("a"), work("b")], "b")).toBe("b"));
   it("is never what another tab has open", () => {
     expect(opened([work("a", "elsewhere")])).toBeUndefined();
     expect(opened([work("a", "elsewhere"), work("b")])).toBe("b");
   });
-  it("may still be held by the page before in this tab", () => {
+  it("may still be locked by the page before the reload", () => {
     expect(opened([work("a", "elsewhere"), work("b")], "a")).toBe("a");
   });
-  it("is never what the page stopped with", () => {
+  it("is never work that crashed the page", () => {
     expect(opened([{ ...work("a"), stopped: true }], "a")).toBeUndefined();
     expect(opened([{ ...work("a"), stopped: true }, work("b")])).toBeUndefined();
   });
@@ -82,12 +82,12 @@ describe("what a visit opens by itself", () => {
 
 describe("locks", () => {
   afterEach(() => vi.unstubAllGlobals());
-  it("are given by nobody on plain HTTP: then everything is free", async () => {
+  it("are missing on plain HTTP, where all work counts as free", async () => {
     vi.stubGlobal("navigator", {});
     expect(await hold("a")).toBeDefined();
     expect([...(await heldIds())]).toEqual([]);
   });
-  it("of other pages of the origin are no work", async () => {
+  it("of other pages of the origin are ignored", async () => {
     const held = [{ name: "cagework.work.a" }, { name: "somebody's" }, {}];
     vi.stubGlobal("navigator", { locks: { query: async () => ({ held }) } });
     expect([...(await heldIds())]).toEqual(["a"]);

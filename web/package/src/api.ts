@@ -55,7 +55,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
     });
   const requireGpu = async ({ backend }: Partial<BindOptions>) => {
     if (backend !== "gpu" || (await runtime()).hasGpu) return;
-    throw named("NoAdapter", 'there is no WebGPU here: leave out backend: "gpu"');
+    throw named("NoAdapter", 'WebGPU is missing here: leave out backend: "gpu"');
   };
   const deformers = new WeakMap<Weights, Deformer>();
 

@@ -51,7 +51,7 @@ export function originOf(name: string, given: ArrayLike<number>): Float64Array {
   throw wrong(`${name} is ${Array.from(given).join(", ")}; it must be three finite numbers`);
 }
 
-/** A pose, with as many points as the cage. */
+/** A pose: as many points as the cage has. */
 export function poseOf(given: ArrayLike<number>, cage: Float32Array): Float32Array {
   const posed = pointsOf("posed", given);
   if (posed.length !== cage.length) {

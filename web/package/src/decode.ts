@@ -1,4 +1,4 @@
-/** Decompresses GLBs with Draco or meshopt. Loaded only when such a file is opened. */
+/** Decompresses GLBs with Draco or meshopt. Loaded when the first such file is opened. */
 
 import { type Document, WebIO } from "@gltf-transform/core";
 import { ALL_EXTENSIONS, EXTMeshoptCompression, KHRDracoMeshCompression } from "@gltf-transform/extensions";

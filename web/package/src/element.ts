@@ -23,7 +23,7 @@ const STYLE = `
     pointer-events: none; text-align: center; text-wrap: balance; }
 `;
 
-// On a server there is no HTMLElement: the module can be imported, but defines no element.
+// Servers lack HTMLElement: there the module can be imported, but defines no element.
 const Base: typeof HTMLElement = globalThis.HTMLElement ?? (class {} as typeof HTMLElement);
 
 export class CageDeformer extends Base {
@@ -74,7 +74,7 @@ export class CageDeformer extends Base {
   }
 
   /**
-   * Positions of the cage's vertices, `[n_cage, 3]`, object units; null while there is no cage. Set it to an array of that
+   * Positions of the cage's vertices, `[n_cage, 3]`, object units; null without a cage. Set it to an array of that
    * length to pose, or to null for the rest pose.
    */
   get pose(): Float32Array | null {
@@ -83,7 +83,7 @@ export class CageDeformer extends Base {
   }
   set pose(posed: ArrayLike<number> | null) {
     const engine = this.#shown?.engine;
-    if (!engine?.bound) throw named("Missing", "there is no cage yet: wait for the `ready` event");
+    if (!engine?.bound) throw named("Missing", "the model has no cage yet: wait for the `ready` event");
     const rest = engine.restPositions();
     engine.setCagePositions(posed === null ? rest : poseOf(posed, rest));
   }

@@ -8,7 +8,7 @@ const FIRST_SHARE = 0.04;
 const FIRST_MS = 250;
 
 export interface Eta {
-  /** Records a fraction done, 0 to 1. Returns the time left in ms, or undefined while there is no estimate. */
+  /** Records a fraction done, 0 to 1. Returns the time left in ms, or undefined before the first estimate. */
   update(share: number, now: number): number | undefined;
 }
 

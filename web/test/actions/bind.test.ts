@@ -13,7 +13,7 @@ function page() {
   return { ...fake, bind };
 }
 
-it("a bind that ends leaves weights and a report, and covers the cage until there is another", async () => {
+it("a finished bind provides weights and a report, valid until the cage changes", async () => {
   const { bind, asked, store, engine } = page();
   const bound = bind.start();
   await settled();
@@ -27,7 +27,7 @@ it("a bind that ends leaves weights and a report, and covers the cage until ther
   expect(bind.covers()).toBe(false);
 });
 
-it("a second bind ends the first, silently, and each solver's report is kept beside the last", async () => {
+it("a second bind cancels the first silently; the latest report of each solver is kept", async () => {
   const { bind, asked, store, problems } = page();
   const first = bind.start();
   await settled();
@@ -70,7 +70,7 @@ it("a cancelled bind leaves the previous one, and the settings just chosen are m
   expect([hasUnappliedOptions(store.get()), optionsInUse(store.get()).grid]).toEqual([false, 256]);
 });
 
-it("an error is a problem with the fix that it has", async () => {
+it("an error is shown with its fix", async () => {
   const { bind, asked, problems } = page();
   const bound = bind.start();
   await settled();
@@ -81,7 +81,7 @@ it("an error is a problem with the fix that it has", async () => {
   ]);
 });
 
-it("a solver that stopped early is said, and a cage with faults is not bound", async () => {
+it("reports a solver at its iteration limit; does not bind a faulty cage", async () => {
   const { bind, asked, said, store } = page();
   const bound = bind.start();
   await settled();
@@ -94,7 +94,7 @@ it("a solver that stopped early is said, and a cage with faults is not bound", a
   expect(asked.length).toBe(1);
 });
 
-it("coordinates by formula are computed once for who asks twice", async () => {
+it("coordinates by formula are computed once", async () => {
   const { bind, asked, others } = page();
   const both = [bind.prepareCompare(["harmonic", "green"]), bind.prepareCompare(["green"])];
   await settled();

@@ -20,13 +20,13 @@ function page() {
   return { ...fake, cage, grids, changes: () => changes, height: heights };
 }
 
-it("a cage that is made replaces the one before, and undo brings that back with what was found wrong", async () => {
+it("a generated cage replaces the previous one; undo restores that and its problems", async () => {
   const { cage, asked, store, ctx, height } = page();
   const first = cage.make();
   await settled();
   asked[0]?.resolve(cageOf(8, 1));
   await first;
-  expect(ctx.history.undoLabel, "the first cage is no step").toBeUndefined();
+  expect(ctx.history.undoLabel, "the first cage adds no undo step").toBeUndefined();
   const checked = store.get().check;
   const second = cage.make();
   await settled();
@@ -40,7 +40,7 @@ it("a cage that is made replaces the one before, and undo brings that back with 
   expect(asked.length, "nothing is checked again").toBe(2);
 });
 
-it("undo of another cage brings pose and blend back", async () => {
+it("undoing a new cage restores pose and blend", async () => {
   const { cage, asked, store, engine, said, ctx } = page();
   const first = cage.make();
   await settled();
@@ -58,7 +58,7 @@ it("undo of another cage brings pose and blend back", async () => {
   expect([engine.cagePositions()[0], engine.restPositions()[0], store.get().shares]).toEqual([7, 1, [0.5]]);
 });
 
-it("of two cages that are asked for only the later one comes", async () => {
+it("of two requested cages only the later is used", async () => {
   const { cage, asked, problems, height, store } = page();
   const both = [cage.make(), cage.make()];
   await settled();
@@ -67,7 +67,7 @@ it("of two cages that are asked for only the later one comes", async () => {
   expect([height(), problems.length, store.get().cageProgress]).toEqual([5, 0, null]);
 });
 
-it("cancel leaves the cage that is there", async () => {
+it("cancel keeps the current cage", async () => {
   const { cage, asked, store, problems } = page();
   const made = cage.make();
   await settled();
@@ -81,7 +81,7 @@ it("cancel leaves the cage that is there", async () => {
   ]);
 });
 
-it("a box is checked once it is there, an older check is not shown", async () => {
+it("a box is checked; results of an older check are dropped", async () => {
   const { cage, asked, store } = page();
   store.set({ cageSource: "box", boxDivisions: 3 });
   await cage.make();
@@ -93,7 +93,7 @@ it("a box is checked once it is there, an older check is not shown", async () =>
   expect(store.get().check).toBe(check);
 });
 
-it("more vertices than wanted are said", async () => {
+it("tells when a cage has more vertices than wanted", async () => {
   const { cage, asked, said } = page();
   const made = cage.make();
   await settled();
@@ -102,7 +102,7 @@ it("more vertices than wanted are said", async () => {
   expect(said).toEqual(["The model's holes and gaps need 100 vertices instead of 80."]);
 });
 
-it("gaps that a made cage closes are named with it", async () => {
+it("a generated cage lists the gaps that it closes", async () => {
   const { cage, asked, store } = page();
   const made = cage.make();
   await settled();
@@ -111,7 +111,7 @@ it("gaps that a made cage closes are named with it", async () => {
   expect(store.get().cage?.info.notices).toEqual(["the cage closes the gap"]);
 });
 
-it("a cage that joins separate parts offers one for each", async () => {
+it("offers one cage per part if a cage joins separate parts", async () => {
   const fake = createFake();
   const { asked, said, store } = fake;
   const cage = createCage(fake.ctx, {
@@ -130,7 +130,7 @@ it("a cage that joins separate parts offers one for each", async () => {
   expect(store.get().cageOptions.per_component, "the switch shows it").toBe(true);
 });
 
-it("a button beside a problem repairs, refines the grid, or makes another cage", async () => {
+it("a problem's button repairs, refines the grid, or generates another cage", async () => {
   const { cage, asked, grids, problems, store, height } = page();
   cage.mend({ kind: "grid", cells: 128 });
   expect(grids).toEqual([128]);
@@ -152,7 +152,7 @@ it("a button beside a problem repairs, refines the grid, or makes another cage",
   expect([asked[2]?.kind, store.get().cageSource]).toEqual(["cage", "auto"]);
 });
 
-it("a file that is no cage leaves the one that is there, and its way of making", async () => {
+it("a file that is not a cage keeps the current cage and its source", async () => {
   const { cage, asked, problems, store, changes } = page();
   const file = { name: "cage.obj", path: "cage.obj", file: new Blob() };
   const loaded = cage.load([file]);

@@ -43,12 +43,12 @@ function page() {
     model: { ...MODEL, rigged: true, clips: [{ name: "Walk", seconds: 2 }], targets },
   });
   const clips = createClips(fake.ctx, () => undefined);
-  /** The next frame, at a time, ms. */
+  /** Runs the next frame at this time, ms. */
   const frame = (now: number) => frames.shift()?.(now);
   return { ...fake, clips, shown, frame, starts: () => starts, end: () => fake.teach({ showsClip: false }) };
 }
 
-it("a clip that is chosen plays, again and again, and pauses where it is", async () => {
+it("a chosen clip plays in a loop and pauses in place", async () => {
   const { clips, shown, frame, store, starts } = page();
   await clips.choose(0);
   frame(1500);
@@ -64,7 +64,7 @@ it("a clip that is chosen plays, again and again, and pauses where it is", async
   expect(shown.at(-1)).toEqual([0, 1.5, []]);
 });
 
-it("once through it stays at the end, and half the speed takes twice the time", async () => {
+it("without looping it stops at the end; at half speed it takes twice as long", async () => {
   const { clips, shown, frame, store } = page();
   clips.loop(false);
   clips.speed(0.5);
@@ -75,20 +75,20 @@ it("once through it stays at the end, and half the speed takes twice the time", 
   expect([shown.at(-1)?.[1], store.get().clip.playing]).toEqual([2, false]);
 });
 
-it("who wants no motion gets the clip paused", async () => {
+it("with reduced motion the clip starts paused", async () => {
   vi.stubGlobal("matchMedia", () => ({ matches: true }));
   const { clips, shown, store } = page();
   await clips.choose(0);
   expect([shown.length, store.get().clip.playing]).toEqual([1, false]);
 });
 
-it("a morph target changes beside the others' defaults", async () => {
+it("changing a morph target keeps the others' defaults", async () => {
   const { clips, shown } = page();
   await clips.target(1, 0.8);
   expect(shown.at(-1)).toEqual([undefined, 0, [0.25, expect.closeTo(0.8)]]);
 });
 
-it("another pose of the cage ends it", async () => {
+it("posing the cage ends a clip", async () => {
   const { clips, frame, store, end } = page();
   await clips.choose(0);
   end();
@@ -96,7 +96,7 @@ it("another pose of the cage ends it", async () => {
   expect(store.get().clip).toMatchObject({ clip: null, playing: false, seconds: 0 });
 });
 
-it("before a bind it says what to do; what cannot be played is told", async () => {
+it("asks for a bind first, and reports clips that cannot be played", async () => {
   const { clips, store, said, problems, teach } = page();
   store.set({ bound: false });
   await clips.choose(0);
@@ -108,7 +108,7 @@ it("before a bind it says what to do; what cannot be played is told", async () =
   expect(problems).toMatchObject([{ title: "The clip cannot be played" }]);
 });
 
-it("a clip that is paused ends when the cage is posed otherwise", async () => {
+it("posing the cage ends a paused clip", async () => {
   const { clips, store, end } = page();
   await clips.choose(0);
   await clips.scrub(0.5);
@@ -119,7 +119,7 @@ it("a clip that is paused ends when the cage is posed otherwise", async () => {
   expect(store.get().clip).toMatchObject({ clip: null, seconds: 0 });
 });
 
-it("parts that are kept rigid are those of the model that is open", () => {
+it("rigid parts are limited to those of the open model", () => {
   const { clips, store } = page();
   clips.rig({ rigid: ["hat", "sword"] });
   expect(rigOf(store.get()).rigid).toEqual([]);
@@ -127,14 +127,14 @@ it("parts that are kept rigid are those of the model that is open", () => {
   expect(rigOf(store.get()).rigid).toEqual(["sword"]);
 });
 
-it("another choice for the joints shows the cage's pose again", async () => {
+it("changing the joint option shows the cage's pose again", async () => {
   const { clips, store } = page();
   await clips.choose(0);
   clips.rig({ joints: "stay" });
   expect([store.get().clip.clip, store.get().rigOptions.joints]).toEqual([null, "stay"]);
 });
 
-it("the cage bends the moving model once the space around it is ready, which is asked for once", async () => {
+it("the cage bends the moving model once its lattice is ready, which is requested once", async () => {
   const { clips, asked, starts, teach, said } = page();
   clips.rig({ dynamic: true });
   teach({ hasLattice: false });

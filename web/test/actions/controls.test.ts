@@ -1,4 +1,4 @@
-/** Smooth cages and controls inside: steps of the history, poses that come along, bones that clicks draw. */
+/** Smooth cages and controls inside: undo, poses, and drawing bones by clicks. */
 
 import { named } from "@cagework/core/session/client";
 import { expect, test } from "vitest";
@@ -22,7 +22,7 @@ function actions(fake: Fake) {
   return { cage, edit, carried, controls: createControls(fake.ctx, cage, edit) };
 }
 
-test("a smooth surface keeps the pose, is bound again, and is undone and done again", async () => {
+test("smoothing keeps the pose, binds again, and can be undone and redone", async () => {
   const fake = createFake();
   const { cage, carried } = actions(fake);
   const pose = BEFORE.map((x) => x + 1);
@@ -42,7 +42,7 @@ test("a smooth surface keeps the pose, is bound again, and is undone and done ag
   expect(fake.store.get().cage?.controls.smooth).toBe(2);
 });
 
-test("what does not fit is said, and all stays as it was", () => {
+test("a control that does not fit is reported and changes nothing", () => {
   const fake = createFake();
   const { controls } = actions(fake);
   fake.teach({
@@ -56,7 +56,7 @@ test("what does not fit is said, and all stays as it was", () => {
   expect([fake.engine.revision, fake.ctx.history.undoLabel]).toEqual([revision, undefined]);
 });
 
-test("clicks draw a bone; a second click at one place ends it; poses come along", async () => {
+test("clicks draw a bone, a double click ends it, and poses are kept", async () => {
   const fake = createFake();
   const { controls, carried } = actions(fake);
   controls.arm("line");
@@ -74,7 +74,7 @@ test("clicks draw a bone; a second click at one place ends it; poses come along"
   expect(fake.engine.restPositions()).toEqual(BEFORE);
 });
 
-test("a bone of one click is none; a point needs one", () => {
+test("one click makes a point but no bone", () => {
   const fake = createFake();
   const { controls } = actions(fake);
   controls.arm("line");
@@ -87,7 +87,7 @@ test("a bone of one click is none; a point needs one", () => {
   expect(fake.store.get().placing).toBe(null);
 });
 
-test("a link says what a cage has besides its own vertices", () => {
+test("a link contains smoothing and controls inside", () => {
   const fake = createFake();
   const { controls } = actions(fake);
   expect(controls.shared()).toBe(undefined);

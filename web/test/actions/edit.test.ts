@@ -9,7 +9,7 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-/** A page with a cage of two vertices whose gestures move all by 1. */
+/** A page with a cage of two vertices; each gesture moves both by 1. */
 function page() {
   const fake = createFake();
   const changed: number[] = [];
@@ -30,7 +30,7 @@ function page() {
   return { ...fake, edit, changed, height };
 }
 
-it("reshaping begins at rest: the pose before comes back by undo, with its shares", async () => {
+it("reshaping starts at rest; undo restores the pose and its blend", async () => {
   const { edit, ctx, store, height } = page();
   store.set({ shares: [1] });
   expect(edit.begin("grab", 0, 0)).toBe(true);
@@ -42,7 +42,7 @@ it("reshaping begins at rest: the pose before comes back by undo, with its share
   expect([store.get().shares, height(), store.get().editingRest]).toEqual([[1], 1, false]);
 });
 
-it("faces are selected for reshaping: leaving it ends that", () => {
+it("leaving reshape mode ends face selection", () => {
   const { edit, store } = page();
   edit.setEditingRest(true);
   store.set({ element: "face" });
@@ -50,7 +50,7 @@ it("faces are selected for reshaping: leaving it ends that", () => {
   expect(store.get().element).toBe("vertex");
 });
 
-it("a gesture is one step, and one that is given up is none", async () => {
+it("a gesture adds one undo step, a cancelled one adds none", async () => {
   const { edit, ctx, store, height } = page();
   expect(edit.begin("grab", 0, 0)).toBe(true);
   expect(edit.begin("rotate", 0, 0), "one at a time").toBe(false);
@@ -67,7 +67,7 @@ it("a gesture is one step, and one that is given up is none", async () => {
   expect([ctx.history.undoLabel, edit.active(), store.get().gesture]).toEqual(["Move 1 vertex", false, null]);
 });
 
-it("amounts are typed into a gesture", () => {
+it("typed numbers set the amount of a gesture", () => {
   const { edit, teach, store } = page();
   const amounts: (number | undefined)[] = [];
   teach({ typeTransform: (amount) => amounts.push(amount ?? Number.NaN) });
@@ -76,7 +76,7 @@ it("amounts are typed into a gesture", () => {
   expect([amounts.at(-1), store.get().gesture]).toEqual([1.5, "Move  [1.5]"]);
 });
 
-it("nudges that follow each other are one step once the keys rest", async () => {
+it("consecutive nudges are one undo step", async () => {
   const { edit, ctx, store, height } = page();
   store.set({ selected: { count: 2, last: 0, center: null } });
   edit.nudge(1, 0);
@@ -89,7 +89,7 @@ it("nudges that follow each other are one step once the keys rest", async () => 
   expect(height()).toBe(0);
 });
 
-it("a reshaped cage is another cage; one that it cannot be stays as it was", async () => {
+it("a reshape replaces the cage; an invalid one is rejected", async () => {
   const { edit, ctx, teach, changed, problems, engine, height } = page();
   edit.setEditingRest(true);
   edit.begin("grab", 0, 0);
@@ -117,7 +117,7 @@ it("a reshaped cage is another cage; one that it cannot be stays as it was", asy
   ]);
 });
 
-it("an edit that is not possible is said, and changes nothing", () => {
+it("an impossible edit is reported and changes nothing", () => {
   const { edit, teach, problems, changed } = page();
   teach({
     editRest: () => {

@@ -3,7 +3,7 @@ import { createExports } from "../../src/actions/exports";
 import { createProject } from "../../src/actions/project";
 import { cageOf, createFake, MODEL, memberOf, modelOf, settled } from "../fake";
 
-/** What a project says of a model that keeps its shape. */
+/** A project's entry for a model that keeps its shape. */
 const SETTINGS = { first_triangle: 0, options: { shown: true, rigid: ["all"], stays: [] }, painted: [] };
 
 /** Names of downloads. */
@@ -37,7 +37,7 @@ function page() {
   return { ...fake, exports, project };
 }
 
-it("each file has the model's name, and its size is said", async () => {
+it("files are named after the model and their size is shown", async () => {
   const { exports, teach, said, store } = page();
   teach({
     exportGlb: () => new Uint8Array(2000),
@@ -58,7 +58,7 @@ it("each file has the model's name, and its size is said", async () => {
   expect(said.at(-2)).toContain("(3 byte)");
 });
 
-it("several models leave as a file each, or one of them alone", async () => {
+it("several models are exported to one file each, or one alone", async () => {
   const { exports, teach, said, store } = page();
   const members = [memberOf(4, "body.vrm"), memberOf(5, "a/shirt.glb"), memberOf(7, "shirt.glb")];
   store.set({ model: modelOf(members) });
@@ -87,14 +87,14 @@ it("several models leave as a file each, or one of them alone", async () => {
   expect(downloads.slice(3), "the cage is all of theirs").toEqual(["shirt-weights.npz", "body-cage.obj"]);
   store.set({ exportOnly: 6 });
   await exports.save("weights");
-  expect(downloads.length, "one that is gone is no choice").toBe(8);
+  expect(downloads.length, "a removed model cannot be chosen").toBe(8);
 });
 
-it("an export that fails is a problem, and no file", async () => {
+it("a failed export is reported and saves nothing", async () => {
   const { exports, teach, problems, asked } = page();
   teach({
     exportWeights: () => {
-      throw Object.assign(new Error("there are no weights yet: bind the model first"), { name: "Missing" });
+      throw Object.assign(new Error("the model has no weights yet: bind it first"), { name: "Missing" });
     },
   });
   await exports.save("weights");
@@ -106,7 +106,7 @@ it("an export that fails is a problem, and no file", async () => {
   expect([problems.length, downloads]).toEqual([2, []]);
 });
 
-it("only poses of the cage that is open are exported", async () => {
+it("only poses of the current cage are exported", async () => {
   const { exports, store, teach } = page();
   const pose = (name: string, n: number) => ({ name, positions: new Float32Array(n) });
   store.set({ poses: [pose("Fits", 6), pose("Of another cage", 9)] });
@@ -121,7 +121,7 @@ it("only poses of the cage that is open are exported", async () => {
   expect(names).toEqual([["Fits"]]);
 });
 
-it("a project holds the page's settings", async () => {
+it("a project contains the page's settings", async () => {
   const { project, store, teach } = page();
   const written: string[] = [];
   teach({
@@ -147,7 +147,7 @@ it("a project holds the page's settings", async () => {
   expect(project.fileName()).toBe("cube.cagework.glb");
 });
 
-it("a link is for samples in their own cage; others are told what to do instead", async () => {
+it("links are for samples in their own cage; otherwise suggests a project", async () => {
   const { exports, store, said, teach } = page();
   await exports.share();
   expect([copied, said[0]]).toEqual([

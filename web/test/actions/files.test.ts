@@ -47,7 +47,7 @@ function page() {
   return { ...fake, files, steps };
 }
 
-it("a model that is dropped gets a cage and is bound; what was open is kept first", async () => {
+it("a dropped model gets a cage and is bound; the previous work is saved first", async () => {
   const { files, asked, store, steps } = page();
   const opened = files.openFiles([file("cube.obj")]);
   await settled();
@@ -61,7 +61,7 @@ it("a model that is dropped gets a cage and is bound; what was open is kept firs
   expect(store.get()).toMatchObject({ model: { name: "cube.obj" }, sample: null, busy: null, step: "pose" });
 });
 
-it("models dropped together are all in before there is a cage; one that cannot be read is named", async () => {
+it("models dropped together are read before the cage is made; unreadable ones are named", async () => {
   const { files, asked, steps, problems, store, said } = page();
   const list = ["bad.glb", "body.glb", "skin.png", "shirt.gltf", "body-cage.obj"].map((name) => file(name));
   const opened = files.openFiles(list);
@@ -85,7 +85,7 @@ it("models dropped together are all in before there is a cage; one that cannot b
   expect(store.get().busy).toBeNull();
 });
 
-it("a second file ends the reading of the first", async () => {
+it("a second file cancels reading the first", async () => {
   const { files, asked, store, problems, steps } = page();
   const first = files.openFiles([file("a.obj")]);
   await settled();
@@ -103,7 +103,7 @@ it("a second file ends the reading of the first", async () => {
   ]);
 });
 
-it("a file that cannot be read is named, and what is open stays", async () => {
+it("an unreadable file is named and the open model stays", async () => {
   const { files, asked, store, problems, steps } = page();
   store.set({ model: MODEL });
   const opened = files.openFiles([file("bad.glb")]);
@@ -116,7 +116,7 @@ it("a file that cannot be read is named, and what is open stays", async () => {
   expect([store.get().model, store.get().busy, steps]).toEqual([MODEL, null, []]);
 });
 
-it("who would wait for seconds is asked, and may give it up", async () => {
+it("a file that freezes the page for seconds needs confirmation", async () => {
   const { files, asked, store, problems } = page();
   const opened = files.openFiles([file("large.glb")]);
   await settled();
@@ -131,7 +131,7 @@ it("who would wait for seconds is asked, and may give it up", async () => {
   expect([store.get().busy, store.get().goOn, problems, asked.length]).toEqual([null, null, [], 1]);
 });
 
-it("a cage beside the model is loaded, an empty file and none at all are said", async () => {
+it("loads a cage next to the model; reports an empty file and an empty drop", async () => {
   const { files, asked, steps, problems } = page();
   const opened = files.openFiles([file("cube.obj"), file("cube-cage.obj")]);
   await settled();
@@ -146,7 +146,7 @@ it("a cage beside the model is loaded, an empty file and none at all are said", 
   expect(problems.map(({ title }) => title)).toEqual(["This file is empty", "Nothing to open"]);
 });
 
-it("a project brings its poses and settings; the memory limit stays this computer's", async () => {
+it("a project restores poses and settings except the memory limit", async () => {
   const { files, asked, store, steps, ctx } = page();
   ctx.history.push({ label: "Move", undo: () => undefined, redo: () => undefined });
   store.set({ bindOptions: { ...store.get().bindOptions, memory_limit: 7 } });
@@ -165,13 +165,13 @@ it("a project brings its poses and settings; the memory limit stays this compute
   expect([steps.includes("pose AAEC"), ctx.history.undoLabel]).toEqual([true, undefined]);
 });
 
-it("a sample that cannot be built is said by its name", async () => {
+it("a sample that cannot be built is named", async () => {
   const { files, asked, store, problems } = page();
   store.set({ samples: [{ id: "rat", label: "Rat" }] });
   const opened = files.openSample("rat");
   await settled();
   expect(store.get().busy).toBe("Opening Rat");
-  asked[0]?.reject(new Error("there is no sample"));
+  asked[0]?.reject(new Error("unknown sample"));
   expect([await opened, problems[0]?.title, store.get().busy]).toEqual([
     false,
     "The sample could not be opened",
@@ -179,7 +179,7 @@ it("a sample that cannot be built is said by its name", async () => {
   ]);
 });
 
-it("a model's settings end with it; the person's, and where and in how much memory binds run, stay", async () => {
+it("a new model resets model settings; user settings, backend and memory limit stay", async () => {
   const { files, asked, store } = page();
   const { scene, cageOptions, rigOptions, bindOptions } = store.get();
   store.set({

@@ -11,7 +11,7 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-/** A page that counts how often it looks again and binds. */
+/** A page that counts checks and binds. */
 function page() {
   const fake = createFake();
   const count = { looks: 0, binds: 0 };
@@ -38,7 +38,7 @@ function page() {
   return { ...fake, count, state, change };
 }
 
-it("a changed cage is looked at at once and bound when the hand rests, however often it changed", () => {
+it("a changed cage is checked at once and bound after a pause, once", () => {
   const { count, change } = page();
   for (let k = 0; k < 3; k++) {
     change();
@@ -49,7 +49,7 @@ it("a changed cage is looked at at once and bound when the hand rests, however o
   expect(count.binds).toBe(1);
 });
 
-it("while a gesture goes on it waits, and what is bound already is left", () => {
+it("waits during a gesture, and does not repeat a bind", () => {
   const { count, state, change } = page();
   state.isActive = true;
   change();
@@ -64,7 +64,7 @@ it("while a gesture goes on it waits, and what is bound already is left", () => 
   expect(count.binds).toBe(1);
 });
 
-it("a fine grid waits for the user's word", () => {
+it("does not bind by itself on a fine grid", () => {
   const { count, store, change } = page();
   store.set({ bindOptions: { ...store.get().bindOptions, grid: 256 } });
   change();
@@ -72,7 +72,7 @@ it("a fine grid waits for the user's word", () => {
   expect(count.binds).toBe(0);
 });
 
-it("who has ended reshaping waits no longer", () => {
+it("leaving reshape mode binds at once", () => {
   const { count, store, change } = page();
   store.set({ editingRest: true });
   change();
@@ -81,7 +81,7 @@ it("who has ended reshaping waits no longer", () => {
   expect(count.binds).toBe(1);
 });
 
-it("settings that no bind has used yet wait for the user's word", () => {
+it("does not bind by itself with unapplied settings", () => {
   const { store, state, change } = page();
   store.set({ bindOptions: { ...BIND_DEFAULTS, grid: 128 }, appliedOptions: { ...BIND_DEFAULTS, grid: 32 } });
   change();

@@ -8,7 +8,7 @@ const none = new Uint32Array();
 const CHECK = { vertices: none, edges: none, faces: none, points: new Float32Array(), outside: none };
 const OUTSIDE = { code: "model_outside", severity: "warning", message: "", count: 1, fix: null } as const;
 
-/** A page with a body in a cage that is bound; the engine keeps models in order, binned ones aside. */
+/** A page with a bound body. The engine keeps models in order, and removed ones for undo. */
 function page() {
   const fake = createFake();
   let all: readonly (MemberInfo & { readonly binned?: boolean })[] = [memberOf(0, "body.glb", 100)];
@@ -57,7 +57,7 @@ function page() {
   });
   const { positions, corners } = cageOf(8);
   fake.store.set({ model: info(), cage: fake.engine.setCage(positions, corners), bound: true });
-  /** The worker has read, and the engine added, what was asked for last. */
+  /** Completes the last read and add. */
   const read = async (name: string, id: number, triangles = 50) => {
     fake.asked.at(-1)?.resolve({ took: 0 });
     await settled();
@@ -78,7 +78,7 @@ function page() {
     reachOut: () => {
       outside = true;
     },
-    /** From now on a look at the cage ends when what is returned is called. */
+    /** From now on, a cage check ends when the returned function is called. */
     holdLooks() {
       let end = () => {};
       look = new Promise((resolve) => {
@@ -99,7 +99,7 @@ async function withShirt() {
   return { ...all, first };
 }
 
-it("a model that is added joins the cage, which is looked at and bound again; undo takes it out", async () => {
+it("an added model joins the cage, which is checked and bound again; undo removes it", async () => {
   const { store, names, adopted, ctx, first } = await withShirt();
   expect(names()).toEqual(["body.glb", "shirt.glb"]);
   expect([store.get().bound, adopted.length, store.get().busy]).toEqual([false, 1, null]);
@@ -111,7 +111,7 @@ it("a model that is added joins the cage, which is looked at and bound again; un
   expect([names(), adopted.length]).toEqual([["body.glb", "shirt.glb"], 3]);
 });
 
-it("several are one step; one that cannot be read is named, and the others come", async () => {
+it("adding several models is one step; unreadable ones are named and skipped", async () => {
   const { models, asked, read, names, problems, ctx } = page();
   const added = models.add([file("bad.glb"), file("empty.obj", ""), file("shirt.glb"), file("hat.glb")]);
   await settled();
@@ -131,7 +131,7 @@ it("several are one step; one that cannot be read is named, and the others come"
   expect([names(), ctx.history.undoLabel]).toEqual([["body.glb"], undefined]);
 });
 
-it("files that are being read can be cancelled, and nothing is added; nor is it when there is no room", async () => {
+it("cancelling the read adds nothing; neither does running out of memory", async () => {
   const { models, asked, store, names, problems, ctx } = page();
   const cancelled = models.add([file("shirt.glb"), file("hat.glb")]);
   await settled();
@@ -151,7 +151,7 @@ it("files that are being read can be cancelled, and nothing is added; nor is it 
   expect([names(), ctx.history.undoLabel]).toEqual([["body.glb"], undefined]);
 });
 
-it("what reaches outside of the cage is said once, with the way to another cage", async () => {
+it("a model outside the cage is reported once, with the offer of a new cage", async () => {
   const all = page();
   all.reachOut();
   const added = all.models.add([file("skirt.glb"), file("body-cage.obj")]);
@@ -163,7 +163,7 @@ it("what reaches outside of the cage is said once, with the way to another cage"
   expect(all.steps).toEqual(["settle", "cage body-cage.obj", "cage around all"]);
 });
 
-it("a sample with clothes is no sample any more, until they are gone", async () => {
+it("a sample with added models counts as changed until they are removed", async () => {
   const all = page();
   all.store.set({ sample: "rat", sampleCage: true });
   const added = all.models.add([file("hat.glb")]);
@@ -175,7 +175,7 @@ it("a sample with clothes is no sample any more, until they are gone", async () 
   expect(all.store.get()).toMatchObject({ sample: "rat", sampleCage: true });
 });
 
-it("what is no model is not added, and nothing open is opened", async () => {
+it("adds no project or unknown file, and nothing to an empty page", async () => {
   const { models, store, problems, steps, names } = page();
   expect(await models.add([file("notes.txt")])).toBe(false);
   expect(await models.add([file("work.cagework.glb")])).toBe(false);
@@ -186,7 +186,7 @@ it("what is no model is not added, and nothing open is opened", async () => {
   expect(steps).toEqual(["open 2"]);
 });
 
-it("a binned model is one step; pins keep the numbers that Rust knows them by", async () => {
+it("removing a model is one step; pins keep their model numbers", async () => {
   const { models, store, names, ctx } = await withShirt();
   const pins = [{ triangle: 120, bary: [1, 0, 0] as [number, number, number] }];
   store.set({ pins, bound: true });
@@ -197,7 +197,7 @@ it("a binned model is one step; pins keep the numbers that Rust knows them by", 
   expect(names()).toEqual(["body.glb", "shirt.glb"]);
 });
 
-it("a binned model is a step while the cage is looked at: undo brings it back, and nothing else", async () => {
+it("removing a model during a cage check is one step; undo restores only the model", async () => {
   const { models, names, ctx, holdLooks } = await withShirt();
   const looked = holdLooks();
   const binned = models.bin(1);
@@ -211,7 +211,7 @@ it("a binned model is a step while the cage is looked at: undo brings it back, a
   expect([ctx.history.undoLabel, ctx.history.redoLabel]).toEqual(["Add a model", "Take shirt.glb out"]);
 });
 
-it("whoever joins while a cage is made gets one around all", async () => {
+it("a model added while a cage is generated restarts it around all models", async () => {
   const { models, store, steps, read } = page();
   store.set({ cage: null, cageProgress: 0.5 });
   const added = models.add([file("shirt.glb")]);
@@ -221,7 +221,7 @@ it("whoever joins while a cage is made gets one around all", async () => {
   expect(steps).toContain("cage around all");
 });
 
-it("the last model cannot be taken out, which is said", async () => {
+it("the last model cannot be removed, which is reported", async () => {
   const { models, problems, names, teach, ctx } = page();
   teach({ bin: () => Promise.reject(new Error("this is the only model in the cage")) });
   expect(await models.bin(0)).toBe(false);
@@ -232,7 +232,7 @@ it("the last model cannot be taken out, which is said", async () => {
   ]);
 });
 
-it("a part keeps its shape or stays, not both; each press is a step, the eye is none", async () => {
+it('"keeps its shape" and "stays" exclude each other; each is an undo step, visibility is not', async () => {
   const { models, store, ctx, problems } = await withShirt();
   const options = () => store.get().model?.members[1]?.options;
   models.part(1, "material:Cloth", "rigid");

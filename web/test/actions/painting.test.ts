@@ -2,7 +2,7 @@ import { expect, it } from "vitest";
 import { createPainting } from "../../src/actions/painting";
 import { createFake, memberOf, modelOf } from "../fake";
 
-/** Two models of eight vertices; the view is ten pixels a vertex of the first, and beside it below y = 100. */
+/** Two models of eight vertices. In the view, the first model has ten pixels per vertex; below y = 100 is background. */
 function page() {
   const fake = createFake();
   let amounts = new Uint8Array();
@@ -30,7 +30,7 @@ function page() {
   return { ...fake, painting, shown, dabs, amounts: () => [...amounts] };
 }
 
-it("a stroke is one step, without gaps where the hand was quick", async () => {
+it("a stroke is one step and has no gaps at high speed", async () => {
   const { painting, store, amounts, ctx, shown, calls } = page();
   painting.on(0);
   expect([store.get().painting, shown, calls]).toEqual([
@@ -50,7 +50,7 @@ it("a stroke is one step, without gaps where the hand was quick", async () => {
   expect(amounts()).toEqual([255, 255, 255, 255, 255, 0, 0, 0]);
 });
 
-it("the brush takes away as well, and keeps its size for the next time", async () => {
+it("the brush erases too and remembers its size", async () => {
   const { painting, store, amounts, dabs, ctx } = page();
   painting.on(0);
   painting.brush({ radius: 0.2 });
@@ -68,7 +68,7 @@ it("the brush takes away as well, and keeps its size for the next time", async (
   expect(store.get().painting).toEqual({ id: 1, radius: 0.2, erase: false });
 });
 
-it("a stroke that is given up leaves nothing, and clearing is a step", async () => {
+it("a cancelled stroke changes nothing; clearing is an undo step", async () => {
   const { painting, amounts, ctx } = page();
   painting.on(0);
   painting.begin(5, 150);
@@ -84,12 +84,12 @@ it("a stroke that is given up leaves nothing, and clearing is a step", async () 
   expect(amounts()[0]).toBe(255);
 });
 
-it("what cannot be painted yet is said; a moment without the GPU leaves no gap", () => {
+it("reports models that cannot be painted yet; a busy GPU leaves no gap", () => {
   const { painting, problems, amounts, teach, engine, store, ctx } = page();
   painting.on(0);
   const real = engine.paint;
   const busy = () => {
-    throw new Error("there are no weights yet");
+    throw new Error("the model has no weights yet");
   };
   teach({ paint: busy });
   expect([painting.begin(5, 150), problems.length]).toEqual([false, 1]);
@@ -105,7 +105,7 @@ it("what cannot be painted yet is said; a moment without the GPU leaves no gap",
   expect([amounts().slice(0, 5), problems.length]).toEqual([[255, 255, 255, 255, 255], 1]);
 });
 
-it("the brush has an outline where it would paint", () => {
+it("the brush outline shows where it would paint", () => {
   const { painting, store, teach } = page();
   teach({ brushRadius: (_x: number, y: number, radius: number) => (y < 100 ? undefined : 100 * radius) });
   expect(painting.radiusAt(5, 150), "nobody paints").toBeNull();
@@ -113,7 +113,7 @@ it("the brush has an outline where it would paint", () => {
   expect([painting.radiusAt(5, 150), painting.radiusAt(5, 50)]).toEqual([5, null]);
   teach({
     brushRadius() {
-      throw new Error("there are no weights yet");
+      throw new Error("the model has no weights yet");
     },
   });
   expect(painting.radiusAt(5, 150)).toBeNull();
@@ -121,7 +121,7 @@ it("the brush has an outline where it would paint", () => {
   expect(painting.radiusAt(5, 150), "the GPU is busy").toBeUndefined();
 });
 
-it("painting ends with its model, and where the cage is reshaped", () => {
+it("removing the model or reshaping the cage ends painting", () => {
   const { painting, store, shown } = page();
   painting.on(0);
   store.set({ model: modelOf([memberOf(1, "b")]) });

@@ -15,7 +15,7 @@ function page() {
   return { ...fake, poses, height };
 }
 
-it("a pose is saved, renamed and deleted, each a step that undo takes back", async () => {
+it("saving, renaming and deleting a pose are undo steps", async () => {
   const { poses, store, ctx, said } = page();
   poses.save();
   const [pose] = store.get().poses;
@@ -38,7 +38,7 @@ it("a pose is saved, renamed and deleted, each a step that undo takes back", asy
   expect(store.get().poses).toEqual([]);
 });
 
-it("a saved pose is shown, and undo goes back to the one before", async () => {
+it("showing a saved pose can be undone", async () => {
   const { poses, store, ctx, engine, height } = page();
   poses.save();
   engine.setCagePositions(new Float32Array(6).fill(5));
@@ -49,7 +49,7 @@ it("a saved pose is shown, and undo goes back to the one before", async () => {
   expect(height()).toBe(5);
 });
 
-it("a pose brings its pins, and undo those of before", async () => {
+it("showing a pose restores its pins; undo restores the previous ones", async () => {
   const { poses, store, engine, ctx } = page();
   const pin = { triangle: 3, weights: [1, 0, 0] } as never;
   store.set({ pins: [pin] });
@@ -65,7 +65,7 @@ it("a pose brings its pins, and undo those of before", async () => {
   expect(store.get().pins).toEqual([pin]);
 });
 
-it("pose and poses of a cage of before are carried over, as one step", async () => {
+it("poses of a previous cage are carried over as one step", async () => {
   const { poses, store, ctx, engine, asked, height } = page();
   poses.save();
   const before = { cage: cageOf(2), positions: engine.cagePositions(), shares: [1], sampleCage: false };
@@ -74,7 +74,7 @@ it("pose and poses of a cage of before are carried over, as one step", async () 
   const done = poses.carry(before);
   await Promise.resolve();
   const job = asked.at(-1);
-  // What is shown comes first, then the saved poses.
+  // The current pose comes first, then the saved ones.
   expect(job).toMatchObject({ kind: "carry", input: { poses: [before.positions, before.positions] } });
   job?.resolve([new Float32Array(9).fill(7), new Float32Array(9).fill(8)]);
   await done;
@@ -83,7 +83,7 @@ it("pose and poses of a cage of before are carried over, as one step", async () 
   expect([height(), store.get().poses[0]?.positions.length]).toEqual([positions[0], 6]);
 });
 
-it("one drag of a blend's slider is one step", async () => {
+it("one drag of a blend slider is one undo step", async () => {
   const { poses, store, ctx, teach, engine, height } = page();
   poses.save();
   const blended: number[][] = [];
@@ -102,7 +102,7 @@ it("one drag of a blend's slider is one step", async () => {
   ] as const) {
     poses.blend(pose, share, done);
   }
-  // Each from where the drag began: what is saved is shown, a blend of all of it.
+  // Each blend starts from the pose at the start of the drag.
   const [a, b, c] = [0.25, 0.5, 0.75].map((share) => [1, 1, share]);
   expect([blended, store.get().shares, height()]).toEqual([[a, b, c], [0.75], 0.75]);
   await ctx.history.undo();
@@ -115,7 +115,7 @@ it("one drag of a blend's slider is one step", async () => {
   expect([height(), store.get().shares]).toEqual([0.75, [0.75]]);
 });
 
-it("reset goes back to rest, and what cannot be played is said", () => {
+it("reset returns to rest; playing without poses is reported", () => {
   const { poses, store, height, said } = page();
   store.set({ posed: true });
   poses.reset();
@@ -124,7 +124,7 @@ it("reset goes back to rest, and what cannot be played is said", () => {
   expect([store.get().playing, said]).toEqual([false, ["Save a pose first, then play it."]]);
 });
 
-it("a new pose has a name of its own", () => {
+it("a new pose gets an unused name", () => {
   const positions = new Float32Array();
   expect(freshName([{ name: "Pose 2", positions }])).toBe("Pose 3");
 });

@@ -3,7 +3,7 @@ import { createEdit } from "../../src/actions/edit";
 import { createPulling } from "../../src/actions/pull";
 import { cageOf, createFake, settled } from "../fake";
 
-/** Frames of the page, run by hand. */
+/** Animation frames, run by the test. */
 let frames: (() => void)[] = [];
 beforeEach(() => {
   frames = [];
@@ -15,7 +15,7 @@ afterEach(() => {
 
 const POINT = { triangle: 0, bary: [1, 0, 0] as [number, number, number] };
 
-/** A page whose model is under the pointer at (10, 10) only, ready to be pulled. */
+/** A page ready to pull, whose model is only at pointer position (10, 10). */
 function page() {
   const fake = createFake();
   const shown: unknown[][] = [];
@@ -50,7 +50,7 @@ function page() {
   return { ...fake, pull, answer, frame, took, cage, shown };
 }
 
-it("a pull moves the cage as the worker answers, and is one step of the history", async () => {
+it("a pull moves the cage with the worker's answers and is one undo step", async () => {
   const { pull, answer, frame, took, cage, asked, engine, store, ctx } = page();
   expect(pull.begin(50, 10)).toBe(false);
   expect(pull.begin(10, 10)).toBe(true);
@@ -67,7 +67,7 @@ it("a pull moves the cage as the worker answers, and is one step of the history"
   expect(engine.cagePositions()[0]).not.toBe(3);
 });
 
-it("Esc puts the cage back, and what the worker still answers is dropped", async () => {
+it("Esc restores the cage and later answers are dropped", async () => {
   const { pull, answer, took, cage, engine, ctx } = page();
   const before = engine.cagePositions();
   pull.begin(10, 10);
@@ -78,7 +78,7 @@ it("Esc puts the cage back, and what the worker still answers is dropped", async
   expect([engine.cagePositions(), ctx.history.undoLabel, pull.active()]).toEqual([before, undefined, false]);
 });
 
-it("pins go with the grab, but not the one that is grabbed", async () => {
+it("a grab includes all pins except the grabbed one", async () => {
   const { pull, asked, store, ctx, teach } = page();
   expect(pull.pin(50, 10)).toBe(false);
   pull.pin(10, 10);
@@ -86,7 +86,7 @@ it("pins go with the grab, but not the one that is grabbed", async () => {
   pull.begin(10, 10);
   expect(asked.at(-1)).toMatchObject({ kind: "pullGrab", input: { grabs: 1, seeds: Uint32Array.of(3) } });
   pull.end(false);
-  // Seen from elsewhere, the pin is not where the pointer is.
+  // From another view, the pin is not under the pointer.
   teach({ project: () => Float32Array.of(90, 90, 1) });
   pull.begin(10, 10);
   expect(asked.at(-1)).toMatchObject({ input: { grabs: 1, seeds: Uint32Array.of(3, 3) } });
@@ -95,7 +95,7 @@ it("pins go with the grab, but not the one that is grabbed", async () => {
   expect(store.get().pins).toEqual([]);
 });
 
-it("a wider reach takes hold anew, from the same pose", async () => {
+it("changing the reach grabs again from the same pose", async () => {
   const { pull, answer, took, asked } = page();
   pull.begin(10, 10);
   await answer(took);
@@ -105,7 +105,7 @@ it("a wider reach takes hold anew, from the same pose", async () => {
   expect(asked.at(-1)).toMatchObject({ input: { options: { whole: true } } });
 });
 
-it("a worker that fails leaves the cage as it was and says so", async () => {
+it("a failing worker is reported and leaves the cage unchanged", async () => {
   const { pull, asked, problems, engine } = page();
   const before = engine.cagePositions();
   pull.begin(10, 10);
@@ -115,13 +115,13 @@ it("a worker that fails leaves the cage as it was and says so", async () => {
   expect([engine.cagePositions(), pull.active()]).toEqual([before, false]);
 });
 
-it("a pull that another cage overtakes leaves that cage alone", async () => {
+it("a pull does not change a cage that has been replaced", async () => {
   const { pull, asked, engine, ctx, problems } = page();
   pull.begin(10, 10);
   const { positions, corners } = cageOf(2, 9);
   engine.setCage(positions, corners);
   const other = engine.cagePositions();
-  asked.at(-1)?.reject(Object.assign(new Error("there is another cage by now"), { name: "Cancelled" }));
+  asked.at(-1)?.reject(Object.assign(new Error("the cage was replaced"), { name: "Cancelled" }));
   await settled();
   expect([engine.cagePositions(), ctx.history.undoLabel, problems]).toEqual([other, undefined, []]);
 });

@@ -28,7 +28,7 @@ function page(canCompare = true) {
   return { ...fake, view, scenes, zooms, elements };
 }
 
-it("the theme follows the system unless it is chosen", () => {
+it("the theme follows the system unless one is chosen", () => {
   const { view, scenes, store } = page();
   view.theme("auto");
   view.theme("light");
@@ -36,7 +36,7 @@ it("the theme follows the system unless it is chosen", () => {
   expect(store.get().theme).toBe("light");
 });
 
-it("of slices that a slider asks for, the last one is computed", async () => {
+it("only the last slice that a slider requests is computed", async () => {
   vi.useFakeTimers();
   const { view, asked, store } = page();
   view.slice({}, "kinds");
@@ -51,7 +51,7 @@ it("of slices that a slider asks for, the last one is computed", async () => {
   expect(store.get().slice.busy).toBe(false);
 });
 
-it("a slice that fails is said, and waits for nothing", async () => {
+it("a failed slice is reported and ends the busy state", async () => {
   vi.useFakeTimers();
   const { view, asked, store, problems } = page();
   view.slice({}, "value");
@@ -62,21 +62,21 @@ it("a slice that fails is said, and waits for nothing", async () => {
   expect([store.get().slice.busy, problems[0]?.title]).toEqual([false, "The slice could not be computed"]);
 });
 
-it("pictures side by side hold a smaller model each, and go when there is nothing to compare", async () => {
+it("side-by-side views shrink the model and end with the comparison", async () => {
   const { view, store, zooms } = page();
   await view.compare(["harmonic", "green"]);
   await view.compare(["harmonic", "green"]);
   expect([store.get().scene.compare, zooms]).toEqual([["harmonic", "green"], [0.6]]);
   await view.compare(["harmonic", "mean_value", "green"]);
   await view.compare(["green"]);
-  expect(store.get().scene.compare, "one alone is no comparison").toEqual(["harmonic"]);
+  expect(store.get().scene.compare, "a single kind ends the comparison").toEqual(["harmonic"]);
   expect(zooms.reduce((all, zoom) => all * zoom)).toBeCloseTo(1);
   const other = page(false);
   await other.view.compare(["harmonic", "green"]);
   expect(other.store.get().scene.compare).toEqual(["harmonic"]);
 });
 
-it("pulling takes single vertices, whatever was selected while reshaping", () => {
+it("pulling selects vertices whatever element was used for reshaping", () => {
   const { view, store, elements } = page();
   store.set({ editingRest: true });
   view.element("face");
@@ -89,7 +89,7 @@ it("pulling takes single vertices, whatever was selected while reshaping", () =>
   expect(elements.at(-1)).toBe("vertex");
 });
 
-it("proportional editing stays within its range and keeps its radius", () => {
+it("the proportional radius is clamped and remembered", () => {
   const { view, store } = page();
   view.proportional(true, 7);
   view.proportional(false);

@@ -4,7 +4,7 @@ import type { NamedFile } from "../../src/contract";
 import type { Entry } from "../../src/works/entry";
 import { cageOf, createFake, MODEL } from "../fake";
 
-/** What the browser keeps. */
+/** Simulated browser storage. */
 const kept = new Map<string, { entry: Entry; file: Uint8Array | undefined }>();
 const disk: { error: Error | undefined } = { error: undefined };
 let held: string[] = [];
@@ -64,7 +64,7 @@ const entryOf = (id: string, when = Date.now()): Entry => ({ id, name: `${id}.ob
 const keep = (id: string, when?: number) =>
   kept.set(id, { entry: entryOf(id, when), file: Uint8Array.of(1) });
 
-it("work is kept once it rests, and not while something is under way", async () => {
+it("work is saved after a pause, and not during an operation", async () => {
   const { works, store } = page();
   store.set({ gesture: "Move" });
   works.touch();
@@ -78,7 +78,7 @@ it("work is kept once it rests, and not while something is under way", async () 
   expect([kept.size, store.get().works[0]?.where]).toEqual([1, "here"]);
 });
 
-it("another model keeps the one before, one click away", async () => {
+it("opening another model saves the previous work and offers it", async () => {
   const { works, store, said } = page();
   await works.flush();
   works.leave();
@@ -91,7 +91,7 @@ it("another model keeps the one before, one click away", async () => {
   ]);
 });
 
-it("a full disk is said once, with what to do", async () => {
+it("a full disk is reported once, with a remedy", async () => {
   const { works, said } = page();
   disk.error = new DOMException("full", "QuotaExceededError");
   works.touch();
@@ -101,7 +101,7 @@ it("a full disk is said once, with what to do", async () => {
   expect(said).toEqual([expect.stringMatching(/no room left .* Save a project file/)]);
 });
 
-it("what this tab had open comes back; of several others the visitor chooses", async () => {
+it("work of this tab is restored; with several others, the user chooses", async () => {
   const { works, opened, said, store } = page();
   keep("a");
   keep("b");
@@ -115,7 +115,7 @@ it("what this tab had open comes back; of several others the visitor chooses", a
   ]);
 });
 
-it("work that another tab has open is opened as a copy", async () => {
+it("work open in another tab is opened as a copy", async () => {
   const { works, opened } = page();
   keep("a");
   held = ["a"];
@@ -123,7 +123,7 @@ it("work that another tab has open is opened as a copy", async () => {
   expect([opened, held, own]).toEqual([["a.cagework.glb"], ["a"], null]);
 });
 
-it("damaged work is deleted, and a sentence says so", async () => {
+it("damaged work is deleted and reported", async () => {
   const { works, said, opened } = page();
   kept.set("a", { entry: entryOf("a"), file: undefined });
   expect(await works.open({ ...entryOf("a"), where: "nowhere" })).toBe(false);
@@ -134,7 +134,7 @@ it("damaged work is deleted, and a sentence says so", async () => {
   ]);
 });
 
-it("work of more than 30 days ago goes, unless a tab has it", async () => {
+it("work older than 30 days is deleted unless a tab has it open", async () => {
   const { works, store } = page();
   const old = Date.now() - 31 * 24 * 3600 * 1000;
   keep("old", old);

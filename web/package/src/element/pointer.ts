@@ -36,7 +36,7 @@ export function attachPointer(
     },
     interrupt: () => release(false),
   });
-  /** Selects the handle under the pointer and starts to drag it. Returns false if there is none. */
+  /** Selects the handle under the pointer and starts to drag it. Returns false if it misses. */
   const hold = (engine: Engine, event: PointerEvent): boolean => {
     const { x, y } = last;
     const radius = event.pointerType === "touch" ? TOUCH_RADIUS : MOUSE_RADIUS;
