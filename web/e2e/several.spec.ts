@@ -153,7 +153,7 @@ test("a body, its shirt and a buckle are dropped, told apart, undone, exported a
 
   await test.step("the shirt is taken out, and comes back", async () => {
     await step(page, "Model");
-    await press(page, "Take shirt.glb out of the cage");
+    await press(page, "Remove shirt.glb from the cage");
     await expect(rows(page)).toHaveCount(2);
     await bound(page);
     expect((await modelPositions(page)).length / 3).toBe(SIZES.body + SIZES.buckle);

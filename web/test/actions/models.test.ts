@@ -191,7 +191,7 @@ it("removing a model is one step; pins keep their model numbers", async () => {
   const pins = [{ triangle: 120, bary: [1, 0, 0] as [number, number, number] }];
   store.set({ pins, bound: true });
   expect(await models.bin(0)).toBe(true);
-  expect([names(), ctx.history.undoLabel]).toEqual([["shirt.glb"], "Take body.glb out"]);
+  expect([names(), ctx.history.undoLabel]).toEqual([["shirt.glb"], "Remove body.glb"]);
   expect(store.get()).toMatchObject({ pins, bound: false });
   await ctx.history.undo();
   expect(names()).toEqual(["body.glb", "shirt.glb"]);
@@ -202,13 +202,13 @@ it("removing a model during a cage check is one step; undo restores only the mod
   const looked = holdLooks();
   const binned = models.bin(1);
   await settled();
-  expect([names(), ctx.history.undoLabel]).toEqual([["body.glb"], "Take shirt.glb out"]);
+  expect([names(), ctx.history.undoLabel]).toEqual([["body.glb"], "Remove shirt.glb"]);
   const undone = ctx.history.undo();
   await settled();
   expect(names()).toEqual(["body.glb", "shirt.glb"]);
   looked();
   await Promise.all([binned, undone]);
-  expect([ctx.history.undoLabel, ctx.history.redoLabel]).toEqual(["Add a model", "Take shirt.glb out"]);
+  expect([ctx.history.undoLabel, ctx.history.redoLabel]).toEqual(["Add a model", "Remove shirt.glb"]);
 });
 
 it("a model added while a cage is generated restarts it around all models", async () => {

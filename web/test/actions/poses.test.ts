@@ -23,7 +23,7 @@ it("saving, renaming and deleting a pose are undo steps", async () => {
   expect([pose.name, store.get().shares, said]).toEqual([
     "Pose 1",
     [1],
-    ['Saved as "Pose 1": it is the rest pose.'],
+    ['Saved as "Pose 1". It is the rest pose.'],
   ]);
   poses.rename(pose, " Wave ");
   poses.rename(pose, "  ");
