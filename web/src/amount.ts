@@ -1,6 +1,6 @@
-/** Amounts typed while something is moved. */
+/** Numbers typed during a gesture. */
 
-/** The typed amount after a key: digits, one point, a sign that any minus turns, backspace. */
+/** The text after a key press: digits append, one point is allowed, minus toggles the sign, Backspace deletes. */
 export function nextAmount(typed: string, key: string): string | undefined {
   if (/^\d$/.test(key)) return typed + key;
   if (key === "." || key === ",") return typed.includes(".") ? typed : `${typed}.`;

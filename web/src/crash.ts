@@ -1,4 +1,4 @@
-/** A panic or memory that ran out in wasm leaves a module whose every call fails: the page is begun anew, and says so. */
+/** Crash recovery. After a panic or out-of-memory in wasm every call of the module fails, so the page restarts. */
 
 import { cageBroken } from "./derived";
 import type { Store } from "./signals";
@@ -6,41 +6,41 @@ import type { AppState } from "./state";
 import { forgetCrash, keepCrash, lastCrash } from "./store";
 import { T } from "./words";
 
-/** What happened, for the page that comes after. */
+/** A crash, stored for the page after the restart. */
 export interface Crash {
-  /** What it happened with, as a sentence. */
+  /** Sentence that says what was open or in progress. */
   readonly during: string;
-  /** For whoever mends it: plain text. */
+  /** Plain text for a bug report. */
   readonly report: string;
 }
 
-/** Whether an error says that the module is of no use any more: a panic (crates/cagework-web/src/lib.rs), or a trap. */
+/** Whether the module is unusable after this error: a panic (crates/cagework-web/src/lib.rs) or a trap. */
 export function isFatal(error: unknown): boolean {
   return error instanceof WebAssembly.RuntimeError || (error instanceof Error && error.name === "Panic");
 }
 
 export interface Crashes {
-  /** Why this page was begun anew, if it was. */
+  /** The crash before this page's start, if any. */
   readonly before: Crash | undefined;
-  /** What is open has been bound and drawn: the next crash is another one. */
+  /** Called when a model is bound and drawn: the next crash then counts as a first one. */
   settled(): void;
 }
 
 /**
- * Waits for a crash. The first one calls `restart`; one more before anything was bound and drawn calls `ask` instead, because
- * what is opened by itself may be the cause and the page would begin anew for ever.
+ * Listens for crashes. The first one calls `restart`. One more before a model is bound and drawn calls `ask`: the work that is
+ * reopened may be the cause, and the page would restart forever.
  */
 export function watchCrashes(store: Store, restart: () => void, ask: (crash: Crash) => void): Crashes {
   const before = lastCrash();
   let isSettled = before === undefined;
   let isDead = false;
   const hear = (error: unknown) => {
-    // A module that has failed once fails with each call.
+    // After the first failure every call fails.
     if (isDead || !isFatal(error)) return;
     isDead = true;
     const during = sayDuring(store.get());
     const crash = { during, report: reportOf(error as Error, during, store.get()) };
-    // Where nothing can be kept, nobody could tell the second crash from the first.
+    // Without storage, a second crash cannot be recognised: ask at once.
     if (keepCrash(crash) && isSettled) restart();
     else ask(crash);
   };
@@ -56,7 +56,7 @@ export function watchCrashes(store: Store, restart: () => void, ask: (crash: Cra
   };
 }
 
-/** What was going on. */
+/** What was open or in progress. */
 export function sayDuring({ busy, model }: Pick<AppState, "busy" | "model">): string {
   if (busy) return T.crash.while(`${busy.charAt(0).toLowerCase()}${busy.slice(1)}`);
   return model ? T.crash.with(model.name) : T.crash.nothing;

@@ -1,4 +1,4 @@
-/** What is chosen before anybody chose anything, and what can be: Rust's. The reasons are there, next to each option. */
+/** Defaults and ranges of options, generated from Rust, which documents the reasons. */
 
 import { BIND_DEFAULTS, type BindOptions } from "@cagework/core/contract/generated";
 
@@ -12,5 +12,5 @@ export {
   SHAPE_FORMATS,
 } from "@cagework/core/contract/generated";
 
-/** What the paper did. */
+/** The published method. */
 export const PAPER_DEFAULTS: BindOptions = { ...BIND_DEFAULTS, method: "classic", solver: "jacobi" };

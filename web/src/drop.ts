@@ -1,4 +1,4 @@
-/** What dropped files are, by their names: a model, a cage, a project, or what the page cannot open. */
+/** Decides from file names what a drop contains: a model, a cage, a project, or nothing that can be opened. */
 
 import { extension, isModel, rankOf } from "@cagework/core/names";
 import { T } from "./words";
@@ -11,11 +11,11 @@ export interface DropPlan {
   kind: DropKind;
   /** Index of the file to open. */
   main?: number;
-  /** Other models, which share its cage, in the order given. */
+  /** Further models for the same cage, in the order given. */
   more?: readonly number[];
-  /** The file that is their cage. */
+  /** The file to use as the cage. */
   second?: number;
-  /** What will happen, as a sentence. */
+  /** Says what will happen. */
   sentence: string;
 }
 
@@ -24,19 +24,19 @@ const CAGE_NAME = /(^|[^a-z])cage([^a-z]|$)/i;
 const CONTROLS_NAME = /(^|[^a-z])controls?([^a-z].*)?\.obj$/i;
 const PROJECT_NAME = /\.cagework\.glb$/i;
 
-/** Says what opening these files means. Files named "...cage..." are cages when another model is among them. */
+/** Plans how to open these files. Next to another model, a file named "...cage..." is the cage. */
 export function planDrop(names: readonly string[]): DropPlan {
   if (names.length === 0) return { kind: "nothing", sentence: T.opening.dropped };
   const project = names.findIndex((name) => PROJECT_NAME.test(name));
   if (project >= 0) {
-    return { kind: "project", main: project, sentence: `Opens the project ${base(names[project])}.` };
+    return { kind: "project", main: project, sentence: T.opening.project(base(names[project])) };
   }
   const [only] = names;
   if (only !== undefined && names.length === 1 && CONTROLS_NAME.test(base(only))) {
     return { kind: "controls", main: 0, sentence: T.opening.asControls(base(only)) };
   }
   const all = names.map((name, index) => ({ name, index })).filter(({ name }) => isModel(name));
-  // Controls come alone, when the cage is there.
+  // A controls file is opened only alone; next to a model it is ignored.
   const plain = all.filter(({ name }) => !CONTROLS_NAME.test(base(name)));
   const models = oneFormatEach(plain.length > 0 ? plain : all);
   const model = models.find(({ name }) => !CAGE_NAME.test(base(name))) ?? models[0];
@@ -52,11 +52,8 @@ export function planDrop(names: readonly string[]): DropPlan {
   const second = models.find((other) => other !== model && CAGE_NAME.test(base(other.name)));
   const more = models.filter((other) => other !== model && !CAGE_NAME.test(base(other.name)));
   const companions = names.length - all.length;
-  const files = companions > 0 ? ` with ${companions} ${companions === 1 ? "file" : "files"}` : "";
-  const what = T.models.several(base(model.name), more.length) + files;
-  const sentence = second
-    ? `Opens ${what} with ${base(second.name)} as ${more.length > 0 ? "their" : "its"} cage.`
-    : `Opens ${what} and makes a cage for ${more.length > 0 ? "all of them" : "it"}.`;
+  const what = T.models.several(base(model.name), more.length);
+  const sentence = T.opening.plan(what, companions, more.length > 0, second && base(second.name));
   return {
     kind: "model",
     main: model.index,
@@ -66,7 +63,7 @@ export function planDrop(names: readonly string[]): DropPlan {
   };
 }
 
-/** Of a model that came in several formats, as downloads do, the one that says most. */
+/** Of a model in several formats, as in many downloads, keeps the one with most information. */
 function oneFormatEach<T extends { readonly name: string }>(models: readonly T[]): T[] {
   const path = (name: string) => name.slice(0, name.length - extension(name).length);
   const isBest = ({ name }: T) =>
@@ -74,7 +71,7 @@ function oneFormatEach<T extends { readonly name: string }>(models: readonly T[]
   return models.filter(isBest);
 }
 
-/** What the page can say while files hover over it: browsers tell how many there are, and types of some. */
+/** Announces the effect of a drop while files hover. Browsers then reveal only the number of files. */
 export function hoverSentence(files: number, hasModel: boolean, onCagePanel: boolean): string {
   if (files > 1) {
     return T.opening.together;

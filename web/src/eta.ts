@@ -1,11 +1,11 @@
-/** How long it will still take, in words. */
+/** Time left, in words. */
 
 import { inUnit } from "./format";
 import { T } from "./words";
 
 export { createEta, type Eta } from "@cagework/core/eta";
 
-/** Time left, rounded as one would say it: never more exact than it can be. */
+/** Time left, rounded to the precision of the estimate. */
 export function timeLeft(ms: number): string {
   if (ms < 1500) return T.eta.second;
   const isShort = ms < 60_000;

@@ -1,15 +1,15 @@
-/** Numbers as people read them, in the language of the page. */
+/** Formats numbers in the language of the page. */
 
 import { MODEL_ENDINGS } from "./defaults";
 
-/** Of the words in words/index.ts. */
+/** Language of the words in words/index.ts. */
 export const LOCALE = "en";
 
 const INTEGER = new Intl.NumberFormat(LOCALE, { maximumFractionDigits: 0 });
 const LIST = new Intl.ListFormat(LOCALE);
 const PLURAL = new Intl.PluralRules(LOCALE);
 
-/** 3 minutes: "3 min". */
+/** 3, "minute" -> "3 min". */
 export function inUnit(value: number, unit: string, maximumFractionDigits = 0): string {
   return new Intl.NumberFormat(LOCALE, {
     style: "unit",
@@ -24,22 +24,22 @@ export function count(value: number): string {
   return INTEGER.format(value);
 }
 
-/** 1 vertex, 2 vertices. */
+/** 1 -> "1 vertex", 2 -> "2 vertices". */
 export function plural(value: number, one: string, many = `${one}s`): string {
   return `${count(value)} ${PLURAL.select(value) === "one" ? one : many}`;
 }
 
-/** ".glb, .obj, and .stl": what may be opened. */
+/** ".glb, .obj, and .stl": the extensions of model files. */
 export function endings(type: "conjunction" | "disjunction"): string {
   return new Intl.ListFormat(LOCALE, { type }).format(MODEL_ENDINGS.map((ending) => `.${ending}`));
 }
 
-/** a, b, and c */
+/** "a, b, and c". */
 export function list(names: readonly string[]): string {
   return LIST.format(names);
 }
 
-/** Bytes in the unit that leaves one to three digits before the point: 1536 -> "1.5 kB". */
+/** Bytes with one to three digits before the point: 1536 -> "1.5 kB". */
 export function bytes(value: number): string {
   const units = ["byte", "kilobyte", "megabyte", "gigabyte", "terabyte"] as const;
   const power = Math.min(units.length - 1, Math.max(0, Math.floor(Math.log10(Math.max(1, value)) / 3)));
@@ -55,7 +55,7 @@ export function duration(ms: number): string {
   return `${inUnit(Math.floor(seconds / 60), "minute")} ${inUnit(seconds % 60, "second")}`;
 }
 
-/** Small or large numbers with three digits: 0.000123 -> "1.23e-4", 0 -> "0". */
+/** Three significant digits, with an exponent for small and large numbers: 0.000123 -> "1.23e-4". */
 export function scientific(value: number): string {
   if (value === 0) return "0";
   const size = Math.abs(value);
@@ -64,18 +64,18 @@ export function scientific(value: number): string {
   return `${Number(mantissa)}e${Number(exponent)}`;
 }
 
-/** A share of one as percent. */
+/** A fraction as percent, clamped to 0 and 100. */
 export function percent(share: number, maximumFractionDigits = 0): string {
   const clamped = Math.min(1, Math.max(0, share));
   return new Intl.NumberFormat(LOCALE, { style: "percent", maximumFractionDigits }).format(clamped);
 }
 
-/** A coordinate as a field shows it, at every scale: five significant digits, no trailing zeros, no minus zero. */
+/** A coordinate for a number field: five significant digits, no trailing zeros, no minus zero. */
 export function coordinate(value: number): string {
   return String(value === 0 ? 0 : Number(value.toPrecision(5)));
 }
 
-/** A file's name without its extension, or both of a project's. */
+/** A file name without its extension; of a project, without both of them. */
 export function stem(name: string): string {
   const base = (name.split(/[\\/]/).at(-1) ?? name).replace(/\.cagework(\.glb)?$/i, "");
   const dot = base.lastIndexOf(".");

@@ -1,4 +1,4 @@
-/** The page: its state, what it shows, and the session that it opens. */
+/** Entry point of the page. */
 
 import { lackOf } from "@cagework/core/session/adapter";
 import { createApp } from "./app";
@@ -27,7 +27,7 @@ function byId(id: string): HTMLElement {
   return element;
 }
 
-/** Not by its link again, which may be the cause. */
+/** Reloads without the link, which may have caused the crash. */
 function restart(): void {
   window.history.replaceState(null, "", location.pathname + location.search);
   location.reload();

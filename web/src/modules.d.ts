@@ -1,4 +1,4 @@
-// Packages without types of their own: what is used of them.
+// Types of packages that ship none; only the parts used here.
 
 declare module "draco3dgltf" {
   const draco: { createEncoderModule(): Promise<unknown> };

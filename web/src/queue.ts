@@ -1,20 +1,20 @@
-/** What takes time, in order: of each kind one after the other. */
+/** Queue of asynchronous jobs: those of one kind run in sequence. */
 
 import type { Job } from "./contract";
 
 export type Kind = "open" | "cage" | "check" | "bind" | "carry" | "compare" | "pull" | "slice" | "lattice";
 
 export interface Queue {
-  /** Runs `work` when the work of its kind that was asked for before has ended. */
+  /** Runs `work` after all earlier work of its kind. */
   add<T>(kind: Kind, work: (signal: AbortSignal) => Promise<T>): Promise<T>;
-  /** The same, and all work of its kind that was asked for before is cancelled. */
+  /** Like `add`, but cancels all earlier work of its kind. */
   replace<T>(kind: Kind, work: (signal: AbortSignal) => Promise<T>): Promise<T>;
-  /** Cancels the work of a kind that runs, and all that waits. */
+  /** Cancels the running and all queued work of a kind. */
   cancel(kind: Kind): void;
 }
 
 interface Line {
-  /** Of the work that has not ended. */
+  /** Controllers of unfinished work. */
   readonly stops: Set<AbortController>;
   last: Promise<unknown>;
 }
@@ -46,13 +46,13 @@ export function createQueue(): Queue {
   return queue;
 }
 
-/** Calls `stop` when the signal is aborted: at once if it already is. */
+/** Calls `stop` when the signal aborts, or at once if it has. */
 export function onAbort(signal: AbortSignal, stop: () => void): void {
   if (signal.aborted) stop();
   else signal.addEventListener("abort", stop, { once: true });
 }
 
-/** A job's result; the job is cancelled by the signal. */
+/** The job's result. The signal cancels the job. */
 export function follow<T>(signal: AbortSignal, job: Job<T>): Promise<T> {
   onAbort(signal, job.cancel);
   return job.done;

@@ -1,15 +1,15 @@
-/** Share links: what is open and how it is posed, in the part of the address that no server ever sees. */
+/** Share links: sample, pose and view in the URL's fragment, which browsers do not send to the server. */
 
 import type { CageControls, CameraView, SceneOptions } from "./contract";
 
-/** What a view shows besides the model. */
+/** What a link contains besides the pose. */
 export interface Seen {
   readonly camera: CameraView;
   readonly selected: readonly number[];
   readonly scene: Partial<SceneOptions>;
 }
 
-/** What a link says of a cage: its controls, and where those inside are. */
+/** Smoothing and controls inside, with their rest positions. */
 export interface SharedControls {
   readonly controls: CageControls;
   /** `[n_inner, 3]` */
@@ -17,21 +17,21 @@ export interface SharedControls {
 }
 
 export interface Shared {
-  /** Identifier of the sample; links hold no files, so only samples can be shared with their pose. */
+  /** Id of the sample. Links contain no files, so only samples can be shared. */
   sample: string;
-  /** How the cage was made, as the page's settings say it. */
+  /** Options of the cage, in the form of the page's settings. */
   cage?: string;
-  /** The pose, as `Engine.encodePose` packs it. */
+  /** The pose, packed by `Engine.encodePose`. */
   pose?: Uint8Array;
   seen?: Seen;
-  /** A smooth surface, and controls inside. */
+  /** Set if the cage is smooth or has controls inside. */
   controls?: SharedControls;
 }
 
-/** Longest fragment read; a pose of 400 cage vertices takes about 3 kB. */
+/** Longest fragment that is read. A pose of 400 cage vertices takes about 3 kB. */
 const LONGEST = 16_384;
 
-/** The fragment of a link, with its #. */
+/** The fragment of a link, including the #. */
 export async function encodeShare(shared: Shared): Promise<string> {
   const fields = new URLSearchParams({ sample: shared.sample });
   if (shared.cage !== undefined) fields.set("cage", shared.cage);
@@ -43,7 +43,7 @@ export async function encodeShare(shared: Shared): Promise<string> {
   return `#${fields}`;
 }
 
-/** What a fragment says; undefined when it is no share link. One that is cut off or cannot be read is an error. */
+/** Decodes a fragment. Undefined if it is not a share link; throws if it is damaged. */
 export async function decodeShare(fragment: string): Promise<Shared | undefined> {
   const fields = new URLSearchParams(fragment.slice(1));
   const sample = fields.get("sample");
@@ -53,7 +53,7 @@ export async function decodeShare(fragment: string): Promise<Shared | undefined>
   const controls = fields.get("controls");
   if (sample === null && pose === null) return undefined;
   if (!sample) throw new Error("it does not say which sample it shows");
-  if (fragment.length > LONGEST) throw new Error(`it is longer than ${LONGEST} letters`);
+  if (fragment.length > LONGEST) throw new Error(`it is longer than ${LONGEST} characters`);
   return {
     sample,
     ...(cage === null ? {} : { cage }),
@@ -71,14 +71,14 @@ async function read(what: string, text: string): Promise<Uint8Array> {
   }
 }
 
-/** Only the outside is looked at here: the engine refuses a camera or a scene that is none. */
+/** Checks the structure only; the engine validates camera and scene. */
 function parse(json: Uint8Array): Seen {
   const seen: Partial<Seen> | null = JSON.parse(new TextDecoder().decode(json));
   if (!seen?.camera || !Array.isArray(seen.selected)) throw new Error("its view cannot be read");
   return { camera: seen.camera, selected: seen.selected, scene: { ...seen.scene } };
 }
 
-/** Only the outside is looked at here too. */
+/** Checks the structure only. */
 function parseControls(json: Uint8Array): SharedControls {
   const said: Partial<SharedControls> | null = JSON.parse(new TextDecoder().decode(json));
   if (!said?.controls || !Array.isArray(said.inner)) throw new Error("its controls cannot be read");
@@ -101,14 +101,14 @@ function unpack(data: Uint8Array): Promise<Uint8Array> {
   return through(data, new DecompressionStream("deflate-raw"));
 }
 
-/** Base 64 with the letters that addresses allow, without padding. */
+/** URL-safe Base64 without padding. */
 export function toBase64Url(data: Uint8Array): string {
   let binary = "";
   for (const byte of data) binary += String.fromCharCode(byte);
   return btoa(binary).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
 }
 
-/** The bytes; throws when the text is not of that alphabet. */
+/** Decodes URL-safe Base64; throws on other characters. */
 export function fromBase64Url(text: string): Uint8Array {
   const binary = atob(text.replaceAll("-", "+").replaceAll("_", "/"));
   return Uint8Array.from(binary, (letter) => letter.charCodeAt(0));

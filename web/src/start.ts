@@ -1,4 +1,4 @@
-/** The first moments of a visit, and what goes on by itself: size, title, autosave, and what to open. */
+/** Start of a visit: canvas size, window title, autosave, and what to open. */
 
 import { isSoftware } from "@cagework/core/session/adapter";
 import { effect, untracked } from "@preact/signals";
@@ -14,7 +14,7 @@ import type { Stage } from "./ui/viewport";
 import { T } from "./words";
 import { hasEntries } from "./works/database";
 
-/** Sharper than this nobody sees, and it costs four times the pixels. */
+/** Limit of the device pixel ratio: higher ratios are hardly visible and cost four times the pixels. */
 const MOST_SHARP = 2;
 
 export interface Start {
@@ -49,10 +49,10 @@ export function startUp({ app, stage, crashes }: Start): void {
   effect(() => {
     const { model, cage, poses, posed, selected, appliedOptions, symmetry } = store.get();
     const { bound, undoLabel, sampleCage, tour } = store.get();
-    // A sample that nobody has touched is no work to come back to.
+    // An unmodified sample is not worth saving.
     const isUntouched = sampleCage && undoLabel === null;
     const isWork = bound && !isUntouched && tour === null;
-    // Each of them is part of the work, or says that some of it has changed.
+    // Reading these keys subscribes to their changes: all of them are part of the work.
     if (isWork && [model, cage, poses, posed, selected, appliedOptions, symmetry])
       untracked(() => app.works.touch());
   });
@@ -73,19 +73,19 @@ export function startUp({ app, stage, crashes }: Start): void {
   });
 }
 
-/** Whether this visit begins with the first sample: no link, and nothing to come back to. */
+/** Whether this visit opens the first sample: no link, and no kept work. */
 export async function isFresh(): Promise<boolean> {
   return location.hash.length <= 1 && !(await hasEntries());
 }
 
-/** A link comes first, then the work of the last visit, then the first sample. */
+/** Opens, in this order of preference, a link, the work of the last visit, or the first sample. */
 async function open(app: App, crash: Crash | undefined): Promise<void> {
   const stop = stopOf(location.hash);
   const link: Link = stop === undefined ? await openShared(app) : { opened: true };
   if (stop !== undefined) await app.tour.start(stop);
   else if (!link.opened) await openFirst(app);
   else void app.works.refresh();
-  // Last, because whatever is opened takes messages away.
+  // Last, because opening clears messages.
   sayDamage(app, link.damage);
   if (crash) {
     const report = { label: T.crash.showReport, run: () => showReport(crash) };
@@ -93,7 +93,7 @@ async function open(app: App, crash: Crash | undefined): Promise<void> {
   }
 }
 
-/** What this tab had open, or the only work there is; else a sample, and the list of what there is to choose from. */
+/** Opens this tab's last work or the only work there is; otherwise a sample, and the list of kept work. */
 async function openFirst(app: App): Promise<void> {
   if (await app.works.restore()) return;
   const { works, samples } = app.store.get();
@@ -107,7 +107,7 @@ interface Link {
   readonly damage?: unknown;
 }
 
-/** Opens what a link shows. Says whether there is something open now, and what is wrong with the link. */
+/** Opens a share link. Returns whether a model is open now, and the damage of the link. */
 async function openShared(app: App): Promise<Link> {
   let opened = false;
   try {

@@ -1,4 +1,4 @@
-/** Small things that the browser keeps: the theme, notices that were read, and why the page was begun anew. Nothing leaves it. */
+/** Small items in browser storage: theme, closed notices, last stop of the tour, and the last crash. */
 
 import type { Crash } from "./crash";
 
@@ -8,7 +8,7 @@ const TOUR = "cagework.tour";
 
 const CRASH = "cagework.crash";
 
-/** Keeps what happened for the page that comes after in this tab; whether that was possible. */
+/** Stores a crash for the page after the restart in this tab. Returns false if storage is unavailable. */
 export function keepCrash(crash: Crash): boolean {
   try {
     sessionStorage.setItem(CRASH, JSON.stringify(crash));
@@ -18,7 +18,7 @@ export function keepCrash(crash: Crash): boolean {
   }
 }
 
-/** What happened to the page before in this tab. */
+/** The crash stored by the previous page in this tab. */
 export function lastCrash(): Crash | undefined {
   try {
     const { during, report } = JSON.parse(sessionStorage.getItem(CRASH) ?? "{}");
@@ -32,7 +32,7 @@ export function forgetCrash(): void {
   try {
     sessionStorage.removeItem(CRASH);
   } catch {
-    // Storage is forbidden: nothing was kept.
+    // Storage is forbidden, so nothing was stored.
   }
 }
 
@@ -48,7 +48,7 @@ export function saveTheme(theme: Theme): void {
   writeItem(THEME, theme);
 }
 
-/** Whether a notice has been read and closed. */
+/** Whether a notice has been closed. */
 export function hasSeen(notice: string): boolean {
   return readItem(SEEN + notice) !== null;
 }
@@ -57,7 +57,7 @@ export function markSeen(notice: string): void {
   writeItem(SEEN + notice, "yes");
 }
 
-/** The stop of the tour that was open last, from 0. */
+/** The last stop of the tour, from 0. */
 export function loadStop(): number {
   return Number(readItem(TOUR)) || 0;
 }
@@ -70,7 +70,7 @@ function writeItem(key: string, value: string): void {
   try {
     localStorage.setItem(key, value);
   } catch {
-    // Storage is forbidden or full: it holds until the page is closed.
+    // Storage is forbidden or full: the value is lost when the page closes.
   }
 }
 

@@ -1,23 +1,23 @@
-/** Sentences that come from Rust, and errors as the page says them. */
+/** Turns messages and errors from Rust into sentences. */
 
 import type { ErrorName } from "./contract";
 import { T } from "./words";
 
-/** A sentence from Rust starts lower case and may lack its full stop. */
+/** Capitalises a message from Rust and adds a full stop if it is missing. */
 export function sentence(text: string): string {
   const trimmed = text.trim();
   if (trimmed === "") return T.somethingWrong;
-  // Names of files keep their letters.
+  // File names keep their case.
   const isName = /^\S*\.\w/.test(trimmed);
   const first = isName ? trimmed : trimmed.charAt(0).toUpperCase() + trimmed.slice(1);
   return /[.!?:]$/.test(first) ? first : `${first}.`;
 }
 
 export interface Explained {
-  /** Headline: what did not work. */
+  /** Headline: what failed. */
   title: string;
   message: string;
-  /** What the page can do about it. */
+  /** A remedy that the page offers. */
   fix?: "coarser" | "fewer" | "cpu" | "file" | "add" | "regenerate" | "reload";
 }
 
@@ -34,7 +34,7 @@ const FIXES: Readonly<Partial<Record<ErrorName | "Empty", NonNullable<Explained[
   DeviceLost: "reload",
 };
 
-/** An error as the page says it. */
+/** An error with headline, message and remedy. */
 export function explain(error: unknown, title: string): Explained {
   const name = error instanceof Error ? error.name : "";
   const message = sentence(error instanceof Error ? error.message : String(error));
@@ -42,7 +42,7 @@ export function explain(error: unknown, title: string): Explained {
   return fix ? { title, message, fix } : { title, message };
 }
 
-/** Whether an error only says that the user cancelled. */
+/** Whether an error only means that the user cancelled. */
 export function isCancelled(error: unknown): boolean {
   return error instanceof Error && error.name === "Cancelled";
 }

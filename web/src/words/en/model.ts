@@ -58,6 +58,13 @@ export const opening = {
   dropped: "Nothing was dropped.",
   kinds: `Cagework opens ${endings("conjunction")} files.`,
   companions: "These files belong to a .gltf or .obj file. Drop that file together with them.",
+  project: (name: string) => `Opens the project ${name}.`,
+  plan: (models: string, companions: number, several: boolean, cage: string | undefined) => {
+    const what = companions > 0 ? `${models} with ${plural(companions, "file")}` : models;
+    return cage
+      ? `Opens ${what} with ${cage} as ${several ? "their" : "its"} cage.`
+      : `Opens ${what} and makes a cage for ${several ? "all of them" : "it"}.`;
+  },
   damagedPose: "The pose in this project is damaged; it opens at rest.",
   dropTo: {
     page: "Drop to open",
