@@ -40,7 +40,7 @@ export interface Fake {
   readonly problems: (Explained & { fix?: Fix["label"] })[];
   /** Kinds of coordinates that the engine has computed. */
   readonly others: string[];
-  /** Log of engine calls without state, by name. */
+  /** Names of engine calls that the fake only records. */
   readonly calls: string[];
   /** Replaces a function of the engine. */
   teach(functions: Partial<Engine>): void;

@@ -8,7 +8,7 @@ import { createPool } from "./pool";
 import type { Package } from "./session/artifact";
 import { type Client, named } from "./session/client";
 import type { JobKind, Jobs } from "./session/messages";
-import type { Api, Cage, File, Follow, Named, Weights } from "./types";
+import type { Api, Cage, CallOptions, File, Named, Weights } from "./types";
 
 /** The initialised module on this thread, and a way to open workers. */
 export interface Runtime {
@@ -19,7 +19,7 @@ export interface Runtime {
   readonly hasGpu: boolean;
 }
 
-const FOLLOWED: Required<{ [K in keyof Follow]: null }> = { signal: null, onProgress: null };
+const CALL_OPTIONS: Required<{ [K in keyof CallOptions]: null }> = { signal: null, onProgress: null };
 
 export function createApi(open: () => Promise<Runtime>): Api {
   const runtime = once(open);
@@ -31,7 +31,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
    * Runs a job in a worker. An abort rejects at once, even while the job is queued or the module loads; so does an error thrown
    * by `onProgress`.
    */
-  const run = <K extends JobKind>(job: K, input: Jobs[K]["input"], { signal, onProgress }: Follow) =>
+  const run = <K extends JobKind>(job: K, input: Jobs[K]["input"], { signal, onProgress }: CallOptions) =>
     new Promise<Jobs[K]["output"]>((resolve, reject) => {
       const ended = new AbortController();
       const giveUp = (reason: unknown) => {
@@ -61,7 +61,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
 
   return {
     async bind(points, cage, options = {}) {
-      requireKnown(options, FOLLOWED, BIND_ON_CPU);
+      requireKnown(options, CALL_OPTIONS, BIND_ON_CPU);
       const input = {
         positions: pointsOf("points", points),
         extra: 0,
@@ -74,7 +74,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
       return { weights: { ...arrays, controls: input.cage.positions.length / 3 }, report };
     },
     async generateCage(mesh, options = {}) {
-      requireKnown(options, FOLLOWED, CAGE_DEFAULTS);
+      requireKnown(options, CALL_OPTIONS, CAGE_DEFAULTS);
       const positions = pointsOf("positions", mesh.positions);
       const triangles = trianglesOf("triangles", mesh.triangles);
       const asked = optionsOf(CAGE_DEFAULTS, options);
@@ -102,7 +102,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
     },
     async reshape(model, cage, posed, options = {}) {
       const { dynamic: _, ...rigs } = RIG_DEFAULTS;
-      requireKnown(options, FOLLOWED, { name: null }, BIND_ON_CPU, rigs);
+      requireKnown(options, CALL_OPTIONS, { name: null }, BIND_ON_CPU, rigs);
       const arrays = cageOf(cage);
       const input = {
         files: [fileOf(model, options)],
@@ -116,7 +116,7 @@ export function createApi(open: () => Promise<Runtime>): Api {
       return (await run("reshape", input, options)) as Uint8Array<ArrayBuffer>;
     },
     async readModel(model, options = {}) {
-      requireKnown(options, FOLLOWED, { name: null, states: null, clip: null });
+      requireKnown(options, CALL_OPTIONS, { name: null, states: null, clip: null });
       const { states = false, clip } = options;
       return run("model", { files: [fileOf(model, options)], states, clip }, options);
     },

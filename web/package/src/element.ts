@@ -180,7 +180,7 @@ export class CageDeformer extends Base {
         this.#resize();
       },
       () => {
-        // The next src tries again.
+        // Setting src again opens another view.
         if (this.#view === opening) this.#view = undefined;
       },
     );

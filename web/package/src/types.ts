@@ -13,7 +13,7 @@ import type {
 import type { Reading } from "./contract/work";
 
 /** Options of every long call. */
-export interface Follow {
+export interface CallOptions {
   /** Cancels the call at once; the promise is rejected with the signal's reason. */
   readonly signal?: AbortSignal | undefined;
   readonly onProgress?: ((progress: Progress | Reading) => void) | undefined;
@@ -23,12 +23,12 @@ export interface Follow {
  * Origin to which 32-bit positions are relative, `[3]`, object units. It is not zero for models far from the world's origin,
  * such as those in map coordinates. A model, its cage, poses and points must have the same origin. Default `[0, 0, 0]`.
  */
-export interface Placed {
+export interface WithOrigin {
   readonly origin?: ArrayLike<number> | undefined;
 }
 
 /** Vertices `[n, 3]` in object units, and triangles `[n, 3]`, flattened. */
-export interface Mesh extends Placed {
+export interface Mesh extends WithOrigin {
   readonly positions: ArrayLike<number>;
   readonly triangles: ArrayLike<number>;
 }
@@ -41,7 +41,7 @@ export interface ModelMesh extends Mesh {
 }
 
 /** A closed mesh of polygons. */
-export interface Cage extends Placed {
+export interface Cage extends WithOrigin {
   /** Vertices `[n_cage, 3]`, object units. A pose is another array of this length. */
   readonly positions: ArrayLike<number>;
   /** For each face, the number of its corners and then its vertices, counter-clockwise seen from outside. */
@@ -88,26 +88,29 @@ export interface Named {
  * `states`: append the vertices of each morph target and, with the name of a `clip`, of its frames, for a cage that encloses
  * them all.
  */
-export interface ReadAsked extends Follow, Named {
+export interface ReadCallOptions extends CallOptions, Named {
   readonly states?: boolean | undefined;
   readonly clip?: string | undefined;
 }
 
-export type BindAsked = Follow & Partial<BindOptions>;
-export type CageAsked = Follow & Partial<CageOptions>;
+export type BindCallOptions = CallOptions & Partial<BindOptions>;
+export type CageCallOptions = CallOptions & Partial<CageOptions>;
 /** `plain`: export the shape without its rig. */
-export type ReshapeAsked = Follow & Named & Partial<BindOptions> & Partial<Omit<RigOptions, "dynamic">>;
+export type ReshapeCallOptions = CallOptions &
+  Named &
+  Partial<BindOptions> &
+  Partial<Omit<RigOptions, "dynamic">>;
 
 /** The functions that index.ts exports and documents. */
 export interface Api {
-  bind(points: ArrayLike<number>, cage: Cage, options?: BindAsked): Promise<Bound>;
-  generateCage(mesh: Mesh, options?: CageAsked): Promise<GeneratedCage>;
+  bind(points: ArrayLike<number>, cage: Cage, options?: BindCallOptions): Promise<Bound>;
+  generateCage(mesh: Mesh, options?: CageCallOptions): Promise<GeneratedCage>;
   deform(weights: Weights, posed: ArrayLike<number>): Promise<Float32Array>;
   reshape(
     model: File,
     cage: Cage,
     posed: ArrayLike<number>,
-    options?: ReshapeAsked,
+    options?: ReshapeCallOptions,
   ): Promise<Uint8Array<ArrayBuffer>>;
-  readModel(model: File, options?: ReadAsked): Promise<ModelMesh>;
+  readModel(model: File, options?: ReadCallOptions): Promise<ModelMesh>;
 }

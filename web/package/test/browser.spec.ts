@@ -7,7 +7,7 @@ import { WITH_WEBGL, WITH_WEBGPU } from "../../e2e/browser";
 import type { CageDeformer } from "../src/element";
 import type { Bound } from "../src/types";
 
-/** Screenshots, for a look by eye. */
+/** Screenshots for visual inspection. */
 const SCREENS = join(import.meta.dirname, "../../../target/screens");
 /** Rounding of 32-bit sums, over the model's size. */
 const ROUNDING = 1e-6;
@@ -66,7 +66,7 @@ for (const [how, address] of [
     const page = await visit("webgl", address);
     await page.waitForFunction(() => "weights" in globalThis);
     const rest = await page.evaluate(() => Array.from((globalThis as unknown as Example).posed.array));
-    // Wait a frame for the camera's matrices.
+    // The first frame sets the camera's matrices.
     await page.waitForTimeout(200);
     const place = await page.evaluate(() => {
       const { camera, posed } = globalThis as unknown as Example;

@@ -150,7 +150,7 @@ export function keyOf(event: KeyPress): string {
   const numpad = /^Numpad(\d)$/.exec(event.code)?.[1];
   const typed = event.key.toLowerCase();
   const key = numpad ?? ((event.altKey || mod) && place ? place.toLowerCase() : typed);
-  // Signs such as "?" already need Shift on most keyboards.
+  // Omit Shift for signs such as "?", which need it on most keyboards.
   const sign = key.length === 1 && !/[a-z0-9 ]/.test(key);
   return `${event.shiftKey && !sign ? "shift+" : ""}${mod ? "mod+" : ""}${event.altKey ? "alt+" : ""}${key}`;
 }

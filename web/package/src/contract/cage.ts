@@ -26,7 +26,7 @@ export interface Check {
   readonly outside: Uint32Array;
 }
 
-/** A cage and the result of its check; null if it has not been checked. */
+/** A cage with the result of its check; `check` is null before it. */
 export interface CheckedCage extends CageArrays {
   readonly check: Check | null;
   /** For a generated cage: the number of separate parts of the model that it joins. */

@@ -29,7 +29,7 @@ export function createFrames(): Frames {
     if (stopped) return;
     clearTimeout(quiet);
     if (!asked) requestAnimationFrame(frame);
-    // A request without delay takes precedence; the frame is sharpened later.
+    // A normal request takes precedence over sharpening, which follows later.
     asked = asked === "soon" ? asked : how;
   };
   const sharpen = () => {

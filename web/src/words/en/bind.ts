@@ -64,7 +64,7 @@ export const bind = {
   iterationsLogarithmic: "iterations, logarithmic",
   doneBelow: "converged below this",
   plot: (reached: string) => `Change per iteration, logarithmic${reached && `: ${reached}`}`,
-  beside: "Earlier binds in comparison",
+  beside: "Comparison with earlier binds",
   all: "Binds of this cage",
   columns: ["Bind", "Time", "Rest error"],
   place: "Computed on",

@@ -62,7 +62,7 @@ export const cage = {
   clear: "Delete all",
   openControls: "From a file",
   moveThem: (key: string) =>
-    `Drag them like cage vertices. While the cage is reshaped (${key} in the view) this moves where they are; otherwise it poses the model.`,
+    `Drag them like cage vertices. While you reshape the cage (${key} in the view), dragging moves their rest position; otherwise it poses the model.`,
   shape: "Shape it",
   reshape: "Reshape the cage",
   reshapeSentence: (key: string) =>
