@@ -1,5 +1,5 @@
-//! Poses of a cage for what the model should do: points of it are pulled, or it is fitted to a target; and parts of it that the
-//! cage does not bend.
+//! Inverse posing: solves for the cage that brings points of the model to given places, and holds parts of the model
+//! rigid or in place while the cage bends the rest.
 //!
 //! No I/O, no GPU, no JavaScript; everything here compiles for `wasm32-unknown-unknown`.
 
@@ -8,7 +8,7 @@ pub mod pull;
 
 pub use parts::Parts;
 
-/// The example of the README.
+/// Compiles the README's example.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,6 +1,6 @@
-//! Parts of a model that the cage does not bend: what stays where it is, and pieces that keep their shape.
+//! Parts of a model that the cage does not bend: vertices that stay in place and rigid pieces.
 //!
-//! Both change how far a point moves, so they work after any deformation, of vertices as of states of a morph target.
+//! Both are functions of displacements, so they apply after any deformation, to vertices and to morph targets.
 
 mod bound;
 
@@ -13,34 +13,34 @@ use cagework_core::rotation::nearest_rotation;
 
 pub use bound::{BoundParts, PieceMotion, hold_parts};
 
-/// Share of a piece's size that stands still in all directions when its turn is looked for: where the piece itself does not say
-/// (a line does not, about itself), it turns as little as it can.
-const UNTURNED: f64 = 1e-9;
+/// Multiple of the identity that is added to a piece's covariance, over its trace. It fixes the rotation where the
+/// points do not determine one: a line does not rotate about itself.
+const IDENTITY_WEIGHT: f64 = 1e-9;
 
-/// What of a model the cage does not bend.
+/// Vertices that do not follow the cage.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parts {
-    /// How much of each vertex stays where it is, 0 to 1. `[n_vertices]`, or empty where all follow.
+    /// Share of each vertex's displacement that is suppressed, 0 to 1. `[n_vertices]`, or empty if all vertices follow the cage.
     pub stays: Vec<f32>,
-    /// Vertices of each piece that keeps its shape: a buckle, an eye, a tooth. See [`pieces`].
+    /// Vertices of each rigid piece: a buckle, an eye, a tooth. [`pieces`] finds them in a selection.
     pub rigid: Vec<Vec<u32>>,
 }
 
-/// How a rigid piece moves: `x` to `x + turn (x - centre) - (x - centre) + shift`.
+/// Displacement field of a rigid motion: `x` moves by `turn (x - centre) + shift`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     centre: DVec3,
-    /// A rotation, less the identity.
+    /// Rotation minus identity.
     turn: DMat3,
     shift: DVec3,
 }
 
 impl Motion {
-    /// The rigid motion that leaves the least squares between where points are and where they should go (Kabsch 1976).
-    /// Each is where it is, and how far it should go; not none.
+    /// The rigid motion nearest to the given displacements in least squares (Kabsch 1976). `points`: `(position,
+    /// displacement)` pairs; must not be empty.
     #[must_use]
     pub fn of(points: &[(DVec3, DVec3)]) -> Self {
-        // At rest nothing is rounded.
+        // No displacement: return exactly zero, without rounding.
         if points.iter().all(|(_, by)| *by == DVec3::ZERO) {
             return Self { centre: DVec3::ZERO, turn: DMat3::ZERO, shift: DVec3::ZERO };
         }
@@ -55,35 +55,35 @@ impl Motion {
         Self::from_sums(centre, shift, at_rest, moved)
     }
 
-    /// A rotation about a point, which itself goes by `shift`.
+    /// Rotation about `centre`, which itself moves by `shift`.
     #[must_use]
     pub fn about(centre: DVec3, rotation: DMat3, shift: DVec3) -> Self {
         Self { centre, turn: rotation - DMat3::IDENTITY, shift }
     }
 
-    /// The same from what is summed: `centre` of the points and their mean `shift`; sums of `from from^T` and of `by from^T`, where
-    /// `from` is a point's place from the centre and `by` how far it moves.
+    /// Kabsch's rotation from sums over the points: `centre`, their mean; `shift`, their mean displacement; `at_rest`, the sum of
+    /// `from from^T`; `moved`, the sum of `by from^T`, with `from` the position minus the centre and `by` the displacement.
     fn from_sums(centre: DVec3, shift: DVec3, at_rest: DMat3, moved: DMat3) -> Self {
         let size = at_rest.x_axis.x + at_rest.y_axis.y + at_rest.z_axis.z;
         let rotation =
-            nearest_rotation(at_rest + moved + DMat3::from_diagonal(DVec3::splat(UNTURNED * size)));
+            nearest_rotation(at_rest + moved + DMat3::from_diagonal(DVec3::splat(IDENTITY_WEIGHT * size)));
         Self { centre, turn: rotation - DMat3::IDENTITY, shift }
     }
 
-    /// As [`PieceMotion`].
+    /// The motion as three rows, see [`PieceMotion`].
     fn rows(&self) -> PieceMotion {
         let at_origin = self.by(DVec3::ZERO);
         let rows = self.turn.transpose();
         [0, 1, 2].map(|axis| rows.col(axis).extend(at_origin[axis]).as_vec4())
     }
 
-    /// How far it moves a point.
+    /// Displacement of a point.
     #[must_use]
     pub fn by(&self, at: DVec3) -> DVec3 {
         self.turn * (at - self.centre) + self.shift
     }
 
-    /// The same as a transform.
+    /// The motion as an affine transform.
     #[must_use]
     pub fn transform(&self) -> DMat4 {
         DMat4::from_mat3_translation(DMat3::IDENTITY + self.turn, self.by(DVec3::ZERO))
@@ -96,19 +96,19 @@ fn outer(a: DVec3, b: DVec3) -> DMat3 {
 }
 
 impl Parts {
-    /// Whether everything follows the cage.
+    /// Whether all vertices follow the cage.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.stays.is_empty() && self.rigid.is_empty()
     }
 
-    /// How far vertices move where they would move `by`. `rest`, `by`: `[n_vertices]`, object units. Exactly zero where a vertex
-    /// stays whole, and for a piece whose vertices do not move.
+    /// The constrained displacement field, for vertices at `rest` that the cage displaces by `by`, `[n_vertices]`,
+    /// object units. A fully fixed vertex, and a rigid piece without displacements, move by exactly zero.
     ///
     /// # Panics
-    /// If a vertex is none of `rest`, or there is not one displacement for each.
+    /// If a piece has a vertex outside `rest`, or the lengths differ.
     #[must_use]
-    pub fn held(&self, rest: &[DVec3], by: &[DVec3]) -> Held {
+    pub fn held(&self, rest: &[DVec3], by: &[DVec3]) -> HeldMotion {
         assert!(rest.len() == by.len(), "one displacement per vertex");
         assert!(self.stays.is_empty() || self.stays.len() == rest.len(), "one amount per vertex");
         let motion_of = |piece: &Vec<u32>| {
@@ -116,14 +116,14 @@ impl Parts {
             Motion::of(&points)
         };
         let pieces = self.rigid.iter().zip(0..).flat_map(|(piece, k)| piece.iter().map(move |&v| (v, k)));
-        Held {
+        HeldMotion {
             motions: self.rigid.iter().map(motion_of).collect(),
             piece_of: pieces.collect(),
             stays: self.stays.clone(),
         }
     }
 
-    /// Deformed positions with what stays and what is rigid. `rest`, `deformed`: `[n_vertices]`.
+    /// Deformed positions with fixed vertices and rigid pieces put right. `rest`, `deformed`: `[n_vertices]`, object units.
     ///
     /// # Panics
     /// As [`Self::held`].
@@ -143,27 +143,27 @@ impl Parts {
     }
 }
 
-/// [`Parts`] of one deformation.
+/// [`Parts`] applied to one deformation: a rigid motion for each piece.
 #[derive(Clone, Debug)]
-pub struct Held {
+pub struct HeldMotion {
     motions: Vec<Motion>,
     piece_of: HashMap<u32, usize>,
     stays: Vec<f32>,
 }
 
-impl Held {
-    /// Whether a vertex moves in another way than the cage says.
+impl HeldMotion {
+    /// Whether a vertex moves differently from what the cage gives.
     #[must_use]
     pub fn is_held(&self, vertex: u32) -> bool {
         self.piece_of.contains_key(&vertex) || self.stays.get(vertex as usize).is_some_and(|&s| s > 0.0)
     }
 
-    /// How far a state of a vertex moves that is `at` a place and would move `by`.
+    /// Constrained displacement of a vertex, or of a state of it in a morph target, that is at `at` and would move by `by`.
     #[must_use]
     pub fn by(&self, vertex: u32, at: DVec3, by: DVec3) -> DVec3 {
         let by = self.piece_of.get(&vertex).map_or(by, |&piece| self.motions[piece].by(at));
         match self.stays.get(vertex as usize) {
-            // Not even a sign of zero is left.
+            // A literal zero: a product could be -0.
             Some(&stays) if stays >= 1.0 => DVec3::ZERO,
             Some(&stays) if stays > 0.0 => (1.0 - f64::from(stays)) * by,
             _ => by,
@@ -171,17 +171,17 @@ impl Held {
     }
 }
 
-/// The connected pieces of a selection: vertices that triangles of the selection join, or that share a place, as at a seam.
-/// Pieces in order of their first vertex, and their vertices ascending.
+/// Connected pieces of a selection. Vertices are connected by triangles whose corners are all selected, and by equal
+/// positions (seams). Pieces are in order of their first vertex, vertices in ascending order.
 ///
 /// # Panics
-/// If a vertex is none of `positions`.
+/// If a vertex is not in `positions`.
 #[must_use]
 pub fn pieces(positions: &[Vec3], triangles: &[[u32; 3]], selected: &[u32]) -> Vec<Vec<u32>> {
     let mut is_selected = vec![false; positions.len()];
     selected.iter().for_each(|&v| is_selected[v as usize] = true);
     let unique_of = weld(positions).unique_of;
-    // Each place's way to the first place of its piece.
+    // Union-find forest over welded positions; roots are the smallest index of a piece.
     let mut above: Vec<u32> = (0..positions.len() as u32).collect();
     for triangle in triangles.iter().filter(|t| t.iter().all(|&v| is_selected[v as usize])) {
         let [a, b, c] = triangle.map(|v| unique_of[v as usize]);
@@ -203,7 +203,7 @@ pub fn pieces(positions: &[Vec3], triangles: &[[u32; 3]], selected: &[u32]) -> V
     pieces
 }
 
-/// The first place of a piece; the way there is made shorter.
+/// Root of a piece: find with path halving.
 fn top(above: &mut [u32], mut place: u32) -> u32 {
     while above[place as usize] != place {
         above[place as usize] = above[above[place as usize] as usize];
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_piece_keeps_the_lengths_of_its_edges_however_the_cage_bends_it() {
+    fn a_rigid_piece_keeps_its_edge_lengths() {
         let rest = cloud(30);
         let bent = displaced(&rest, |p| DVec3::new(p.y * p.y, 0.5 * p.x, 2.0 * p.z));
         let held = all_rigid(30).hold(&rest, &bent);
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_that_is_rigid_is_found() {
+    fn a_rigid_motion_is_recovered() {
         let rest = cloud(12);
         let turn = DQuat::from_axis_angle(DVec3::new(1.0, -2.0, 0.5).normalize(), 2.5);
         let to = displaced(&rest, |p| turn * p - p + DVec3::new(3.0, -1.0, 0.25));
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn no_other_rotation_leaves_smaller_squares() {
+    fn the_rotation_minimises_squared_distances() {
         let rest = cloud(20);
         let bent = displaced(&rest, |p| DVec3::new(p.y * p.z, p.x * p.x - p.z, -p.y));
         let held = all_rigid(20).hold(&rest, &bent);
@@ -274,26 +274,29 @@ mod tests {
     #[test]
     fn a_line_turns_without_twist_and_a_point_only_moves() {
         let line: Vec<Vec3> = (0..5).map(|k| Vec3::new(k as f32, 0.0, 0.0)).collect();
-        // A quarter about z takes x to y.
+        // A quarter turn about z maps x to y.
         let to: Vec<Vec3> = line.iter().map(|p| Vec3::new(0.0, p.x, 0.0)).collect();
         let at: Vec<DVec3> = line.iter().map(|p| p.as_dvec3()).collect();
         let by: Vec<DVec3> = to.iter().zip(&at).map(|(t, a)| t.as_dvec3() - a).collect();
         let held = all_rigid(5).held(&at, &by);
         let above = DVec3::new(0.0, 0.0, 1.0);
-        assert!(held.by(2, at[2] + above, DVec3::ZERO).distance(by[2]) <= 1e-6, "z stays z");
+        assert!(
+            held.by(2, at[2] + above, DVec3::ZERO).distance(by[2]) <= 1e-6,
+            "the turn is about z, without twist"
+        );
         let point = all_rigid(1).hold(&line[..1], &to[2..3]);
         assert_eq!(point, [to[2]]);
     }
 
     #[test]
-    fn at_rest_everything_stays_to_the_bit() {
+    fn the_rest_pose_is_exact() {
         let rest = cloud(10);
         let parts = Parts { stays: vec![0.5; 10], ..all_rigid(10) };
         assert_eq!(parts.hold(&rest, &rest), rest);
     }
 
     #[test]
-    fn what_stays_is_left_out_by_its_amount() {
+    fn a_fixed_share_reduces_the_displacement() {
         let rest = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let to = [Vec3::Z, Vec3::X + 2.0 * Vec3::Z, Vec3::Y + Vec3::Z];
         let parts = Parts { stays: vec![1.0, 0.25, 0.0], rigid: Vec::new() };
@@ -301,8 +304,8 @@ mod tests {
     }
 
     #[test]
-    fn pieces_hang_together_by_triangles_of_the_selection_and_by_places() {
-        // Two triangles that share a place (2 and 3), one apart, and one that is not selected between them.
+    fn pieces_are_connected_by_selected_triangles_and_equal_positions() {
+        // Two triangles that share a position (2 and 3), a third one apart, and an unselected one that joins them.
         let positions = [0, 1, 2, 2, 3, 4, 5, 6, 7].map(|x| Vec3::new(x as f32, (x * x) as f32, 0.0));
         let triangles = [[0, 1, 2], [3, 4, 5], [6, 7, 8], [5, 6, 7]];
         let found = pieces(&positions, &triangles, &[0, 1, 2, 3, 4, 5, 6, 8]);

@@ -43,7 +43,7 @@ def test_a_mesh_that_is_no_cage_is_refused_with_the_commands_sentence(tmp_path):
         (lambda: cw.bind(POINT * np.nan, CUBE, grid=8), cw.BindError, "mesh vertex 0 is not a finite number"),
         (lambda: cw.bind(POINT, CUBE, grid=512, memory_limit=1 << 20), cw.BindError, "more than the limit of 1 MiB"),
         (lambda: cw.generate_cage(np.zeros((0, 3)), [[0, 0, 0]]), cw.CageError, "model has no vertices"),
-        (lambda: pulled([[0, 1, 2]]), cw.PullError, "there is no vertex 1: they count from 0 to 0"),
+        (lambda: pulled([[0, 1, 2]]), cw.PullError, "there is no vertex 1: indices run from 0 to 0"),
         (lambda: cw.reshape(b"no model", CUBE, CUBE.vertices), cw.ModelError, "model"),
         (lambda: cw.reshape("missing.glb", CUBE, CUBE.vertices), FileNotFoundError, "missing.glb"),
         (lambda: cw.reshape(b"", CUBE, CUBE.vertices, joints="run"), cw.OptionError, "joints is .run"),

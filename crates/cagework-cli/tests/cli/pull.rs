@@ -65,15 +65,18 @@ fn a_job_that_cannot_be_done_says_what_is_wrong_and_writes_nothing() {
         (r#"{"grabs": []}"#, "nothing is grabbed"),
         (
             r#"{"grabs": [{"vertex": 100000, "to": [0, 0, 0]}]}"#,
-            "no vertex of the model 100000: they count from 0 to 177",
+            "no vertex of the model 100000: indices run from 0 to 177",
         ),
         (r#"{"grabs": [{"vertex": -1, "to": [0, 0, 0]}]}"#, "-1"),
         (
             r#"{"grabs": [{"triangle": 5000, "bary": [1, 0, 0], "to": [0, 0, 0]}]}"#,
             "no triangle of the model 5000",
         ),
-        (r#"{"grabs": [{"triangle": 0, "bary": [1, 1, 0], "to": [0, 0, 0]}]}"#, "no point of a triangle"),
-        (r#"{"grabs": [{"cage": 8, "to": [0, 0, 0]}]}"#, "no vertex of the cage 8: they count from 0 to 7"),
+        (
+            r#"{"grabs": [{"triangle": 0, "bary": [1, 1, 0], "to": [0, 0, 0]}]}"#,
+            "not barycentric coordinates",
+        ),
+        (r#"{"grabs": [{"cage": 8, "to": [0, 0, 0]}]}"#, "no vertex of the cage 8: indices run from 0 to 7"),
         (r#"{"grabs": [{"vertex": 0}]}"#, "grab 0 has no target"),
         (r#"{"grabs": [{"to": [0, 0, 0]}]}"#, "one of vertex, triangle"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 1e300, 0]}]}"#, "grab 0 goes to inf"),
@@ -95,7 +98,7 @@ fn a_job_that_cannot_be_done_says_what_is_wrong_and_writes_nothing() {
         format!(r#"{{"grabs": [{{"vertex": 0, "to": [0, 5, 0]}}], "pins": [{pins}]}}"#)
     };
     sandbox.write("job.json", all(200));
-    sandbox.run(PULL).failure().stderr(contains("201 grabs and pins; at most 200"));
+    sandbox.run(PULL).failure().stderr(contains("201 grabs and pins are more than the limit of 200"));
     sandbox.write("job.json", all(178));
     sandbox.run(PULL).success();
     assert!(obj_positions(&sandbox.read("pose.obj")).iter().flatten().all(|x| x.is_finite()));

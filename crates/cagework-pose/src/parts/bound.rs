@@ -1,7 +1,7 @@
-//! Parts of a model that follows its cage, in every frame: what [`Parts`] does once, without looking at every vertex of a piece.
+//! [`Parts`] of a model bound to a cage, evaluated for every frame without a pass over the vertices of the pieces.
 //!
-//! How far a vertex moves is a sum over the controls, so the two sums that the nearest rotation needs (Kabsch 1976) are too: they are
-//! made once for each piece, and a frame costs a few numbers a control however large the piece is.
+//! Displacements are linear in the controls, and so are the two sums from which Kabsch's rotation follows. They are
+//! summed per piece and control once, so a frame costs a few operations per control, whatever the size of the piece.
 
 use glam::{DMat3, DVec3, Vec3, Vec4};
 
@@ -9,39 +9,39 @@ use super::{Motion, Parts, outer};
 use cagework_core::frames::Frames;
 use cagework_core::weights::Weights;
 
-/// What of a bound model the cage does not bend, ready for any pose.
+/// Fixed vertices and rigid pieces of a bound model, ready for any pose.
 #[derive(Clone, Debug)]
 pub struct BoundParts {
-    /// Where each vertex rests, object units, and how much of it stays there, 0 to 1. `[n_vertices]`
+    /// Rest position, object units, and share of the displacement that is suppressed, 0 to 1. `[n_vertices]`
     pub rest: Vec<Vec4>,
-    /// The rigid piece of each vertex, counted from 1; 0 for none. `[n_vertices]`
+    /// Rigid piece of each vertex, counted from 1; 0 if it belongs to none. `[n_vertices]`
     pub piece_of: Vec<u32>,
     pieces: Vec<PieceSums>,
-    /// Where the columns of the weights rest.
+    /// Rest positions of the columns of the weights.
     columns: Vec<Vec3>,
     frames: Frames,
 }
 
-/// How a rigid piece moves: a vertex at `x` moves by `rows * (x, 1)`.
+/// Displacement field of a rigid piece: a vertex at `x` moves by `rows * (x, 1)`.
 pub type PieceMotion = [Vec4; 3];
 
-/// Sums over the vertices of a piece.
+/// Sums over the vertices of a rigid piece.
 #[derive(Clone, Debug)]
 struct PieceSums {
-    /// Of the vertices at rest.
+    /// Mean of the rest positions.
     centre: DVec3,
-    /// Of `from from^T`, `from` being a vertex's place from the centre.
+    /// Sum of `from from^T`, with `from` the rest position minus the centre.
     moments: DMat3,
     n: f64,
-    /// For each control that moves it: itself, the sum of its weights, and the sum of its weights times `from`.
+    /// Per control that moves the piece: its index, the sum of its weights, and the sum of weight times `from`.
     columns: Vec<(u32, f64, DVec3)>,
 }
 
 impl BoundParts {
-    /// `rest`: the model's vertices; `weights`, `frames`: of them; `controls`: at rest.
+    /// `rest`: the model's vertices; `weights`, `frames`: its bind; `controls`: their rest positions. Object units.
     ///
     /// # Panics
-    /// If there is not one row per vertex.
+    /// If `weights` or `parts.stays` does not have one entry per vertex.
     #[must_use]
     pub fn new(parts: &Parts, rest: &[Vec3], weights: &Weights, frames: &Frames, controls: &[Vec3]) -> Self {
         assert_eq!(weights.n_rows(), rest.len(), "one row per vertex");
@@ -66,7 +66,7 @@ impl BoundParts {
         self.pieces.len()
     }
 
-    /// How each piece moves with the controls at `posed`, `[n_controls]`, object units. `[n_pieces]`
+    /// Motion of each piece when the controls are at `posed`, `[n_controls]`, object units. `[n_pieces]`
     ///
     /// # Panics
     /// If there is not one position per control.
@@ -111,7 +111,7 @@ impl PieceSums {
             shift += sum * by;
             moments += outer(by, moment);
         }
-        // At rest nothing is rounded.
+        // No displacement: return exactly zero, without rounding.
         if shift == DVec3::ZERO && moments == DMat3::ZERO {
             return [Vec4::ZERO; 3];
         }
@@ -119,12 +119,11 @@ impl PieceSums {
     }
 }
 
-/// Moves vertices as the cage does not: what stays goes back to its place, pieces by their motions. `rest`, `piece_of`: of
-/// [`BoundParts`]; `positions`: where the cage has brought the vertices, `[n_vertices]`, object units. GPU twin:
-/// `shaders/hold_parts.wgsl`.
+/// Applies fixed vertices and rigid pieces to deformed `positions`, `[n_vertices]`, object units, in place. `rest`,
+/// `piece_of`: fields of [`BoundParts`]; `motions`: from [`BoundParts::motions`]. GPU twin: `shaders/hold_parts.wgsl`.
 ///
 /// # Panics
-/// If a vertex names a piece that is not there.
+/// If `piece_of` names a piece beyond `motions`.
 pub fn hold_parts(rest: &[Vec4], piece_of: &[u32], motions: &[PieceMotion], positions: &mut [Vec3]) {
     for ((position, &rest), &piece) in positions.iter_mut().zip(rest).zip(piece_of) {
         let (at, stays) = (rest.truncate(), rest.w);
@@ -146,14 +145,14 @@ mod tests {
     use super::*;
     use cagework_core::deform::deform_bound;
 
-    /// Places of size 1 in 32 bits, moved by sums of 64.
+    /// f32 rounding of positions of size 1 after sums of 64 terms.
     const ROUNDED: f32 = 2e-6;
 
     fn hashed(n: u32, seed: u32) -> impl Iterator<Item = f32> {
         (0..n).map(move |k| ((k.wrapping_add(seed).wrapping_mul(2_654_435_761) >> 8) % 1000) as f32 / 1000.0)
     }
 
-    /// Vertices with random rows over eight corners of a cube, two of them with an offset that stays as it is.
+    /// Vertices with random weights for the eight corners of a cube; two vertices carry a constant offset.
     fn bound() -> (Vec<Vec3>, Weights, Frames, Vec<Vec3>) {
         let cube: Vec<Vec3> =
             (0..8).map(|k| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32)).collect();
@@ -179,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_moves_vertices_where_parts_hold_them() {
+    fn bound_parts_move_vertices_like_parts() {
         let (rest, weights, frames, cube) = bound();
         let mut stays = vec![0.0; rest.len()];
         stays[..6].copy_from_slice(&[1.0, 0.5, 0.25, 0.0, 1.0, 0.75]);
@@ -197,8 +196,8 @@ mod tests {
         for (v, (a, b)) in frame.iter().zip(&expected).enumerate() {
             assert!(a.distance(*b) <= ROUNDED, "vertex {v}: {a} instead of {b}");
         }
-        assert_eq!(frame[0], rest[0], "what stays whole stays to the bit");
-        assert_eq!(frame[39], moved[39], "what the cage moves, it moves to the bit");
+        assert_eq!(frame[0], rest[0], "a fixed vertex keeps its rest position exactly");
+        assert_eq!(frame[39], moved[39], "a free vertex keeps its deformed position exactly");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! One drag: the factorisation at the grab, then frames as the pointer moves.
+//! A drag: matrices factorised when it starts, and its state while the pointer moves.
 
 use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, DVector};
@@ -10,51 +10,53 @@ use super::{MAX_HANDLES, PullError};
 use cagework_core::edit::Symmetry;
 use cagework_core::rotation::nearest_rotation;
 
-/// Weight of the cage's own part; flat from 0.02 to 0.4. With less the cage spikes where the model does not mind.
-pub(super) const CAGE: f64 = 0.1;
-/// The same while a vertex of the cage is dragged: below, its neighbours move against the drag.
-const CAGE_GRABBED: f64 = 3.0;
-/// How firmly samples beyond the reach stay; flat from 100 to 300.
-const STAY: f64 = 200.0;
-/// Share of the reach within which nothing is held.
-const FREE: f64 = 0.75;
+/// Weight of the cage's own edges in the energy; results are flat from 0.02 to 0.4. Below, the cage spikes where it
+/// hardly moves the model.
+pub(super) const CAGE_WEIGHT: f64 = 0.1;
+/// Weight of the cage's edges while a cage vertex is dragged: below this its neighbours move against the drag.
+const GRABBED_CAGE_WEIGHT: f64 = 3.0;
+/// Weight of samples beyond the reach that stay in place; results are flat from 100 to 300.
+const STAY_WEIGHT: f64 = 200.0;
+/// Share of the reach within which samples move freely; from there to the reach their weight rises to 1.
+const FREE_SHARE: f64 = 0.75;
 /// Share of the model's area within the automatic reach of one grab.
 const REACH_AREA: f64 = 0.15;
-/// Least and most of it, over the model's size.
-const REACHES: [f64; 2] = [0.15, 0.5];
-/// Reach over the greatest distance between two grabs.
-const BETWEEN: f64 = 1.2;
-/// Radius of the patch that a pin holds, over the model's size: about a bare point the rest would roll.
+/// Range of the automatic reach, over the model's size.
+const REACH_RANGE: [f64; 2] = [0.15, 0.5];
+/// Least automatic reach over the greatest distance between two grabs.
+const REACH_PER_GRAB_DISTANCE: f64 = 1.2;
+/// Radius of the patch that a pin holds, over the model's size: a pinned point without area would let the model roll about it.
 const PIN_RADIUS: f64 = 0.05;
-/// How firmly.
-const PIN: f64 = 2e4;
-/// How firmly grabs and pins hold, over the mean of the whole matrix's diagonal.
-const HOLD: f64 = 1e3;
-/// What keeps the matrix regular, over the mean of the diagonal without what stays.
-pub(super) const REGULAR: f64 = 1e-6;
-/// A frame that moves the cage by less, over the model's size, is the last one: above 1e-4 a pull of the whole model ends 5 % early.
-const SETTLED: f64 = 2e-5;
+/// Weight of a pin's patch.
+const PIN_WEIGHT: f64 = 2e4;
+/// Stiffness of grabs and pins, over the mean diagonal of the whole matrix.
+const HANDLE_STIFFNESS: f64 = 1e3;
+/// Regularisation, over the mean diagonal of the matrix without fixed samples.
+pub(super) const REGULARISATION: f64 = 1e-6;
+/// The drag has settled when a frame moves the cage by less than this, over the model's size. At 1e-4 a pull of the
+/// whole model stops 5 % short.
+const MIN_FRAME_MOVE: f64 = 2e-5;
 
-/// How far a drag reaches along the surface.
+/// How far along the surface a drag moves the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Reach {
-    /// As far as a share of the model's area lies.
+    /// The distance that encloses 15 % of the model's area per grab.
     #[default]
     Automatic,
-    /// Over the model's size.
+    /// A multiple of the model's size.
     Of(f64),
-    /// Everywhere: nothing stays but pins.
+    /// No limit: only pins stay in place.
     Whole,
 }
 
-/// How a drag is made.
+/// Options of a drag.
 #[derive(Clone, Copy, Debug)]
 pub struct DragOptions<'a> {
-    /// How far it reaches.
+    /// How far along the surface the model moves.
     pub reach: Reach,
-    /// How much parts within reach go back to their shape at rest as the drag grows, 0 to 1. Default 0.5.
+    /// How much parts within reach return to their rest shape as the drag grows, 0 to 1. Default 0.5.
     pub relax: f64,
-    /// Mirror images stay mirror images: of the cage's vertices.
+    /// Keeps the cage symmetric: each step is averaged with its mirror image.
     pub symmetry: Option<&'a Symmetry>,
 }
 
@@ -64,34 +66,34 @@ impl Default for DragOptions<'_> {
     }
 }
 
-/// A drag under way.
+/// State of a drag in progress.
 pub struct Drag {
     pub(super) n: usize,
     pub(super) n_groups: usize,
     pub(super) size: f64,
     reach: f64,
     pub(super) relax: f64,
-    /// Columns x, y, z one after the other. `[3 n]`
+    /// Cage positions: all x, then all y, then all z. `[3 n]`
     pub(super) cage: DVector<f64>,
-    /// Rows of grabs, then of pins. `[n_handles, n]`
+    /// Weights `Q` of the grabs, then of the pins. `[n_handles, n]`
     pub(super) handles: DMatrix<f64>,
-    /// Where they are to be. `[n_handles, 3]`
+    /// Targets of the grabs and pins. `[n_handles, 3]`
     pub(super) targets: DMatrix<f64>,
-    /// Where the grabs were. `[n_grabs]`
+    /// Positions of the grabs at the start. `[n_grabs]`
     pub(super) start: Vec<DVec3>,
     /// `A^-1`, `A^-1 Q^T`, `(Q A^-1 Q^T + 1 / mu)^-1`.
     pub(super) inverse: DMatrix<f64>,
     pub(super) spread: DMatrix<f64>,
     pub(super) hold: DMatrix<f64>,
-    /// What stays wherever the groups turn. `[n, 3]`
+    /// Rotation-independent part of the right-hand side. `[n, 3]`
     pub(super) constant: DMatrix<f64>,
-    /// Moments of the pose at the grab, what is added to them when all is relaxed, and those of the moment.
+    /// Moments (see [`Pull::moments`]) of the start pose, what full relaxation adds to them, and their current blend.
     pub(super) posed: Vec<f64>,
     pub(super) relaxing: Vec<f64>,
     pub(super) moments: Vec<f64>,
-    /// How far each vertex of the model is from the nearest grab, along the surface, object units. `[n_vertices]`
+    /// Distance along the surface to the nearest grab, object units. `[n_vertices]`
     walks: Vec<f32>,
-    /// Whether one grab alone moves all there is: then it is moved as it is.
+    /// A single grab without reach or pins: the model is translated.
     pub(super) is_shift: bool,
     pub(super) anderson: Anderson,
     pub(super) moved: f64,
@@ -99,10 +101,10 @@ pub struct Drag {
 }
 
 impl Drag {
-    /// Grabs where they are in the pose `start`, and holds pins where they are. `start`: `[n]`, object units.
+    /// Starts a drag of `grabs` with `pins` fixed, from the cage `start`, `[n]`, object units.
     ///
     /// # Errors
-    /// [`PullError`]: a handle that is not there, too many of them, a number out of range, a pose that is not finite.
+    /// [`PullError`]: a handle that does not exist, too many handles, a number out of range, a pose that is not finite.
     pub fn new(
         pull: &Pull,
         start: &[DVec3],
@@ -113,7 +115,7 @@ impl Drag {
         check(pull, start, grabs, pins, options)?;
         let n = pull.n_cage();
         let cage_grabbed = grabs.iter().any(|grab| grab.is_cage);
-        let gamma = if cage_grabbed { CAGE_GRABBED } else { CAGE };
+        let gamma = if cage_grabbed { GRABBED_CAGE_WEIGHT } else { CAGE_WEIGHT };
         let grips: Vec<&Grip> = grabs.iter().chain(pins).collect();
         let handles = DMatrix::from_fn(grips.len(), n, |h, i| grips[h].row[i]);
         let cage = DMatrix::from_fn(n, 3, |i, x| start[i][x]);
@@ -128,12 +130,12 @@ impl Drag {
             .map(|v| walks.iter().map(|walk| walk[v]).fold(f32::INFINITY, f32::min))
             .collect();
         let stays: Vec<f64> = samples.iter().map(|&s| stays(walks[s as usize], reach)).collect();
-        let mut holds: Vec<f64> = stays.iter().map(|stay| STAY * stay).collect();
+        let mut holds: Vec<f64> = stays.iter().map(|stay| STAY_WEIGHT * stay).collect();
         let patch = PIN_RADIUS * pull.size;
         for &seed in &seeds[grabs.len()..] {
             let walk = pull.geodesic.from(seed, patch as f32);
             for (hold, &s) in holds.iter_mut().zip(samples) {
-                *hold += PIN * (1.0 - smooth(f64::from(walk[s as usize]) / patch));
+                *hold += PIN_WEIGHT * (1.0 - smooth(f64::from(walk[s as usize]) / patch));
             }
         }
         let mut held = pull.sample_rows.clone();
@@ -146,11 +148,11 @@ impl Drag {
         let mean = matrix.trace() / n as f64;
         let mut matrix = matrix + &held * &pull.sample_rows;
         for i in 0..n {
-            matrix[(i, i)] += REGULAR * mean;
+            matrix[(i, i)] += REGULARISATION * mean;
         }
-        // Firm beside what holds: a coarse cage bends all of it at once.
-        let firm = HOLD * matrix.trace() / n as f64;
-        let constant = &held * (&pull.sample_rows * &cage) + REGULAR * mean * &cage;
+        // Scaled by the whole matrix: a coarse cage couples all of it to each handle.
+        let firm = HANDLE_STIFFNESS * matrix.trace() / n as f64;
+        let constant = &held * (&pull.sample_rows * &cage) + REGULARISATION * mean * &cage;
         let inverse = matrix.cholesky().ok_or(PullError::Singular)?.inverse();
         let spread = &inverse * handles.transpose();
         let mut hold = &handles * &spread;
@@ -159,7 +161,7 @@ impl Drag {
         }
         let hold = hold.cholesky().ok_or(PullError::Singular)?.inverse();
 
-        // References: the pose as it was grabbed, and what it would be if each group were rotated from its shape at rest.
+        // References of the start pose, and those of the rest shape with each group rotated to the start pose.
         let posed = pull.references(start);
         let rest = pull.references(&pull.cage);
         let of_rest = pull.moments(&rest, gamma);
@@ -209,50 +211,50 @@ impl Drag {
         })
     }
 
-    /// Where the grabs were when they were taken. `[n_grabs]`, object units
+    /// Positions of the grabs at the start. `[n_grabs]`, object units
     #[must_use]
     pub fn start(&self) -> &[DVec3] {
         &self.start
     }
 
-    /// How far the drag reaches, over the model's size; infinite for the whole model.
+    /// Reach over the model's size; infinite for the whole model.
     #[must_use]
     pub fn reach(&self) -> f64 {
         self.reach / self.size
     }
 
-    /// The same, object units.
+    /// Reach, object units.
     #[must_use]
     pub fn reach_length(&self) -> f64 {
         self.reach
     }
 
-    /// How far each vertex of the model is from the nearest grab, along the surface, object units. `[n_vertices]`
+    /// Distance of each vertex from the nearest grab along the surface, object units. `[n_vertices]`
     #[must_use]
     pub fn walks(&self) -> &[f32] {
         &self.walks
     }
 
-    /// How much a vertex of the model stays where it is: 0 within reach, 1 beyond.
+    /// How firmly a vertex of the model stays in place: 0 within reach, 1 beyond.
     #[must_use]
     pub fn stays(&self, vertex: u32) -> f64 {
         stays(self.walks[vertex as usize], self.reach)
     }
 
-    /// The cage. `[n]`, object units
+    /// Cage positions. `[n]`, object units
     #[must_use]
     pub fn cage(&self) -> Vec<DVec3> {
         let [x, y, z] = [0, 1, 2].map(|k| self.cage.rows(k * self.n, self.n));
         (0..self.n).map(|i| DVec3::new(x[i], y[i], z[i])).collect()
     }
 
-    /// Whether the last frame moved it so little that another one need not be asked for.
+    /// Whether the last frame moved the cage by less than 2e-5 of the model's size: no further frame is needed.
     #[must_use]
     pub fn is_settled(&self) -> bool {
-        self.moved < SETTLED
+        self.moved < MIN_FRAME_MOVE
     }
 
-    /// How far the grabs and pins are from their targets, at most, over the model's size.
+    /// Largest distance of a grab or pin from its target, over the model's size.
     #[must_use]
     pub fn error(&self) -> f64 {
         let cage = DMatrix::from_column_slice(self.n, 3, self.cage.as_slice());
@@ -303,8 +305,8 @@ fn check(
     }
 }
 
-/// How far a drag reaches, object units. Automatic: far enough to hold a share of the area (twice as much with two grabs), and
-/// all between the grabs.
+/// Reach in object units. Automatic: the distance that encloses 15 % of the area per grab, but at least 1.2 times the
+/// largest distance between two grabs.
 fn reach_of(pull: &Pull, reach: Reach, walks: &[Vec<f32>], seeds: &[u32]) -> f64 {
     match reach {
         Reach::Whole => return f64::INFINITY,
@@ -322,18 +324,22 @@ fn reach_of(pull: &Pull, reach: Reach, walks: &[Vec<f32>], seeds: &[u32]) -> f64
         });
         last.or(order.last()).map_or(0.0, |&v| f64::from(walk[v as usize]))
     };
-    let [least, most] = REACHES.map(|share| share * pull.size);
+    let [least, most] = REACH_RANGE.map(|share| share * pull.size);
     let reach = walks.iter().map(holding).fold(0.0, f64::max).clamp(least, most);
     let between = walks.iter().flat_map(|walk| seeds.iter().map(|&s| f64::from(walk[s as usize])));
-    reach.max(BETWEEN * between.fold(0.0, f64::max))
+    reach.max(REACH_PER_GRAB_DISTANCE * between.fold(0.0, f64::max))
 }
 
-/// How much stays at a distance from the grabs.
+/// How firmly a point at a distance from the grabs stays in place: 0 within reach, 1 beyond, smooth in between.
 fn stays(walk: f32, reach: f64) -> f64 {
-    if reach.is_infinite() { 0.0 } else { smooth((f64::from(walk) / reach - FREE) / (1.0 - FREE)) }
+    if reach.is_infinite() {
+        0.0
+    } else {
+        smooth((f64::from(walk) / reach - FREE_SHARE) / (1.0 - FREE_SHARE))
+    }
 }
 
-/// How much each group is within reach, 0 to 1: a cage vertex as much as the samples that follow it. `[n_groups]`
+/// How far each group lies within reach, 0 to 1. A cage vertex takes the weighted mean of the samples that it moves. `[n_groups]`
 fn locality(pull: &Pull, follows: &[f64]) -> Vec<f64> {
     let shares = DVector::from_column_slice(&pull.probes.shares);
     let followed =
@@ -343,18 +349,18 @@ fn locality(pull: &Pull, follows: &[f64]) -> Vec<f64> {
     follows.iter().copied().chain(of_cage).collect()
 }
 
-/// Columns x, y, z one after the other.
+/// All x, then all y, then all z. `[3 n]`
 pub(super) fn flat(cage: &[DVec3]) -> DVector<f64> {
     DVector::from_iterator(3 * cage.len(), (0..3).flat_map(|x| cage.iter().map(move |p| p[x])))
 }
 
-/// 0 below 0, 1 above 1, smooth between.
+/// Smoothstep: 0 below 0, 1 above 1.
 pub(super) fn smooth(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// `c^T B_r` of each group r: how its references lie to what they have become.
+/// `c^T B_r` for each group r: the covariance of its current edges with its references.
 pub(super) fn group_matrices(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> Vec<DMat3> {
     let width = 3 * n_groups;
     let n = moments.len() / width;

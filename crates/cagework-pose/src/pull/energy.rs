@@ -1,4 +1,4 @@
-//! What a pull needs once per binding: samples, gradients, the quadratic part of the energy.
+//! Precomputation per bind: samples, gradients and the matrix of the energy.
 
 use glam::{DVec3, Vec3};
 use nalgebra::DMatrix;
@@ -11,33 +11,33 @@ use cagework_core::controls::Controls;
 use cagework_core::mesh::{Bounds, TriMesh};
 use cagework_core::weights::Weights;
 
-/// A model and its cage, ready to be pulled.
+/// A model and its cage, ready for pulling and fitting.
 pub struct Pull {
-    /// Diagonal of the model's box, object units: every length below is a share of it.
+    /// Diagonal of the model's box, object units. Lengths that are shares refer to it.
     pub(super) size: f64,
     pub(super) n_vertices: usize,
-    /// The cage at rest. `[n]`
+    /// Rest positions of cage vertices and controls inside. `[n]`
     pub(super) cage: Vec<DVec3>,
     pub(super) geodesic: Geodesic,
     pub(super) probes: Probes,
-    /// Rows of the weights at the samples. `[n_samples, n]`
+    /// Weights at the samples. `[n_samples, n]`
     pub(super) sample_rows: DMatrix<f64>,
-    /// Gradients of the weights at the samples: row `3 s + x`. `[3 n_samples, n]`
+    /// Gradients of the weights at the samples; row `3 s + x` is d/dx at sample s. `[3 n_samples, n]`
     gradients: DMatrix<f64>,
-    /// Each edge of the cage, and of controls inside, in both directions.
+    /// Edges of the cage and of controls inside, in both directions.
     edges: Vec<[u32; 2]>,
-    /// Weight of each of them: together they are as heavy as the model's part.
+    /// Weight of each edge. All edges together weigh as much as the model.
     edge_weight: f64,
-    /// Matrices of the two parts: `sum_e w_e D_e^T D_e`. `[n, n]`
+    /// `sum_e w_e D_e^T D_e` over the model's rows and over the cage's. `[n, n]`
     of_model: DMatrix<f64>,
     of_cage: DMatrix<f64>,
 }
 
 impl Pull {
-    /// `weights`: of [`Probes::points`], bound to the controls.
+    /// `weights`: of the controls at [`Probes::points`].
     ///
     /// # Errors
-    /// [`PullError::Shape`] when they do not belong together.
+    /// [`PullError::Shape`] if `weights` do not have one row per probe and one column per control.
     pub fn new<'a>(
         mesh: &TriMesh,
         controls: impl Into<Controls<'a>>,
@@ -51,7 +51,7 @@ impl Pull {
             return Err(PullError::Shape { rows, columns, vertices, cage: n });
         }
         let size = Bounds::of(&mesh.positions).ok_or(PullError::Empty)?.diagonal();
-        // A model of one point has no size of its own.
+        // A model that is a single point has no size: use the cage's.
         let size = if size > 0.0 { size } else { cage.diagonal() };
         let rest: Vec<DVec3> = controls.rest().iter().copied().map(Vec3::as_dvec3).collect();
         let sample_rows = probes.rows(weights);
@@ -98,24 +98,24 @@ impl Pull {
         self.cage.len()
     }
 
-    /// Samples of the model.
+    /// Number of samples on the model.
     #[must_use]
     pub fn n_samples(&self) -> usize {
         self.probes.samples.len()
     }
 
-    /// Groups with a rotation each: samples, then cage vertices.
+    /// Groups that rotate as one: a group per sample, then a group per cage vertex.
     #[must_use]
     pub fn n_groups(&self) -> usize {
         self.n_samples() + self.n_cage()
     }
 
-    /// The quadratic part of the energy with the cage's own part `gamma` times as heavy. `[n, n]`
+    /// Matrix of the energy, with the cage's part weighted by `gamma`. `[n, n]`
     pub(super) fn matrix(&self, gamma: f64) -> DMatrix<f64> {
         &self.of_model + gamma * &self.of_cage
     }
 
-    /// References `d_e` of all rows for a cage: its gradients, then its edges.
+    /// References `d_e` of all rows for a cage: gradients at the samples, then edges.
     pub(super) fn references(&self, cage: &[DVec3]) -> Vec<DVec3> {
         let gradient = |e: usize| {
             let row = self.gradients.row(e);
@@ -125,14 +125,13 @@ impl Pull {
         (0..self.gradients.nrows()).map(gradient).chain(self.edges.iter().map(edge)).collect()
     }
 
-    /// The group of each row.
     pub(super) fn groups(&self) -> impl Iterator<Item = usize> {
         let samples = self.n_samples();
         (0..3 * samples).map(|e| e / 3).chain(self.edges.iter().map(move |[a, _]| samples + *a as usize))
     }
 
-    /// `sum_e w_e D_e^T d_e` by groups: row i, columns `3 r` to `3 r + 2` are cage vertex i's part in group r. `[n, 3 n_groups]`,
-    /// one row after the other.
+    /// `sum_e w_e D_e^T d_e` per group: columns `3 r` to `3 r + 2` of row i are the moment of cage vertex i and group r.
+    /// `[n, 3 n_groups]`, row-major.
     pub(super) fn moments(&self, references: &[DVec3], gamma: f64) -> Vec<f64> {
         let width = 3 * self.n_groups();
         let mut moments = vec![0.0; self.n_cage() * width];
@@ -155,15 +154,15 @@ impl Pull {
         moments
     }
 
-    /// A handle on a vertex of the cage.
+    /// A grip on a vertex of the cage.
     ///
     /// # Errors
-    /// [`PullError::Missing`].
+    /// [`PullError::Missing`] if the cage has no such vertex.
     pub fn on_cage(&self, vertex: u32) -> Result<Grip, PullError> {
         check("vertex of the cage", vertex, self.n_cage())?;
         let mut row = vec![0.0; self.n_cage()];
         row[vertex as usize] = 1.0;
-        // Walks begin at the sample that follows it most.
+        // Surface distances start at the sample with the largest weight of this vertex.
         let nearest = self.sample_rows.column(vertex as usize).imax();
         Ok(Grip { row, seed: self.probes.samples[nearest], is_cage: true })
     }

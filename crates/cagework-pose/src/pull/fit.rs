@@ -1,96 +1,97 @@
-//! The pose that brings a model to a target: all of its vertices where the two have the same, or landmarks where they do not.
+//! Fits a cage so that the model meets targets: all vertices for a target of the same topology, or landmarks.
 
 use glam::{DVec3, Vec3};
 use nalgebra::{DMatrix, DVector};
 
 use super::anderson::Anderson;
-use super::drag::{CAGE, REGULAR, flat};
+use super::drag::{CAGE_WEIGHT, REGULARISATION, flat};
 use super::energy::Pull;
 use super::frame::turned;
 use super::{MAX_CAGE, PullError};
 use crate::parts::Motion;
 use cagework_core::weights::Weights;
 
-/// Least and most of what the energy weighs where it is chosen by the noise: the least leaves a target without noise within 1e-5 of
-/// the model's size.
-const LAMBDAS: [f64; 2] = [1e-10, 1e-2];
+/// Range of the energy's weight when it is estimated from the noise. The lower end leaves 1e-5 of the model's size on a
+/// target without noise.
+const LAMBDA_RANGE: [f64; 2] = [1e-10, 1e-2];
 
-/// Rounds of that choice, and the change below which it stands.
-const ROUNDS: usize = 8;
-const STANDS: f64 = 1.1;
+/// Limit on the rounds of that estimate, and the ratio of successive weights below which it has converged.
+const MAX_LAMBDA_ROUNDS: usize = 8;
+const LAMBDA_RATIO: f64 = 1.1;
 
-/// Points for each of the cage's vertices from which on the noise can be told from the shape.
-const ENOUGH: usize = 4;
+/// Points per cage vertex from which on noise can be estimated.
+const MIN_POINTS_PER_VERTEX: usize = 4;
 
-/// What the energy weighs with fewer points: they are met within about a thousandth of the model's size, and between them the model
-/// bends as little as it can.
-const OF_LANDMARKS: f64 = 1e-5;
+/// Weight of the energy with fewer points: landmarks are met within about 1e-3 of the model's size, and the model bends
+/// as little as possible between them.
+const LANDMARK_LAMBDA: f64 = 1e-5;
 
-/// Steps of rotations and of the cage that fits them, and the movement, over the model's size, that ends them.
-const STEPS: usize = 2000;
-const SETTLED: f64 = 1e-8;
+/// Limit on local-global steps, and the movement per step, over the model's size, at which they stop.
+const MAX_STEPS: usize = 2000;
+const MIN_STEP_MOVE: f64 = 1e-8;
 
-/// How a pose is fitted.
+/// Options of [`Pull::fit`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FitOptions {
-    /// What the energy weighs, over the mean squared distance from the targets (over the model's size); at least 0. None: as much as
-    /// the distance that is left says of noise, `n d / (N E)` for N points with the mean squared distance d and a cage of n vertices with
-    /// the energy E, which makes the pose the most likely one; with fewer than four points for each cage vertex, 1e-5.
+    /// Weight of the energy against the mean squared distance from the targets (over the model's size squared), at least 0.
+    /// `None`: the most likely value given the remaining distance, `n d / (N E)`, for N points at the mean squared distance d and
+    /// a cage of n vertices with the energy E; with fewer than four points per cage vertex, 1e-5.
     pub lambda: Option<f64>,
 }
 
-/// A pose that was fitted. Lengths are shares of the model's size, the diagonal of its box.
+/// A fitted pose. Lengths are shares of the model's size, the diagonal of its box.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fitted {
+pub struct Fit {
     /// Cage vertices and controls inside. `[n]`, object units
     pub cage: Vec<DVec3>,
-    /// What the energy weighed.
+    /// Weight of the energy.
     pub lambda: f64,
-    /// Energy of the pose: the mean squared distance of the model's gradients from rotations, and a tenth of the cage's own.
+    /// Energy of the pose: mean squared distance of the model's gradients from rotations, plus 0.1 times that of the
+    /// cage's edges.
     pub energy: f64,
     /// Root of the mean squared distance from the targets.
     pub rms: f64,
     /// The largest distance from a target.
     pub largest: f64,
-    /// Steps that were taken.
+    /// Number of local-global steps.
     pub steps: usize,
-    /// Whether it moved no more at the end.
+    /// Whether the steps converged.
     pub is_settled: bool,
 }
 
-/// `sum_k m_k |W_k c - t_k|^2`, over the model's size squared, as normal equations.
+/// Data term `sum_k m_k |W_k c - t_k|^2`, over the model's size squared, as normal equations.
 struct Goals<'a> {
     weights: &'a Weights,
     shares: &'a [f64],
     to: &'a [Vec3],
     total: f64,
-    /// `[n, n]`, `[n, 3]`
+    /// Matrix, `[n, n]`, and right-hand side, `[n, 3]`.
     matrix: DMatrix<f64>,
     right: DMatrix<f64>,
 }
 
 impl Pull {
-    /// Share of the model's area at each vertex: how much it counts in a fit of all of them. `[n_vertices]`
+    /// Share of the model's area at each vertex: the weight of a vertex when all vertices have targets. `[n_vertices]`
     #[must_use]
     pub fn areas(&self) -> &[f64] {
         &self.probes.areas
     }
 
-    /// The pose that minimises `sum_k m_k |W_k c - t_k|^2 / size^2 + lambda E(c)`, with E the energy of a pull (see the module) without
-    /// what stays, from the shape at rest.
+    /// Minimises `sum_k m_k |W_k c - t_k|^2 / size^2 + lambda E(c)`, with E the energy of a pull (see the module)
+    /// relative to the rest shape, without fixed samples.
     ///
-    /// `weights`: of the points, `[n_points, n]`: vertices of the model, or landmarks. `shares`: how much each counts, made to sum to
-    /// 1; 0 leaves it out. `to`: where each should be, object units.
+    /// `weights`: of the points (vertices or landmarks), `[n_points, n]`. `shares`: weight of each point, scaled to sum
+    /// to 1; 0 ignores the point. `to`: targets, object units.
     ///
     /// # Errors
-    /// [`PullError`]: weights of another cage, not one target for each point, none at all, numbers out of range.
+    /// [`PullError`]: weights of another cage, lengths that differ, no point with a target, numbers out of range.
     pub fn fit(
         &self,
         weights: &Weights,
         shares: &[f64],
         to: &[Vec3],
         options: FitOptions,
-    ) -> Result<Fitted, PullError> {
+    ) -> Result<Fit, PullError> {
         let goals = self.goals(weights, shares, to)?;
         let used = shares.iter().filter(|&&share| share > 0.0).count();
         let n = self.n_cage();
@@ -101,17 +102,17 @@ impl Pull {
             }
             return self.fit_with(&goals, lambda);
         }
-        if used < ENOUGH * n {
-            return self.fit_with(&goals, OF_LANDMARKS);
+        if used < MIN_POINTS_PER_VERTEX * n {
+            return self.fit_with(&goals, LANDMARK_LAMBDA);
         }
-        let [least, most] = LAMBDAS;
+        let [least, most] = LAMBDA_RANGE;
         let mut fitted = self.fit_with(&goals, least)?;
-        for _ in 0..ROUNDS {
-            // The fit itself has taken a share of the noise.
+        for _ in 0..MAX_LAMBDA_ROUNDS {
+            // n of the degrees of freedom fit the noise: unbiased variance.
             let noise = fitted.rms * fitted.rms * used as f64 / (used - n) as f64;
             let lambda = (noise * n as f64 / (used as f64 * fitted.energy)).clamp(least, most);
             let ratio = lambda / fitted.lambda;
-            if (1.0 / STANDS..STANDS).contains(&ratio) {
+            if (1.0 / LAMBDA_RATIO..LAMBDA_RATIO).contains(&ratio) {
                 break;
             }
             fitted = self.fit_with(&goals, lambda)?;
@@ -159,11 +160,11 @@ impl Pull {
         Ok(goals)
     }
 
-    fn fit_with(&self, goals: &Goals<'_>, lambda: f64) -> Result<Fitted, PullError> {
+    fn fit_with(&self, goals: &Goals<'_>, lambda: f64) -> Result<Fit, PullError> {
         let n = self.n_cage();
-        let own = self.matrix(CAGE);
-        let regular = REGULAR * own.trace() / n as f64;
-        // Not even lambda 0 leaves a vertex nowhere.
+        let own = self.matrix(CAGE_WEIGHT);
+        let regular = REGULARISATION * own.trace() / n as f64;
+        // Keep the matrix regular with lambda 0 if no point depends on a vertex.
         let energy_weight = lambda.max(f64::EPSILON);
         let mut matrix = &goals.matrix + energy_weight * &own;
         for i in 0..n {
@@ -171,19 +172,19 @@ impl Pull {
         }
         let factors = matrix.cholesky().ok_or(PullError::Singular)?;
         let rest = flat(&self.cage);
-        let moments = self.moments(&self.references(&self.cage), CAGE);
+        let moments = self.moments(&self.references(&self.cage), CAGE_WEIGHT);
         let start = flat(&self.brought(goals));
         let columns = |flat: &DVector<f64>| DMatrix::from_column_slice(n, 3, flat.as_slice());
         let constant = &goals.right + energy_weight * regular * columns(&start);
         let (mut cage, mut anderson) = (start, Anderson::default());
         let (mut steps, mut is_settled) = (0, false);
-        while steps < STEPS && !is_settled {
+        while steps < MAX_STEPS && !is_settled {
             let right = energy_weight * turned(&moments, &cage, self.n_groups()) + &constant;
             let image = DVector::from_column_slice(factors.solve(&right).as_slice());
             if image.iter().any(|x| !x.is_finite()) {
                 return Err(PullError::Singular);
             }
-            is_settled = (&image - &cage).amax() <= SETTLED * self.size;
+            is_settled = (&image - &cage).amax() <= MIN_STEP_MOVE * self.size;
             cage = if is_settled { image } else { anderson.next(&cage, image) };
             steps += 1;
         }
@@ -193,7 +194,7 @@ impl Pull {
         let at = |i: usize| DVec3::new(cage[i], cage[n + i], cage[2 * n + i]);
         let cage: Vec<DVec3> = (0..n).map(at).collect();
         let (rms, largest) = goals.distances(&cage);
-        Ok(Fitted {
+        Ok(Fit {
             lambda,
             energy: energy.max(f64::EPSILON),
             rms: rms / self.size,
@@ -204,7 +205,7 @@ impl Pull {
         })
     }
 
-    /// The cage at rest, moved as a whole to where the points should be: rotations are looked for from there.
+    /// Rest cage moved rigidly onto the targets: initial guess of the rotations.
     fn brought(&self, goals: &Goals<'_>) -> Vec<DVec3> {
         let points = goals.used().map(|(row, _, to)| {
             let at = place(row, &self.cage);
@@ -221,7 +222,7 @@ impl<'a> Goals<'a> {
         all.filter(|((_, share), _)| **share > 0.0).map(|((row, &share), &to)| (row, share, to))
     }
 
-    /// Root of the mean squared distance from the targets, and the largest one, object units.
+    /// Root mean squared and largest distance from the targets, object units.
     fn distances(&self, cage: &[DVec3]) -> (f64, f64) {
         let (mut sum, mut largest) = (0.0, 0.0_f64);
         for (row, share, to) in self.used() {

@@ -1,4 +1,4 @@
-//! A frame of a drag: rotations of the groups, then the cage that fits them.
+//! A frame of a drag: alternates rotations of the groups (local step) with a solve for the cage (global step).
 
 use glam::{DMat3, DQuat, DVec3, Vec3};
 use nalgebra::{DMatrix, DVector};
@@ -7,23 +7,24 @@ use super::drag::{Drag, group_matrices, smooth};
 use super::grip::Handle;
 use cagework_core::rotation::nearest_rotation;
 
-/// Most frames after the last target, until nothing moves any more.
-const SETTLING: u32 = 60;
-/// Steps of a frame.
-const STEPS: usize = 4;
-/// A target that moves by less, over the model's size, has not moved.
-const SAME: f64 = 1e-9;
-/// Length of a drag, over the model's size, at which parts within reach are as relaxed as asked for.
-const RELAXED: f64 = 0.1;
+/// Most frames that [`Drag::settle`] takes.
+const MAX_SETTLING_FRAMES: u32 = 60;
+/// Local-global steps per frame.
+const STEPS_PER_FRAME: usize = 4;
+/// A target has changed if it moves by more than this, over the model's size.
+const MIN_TARGET_MOVE: f64 = 1e-9;
+/// Drag length, over the model's size, at which relaxation is complete.
+const RELAX_LENGTH: f64 = 0.1;
 
-/// Grabs that turn by more in a frame, radians, go in steps along arcs: straight ways of half a turn meet in one place.
-const TURN: f64 = 0.5;
-/// How firmly a turn of grabs that do not tell it, as of two about the line between them, is taken for none.
-const NO_ROLL: f64 = 1e-3;
+/// Rotation of the grabs, radians, above which [`Drag::go`] follows arcs: straight paths of a half turn would meet in one point.
+const MIN_ARC_ANGLE: f64 = 0.5;
+/// Multiple of the identity added to the grabs' covariance, over its trace. Grabs that do not determine a rotation
+/// (two, about the line between them) do not rotate.
+const IDENTITY_WEIGHT: f64 = 1e-3;
 
 impl Drag {
-    /// One frame: the grabs go towards `to` (`[n_grabs]`, object units). Targets that are not finite are ignored, and the pose
-    /// stays finite.
+    /// Runs one frame with the grabs at `to` (`[n_grabs]`, object units). Ignores targets that are not finite, so the
+    /// pose stays finite.
     pub fn frame(&mut self, to: &[DVec3]) {
         if to.len() != self.start.len() || !to.iter().all(|t| t.is_finite()) {
             return;
@@ -39,8 +40,8 @@ impl Drag {
             return;
         }
         let from: Vec<DVec3> = (0..to.len()).map(|h| self.target(h)).collect();
-        let way = Way::new(&from, to);
-        let n = (way.angle() / TURN).ceil().max(1.0);
+        let way = GrabPath::new(&from, to);
+        let n = (way.angle() / MIN_ARC_ANGLE).ceil().max(1.0);
         for k in 1..n as u32 {
             self.frame_straight(&way.at(f64::from(k) / n));
         }
@@ -49,7 +50,7 @@ impl Drag {
 
     fn frame_straight(&mut self, to: &[DVec3]) {
         self.set_targets(to);
-        for _ in 0..STEPS {
+        for _ in 0..STEPS_PER_FRAME {
             let image = self.step();
             if image.iter().any(|x| !x.is_finite()) {
                 self.anderson.forget();
@@ -64,31 +65,31 @@ impl Drag {
         }
     }
 
-    /// The grabs go from where they were taken to `to` (`[n_grabs]`, object units) in so many frames: straight, or along arcs if
-    /// together they turn far.
+    /// Moves the grabs from the start to `to` (`[n_grabs]`, object units) in `frames` frames, on straight paths, or on
+    /// arcs if the grabs rotate together by more than 0.5 radians.
     pub fn go(&mut self, to: &[DVec3], frames: u32) {
         if to.len() != self.start.len() || !to.iter().all(|t| t.is_finite()) {
             return;
         }
         let start = self.start.clone();
-        let way = Way::new(&start, to);
+        let way = GrabPath::new(&start, to);
         for k in 1..=frames {
             self.frame(&way.at(f64::from(k) / f64::from(frames)));
         }
     }
 
-    /// Frames with the grabs at `to` until nothing moves any more, 60 at most. Returns how many.
+    /// Runs frames with the grabs at `to` until the cage settles, at most 60. Returns their number.
     pub fn settle(&mut self, to: &[DVec3]) -> u32 {
         let mut frames = 0;
-        while frames == 0 || frames < SETTLING && !self.is_settled() {
+        while frames == 0 || frames < MAX_SETTLING_FRAMES && !self.is_settled() {
             self.frame(to);
             frames += 1;
         }
         frames
     }
 
-    /// Targets for the handles that were grabbed, which are to go to `to`. A vertex outside the cage is beside what its weights
-    /// give, and its target is moved by as much. `deformed`: the model at the start of the drag. `[n_vertices]`, object units
+    /// Targets that bring the grabbed handles to `to`. A vertex outside the cage differs from what its weights give by a constant
+    /// offset, by which its target is shifted. `deformed`: the model at the start of the drag, `[n_vertices]`, object units.
     #[must_use]
     pub fn targets(&self, grabs: &[Handle], to: &[Vec3], deformed: &[Vec3]) -> Vec<DVec3> {
         let beside = |(grab, start): (&Handle, &DVec3)| match grab {
@@ -104,22 +105,23 @@ impl Drag {
     }
 
     fn set_targets(&mut self, to: &[DVec3]) {
-        let is_same = |h: usize| (0..3).all(|x| (self.targets[(h, x)] - to[h][x]).abs() <= SAME * self.size);
+        let is_same =
+            |h: usize| (0..3).all(|x| (self.targets[(h, x)] - to[h][x]).abs() <= MIN_TARGET_MOVE * self.size);
         if (0..to.len()).all(is_same) {
             return;
         }
         for (h, target) in to.iter().enumerate() {
             (0..3).for_each(|x| self.targets[(h, x)] = target[x]);
         }
-        // Another map: what was learnt of the one before misleads.
+        // The map changes with the targets: its history no longer applies.
         self.anderson.forget();
         let drag = to.iter().zip(&self.start).map(|(to, from)| to.distance(*from)).fold(0.0, f64::max);
-        let relax = self.relax * smooth(drag / (RELAXED * self.size));
+        let relax = self.relax * smooth(drag / (RELAX_LENGTH * self.size));
         let parts = self.posed.iter().zip(&self.relaxing);
         self.moments.iter_mut().zip(parts).for_each(|(m, (posed, more))| *m = posed + relax * more);
     }
 
-    /// One local step (rotations) and one global step (the cage that fits them).
+    /// One local step (rotations) and one global step (the cage that best fits them).
     fn step(&self) -> DVector<f64> {
         let right = turned(&self.moments, &self.cage, self.n_groups) + &self.constant;
         let free = &self.inverse * right;
@@ -129,23 +131,24 @@ impl Drag {
     }
 }
 
-/// The ways of some grabs from one place to another.
-struct Way<'a> {
+/// Paths of the grabs: a rigid motion plus what remains of each displacement.
+struct GrabPath<'a> {
     from: &'a [DVec3],
     to: &'a [DVec3],
-    /// Means of both, and the rotation about them that is nearest to the grabs' own.
+    /// Means of `from` and `to`, and the nearest rotation between them.
     middles: [DVec3; 2],
     turn: DQuat,
 }
 
-impl<'a> Way<'a> {
+impl<'a> GrabPath<'a> {
     fn new(from: &'a [DVec3], to: &'a [DVec3]) -> Self {
         let middles = [from, to].map(|places| places.iter().sum::<DVec3>() / places.len() as f64);
         let pairs = || from.iter().zip(to).map(|(a, b)| (*a - middles[0], *b - middles[1]));
         let size: f64 = pairs().map(|(a, b)| a.length() * b.length()).sum();
         let of_pair = |(a, b): (DVec3, DVec3)| DMat3::from_cols(b * a.x, b * a.y, b * a.z);
-        let covariance =
-            pairs().map(of_pair).fold(DMat3::from_diagonal(DVec3::splat(NO_ROLL * size)), |m, p| m + p);
+        let covariance = pairs()
+            .map(of_pair)
+            .fold(DMat3::from_diagonal(DVec3::splat(IDENTITY_WEIGHT * size)), |m, p| m + p);
         Self { from, to, middles, turn: DQuat::from_mat3(&nearest_rotation(covariance)) }
     }
 
@@ -153,10 +156,10 @@ impl<'a> Way<'a> {
         self.turn.angle_between(DQuat::IDENTITY)
     }
 
-    /// Where the grabs are after a share of the way.
+    /// Grab positions at a share of the path, 0 to 1.
     fn at(&self, share: f64) -> Vec<DVec3> {
         let straight = |(a, b): (&DVec3, &DVec3)| a.lerp(*b, share);
-        if self.angle() <= TURN {
+        if self.angle() <= MIN_ARC_ANGLE {
             return self.from.iter().zip(self.to).map(straight).collect();
         }
         let (part, [first, last]) = (DQuat::IDENTITY.slerp(self.turn, share), self.middles);
@@ -168,7 +171,7 @@ impl<'a> Way<'a> {
     }
 }
 
-/// `sum_r B_r R_r^T`, with the rotations that are nearest to a cage. `[n, 3]`
+/// `sum_r B_r R_r^T` with each rotation R nearest to the group's covariance for `cage`. `[n, 3]`
 pub(super) fn turned(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> DMatrix<f64> {
     let width = 3 * n_groups;
     let mut turned = vec![0.0; 3 * width];
@@ -182,7 +185,7 @@ pub(super) fn turned(moments: &[f64], cage: &DVector<f64>, n_groups: usize) -> D
     DMatrix::from_fn(rows.len(), 3, |i, x| dot(rows[i], &turned[x * width..][..width]))
 }
 
-/// In eight sums, which a processor makes side by side.
+/// Dot product in eight partial sums, which the compiler vectorises.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
     let mut sums = [0.0; 8];
@@ -193,7 +196,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
-/// The mean of a pose and its mirror image.
+/// Averages the cage with its mirror image.
 fn average(cage: &mut DVector<f64>, plane: f64, partners: &[Option<u32>]) {
     let n = partners.len();
     let before = cage.clone();

@@ -1,4 +1,4 @@
-//! Distances along the model's edges (Dijkstra 1959): how far apart two points of the surface are for who walks on it.
+//! Approximate geodesic distances: shortest paths along the model's edges (Dijkstra 1959).
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -8,20 +8,20 @@ use glam::Vec3;
 use super::nearest::Nearest;
 use cagework_core::mesh::weld;
 
-/// Shortest bridge between two parts, over the model's size: a walk along one of no length would go round in circles.
-const SHORTEST: f32 = 1e-9;
+/// Minimum length of a bridge, over the model's size.
+const MIN_BRIDGE_LENGTH: f32 = 1e-9;
 
-/// Edges of a model; equal positions are one vertex, and parts that do not touch are joined where they are nearest to the
-/// largest one.
+/// Graph of the model's edges. Equal positions are one node; each component is joined to the largest one by a bridge
+/// between their nearest points.
 pub(super) struct Geodesic {
-    /// For each vertex of the model its place here.
+    /// Node of each vertex of the model.
     unique_of: Vec<u32>,
     starts: Vec<u32>,
     neighbours: Vec<(u32, f32)>,
 }
 
 impl Geodesic {
-    /// Of a model; `size` is the diagonal of its box.
+    /// `size`: diagonal of the model's box.
     pub(super) fn new(positions: &[Vec3], triangles: &[[u32; 3]], size: f32) -> Self {
         let welded = weld(positions);
         let points: Vec<Vec3> = welded.first.iter().map(|&v| positions[v as usize]).collect();
@@ -35,7 +35,8 @@ impl Geodesic {
         edges.sort_unstable();
         edges.dedup();
         edges.extend(bridges(&points, &edges));
-        let length = |[a, b]: [u32; 2]| points[a as usize].distance(points[b as usize]).max(SHORTEST * size);
+        let length =
+            |[a, b]: [u32; 2]| points[a as usize].distance(points[b as usize]).max(MIN_BRIDGE_LENGTH * size);
         let mut starts = vec![0_u32; points.len() + 1];
         for &[a, b] in &edges {
             starts[a as usize + 1] += 1;
@@ -55,12 +56,12 @@ impl Geodesic {
         Self { unique_of, starts, neighbours }
     }
 
-    /// Distance of each vertex of the model from a vertex, object units; infinite from `limit` on. `[n_vertices]`
+    /// Distance of each vertex from `seed` along edges, object units; infinite beyond `limit`. `[n_vertices]`
     pub(super) fn from(&self, seed: u32, limit: f32) -> Vec<f32> {
         let mut distance = vec![f32::INFINITY; self.starts.len() - 1];
         let first = self.unique_of[seed as usize];
         distance[first as usize] = 0.0;
-        // Bits of floats that are not negative are in the floats' order.
+        // Non-negative floats sort like their bits.
         let mut heap = BinaryHeap::from([Reverse((0_u32, first))]);
         while let Some(Reverse((bits, at))) = heap.pop() {
             let here = f32::from_bits(bits);
@@ -80,7 +81,7 @@ impl Geodesic {
     }
 }
 
-/// An edge from each part to what is nearest of the largest one.
+/// An edge from each smaller component to the nearest node of the largest one.
 fn bridges(points: &[Vec3], edges: &[[u32; 2]]) -> Vec<[u32; 2]> {
     let mut part: Vec<u32> = (0..points.len() as u32).collect();
     for &[a, b] in edges {
@@ -110,7 +111,7 @@ fn bridges(points: &[Vec3], edges: &[[u32; 2]]) -> Vec<[u32; 2]> {
     best.into_iter().flatten().map(|(edge, _)| edge).collect()
 }
 
-/// The first vertex of a part; the way to it is halved for who comes after.
+/// Root of a component: find with path halving.
 fn root(part: &mut [u32], mut i: u32) -> u32 {
     while part[i as usize] != i {
         part[i as usize] = part[part[i as usize] as usize];
@@ -124,8 +125,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_walk_goes_along_edges_and_over_one_bridge() {
-        // Two unit squares side by side, split at a seam (vertices 1 and 4), and a triangle 2 to the right.
+    fn distances_follow_edges_and_one_bridge() {
+        // Two unit squares side by side, separated by a seam (vertices 1 and 4), and a triangle at a distance of 2.
         let at = |x: f32, y: f32| Vec3::new(x, y, 0.0);
         let positions = [
             at(0.0, 0.0),

@@ -1,44 +1,44 @@
-//! What is taken hold of.
+//! Points that a drag moves or fixes.
 
 use super::samples::dense;
 use super::{Pull, PullError};
 use cagework_core::weights::Weights;
 
-/// How far barycentric coordinates may be off: they come from pointers and from files.
-const OFF: f64 = 1e-3;
+/// Tolerance of barycentric coordinates, which come from pointers and files.
+const BARYCENTRIC_TOLERANCE: f64 = 1e-3;
 
-/// Something to take hold of.
+/// A point that can be grabbed or pinned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Handle {
     /// A vertex of the model.
     Vertex(u32),
-    /// A point of the model: a triangle and barycentric coordinates in it.
+    /// A point of the model: a triangle and barycentric coordinates.
     Triangle(u32, [f64; 3]),
     /// A vertex of the cage.
     Cage(u32),
 }
 
-/// A handle as a drag needs it: how it follows the cage.
+/// A handle with its weights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grip {
-    /// Weights of the point. `[n_cage]`
+    /// Weights of the controls at the point. `[n_cage]`
     pub(super) row: Vec<f64>,
-    /// The vertex of the model that walks over it start from.
+    /// Vertex of the model from which surface distances are measured.
     pub(super) seed: u32,
     pub(super) is_cage: bool,
 }
 
 impl Grip {
-    /// Of a point of the model: its weights, `[n_cage]`, and the nearest vertex. What is wrong with them [`super::Drag::new`] says.
+    /// A point of the model by its weights, `[n_cage]`, and its nearest vertex. [`super::Drag::new`] checks both.
     #[must_use]
     pub fn of_row(row: Vec<f64>, seed: u32) -> Self {
         Self { row, seed, is_cage: false }
     }
 
-    /// Of a handle; `triangles` and `weights` are the model's.
+    /// `triangles` and `weights`: the model's.
     ///
     /// # Errors
-    /// When there is no such handle, or the weights are another model's or another cage's.
+    /// [`PullError`] if the handle does not exist, its coordinates are not barycentric, or `weights` belong to another model or cage.
     pub fn new(
         handle: Handle,
         pull: &Pull,
@@ -58,7 +58,9 @@ impl Grip {
             Handle::Triangle(t, bary) => {
                 check("triangle of the model", t, triangles.len())?;
                 let sum: f64 = bary.iter().sum();
-                if !(bary.iter().all(|b| *b >= -OFF) && (sum - 1.0).abs() < OFF) {
+                if !(bary.iter().all(|b| *b >= -BARYCENTRIC_TOLERANCE)
+                    && (sum - 1.0).abs() < BARYCENTRIC_TOLERANCE)
+                {
                     return Err(PullError::Barycentric(bary));
                 }
                 let corners = triangles[t as usize];
@@ -72,7 +74,6 @@ impl Grip {
     }
 }
 
-/// Whether an index is below a count.
 pub(super) fn check(what: &'static str, index: u32, count: usize) -> Result<(), PullError> {
     let last = count.saturating_sub(1);
     if (index as usize) < count { Ok(()) } else { Err(PullError::Missing { what, index, last }) }

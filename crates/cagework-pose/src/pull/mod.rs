@@ -1,20 +1,19 @@
-//! Pulling the model itself: points of it are grabbed and moved, and the cage is solved for, so that the rest bends as
-//! little as it can.
+//! Direct manipulation of the model: the user moves points of it, and the cage is solved for so that the rest bends as
+//! little as possible.
 //!
-//! Unknown are the cage's vertices `c` (`[n, 3]`). The energy is of the local and global kind (Sorkine and Alexa 2007), its
-//! rotations and moments as in Jacobson et al. 2012, "Fast automatic skinning transformations":
+//! The unknowns are the cage's vertices `c` (`[n, 3]`). The energy is as rigid as possible (Sorkine and Alexa 2007), with
+//! rotation groups and moments as in Jacobson et al. 2012, "Fast automatic skinning transformations":
 //!
 //! ```text
 //! E(c) = sum_r sum_{e in r} w_e |D_e c - R_r d_e|^2    groups r with one rotation each
-//!      + sum_s m_s |W_s c - p_s|^2                      samples that stay where they were
-//!      + mu |Q c - T|^2 + eps |c - c0|^2                grabs and pins, and a little of everything
+//!      + sum_s m_s |W_s c - p_s|^2                      samples beyond the reach stay in place
+//!      + mu |Q c - T|^2 + eps |c - c0|^2                grabs and pins; regularisation
 //! ```
 //!
-//! A group is a sample of the model with the gradients of the weights there (three rows `D_e`: the energy measures how far
-//! the deformation's Jacobian is from a rotation), or a cage vertex with its edges. One solve per binding gives the
-//! gradients ([`Probes`]), one factorisation per grab the rest ([`Drag`]), and a frame is a few steps of rotations and
-//! multiplications ([`Drag::frame`]). With targets for all of the model, or for landmarks on it, the same energy fills in what they
-//! leave open ([`Pull::fit`]).
+//! A group is a sample of the model with the gradients of the weights there (three rows `D_e`: the energy measures the distance
+//! of the deformation's Jacobian from a rotation), or a cage vertex with its edges. A bind of extra points yields the gradients
+//! ([`Probes`]), once per model; a drag factorises its matrix once ([`Drag`]); a frame is a few local-global steps
+//! ([`Drag::frame`]). [`Pull::fit`] minimises the same energy with targets for all vertices or for landmarks.
 
 mod anderson;
 mod drag;
@@ -32,84 +31,84 @@ use thiserror::Error;
 
 pub use drag::{Drag, DragOptions, Reach};
 pub use energy::Pull;
-pub use fit::{FitOptions, Fitted};
+pub use fit::{Fit, FitOptions};
 pub use grip::{Grip, Handle};
 pub use samples::Probes;
 
-/// Grabs and pins together: each is a row of a dense matrix that every grab inverts.
+/// Most grabs and pins together: a drag inverts a dense matrix of that size.
 pub const MAX_HANDLES: usize = 200;
 
-/// Cage vertices: a pull's matrices are dense, and a frame multiplies by them.
+/// Most cage vertices: the matrices are dense, and every frame multiplies by them.
 pub const MAX_CAGE: usize = 1000;
 
-/// Why nothing can be pulled.
+/// Why a pull or a fit failed.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum PullError {
     /// The model has no vertices.
-    #[error("the model has no vertices: there is nothing to take hold of")]
+    #[error("the model has no vertices to grab")]
     Empty,
-    /// Weights of something else.
+    /// Weights of another model or cage.
     #[error(
         "the weights are of {rows} model vertices and {columns} cage vertices, but the model has {vertices} and the cage {cage}: \
-         bind this model to this cage"
+     bind this model to this cage"
     )]
     Shape {
         /// Rows of the weights.
         rows: usize,
-        /// Their columns.
+        /// Columns of the weights.
         columns: usize,
         /// Vertices of the model.
         vertices: usize,
         /// Vertices of the cage.
         cage: usize,
     },
-    /// A cage that is too large.
+    /// The cage is too large.
     #[error("the cage has {cage} vertices; at most {MAX_CAGE} can be pulled: make a coarser cage")]
     Cage {
-        /// Its vertices.
+        /// Number of its vertices.
         cage: usize,
     },
-    /// A handle that is not there.
-    #[error("there is no {what} {index}: they count from 0 to {last}")]
+    /// A handle that does not exist.
+    #[error("there is no {what} {index}: indices run from 0 to {last}")]
     Missing {
-        /// Vertex, triangle or cage vertex.
+        /// Kind of handle: vertex, triangle or cage vertex.
         what: &'static str,
-        /// The number that was given.
+        /// The index.
         index: u32,
-        /// The largest there is.
+        /// The largest valid index.
         last: usize,
     },
-    /// Barycentric coordinates that are no point of a triangle.
-    #[error("{0:?} is no point of a triangle: three numbers that are not negative and sum to 1")]
+    /// Coordinates that are not barycentric.
+    #[error("{0:?} are not barycentric coordinates: give three numbers that are not negative and sum to 1")]
     Barycentric([f64; 3]),
-    /// Nothing is grabbed.
+    /// No grab.
     #[error("nothing is grabbed: give at least one grab")]
     NoGrab,
-    /// More handles than there may be.
-    #[error("{0} grabs and pins; at most {MAX_HANDLES}")]
+    /// Too many grabs and pins.
+    #[error("{0} grabs and pins are more than the limit of {MAX_HANDLES}")]
     Handles(usize),
-    /// A position or a number that is not finite or out of range.
+    /// A value that is not finite or out of range.
     #[error("{what} is {value}; it must be {range}")]
     Value {
-        /// What it is.
+        /// The quantity.
         what: &'static str,
-        /// What was given.
+        /// The value.
         value: f64,
-        /// What may be given.
+        /// The valid range.
         range: &'static str,
     },
-    /// Targets of other points.
-    #[error("there are {given} targets for {points} points: one for each")]
+    /// Targets and points differ in number.
+    #[error("there are {given} targets for {points} points: give one per point")]
     Targets {
         /// Targets.
         given: usize,
         /// Points.
         points: usize,
     },
-    /// Nothing has a place to go to.
-    #[error("no point has a target: all of them lie outside the cage, or count for nothing")]
+    /// No point has a target and weight.
+    #[error("no point has a target: all points lie outside the cage or have zero weight")]
     NoTarget,
-    /// A pose of another cage.
+    /// The start pose is of another cage.
     #[error("the start has {given} vertices, but the cage has {cage}")]
     Start {
         /// Vertices of the start.
@@ -117,7 +116,7 @@ pub enum PullError {
         /// Vertices of the cage.
         cage: usize,
     },
-    /// The equations have no solution in f64.
+    /// The matrix is singular in f64.
     #[error("the pull cannot be solved: is the cage flat, or the pose not finite?")]
     Singular,
 }

@@ -1,21 +1,21 @@
-//! The nearest of many points (Bentley 1975, "Multidimensional binary search trees").
+//! Nearest neighbour search in a k-d tree (Bentley 1975, "Multidimensional binary search trees").
 
 use glam::Vec3;
 
-/// Points sorted so that each half's median splits it, along x, y and z in turn.
+/// Implicit k-d tree: the median of each range splits it, along x, y and z cyclically.
 pub(super) struct Nearest<'a> {
     points: &'a [Vec3],
     order: Vec<u32>,
 }
 
 impl<'a> Nearest<'a> {
-    /// Of these points of `points`.
+    /// Tree of the points with the indices `order`.
     pub(super) fn new(points: &'a [Vec3], mut order: Vec<u32>) -> Self {
         sort(points, &mut order, 0);
         Self { points, order }
     }
 
-    /// The nearest point to `at` that is nearer than the square root of `limit`, and its squared distance.
+    /// Index and squared distance of the point nearest to `at`, if that is below `limit` (squared).
     pub(super) fn find(&self, at: Vec3, limit: f32) -> Option<(u32, f32)> {
         let mut best = (u32::MAX, limit);
         self.search(&self.order, 0, at, &mut best);
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_nearest_is_that_of_all_distances() {
+    fn the_nearest_point_is_that_of_brute_force() {
         let points: Vec<Vec3> = (0..200_u32)
             .map(|i| Vec3::new((i * 73 % 101) as f32, (i * 37 % 89) as f32, (i * 11 % 53) as f32))
             .collect();
@@ -64,7 +64,7 @@ mod tests {
         for at in [Vec3::ZERO, Vec3::splat(40.5), Vec3::new(90.0, 3.0, 200.0)] {
             let all = points.iter().map(|p| p.distance_squared(at)).fold(f32::INFINITY, f32::min);
             assert_eq!(nearest.find(at, f32::INFINITY).map(|found| found.1), Some(all));
-            assert_eq!(nearest.find(at, all), None, "nothing is nearer than the nearest");
+            assert_eq!(nearest.find(at, all), None, "no point is nearer than the nearest");
         }
     }
 }

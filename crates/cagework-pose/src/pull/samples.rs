@@ -1,4 +1,4 @@
-//! Points of the model at which a pull measures it, and where the field is probed for gradients there.
+//! Samples of the model at which a pull measures the deformation, and probe points for gradients of the weights there.
 
 use glam::{DMat3, DVec3, Vec3};
 use nalgebra::DMatrix;
@@ -8,38 +8,38 @@ use cagework_core::controls::Controls;
 use cagework_core::mesh::{Bounds, TriMesh};
 use cagework_core::weights::Weights;
 
-/// Samples of a model: of 100, 200, 300 and 600 the third has all but 1 % of the last one's energy.
-const SAMPLES: usize = 300;
+/// Number of samples. The energy with 300 samples is within 1 % of that with 600.
+const N_SAMPLES: usize = 300;
 
-/// Cells of a grid whose edge is the distance of a probe from its sample.
-const PROBES_APART: f32 = 64.0;
+/// Cage extent over the distance of a probe from its sample.
+const STEPS_PER_EXTENT: f32 = 64.0;
 
-/// Points of a sample.
-const PROBES: usize = 7;
+/// Probe points per sample.
+const PROBES_PER_SAMPLE: usize = 7;
 
-/// A probe far outside the cage stays where it is: its gradient is off by more than this.
-const OFF: f64 = 0.5;
+/// Largest entry of Jacobian minus identity: a sample is ignored above it. A probe far outside the cage does not move with it.
+const MAX_JACOBIAN_ERROR: f64 = 0.5;
 
-/// Samples of a model, and the points where their gradients come from.
+/// Samples of a model with probe points for central differences.
 #[derive(Clone, Debug)]
 pub struct Probes {
-    /// Vertices of the model, far from each other. `[n_samples]`
+    /// Farthest-point samples: vertices of the model. `[n_samples]`
     pub(super) samples: Vec<u32>,
-    /// Share of the model's area that each of them stands for; they sum to 1. `[n_samples]`
+    /// Share of the model's area nearest to each sample; sums to 1. `[n_samples]`
     pub(super) shares: Vec<f64>,
-    /// Share of the area at each vertex of the model; they sum to 1. `[n_vertices]`
+    /// Share of the model's area at each vertex; sums to 1. `[n_vertices]`
     pub(super) areas: Vec<f64>,
-    /// Distance of the probes from their sample, object units.
+    /// Distance of a probe from its sample, object units.
     step: f32,
-    /// Each sample, then six around it: along x, y, z, then against. `[7 * n_samples]`
+    /// Each sample followed by six probes: +x, +y, +z, -x, -y, -z. `[7 * n_samples]`
     points: Vec<Vec3>,
 }
 
 impl Probes {
-    /// Of a model and the controls at rest.
+    /// Samples of `mesh`. `controls`: at rest.
     ///
     /// # Errors
-    /// [`PullError::Empty`], [`PullError::Cage`], [`PullError::Missing`] for a corner of a triangle.
+    /// [`PullError::Empty`], [`PullError::Cage`], or [`PullError::Missing`] if a triangle has an invalid corner.
     pub fn new<'a>(mesh: &TriMesh, controls: impl Into<Controls<'a>>) -> Result<Self, PullError> {
         let controls = controls.into();
         if controls.n_controls() > MAX_CAGE {
@@ -57,41 +57,42 @@ impl Probes {
         for (area, sample) in areas.iter().zip(nearest) {
             shares[sample as usize] += area;
         }
-        let step = cage.bounds().extent().max_element() / PROBES_APART;
+        let step = cage.bounds().extent().max_element() / STEPS_PER_EXTENT;
         let around = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
         let points =
             samples.iter().flat_map(|&s| around.map(|way| positions[s as usize] + step * way)).collect();
         Ok(Self { samples, shares, areas, step, points })
     }
 
-    /// Points to bind to the cage, `[7 * n_samples]`: their weights are what [`super::Pull::new`] asks for.
+    /// Points to bind for [`super::Pull::new`]. `[7 * n_samples]`
     #[must_use]
     pub fn points(&self) -> &[Vec3] {
         &self.points
     }
 
-    /// Rows of the weights at the samples. `[n_samples, n]`
+    /// Weights at the samples. `[n_samples, n]`
     pub(super) fn rows(&self, weights: &Weights) -> DMatrix<f64> {
-        let rows: Vec<_> = (0..self.samples.len()).map(|s| dense(weights, PROBES * s)).collect();
+        let rows: Vec<_> = (0..self.samples.len()).map(|s| dense(weights, PROBES_PER_SAMPLE * s)).collect();
         DMatrix::from_fn(rows.len(), weights.n_columns(), |s, i| rows[s][i])
     }
 
-    /// Gradients of the weights at the samples, by central differences, made exact for linear functions: `cage` (`[n]`, at
-    /// rest) has the identity as its gradient. Row `3 s + x` is d/dx at sample s; zero, with a share of zero, where a probe
-    /// has left the cage. `[3 * n_samples, n]`
+    /// Gradients of the weights at the samples by central differences, corrected so that `cage` (`[n]`, at rest) has
+    /// the identity as its Jacobian. Row `3 s + x` is d/dx at sample s. If a probe has left the cage, the sample's rows
+    /// and share are zero. `[3 * n_samples, n]`
     pub(super) fn gradients(&mut self, weights: &Weights, cage: &[DVec3]) -> Vec<Vec<f64>> {
         let n = cage.len();
         let scale = 0.5 / f64::from(self.step);
         let mut all = Vec::with_capacity(3 * self.samples.len());
         for s in 0..self.samples.len() {
             let raw = [0, 1, 2].map(|x| {
-                let [after, before] = [1, 4].map(|first| dense(weights, PROBES * s + first + x));
+                let [after, before] = [1, 4].map(|first| dense(weights, PROBES_PER_SAMPLE * s + first + x));
                 after.iter().zip(before).map(|(a, b)| scale * (a - b)).collect::<Vec<f64>>()
             });
-            // Row x of the Jacobian: d/dx of the position.
+            // Row x of the Jacobian: derivative of the position with respect to x.
             let jacobian = raw.each_ref().map(|g| g.iter().zip(cage).map(|(&w, &c)| w * c).sum::<DVec3>());
             let off = jacobian.iter().zip(DMat3::IDENTITY.to_cols_array_2d());
-            let is_near = |(a, b): (&DVec3, [f64; 3])| (*a - DVec3::from(b)).abs().max_element() <= OFF;
+            let is_near =
+                |(a, b): (&DVec3, [f64; 3])| (*a - DVec3::from(b)).abs().max_element() <= MAX_JACOBIAN_ERROR;
             if !off.into_iter().all(is_near) {
                 self.shares[s] = 0.0;
                 all.extend([const { Vec::new() }; 3].map(|_: Vec<f64>| vec![0.0; n]));
@@ -110,7 +111,7 @@ impl Probes {
     }
 }
 
-/// A row of sparse weights. `[n]`
+/// A row of the weights as a dense vector. `[n]`
 pub(super) fn dense(weights: &Weights, row: usize) -> Vec<f64> {
     let mut dense = vec![0.0; weights.n_columns()];
     let (columns, values) = weights.row(row);
@@ -118,7 +119,7 @@ pub(super) fn dense(weights: &Weights, row: usize) -> Vec<f64> {
     dense
 }
 
-/// Share of the area at each vertex: a third of its triangles'. A model without area has as much everywhere.
+/// Share of the area at each vertex: a third of its triangles' area. Uniform if the model has no area.
 fn areas(mesh: &TriMesh) -> Vec<f64> {
     let mut areas = vec![0.0; mesh.positions.len()];
     for triangle in &mesh.triangles {
@@ -134,8 +135,7 @@ fn areas(mesh: &TriMesh) -> Vec<f64> {
     areas
 }
 
-/// Vertices each of which is farthest from those before (Gonzalez 1985), and for each vertex the nearest of them. None without
-/// vertices.
+/// Farthest-point sampling (Gonzalez 1985): the samples, and the nearest sample of each vertex. `None` without vertices.
 fn farthest_points(positions: &[Vec3]) -> Option<(Vec<u32>, Vec<u32>)> {
     let center = Bounds::of(positions)?.center();
     let farthest = |distances: &[f32]| {
@@ -145,8 +145,8 @@ fn farthest_points(positions: &[Vec3]) -> Option<(Vec<u32>, Vec<u32>)> {
     let mut next = farthest(&distances)?;
     distances.fill(f32::INFINITY);
     let mut nearest = vec![0; positions.len()];
-    let mut samples = Vec::with_capacity(SAMPLES);
-    while samples.len() < SAMPLES && distances[next] > 0.0 {
+    let mut samples = Vec::with_capacity(N_SAMPLES);
+    while samples.len() < N_SAMPLES && distances[next] > 0.0 {
         let (number, at) = (samples.len() as u32, positions[next]);
         samples.push(next as u32);
         for ((p, distance), nearest) in positions.iter().zip(&mut distances).zip(&mut nearest) {

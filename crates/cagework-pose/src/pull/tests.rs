@@ -1,4 +1,4 @@
-//! Properties of `pull.md` section 8, on the samples; figures on other models are in `docs/notes/pull.md`.
+//! Properties of pulls on the built-in samples; results on other models are in `docs/notes/pull.md`.
 
 mod fit;
 
@@ -39,7 +39,7 @@ fn bound(id: &str) -> Bound {
     Bound { mesh, weights, cage, pull, size }
 }
 
-/// The humanoid, bound once.
+/// The humanoid; bound once for all tests.
 fn humanoid() -> &'static Bound {
     static BOUND: OnceLock<Bound> = OnceLock::new();
     BOUND.get_or_init(|| bound("humanoid"))
@@ -50,7 +50,7 @@ impl Bound {
         self.cage.positions().iter().copied().map(Vec3::as_dvec3).collect()
     }
 
-    /// The vertex of the model that is farthest along a direction.
+    /// Vertex of the model that is farthest in a direction.
     fn farthest(&self, way: Vec3) -> Handle {
         let all = self.mesh.positions.iter().enumerate();
         Handle::Vertex(all.max_by(|a, b| a.1.dot(way).total_cmp(&b.1.dot(way))).unwrap().0 as u32)
@@ -81,7 +81,7 @@ impl Bound {
         Drag::new(&self.pull, start, &grabs?, &pins?, options)
     }
 
-    /// How a handle moves with the cage.
+    /// Displacement of a handle when the cage is at `cage`.
     fn moved(&self, handle: Handle, cage: &[DVec3]) -> DVec3 {
         let row = self.grip(handle).unwrap().row;
         row.iter().zip(cage.iter().zip(self.rest())).map(|(w, (c, r))| *w * (*c - r)).sum()
@@ -93,7 +93,7 @@ impl Bound {
     }
 }
 
-/// Frames of a drag in a straight line, then until it has settled.
+/// Drags in a straight line, then runs frames until the drag has settled.
 fn pulled(drag: &mut Drag, by: DVec3, frames: u32) -> Vec<DVec3> {
     let from: Vec<DVec3> = drag.start().to_vec();
     let to = |share: f64| from.iter().map(|f| *f + share * by).collect::<Vec<_>>();
@@ -108,7 +108,7 @@ fn pulled(drag: &mut Drag, by: DVec3, frames: u32) -> Vec<DVec3> {
 }
 
 #[test]
-fn a_pull_of_nothing_moves_nothing() {
+fn a_pull_of_zero_length_moves_nothing() {
     let b = humanoid();
     let bent: Vec<DVec3> = b
         .rest()
@@ -124,7 +124,7 @@ fn a_pull_of_nothing_moves_nothing() {
 }
 
 #[test]
-fn a_grab_is_where_it_is_pulled_to_and_far_parts_stay() {
+fn a_grab_reaches_its_target_and_far_parts_stay() {
     let b = humanoid();
     let foot = b.farthest(Vec3::new(-0.3, -1.0, 0.0));
     let by = b.size * DVec3::new(-0.1, 0.15, 0.05);
@@ -136,7 +136,7 @@ fn a_grab_is_where_it_is_pulled_to_and_far_parts_stay() {
 }
 
 #[test]
-fn the_answer_turns_with_the_question() {
+fn pulls_are_rotation_equivariant() {
     let b = humanoid();
     let by = b.size * DVec3::new(-0.05, 0.1, 0.1);
     let turn = DMat3::from_rotation_z(0.7) * DMat3::from_rotation_x(0.4);
@@ -160,9 +160,9 @@ fn grabs_that_move_rigidly_move_all_rigidly() {
     assert!(b.apart(&drag.cage(), &expected) < 1e-3, "{}", b.apart(&drag.cage(), &expected));
 }
 
-/// Half a turn in one frame or in a few: on straight ways all grabs meet in the middle, and the model collapses.
+/// A half turn in few frames: on straight paths all grabs would meet in the middle, and the model would collapse.
 #[test]
-fn grabs_that_turn_half_round_turn_all() {
+fn grabs_that_make_a_half_turn_turn_the_model() {
     let b = humanoid();
     let grabs = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y].map(|way| b.farthest(way));
     for (turn, frames) in
@@ -178,18 +178,18 @@ fn grabs_that_turn_half_round_turn_all() {
 }
 
 #[test]
-fn a_grab_of_the_whole_model_without_pins_moves_it_as_it_is() {
+fn a_single_grab_with_whole_reach_translates_the_model() {
     let b = humanoid();
     let mut drag = b.drag(&b.rest(), &[b.hand()], &[], Reach::Whole);
     let by = b.size * DVec3::new(0.3, 0.2, 0.1);
     let cage = pulled(&mut drag, by, 3);
     let expected: Vec<DVec3> = b.rest().iter().map(|p| *p + by).collect();
-    // Rows of f32 sum to 1 to seven digits.
+    // f32 weights sum to 1 within 1e-7.
     assert!(b.apart(&cage, &expected) < 1e-6);
 }
 
 #[test]
-fn the_way_to_a_target_does_not_matter() {
+fn the_result_is_independent_of_the_path() {
     let b = humanoid();
     let by = b.size * DVec3::new(-0.05, 0.1, 0.05);
     let drag = || b.drag(&b.rest(), &[b.hand()], &[], Reach::Automatic);
@@ -199,7 +199,7 @@ fn the_way_to_a_target_does_not_matter() {
     let mut away = drag();
     pulled(&mut away, 50.0 * by, 5);
     pulled(&mut away, DVec3::ZERO, 5);
-    // Where a page asks for no more frames, 2e-5 a step are still to go.
+    // A drag counts as settled at 2e-5 a step; more frames bring it the rest of the way.
     let back = pulled(&mut away, DVec3::ZERO, 30);
     assert!(b.apart(&back, &b.rest()) < 1e-4, "{}", b.apart(&back, &b.rest()));
 }
@@ -219,7 +219,7 @@ fn pins_hold() {
 }
 
 #[test]
-fn neighbours_of_a_cage_vertex_come_along() {
+fn neighbours_of_a_dragged_cage_vertex_follow() {
     let b = humanoid();
     let hand = b.grip(b.hand()).unwrap().row;
     let vertex = (0..hand.len()).max_by(|&i, &j| hand[i].total_cmp(&hand[j])).unwrap() as u32;
@@ -261,9 +261,9 @@ fn symmetric_pulls_are_symmetric() {
     }
 }
 
-/// Targets that cannot all be had end in a finite pose near where they were.
+/// Unreachable targets end in a finite pose.
 #[test]
-fn jobs_that_ask_for_too_much_stay_finite() {
+fn unreachable_targets_stay_finite() {
     let b = humanoid();
     let hand = b.hand();
     let near = Handle::Triangle(0, [0.2, 0.3, 0.5]);
@@ -307,7 +307,7 @@ fn gradients_are_exact_for_linear_functions_and_only_shifts_are_free() {
 }
 
 #[test]
-fn what_is_no_handle_is_an_error_with_its_number() {
+fn invalid_handles_are_errors_with_their_index() {
     let b = humanoid();
     let last = b.mesh.positions.len() - 1;
     let start = b.rest();
@@ -350,7 +350,7 @@ fn a_model_of_one_triangle_or_of_one_point_is_pulled() {
         let grip = Grip::new(Handle::Vertex(0), &pull, &mesh.triangles, &weights).unwrap();
         let start: Vec<DVec3> = cage.positions().iter().copied().map(Vec3::as_dvec3).collect();
         let mut drag = Drag::new(&pull, &start, &[grip], &[], DragOptions::default()).unwrap();
-        // Eight corners cannot bend a triangle: what stays and what is pulled share the difference.
+        // Eight corners cannot bend a triangle: fixed samples and the grab share the error.
         (0..30).for_each(|_| drag.frame(&[DVec3::new(0.1, 0.0, 0.0)]));
         assert!(drag.cage().iter().all(|p| p.is_finite()) && drag.error() < 0.1, "{}", drag.error());
     }

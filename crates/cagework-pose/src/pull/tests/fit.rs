@@ -1,12 +1,12 @@
-//! Poses that are fitted to targets.
+//! Fits to targets.
 
 use glam::{DQuat, DVec3, Vec3};
 
 use super::{Bound, bound, humanoid};
-use crate::pull::{FitOptions, Fitted, PullError};
+use crate::pull::{Fit, FitOptions, PullError};
 use cagework_core::deform::deform_vertices;
 
-/// Bent, twisted, made longer and moved away as a whole; lengths over the size.
+/// A map that bends, twists, stretches and translates the cage; lengths over the model's size.
 fn moved(bound: &Bound, cage: &[DVec3]) -> Vec<DVec3> {
     let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 0.5).normalize(), 1.0);
     let size = bound.size;
@@ -19,7 +19,7 @@ fn moved(bound: &Bound, cage: &[DVec3]) -> Vec<DVec3> {
     cage.iter().map(|&p| map(p)).collect()
 }
 
-/// Normally distributed numbers (Box and Muller 1958) of a linear congruential generator.
+/// Normally distributed numbers (Box and Muller 1958) from a linear congruential generator.
 struct Noise(u64);
 
 impl Noise {
@@ -45,12 +45,12 @@ impl Bound {
         deform_vertices(&self.weights, &narrow(cage))
     }
 
-    fn fit(&self, to: &[Vec3], lambda: Option<f64>) -> Fitted {
+    fn fit(&self, to: &[Vec3], lambda: Option<f64>) -> Fit {
         self.pull.fit(&self.weights, self.pull.areas(), to, FitOptions { lambda }).unwrap()
     }
 }
 
-/// Root of the mean squared distance, and the largest one, over the size.
+/// Root mean squared and largest distance, over the model's size.
 fn apart(a: &[Vec3], b: &[Vec3], size: f64) -> [f64; 2] {
     let all: Vec<f64> = a.iter().zip(b).map(|(a, b)| f64::from(a.distance(*b)) / size).collect();
     [
@@ -60,41 +60,41 @@ fn apart(a: &[Vec3], b: &[Vec3], size: f64) -> [f64; 2] {
 }
 
 #[test]
-fn a_pose_is_recovered_from_the_model_that_it_made() {
+fn a_pose_is_recovered_from_its_model() {
     for id in ["humanoid", "rat"] {
         let bound = bound(id);
         let truth = moved(&bound, &bound.rest());
         let fitted = bound.fit(&bound.model(&truth), None);
         let [_, largest] = apart(&narrow(&fitted.cage), &narrow(&truth), bound.size);
-        // The aim is 1e-4; f32 leaves 1e-6.
+        // The aim is 1e-4; f32 positions allow 1e-6.
         assert!(fitted.is_settled && largest <= 1e-5, "{id}: {largest:e} in {} steps", fitted.steps);
     }
 }
 
 #[test]
-fn noise_of_the_target_is_averaged_as_far_as_statistics_allows() {
+fn a_fit_averages_noise_as_statistics_predict() {
     let bound = humanoid();
     let truth = moved(bound, &bound.rest());
     let model = bound.model(&truth);
     for noise in [1e-3, 5e-3] {
-        // Each coordinate gets its share, so that the distance is `noise` in the mean square.
+        // Standard deviation per coordinate so that the root mean squared distance is `noise`.
         let (mut random, each) = (Noise(1), noise / 3.0_f64.sqrt() * bound.size);
         let noisy: Vec<Vec3> =
             model.iter().map(|p| (p.as_dvec3() + each * random.vector()).as_vec3()).collect();
         let fitted = bound.fit(&noisy, None);
         let [rms, _] = apart(&bound.model(&fitted.cage), &model, bound.size);
-        // The error of n unknowns that are fitted to N values of unit variance, in the mean square.
+        // RMS error of n unknowns fitted to N values of unit variance.
         let expected = noise * (bound.pull.n_cage() as f64 / model.len() as f64).sqrt();
         assert!(rms <= 1.2 * expected, "{noise:e}: {rms:e}, expected {expected:e}");
         assert!(rms <= 1e-4 || noise > 1e-3, "{noise:e}: {rms:e}");
-        assert!((fitted.rms - noise).abs() <= 0.02 * noise, "what is left is the noise: {:e}", fitted.rms);
+        assert!((fitted.rms - noise).abs() <= 0.02 * noise, "the residual is the noise: {:e}", fitted.rms);
         let [cage, _] = apart(&narrow(&fitted.cage), &narrow(&truth), bound.size);
         assert!(cage <= 2.0 * noise, "{noise:e}: the cage is off by {cage:e}");
     }
 }
 
 #[test]
-fn landmarks_that_moved_as_one_move_the_model_as_one() {
+fn rigidly_moved_landmarks_move_the_model_rigidly() {
     let bound = humanoid();
     let turn = DQuat::from_axis_angle(DVec3::new(0.0, 1.0, 0.3).normalize(), 2.0);
     let map = |p: DVec3| turn * p + DVec3::new(0.3, -1.0, 2.0);
@@ -108,7 +108,7 @@ fn landmarks_that_moved_as_one_move_the_model_as_one() {
 }
 
 #[test]
-fn landmarks_are_met_and_the_more_the_energy_weighs_the_less_it_is() {
+fn landmarks_are_met_and_a_larger_lambda_lowers_the_energy() {
     let bound = humanoid();
     let ways = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::new(1.0, -2.0, 0.0)];
     let rows = ways.map(|way| {
@@ -117,9 +117,9 @@ fn landmarks_are_met_and_the_more_the_energy_weighs_the_less_it_is() {
     });
     let weights = bound.weights.with_rows(&rows);
     let mut to = deform_vertices(&weights, &narrow(&bound.rest()));
-    // A hand a tenth of the size up.
+    // Raise the hand by a tenth of the size.
     to[0].y += 0.1 * bound.size as f32;
-    let fits: Vec<Fitted> = [None, Some(1e-3), Some(1e-1)]
+    let fits: Vec<Fit> = [None, Some(1e-3), Some(1e-1)]
         .map(|lambda| bound.pull.fit(&weights, &[1.0; 5], &to, FitOptions { lambda }).unwrap())
         .into();
     assert!(fits[0].largest <= 1e-3, "{:e}", fits[0].largest);
@@ -129,7 +129,7 @@ fn landmarks_are_met_and_the_more_the_energy_weighs_the_less_it_is() {
 }
 
 #[test]
-fn what_cannot_be_fitted_is_refused() {
+fn invalid_fits_are_errors() {
     let bound = humanoid();
     let (n, rest) = (bound.weights.n_rows(), bound.mesh.positions.clone());
     let fit = |shares: &[f64], to: &[Vec3], lambda| {
@@ -143,7 +143,7 @@ fn what_cannot_be_fitted_is_refused() {
     let mut broken = rest;
     broken[7].y = f32::NAN;
     assert!(matches!(fit(areas, &broken, None), PullError::Value { what: "a target", .. }));
-    // A vertex that counts for nothing may be anywhere.
+    // A vertex with zero weight may have any target.
     let mut shares = areas.to_vec();
     shares[7] = 0.0;
     bound.pull.fit(&bound.weights, &shares, &broken, FitOptions::default()).unwrap();
