@@ -1,4 +1,4 @@
-//! Cages for models: generated, checked and repaired; and models to try, each with a cage and poses.
+//! Cages for models: generation, checks and repairs; and built-in sample models with cages and poses.
 //!
 //! No I/O, no GPU, no JavaScript; everything here compiles for `wasm32-unknown-unknown`.
 
@@ -8,7 +8,7 @@ pub mod samples;
 
 pub use generate::{CageOptions, GeneratedCage};
 
-/// The example of the README.
+/// Compiles the README's example.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,4 +1,4 @@
-//! Faults of the connectivity: open and crowded edges, vertices that are not joined, not used or pinched.
+//! Faults of the connectivity: open and non-manifold edges, duplicate, unused and non-manifold vertices.
 
 use super::mirror::Plane;
 use super::{Code, Fix, Places, Problem, Repair, Severity, problem};
@@ -6,7 +6,7 @@ use cagework_core::cage::{Side, sides_of};
 use cagework_core::crossing::same_places;
 use cagework_core::mesh::PolygonMesh;
 
-/// All sides of sound faces, sorted by edge.
+/// All sides of valid faces, sorted by edge.
 #[derive(Debug)]
 pub(super) struct Edges {
     sides: Vec<Side>,
@@ -17,12 +17,12 @@ impl Edges {
         Self { sides: sides_of(&mesh.faces, sound.iter().copied()) }
     }
 
-    /// The sides of every edge.
+    /// Groups of sides with the same edge.
     pub(super) fn groups(&self) -> impl Iterator<Item = &[Side]> {
         self.sides.chunk_by(|a, b| (a.lo, a.hi) == (b.lo, b.hi))
     }
 
-    /// Edges of exactly one face, run through as the missing neighbour would have to.
+    /// Edges of exactly one face, directed as in the missing neighbour.
     pub(super) fn open(&self) -> Vec<[u32; 2]> {
         self.groups()
             .filter(|g| g.len() == 1)
@@ -30,11 +30,11 @@ impl Edges {
             .collect()
     }
 
-    /// Reports edges that do not belong to two faces.
+    /// Reports edges that do not have exactly two faces.
     pub(super) fn report(&self, mesh: &PolygonMesh, found: &mut Vec<Problem>) {
         let open = self.open();
         if !open.is_empty() {
-            // Vertices that were split at a seam leave open edges, too: welding is tried first.
+            // Vertices split at a seam also leave open edges, so welding comes first.
             let (_, joined) = same_places(mesh);
             let is_half = joined == 0 && Plane::of(mesh, &open).is_some_and(Plane::is_central);
             let fixes = [Repair::Weld, Repair::Mirror, Repair::FillHoles].into_iter();
@@ -66,7 +66,7 @@ impl Edges {
     }
 }
 
-/// Reports vertices that are not joined, not used, or pinch the surface.
+/// Reports duplicate, unused and non-manifold vertices.
 pub(super) fn report_vertices(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec<Problem>) {
     let (first, joined) = same_places(mesh);
     if joined > 0 {
@@ -102,9 +102,9 @@ pub(super) fn report_vertices(mesh: &PolygonMesh, sound: &[u32], found: &mut Vec
     }
 }
 
-/// Vertices around which the faces form more than one fan.
+/// Non-manifold vertices: their faces form more than one fan.
 fn pinched(mesh: &PolygonMesh, sound: &[u32]) -> Vec<u32> {
-    // Corners by vertex, with the neighbours in their face.
+    // `[vertex, previous, next]` of each corner.
     let mut corners: Vec<[u32; 3]> = Vec::new();
     for &f in sound {
         let face = &mesh.faces[f as usize];
@@ -114,7 +114,7 @@ fn pinched(mesh: &PolygonMesh, sound: &[u32]) -> Vec<u32> {
     corners.sort_unstable();
     let mut pinched = Vec::new();
     for around in corners.chunk_by(|a, b| a[0] == b[0]) {
-        // Corners hang together if they share a neighbour.
+        // Union-find: two corners are in the same fan if they share a neighbour.
         let mut neighbours: Vec<[u32; 2]> =
             (0u32..).zip(around).flat_map(|(k, c)| [[c[1], k], [c[2], k]]).collect();
         neighbours.sort_unstable();
@@ -132,7 +132,7 @@ fn pinched(mesh: &PolygonMesh, sound: &[u32]) -> Vec<u32> {
     pinched
 }
 
-/// What stands for all that `k` hangs together with; later searches are shorter.
+/// Root of a set: find with path halving.
 fn find(root: &mut [u32], mut k: u32) -> u32 {
     while root[k as usize] != k {
         root[k as usize] = root[root[k as usize] as usize];

@@ -1,4 +1,4 @@
-//! Moving a cage outward until it encloses the model.
+//! Grows a cage until it encloses the model.
 
 use glam::{DVec3, Vec3};
 
@@ -9,23 +9,21 @@ use cagework_core::enclosure::Enclosure;
 use cagework_core::geometry::closest_point_on_triangle;
 use cagework_core::mesh::{Bounds, PolygonMesh};
 
-/// Rounds of moving; each makes room for the vertices that are outside now.
+/// Limit on rounds; each moves the cage past the vertices that are still outside.
 const MAX_ROUNDS: usize = 40;
 
-/// Room left beyond the model, as a fraction of the cage's diagonal.
+/// Gap left beyond each point, over the cage's diagonal.
 const MARGIN: f64 = 0.004;
 
-/// The cage and its smooth surface.
 fn smoothed(mesh: &PolygonMesh, smooth: u32) -> Result<ControlSet, RepairError> {
     Ok(ControlSet::new(&Cage::new(mesh)?, smooth, InnerControls::default())?)
 }
 
-/// Which points are outside of the smooth surface.
 fn outside(mesh: &PolygonMesh, smooth: u32, model: &[Vec3]) -> Result<Vec<u32>, RepairError> {
     Ok(Enclosure::new(Controls::from(&smoothed(mesh, smooth)?).surface(), model).outside())
 }
 
-/// Moves vertices outward until the surface, subdivided `smooth` times, holds the model; returns how many have moved.
+/// Moves vertices outward until the surface, subdivided `smooth` times, encloses the model. Returns the number of moved vertices.
 pub(crate) fn grow(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Result<usize, RepairError> {
     let before = mesh.positions.clone();
     let mut left = 0;
@@ -39,7 +37,7 @@ pub(crate) fn grow(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Resul
         }
         push(mesh, controls, outside.iter().map(|&v| model[v as usize].as_dvec3()));
     }
-    // Whatever stands out of a cage of this shape is inside it when it is scaled up about the model's middle.
+    // Scaling about the model's centre encloses what local moves did not.
     scale(mesh, model, smooth)?;
     let left_now = outside(mesh, smooth, model)?.len();
     if left_now > 0 {
@@ -48,8 +46,7 @@ pub(crate) fn grow(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Resul
     Ok(before.iter().zip(&mesh.positions).filter(|(a, b)| a != b).count())
 }
 
-/// Moves the corners of the triangle nearest to each point outward by its distance and a margin; of a smooth surface those of
-/// the cage's face that the triangle is part of.
+/// Moves the triangle nearest to each point outward past it: its corners, or those of its cage face if the surface is subdivided.
 fn push(mesh: &mut PolygonMesh, controls: Controls<'_>, points: impl Iterator<Item = DVec3>) {
     let (cage, is_smooth) = (controls.surface(), controls.smooth() > 0);
     let margin = MARGIN * f64::from(cage.diagonal());
@@ -71,7 +68,7 @@ fn push(mesh: &mut PolygonMesh, controls: Controls<'_>, points: impl Iterator<It
         };
         for &i in corners {
             let so_far = &mut offset[i as usize];
-            // Only what is still missing along this direction.
+            // Add only what earlier moves lack in this direction.
             let missing = needed.length() - so_far.dot(direction);
             if missing > 0.0 {
                 *so_far += direction * missing;
@@ -83,7 +80,7 @@ fn push(mesh: &mut PolygonMesh, controls: Controls<'_>, points: impl Iterator<It
     }
 }
 
-/// Scales a mesh about the middle of the model in small steps until its box has room for the model's box.
+/// Scales a mesh about the model's centre in small steps until its surface encloses the model's box.
 fn scale(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Result<(), RepairError> {
     const STEPS: usize = 24;
     const STEP: f32 = 1.08;

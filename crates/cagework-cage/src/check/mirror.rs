@@ -1,11 +1,11 @@
-//! Half a cage, as it is modelled with a mirror that was not applied: all its open edges lie in one plane across an axis.
+//! Half a cage, modelled with a mirror that was not applied: all open edges lie in one axis-aligned plane.
 
 use cagework_core::mesh::PolygonMesh;
 
-/// Open edges this near to one plane are in it, of the diagonal: a modeller's rounding.
-const IN_PLANE: f64 = 1e-4;
+/// Tolerance of the plane over the diagonal of the mesh: rounding of the modelling program.
+const PLANE_TOLERANCE: f64 = 1e-4;
 
-/// The plane in which a cage ends, across an axis.
+/// An axis-aligned plane that holds all open edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Plane {
     axis: usize,
@@ -13,13 +13,13 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    /// The plane of all `open` edges, if the whole mesh is on one side of it.
+    /// The plane of all `open` edges, if the whole mesh lies on one side of it.
     pub(super) fn of(mesh: &PolygonMesh, open: &[[u32; 2]]) -> Option<Self> {
-        let reach = (IN_PLANE * mesh.diagonal()) as f32;
+        let reach = (PLANE_TOLERANCE * mesh.diagonal()) as f32;
         let first = mesh.positions[open.first()?[0] as usize];
         (0..3).find_map(|axis| {
             let at = if first[axis].abs() <= reach { 0.0 } else { first[axis] };
-            // Faces may name vertices that are not there.
+            // Faces may have invalid indices.
             let from_plane = |v: u32| mesh.positions.get(v as usize).map_or(0.0, |p| p[axis] - at);
             let is_border = open.as_flattened().iter().all(|&v| from_plane(v).abs() <= reach);
             let mut sides = mesh.faces.iter().flatten().map(|&v| from_plane(v)).filter(|x| x.abs() > reach);
@@ -28,12 +28,12 @@ impl Plane {
         })
     }
 
-    /// Whether it goes through the origin, as the plane of a mirror does.
+    /// Whether the plane goes through the origin, as a modelling program's mirror does.
     pub(super) fn is_central(self) -> bool {
         self.at == 0.0
     }
 
-    /// Adds the other half: vertices of open edges are shared, and moved into the plane.
+    /// Adds the mirror image. Vertices of open edges are shared, and moved into the plane.
     pub(super) fn mirror(self, mesh: &mut PolygonMesh, open: &[[u32; 2]]) -> String {
         let Self { axis, at } = self;
         let mut other: Vec<u32> = (0..mesh.positions.len() as u32).collect();
@@ -71,7 +71,7 @@ mod tests {
     use cagework_core::cage::subdivided_box;
     use cagework_core::mesh::Bounds;
 
-    /// The half of a box of side 2 on one side of a plane, its middle at the origin.
+    /// Half of a box of side 2, cut by a plane across `axis`; the whole box is centred at `at`.
     fn half(axis: usize, at: f32) -> PolygonMesh {
         let mut mesh = subdivided_box(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }, 0.0, [2; 3]);
         mesh.faces.retain(|face| face.iter().all(|&v| mesh.positions[v as usize][axis] <= 0.0));
@@ -88,7 +88,7 @@ mod tests {
             let mended = repair(&mesh, &[Repair::DropDegenerate, Repair::Mirror], None).unwrap();
             assert_eq!(mended.done[1], format!("Mirrored 12 faces across {name} = 0."));
             let cage = Cage::new(&mended.mesh).unwrap();
-            // Of the whole box: 27 points but for the one in its middle, 6 sides of 4 faces.
+            // The whole box has 3^3 points minus the one at its centre, and 6 sides of 4 faces.
             assert_eq!((cage.n_vertices(), cage.faces().len(), cage.notices().len()), (26, 24, 0));
             assert_eq!((cage.bounds().min, cage.bounds().max), (Vec3::splat(-1.0), Vec3::ONE));
         }
@@ -97,11 +97,11 @@ mod tests {
         assert_eq!(
             fixes,
             [Fix::Repair { repair: Repair::FillHoles }],
-            "no mirror stands there, but it may be asked for"
+            "a plane away from the origin is not offered, but can be requested"
         );
         let mended = repair(&beside, &[Repair::Mirror], None).unwrap();
         assert_eq!(mended.done, ["Mirrored 12 faces across x = 3."]);
-        // A hole that is bent, and one with faces on both sides of it: nothing to mirror.
+        // An open boundary that is not planar: no mirror plane.
         let mut bent = half(0, 0.0);
         bent.positions.iter_mut().filter(|p| p.x == 0.0 && p.y > 0.5).for_each(|p| p.x = 0.25);
         assert_eq!(repair(&bent, &[Repair::Mirror], None).unwrap().done, [""; 0]);

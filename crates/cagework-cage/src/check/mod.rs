@@ -1,7 +1,7 @@
-//! What is wrong with a cage, all of it at once and as data, and what can be done about it.
+//! Checks a mesh for use as a cage and repairs it.
 //!
-//! [`Cage::new`] stops at the first fault; [`check`] goes on, also on meshes that are no cage at all, so that a page can
-//! mark every place and a command can list them. [`repair`] does what can be done without asking.
+//! [`Cage::new`] stops at the first fault. [`check`] reports all faults with their locations, of any polygon mesh.
+//! [`repair`] makes those repairs that need no decision by the user.
 
 mod edges;
 mod grow;
@@ -23,61 +23,61 @@ use cagework_core::enclosure::Enclosure;
 use cagework_core::mesh::PolygonMesh;
 
 pub(crate) use grow::grow;
-pub use repair::{Repair, RepairError, Repaired, repair, repair_smooth};
+pub use repair::{Repair, RepairError, RepairedMesh, repair, repair_smooth};
 
-/// What is wrong. The names are stable: programs may rely on them.
+/// Kinds of problems. The names are part of the file format and stay stable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Code {
-    /// There are no faces.
+    /// The mesh has no faces.
     Empty,
     /// A coordinate is infinite or not a number.
     NotFinite,
-    /// A face names a vertex that does not exist.
+    /// A face has the index of a vertex that does not exist.
     BadIndex,
-    /// A face has too few corners, one of them twice, or no area, or its outline crosses itself.
+    /// A face has too few corners, a repeated corner, no area, or an outline that crosses itself.
     DegenerateFace,
     /// Two faces have the same corners.
     DuplicateFace,
-    /// Vertices at one place that are not joined.
+    /// Vertices at the same position that are not joined.
     DuplicateVertex,
-    /// An edge belongs to one face only.
+    /// An edge has only one face.
     OpenEdge,
-    /// An edge belongs to three faces or more.
+    /// An edge has three or more faces.
     NonManifoldEdge,
-    /// Parts of the surface meet in a vertex only.
+    /// Parts of the surface meet only in a vertex.
     NonManifoldVertex,
-    /// Faces point inwards. One problem for each component.
+    /// Faces point inwards. One problem per component.
     Flipped,
-    /// Faces cannot be turned consistently.
+    /// Faces cannot be oriented consistently.
     OneSided,
-    /// Faces go through each other.
+    /// Faces intersect.
     SelfIntersection,
-    /// A vertex of no face.
+    /// A vertex without faces.
     UnusedVertex,
-    /// Vertices of the model are not inside.
+    /// Vertices of the model lie outside the cage.
     ModelOutside,
-    /// Parts of the cage are thinner than a cell of the grid.
+    /// Parts of the cage are thinner than a grid cell.
     ThinPart,
-    /// Something else keeps it from being a cage.
+    /// Any other reason for which [`Cage::new`] rejects the mesh.
     NotACage,
 }
 
-/// How bad it is.
+/// Severity of a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Severity {
-    /// It cannot be bound, or not rightly.
+    /// The cage cannot be bound, or results would be wrong.
     Error,
-    /// It can be bound, but something will not be as expected.
+    /// The cage can be bound, but results may be unexpected.
     Warning,
-    /// Mended by itself, or harmless.
+    /// Harmless, or repaired during binding.
     Note,
 }
 
-/// Where a problem is: indices into the mesh that was checked (`points`: object units).
+/// Locations of a problem: indices into the checked mesh, and points in object units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Places {
     /// Cage vertices; for [`Code::ModelOutside`] vertices of the model.
@@ -90,77 +90,75 @@ pub struct Places {
     pub points: Vec<[f32; 3]>,
 }
 
-/// What helps.
+/// A remedy for a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Fix {
-    /// One of the repairs.
+    /// A repair.
     Repair {
-        /// Which one.
+        /// The repair.
         repair: Repair,
     },
-    /// Bind with this many cells along the longest side.
+    /// Bind with this many cells along the cage's longest side.
     Grid {
-        /// Cells.
+        /// Number of cells.
         cells: u32,
     },
 }
 
-/// One kind of fault and all its places.
+/// All occurrences of one kind of problem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Problem {
-    /// What.
+    /// Kind of problem.
     pub code: Code,
-    /// How bad.
+    /// Its severity.
     pub severity: Severity,
-    /// How many.
+    /// Number of occurrences.
     pub count: usize,
-    /// Where; up to [`MAX_PLACES`] of each kind.
+    /// Locations, at most [`MAX_PLACES`] of each kind.
     pub places: Places,
-    /// A sentence.
+    /// Description, one sentence.
     pub message: String,
-    /// What helps, best first; empty if a person has to look.
+    /// Remedies, best first; empty if the user has to decide.
     pub fixes: Vec<Fix>,
 }
 
-/// All that is known about a cage.
+/// Result of a check.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CageCheck {
-    /// Whether it can be used: no problem is an error.
+    /// Whether the mesh can be bound: no problem is an error.
     pub valid: bool,
-    /// Whether all of the model is inside, if a model was given and that can be told.
+    /// Whether the cage encloses the model; `None` without a model or if the cage is not valid.
     pub encloses: Option<bool>,
-    /// Vertices.
+    /// Number of vertices.
     pub vertices: usize,
-    /// Faces.
+    /// Number of faces.
     pub faces: usize,
-    /// Parts that hang together through edges.
+    /// Number of edge-connected components.
     pub components: usize,
-    /// Smallest thickness found, object units, if it has an inside.
+    /// Smallest thickness found, object units; `None` if the cage has no interior.
     pub thickness: Option<f32>,
-    /// What is wrong, worst first.
+    /// Problems, worst first.
     pub problems: Vec<Problem>,
 }
 
 impl CageCheck {
-    /// The problem of a kind, if there is one.
+    /// The problem with this code.
     #[must_use]
     pub fn problem(&self, code: Code) -> Option<&Problem> {
         self.problems.iter().find(|p| p.code == code)
     }
 }
 
-/// Looks for everything that may be wrong with a polygon mesh as a cage.
+/// Checks a polygon mesh for use as a cage.
 ///
-/// `model`: positions that should be inside, if any. `grid`: cells along the longest side that will be used to bind, to
-/// look for parts thinner than a cell.
+/// `model`: positions that should lie inside. `grid`: cells along the longest side; parts thinner than a cell are reported.
 #[must_use]
 pub fn check(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>) -> CageCheck {
     check_smooth(mesh, model, grid, 0)
 }
 
-/// [`check`] of a cage that is subdivided `smooth` times: what should be inside, and how thick it is, is asked of the smooth
-/// surface.
+/// [`check`] of a cage that is subdivided `smooth` times. Enclosure and thickness are those of the subdivided surface.
 #[must_use]
 pub fn check_smooth(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32>, smooth: u32) -> CageCheck {
     let mut found = Vec::new();
@@ -207,7 +205,7 @@ pub fn check_smooth(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32
         p.places.faces.truncate(MAX_PLACES);
         p.places.points.truncate(MAX_PLACES);
     }
-    // By pairs of numbers, which are sorted elsewhere too: every other kind of key is 2 kB more to download.
+    // Sorts pairs of numbers: a sort of another key type would add 2 kB to the wasm module.
     let kind = |p: &Problem| (p.severity as u32) << 16 | p.code as u32;
     let mut order: Vec<[u32; 2]> = (0u32..).zip(&found).map(|(k, p)| [kind(p), k]).collect();
     order.sort_unstable();
@@ -224,7 +222,6 @@ pub fn check_smooth(mesh: &PolygonMesh, model: Option<&[Vec3]>, grid: Option<u32
     }
 }
 
-/// The problem that faces go through each other, if they do.
 fn crossing(found: Crossings) -> Problem {
     Problem {
         places: Places { faces: found.faces, points: found.points, ..Places::default() },
@@ -233,7 +230,7 @@ fn crossing(found: Crossings) -> Problem {
     }
 }
 
-/// Vertices of the model that the cage does not enclose; whether there are none.
+/// Reports model vertices outside the cage. Returns whether the cage encloses the model.
 fn report_outside(cage: &Cage, model: &[Vec3], found: &mut Vec<Problem>) -> bool {
     let outside = Enclosure::new(cage, model).outside();
     if outside.is_empty() {
@@ -250,7 +247,7 @@ fn report_outside(cage: &Cage, model: &[Vec3], found: &mut Vec<Problem>) -> bool
     false
 }
 
-/// A problem without places and fixes.
+/// A problem without locations and remedies.
 fn problem(code: Code, severity: Severity, count: usize) -> Problem {
     let message = sentences::of(code, count);
     Problem { code, severity, count, places: Places::default(), message, fixes: Vec::new() }

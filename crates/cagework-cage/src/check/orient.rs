@@ -1,4 +1,4 @@
-//! Which faces point the wrong way.
+//! Orientation of faces: which ones point inwards.
 
 use std::collections::VecDeque;
 
@@ -9,17 +9,16 @@ use super::{Code, Fix, Places, Problem, Repair, Severity, problem, sentences};
 use cagework_core::enclosure::winding_number;
 use cagework_core::mesh::PolygonMesh;
 
-/// Faces of one part of the surface.
 #[derive(Clone, Debug)]
 pub(super) struct Component {
     pub(super) faces: Vec<u32>,
-    /// Whether each of `faces` must be turned for all to point away from the solid.
+    /// Whether each of `faces` must be flipped for all to point outward.
     pub(super) turn: Vec<bool>,
-    /// An edge at which faces cannot agree.
+    /// An edge at which no consistent orientation exists.
     pub(super) one_sided: Option<[u32; 2]>,
 }
 
-/// The parts of the surface, in order of first faces, and how their faces should be turned.
+/// Components in order of their first face, with the orientation of their faces.
 pub(super) fn components(mesh: &PolygonMesh, sound: &[u32], edges: &Edges) -> Vec<Component> {
     let n = mesh.faces.len();
     let mut neighbours: Vec<Vec<(u32, bool, [u32; 2])>> = vec![Vec::new(); n];
@@ -58,22 +57,22 @@ pub(super) fn components(mesh: &PolygonMesh, sound: &[u32], edges: &Edges) -> Ve
     components
 }
 
-/// Fewest triangles that go more than half around a point.
-const ENCLOSING: usize = 3;
+/// Smallest number of triangles of a component that may contain another component.
+const MIN_ENCLOSING_TRIANGLES: usize = 3;
 
 fn corners_of_box(triangles: &[[DVec3; 3]]) -> [DVec3; 2] {
     let corners = || triangles.iter().flatten().copied();
     [corners().fold(DVec3::INFINITY, DVec3::min), corners().fold(DVec3::NEG_INFINITY, DVec3::max)]
 }
 
-/// Turns whole components whose volume has the wrong sign: negative, or positive for one inside another.
+/// Flips whole components whose volume has the wrong sign: negative, or positive for a component nested inside another.
 fn turn_outward(mesh: &PolygonMesh, components: &mut [Component]) {
     let solids: Vec<Vec<[DVec3; 3]>> = components.iter().map(|c| triangles(mesh, c)).collect();
-    // A soup may have as many components as faces: only those that can have something inside are looked at.
+    // A triangle soup may have as many components as faces: test nesting only in components that can contain something.
     let around: Vec<(usize, [DVec3; 2])> = solids
         .iter()
         .enumerate()
-        .filter(|(_, s)| s.len() >= ENCLOSING)
+        .filter(|(_, s)| s.len() >= MIN_ENCLOSING_TRIANGLES)
         .map(|(j, s)| (j, corners_of_box(s)))
         .collect();
     for (k, component) in components.iter_mut().enumerate() {
@@ -99,7 +98,7 @@ fn turn_outward(mesh: &PolygonMesh, components: &mut [Component]) {
     }
 }
 
-/// A component as triangles (fans: enough for volumes), its faces turned alike.
+/// Triangle fans of a component with consistent orientation; enough for volumes and winding numbers.
 fn triangles(mesh: &PolygonMesh, component: &Component) -> Vec<[DVec3; 3]> {
     let mut triangles = Vec::new();
     for (&f, &turned) in component.faces.iter().zip(&component.turn) {
@@ -115,7 +114,7 @@ fn triangles(mesh: &PolygonMesh, component: &Component) -> Vec<[DVec3; 3]> {
     triangles
 }
 
-/// Reports faces that point the wrong way; returns the number of components.
+/// Reports faces that point inwards. Returns the number of components.
 pub(super) fn report(mesh: &PolygonMesh, sound: &[u32], edges: &Edges, found: &mut Vec<Problem>) -> usize {
     let components = components(mesh, sound, edges);
     for (k, component) in components.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What can be mended without asking.
+//! Repairs that need no decision by the user.
 
 use std::collections::{HashMap, HashSet};
 
@@ -22,64 +22,64 @@ use cagework_core::words::counted;
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Repair {
-    /// Joins vertices at one place.
+    /// Joins vertices at the same position.
     Weld,
-    /// Drops faces without area, faces with the corners of another one, corners named twice, and unused vertices.
+    /// Drops faces without area, duplicate faces, repeated corners and unused vertices.
     DropDegenerate,
-    /// Adds the other half of a cage that ends in a plane across an axis.
+    /// Mirrors a half cage whose open edges lie in one axis-aligned plane.
     Mirror,
-    /// Closes holes of up to 64 edges.
+    /// Fills holes of up to 64 edges.
     FillHoles,
-    /// Turns faces outward.
+    /// Flips faces that point inwards.
     Flip,
-    /// Moves vertices outward until all of the model is inside.
+    /// Moves vertices outward until the cage encloses the model.
     Grow,
 }
 
-/// A mended cage.
+/// A repaired mesh.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Repaired {
-    /// The mesh.
+pub struct RepairedMesh {
+    /// The repaired mesh.
     pub mesh: PolygonMesh,
-    /// For every old vertex the new one that stands for it, if any. `[n_old]`
+    /// New index of every old vertex; `None` if it was dropped. `[n_old]`
     pub vertex_of: Vec<Option<u32>>,
-    /// What was done, a sentence each; empty if there was nothing to do.
+    /// What was repaired, one sentence each; empty if nothing was.
     pub done: Vec<String>,
 }
 
-/// Why a repair did not come about.
+/// Why a repair failed.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum RepairError {
-    /// Growing needs the model.
+    /// Growing needs a model.
     #[error("growing the cage needs the model that should be inside: give it")]
     NoModel,
-    /// Growing needs a cage.
-    #[error("the cage cannot grow before it is one: {0}")]
+    /// Growing needs a valid cage.
+    #[error("the mesh must be a valid cage before it can grow: {0}")]
     NotACage(#[from] CageError),
-    /// Nor before its smooth surface is one.
+    /// Growing needs a valid subdivided surface.
     #[error(transparent)]
     NotSmooth(#[from] ControlError),
-    /// Growing did not help.
+    /// The model is still partly outside.
     #[error("{left} model vertices are still outside after growing: make a new cage")]
     StillOutside {
-        /// How many.
+        /// Number of model vertices outside.
         left: usize,
     },
 }
 
-/// Repairs a mesh: in the order weld, drop, mirror, fill, flip, grow, whichever of them are asked for. Faces keep their order.
+/// Repairs a mesh. Applies `repairs` in the order weld, drop, mirror, fill, flip, grow; faces keep their order.
 ///
 /// # Errors
-/// [`RepairError`], all about growing; the other repairs do what they can.
+/// [`RepairError`] if growing fails. Other repairs never fail.
 pub fn repair(
     mesh: &PolygonMesh,
     repairs: &[Repair],
     model: Option<&[Vec3]>,
-) -> Result<Repaired, RepairError> {
+) -> Result<RepairedMesh, RepairError> {
     repair_smooth(mesh, repairs, model, 0)
 }
 
-/// [`repair`] of a cage that is subdivided `smooth` times: it grows until the model is inside its smooth surface.
+/// [`repair`] of a cage that is subdivided `smooth` times: it grows until its subdivided surface encloses the model.
 ///
 /// # Errors
 /// As [`repair`].
@@ -88,8 +88,8 @@ pub fn repair_smooth(
     repairs: &[Repair],
     model: Option<&[Vec3]>,
     smooth: u32,
-) -> Result<Repaired, RepairError> {
-    let mut repaired = Repaired {
+) -> Result<RepairedMesh, RepairError> {
+    let mut repaired = RepairedMesh {
         mesh: mesh.clone(),
         vertex_of: (0..mesh.positions.len() as u32).map(Some).collect(),
         done: Vec::new(),
@@ -121,8 +121,8 @@ pub fn repair_smooth(
     Ok(repaired)
 }
 
-impl Repaired {
-    /// Leaves only vertices for which `keep` holds, in their order.
+impl RepairedMesh {
+    /// Removes vertices for which `keep` is false; the rest keep their order.
     fn keep_vertices(&mut self, keep: &[bool]) {
         let mut number = vec![None; keep.len()];
         let mut positions = Vec::new();
@@ -140,7 +140,7 @@ impl Repaired {
     }
 }
 
-fn weld(repaired: &mut Repaired) {
+fn weld(repaired: &mut RepairedMesh) {
     let (first, joined) = same_places(&repaired.mesh);
     if joined == 0 {
         return;
@@ -157,7 +157,7 @@ fn weld(repaired: &mut Repaired) {
     repaired.done.push(format!("Joined {joined} vertices with others at the same place."));
 }
 
-fn drop_degenerate(repaired: &mut Repaired) {
+fn drop_degenerate(repaired: &mut RepairedMesh) {
     let n = repaired.mesh.positions.len() as u32;
     let before = repaired.mesh.faces.len();
     for face in &mut repaired.mesh.faces {
@@ -166,7 +166,7 @@ fn drop_degenerate(repaired: &mut Repaired) {
             face.pop();
         }
     }
-    // A corner named twice cuts an outline into two: keep what lies between, if that is a face.
+    // A repeated corner splits an outline into two: keep each part that is a valid face.
     let sound = shape::sound_faces(&repaired.mesh, &mut Vec::new());
     let keep: HashSet<u32> = sound.into_iter().collect();
     let mut number = 0..;
@@ -186,7 +186,7 @@ fn drop_degenerate(repaired: &mut Repaired) {
     }
 }
 
-fn fill_holes(repaired: &mut Repaired) {
+fn fill_holes(repaired: &mut RepairedMesh) {
     let mesh = &mut repaired.mesh;
     let sound = shape::sound_faces(mesh, &mut Vec::new());
     let edges = Edges::of(mesh, &sound);
@@ -208,7 +208,7 @@ fn fill_holes(repaired: &mut Repaired) {
     }
 }
 
-fn flip(repaired: &mut Repaired) {
+fn flip(repaired: &mut RepairedMesh) {
     let mesh = &mut repaired.mesh;
     let sound = shape::sound_faces(mesh, &mut Vec::new());
     let edges = Edges::of(mesh, &sound);

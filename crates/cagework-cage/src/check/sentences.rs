@@ -1,9 +1,9 @@
-//! What the problems of a cage say, in English: another language is another file like this one.
+//! English messages of the problems.
 
 use super::Code;
 use cagework_core::words::counted;
 
-/// For the problems of which the number says all there is.
+/// Message of a problem that is described by its code and count.
 pub(super) fn of(code: Code, n: usize) -> String {
     let with = |one: &str, many: &str| counted(n, one, many);
     match code {
@@ -24,7 +24,7 @@ pub(super) fn of(code: Code, n: usize) -> String {
             )
         }
         Code::DuplicateVertex => format!(
-            "{} where another one is: on open edges they count as one, elsewhere as two handles.",
+            "{} at the same position as another one: at open edges they are joined, elsewhere they stay separate handles.",
             with("vertex is", "vertices are")
         ),
         Code::OpenEdge => {
@@ -42,7 +42,7 @@ pub(super) fn of(code: Code, n: usize) -> String {
         Code::UnusedVertex => {
             format!("{} to no face: moving it does nothing.", with("vertex belongs", "vertices belong"))
         }
-        // These say more than a number.
+        // Composed by the functions below.
         Code::Flipped
         | Code::OneSided
         | Code::SelfIntersection
@@ -52,7 +52,7 @@ pub(super) fn of(code: Code, n: usize) -> String {
     }
 }
 
-/// Vertices of a model of `all` are outside.
+/// Message for `n` model vertices of `all` outside the cage.
 pub(super) fn outside(n: usize, all: usize) -> String {
     format!(
         "{n} of {} {} outside the cage: {} would follow it less and less with distance.",
@@ -62,7 +62,7 @@ pub(super) fn outside(n: usize, all: usize) -> String {
     )
 }
 
-/// `n` of the `all` faces of a component point inwards.
+/// Message for `n` of the `all` faces of a component that point inwards.
 pub(super) fn flipped(component: usize, n: usize, all: usize) -> String {
     if n == all {
         return format!("Component {component} is inside out: all its {all} faces point into the solid.");
@@ -71,12 +71,12 @@ pub(super) fn flipped(component: usize, n: usize, all: usize) -> String {
     format!("In component {component}, {n} of {all} faces {points} inwards.")
 }
 
-/// Faces of a component cannot be turned consistently.
+/// Message for a component that cannot be oriented.
 pub(super) fn one_sided(component: usize) -> String {
     format!("Component {component} has no inside: its faces cannot be turned consistently.")
 }
 
-/// Places are thinner than a cell; `cells` along the longest side would do, if a grid may have so many.
+/// Message for thin places. `cells`: a grid that resolves them, if that is within the limit.
 pub(super) fn thin(places: usize, cells: Option<u32>) -> String {
     let places = counted(places, "place", "places");
     let advice = cells.map_or("make the cage thicker".into(), |cells| format!("use a grid of {cells} cells"));

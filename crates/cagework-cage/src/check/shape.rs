@@ -1,4 +1,4 @@
-//! Faults of faces and of the shape: faces without area, thin parts.
+//! Faults of single faces, and thin parts.
 
 use std::collections::HashMap;
 
@@ -10,17 +10,17 @@ use cagework_core::controls::Controls;
 use cagework_core::mesh::PolygonMesh;
 use cagework_core::options::MAX_GRID;
 
-/// Triangles up to which the thickness is looked at everywhere; of more, every n-th is a place to measure from.
-const MEASURED: usize = 1500;
+/// Number of triangles up to which thickness is measured at every triangle; larger cages are sampled evenly.
+const MAX_MEASURED_TRIANGLES: usize = 1500;
 
-/// A part this many cells thick is thick enough: one cell has no unknown of its own in the worst case.
-const ENOUGH_CELLS: f64 = 1.0;
+/// Thickness, in cells, from which on a part is not reported. A part one cell thick may have no unknown of its own.
+const MIN_CELLS: f64 = 1.0;
 
-/// Two faces bound a thin part if they lean towards each other by less than some 70 degrees (this is the cosine; a regular
-/// tetrahedron's still count). Steeper ones make a corner: near it they are as close as one likes, however thick the part.
-const OPPOSITE: f64 = 0.3;
+/// Two faces bound a thin part if the cosine between one normal and the other's opposite exceeds this (70 degrees; the faces of a
+/// regular tetrahedron still count). Faces at a steeper angle form a corner, near which their distance tends to zero.
+const MIN_OPPOSITION_COSINE: f64 = 0.3;
 
-/// Faces that name existing, finite vertices, none twice, and have an area. The others are reported.
+/// Indices of valid faces: existing, finite, distinct vertices and an area. Reports the others.
 pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u32> {
     let n = mesh.positions.len();
     if mesh.faces.is_empty() || n == 0 {
@@ -73,8 +73,8 @@ pub(super) fn sound_faces(mesh: &PolygonMesh, found: &mut Vec<Problem>) -> Vec<u
     sound
 }
 
-/// Measures from the middle of faces straight inwards, to faces about opposite; reports where that is less than a cell of the
-/// grid.
+/// Measures thickness by rays from face centres inwards to opposing faces, and reports where it is less than a grid
+/// cell. Returns the smallest thickness.
 pub(super) fn report_thickness(
     controls: Controls<'_>,
     grid: Option<u32>,
@@ -87,7 +87,7 @@ pub(super) fn report_thickness(
     let facing = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize_or_zero();
     let mut thinnest = f64::INFINITY;
     let (mut faces, mut points) = (Vec::new(), Vec::new());
-    for t in (0..n).step_by(n.div_ceil(MEASURED).max(1)) {
+    for t in (0..n).step_by(n.div_ceil(MAX_MEASURED_TRIANGLES).max(1)) {
         let [a, b, c] = triangles[t];
         let normal = facing(triangles[t]);
         let middle = (a + b + c) / 3.0;
@@ -97,19 +97,19 @@ pub(super) fn report_thickness(
                 (way, nearest) = (distance, other);
             }
         }
-        if normal.dot(facing(triangles[nearest])) > -OPPOSITE {
-            // Past a corner.
+        if normal.dot(facing(triangles[nearest])) > -MIN_OPPOSITION_COSINE {
+            // The ray hit the other side of a corner.
             continue;
         }
         thinnest = thinnest.min(way);
-        if cell.is_some_and(|cell| way < ENOUGH_CELLS * cell) {
+        if cell.is_some_and(|cell| way < MIN_CELLS * cell) {
             faces.extend(controls.cage_face(cage.face_of_triangle()[t]));
             points.push((middle - 0.5 * way * normal).as_vec3().to_array());
         }
     }
     faces.dedup();
     if let (Some(cell), Some(grid), false) = (cell, grid, points.is_empty()) {
-        let cells = (f64::from(grid) * cell / thinnest.max(1e-30)).ceil() * ENOUGH_CELLS;
+        let cells = (f64::from(grid) * cell / thinnest.max(1e-30)).ceil() * MIN_CELLS;
         let cells = (cells <= f64::from(MAX_GRID)).then_some(cells as u32);
         let count = points.len();
         found.push(Problem {
@@ -122,9 +122,7 @@ pub(super) fn report_thickness(
     thinnest.is_finite().then_some(thinnest as f32)
 }
 
-/// Distance from a point along a unit direction to a triangle, if the ray meets it.
-///
-/// Source: Moeller, Trumbore 1997.
+/// Distance from a point along a unit direction to a triangle; `None` if the ray misses (Moeller and Trumbore 1997).
 fn distance_along(from: DVec3, direction: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<f64> {
     let (ab, ac) = (*b - *a, *c - *a);
     let p = direction.cross(ac);

@@ -31,10 +31,9 @@ fn sound_cage_has_no_problems() {
     assert!((found.thickness.unwrap() - 2.0).abs() < 1e-6, "the box is 2 wide");
 }
 
-/// The size of the mesh was taken from all vertices: beside a far one of no face, all faces seemed to have no area, and
-/// the cage was valid all the same.
+/// The diagonal once included vertices without faces: one far away made all faces seem to have no area.
 #[test]
-fn valid_cage_has_no_fault_though_a_vertex_of_no_face_is_far_away() {
+fn a_far_unused_vertex_does_not_make_a_valid_cage_faulty() {
     let mut mesh = box_mesh(2);
     mesh.positions.push(Vec3::splat(1e12));
     let found = check(&mesh, None, None);
@@ -43,7 +42,7 @@ fn valid_cage_has_no_fault_though_a_vertex_of_no_face_is_far_away() {
 }
 
 #[test]
-fn hole_is_found_with_its_edges_and_filled() {
+fn holes_are_reported_with_their_edges_and_filled() {
     let mut mesh = box_mesh(2);
     let missing = mesh.faces.remove(5);
     let found = check(&mesh, None, None);
@@ -67,7 +66,7 @@ fn split_seams_are_welded() {
         split.positions.extend(face.iter().map(|&i| whole.positions[i as usize]));
         split.faces.push((first..first + face.len() as u32).collect());
     }
-    // Within the rounding of a text file.
+    // Rounding of a text file.
     split.positions[3].x += 1e-6;
     let found = check(&split, None, None);
     assert_eq!(found.problem(Code::DuplicateVertex).unwrap().count, 24 - 8);
@@ -82,7 +81,7 @@ fn split_seams_are_welded() {
 }
 
 #[test]
-fn turned_faces_are_found_by_component_and_turned_back() {
+fn flipped_faces_are_reported_by_component_and_flipped_back() {
     let inner = box_mesh(1);
     let mut mesh = inner.clone();
     mesh.positions.extend(inner.positions.iter().map(|p| *p + vec3(5.0, 0.0, 0.0)));
@@ -104,20 +103,20 @@ fn turned_faces_are_found_by_component_and_turned_back() {
 }
 
 #[test]
-fn crossing_faces_are_found_where_they_cross() {
+fn intersections_are_reported_with_their_location() {
     let mut mesh = box_mesh(1);
     let other = box_mesh(1);
     mesh.positions.extend(other.positions.iter().map(|p| *p + vec3(1.3, 0.2, 0.1)));
     mesh.faces.extend(other.faces.iter().map(|f| f.iter().map(|i| i + 8).collect::<Vec<_>>()));
     let found = check(&mesh, None, None);
-    assert!(found.valid, "parts that overlap are bound as one");
+    assert!(found.valid, "overlapping parts are bound as their union");
     assert!(found.problems[0].message.starts_with("Parts of the cage overlap"));
-    // A part that goes through itself: a vertex of a box pushed out through the side across.
+    // A component that intersects itself: a vertex of a box is pushed out through the opposite side.
     let mut pushed = box_mesh(3);
     let through = pushed.positions.iter().position(|p| p.x < -0.99 && p.y.abs() < 0.5 && p.z.abs() < 0.5);
     pushed.positions[through.unwrap()].x = 2.0;
     let crossing = check(&pushed, None, None);
-    assert!(crossing.valid, "it is bound");
+    assert!(crossing.valid, "a cage that intersects itself can be bound");
     let cage = Cage::new(&pushed).unwrap();
     let said = &crossing.problem(Code::SelfIntersection).unwrap().message;
     assert!(said.starts_with("The cage goes through itself: "), "{said}");
@@ -132,7 +131,7 @@ fn crossing_faces_are_found_where_they_cross() {
 }
 
 #[test]
-fn useless_faces_and_vertices_are_dropped() {
+fn degenerate_faces_and_unused_vertices_are_dropped() {
     let mut mesh = box_mesh(1);
     mesh.positions.push(Vec3::ZERO);
     mesh.faces.push(mesh.faces[0].clone());
@@ -150,13 +149,13 @@ fn useless_faces_and_vertices_are_dropped() {
 }
 
 #[test]
-fn crowded_edges_and_pinched_vertices_are_named() {
+fn non_manifold_edges_and_vertices_are_reported() {
     let mut mesh = box_mesh(1);
     mesh.positions.push(vec3(3.0, 0.0, 0.0));
     mesh.faces.push(vec![mesh.faces[0][0], mesh.faces[0][1], 8]);
     let found = check(&mesh, None, None);
     assert_eq!(found.problem(Code::NonManifoldEdge).unwrap().count, 1);
-    // Two tetrahedra with a common tip.
+    // Two tetrahedra that share a vertex.
     let mut pair = PolygonMesh {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z],
         faces: vec![vec![0, 2, 1], vec![0, 1, 3], vec![1, 2, 3], vec![2, 0, 3]],
@@ -168,7 +167,7 @@ fn crowded_edges_and_pinched_vertices_are_named() {
 }
 
 #[test]
-fn vertices_outside_are_listed_and_growing_takes_them_in() {
+fn vertices_outside_are_listed_and_growing_encloses_them() {
     let mesh = box_mesh(2);
     let model = [Vec3::ZERO, vec3(1.2, 0.3, 0.1), vec3(-0.5, 0.9, 0.2), vec3(0.0, -1.3, 1.1)];
     let found = check(&mesh, Some(&model), None);
@@ -181,9 +180,9 @@ fn vertices_outside_are_listed_and_growing_takes_them_in() {
     assert_eq!(grown.faces, mesh.faces);
 }
 
-/// Two steps round the box's corners off: (0.9, 0.9, 0.9) sticks out of the surface, though not out of the box.
+/// Two subdivisions round off the box's corners: (0.9, 0.9, 0.9) is outside the smooth surface but inside the box.
 #[test]
-fn smooth_surface_is_what_a_smooth_cage_is_checked_for() {
+fn a_smooth_cage_is_checked_by_its_smooth_surface() {
     let (mesh, model) = (box_mesh(2), [Vec3::ZERO, Vec3::splat(0.9)]);
     assert_eq!(check(&mesh, Some(&model), None).encloses, Some(true));
     let found = check_smooth(&mesh, Some(&model), None, 2);
@@ -195,7 +194,7 @@ fn smooth_surface_is_what_a_smooth_cage_is_checked_for() {
 }
 
 #[test]
-fn thin_part_is_found_and_a_grid_is_named_that_resolves_it() {
+fn thin_parts_are_reported_with_a_grid_that_resolves_them() {
     let bounds = Bounds { min: Vec3::ZERO, max: vec3(4.0, 4.0, 0.05) };
     let mesh = subdivided_box(bounds, 0.0, [4, 4, 1]);
     let thickness = check(&mesh, None, None).thickness.unwrap();
@@ -207,9 +206,9 @@ fn thin_part_is_found_and_a_grid_is_named_that_resolves_it() {
     assert!(check(&mesh, None, Some(cells)).problem(Code::ThinPart).is_none());
 }
 
-/// From the middle of a narrow face along a corner the other side of the corner is near.
+/// A ray from a narrow face beside a corner hits the other side of the corner at a short distance.
 #[test]
-fn a_corner_is_no_thin_part() {
+fn a_corner_is_not_a_thin_part() {
     let outline = [[-1.0, -1.0], [1.0002, -1.0], [1.0, -0.999], [1.0, 1.0], [-1.0, 1.0]];
     let n = outline.len() as u32;
     let positions =
@@ -222,7 +221,7 @@ fn a_corner_is_no_thin_part() {
 }
 
 #[test]
-fn check_is_written_as_json_with_stable_names() {
+fn json_of_a_check_has_stable_names() {
     let mut mesh = box_mesh(1);
     mesh.faces.remove(0);
     let found = check(&mesh, None, None);
@@ -256,26 +255,26 @@ proptest! {
     }
 }
 
-/// A cage that is being shaped had one vertex dragged far away: what is left of the cube is small against the diagonal, so its
-/// other corners counted as one, and a triangle shared corners with its neighbour that it does not have. That was a panic.
+/// With one vertex dragged far away the rest of the cube is small against the diagonal: its other corners count as
+/// duplicates, and faces seem to share corners that they do not share.
 #[test]
-fn cube_with_a_vertex_far_away_is_checked() {
+fn a_cube_with_a_far_vertex_is_checked() {
     let mut mesh = box_mesh(1);
     mesh.positions[0].y = -1_429_490.6;
     let found = check(&mesh, Some(&[Vec3::ZERO]), Some(64));
-    assert!(found.valid, "closed, and no face goes through another one: {:?}", found.problems);
-    // Within 2e-6 of the diagonal, 2.86, of the first of seven are all but the one across the cube, at 3.46.
+    assert!(found.valid, "closed and free of intersections: {:?}", found.problems);
+    // Tolerance: 2e-6 of the diagonal is 2.86. All of the seven are that near to the first one, except its opposite at
+    // 3.46.
     assert_eq!(found.problem(Code::DuplicateVertex).unwrap().count, 5);
-    // Its sister from a damaged file: two corners of a face are at one place.
+    // Like a damaged file: two corners of a face at the same position.
     let mut mesh = box_mesh(1);
     mesh.positions[1] = mesh.positions[0];
     assert!(check(&mesh, Some(&[Vec3::ZERO]), Some(64)).problem(Code::DuplicateVertex).is_some());
     let repaired = mended(&mesh, &[Repair::Weld, Repair::DropDegenerate, Repair::FillHoles, Repair::Flip]);
-    assert_eq!(codes(&repaired), [], "a cube without one of its edges");
+    assert_eq!(codes(&repaired), [], "a cube with one edge collapsed");
 }
 
-/// What a file of separate triangles has: as many parts and holes as faces. Each was compared with all others, half an hour
-/// for the 100,000 of a model that was taken for its cage.
+/// Separate triangles have as many components and holes as faces: comparing all pairs would take half an hour for 100,000.
 #[test]
 fn soup_of_separate_triangles_is_checked_and_repaired_within_seconds() {
     let mut soup = PolygonMesh::default();
@@ -288,10 +287,10 @@ fn soup_of_separate_triangles_is_checked_and_repaired_within_seconds() {
     let (found, repaired) = within_seconds(move || (check(&soup, None, None), mended(&soup, &repairs)));
     assert_eq!(found.components, 30_000);
     assert_eq!(found.problem(Code::OpenEdge).unwrap().count, 90_000);
-    assert_eq!(repaired.faces.len(), 60_000, "each hole was filled with the triangle's other side");
+    assert_eq!(repaired.faces.len(), 60_000, "each hole is filled by the triangle's back side");
 }
 
-/// Triangles that all go through each other: the pairs of 100,000 of them are 40 GB.
+/// Triangles that all intersect each other: listing the pairs of 100,000 of them would take 40 GB.
 #[test]
 fn crossings_are_counted_and_listed_up_to_a_limit() {
     let star = |n: u32| {
@@ -325,7 +324,7 @@ fn crossings_are_counted_and_listed_up_to_a_limit() {
     );
 }
 
-/// The outcome of `work`, which must be there long before anybody gives up waiting: a tenth of the limit on a slow machine.
+/// Runs `work` on a thread; fails if it takes more than a minute.
 fn within_seconds<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
     let (send, receive) = std::sync::mpsc::channel();
     std::thread::spawn(move || send.send(work()));

@@ -1,24 +1,23 @@
-//! Which triangles are near: a coarse grid of lists that grow as triangles move and are tidied when they are read.
+//! Uniform grid of triangles for neighbour queries. Lists grow as triangles move; stale entries are removed on reading.
 
 use glam::DVec3;
 
 /// Edge of a bucket in voxels.
 const BUCKET_EDGE: f64 = 4.0;
 
-/// Lists of triangles by place. Stale entries stay until somebody reads their list.
 #[derive(Debug)]
 pub(super) struct Buckets {
     origin: DVec3,
     dims: [usize; 3],
     lists: Vec<Vec<u32>>,
-    /// For each triangle, the list in which it was last met, and the search.
+    /// For each triangle, the read of a list and the search that last returned it.
     met: Vec<(u32, u32)>,
     lists_read: u32,
     searches: u32,
 }
 
 impl Buckets {
-    /// Empty lists for a box of this size around the origin, and `n` triangles.
+    /// An empty grid of size `2 * half` around the origin, for `n` triangles.
     pub(super) fn new(half: DVec3, n: usize) -> Self {
         let dims = half.to_array().map(|h| (2.0 * h / BUCKET_EDGE).ceil() as usize + 1);
         Self {
@@ -35,7 +34,6 @@ impl Buckets {
         (z * self.dims[1] + y) * self.dims[0] + x
     }
 
-    /// Notes that a triangle has this bounding box from now on.
     pub(super) fn add(&mut self, triangle: u32, min: DVec3, max: DVec3) {
         let [xs, ys, zs] = range(self.origin, self.dims, min, max);
         for z in zs[0]..=zs[1] {
@@ -48,7 +46,8 @@ impl Buckets {
         }
     }
 
-    /// Triangles whose box overlaps `min`..`max`, each once, in `found`. `bounds` says where a triangle is, if it still is.
+    /// Writes to `found` all triangles whose box overlaps `min`..`max`, each once. `bounds`: current box of a triangle,
+    /// if it exists.
     pub(super) fn near(
         &mut self,
         min: DVec3,
@@ -89,7 +88,7 @@ impl Buckets {
     }
 }
 
-/// Buckets along each axis that a box overlaps; what lies beyond the grid is kept in the outermost ones.
+/// Range of buckets along each axis that a box overlaps, clamped to the grid.
 fn range(origin: DVec3, dims: [usize; 3], min: DVec3, max: DVec3) -> [[usize; 2]; 3] {
     [0, 1, 2].map(|k| {
         let at = |p: DVec3| (((p[k] - origin[k]) / BUCKET_EDGE).max(0.0) as usize).min(dims[k] - 1);
@@ -97,7 +96,7 @@ fn range(origin: DVec3, dims: [usize; 3], min: DVec3, max: DVec3) -> [[usize; 2]
     })
 }
 
-/// The box of a bucket; the outermost ones have no end.
+/// Box of a bucket; outermost buckets extend to infinity.
 fn bucket_bounds(origin: DVec3, dims: [usize; 3], at: [usize; 3]) -> [DVec3; 2] {
     let [mut min, mut max] = [DVec3::NEG_INFINITY, DVec3::INFINITY];
     for k in 0..3 {

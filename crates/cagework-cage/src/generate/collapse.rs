@@ -1,79 +1,77 @@
-//! Edge collapses, cheapest first, as far as the target or as the obstacle allows.
+//! Edge collapses, cheapest first, down to the target or until the obstacle blocks every edge.
 //!
-//! Source: Garland, Heckbert 1997 for the cost. Changes: the merged vertex goes where the quadric is smallest, or, if
-//! the solid is in the way, further out along the normal until its triangles are clear, so that a coarse cage bulges
-//! around the model as a progressive hull (Sander et al. 2000) does; an edge whose place costs more than expected
-//! waits for its turn.
+//! Source: Garland and Heckbert 1997 for the cost. Changes: the merged vertex goes to the minimum of the quadric or, if the solid
+//! is in the way, outward along the normal until its triangles are clear, so that a coarse cage bulges around the model like a
+//! progressive hull (Sander et al. 2000). An edge whose position costs more than expected returns to the heap at that cost.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
-use super::guarded::Guarded;
+use super::guarded::GuardedSurface;
 use super::quadric::Quadric;
 use super::shell::Spacing;
 use cagework_core::contact::Corners;
 use cagework_core::progress::Cancelled;
 
-/// Where the merged vertex is tried, voxels along the normal.
+/// Offsets along the normal that are tried for the merged vertex, voxels.
 const NORMAL_OFFSETS: [f64; 8] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.1, 2.8, 3.6];
 
-/// Smallest cosine between a triangle's normals before and after.
+/// Smallest cosine between a triangle's normals before and after a collapse.
 const MIN_COLLAPSE_COSINE: f64 = 0.15;
 
-/// Smallest quality (4 sqrt(3) area over summed squared edges; 1 for an equilateral triangle) of a new triangle.
+/// Smallest quality of a new triangle, see [`quality`].
 const MIN_QUALITY: f64 = 0.12;
 
 /// Most triangles around a vertex.
 const MAX_VALENCE: usize = 11;
 
-/// An edge waits again if it costs more than this times what was expected.
+/// An edge returns to the heap if it costs more than this factor times the expected cost.
 const MAX_COST_RATIO: f64 = 1.2;
 
-/// Collapses from one check whether the work was cancelled to the next.
+/// Collapses between polls for cancellation.
 const COLLAPSES_PER_CHECK: usize = 64;
 
-/// An edge waiting to be collapsed.
+/// An edge in the heap of collapses.
 #[derive(Debug, PartialEq)]
-struct Waiting {
+struct HeapEdge {
     cost: f64,
     edge: [u32; 2],
-    /// State of both vertices when the cost was found; it is out of date if either has changed.
+    /// Versions of both vertices when the cost was computed; the entry is stale if either has changed.
     version: [u32; 2],
 }
 
-impl Eq for Waiting {}
+impl Eq for HeapEdge {}
 
-impl PartialOrd for Waiting {
+impl PartialOrd for HeapEdge {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Ord for Waiting {
-    /// The cheapest edge is the greatest; equal ones by number, so that runs are alike.
+impl Ord for HeapEdge {
+    /// Reversed cost, so that the heap pops the cheapest edge; ties by index keep runs deterministic.
     fn cmp(&self, other: &Self) -> Ordering {
         other.cost.total_cmp(&self.cost).then_with(|| other.edge.cmp(&self.edge))
     }
 }
 
-/// A surface with the quadric of every vertex.
 #[derive(Debug)]
 pub(super) struct Collapser<'g, 'a> {
-    pub(super) surface: &'g mut Guarded<'a>,
+    pub(super) surface: &'g mut GuardedSurface<'a>,
     pub(super) quadrics: Vec<Quadric>,
-    /// The same of planes alone: how far a vertex is from the hull that it stands for.
+    /// Quadrics of the planes alone: squared distance of a vertex from the part of the hull that it replaces.
     planes: Vec<Quadric>,
-    /// Most of that, voxels; none for as far as need be.
+    /// Limit on the RMS of that distance, voxels; `None` without limit.
     pub(super) budget: Option<f64>,
-    /// Whether vertices on plates stay near each other.
+    /// Whether the spacing of vertices on plates is limited.
     pub(super) keeps_plates: bool,
-    /// How far each vertex may be from its neighbours.
+    /// Limit on the distance of each vertex from its neighbours.
     spacings: Vec<Option<Spacing>>,
     version: Vec<u32>,
-    heap: BinaryHeap<Waiting>,
-    /// Vertices of the whole surface, both halves.
+    heap: BinaryHeap<HeapEdge>,
+    /// Vertices of the whole surface, including the mirror image.
     count: usize,
     scratch: Scratch,
 }
@@ -82,13 +80,13 @@ pub(super) struct Collapser<'g, 'a> {
 struct Scratch {
     near_a: Vec<u32>,
     near_b: Vec<u32>,
-    /// Triangles that a collapse changes, with their corners and normals before.
+    /// Triangles that a collapse changes, with their current corners and normals.
     star: Vec<(Corners, DVec3)>,
     gone: Vec<u32>,
     new: Vec<Corners>,
 }
 
-/// Quality of a triangle: 1 if equilateral, 0 if flat.
+/// Quality of a triangle, `4 sqrt(3) area / sum of squared edges`: 1 if equilateral, 0 if degenerate.
 pub(super) fn quality(t: &[DVec3; 3]) -> f64 {
     let edges =
         (t[1] - t[0]).length_squared() + (t[2] - t[1]).length_squared() + (t[0] - t[2]).length_squared();
@@ -96,8 +94,7 @@ pub(super) fn quality(t: &[DVec3; 3]) -> f64 {
 }
 
 impl<'g, 'a> Collapser<'g, 'a> {
-    /// Prepares a surface.
-    pub(super) fn new(surface: &'g mut Guarded<'a>, spacings: Vec<Option<Spacing>>) -> Self {
+    pub(super) fn new(surface: &'g mut GuardedSurface<'a>, spacings: Vec<Option<Spacing>>) -> Self {
         let n = surface.positions.len();
         let mut quadrics = vec![Quadric::default(); n];
         let mut planes = quadrics.clone();
@@ -127,7 +124,6 @@ impl<'g, 'a> Collapser<'g, 'a> {
         }
     }
 
-    /// Enters every edge.
     fn wait_for_all(&mut self) {
         let mut near = Vec::new();
         for v in 0..self.surface.positions.len() as u32 {
@@ -138,10 +134,10 @@ impl<'g, 'a> Collapser<'g, 'a> {
         }
     }
 
-    /// Collapses edges until `target` vertices are left or no edge can be collapsed; returns the vertices left.
+    /// Collapses edges until `target` vertices are left or no edge can be collapsed. Returns the number of vertices.
     ///
     /// # Errors
-    /// When `go_on` says so; it hears the share that is done.
+    /// If `go_on`, called with the completed share, cancels.
     pub(super) fn run(
         &mut self,
         target: usize,
@@ -156,8 +152,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
                 if self.count == count_then || self.surface.has_band() {
                     break;
                 }
-                // Edges that had no place may have one now that their surroundings have changed. (With a band
-                // they get their chance in the next, wider one.)
+                // Blocked edges may be free now that their surroundings have changed. (With a band they are retried in
+                // the next, wider one.)
                 count_then = self.count;
                 self.wait_for_all();
                 continue;
@@ -176,7 +172,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
             }
             let next = self.heap.peek().map_or(f64::INFINITY, |next| next.cost);
             if cost > MAX_COST_RATIO * waiting.cost + 1e-9 && cost > next {
-                self.heap.push(Waiting { cost, ..waiting });
+                self.heap.push(HeapEdge { cost, ..waiting });
                 continue;
             }
             self.collapse(a, b, at);
@@ -184,12 +180,12 @@ impl<'g, 'a> Collapser<'g, 'a> {
         Ok(self.count)
     }
 
-    /// The vertex that stays: the one on the mirror plane.
+    /// `(kept, removed)`: keeps the vertex on the mirror plane.
     fn ordered(&self, a: u32, b: u32) -> (u32, u32) {
         if self.surface.on_mirror[b as usize] { (b, a) } else { (a, b) }
     }
 
-    /// The mirror axis, if the merged vertex lies on the plane.
+    /// The mirror axis, if the merged vertex must lie on the mirror plane.
     fn pinned(&self, kept: u32) -> Option<usize> {
         self.surface.mirror.filter(|_| self.surface.on_mirror[kept as usize])
     }
@@ -198,7 +194,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.quadrics[a as usize].plus(&self.quadrics[b as usize])
     }
 
-    /// Where the quadric of an edge is smallest, if that is anywhere near the edge; its middle otherwise.
+    /// Minimum of an edge's quadric if that is near the edge, otherwise the edge's middle.
     fn optimum(&self, a: u32, b: u32) -> DVec3 {
         let (kept, _) = self.ordered(a, b);
         let pinned = self.pinned(kept);
@@ -211,16 +207,16 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.merged_quadric(a, b).minimum(pinned).filter(|o| o.distance(middle) < reach).unwrap_or(middle)
     }
 
-    /// Enters an edge with the cost that it has if nothing is in the way.
+    /// Pushes an edge with its cost if nothing blocks it.
     fn wait(&mut self, edge: [u32; 2]) {
         let [a, b] = edge;
         let cost = self.merged_quadric(a, b).cost(self.optimum(a, b));
         let version = edge.map(|v| self.version[v as usize]);
-        self.heap.push(Waiting { cost, edge, version });
+        self.heap.push(HeapEdge { cost, edge, version });
     }
 
-    /// Whether the surface stays a manifold (and, with a mirror, a half of one) without the edge: the link condition
-    /// of Dey et al. 1999.
+    /// Whether the surface remains a manifold (and, with a mirror, half of one) when the edge is collapsed: the link
+    /// condition (Dey et al. 1999).
     fn is_allowed(&mut self, a: u32, b: u32) -> bool {
         let Scratch { near_a, near_b, .. } = &mut self.scratch;
         let surface = &*self.surface;
@@ -242,7 +238,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         if on_mirror(a) && on_mirror(b) && sides.len() != 1 {
             return false;
         }
-        // A tip loses a triangle: it must keep enough of them to be a corner of a solid.
+        // A tip loses a triangle and must keep enough to be the corner of a solid.
         let least = |v: u32| if on_mirror(v) { 2 } else { 3 };
         if sides.iter().any(|&tip| surface.around[tip as usize].len() <= least(tip)) {
             return false;
@@ -252,20 +248,19 @@ impl<'g, 'a> Collapser<'g, 'a> {
             return true;
         }
         if !on_mirror(gone) {
-            // No new edge may join two vertices of the mirror plane: its image would lie on it.
+            // A new edge between two vertices of the mirror plane would coincide with its image.
             let (near_kept, near_gone) = if kept == a { (&*near_a, &*near_b) } else { (&*near_b, &*near_a) };
             if near_gone.iter().any(|&v| v != kept && on_mirror(v) && near_kept.binary_search(&v).is_err()) {
                 return false;
             }
         }
-        // Nor may a triangle lie in the plane.
+        // A triangle may not lie in the mirror plane.
         surface.around[gone as usize]
             .iter()
             .map(|&t| surface.triangles[t as usize])
             .all(|t| t.contains(&kept) || !t.iter().all(|&i| i == gone || on_mirror(i)))
     }
 
-    /// Where the merged vertex may go, and what it costs there.
     fn place_of(&mut self, a: u32, b: u32) -> Option<(DVec3, f64)> {
         let (kept, gone) = self.ordered(a, b);
         let surface = &*self.surface;
@@ -307,7 +302,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
             candidates.push(q);
         }
         let mut priced: Vec<(f64, DVec3)> = candidates.into_iter().map(|c| (quadric.cost(c), c)).collect();
-        // The cheapest place that will do, of equal ones the first; mostly that is the first that is looked at.
+        // Cheapest valid candidate; mostly the first one tested.
         while let Some(k) = (0..priced.len()).min_by(|&x, &y| priced[x].0.total_cmp(&priced[y].0)) {
             let (cost, place) = priced.remove(k);
             if self.is_place(kept, place) {
@@ -317,7 +312,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
         None
     }
 
-    /// Whether the star found by [`Self::place_of`] may have its vertex `kept` at `p`.
+    /// Whether the star found by [`Self::place_of`] is valid with its vertex `kept` at `p`.
     fn is_place(&mut self, kept: u32, p: DVec3) -> bool {
         let Scratch { star, gone, new, .. } = &mut self.scratch;
         new.clear();
@@ -339,8 +334,8 @@ impl<'g, 'a> Collapser<'g, 'a> {
         self.surface.may_stand(new, gone)
     }
 
-    /// Whether a vertex there would be farther from the hull than may be (root mean square to the planes, by area), or from
-    /// its neighbours on a limb or plate. Limbs keep their rings only while there is a budget.
+    /// Whether a vertex at `at` exceeds its limits: RMS distance to the planes of the hull (weighted by area), or the
+    /// distance from its neighbours on a limb or plate. Limbs are limited only while a budget applies.
     fn is_over_budget(&self, a: u32, b: u32, at: DVec3) -> bool {
         let planes = self.planes[a as usize].plus(&self.planes[b as usize]);
         let is_off = |budget: f64| (planes.at(at) / planes.area.max(1e-12)).sqrt() > budget;
@@ -355,7 +350,7 @@ impl<'g, 'a> Collapser<'g, 'a> {
             || (self.keeps_plates && spacings().filter(|spacing| spacing.along.is_none()).any(is_too_far))
     }
 
-    /// Of the spacings at two vertices that of a plate, which limits all directions, or the smaller one.
+    /// The stricter spacing of two vertices: that of a plate, which limits all directions, otherwise the smaller one.
     fn spacing_of(&self, a: u32, b: u32) -> Option<Spacing> {
         let spacings = [a, b].into_iter().filter_map(|v| self.spacings[v as usize]);
         spacings

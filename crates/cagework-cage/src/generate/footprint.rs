@@ -1,35 +1,34 @@
-//! The voxels that a triangle overlaps, row by row.
+//! Voxels that a triangle overlaps, as one run per row.
 //!
-//! Source: Akenine-Moeller 2001, "Fast 3D triangle-box overlap testing" (separating axes). For one row all axes but x
-//! are constants, so that each axis bounds x on both sides and the row's voxels come out as one run, without testing
-//! any of them.
+//! Source: Akenine-Moeller 2001, "Fast 3D triangle-box overlap testing" (separating axes). Along a row all terms but x are
+//! constant, so each separating axis bounds x from both sides and the row's voxels form one run, without a test per voxel.
 
 use glam::DVec3;
 
 use super::voxels::Voxels;
 
-/// Widening of voxels, in voxels, above f64's rounding.
+/// Enlargement of voxels, in voxels, above f64 rounding.
 const ROUNDING_MARGIN: f64 = 1e-6;
 
-/// An axis whose x component is below this says nothing about x.
+/// An axis with a smaller x component does not bound x.
 const MIN_AXIS_X: f64 = 1e-12;
 
-/// A triangle among voxels.
+/// Separating-axis bounds of a triangle on voxel centres.
 #[derive(Debug)]
 pub(crate) struct Footprint {
-    /// Bounds on a voxel centre's x that depend on y and z; the first `n_slanted` count.
-    slanted: [Slanted; 10],
+    /// Bounds on x that depend on y and z; the first `n_slanted` are used.
+    slanted: [RowBound; 10],
     n_slanted: usize,
-    /// Bounds on y and z alone; the first `n_across` count.
-    across: [Slanted; 10],
+    /// Bounds on y and z alone; the first `n_across` are used.
+    across: [RowBound; 10],
     n_across: usize,
     min: DVec3,
     max: DVec3,
 }
 
-/// `low <= x + y_share y + z_share z <= high` (slanted), or the same without x.
+/// `low <= x + y_share y + z_share z <= high`, or the same without x.
 #[derive(Clone, Copy, Debug, Default)]
-struct Slanted {
+struct RowBound {
     y: f64,
     z: f64,
     low: f64,
@@ -37,14 +36,14 @@ struct Slanted {
 }
 
 impl Footprint {
-    /// The footprint of a triangle in voxel units, for voxels grown by `grow` on all sides.
+    /// Footprint of a triangle in voxel units, for voxels enlarged by `grow` on all sides.
     pub(crate) fn new(triangle: [DVec3; 3], grow: f64) -> Self {
         let half = 0.5 + grow + ROUNDING_MARGIN;
         let [a, b, c] = triangle;
         let mut footprint = Self {
-            slanted: [Slanted::default(); 10],
+            slanted: [RowBound::default(); 10],
             n_slanted: 0,
-            across: [Slanted::default(); 10],
+            across: [RowBound::default(); 10],
             n_across: 0,
             min: a.min(b).min(c) - half,
             max: a.max(b).max(c) + half,
@@ -59,7 +58,7 @@ impl Footprint {
         footprint
     }
 
-    /// Adds a separating axis: a voxel overlaps only if its centre is near the triangle along it.
+    /// Adds a separating axis.
     fn bound(&mut self, axis: DVec3, triangle: [DVec3; 3], half: f64) {
         let [p, q, r] = triangle.map(|v| axis.dot(v));
         let reach = half * (axis.x.abs() + axis.y.abs() + axis.z.abs());
@@ -68,27 +67,26 @@ impl Footprint {
             let scale = 1.0 / axis.x;
             let (one, other) = (low * scale, high * scale);
             self.slanted[self.n_slanted] =
-                Slanted { y: axis.y * scale, z: axis.z * scale, low: one.min(other), high: one.max(other) };
+                RowBound { y: axis.y * scale, z: axis.z * scale, low: one.min(other), high: one.max(other) };
             self.n_slanted += 1;
         } else {
-            // x counts where y and z are as small: an edge along y or z but for rounding.
+            // An edge along y or z up to rounding: widen the bounds by the range of the x term.
             let (one, other) = (axis.x * self.min.x, axis.x * self.max.x);
             let (low, high) = (low - one.max(other), high - one.min(other));
-            self.across[self.n_across] = Slanted { y: axis.y, z: axis.z, low, high };
+            self.across[self.n_across] = RowBound { y: axis.y, z: axis.z, low, high };
             self.n_across += 1;
         }
     }
 
-    /// Rows of its box.
     pub(crate) fn n_rows(&self, dims: [usize; 3]) -> usize {
         let [_, ys, zs] = rows(self.min, self.max, dims);
         ys[1].saturating_sub(ys[0]) * zs[1].saturating_sub(zs[0])
     }
 
-    /// Adds the run of every row; rows in which `voxels` has all of its box are passed over.
+    /// Adds the run of every row. Skips rows whose part of the bounding box is already set.
     pub(crate) fn add_to(&self, voxels: &mut Voxels) {
         let [xs, ys, zs] = rows(self.min, self.max, voxels.dims);
-        // Runs may begin and end a voxel further out, by rounding.
+        // Rounding may extend runs by one voxel.
         let (from, to) = (xs[0].saturating_sub(1), xs[1].min(voxels.dims[0] - 1));
         for z in zs[0]..zs[1] {
             for y in ys[0]..ys[1] {
@@ -120,9 +118,9 @@ impl Footprint {
     }
 }
 
-/// Whether `each(y, z, first, last)` is true of the voxels of any row that a triangle overlaps, for voxels grown by
-/// `grow`. `each` is asked about a row's part of the bounding box first and, only if that is true, about the voxels that
-/// really overlap: most triangles are told apart from most rows without any geometry.
+/// Whether `each(y, z, first, last)` holds for the run of any row that a triangle overlaps, for voxels enlarged by
+/// `grow`. `each` is called with a row's part of the bounding box first and, only if that holds, with the run: most
+/// rows are rejected without computing the run.
 pub(super) fn any_run(
     triangle: [DVec3; 3],
     grow: f64,
@@ -149,12 +147,12 @@ pub(super) fn any_run(
     false
 }
 
-/// First voxel and the one after the last whose centre is in a box, along each axis.
+/// Half-open range of voxels whose centre lies in a box, along each axis.
 fn rows(min: DVec3, max: DVec3, dims: [usize; 3]) -> [[usize; 2]; 3] {
     [0, 1, 2].map(|k| [ceil(min[k] - 0.5).min(dims[k]), ceil(max[k] - 0.5 + ROUNDING_MARGIN).min(dims[k])])
 }
 
-/// The next whole number, at least 0. Not `f64::ceil`, which is a call on plain x86-64.
+/// `max(ceil(x), 0)`. `f64::ceil` is a function call on baseline x86-64.
 fn ceil(x: f64) -> usize {
     let whole = x as usize;
     whole + usize::from(x > whole as f64)
@@ -164,8 +162,8 @@ fn ceil(x: f64) -> usize {
 mod tests {
     use super::*;
 
-    /// A face of an axis-parallel prism whose edge along y is off by the rounding of one coordinate. Voxels by hand: those of the
-    /// same face without it.
+    /// A face of an axis-parallel prism whose edge along y is off by the rounding of one coordinate. Expected: the
+    /// voxels of the exact face.
     #[test]
     fn an_edge_along_an_axis_but_for_rounding_leaves_no_hole() {
         for off in [0.0, 1.8e-15, -1.8e-15, 4e-14, -4e-14] {

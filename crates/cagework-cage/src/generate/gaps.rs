@@ -1,5 +1,5 @@
-//! Gaps between parts of a model: sheets of outside voxels halfway between two walls that face each other. A cage that
-//! crosses no sheet leaves its gap open.
+//! Gaps between parts of a model, represented by sheets of outside voxels halfway between two facing walls. A gap stays
+//! open if the cage does not cross its sheet.
 
 use glam::{DVec3, Vec3};
 
@@ -10,90 +10,89 @@ use cagework_core::cage::Cage;
 use cagework_core::geometry::winding_number;
 use cagework_core::progress::Cancelled;
 
-/// Largest cosine between the directions from a sheet to its two walls: creases wider than 60 degrees are not gaps.
+/// Largest cosine between the directions from a sheet to its walls: creases wider than 60 degrees are not gaps.
 const MAX_WALL_COSINE: f64 = -0.5;
 
 /// Smallest distance of a sheet from the crease where its walls meet, over the distance between the walls.
 const MIN_DEPTH: f64 = 1.0;
 
-/// Voxels across the narrowest gap that a hull leaves open: three, and room for flat walls beside round limbs.
-const OPEN_GAP: f64 = 4.0;
+/// Narrowest gap, in voxels, that a hull leaves open: three, plus one for flat walls beside round limbs.
+const MIN_OPEN_WIDTH: f64 = 4.0;
 
-/// Area of the smallest gap for which the lattice is refined, over the square of the model's longest side.
+/// Smallest area of a gap for which the lattice is refined, over the squared longest side of the model.
 const MIN_GAP_AREA: f64 = 0.003;
 
-/// Length of a voxel over its thickness across narrow gaps: the first one, or the second one where the first would need more than
+/// Length of a voxel over its thickness across narrow gaps. The second value is used where the first would need more than
 /// [`MAX_RESOLUTION`] thicknesses.
 const STRETCHES: [f64; 2] = [3.0, 8.0];
 
-/// Most thicknesses of a voxel along the model's longest side with the first of [`STRETCHES`].
+/// Limit on the model's longest side over the thickness of a voxel with the first of [`STRETCHES`].
 const MAX_RESOLUTION: f64 = 250.0;
 
-/// Thin voxels across the narrow part of a gap that a hull leaves open: six bridged one of two figures.
-const OPEN_NARROWS: f64 = 7.0;
+/// Thin voxels across the narrow part of a gap that a hull leaves open; with six, one of two test figures was bridged.
+const MIN_OPEN_NARROW_WIDTH: f64 = 7.0;
 
 /// Share of a gap's sheet that is its narrow part.
 const NARROW_SHARE: f64 = 0.1;
 
-/// Smallest mean of `cos^2` of the angle between a gap's direction across and the thin axis for which the gap is measured again.
+/// A gap is measured again on a stretched lattice if the mean `cos^2` between its direction and the thin axis is at least this.
 const MIN_ACROSS: f64 = 0.7;
 
-/// Voxels along the longest side that gaps need, over those of the target, above which voxels are thinner instead of smaller.
+/// Voxels are stretched rather than refined if gaps need more than this factor times the voxels of the target.
 const MIN_REFINEMENT: f64 = 2.0;
 
-/// Most voxels along the longest side of thinner voxels, over those of cubes that leave the same gaps open.
+/// Limit on voxels along the longest side of a stretched lattice, over [`MAX_VOXELS`].
 const MAX_STRETCHED_SHARE: f64 = 0.66;
 
-/// Points of a sheet that decide whether a cage closes its gap.
+/// Sample points of a sheet with which a cage is tested for closing the gap.
 const SAMPLES: usize = 32;
 
-/// Stands for no wall within reach.
-const NONE: u32 = u32::MAX;
+/// No wall within reach.
+const NO_WALL: u32 = u32::MAX;
 
-/// The sheet of one gap.
 #[derive(Clone, Debug)]
 pub(super) struct Gap {
     pub(super) voxels: Vec<[usize; 3]>,
     /// Area of the sheet, voxels squared.
     pub(super) area: f64,
-    /// Mean distance from wall to wall, voxels.
+    /// Mean distance between the walls, voxels.
     width: f64,
-    /// Distance that its narrow part stays below, voxels.
+    /// Distance between the walls of its narrow part, voxels: a quantile.
     narrow_width: f64,
-    /// Mean squares of the components of the unit vectors from wall to wall.
+    /// Mean squared components of the unit vectors between the walls.
     across: DVec3,
 }
 
 /// A large gap of the model.
 #[derive(Clone, Debug)]
 pub(super) struct ModelGap {
-    /// Points of its sheet, object units.
+    /// Sample points of its sheet, object units.
     points: Vec<Vec3>,
-    /// Mean distance from wall to wall, object units.
+    /// Mean distance between the walls, object units.
     width: f64,
-    /// Mean squares of the components of the unit vectors from wall to wall.
+    /// Mean squared components of the unit vectors between the walls.
     across: DVec3,
-    /// Voxels along the model's longest side that leave it open, cubes.
+    /// Cubic voxels along the model's longest side that leave the gap open.
     least_voxels: f64,
-    /// The same of the lattice that is taken.
+    /// Voxels of the chosen lattice that leave the gap open.
     pub(super) voxels: usize,
 }
 
-/// The narrow gaps of a model and the lattice for them.
+/// Narrow gaps of a model, and a lattice that resolves them.
 #[derive(Debug)]
 pub(super) struct NarrowGaps {
     pub(super) gaps: Vec<ModelGap>,
-    /// How many times thinner voxels are along each axis.
+    /// Longest edge of a voxel over its edge along each axis.
     pub(super) stretch: DVec3,
     /// Voxels along the model's longest side.
     pub(super) voxels: usize,
 }
 
-/// The large gaps of a model that a lattice of `base` voxels closes, or nearly, and a lattice that leaves them open, if there are at
-/// most `most`.
+/// Finds the large gaps that a lattice of `base` voxels closes or nearly closes, and a lattice of at most `most` voxels
+/// that leaves them open.
 ///
 /// # Errors
-/// When `go_on` says so.
+/// If `go_on` cancels.
 pub(super) fn narrow_gaps(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
@@ -104,7 +103,7 @@ pub(super) fn narrow_gaps(
     let lattice = Lattice::around(bounds, MAX_VOXELS, DVec3::ONE, MARGIN_VOXELS);
     let solid = lattice.touched(positions, triangles, go_on)?.filled();
     let n = MAX_VOXELS as f64;
-    let reach = (0.5 * OPEN_GAP * n / base as f64).ceil() as usize;
+    let reach = (0.5 * MIN_OPEN_WIDTH * n / base as f64).ceil() as usize;
     let mut found = gaps(&solid, &solid, reach);
     found.retain(|gap| gap.area >= MIN_GAP_AREA * n * n && !gap.is_hollow(&lattice, positions, triangles));
     let of_model = |gap: Gap| ModelGap {
@@ -116,7 +115,7 @@ pub(super) fn narrow_gaps(
             .collect(),
         width: gap.width * lattice.cell,
         across: gap.across,
-        least_voxels: OPEN_GAP * n / gap.width,
+        least_voxels: MIN_OPEN_WIDTH * n / gap.width,
         voxels: 0,
     };
     let mut found: Vec<ModelGap> = found.into_iter().map(of_model).collect();
@@ -135,11 +134,11 @@ pub(super) fn narrow_gaps(
     Ok(NarrowGaps { gaps: found, stretch, voxels: voxels.min(MAX_VOXELS) })
 }
 
-/// Thicknesses of a voxel along the model's longest side that leave the narrow parts of the large gaps across the thin axis of `stretch`
-/// open; 0 without such gaps.
+/// Resolution (longest side over voxel thickness) that leaves open the narrow parts of the large gaps across the thin
+/// axis of `stretch`; 0 without such gaps.
 ///
 /// # Errors
-/// When `go_on` says so.
+/// If `go_on` cancels.
 fn resolution_of_narrows(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
@@ -151,7 +150,7 @@ fn resolution_of_narrows(
     let solid = lattice.touched(positions, triangles, go_on)?.filled();
     let axis = stretch.max_position();
     let n = MAX_VOXELS as f64;
-    let reach = (OPEN_NARROWS * stretch.max_element()).ceil() as usize;
+    let reach = (MIN_OPEN_NARROW_WIDTH * stretch.max_element()).ceil() as usize;
     let mut found = gaps(&solid, &solid, reach);
     found.retain(|gap| {
         gap.area >= MIN_GAP_AREA * n * n
@@ -159,18 +158,17 @@ fn resolution_of_narrows(
             && !gap.is_hollow(&lattice, positions, triangles)
     });
     let narrowest = found.iter().map(|gap| gap.narrow_width).fold(f64::INFINITY, f64::min);
-    Ok(n * stretch.max_element() * OPEN_NARROWS / narrowest)
+    Ok(n * stretch.max_element() * MIN_OPEN_NARROW_WIDTH / narrowest)
 }
 
-/// Most voxels along the longest side of a lattice that is refined for gaps.
+/// Limit on voxels along the longest side of a lattice that is refined for gaps.
 fn most_voxels(stretch: DVec3) -> usize {
     if stretch == DVec3::ONE { usize::MAX } else { (MAX_STRETCHED_SHARE * MAX_VOXELS as f64) as usize }
 }
 
-/// How many times thinner voxels should be along each axis. Thinner ones across most gaps leave them open with fewer voxels than
-/// smaller cubes.
+/// Stretch of the voxels. If most gaps have the same direction, voxels that are thin in it need fewer voxels than smaller cubes.
 fn stretch(gaps: &[ModelGap], base: usize) -> DVec3 {
-    // Gaps that stay closed, and voxels for the others.
+    // Number of gaps that stay closed, and voxels that the others need.
     let closed_and_finest = |stretch: DVec3| {
         let most = most_voxels(stretch).min(MAX_VOXELS);
         let needed = || gaps.iter().map(|gap| gap.voxels_of(stretch));
@@ -186,12 +184,12 @@ fn stretch(gaps: &[ModelGap], base: usize) -> DVec3 {
 }
 
 impl ModelGap {
-    /// Voxels along the model's longest side that leave it open.
+    /// Voxels along the model's longest side that leave the gap open.
     fn voxels_of(&self, stretch: DVec3) -> usize {
         (self.least_voxels * (self.across / (stretch * stretch)).element_sum().sqrt()).ceil() as usize
     }
 
-    /// Where the gap is and what would keep it open, if a cage made on a lattice of `voxels` closes it.
+    /// If the cage, made with `voxels`, closes the gap: a sentence with its place and a remedy.
     pub(super) fn notice(&self, cage: &Cage, voxels: usize, options: &CageOptions) -> Option<String> {
         let triangles = || (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
         let inside = self.points.iter().filter(|p| winding_number(p.as_dvec3(), triangles()) > 0.5).count();
@@ -216,7 +214,7 @@ impl ModelGap {
 }
 
 impl Gap {
-    /// Whether it lies within a hollow part, such as an open sleeve, and separates nothing.
+    /// Whether the gap lies within a hollow part, such as an open sleeve, rather than between two parts.
     pub(super) fn is_hollow(&self, lattice: &Lattice, positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
         let n = self.voxels.len();
         let is_inside = |k: usize| {
@@ -232,17 +230,16 @@ fn center(lattice: &Lattice, voxel: [usize; 3]) -> Vec3 {
     lattice.object(DVec3::from_array(voxel.map(|x| x as f64 + 0.5)) - lattice.half())
 }
 
-/// The number of a voxel, x fastest.
+/// Index of a voxel, x fastest.
 fn number(dims: [usize; 3], [x, y, z]: [usize; 3]) -> usize {
     (z * dims[1] + y) * dims[0] + x
 }
 
-/// The voxel of a number.
 fn voxel(dims: [usize; 3], i: usize) -> [usize; 3] {
     [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]]
 }
 
-/// The gaps of a solid that are at most `2 * reach` voxels wide, the largest first. Voxels of `closed` belong to none.
+/// Gaps of a solid at most `2 * reach` voxels wide, largest first. Ignores voxels of `closed`.
 pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
     let dims = solid.dims;
     let wall = nearest(solid, reach);
@@ -250,7 +247,7 @@ pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
         let at = |i: usize| DVec3::from_array(voxel(dims, i).map(|x| x as f64));
         at(wall[i] as usize) - at(i)
     };
-    let is_free = |i: usize| wall[i] != NONE && !closed.has(voxel(dims, i));
+    let is_free = |i: usize| wall[i] != NO_WALL && !closed.has(voxel(dims, i));
     let mut width = vec![0.0; wall.len()];
     let mut sheet = Voxels::new(dims);
     for i in (0..wall.len()).filter(|&i| is_free(i)) {
@@ -289,15 +286,15 @@ pub(super) fn gaps(solid: &Voxels, closed: &Voxels, reach: usize) -> Vec<Gap> {
     gaps
 }
 
-/// The voxel of the solid nearest to each voxel outside, up to `reach` away; [`NONE`] elsewhere. Passed on from voxel to
-/// voxel, so that it may be the second nearest.
+/// Approximate nearest solid voxel of each outside voxel, up to `reach` away; [`NO_WALL`] elsewhere. Propagated between
+/// neighbours, so it may be the second nearest.
 fn nearest(solid: &Voxels, reach: usize) -> Vec<u32> {
     let dims = solid.dims;
     let square = |i: u32, v: [usize; 3]| {
         let wall = voxel(dims, i as usize);
         (0..3).map(|k| wall[k].abs_diff(v[k]).pow(2)).sum::<usize>()
     };
-    let mut wall = vec![NONE; dims.iter().product()];
+    let mut wall = vec![NO_WALL; dims.iter().product()];
     let mut front = Vec::new();
     solid.for_each(|v| front.push((v, number(dims, v) as u32)));
     while !front.is_empty() {
@@ -305,7 +302,7 @@ fn nearest(solid: &Voxels, reach: usize) -> Vec<u32> {
         for (v, from) in front {
             for next in solid.neighbours(v) {
                 let (i, far) = (number(dims, next), square(from, next));
-                let is_farther = wall[i] != NONE && square(wall[i], next) <= far;
+                let is_farther = wall[i] != NO_WALL && square(wall[i], next) <= far;
                 if far <= reach * reach && !is_farther && !solid.has(next) {
                     wall[i] = from;
                     ahead.push((next, from));
@@ -317,7 +314,7 @@ fn nearest(solid: &Voxels, reach: usize) -> Vec<u32> {
     wall
 }
 
-/// Steps within a sheet from each of its voxels to the crease where its walls meet; the largest number if they do not.
+/// Graph distance within a sheet from each of its voxels to the crease where its walls meet; `usize::MAX` if they do not meet.
 fn depths(sheet: &Voxels, closed: &Voxels, to_wall: &dyn Fn(usize) -> DVec3) -> Vec<usize> {
     let dims = sheet.dims;
     let mut depth = vec![usize::MAX; dims.iter().product()];

@@ -1,4 +1,4 @@
-//! A surface that changes only in ways that keep it apart from the solid and from itself.
+//! A surface whose edits are rejected if it would meet the solid or itself.
 
 use glam::DVec3;
 
@@ -8,42 +8,41 @@ use super::surface::Surface;
 use super::voxels::Voxels;
 use cagework_core::contact::{Corners, meet};
 
-/// Parts of the cage that are not neighbours stay this far apart, in voxels.
+/// Smallest distance between triangles that are not neighbours, in voxels.
 const MIN_GAP: f64 = 0.05;
 
-/// How much smaller than a voxel those of a gap's sheet are: walls beside it may graze it.
+/// Shrinkage of the voxels of gap sheets, in voxels: walls beside a sheet may graze it.
 const SHEET_SHRINKAGE: f64 = 0.4;
 
-/// Vertices beside the mirror plane stay this far from it, in voxels.
+/// Smallest distance of vertices from the mirror plane, in voxels, unless they lie on it.
 const MIN_MIRROR_DISTANCE: f64 = 0.1;
 
-/// Smallest cosine of the turn between neighbours, 120 degrees: sharper folds turn a model over when they are bent.
+/// Smallest cosine between the normals of neighbours (120 degrees): sharper folds invert the model when they are bent.
 pub(super) const MIN_FOLD_COSINE: f64 = -0.5;
 
-/// What the surface must keep away from.
+/// A solid that the surface must not meet.
 #[derive(Debug)]
 pub(super) struct Obstacle {
-    /// The solid.
     pub(super) voxels: Voxels,
-    /// Distance along each axis to keep from its voxels, in voxels.
+    /// Distance to keep from its voxels along each axis, in voxels.
     pub(super) clearance: f64,
-    /// How many times thinner voxels are along each axis.
+    /// Longest edge of a voxel over its edge along each axis.
     pub(super) stretch: DVec3,
 }
 
 impl Obstacle {
-    /// Whether a triangle (centred coordinates) keeps its distance.
+    /// Whether a triangle (centred coordinates) keeps the clearance.
     pub(super) fn is_clear(&self, triangle: [DVec3; 3]) -> bool {
         !overlaps(&self.voxels, triangle, self.clearance)
     }
 
-    /// A triangle (centred coordinates) with the angles that it has in object units.
+    /// A triangle (centred coordinates) scaled so that its angles are those in object units.
     pub(super) fn unstretched(&self, triangle: &Corners) -> Corners {
         Corners { at: triangle.at.map(|p| p / self.stretch), ..*triangle }
     }
 }
 
-/// Whether a triangle (centred coordinates) overlaps a voxel of a set, each grown by `grow` on all sides.
+/// Whether a triangle (centred coordinates) overlaps a voxel of a set, each enlarged by `grow` on all sides.
 fn overlaps(voxels: &Voxels, triangle: [DVec3; 3], grow: f64) -> bool {
     let half = DVec3::from_array(voxels.dims.map(|n| 0.5 * n as f64));
     any_run(triangle.map(|p| p + half), grow, voxels.dims, |y, z, first, last| {
@@ -51,30 +50,30 @@ fn overlaps(voxels: &Voxels, triangle: [DVec3; 3], grow: f64) -> bool {
     })
 }
 
-/// A surface under change. Triangles and vertices that go away leave gaps in the numbering.
+/// An editable surface. Removed triangles and vertices leave unused indices.
 #[derive(Debug)]
-pub(super) struct Guarded<'a> {
+pub(super) struct GuardedSurface<'a> {
     pub(super) positions: Vec<DVec3>,
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Triangles around each vertex; none once it is gone.
+    /// Triangles around each vertex; empty for removed vertices.
     pub(super) around: Vec<Vec<u32>>,
     pub(super) on_mirror: Vec<bool>,
     pub(super) mirror: Option<usize>,
-    /// Whether it may fold more than [`MIN_FOLD_COSINE`] allows.
+    /// Whether folds sharper than [`MIN_FOLD_COSINE`] are allowed.
     pub(super) may_fold: bool,
     obstacle: &'a Obstacle,
-    /// What no triangle may come near: the solid and, if there is a band, everything outside the band.
+    /// Voxels that no triangle may overlap: the solid and, with a band, everything outside the band.
     keep_out: Voxels,
     has_band: bool,
-    /// Sheets of gaps, which no triangle may cross, and the corners of their box (centred coordinates).
+    /// Sheets of gaps, which no triangle may cross, with the corners of their box (centred coordinates).
     sheets: Option<(Voxels, [DVec3; 2])>,
     buckets: Buckets,
     bounds: Vec<Option<(DVec3, DVec3)>>,
     near: Vec<u32>,
 }
 
-impl<'a> Guarded<'a> {
-    /// Takes over a surface that is clear of the obstacle and of itself.
+impl<'a> GuardedSurface<'a> {
+    /// `surface` must be clear of the obstacle and of itself.
     pub(super) fn new(surface: Surface, obstacle: &'a Obstacle) -> Self {
         let half = DVec3::from_array(obstacle.voxels.dims.map(|n| 0.5 * n as f64));
         let n = surface.triangles.len();
@@ -102,7 +101,7 @@ impl<'a> Guarded<'a> {
         guarded
     }
 
-    /// Sets the band within which triangles may change from now on; none: anywhere.
+    /// Sets the band to which triangles are confined; `None` removes the limit.
     pub(super) fn set_band(&mut self, band: Option<&Voxels>) {
         self.has_band = band.is_some();
         self.keep_out = self.obstacle.voxels.clone();
@@ -111,7 +110,6 @@ impl<'a> Guarded<'a> {
         }
     }
 
-    /// Sets the sheets that no triangle may cross from now on.
     pub(super) fn set_sheets(&mut self, sheets: Option<Voxels>) {
         self.sheets = sheets.map(|sheets| {
             let half = DVec3::from_array(sheets.dims.map(|n| 0.5 * n as f64));
@@ -124,7 +122,7 @@ impl<'a> Guarded<'a> {
         });
     }
 
-    /// Whether a triangle is clear of the solid, stays in the band and crosses no sheet.
+    /// Whether a triangle is clear of the solid, lies in the band and crosses no sheet.
     fn is_clear(&self, triangle: [DVec3; 3]) -> bool {
         let half = DVec3::from_array(self.keep_out.dims.map(|n| 0.5 * n as f64));
         let leaves = self.has_band && triangle.iter().any(|p| p.abs().cmpge(half).any());
@@ -138,12 +136,11 @@ impl<'a> Guarded<'a> {
             && !self.sheets.as_ref().is_some_and(crosses)
     }
 
-    /// Whether there is a band.
     pub(super) fn has_band(&self) -> bool {
         self.has_band
     }
 
-    /// The surface as it is now, without gaps.
+    /// The current surface, compacted.
     pub(super) fn surface(&self) -> Surface {
         let mut number = vec![u32::MAX; self.positions.len()];
         let mut surface = Surface { mirror: self.mirror, ..Surface::default() };
@@ -157,18 +154,15 @@ impl<'a> Guarded<'a> {
         surface
     }
 
-    /// Whether a triangle is still part of the surface.
     pub(super) fn is_alive(&self, triangle: u32) -> bool {
         self.bounds[triangle as usize].is_some()
     }
 
-    /// A triangle's corners.
     pub(super) fn corners(&self, triangle: u32) -> Corners {
         let index = self.triangles[triangle as usize];
         Corners { index, at: index.map(|i| self.positions[i as usize]) }
     }
 
-    /// Enters a triangle's place.
     fn note(&mut self, triangle: u32) {
         let corners = self.corners(triangle);
         let (min, max) = (corners.min(), corners.max());
@@ -176,7 +170,7 @@ impl<'a> Guarded<'a> {
         self.buckets.add(triangle, min, max);
     }
 
-    /// Smallest cosine of the turn from one of the triangles to another one, to `others` or across the mirror.
+    /// Smallest cosine between the normals of neighbours among `triangles`, to `others` and across the mirror.
     fn sharpest(&self, triangles: &[Corners], others: &[Corners]) -> f64 {
         let real = |t: &Corners| self.obstacle.unstretched(t);
         let triangles: Vec<Corners> = triangles.iter().map(real).collect();
@@ -193,8 +187,8 @@ impl<'a> Guarded<'a> {
         folds.fold(1.0, f64::min)
     }
 
-    /// Whether `new` triangles may stand where those numbered `gone` were: clear of the obstacle, of the rest of the
-    /// surface and of each other, and not folded more than [`MIN_FOLD_COSINE`] allows or than those were.
+    /// Whether `new` triangles may replace those with the indices `gone`: clear of the obstacle, of the rest of the
+    /// surface and of each other, and not folded more sharply than [`MIN_FOLD_COSINE`] or than those were.
     pub(super) fn may_stand(&mut self, new: &[Corners], gone: &[u32]) -> bool {
         if let Some(axis) = self.mirror {
             let beside = |i: u32, p: DVec3| self.on_mirror[i as usize] || p[axis] >= MIN_MIRROR_DISTANCE;
@@ -231,7 +225,7 @@ impl<'a> Guarded<'a> {
         fold >= MIN_FOLD_COSINE || fold >= self.sharpest(&before(), &others)
     }
 
-    /// Pairs of triangles that meet where they should not, as vertices of both.
+    /// Vertices of triangles that intersect other triangles.
     pub(super) fn offenders(&mut self) -> Vec<u32> {
         let mut offenders = Vec::new();
         for t in 0..self.triangles.len() as u32 {
@@ -253,7 +247,6 @@ impl<'a> Guarded<'a> {
         offenders
     }
 
-    /// Puts a vertex elsewhere.
     pub(super) fn place(&mut self, vertex: u32, at: DVec3) {
         self.positions[vertex as usize] = at;
         for k in 0..self.around[vertex as usize].len() {
@@ -261,7 +254,6 @@ impl<'a> Guarded<'a> {
         }
     }
 
-    /// Merges `gone` into `kept`, which moves to `at`.
     pub(super) fn merge(&mut self, kept: u32, gone: u32, at: DVec3) {
         for t in std::mem::take(&mut self.around[gone as usize]) {
             let corners = &mut self.triangles[t as usize];
@@ -280,7 +272,7 @@ impl<'a> Guarded<'a> {
         self.place(kept, at);
     }
 
-    /// Replaces the two triangles of the edge `a`-`b` by two of the edge between their tips.
+    /// Flips the edge `a`-`b` of two triangles.
     pub(super) fn swap(&mut self, pair: [u32; 2], new: [[u32; 3]; 2]) {
         for t in pair {
             for i in self.triangles[t as usize] {
@@ -296,7 +288,7 @@ impl<'a> Guarded<'a> {
         }
     }
 
-    /// Vertices that share an edge with one, each once.
+    /// Vertices that share an edge with `vertex`, sorted.
     pub(super) fn neighbours(&self, vertex: u32, out: &mut Vec<u32>) {
         out.clear();
         for &t in &self.around[vertex as usize] {
@@ -311,12 +303,12 @@ impl<'a> Guarded<'a> {
 mod tests {
     use super::*;
 
-    /// Of two sheets that open by 2 atan(0.2), by the formula -(1 - 0.2^2) / (1 + 0.2^2).
+    /// Two triangles that open by 2 atan(0.2); the cosine is -(1 - 0.2^2) / (1 + 0.2^2).
     #[test]
     fn a_fold_is_measured_in_object_units() {
         let stretch = DVec3::new(3.0, 1.0, 1.0);
         let obstacle = Obstacle { voxels: Voxels::new([8; 3]), clearance: 0.0, stretch };
-        let guarded = Guarded::new(Surface::default(), &obstacle);
+        let guarded = GuardedSurface::new(Surface::default(), &obstacle);
         let points = [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.0, 1.0], [-0.2, 0.0, 1.0]];
         let triangle = |index: [u32; 3]| {
             let at = index.map(|i| stretch * DVec3::from_array(points[i as usize]));

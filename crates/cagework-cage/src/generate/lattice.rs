@@ -1,5 +1,4 @@
-//! Where the voxels are: a lattice of cubes centred on the model, so that a mirror through its centre maps voxels onto
-//! voxels.
+//! Voxel lattices centred on the model, so that a mirror through its centre maps voxels onto voxels.
 
 use std::collections::HashSet;
 
@@ -9,22 +8,23 @@ use super::footprint::Footprint;
 use super::voxels::Voxels;
 use cagework_core::progress::Cancelled;
 
-/// Edge of a voxel over the model's length divided by their number: its ends lie inside voxels, not between two.
+/// Enlargement of voxels so that the model's ends lie inside voxels, not between two.
 const VOXEL_ENLARGEMENT: f64 = 1.002;
 
-/// Voxels between the solid's box and the lattice's, apart from dilation: the outermost layer stays empty.
+/// Empty voxels between the solid's box and the lattice's, apart from dilation; the outermost layer always stays empty.
 pub(super) const MARGIN_VOXELS: usize = 6;
 
-/// Smallest edge of a voxel over the largest coordinate: f32 positions can tell its parts apart.
+/// Smallest edge of a voxel over the largest coordinate that f32 positions resolve.
 const MIN_VOXEL_RATIO: f64 = 2e-5;
 
-/// Triangles from one check whether the work was cancelled to the next.
+/// Triangles between polls for cancellation.
 const TRIANGLES_PER_CHECK: usize = 4096;
 
-/// Rows of a triangle's box above which triangles at one place, such as instances, are looked for and added once.
-const FEW_ROWS: usize = 64;
+/// Triangles whose box has more rows are deduplicated (instances at the same place) before they are rasterised.
+const MAX_ROWS_WITHOUT_LOOKUP: usize = 64;
 
-/// A lattice of voxels: cubes, or boxes that are thinner along one axis. Lattice coordinates count voxels from the box's corner; *centred* ones from its centre.
+/// A lattice of voxels: cubes, or boxes that are thinner along one axis. *Lattice coordinates* count voxels from the
+/// corner of the lattice's box, *centred coordinates* from its centre.
 #[derive(Clone, Debug)]
 pub(super) struct Lattice {
     /// Centre of the box, object units.
@@ -38,11 +38,11 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
-    /// Voxels of which `n` longest edges are as long as the longest side of `min`..`max`, and `pad` voxels more on every side.
+    /// A lattice whose voxels divide the longest side of `min`..`max` into `n`, with `pad` more voxels on every side.
     pub(super) fn around([min, max]: [DVec3; 2], n: usize, stretch: DVec3, pad: usize) -> Self {
         let extent = max - min;
         let largest = min.abs().max(max.abs()).max_element();
-        // A model of one point has no size of its own: take the unit of length.
+        // A single point has no size: use the unit of length.
         let smallest = if extent.max_element() > 0.0 { f64::from(f32::MIN_POSITIVE) } else { 1.0 / n as f64 };
         let cell = (VOXEL_ENLARGEMENT * extent.max_element() / n as f64)
             .max(MIN_VOXEL_RATIO * largest)
@@ -77,10 +77,10 @@ impl Lattice {
         (self.center + p * self.cell / self.stretch).as_vec3()
     }
 
-    /// All voxels that a triangle or a vertex touches.
+    /// Voxels that a triangle or a vertex overlaps.
     ///
     /// # Errors
-    /// When `go_on` says so.
+    /// If `go_on` cancels.
     pub(super) fn touched(
         &self,
         positions: &[Vec3],
@@ -104,7 +104,7 @@ impl Lattice {
                 continue;
             }
             let footprint = Footprint::new(corners, 0.0);
-            let is_large = footprint.n_rows(self.dims) > FEW_ROWS;
+            let is_large = footprint.n_rows(self.dims) > MAX_ROWS_WITHOUT_LOOKUP;
             if !is_large || large.insert(corners.map(|p| p.to_array().map(f64::to_bits))) {
                 footprint.add_to(&mut voxels);
             }

@@ -1,14 +1,14 @@
-//! Cages made for a model: a box of quads, or a coarse closed surface that follows the model's shape.
+//! Cage generation: a box of quads, or a coarse closed surface that follows the model's shape.
 //!
-//! [`generate`] takes any triangle soup, however open, overlapping or scattered. The way: conservative voxels, the
-//! outside flooded, a hull of voxels at a distance whose boundary is a 2-manifold by construction, its stairs
-//! smoothed, then edge collapses that never make the cage meet the solid or itself, then better triangles under the
-//! same constraints. What is returned has been checked as a whole on its final f32 numbers; if the check fails, fewer
-//! edges are collapsed, down to the hull itself, and [`CageReport`] says so.
+//! [`generate`] accepts any triangle soup, however open, overlapping or scattered. Steps: conservative voxelisation;
+//! flood fill of the outside; a dilated hull of voxels whose boundary is a 2-manifold by construction; smoothing of its
+//! stairs; edge collapses that never make the cage meet the solid or itself; relaxation and pairing into quads under
+//! the same constraints. The final f32 mesh is verified as a whole. If verification fails, fewer edges are collapsed,
+//! down to the hull itself ([`CageReport::hull`]).
 //!
-//! Sources: Xian, Lin, Gao 2009 (voxels and hull); Garland, Heckbert 1997 (quadrics); Sander et al. 2000
-//! (progressive hulls). Changes: the constraint is a bit set of voxels and a grid of the cage's own triangles, not a
-//! linear program; symmetric models are simplified as one half. Where the constants come from: `docs/notes/cage-generator.md`.
+//! Sources: Xian, Lin and Gao 2009 (voxels and hull); Garland and Heckbert 1997 (quadrics); Sander et al. 2000
+//! (progressive hulls). Changes: the constraint is a voxel set and a grid of the cage's own triangles instead of a
+//! linear program; symmetric models are simplified as one half. `docs/notes/cage-generator.md` derives the constants.
 
 mod buckets;
 mod collapse;
@@ -35,7 +35,7 @@ use cagework_core::cage::Cage;
 use cagework_core::progress::{Cancelled, Progress, ProgressEvent, Stage};
 use collapse::Collapser;
 use gaps::NarrowGaps;
-use guarded::Guarded;
+use guarded::GuardedSurface;
 pub use options::{
     CLEARANCE, CageGenError, CageOptions, CageReport, DETAIL, DETAILS, GeneratedCage, MAX_CLEARANCE,
     MAX_TARGET, MAX_VOXELS, MIN_TARGET, MIN_VOXELS, Mirror, Shape, Symmetry, TARGET, VOXELS,
@@ -44,48 +44,48 @@ use quads::Faces;
 use shell::Shell;
 use verify::{verified, verified_faces};
 
-/// Most lattices that are tried until the target is met.
+/// Limit on the lattices that are tried to meet the target.
 const MAX_LATTICES: usize = 4;
 
-/// Vertices of a cage over those asked for, above which a coarser lattice is tried.
+/// Vertices of a cage over the target above which a coarser lattice is tried.
 const MAX_TARGET_RATIO: f64 = 1.1;
 
-/// Layers of voxels around the hull in which the cage must stay, tried one after the other until the target is met:
-/// as far as possible it spans no gap. At last anywhere.
+/// Layers of voxels around the hull to which the cage is confined, tried in this order until the target is met. Narrow
+/// bands keep the cage from spanning gaps; `None` does not confine it.
 const BAND_LAYERS: [Option<usize>; 5] = [Some(1), Some(2), Some(3), Some(5), None];
 
-/// Gaps that stay open, one share after the other until the target is met: of the largest one's volume.
-const KEPT_GAPS: [f64; 3] = [0.0, 0.3, f64::INFINITY];
+/// Gaps that stay open have at least this share of the largest gap's area; tried in this order until the target is met.
+const MIN_GAP_SHARES: [f64; 3] = [0.0, 0.3, f64::INFINITY];
 
-/// Of these, those in which a cage takes the shape that the budget allows.
-const NARROW_BANDS: usize = 3;
+/// Number of bands, from the first, in which the cage is collapsed as far as the budget allows.
+const N_NARROW_BANDS: usize = 3;
 
-/// Vertices that the budget leaves over those asked for, above which a coarser lattice is tried at once for a model in pieces: the
-/// bridges between them cannot be collapsed.
+/// For models in several pieces: vertices within the budget, over the target, above which a coarser lattice is tried at
+/// once, as bridges between pieces cannot be collapsed.
 const MAX_FIRST_RATIO: f64 = 5.0;
 
-/// Vertices that the budget leaves over those left at the end, of such models.
+/// For such models: vertices within the budget over the final number of vertices.
 const LATER_RATIO: f64 = 3.7;
 
-/// Vertices that a gap costs, nearly: a ring on each side.
+/// Estimated vertices per open gap: a ring on each side.
 const VERTICES_PER_GAP: usize = 10;
 
-/// Most vertices of a hull, or of its half in a mirror, on a lattice that is refined for gaps: two seconds of collapses.
+/// Limit on the vertices of a hull, or of its half with a mirror, on a lattice refined for gaps: two seconds of collapses.
 const MAX_HULL: usize = 20_000;
 
-/// Gaps that a report names.
+/// Limit on the gaps that a report names.
 const MAX_NOTICES: usize = 3;
 
-/// Rounds in which quads that break the promise become triangles again.
-const MAX_SPLITS: usize = 4;
+/// Limit on rounds that split quads back into triangles where verification fails.
+const MAX_SPLIT_ROUNDS: usize = 4;
 
-/// Makes a cage that encloses a model strictly.
+/// Generates a cage that strictly encloses a model.
 ///
-/// `positions`: `[n_vertices]`, object units; vertices of no triangle are enclosed, too. `triangles`:
-/// `[n_triangles]`, any soup. 0.2 to 1.5 s for a figure and 80 vertices on one core, most of it for the gaps between limbs.
+/// `positions`: `[n_vertices]`, object units; vertices without triangles are enclosed, too. `triangles`: `[n_triangles]`, any
+/// soup. Takes 0.2 to 1.5 s for a figure and 80 vertices on one core, most of it for the gaps between limbs.
 ///
 /// # Errors
-/// [`CageGenError`]: nothing to enclose, numbers or options out of range, cancelled.
+/// [`CageGenError`]: an empty model, numbers or options out of range, no cage that passes verification, cancelled.
 pub fn generate(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
@@ -98,7 +98,7 @@ pub fn generate(
     generate_plain(positions, triangles, options, progress)
 }
 
-/// A cage whose faces enclose the model as they are.
+/// A cage that encloses the model without subdivision.
 fn generate_plain(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
@@ -111,7 +111,7 @@ fn generate_plain(
     let base = first_voxels(target);
     let most_gaps = target / VERTICES_PER_GAP;
     let NarrowGaps { gaps, stretch, voxels: finest } = match (options.shape, options.smooth) {
-        // A smooth surface is kept clear of the model by its distance, which a finer lattice would halve.
+        // With subdivision the clearance keeps the surface off the model, and a finer lattice would halve it.
         (Shape::Follow, 0) => gaps::narrow_gaps(positions, triangles, bounds, [base, most_gaps], &|_| {
             let event = ProgressEvent { stage: Stage::Voxelize, fraction: 0.0, iteration: 0, delta: None };
             if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
@@ -131,7 +131,7 @@ fn generate_plain(
         if gaps.len() > most_gaps {
             shell.gaps.clear();
         }
-        // The solid's handles and gaps may need more vertices than asked for: a coarser lattice closes them.
+        // Handles and gaps of the solid may need more vertices than the target; a coarser lattice closes them.
         let may_coarsen = attempt < MAX_LATTICES && voxels > MIN_VOXELS;
         let n_half = shell.hull.positions.len();
         if options.voxels == 0 && voxels > base && may_coarsen && n_half > MAX_HULL {
@@ -141,8 +141,8 @@ fn generate_plain(
         }
         let simplify = |share| go_on(Stage::Simplify, 0.4 + 0.6 * share);
         let (cage, hull) = match simplified(&shell, options, may_coarsen, &simplify)? {
-            Simplified::Cage(cage, hull) => (*cage, hull),
-            Simplified::TooMany(left) => {
+            Simplification::Cage(cage, hull) => (*cage, hull),
+            Simplification::TooMany(left) => {
                 let ratio = (target as f64 / left as f64).sqrt().clamp(0.4, 0.7);
                 let least = if voxels > base { base } else { MIN_VOXELS };
                 voxels = ((ratio * voxels as f64) as usize).max(least);
@@ -173,55 +173,55 @@ fn generate_plain(
     Err(CageGenError::Unresolved)
 }
 
-/// Voxels along the longest side for a target: a cage of few vertices cannot follow small gaps anyway.
+/// Initial voxels along the longest side: a cage of few vertices cannot follow small gaps.
 fn first_voxels(target: usize) -> usize {
     ((4.0 * (target as f64).sqrt()).round() as usize).clamp(MIN_VOXELS, MAX_VOXELS)
 }
 
-/// What became of a hull.
-enum Simplified {
+/// Outcome of simplifying a hull.
+enum Simplification {
     /// The verified cage, and whether it is the hull itself.
     Cage(Box<Cage>, bool),
-    /// So many vertices are left that a coarser lattice should be tried.
+    /// This many vertices are left: try a coarser lattice.
     TooMany(usize),
 }
 
-/// The verified cage: as few vertices as its shape needs and at most as many as asked for, if that can be.
+/// Simplifies a hull to as few vertices as its shape needs, at most the target if possible, and verifies the result.
 fn simplified(
     shell: &Shell,
     options: &CageOptions,
     may_coarsen: bool,
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
-) -> Result<Simplified, CageGenError> {
+) -> Result<Simplification, CageGenError> {
     let n_hull = shell.hull.n_whole();
     let mut target = options.target as usize;
-    // The lattice may be coarser than the first one: the budget is the model's, not the lattice's.
+    // The budget is a share of the model's size, so its value in voxels depends on the lattice.
     let mut budget = Some(f64::from(options.detail) * shell.longest / shell.lattice.cell);
     while target < n_hull {
-        let mut guarded = Guarded::new(shell.hull.clone(), &shell.obstacle);
+        let mut guarded = GuardedSurface::new(shell.hull.clone(), &shell.obstacle);
         let spacings = shell.spacings();
         let has_plates = spacings.iter().flatten().any(|spacing| spacing.along.is_none());
         let mut collapser = Collapser::new(&mut guarded, spacings);
         let mut left = n_hull;
-        // First as far as the budget goes, in narrow bands; then on to the count, in any.
-        let narrow = BAND_LAYERS[..NARROW_BANDS]
+        // First collapse within the budget, in narrow bands; then down to the target, in any band.
+        let narrow = BAND_LAYERS[..N_NARROW_BANDS]
             .iter()
             .map(|&layers| (layers, budget, MIN_TARGET as usize, 0.0, false, true));
-        // A sharp fold is better than a closed gap, and a plate that bends badly better than a fold.
+        // Preference: sharp folds before closed gaps, plates that bend badly before sharp folds.
         let passes_of_gaps = |&least| {
             let plates = BAND_LAYERS.iter().map(move |&layers| (layers, None, target, least, false, true));
             let plain = BAND_LAYERS.iter().map(move |&layers| (layers, None, target, least, false, false));
             plates.chain(plain).chain([(None, None, target, least, true, false)])
         };
-        let wide = KEPT_GAPS.iter().flat_map(passes_of_gaps);
-        let n_passes = (NARROW_BANDS + KEPT_GAPS.len() * (2 * BAND_LAYERS.len() + 1)) as f32;
+        let wide = MIN_GAP_SHARES.iter().flat_map(passes_of_gaps);
+        let n_passes = (N_NARROW_BANDS + MIN_GAP_SHARES.len() * (2 * BAND_LAYERS.len() + 1)) as f32;
         for (k, (layers, budget, aim, least, may_fold, keeps_plates)) in narrow.chain(wide).enumerate() {
             let is_repeated =
                 (least > 0.0 && shell.gaps.is_empty()) || (budget.is_none() && keeps_plates && !has_plates);
             let is_far = left as f64 > MAX_FIRST_RATIO * f64::from(options.target);
             let is_in_pieces = shell.separate > options.target as usize / 10;
-            if k == NARROW_BANDS && may_coarsen && is_far && is_in_pieces {
-                return Ok(Simplified::TooMany((left as f64 / LATER_RATIO) as usize));
+            if k == N_NARROW_BANDS && may_coarsen && is_far && is_in_pieces {
+                return Ok(Simplification::TooMany((left as f64 / LATER_RATIO) as usize));
             }
             if left <= aim || is_repeated || (budget.is_none() && left <= target) {
                 continue;
@@ -236,28 +236,28 @@ fn simplified(
         }
         collapser.surface.may_fold = false;
         if may_coarsen && left as f64 > MAX_TARGET_RATIO * f64::from(options.target) {
-            return Ok(Simplified::TooMany(left));
+            return Ok(Simplification::TooMany(left));
         }
-        // Relaxing weighs distances from the hull against shape as on the lattice that the target asks for.
+        // Rescale so that relaxation weighs distance against shape as on the target's lattice.
         let quadrics: Vec<_> = collapser.quadrics.iter().map(|q| q.in_units(shell.fineness)).collect();
         if let Some(cage) = relaxed(shell, guarded, &quadrics, options.quads, go_on)? {
-            return Ok(Simplified::Cage(Box::new(cage), false));
+            return Ok(Simplification::Cage(Box::new(cage), false));
         }
         target = left.max(target) * 2;
         budget = budget.map(|budget| 0.5 * budget);
     }
     for surface in [&shell.hull, &shell.stairs] {
         if let Some(cage) = verified(shell, surface) {
-            return Ok(Simplified::Cage(Box::new(cage), true));
+            return Ok(Simplification::Cage(Box::new(cage), true));
         }
     }
     Err(CageGenError::Unresolved)
 }
 
-/// The cage of a collapsed surface, relaxed and of quads as far as it then still keeps the promise.
+/// Relaxes a collapsed surface, pairs triangles into quads where the result passes verification, and returns the cage.
 fn relaxed(
     shell: &Shell,
-    mut guarded: Guarded<'_>,
+    mut guarded: GuardedSurface<'_>,
     quadrics: &[quadric::Quadric],
     of_quads: bool,
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
@@ -267,7 +267,7 @@ fn relaxed(
     let triangles = guarded.surface();
     if of_quads {
         let mut pairing = quads::quads(&mut guarded, quadrics, &|share| go_on(0.8 + 0.2 * share))?;
-        for _ in 0..MAX_SPLITS {
+        for _ in 0..MAX_SPLIT_ROUNDS {
             let Faces { positions, faces, first } = quads::faces(&guarded, &pairing);
             match verified_faces(shell, &positions, faces) {
                 Ok(cage) => return Ok(Some(cage)),
@@ -279,7 +279,6 @@ fn relaxed(
     Ok(verified(shell, &triangles).or_else(|| verified(shell, &collapsed)))
 }
 
-/// Closed parts of a cage.
 fn n_parts(cage: &Cage) -> u32 {
     let mut root: Vec<u32> = (0..cage.n_vertices() as u32).collect();
     let find = |root: &mut Vec<u32>, mut v: u32| {
@@ -302,7 +301,6 @@ fn n_parts(cage: &Cage) -> u32 {
     parts
 }
 
-/// Corners of the box of all positions in f64.
 fn bounds_of(positions: &[Vec3]) -> [DVec3; 2] {
     let points = || positions.iter().map(|p| p.as_dvec3());
     [points().fold(DVec3::INFINITY, DVec3::min), points().fold(DVec3::NEG_INFINITY, DVec3::max)]

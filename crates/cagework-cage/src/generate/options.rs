@@ -1,4 +1,4 @@
-//! What can be asked of [`super::generate`], and what it answers.
+//! Options, report and errors of [`super::generate`].
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -9,15 +9,15 @@ use cagework_core::choice;
 use cagework_core::options::{Number, OutOfRange, SMOOTH};
 use cagework_core::progress::Cancelled;
 
-/// Fewest vertices that can be asked for.
+/// Smallest target number of vertices.
 pub const MIN_TARGET: u32 = 8;
-/// Most vertices that can be asked for.
+/// Largest target number of vertices.
 pub const MAX_TARGET: u32 = 400;
-/// Coarsest and finest lattice.
+/// Fewest voxels along the longest side.
 pub const MIN_VOXELS: usize = 8;
-/// See [`MIN_VOXELS`].
+/// Most voxels along the longest side.
 pub const MAX_VOXELS: usize = 128;
-/// Largest distance to keep from the model, a fraction of its diagonal.
+/// Largest clearance, over the diagonal of the model's box.
 pub const MAX_CLEARANCE: f32 = 0.25;
 /// Range of [`CageOptions::target`].
 pub const TARGET: Number = Number {
@@ -25,7 +25,7 @@ pub const TARGET: Number = Number {
     allowed: "a whole number from 8 to 400",
     is_allowed: |n| n.fract() == 0.0 && (f64::from(MIN_TARGET)..=f64::from(MAX_TARGET)).contains(&n),
 };
-/// Finest and coarsest detail.
+/// Smallest and largest [`CageOptions::detail`].
 pub const DETAILS: [f32; 2] = [0.005, 0.2];
 /// Range of [`CageOptions::detail`].
 pub const DETAIL: Number = Number {
@@ -47,34 +47,34 @@ pub const VOXELS: Number = Number {
 };
 
 choice! {
-    /// What the cage follows.
+    /// Shape that the cage follows.
     Shape {
-        /// The model, limb by limb.
+        /// The model with its limbs.
         #[default]
         Follow = "follow",
-        /// The model's convex hull, roughly (26 planes): the simplest cage that is not a box.
+        /// Approximate convex hull of the model (26 planes).
         Hull = "hull",
     }
 }
 
 choice! {
-    /// Whether the cage is its own image in a mirror through the middle of the model's box.
+    /// Mirror symmetry of the cage about a plane through the centre of the model's box.
     Symmetry {
-        /// If the model is, to within a voxel.
+        /// Symmetric if the model is, to within a voxel.
         #[default]
         Auto = "auto",
-        /// No.
+        /// Not symmetric.
         None = "none",
-        /// Yes, x is turned round.
+        /// Mirror across x.
         X = "x",
-        /// Yes, y is turned round.
+        /// Mirror across y.
         Y = "y",
-        /// Yes, z is turned round.
+        /// Mirror across z.
         Z = "z",
     }
 }
 
-/// The axis that a mirror turns round.
+/// The axis that a mirror inverts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mirror {
@@ -95,27 +95,27 @@ impl Mirror {
 /// Options of [`super::generate`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CageOptions {
-    /// Vertices that the cage may have, 8 to 400. Default 80.
+    /// Target number of vertices, 8 to 400. Default 80.
     pub target: u32,
-    /// How far the cage may be from what it follows, root mean square, as a fraction of the model's longest side, 0.005 to 0.2:
-    /// a shape that needs fewer vertices for it gets fewer. Default 0.028, a voxel of 36.
+    /// Allowed RMS distance of the cage from the shape that it follows, as a fraction of the model's longest side,
+    /// 0.005 to 0.2. Simple shapes get fewer vertices than the target. Default 0.028, a voxel of 36.
     pub detail: f32,
-    /// Quads where two triangles make a good one. Default true.
+    /// Whether to pair triangles into quads. Default true.
     pub quads: bool,
-    /// Default follow.
+    /// Shape that the cage follows. Default follow.
     pub shape: Shape,
-    /// Default auto.
+    /// Mirror symmetry. Default auto.
     pub symmetry: Symmetry,
-    /// One closed part for each separate part of the model (parts nearer than a few voxels count as one); otherwise
-    /// thin bridges join them to one cage. Default false.
+    /// Whether each part of the model gets its own closed cage (parts within a few voxels of each other count as one).
+    /// Otherwise thin bridges join them to one cage. Default false.
     pub per_component: bool,
     /// Distance to keep from the model along each axis, as a fraction of the diagonal of its box, 0 to 0.25; at least
-    /// half a voxel in any case. Default 0.
+    /// half a voxel. Default 0.
     pub clearance: f32,
-    /// Voxels along the model's longest side, 8 to 128: gaps narrower than three of them are closed, detail thinner than one is
-    /// lost. 0 ties them to the target. Default 0.
+    /// Voxels along the model's longest side, 8 to 128, or 0 to derive them from the target. Gaps narrower than three
+    /// voxels are closed, detail thinner than one is lost. Default 0.
     pub voxels: u32,
-    /// Steps of subdivision after which the cage's surface encloses the model, 0 to 3. Default 0.
+    /// Subdivision steps after which the cage's surface must enclose the model, 0 to 3. Default 0.
     pub smooth: u32,
 }
 
@@ -136,10 +136,10 @@ impl Default for CageOptions {
 }
 
 impl CageOptions {
-    /// Checks every option's range.
+    /// Checks the range of every option.
     ///
     /// # Errors
-    /// [`OutOfRange`] names the first that is wrong.
+    /// [`OutOfRange`] for the first invalid option.
     pub fn check(&self) -> Result<(), OutOfRange> {
         TARGET.check(self.target)?;
         DETAIL.check(self.detail)?;
@@ -149,60 +149,60 @@ impl CageOptions {
     }
 }
 
-/// A cage and how it came about.
+/// A generated cage with its report.
 #[derive(Clone, Debug)]
 pub struct GeneratedCage {
     /// The verified cage; its faces are triangles and quads.
     pub cage: Cage,
-    /// What was done.
+    /// How it was generated.
     pub report: CageReport,
 }
 
-/// How a cage was made.
+/// How a cage was generated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CageReport {
-    /// Most vertices asked for.
+    /// Target number of vertices.
     pub target: u32,
-    /// Vertices it has.
+    /// Number of vertices.
     pub vertices: u32,
-    /// Faces it has.
+    /// Number of faces.
     pub faces: u32,
-    /// Quads among them.
+    /// Number of faces that are quads.
     pub quads: u32,
-    /// Whether it has at most a tenth more vertices than asked for; if not, the model's holes and gaps need them.
+    /// Whether the cage has at most a tenth more vertices than the target; otherwise the model's holes and gaps need them.
     pub target_met: bool,
     /// Voxels along the model's longest side.
     pub voxels: u32,
-    /// Edge of a voxel, object units: smaller gaps are closed.
+    /// Edge of a voxel, object units. Gaps narrower than three voxels are closed.
     pub voxel_size: f32,
-    /// Distance that the cage keeps from the model along at least one axis, object units.
+    /// Smallest distance from the model along at least one axis, object units.
     pub clearance: f32,
-    /// The mirror that maps the cage onto itself.
+    /// Mirror symmetry of the cage.
     pub mirror: Option<Mirror>,
-    /// Gaps of the model that the cage closes, and what would keep each open: a sentence each.
+    /// Gaps of the model that the cage closes, with a remedy; a sentence each.
     pub notices: Vec<String>,
-    /// Closed parts.
+    /// Connected components of the cage.
     pub parts: u32,
-    /// Parts that the model's own gaps leave apart: more than `parts` if they were bridged.
+    /// Components of the hull before bridging.
     pub separate: u32,
-    /// Vertices of the hull before it was simplified.
+    /// Vertices of the hull before simplification.
     pub hull_vertices: u32,
-    /// Whether nothing was simplified: the cage is the hull that is right by construction.
+    /// Whether the cage is the unsimplified hull.
     pub hull: bool,
-    /// Lattices tried.
+    /// Number of lattices tried.
     pub attempts: u32,
-    /// Wall-clock time.
+    /// Wall-clock time, milliseconds.
     pub elapsed_ms: f64,
 }
 
-/// Why there is no cage.
+/// Why no cage was generated.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum CageGenError {
     /// An option is out of range.
     #[error(transparent)]
     Option(#[from] OutOfRange),
     /// The model has no vertices.
-    #[error("model has no vertices: there is nothing to make a cage for")]
+    #[error("the model has no vertices")]
     Empty,
     /// A vertex is not a finite number.
     #[error("model vertex {vertex} is not a finite number")]
@@ -210,30 +210,30 @@ pub enum CageGenError {
         /// The vertex.
         vertex: u32,
     },
-    /// A triangle names a vertex that does not exist.
+    /// A triangle has the index of a vertex that does not exist.
     #[error("model triangle {triangle} names vertex {vertex}, but there are only {n}")]
     Index {
         /// The triangle.
         triangle: u32,
-        /// The vertex it names.
+        /// The invalid index.
         vertex: u32,
-        /// Vertices there are.
+        /// Number of vertices.
         n: usize,
     },
-    /// The model is too large to compute with.
+    /// The model is too large.
     #[error("model has coordinates up to {largest:e}; they must be below {:e}: scale it", 0.1 * MAX_DIAGONAL)]
     Size {
         /// Largest coordinate, object units.
         largest: f64,
     },
-    /// Not even the hull passes the check.
+    /// Not even the hull passes verification.
     #[error(
-        "no cage passes the check: the model is too small for its distance from the origin; move it there"
+        "no cage passes the final check: the model is too small for its distance from the origin; move it to the origin"
     )]
     Unresolved,
-    /// No cage's smooth surface holds the model.
+    /// No subdivided surface encloses the model.
     #[error(
-        "no cage was found whose smooth surface holds the model: take fewer steps (--smooth), or more vertices"
+        "no cage was found whose smooth surface encloses the model: take fewer steps (--smooth), or more vertices"
     )]
     Unsmooth,
     /// Cancelled by the caller.
@@ -241,7 +241,7 @@ pub enum CageGenError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Checks input and options; returns the corners of the model's box.
+/// Checks input and options. Returns the corners of the model's box.
 pub(super) fn check(
     positions: &[Vec3],
     triangles: &[[u32; 3]],

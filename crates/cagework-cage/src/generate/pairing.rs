@@ -1,46 +1,45 @@
-//! Which triangles become quads: a matching of neighbours, by simulated annealing.
+//! Pairs triangles into quads: a maximum-weight matching by simulated annealing.
 //!
-//! An exact matching gives no more quads: seven times the moves gave none either (`docs/notes/cage-generator.md`).
+//! Seven times the moves give no more quads; see `docs/notes/cage-generator.md`.
 
 use glam::DVec3;
 
-use super::guarded::Guarded;
+use super::guarded::GuardedSurface;
 use cagework_core::contact::Corners;
 
-/// Corners of a quad: the vertex, and whether its mirror image is meant.
+/// Corners of a quad: vertex, and whether the corner is its mirror image.
 pub(super) type Quad = [(u32, bool); 4];
 
-/// Creases stay creases: smallest cosine between the two triangles of a quad, cut either way.
+/// Smallest cosine between the two triangles of a quad, cut either way: creases stay between quads.
 const MIN_FOLD_COSINE: f64 = 0.0;
-/// Quads that are worse are none.
+/// Largest [`badness`] of a quad.
 const MAX_BADNESS: f64 = 4.0;
-/// Moves of the annealing, and its first temperature; quads are worth about 1.
+/// Number of moves of the annealing, and its initial temperature; a quad is worth about 1.
 const MOVES: usize = 15_000;
 const TEMPERATURE: f64 = 0.25;
-/// Seed of the pseudo-random moves: runs are alike.
+/// Seed of the pseudo-random moves.
 const SEED: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// What a triangle is paired with.
+/// The triangle with which a triangle forms a quad.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Partner {
-    /// Nothing: it stays a triangle.
+    /// Unpaired.
     #[default]
     None,
-    /// Its own image across the mirror plane.
+    /// Its own mirror image.
     Image,
     /// Another triangle.
     Triangle(u32),
 }
 
-/// Partners of all triangles.
+/// Partner and quad weight of every triangle.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pairing {
     pub(super) partner: Vec<Partner>,
     weight: Vec<f64>,
 }
 
-/// Where the corners are.
-pub(super) fn places(surface: &Guarded<'_>, quad: &Quad) -> [DVec3; 4] {
+pub(super) fn places(surface: &GuardedSurface<'_>, quad: &Quad) -> [DVec3; 4] {
     quad.map(|(v, is_image)| {
         let mut p = surface.positions[v as usize];
         if let (true, Some(axis)) = (is_image, surface.mirror) {
@@ -50,14 +49,14 @@ pub(super) fn places(surface: &Guarded<'_>, quad: &Quad) -> [DVec3; 4] {
     })
 }
 
-/// How far a quad is from flat: half the distance between its diagonals over its mean side.
+/// Deviation of a quad from a plane: half the distance between its diagonals over its mean side.
 pub(super) fn warp(p: &[DVec3; 4]) -> f64 {
     let normal = (p[2] - p[0]).cross(p[3] - p[1]).normalize_or_zero();
     let side = 0.25 * (0..4).map(|k| p[k].distance(p[(k + 1) % 4])).sum::<f64>();
     normal.dot(p[0] - p[1] + p[2] - p[3]).abs() / (2.0 * side.max(1e-12))
 }
 
-/// 0 for a rectangle; more for what is bent, slanted, tapered or not convex.
+/// Shape penalty of a quad: 0 for a rectangle; larger if bent, slanted, tapered or not convex.
 pub(super) fn badness(p: &[DVec3; 4]) -> f64 {
     let normal = (p[2] - p[0]).cross(p[3] - p[1]).normalize_or_zero();
     let (mut slant, mut dent) = (0.0, 0.0);
@@ -71,8 +70,8 @@ pub(super) fn badness(p: &[DVec3; 4]) -> f64 {
     1.5 * slant + 3.0 * warp(p).powi(2) + dent + 0.15 * taper
 }
 
-/// The quad of a triangle and its partner; none if they do not touch as they should.
-pub(super) fn quad_of(surface: &Guarded<'_>, t: u32, partner: Partner) -> Option<Quad> {
+/// The quad of a triangle and its partner; `None` if they do not share exactly one edge.
+pub(super) fn quad_of(surface: &GuardedSurface<'_>, t: u32, partner: Partner) -> Option<Quad> {
     let x = surface.triangles[t as usize];
     let edge = |is_shared: &dyn Fn(u32, u32, u32) -> bool| {
         (0..3).map(|k| [x[k], x[(k + 1) % 3], x[(k + 2) % 3]]).find(|&[a, b, c]| is_shared(a, b, c))
@@ -93,27 +92,27 @@ pub(super) fn quad_of(surface: &Guarded<'_>, t: u32, partner: Partner) -> Option
     }
 }
 
-/// The triangles of two triangles' quad, cut along its other diagonal.
-pub(super) fn other_cut(surface: &Guarded<'_>, t: u32, u: u32) -> Option<[Corners; 2]> {
+/// The two triangles of a quad, cut along its other diagonal.
+pub(super) fn other_cut(surface: &GuardedSurface<'_>, t: u32, u: u32) -> Option<[Corners; 2]> {
     let [a, b, c, d] = quad_of(surface, t, Partner::Triangle(u))?.map(|corner| corner.0);
     let corners = |index: [u32; 3]| Corners { index, at: index.map(|i| surface.positions[i as usize]) };
     Some([[a, b, d], [b, c, d]].map(corners))
 }
 
-/// Whether the surface may be cut along a quad's other diagonal.
-pub(super) fn is_free(surface: &mut Guarded<'_>, t: u32, partner: Partner) -> bool {
+/// Whether the surface allows the other diagonal of a quad.
+pub(super) fn is_free(surface: &mut GuardedSurface<'_>, t: u32, partner: Partner) -> bool {
     let Partner::Triangle(u) = partner else { return true };
     other_cut(surface, t, u).is_some_and(|cut| surface.may_stand(&cut, &[t, u]))
 }
 
-/// What a quad is worth; 0 for one that may not be.
-pub(super) fn worth(surface: &Guarded<'_>, t: u32, partner: Partner) -> f64 {
+/// Weight of a quad in the matching; 0 if it is not allowed.
+pub(super) fn worth(surface: &GuardedSurface<'_>, t: u32, partner: Partner) -> f64 {
     let Some(quad) = quad_of(surface, t, partner) else { return 0.0 };
     let [_, (b, _), _, (d, _)] = quad;
     let on_mirror = |v: u32| surface.on_mirror[v as usize];
     let joined =
         |v: u32| surface.around[b as usize].iter().any(|&t| surface.triangles[t as usize].contains(&v));
-    // The other diagonal must be no edge.
+    // The other diagonal must not be an edge already.
     if partner != Partner::Image && (joined(d) || on_mirror(b) && on_mirror(d)) {
         return 0.0;
     }
@@ -128,13 +127,13 @@ pub(super) fn worth(surface: &Guarded<'_>, t: u32, partner: Partner) -> f64 {
         return 0.0;
     }
     let worth = 0.25 + 1.0 / (1.0 + badness) + 0.3 * fold;
-    // Half of it is the other half's.
+    // The other half of the surface gets the other half of the weight.
     if partner == Partner::Image { 0.5 * worth } else { worth }
 }
 
-/// Pairs triangles so that quads are many and good; what was paired `before` is where it begins. `strict`: only quads that may be cut
-/// along either diagonal.
-pub(super) fn pair(surface: &mut Guarded<'_>, before: &Pairing, strict: bool) -> Pairing {
+/// Pairs triangles to maximise the total weight, starting from `before`. `strict`: only quads that may be cut along either
+/// diagonal.
+pub(super) fn pair(surface: &mut GuardedSurface<'_>, before: &Pairing, strict: bool) -> Pairing {
     let n = surface.triangles.len();
     let mut near: Vec<Vec<(Partner, f64)>> = vec![Vec::new(); n];
     let mut options: Vec<(u32, Partner, f64)> = Vec::new();
@@ -181,7 +180,7 @@ pub(super) fn pair(surface: &mut Guarded<'_>, before: &Pairing, strict: bool) ->
     pairing
 }
 
-/// A pseudo-random number (Marsaglia 2003, "Xorshift RNGs").
+/// Xorshift pseudo-random number generator (Marsaglia 2003).
 fn next(state: &mut u64) -> u64 {
     *state ^= *state << 13;
     *state ^= *state >> 7;
@@ -195,7 +194,7 @@ impl Pairing {
         (self.partner[t as usize], self.weight[t as usize]) = (partner, weight);
     }
 
-    /// Puts a quad in; whose partners it takes away find others if they can. What is gained.
+    /// Adds a quad, and pairs triangles that lose their partner with others if possible. Returns the gain in weight.
     fn exchange(
         &mut self,
         t: u32,
@@ -245,9 +244,9 @@ impl Pairing {
         gain
     }
 
-    /// Two quads with the same other diagonal would share an edge that belongs to four triangles when both are cut along it, as around
-    /// a vertex with two edges: the second one's are triangles again.
-    fn part_doubles(&mut self, surface: &Guarded<'_>) {
+    /// Splits one of two quads with the same other diagonal: cut along it, both would share an edge of four triangles.
+    /// This occurs at a vertex with two edges.
+    fn part_doubles(&mut self, surface: &GuardedSurface<'_>) {
         let mut taken = Vec::new();
         for t in 0..self.partner.len() as u32 {
             let partner = self.partner[t as usize];
@@ -263,7 +262,6 @@ impl Pairing {
         }
     }
 
-    /// The two of a quad are triangles again.
     pub(super) fn part(&mut self, t: u32) {
         if let Partner::Triangle(u) = std::mem::take(&mut self.partner[t as usize]) {
             self.partner[u as usize] = Partner::None;

@@ -1,36 +1,35 @@
 //! Quadric error: the sum of squared distances to planes as a function of a point.
-//!
-//! Source: Garland, Heckbert 1997, "Surface simplification using quadric error metrics".
+//! Source: Garland and Heckbert 1997, "Surface simplification using quadric error metrics".
 
 use glam::{DMat3, DVec3};
 
-/// Weight of the distance to where a vertex came from, the planes' being 1: triangles of flat parts keep an even size.
+/// Weight of the squared distance to a vertex's original position relative to planes: keeps triangles of flat parts evenly sized.
 const POINT_WEIGHT: f64 = 0.004;
 
-/// `p . a p - 2 b . p + c`: squared distances weighted by area, voxel units.
+/// `p . a p - 2 b . p + c`: sum of squared distances weighted by area, voxel units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Quadric {
     a: DMat3,
     b: DVec3,
     c: f64,
-    /// Total weight: area.
+    /// Total weight (area).
     pub(super) area: f64,
 }
 
 impl Default for Quadric {
-    /// Of nothing: zero everywhere. (glam's default matrix is the identity, which pulls everything to the origin.)
+    /// Zero everywhere. (glam's default matrix is the identity.)
     fn default() -> Self {
         Self { a: DMat3::ZERO, b: DVec3::ZERO, c: 0.0, area: 0.0 }
     }
 }
 
 impl Quadric {
-    /// Squared distance to a triangle's plane alone.
+    /// Squared distance to a triangle's plane.
     pub(super) fn of_plane(corner: DVec3, normal: DVec3) -> Self {
         Self::weighted(corner, normal, 0.0)
     }
 
-    /// Squared distance to a triangle's plane, and a little to its corner, weighted by a third of its area.
+    /// Squared distance to a triangle's plane, plus a small multiple of that to its corner, weighted by a third of its area.
     pub(super) fn of_corner(corner: DVec3, normal: DVec3) -> Self {
         Self::weighted(corner, normal, POINT_WEIGHT)
     }
@@ -52,29 +51,27 @@ impl Quadric {
         }
     }
 
-    /// The same of distances in a unit that is `unit` times as long.
+    /// The same quadric for distances in a unit `unit` times as long.
     pub(super) fn in_units(&self, unit: f64) -> Self {
         let scale = 1.0 / (unit * unit);
         Self { a: self.a * scale, b: self.b * scale, c: self.c * scale, area: self.area }
     }
 
-    /// The sum of two.
     pub(super) fn plus(&self, other: &Self) -> Self {
         Self { a: self.a + other.a, b: self.b + other.b, c: self.c + other.c, area: self.area + other.area }
     }
 
-    /// Its value at a point.
     pub(super) fn at(&self, p: DVec3) -> f64 {
         (p.dot(self.a * p) - 2.0 * self.b.dot(p) + self.c).max(0.0)
     }
 
-    /// What a vertex there costs: area times the fourth power of the distance. The square alone lets a thin limb's few
-    /// planes be far off because its area is small, and webs grow between limbs.
+    /// Cost of a vertex at `p`: area times the fourth power of the RMS distance. The squared distance alone neglects
+    /// thin limbs, whose area is small, and webs grow between them.
     pub(super) fn cost(&self, p: DVec3) -> f64 {
         self.at(p).powi(2) / self.area.max(1e-12)
     }
 
-    /// Where it is smallest, among the points with `p[axis] = 0` if an axis is given.
+    /// Minimum, restricted to `p[axis] = 0` if an axis is given.
     pub(super) fn minimum(&self, on_mirror: Option<usize>) -> Option<DVec3> {
         let (mut a, mut b) = (self.a, self.b);
         if let Some(axis) = on_mirror {
@@ -102,7 +99,7 @@ mod tests {
         let (corner, normal) = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.0, 0.0, 5.0));
         let plane = Quadric::of_plane(corner, normal);
         assert!(plane.at(DVec3::new(-30.0, 8.0, 3.0)) < 1e-9);
-        // A sixth of the normal's length, times the squared distance.
+        // Squared distance times a sixth of the length of the normal.
         assert!((plane.at(DVec3::new(4.0, 4.0, 5.0)) - 4.0 * 5.0 / 6.0).abs() < 1e-9);
     }
 }

@@ -1,10 +1,10 @@
-//! Quads from the triangles of a collapsed surface: paired, made rectangular under the guard, split where the cage will split
-//! them.
+//! Turns a collapsed triangle surface into quads: pairs triangles, moves vertices to make quads rectangular, and splits
+//! quads along the diagonal that the cage will use.
 
 use glam::DVec3;
 
 use super::collapse::quality;
-use super::guarded::Guarded;
+use super::guarded::GuardedSurface;
 use super::pairing::{
     Pairing, Partner, Quad, badness, is_free, other_cut, pair, places, quad_of, warp, worth,
 };
@@ -12,32 +12,32 @@ use super::quadric::Quadric;
 use cagework_core::contact::Corners;
 use cagework_core::progress::Cancelled;
 
-/// Rounds of relaxing between two pairings, and after the last one.
+/// Rounds of vertex moves between two pairings, and after the last one.
 const ROUNDS: [usize; 3] = [2, 2, 3];
-/// Weight of the mean squared distance from the hull (voxels squared) against the badness of quads.
+/// Weight of the mean squared distance from the hull (voxels squared) against [`badness`].
 const DISTANCE_WEIGHT: f64 = 0.6;
-/// Weights of the inverse quality of triangles, and of the halves of quads.
+/// Weights of the inverse quality of triangles, and of the two halves of quads.
 const TRIANGLE_WEIGHT: f64 = 0.3;
 const HALF_WEIGHT: f64 = 0.01;
-/// Weight of each quad that may be cut along one diagonal only.
-const BOUND_WEIGHT: f64 = 6.0;
-/// Shares of a vertex's way that are tried.
+/// Penalty of a quad that can be cut along one diagonal only.
+const SINGLE_CUT_PENALTY: f64 = 6.0;
+/// Step lengths that are tried for a move, as shares of the full step.
 const STEP_SHARES: [f64; 3] = [1.0, 0.5, 0.2];
-/// Step outward that is tried, over the mean distance of a vertex's neighbours.
+/// Length of the outward step that is tried, over the mean distance of a vertex's neighbours.
 const OUTWARD_STEP: f64 = 0.3;
-/// A move must lower the energy by this much.
+/// Smallest decrease of the energy for which a move is accepted.
 const MIN_DECREASE: f64 = 1e-3;
-/// A quad that is bent by less is flat.
-const FLAT: f64 = 1e-2;
+/// Largest [`warp`] of a quad that counts as planar.
+const MAX_PLANAR_WARP: f64 = 1e-2;
 /// Smallest cosine between a triangle's normals before and after a move.
 const MIN_MOVE_COSINE: f64 = 0.3;
 
-/// Pairs the triangles of a surface, and moves its vertices so that quads are better.
+/// Pairs the triangles of a surface and moves its vertices to improve the quads.
 ///
 /// # Errors
-/// When `go_on` says so; it hears the share that is done.
+/// If `go_on`, called with the completed share, cancels.
 pub(super) fn quads(
-    surface: &mut Guarded<'_>,
+    surface: &mut GuardedSurface<'_>,
     quadrics: &[Quadric],
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
 ) -> Result<Pairing, Cancelled> {
@@ -56,22 +56,22 @@ pub(super) fn quads(
     Ok(pairing)
 }
 
-/// What stands around a vertex: quads, triangles that are left, all triangles.
+/// Faces around a vertex: quads, unpaired triangles, and all triangles.
 struct Star {
     quads: Vec<Quad>,
-    /// Two triangles of each quad that does not cross the mirror.
+    /// Both triangles of each quad that does not cross the mirror plane.
     pairs: Vec<[u32; 2]>,
     alone: Vec<u32>,
     all: Vec<u32>,
 }
 
 impl Star {
-    fn new(surface: &Guarded<'_>, pairing: &Pairing, v: u32) -> Self {
+    fn new(surface: &GuardedSurface<'_>, pairing: &Pairing, v: u32) -> Self {
         let all = surface.around[v as usize].clone();
         let (mut quads, mut pairs, mut alone) = (Vec::new(), Vec::new(), Vec::new());
         for &t in &all {
             let partner = pairing.partner[t as usize];
-            // A quad of two triangles that both touch the vertex counts once.
+            // Count a quad once if both of its triangles touch the vertex.
             let is_second = matches!(partner, Partner::Triangle(u) if u < t && all.contains(&u));
             match quad_of(surface, t, partner) {
                 Some(quad) if !is_second => {
@@ -87,7 +87,7 @@ impl Star {
         Self { quads, pairs, alone, all }
     }
 
-    fn energy(&self, surface: &Guarded<'_>, quadric: &Quadric, v: u32) -> f64 {
+    fn energy(&self, surface: &GuardedSurface<'_>, quadric: &Quadric, v: u32) -> f64 {
         let inverse = |t: &u32| 1.0 / quality(&surface.corners(*t).at).max(1e-6);
         DISTANCE_WEIGHT * quadric.at(surface.positions[v as usize]) / quadric.area.max(1e-12)
             + self.quads.iter().map(|quad| badness(&places(surface, quad))).sum::<f64>()
@@ -95,15 +95,15 @@ impl Star {
             + HALF_WEIGHT * self.all.iter().map(inverse).sum::<f64>()
     }
 
-    /// The same of quads that may not be cut along their other diagonal.
-    fn penalty(&self, surface: &mut Guarded<'_>) -> f64 {
+    /// Penalty of quads whose other diagonal is not allowed.
+    fn penalty(&self, surface: &mut GuardedSurface<'_>) -> f64 {
         let bound = self.pairs.iter().filter(|[t, u]| !is_free(surface, *t, Partner::Triangle(*u)));
-        BOUND_WEIGHT * bound.count() as f64
+        SINGLE_CUT_PENALTY * bound.count() as f64
     }
 
-    /// Places where the vertex would make better quads: parallelograms, their planes, the middle of its neighbours, the hull, and
-    /// farther out, where the model is not in the way of either diagonal.
-    fn goals(&self, surface: &Guarded<'_>, quadric: &Quadric, v: u32) -> Vec<DVec3> {
+    /// Candidate positions: those that make each quad a parallelogram or planar, the mean of the neighbours, the
+    /// minimum of the quadric, and a step outward, where the model does not block either diagonal.
+    fn goals(&self, surface: &GuardedSurface<'_>, quadric: &Quadric, v: u32) -> Vec<DVec3> {
         let here = surface.positions[v as usize];
         let mut goals = Vec::new();
         let mut corners = Vec::new();
@@ -134,8 +134,7 @@ impl Star {
     }
 }
 
-/// Moves a vertex where its quads are better.
-fn straighten(surface: &mut Guarded<'_>, pairing: &Pairing, quadrics: &[Quadric], v: u32) {
+fn straighten(surface: &mut GuardedSurface<'_>, pairing: &Pairing, quadrics: &[Quadric], v: u32) {
     if surface.around[v as usize].is_empty() {
         return;
     }
@@ -177,15 +176,16 @@ fn straighten(surface: &mut Guarded<'_>, pairing: &Pairing, quadrics: &[Quadric]
     }
 }
 
-/// A cage splits its quads along the shorter diagonal: what is guarded must be that split, or triangles.
-fn settle(surface: &mut Guarded<'_>, pairing: &mut Pairing) {
+/// Cuts every quad along its shorter diagonal, as [`Cage`](cagework_core::cage::Cage) does, or splits it where that is
+/// not allowed.
+fn settle(surface: &mut GuardedSurface<'_>, pairing: &mut Pairing) {
     for t in 0..surface.triangles.len() as u32 {
         let partner = pairing.partner[t as usize];
         let Partner::Triangle(u) = partner else { continue };
         let Some(quad) = quad_of(surface, t, partner).filter(|_| u > t) else { continue };
         let p = places(surface, &quad);
         if worth(surface, t, partner) <= 0.0 {
-            // Its corners have moved since.
+            // Vertex moves have made the quad invalid.
             pairing.part(t);
             continue;
         }
@@ -200,18 +200,18 @@ fn settle(surface: &mut Guarded<'_>, pairing: &mut Pairing) {
     }
 }
 
-/// A whole surface, both halves.
+/// Faces of the whole surface, including the mirror image.
 pub(super) struct Faces {
     pub(super) positions: Vec<DVec3>,
     pub(super) faces: Vec<Vec<u32>>,
-    /// The triangle of the half that each face comes from, or its first one.
+    /// A triangle of the half surface for each face.
     pub(super) first: Vec<u32>,
 }
 
-/// The faces of a surface whose triangles are paired.
-pub(super) fn faces(surface: &Guarded<'_>, pairing: &Pairing) -> Faces {
+/// Faces of the whole surface with quads for paired triangles.
+pub(super) fn faces(surface: &GuardedSurface<'_>, pairing: &Pairing) -> Faces {
     let mut positions = Vec::new();
-    // Of each vertex and its image.
+    // New indices of each vertex and its image.
     let mut number = vec![[u32::MAX; 2]; surface.positions.len()];
     for (v, &p) in surface.positions.iter().enumerate() {
         if surface.around[v].is_empty() {
@@ -239,12 +239,12 @@ pub(super) fn faces(surface: &Guarded<'_>, pairing: &Pairing) -> Faces {
         let partner = pairing.partner[t as usize];
         let quad = quad_of(surface, t, partner).filter(|quad| {
             let p = places(surface, quad);
-            // Nobody guards the other diagonal of a quad across the mirror; where it is flat, that is the same.
+            // The other diagonal of a quad across the mirror is not guarded; for a planar quad both cuts are the same.
             let is_guarded = partner != Partner::Image || p[0].distance(p[2]) <= p[1].distance(p[3]);
-            is_guarded || warp(&p) <= FLAT
+            is_guarded || warp(&p) <= MAX_PLANAR_WARP
         });
         let corners: Vec<(u32, bool)> = match (quad, partner) {
-            // The other half writes it.
+            // Emitted with the other triangle.
             (Some(_), Partner::Triangle(u)) if u < t => continue,
             (Some(quad), Partner::Image) => {
                 faces.push(of(&quad, false));

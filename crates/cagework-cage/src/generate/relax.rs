@@ -1,41 +1,41 @@
-//! Better triangles for the same cage: vertices slide towards the middle of their neighbours and back towards the
-//! hull that they stand for, edges are swapped, and nothing is done that the obstacle or the cage itself forbids.
+//! Improves triangles under the guard's constraints: moves vertices towards the mean of their neighbours and back to
+//! the hull, and swaps edges.
 
 use glam::DVec3;
 
 use super::collapse::quality;
-use super::guarded::Guarded;
+use super::guarded::GuardedSurface;
 use super::quadric::Quadric;
 use cagework_core::contact::Corners;
 use cagework_core::progress::Cancelled;
 
-/// Rounds over all vertices and edges; after six, pictures no longer change.
+/// Rounds over all vertices and edges; more than six do not visibly change the result.
 const ROUNDS: usize = 6;
 
 /// Weight of the mean squared distance from the hull (voxels squared) against the inverse quality of triangles.
 const DISTANCE_WEIGHT: f64 = 1.5;
 
-/// Shares of a vertex's way that are tried.
+/// Step lengths that are tried for a move, as shares of the full step.
 const STEP_SHARES: [f64; 3] = [0.8, 0.4, 0.15];
 
-/// A change must lower the energy (dimensionless) by this much.
+/// Smallest decrease of the energy (dimensionless) for which a change is accepted.
 const MIN_DECREASE: f64 = 1e-3;
 
 /// Smallest cosine between a triangle's normals before and after a move.
 const MIN_MOVE_COSINE: f64 = 0.5;
 
-/// Smallest cosine between the two triangles of a swapped edge and each of those before.
+/// Smallest cosine between the normals of each triangle after and before an edge swap.
 const MIN_SWAP_COSINE: f64 = 0.6;
 
 /// Most triangles around a vertex after a swap.
 const MAX_VALENCE: usize = 9;
 
-/// Improves the surface under its own constraints.
+/// Improves the shape of triangles under the guard's constraints.
 ///
 /// # Errors
-/// When `go_on` says so; it hears the share that is done.
+/// If `go_on`, called with the completed share, cancels.
 pub(super) fn relax(
-    surface: &mut Guarded<'_>,
+    surface: &mut GuardedSurface<'_>,
     quadrics: &[Quadric],
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
 ) -> Result<(), Cancelled> {
@@ -65,8 +65,7 @@ fn shape<'t>(triangles: impl Iterator<Item = &'t Corners>) -> f64 {
     triangles.map(|t| 1.0 / quality(&t.at).max(1e-6)).sum()
 }
 
-/// Moves a vertex where its triangles are better.
-fn slide(surface: &mut Guarded<'_>, quadrics: &[Quadric], v: u32) {
+fn slide(surface: &mut GuardedSurface<'_>, quadrics: &[Quadric], v: u32) {
     let gone = surface.around[v as usize].clone();
     let star: Vec<Corners> = gone.iter().map(|&t| surface.corners(t)).collect();
     let p = surface.positions[v as usize];
@@ -101,8 +100,8 @@ fn slide(surface: &mut Guarded<'_>, quadrics: &[Quadric], v: u32) {
     }
 }
 
-/// Swaps the edge from corner `k` of a triangle if that makes better triangles.
-fn swap(surface: &mut Guarded<'_>, quadrics: &[Quadric], t: u32, k: usize) {
+/// Swaps the edge from corner `k` of a triangle if that improves both triangles.
+fn swap(surface: &mut GuardedSurface<'_>, quadrics: &[Quadric], t: u32, k: usize) {
     let first = surface.triangles[t as usize];
     let (a, b, c) = (first[k], first[(k + 1) % 3], first[(k + 2) % 3]);
     if a > b {

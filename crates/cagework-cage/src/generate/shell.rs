@@ -1,62 +1,63 @@
-//! From a triangle soup to the solid it stands for and a hull around it: the part that works for any input.
+//! Converts a triangle soup to a solid and a hull around it, for any input.
 //!
-//! Source: Xian, Lin, Gao 2009, "Automatic generation of coarse bounding cages from dense meshes", for voxels,
-//! flood fill and hull. Changes: the hull is dilated for clearance, its boundary is made a 2-manifold by filling
-//! voxels, and separate parts are bridged if one cage is asked for.
+//! Source: Xian, Lin and Gao 2009, "Automatic generation of coarse bounding cages from dense meshes", for voxels, flood
+//! fill and hull. Changes: the hull is dilated for clearance, its boundary is made a 2-manifold by adding voxels, and
+//! separate parts are bridged if one cage is requested.
 
 use std::collections::VecDeque;
 
 use glam::{DVec3, Vec3};
 
 use super::gaps::{Gap, gaps};
-use super::guarded::{Guarded, Obstacle};
+use super::guarded::{GuardedSurface, Obstacle};
 use super::lattice::{Lattice, MARGIN_VOXELS};
 use super::surface::{SMOOTHING_REACH, Surface};
 use super::voxels::Voxels;
 use super::{CageOptions, Shape, Symmetry, VERTICES_PER_GAP, first_voxels};
 use cagework_core::progress::Cancelled;
 
-/// Smallest share of the solid's voxels with an image for which a mirror is taken.
+/// Smallest share of the solid's voxels with a mirror image for which the model counts as symmetric.
 const MIN_MIRROR_SHARE: f64 = 0.985;
 
-/// Distance of an image from its voxel, over the model's longest side; at least a voxel.
+/// Largest distance of a voxel from its mirror image, over the model's longest side; at least one voxel.
 const MIRROR_TOLERANCE: f64 = 1.0 / 36.0;
 
-/// Largest extent of a cluster of voxels without an image, over the model's longest side: a larger one is a part that only
-/// one side has.
+/// Largest extent of a cluster of voxels without mirror image, over the model's longest side. A larger cluster is an
+/// asymmetric part.
 const MAX_UNMATCHED: f64 = 0.08;
 
-/// Half the width of the widest gaps that are looked for, over the model's longest side.
+/// Half the width of the widest gaps that are detected, over the model's longest side.
 const MAX_GAP_HALF: f64 = 0.12;
 
-/// Clearance in voxels unless the caller asks for more.
+/// Minimum clearance in voxels.
 const DEFAULT_CLEARANCE: f64 = 0.5;
 
-/// Clearance in voxels of a hull one voxel off: what smoothing leaves, less rounding.
+/// Clearance of a hull dilated by one voxel, in voxels: what smoothing leaves, minus rounding.
 const HULL_CLEARANCE: f64 = 1.0 - SMOOTHING_REACH - 1e-3;
 
-/// Least length of a limb over its thickness.
+/// Minimum length of a limb over its thickness.
 const MIN_LIMB_RATIO: f64 = 2.2;
 
-/// Largest cosine between a limb's direction and those across it.
+/// Largest cosine between a limb's axis and directions across it.
 const MAX_ACROSS_COSINE: f64 = 0.3;
 
-/// Largest distance from ring to ring along a limb over its thickness, within the budget.
+/// Largest distance between rings along a limb over its thickness, within the budget.
 const MAX_RING_DISTANCE: f64 = 1.3;
 
-/// Least length of a plate over its thickness.
+/// Minimum length of a plate over its thickness.
 const MIN_PLATE_RATIO: f64 = 5.0;
 
-/// Least width of a plate over its length.
+/// Minimum width of a plate over its length.
 const MIN_PLATE_WIDTH: f64 = 0.5;
 
 /// Largest distance between vertices on a plate over its length, within the budget.
 const MAX_PLATE_SPACING: f64 = 0.5;
 
-/// Least share of a hull's vertices on plates.
+/// Spacing of plates applies if at least this share of the hull's vertices lies on plates.
 const MIN_PLATE_SHARE: f64 = 0.25;
 
-/// Directions in which the length and thickness of limbs are measured: to neighbours on the lattice, one of each pair.
+/// Directions in which length and thickness of limbs are measured: to the 26 neighbours on the lattice, one of each
+/// opposite pair.
 const DIRECTIONS: [DVec3; 13] = [
     DVec3::new(1.0, 0.0, 0.0),
     DVec3::new(0.0, 1.0, 0.0),
@@ -73,10 +74,10 @@ const DIRECTIONS: [DVec3; 13] = [
     DVec3::new(-1.0, 1.0, 1.0),
 ];
 
-/// How far apart the vertices of a cage may be, within the budget, so that it can bend a place of the hull.
+/// Limit on the distance between neighbouring cage vertices on a limb or plate, so that the cage can bend it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spacing {
-    /// The direction in which they may not be farther apart, of unit length: along a limb. None: in any, on a plate.
+    /// Unit vector along a limb, to which the limit applies; `None` on a plate, where it applies in all directions.
     pub(super) along: Option<DVec3>,
     /// Largest distance, voxels.
     pub(super) distance: f64,
@@ -86,30 +87,29 @@ pub(super) struct Spacing {
 #[derive(Debug)]
 pub(super) struct Shell {
     pub(super) lattice: Lattice,
-    /// Voxels along the model's longest side, over those that the target asks for.
+    /// Voxels along the model's longest side over those derived from the target.
     pub(super) fineness: f64,
     /// Longest side of the model's box, object units.
     pub(super) longest: f64,
-    /// What the cage must not meet.
+    /// Voxels that the cage must keep clear of.
     pub(super) obstacle: Obstacle,
-    /// The hull as voxels.
     filled: Voxels,
     /// The smoothed hull: clear of the obstacle and of itself.
     pub(super) hull: Surface,
-    /// The hull with its stairs: right by construction.
+    /// The unsmoothed hull: a 2-manifold by construction.
     pub(super) stairs: Surface,
-    /// Separate parts of the hull before they were bridged.
+    /// Components of the hull before bridging.
     pub(super) separate: usize,
-    /// One voxel of every part of the solid.
+    /// A voxel of each component of the solid.
     pub(super) parts: Vec<[usize; 3]>,
     /// Distance that the hull keeps from the model along each axis, object units.
     pub(super) clearance: f64,
-    /// Gaps that the hull leaves open, the largest first: as many as there are vertices for.
+    /// Gaps that the hull leaves open, largest first; as many as there are vertices for.
     pub(super) gaps: Vec<Gap>,
 }
 
 impl Shell {
-    /// The hull of a model on a lattice of `n` voxels, thinner ones along the axes of `stretch`. `go_on` may end it.
+    /// Hull of a model on a lattice of `n` voxels with the given stretch. `go_on` may cancel.
     pub(super) fn new(
         positions: &[Vec3],
         triangles: &[[u32; 3]],
@@ -120,7 +120,7 @@ impl Shell {
     ) -> Result<Self, Cancelled> {
         let [min, max] = bounds;
         let asked = f64::from(options.clearance) * max.distance(min);
-        // Layers of voxels between solid and hull: enough for the clearance that was asked for.
+        // Layers of voxels between solid and hull that give the requested clearance.
         let layers_for =
             |cell: f64| ((asked / cell).max(DEFAULT_CLEARANCE) + 1.0 - HULL_CLEARANCE).ceil() as usize;
         let rough = Lattice::around(bounds, n, stretch, MARGIN_VOXELS);
@@ -155,7 +155,7 @@ impl Shell {
         let stairs = Surface::of(&hull, mirror);
         let filled = hull;
         let clearance = (asked / lattice.shortest()).max(DEFAULT_CLEARANCE);
-        // Whole voxels of it by dilation, the rest as distance.
+        // Dilation by whole voxels; the remainder is kept as a distance.
         let whole = clearance.floor();
         let mut keep_out = solid.clone();
         for _ in 0..whole as usize {
@@ -190,14 +190,14 @@ impl Shell {
         (0..layers).fold(self.filled.clone(), |band, _| band.dilated())
     }
 
-    /// The spacing of rings along limbs and of vertices on plates, at each vertex of the hull that is on one.
+    /// Spacing limit at each vertex of the hull, if it lies on a limb or plate.
     pub(super) fn spacings(&self) -> Vec<Option<Spacing>> {
         let mut normals = vec![DVec3::ZERO; self.hull.positions.len()];
         for t in &self.hull.triangles {
             let [a, b, c] = t.map(|i| self.hull.positions[i as usize]);
             t.iter().for_each(|&i| normals[i as usize] += (b - a).cross(c - a));
         }
-        // Length of the run of hull voxels from a point (lattice coordinates) on.
+        // Number of hull voxels in a row from a point (lattice coordinates).
         let run = |from: DVec3, along: DVec3| {
             let is_inside = |k: usize| {
                 let p = from + k as f64 * along;
@@ -229,14 +229,14 @@ impl Shell {
         let mut spacings: Vec<_> = self.hull.positions.iter().zip(&normals).map(spacing).collect();
         let is_on_plate = |spacing: &Option<Spacing>| spacing.is_some_and(|spacing| spacing.along.is_none());
         let on_plates = spacings.iter().filter(|&spacing| is_on_plate(spacing)).count();
-        // Less is where wires cross.
+        // Few such vertices: crossing wires, not plates.
         if (on_plates as f64) < MIN_PLATE_SHARE * spacings.len() as f64 {
             spacings.iter_mut().filter(|spacing| is_on_plate(spacing)).for_each(|spacing| *spacing = None);
         }
         spacings
     }
 
-    /// The sheets of gaps of at least this share of the largest one's area.
+    /// Sheets of gaps whose area is at least this share of the largest one's.
     pub(super) fn sheets(&self, least: f64) -> Option<Voxels> {
         let largest = self.gaps.first()?.area;
         let mut sheets = Voxels::new(self.filled.dims);
@@ -246,7 +246,7 @@ impl Shell {
     }
 }
 
-/// The solid with layers of voxels around it, cavities filled, its boundary a 2-manifold.
+/// The solid dilated by `layers`, with filled cavities and a 2-manifold boundary.
 fn grown(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
     let mut hull = solid.clone();
     for _ in 0..layers {
@@ -255,7 +255,7 @@ fn grown(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
     hull = hull.filled();
     loop {
         hull.compose(mirror);
-        // The repair may have closed a cavity off.
+        // Adding voxels may have closed off a cavity.
         let filled = hull.filled();
         if filled == hull {
             return hull;
@@ -264,12 +264,12 @@ fn grown(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
     }
 }
 
-/// The stairs smoothed; vertices whose triangles then meet others go back until none do.
+/// Smoothed hull; vertices of triangles that intersect others return to their stairs until none do.
 fn smoothed(stairs: &Surface, obstacle: &Obstacle) -> Surface {
     let mut smooth = stairs.clone();
     smooth.smooth();
     loop {
-        let offenders = Guarded::new(smooth.clone(), obstacle).offenders();
+        let offenders = GuardedSurface::new(smooth.clone(), obstacle).offenders();
         let mut moved = false;
         for v in offenders {
             let (now, before) = (&mut smooth.positions[v as usize], stairs.positions[v as usize]);
@@ -282,8 +282,8 @@ fn smoothed(stairs: &Surface, obstacle: &Obstacle) -> Surface {
     }
 }
 
-/// The axis of the mirror to use: the one asked for, or the first (x, z, y) in which the solid is its own image, apart from
-/// scattered voxels. `longest`: voxels along the model's longest side.
+/// Axis of the mirror: the requested one, or the first of x, z, y in which the solid is symmetric up to scattered voxels.
+/// `longest`: voxels along the model's longest side.
 fn find_mirror(solid: &Voxels, longest: usize, symmetry: Symmetry) -> Option<usize> {
     match symmetry {
         Symmetry::None => None,
@@ -311,19 +311,19 @@ fn find_mirror(solid: &Voxels, longest: usize, symmetry: Symmetry) -> Option<usi
     }
 }
 
-/// Joins the parts of the hull by paths of voxels in the solid, each grown from what is joined already to the nearest
-/// part that is not; false if there is only one part. `layers` of voxels will come around the paths.
+/// Joins the components of the hull by paths of voxels in the solid, shortest first (breadth-first search from the
+/// joined set). The paths will be dilated by `layers`. Returns false if there is only one component.
 fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirror: Option<usize>) -> bool {
     let parts = hull.parts();
     if parts.len() < 2 {
         return false;
     }
-    let mut joined = Joined { hull, from: vec![[usize::MAX; 3]; hull.dims.iter().product()] };
+    let mut joined = JoinedVoxels { hull, from: vec![[usize::MAX; 3]; hull.dims.iter().product()] };
     let mut queue = VecDeque::new();
     joined.add_part(parts[0], &mut queue);
     while let Some(voxel) = queue.pop_front() {
         for next in hull.neighbours(voxel) {
-            // The outermost layer stays empty.
+            // Keep the outermost layer empty.
             let edge = (0..3).any(|k| next[k] <= layers || next[k] + layers + 1 >= hull.dims[k]);
             if edge || joined.has(next) {
                 continue;
@@ -357,14 +357,14 @@ fn bridge(solid: &mut Voxels, hull: &Voxels, layers: usize, mirror: Option<usize
     true
 }
 
-/// Voxels that are joined or have been reached from there.
-struct Joined<'a> {
+/// Voxels that are joined, or reached by the search.
+struct JoinedVoxels<'a> {
     hull: &'a Voxels,
-    /// Where each voxel was reached from; what is joined was reached from itself.
+    /// Predecessor of each reached voxel; a joined voxel is its own.
     from: Vec<[usize; 3]>,
 }
 
-impl Joined<'_> {
+impl JoinedVoxels<'_> {
     fn index(&self, v: [usize; 3]) -> usize {
         (v[2] * self.hull.dims[1] + v[1]) * self.hull.dims[0] + v[0]
     }
@@ -373,7 +373,7 @@ impl Joined<'_> {
         self.from[self.index(voxel)][0] != usize::MAX
     }
 
-    /// Takes in a part of the hull.
+    /// Adds a component of the hull to the joined set.
     fn add_part(&mut self, seed: [usize; 3], queue: &mut VecDeque<[usize; 3]>) {
         let mut stack = vec![seed];
         let index = self.index(seed);
@@ -391,16 +391,14 @@ impl Joined<'_> {
     }
 }
 
-/// Voxels that overlap the model's hull of 26 planes (faces, edges and corners of a cube).
-///
-/// Source: Klosowski et al. 1998, k-DOPs.
+/// Voxels inside the model's 26-DOP, bounded by planes across the faces, edges and corners of a cube (Klosowski et al. 1998).
 fn slab_hull(lattice: &Lattice, positions: &[Vec3]) -> Voxels {
     let mut axes = Vec::new();
     for x in -1..=1 {
         for y in -1..=1 {
             for z in 0..=1 {
                 let axis = [x, y, z];
-                // One of each pair of opposite directions.
+                // One of each opposite pair.
                 if axis.iter().rev().find(|&&k| k != 0) == Some(&1) {
                     axes.push(DVec3::from_array(axis.map(f64::from)));
                 }

@@ -1,4 +1,5 @@
-//! Cages whose smooth surface encloses the model. Subdivision shrinks a cage, so it is made with more room, and grown.
+//! Cages whose subdivided surface encloses the model. Subdivision shrinks a cage, so it is generated with more
+//! clearance, then grown.
 
 use glam::{DVec3, Vec3};
 
@@ -10,11 +11,10 @@ use cagework_core::controls::{ControlSet, Controls, InnerControls};
 use cagework_core::enclosure::Enclosure;
 use cagework_core::progress::Progress;
 
-/// Room to keep, as fractions of the diagonal of the model's box, one tried after the other. With 0.05 all models of the
-/// measurements were inside.
-const ROOM: [f32; 8] = [0.0, 0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.12];
+/// Clearances that are tried in this order, as fractions of the diagonal of the model's box. 0.05 sufficed for all test models.
+const CLEARANCES: [f32; 8] = [0.0, 0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.12];
 
-/// As [`super::generate`], with `options.smooth` steps.
+/// [`super::generate`] with `options.smooth` subdivision steps.
 pub(super) fn generate(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
@@ -22,7 +22,7 @@ pub(super) fn generate(
     progress: &dyn Progress,
 ) -> Result<GeneratedCage, CageGenError> {
     options::check(positions, triangles, options)?;
-    // What must be inside: vertices, and between them the middles of triangles and of their sides.
+    // Points to enclose: vertices, edge midpoints and triangle centroids.
     let middles = triangles.iter().flat_map(|t| {
         let [a, b, c] = t.map(|i| positions[i as usize]);
         [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
@@ -30,13 +30,13 @@ pub(super) fn generate(
     let points: Vec<Vec3> = positions.iter().copied().chain(middles).collect();
     let began = progress.now_ms();
     for (attempt, room) in
-        (1u32..).zip(ROOM.into_iter().filter(|&room| room == 0.0 || room > options.clearance))
+        (1u32..).zip(CLEARANCES.into_iter().filter(|&room| room == 0.0 || room > options.clearance))
     {
         let clearance = room.max(options.clearance);
         let mut made =
             super::generate_plain(positions, triangles, &CageOptions { clearance, ..*options }, progress)?;
         let mut mesh = made.cage.to_polygon_mesh();
-        // Growing would take a mirrored cage's symmetry.
+        // Growing would break the symmetry of a mirrored cage.
         if made.report.mirror.is_none() && grow(&mut mesh, &points, options.smooth).is_err() {
             continue;
         }
@@ -54,7 +54,7 @@ pub(super) fn generate(
     Err(CageGenError::Unsmooth)
 }
 
-/// Whether a cage does not go through itself.
+/// Whether a cage is free of self-intersections.
 fn keeps_apart(cage: &Cage) -> bool {
     let at = |index: [u32; 3]| index.map(|i| -> DVec3 { cage.positions()[i as usize].as_dvec3() });
     let triangles: Vec<Corners> =

@@ -1,30 +1,29 @@
-//! The boundary of a set of voxels as triangles, and its stairs smoothed away.
+//! Boundary surface of a voxel set, and its smoothing.
 
 use glam::DVec3;
 
 use super::voxels::Voxels;
 
-/// How far smoothing may move a vertex along each axis, in voxels. Below half a voxel, so that the hull, a whole voxel
-/// from the solid, keeps more than half of that.
+/// Limit on the movement of a smoothed vertex along each axis, in voxels. Below half a voxel: the hull is one voxel
+/// away from the solid and keeps more than half of that.
 pub(super) const SMOOTHING_REACH: f64 = 0.45;
 
-/// Rounds of smoothing: after eight, the stairs of a slanted plane are gone.
+/// Smoothing rounds; eight flatten the stairs of a slanted plane.
 const SMOOTHING_ROUNDS: usize = 8;
 
-/// A closed, outward surface in centred voxel units; or, with a mirror, the half of it on the positive side, whose
-/// border lies on the mirror plane.
+/// A closed, outward surface in centred voxel units; or, with a mirror, its half on the positive side, bounded by the
+/// mirror plane.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Surface {
     pub(super) positions: Vec<DVec3>,
     pub(super) triangles: Vec<[u32; 3]>,
     /// Whether each vertex lies on the mirror plane.
     pub(super) on_mirror: Vec<bool>,
-    /// The axis that is mirrored.
     pub(super) mirror: Option<usize>,
 }
 
 impl Surface {
-    /// The boundary of a well-composed set.
+    /// Boundary of a well-composed voxel set.
     pub(super) fn of(voxels: &Voxels, mirror: Option<usize>) -> Self {
         let dims = voxels.dims;
         let corners = dims.map(|n| n + 1);
@@ -38,7 +37,7 @@ impl Surface {
             for side in 0..6 {
                 let (axis, up) = (side / 2, side % 2 == 1);
                 let mut next = voxel;
-                // The outermost layer is empty: there always is a next voxel.
+                // The outermost layer is empty, so a next voxel always exists.
                 next[axis] = if up { voxel[axis] + 1 } else { voxel[axis] - 1 };
                 if voxels.has(next) {
                     continue;
@@ -55,7 +54,7 @@ impl Surface {
                     corner[v] += dv;
                     corner
                 });
-                // The diagonal between even corners: the same in the mirror, because dimensions are even.
+                // Cut along the diagonal between even corners: mirror-symmetric because dimensions are even.
                 let even = quad[0].iter().sum::<usize>() % 2 == 0;
                 let [a, b, c, d] = quad.map(|corner| {
                     let slot = &mut number[(corner[2] * corners[1] + corner[1]) * corners[0] + corner[0]];
@@ -73,7 +72,7 @@ impl Surface {
         surface
     }
 
-    /// Moves every vertex towards the mean of its neighbours, but by less than half a voxel.
+    /// Laplacian smoothing, limited to [`SMOOTHING_REACH`] per vertex.
     pub(super) fn smooth(&mut self) {
         let stairs = self.positions.clone();
         let mut sum = vec![DVec3::ZERO; stairs.len()];
@@ -101,13 +100,13 @@ impl Surface {
         }
     }
 
-    /// Vertices of the whole surface.
+    /// Number of vertices of the whole surface, including the mirror image.
     pub(super) fn n_whole(&self) -> usize {
         let on_mirror = self.on_mirror.iter().filter(|&&on| on).count();
         if self.mirror.is_some() { 2 * self.positions.len() - on_mirror } else { self.positions.len() }
     }
 
-    /// The whole surface: both halves, joined on the mirror plane.
+    /// The whole surface: both halves joined at the mirror plane.
     pub(super) fn whole(&self) -> Self {
         let Some(axis) = self.mirror else { return self.clone() };
         let mut whole = Self { mirror: None, ..self.clone() };

@@ -14,19 +14,19 @@ use cagework_core::options::{BindOptions, OutOfRange};
 use cagework_core::progress::{ProgressEvent, Silent};
 use cagework_core::smooth::subdivide;
 
-/// Positions of the order of 1, rounded to f32 and mirrored.
+/// f32 rounding of positions of size 1 after mirroring.
 const ROUNDING: f32 = 1e-6;
 
 type Soup = (Vec<Vec3>, Vec<[u32; 3]>);
 
-/// Winding numbers of closed surfaces are whole, apart from rounding of angles.
+/// Rounding of winding numbers, which are integers for closed surfaces.
 const WINDING_TOLERANCE: f64 = 1e-6;
 
 fn winding(cage: &Cage, p: Vec3) -> f64 {
     winding_number(p.as_dvec3(), (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t)))
 }
 
-/// A cage as other programs may cut it: quads from corner `k`.
+/// Cuts quads from corner `k`, as other programs may.
 fn cut(mesh: &PolygonMesh, k: usize) -> PolygonMesh {
     let cut = |f: &Vec<u32>| {
         let f = f.clone();
@@ -35,17 +35,17 @@ fn cut(mesh: &PolygonMesh, k: usize) -> PolygonMesh {
     PolygonMesh { positions: mesh.positions.clone(), faces: mesh.faces.iter().flat_map(cut).collect() }
 }
 
-/// The promise, checked by means of its own: no voxels. It holds along whichever diagonal quads are cut.
+/// Asserts without voxels that a cage encloses the model, whichever diagonal quads are cut along.
 fn assert_promise((positions, _): &Soup, made: &GeneratedCage) {
     let cage = &made.cage;
     let mesh = cage.to_polygon_mesh();
     for (way, mesh) in [cut(&mesh, 0), cut(&mesh, 1), mesh].iter().enumerate() {
         let again = Cage::new(mesh).unwrap_or_else(|error| panic!("cut {way}: {error}"));
-        assert_eq!(again.notices(), [], "closed, oriented, manifold, no vertex unused");
+        assert_eq!(again.notices(), [], "closed, oriented, manifold, without unused vertices");
         let triangles: Vec<Corners> = (0..again.triangles().len())
             .map(|t| Corners { index: again.triangles()[t], at: again.triangle_corners(t as u32) })
             .collect();
-        assert_eq!(meeting(&triangles), Vec::<[u32; 2]>::new(), "cut {way}: it meets itself");
+        assert_eq!(meeting(&triangles), Vec::<[u32; 2]>::new(), "cut {way}: it intersects itself");
         let step = (positions.len() / 200).max(1);
         for &p in positions.iter().step_by(step) {
             let w = winding(&again, p);
@@ -69,7 +69,7 @@ fn options(target: u32) -> CageOptions {
     CageOptions { target, ..CageOptions::default() }
 }
 
-/// A tube of quads cut in two, along a line of points with one radius; `closed` joins its ends. No caps: open ends.
+/// An open tube of triangulated quads along a polyline; `closed` joins its ends.
 fn tube(line: &[Vec3], radius: f32, closed: bool) -> Soup {
     const SIDES: u32 = 12;
     let n = line.len();
@@ -112,7 +112,7 @@ fn segment(a: Vec3, b: Vec3) -> Vec<Vec3> {
     (0..=8).map(|k| a.lerp(b, k as f32 / 8.0)).collect()
 }
 
-/// Two legs below a bar, overlapping open tubes: symmetric about x = 0.
+/// Two legs below a bar, as overlapping open tubes; symmetric about x = 0.
 fn trousers() -> Soup {
     join([
         tube(&segment(vec3(-0.3, 1.0, 0.0), vec3(0.3, 1.0, 0.0)), 0.2, false),
@@ -139,7 +139,7 @@ fn cage_goes_into_the_gap_between_legs() {
     }
 }
 
-/// Trunk, two legs with feet, two arms: 1.8 high. `gap` between the legs, their `radius`.
+/// Trunk, two legs with feet and two arms, 1.8 high. `gap`: distance between the legs; `radius`: of a leg.
 fn mannequin(gap: f32, radius: f32) -> Soup {
     let x = 0.5 * gap + radius;
     let limb = |a: Vec3, b: Vec3, radius: f32| tube(&segment(a, b), radius, false);
@@ -152,10 +152,9 @@ fn mannequin(gap: f32, radius: f32) -> Soup {
     join(parts)
 }
 
-/// Weights of the cage's vertices at one leg's lower half sum to how much of a drag of them a foot follows: nearly all at
-/// their own, nearly nothing at the other.
+/// The weights of a leg's lower cage vertices sum to nearly 1 at its own foot and to nearly 0 at the other foot.
 #[test]
-fn lower_vertices_of_a_leg_move_its_own_foot_alone() {
+fn lower_cage_vertices_of_a_leg_move_only_its_foot() {
     for (gap, radius, target) in
         [(0.17, 0.06, 80), (0.1, 0.06, 80), (0.08, 0.05, 120), (0.03, 0.07, 80), (0.025, 0.07, 80)]
     {
@@ -184,7 +183,7 @@ fn lower_vertices_of_a_leg_move_its_own_foot_alone() {
 }
 
 #[test]
-fn a_gap_that_no_lattice_resolves_is_named() {
+fn a_gap_that_no_lattice_resolves_is_reported() {
     let (positions, triangles) = mannequin(0.004, 0.08);
     let report = generate(&positions, &triangles, &options(80), &Silent).unwrap().report;
     let named = report.notices.iter().any(|notice| notice.contains("closes the gap"));
@@ -193,9 +192,9 @@ fn a_gap_that_no_lattice_resolves_is_named() {
     assert_eq!(generate(&open.0, &open.1, &options(120), &Silent).unwrap().report.notices, [""; 0]);
 }
 
-/// A sword in one hand has less than 1.5 % of the model's voxels.
+/// A sword in one hand is less than 1.5 % of the model's voxels.
 #[test]
-fn an_accessory_on_one_side_gets_no_twin() {
+fn an_accessory_on_one_side_prevents_mirroring() {
     let sword = tube(&segment(vec3(0.8, 1.4, 0.0), vec3(0.8, 1.4, 0.8)), 0.02, false);
     let soup = join([mannequin(0.17, 0.06), sword]);
     let made = make(&soup, &options(80));
@@ -204,9 +203,9 @@ fn an_accessory_on_one_side_gets_no_twin() {
     assert_eq!(make(&mannequin(0.17, 0.06), &options(80)).report.mirror, Some(Mirror::X));
 }
 
-/// Of a straight bar, twelve vertices keep the distance; a bend needs rings, every 1.3 of its hull's thickness at most.
+/// Twelve vertices would bound a straight bar; bending needs rings at most 1.3 hull thicknesses apart.
 #[test]
-fn limbs_have_rings_and_compact_models_few_vertices() {
+fn limbs_get_rings_and_compact_models_few_vertices() {
     let bar = tube(&segment(vec3(0.0, 0.0, 0.0), vec3(0.0, 6.0, 0.0)), 0.4, false);
     let made = make(&bar, &options(80));
     let mut heights: Vec<f32> = made.cage.positions().iter().map(|p| p.y).collect();
@@ -219,7 +218,7 @@ fn limbs_have_rings_and_compact_models_few_vertices() {
     assert!(make(&(cube.positions, triangles), &options(80)).report.vertices < 24);
 }
 
-/// A plate has vertices in its middle, on both sides, without which a cage could not bend it.
+/// A cage can bend a plate only with vertices in the middle of both sides.
 #[test]
 fn plates_have_vertices_in_the_middle() {
     let bounds = Bounds { min: vec3(-1.0, -0.04, -0.8), max: vec3(1.0, 0.04, 0.8) };
@@ -236,12 +235,12 @@ fn plates_have_vertices_in_the_middle() {
 fn cage_of_a_ring_keeps_its_hole() {
     let made = make(&ring(), &options(80));
     assert!(winding(&made.cage, Vec3::ZERO).abs() < WINDING_TOLERANCE);
-    // Euler characteristic of a torus: V - E + F = 0 with 2 E = 3 F.
+    // Euler characteristic of a torus: V - E + F = 0, and 2 E = 3 F.
     assert_eq!(2 * made.cage.n_vertices(), made.cage.triangles().len());
 }
 
 #[test]
-fn no_fold_is_sharper_than_120_degrees_whichever_way_quads_are_cut() {
+fn folds_stay_below_120_degrees_for_either_cut_of_quads() {
     for (soup, target) in [(trousers(), 80), (trousers(), 120), (ring(), 80), (ring(), 200)] {
         let mesh = make(&soup, &options(target)).cage.to_polygon_mesh();
         for k in 0..2 {
@@ -271,7 +270,7 @@ fn symmetric_model_gets_a_symmetric_cage() {
 }
 
 #[test]
-fn lopsided_model_gets_no_mirror_unless_asked_for() {
+fn an_asymmetric_model_is_mirrored_only_on_request() {
     let soup = tube(&segment(vec3(-1.0, 0.0, 0.3), vec3(1.0, 0.7, -0.4)), 0.1, false);
     assert_eq!(make(&soup, &options(40)).report.mirror, None);
     let asked = CageOptions { symmetry: Symmetry::Y, ..options(40) };
@@ -279,7 +278,7 @@ fn lopsided_model_gets_no_mirror_unless_asked_for() {
 }
 
 #[test]
-fn scattered_parts_get_one_cage_or_one_each() {
+fn separate_parts_get_one_cage_or_one_each() {
     let places = [vec3(0.0, 0.0, 0.0), vec3(3.0, 0.5, 0.0), vec3(1.0, 2.5, 1.0)];
     let soup = join(places.map(|p| tube(&segment(p, p + vec3(0.3, 0.0, 0.4)), 0.3, false)));
     let CageReport { parts, separate, .. } = make(&soup, &options(80)).report;
@@ -295,7 +294,7 @@ fn hull_is_coarse_and_convex_in_the_large() {
     assert!(made.report.target_met);
     assert!(
         (winding(&made.cage, vec3(0.0, -0.6, 0.0)) - 1.0).abs() < WINDING_TOLERANCE,
-        "no gap between the legs"
+        "the hull spans the gap between the legs"
     );
 }
 
@@ -305,7 +304,7 @@ fn clearance_is_kept() {
     for clearance in [0.0, 0.02, 0.1] {
         let made = make(&soup, &CageOptions { clearance, ..options(60) });
         assert!(made.report.clearance >= clearance * 2.0, "the diagonal is longer than 2");
-        // Every cage triangle keeps it along some axis, so cage vertices are at least that far from mesh vertices.
+        // Every cage triangle keeps the clearance along some axis, which bounds vertex distances.
         for c in made.cage.positions() {
             let nearest = soup.0.iter().map(|p| p.distance(*c)).fold(f32::MAX, f32::min);
             assert!(nearest >= 0.97 * made.report.clearance, "{nearest} < {}", made.report.clearance);
@@ -323,13 +322,13 @@ fn flat_straight_and_single_point_models_are_enclosed() {
 }
 
 #[test]
-fn far_from_the_origin_the_cage_is_coarser_but_right() {
+fn a_cage_far_from_the_origin_is_coarser_but_valid() {
     let far = trousers().0.iter().map(|&p| p + vec3(3e4, -1e4, 0.0)).collect();
     make(&(far, trousers().1), &options(60));
 }
 
 #[test]
-fn bad_input_is_refused_in_words() {
+fn invalid_input_is_an_error_with_a_message() {
     let (positions, triangles) = trousers();
     let refused = |p: &[Vec3], t: &[[u32; 3]], o: &CageOptions| generate(p, t, o, &Silent).unwrap_err();
     assert_eq!(refused(&[], &[], &options(80)), CageGenError::Empty);
@@ -352,7 +351,7 @@ fn bad_input_is_refused_in_words() {
 }
 
 #[test]
-fn cancelling_ends_the_work() {
+fn cancelling_stops_generation() {
     let (positions, triangles) = trousers();
     let cancel = |_: ProgressEvent| ControlFlow::Break(());
     let error = generate(&positions, &triangles, &options(80), &cancel).unwrap_err();
@@ -360,7 +359,7 @@ fn cancelling_ends_the_work() {
 }
 
 #[test]
-fn runs_are_alike() {
+fn generation_is_deterministic() {
     let soup = trousers();
     let once = make(&soup, &options(60)).cage;
     let twice = make(&soup, &options(60)).cage;
@@ -389,9 +388,9 @@ proptest! {
     }
 }
 
-/// The promise of a smooth cage, of its surface and by winding numbers; the cage itself need only be one.
+/// The smooth surface encloses the model by winding number; the cage itself need not.
 #[test]
-fn smooth_surface_of_a_cage_holds_the_model() {
+fn the_smooth_surface_of_a_cage_encloses_the_model() {
     for (soup, smooth) in [(trousers(), 1), (trousers(), 2), (ring(), 2)] {
         for symmetry in [Symmetry::Auto, Symmetry::None] {
             let options = CageOptions { smooth, symmetry, ..options(80) };

@@ -1,4 +1,4 @@
-//! The promise of a generated cage, checked on the very numbers that are returned.
+//! Verification of a generated cage in its final f32 coordinates.
 
 use glam::DVec3;
 
@@ -10,27 +10,27 @@ use cagework_core::contact::{Corners, meeting};
 use cagework_core::geometry::winding_number;
 use cagework_core::mesh::PolygonMesh;
 
-/// Share of the clearance that must be left after rounding to f32.
+/// Smallest share of the clearance that remains after rounding to f32.
 const MIN_CLEARANCE_SHARE: f64 = 0.98;
 
-/// The same of the facets of bent faces, which lie a little inside of the triangles that were guarded.
+/// The same for facets of bent faces, which lie slightly inside the guarded triangles.
 const MIN_FACET_CLEARANCE_SHARE: f64 = 0.1;
 
-/// Largest distance of a winding number from 1; of a closed surface it is whole.
+/// Largest distance of a winding number from 1; it is an integer for closed surfaces.
 const WINDING_TOLERANCE: f64 = 1e-3;
 
-/// The cage of a whole surface, if it keeps the promise: closed, manifold, outward, free of self-intersection, clear
-/// of the solid, around every part of it. All of the model lies in the solid, so all of it lies strictly inside.
+/// The cage of a whole surface if it passes verification: closed, manifold, outward, free of self-intersections, clear
+/// of the solid and around every part of it. The solid contains the model, so the cage strictly encloses it.
 pub(super) fn verified(shell: &Shell, surface: &Surface) -> Option<Cage> {
     let whole = surface.whole();
     verified_faces(shell, &whole.positions, whole.triangles.iter().map(|t| t.to_vec()).collect()).ok()
 }
 
-/// The same of vertices (centred voxel units) and faces. Bent faces keep it as the triangles and as the finer facets that models
-/// are bound to.
+/// Verifies vertices (centred voxel units) and faces. Bent faces must pass both as triangles and as the finer facets
+/// that models are bound to.
 ///
 /// # Errors
-/// The faces that break the promise, ascending; none where it is the whole.
+/// Indices of the faces that fail, ascending; empty if the cage fails as a whole.
 pub(super) fn verified_faces(
     shell: &Shell,
     positions: &[DVec3],
@@ -79,11 +79,11 @@ pub(super) fn verified_faces(
     if around { Ok(cage) } else { Err(Vec::new()) }
 }
 
-/// The faces of a cage as triangles, quads as all four that other programs may cut them into.
+/// Triangles of a cage; quads are cut along both diagonals, as other programs may.
 struct Cut {
     triangles: Vec<Corners>,
     face_of: Vec<u32>,
-    /// Whether each is one of the cage's own.
+    /// Whether the cage itself cuts the face this way.
     is_ours: Vec<bool>,
     /// Whether each is half a quad.
     is_half: Vec<bool>,
@@ -110,13 +110,13 @@ impl Cut {
         cut
     }
 
-    /// Whether a triangle is there when all quads are cut as the cage does, or all along their other diagonals.
+    /// Whether a triangle exists when quads are cut as the cage does (`ours`), or along the other diagonal.
     fn is_of(&self, t: usize, ours: bool) -> bool {
         !self.is_half[t] || self.is_ours[t] == ours
     }
 
-    /// Faces that meet others where they should not, or make a sharp fold with them when they are cut the other way. Of two that meet,
-    /// one that is cut the other way if there is one.
+    /// Faces that intersect others or form a sharp fold with them when cut the other way. Of two intersecting faces,
+    /// prefers one that is cut the other way.
     fn wrong(&self, obstacle: &Obstacle) -> Vec<u32> {
         let mut wrong = Vec::new();
         for pair in meeting(&self.triangles) {

@@ -1,20 +1,17 @@
-//! A set of voxels as bits, one row of words along x after the other, and what is done to such sets.
+//! Sets of voxels as bit arrays, one row of words along x, with morphological operations.
 
-/// Bits of a word.
+/// Bits per word.
 const WORD: usize = u64::BITS as usize;
 
-/// A box of voxels, each in the set or not. Voxel `[x, y, z]` is the unit cube from that corner on.
+/// A subset of a box of voxels. Voxel `[x, y, z]` is the unit cube with that lowest corner.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Voxels {
-    /// Voxels along x, y, z.
     pub(super) dims: [usize; 3],
-    /// Words of a row.
     words: usize,
     bits: Vec<u64>,
 }
 
 impl Voxels {
-    /// The empty set.
     pub(super) fn new(dims: [usize; 3]) -> Self {
         let words = dims[0].div_ceil(WORD);
         Self { dims, words, bits: vec![0; words * dims[1] * dims[2]] }
@@ -25,17 +22,14 @@ impl Voxels {
         &self.bits[start..start + self.words]
     }
 
-    /// Whether a voxel is in the set.
     pub(super) fn has(&self, [x, y, z]: [usize; 3]) -> bool {
         self.row(y, z)[x / WORD] >> (x % WORD) & 1 == 1
     }
 
-    /// Adds a voxel.
     pub(super) fn add(&mut self, [x, y, z]: [usize; 3]) {
         self.bits[(z * self.dims[1] + y) * self.words + x / WORD] |= 1 << (x % WORD);
     }
 
-    /// Adds voxels `first..=last` of a row.
     pub(super) fn add_run(&mut self, y: usize, z: usize, first: usize, last: usize) {
         let start = (z * self.dims[1] + y) * self.words;
         for w in first / WORD..=last / WORD {
@@ -55,7 +49,6 @@ impl Voxels {
         (first / WORD..=last / WORD).all(|w| !row[w] & run_mask(w, first, last) == 0)
     }
 
-    /// Voxels in the set.
     pub(super) fn count(&self) -> usize {
         self.bits.iter().map(|w| w.count_ones() as usize).sum()
     }
@@ -73,24 +66,22 @@ impl Voxels {
         }
     }
 
-    /// Adds all voxels of another set in the same box.
     pub(super) fn unite(&mut self, other: &Self) {
         for (a, b) in self.bits.iter_mut().zip(&other.bits) {
             *a |= b;
         }
     }
 
-    /// All other voxels of the box.
     pub(super) fn complement(&self) -> Self {
         Self { bits: self.bits.iter().map(|w| !w).collect(), ..*self }
     }
 
-    /// The voxels that are not in another set in the same box.
+    /// Difference with another set in the same box.
     pub(super) fn without(&self, other: &Self) -> Self {
         Self { bits: self.bits.iter().zip(&other.bits).map(|(a, b)| a & !b).collect(), ..*self }
     }
 
-    /// The set seen in a mirror halfway along `axis`.
+    /// Mirror image about the middle of `axis`.
     pub(super) fn mirrored(&self, axis: usize) -> Self {
         let mut mirrored = Self::new(self.dims);
         self.for_each(|mut voxel| {
@@ -100,7 +91,7 @@ impl Voxels {
         mirrored
     }
 
-    /// The set and all voxels that share a face, an edge or a corner with it. The outermost layer must be empty.
+    /// Dilation by the 26 neighbours. The outermost layer must be empty.
     pub(super) fn dilated(&self) -> Self {
         let mut along_x = self.bits.clone();
         for (k, wide) in along_x.iter_mut().enumerate() {
@@ -121,7 +112,7 @@ impl Voxels {
         wide
     }
 
-    /// The set with everything that cannot be reached from the box's corner through faces: cavities filled.
+    /// The set with its cavities filled: complement of what face-connects to the box's corner.
     pub(super) fn filled(&self) -> Self {
         let mut all = Self::new(self.dims);
         for z in 0..self.dims[2] {
@@ -135,8 +126,8 @@ impl Voxels {
         all.without(&reached)
     }
 
-    /// Adds a voxel, and those of this set that hang together with it through faces, to `reached`; a row at a time. `waiting`: false for
-    /// each row.
+    /// Flood fill: adds to `reached` a voxel and the voxels of this set that are face-connected to it, row by row.
+    /// `waiting`: scratch, false for each row.
     fn reach(&self, from: [usize; 3], reached: &mut Self, waiting: &mut [bool]) {
         reached.add(from);
         let mut queue = vec![from[2] * self.dims[1] + from[1]];
@@ -166,7 +157,7 @@ impl Voxels {
         }
     }
 
-    /// Spreads what was reached of a row to all voxels of this set beside it in the row.
+    /// Extends the reached voxels of a row along connected voxels of this set.
     fn spread_along_row(&self, reached: &mut Self, row: usize) {
         let range = row * self.words..(row + 1) * self.words;
         let (free, reached) = (&self.bits[range.clone()], &mut reached.bits[range]);
@@ -192,10 +183,10 @@ impl Voxels {
         }
     }
 
-    /// Adds voxels until the set's boundary is a 2-manifold: where two voxels meet in an edge or a corner only, their
-    /// common box is filled. It ends because voxels are only added, and never beyond the set's bounding box.
+    /// Adds voxels until the set's boundary is a 2-manifold: where two voxels share only an edge or a corner, their
+    /// bounding box is filled. Terminates because voxels are only added, within the set's bounding box.
     ///
-    /// Source: Latecki 1997, "3D well-composed pictures"; the repair is ours.
+    /// Well-composedness: Latecki 1997, "3D well-composed pictures". The repair is our own.
     pub(super) fn compose(&mut self, mirror: Option<usize>) {
         let critical: Vec<bool> = (0..256).map(is_critical).collect();
         loop {
@@ -206,7 +197,7 @@ impl Voxels {
                 }
             }
             if let (true, Some(axis)) = (changed, mirror) {
-                // Blocks are visited in one order: without this, the repair would not be symmetric.
+                // Blocks are visited in a fixed order, so the repair must be symmetrised.
                 let other = self.mirrored(axis);
                 self.unite(&other);
             }
@@ -245,7 +236,7 @@ impl Voxels {
         changed
     }
 
-    /// Voxels x and x + 1 of a row as two bits.
+    /// Voxels x and x + 1 of a row, as two bits.
     fn pair(&self, x: usize, y: usize, z: usize) -> usize {
         let row = self.row(y, z);
         let (word, bit) = (x / WORD, x % WORD);
@@ -253,7 +244,7 @@ impl Voxels {
         ((row[word] >> bit | above) & 3) as usize
     }
 
-    /// One voxel of every part that hangs together through faces.
+    /// A voxel of every face-connected component.
     pub(super) fn parts(&self) -> Vec<[usize; 3]> {
         let (mut seen, mut waiting) = (Self::new(self.dims), vec![false; self.dims[1] * self.dims[2]]);
         let mut parts = Vec::new();
@@ -269,7 +260,7 @@ impl Voxels {
         parts
     }
 
-    /// The voxels of every part that hangs together through faces.
+    /// The voxels of every face-connected component.
     pub(super) fn islands(&self) -> Vec<Vec<[usize; 3]>> {
         let mut seen = Self::new(self.dims);
         let mut islands = Vec::new();
@@ -294,7 +285,7 @@ impl Voxels {
         islands
     }
 
-    /// The up to six voxels that share a face with one.
+    /// The voxels of the box that share a face with a voxel.
     pub(super) fn neighbours(&self, voxel: [usize; 3]) -> impl Iterator<Item = [usize; 3]> + use<> {
         let dims = self.dims;
         (0..6).filter_map(move |side| {
@@ -306,14 +297,14 @@ impl Voxels {
     }
 }
 
-/// The bits of word `w` of a row that belong to voxels `first..=last`.
+/// Bits of word `w` of a row for voxels `first..=last`.
 fn run_mask(w: usize, first: usize, last: usize) -> u64 {
     let low = first.saturating_sub(w * WORD).min(WORD - 1);
     let high = (last - w * WORD).min(WORD - 1);
     (u64::MAX << low) & (u64::MAX >> (WORD - 1 - high))
 }
 
-/// Whether a block of 2 x 2 x 2 voxels (bit 0: x, 1: y, 2: z) has voxels, or gaps, that meet in an edge or corner only.
+/// Whether a block of 2 x 2 x 2 voxels (bit index x + 2 y + 4 z) has voxels, or gaps, that share only an edge or a corner.
 fn is_critical(block: usize) -> bool {
     let has = |i: usize| block >> i & 1 == 1;
     let edge = [(0, 3, 1, 2), (4, 7, 5, 6), (0, 5, 1, 4), (2, 7, 3, 6), (0, 6, 2, 4), (1, 7, 3, 5)]

@@ -1,34 +1,34 @@
-//! A clamp in the shape of a C, its jaws almost closed: what coordinates do that look straight across.
+//! A C-shaped clamp with nearly closed jaws, across whose gap mean value coordinates leak.
 
 use glam::{Quat, Vec3, vec3};
 
 use super::sdf::{Body, Solid};
-use super::{CageRecipe, Pulled, Recipe, SampleInfo};
+use super::{CageRecipe, PulledPose, Recipe, SampleInfo};
 use cagework_core::mesh::PolygonMesh;
 
 pub(super) const INFO: SampleInfo = SampleInfo {
     id: "clamp",
     label: "Clamp",
-    sentence: "The lower jaw opens and the upper one, a finger's breadth away, keeps its place; with mean value \
-               coordinates, which look straight across the gap, it would be dragged along. Take hold of the tip of a jaw.",
+    sentence: "The lower jaw opens and the upper one, a finger's breadth away, keeps its place; mean value \
+               coordinates measure straight across the gap and would drag it along. Grab the tip of a jaw.",
 };
 
 const STEEL: [u8; 3] = [84, 104, 128];
 const BRASS: [u8; 3] = [198, 156, 76];
 
-/// Half the cage's thickness along z.
+/// Half of the cage's extent along z.
 const THICKNESS: f32 = 0.27;
 
-/// The hinge of the poses: the middle of the back.
+/// Hinge of the poses: the middle of the back.
 const HINGE: Vec3 = vec3(-0.8, 0.0, 0.0);
 
 pub(super) fn recipe() -> Recipe {
     Recipe {
         body: body(),
         cell: 0.0135,
-        cage: CageRecipe::Made(cage()),
+        cage: CageRecipe::Mesh(cage()),
         poses: vec![("Lower jaw open", Box::new(open))],
-        pulled: Pulled {
+        pulled: PulledPose {
             name: "Lower jaw pulled down",
             at: vec3(0.95, -0.3, 0.18),
             by: vec3(-0.1, -0.4, 0.0),
@@ -67,7 +67,7 @@ fn body() -> Body {
 /// The cage: a bent beam of quads.
 fn cage() -> PolygonMesh {
     let mut mesh = PolygonMesh::default();
-    // Outlines of the C at the two sides, in the plane: outer and inner rim, from the lower tip to the upper one.
+    // Outer and inner outline of the C in the xy plane, from the lower tip to the upper one.
     let outer = [
         (1.04, -0.52),
         (0.50, -0.52),
@@ -113,7 +113,7 @@ fn cage() -> PolygonMesh {
     mesh
 }
 
-/// How much a point belongs to the lower jaw: 0 on the back and above, 1 along the jaw.
+/// Share of a point in the motion of the lower jaw: 0 on the back and above, 1 along the jaw.
 fn share_of_jaw(p: Vec3) -> f32 {
     if p.y >= -0.01 {
         return 0.0;

@@ -1,4 +1,4 @@
-//! A person whose legs stand close together.
+//! A person with legs close together.
 
 use std::f32::consts::{PI, TAU};
 
@@ -6,7 +6,7 @@ use glam::{Quat, Vec3, vec3};
 
 use super::sdf::{Body, Solid};
 use super::skeleton::Skeleton;
-use super::{CageRecipe, Pulled, Recipe, SampleInfo};
+use super::{CageRecipe, PulledPose, Recipe, SampleInfo};
 use crate::generate::CageOptions;
 use cagework_core::skin::Rig;
 
@@ -14,7 +14,7 @@ pub(super) const INFO: SampleInfo = SampleInfo {
     id: "humanoid",
     label: "Legs close together",
     sentence: "One leg steps forward and the other, a hand's breadth beside it, does not follow: harmonic \
-               coordinates go round the gap, not across it. Take hold of a knee and lift it.",
+               coordinates follow the body, not the gap. Grab a knee and lift it.",
 };
 
 const SKIN: [u8; 3] = [224, 178, 148];
@@ -23,21 +23,21 @@ const TROUSERS: [u8; 3] = [66, 70, 84];
 const SHOE: [u8; 3] = [112, 62, 44];
 const HAIR: [u8; 3] = [74, 50, 36];
 
-/// Pelvis to head, with radii.
+/// Trunk from the pelvis to the head: points and radii.
 const TRUNK: [(Vec3, f32); 4] = [
     (vec3(0.0, 0.98, 0.0), 0.15),
     (vec3(0.0, 1.18, 0.0), 0.13),
     (vec3(0.0, 1.42, 0.0), 0.15),
     (vec3(0.0, 1.60, 0.01), 0.065),
 ];
-/// The left arm from the shoulder to the fingers, with radii.
+/// Left arm from the shoulder to the fingers: points and radii.
 const ARM: [(Vec3, f32); 4] = [
     (vec3(0.20, 1.46, 0.0), 0.085),
     (vec3(0.47, 1.38, -0.01), 0.062),
     (vec3(0.73, 1.31, 0.04), 0.048),
     (vec3(0.88, 1.27, 0.06), 0.044),
 ];
-/// The left leg from the hip to the toes, with radii.
+/// Left leg from the hip to the toes: points and radii.
 const LEG: [(Vec3, f32); 4] = [
     (vec3(0.135, 0.90, 0.0), 0.108),
     (vec3(0.142, 0.50, 0.01), 0.078),
@@ -56,7 +56,7 @@ pub(super) fn recipe() -> Recipe {
             ..CageOptions::default()
         }),
         poses: vec![("A step", Box::new(step))],
-        pulled: Pulled {
+        pulled: PulledPose {
             name: "Knee up",
             at: vec3(0.142, 0.5, 0.1),
             by: vec3(0.03, 0.24, 0.26),
@@ -93,7 +93,7 @@ fn body() -> Body {
     body
 }
 
-/// The skeleton with the numbers of arms and legs (left, right).
+/// The skeleton, and the bone indices of arms and legs (left, right).
 fn skeleton() -> (Skeleton, [Vec<usize>; 2], [Vec<usize>; 2]) {
     let mut skeleton = Skeleton::default();
     let trunk = skeleton.add_chain(&TRUNK, 0);
@@ -104,7 +104,7 @@ fn skeleton() -> (Skeleton, [Vec<usize>; 2], [Vec<usize>; 2]) {
     (skeleton, arms, legs)
 }
 
-/// Of the skeleton's bones, in turn.
+/// Names of the skeleton's bones, in order.
 const NAMES: [&str; 16] = [
     "hips",
     "spine",
@@ -124,23 +124,23 @@ const NAMES: [&str; 16] = [
     "foot.R",
 ];
 
-/// The skeleton, and a walk on the spot: two steps in two seconds, after which it begins again.
+/// A rig with a looping walk on the spot: two steps in two seconds.
 fn walk(vertices: &[Vec3]) -> Rig {
     const SECONDS: f32 = 2.0;
     const KEYS: usize = 17;
     let times: Vec<f32> = (0..KEYS).map(|k| SECONDS * k as f32 / (KEYS - 1) as f32).collect();
     let turn = |bone: usize, t: f32| {
         let phase = TAU * t / SECONDS;
-        // Left and right are half a round apart.
+        // Left and right are half a cycle apart.
         let (side, own) = if matches!(bone, 7..=9 | 13..=15) { (-1.0, phase + PI) } else { (1.0, phase) };
         match bone {
             0 => vec3(0.0, -0.08 * phase.sin(), 0.0),
             2 => vec3(0.0, 0.10 * phase.sin(), 0.0),
-            // Arms hang, and swing against the legs.
+            // Arms hang and swing against the legs.
             4 | 7 => vec3(0.35 * own.sin(), 0.0, -1.1 * side),
             5 | 8 => vec3(0.0, -0.25 * side, 0.0),
             10 | 13 => vec3(-0.42 * own.sin(), 0.0, 0.0),
-            // A knee bends while its leg swings forward.
+            // The knee bends while its leg swings forward.
             11 | 14 => vec3(0.08 + 0.75 * own.cos().max(0.0).powi(2), 0.0, 0.0),
             12 | 15 => vec3(0.12 * own.sin(), 0.0, 0.0),
             _ => Vec3::ZERO,

@@ -1,4 +1,4 @@
-//! From a signed distance function to triangles.
+//! Meshes a signed distance function.
 
 use fast_surface_nets::ndshape::RuntimeShape;
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
@@ -7,15 +7,15 @@ use glam::{UVec3, Vec3};
 use super::sdf::Body;
 use cagework_core::mesh::TriMesh;
 
-/// Samples along the edge of a block that is skipped if the surface is far.
+/// Samples along the edge of a block; blocks far from the surface are skipped.
 const BLOCK: u32 = 4;
 
-/// Newton steps from the net's vertex to the surface: two leave less than a thousandth of a cell.
+/// Newton steps from a vertex of the net to the surface; two leave less than 1e-3 of a cell.
 const STEPS: usize = 2;
 
-/// The surface of a body, meshed on cells of this size, with the colour of every vertex.
+/// Mesh of a body's surface on cells of edge `cell`, with vertex colours.
 ///
-/// Source: Gibson 1998 (surface nets), by the crate `fast-surface-nets`; the vertices are then laid onto the surface.
+/// Source: surface nets (Gibson 1998) from the crate `fast-surface-nets`; vertices are then projected onto the surface.
 pub(super) fn mesh(body: &Body, cell: f32) -> (TriMesh, Vec<[u8; 4]>) {
     let [min, max] = body.bounds();
     let origin = min - 2.0 * cell;
@@ -45,21 +45,21 @@ pub(super) fn mesh(body: &Body, cell: f32) -> (TriMesh, Vec<[u8; 4]>) {
     (TriMesh { positions, triangles }, colours)
 }
 
-/// Blocks of the lattice, x fastest: what of the body is near each.
+/// Blocks of the lattice, x fastest, with the part of the body near each.
 struct Blocks {
     origin: Vec3,
     cell: f32,
-    /// Points of the lattice along each axis, and blocks.
+    /// Numbers of lattice points and of blocks along each axis.
     n: UVec3,
     n_blocks: UVec3,
-    /// The distance of a block's middle, and the parts that count in it if the surface can reach it.
+    /// Distance at the block's centre, and the solids that matter in it if the surface can reach it.
     blocks: Vec<(f32, Option<Body>)>,
 }
 
 impl Blocks {
     fn new(body: &Body, origin: Vec3, cell: f32, n: UVec3) -> Self {
         let n_blocks = (n + (BLOCK - 1)) / BLOCK;
-        // From the middle of a block to its farthest sample and the samples beyond.
+        // From a block's centre to its farthest sample and one cell beyond.
         let reach = 1.05 * cell * 3.0_f32.sqrt() * (0.5 * BLOCK as f32 + 1.0);
         let mut blocks = Vec::with_capacity((n_blocks.x * n_blocks.y * n_blocks.z) as usize);
         for z in 0..n_blocks.z {
@@ -68,7 +68,7 @@ impl Blocks {
                     let first = BLOCK * UVec3::new(x, y, z);
                     let middle = origin + cell * first.as_vec3() + 0.5 * cell * (BLOCK - 1) as f32;
                     let distance = body.distance(middle);
-                    // A vertex moves a little over a cell from its place in the net.
+                    // Projection moves a vertex by a little more than a cell.
                     let near = || body.near(middle, reach + 2.0 * cell);
                     blocks.push((distance, (distance.abs() <= reach).then(near)));
                 }
@@ -81,13 +81,13 @@ impl Blocks {
         ((block.z * self.n_blocks.y + block.y) * self.n_blocks.x + block.x) as usize
     }
 
-    /// What counts near a point, in cells from the lattice's first.
+    /// The body near a point in lattice coordinates; `None` far from the surface.
     fn at(&self, p: Vec3) -> Option<&Body> {
         let block = (p.as_uvec3() / BLOCK).min(self.n_blocks - 1);
         self.blocks[self.number(block)].1.as_ref()
     }
 
-    /// Distances at the lattice's points, x fastest. Blocks that the surface cannot reach get one distance for all.
+    /// Distances at the lattice points, x fastest. A block that the surface cannot reach gets its centre's distance.
     fn sample(&self) -> Vec<f32> {
         let n = self.n;
         let mut samples = Vec::with_capacity((n.x * n.y * n.z) as usize);
@@ -105,10 +105,10 @@ impl Blocks {
     }
 }
 
-/// The point of the surface that Newton's method finds from a point near it.
+/// Projects a point near the surface onto it by Newton's method.
 fn on_surface(body: &Body, start: Vec3, cell: f32) -> Vec3 {
     let h = 0.05 * cell;
-    // Four corners of a tetrahedron: their weighted sum is the gradient, their mean the distance.
+    // Corners of a tetrahedron: their weighted sum gives the gradient, their mean the distance.
     let corners =
         [Vec3::new(1.0, -1.0, -1.0), Vec3::new(-1.0, -1.0, 1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::ONE];
     let mut p = start;

@@ -1,7 +1,7 @@
-//! Models to try: made by formula, so that they cost no download and belong to nobody else.
+//! Built-in sample models, made by formula: no download and no third-party licence.
 //!
-//! Each is a signed distance function (smooth unions of a few round solids), meshed by surface nets and laid onto the
-//! zero level; with a cage, prepared poses of that cage and a sentence on what to see. A few hundred milliseconds each.
+//! Each is a signed distance function (smooth unions of a few round solids), meshed by surface nets and projected onto the zero
+//! level, with a cage, poses of that cage and a sentence on what to try. Building one takes a few hundred milliseconds.
 
 mod clamp;
 mod humanoid;
@@ -21,43 +21,43 @@ use cagework_core::skin::Rig;
 
 use sdf::Body;
 
-/// What can be built, and what to look at in it.
+/// Description of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct SampleInfo {
-    /// Name for programs: lower case, unique.
+    /// Identifier: lower case, unique.
     pub id: &'static str,
-    /// Name for people.
+    /// Display name.
     pub label: &'static str,
-    /// What there is to see.
+    /// What the sample demonstrates and what to try.
     pub sentence: &'static str,
 }
 
 /// A built sample.
 #[derive(Clone, Debug)]
 pub struct Sample {
-    /// Its label.
+    /// Display name.
     pub name: String,
     /// The model: y is up, z is forward, about two units long. Closed, counter-clockwise seen from outside.
     pub mesh: TriMesh,
-    /// Colour of every vertex: sRGB and opacity, 0 to 255. `[n_vertices]`
+    /// Vertex colours: sRGB and opacity, 0 to 255. `[n_vertices]`
     pub colours: Vec<[u8; 4]>,
-    /// A cage that encloses it.
+    /// A cage that encloses the model.
     pub cage: PolygonMesh,
-    /// Prepared poses: name and positions of the cage's vertices. `[n_cage]` each
+    /// Named poses: positions of the cage's vertices, `[n_cage]` each.
     pub poses: Vec<(String, Vec<Vec3>)>,
-    /// Its skeleton, if it has one, with a clip.
+    /// Skeleton with an animation clip, if the sample has one.
     pub rig: Option<Rig>,
 }
 
 const SAMPLES: [SampleInfo; 4] = [rat::INFO, humanoid::INFO, clamp::INFO, strider::INFO];
 
-/// The samples there are, the one to begin with first.
+/// All samples; the first one is the default.
 #[must_use]
 pub fn all() -> &'static [SampleInfo] {
     &SAMPLES
 }
 
-/// Builds a sample; `None` if there is none with this id.
+/// Builds a sample; `None` if the identifier is unknown.
 #[must_use]
 pub fn build(id: &str) -> Option<Sample> {
     let recipe = match id {
@@ -70,12 +70,10 @@ pub fn build(id: &str) -> Option<Sample> {
     let info = SAMPLES.iter().find(|info| info.id == id)?;
     let (mesh, colours) = mesher::mesh(&recipe.body, recipe.cell);
     let cage = match recipe.cage {
-        CageRecipe::Made(cage) => cage,
+        CageRecipe::Mesh(cage) => cage,
         CageRecipe::Generate(options) => {
             let made = generate(&mesh.positions, &mesh.triangles, &options, &Silent);
-            made.expect("the options and the model are constants, and tests make every cage")
-                .cage
-                .to_polygon_mesh()
+            made.expect("options and model are constants, and tests build every cage").cage.to_polygon_mesh()
         }
     };
     let posed = |(name, pose): &(&str, Pose)| ((*name).to_owned(), pose(&cage.positions));
@@ -85,44 +83,40 @@ pub fn build(id: &str) -> Option<Sample> {
     Some(Sample { name: info.label.to_owned(), mesh, colours, cage, poses, rig })
 }
 
-/// How a cage comes about.
 enum CageRecipe {
-    /// Drawn by hand.
-    Made(PolygonMesh),
-    /// Generated around the mesh.
+    /// A mesh modelled by hand.
+    Mesh(PolygonMesh),
+    /// Generated around the model.
     Generate(CageOptions),
 }
 
-/// What a sample is made of.
 struct Recipe {
     body: Body,
     /// Edge of a meshing cell, object units.
     cell: f32,
     cage: CageRecipe,
     poses: Vec<(&'static str, Pose)>,
-    /// The last pose.
-    pulled: Pulled,
-    /// A rig for the mesh's vertices.
+    pulled: PulledPose,
     rig: Option<fn(&[Vec3]) -> Rig>,
 }
 
-/// A pose made by one pull. It is kept as bytes: a pull needs a bind, which would keep a visitor waiting.
-struct Pulled {
+/// A pose made by one pull of the model. Stored as bytes because a pull needs a bind.
+struct PulledPose {
     name: &'static str,
-    /// The model's vertex nearest to this point is taken hold of, object units.
-    #[cfg_attr(not(test), expect(dead_code, reason = "the test that makes the bytes pulls"))]
+    /// The model's vertex nearest to this point is grabbed, object units.
+    #[cfg_attr(not(test), expect(dead_code, reason = "only the test that makes the bytes pulls"))]
     at: Vec3,
-    /// How far it is pulled, object units.
-    #[cfg_attr(not(test), expect(dead_code, reason = "the test that makes the bytes pulls"))]
+    /// Displacement of the grab, object units.
+    #[cfg_attr(not(test), expect(dead_code, reason = "only the test that makes the bytes pulls"))]
     by: Vec3,
-    /// Offsets of the cage's vertices, i16, little endian, in [`PULLED_UNIT`]. `[n_cage, 3]`
+    /// Offsets of the cage's vertices, little-endian i16 in units of [`PULLED_UNIT`]. `[n_cage, 3]`
     bytes: &'static [u8],
 }
 
-/// Object units in a unit of stored poses.
+/// Unit of stored offsets, object units.
 const PULLED_UNIT: f32 = 1e-4;
 
-impl Pulled {
+impl PulledPose {
     fn pose(&self, rest: &[Vec3]) -> Vec<Vec3> {
         let numbers =
             self.bytes.as_chunks().0.iter().map(|&b| PULLED_UNIT * f32::from(i16::from_le_bytes(b)));
@@ -131,7 +125,7 @@ impl Pulled {
     }
 }
 
-/// From the rest positions of a cage to posed ones.
+/// Maps rest positions of a cage to posed positions.
 type Pose = Box<dyn Fn(&[Vec3]) -> Vec<Vec3>>;
 
 #[cfg(test)]

@@ -1,17 +1,17 @@
-//! The paper's rat (its figures 1, 5 and 6): a body on short legs with a long tail.
+//! The rat of Joshi et al. 2007 (figures 1, 5 and 6): a body on short legs with a long tail.
 
 use glam::{Quat, Vec3, vec3};
 
 use super::sdf::{Body, Solid};
 use super::skeleton::Skeleton;
-use super::{CageRecipe, Pulled, Recipe, SampleInfo};
+use super::{CageRecipe, PulledPose, Recipe, SampleInfo};
 use crate::generate::CageOptions;
 
 pub(super) const INFO: SampleInfo = SampleInfo {
     id: "rat",
     label: "Rat",
     sentence: "The paper's model: the tail curls and the head turns while the feet stay where they are. \
-               Take hold of the nose and let the rat look round.",
+               Grab the nose and turn the rat's head.",
 };
 
 const FUR: [u8; 3] = [142, 126, 116];
@@ -19,7 +19,7 @@ const BELLY: [u8; 3] = [196, 184, 172];
 const SKIN: [u8; 3] = [222, 160, 152];
 const EYE: [u8; 3] = [28, 22, 24];
 
-/// The spine from the hips to the nose, with radii.
+/// Spine from the hips to the nose: points and radii.
 const SPINE: [(Vec3, f32); 5] = [
     (vec3(0.0, 0.46, -0.52), 0.34),
     (vec3(0.0, 0.47, -0.05), 0.35),
@@ -28,7 +28,7 @@ const SPINE: [(Vec3, f32); 5] = [
     (vec3(0.0, 0.45, 1.06), 0.06),
 ];
 
-/// The tail from the root to the tip, with radii.
+/// Tail from the root to the tip: points and radii.
 const TAIL: [(Vec3, f32); 8] = [
     (vec3(0.0, 0.40, -0.80), 0.105),
     (vec3(0.0, 0.31, -1.05), 0.085),
@@ -40,7 +40,7 @@ const TAIL: [(Vec3, f32); 8] = [
     (vec3(0.0, 0.42, -2.48), 0.038),
 ];
 
-/// Left legs, from the hip to the toes, with radii.
+/// Left legs from the hip to the toes: points and radii.
 const FRONT_LEG: [(Vec3, f32); 4] = [
     (vec3(0.17, 0.36, 0.36), 0.125),
     (vec3(0.23, 0.20, 0.32), 0.085),
@@ -65,7 +65,7 @@ pub(super) fn recipe() -> Recipe {
             ..CageOptions::default()
         }),
         poses: vec![("Tail up, head turned", Box::new(curled))],
-        pulled: Pulled {
+        pulled: PulledPose {
             name: "Looking round",
             at: vec3(0.0, 0.47, 1.1),
             by: vec3(0.32, 0.12, -0.14),
@@ -119,7 +119,7 @@ fn body() -> Body {
     body
 }
 
-/// The skeleton with the numbers of spine, tail and legs (left front, right front, left hind, right hind).
+/// The skeleton, and the bone indices of spine, tail and legs (left front, right front, left hind, right hind).
 fn skeleton() -> (Skeleton, Vec<usize>, Vec<usize>, Vec<Vec<usize>>) {
     let mut skeleton = Skeleton::default();
     let spine = skeleton.add_chain(&SPINE, 0);

@@ -1,32 +1,31 @@
-//! Signed distance functions with colours: round solids joined smoothly.
+//! Coloured signed distance functions: smooth unions of round solids.
 //!
 //! Source: Inigo Quilez, "distance functions" and "smooth minimum" (polynomial).
 
 use glam::{Quat, Vec3};
 
-/// A solid.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Solid {
-    /// A segment with a radius that goes from `ra` at `a` to `rb` at `b`.
+    /// A segment with a radius that varies linearly from `ra` at `a` to `rb` at `b`.
     Cone { a: Vec3, b: Vec3, ra: f32, rb: f32 },
-    /// An ellipsoid; its distance is a close bound, exact on the surface.
+    /// An ellipsoid. Its distance is a bound, exact on the surface.
     Ellipsoid { center: Vec3, radii: Vec3, turn: Quat },
     /// A box with rounded edges; `half` includes the rounding.
     Block { center: Vec3, half: Vec3, round: f32 },
 }
 
-/// A solid with its colour and how far it flows into what was there before.
+/// A solid with its colour and the width over which it blends into earlier solids.
 #[derive(Clone, Copy, Debug)]
-struct Part {
+struct Layer {
     solid: Solid,
     blend: f32,
     colour: [u8; 3],
 }
 
-/// Parts, joined one after the other.
+/// Solids, united in order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Body {
-    parts: Vec<Part>,
+    parts: Vec<Layer>,
 }
 
 impl Solid {
@@ -49,11 +48,11 @@ impl Solid {
         }
     }
 
-    /// At most so much the distance changes on a way of length 1.
+    /// Lipschitz constant of the distance.
     fn steepness(&self) -> f32 {
         match *self {
             Self::Cone { a, b, ra, rb } => 1.0 + (rb - ra).abs() / a.distance(b).max(1e-6),
-            // Of a bound, not of a distance; tests compare.
+            // The distance is only a bound; a test compares.
             Self::Ellipsoid { .. } => 2.0,
             Self::Block { .. } => 1.0,
         }
@@ -72,12 +71,12 @@ impl Solid {
 }
 
 impl Body {
-    /// Adds a solid that flows into the others over the distance `blend`.
+    /// Adds a solid that blends into the others over the distance `blend`.
     pub(super) fn add(&mut self, solid: Solid, blend: f32, colour: [u8; 3]) {
-        self.parts.push(Part { solid, blend, colour });
+        self.parts.push(Layer { solid, blend, colour });
     }
 
-    /// Adds a solid and its image on the other side of x = 0.
+    /// Adds a solid and its mirror image about x = 0.
     pub(super) fn add_both(&mut self, solid: Solid, blend: f32, colour: [u8; 3]) {
         let turned = |v: Vec3| Vec3::new(-v.x, v.y, v.z);
         let image = match solid {
@@ -93,7 +92,7 @@ impl Body {
         self.add(image, blend, colour);
     }
 
-    /// Adds cones along a line of points with their radii.
+    /// Adds cones along a polyline with radii.
     pub(super) fn add_chain(&mut self, chain: &[(Vec3, f32)], blend: f32, colour: [u8; 3]) {
         for pair in chain.windows(2) {
             let [(a, ra), (b, rb)] = [pair[0], pair[1]];
@@ -101,7 +100,7 @@ impl Body {
         }
     }
 
-    /// Adds a chain on both sides of x = 0.
+    /// Adds a chain and its mirror image about x = 0.
     pub(super) fn add_chain_both(&mut self, chain: &[(Vec3, f32)], blend: f32, colour: [u8; 3]) {
         for pair in chain.windows(2) {
             let [(a, ra), (b, rb)] = [pair[0], pair[1]];
@@ -109,18 +108,18 @@ impl Body {
         }
     }
 
-    /// Distance to the surface, negative inside; nowhere larger than the true one, apart from rounding.
+    /// Signed distance to the surface, negative inside; at most the true distance, apart from rounding.
     pub(super) fn distance(&self, p: Vec3) -> f32 {
         self.parts.iter().fold(f32::MAX, |d, part| smooth_min(d, part.solid.distance(p), part.blend).0)
     }
 
-    /// The parts that decide distance and colour within `reach` of a point: of the others neither changes a bit there.
+    /// The solids that affect distance and colour within `reach` of a point. Results there are identical to the whole body's.
     pub(super) fn near(&self, p: Vec3, reach: f32) -> Self {
         let mut parts = Vec::new();
         let (mut distance, mut steepest) = (f32::MAX, 0.0_f32);
         for part in &self.parts {
             let d = part.solid.distance(p);
-            // By so much the two can come closer on the way.
+            // Bound on how much closer the two distances can get within reach.
             let slack = reach * (steepest + part.solid.steepness());
             steepest = steepest.max(part.solid.steepness());
             if d - distance >= part.blend + slack {
@@ -135,7 +134,6 @@ impl Body {
         Self { parts }
     }
 
-    /// Colour at a point of the surface.
     pub(super) fn colour(&self, p: Vec3) -> [u8; 4] {
         let mut colour = Vec3::ZERO;
         let mut distance = f32::MAX;
@@ -148,7 +146,6 @@ impl Body {
         [r, g, b, 255]
     }
 
-    /// A box that holds the surface.
     pub(super) fn bounds(&self) -> [Vec3; 2] {
         let far = [Vec3::INFINITY, Vec3::NEG_INFINITY];
         self.parts.iter().fold(far, |[min, max], part| {
@@ -158,7 +155,7 @@ impl Body {
     }
 }
 
-/// The smaller of two distances, rounded where they are nearly equal, and the share of the second in it.
+/// Polynomial smooth minimum of two distances, and the share of the second in it.
 fn smooth_min(a: f32, b: f32, blend: f32) -> (f32, f32) {
     if blend <= 0.0 || a - b >= blend {
         return if b < a { (b, 1.0) } else { (a, 0.0) };

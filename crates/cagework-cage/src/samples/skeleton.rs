@@ -1,20 +1,20 @@
-//! Prepared poses: bones that turn, and cage vertices that follow the bones near them.
+//! Skeletons for poses of samples: each cage vertex follows the bones near it.
 
 use glam::{Affine3A, Quat, Vec3};
 
 use cagework_core::skin::{Joint, Rig};
 
-/// How fast a bone's say falls off with distance.
+/// Exponent of the inverse distance in a bone's weight.
 const SHARPNESS: i32 = 6;
 
-/// A rigid segment; it turns about its first end and takes its children along.
+/// A rigid segment that rotates about its first end and moves its children.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bone {
     pub(super) from: Vec3,
     pub(super) to: Vec3,
-    /// Radius of the limb: distances count relative to it.
+    /// Radius of the limb, the unit of distances from the bone.
     pub(super) radius: f32,
-    /// Index of the bone that this one hangs on; lower than its own. The root names itself.
+    /// Index of the parent, lower than its own. The root's is its own.
     pub(super) parent: usize,
 }
 
@@ -25,13 +25,11 @@ pub(super) struct Skeleton {
 }
 
 impl Skeleton {
-    /// Adds a bone and returns its number.
     pub(super) fn add(&mut self, from: Vec3, to: Vec3, radius: f32, parent: usize) -> usize {
         self.bones.push(Bone { from, to, radius, parent });
         self.bones.len() - 1
     }
 
-    /// Adds bones along a chain of points; returns their numbers.
     pub(super) fn add_chain(&mut self, chain: &[(Vec3, f32)], parent: usize) -> Vec<usize> {
         let mut parent = parent;
         let pairs = chain.windows(2);
@@ -43,7 +41,7 @@ impl Skeleton {
             .collect()
     }
 
-    /// Positions after the bones have turned: (bone, rotation vector in radians, rest axes). `[n]`
+    /// Positions after bones have rotated. `turns`: (bone, rotation vector in radians, rest axes). `[n]`
     pub(super) fn pose(&self, points: &[Vec3], turns: &[(usize, Vec3)]) -> Vec<Vec3> {
         let mut motion: Vec<Affine3A> = Vec::with_capacity(self.bones.len());
         for (k, bone) in self.bones.iter().enumerate() {
@@ -60,7 +58,7 @@ impl Skeleton {
         points.iter().map(|&p| self.moved(p, &motion)).collect()
     }
 
-    /// The mean of where the bones would take a point, the nearest ones first of all.
+    /// Weighted mean of a point's images under all bones.
     fn moved(&self, p: Vec3, motion: &[Affine3A]) -> Vec3 {
         let mut sum = Vec3::ZERO;
         for (weight, m) in self.weights(p).into_iter().zip(motion) {
@@ -69,7 +67,7 @@ impl Skeleton {
         sum
     }
 
-    /// The say that each bone has at a point; they sum to 1.
+    /// Weights of the bones at a point; they sum to 1.
     fn weights(&self, p: Vec3) -> Vec<f32> {
         let distances = self.bones.iter().map(|bone| {
             let axis = bone.to - bone.from;
@@ -83,8 +81,8 @@ impl Skeleton {
         weights.into_iter().map(|weight| weight / total).collect()
     }
 
-    /// A rig of the bones: a joint where each begins, and the four that have most say at each vertex. `names`: of the bones;
-    /// `turns`: of each bone at each key, rotation vectors in radians; `lift`: of the root at each key.
+    /// A rig with a joint at the start of each bone and the four largest weights at each vertex. `names`: of the bones;
+    /// `turns`: rotation vector of a bone at a key, radians; `lift`: translation of the root at a key.
     pub(super) fn rig(
         &self,
         names: &[&'static str],

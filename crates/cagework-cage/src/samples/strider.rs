@@ -1,17 +1,17 @@
-//! A creature on eight long, thin legs: limbs thinner than a grid cell.
+//! A creature with eight legs thinner than a grid cell.
 
 use glam::{Quat, Vec3, vec3};
 
 use super::sdf::{Body, Solid};
 use super::skeleton::Skeleton;
-use super::{CageRecipe, Pulled, Recipe, SampleInfo};
+use super::{CageRecipe, PulledPose, Recipe, SampleInfo};
 use crate::generate::CageOptions;
 
 pub(super) const INFO: SampleInfo = SampleInfo {
     id: "strider",
     label: "Strider",
-    sentence: "Legs as thin as a cell of the grid: each bends by its own part of the cage, and the rest pose stays \
-               exact. Take hold of a foot and lift it.",
+    sentence: "Legs as thin as a cell of the grid: each bends with its own part of the cage, and the rest pose stays \
+               exact. Grab a foot and lift it.",
 };
 
 const SHELL: [u8; 3] = [176, 84, 52];
@@ -19,7 +19,7 @@ const BACK: [u8; 3] = [96, 44, 40];
 const LEG: [u8; 3] = [206, 150, 84];
 const EYE: [u8; 3] = [20, 20, 26];
 
-/// Angles of the left legs in the plane, from the front, and their reach.
+/// Angles of the left legs in the horizontal plane, from the front, and their reach.
 const LEGS: [(f32, f32); 4] = [(0.50, 1.15), (1.20, 1.0), (1.90, 1.0), (2.62, 1.2)];
 
 pub(super) fn recipe() -> Recipe {
@@ -33,7 +33,7 @@ pub(super) fn recipe() -> Recipe {
             ..CageOptions::default()
         }),
         poses: vec![("Front legs raised", Box::new(raised))],
-        pulled: Pulled {
+        pulled: PulledPose {
             name: "One leg up",
             at: vec3(0.617, 0.03, 1.13),
             by: vec3(0.1, 0.45, 0.1),
@@ -43,7 +43,7 @@ pub(super) fn recipe() -> Recipe {
     }
 }
 
-/// A leg on the left: hip, knee, ankle, foot, with radii.
+/// A left leg: hip, knee, ankle and foot, with radii.
 fn leg(angle: f32, reach: f32) -> [(Vec3, f32); 4] {
     let out = |along: f32, y: f32| vec3(angle.sin() * along, y, angle.cos() * along);
     [
@@ -67,7 +67,7 @@ fn body() -> Body {
     body
 }
 
-/// The skeleton with the numbers of the legs: left ones from the front, then right ones.
+/// The skeleton, and the bone indices of the legs: left ones from the front, then right ones.
 fn skeleton() -> (Skeleton, Vec<Vec<usize>>) {
     let mut skeleton = Skeleton::default();
     let trunk = skeleton.add(vec3(0.0, 0.54, -0.4), vec3(0.0, 0.54, 0.25), 0.2, 0);

@@ -9,7 +9,7 @@ use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
 use cagework_pose::pull::{Drag, DragOptions, Grip, Handle, Probes, Pull};
 
-/// Mean distance between rest pose and reconstruction over the diagonal: f32 round-off of the corrected rows.
+/// Mean rest error over the diagonal: f32 rounding of the corrected rows.
 const REST_ERROR: f64 = 2e-6;
 
 fn recipes() -> [Recipe; 4] {
@@ -39,7 +39,7 @@ fn every_sample_is_enclosed_by_its_cage_and_bound_exactly() {
 }
 
 #[test]
-fn poses_move_some_of_the_cage_and_keep_its_vertices() {
+fn poses_move_part_of_the_cage_and_keep_its_vertex_count() {
     for info in all() {
         let sample = build(info.id).unwrap();
         assert!(!sample.poses.is_empty());
@@ -52,9 +52,9 @@ fn poses_move_some_of_the_cage_and_keep_its_vertices() {
     }
 }
 
-/// Where stored poses are made: when a sample's model, cage or pull has changed, this writes them anew and fails once.
+/// Regenerates stored poses: when a sample's model, cage or pull has changed, it rewrites the file and fails once.
 #[test]
-fn the_last_pose_of_each_sample_is_what_one_pull_makes() {
+fn the_last_pose_of_each_sample_is_that_of_its_pull() {
     for (info, recipe) in all().iter().zip(recipes()) {
         let Sample { mesh, cage, poses, .. } = build(info.id).unwrap();
         let (rest, pulled) = (cage.positions.clone(), recipe.pulled);
@@ -83,7 +83,7 @@ fn the_last_pose_of_each_sample_is_what_one_pull_makes() {
             let offsets = made.iter().zip(&rest).flat_map(|(p, r)| (*p - *r).to_array());
             let path = format!("{}/src/samples/pulled/{}.bin", env!("CARGO_MANIFEST_DIR"), info.id);
             std::fs::write(&path, offsets.flat_map(number).collect::<Vec<u8>>()).unwrap();
-            panic!("{path} was {off} off and has been written anew: run again");
+            panic!("{path} was off by {off} and has been rewritten: run the test again");
         }
     }
 }
@@ -109,12 +109,12 @@ fn samples_are_closed_surfaces_that_face_outward() {
 }
 
 #[test]
-fn unknown_samples_are_none() {
+fn an_unknown_sample_is_none() {
     assert!(build("unicorn").is_none());
 }
 
 #[test]
-fn what_is_left_out_of_a_body_changes_no_distance_and_no_colour() {
+fn a_pruned_body_has_the_same_distance_and_colour() {
     let reach = 0.1;
     for recipe in recipes() {
         let body = recipe.body;
@@ -135,9 +135,9 @@ fn what_is_left_out_of_a_body_changes_no_distance_and_no_colour() {
     }
 }
 
-/// The page opens with one of them: nothing of it may look broken.
+/// The page opens with a sample, so none may show a problem.
 #[test]
-fn no_sample_has_a_fault() {
+fn no_sample_has_a_problem() {
     for info in all() {
         let sample = build(info.id).unwrap();
         let found = check(&sample.cage, Some(&sample.mesh.positions), Some(BindOptions::default().grid));
