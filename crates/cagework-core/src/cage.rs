@@ -1,12 +1,12 @@
-//! The cage: a closed, oriented polygon mesh by construction, and its boundary values.
+//! The cage: a polygon mesh that is closed and oriented by construction, with its boundary values.
 //!
-//! Everything that later stages rely on is established here, once: every edge belongs to two faces that run along it
-//! in opposite directions, every face has an area, every component encloses a volume and faces away from the solid.
-//! The solid is what an odd number of components encloses, so a component inside another one bounds a cavity.
-//! What can be mended without changing the solid is mended with a [`CageNotice`]; everything else is a [`CageError`]
-//! that names the place. Vertices, faces and components are counted from 0. Self-intersection is not looked for.
+//! [`Cage::new`] establishes the invariants of all later stages: every edge belongs to two faces with opposite directions along
+//! it, every face has an area, every component encloses a volume and faces away from the solid. The solid consists of the points
+//! enclosed by an odd number of components, so a component inside another one bounds a cavity. Faults that can be repaired
+//! without changing the solid are repaired with a [`CageNotice`]; all others are a [`CageError`] with their location. Indices of
+//! vertices, faces and components start at 0. Self-intersection is not checked.
 //!
-//! Boundary values ("hats"): see [`Cage::hats_at`].
+//! [`Cage::hats_at`] gives the boundary values ("hats").
 
 mod defects;
 mod hats;
@@ -34,19 +34,18 @@ pub use subdivided_box::subdivided_box;
 use topology::Surface;
 pub use topology::{Side, sides_of};
 
-/// Smallest diagonal of a cage, object units: squares and cubes of lengths stay far from the end of f32 and f64.
+/// Smallest diagonal of a cage, object units: keeps squares and cubes of lengths within the range of f32 and f64.
 pub const MIN_DIAGONAL: f64 = 1e-12;
-/// Largest diagonal of a cage, object units; the reason is the same.
+/// Largest diagonal of a cage, object units, for the same reason.
 pub const MAX_DIAGONAL: f64 = 1e12;
 
-/// Most faces of a cage: a model that is taken for one has more, and looking at each of them would take minutes.
+/// Most faces of a cage: more would take minutes to check, and usually mean that a model was given as its cage.
 pub const MAX_FACES: usize = 100_000;
 
-/// A point this close to the cage (over the cage's diagonal) is on it, whatever side rounding put it on: the resolution of
-/// f32 coordinates.
-pub(crate) const ON_CAGE: f64 = 1e-6;
+/// A point within this distance of the cage (over its diagonal) is on the surface: resolution of f32 coordinates.
+pub(crate) const CAGE_TOLERANCE: f64 = 1e-6;
 
-/// Corners up to which hat values need no heap memory.
+/// Most corners for which hat values need no heap memory.
 const STACK_CORNERS: usize = 8;
 
 /// A closed, outward-oriented polygon mesh around the model.
@@ -60,7 +59,6 @@ pub struct Cage {
     facets: Vec<[u32; 3]>,
     facet_points: Vec<DVec3>,
     face_of_facet: Vec<u32>,
-    /// Rank of each face's first facet.
     first_facet: Vec<u32>,
     polygons: Vec<Polygon>,
     bounds: Bounds,
@@ -70,8 +68,8 @@ pub struct Cage {
 impl Cage {
     /// Checks a polygon mesh and makes it a cage.
     ///
-    /// Mended, with a notice: faces turned the wrong way, vertices that were split at a seam (equal positions along
-    /// open edges, as exporters of glTF write them: the first one stands for all).
+    /// Repaired, with a notice: inverted faces, and vertices split at a seam (equal positions along open edges, as in
+    /// glTF files; the first one replaces the others).
     ///
     /// # Errors
     /// [`CageError`] naming the face, edge or vertex.
@@ -88,14 +86,14 @@ impl Cage {
         Ok(Self::assembled(mesh.positions.clone(), faces, polygons, component, bounds, notices))
     }
 
-    /// This cage with more faces, which are taken as they are: walls inside it whose sides need not enclose anything. A wall of
-    /// which both sides are faces, back to back, is one that the model does not see through from either side.
+    /// This cage with additional faces, which are not checked: walls inside it, which need not enclose anything. A wall
+    /// that separates both sides has its faces twice, back to back.
     ///
-    /// `positions`, `faces`: vertices after the cage's own, and what they are corners of; `parts`: a number for each face, the
-    /// same for those that hang together.
+    /// `positions`, `faces`: additional vertices and faces, whose indices count from the cage's first vertex; `parts`:
+    /// number of the connected part of each face.
     ///
     /// # Errors
-    /// [`CageError`] when there are too many faces, or one has no area.
+    /// [`CageError`] if there are too many faces, or one has no area.
     pub(crate) fn with_walls(
         &self,
         positions: &[Vec3],
@@ -120,7 +118,7 @@ impl Cage {
         Ok(Self::assembled(all, faces, polygons, parts, self.bounds, self.notices.clone()))
     }
 
-    /// A cage of faces that are right.
+    /// A cage of checked faces.
     fn assembled(
         positions: Vec<Vec3>,
         faces: Vec<Vec<u32>>,
@@ -160,7 +158,7 @@ impl Cage {
         cage
     }
 
-    /// Vertex positions, the input's order. `[n_cage]`, object units.
+    /// Vertex positions in the order of the input. `[n_cage]`, object units.
     #[must_use]
     pub fn positions(&self) -> &[Vec3] {
         &self.positions
@@ -172,38 +170,38 @@ impl Cage {
         self.positions.len()
     }
 
-    /// Vertex indices of each face, the input's order, counter-clockwise seen from outside. `[n_faces]`
+    /// Vertex indices of each face in the order of the input, counter-clockwise seen from outside. `[n_faces]`
     #[must_use]
     pub fn faces(&self) -> &[Vec<u32>] {
         &self.faces
     }
 
-    /// All faces cut into triangles, face by face, counter-clockwise seen from outside. `[n_triangles]`
+    /// Triangulation of all faces in their order, counter-clockwise seen from outside. `[n_triangles]`
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// The face that each triangle was cut from. `[n_triangles]`
+    /// Face of each triangle. `[n_triangles]`
     #[must_use]
     pub fn face_of_triangle(&self) -> &[u32] {
         &self.face_of_triangle
     }
 
-    /// The closed part that each face belongs to, in order of first faces. `[n_faces]`
+    /// Connected component of each face, numbered in order of their first faces. `[n_faces]`
     #[must_use]
     pub fn component_of_face(&self) -> &[u32] {
         &self.component_of_face
     }
 
-    /// The surface that a model is bound to, as [`Self::facet_points`], counter-clockwise seen from outside:
-    /// [`Self::triangles`], but bent faces are cut finer. `[n_facets]`
+    /// The surface that a model is bound to, as indices into [`Self::facet_points`], counter-clockwise seen from
+    /// outside: the [`Self::triangles`], with bent faces subdivided. `[n_facets]`
     #[must_use]
     pub fn facets(&self) -> &[[u32; 3]] {
         &self.facets
     }
 
-    /// The face that each facet was cut from. `[n_facets]`
+    /// Face of each facet. `[n_facets]`
     #[must_use]
     pub fn face_of_facet(&self) -> &[u32] {
         &self.face_of_facet
@@ -215,7 +213,7 @@ impl Cage {
         &self.facet_points
     }
 
-    /// The same with the cage's vertices moved to `positions`. `[n_cage]`
+    /// [`Self::facet_points`] with the cage's vertices at `positions`. `[n_cage + n_inner]`
     ///
     /// # Panics
     /// If there are fewer positions than cage vertices.
@@ -243,7 +241,7 @@ impl Cage {
         self.triangles[triangle as usize].map(|i| self.positions[i as usize].as_dvec3())
     }
 
-    /// Bounding box of the surface (vertices of no face do not count), object units.
+    /// Bounding box of the surface, without unused vertices. Object units.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         self.bounds
@@ -255,27 +253,27 @@ impl Cage {
         self.bounds.diagonal()
     }
 
-    /// What was mended or is worth knowing.
+    /// Repairs and remarks.
     #[must_use]
     pub fn notices(&self) -> &[CageNotice] {
         &self.notices
     }
 
-    /// The cage as it is used: faces turned outward, seams closed.
+    /// The cage with repairs applied: faces outward, seams closed.
     #[must_use]
     pub fn to_polygon_mesh(&self) -> PolygonMesh {
         PolygonMesh { positions: self.positions.clone(), faces: self.faces.clone() }
     }
 
-    /// Dirichlet values ("hats") of all cage vertices at a point of the surface, given by one of
-    /// [`Self::facets`] and barycentric coordinates in it. Calls `each(cage vertex, value)` for every vertex whose
-    /// value is not zero; the values sum to 1 and reproduce the point (on a bent face, to 2 % of its bend).
+    /// Dirichlet values ("hats") of the cage vertices at a point of the surface, given by one of [`Self::facets`] and
+    /// barycentric coordinates in it. Calls `each(cage vertex, value)` for non-zero values. They sum to 1 and reproduce
+    /// the point (on a bent face up to 2 % of its bend).
     ///
-    /// Linear on triangles; Meyer et al. 2002 on planar quads (bilinear on a rectangle), blended with the following
-    /// where a corner is nearly straight. On all other polygons the hats are pseudo-harmonic coordinates (after Gordon and
-    /// Wixom 1974; means over the chords through the point), which change continuously with the corners. A bent face is a
-    /// patch over the plane that fits it best, with the coordinates of its outline there. All are linear along edges, so
-    /// neighbouring faces agree; none is negative.
+    /// Hats are linear on triangles. On planar quads they are the coordinates of Meyer et al. 2002 (bilinear on a rectangle),
+    /// blended with pseudo-harmonic coordinates where a corner is nearly straight. On all other polygons they are pseudo-harmonic
+    /// coordinates (after Gordon and Wixom 1974: means over the chords through the point), which depend continuously on the
+    /// corners. A bent face is a patch over its best-fitting plane, with the coordinates of its projected outline. All hats are
+    /// non-negative and linear along edges, so neighbouring faces agree.
     ///
     /// # Panics
     /// If there is no such facet.
@@ -309,12 +307,12 @@ impl Cage {
     }
 }
 
-/// Triangles that cover a face, as corners of it; `diagonal` of the cage.
+/// Triangulation of a face, as indices of its corners. `diagonal`: of the cage.
 pub fn face_triangles(corners: &[DVec3], diagonal: f64) -> Result<Vec<[u32; 3]>, FaceDefect> {
     Polygon::new(corners, diagonal).map(|polygon| polygon.triangles)
 }
 
-/// What can be told without looking at edges; returns the bounds of the vertices that faces use.
+/// Checks numbers and indices. Returns the bounds of the vertices that faces use.
 fn check_numbers(mesh: &PolygonMesh) -> Result<Bounds, CageError> {
     let n = mesh.positions.len();
     if mesh.faces.is_empty() || n == 0 {
@@ -338,7 +336,7 @@ fn check_numbers(mesh: &PolygonMesh) -> Result<Bounds, CageError> {
     topology::check_repeats(&mesh.faces)?;
     let used: Vec<Vec3> = mesh.faces.iter().flatten().map(|&i| mesh.positions[i as usize]).collect();
     let bounds = Bounds::of(&used).ok_or(CageError::Empty)?;
-    // In f64, because in f32 the square of a length overflows from 1e19 on.
+    // f64, because the square of a length overflows f32 from 1e19 on.
     let diagonal = bounds.max.as_dvec3().distance(bounds.min.as_dvec3());
     if !(MIN_DIAGONAL..=MAX_DIAGONAL).contains(&diagonal) {
         return Err(CageError::Size { diagonal });

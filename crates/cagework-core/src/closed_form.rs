@@ -1,4 +1,4 @@
-//! Coordinates by formula, to compare harmonic ones with: what mean value and Green coordinates share.
+//! Shared parts of closed-form coordinates (mean value and Green), which serve as comparison for harmonic ones.
 
 use glam::{DVec3, Vec3};
 use thiserror::Error;
@@ -6,7 +6,7 @@ use thiserror::Error;
 use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
 use crate::weights::Weights;
 
-/// Why there are no coordinates by formula.
+/// Why closed-form coordinates cannot be computed.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ClosedFormError {
     /// A point is not a finite number.
@@ -15,9 +15,9 @@ pub enum ClosedFormError {
         /// The point.
         vertex: u32,
     },
-    /// A point outside the cage has none.
+    /// A point outside the cage has no coordinates.
     #[error(
-        "{kind} coordinates are not defined at mesh vertex {vertex}, outside of the cage: enlarge the cage"
+        "{kind} coordinates are not defined at mesh vertex {vertex}, which is outside the cage: enlarge the cage"
     )]
     Undefined {
         /// Mean value or Green.
@@ -25,7 +25,7 @@ pub enum ClosedFormError {
         /// The point.
         vertex: u32,
     },
-    /// More memory than is allowed.
+    /// The weights exceed the memory limit.
     #[error(
         "the coordinates need about {} MiB of memory, more than the limit of {} MiB: use a smaller model or raise the limit",
         needed.div_ceil(1 << 20),
@@ -40,20 +40,21 @@ pub enum ClosedFormError {
     /// The work was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
-    /// There would be more weights than row pointers can count.
+    /// The weights exceed the range of row pointers.
     #[error("{rows} vertices times {columns} controls are more than {} weights: use fewer", u32::MAX)]
     TooMany {
-        /// Points.
+        /// Number of points.
         rows: usize,
-        /// Controls.
+        /// Number of controls.
         columns: usize,
     },
 }
 
-/// Rows between two reports of progress.
+/// Rows between two progress reports.
 const RUN: usize = 1 << 10;
 
-/// Rows that have all columns, within `memory_limit` bytes. `coordinates` of a point go into a row of zeros, `[columns]`; whether they are defined there.
+/// Dense rows of weights, within `memory_limit` bytes. `coordinates(point, row)` fills a row of zeros, `[columns]`, and
+/// returns whether they are defined at the point.
 pub(crate) fn dense(
     kind: &'static str,
     points: &[Vec3],
@@ -69,7 +70,7 @@ pub(crate) fn dense(
     if rows.checked_mul(columns).is_none_or(|n| u32::try_from(n).is_err()) {
         return Err(ClosedFormError::TooMany { rows, columns });
     }
-    // A value and a column for each weight.
+    // A value and a column index per weight.
     let needed = 8 * (rows * columns) as u64;
     if needed > memory_limit {
         return Err(ClosedFormError::Memory { needed, limit: memory_limit });

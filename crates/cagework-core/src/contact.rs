@@ -1,35 +1,35 @@
-//! Whether two triangles of one surface meet where they should not.
+//! Intersection of triangles of one surface, apart from shared vertices and edges.
 //!
-//! What counts depends on what they share. Nothing: they must keep a gap (separating axes). One vertex: apart from it
-//! they must not meet. An edge: they must not be folded onto each other.
+//! Triangles without common vertices must be more than a gap apart (separating axes). With one common vertex they must
+//! not meet elsewhere. With a common edge they must not be folded onto each other.
 
 use std::ops::ControlFlow;
 
 use glam::DVec3;
 
-/// Sine of the angle below which a direction counts as lying in a plane: far above the rounding of f64, far below
-/// what f32 coordinates of a cage resolve.
-const IN_PLANE: f64 = 1e-7;
+/// Sine of the angle to a plane below which a direction lies in it: far above f64 rounding, far below the resolution of f32
+/// coordinates.
+const PLANE_TOLERANCE: f64 = 1e-7;
 
-/// Triangles nearer than this fraction of their size touch: rounding of f64, with room.
-const TOUCH: f64 = 1e-10;
+/// Distance below which triangles touch, over their size: f64 rounding with a margin.
+const TOUCH_TOLERANCE: f64 = 1e-10;
 
-/// Cosine of the smallest angle between two faces with a common edge (2 degrees): sharper is folded.
-const FOLDED: f64 = 0.9994;
+/// Cosine of the smallest angle between two faces with a common edge (2 degrees).
+const MAX_FOLD_COSINE: f64 = 0.9994;
 
-/// Most pairs that [`meeting`] lists: where thousands of triangles go through each other, their pairs would fill the memory.
+/// Limit on the pairs that [`meeting`] lists, against memory exhaustion.
 const MAX_PAIRS: usize = 100_000;
 
-/// Most comparisons of triangles' boxes in a search, some seconds: 40,000 triangles that all meet have 800 million pairs.
+/// Limit on comparisons of boxes in a search, some seconds: 40,000 triangles that all meet have 800 million pairs.
 const MAX_COMPARISONS: u64 = 1 << 29;
 
-/// Comparisons of boxes that take as long as one of triangles.
-const COMPARISONS_OF_TRIANGLES: u64 = 40;
+/// Cost of an intersection test of triangles, in comparisons of boxes.
+const COMPARISONS_PER_TRIANGLE_TEST: u64 = 40;
 
-/// A triangle with its corners' vertex numbers, which say what it shares with others.
+/// A triangle with the vertex indices of its corners.
 #[derive(Clone, Copy, Debug)]
 pub struct Corners {
-    /// Vertex numbers, three different ones.
+    /// Vertex indices, distinct.
     pub index: [u32; 3],
     /// Their positions.
     pub at: [DVec3; 3],
@@ -51,13 +51,13 @@ impl Corners {
         (self.at[1] - self.at[0]).cross(self.at[2] - self.at[0])
     }
 
-    /// Cosine of the turn from this triangle to one that shares an edge with it, if it does.
+    /// Cosine between the normals of this triangle and another one, if they share an edge.
     pub fn fold_cosine(&self, other: &Self) -> Option<f64> {
         let shared = self.index.iter().filter(|i| other.index.contains(i)).count();
         (shared == 2).then(|| self.normal().normalize_or_zero().dot(other.normal().normalize_or_zero()))
     }
 
-    /// The triangle with a vertex elsewhere.
+    /// The triangle with a vertex moved to `at`.
     pub fn with_corner(&self, vertex: u32, at: DVec3) -> Self {
         let mut moved = *self;
         for (i, p) in moved.index.iter().zip(&mut moved.at) {
@@ -68,14 +68,14 @@ impl Corners {
         moved
     }
 
-    /// The triangle rotated so that corner `k` comes first.
+    /// Corners in cyclic order from corner `k`.
     fn turned_to(&self, k: usize) -> [DVec3; 3] {
         [self.at[k], self.at[(k + 1) % 3], self.at[(k + 2) % 3]]
     }
 }
 
-/// Whether two triangles of a surface meet anywhere but in the vertices and edges that they share. Triangles that
-/// share nothing must be more than `gap` apart.
+/// Whether two triangles of a surface meet outside their common vertices and edges. Triangles without common vertices
+/// also meet if they are at most `gap` apart.
 pub fn meet(a: &Corners, b: &Corners, gap: f64) -> bool {
     debug_assert!([a, b].iter().all(|Corners { index: [i, j, k], .. }| i != j && j != k && k != i));
     let mut shared = [(0, 0); 3];
@@ -99,16 +99,15 @@ pub fn meet(a: &Corners, b: &Corners, gap: f64) -> bool {
     }
 }
 
-/// A key that ascends as `x` does, by `f64::total_cmp`, and then as `number` does: numbers as they are sorted elsewhere, because
-/// every other kind of key is 2 kB more to download.
+/// A sort key by `x` (`f64::total_cmp`), then by `number`, of a type that is sorted elsewhere: another one would add 2
+/// kB to the wasm module.
 fn ascending(x: f64, number: u32) -> [u32; 3] {
     let bits = x.to_bits();
     let key = if bits >> 63 == 1 { !bits } else { bits | 1 << 63 };
     [(key >> 32) as u32, key as u32, number]
 }
 
-/// Pairs of triangles of one surface that meet where they should not, each once, in order. `[n_triangles]` given. It stops
-/// after 100,000 pairs.
+/// Pairs of triangles of one surface that [`meet`], each once, in order; at most 100,000.
 pub fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
     each_meeting(triangles, |pair| {
@@ -119,10 +118,10 @@ pub fn meeting(triangles: &[Corners]) -> Vec<[u32; 2]> {
     pairs
 }
 
-/// Calls `each` with every pair of triangles of one surface that meet where they should not, lower number first. Returns
-/// whether those were all: `each` may end the search, and 2^29 comparisons do.
+/// Calls `each` with every pair of triangles of one surface that [`meet`], smaller index first. Returns whether the
+/// search was complete: it stops if `each` breaks, or after 2^29 comparisons.
 ///
-/// Sweep along x: `n log n` for surfaces whose triangles are small against the whole.
+/// Sweep along x: `O(n log n)` for surfaces whose triangles are small against the whole.
 pub fn each_meeting(triangles: &[Corners], mut each: impl FnMut([u32; 2]) -> ControlFlow<()>) -> bool {
     let mut order: Vec<[u32; 3]> = (0u32..).zip(triangles).map(|(t, c)| ascending(c.min().x, t)).collect();
     order.sort_unstable();
@@ -139,7 +138,7 @@ pub fn each_meeting(triangles: &[Corners], mut each: impl FnMut([u32; 2]) -> Con
             if rival.min().cmpgt(max).any() || rival.max().cmplt(min).any() {
                 continue;
             }
-            comparisons += COMPARISONS_OF_TRIANGLES;
+            comparisons += COMPARISONS_PER_TRIANGLE_TEST;
             if meet(corners, rival, 0.0) && each([t.min(other), t.max(other)]).is_break() {
                 return false;
             }
@@ -152,14 +151,14 @@ pub fn each_meeting(triangles: &[Corners], mut each: impl FnMut([u32; 2]) -> Con
     true
 }
 
-/// Whether some axis separates two triangles by more than `gap`. Exact for a gap of 0, but that touching counts as
-/// meeting; with a gap it may refuse pairs whose closest points are both corners.
+/// Whether a separating axis puts two triangles more than `gap` apart. Exact for a gap of 0 (touching counts as
+/// meeting). With a gap it may miss pairs whose closest points are both corners.
 fn are_apart(a: &[DVec3; 3], b: &[DVec3; 3], gap: f64) -> bool {
-    // Near the origin nothing is lost when triangles are small against their distance from it.
+    // Relative coordinates keep precision if the triangles are far from the origin.
     let origin = a[0];
     let (a, b) = (&a.map(|p| p - origin), &b.map(|p| p - origin));
     let size = a.iter().chain(b).fold(0.0, |m: f64, p| m.max(p.abs().max_element()));
-    let gap = gap + TOUCH * size;
+    let gap = gap + TOUCH_TOLERANCE * size;
     let separates = |axis: DVec3| {
         let margin = gap * axis.length();
         let (p, q) = (a.map(|x| axis.dot(x)), b.map(|x| axis.dot(x)));
@@ -177,16 +176,16 @@ fn are_apart(a: &[DVec3; 3], b: &[DVec3; 3], gap: f64) -> bool {
         || eb.iter().any(|&w| separates(nb.cross(w)))
 }
 
-/// Whether two triangles with the same first corner meet elsewhere, too.
+/// Whether two triangles with the same first corner also meet elsewhere.
 fn cones_meet(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
     let (a, b) = ([a[1] - a[0], a[2] - a[0]], [b[1] - b[0], b[2] - b[0]]);
     let (na, nb) = (a[0].cross(a[1]), b[0].cross(b[1]));
     enters(a, b, nb) || enters(b, a, na)
 }
 
-/// Whether a direction of the cone spanned by `a` that lies in the plane of `b` (normal `nb`) lies in its cone.
+/// Whether a direction in the cone of `a` and in the plane of `b` (normal `nb`) lies in the cone of `b`.
 fn enters(a: [DVec3; 2], b: [DVec3; 2], nb: DVec3) -> bool {
-    let limit = |d: DVec3| IN_PLANE * d.length() * nb.length();
+    let limit = |d: DVec3| PLANE_TOLERANCE * d.length() * nb.length();
     let height = a.map(|d| nb.dot(d));
     let flat = [0, 1].map(|k| height[k].abs() <= limit(a[k]));
     if (0..2).any(|k| flat[k] && is_in_cone(a[k], b, nb)) {
@@ -199,20 +198,20 @@ fn enters(a: [DVec3; 2], b: [DVec3; 2], nb: DVec3) -> bool {
     is_in_cone(crossing, b, nb)
 }
 
-/// Whether a direction in the plane of the cone lies in it or on its rim.
+/// Whether a direction in the plane of a cone lies in it or on its boundary.
 fn is_in_cone(d: DVec3, b: [DVec3; 2], nb: DVec3) -> bool {
-    let limit = -IN_PLANE * d.length() * nb.length();
+    let limit = -PLANE_TOLERANCE * d.length() * nb.length();
     nb.dot(b[0].cross(d)) >= limit * b[0].length() && nb.dot(d.cross(b[1])) >= limit * b[1].length()
 }
 
-/// Whether two faces with the common edge `p`-`q` lie on each other.
+/// Whether two faces with the common edge `p`-`q` are folded onto each other.
 fn is_folded(p: DVec3, q: DVec3, tips: [DVec3; 2]) -> bool {
     let along = (q - p).normalize_or_zero();
     let [u, w] = tips.map(|tip| {
         let d = tip - p;
         (d - along * along.dot(d)).normalize_or_zero()
     });
-    u.dot(w) > FOLDED
+    u.dot(w) > MAX_FOLD_COSINE
 }
 
 #[cfg(test)]
@@ -228,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_ascend_as_numbers_do() {
+    fn sort_keys_order_like_numbers() {
         let numbers =
             [f64::NEG_INFINITY, -2.5, -2.0, -1e-300, -0.0, 0.0, 1e-300, 0.1, 7.0, 7.5, f64::INFINITY];
         let keys = numbers.iter().flat_map(|&x| [ascending(x, 3), ascending(x, 4)]);
@@ -238,7 +237,7 @@ mod tests {
     const FLOOR: [DVec3; 3] = [DVec3::ZERO, DVec3::new(4.0, 0.0, 0.0), DVec3::new(0.0, 4.0, 0.0)];
 
     #[test]
-    fn strangers_meet_when_they_cross_touch_or_come_too_near() {
+    fn triangles_without_common_vertices_meet_within_the_gap() {
         let floor = t([0, 1, 2], FLOOR);
         let above = |z: f64| t([3, 4, 5], [v(1.0, 1.0, z), v(2.0, 1.0, z), v(1.0, 2.0, z + 1.0)]);
         assert!(meet(&floor, &above(-0.5), 0.0), "crosses");
@@ -246,23 +245,23 @@ mod tests {
         assert!(!meet(&floor, &above(0.1), 0.0));
         assert!(meet(&floor, &above(0.1), 0.2), "nearer than the gap");
         let beside = t([3, 4, 5], [v(3.0, 3.0, 0.0), v(5.0, 3.0, 0.0), v(3.0, 5.0, 0.0)]);
-        assert!(!meet(&floor, &beside, 0.0), "in one plane, side by side");
+        assert!(!meet(&floor, &beside, 0.0), "coplanar, side by side");
         let inside = t([3, 4, 5], [v(1.0, 1.0, 0.0), v(1.5, 1.0, 0.0), v(1.0, 1.5, 0.0)]);
-        assert!(meet(&floor, &inside, 0.0), "in one plane, on each other");
+        assert!(meet(&floor, &inside, 0.0), "coplanar, overlapping");
     }
 
     #[test]
-    fn triangles_with_a_common_vertex_meet_only_when_their_cones_do() {
+    fn triangles_with_a_common_vertex_meet_if_their_cones_do() {
         let floor = t([0, 1, 2], FLOOR);
         let fan = |p: DVec3, q: DVec3| t([0, 3, 4], [DVec3::ZERO, p, q]);
-        assert!(!meet(&floor, &fan(v(-1.0, 0.0, 0.0), v(0.0, -1.0, 0.0)), 1.0), "across, in one plane");
-        assert!(meet(&floor, &fan(v(1.0, 1.0, 0.0), v(1.0, 2.0, 0.0)), 0.0), "on it");
-        assert!(meet(&floor, &fan(v(1.0, 1.0, 1.0), v(1.0, 1.0, -1.0)), 0.0), "through it");
+        assert!(!meet(&floor, &fan(v(-1.0, 0.0, 0.0), v(0.0, -1.0, 0.0)), 1.0), "opposite, coplanar");
+        assert!(meet(&floor, &fan(v(1.0, 1.0, 0.0), v(1.0, 2.0, 0.0)), 0.0), "overlapping, coplanar");
+        assert!(meet(&floor, &fan(v(1.0, 1.0, 1.0), v(1.0, 1.0, -1.0)), 0.0), "crossing");
         assert!(
             !meet(&floor, &fan(v(-1.0, -1.0, 1.0), v(-1.0, -1.0, -1.0)), 0.0),
-            "through its plane elsewhere"
+            "crossing its plane outside the triangle"
         );
-        assert!(!meet(&floor, &fan(v(1.0, 1.0, 1.0), v(1.0, 2.0, 1.0)), 0.0), "above it");
+        assert!(!meet(&floor, &fan(v(1.0, 1.0, 1.0), v(1.0, 2.0, 1.0)), 0.0), "above");
     }
 
     #[test]

@@ -1,10 +1,10 @@
-//! Controls: what the columns of the weights are, and which values they have on the boundary.
+//! Controls: the columns of the weights and their boundary values.
 //!
-//! *Controls* are the columns: each has a rest position `c_j` and is moved by the user. The *surface* is the closed polygon
-//! mesh on which values are prescribed, where grid lines and rays end: vertices `s_k`. The *rows* are a matrix B,
-//! `[n_surface, n_controls]`, not negative, each row summing to 1: control j has the value `sum_k hat_k B_kj` at a point of
-//! the surface, where `hat_k` are the values of [`Cage::hats_at`]. Weights reproduce a place, `sum_j w_j c_j = x`, wherever
-//! `s_k = sum_j B_kj c_j`. For a plain cage the controls are the surface's vertices and B is the identity.
+//! Each *control* is a column, with a rest position `c_j`, that the user moves. The *surface* is the closed polygon
+//! mesh on which values are prescribed and where grid lines and rays end; its vertices are `s_k`. The *rows* are a
+//! matrix B, `[n_surface, n_controls]`, non-negative with row sums 1: at a point of the surface, control j has the
+//! value `sum_k hat_k B_kj` with the hats of [`Cage::hats_at`]. Weights reproduce positions, `sum_j w_j c_j = x`,
+//! wherever `s_k = sum_j B_kj c_j`. For a plain cage the controls are the surface's vertices and B is the identity.
 
 mod inner;
 mod set;
@@ -24,9 +24,9 @@ pub struct Controls<'a> {
     cage: &'a Cage,
     rest: &'a [Vec3],
     surface: &'a Cage,
-    /// None for the identity.
+    /// B; `None` for the identity.
     rows: Option<&'a Weights>,
-    /// The face of the cage that each face of the surface is part of, none for a wall inside; or none where all are the cage's own.
+    /// Cage face of each face of the surface, `None` for an inner wall; the whole is `None` if the surface is the cage.
     origins: Option<&'a [Option<u32>]>,
     set: Option<&'a ControlSet>,
 }
@@ -39,7 +39,7 @@ impl<'a> From<&'a Cage> for Controls<'a> {
 }
 
 impl<'a> Controls<'a> {
-    /// The same, to be kept.
+    /// An owned copy.
     #[must_use]
     pub fn to_set(&self) -> ControlSet {
         self.set.cloned().unwrap_or_else(|| ControlSet::plain(self.cage))
@@ -75,13 +75,13 @@ impl<'a> Controls<'a> {
         self.set.map_or(0, ControlSet::smooth)
     }
 
-    /// Controls inside, if there are any.
+    /// Inner controls, if any.
     #[must_use]
     pub fn inner(&self) -> Option<&'a InnerControls> {
         self.set.map(ControlSet::inner).filter(|inner| !inner.positions.is_empty())
     }
 
-    /// Edges of the controls inside, and three from each of them to the cage beside it, so that none is alone.
+    /// Edges of the inner controls, plus three from each of them to the nearest cage triangle, so that all are connected.
     #[must_use]
     pub fn inner_edges(&self) -> Vec<[u32; 2]> {
         let Some(inner) = self.inner() else { return Vec::new() };
@@ -98,17 +98,17 @@ impl<'a> Controls<'a> {
         edges
     }
 
-    /// The face of the cage that a face of the surface is part of; none for a wall inside.
+    /// Cage face of a face of the surface; `None` for an inner wall.
     #[must_use]
     pub fn cage_face(&self, face: u32) -> Option<u32> {
         self.origins.map_or(Some(face), |origins| origins[face as usize])
     }
 
     /// Dirichlet values at a point of the surface, given by one of its triangles and barycentric coordinates in it. Calls
-    /// `each(control, value)` for values that are not zero, a control perhaps several times: they add up. They sum to 1.
+    /// `each(control, value)` for non-zero values, possibly several times per control. All values sum to 1.
     ///
     /// # Panics
-    /// If there is no such triangle.
+    /// If the triangle does not exist.
     #[inline]
     pub fn values_at(&self, triangle: u32, barycentric: [f64; 3], each: &mut dyn FnMut(u32, f64)) {
         let Some(rows) = self.rows else { return self.surface.hats_at(triangle, barycentric, each) };
@@ -130,8 +130,8 @@ mod tests {
     use crate::options::BindOptions;
     use crate::progress::Silent;
 
-    /// f32 rounding of weights and of what the solver leaves.
-    const ROUNDED: f32 = 2e-5;
+    /// f32 rounding of weights, and the solver's tolerance.
+    const ROUNDING: f32 = 2e-5;
 
     /// Trilinear coordinates of a point in the unit cube: 8 corners, x fastest.
     fn trilinear(p: Vec3) -> [f32; 8] {
@@ -140,8 +140,8 @@ mod tests {
         })
     }
 
-    /// A box cut into 27 boxes whose surface takes the values of the box's eight corners, by rows of B: the harmonic function
-    /// with these values is the trilinear one, whose values on the small quads are bilinear as their hats are.
+    /// A box divided into 27 boxes, whose surface takes the values of the box's eight corners by rows of B. The
+    /// harmonic function with these values is trilinear, and bilinear on the small quads as their hats are.
     #[test]
     fn rows_mix_the_values_of_the_surface() {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
@@ -172,12 +172,12 @@ mod tests {
         let options = BindOptions { grid: 16, tau: 1e-7, ..BindOptions::default() };
         let binding = bind(&points, controls, &options, &Silent).unwrap();
         assert_eq!(binding.weights.n_columns(), 8);
-        assert!(binding.report.raw_error.point_rel.max < f64::from(ROUNDED));
+        assert!(binding.report.raw_error.point_rel.max < f64::from(ROUNDING));
         for (v, p) in points.iter().enumerate() {
             let (columns, weights) = binding.weights.row(v);
             for (c, expected) in trilinear(*p).into_iter().enumerate() {
                 let w = columns.iter().position(|&k| k as usize == c).map_or(0.0, |k| weights[k]);
-                assert!((w - expected).abs() < ROUNDED, "vertex {v}, control {c}: {w}, not {expected}");
+                assert!((w - expected).abs() < ROUNDING, "vertex {v}, control {c}: {w}, not {expected}");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Faces of a mesh that go through each other: where, and in a sentence. A bind says so, and so does a check of a cage.
+//! Self-intersections of a mesh: locations, and messages for binds and checks.
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -10,40 +10,40 @@ use crate::contact::{Corners, each_meeting};
 use crate::mesh::PolygonMesh;
 use crate::words::{counted, grouped};
 
-/// Most places that are listed of each kind; a count is the full number.
+/// Limit on the locations that are listed of each kind; counts are complete.
 pub const MAX_PLACES: usize = 2000;
 
-/// Vertices nearer than this fraction of the diagonal are at one place: the rounding of six decimals in a file.
+/// Distance over the diagonal up to which vertices have the same position: rounding to six decimals in a file.
 const WELD_DISTANCE: f64 = 2e-6;
 
-/// Faces that go through each other.
+/// Intersecting faces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crossings {
     /// The faces, ascending.
     pub faces: Vec<u32>,
-    /// Where pairs of their triangles meet, object units; up to [`MAX_PLACES`].
+    /// Locations of intersecting pairs of triangles, object units; at most [`MAX_PLACES`].
     pub points: Vec<[f32; 3]>,
-    /// Pairs of triangles.
+    /// Number of intersecting pairs of triangles.
     pub count: usize,
-    /// A sentence.
+    /// Description, one sentence.
     pub message: String,
 }
 
-/// What a user should know of a cage that is bound, a sentence each: what was mended, and where it goes through itself.
+/// Notices about a cage, one sentence each: repairs and self-intersections.
 #[must_use]
 pub fn notices(cage: &Cage) -> Vec<String> {
     let crossing = crossings_of(cage).map(|found| found.message);
     cage.notices().iter().map(ToString::to_string).chain(crossing).collect()
 }
 
-/// Faces of a cage that go through each other.
+/// Intersecting faces of a cage.
 #[must_use]
 pub fn crossings_of(cage: &Cage) -> Option<Crossings> {
     let all: Vec<u32> = (0..cage.faces().len() as u32).collect();
     crossings(&cage.to_polygon_mesh(), Some(cage.component_of_face()), &all)
 }
 
-/// Faces among `sound` ones that go through each other; `parts`: the part of each face of a cage.
+/// Intersecting faces among the valid faces `sound`. `parts`: component of each face of a cage.
 #[must_use]
 pub fn crossings(mesh: &PolygonMesh, parts: Option<&[u32]>, sound: &[u32]) -> Option<Crossings> {
     let mut of_parts = parts.is_some();
@@ -62,7 +62,7 @@ pub fn crossings(mesh: &PolygonMesh, parts: Option<&[u32]>, sound: &[u32]) -> Op
         ControlFlow::Continue(())
     });
     pairs.sort_unstable();
-    // A search that ended early and found nothing says nothing.
+    // No pair found, possibly because the search reached its limit: report nothing.
     let first = *pairs.first()?;
     let mut faces: Vec<u32> = pairs.iter().flatten().map(|&t| face_of[t as usize]).collect();
     faces.sort_unstable();
@@ -78,7 +78,7 @@ pub fn crossings(mesh: &PolygonMesh, parts: Option<&[u32]>, sound: &[u32]) -> Op
     })
 }
 
-/// Sound faces as triangles with the face that each was cut from.
+/// Triangulation of the valid faces, with the face of each triangle.
 fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
     let diagonal = mesh.diagonal();
     let (mut triangles, mut face_of) = (Vec::new(), Vec::new());
@@ -91,8 +91,8 @@ fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
             face_of.push(f);
         }
     }
-    // Vertices at one place count as one, so that neighbours across a seam do not seem to meet; but not the corners of one
-    // triangle, as where the mesh is that small against its diagonal.
+    // Identify vertices at the same position, so that neighbours across a seam do not count as intersecting. Do not
+    // identify the corners of one triangle, in parts that are tiny against the diagonal.
     let (mut first, _) = same_places(mesh);
     for Corners { index, .. } in &triangles {
         let named = index.map(|i| first[i as usize]);
@@ -108,12 +108,12 @@ fn triangles(mesh: &PolygonMesh, sound: &[u32]) -> (Vec<Corners>, Vec<u32>) {
     (triangles, face_of)
 }
 
-/// A point near where two triangles meet: the middle of where their boxes overlap.
+/// A point near the intersection of two triangles: the centre of their boxes' overlap.
 fn between(a: &Corners, b: &Corners) -> DVec3 {
     0.5 * (a.min().max(b.min()) + a.max().min(b.max()))
 }
 
-/// For each vertex the first one at the same place, and how many have an earlier one.
+/// First vertex at the position of each vertex, and the number of vertices that have an earlier one.
 #[must_use]
 pub fn same_places(mesh: &PolygonMesh) -> (Vec<u32>, usize) {
     let reach = WELD_DISTANCE * mesh.diagonal();
@@ -129,7 +129,7 @@ pub fn same_places(mesh: &PolygonMesh) -> (Vec<u32>, usize) {
         let cell = (p / size).floor().to_array().map(|x| x as i64);
         let mut found = None;
         for k in 0..27 {
-            // Coordinates of a mesh without extent saturate: they may wrap, equal places still meet.
+            // Keys of a mesh without extent saturate and may wrap; equal positions still get equal keys.
             let key = [0, 1, 2].map(|a| cell[a].wrapping_add(k / [1, 3, 9][a] % 3 - 1));
             let near = at_place.get(&key).into_iter().flatten();
             for &w in near {
@@ -149,7 +149,8 @@ pub fn same_places(mesh: &PolygonMesh) -> (Vec<u32>, usize) {
     (first, joined)
 }
 
-/// Pairs of triangles meet: so many are listed, so many there are (at least, if not `complete`); the first one's faces and where.
+/// Message. `listed`: pairs in the list; `all`: pairs found, a lower bound unless `complete`; then faces and location
+/// of the first pair.
 fn sentence(
     [listed, all]: [usize; 2],
     complete: bool,
@@ -170,7 +171,7 @@ fn sentence(
     } else {
         (
             "The cage goes through itself",
-            "What it encloses twice counts as inside; move their vertices apart.",
+            "Space that it encloses twice counts as inside; move the vertices apart.",
         )
     };
     format!("{what}: {listed} meet{more}, the first of faces {f} and {g} near {at:?}. {then}")

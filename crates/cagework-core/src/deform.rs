@@ -1,4 +1,4 @@
-//! Deformation: `v' = sum_i w_i(v) c_i'`, and normals of the result.
+//! Deformation, `v' = sum_i w_i(v) c_i'`, and normals.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -13,13 +13,14 @@ use crate::words::{counted, grouped};
 pub struct OutsideVertex {
     /// Mesh vertex.
     pub vertex: u32,
-    /// How far it is from the cage, object units.
+    /// Distance from the cage, object units.
     pub distance: f32,
-    /// How much of the cage's motion it follows: 1 near the cage, 0 where it stays.
+    /// Share of the cage's motion that it follows: 1 near the cage, 0 if it stays in place.
     pub share: f32,
 }
 
-/// How many vertices are outside a cage of this diagonal (object units), how far, and how many stay; nothing if there are none.
+/// One sentence on the vertices outside a cage with this diagonal (object units): number, distance, and how many stay
+/// in place. `None` if `outside` is empty.
 #[must_use]
 pub fn outside_in_words<'a>(
     outside: impl Iterator<Item = &'a OutsideVertex>,
@@ -52,7 +53,7 @@ pub fn outside_in_words<'a>(
 /// `cage_positions`: `[n_cage]`, object units. Returns `[n_rows]`.
 ///
 /// # Panics
-/// If `cage_positions` has not one position per column.
+/// If `cage_positions` does not have one position per column.
 #[must_use]
 pub fn deform_vertices(weights: &Weights, cage_positions: &[Vec3]) -> Vec<Vec3> {
     assert_eq!(cage_positions.len(), weights.n_columns(), "one position per column");
@@ -72,14 +73,14 @@ pub fn deform_vertices(weights: &Weights, cage_positions: &[Vec3]) -> Vec<Vec3> 
 /// `controls`: `[n_controls]`, object units. Returns `[n_rows]`.
 ///
 /// # Panics
-/// If there is not one position per control.
+/// If `controls` does not have one position per control.
 #[must_use]
 pub fn deform_bound(weights: &Weights, frames: &Frames, controls: &[Vec3]) -> Vec<Vec3> {
     deform_vertices(weights, &frames.columns(controls))
 }
 
-/// How far each bound point moves with the controls: `sum_i w_i (c_i' - c_i)` over all columns. Exactly zero where nothing near has
-/// moved, which the difference of two deformed shapes is not.
+/// Displacement of each bound point: `sum_i w_i (c_i' - c_i)` over all columns. It is exactly zero if no control of the
+/// point has moved, unlike the difference of two deformed shapes.
 ///
 /// `rest`, `posed`: `[n_controls]`, object units. Returns `[n_rows]`.
 ///
@@ -96,7 +97,7 @@ pub fn displacements(weights: &Weights, frames: &Frames, rest: &[Vec3], posed: &
     weights.rows().map(of_row).collect()
 }
 
-/// Area-weighted unit vertex normals; a vertex of no triangle gets zero. `[n_vertices]`
+/// Area-weighted unit vertex normals; zero for a vertex without triangles. `[n_vertices]`
 #[must_use]
 pub fn vertex_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
     let mut normals = vec![Vec3::ZERO; positions.len()];
@@ -117,16 +118,16 @@ pub fn vertex_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
 mod tests {
     use super::*;
 
-    /// Rounding of rotated f32 positions of size 1.
-    const ROUNDED: f32 = 1e-6;
+    /// f32 rounding of rotated positions of size 1.
+    const ROUNDING: f32 = 1e-6;
 
     fn weights() -> Weights {
-        // The middle of an edge, and a corner.
+        // The midpoint of an edge, and a corner.
         Weights::new(3, vec![0, 2, 3], vec![0, 2, 1], vec![0.5, 0.5, 1.0]).unwrap()
     }
 
     #[test]
-    fn vertices_outside_are_counted_in_one_sentence() {
+    fn vertices_outside_are_summarised_in_a_sentence() {
         let at = |distance, share| OutsideVertex { vertex: 0, distance, share };
         let said = |outside: &[OutsideVertex]| outside_in_words(outside.iter(), 4.0);
         assert_eq!(said(&[]), None);
@@ -150,10 +151,10 @@ mod tests {
         positions.push(Vec3::splat(9.0));
         let normals = vertex_normals(&positions, cage.triangles());
         for (p, n) in positions[..8].iter().zip(&normals) {
-            // Two triangles of one face and one of another make a corner's sum lopsided, by a factor of 2 at most.
+            // Two triangles of one face and one of another tilt a corner's normal by a factor of at most 2.
             let away = (p - Vec3::splat(0.5)).normalize();
-            assert!((n.length() - 1.0).abs() <= ROUNDED && n.dot(away) > 0.9, "{n} at {p}");
+            assert!((n.length() - 1.0).abs() <= ROUNDING && n.dot(away) > 0.9, "{n} at {p}");
         }
-        assert_eq!(normals[8], Vec3::ZERO, "a vertex of no triangle has no normal");
+        assert_eq!(normals[8], Vec3::ZERO, "a vertex without triangles has no normal");
     }
 }

@@ -1,8 +1,8 @@
-//! Dynamic binding (Joshi et al. 2007): the skeleton moves the model first, and the cage bends what has moved.
+//! Dynamic binding (Joshi et al. 2007): the skeleton moves the model first, then the cage deforms the result.
 //!
-//! Coordinates are then needed wherever a vertex comes by. A pose of the cage is one vector field, so that is what is kept: on a
-//! lattice around the cage, interpolated linearly between its nodes. Inside and close to the cage, a node moves as a vertex
-//! there would. Further out the field is smooth (Laplace's equation) and ends at the lattice's edge.
+//! Vertices may be anywhere, so displacements are needed at any point. The field of a pose is stored on a lattice
+//! around the cage and interpolated linearly. Nodes inside or near the cage are bound like vertices; further out the
+//! field solves Laplace's equation, with zero at the lattice's boundary.
 
 use glam::{UVec3, Vec3, Vec4};
 
@@ -12,13 +12,13 @@ use crate::frames::Frames;
 use crate::geometry::closest_point_on_triangle;
 use crate::weights::Weights;
 
-/// Cells along the longest side of the cage's box.
+/// Lattice cells along the longest side of the cage's box.
 const CELLS: u32 = 48;
-/// Cells on each side of it: where the field ends.
-const MARGIN: u32 = 16;
-/// Nodes that are bound are at most so many cells from the cage.
-const NEAR: u32 = 2;
-/// Strides of the lattices that the outer field is found on, each from the one before; and sweeps on each.
+/// Lattice cells on each side of the box.
+const MARGIN_CELLS: u32 = 16;
+/// Distance from the cage, in cells, up to which nodes are bound.
+const BOUND_CELLS: u32 = 2;
+/// Cascade that solves the outer field: strides of successively finer lattices, and Gauss-Seidel sweeps on each.
 const STRIDES: [(u32, usize); 4] = [(8, 40), (4, 12), (2, 8), (1, 8)];
 
 /// Nodes of a regular lattice around a cage, x fastest.
@@ -30,35 +30,36 @@ pub struct Lattice {
     pub cell: f32,
     /// Nodes along each axis.
     pub dims: UVec3,
-    /// Nodes inside the cage or `NEAR` cells from it, ascending.
+    /// Nodes inside the cage or within `BOUND_CELLS` cells of it, ascending.
     bound: Vec<u32>,
 }
 
 impl Lattice {
-    /// The lattice around a cage at rest.
+    /// The lattice around a cage in its rest pose.
     #[must_use]
     pub fn new(cage: &Cage) -> Self {
         let bounds = cage.bounds();
         let size = bounds.max - bounds.min;
         let cell = size.max_element() / CELLS as f32;
-        // Whole cells of the coarsest lattice.
-        let cells = (size / cell).ceil().as_uvec3() + 2 * MARGIN;
+        // A multiple of the coarsest stride.
+        let cells = (size / cell).ceil().as_uvec3() + 2 * MARGIN_CELLS;
         let dims = cells.map(|n| n.next_multiple_of(STRIDES[0].0)) + 1;
-        let mut lattice = Self { origin: bounds.min - MARGIN as f32 * cell, cell, dims, bound: Vec::new() };
+        let mut lattice =
+            Self { origin: bounds.min - MARGIN_CELLS as f32 * cell, cell, dims, bound: Vec::new() };
         lattice.bound = lattice.around(cage);
         lattice
     }
 
-    /// Nodes to be bound to the cage as a model's vertices are.
+    /// Positions of the nodes to bind to the cage.
     #[must_use]
     pub fn points(&self) -> Vec<Vec3> {
         self.bound.iter().map(|&index| self.origin + self.cell * self.node(index).as_vec3()).collect()
     }
 
-    /// All nodes that cannot be reached from the first without coming close to the cage.
+    /// Flood fill from the first node: returns the nodes it does not reach without coming near the cage.
     fn around(&self, cage: &Cage) -> Vec<u32> {
         let n = self.dims.element_product();
-        let (origin, cell, reach) = (self.origin.as_dvec3(), f64::from(self.cell), f64::from(NEAR));
+        let (origin, cell, reach) = (self.origin.as_dvec3(), f64::from(self.cell), f64::from(BOUND_CELLS));
         let mut is_near = vec![false; n as usize];
         for facet in 0..cage.facets().len() as u32 {
             let corners = cage.facet_corners(facet).map(|corner| (corner - origin) / cell);
@@ -95,7 +96,7 @@ impl Lattice {
         (0..n).filter(|&index| is_bound[index as usize]).collect()
     }
 
-    /// Distance of two neighbours along an axis in the list.
+    /// Index difference of neighbours along an axis.
     fn stride_of(&self, axis: usize) -> usize {
         self.dims.to_array()[..axis].iter().product::<u32>() as usize
     }
@@ -109,12 +110,12 @@ impl Lattice {
     }
 }
 
-/// How far a pose of the cage moves each place.
+/// Displacement field of a pose, in space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DisplacementField {
-    /// Its nodes.
+    /// The lattice of its nodes.
     pub lattice: Lattice,
-    /// Object units; the fourth is 0. `[dims.z, dims.y, dims.x]`
+    /// Displacements, object units; the fourth component is 0. `[dims.z, dims.y, dims.x]`
     pub values: Vec<Vec4>,
 }
 
@@ -122,7 +123,7 @@ impl DisplacementField {
     /// The field of a pose. `weights`, `frames`: of [`Lattice::points`]; `rest`, `posed`: `[n_cage]`, object units.
     ///
     /// # Panics
-    /// If there is not one row per point, or one position per column.
+    /// If `weights` does not have one row per point, or the lengths do not match its columns.
     #[must_use]
     pub fn new(lattice: Lattice, weights: &Weights, frames: &Frames, rest: &[Vec3], posed: &[Vec3]) -> Self {
         let by = displacements(weights, frames, rest, posed);
@@ -144,12 +145,12 @@ impl DisplacementField {
         field
     }
 
-    /// Free nodes that the lattice of twice the stride lacks get the mean of their two neighbours in it, one axis at a time.
+    /// Interpolates the free nodes that the lattice of twice the stride lacks, as means of two neighbours, axis by axis.
     fn interpolate(&mut self, is_free: &[bool], stride: u32) {
         let at = |axis: usize, from: u32, step: u32| (from..self.lattice.dims[axis]).step_by(step as usize);
         for axis in 0..3 {
             let step = stride as usize * self.lattice.stride_of(axis);
-            // Axes before this one have all their nodes by now.
+            // Along earlier axes all nodes of this stride are already set.
             let steps = [0, 1, 2].map(|other| if other < axis { stride } else { 2 * stride });
             for z in at(2, if axis == 2 { stride } else { 0 }, steps[2]) {
                 for y in at(1, if axis == 1 { stride } else { 0 }, steps[1]) {
@@ -164,7 +165,7 @@ impl DisplacementField {
         }
     }
 
-    /// One Gauss-Seidel sweep of the free nodes of a stride; those on the lattice's edge stay 0.
+    /// A Gauss-Seidel sweep over the free nodes of a stride; boundary nodes stay 0.
     fn relax(&mut self, is_free: &[bool], stride: u32) {
         let dims = self.lattice.dims;
         let steps = [0, 1, 2].map(|axis| stride as usize * self.lattice.stride_of(axis));
@@ -183,7 +184,7 @@ impl DisplacementField {
     }
 }
 
-/// Moves points by the field, in place: trilinear between its nodes, nothing beyond them.
+/// Displaces points by the field, in place: trilinear interpolation, zero outside the lattice.
 pub fn bend_vertices(field: &DisplacementField, positions: &mut [Vec3]) {
     let DisplacementField { lattice, values } = field;
     let last = (lattice.dims - 2).as_vec3();

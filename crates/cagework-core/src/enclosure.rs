@@ -1,7 +1,7 @@
-//! Which points a cage encloses, kept up to date while the cage is dragged.
+//! Which points a cage encloses, updated incrementally while the cage is dragged.
 //!
-//! The winding number of a point is a sum over the cage's triangles, so when a few vertices move, only the terms of
-//! their triangles change; and a point that lies outside the box of where those triangles were and are keeps its sum.
+//! A winding number is a sum over the cage's triangles. When a few vertices move, only the terms of their triangles
+//! change, and only for points inside the bounding box of those triangles before and after.
 
 mod columns;
 
@@ -11,10 +11,10 @@ use self::columns::Columns;
 use crate::cage::Cage;
 use crate::mesh::Bounds;
 
-/// A point with a winding number above this is inside. Whole numbers are expected; on the surface it is in between.
-const INSIDE: f64 = 0.5;
+/// Winding number above which a point is inside. It is an integer off the surface, and in between on it.
+const MIN_INSIDE_WINDING: f64 = 0.5;
 
-/// Points and a cage, with the winding number of every point.
+/// Winding numbers of points with respect to a cage.
 #[derive(Clone, Debug)]
 pub struct Enclosure {
     points: Vec<Vec3>,
@@ -23,7 +23,7 @@ pub struct Enclosure {
 }
 
 impl Enclosure {
-    /// Finds the winding numbers of all points.
+    /// Computes the winding numbers of all points.
     #[must_use]
     pub fn new(cage: &Cage, points: &[Vec3]) -> Self {
         let corners: Vec<[DVec3; 3]> =
@@ -34,15 +34,15 @@ impl Enclosure {
         Self { points: points.to_vec(), cage: cage.clone(), winding }
     }
 
-    /// Points that are not inside the cage as it was given, ascending.
+    /// Points outside the cage in its rest pose, ascending.
     #[must_use]
     pub fn outside(&self) -> Vec<u32> {
-        let outside = self.winding.iter().enumerate().filter(|(_, w)| **w <= INSIDE);
+        let outside = self.winding.iter().enumerate().filter(|(_, w)| **w <= MIN_INSIDE_WINDING);
         outside.map(|(v, _)| v as u32).collect()
     }
 
-    /// Points that are not inside the cage with its vertices moved to `positions` (`[n_cage]`, object units),
-    /// ascending. The fewer vertices have moved, the faster.
+    /// Points outside the cage with its vertices at `positions` (`[n_cage]`, object units), ascending. Time is
+    /// proportional to the number of triangles that have changed.
     ///
     /// # Panics
     /// If there are fewer positions than cage vertices.
@@ -65,7 +65,7 @@ impl Enclosure {
             } else {
                 rest
             };
-            if winding <= INSIDE {
+            if winding <= MIN_INSIDE_WINDING {
                 outside.push(v as u32);
             }
         }
@@ -73,8 +73,8 @@ impl Enclosure {
     }
 }
 
-/// The sum of [`crate::geometry::winding_number`] with one arc tangent in all: half solid angles are angles of complex
-/// numbers, whose product has the angle of their sum; full turns are counted on the way.
+/// [`crate::geometry::winding_number`] with a single arc tangent: half solid angles are arguments of complex numbers,
+/// whose product has their sum as argument. Full turns are counted separately.
 #[must_use]
 pub fn winding_number(point: DVec3, triangles: &[[DVec3; 3]]) -> f64 {
     let (mut re, mut im) = (1.0_f64, 0.0_f64);
@@ -90,7 +90,7 @@ pub fn winding_number(point: DVec3, triangles: &[[DVec3; 3]]) -> f64 {
         }
         let (x, y) = (x / size, y / size);
         let product = (re * x - im * y, re * y + im * x);
-        // Two angles of one sign may add up to more than half a turn; the product's sign then differs.
+        // The sum of two angles of equal sign may exceed half a turn, which changes the product's sign.
         if im >= 0.0 && y >= 0.0 && product.1 < 0.0 {
             turns += 1;
         } else if im < 0.0 && y < 0.0 && product.1 >= 0.0 {
@@ -110,7 +110,7 @@ mod tests {
     use crate::geometry;
     use crate::mesh::PolygonMesh;
 
-    /// Sums of a few hundred angles in f64.
+    /// f64 rounding of sums of a few hundred angles.
     const ROUNDING: f64 = 1e-9;
 
     fn box_cage() -> Cage {
@@ -118,7 +118,7 @@ mod tests {
         Cage::new(&subdivided_box(bounds, 0.0, [3, 3, 3])).unwrap()
     }
 
-    /// Points in and around the box, on no face of it.
+    /// Points in and around the box, none on its surface.
     fn points() -> Vec<Vec3> {
         let steps = || (-7..=7).map(|k| 0.19 * k as f32 + 0.013);
         steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| Vec3::new(x, y, z)))).collect()
@@ -134,18 +134,18 @@ mod tests {
             let expected = geometry::winding_number(p, triangles.iter().copied());
             let actual = winding_number(p, &triangles);
             assert!((actual - expected).abs() < ROUNDING, "{p}: {actual} instead of {expected}");
-            // An open part of it, whose winding number is no whole number.
+            // Part of it, open, whose winding number is not an integer.
             let expected = geometry::winding_number(p, triangles[..20].iter().copied());
             let actual = winding_number(p, &triangles[..20]);
             assert!((actual - expected).abs() < ROUNDING, "{p}: {actual} instead of {expected}");
         }
     }
 
-    /// A model of 200,000 vertices kept the page from answering for 0.7 s, as each point was seen from every triangle.
+    /// The column method equals the sum over all triangles.
     #[test]
-    fn lines_that_leave_are_the_sum_of_angles() {
+    fn ray_crossings_equal_the_sum_of_angles() {
         let cage = box_cage();
-        // Turned, twisted and bent inwards, so that lines leave it more than once.
+        // Rotated, twisted and dented, so that lines leave it more than once.
         let bend =
             |p: &Vec3| glam::Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.2 + p.y, 0.5) * (*p * p.length());
         let bent =
@@ -155,7 +155,7 @@ mod tests {
                 (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t)).collect();
             let columns = Columns::new(&triangles);
             let (mut inside, mut left) = (0, 0);
-            // Below and above each vertex and on it, where lines pass edges and points lie on faces, too.
+            // Points below, above and on each vertex: lines pass edges, and points lie on faces.
             let around = cage.positions().iter().flat_map(|p| [-0.4, 0.0, 0.4].map(|z| *p + z * Vec3::Z));
             for p in points().into_iter().chain(around) {
                 let expected = winding_number(p.as_dvec3(), &triangles);
@@ -165,14 +165,14 @@ mod tests {
                     }
                     None => left += 1,
                 }
-                inside += u32::from(expected > INSIDE);
+                inside += u32::from(expected > MIN_INSIDE_WINDING);
             }
             assert!(inside > 100 && left >= cage.n_vertices() as u32 && left < 500, "{inside}, {left}");
         }
     }
 
     #[test]
-    fn dragging_finds_the_same_points_as_starting_anew() {
+    fn incremental_update_equals_recomputation() {
         let cage = box_cage();
         let enclosure = Enclosure::new(&cage, &points());
         let inside = |p: &Vec3| p.abs().max_element() < 1.0;
@@ -182,7 +182,7 @@ mod tests {
         posed[0] += Vec3::splat(0.7);
         posed[5] *= 1.4;
         let moved = Cage::new(&PolygonMesh { positions: posed.clone(), ..cage.to_polygon_mesh() });
-        // The same triangles: a moved quad might be cut along its other diagonal.
+        // Comparable only with the same triangles: a moved quad may be cut along its other diagonal.
         let moved = moved.unwrap();
         if moved.triangles() == cage.triangles() {
             assert_eq!(enclosure.outside_of(&posed), Enclosure::new(&moved, &points()).outside());

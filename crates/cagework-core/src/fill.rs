@@ -1,15 +1,15 @@
-//! Holes: their outlines, and triangles that close them.
+//! Holes: boundary loops and their triangulation.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use glam::DVec3;
 
-/// Most edges of a hole that is filled: the best triangulation takes the cube of it, and larger ones are no accident.
+/// Most edges of a hole that is filled. Triangulation costs the cube of it, and larger holes are usually intended.
 const MAX_EDGES: usize = 64;
 
-/// Closed outlines made of edges, each run through as most of its edges are; edges that lead nowhere are left out.
+/// Closed loops of edges, each directed like the majority of its edges. Ignores edges that are not part of a loop.
 pub fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
-    // Both ways: a face next to the hole may be turned the wrong way.
+    // Undirected: a face next to the hole may be inverted.
     let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for &[from, to] in edges {
         next.entry(from).or_default().push(to);
@@ -29,7 +29,7 @@ pub fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
                     back.swap_remove(k);
                 }
                 if let Some(k) = path.iter().position(|&v| v == to) {
-                    // Where holes touch in a vertex, the path closes early: cut the loop off and go on.
+                    // Holes that touch in a vertex close the path early: split the loop off and continue.
                     found.push(path.split_off(k));
                 }
                 path.push(to);
@@ -48,17 +48,17 @@ pub fn loops(edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
     found
 }
 
-/// A triangle that folds back onto the face behind one of its sides counts as so much more area, for each such side.
-/// Around a missing corner of a cube both ways to cut the hole have the same area, and one lies on the faces that stay.
-const FOLD: f64 = 1.0;
+/// Cost of a triangle that folds back onto the face behind one of its sides, as a multiple of its area, per such side. It decides
+/// between cuts of equal area: around a missing corner of a cube, one of the two lies on the remaining faces.
+const FOLD_COST: f64 = 1.0;
 
-/// Cosine of the angle between two faces above which they lie on each other: 8 degrees.
-const FOLDED: f64 = 0.99;
+/// Cosine of the angle between two faces above which they are folded onto each other (8 degrees).
+const MAX_FOLD_COSINE: f64 = 0.99;
 
-/// Triangles of the smallest total area between the corners of an outline, turned like it; they keep off `faces`, those
-/// around the hole. `None` if the outline has too many corners.
+/// Minimum-area triangulation of an outline with its orientation, which avoids folding onto `faces`, those around the
+/// hole. `None` if the outline has too many corners.
 ///
-/// Source: Barequet, Sharir 1995, "Filling gaps in the boundary of a polyhedron" (dynamic programming).
+/// Source: Barequet and Sharir 1995, "Filling gaps in the boundary of a polyhedron" (dynamic programming).
 pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<Vec<[u32; 3]>> {
     let n = outline.len();
     if !(3..=MAX_EDGES).contains(&n) {
@@ -69,7 +69,7 @@ pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<
     let folds = |side: usize, opposite: usize| {
         let (from, to) = (p(side), p((side + 1) % n));
         let across = (p(opposite) - from).reject_from((to - from).normalize_or(DVec3::X));
-        f64::from(u8::from(across.normalize_or_zero().dot(behind[side]) > FOLDED))
+        f64::from(u8::from(across.normalize_or_zero().dot(behind[side]) > MAX_FOLD_COSINE))
     };
     let mut cost = vec![vec![0.0_f64; n]; n];
     let mut split = vec![vec![0; n]; n];
@@ -87,7 +87,7 @@ pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<
                         folded += folds(side, opposite);
                     }
                 }
-                let total = cost[i][m] + cost[m][k] + area * (1.0 + FOLD * folded);
+                let total = cost[i][m] + cost[m][k] + area * (1.0 + FOLD_COST * folded);
                 if total < cost[i][k] {
                     cost[i][k] = total;
                     split[i][k] = m;
@@ -108,7 +108,8 @@ pub fn triangulate(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Option<
     Some(triangles)
 }
 
-/// For each side of an outline the direction from it across the face behind it, as far as there is one. Unit or zero.
+/// For each side of an outline, the direction across its neighbouring face, away from the side. Unit, or zero without
+/// such a face.
 fn behind(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Vec<DVec3> {
     let n = outline.len();
     let key = |a: u32, b: u32| [a.min(b), a.max(b)];
@@ -121,7 +122,7 @@ fn behind(outline: &[u32], at: &[DVec3], faces: &[Vec<u32>]) -> Vec<DVec3> {
             let Some(&side) = sides.get(&key(a, b)) else { continue };
             let point = |i: u32| at.get(i as usize).copied().unwrap_or_default();
             let corners = face.iter().zip(face.iter().cycle().skip(1));
-            // Newell's normal; whichever way the face is turned, its own sides run around it.
+            // Newell's normal; independent of the face's orientation, since its own sides run around it.
             let normal: DVec3 =
                 corners.map(|(&c, &d)| (point(c) - point(a)).cross(point(d) - point(a))).sum();
             across[side] = normal.cross(point(b) - point(a)).normalize_or_zero();

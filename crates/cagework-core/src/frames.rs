@@ -1,14 +1,15 @@
-//! Offsets that posed controls carry: what keeps vertices in place where their weights alone do not.
+//! Frames: posed columns that carry offsets, which compensate what weights alone do not reproduce.
 //!
-//! A vertex moves to `sum_i w_i c_i' + sum_f x_f e_f'`. The columns `e_f'` follow from the posed controls: first the three unit
-//! vectors, whose entries `x` are an offset that never turns; then the columns of the matrix of the affine map that is nearest to the
-//! motion of the whole cage (least squares over its vertices); then those of the matrix of each *hold*. Entries of matrices are a share
-//! of the vertex's rest vector `d = x - sum_i w_i c_i`.
+//! A vertex moves to `sum_i w_i c_i' + sum_f x_f e_f'`. The columns `e_f'` are computed from the posed controls. The
+//! first three are the unit vectors, whose entries `x` are a constant offset. The next three are the columns of the
+//! affine map nearest to the motion of the whole cage (least squares over its vertices). Three follow for each *hold*.
+//! Entries of a matrix are a share of the vertex's rest vector `d = x - sum_i w_i c_i`.
 //!
-//! A hold is a joint (a point inside the cage, or a corner of a polyline) with one of its bones, or alone. Its matrix is `R F`.
-//! `F = sum_j c_j' grad w_j`, by the coordinates of the cage without controls inside, is the motion of the cage at the joint. `R`
-//! belongs to the bone: the smallest rotation to where its direction is posed from where the cage alone and the bone before it on the
-//! line would take it, so that nothing rolls. With all controls moved by one affine map, `F` is its matrix and `R` the identity.
+//! A hold is a joint (a point inside the cage, or a corner of a polyline), with one of its bones or alone. Its matrix
+//! is `R F`. `F = sum_j c_j' grad w_j`, from the coordinates of the cage without inner controls, is the Jacobian of the
+//! cage's motion at the joint. `R` belongs to the bone: the smallest rotation of the bone's direction from where the
+//! cage and the previous bone of the line take it to where it is posed, so that the bone does not roll. If one affine
+//! map moves all controls, `F` is its matrix and `R` the identity.
 
 use std::borrow::Cow;
 
@@ -17,24 +18,24 @@ use serde::{Deserialize, Serialize};
 
 use crate::weights::Weights;
 
-/// A share of a vertex's rest vector below this, of the largest, is left to the others.
-const LEAST_SHARE: f64 = 1e-3;
+/// Shares of a rest vector below this, over the largest one, are dropped.
+const MIN_SHARE: f64 = 1e-3;
 
-/// The first column of the whole cage's matrix, counted from the first frame; the unit vectors come before.
-pub(crate) const WHOLE: usize = 3;
-/// The first column of the first hold.
-const HOLDS: usize = 6;
+/// First column of the whole cage's matrix, counted from the first frame.
+pub(crate) const CAGE_COLUMN: usize = 3;
+/// First column of the first hold, counted from the first frame.
+const HOLD_COLUMN: usize = 6;
 
-/// The columns of a bind's weights after those of its controls.
+/// Columns of a bind's weights that follow those of its controls.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Frames {
-    /// What each vertex of the cage adds to the matrix of the whole cage's motion, per object unit; nothing where there are no frames.
-    /// `[n_cage]`
+    /// Contribution of each cage vertex to the matrix of the whole cage's motion, per object unit; empty without
+    /// frames. `[n_cage]`
     pub whole: Vec<[f32; 3]>,
     /// The control of each joint. `[n_joints]`
     pub joints: Vec<u32>,
-    /// The two joints of each bone, counted in `joints`; those of one line in order. `[n_bones]`
+    /// The two joints of each bone, as indices into `joints`; bones of a line are consecutive. `[n_bones]`
     pub bones: Vec<[u32; 2]>,
     /// Weight and gradient (per object unit) of each vertex of the cage at each joint. `[n_joints, n_cage]`
     pub plain: Vec<[f32; 4]>,
@@ -46,7 +47,7 @@ impl Frames {
     pub fn of_cage(rest: &[Vec3]) -> Self {
         let rest = || rest.iter().map(|p| p.as_dvec3());
         let mean = rest().sum::<DVec3>() / rest().count() as f64;
-        // The matrix of sum |A (c - mean) - (c' - mean')|^2 at its least: (sum c' (c - mean)^T) M^-1.
+        // Minimum of sum |A (c - mean) - (c' - mean')|^2: A = (sum c' (c - mean)^T) M^-1.
         let spread = rest().map(|c| c - mean).map(|d| DMat3::from_cols(d * d.x, d * d.y, d * d.z));
         let inverse = spread.fold(DMat3::ZERO, |sum, one| sum + one).inverse();
         Self {
@@ -55,13 +56,13 @@ impl Frames {
         }
     }
 
-    /// Whether there are any.
+    /// Whether there are frames.
     #[must_use]
     pub fn is_used(&self) -> bool {
         !self.whole.is_empty()
     }
 
-    /// Whether numbers that come from elsewhere belong to this many controls.
+    /// Whether the sizes and indices of deserialised frames match this many controls.
     #[must_use]
     pub fn fits(&self, n_controls: usize) -> bool {
         let n = self.joints.len();
@@ -74,13 +75,13 @@ impl Frames {
             && self.plain.iter().flatten().chain(self.whole.iter().flatten()).all(|x| x.is_finite())
     }
 
-    /// Columns after those of the controls.
+    /// Number of columns.
     #[must_use]
     pub fn n_columns(&self) -> usize {
-        if self.is_used() { HOLDS + 3 * self.holds().count() } else { 0 }
+        if self.is_used() { HOLD_COLUMN + 3 * self.holds().count() } else { 0 }
     }
 
-    /// Joints, each alone or with each of its bones.
+    /// Joints, each with each of its bones, or alone without bones.
     fn holds(&self) -> impl Iterator<Item = (usize, Option<usize>)> {
         (0..self.joints.len()).flat_map(move |joint| {
             let of_joint = move |bone: &usize| self.bones[*bone].contains(&(joint as u32));
@@ -90,10 +91,10 @@ impl Frames {
         })
     }
 
-    /// Where all columns are with the controls at `controls`, `[n_controls]`, object units: the controls, then the frames.
+    /// All columns with the controls at `controls`, `[n_controls]`, object units: the controls, then the frames.
     ///
     /// # Panics
-    /// If the controls are fewer than these frames name.
+    /// If there are fewer controls than these frames refer to.
     #[must_use]
     pub fn columns<'a>(&self, controls: &'a [Vec3]) -> Cow<'a, [Vec3]> {
         if !self.is_used() {
@@ -115,7 +116,7 @@ impl Frames {
         Cow::Owned(columns)
     }
 
-    /// Where the cage alone takes a joint, and its motion there.
+    /// Position of a joint moved by the cage alone, and the Jacobian of that motion.
     fn moved(&self, joint: usize, controls: &[Vec3]) -> (DVec3, DMat3) {
         let n = self.plain.len() / self.joints.len();
         let (mut at, mut matrix) = (DVec3::ZERO, DMat3::ZERO);
@@ -127,7 +128,6 @@ impl Frames {
         (at, matrix)
     }
 
-    /// The rotation of each bone.
     fn turns(&self, moved: &[(DVec3, DMat3)], controls: &[Vec3]) -> Vec<DMat3> {
         let mut turns: Vec<DMat3> = Vec::with_capacity(self.bones.len());
         for (number, [a, b]) in self.bones.iter().map(|bone| bone.map(|j| j as usize)).enumerate() {
@@ -137,18 +137,18 @@ impl Frames {
             let goes = before * (moved[b].0 - moved[a].0);
             turns.push(match (goes.try_normalize(), (to - from).try_normalize()) {
                 (Some(goes), Some(posed)) => DMat3::from_quat(DQuat::from_rotation_arc(goes, posed)) * before,
-                // A bone without length has no direction.
+                // A bone of zero length has no direction.
                 _ => before,
             });
         }
         turns
     }
 
-    /// Rows of the controls alone that move vertices as these weights do as long as no bone turns: for what solves for controls.
-    /// Offsets that do not turn are left out.
+    /// Weights of the controls alone that move vertices like these weights as long as no bone rotates, for solvers
+    /// whose unknowns are the controls. Omits constant offsets.
     ///
     /// # Panics
-    /// If the weights have fewer columns than these frames.
+    /// If `weights` has fewer columns than these frames.
     #[must_use]
     pub fn folded(&self, weights: &Weights) -> Weights {
         let n_controls = weights.n_columns() - self.n_columns();
@@ -164,11 +164,11 @@ impl Frames {
                 match (column as usize).checked_sub(n_controls) {
                     None => row[column as usize] += x,
                     Some(0..3) => {}
-                    Some(frame @ 3..HOLDS) => {
+                    Some(frame @ 3..HOLD_COLUMN) => {
                         self.whole.iter().zip(&mut row).for_each(|(s, w)| *w += x * s[frame % 3]);
                     }
                     Some(frame) => {
-                        let slopes = &self.plain[holds[(frame - HOLDS) / 3] * n..][..n];
+                        let slopes = &self.plain[holds[(frame - HOLD_COLUMN) / 3] * n..][..n];
                         slopes.iter().zip(&mut row).for_each(|(s, w)| *w += x * s[1 + frame % 3]);
                     }
                 }
@@ -183,10 +183,10 @@ impl Frames {
         Weights::from_parts(n_controls as u32, indptr, all, data)
     }
 
-    /// Shares of a vertex's rest vector by hold, for its weights of the joints: `each(column, share)` with the hold's first column,
-    /// counted from the first frame. They sum to 1; with no weight of any joint all goes with the whole cage.
+    /// Distributes a vertex's rest vector over the holds by its weights at the joints: `each(column, share)` with the hold's
+    /// first column, counted from the first frame. Shares sum to 1; without weight at any joint all goes to the whole cage.
     ///
-    /// Along a line the share passes from bone to bone within about a radius of the joint. `lengths`: of the bones at rest.
+    /// Along a line, the share blends from bone to bone within about a radius of the joint. `lengths`: rest lengths of the bones.
     pub(crate) fn shares(
         &self,
         weights: &[f64],
@@ -196,9 +196,9 @@ impl Frames {
     ) {
         let total: f64 = weights.iter().sum();
         if total <= 0.0 {
-            return each(WHOLE, 1.0);
+            return each(CAGE_COLUMN, 1.0);
         }
-        // How far along a bone the vertex is from one of its ends.
+        // Distance of the vertex from the joint along a bone, plus the radius, to the fourth power.
         let along = |joint: usize, bone: usize| {
             let [a, b] = self.bones[bone];
             let other = if a as usize == joint { b } else { a };
@@ -212,10 +212,10 @@ impl Frames {
             })
         };
         let shares: Vec<f64> = self.holds().map(share).collect();
-        let least = LEAST_SHARE * shares.iter().copied().fold(0.0, f64::max);
+        let least = MIN_SHARE * shares.iter().copied().fold(0.0, f64::max);
         let kept: f64 = shares.iter().filter(|&&s| s > least).sum();
         for (hold, s) in shares.into_iter().enumerate().filter(|(_, s)| *s > least) {
-            each(HOLDS + 3 * hold, s / kept);
+            each(HOLD_COLUMN + 3 * hold, s / kept);
         }
     }
 }
@@ -226,7 +226,7 @@ mod tests {
 
     use super::*;
 
-    /// A unit cube's corners and a line of three joints in it, by the cube's trilinear coordinates.
+    /// Corners of a unit cube and a line of three joints in it, with trilinear coordinates.
     fn line() -> (Frames, Vec<Vec3>) {
         let cube = (0..8).map(|k| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32));
         let joints = [0.2, 0.5, 0.8].map(|z| Vec3::new(0.5, 0.5, z));
@@ -246,20 +246,20 @@ mod tests {
         (frames, controls)
     }
 
-    /// Matrices of the axes, of the whole cage, and of the holds.
+    /// Matrices of the constant offset, of the whole cage, and of the holds.
     fn matrices(columns: &[Vec3]) -> Vec<DMat3> {
         let of = |c: &[Vec3]| DMat3::from_cols(c[0].as_dvec3(), c[1].as_dvec3(), c[2].as_dvec3());
         columns[11..].chunks_exact(3).map(of).collect()
     }
 
     #[test]
-    fn one_affine_map_of_all_controls_is_the_matrix_of_each_hold() {
+    fn an_affine_map_of_all_controls_is_the_matrix_of_each_hold() {
         let (frames, rest) = line();
         let matrix = DMat3::from_cols_array(&[1.2, 0.4, 0.1, -0.3, 0.9, 0.2, 0.5, -0.1, 1.1]);
         let posed: Vec<Vec3> = rest.iter().map(|p| (matrix * p.as_dvec3()).as_vec3() + 3.0).collect();
         let columns = frames.columns(&posed);
         assert_eq!((columns.len(), &columns[11..14]), (11 + frames.n_columns(), &Vec3::AXES[..]));
-        // The first three of the axes do not turn; then the whole cage and four holds.
+        // The first matrix is constant; then follow the whole cage and four holds.
         let holds = &matrices(&columns)[1..];
         assert_eq!(holds.len(), 5);
         for hold in holds {
@@ -267,7 +267,7 @@ mod tests {
         }
     }
 
-    /// A bone bent at its middle joint turns what it holds by the same rotation in every direction, and the other bone not at all.
+    /// A bone bent at the middle joint rotates its holds by the smallest rotation, and leaves the other bone's unchanged.
     #[test]
     fn a_bent_bone_turns_by_the_smallest_rotation() {
         let (frames, rest) = line();
@@ -285,9 +285,9 @@ mod tests {
     }
 
     #[test]
-    fn a_bone_turns_on_from_the_one_before_it() {
+    fn a_bone_inherits_the_rotation_of_the_previous_one() {
         let (frames, rest) = line();
-        // All of the line turns about x and z by 90 degrees: the first bone's smallest rotation serves the second too.
+        // The line rotates rigidly about z and x: the smallest rotation of the first bone also fits the second.
         let turn = Quat::from_rotation_z(1.0) * Quat::from_rotation_x(1.5);
         let mut posed = rest.clone();
         for k in 8..11 {
@@ -304,7 +304,7 @@ mod tests {
             let mut all = [0.0; 6];
             frames.shares(&weights, &[0.3, 0.3], 0.02, |column, share| all[column / 3] += share);
             assert!((all.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-            // Axes, the whole cage, and holds: joint 0 with bone 0, joint 1 with both, joint 2 with bone 1.
+            // Columns: constant, whole cage, joint 0 with bone 0, joint 1 with both bones, joint 2 with bone 1.
             [all[1], all[2] + all[3], all[4] + all[5]]
         };
         assert_eq!(of_bones([0.0, 0.7, 0.0]), [0.0, 0.5, 0.5]);

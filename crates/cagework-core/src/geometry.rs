@@ -1,26 +1,26 @@
-//! Small exact-enough geometry in f64: closest point of a triangle, triangle against box, winding number.
+//! Geometry in f64: closest point on a triangle, triangle-box overlap, winding number.
 
 use glam::DVec3;
 
-/// Relative widening of the box in [`triangle_box_overlaps`]: above the rounding of f64, far below a cell.
+/// Relative enlargement of the box in [`triangle_box_overlaps`]: above f64 rounding, far below a cell.
 const BOX_WIDENING: f64 = 1e-9;
 
-/// A triangle lower than this fraction of its length is taken as a segment: its plane is lost in the rounding of f64.
-const STRAIGHT: f64 = 1e-12;
+/// Height of a triangle over its length below which it is treated as a segment: its plane is lost in f64 rounding.
+const MIN_RELATIVE_HEIGHT: f64 = 1e-12;
 
-/// The point of a triangle that is closest to some other point.
+/// Closest point on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosestPoint {
     /// The point, object units.
     pub point: DVec3,
-    /// Its barycentric coordinates: not negative, sum 1.
+    /// Barycentric coordinates, non-negative, sum 1.
     pub barycentric: [f64; 3],
 }
 
-/// Closest point of `triangle` to `point`. A triangle without area is treated as the segment or point that it is.
+/// Closest point of `triangle` to `point`. Degenerate triangles are treated as a segment or point.
 ///
-/// Source: Ericson 2005, "Real-time collision detection", sections 3.4 and 5.1.2; not his faster 5.1.5, whose case
-/// distinction takes a wrong side of a triangle without area.
+/// Source: Ericson 2005, "Real-time collision detection", sections 3.4 and 5.1.2. The faster 5.1.5 picks a wrong side
+/// of degenerate triangles.
 #[must_use]
 pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> ClosestPoint {
     let [a, b, c] = triangle;
@@ -28,7 +28,7 @@ pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> ClosestP
         let [on_ab, on_bc, on_ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| share_of_segment(point, p, q));
         let candidates = [[1.0 - on_ab, on_ab, 0.0], [0.0, 1.0 - on_bc, on_bc], [on_ca, 0.0, 1.0 - on_ca]];
         let distance = |[u, v, w]: [f64; 3]| (u * a + v * b + w * c).distance_squared(point);
-        // The first of equally close ones.
+        // Ties: the first candidate.
         let mut best = candidates[0];
         for candidate in &candidates[1..] {
             if distance(*candidate) < distance(best) {
@@ -41,9 +41,9 @@ pub fn closest_point_on_triangle(point: DVec3, triangle: [DVec3; 3]) -> ClosestP
     ClosestPoint { point: u * a + v * b + w * c, barycentric }
 }
 
-/// How far from `from` along a unit vector a triangle is met from either side, object units; nothing behind or beside.
+/// Distance from `from` along a unit vector to a triangle of either orientation, object units; `None` if the ray misses.
 ///
-/// Source: Moeller, Trumbore 1997, "Fast, minimum storage ray-triangle intersection".
+/// Source: Moeller and Trumbore 1997, "Fast, minimum storage ray-triangle intersection".
 #[must_use]
 pub fn distance_along(from: DVec3, way: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
     let (ab, ac, to) = (b - a, c - a, from - a);
@@ -53,13 +53,13 @@ pub fn distance_along(from: DVec3, way: DVec3, [a, b, c]: [DVec3; 3]) -> Option<
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && s >= 0.0).then_some(s)
 }
 
-/// Barycentric coordinates of the projection of `point`, if it is in the triangle and the triangle has an area.
+/// Barycentric coordinates of the projection of `point`, if it lies in the triangle and the triangle has an area.
 fn projection_inside(point: DVec3, [a, b, c]: [DVec3; 3]) -> Option<[f64; 3]> {
     let (ab, ac, ap) = (b - a, c - a, point - a);
     let normal = ab.cross(ac);
     let area_squared = normal.length_squared();
     let longest_squared = ab.length_squared().max(ac.length_squared());
-    if area_squared <= (STRAIGHT * longest_squared).powi(2) {
+    if area_squared <= (MIN_RELATIVE_HEIGHT * longest_squared).powi(2) {
         return None;
     }
     let v = ap.cross(ac).dot(normal) / area_squared;
@@ -68,16 +68,15 @@ fn projection_inside(point: DVec3, [a, b, c]: [DVec3; 3]) -> Option<[f64; 3]> {
     (u >= 0.0 && v >= 0.0 && w >= 0.0).then_some([u, v, w])
 }
 
-/// Share of the way from `p` to `q` at which the segment is closest to `point`.
+/// Parameter, 0 to 1, of the segment's point closest to `point`.
 fn share_of_segment(point: DVec3, p: DVec3, q: DVec3) -> f64 {
     let way = q - p;
     let length_squared = way.length_squared();
     if length_squared > 0.0 { ((point - p).dot(way) / length_squared).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Whether a triangle and an axis-aligned box (centre, half edge lengths) have a point in common. A triangle that
-/// misses the box by less than 1e-9 of their size may count as touching, never the other way round: a surface
-/// must not slip between two boxes.
+/// Whether a triangle and an axis-aligned box (centre, half edge lengths) overlap. Conservative: a triangle that misses
+/// the box by less than 1e-9 of their size may count as overlapping, so that no surface slips between two boxes.
 ///
 /// Source: Akenine-Moeller 2001, "Fast 3D triangle-box overlap testing" (separating axes).
 #[must_use]
@@ -104,10 +103,10 @@ pub fn triangle_box_overlaps(center: DVec3, half: DVec3, triangle: [DVec3; 3]) -
     })
 }
 
-/// How often a closed set of triangles, counter-clockwise seen from outside, winds around `point`: 1 inside,
-/// 0 outside, in between on the surface itself. 1 inside a solid, also one with cavities.
+/// Winding number of a closed set of triangles, counter-clockwise seen from outside, around `point`: 1 inside (also of
+/// a solid with cavities), 0 outside, in between on the surface.
 ///
-/// Source: van Oosterom, Strackee 1983, "The solid angle of a plane triangle".
+/// Source: van Oosterom and Strackee 1983, "The solid angle of a plane triangle".
 #[must_use]
 pub fn winding_number(point: DVec3, triangles: impl IntoIterator<Item = [DVec3; 3]>) -> f64 {
     let solid_angle: f64 = triangles

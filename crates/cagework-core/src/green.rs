@@ -1,10 +1,11 @@
-//! Green coordinates: the closed form that keeps the shape of details, beside harmonic and mean value coordinates to compare.
+//! Green coordinates, a closed form that preserves details, for comparison with harmonic and mean value coordinates.
 //!
 //! A point is a combination of the cage's vertices and of its faces' normals. The columns of the weights are therefore the cage's
-//! vertices, then its triangles; a triangle's control is its normal times how much the pose has stretched it, so that a pose is the
-//! same product as for other coordinates. What moves is not held inside the cage.
+//! vertices, then its triangles. The control of a triangle is its normal scaled by the stretch of the posed triangle, so that
+//! poses are applied by the same product as for other coordinates. Deformed points may leave the cage.
 //!
-//! Source: Lipman, Levin, Cohen-Or 2008, "Green coordinates"; integrals over triangles as in its appendix, angles by arctangent.
+//! Source: Lipman, Levin and Cohen-Or 2008, "Green coordinates"; integrals over triangles as in its appendix, angles by
+//! arctangent.
 
 use std::f64::consts::PI;
 
@@ -15,17 +16,17 @@ use crate::closed_form::{ClosedFormError, dense};
 use crate::progress::Progress;
 use crate::weights::Weights;
 
-/// Sine, or fraction of the cage's diagonal, below which directions count as in one plane: the root of the rounding of f64.
-const FLAT: f64 = 1e-8;
+/// Sine, or distance over the cage's diagonal, below which directions are coplanar: square root of f64 rounding.
+const PLANE_TOLERANCE: f64 = 1e-8;
 
-/// Weights of the vertices sum to 1 inside the cage, to 0 outside, and to the share of a small ball that is inside on the surface.
-const LEAST_SUM: f64 = 0.99;
+/// Smallest sum of a point's vertex weights inside the cage. The sum is 1 inside, 0 outside, and the enclosed share of
+/// a small ball on the surface.
+const MIN_SUM: f64 = 0.99;
 
-/// Green coordinates at `points` (`[n_vertices]`, object units, inside the cage). Dense. `[n_vertices, n_cage + n_triangles]`
+/// Green coordinates at `points` (`[n_vertices]`, object units, inside the cage), dense. `[n_vertices, n_cage + n_triangles]`
 ///
 /// # Errors
-/// [`ClosedFormError`]: a point is not finite or not inside, the weights take more than `memory_limit` bytes, or `progress`
-/// cancelled.
+/// [`ClosedFormError`]: a point is not finite or not inside, the weights exceed `memory_limit` bytes, or `progress` cancelled.
 pub fn green_weights(
     points: &[Vec3],
     cage: &Cage,
@@ -36,8 +37,8 @@ pub fn green_weights(
     dense("Green", points, columns, memory_limit, progress, |point, row| coordinates(point, cage, row))
 }
 
-/// What the columns of [`green_weights`] are for a posed cage: its vertices, then `s n` of its triangles (the paper's section 3.1).
-/// `positions`: `[n_cage]`, object units. Returns `[n_cage + n_triangles]`.
+/// Controls for the columns of [`green_weights`] in a pose: cage vertices, then `s n` of the triangles (section 3.1 of
+/// the paper). `positions`: `[n_cage]`, object units. Returns `[n_cage + n_triangles]`.
 ///
 /// # Panics
 /// If there are fewer positions than cage vertices.
@@ -47,7 +48,7 @@ pub fn green_controls(cage: &Cage, positions: &[Vec3]) -> Vec<Vec3> {
     positions[..cage.n_vertices()].iter().copied().chain(normals).collect()
 }
 
-/// `s n` of the triangles, where the cage's vertices are `at`. `[n_triangles]`
+/// Scaled normals `s n` of the triangles with the cage's vertices at `at`. `[n_triangles]`
 fn stretched_normals(cage: &Cage, at: impl Fn(u32) -> DVec3) -> impl Iterator<Item = DVec3> {
     let sides = |[a, b, c]: [DVec3; 3]| [b - a, c - a];
     cage.triangles().iter().enumerate().map(move |(t, triangle)| {
@@ -55,15 +56,15 @@ fn stretched_normals(cage: &Cage, at: impl Fn(u32) -> DVec3) -> impl Iterator<It
         let [x, y] = sides(triangle.map(&at));
         let squares = x.length_squared() * v.length_squared() - 2.0 * x.dot(y) * u.dot(v)
             + y.length_squared() * u.length_squared();
-        // Over the root of 8 times the area, which is half the length of the sides' product.
+        // Denominator: sqrt(8) times the area, which is half of |u x v|.
         let stretch = squares.max(0.0).sqrt() / (2.0_f64.sqrt() * u.cross(v).length());
         stretch * x.cross(y).normalize_or_zero()
     })
 }
 
-/// Coordinates at one point; `row` must be zero. `[n_cage + n_triangles]`. Whether it is inside.
+/// Coordinates at a point; returns whether it is inside. `row`: `[n_cage + n_triangles]`, zero on entry.
 fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
-    let near = FLAT * f64::from(cage.diagonal());
+    let near = PLANE_TOLERANCE * f64::from(cage.diagonal());
     let (of_vertices, of_triangles) = row.split_at_mut(cage.n_vertices());
     for (t, triangle) in cage.triangles().iter().enumerate() {
         let v = cage.triangle_corners(t as u32).map(|p| p - point);
@@ -76,7 +77,7 @@ fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
         };
         let potential = -(0..3).map(signed).sum::<f64>().abs();
         of_triangles[t] = -potential;
-        // Seen edge-on: its solid angle is zero.
+        // Seen edge-on, its solid angle is zero.
         if foot.length() <= near {
             continue;
         }
@@ -88,21 +89,20 @@ fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
             of_vertices[triangle[k] as usize] += plane.dot(mean) / plane.dot(v[k]);
         }
     }
-    of_vertices.iter().sum::<f64>() >= LEAST_SUM
+    of_vertices.iter().sum::<f64>() >= MIN_SUM
 }
 
-/// Integral of `-1 / (4 pi r)`, the potential of the origin, over the triangle of `foot`, the origin's projection to its plane, `a`
-/// and `b`; or, with the origin as `foot`, over the part of a plane through the origin that the formula's second call stands for.
-/// Not above 0.
+/// Integral of the Green's function `-1 / (4 pi r)` of the origin over the triangle of `foot` (projection of the origin to its
+/// plane), `a` and `b`; or, with the origin as `foot`, over the sector that the second call in the formula stands for. At most 0.
 fn over_triangle(foot: DVec3, a: DVec3, b: DVec3) -> f64 {
     let (edge, to_a, to_b) = (b - a, foot - a, foot - b);
     let product = edge.cross(to_a).length();
-    if product <= FLAT * edge.length() * to_a.length().max(to_b.length()) {
+    if product <= PLANE_TOLERANCE * edge.length() * to_a.length().max(to_b.length()) {
         return 0.0;
     }
     let at_a = product.atan2(edge.dot(to_a));
     let at_foot = to_a.cross(to_b).length().atan2(to_a.dot(to_b));
-    // Squared distances of the foot from the edge, and from the origin.
+    // Squared distances of the foot from the edge and from the origin.
     let (lambda, c) = (product * product / edge.length_squared(), foot.length_squared());
     let (root_lambda, root_c) = (lambda.sqrt(), c.sqrt());
     let antiderivative = |angle: f64| {
@@ -127,8 +127,8 @@ mod tests {
     use super::*;
     use crate::cage::shapes;
 
-    /// What the midpoint rule below is off by, where points are a tenth of the cage's size from its faces.
-    const NEAR_FACES: f64 = 2e-5;
+    /// Error of the midpoint rule below for points a tenth of the cage's size from its faces.
+    const MIDPOINT_ERROR: f64 = 2e-5;
 
     fn at(cage: &Cage, point: DVec3) -> Vec<f64> {
         let mut row = vec![0.0; cage.n_vertices() + cage.triangles().len()];
@@ -145,7 +145,7 @@ mod tests {
         assert!(combined.distance(point) <= within, "{combined} is not {point}");
     }
 
-    /// The definition (the paper's equations 4 and 5) by the midpoints of many small triangles.
+    /// The definition (equations 4 and 5 of the paper) by the midpoint rule over many small triangles.
     fn integrated(cage: &Cage, point: DVec3) -> Vec<f64> {
         const STEPS: usize = 200;
         let mut row = vec![0.0; cage.n_vertices() + cage.triangles().len()];
@@ -154,7 +154,7 @@ mod tests {
             let area = 0.5 * (b - a).cross(c - a);
             let small = area.length() / (STEPS * STEPS) as f64;
             for (i, j) in (0..STEPS).flat_map(|i| (0..STEPS - i).map(move |j| (i, j))) {
-                // Upright, and upside down.
+                // Upright and inverted small triangles.
                 for third in [1.0 / 3.0, 2.0 / 3.0].into_iter().take(if i + j + 1 < STEPS { 2 } else { 1 }) {
                     let (v, w) = ((i as f64 + third) / STEPS as f64, (j as f64 + third) / STEPS as f64);
                     let to = (1.0 - v - w) * a + v * b + w * c - point;
@@ -169,10 +169,10 @@ mod tests {
         row
     }
 
-    /// Similarities of the cage are similarities of what is inside: the paper's section 3. Weights are rounded to f32 for
-    /// storage, which alone would be 4e-6 here.
+    /// A similarity of the cage acts as the same similarity on the interior (section 3 of the paper). In f64, because
+    /// f32 storage alone would cause errors of 4e-6.
     #[test]
-    fn a_cage_that_is_turned_and_scaled_does_so_to_what_is_inside() {
+    fn a_similarity_of_the_cage_is_one_of_its_interior() {
         let cage = Cage::new(&shapes::c_shape()).unwrap();
         let turn = DQuat::from_axis_angle(DVec3::new(1.0, -2.0, 0.5).normalize(), 2.2);
         let similar = |p: DVec3| 1.7 * (turn * p) + DVec3::new(3.0, -1.0, 2.0);
@@ -185,13 +185,13 @@ mod tests {
     }
 
     #[test]
-    fn point_outside_or_not_finite_is_named() {
+    fn point_outside_or_not_finite_is_an_error_with_its_index() {
         let cage = Cage::new(&shapes::cube()).unwrap();
         let inside = cage.bounds().center();
         let outside = green_weights(&[inside, inside + 9.0], &cage, u64::MAX, &Silent).unwrap_err();
         assert_eq!(
             outside.to_string(),
-            "Green coordinates are not defined at mesh vertex 1, outside of the cage: enlarge the cage"
+            "Green coordinates are not defined at mesh vertex 1, which is outside the cage: enlarge the cage"
         );
         let memory = green_weights(&[inside; 100], &cage, 100 * 20 * 8 - 1, &Silent).unwrap_err();
         // A cube has 8 vertices and 12 triangles.
@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn points_in_the_planes_of_faces_and_on_lines_through_edges_are_reproduced() {
-        // The inner edge of the L continues into both of its arms.
+        // The inner edge of the L extends into both of its arms.
         let cage = Cage::new(&shapes::l_shape()).unwrap();
         let positions: Vec<DVec3> = cage.positions().iter().map(|p| p.as_dvec3()).collect();
         let centre = cage.bounds().center().as_dvec3();
@@ -228,7 +228,7 @@ mod tests {
         fn points_inside_are_reproduced(
             x in 0.001..0.999f64, y in 0.001..2.999f64, z in 0.001..0.999f64,
         ) {
-            // The back of the C.
+            // Points in the back of the C.
             assert_reproduced(&Cage::new(&shapes::c_shape()).unwrap(), DVec3::new(x, y, z), 1e-6);
         }
     }
@@ -240,7 +240,7 @@ mod tests {
             let cage = Cage::new(&shapes::octahedron()).unwrap();
             let point = cage.bounds().center().as_dvec3() + DVec3::new(x, y, z);
             for (found, expected) in at(&cage, point).iter().zip(&integrated(&cage, point)) {
-                prop_assert!((found - expected).abs() <= NEAR_FACES, "{found} instead of {expected}");
+                prop_assert!((found - expected).abs() <= MIDPOINT_ERROR, "{found} instead of {expected}");
             }
         }
     }

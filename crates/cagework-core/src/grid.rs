@@ -1,17 +1,17 @@
-//! The grid: cell <-> index <-> point. The only place with index arithmetic.
+//! The grid: conversion between cells, indices and points.
 
 use glam::DVec3;
 
 use crate::mesh::Bounds;
 
-/// Offset of the cell centres, in cells: small and irrational-looking, so that grid lines through an axis-aligned
-/// cage do not run along its edges and vertices.
+/// Offset of the cell centres, in cells: small and irregular, so that grid lines do not run along edges and vertices of
+/// axis-aligned cages.
 const SHIFT: DVec3 = DVec3::new(0.013_713_7, 0.007_071_1, 0.019_318_5);
 
-/// No cell: an index that no grid has.
+/// Index of no cell.
 pub const NO_CELL: u32 = u32::MAX;
 
-/// A box of equal cells; unknowns sit at cell centres. x runs fastest, then y, then z.
+/// A box of equal cells with unknowns at their centres; x runs fastest, then y, then z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     /// Cells along x, y, z.
@@ -23,17 +23,17 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Cubic cells around `bounds`, `g` of them along its longest side and one more layer all around.
+    /// Cubic cells around `bounds`: `g` along its longest side, plus one layer all around.
     #[must_use]
     pub fn cubic(bounds: Bounds, g: u32) -> Self {
         let (min, extent) = (bounds.min.as_dvec3(), bounds.extent().as_dvec3());
         let h = extent.max_element() / f64::from(g);
-        // Centres at -1/2, 1/2, ..., so that the first and the last layer lie outside the cage.
+        // Centres at -1/2, 1/2, ...: the first and the last layer lie outside the cage.
         let dims = [0, 1, 2].map(|a| (extent[a] / h - SHIFT[a] + 0.5).ceil().max(1.0) as u32 + 1);
         Self { dims, origin: min + h * (SHIFT - 0.5), cell: DVec3::splat(h) }
     }
 
-    /// The grid of every second centre along each axis: `coarse(x, y, z)` is `fine(2x, 2y, 2z)`.
+    /// The grid of every second centre along each axis: cell (x, y, z) has the centre of cell (2x, 2y, 2z) here.
     #[must_use]
     pub fn coarsened(&self) -> Self {
         Self { dims: self.dims.map(|d| (d - 1) / 2 + 1), origin: self.origin, cell: 2.0 * self.cell }
@@ -45,7 +45,7 @@ impl Grid {
         self.dims.iter().map(|&d| d as usize).product()
     }
 
-    /// Index of a cell that is in the grid.
+    /// Index of a cell.
     #[inline]
     #[must_use]
     pub fn index(&self, [x, y, z]: [u32; 3]) -> usize {
@@ -53,7 +53,7 @@ impl Grid {
         (z as usize * self.dims[1] as usize + y as usize) * self.dims[0] as usize + x as usize
     }
 
-    /// The cell of an index.
+    /// Cell at an index.
     #[inline]
     #[must_use]
     pub fn cell(&self, index: usize) -> [u32; 3] {
@@ -61,7 +61,7 @@ impl Grid {
         [index % nx, index / nx % ny, index / (nx * ny)].map(|x| x as u32)
     }
 
-    /// The cell one step along `direction` (+x, -x, +y, -y, +z, -z), if it is in the grid.
+    /// The neighbour in a `direction` (+x, -x, +y, -y, +z, -z), if it is in the grid.
     #[inline]
     #[must_use]
     pub fn neighbour(&self, mut cell: [u32; 3], direction: usize) -> Option<[u32; 3]> {
@@ -81,7 +81,7 @@ impl Grid {
         Some(moved)
     }
 
-    /// Distance in the array between a cell and its neighbour one up along each axis.
+    /// Index difference between neighbours along each axis.
     #[must_use]
     pub fn strides(&self) -> [usize; 3] {
         let (nx, ny) = (self.dims[0] as usize, self.dims[1] as usize);
@@ -102,7 +102,7 @@ impl Grid {
         (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
     }
 
-    /// Cell coordinates of a point: cell centres are whole numbers.
+    /// Cell coordinates of a point, in which cell centres are integers.
     #[inline]
     #[must_use]
     pub fn to_grid(&self, p: DVec3) -> DVec3 {

@@ -1,8 +1,8 @@
-//! The hierarchy: each level's unknowns, their stencils and the transfers between levels.
+//! The hierarchy: unknowns of each level, their stencils, and transfers between levels.
 //!
-//! Unknowns are stored by colour, red cells first, each colour in grid order (x fastest) and closed by one row that
-//! stays zero, the neighbour of whoever has none: `[red .., 0, black .., 0]`. A red-black sweep then streams
-//! through contiguous memory, and a *run* of whole stencils needs seven numbers, not seven gathers a cell.
+//! Unknowns are stored by colour, red before black, each in grid order (x fastest). One zero row follows each colour
+//! and stands for missing neighbours: `[red .., 0, black .., 0]`. A red-black half sweep then streams through
+//! contiguous memory, and a *run* of complete stencils needs seven indices instead of seven gathers per cell.
 
 use std::ops::Range;
 
@@ -12,73 +12,73 @@ use crate::grid::{Grid, NO_CELL};
 
 mod build;
 
-/// Coarsening stops at this many unknowns: there, a few dozen sweeps cost nothing.
+/// Coarsening stops at this many unknowns, where a few dozen sweeps cost almost nothing.
 const COARSEST_UNKNOWNS: usize = 200;
 
-/// The cage as a level sees it: which cells are unknowns, and where their arms end on the cage.
+/// A level's view of the cage: which cells are unknowns, and where their arms end on the cage.
 pub trait Boundary: Sync {
     /// The level's grid.
     fn grid(&self) -> Grid;
-    /// Whether each cell is solved for. `[nz, ny, nx]`
+    /// Whether each cell is an unknown. `[nz, ny, nx]`
     fn unknowns(&self) -> &[bool];
-    /// Of each unknown the directions (bit d: +x, -x, +y, -y, +z, -z) in which its arm ends on the cage;
-    /// what is there of other cells does not count. `[nz, ny, nx]`
+    /// Directions of each unknown in which its arm ends on the cage (bits: +x, -x, +y, -y, +z, -z). Values of other
+    /// cells are ignored. `[nz, ny, nx]`
     fn cut_arms(&self) -> &[u8];
-    /// Weight of the arm (1 over its length in cells; 0 if it does not end on the cage after all); calls
-    /// `hats(control vertex, value)` for the Dirichlet values at its end.
+    /// Weight of an arm: 1 over its length in cells, or 0 if it does not end on the cage. Calls `hats(control, value)`
+    /// for the Dirichlet values at its end.
     fn arm(&self, cell: [u32; 3], direction: usize, hats: &mut dyn FnMut(u32, f64)) -> f64;
 }
 
-/// Unknowns of one colour in a row along x whose six neighbours are all unknowns, every second cell.
+/// Every second cell of a row along x: unknowns of one colour whose six neighbours are all unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
-    /// First cell, within its colour.
+    /// Index of the first cell within its colour.
     pub start: u32,
     /// Number of cells.
     pub len: u32,
-    /// First cell's -x neighbour within the other colour; its +x neighbour is the next one.
+    /// Index of the first cell's -x neighbour within the other colour; the +x neighbour follows it.
     pub x: u32,
-    /// First cell's -y, +y, -z, +z neighbours within the other colour.
+    /// Indices of the first cell's -y, +y, -z, +z neighbours within the other colour.
     pub yz: [u32; 4],
 }
 
 /// An unknown next to the cage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutCell {
-    /// The cell, within its colour.
+    /// Index within its colour.
     pub cell: u32,
-    /// Neighbours within the other colour; the zero row where the arm is cut.
+    /// Indices of the neighbours within the other colour; the zero row if the arm ends on the cage.
     pub neighbours: [u32; 6],
-    /// Sum of the six arms' weights.
+    /// Sum of the weights of the six arms.
     pub diagonal: f32,
 }
 
-/// Dirichlet values that reach a cut cell: `value` is the hat value times the arm's weight, summed over arms.
+/// A Dirichlet value of a cut cell: hat value times arm weight, summed over its arms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundaryTerm {
-    /// Number of the cut cell: red ones first, then black.
+    /// Number of the cut cell, red before black.
     pub cut_cell: u32,
-    /// Control vertex.
+    /// Control.
     pub column: u32,
-    /// Its share of the right-hand side.
+    /// Contribution to the right-hand side.
     pub value: f32,
 }
 
-/// What one colour's half sweep goes through.
+/// Stencils of one colour, in the order of a half sweep.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Colour {
     /// Number of cells.
     pub n_cells: u32,
-    /// Cells with whole stencils.
+    /// Cells with complete stencils.
     pub runs: Vec<Run>,
     /// Cells next to the cage.
     pub cut: Vec<CutCell>,
-    /// Where each z-plane's runs and cut cells start. `[nz + 1]`
+    /// First run and first cut cell of each z-plane. `[nz + 1]`
     pub planes: Vec<[u32; 2]>,
 }
 
 impl Colour {
-    /// The runs and the cut cells of a z-plane.
+    /// Ranges of runs and cut cells of a z-plane.
     #[inline(always)]
     #[must_use]
     pub fn of_plane(&self, plane: usize) -> [Range<usize>; 2] {
@@ -87,7 +87,7 @@ impl Colour {
     }
 }
 
-/// One level: its unknowns and their stencils.
+/// One level: unknowns and stencils.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {
     /// The level's grid.
@@ -96,20 +96,20 @@ pub struct Level {
     pub colours: [Colour; 2],
     /// Right-hand sides, ascending in `cut_cell`, then `column`.
     pub boundary: Vec<BoundaryTerm>,
-    /// Row of each grid cell in the level's fields; [`NO_CELL`] where it is no unknown. `[nz, ny, nx]`
+    /// Row of each grid cell in the level's fields; [`NO_CELL`] if it is not an unknown. `[nz, ny, nx]`
     pub row_of: Vec<u32>,
-    /// Cells with no arm at all, which the axes' disagreement cut off from everything; not solved for.
+    /// Cells without any arm, because the axes classify their neighbours differently. They are not unknowns.
     pub isolated: u64,
 }
 
 impl Level {
-    /// Rows of a field on this level, the two zero rows included.
+    /// Rows of a field, including the two zero rows.
     #[must_use]
     pub fn n_rows(&self) -> usize {
         self.n_unknowns() + 2
     }
 
-    /// Unknowns of both colours.
+    /// Number of unknowns.
     #[must_use]
     pub fn n_unknowns(&self) -> usize {
         (self.colours[0].n_cells + self.colours[1].n_cells) as usize
@@ -121,24 +121,24 @@ impl Level {
         if colour == 0 { 0 } else { self.colours[0].n_cells as usize + 1 }
     }
 
-    /// The row that stays zero, for cells that are no unknowns.
+    /// The zero row, which stands for cells that are not unknowns.
     #[must_use]
     pub fn zero_row(&self) -> u32 {
         self.colours[0].n_cells
     }
 
-    /// Row of the cell at `cell + offset`; the zero row where it is no unknown.
+    /// Row of the cell at `cell + offset`; the zero row if it is not an unknown.
     #[must_use]
     pub fn row_at(&self, cell: [u32; 3], offset: [i32; 3]) -> u32 {
         self.rows_at(cell, &[offset])[0]
     }
 
-    /// Rows of the cells at `cell + offset`; the zero row where there is no unknown.
+    /// Rows of the cells at `cell + offset`; the zero row for cells that are not unknowns.
     #[inline]
     #[must_use]
     pub fn rows_at<const N: usize>(&self, cell: [u32; 3], offsets: &[[i32; 3]; N]) -> [u32; N] {
         let [sx, sy, sz] = self.grid.strides().map(|s| s as isize);
-        // One step from the grid's sides, which is nearly everywhere, there is nothing to be checked.
+        // Fast path: no bounds checks at least one cell from the grid's sides.
         let is_within = (0..3).all(|a| cell[a] > 0 && cell[a] + 1 < self.grid.dims[a]);
         let center = if is_within { self.grid.index(cell) } else { 0 };
         offsets.map(|offset| {
@@ -152,13 +152,13 @@ impl Level {
         })
     }
 
-    /// Number of cut cells of both colours.
+    /// Number of cut cells.
     #[must_use]
     pub fn n_cut(&self) -> usize {
         self.colours[0].cut.len() + self.colours[1].cut.len()
     }
 
-    /// Row of a cut cell, by its number: red ones first, then black.
+    /// Row of a cut cell by its number, red before black.
     #[must_use]
     pub fn row_of_cut(&self, number: usize) -> usize {
         let [red, black] = &self.colours;
@@ -174,7 +174,7 @@ impl Level {
         self.grid.center(cell)
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(self.row_of.as_slice())
@@ -191,7 +191,7 @@ impl Level {
     }
 }
 
-/// Cells of doubling size, from the finest on until few unknowns remain. `coarsen` makes the next coarser ones.
+/// The finest level and coarser ones from `coarsen`, until few unknowns remain.
 pub fn coarsened_until_few<C>(
     finest: C,
     unknowns: impl Fn(&C) -> &[bool],

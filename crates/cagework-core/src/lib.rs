@@ -1,7 +1,7 @@
-//! Harmonic-coordinate cage deformation: the mathematics, and nothing else.
+//! The numerical core of cage deformation by harmonic coordinates.
 //!
-//! Data flows one way: mesh and [`Controls`] -> grid -> levels -> (batch: solve, sample) -> [`Weights`] -> deform.
-//! No I/O, no GPU, no JavaScript; everything here compiles for `wasm32-unknown-unknown`.
+//! Data flow: mesh and [`Controls`] -> grid -> levels -> (per batch: solve, sample) -> [`Weights`] -> deform. No I/O,
+//! no GPU, no JavaScript; everything here compiles for `wasm32-unknown-unknown`.
 
 pub mod assemble;
 pub mod bind;
@@ -52,7 +52,7 @@ pub use progress::{Cancelled, Progress, ProgressEvent, Stage};
 pub use report::BindReport;
 pub use weights::Weights;
 
-/// The example of the README.
+/// Compiles the README's example.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,13 +1,13 @@
-//! Mean value coordinates for closed triangle meshes: the closed-form alternative to compare harmonic ones with.
+//! Mean value coordinates for closed triangle meshes, a closed form for comparison with harmonic coordinates.
 //!
-//! They need no grid and no solver, but they are negative in places where the cage is not convex, and they see through
-//! its walls: a vertex in one leg follows the other leg. That is what harmonic coordinates were made for.
+//! They need no grid and no solver. But they are negative in places if the cage is not convex, and they act across
+//! gaps: a vertex in one leg follows the other leg. Harmonic coordinates avoid both.
 //!
-//! Source: Ju, Schaefer, Warren 2005, "Mean value coordinates for closed triangular meshes".
+//! Source: Ju, Schaefer and Warren 2005, "Mean value coordinates for closed triangular meshes".
 //!
-//! Changes versus the paper: weights are the mean vector's components along the corners' directions (section 3.2), with
-//! angles by arctangent. The robust form of section 3.3 takes the root of `1 - c^2`, which loses half of all digits near
-//! the plane of a triangle. Polygons are taken as the triangles that [`Cage::triangles`] cuts them into.
+//! Changes: weights are the components of the mean vector along the corners' directions (section 3.2), with angles by
+//! arctangent. The robust form of section 3.3 takes the root of `1 - c^2`, which loses half of all digits near the
+//! plane of a triangle. Polygons are triangulated as in [`Cage::triangles`].
 
 use glam::{DVec3, Vec3};
 
@@ -16,21 +16,18 @@ use crate::closed_form::{ClosedFormError, dense};
 use crate::progress::Progress;
 use crate::weights::Weights;
 
-/// Sine below which directions count as in one plane or along one line, and fraction of the cage's diagonal below
-/// which a point counts as on the surface: the root of the rounding of f64, where the error of the formula and of
-/// leaving a triangle out are the same, 1e-8.
-const ON_SURFACE: f64 = 1e-8;
+/// Sine below which directions are coplanar or collinear, and distance over the cage's diagonal below which a point is on the
+/// surface. At this value, the square root of f64 rounding, the errors of the formula and of omitting the triangle are both 1e-8.
+const SURFACE_TOLERANCE: f64 = 1e-8;
 
-/// Angles of a triangle's sides that sum to a full turn up to this are seen from a point on it: ten times the angle that
-/// [`ON_SURFACE`] leaves open, because the nearness of an edge magnifies it.
-const ALL_AROUND: f64 = 1e-7;
+/// Tolerance of the sum of a triangle's three angles against a full turn, at which a point lies on the triangle: ten
+/// times [`SURFACE_TOLERANCE`], whose effect grows near an edge.
+const FULL_TURN_TOLERANCE: f64 = 1e-7;
 
-/// Mean value coordinates of all cage vertices at `points` (`[n_vertices]`, object units, inside or outside of the
-/// cage). Dense: every row has all columns. `[n_vertices, n_cage]`
+/// Mean value coordinates at `points` (`[n_vertices]`, object units, inside or outside the cage), dense. `[n_vertices, n_cage]`
 ///
 /// # Errors
-/// [`ClosedFormError`]: a point is not finite or has no coordinates, the weights take more than `memory_limit` bytes, or
-/// `progress` cancelled.
+/// [`ClosedFormError`]: a point is not finite or has no coordinates, the weights exceed `memory_limit` bytes, or `progress` cancelled.
 pub fn mean_value_weights(
     points: &[Vec3],
     cage: &Cage,
@@ -42,9 +39,9 @@ pub fn mean_value_weights(
     })
 }
 
-/// Mean value coordinates at one point; `row` must be zero. `[n_cage]`. Whether they are defined there.
+/// Mean value coordinates at a point; returns whether they are defined. `row`: `[n_cage]`, zero on entry.
 fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
-    let near = ON_SURFACE * f64::from(cage.diagonal());
+    let near = SURFACE_TOLERANCE * f64::from(cage.diagonal());
     for (t, triangle) in cage.triangles().iter().enumerate() {
         let arms = cage.triangle_corners(t as u32).map(|p| p - point);
         let lengths = arms.map(DVec3::length);
@@ -54,16 +51,16 @@ fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
             return true;
         }
         let directions = [0, 1, 2].map(|k| arms[k] / lengths[k]);
-        // Side k is across from corner k; its normal has the length of the sine of its angle.
+        // Side k is opposite corner k; its normal has the length of the sine of its angle.
         let normals = [0, 1, 2].map(|k| directions[(k + 1) % 3].cross(directions[(k + 2) % 3]));
         let sines = normals.map(DVec3::length);
         let angles = [0, 1, 2].map(|k| sines[k].atan2(directions[(k + 1) % 3].dot(directions[(k + 2) % 3])));
         let determinant = directions[0].dot(normals[0]);
-        // Over the largest sine it is that of the point's elevation over the plane; alone it would be small for every
-        // triangle that is far away.
-        if determinant.abs() <= ON_SURFACE * sines.into_iter().fold(0.0, f64::max) {
-            if std::f64::consts::TAU - angles.iter().sum::<f64>() > ALL_AROUND {
-                continue; // seen edge-on from outside of it: its solid angle is zero
+        // Over the largest sine, the determinant is the sine of the point's elevation above the plane; unscaled it
+        // would also be small for distant triangles.
+        if determinant.abs() <= SURFACE_TOLERANCE * sines.into_iter().fold(0.0, f64::max) {
+            if std::f64::consts::TAU - angles.iter().sum::<f64>() > FULL_TURN_TOLERANCE {
+                continue; // in the plane but outside the triangle: solid angle zero
             }
             let on_face = [0, 1, 2].map(|k| sines[k] * lengths[(k + 1) % 3] * lengths[(k + 2) % 3]);
             let sum: f64 = on_face.iter().sum();
@@ -79,7 +76,7 @@ fn coordinates(point: DVec3, cage: &Cage, row: &mut [f64]) -> bool {
         }
     }
     let sum: f64 = row.iter().sum();
-    let cancelled = sum.abs() <= ON_SURFACE * row.iter().map(|w| w.abs()).sum::<f64>();
+    let cancelled = sum.abs() <= SURFACE_TOLERANCE * row.iter().map(|w| w.abs()).sum::<f64>();
     for w in row {
         *w /= sum;
     }
@@ -95,7 +92,7 @@ mod tests {
     use super::*;
     use crate::cage::shapes;
 
-    /// [`ON_SURFACE`] in units of the shapes, over the few cosines that are smaller than 1.
+    /// [`SURFACE_TOLERANCE`] with a margin for cosines below 1.
     const TOLERANCE: f64 = 1e-7;
 
     fn at(cage: &Cage, point: DVec3) -> Vec<f64> {
@@ -149,14 +146,14 @@ mod tests {
 
     #[test]
     fn weights_go_negative_across_the_gap_of_a_c() {
-        // In the lower arm, next to the gap: the walls of the gap are seen from behind.
+        // In the lower arm, next to the gap: the far wall of the gap is seen from behind.
         let cage = Cage::new(&shapes::c_shape()).unwrap();
         let row = at(&cage, DVec3::new(2.5, 0.9, 0.5));
         assert!(row.iter().any(|&w| w < -1e-3), "{row:?}");
     }
 
     #[test]
-    fn point_that_is_not_finite_is_named() {
+    fn point_that_is_not_finite_is_an_error_with_its_index() {
         let cage = Cage::new(&shapes::cube()).unwrap();
         let points = [Vec3::ONE, Vec3::NAN];
         assert_eq!(
@@ -170,7 +167,7 @@ mod tests {
         fn weights_sum_to_1_and_reproduce_points_inside(
             x in 0.001..0.999f64, y in 0.001..2.999f64, z in 0.001..0.999f64,
         ) {
-            // The back of the C.
+            // Points in the back of the C.
             assert_reproduced(&Cage::new(&shapes::c_shape()).unwrap(), DVec3::new(x, y, z));
         }
     }

@@ -1,4 +1,4 @@
-//! Meshes as plain arrays, their bounds, and welding of vertices that were split at seams.
+//! Meshes as plain arrays, bounding boxes, and welding of vertices.
 
 use glam::Vec3;
 use rustc_hash::{FxBuildHasher, FxHashMap};
@@ -14,7 +14,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Bounds of `points`; `None` when there are none.
+    /// Bounds of `points`; `None` if empty.
     #[must_use]
     pub fn of(points: &[Vec3]) -> Option<Self> {
         let first = *points.first()?;
@@ -37,24 +37,24 @@ impl Bounds {
         self.min + 0.5 * self.extent()
     }
 
-    /// Length of the diagonal: the unit of every relative error in a report.
+    /// Length of the diagonal: the unit of relative errors in reports.
     #[must_use]
     pub fn diagonal(&self) -> f32 {
         self.extent().length()
     }
 }
 
-/// Triangle mesh: `positions` `[n_vertices, 3]` in object units, `triangles` `[n_triangles, 3]` counter-clockwise
-/// seen from outside.
+/// Triangle mesh: `positions` `[n_vertices, 3]` in object units, `triangles` `[n_triangles, 3]` counter-clockwise seen
+/// from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
     /// Vertex positions.
     pub positions: Vec<Vec3>,
-    /// Vertex indices, three a triangle.
+    /// Vertex indices of each triangle.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Polygon mesh, faces of any size: what a cage is read from.
+/// Polygon mesh with faces of any size: input of a cage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PolygonMesh {
     /// Vertex positions.
@@ -64,7 +64,7 @@ pub struct PolygonMesh {
 }
 
 impl PolygonMesh {
-    /// Diagonal of the box of all finite vertices of faces, object units: that of a cage as far as there is one.
+    /// Diagonal of the box of all finite vertices that faces use, object units: the cage's diagonal, also for invalid meshes.
     #[must_use]
     pub fn diagonal(&self) -> f64 {
         let used = self.faces.iter().flatten().filter_map(|&i| self.positions.get(i as usize));
@@ -73,23 +73,23 @@ impl PolygonMesh {
     }
 }
 
-/// Which vertices share one position, so that a vertex split at a UV or normal seam is bound once.
+/// Vertices that share a position, so that a vertex split at a UV or normal seam is bound once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Weld {
-    /// For each unique position, the first input vertex that has it. `[n_unique]`
+    /// First input vertex of each distinct position. `[n_unique]`
     pub first: Vec<u32>,
-    /// For each input vertex, its unique position. `[n_vertices]`
+    /// Index of the distinct position of each input vertex. `[n_vertices]`
     pub unique_of: Vec<u32>,
 }
 
-/// Welds vertices whose positions are equal (`-0` equals `0`); the order of first occurrence is kept.
+/// Welds vertices with equal positions (`-0` equals `0`), in order of first occurrence.
 #[must_use]
 pub fn weld(positions: &[Vec3]) -> Weld {
     let mut seen: FxHashMap<[u32; 3], u32> =
         FxHashMap::with_capacity_and_hasher(positions.len(), FxBuildHasher);
     let mut welded = Weld { first: Vec::new(), unique_of: Vec::with_capacity(positions.len()) };
     for (v, p) in positions.iter().enumerate() {
-        // Adding zero turns -0 into +0, so that both have the same bits.
+        // Adding zero turns -0 into +0, so that equal positions have equal bits.
         let key = (*p + Vec3::ZERO).to_array().map(f32::to_bits);
         let unique = *seen.entry(key).or_insert_with(|| {
             welded.first.push(v as u32);
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_welds_to_nothing() {
+    fn empty_input_welds_to_an_empty_result() {
         assert_eq!(weld(&[]), Weld::default());
     }
 

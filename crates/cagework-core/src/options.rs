@@ -1,4 +1,4 @@
-//! Every option of a bind: its name, its words, its range and its default. Command, page and packages spell nothing again.
+//! Options of a bind: names, words, ranges and defaults, for the command, the page and the packages.
 
 use std::str::FromStr;
 
@@ -10,13 +10,14 @@ pub const MIN_GRID: u32 = 8;
 /// Largest number of cells along the longest side.
 pub const MAX_GRID: u32 = 512;
 
-/// An option whose value is one of a few words.
+/// An option with a fixed set of words as values.
 pub trait Choice: Copy + 'static {
-    /// Each word, as it is parsed and serialised, and its value.
+    /// Each value with its word, as it is parsed and serialised.
     const ALL: &'static [(&'static str, Self)];
 }
 
-/// Defines an enum, its words in serde, [`Choice`](crate::options::Choice), `FromStr` (which takes `-` for `_`) and `Display` (which writes `-`).
+/// Defines an enum with its words in serde, [`Choice`](crate::options::Choice), `FromStr` (which accepts `-` for `_`)
+/// and `Display` (which writes `-`).
 #[macro_export]
 macro_rules! choice {
     ($(#[$about:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $word:literal,)+ }) => {
@@ -45,31 +46,31 @@ macro_rules! choice {
 }
 
 choice! {
-    /// How the cage meets the grid.
+    /// Discretisation of the cage.
     Method {
-        /// As published: cells that the cage touches hold its values; a vertex takes its cell's weights.
+        /// As published: cells that the cage touches take its values, and a vertex takes the weights of its cell.
         Classic = "classic",
-        /// The cage is met where it is (arms), weights are interpolated.
+        /// The exact cage surface ends the stencils' arms, and weights are interpolated.
         #[default]
         Embedded = "embedded",
     }
 }
 
 choice! {
-    /// How Laplace's equation is solved.
+    /// Solver of Laplace's equation.
     Solver {
-        /// The paper's Algorithm 3.
+        /// Jacobi sweeps (Algorithm 3 of the paper).
         Jacobi = "jacobi",
-        /// Full multigrid and V-cycles.
+        /// Full multigrid with V-cycles.
         #[default]
         Multigrid = "multigrid",
-        /// Conjugate gradients; on the CPU only.
+        /// Conjugate gradients, on the CPU only.
         ConjugateGradient = "cg",
     }
 }
 
 impl Method {
-    /// The solver of a bind that asks for none: the paper's for the paper's method.
+    /// Default solver of a method: the paper's for the paper's method.
     #[must_use]
     pub fn usual_solver(self) -> Solver {
         match self {
@@ -80,20 +81,20 @@ impl Method {
 }
 
 choice! {
-    /// What conjugate gradients are preconditioned by.
+    /// Preconditioner of conjugate gradients.
     Preconditioner {
-        /// Nothing.
+        /// None.
         #[default]
         None = "none",
-        /// One V-cycle of multigrid.
+        /// One multigrid V-cycle.
         VCycle = "v_cycle",
     }
 }
 
 choice! {
-    /// Shape of the classic method's cells.
+    /// Cell shape of the classic method.
     CellShape {
-        /// g cells along each axis of the cage's box, as published: rectangular cells.
+        /// Rectangular cells, g along each axis of the cage's box, as published.
         #[default]
         Box = "box",
         /// Cubic cells, g along the longest axis.
@@ -102,55 +103,55 @@ choice! {
 }
 
 choice! {
-    /// How Eq. 2 is read.
+    /// Interpretation of Eq. 2.
     DeltaNorm {
         /// Euclidean norm of a cell's change: `sqrt(sum_i (w_i^n - w_i^(n-1))^2)`.
         #[default]
         Euclidean = "euclidean",
-        /// The letter of Eq. 2: `sqrt(sum_i |w_i^n - w_i^(n-1)|)`.
+        /// Eq. 2 literally: `sqrt(sum_i |w_i^n - w_i^(n-1)|)`.
         Literal = "literal",
     }
 }
 
 choice! {
-    /// What happens to a mesh vertex outside the cage.
+    /// Treatment of mesh vertices outside the cage.
     OutsidePolicy {
-        /// Near the cage, within 5 % of its diagonal, weights are extended linearly. Further out vertices follow less and less; from 15 %
-        /// on they stay where they are.
+        /// Weights are extended linearly within 5 % of the cage's diagonal. Beyond, vertices follow less and less, and
+        /// from 15 % on they stay in place.
         #[default]
         Extend = "extend",
-        /// It stays where it is.
+        /// They stay in place.
         Stay = "stay",
-        /// The bind ends in an error.
+        /// The bind fails.
         Refuse = "refuse",
     }
 }
 
 choice! {
-    /// Where a bind is computed.
+    /// Processor of a bind.
     Backend {
-        /// On the processor.
+        /// The CPU.
         #[default]
         Cpu = "cpu",
-        /// On the graphics card.
+        /// The GPU.
         Gpu = "gpu",
     }
 }
 
-/// A word that an option does not have.
+/// The word is not a value of the option.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{word:?} is not one of {known}")]
 pub struct UnknownWord {
     /// The word.
     word: String,
-    /// Those there are, with commas.
+    /// Valid words, separated by commas.
     known: String,
 }
 
-/// The value that a word stands for.
+/// Parses a word.
 ///
 /// # Errors
-/// [`UnknownWord`] names those there are.
+/// [`UnknownWord`] lists the valid words.
 pub fn choose<T: Choice>(text: &str) -> Result<T, UnknownWord> {
     let word = text.replace('-', "_");
     let found = T::ALL.iter().find(|(known, _)| *known == word).map(|(_, value)| *value);
@@ -166,20 +167,20 @@ pub fn choose<T: Choice>(text: &str) -> Result<T, UnknownWord> {
 pub struct OutOfRange {
     /// Name of the option.
     pub option: &'static str,
-    /// Its value, as it was given.
+    /// The value as given.
     pub value: String,
-    /// What it may be.
+    /// The valid range, in words.
     pub allowed: &'static str,
 }
 
-/// An option whose value is a number.
+/// A numeric option.
 #[derive(Clone, Copy, Debug)]
 pub struct Number {
     /// Its name.
     pub name: &'static str,
-    /// What it may be, in words.
+    /// The valid range, in words.
     pub allowed: &'static str,
-    /// Whether it may be this.
+    /// Whether a value is valid.
     pub is_allowed: fn(f64) -> bool,
 }
 
@@ -189,7 +190,7 @@ pub const GRID: Number = Number {
     allowed: "a whole number from 8 to 512",
     is_allowed: |g| g.fract() == 0.0 && (f64::from(MIN_GRID)..=f64::from(MAX_GRID)).contains(&g),
 };
-/// Threshold for delta.
+/// Convergence threshold for delta.
 pub const TAU: Number =
     Number { name: "tau", allowed: "a number above 0", is_allowed: |tau| tau.is_finite() && tau > 0.0 };
 /// Limit on iterations.
@@ -198,14 +199,14 @@ pub const MAX_ITERATIONS: Number = Number {
     allowed: "a whole number from 1 on",
     is_allowed: |n| n.fract() == 0.0 && n >= 1.0,
 };
-/// Threshold for weights.
+/// Total weight dropped per row.
 pub const SPARSIFY: Number = Number {
     name: "sparsify",
     allowed: "0 (keep all weights) or a threshold below 0.1",
     is_allowed: |w| (0.0..0.1).contains(&w),
 };
 
-/// Steps of subdivision of a smooth cage.
+/// Subdivision steps of a smooth cage.
 pub const SMOOTH: Number = Number {
     name: "smooth",
     allowed: "a whole number from 0 to 3",
@@ -222,10 +223,10 @@ impl Number {
         if (self.is_allowed)(value) { Ok(()) } else { Err(self.refuse(&value.to_string())) }
     }
 
-    /// Reads a value.
+    /// Parses and checks a value.
     ///
     /// # Errors
-    /// [`OutOfRange`], also when the text is no such number.
+    /// [`OutOfRange`], also if the text is not a number of this type.
     pub fn parse<T: FromStr + Into<f64> + Copy>(&self, text: &str) -> Result<T, OutOfRange> {
         let value: T = text.parse().map_err(|_| self.refuse(text))?;
         self.check(value).map(|()| value)
@@ -243,35 +244,34 @@ impl Number {
 pub struct BindOptions {
     /// Cells along the longest side (each side for classic box cells), 8 to 512. Default 64.
     pub grid: u32,
-    /// Default embedded.
+    /// Discretisation of the cage. Default embedded.
     pub method: Method,
-    /// Default multigrid.
+    /// Solver of Laplace's equation. Default multigrid.
     pub solver: Solver,
-    /// Default none; only conjugate gradients look at it.
+    /// Preconditioner of conjugate gradients. Default none.
     pub preconditioner: Preconditioner,
-    /// Default box; only the classic method looks at it.
+    /// Cell shape of the classic method. Default box.
     pub cell_shape: CellShape,
-    /// Default Euclidean; only Jacobi looks at it.
+    /// Delta of Jacobi sweeps. Default Euclidean.
     pub delta_norm: DeltaNorm,
-    /// Threads; 0 = all. Default 0. (The page has one.)
+    /// Number of threads; 0 uses all. Default 0. (The page has one.)
     #[cfg_attr(feature = "typescript", ts(skip))]
     pub threads: usize,
-    /// Stop when delta falls below it. Default 1e-5.
+    /// Convergence threshold for delta. Default 1e-5.
     pub tau: f32,
     /// Limit on Jacobi sweeps, V-cycles, or steps of conjugate gradients. Default 20,000.
     pub max_iterations: u32,
-    /// In each row the smallest weights, up to this total, are dropped; then sum and rest position are restored. 0 keeps all. Default 0.
+    /// Drops the smallest weights of each row up to this total, then restores sum and rest position. 0 keeps all. Default 0.
     pub sparsify: f32,
-    /// Refuse to start above this many bytes of memory, `held` ones included. Default 4 GiB; 2 GiB in wasm.
+    /// Fails before the bind if it needs more bytes of memory, including `held`. Default 4 GiB; 2 GiB in wasm.
     pub memory_limit: u64,
-    /// Default extend.
+    /// Treatment of vertices outside the cage. Default extend.
     pub outside: OutsidePolicy,
-    /// Bytes that the caller holds meanwhile, a model and its document: they count towards the limit. Default 0.
+    /// Bytes that the caller holds during the bind (model, document), which count towards the limit. Default 0.
     #[serde(skip)]
     #[cfg_attr(feature = "typescript", ts(skip))]
     pub held: u64,
-    /// So many points at the end are no vertices of the mesh: they are bound, but nobody sees whether they are outside.
-    /// Default 0.
+    /// Trailing points that are not mesh vertices. They are bound, but excluded from the check for vertices outside. Default 0.
     #[serde(skip)]
     #[cfg_attr(feature = "typescript", ts(skip))]
     pub extra_points: usize,
@@ -299,10 +299,10 @@ impl Default for BindOptions {
 }
 
 impl BindOptions {
-    /// Checks every option's range.
+    /// Checks the range of every option.
     ///
     /// # Errors
-    /// [`OutOfRange`] names the first that is wrong.
+    /// [`OutOfRange`] for the first invalid option.
     pub fn check(&self) -> Result<(), OutOfRange> {
         GRID.check(self.grid)?;
         TAU.check(self.tau)?;
@@ -310,7 +310,7 @@ impl BindOptions {
         SPARSIFY.check(self.sparsify)
     }
 
-    /// Whether the solver needs coarser levels than the finest.
+    /// Whether the solver needs coarse levels.
     #[must_use]
     pub fn needs_coarse_levels(&self) -> bool {
         match self.solver {
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn a_word_is_the_same_wherever_it_is_spelled() {
+    fn words_are_parsed_displayed_and_serialised_consistently() {
         assert_words::<Method>();
         assert_words::<Solver>();
         assert_words::<Preconditioner>();
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_out_of_range_are_refused_with_what_is_allowed() {
+    fn numbers_out_of_range_are_errors_with_the_range() {
         let refused = GRID.parse::<u32>("7").unwrap_err();
         assert_eq!(refused.to_string(), "grid is 7; it must be a whole number from 8 to 512");
         assert!(GRID.parse::<u32>("8").is_ok() && GRID.parse::<u32>("64.5").is_err());
@@ -359,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_said_is_the_default() {
+    fn missing_options_are_the_defaults() {
         let read: BindOptions = serde_json::from_str(r#"{"grid": 32, "solver": "cg"}"#).unwrap();
         let expected = BindOptions { grid: 32, solver: Solver::ConjugateGradient, ..BindOptions::default() };
         assert_eq!(read, expected);

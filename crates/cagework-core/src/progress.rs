@@ -1,45 +1,45 @@
-//! How long work says where it is, and how it is told to stop.
+//! Progress reports and cancellation.
 
 use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// The stages of a bind, in order, and those of making a cage.
+/// Stages of a bind, in order, and of cage generation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Stage {
-    /// The cage is laid into the grid.
+    /// Voxelization of the cage.
     Voxelize,
-    /// Laplace's equation, one right-hand side per cage vertex.
+    /// Solving Laplace's equation, one right-hand side per control.
     Solve,
-    /// Weights are taken at the mesh's vertices.
+    /// Sampling the weights at the mesh's vertices.
     Sample,
-    /// A generated cage is brought to few vertices.
+    /// Simplification of a generated cage.
     Simplify,
 }
 
-/// One step of progress.
+/// A progress report.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProgressEvent {
-    /// The stage under way.
+    /// Current stage.
     pub stage: Stage,
-    /// How much of the whole work is done, 0 to 1.
+    /// Completed share of the whole work, 0 to 1.
     pub fraction: f32,
-    /// Sweeps or V-cycles done so far in this stage.
+    /// Completed sweeps or V-cycles of this stage.
     pub iteration: u32,
-    /// Latest delta (Eq. 2), where the stage has one.
+    /// Latest delta (Eq. 2), if the stage has one.
     pub delta: Option<f32>,
 }
 
-/// Receives progress, from any thread, and may cancel.
+/// Receives progress from any thread, and may cancel.
 pub trait Progress: Sync {
-    /// Called often (many times a second); return `Break` to cancel the work.
+    /// Called many times a second. Return `Break` to cancel the work.
     fn report(&self, event: ProgressEvent) -> ControlFlow<()>;
 
-    /// Milliseconds on a clock that only runs forward. Where the standard library has none (wasm), whoever watches
-    /// lends one; without it all times read 0.
+    /// Milliseconds of a monotonic clock. wasm has none in the standard library: implementations override this,
+    /// otherwise all times are 0.
     fn now_ms(&self) -> f64 {
         clock_ms()
     }
@@ -63,7 +63,7 @@ impl<F: Fn(ProgressEvent) -> ControlFlow<()> + Sync> Progress for F {
     }
 }
 
-/// For callers who neither watch nor cancel.
+/// Ignores progress and never cancels.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 

@@ -1,10 +1,10 @@
-//! What a bind reports, always: the one struct behind the command line, the JSON report and the page.
+//! Report of a bind, shared by the command line, JSON and the page.
 
 use serde::{Deserialize, Serialize};
 
 use crate::options::{Backend, CellShape, DeltaNorm, Method, Preconditioner, Solver};
 
-/// Everything worth knowing about one bind.
+/// Report of a bind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct BindReport {
@@ -12,84 +12,82 @@ pub struct BindReport {
     pub method: Method,
     /// Jacobi, multigrid, or conjugate gradients.
     pub solver: Solver,
-    /// What conjugate gradients were preconditioned by.
+    /// Preconditioner of conjugate gradients.
     #[serde(default)]
     pub preconditioner: Preconditioner,
-    /// Where it was computed.
+    /// Processor that computed the bind.
     pub backend: Backend,
-    /// Name of the GPU that solved.
+    /// Name of the GPU, if it solved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "typescript", ts(optional))]
     pub adapter: Option<String>,
-    /// Threads that solved.
+    /// Number of threads that solved.
     pub threads: usize,
-    /// Cells along the longest side, as asked for.
+    /// Requested number of cells along the longest side.
     pub grid: u32,
-    /// Cells along x, y, z of the grid that was built.
+    /// Cells of the grid along x, y, z.
     pub dims: [u32; 3],
     /// Edge lengths of a cell, object units.
     pub cell_size: [f32; 3],
     /// Rectangular (as published) or cubic cells.
     pub cell_shape: CellShape,
-    /// How Eq. 2 is read.
+    /// Interpretation of Eq. 2.
     pub delta_norm: DeltaNorm,
-    /// Stop threshold for delta.
+    /// Convergence threshold for delta.
     pub tau: f32,
-    /// Cells of each kind on the finest grid.
+    /// Cells of the finest grid by kind.
     pub cells: CellCounts,
-    /// Cells to be solved for on each level, finest first; one entry for Jacobi.
+    /// Unknowns of each level, finest first; one entry for Jacobi.
     pub levels: Vec<u64>,
-    /// Jacobi sweeps, V-cycles on the finest level, or steps of conjugate gradients (the largest number over the batches).
+    /// Jacobi sweeps, V-cycles on the finest level, or steps of conjugate gradients; maximum over batches.
     pub iterations: u32,
-    /// Whether delta fell below tau before the limit on iterations.
+    /// Whether delta fell below tau within the limit on iterations.
     pub converged: bool,
-    /// Whether f32 ended the solve, having no more digits to give, before delta met tau.
+    /// Whether f32 precision ended the solve before delta fell below tau.
     pub at_round_off: bool,
-    /// Delta after every `delta_interval` iterations. Jacobi: Eq. 2, the sweep's average change of a cell. The others:
-    /// the error that is expected to remain, root mean square over cells.
-    /// `[iterations / delta_interval]`, rounded up.
+    /// Delta after every `delta_interval` iterations. Jacobi: Eq. 2, the mean change of a cell per sweep. Other
+    /// solvers: estimated remaining error, RMS over cells. `[iterations / delta_interval]`, rounded up.
     pub delta_history: Vec<f32>,
-    /// Iterations between two entries of `delta_history`: 1, but for the GPU's Jacobi sweeps, which are checked now
-    /// and then.
+    /// Iterations per entry of `delta_history`: 1 except for Jacobi on the GPU.
     #[serde(default = "one")]
     pub delta_interval: u32,
-    /// Root mean square residual of the finest level before each iteration; empty for Jacobi. `[iterations]`
+    /// RMS residual of the finest level before each iteration; empty for Jacobi. `[iterations]`
     pub residual_history: Vec<f32>,
     /// Wall-clock time of the stages, milliseconds.
     pub timings_ms: Timings,
     /// Bytes of working memory.
     pub memory_bytes: MemoryBytes,
-    /// Distance between `sum_i w_i c_i` and the mesh vertex (Eq. 3), over vertices inside the cage.
+    /// Rest error: distance of `sum_i w_i c_i` from the mesh vertex (Eq. 3), over vertices inside the cage.
     pub rest_error: RestError,
-    /// The same and the rows' sums before rows were restored: the solver's doing alone.
+    /// Error of the rows before correction: that of the solver alone.
     #[serde(default)]
     pub raw_error: RawError,
     /// Statistics of the stored weights.
     pub weights: WeightStats,
-    /// Mesh vertices (rows).
+    /// Number of mesh vertices (rows).
     pub vertices: u64,
-    /// Cage vertices (the first columns).
+    /// Number of cage vertices (the first columns).
     pub cage_vertices: u64,
-    /// Controls inside the cage (the columns after them).
+    /// Number of inner controls (the next columns).
     #[serde(default)]
     pub inner_controls: u64,
-    /// Steps of subdivision between the cage and its smooth surface.
+    /// Subdivision steps of the smooth surface.
     #[serde(default)]
     pub smooth: u32,
-    /// Mesh vertices outside the cage.
+    /// Number of mesh vertices outside the cage.
     pub outside_vertices: u64,
-    /// Those of them that stay where they are.
+    /// Number of vertices outside that stay in place.
     #[serde(default)]
     pub staying_vertices: u64,
-    /// How far the furthest of them is from the cage, object units.
+    /// Largest distance of a vertex from the cage, object units.
     #[serde(default)]
     pub outside_distance: f32,
-    /// Mesh vertices inside of controls.
+    /// Number of mesh vertices inside balls and tubes.
     #[serde(default)]
     pub held_vertices: u64,
-    /// Cells about which the three axes disagreed whether they are inside.
+    /// Number of cells that lines along the three axes classify differently.
     pub ambiguous_cells: u64,
-    /// Remarks in whole sentences (cage was inside out, unused vertices, ...).
+    /// Notices in whole sentences, such as flipped faces or unused vertices.
     pub notices: Vec<String>,
 }
 
@@ -97,13 +95,13 @@ fn one() -> u32 {
     1
 }
 
-/// Cells per kind.
+/// Numbers of cells by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct CellCounts {
-    /// Cells that are solved for.
+    /// Unknowns.
     pub interior: u64,
-    /// Cells that the cage's surface passes through.
+    /// Cells that the cage's surface intersects.
     pub boundary: u64,
     /// Cells outside the cage.
     pub exterior: u64,
@@ -113,13 +111,13 @@ pub struct CellCounts {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct Timings {
-    /// Cage into grid, levels, transfer tables.
+    /// Voxelization, levels and transfer tables.
     pub voxelize: f64,
-    /// Laplace's equation for all columns.
+    /// Solve of all columns.
     pub solve: f64,
-    /// Weights at the vertices, sparsification.
+    /// Sampling and assembly.
     pub sample: f64,
-    /// Whole bind.
+    /// The whole bind.
     pub total: f64,
 }
 
@@ -127,9 +125,9 @@ pub struct Timings {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct MemoryBytes {
-    /// Estimated before anything was allocated.
+    /// Estimate before the bind.
     pub estimated: u64,
-    /// Sum of the buffers that were alive together at the worst moment.
+    /// Largest sum of buffers alive at the same time.
     pub peak: u64,
 }
 
@@ -149,8 +147,8 @@ pub struct RestError {
     pub max_rel: f64,
 }
 
-/// What was off before rows were restored, over vertices inside the cage. The operator and the sampling reproduce linear
-/// functions exactly, so with the embedded method this is what the solver left.
+/// Error of the rows before correction, over vertices inside the cage. Operator and sampling reproduce linear functions
+/// exactly, so with the embedded method it is that of the solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct RawError {
@@ -158,11 +156,11 @@ pub struct RawError {
     pub sum: MeanMax,
     /// Distance of `sum_i w_i c_i` from the vertex over the diagonal of the cage's bounding box.
     pub point_rel: MeanMax,
-    /// Smallest value, before negative ones were taken for 0.
+    /// Smallest value, before negative values are clamped to 0.
     pub min_weight: f32,
 }
 
-/// Mean and largest of some numbers.
+/// Mean and maximum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub struct MeanMax {
@@ -180,8 +178,8 @@ pub struct WeightStats {
     pub min: f32,
     /// Largest weight.
     pub max: f32,
-    /// Largest |sum of a row - 1|.
+    /// Largest `|sum of a row - 1|`.
     pub max_sum_error: f64,
-    /// Stored weights.
+    /// Number of stored weights.
     pub nonzeros: u64,
 }

@@ -1,22 +1,23 @@
-//! The nearest rotation to a matrix, always a proper one.
+//! Nearest rotation to a matrix.
 
 use glam::{DMat3, DQuat};
 
-/// Newton's steps; at a simple root five are enough, at a double one each halves the distance.
+/// Limit on Newton steps: five suffice at a simple root; at a double root each step halves the distance.
 const STEPS: usize = 40;
 
-/// The rotation R with the largest trace of `R^T m`.
+/// The proper rotation R that maximises the trace of `R^T m`.
 ///
-/// Its quaternion belongs to the largest eigenvalue of a symmetric 4 x 4 matrix (Horn 1987, "Closed-form solution of absolute
-/// orientation using unit quaternions"; Higham and Noferini 2016 find the polar factor by the same matrix), which Newton's method
-/// finds on the characteristic polynomial, from above (Theobald 2005). Where several rotations are as near, one of them.
+/// Its quaternion is the eigenvector of the largest eigenvalue of a symmetric 4 x 4 matrix (Horn 1987, "Closed-form
+/// solution of absolute orientation using unit quaternions"; Higham and Noferini 2016 derive the polar factor from the
+/// same matrix). Newton's method on the characteristic polynomial finds the eigenvalue from above (Theobald 2005). If
+/// several rotations are equally near, returns one of them.
 pub fn nearest_rotation(m: DMat3) -> DMat3 {
     let size = m.x_axis.abs().max(m.y_axis.abs()).max(m.z_axis.abs()).max_element();
     if size == 0.0 || !size.is_finite() {
         return DMat3::IDENTITY;
     }
     let m = m * size.recip();
-    // Rows of m: `a[row][column]`.
+    // `a[row][column]` of m.
     let a = m.transpose().to_cols_array_2d();
     let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = a;
     let k = [
@@ -29,13 +30,13 @@ pub fn nearest_rotation(m: DMat3) -> DMat3 {
     let c2 = -2.0 * a.as_flattened().iter().map(|x| x * x).sum::<f64>();
     let c1 = -8.0 * m.determinant();
     let c0 = determinant4(&k);
-    // No eigenvalue is larger than the sum of m's singular values, which is at most this.
+    // Upper bound on the sum of m's singular values, and so on all eigenvalues.
     let mut l = (-1.5 * c2).sqrt();
     for _ in 0..STEPS {
         let value = ((l * l + c2) * l + c1) * l + c0;
         let slope = (4.0 * l * l + 2.0 * c2) * l + c1;
         let next = l - value / slope;
-        // From above it only falls; what rises is rounding.
+        // Newton's iterates decrease from above; an increase is rounding.
         if !next.is_finite() || next >= l {
             break;
         }
@@ -45,7 +46,7 @@ pub fn nearest_rotation(m: DMat3) -> DMat3 {
     for (i, row) in shifted.iter_mut().enumerate() {
         row[i] -= l;
     }
-    // Each column of the adjugate is a multiple of the eigenvector; the longest has the most digits.
+    // Each column of the adjugate is a multiple of the eigenvector; the longest is the most accurate.
     let columns = [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| cofactor(&shifted, i, j)));
     let squared = |q: &[f64; 4]| q.iter().map(|x| x * x).sum::<f64>();
     let longest = columns.into_iter().max_by(|a, b| squared(a).total_cmp(&squared(b))).unwrap_or_default();
@@ -76,7 +77,7 @@ mod tests {
 
     use super::*;
 
-    /// By singular values (Kabsch 1976).
+    /// By singular value decomposition (Kabsch 1976).
     fn by_svd(m: DMat3) -> DMat3 {
         let svd = Matrix3::from_column_slice(&m.to_cols_array()).svd(true, true);
         let (mut u, v) = (svd.u.unwrap(), svd.v_t.unwrap());
@@ -97,11 +98,11 @@ mod tests {
     }
 
     #[test]
-    fn it_is_that_of_singular_values() {
+    fn rotation_equals_that_of_singular_value_decomposition() {
         for m in matrices() {
             let (found, expected) = (nearest_rotation(m), by_svd(m));
             assert!((found.determinant() - 1.0).abs() < 1e-12);
-            // As near, where two are nearly as near as each other; else the same.
+            // Equally good if two rotations are nearly equally near; otherwise equal.
             let trace = |r: DMat3| (r.transpose() * m).to_cols_array();
             let [ours, theirs] = [trace(found), trace(expected)].map(|t| t[0] + t[4] + t[8]);
             assert!(ours >= theirs - 1e-12, "{m}: {ours} {theirs}");
@@ -112,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stretch_has_none_whatever_its_scale_and_a_mirror_has_one() {
+    fn a_stretch_gives_the_identity_and_a_mirror_a_proper_rotation() {
         for scale in [1e-30, 1.0, 1e30] {
             let stretch = DMat3::from_diagonal(DVec3::new(3.0, 2.0, 0.5) * scale);
             assert!(nearest_rotation(stretch).abs_diff_eq(DMat3::IDENTITY, 1e-14));

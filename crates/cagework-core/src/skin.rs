@@ -1,52 +1,52 @@
-//! Linear blend skinning and morph targets: what plays a clip.
+//! Linear blend skinning and morph targets, for the playback of clips.
 
 use glam::{Mat4, Quat, Vec3};
 
-/// Vertices with their joints and morph targets, in compressed rows.
+/// Vertices with joint weights and morph targets, in compressed rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Skin {
-    /// In the mesh's own space, all targets at 0. `[n_vertices]`
+    /// Rest positions in mesh space, without morph targets. `[n_vertices]`
     pub positions: Vec<Vec3>,
-    /// Where each vertex's joints begin. `[n_vertices + 1]`
+    /// First entry of each vertex in `joints`. `[n_vertices + 1]`
     pub joint_starts: Vec<u32>,
-    /// Matrix of the palette, and its weight; those of a vertex sum to 1.
+    /// `(index into the palette, weight)`; weights of a vertex sum to 1.
     pub joints: Vec<(u32, f32)>,
-    /// Where each vertex's deltas begin. `[n_vertices + 1]`
+    /// First entry of each vertex in `deltas`. `[n_vertices + 1]`
     pub delta_starts: Vec<u32>,
-    /// Target, and what it adds at weight 1, in the mesh's own space.
+    /// `(target, displacement at weight 1)`, in mesh space.
     pub deltas: Vec<(u32, Vec3)>,
 }
 
-/// A skeleton with a clip, its joints turned as the world at rest.
+/// A skeleton with an animation clip. Joints are axis-aligned in the rest pose.
 #[derive(Clone, Debug)]
 pub struct Rig {
-    /// Parents before children, the root first.
+    /// Joints, parents before children, the root first.
     pub joints: Vec<Joint>,
-    /// Joints of each vertex, and their weights. `[n_vertices]`
+    /// Four joints of each vertex with their weights. `[n_vertices]`
     pub influences: Vec<[(u32, f32); 4]>,
     /// Name of the clip.
     pub clip: &'static str,
-    /// Of the keys, seconds.
+    /// Times of the keys, seconds.
     pub times: Vec<f32>,
-    /// Rotation of each joint against its rest. `[n_joints, n_keys]`
+    /// Rotation of each joint relative to its rest pose. `[n_joints, n_keys]`
     pub turns: Vec<Vec<Quat>>,
-    /// Place of the root, object units. `[n_keys]`
+    /// Position of the root, object units. `[n_keys]`
     pub root: Vec<Vec3>,
 }
 
 /// A joint.
 #[derive(Clone, Copy, Debug)]
 pub struct Joint {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Where it is at rest, object units.
+    /// Rest position, object units.
     pub at: Vec3,
-    /// The joint it hangs on.
+    /// Index of the parent; `None` for the root.
     pub parent: Option<usize>,
 }
 
 impl Skin {
-    /// The same with copies of vertices after them.
+    /// The skin with copies of the given vertices appended.
     #[must_use]
     pub fn with_copies(&self, copies: &[u32]) -> Self {
         let mut all = self.clone();
@@ -69,7 +69,7 @@ impl Skin {
 /// `palette`: world from mesh space for each joint. `targets`: weights of the morph targets. Returns `[n_vertices]`.
 ///
 /// # Panics
-/// If a joint or target is not there.
+/// If a joint or target index is out of range.
 #[must_use]
 pub fn skin_vertices(skin: &Skin, palette: &[Mat4], targets: &[f32]) -> Vec<Vec3> {
     let range = |starts: &[u32], v: usize| starts[v] as usize..starts[v + 1] as usize;
@@ -102,7 +102,7 @@ mod tests {
         let turn = Mat4::from_quat(Quat::from_rotation_z(std::f32::consts::FRAC_PI_2));
         let palette = [Mat4::from_translation(Vec3::splat(4.0)), turn];
         let posed = skin_vertices(&skin, &palette, &[0.5, 1.0]);
-        // (2, 0, 0.5) turned by 90 degrees about z; a quarter of (4, 5, 4) and three of (-1, 0, 0).
+        // (2, 0, 0.5) rotated by 90 degrees about z; a quarter of (4, 5, 4) plus three quarters of (-1, 0, 0).
         let copied = skin_vertices(&skin.with_copies(&[1, 0]), &palette, &[0.5, 1.0]);
         assert_eq!(copied, [posed[0], posed[1], posed[1], posed[0]]);
         assert!(posed[0].distance(Vec3::new(0.0, 2.0, 0.5)) < 1e-6, "{}", posed[0]);

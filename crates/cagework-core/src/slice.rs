@@ -1,7 +1,6 @@
-//! A slice through the grid, to look at: the kinds of its cells, and the harmonic coordinates at their centres.
+//! A slice through the grid for display: cell kinds, and harmonic coordinates at the cell centres.
 //!
-//! Values are those that a mesh vertex at each cell's centre would get, from the bind itself ([`crate::bind()`] with
-//! [`Slice::centers`] as its mesh), so that there is no second solver that could disagree.
+//! Values come from a bind ([`crate::bind()`]) with [`Slice::centers`] as mesh, so they are what a mesh vertex there would get.
 
 use glam::{DVec3, Vec3};
 use thiserror::Error;
@@ -15,44 +14,44 @@ use crate::voxelize::classic::{place_grid, voxelize_classic};
 use crate::voxelize::embedded::{Cells, shoot_lines, votes};
 use crate::weights::Weights;
 
-/// One layer of cells across an axis.
+/// A layer of cells normal to an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slice {
-    /// The axis it lies across: 0, 1, 2.
+    /// The axis, 0 to 2.
     pub axis: usize,
-    /// The layer, counted from the grid's first.
+    /// Index of the layer.
     pub layer: u32,
     /// Cells along [`Self::u`] and [`Self::v`].
     pub dims: [u32; 2],
     /// Outer corner of its first cell, in the plane of the centres, object units.
     pub corner: Vec3,
-    /// Edge of a cell along the next axis (y for x, z for y, x for z), object units.
+    /// Edge vector of a cell along the next axis (y for x, z for y, x for z), object units.
     pub u: Vec3,
-    /// Edge of a cell along the one after it.
+    /// Edge vector of a cell along the remaining axis.
     pub v: Vec3,
-    /// u fastest; none is untyped. `[dims[1], dims[0]]`
+    /// Kind of each cell, u fastest; none is untyped. `[dims[1], dims[0]]`
     pub kinds: Vec<CellKind>,
-    /// Cells that are not exterior, ascending: what [`Self::weights`] has rows for.
+    /// Cells that are not exterior, ascending: the rows of [`Self::weights`].
     pub cells: Vec<u32>,
-    /// Harmonic coordinates at the centres of [`Self::cells`], once they are known. `[n_cells, n_cage]`
+    /// Harmonic coordinates at the centres of [`Self::cells`], once computed. `[n_cells, n_cage]`
     pub weights: Option<Weights>,
 }
 
-/// Why weights do not belong to a slice.
+/// The weights have the wrong number of rows for the slice.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("the slice has {cells} cells inside the cage, but there are {rows} rows of weights")]
 pub struct SliceError {
-    /// Cells.
+    /// Number of cells of the slice.
     pub cells: usize,
-    /// Rows.
+    /// Number of rows of the weights.
     pub rows: usize,
 }
 
 impl Slice {
-    /// The layer of the grid of a bind with `options` at `fraction` (0 to 1) of its length along `axis`.
+    /// The layer at `fraction` (0 to 1) of the length along `axis`, in the grid of a bind with `options`.
     ///
     /// # Panics
-    /// If there is no such axis.
+    /// If `axis` is above 2.
     #[must_use]
     pub fn new<'a>(
         controls: impl Into<Controls<'a>>,
@@ -114,7 +113,7 @@ impl Slice {
         }
     }
 
-    /// Centres of [`Self::cells`]: the mesh whose weights are the slice's values. Object units.
+    /// Centres of [`Self::cells`], object units: the mesh to bind.
     #[must_use]
     pub fn centers(&self) -> Vec<Vec3> {
         let n = self.dims[0];
@@ -123,10 +122,10 @@ impl Slice {
         self.cells.iter().map(center).collect()
     }
 
-    /// Takes the weights of a bind of [`Self::centers`].
+    /// Stores the weights of a bind of [`Self::centers`].
     ///
     /// # Errors
-    /// [`SliceError`] when there is not one row for each.
+    /// [`SliceError`] if there is not one row per cell.
     pub fn set_weights(&mut self, weights: Weights) -> Result<(), SliceError> {
         if weights.n_rows() != self.cells.len() {
             return Err(SliceError { cells: self.cells.len(), rows: weights.n_rows() });
@@ -135,7 +134,7 @@ impl Slice {
         Ok(())
     }
 
-    /// Values of one coordinate, 0 in exterior cells; nothing without weights. `[dims[1], dims[0]]`
+    /// Values of a column, 0 in exterior cells; `None` without weights. `[dims[1], dims[0]]`
     #[must_use]
     pub fn values(&self, column: u32) -> Option<Vec<f32>> {
         let weights = self.weights.as_ref()?;
@@ -167,7 +166,7 @@ mod tests {
     #[test]
     fn middle_of_a_box_is_interior_within_one_ring_of_boundary() {
         let slice = Slice::new(&box_cage(), &options(Method::Embedded), 0, 0.5);
-        // g = 16 along z: cells of 1/4; 8 x 16 of them inside across x, less the ring next to the cage.
+        // g = 16 along z gives cells of 1/4: 8 x 16 of them inside, minus the ring next to the cage.
         let count = |kind| slice.kinds.iter().filter(|&&k| k == kind).count();
         assert_eq!((count(CellKind::Interior), count(CellKind::Boundary)), (6 * 14, 8 * 16 - 6 * 14));
         assert_eq!((slice.cells.len(), slice.u, slice.v), (8 * 16, 0.25 * Vec3::Y, 0.25 * Vec3::Z));
@@ -194,7 +193,7 @@ mod tests {
         assert!(at(1.0) == at(2.0) && at(1.0) >= 16);
     }
 
-    /// Harmonic coordinates of a box are trilinear: at the centre of a cell they are a product of three fractions.
+    /// Harmonic coordinates of a box are trilinear: products of three fractions.
     #[test]
     fn values_are_the_harmonic_coordinates() {
         let cage = box_cage();
@@ -211,7 +210,7 @@ mod tests {
             for (&cell, p) in slice.cells.iter().zip(&centers) {
                 let t = *p / Vec3::new(1.0, 2.0, 4.0);
                 let expected = (Vec3::ONE - (t - corner).abs()).to_array().iter().product::<f32>();
-                // What tau = 1e-5 leaves.
+                // Error of the solver at tau = 1e-5.
                 assert!((values[cell as usize] - expected).abs() < 1e-4);
             }
             let outside = (0..slice.kinds.len()).filter(|&c| slice.kinds[c] == CellKind::Exterior);

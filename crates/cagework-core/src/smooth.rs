@@ -1,9 +1,10 @@
-//! Smooth cages: the surface of Catmull-Clark subdivision, and its basis functions as rows.
+//! Smooth cages: Catmull-Clark subdivision with its basis functions as rows.
 //!
-//! Each vertex of the subdivided mesh is a mean of the cage's vertices: a row of B (see [`crate::controls`]). Values on such a
-//! surface are close to cubic B-splines, so that a model shows no edges of its cage; the columns stay the cage's vertices.
+//! Each vertex of the subdivided mesh is a weighted mean of the cage's vertices: a row of B (see [`crate::controls`]).
+//! Values on the surface are close to cubic B-splines, so that the cage's edges do not show in the model. Columns
+//! remain the cage's vertices.
 //!
-//! Source: Catmull, Clark 1978, "Recursively generated B-spline surfaces on arbitrary topological meshes".
+//! Source: Catmull and Clark 1978, "Recursively generated B-spline surfaces on arbitrary topological meshes".
 
 use std::collections::BTreeMap;
 
@@ -12,25 +13,25 @@ use glam::{DVec3, Vec3};
 use crate::mesh::PolygonMesh;
 use crate::weights::Weights;
 
-/// A subdivided mesh and where it comes from.
+/// A subdivided mesh and its relation to the original.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Subdivided {
-    /// Vertices: those of the mesh before, then one for each of its edges (by their ends), then one for each of its faces, step
-    /// after step. Faces: one for each corner of each face before, in order.
+    /// Vertices per step: those of the previous mesh, then one per edge (ordered by its ends), then one per face.
+    /// Faces: one per corner of each previous face, in order.
     pub mesh: PolygonMesh,
-    /// What each vertex is a mean of: not negative, each row summing to 1. `[n_subdivided, n_vertices]`
+    /// Weights of the original vertices, non-negative, row sums 1. `[n_subdivided, n_vertices]`
     pub rows: Weights,
-    /// The first mesh's face that each face is part of. `[n_subdivided_faces]`
+    /// Original face of each face. `[n_subdivided_faces]`
     pub face_of: Vec<u32>,
 }
 
-/// A sparse row in exact sums, columns ascending.
+/// A sparse row in f64, columns ascending.
 type Row = BTreeMap<u32, f64>;
 
-/// Subdivides a closed mesh, whose edges have two faces each, `steps` times. Vertices of no face stay where they are.
+/// Subdivides a closed mesh (two faces per edge) `steps` times. Vertices without faces stay in place.
 ///
 /// # Panics
-/// If a face names a vertex that does not exist.
+/// If a face has an invalid index.
 #[must_use]
 pub fn subdivide(mesh: &PolygonMesh, steps: u32) -> Subdivided {
     let mut rows: Vec<Row> = (0..mesh.positions.len() as u32).map(|i| Row::from([(i, 1.0)])).collect();
@@ -55,7 +56,7 @@ pub fn subdivide(mesh: &PolygonMesh, steps: u32) -> Subdivided {
     Subdivided { mesh: PolygonMesh { positions, faces }, rows, face_of }
 }
 
-/// One step: rows of the new vertices, new faces, and where those come from.
+/// One step: rows of the new vertices, new faces, and their original faces.
 fn step(rows: &[Row], faces: &[Vec<u32>], face_of: &[u32]) -> (Vec<Row>, Vec<Vec<u32>>, Vec<u32>) {
     let n = rows.len();
     let mean = |of: &mut dyn Iterator<Item = &Row>| {
@@ -64,7 +65,7 @@ fn step(rows: &[Row], faces: &[Vec<u32>], face_of: &[u32]) -> (Vec<Row>, Vec<Vec
     };
     let face_points: Vec<Row> =
         faces.iter().map(|face| mean(&mut face.iter().map(|&i| &rows[i as usize]))).collect();
-    // Faces of each edge and of each vertex.
+    // Faces around each edge and each vertex.
     let mut edges: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
     let mut around: Vec<Vec<usize>> = vec![Vec::new(); n];
     for (f, face) in faces.iter().enumerate() {
@@ -87,7 +88,7 @@ fn step(rows: &[Row], faces: &[Vec<u32>], face_of: &[u32]) -> (Vec<Row>, Vec<Vec
             new.push(row.clone());
             continue;
         }
-        // F: mean of the faces' points; R: mean of the edges' middles; (F + 2 R + (n - 3) P) / n.
+        // (F + 2 R + (n - 3) P) / n with F the mean of the face points and R the mean of the edges' midpoints.
         let valence = faces.len() as f64;
         let of_faces = faces.iter().map(|&f| (&face_points[f], 1.0 / (valence * valence)));
         let of_edges = edges.iter().map(|&w| (&rows[w as usize], 1.0 / (valence * edges.len() as f64)));
@@ -114,7 +115,7 @@ fn step(rows: &[Row], faces: &[Vec<u32>], face_of: &[u32]) -> (Vec<Row>, Vec<Vec
     (new, new_faces, new_face_of)
 }
 
-/// The sum of rows times factors.
+/// Linear combination of rows.
 fn combined<'a>(parts: impl Iterator<Item = (&'a Row, f64)>) -> Row {
     let mut sum = Row::new();
     for (row, factor) in parts {

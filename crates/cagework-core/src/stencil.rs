@@ -1,8 +1,8 @@
-//! CPU twins of the GPU's kernels: the same maths in plain serial f32 loops, additions in the same order.
+//! CPU twins of the GPU kernels: the same computation in plain serial f32 loops, with additions in the same order.
 //!
-//! They say what `shaders/` computes, argument by argument in the order of the shader's bindings, and nothing is tuned:
-//! the solvers use the fast versions in [`crate::solve::rows`]. Fields are `[row][lane]`, flat, rows in the level's
-//! order, `n_lanes` columns of one batch; the arrays of geometry are those of [`tables`], which the GPU gets as well.
+//! They specify `shaders/`, with arguments in the order of the shaders' bindings, and are not optimised; solvers use
+//! the fast versions in [`crate::solve::rows`]. Fields are flat, `[row][lane]`, with rows in the level's order and
+//! `n_lanes` columns of one batch; geometry comes in the arrays of [`tables`], which the GPU receives as well.
 
 mod reduce;
 pub mod tables;
@@ -21,10 +21,10 @@ use crate::solve::rows::Prolong;
 use crate::transfer::{RESTRICT_CENTRE, RESTRICT_EDGE};
 use tables::{BUNDLE, LevelTable, NormalTable, SLICE, SamplingTable, SlicedWeights};
 
-/// Changes of a weight below this do not count: their squares would be denormal.
-const NEGLIGIBLE: f32 = 1e-18;
+/// Smaller changes of a weight count as zero: their squares would be denormal.
+const MIN_CHANGE: f32 = 1e-18;
 
-/// Right-hand side and neighbours of one row, summed in the kernels' order.
+/// Right-hand side plus neighbours of a row, summed in the kernels' order.
 fn gather(level: &LevelTable, n_lanes: usize, row: usize, lane: usize, rhs: &[f32], field: &[f32]) -> f32 {
     let mut sum = 0.0;
     if level.rhs_of_row[row] != NO_CELL {
@@ -56,8 +56,7 @@ pub fn relax_cells(
     }
 }
 
-/// One sweep of the paper's smoothing (Algorithm 3) from `u_in` to `u_out`, both `[row][lane]`.
-/// GPU twin: `shaders/jacobi_cells.wgsl`.
+/// A Jacobi sweep (Algorithm 3 of the paper) from `u_in` to `u_out`, both `[row][lane]`. GPU twin: `shaders/jacobi_cells.wgsl`.
 pub fn jacobi_cells(
     rows: Range<usize>,
     n_lanes: usize,
@@ -73,7 +72,7 @@ pub fn jacobi_cells(
     }
 }
 
-/// The inner sum of Eq. 2 of each row, added to `changes` (`[row]`) or, for the `first` batch, put there.
+/// Inner sum of Eq. 2 of each row, added to `changes` (`[row]`), or stored there for the `first` batch.
 /// GPU twin: `shaders/change_norms.wgsl`.
 pub fn change_norms(
     n_lanes: usize,
@@ -88,7 +87,7 @@ pub fn change_norms(
         for quad in (row * n_lanes..(row + 1) * n_lanes).step_by(4) {
             let term = |k: usize| {
                 let d = (u_new[quad + k] - u_old[quad + k]).abs();
-                let d = if d > NEGLIGIBLE { d } else { 0.0 };
+                let d = if d > MIN_CHANGE { d } else { 0.0 };
                 if norm == DeltaNorm::Literal { d } else { d * d }
             };
             sum += (term(0) + term(1)) + (term(2) + term(3));
@@ -97,7 +96,7 @@ pub fn change_norms(
     }
 }
 
-/// Residual `f + sum of neighbours - diagonal u` of the first `n_rows` rows: the red ones and their zero row.
+/// Residual `f + sum of neighbours - diagonal u` of the first `n_rows` rows: red ones and their zero row.
 /// GPU twin: `shaders/residual.wgsl`.
 pub fn residual(
     n_rows: usize,
@@ -131,7 +130,7 @@ pub fn restrict_residual(n_lanes: usize, around: &[[u32; 13]], red_residual: &[f
     }
 }
 
-/// Prolongation from `coarse` to the black rows of `field` that `entries` lists, `n_sources` coarse rows each.
+/// Prolongation from `coarse` to the black rows of `field` listed in `entries`, with `n_sources` coarse rows each.
 /// GPU twin: `shaders/prolong_correction.wgsl`.
 pub fn prolong_correction(
     n_lanes: usize,
@@ -200,8 +199,7 @@ pub fn deform_vertices(weights: &SlicedWeights, cage: &[Vec3], positions: &mut [
     }
 }
 
-/// Area-weighted unit normals, `[n_vertices]`; zero where a vertex has no triangle.
-/// GPU twin: `shaders/vertex_normals.wgsl`.
+/// Area-weighted unit normals, `[n_vertices]`; zero for vertices without triangles. GPU twin: `shaders/vertex_normals.wgsl`.
 pub fn vertex_normals(table: &NormalTable, positions: &[Vec3], normals: &mut [Vec3]) {
     for (vertex, normal) in normals.iter_mut().enumerate() {
         let p = positions[vertex];

@@ -1,14 +1,14 @@
-//! Work shared among threads: each takes the next piece until none is left.
+//! A thread pool that distributes pieces of work.
 //!
-//! No locks, no queue of cells: a piece is a whole batch of columns or a run of vertices, and the only shared state is
-//! one counter. Without the feature `parallel` (wasm) the same code runs on the caller's thread.
+//! A piece is a whole batch of columns or a run of vertices, so there are no locks, and the only shared state is a
+//! counter. Without the feature `parallel` (wasm), everything runs on the calling thread.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Vertices that a thread takes at a time: small enough to share out evenly, large enough not to notice.
+/// Vertices per piece: small enough for even distribution, large enough to make its overhead negligible.
 pub const VERTEX_RUN: usize = 512;
 
-/// Most threads for each processor: more only take memory.
+/// Limit on threads per processor: more would only take memory.
 const MAX_PER_PROCESSOR: usize = 4;
 
 /// A fixed number of threads.
@@ -20,14 +20,15 @@ pub struct Team {
 }
 
 impl Team {
-    /// A team of `threads` (0: one per processor), at most four for each processor. Falls back to the caller's thread if none can be started.
+    /// A team of `threads` (0: one per processor), at most four per processor. Uses only the calling thread if no pool
+    /// can be started.
     #[must_use]
     pub fn new(threads: usize) -> Self {
         #[cfg(feature = "parallel")]
         {
             let processors = std::thread::available_parallelism().map_or(1, usize::from);
             let wanted = if threads == 0 { processors } else { threads.min(MAX_PER_PROCESSOR * processors) };
-            // One thread has its pool, too: what it spawns would else run on all processors.
+            // A single thread needs a pool, too: otherwise work that it spawns would run on all processors.
             let pool = rayon::ThreadPoolBuilder::new().num_threads(wanted).build().ok();
             let n_threads = if pool.is_some() { wanted } else { 1 };
             Self { pool, n_threads }
@@ -39,22 +40,22 @@ impl Team {
         }
     }
 
-    /// Threads of the team.
+    /// Number of threads.
     #[must_use]
     pub fn n_threads(&self) -> usize {
         self.n_threads
     }
 
-    /// What to say if these are fewer than the `asked` threads.
+    /// A notice if the team has fewer threads than requested.
     #[must_use]
     pub fn notice(&self, asked: usize) -> Option<String> {
         let used = self.n_threads;
         (asked > used).then(|| {
-            format!("{asked} threads were asked for, but {used} are used: at most {MAX_PER_PROCESSOR} for each processor.")
+            format!("{asked} threads were requested, but {used} are used: at most {MAX_PER_PROCESSOR} per processor.")
         })
     }
 
-    /// Runs `member(thread)` once on each thread; results in thread order.
+    /// Runs `member(thread)` once on each thread. Results are in thread order.
     pub fn each<T: Send>(&self, member: impl Fn(usize) -> T + Sync) -> Vec<T> {
         #[cfg(feature = "parallel")]
         if let Some(pool) = &self.pool {
@@ -63,7 +64,7 @@ impl Team {
         vec![member(0)]
     }
 
-    /// Runs `work` so that what it spawns runs on the team.
+    /// Runs `work` so that the work it spawns stays on the team.
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         #[cfg(feature = "parallel")]
         if let Some(pool) = &self.pool {
@@ -82,8 +83,8 @@ impl Team {
         states.iter_mut().for_each(work);
     }
 
-    /// Runs `work(state, piece)` for every piece in `0..n_pieces`, whoever is free; `start` makes a thread's own state.
-    /// Results in the order of pieces.
+    /// Runs `work(state, piece)` for every piece in `0..n_pieces` on the next free thread; `start` creates a thread's
+    /// state. Results are in the order of pieces.
     pub fn share<S, T: Send>(
         &self,
         n_pieces: usize,
@@ -110,7 +111,7 @@ impl Team {
     }
 }
 
-/// `f` of each of `0..n`, in order; on all threads with the feature `parallel`.
+/// `f` of each of `0..n`, in order; parallel with the feature `parallel`.
 pub(crate) fn map_indices<T: Send>(n: usize, f: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
     #[cfg(feature = "parallel")]
     {
@@ -128,25 +129,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn more_threads_than_four_for_each_processor_are_a_notice() {
+    fn more_than_four_threads_per_processor_give_a_notice() {
         let team = Team::new(100_000);
         let processors = std::thread::available_parallelism().unwrap().get();
         let expected = if cfg!(feature = "parallel") { 4 * processors } else { 1 };
         assert_eq!(team.n_threads(), expected);
-        let said = format!("100000 threads were asked for, but {expected} are used");
+        let said = format!("100000 threads were requested, but {expected} are used");
         assert!(team.notice(100_000).unwrap().starts_with(&said));
         assert_eq!(team.notice(expected), None);
     }
 
     #[test]
-    fn one_thread_is_one_for_what_it_spawns_as_well() {
+    fn one_thread_also_runs_spawned_work() {
         let on = |team: &Team| team.install(|| map_indices(100, |_| std::thread::current().id()));
         let threads: std::collections::HashSet<_> = on(&Team::new(1)).into_iter().collect();
         assert_eq!(threads.len(), 1);
     }
 
     #[test]
-    fn every_piece_is_done_once_and_in_order() {
+    fn every_piece_runs_once_with_results_in_order() {
         for threads in [1, 2, 3, 8] {
             let doubled = Team::new(threads).share(
                 100,

@@ -1,50 +1,48 @@
 //! Transfers between a level and the next coarser one.
 //!
-//! Prolongation is trilinear and gives cells outside the cage the value zero, which is the error's value on the cage.
-//! Restriction is its transpose, scaled by 1/2 because the coarse operator is `(2h)^2` times the Laplacian and a
-//! coarse cell gathers the weight of eight fine ones: `4 / 8`. A red-black sweep that ends with black leaves no
-//! residual on black cells, and one that starts with red overwrites whatever red cells hold: so restriction reads
-//! red cells only and prolongation writes black cells only.
+//! Prolongation is trilinear, with zero in cells outside the cage, as the error is zero on the cage. Restriction is its
+//! transpose, scaled by 1/2: the coarse operator is `(2h)^2` times the Laplacian, and a coarse cell gathers the weight of eight
+//! fine ones, `4 / 8`. A red-black sweep that ends with black leaves no residual on black cells, and one that starts with red
+//! overwrites red cells. Restriction therefore reads only red cells, and prolongation writes only black ones.
 
 use crate::grid::{Grid, NO_CELL};
 use crate::levels::Level;
 
-/// Weights of restriction: of the fine cell that is the coarse cell's own centre, and of the twelve red cells next
-/// to it across an edge.
+/// Weight in restriction of the fine cell at the coarse cell's centre.
 pub const RESTRICT_CENTRE: f32 = 0.5;
-/// See [`RESTRICT_CENTRE`].
+/// Weight in restriction of each of the twelve red cells that share an edge with it.
 pub const RESTRICT_EDGE: f32 = 0.125;
 
-/// Fine red cells around a coarse cell, rows of the fine level: its own centre first, then twelve edge neighbours.
+/// Red fine cells around a coarse cell, as rows of the fine level: the centre, then twelve edge neighbours.
 pub type RestrictRow = [u32; 13];
 
-/// A fine black cell between two coarse cells (one odd coordinate) or eight (three odd coordinates).
+/// A black fine cell between two coarse cells (one odd coordinate) or eight (three odd coordinates).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProlongRow<const N: usize> {
-    /// The cell, within black.
+    /// Index within black.
     pub cell: u32,
     /// Rows of the coarse level.
     pub coarse: [u32; N],
-    /// 1 over the number of coarse cells that are unknowns; 0 if none is. Full multigrid's first guess is their mean,
+    /// Inverse of the number of coarse cells that are unknowns; 0 without any. Full multigrid starts from their mean,
     /// because the solution, unlike the error, is not zero on the cage.
     pub mean: f32,
 }
 
-/// How a level and the next coarser one exchange fields.
+/// Restriction and prolongation between a level and the next coarser one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transfer {
-    /// For each coarse row but the zero rows: red, then black cells, in order.
+    /// For each coarse unknown, in order: red, then black.
     pub restrict_rows: [Vec<RestrictRow>; 2],
     /// Black cells with one odd coordinate, ascending.
     pub faces: Vec<ProlongRow<2>>,
     /// Black cells with three odd coordinates, ascending.
     pub corners: Vec<ProlongRow<8>>,
-    /// Where each z-plane's faces and corners start. `[nz + 1]`
+    /// First face and first corner of each z-plane. `[nz + 1]`
     pub planes: Vec<[u32; 2]>,
 }
 
-/// A cell and its twelve edge neighbours.
-const AROUND: [[i32; 3]; 13] = [
+/// Offsets of a cell and its twelve edge neighbours.
+const CENTRE_AND_EDGES: [[i32; 3]; 13] = [
     [0, 0, 0],
     [1, 1, 0],
     [-1, 1, 0],
@@ -60,16 +58,16 @@ const AROUND: [[i32; 3]; 13] = [
     [0, -1, -1],
 ];
 
-/// The corners of a cube.
+/// Offsets of the corners of a cube.
 const CORNERS: [[i32; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
 
 impl Transfer {
-    /// Tables between `fine` and `coarse`, whose grid is `fine.grid.coarsened()`.
+    /// Transfer between `fine` and `coarse`, whose grid must be `fine.grid.coarsened()`.
     #[must_use]
     pub fn new(fine: &Level, coarse: &Level) -> Self {
         let [nx, ny, nz] = fine.grid.dims;
-        // One black cell in four has three odd coordinates, more or less.
+        // About a quarter of the black cells have three odd coordinates.
         let n_black = fine.colours[1].n_cells as usize;
         let mut tables = Self {
             restrict_rows: [0, 1].map(|c| Vec::with_capacity(coarse.colours[c].n_cells as usize)),
@@ -98,7 +96,7 @@ impl Transfer {
         for (y, z) in (0..nz).flat_map(|z| (0..ny).map(move |y| (y, z))) {
             let rows = &coarse.row_of[coarse.grid.index([0, y, z])..][..nx as usize];
             for cell in (0..nx).filter(|&x| rows[x as usize] != NO_CELL).map(|x| [x, y, z]) {
-                let around = fine.rows_at(cell.map(|i| 2 * i), &AROUND);
+                let around = fine.rows_at(cell.map(|i| 2 * i), &CENTRE_AND_EDGES);
                 tables.restrict_rows[Grid::colour(cell)].push(around);
             }
         }
@@ -109,7 +107,7 @@ impl Transfer {
         self.planes.push([self.faces.len() as u32, self.corners.len() as u32]);
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.restrict_rows.iter().map(|r| size_of_val(r.as_slice())).sum::<usize>()

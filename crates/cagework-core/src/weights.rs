@@ -1,4 +1,4 @@
-//! Sparse weights: compressed sparse rows, one row per mesh vertex, one column per control vertex.
+//! Sparse weights: compressed sparse rows with one row per mesh vertex and one column per control.
 
 use thiserror::Error;
 
@@ -11,16 +11,16 @@ pub struct Weights {
     data: Vec<f32>,
 }
 
-/// Why three arrays are not a CSR matrix.
+/// Why arrays do not form a CSR matrix.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum WeightsError {
-    /// `indptr` is empty, does not start at 0, or falls.
+    /// `indptr` is empty, does not start at 0, or is not ascending.
     #[error("row pointers are not ascending from 0 (at row {row})")]
     Pointers {
-        /// First row at which they are not.
+        /// First row with an invalid pointer.
         row: usize,
     },
-    /// The last row pointer, the indices and the data do not agree.
+    /// The last row pointer differs from the number of indices or weights.
     #[error("{indices} column indices and {data} weights do not match the last row pointer, {last}")]
     Length {
         /// Number of indices.
@@ -35,12 +35,12 @@ pub enum WeightsError {
     Column {
         /// The row.
         row: usize,
-        /// The column it names.
+        /// The invalid index.
         column: u32,
-        /// Columns there are.
+        /// Number of columns.
         n_columns: u32,
     },
-    /// A row has two weights for one column.
+    /// A row has two weights in one column.
     #[error("row {row} names column {column} twice; sum them with matrix.sum_duplicates()")]
     Duplicate {
         /// The row.
@@ -60,7 +60,7 @@ impl Weights {
     /// A CSR matrix from its arrays: `indptr` `[n_rows + 1]`, `indices` and `data` `[n_nonzeros]`.
     ///
     /// # Errors
-    /// [`WeightsError`] when the arrays do not describe a matrix with `n_columns` columns.
+    /// [`WeightsError`] if the arrays do not form a matrix with `n_columns` columns.
     pub fn new(
         n_columns: u32,
         indptr: Vec<u32>,
@@ -82,7 +82,7 @@ impl Weights {
             if let Some(&column) = indices.iter().find(|&&c| c >= n_columns) {
                 return Err(WeightsError::Column { row, column, n_columns });
             }
-            // Most rows ascend, which leaves no room for duplicates.
+            // Most rows are ascending and therefore without duplicates.
             if !indices.is_sorted_by(|a, b| a < b) {
                 let mut sorted = indices.to_vec();
                 sorted.sort_unstable();
@@ -97,7 +97,7 @@ impl Weights {
         Ok(weights)
     }
 
-    /// A matrix from arrays that are right by construction.
+    /// A matrix from arrays that are valid by construction.
     pub(crate) fn from_parts(n_columns: u32, indptr: Vec<u32>, indices: Vec<u32>, data: Vec<f32>) -> Self {
         Self { n_columns, indptr, indices, data }
     }
@@ -108,7 +108,7 @@ impl Weights {
         (self.indptr, self.indices, self.data)
     }
 
-    /// The matrix whose row v is this one's row `row_of[v]`.
+    /// The matrix whose row v is row `row_of[v]` of this one.
     #[must_use]
     pub fn with_rows(&self, row_of: &[u32]) -> Self {
         let mut indptr = Vec::with_capacity(row_of.len() + 1);
@@ -124,7 +124,7 @@ impl Weights {
         Self::from_parts(self.n_columns, indptr, indices, data)
     }
 
-    /// A matrix without rows, with room for those that [`Self::append`] adds.
+    /// A matrix without rows, with capacity for [`Self::append`].
     #[must_use]
     pub fn with_room(n_columns: u32, n_rows: usize, n_nonzeros: usize) -> Self {
         let mut indptr = Vec::with_capacity(n_rows + 1);
@@ -132,13 +132,13 @@ impl Weights {
         Self::from_parts(n_columns, indptr, Vec::with_capacity(n_nonzeros), Vec::with_capacity(n_nonzeros))
     }
 
-    /// The same matrix with columns of zeros after its own, `n_columns` in all.
+    /// The matrix padded with zero columns to `n_columns`.
     #[must_use]
     pub fn widened(self, n_columns: usize) -> Self {
         Self { n_columns: self.n_columns.max(n_columns as u32), ..self }
     }
 
-    /// Some of the columns, counted from the first of them.
+    /// A range of columns, renumbered from 0.
     #[must_use]
     pub fn columns(&self, range: std::ops::Range<u32>) -> Self {
         let mut made = Self::with_room(range.len() as u32, self.n_rows(), 0);
@@ -152,10 +152,10 @@ impl Weights {
         made
     }
 
-    /// The same rows with those of another matrix behind them, as more columns.
+    /// Horizontal concatenation: the columns of `more` follow.
     ///
     /// # Panics
-    /// If the other one has other rows.
+    /// If the numbers of rows differ.
     #[must_use]
     pub fn beside(&self, more: &Self) -> Self {
         assert_eq!(self.n_rows(), more.n_rows(), "rows are the same");
@@ -169,10 +169,10 @@ impl Weights {
         made
     }
 
-    /// Adds the rows of another matrix after its own.
+    /// Appends the rows of another matrix.
     ///
     /// # Panics
-    /// If the other one has other columns.
+    /// If the numbers of columns differ.
     pub fn append(&mut self, more: &Self) {
         assert_eq!(self.n_columns, more.n_columns, "columns are the same");
         let n = self.indices.len() as u32;
@@ -181,25 +181,25 @@ impl Weights {
         self.data.extend_from_slice(&more.data);
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         4 * (self.indptr.len() + self.indices.len() + self.data.len())
     }
 
-    /// Rows: mesh vertices.
+    /// Number of rows (mesh vertices).
     #[must_use]
     pub fn n_rows(&self) -> usize {
         self.indptr.len().saturating_sub(1)
     }
 
-    /// Columns: control vertices.
+    /// Number of columns (controls).
     #[must_use]
     pub fn n_columns(&self) -> usize {
         self.n_columns as usize
     }
 
-    /// Where each row starts in [`Self::indices`] and [`Self::data`]. `[n_rows + 1]`
+    /// Start of each row in [`Self::indices`] and [`Self::data`]. `[n_rows + 1]`
     #[must_use]
     pub fn indptr(&self) -> &[u32] {
         &self.indptr
@@ -217,14 +217,14 @@ impl Weights {
         &self.data
     }
 
-    /// Columns and weights of one row.
+    /// Columns and weights of a row.
     #[must_use]
     pub fn row(&self, row: usize) -> (&[u32], &[f32]) {
         let range = self.indptr[row] as usize..self.indptr[row + 1] as usize;
         (&self.indices[range.clone()], &self.data[range])
     }
 
-    /// Weights of one column, zeros included. `[n_rows]`
+    /// Weights of a column, including zeros. `[n_rows]`
     pub fn column(&self, column: u32) -> impl Iterator<Item = f32> {
         self.rows()
             .map(move |(columns, data)| columns.iter().position(|&c| c == column).map_or(0.0, |k| data[k]))
@@ -241,7 +241,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_that_are_appended_make_the_matrix_they_were_cut_from() {
+    fn appended_rows_restore_the_matrix() {
         let (indptr, indices, data) =
             (vec![0, 2, 2, 3, 5], vec![0, 2, 1, 0, 1], vec![0.5, 0.5, 1.0, 0.25, 0.75]);
         let whole = Weights::new(3, indptr, indices, data).unwrap();

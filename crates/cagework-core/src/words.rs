@@ -1,6 +1,6 @@
-//! Counts in sentences.
+//! Formatting of counts in messages.
 
-/// A count with commas: `15,002`.
+/// A count with thousands separators: `15,002`.
 pub fn grouped(n: usize) -> String {
     let digits = n.to_string();
     let mut grouped = String::new();

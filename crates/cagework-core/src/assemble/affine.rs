@@ -1,54 +1,53 @@
-//! Restores `sum w = 1` and `sum w c = v` after weights were dropped or rounded.
+//! Restores `sum w = 1` and `sum w c = v` for a row of weights after some were dropped or rounded.
 //!
-//! The correction is the smallest one relative to the weights themselves: among all corrections d of the row w that
-//! restore the four sums, it minimises `sum d_i^2 / w_i`. Its solution is `d_i = w_i phi_i . lambda` with the 4 x 4
-//! system `(sum w_i phi_i phi_i^T) lambda = e_1 - sum w_i phi_i`, `phi_i = (1, (c_i - v) / s)`, s the cage's diagonal.
-//! Zero weights stay zero, so the row stays as sparse as it was. Each weight is multiplied by a factor that is linear in
-//! the control's position: next to 1, and the row not negative, as long as the sums miss by little. Nothing here bounds the
-//! factors; who drops weights must look at them.
+//! Of all corrections d of the row w that restore the four sums, it takes the one that minimises `sum d_i^2 / w_i`.
+//! With `phi_i = (1, (c_i - v) / s)` and s the cage's diagonal, this is `d_i = w_i phi_i . lambda`, where lambda solves
+//! the 4 x 4 system `(sum w_i phi_i phi_i^T) lambda = e_1 - sum w_i phi_i`. Zero weights stay zero. Each weight is
+//! multiplied by a factor that is linear in the control's position and near 1 if the sums are nearly right. The factors
+//! are not bounded: callers that drop weights must check them.
 
 use glam::{DMat4, DVec3, DVec4};
 
 use crate::controls::Controls;
 use crate::solve::rows::{LANES, Row, ZERO};
 
-/// Added to the diagonal of the 4 x 4 system, relative to its trace: on a face of the cage all weights lie in a plane
-/// and the system is singular in its normal direction, along which there is nothing to correct.
+/// Tikhonov term on the diagonal of the 4 x 4 system, relative to its trace. On a face of the cage all controls with
+/// weights lie in a plane, and the system is singular in its normal direction, where no correction is needed.
 const RIDGE: f64 = 1e-7;
 
-/// What a row of weights adds up to.
+/// Sums over a row of weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sums {
-    /// Its sum.
+    /// `sum w`.
     pub sum: f64,
-    /// Distance between `sum w c` and a target over the cage's diagonal.
+    /// Distance of `sum w c` from a target, over the cage's diagonal.
     pub miss: f64,
 }
 
 impl Sums {
-    /// How far it is from a row that sums to 1 and meets the target.
+    /// Largest deviation of the sums from 1 and from the target.
     #[must_use]
     pub fn error(&self) -> f64 {
         self.miss.max((self.sum - 1.0).abs())
     }
 }
 
-/// The controls as columns of weights: rows of lanes, as batches are.
+/// Rest positions of the controls in rows of lanes, laid out like batches of columns.
 #[derive(Clone, Debug)]
 pub struct Columns {
-    /// Positions from the cage's centre over its diagonal. `[3][n_batches]`
+    /// Positions relative to the cage's centre, over its diagonal. `[3][n_batches]`
     scaled: [Vec<Row>; 3],
-    /// The same as f64, to measure with.
+    /// The same in f64, to measure sums.
     exact: [Vec<[f64; LANES]>; 3],
     center: DVec3,
     diagonal: f64,
 }
 
-/// Sums over a row: 1; x, y, z; xx, xy, xz, yy, yz, zz of the columns' distances from the target, each weighted.
+/// Weighted sums of 1; x, y, z; xx, xy, xz, yy, yz, zz over a row, where x, y, z are positions relative to the target.
 type Moments = [f64; 10];
 
 impl Columns {
-    /// Columns at rest.
+    /// From the controls' rest positions.
     #[must_use]
     pub fn new(controls: Controls<'_>) -> Self {
         let surface = controls.surface();
@@ -70,19 +69,19 @@ impl Columns {
         Self { scaled, exact, center, diagonal }
     }
 
-    /// Batches of lanes that a row has.
+    /// Number of batches in a row.
     #[must_use]
     pub fn n_batches(&self) -> usize {
         self.exact[0].len()
     }
 
-    /// A point in the columns' units.
+    /// A point in the scaled coordinates of the columns.
     #[must_use]
     pub fn scale(&self, point: DVec3) -> DVec3 {
         (point - self.center) / self.diagonal
     }
 
-    /// What a row adds up to. `row`: `[n_batches]`.
+    /// Sums of a row, `[n_batches]`, against a scaled target.
     #[inline(always)]
     #[must_use]
     pub fn sums(&self, row: &[Row], target: DVec3) -> Sums {
@@ -90,14 +89,14 @@ impl Columns {
         Sums { sum, miss: (point - target).length() }
     }
 
-    /// (sum of a row, where it puts its vertex in the columns' units). `row`: `[n_batches]`.
-    // Part of its callers where they are compiled for several instruction sets; elsewhere copies would be downloaded.
+    /// `(sum w, sum w c)` of a row, `[n_batches]`, in scaled coordinates.
+    // Inlined where callers are compiled for several instruction sets; wasm keeps one copy to save download size.
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
     #[cfg_attr(target_family = "wasm", inline(never))]
     #[must_use]
     pub fn combined(&self, row: &[Row]) -> (f64, DVec3) {
         let [x, y, z] = &self.exact;
-        // Sums in variables of their own, not in an array: they stay in registers.
+        // Separate variables instead of an array: they stay in registers.
         let (mut s, mut sx, mut sy, mut sz) =
             ([0.0f64; LANES], [0.0f64; LANES], [0.0f64; LANES], [0.0f64; LANES]);
         for (((w, x), y), z) in row.iter().zip(x).zip(y).zip(z) {
@@ -113,8 +112,8 @@ impl Columns {
         (sum, DVec3::new(x, y, z))
     }
 
-    /// Corrects a row so that it sums to 1 and reproduces `target` ([`Self::scale`]d). Returns what [`Self::sums`] said of it
-    /// before, to f32.
+    /// Corrects a row so that it sums to 1 and reproduces the scaled `target` ([`Self::scale`]). Returns the sums
+    /// before, in f32 precision.
     #[inline(always)]
     pub fn restore_affine(&self, row: &mut [Row], target: DVec3) -> Sums {
         let m = self.moments(row, target);
@@ -150,7 +149,7 @@ impl Columns {
     fn moments(&self, row: &[Row], target: DVec3) -> Moments {
         let t = target.as_vec3();
         let [x, y, z] = &self.scaled;
-        // In variables of their own, not in an array: they stay in registers.
+        // Separate variables instead of an array: they stay in registers.
         let (mut s, mut sx, mut sy, mut sz) = (ZERO, ZERO, ZERO, ZERO);
         let (mut sxx, mut sxy, mut sxz, mut syy, mut syz, mut szz) = (ZERO, ZERO, ZERO, ZERO, ZERO, ZERO);
         for (((w, x), y), z) in row.iter().zip(x).zip(y).zip(z) {

@@ -1,17 +1,17 @@
-//! Where the rows of a matrix of weights are written.
+//! Output of the rows of a sparse matrix.
 
 use crate::solve::rows::{LANES, Row};
 
-/// Where a run's column indices and weights go.
+/// Destination of a run's column indices and weights.
 pub(super) enum Entries<'a> {
-    /// What is left of the run's part of the result.
+    /// The rest of the run's range in the matrix.
     Part { indices: &'a mut [u32], data: &'a mut [f32] },
-    /// The result itself.
+    /// The matrix, growing.
     All { indices: Vec<u32>, data: Vec<f32> },
 }
 
 impl Entries<'_> {
-    /// Puts some entries behind the others; false if they do not fit into the run's part.
+    /// Appends entries; false if they exceed the run's range.
     #[inline(always)]
     fn put(&mut self, columns: &[u32], weights: &[f32]) -> bool {
         match self {
@@ -33,14 +33,14 @@ impl Entries<'_> {
         }
     }
 
-    /// Puts the entries of a row that are `chosen(batch)` behind the others; returns how many. `row`: `[n_batches]`.
+    /// Appends the entries of a row selected by `chosen(batch)`. Returns their number. `row`: `[n_batches]`.
     #[inline(always)]
     pub(super) fn put_row(&mut self, row: &[Row], chosen: impl Fn(usize) -> [bool; LANES]) -> u32 {
         let mut n = 0;
         for (batch, row) in row.iter().enumerate() {
             let columns: [u32; LANES] = std::array::from_fn(|k| (batch * LANES + k) as u32);
             let chosen = chosen(batch);
-            // All of them at once, without a branch for each.
+            // Fast path without a branch per lane.
             if chosen.iter().fold(true, |all, &one| all & one) && self.put(&columns, row) {
                 n += LANES as u32;
                 continue;

@@ -1,43 +1,43 @@
-//! What is found out about each row of weights that is stored, and all rows together.
+//! Statistics of stored rows of weights.
 
 use crate::report::{MeanMax, RawError, RestError, WeightStats};
 use crate::solve::rows::{LANES, Row, ZERO};
 
-use super::Assembled;
+use super::AssembledWeights;
 use super::affine::Sums;
 
-/// What was found out about a row of weights.
+/// Statistics of one row of weights.
 #[derive(Clone, Copy, Debug)]
 pub struct RowFacts {
-    /// Distance between `sum w c` and the vertex over the cage's diagonal; none until it is known what its offset makes up for.
+    /// Distance of `sum w c` from the vertex over the cage's diagonal; `None` until the row's offset is known.
     pub error: Option<f32>,
-    /// How far its sum is from 1.
+    /// Distance of its sum from 1.
     pub sum_error: f32,
-    /// Its smallest weight that is not 0.
+    /// Its smallest non-zero weight.
     pub low: f32,
     /// Its largest weight.
     pub high: f32,
-    /// Before it was restored; none for those that are not.
+    /// The row before correction; `None` if it is not corrected.
     pub raw: Option<RawRow>,
 }
 
-/// What was found out about a row before it was restored.
+/// A sampled row before correction.
 #[derive(Clone, Copy, Debug)]
 pub struct RawRow {
-    /// What it added up to.
+    /// Its sums.
     pub sums: Sums,
-    /// Its lowest value, before negative ones were taken for 0.
+    /// Its smallest value, before negative values are clamped to 0.
     pub lowest: f32,
 }
 
 impl RowFacts {
-    /// Facts about a row (`[n_batches]`) that adds up to `sums`; `raw`, for vertices inside: before it was restored.
-    // One copy for all callers in wasm: each would be downloaded.
+    /// Statistics of a row (`[n_batches]`) with the given `sums`; `raw`: before correction, for vertices inside.
+    // wasm keeps one copy for all callers to save download size.
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
     #[cfg_attr(target_family = "wasm", inline(never))]
     #[must_use]
     pub fn of(row: &[Row], sums: Sums, raw: Option<RawRow>) -> Self {
-        // Comparisons, not `min` and `max`: wasm has no instruction for theirs, which say what becomes of NaN.
+        // Comparisons instead of `min` and `max`, whose NaN handling has no single wasm instruction.
         let (mut lows, mut highs) = ([f32::INFINITY; LANES], ZERO);
         for row in row {
             for k in 0..LANES {
@@ -56,9 +56,8 @@ impl RowFacts {
     }
 }
 
-impl Assembled {
-    /// How well the rest pose is reconstructed by vertices inside a cage of this diagonal, how well it was before rows were
-    /// restored, and what the weights are like.
+impl AssembledWeights {
+    /// Rest error of vertices inside, over the cage's diagonal, after and before correction, and statistics of the weights.
     #[must_use]
     pub fn statistics(&self, diagonal: f64) -> (RestError, RawError, WeightStats) {
         let mut errors: Vec<f32> = self.facts.iter().filter_map(|facts| facts.error).collect();

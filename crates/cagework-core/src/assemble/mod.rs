@@ -1,4 +1,4 @@
-//! From batches of sampled columns to one sparse row per vertex, with the statistics of what is stored.
+//! Assembles batches of sampled columns into one sparse row per vertex, with statistics.
 
 pub mod affine;
 mod entries;
@@ -20,56 +20,54 @@ use crate::weights::Weights;
 
 use affine::{Columns, Sums};
 
-/// Rows whose sums miss by less than this (of the cage's diagonal) are good: two units in the last place of an f32
-/// near 1.
-const GOOD_ENOUGH: f64 = 2e-7;
+/// Sums need no further correction below this error (over the cage's diagonal): two units in the last place of an f32 near 1.
+const SUM_TOLERANCE: f64 = 2e-7;
 
-/// Corrections are repeated until the sums hold, at most this often: once is enough but for rows in which the
-/// threshold dropped a large share of the weight.
+/// Limit on repeated corrections of a row. One suffices unless the threshold dropped a large share of the weight.
 const MAX_CORRECTIONS: usize = 3;
 
-/// A row that misses by more (of the cage's diagonal) after small weights were dropped keeps them all: next to a face,
-/// the many small weights of the vertices off the face are what holds the vertex away from it.
-const NOT_RESTORED: f64 = 1e-6;
+/// A row keeps its small weights if its error without them (over the cage's diagonal) stays above this. Next to a face,
+/// the many small weights of vertices off the face keep the vertex at its distance.
+const MAX_ERROR: f64 = 1e-6;
 
-/// So does a row of which a weight would change by a factor outside this range,
-const FACTORS: RangeInclusive<f32> = 0.5..=2.0;
+/// A row keeps its small weights if correction would scale a weight by a factor outside this range,
+const FACTOR_RANGE: RangeInclusive<f32> = 0.5..=2.0;
 
-/// or by more than this many times the threshold.
-const CHANGE: f32 = 5.0;
+/// or change it by more than this many times the threshold.
+const MAX_CHANGE: f32 = 5.0;
 
-/// How rows are made from sampled values.
+/// Options of assembly.
 #[derive(Clone, Copy, Debug)]
 pub struct RowOptions {
-    /// The smallest weights of a row are dropped as long as their sum is not above it; 0 keeps all that are not zero. What
-    /// is dropped changes neither a row's sum nor where it puts its vertex.
+    /// Drops the smallest weights of a row while their sum is at most this; 0 keeps all non-zero weights. Correction
+    /// keeps the row's sum and rest position.
     pub threshold: f32,
-    /// Restore sum and rest position of every row. Off for the classic method, which shows its errors.
+    /// Restores sum and rest position of every row. Off for the classic method, whose errors are shown.
     pub preserve_affine: bool,
 }
 
-/// A matrix of weights and what was found out about its rows.
+/// A weight matrix with statistics of its rows.
 #[derive(Clone, Debug, Default)]
-pub struct Assembled {
-    /// The matrix.
+pub struct AssembledWeights {
+    /// The weights.
     pub weights: Weights,
-    /// `[n_rows]`
+    /// Statistics of each row. `[n_rows]`
     pub facts: Vec<RowFacts>,
 }
 
-/// The rows of one run of vertices in all batches, and what is found out about them.
-struct Run<'a> {
+/// A run of consecutive vertices in all batches: work item of a thread.
+struct VertexRun<'a> {
     first: usize,
     points: &'a [Vec3],
-    /// `[n_batches]` slices of the batches' blocks.
+    /// The run's slice of each batch. `[n_batches]`
     blocks: Vec<&'a mut [Row]>,
     lengths: Vec<u32>,
     facts: Vec<RowFacts>,
     entries: Entries<'a>,
 }
 
-/// Makes the matrix of weights. `blocks[batch][vertex]`: sampled values (used up as scratch space); `points`: rest
-/// positions; `has_offset(vertex)`: whether an offset makes up for what its row misses, so that it stays as it is sampled.
+/// Assembles the weight matrix. `blocks[batch][vertex]`: sampled values, overwritten as scratch; `points`: rest positions;
+/// `has_offset(vertex)`: whether a constant offset compensates the row's error, so that the row is not corrected.
 pub fn assemble(
     controls: Controls<'_>,
     blocks: &mut [Vec<Row>],
@@ -77,14 +75,14 @@ pub fn assemble(
     options: RowOptions,
     has_offset: impl Fn(usize) -> bool + Sync,
     team: &Team,
-) -> Assembled {
+) -> AssembledWeights {
     let columns = Columns::new(controls);
     if team.n_threads() == 1 && options.threshold == 0.0 {
         return assemble_alone(controls, &columns, blocks, points, options, &has_offset);
     }
     let mut runs = runs_of(blocks, points, VERTEX_RUN);
-    // Without a threshold it is known beforehand which weights are stored: rows are corrected on their way into the
-    // result. With one, it depends on the correction.
+    // Without a threshold all positive weights are stored, so rows are corrected while they are written. With one, the
+    // set of stored weights depends on the correction.
     let corrected_first = options.threshold > 0.0;
     team.each_mut(&mut runs, |run| {
         dispatch(
@@ -109,8 +107,8 @@ pub fn assemble(
     for run in &mut runs {
         let n = run.lengths.iter().sum::<u32>() as usize;
         run.entries = Entries::Part {
-            indices: indices_left.split_off_mut(..n).expect("the lengths' sum was allocated"),
-            data: data_left.split_off_mut(..n).expect("the lengths' sum was allocated"),
+            indices: indices_left.split_off_mut(..n).expect("allocated by the sum of lengths"),
+            data: data_left.split_off_mut(..n).expect("allocated by the sum of lengths"),
         };
     }
     team.each_mut(&mut runs, |run| {
@@ -128,11 +126,14 @@ pub fn assemble(
         );
     });
     let facts = runs.into_iter().flat_map(|run| run.facts).collect();
-    Assembled { weights: Weights::from_parts(controls.n_controls() as u32, indptr, indices, data), facts }
+    AssembledWeights {
+        weights: Weights::from_parts(controls.n_controls() as u32, indptr, indices, data),
+        facts,
+    }
 }
 
-/// The same on one thread without a threshold, where rows are nearly full and can be put one after the other without counting
-/// them first: a third less memory is written.
+/// [`assemble`] on one thread without a threshold. Rows are nearly full and are appended without counting first, which
+/// writes a third less memory.
 fn assemble_alone(
     controls: Controls<'_>,
     columns: &Columns,
@@ -140,7 +141,7 @@ fn assemble_alone(
     points: &[Vec3],
     options: RowOptions,
     has_offset: &impl Fn(usize) -> bool,
-) -> Assembled {
+) -> AssembledWeights {
     let mut runs = runs_of(blocks, points, points.len().max(1));
     let room = points.len() * controls.n_controls();
     for run in &mut runs {
@@ -157,14 +158,16 @@ fn assemble_alone(
     }
     let indptr = indptr_of(&runs);
     let (indices, data, facts) = match runs.pop() {
-        Some(Run { entries: Entries::All { indices, data }, facts, .. }) => (indices, data, facts),
+        Some(VertexRun { entries: Entries::All { indices, data }, facts, .. }) => (indices, data, facts),
         _ => Default::default(),
     };
-    Assembled { weights: Weights::from_parts(controls.n_controls() as u32, indptr, indices, data), facts }
+    AssembledWeights {
+        weights: Weights::from_parts(controls.n_controls() as u32, indptr, indices, data),
+        facts,
+    }
 }
 
-/// Where each row starts, and where the last one ends.
-fn indptr_of(runs: &[Run<'_>]) -> Vec<u32> {
+fn indptr_of(runs: &[VertexRun<'_>]) -> Vec<u32> {
     let mut end = 0u32;
     let ends = runs.iter().flat_map(|run| &run.lengths).map(|length| {
         end += length;
@@ -173,11 +176,11 @@ fn indptr_of(runs: &[Run<'_>]) -> Vec<u32> {
     std::iter::once(0).chain(ends).collect()
 }
 
-fn runs_of<'a>(blocks: &'a mut [Vec<Row>], points: &'a [Vec3], length: usize) -> Vec<Run<'a>> {
-    let mut runs: Vec<Run<'a>> = points
+fn runs_of<'a>(blocks: &'a mut [Vec<Row>], points: &'a [Vec3], length: usize) -> Vec<VertexRun<'a>> {
+    let mut runs: Vec<VertexRun<'a>> = points
         .chunks(length)
         .enumerate()
-        .map(|(number, points)| Run {
+        .map(|(number, points)| VertexRun {
             first: number * length,
             points,
             blocks: Vec::new(),
@@ -194,14 +197,14 @@ fn runs_of<'a>(blocks: &'a mut [Vec<Row>], points: &'a [Vec3], length: usize) ->
     runs
 }
 
-impl Run<'_> {
-    /// Copies a vertex's sampled values, those that are positive and not below `least`. Returns the lowest of all.
+impl VertexRun<'_> {
+    /// Copies a vertex's sampled values that are positive and at least `least`. Returns the smallest value.
     #[inline(always)]
     fn load(&self, v: usize, least: f32, row: &mut [Row]) -> f32 {
         let mut lows = [f32::INFINITY; LANES];
         for (row, block) in row.iter_mut().zip(&self.blocks) {
             *row = block[v];
-            // Solver and rounding leave some -1e-8: a harmonic coordinate is never negative.
+            // Solver and rounding leave values near -1e-8: harmonic coordinates are not negative.
             for (w, low) in row.iter_mut().zip(&mut lows) {
                 *low = if *w < *low { *w } else { *low };
                 *w = if *w > 0.0 && *w >= least { *w } else { 0.0 };
@@ -210,7 +213,7 @@ impl Run<'_> {
         lows.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a })
     }
 
-    /// Lengths of the rows if every positive weight is stored.
+    /// Row lengths if every positive weight is stored.
     #[inline(always)]
     fn count(&mut self) {
         for v in 0..self.points.len() {
@@ -224,7 +227,7 @@ impl Run<'_> {
         }
     }
 
-    /// Drops small weights, restores the rows' sums, measures them, and hands them on: `take(run, vertex, row)`.
+    /// Drops small weights, corrects each row and computes statistics. Calls `take(run, vertex, row)` for each row.
     #[inline(always)]
     fn correct(
         &mut self,
@@ -241,7 +244,7 @@ impl Run<'_> {
             let (raw, stored) = if options.preserve_affine && !has_offset {
                 self.restore_row(v, columns, options.threshold, &mut row, target)
             } else if options.threshold > 0.0 {
-                // Errors, and what an offset makes up for, are not sparsification's to change.
+                // With an offset the row's error stays; sparsification must not change its rest position.
                 let raw = columns.sums(&row, target);
                 let goal = columns.combined(&row).1;
                 self.restore_row(v, columns, options.threshold, &mut row, goal);
@@ -256,7 +259,7 @@ impl Run<'_> {
         }
     }
 
-    /// Keeps a row in the blocks until all lengths are known.
+    /// Stores a row in the blocks until all lengths are known.
     #[inline(always)]
     fn keep(&mut self, v: usize, row: &[Row]) {
         for (row, block) in row.iter().zip(&mut self.blocks) {
@@ -264,7 +267,6 @@ impl Run<'_> {
         }
     }
 
-    /// Writes the kept rows into the result.
     #[inline(always)]
     fn store_kept(&mut self) {
         for v in 0..self.points.len() {
@@ -273,8 +275,8 @@ impl Run<'_> {
         }
     }
 
-    /// Drops small weights and restores the row, or keeps all if that cannot be had. `row` holds the
-    /// vertex's sampled values. Returns what the sampled row and this one add up to.
+    /// Drops small weights and corrects the row, or keeps all weights if the correction is not acceptable. `row` holds
+    /// the vertex's sampled values. Returns the sums before and after.
     #[inline(always)]
     fn restore_row(
         &self,
@@ -292,10 +294,10 @@ impl Run<'_> {
         let (_, restored) = restore(columns, row, goal);
         let bounded = row.iter().zip(&self.blocks).all(|(row, block)| {
             row.iter().zip(&block[v]).all(|(&w, &was)| {
-                w == 0.0 || (FACTORS.contains(&(w / was)) && (w - was).abs() <= CHANGE * threshold)
+                w == 0.0 || (FACTOR_RANGE.contains(&(w / was)) && (w - was).abs() <= MAX_CHANGE * threshold)
             })
         });
-        if bounded && restored.error() <= NOT_RESTORED {
+        if bounded && restored.error() <= MAX_ERROR {
             return (sampled, restored);
         }
         self.load(v, 0.0, row);
@@ -303,8 +305,8 @@ impl Run<'_> {
     }
 }
 
-/// A weight such that the sum of all below is at most `most`: the largest one, found by halving the bits of positive
-/// numbers, which ascend as they do.
+/// Largest weight such that all smaller weights sum to at most `most`. Bisects the bits of f32, which are ordered like
+/// positive numbers.
 fn least_kept(row: &[Row], most: f32) -> f32 {
     let (mut low, mut high) = (0, most.to_bits() + 1);
     while high - low > 1 {
@@ -316,15 +318,15 @@ fn least_kept(row: &[Row], most: f32) -> f32 {
     f32::from_bits(low)
 }
 
-/// Corrects a row until it sums to 1 and puts its vertex at `goal`; returns its sums before (to f32) and after.
-// Part of its callers where they are compiled for several instruction sets; elsewhere four copies would be downloaded.
+/// Corrects a row until it sums to 1 and reproduces `goal`. Returns its sums before (in f32 precision) and after.
+// Inlined where callers are compiled for several instruction sets; wasm keeps one copy to save download size.
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[cfg_attr(target_family = "wasm", inline(never))]
 fn restore(columns: &Columns, row: &mut [Row], goal: DVec3) -> (Sums, Sums) {
     let before = columns.restore_affine(row, goal);
     let mut after = columns.sums(row, goal);
     for _ in 1..MAX_CORRECTIONS {
-        if after.error() <= GOOD_ENOUGH {
+        if after.error() <= SUM_TOLERANCE {
             break;
         }
         columns.restore_affine(row, goal);

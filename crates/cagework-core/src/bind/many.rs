@@ -1,14 +1,14 @@
-//! One solve for many models: the fields belong to the cage, only samples of them to a model.
+//! Binds many models to one cage with a single solve: fields depend only on the cage, samples on the model.
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::memory::{Vertices, estimate, field_bytes};
+use super::memory::{VertexCounts, estimate, field_bytes};
 use super::pipeline::Prepared;
-use super::points::Points;
+use super::points::WeldedPoints;
 use super::solving::{Solved, sample_fields, solve_fields};
-use super::voxels::{Gridded, Voxels};
+use super::voxels::{Voxelization, VoxelizedCage};
 use super::{BindError, Binding, Watch};
 use crate::controls::Controls;
 use crate::options::{BindOptions, Solver};
@@ -16,26 +16,26 @@ use crate::progress::{Progress, Stage};
 use crate::solve::rows::Row;
 use crate::team::Team;
 
-/// A cage in its grid with all columns solved: any number of models are bound to it at the cost of sampling alone.
+/// A cage with the solved fields of all columns. Binding a model costs only sampling and assembly.
 ///
-/// No model reaches grid or solve, so what [`Self::bind`] returns is what [`super::bind`] returns, to the bit.
+/// Neither grid nor solve depends on a model, so [`Self::bind`] and [`super::bind`] return identical weights.
 pub struct SolvedCage<'a> {
     controls: Controls<'a>,
     options: BindOptions,
-    gridded: Arc<Gridded>,
+    voxelized: Arc<VoxelizedCage>,
     /// `[n_batches][n_rows]`
     fields: Vec<Vec<Row>>,
-    /// How the solve went; without samples.
+    /// Report of the solve, without samples.
     solved: Solved,
     elapsed_ms: f64,
 }
 
 impl<'a> SolvedCage<'a> {
-    /// Voxelizes and solves. The fields of all columns stay, for which half of the memory limit is there: the other half is
-    /// the models'. `held` and `extra_points` of the options are not looked at.
+    /// Voxelizes and solves. All fields are kept; they may take half of the memory limit, models the other half.
+    /// Ignores `held` and `extra_points` of the options.
     ///
     /// # Errors
-    /// [`BindError`]: options out of range, [`BindError::Memory`] when the fields are too large to be kept, cancelled.
+    /// [`BindError`]: options out of range, [`BindError::Memory`] if the fields exceed their share of the limit, cancelled.
     pub fn new(
         controls: impl Into<Controls<'a>>,
         options: &BindOptions,
@@ -47,39 +47,39 @@ impl<'a> SolvedCage<'a> {
         let began = watch.now_ms();
         let team = Team::new(options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
-        let grid = Voxels::grid(controls.surface(), &options);
-        let none = Vertices { rows: 0, points: 0 };
+        let grid = Voxelization::grid(controls.surface(), &options);
+        let none = VertexCounts { rows: 0, points: 0 };
         let solving = estimate(controls, &grid, none, team.n_threads(), &options).bytes;
-        // Jacobi keeps all fields in any case.
+        // Jacobi keeps all fields anyway.
         let kept = if options.solver == Solver::Jacobi { 0 } else { field_bytes(controls, &grid) };
         let (needed, limit) = (solving + kept, options.memory_limit / 2);
         if needed > limit {
             return Err(BindError::Memory { needed, limit });
         }
-        let gridded = Arc::new(Gridded::new(controls, grid, &options, team, &watch)?);
-        let hierarchy = &gridded.voxels.hierarchy;
-        let (fields, mut solved) = solve_fields(hierarchy, &options, &gridded.team, &watch)?;
+        let voxelized = Arc::new(VoxelizedCage::new(controls, grid, &options, team, &watch)?);
+        let hierarchy = &voxelized.voxels.hierarchy;
+        let (fields, mut solved) = solve_fields(hierarchy, &options, &voxelized.team, &watch)?;
         solved.field_bytes = fields.iter().map(|field| size_of_val(field.as_slice())).sum();
-        Ok(Self { controls, options, gridded, fields, solved, elapsed_ms: watch.now_ms() - began })
+        Ok(Self { controls, options, voxelized, fields, solved, elapsed_ms: watch.now_ms() - began })
     }
 
-    /// How long voxelizing and solving took, milliseconds.
+    /// Time of voxelization and solve, milliseconds.
     #[must_use]
     pub fn elapsed_ms(&self) -> f64 {
         self.elapsed_ms
     }
 
-    /// Bytes of the fields.
+    /// Size of the fields in bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.solved.field_bytes as u64
     }
 
-    /// Binds a model, as [`super::bind`] does. `held`, `extra_points`: as in [`BindOptions`]. The report's times are of the
-    /// model alone.
+    /// Binds a model as [`super::bind`] does. `held`, `extra_points`: as in [`BindOptions`]. The report's times exclude
+    /// grid and solve.
     ///
     /// # Errors
-    /// Those of [`super::bind`].
+    /// As [`super::bind`].
     pub fn bind(
         &self,
         positions: &[Vec3],
@@ -89,15 +89,15 @@ impl<'a> SolvedCage<'a> {
         let watch = Watch::new(progress);
         let began = watch.now_ms();
         let options = BindOptions { held: held + self.bytes(), extra_points, ..self.options };
-        let mesh = Points::new(positions)?;
-        let grid = Voxels::grid(self.controls.surface(), &options);
-        // Fields are there already.
+        let mesh = WeldedPoints::new(positions)?;
+        let grid = Voxelization::grid(self.controls.surface(), &options);
+        // 0 threads: the fields exist already.
         let needed = estimate(self.controls, &grid, mesh.count(), 0, &options);
         needed.check(mesh.count(), self.controls.n_controls(), options.memory_limit)?;
-        let gridded = Arc::clone(&self.gridded);
+        let voxelized = Arc::clone(&self.voxelized);
         let prepared =
-            Prepared::in_grid(mesh, self.controls, &options, gridded, needed.bytes, began, &watch)?;
-        let blocks = sample_fields(prepared.stencils(), &self.fields, &self.gridded.team);
+            Prepared::in_grid(mesh, self.controls, &options, voxelized, needed.bytes, began, &watch)?;
+        let blocks = sample_fields(prepared.stencils(), &self.fields, &self.voxelized.team);
         prepared.finish(Solved { blocks, solve_share: 0.0, ..self.solved.clone() }, &watch)
     }
 }
@@ -113,7 +113,7 @@ mod tests {
     use crate::options::Method;
     use crate::progress::Silent;
 
-    /// Points of a spiral in the cube, with one twice and one outside.
+    /// Points of a spiral in the cube, one of them repeated and one outside.
     fn points(turns: f32) -> Vec<Vec3> {
         let on_spiral = |k: u16| {
             let t = f32::from(k) / 300.0;
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn models_of_a_solved_cage_are_bound_to_the_bit_as_alone() {
+    fn binds_of_a_solved_cage_equal_single_binds_exactly() {
         let cube = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
         let cage = Cage::new(&subdivided_box(cube, 0.0, [2, 2, 2])).unwrap();
         let inner = InnerControls {
@@ -158,12 +158,12 @@ mod tests {
     }
 
     #[test]
-    fn fields_that_do_not_fit_half_of_the_memory_are_refused() {
+    fn fields_above_half_of_the_memory_limit_are_an_error() {
         let cube = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
         let cage = Cage::new(&subdivided_box(cube, 0.0, [8, 8, 8])).unwrap();
         let options = BindOptions { grid: 64, memory_limit: 512 << 20, ..BindOptions::default() };
         let refused = SolvedCage::new(&cage, &options, &Silent).err().unwrap();
-        // 386 columns are 49 batches of 64^3 rows of 32 bytes: 392 MiB, above 256.
+        // 386 columns are 49 batches of 64^3 rows of 32 bytes: 392 MiB, above half of the limit.
         let BindError::Memory { needed, limit } = refused else { panic!("{refused:?}") };
         assert!(needed > 392 << 20 && limit == 256 << 20, "{needed} {limit}");
     }

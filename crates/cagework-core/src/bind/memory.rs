@@ -1,8 +1,8 @@
-//! Memory is estimated before it is allocated.
+//! Estimates memory before it is allocated.
 //!
-//! The number of unknowns follows from the cage's volume and its number of cut cells from its area, both known before
-//! the grid is; everything else is counted from those two. Measured against the memory of the command's process, the
-//! estimate is within 25 % on models with repeated positions, with many nodes, and on many threads.
+//! The number of unknowns follows from the cage's volume, the number of cut cells from its area; all else is
+//! proportional to these. Measured against the peak memory of the command's process, the estimate is within 25 % on
+//! models with repeated positions, with many nodes, and on many threads.
 
 use glam::DVec3;
 
@@ -18,55 +18,54 @@ use crate::solve::rows::{LANES, Row};
 use crate::transfer::{ProlongRow, RestrictRow};
 use crate::voxelize::lines::Hit;
 
-/// All coarser levels together: 1/8 + 1/64 + ... of the finest one.
-const COARSER: f64 = 1.0 / 7.0;
+/// Size of all coarser levels over that of the finest: 1/8 + 1/64 + ...
+const COARSE_LEVELS_SHARE: f64 = 1.0 / 7.0;
 
-/// Cells of a plane that a cage's surface cuts per cell of area, over all orientations: 1.5 on average, and the arms
-/// end on up to three cage vertices each.
+/// Cut cells per cell area of the cage's surface: 1.5 on average over all orientations. Arms end on up to three cage
+/// vertices each.
 const CUT_PER_AREA: f64 = 1.5;
 
-/// What a vertex of the file takes: its place in the table of different positions, and which it has.
+/// Bytes per vertex of the file: its entry in the hash table of positions, and its index.
 const ROW_BYTES: f64 = 44.0;
 
-/// What a different position takes: its sampling stencil (up to 8 rows and a dozen Dirichlet values of 8 bytes), which is
-/// there twice while threads' parts are joined, and facts about its row.
+/// Bytes per distinct position: its sampling stencil (up to 8 rows and a dozen Dirichlet values of 8 bytes), which
+/// exists twice while threads' results are joined, and statistics of its row.
 const POINT_BYTES: f64 = 470.0;
 
-/// What a row of offsets takes: three entries for each of four holds. (The bind of the joints to the cage alone, on an eighth of the
-/// cells, begins when the fields of this one are gone.)
+/// Bytes per row of offsets: three entries for each of four frames. (The bind of the joints to the cage alone uses an
+/// eighth of the cells and starts after the fields have been freed.)
 const OFFSET_BYTES: f64 = 3.0 * 4.0 * 8.0;
 
-/// What a cell of the grid takes while lines and levels are made.
+/// Bytes per grid cell while lines and levels are built.
 const CELL_BYTES: f64 = 30.0;
 
-/// Bytes of the weights of `n_rows` vertices if none is dropped: how many of a row's weights are small is not known before the
-/// solve (a third of 110 columns is kept at a threshold of 1e-5, all of 8).
+/// Bytes of the weights of `n_rows` vertices if none is dropped. The share of small weights is unknown before the solve
+/// (a threshold of 1e-5 keeps a third of 110 columns, all of 8).
 #[must_use]
 pub fn weights_bytes(n_rows: usize, n_columns: usize) -> u64 {
     n_rows as u64 * (n_columns as u64 * 8 + 4)
 }
 
-/// How many vertices a bind has.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Vertices {
-    /// In the file.
+pub(super) struct VertexCounts {
+    /// Vertices in the file.
     pub(super) rows: usize,
-    /// Different positions.
+    /// Distinct positions.
     pub(super) points: usize,
 }
 
-/// Bytes that a bind will need at once.
+/// Peak memory of a bind.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Needed {
+pub(super) struct MemoryEstimate {
     pub(super) bytes: u64,
-    /// What of them grows with the points, not with the grid.
+    /// Bytes that grow with the points rather than with the grid.
     of_points: u64,
 }
 
-impl Needed {
+impl MemoryEstimate {
     /// # Errors
-    /// [`BindError`] that says what the memory is for, if it is more than the limit.
-    pub(super) fn check(self, vertices: Vertices, n_columns: usize, limit: u64) -> Result<(), BindError> {
+    /// [`BindError`] with the main use of the memory, if it exceeds the limit.
+    pub(super) fn check(self, vertices: VertexCounts, n_columns: usize, limit: u64) -> Result<(), BindError> {
         let needed = self.bytes;
         if needed <= limit {
             Ok(())
@@ -78,14 +77,14 @@ impl Needed {
     }
 }
 
-/// Bytes that a bind will need at once. `threads` 0: fields are kept elsewhere.
+/// Peak memory of a bind. `threads`: 0 if the fields are kept elsewhere.
 pub(super) fn estimate(
     controls: Controls<'_>,
     grid: &Grid,
-    vertices: Vertices,
+    vertices: VertexCounts,
     threads: usize,
     options: &BindOptions,
-) -> Needed {
+) -> MemoryEstimate {
     let n_cells = grid.n_cells() as f64;
     let (n_unknowns, n_cut) = unknowns(controls, grid);
     let n_columns = controls.n_controls();
@@ -96,49 +95,50 @@ pub(super) fn estimate(
 
     let voxels = n_cells * (CELL_BYTES + if options.method == Method::Embedded { 7.0 } else { 5.0 });
     let stencils = n_cut * (size_of::<CutCell>() + size_of::<Run>() + 8 * size_of::<BoundaryTerm>()) as f64;
-    // Lines along three axes cross a surface as often as it cuts cells.
+    // Lines along three axes cross the surface about as often as it cuts cells.
     let lines = if options.method == Method::Embedded { n_cut * size_of::<Hit>() as f64 } else { 0.0 };
     let transfers = n_unknowns
         * (size_of::<RestrictRow>() as f64 / 8.0
             + size_of::<ProlongRow<2>>() as f64 * 3.0 / 8.0
             + size_of::<ProlongRow<8>>() as f64 / 8.0);
     let on_levels = |finest_rows: f64| {
-        threads as f64 * row * (finest_rows + 2.0 * COARSER * n_unknowns) + transfers * (1.0 + COARSER)
+        threads as f64 * row * (finest_rows + 2.0 * COARSE_LEVELS_SHARE * n_unknowns)
+            + transfers * (1.0 + COARSE_LEVELS_SHARE)
     };
-    // V-cycles may stall at parts inside, and conjugate gradients take over: five fields.
+    // V-cycles may stall at parts inside the cage; conjugate gradients then need five fields.
     let of_rescue =
         if controls.surface().component_of_face().iter().any(|&part| part > 0) { 5.0 } else { 0.0 };
     let fields = match options.solver {
         _ if threads == 0 => 0.0,
         Solver::Multigrid => on_levels((1.5 + of_rescue) * n_unknowns + n_cut),
-        // Five fields; the V-cycle that preconditions has another two and a half.
+        // Five fields; the preconditioning V-cycle has another two and a half.
         Solver::ConjugateGradient if options.needs_coarse_levels() => on_levels(7.5 * n_unknowns + n_cut),
         Solver::ConjugateGradient => threads as f64 * row * (5.0 * n_unknowns + n_cut),
         Solver::Jacobi => {
             jacobi::field_bytes(n_unknowns as u64, n_cut as u64, n_columns as u64, threads as u64) as f64
         }
     };
-    let Vertices { rows, points } = vertices;
+    let VertexCounts { rows, points } = vertices;
     let bytes_of = |n| weights_bytes(n, n_columns) as f64;
     let blocks = points as f64 * n_batches * row;
-    // Rows of points that several vertices share are copied once all of them are there.
+    // Rows of repeated positions are copied after all rows exist.
     let copies = if rows > points { bytes_of(rows) } else { blocks };
     let assembled = bytes_of(points) + copies.max(blocks);
     let (weights, fields) = if blocks + fields > assembled { (blocks, fields) } else { (assembled, 0.0) };
     let offsets = if needs_all(controls, options) { OFFSET_BYTES } else { 0.0 };
     let of_points = (ROW_BYTES + offsets) * rows as f64 + (POINT_BYTES + offsets) * points as f64 + weights;
-    let of_grid = voxels * (1.0 + COARSER) + lines + stencils * (1.0 + 2.0 * COARSER) + fields;
+    let of_grid =
+        voxels * (1.0 + COARSE_LEVELS_SHARE) + lines + stencils * (1.0 + 2.0 * COARSE_LEVELS_SHARE) + fields;
     let bytes = options.held as f64 + of_points + of_grid;
-    Needed { bytes: bytes as u64, of_points: of_points as u64 }
+    MemoryEstimate { bytes: bytes as u64, of_points: of_points as u64 }
 }
 
-/// Bytes of the fields of all columns.
 pub(super) fn field_bytes(controls: Controls<'_>, grid: &Grid) -> u64 {
     let n_batches = controls.n_controls().div_ceil(LANES) as f64;
     (unknowns(controls, grid).0 * n_batches * size_of::<Row>() as f64) as u64
 }
 
-/// (cells to be solved for, those of them that the cage cuts)
+/// `(unknowns, cut cells)`.
 fn unknowns(controls: Controls<'_>, grid: &Grid) -> (f64, f64) {
     let (volume, area) = volume_and_area(controls.surface());
     let (cell, n_cells) = (grid.cell, grid.n_cells() as f64);
@@ -146,7 +146,7 @@ fn unknowns(controls: Controls<'_>, grid: &Grid) -> (f64, f64) {
     ((volume / of_cell).min(n_cells), (CUT_PER_AREA * area / of_cell.powf(2.0 / 3.0)).min(n_cells))
 }
 
-/// Volume enclosed (divergence theorem) and area of the cage.
+/// Enclosed volume (divergence theorem) and area of the cage.
 fn volume_and_area(cage: &Cage) -> (f64, f64) {
     let origin = cage.bounds().center().as_dvec3();
     (0..cage.triangles().len() as u32).fold((0.0, 0.0), |(volume, area), t| {
@@ -174,7 +174,7 @@ mod tests {
         assert!((volume - 24.0).abs() < 1e-4 && (area - 52.0).abs() < 1e-4, "{volume} {area}");
     }
 
-    /// A threshold that drops nothing leaves as many weights as none does. An estimate for half of them was a quarter too low.
+    /// A threshold may drop nothing: the estimate must hold for all weights.
     #[test]
     fn binds_with_a_threshold_stay_below_their_estimate() {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };

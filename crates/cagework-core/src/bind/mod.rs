@@ -1,4 +1,4 @@
-//! From mesh and cage to weights: the one call that runs every stage.
+//! Binding: computes weights from a mesh and a cage, through every stage.
 
 mod many;
 mod memory;
@@ -30,17 +30,17 @@ use crate::words::grouped;
 /// The result of a bind.
 #[derive(Clone, Debug)]
 pub struct Binding {
-    /// One row per mesh vertex in the caller's order, one column per control and, where offsets are needed, those of `frames`.
+    /// One row per mesh vertex in the caller's order; one column per control, then the columns of `frames` if offsets are needed.
     pub weights: Weights,
-    /// What carries the offsets of vertices outside the cage and near controls inside.
+    /// Frames that carry the offsets of vertices outside the cage and near controls inside.
     pub frames: Frames,
     /// Vertices outside the cage, ascending.
     pub outside: Vec<OutsideVertex>,
-    /// What was measured.
+    /// Measurements.
     pub report: BindReport,
 }
 
-/// Why a bind did not come about.
+/// Why a bind failed.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum BindError {
     /// An option is out of range.
@@ -55,7 +55,7 @@ pub enum BindError {
         /// The vertex.
         vertex: u32,
     },
-    /// More memory would be needed than allowed.
+    /// The bind exceeds the memory limit.
     #[error(
         "binding needs about {} MiB, more than the limit of {} MiB: use a smaller grid or raise the limit",
         needed >> 20, limit >> 20
@@ -66,7 +66,7 @@ pub enum BindError {
         /// Bytes allowed.
         limit: u64,
     },
-    /// More memory would be needed than allowed, and most of it for the weights, whatever the grid.
+    /// The bind exceeds the memory limit, mostly by the weights, which do not depend on the grid.
     #[error(
         "binding needs about {} MiB, more than the limit of {} MiB, most of it for the weights of {} points, one for each of \
          {columns} cage vertices: use a cage with fewer vertices or raise the limit",
@@ -77,7 +77,7 @@ pub enum BindError {
         needed: u64,
         /// Bytes allowed.
         limit: u64,
-        /// Different points to be bound.
+        /// Distinct points.
         points: usize,
         /// Cage vertices.
         columns: usize,
@@ -88,20 +88,20 @@ pub enum BindError {
         /// Cells along the longest side.
         grid: u32,
     },
-    /// Vertices are outside and the policy is to refuse.
+    /// Vertices are outside, and the policy is to fail.
     #[error("{count} mesh vertices are outside the cage, the first is vertex {first}: enlarge the cage")]
     Outside {
-        /// How many.
+        /// Number of vertices outside.
         count: u32,
-        /// The first.
+        /// The first of them.
         first: u32,
     },
-    /// No vertex is inside the cage.
+    /// All vertices are outside the cage.
     #[error("none of the model's {} vertices is inside the cage; {misfit}", grouped(*vertices))]
     NoneInside {
         /// Vertices of the model.
         vertices: usize,
-        /// How the two lie to each other.
+        /// Relative position and size of cage and model.
         misfit: Misfit,
     },
     /// Cancelled by the caller.
@@ -111,7 +111,7 @@ pub enum BindError {
 
 /// Binds mesh vertices to a cage, or other controls, by harmonic coordinates.
 ///
-/// `positions`: `[n_vertices]`, object units, any order, repeats allowed (equal positions are solved once).
+/// `positions`: `[n_vertices]`, object units, in any order. Equal positions are solved once.
 ///
 /// # Errors
 /// [`BindError`]: options out of range, empty or not finite mesh, memory above the limit, no vertex inside, cancelled.
@@ -124,11 +124,11 @@ pub fn bind<'a>(
     pipeline::run(positions, controls.into(), options, progress)
 }
 
-/// Bytes of working memory that a bind of `n_points` vertices on the CPU would need, before anything is allocated; high by 5
-/// to 40 %, and more where a threshold drops most of the weights.
+/// Estimated working memory in bytes of a bind of `n_points` vertices on the CPU; allocates nothing. It is 5 to 40 %
+/// high, more if the threshold drops most of the weights.
 ///
 /// # Errors
-/// [`BindError::Option`] when an option is out of range.
+/// [`BindError::Option`] if an option is out of range.
 pub fn estimate_memory<'a>(
     controls: impl Into<Controls<'a>>,
     n_points: usize,
@@ -136,7 +136,7 @@ pub fn estimate_memory<'a>(
 ) -> Result<u64, BindError> {
     options.check()?;
     let controls = controls.into();
-    let grid = voxels::Voxels::grid(controls.surface(), options);
-    let vertices = memory::Vertices { rows: n_points, points: n_points };
+    let grid = voxels::Voxelization::grid(controls.surface(), options);
+    let vertices = memory::VertexCounts { rows: n_points, points: n_points };
     Ok(memory::estimate(controls, &grid, vertices, options.threads.max(1), options).bytes)
 }

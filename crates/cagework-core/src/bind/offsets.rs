@@ -1,26 +1,26 @@
-//! Offsets that make up for what weights miss: of points outside the cage, and around balls and tubes.
+//! Constant offsets that compensate errors of the weights: of points outside the cage, and around balls and tubes.
 
 use std::ops::ControlFlow;
 
 use glam::{DVec3, Vec3};
 
 use super::{BindError, Watch, pipeline};
-use crate::assemble::Assembled;
+use crate::assemble::AssembledWeights;
 use crate::controls::{ControlSet, Controls, InnerControls, InnerElement};
-use crate::frames::{Frames, WHOLE};
+use crate::frames::{CAGE_COLUMN, Frames};
 use crate::options::{BindOptions, Method, OutsidePolicy};
 use crate::progress::{Progress, ProgressEvent, Stage};
 use crate::sample::Stencils;
 use crate::solve::rows::{LANES, Row};
 use crate::weights::Weights;
 
-/// A rest vector shorter than this, over the cage's diagonal, is rounding.
-const ROUNDED: f64 = 1e-7;
+/// Offsets shorter than this, over the cage's diagonal, are rounding and are dropped.
+const MIN_OFFSET: f64 = 1e-7;
 
-/// A bind within another, of whose progress it is no part.
-struct Within<'a>(&'a Watch<'a>);
+/// Progress of an inner bind: polls for cancellation but reports nothing.
+struct SilentProgress<'a>(&'a Watch<'a>);
 
-impl Progress for Within<'_> {
+impl Progress for SilentProgress<'_> {
     fn report(&self, _: ProgressEvent) -> ControlFlow<()> {
         match self.0.report(Stage::Sample, 0.0, 0, None) {
             Ok(()) => ControlFlow::Continue(()),
@@ -33,18 +33,17 @@ impl Progress for Within<'_> {
     }
 }
 
-/// What offsets a bind needs.
 pub(super) struct Offsets<'a> {
     controls: Controls<'a>,
-    /// Points outside, how much they follow, and their sampled rows, `[n_batches]`.
+    /// Points outside, the share with which they follow the cage, and their sampled rows, `[n_batches]`.
     outside: Vec<(u32, f64, Vec<Row>)>,
     frames: Frames,
-    /// Length of each bone at rest, object units.
+    /// Rest lengths of the bones, object units.
     lengths: Vec<f64>,
     radius: f64,
 }
 
-/// Whether all rows have a rest vector: those of balls and tubes do not reproduce places, and are not bent until they do.
+/// Whether all rows have offsets: near balls and tubes the weights do not reproduce positions, and are not corrected.
 pub(super) fn needs_all(controls: Controls<'_>, options: &BindOptions) -> bool {
     options.method == Method::Embedded && controls.inner().is_some_and(InnerControls::has_radius)
 }
@@ -53,7 +52,7 @@ impl<'a> Offsets<'a> {
     /// `blocks`: sampled values, `[n_batches][n_points]`.
     ///
     /// # Errors
-    /// Those of a bind of the joints to the cage alone.
+    /// As a bind of the joints to the cage alone.
     pub(super) fn new(
         controls: Controls<'a>,
         stencils: &Stencils,
@@ -81,16 +80,16 @@ impl<'a> Offsets<'a> {
         Ok(all)
     }
 
-    /// Rows with columns of the frames after those of the controls, and the frames. `has_offset`: as for `assemble`.
+    /// Appends the frames' columns to the rows, and returns the frames. `has_offset`: as in `assemble`.
     pub(super) fn add_to(
         self,
-        rows: Assembled,
+        rows: AssembledWeights,
         points: &[Vec3],
         has_offset: impl Fn(usize) -> bool,
-    ) -> (Assembled, Frames) {
-        let Assembled { weights, mut facts } = rows;
+    ) -> (AssembledWeights, Frames) {
+        let AssembledWeights { weights, mut facts } = rows;
         if !self.frames.is_used() {
-            return (Assembled { weights, facts }, self.frames);
+            return (AssembledWeights { weights, facts }, self.frames);
         }
         let n_controls = weights.n_columns();
         let columns = self.frames.columns(self.controls.rest());
@@ -125,9 +124,9 @@ impl<'a> Offsets<'a> {
                 if let Some((_, share, _)) = beyond {
                     let stays = (1.0 - share) * point;
                     put(0, stays);
-                    put(WHOLE, rest - stays);
-                } else if rest.length() <= ROUNDED * diagonal {
-                    put(WHOLE, rest);
+                    put(CAGE_COLUMN, rest - stays);
+                } else if rest.length() <= MIN_OFFSET * diagonal {
+                    put(CAGE_COLUMN, rest);
                 } else {
                     let weights = self.of_joints(indices, data);
                     let put = |column: usize, share: f64| put(column, share * rest);
@@ -138,10 +137,9 @@ impl<'a> Offsets<'a> {
             let (indices, data): (Vec<u32>, Vec<f32>) = row.into_iter().unzip();
             made.append(&Weights::from_parts(n_columns, vec![0, indices.len() as u32], indices, data));
         }
-        (Assembled { weights: made, facts }, self.frames)
+        (AssembledWeights { weights: made, facts }, self.frames)
     }
 
-    /// A row's weights of the joints.
     fn of_joints(&self, indices: &[u32], data: &[f32]) -> Vec<f64> {
         let of =
             |control: &u32| indices.iter().position(|c| c == control).map_or(0.0, |k| f64::from(data[k]));
@@ -149,7 +147,7 @@ impl<'a> Offsets<'a> {
     }
 }
 
-/// The frames of balls and tubes: coordinates of the cage alone at their joints, and differences of them a radius to each side.
+/// Frames of balls and tubes: coordinates of the cage alone at their joints, and central differences of them over the radius.
 fn frames(
     controls: Controls<'_>,
     inner: &InnerControls,
@@ -169,7 +167,7 @@ fn frames(
     };
     let points: Vec<Vec3> = joints.iter().flat_map(|&j| around(inner.positions[j as usize])).collect();
 
-    // Half the cells along each side are an eighth of the work.
+    // Half the resolution takes an eighth of the work.
     let options = BindOptions {
         grid: (options.grid / 2).max(8),
         sparsify: 0.0,
@@ -182,7 +180,7 @@ fn frames(
         steps => ControlSet::new(controls.cage(), steps, InnerControls::default())
             .unwrap_or_else(|_| ControlSet::plain(controls.cage())),
     };
-    let bound = pipeline::run(&points, Controls::from(&plain), &options, &Within(watch))?;
+    let bound = pipeline::run(&points, Controls::from(&plain), &options, &SilentProgress(watch))?;
     let n_cage = controls.cage().n_vertices();
     let dense = |row: usize| {
         let mut dense = vec![0.0; n_cage];

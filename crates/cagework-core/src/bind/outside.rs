@@ -1,11 +1,11 @@
-//! Vertices that no cage holds: refused before anything is solved for, with what is likely to be wrong.
+//! Vertices outside the cage: rejects binds without any vertex inside, with the likely cause.
 
 use std::fmt;
 
 use glam::{DVec3, Vec3};
 
 use super::BindError;
-use super::points::Points;
+use super::points::WeldedPoints;
 use crate::cage::Cage;
 use crate::controls::Controls;
 use crate::deform::OutsideVertex;
@@ -14,18 +14,18 @@ use crate::options::{BindOptions, OutsidePolicy};
 use crate::sample::{Outside, Stencils};
 use crate::weights::Weights;
 
-/// Cage and model that differ in size by this factor or more are taken to be in different units, of which feet and metres differ
-/// least; a cage is seldom twice as large as its model.
-const OTHER_UNIT: f64 = 3.0;
+/// Ratio of sizes from which cage and model are assumed to have different units. Feet and metres differ by 3.3; a cage
+/// is rarely twice as large as its model.
+const MIN_UNIT_RATIO: f64 = 3.0;
 
-/// Differences of weights over a model below which it hardly bends.
-const FLAT: f32 = 1e-3;
+/// Largest difference of a weight over the model for which the model hardly bends.
+const MIN_WEIGHT_SPREAD: f32 = 1e-3;
 
-/// A cage that is larger by this factor or more may have another unit: metres and centimetres differ by 100, and a cage is up to
-/// twice as large as its model. Weights of a cage of few vertices differ by less than its inverse then.
-const LARGE: f64 = 50.0;
+/// Ratio of sizes from which the cage may have another unit: metres and centimetres differ by 100, and a cage is up to
+/// twice as large as its model. The weights of a coarse cage then differ by less than the inverse of this.
+const MIN_OVERSIZE_RATIO: f64 = 50.0;
 
-/// How a cage and a model lie to each other.
+/// Relative position and size of a cage and a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misfit {
     /// Distance between their boxes, object units; 0 if they overlap.
@@ -42,14 +42,13 @@ impl Misfit {
     }
 }
 
-/// What is wrong and what to do.
 impl fmt::Display for Misfit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let gap = about(self.gap);
-        // A model of one point has no size.
-        let size = if self.ratio >= OTHER_UNIT {
+        // A single point has no size.
+        let size = if self.ratio >= MIN_UNIT_RATIO {
             Some(format!("{} times smaller than the model", about(self.ratio)))
-        } else if self.ratio > 0.0 && self.ratio <= 1.0 / OTHER_UNIT {
+        } else if self.ratio > 0.0 && self.ratio <= 1.0 / MIN_UNIT_RATIO {
             Some(format!("{} times larger than the model", about(1.0 / self.ratio)))
         } else {
             None
@@ -62,25 +61,25 @@ impl fmt::Display for Misfit {
             ),
             (false, Some(size)) => write!(f, "the cage is {size}: bring both into the same unit"),
             (false, None) => f.write_str(
-                "they overlap, but it lies beside what the cage encloses: is the cage another model's?",
+                "they overlap, but the model lies outside the cage's interior: does the cage belong to another model?",
             ),
         }
     }
 }
 
-/// A length or factor with two digits: what a reader takes in.
+/// A length or factor with two digits.
 fn about(x: f64) -> String {
     let rounded = format!("{x:.1e}").parse().unwrap_or(x);
     if (0.01..1e4).contains(&rounded) { rounded.to_string() } else { format!("{rounded:e}") }
 }
 
-/// Checks that the cage holds some of a model, and, if the options ask for it, all.
+/// Checks that the cage encloses some of a model or, if the options require it, all of it.
 ///
 /// # Errors
 /// [`BindError::NoneInside`], [`BindError::Outside`].
 pub(super) fn refuse_outside(
     controls: Controls<'_>,
-    mesh: &Points<'_>,
+    mesh: &WeldedPoints<'_>,
     stencils: &Stencils,
     options: &BindOptions,
 ) -> Result<(), BindError> {
@@ -102,15 +101,14 @@ pub(super) fn refuse_outside(
     }
 }
 
-/// [`BindError::NoneInside`]: the cage holds none of the model, and nothing of it would follow. `positions`,
-/// of which there are some: of the file.
+/// The [`BindError::NoneInside`] for a model, whose `positions` must not be empty.
 fn none_inside(cage: &Cage, positions: &[Vec3]) -> BindError {
     let model = Bounds::of(positions).unwrap_or(cage.bounds());
     BindError::NoneInside { vertices: positions.len(), misfit: Misfit::of(cage.bounds(), model) }
 }
 
-/// What to say of a cage that is so much larger than what it holds of the model that all of that has nearly the same weights.
-/// `positions`: of the model, the first rows of `weights`; those `outside` do not count.
+/// A notice if the cage is so much larger than the enclosed part of the model that all of that has nearly the same weights.
+/// `positions`: of the model, the first rows of `weights`; vertices `outside` are ignored.
 pub(super) fn oversized(
     cage: Bounds,
     positions: &[Vec3],
@@ -127,7 +125,7 @@ pub(super) fn oversized(
     let none = [Vec3::INFINITY, Vec3::NEG_INFINITY];
     let [min, max] = inside().fold(none, |[min, max], v| [min.min(positions[v]), max.max(positions[v])]);
     let larger = 1.0 / Misfit::of(cage, Bounds { min, max }).ratio;
-    // One point has no size.
+    // A single point has no size.
     if held == 0 || larger.is_infinite() {
         return None;
     }
@@ -140,12 +138,13 @@ pub(super) fn oversized(
         let (low, high, count) = &mut ranges[column as usize];
         (*low, *high, *count) = (low.min(weight), high.max(weight), *count + 1);
     }
-    // What a row does not store is 0.
+    // Weights that are not stored are 0.
     let spread = |&(low, high, n): &(f32, f32, usize)| if n < held { high.max(0.0) } else { high - low };
     let spread = ranges.iter().map(spread).fold(0.0, f32::max);
-    let is_flat = spread < FLAT || larger >= LARGE && f64::from(spread) < 1.0 / LARGE;
+    let is_flat = spread < MIN_WEIGHT_SPREAD
+        || larger >= MIN_OVERSIZE_RATIO && f64::from(spread) < 1.0 / MIN_OVERSIZE_RATIO;
     is_flat.then(|| format!(
-        "The cage is {} times larger than what it holds of the model, and weights differ by {spread:.0e} over it at most: it hardly \
+        "The cage is {} times larger than what it encloses of the model, and weights differ by {spread:.0e} over it at most: it hardly \
          bends. Are both in the same unit?",
         about(larger)
     ))
@@ -160,7 +159,7 @@ mod tests {
     use crate::options::BindOptions;
     use crate::progress::Silent;
 
-    /// What binding points of the unit cube to a box cage says.
+    /// Message of a bind of points of the unit cube to a box.
     fn said(min: Vec3, size: f32) -> String {
         let bounds = Bounds { min, max: min + size };
         let cage = Cage::new(&subdivided_box(bounds, 0.0, [1, 1, 1])).unwrap();
@@ -171,14 +170,14 @@ mod tests {
             .to_string()
     }
 
-    /// Such a cage was bound to, with all vertices outside, and the model then turned with a far triangle.
+    /// All vertices outside: the bind fails with the likely cause.
     #[test]
-    fn cage_that_holds_nothing_is_refused_with_what_is_wrong() {
+    fn cage_without_enclosed_vertices_is_rejected_with_the_cause() {
         let elsewhere = said(Vec3::new(10_001.0, 0.0, -0.5), 1.0);
         let expected =
             "none of the model's 15,002 vertices is inside the cage; the cage is 1e4 away from it: move";
         assert!(elsewhere.starts_with(expected), "{elsewhere}");
-        // Diagonal of the points, root of 2, over root of 3 times 0.01.
+        // Diagonal of the points, sqrt(2), over sqrt(3) times 0.01.
         let small = said(Vec3::new(0.2, 0.3, -0.005), 0.01);
         assert!(
             small.ends_with("; the cage is 82 times smaller than the model: bring both into the same unit"),
@@ -186,7 +185,7 @@ mod tests {
         );
         let both = said(Vec3::new(3.0, 0.0, 0.0), 100.0);
         assert!(both.contains("the cage is 2 away from it and 120 times larger than the model: "), "{both}");
-        // 100 times larger and around it: bound, with a remark.
+        // 100 times larger and around the model: bound, with a notice.
         let bound = |size: f32| {
             let bounds = Bounds { min: Vec3::splat(-0.4 * size), max: Vec3::splat(0.6 * size) };
             let cage = Cage::new(&subdivided_box(bounds, 0.0, [1; 3])).unwrap();
@@ -195,20 +194,21 @@ mod tests {
             binding.report.notices.into_iter().find(|said| said.starts_with("The cage is "))
         };
         let large = bound(100.0).unwrap();
-        // Root of 3 times 100 over root of 2.
-        let large_by = "The cage is 120 times larger than what it holds of the model, and weights differ by ";
+        // sqrt(3) times 100 over sqrt(2).
+        let large_by =
+            "The cage is 120 times larger than what it encloses of the model, and weights differ by ";
         let rest = large.strip_prefix(large_by);
         let spread: f64 = rest.and_then(|rest| rest.split(' ').next()?.parse().ok()).unwrap();
         // Trilinear: the corner at (1, 0, 0) has 0.41 * 0.6 * 0.6 at X and 0.4 * 0.59 * 0.6 at Y.
         assert!((spread - 6e-3).abs() < 2e-3, "{large}");
         assert_eq!(bound(20.0), None);
         let beside = said(Vec3::new(0.1, 0.1, -0.4), 0.8);
-        assert!(beside.contains("beside what the cage encloses"), "{beside}");
+        assert!(beside.contains("outside the cage's interior"), "{beside}");
     }
 
-    /// What is said comes from the weights of what the cage holds, whatever else makes the model or the cage large.
+    /// The notice depends on the enclosed part of the model only, not on the size of the model or of other parts of the cage.
     #[test]
-    fn cages_are_large_for_what_they_hold() {
+    fn oversize_is_judged_by_the_enclosed_part() {
         let box_of = |center: f32, size: f32, cuts: u32| {
             let half = Vec3::splat(size / 2.0);
             let bounds = Bounds { min: Vec3::X * center - half, max: Vec3::X * center + half };
@@ -229,13 +229,13 @@ mod tests {
         };
         let tiny = [Vec3::ZERO, 0.3 * Vec3::X, 0.3 * Vec3::Y];
         let with = |p: Vec3| [&tiny[..], &[p]].concat();
-        // 45 times larger, but of so many vertices that none has a weight of size in the middle.
+        // 45 times larger, with vertices so dense that none has a large weight in the middle.
         let fine = said(&[box_of(0.0, 11.0, 12)], &tiny).unwrap();
-        assert!(fine.starts_with("The cage is 45 times larger than what it holds"), "{fine}");
-        // A second part of the model, outside, hid that; one inside bends.
+        assert!(fine.starts_with("The cage is 45 times larger than what it encloses"), "{fine}");
+        // A second part of the model: outside it is ignored; inside it bends.
         assert!(said(&[box_of(0.0, 30.0, 1)], &with(Vec3::X * 200.0)).is_some());
         assert_eq!(said(&[box_of(0.0, 30.0, 1)], &with(Vec3::X * 12.0)), None);
-        // The model lies in a large part of a cage, or in a small one beside a large one.
+        // The model lies in the large part of a cage, then in the small part beside a large one.
         assert!(said(&[box_of(0.0, 30.0, 1), box_of(40.0, 1.0, 1)], &tiny).is_some());
         assert_eq!(said(&[box_of(0.0, 2.0, 1), box_of(40.0, 30.0, 1)], &tiny), None);
     }

@@ -1,13 +1,13 @@
-//! The stages of a bind, one after the other: voxelize, (batch: solve, sample), assemble.
+//! The stages of a bind: voxelize; per batch, solve and sample; assemble.
 //!
-//! Everything but the middle is the same for every back end: [`Prepared::new`], then whoever solves makes a
+//! All back ends share the first and last stage: [`Prepared::new`], then a solver of the back end produces a
 //! [`Solved`], then [`Prepared::finish`].
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-use crate::assemble::{Assembled, RowOptions, assemble};
+use crate::assemble::{AssembledWeights, RowOptions, assemble};
 use crate::controls::Controls;
 use crate::crossing;
 use crate::deform::{OutsideVertex, outside_in_words};
@@ -24,35 +24,35 @@ use crate::team::{Team, VERTEX_RUN};
 use super::memory::estimate;
 use super::offsets::{Offsets, needs_all};
 use super::outside::{oversized, refuse_outside};
-use super::points::Points;
+use super::points::WeldedPoints;
 pub use super::solving::Solved;
 use super::solving::solve_and_sample;
-use super::voxels::{Gridded, Voxels};
+use super::voxels::{Voxelization, VoxelizedCage};
 use super::watch::Watch;
 use super::{BindError, Binding};
 
-/// What a user should know when conjugate gradients took over.
-const STALLED: &str = "Multigrid converged slowly, as it does around many small parts or controls inside the cage: conjugate \
+/// Notice if conjugate gradients finished the solve.
+const STALL_NOTICE: &str = "Multigrid converged slowly, as it does around many small parts or controls inside the cage: conjugate \
                        gradients finished the solve on the processor.";
 
-/// Where the fields of a solve live: what counts towards the limit on working memory.
+/// Memory that holds the fields of a solve: only host memory counts towards the limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FieldsOn {
-    /// In this process.
+    /// This process.
     Host,
-    /// On a GPU, whose memory is planned there.
+    /// A GPU, which plans its own memory.
     Device,
 }
 
-/// A bind up to the solve: the geometry of grid and mesh.
+/// A bind before the solve: grid and sampling stencils.
 pub struct Prepared<'a> {
-    mesh: Points<'a>,
+    mesh: WeldedPoints<'a>,
     controls: Controls<'a>,
     options: &'a BindOptions,
-    pub(super) gridded: Arc<Gridded>,
+    pub(super) voxelized: Arc<VoxelizedCage>,
     stencils: Stencils,
     estimated: u64,
-    /// On the watcher's clock: the beginning, voxels made, stencils made.
+    /// Times on the watch's clock: start, after voxelization, after stencils.
     times_ms: [f64; 3],
 }
 
@@ -69,10 +69,10 @@ pub(super) fn run(
 }
 
 impl<'a> Prepared<'a> {
-    /// Checks the input, lays the surface into the grid and finds every vertex's sampling stencil.
+    /// Checks the input, voxelizes the surface and computes every vertex's sampling stencil.
     ///
     /// # Errors
-    /// Those of [`super::bind`].
+    /// As [`super::bind`].
     pub fn new(
         positions: &'a [Vec3],
         controls: Controls<'a>,
@@ -82,56 +82,56 @@ impl<'a> Prepared<'a> {
     ) -> Result<Self, BindError> {
         options.check()?;
         let began = watch.now_ms();
-        let mesh = Points::new(positions)?;
+        let mesh = WeldedPoints::new(positions)?;
         let team = Team::new(options.threads);
         watch.report(Stage::Voxelize, 0.0, 0, None)?;
-        let grid = Voxels::grid(controls.surface(), options);
+        let grid = Voxelization::grid(controls.surface(), options);
         let field_threads = if fields == FieldsOn::Host { team.n_threads() } else { 0 };
         let needed = estimate(controls, &grid, mesh.count(), field_threads, options);
         needed.check(mesh.count(), controls.n_controls(), options.memory_limit)?;
-        let gridded = Arc::new(Gridded::new(controls, grid, options, team, watch)?);
-        Self::in_grid(mesh, controls, options, gridded, needed.bytes, began, watch)
+        let voxelized = Arc::new(VoxelizedCage::new(controls, grid, options, team, watch)?);
+        Self::in_grid(mesh, controls, options, voxelized, needed.bytes, began, watch)
     }
 
-    /// Of a cage that is in its grid already. `estimated`: bytes; `began`: when, on the watcher's clock.
+    /// With an existing grid. `estimated`: bytes; `began`: start on the watch's clock.
     pub(super) fn in_grid(
-        mesh: Points<'a>,
+        mesh: WeldedPoints<'a>,
         controls: Controls<'a>,
         options: &'a BindOptions,
-        gridded: Arc<Gridded>,
+        voxelized: Arc<VoxelizedCage>,
         estimated: u64,
         began: f64,
         watch: &Watch<'_>,
     ) -> Result<Self, BindError> {
         let voxelized = watch.now_ms();
-        let stencils = sampling_stencils(controls, &gridded, &mesh.points, options.outside, watch)?;
+        let stencils = sampling_stencils(controls, &voxelized, &mesh.points, options.outside, watch)?;
         refuse_outside(controls, &mesh, &stencils, options)?;
         let times_ms = [began, voxelized, watch.now_ms()];
-        Ok(Self { mesh, controls, options, gridded, stencils, estimated, times_ms })
+        Ok(Self { mesh, controls, options, voxelized, stencils, estimated, times_ms })
     }
 
-    /// What is to be solved.
+    /// The discrete problem on all levels.
     #[must_use]
     pub fn hierarchy(&self) -> &Hierarchy {
-        &self.gridded.voxels.hierarchy
+        &self.voxelized.voxels.hierarchy
     }
 
-    /// Where the solution is to be sampled, one stencil per different position.
+    /// Sampling stencils, one per distinct position.
     #[must_use]
     pub fn stencils(&self) -> &Stencils {
         &self.stencils
     }
 
     fn solve(&self, watch: &Watch<'_>) -> Result<Solved, BindError> {
-        Ok(solve_and_sample(self.hierarchy(), &self.stencils, self.options, &self.gridded.team, watch)?)
+        Ok(solve_and_sample(self.hierarchy(), &self.stencils, self.options, &self.voxelized.team, watch)?)
     }
 
-    /// Solves and samples all columns in this process, where they were to be solved on a device.
+    /// Solves and samples all columns in this process, if the device cannot.
     ///
     /// # Errors
     /// Memory above the limit, or cancelled.
     pub fn solve_on_host(&mut self, watch: &Watch<'_>) -> Result<Solved, BindError> {
-        let (vertices, threads) = (self.mesh.count(), self.gridded.team.n_threads());
+        let (vertices, threads) = (self.mesh.count(), self.voxelized.team.n_threads());
         let needed =
             estimate(self.controls, &self.hierarchy().levels[0].grid, vertices, threads, self.options);
         needed.check(vertices, self.controls.n_controls(), self.options.memory_limit)?;
@@ -139,7 +139,7 @@ impl<'a> Prepared<'a> {
         self.solve(watch)
     }
 
-    /// Makes weights and report of the sampled columns.
+    /// Assembles weights and report from the sampled columns.
     ///
     /// # Errors
     /// Cancelled.
@@ -153,7 +153,7 @@ impl<'a> Prepared<'a> {
         let all = needs_all(self.controls, self.options);
         let has_offset = |point| all || self.stencils.is_outside(point);
         let blocks_bytes: usize = solved.blocks.iter().map(|b| size_of_val(b.as_slice())).sum();
-        let (points, team) = (&self.mesh.points, &self.gridded.team);
+        let (points, team) = (&self.mesh.points, &self.voxelized.team);
         let offsets = Offsets::new(self.controls, &self.stencils, &solved.blocks, self.options, watch)?;
         let rows = assemble(self.controls, &mut solved.blocks, points, row_options, has_offset, team);
         drop(std::mem::take(&mut solved.blocks));
@@ -161,17 +161,17 @@ impl<'a> Prepared<'a> {
         self.reported((rows, frames), blocks_bytes, solved, sampled, watch)
     }
 
-    /// The weights of all vertices, and the report. `sampled`: when the samples were there, on the watcher's clock.
+    /// Weights of all vertices with the report. `sampled`: time at which sampling ended, on the watch's clock.
     fn reported(
         self,
-        (rows, frames): (Assembled, Frames),
+        (rows, frames): (AssembledWeights, Frames),
         blocks_bytes: usize,
         solved: Solved,
         sampled: f64,
         watch: &Watch<'_>,
     ) -> Result<Binding, BindError> {
-        let Self { mesh: Points { positions, welded, points }, controls, options, stencils, .. } = self;
-        let Gridded { team, voxels } = &*self.gridded;
+        let Self { mesh: WeldedPoints { positions, welded, points }, controls, options, stencils, .. } = self;
+        let VoxelizedCage { team, voxels } = &*self.voxelized;
         let [began, voxelized, stencils_made] = self.times_ms;
         let cage = controls.surface();
         let (rest_error, raw_error, weight_stats) = rows.statistics(f64::from(cage.diagonal()));
@@ -195,7 +195,7 @@ impl<'a> Prepared<'a> {
         let (outside, held_vertices) = outside_of(controls, &stencils.outside, &welded, n_vertices);
         let vertices = &positions[..n_vertices];
         notices.extend(oversized(cage.bounds(), vertices, &outside, &weights, controls.n_controls()));
-        notices.extend(solved.report.stalled.then(|| STALLED.to_owned()));
+        notices.extend(solved.report.stalled.then(|| STALL_NOTICE.to_owned()));
         let of_vertices = || outside.iter().filter(|o| (o.vertex as usize) < n_vertices);
         notices.extend(outside_in_words(of_vertices(), cage.diagonal()));
         let narrow = |history: Vec<f64>| history.into_iter().map(|x| x as f32).collect();
@@ -245,21 +245,21 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Stencils of all points, in runs shared among threads.
+/// Stencils of all points, computed in runs on all threads.
 fn sampling_stencils(
     controls: Controls<'_>,
-    gridded: &Gridded,
+    voxelized: &VoxelizedCage,
     points: &[Vec3],
     policy: OutsidePolicy,
     watch: &Watch<'_>,
 ) -> Result<Stencils, BindError> {
-    let sampler = gridded.voxels.sampler(controls, policy);
+    let sampler = voxelized.voxels.sampler(controls, policy);
     let runs: Vec<&[Vec3]> = points.chunks(VERTEX_RUN).collect();
-    let parts = gridded.team.share(
+    let parts = voxelized.team.share(
         runs.len(),
         || (),
         |(), run| {
-            // Faces of hundreds of corners make this long: whoever waits is asked.
+            // Poll for cancellation: faces of hundreds of corners make this slow.
             let is_wanted = watch.report(Stage::Voxelize, 1.0, 0, None).is_ok();
             let points = if is_wanted { runs[run] } else { &[][..] };
             sampler.stencils(points.iter().map(|p| p.as_dvec3()))
@@ -273,7 +273,7 @@ fn sampling_stencils(
     Ok(stencils)
 }
 
-/// Rows outside the cage, and how many of the first `n_vertices` are inside of a control.
+/// Rows outside the cage, and how many of the first `n_vertices` lie inside a ball or tube.
 fn outside_of(
     controls: Controls<'_>,
     points: &[Outside],
@@ -295,7 +295,7 @@ fn outside_of(
     (outside, n_held)
 }
 
-/// What a user should know about controls inside in a grid of `cells` along the longest side.
+/// Notices about controls inside for a grid of `cells` along the longest side.
 fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
     let Some(inner) = controls.inner() else { return Vec::new() };
     let mut notices = Vec::new();
@@ -304,8 +304,8 @@ fn notices_of(controls: Controls<'_>, grid: &Grid, cells: u32) -> Vec<String> {
     if inner.has_radius() && radius < cell {
         let finer = (f64::from(cells) * f64::from(cell / radius)).ceil();
         notices.push(format!(
-            "The radius of the controls inside, {radius:.3e}, is below a cell of this grid, {cell:.3e}: how far they reach \
-             depends on how they lie in it. Use a grid of {finer} cells, or a larger radius."
+            "The radius of the controls inside, {radius:.3e}, is below a cell of this grid, {cell:.3e}: their reach depends on \
+             their position in the grid. Use a grid of {finer} cells, or a larger radius."
         ));
     }
     if let (n @ 1.., Some(first)) = (inner.unused().len(), inner.unused().first()) {

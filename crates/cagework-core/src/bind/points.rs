@@ -1,21 +1,21 @@
-//! What is bound: the vertices of a model, welded.
+//! Vertices of the model to bind, welded.
 
 use glam::Vec3;
 
 use super::BindError;
-use super::memory::Vertices;
+use super::memory::VertexCounts;
 use crate::mesh::{Weld, weld};
 
-/// The vertices of a model, and their different positions.
-pub(super) struct Points<'a> {
+/// The vertices of a model and their distinct positions.
+pub(super) struct WeldedPoints<'a> {
     pub(super) positions: &'a [Vec3],
     pub(super) welded: Weld,
     pub(super) points: Vec<Vec3>,
 }
 
-impl<'a> Points<'a> {
+impl<'a> WeldedPoints<'a> {
     /// # Errors
-    /// When there are none, or one is not a finite number.
+    /// [`BindError`] without vertices, or if one is not finite.
     pub(super) fn new(positions: &'a [Vec3]) -> Result<Self, BindError> {
         if positions.is_empty() {
             return Err(BindError::EmptyMesh);
@@ -28,8 +28,7 @@ impl<'a> Points<'a> {
         Ok(Self { positions, welded, points })
     }
 
-    /// How many there are of both.
-    pub(super) fn count(&self) -> Vertices {
-        Vertices { rows: self.positions.len(), points: self.points.len() }
+    pub(super) fn count(&self) -> VertexCounts {
+        VertexCounts { rows: self.positions.len(), points: self.points.len() }
     }
 }

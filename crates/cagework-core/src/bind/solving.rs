@@ -1,4 +1,4 @@
-//! Solve batch after batch, sample each and keep only the samples; or keep the fields, for many models.
+//! Solves batch after batch and samples each, or keeps the fields for many models.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -16,27 +16,27 @@ use crate::team::Team;
 
 use super::watch::Watch;
 
-/// Delta falls roughly by this factor from the first sweep to tau: for the progress bar only.
+/// Decades by which delta falls from the first Jacobi sweep to tau, roughly: for the progress bar only.
 const JACOBI_DECADES: f64 = 4.0;
 
-/// The sampled columns and how the solve went.
+/// Sampled columns with statistics of the solve.
 #[derive(Clone, Debug, Default)]
 pub struct Solved {
     /// `[n_batches][n_points]` rows of lanes.
     pub blocks: Vec<Vec<Row>>,
-    /// How the solve of all columns went.
+    /// Report of the solve of all columns.
     pub report: SolveReport,
-    /// Sweeps, V-cycles or steps.
+    /// Number of sweeps, V-cycles or steps.
     pub iterations: u32,
-    /// Iterations between two of the report's deltas: 1 but for the GPU's Jacobi sweeps.
+    /// Iterations per delta of the report: 1 except for Jacobi sweeps on the GPU.
     pub delta_interval: u32,
-    /// Bytes of fields alive at once.
+    /// Peak size of the fields, bytes.
     pub field_bytes: usize,
-    /// Bytes planned for them on a device, which the estimate made here leaves out; 0 in this process.
+    /// Bytes planned for fields on a device, which the host's estimate excludes; 0 in this process.
     pub planned_bytes: u64,
-    /// Share of the stage's time that went into solving; the rest is sampling.
+    /// Share of the stage's time spent solving rather than sampling.
     pub solve_share: f64,
-    /// Name of the GPU; none for the CPU.
+    /// Name of the GPU; `None` for the CPU.
     pub adapter: Option<String>,
 }
 
@@ -56,7 +56,7 @@ pub(super) fn solve_and_sample(
         let (fields, mut solved) = jacobi_fields(hierarchy, options, team, watch)?;
         let sampling = watch.now_ms();
         solved.blocks = sample_fields(stencils, &fields, team);
-        let spent = Spent::default();
+        let spent = SolveTimes::default();
         spent.add([begin, sampling, watch.now_ms()]);
         solved.solve_share = spent.solve_share();
         return Ok(solved);
@@ -66,7 +66,7 @@ pub(super) fn solve_and_sample(
     Ok(Solved { blocks, ..solved })
 }
 
-/// Solves all columns and keeps their fields, `[n_batches][n_rows]`, to be sampled by [`sample_fields`] again and again.
+/// Solves all columns and returns their fields, `[n_batches][n_rows]`, for [`sample_fields`].
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -87,7 +87,7 @@ pub(super) fn sample_fields(stencils: &Stencils, fields: &[Vec<Row>], team: &Tea
     team.share(fields.len(), || (), |(), batch| sample(stencils, batch, &fields[batch]))
 }
 
-/// Solves batch after batch and keeps what `take(batch, field)` makes of each.
+/// Solves batch after batch and collects `take(batch, field)`.
 fn solve_batches<T: Send>(
     hierarchy: &Hierarchy,
     options: &BindOptions,
@@ -97,12 +97,12 @@ fn solve_batches<T: Send>(
 ) -> Result<(Vec<T>, Solved), Cancelled> {
     let n_batches = hierarchy.n_batches();
     let rule = options.stop_rule().of_batch(n_batches);
-    let (spent, bytes) = (Spent::default(), AtomicU64::new(0));
+    let (spent, bytes) = (SolveTimes::default(), AtomicU64::new(0));
     let solved: Vec<Option<(SolveReport, T)>> = team.share(
         n_batches,
         || batch_solver(hierarchy, options),
         |solver, batch| {
-            // Before the first look at a batch lies its dearest part.
+            // The first progress report of a batch comes after its most expensive part.
             if watch.is_cancelled() {
                 return None;
             }
@@ -133,7 +133,6 @@ fn solve_batches<T: Send>(
     Ok((taken, solved))
 }
 
-/// A solver with its fields.
 fn batch_solver(hierarchy: &Hierarchy, options: &BindOptions) -> Box<dyn BatchSolver> {
     match options.solver {
         Solver::ConjugateGradient => {
@@ -150,14 +149,14 @@ fn sample(stencils: &Stencils, batch: usize, field: &[Row]) -> Vec<Row> {
     block
 }
 
-/// Microseconds that threads spent in solving and in sampling.
+/// Microseconds spent on solving and on sampling, over all threads.
 #[derive(Default)]
-struct Spent {
+struct SolveTimes {
     solve_us: AtomicU64,
     sample_us: AtomicU64,
 }
 
-impl Spent {
+impl SolveTimes {
     fn add(&self, times_ms: [f64; 3]) {
         self.solve_us.fetch_add(((times_ms[1] - times_ms[0]) * 1e3) as u64, Ordering::Relaxed);
         self.sample_us.fetch_add(((times_ms[2] - times_ms[1]) * 1e3) as u64, Ordering::Relaxed);
@@ -170,7 +169,6 @@ impl Spent {
     }
 }
 
-/// Solves all columns by Jacobi's method. Returns their fields.
 fn jacobi_fields(
     hierarchy: &Hierarchy,
     options: &BindOptions,
@@ -200,7 +198,7 @@ fn jacobi_fields(
 }
 
 impl BindOptions {
-    /// When a solve of all columns at once is done.
+    /// Stopping rule of a solve of all columns.
     #[must_use]
     pub fn stop_rule(&self) -> StopRule {
         StopRule { tolerance: f64::from(self.tau), max_iterations: self.max_iterations }

@@ -1,4 +1,4 @@
-//! The cage in the grid, by either method, ready to be solved and sampled.
+//! Voxelization of a cage by either method, ready for solving and sampling.
 
 use glam::DVec3;
 
@@ -21,30 +21,28 @@ use crate::voxelize::lines::Overlaps;
 use crate::voxelize::published::PublishedCells;
 use crate::voxelize::{CellKind, voxelize_classic};
 
-/// What voxelisation leaves.
 #[derive(Debug)]
-pub(super) struct Voxels {
+pub(super) struct Voxelization {
     pub(super) hierarchy: Hierarchy,
     pub(super) counts: CellCounts,
-    /// Cells about which the axes disagreed.
+    /// Cells that lines along different axes classify differently.
     pub(super) ambiguous: u64,
-    /// What a user should know about the cage in this grid.
+    /// Notices about the cage in this grid.
     pub(super) notices: Vec<String>,
-    /// Where parts of the cage overlap.
     overlaps: Overlaps,
-    /// Bytes held at most.
+    /// Peak memory, bytes.
     pub(super) bytes: usize,
     classic: Option<ClassicCells>,
 }
 
-/// A cage in its grid, and the threads that work on it: what all models of one cage share.
+/// A voxelized cage with the threads that work on it; shared by all models of a cage.
 #[derive(Debug)]
-pub(super) struct Gridded {
+pub(super) struct VoxelizedCage {
     pub(super) team: Team,
-    pub(super) voxels: Voxels,
+    pub(super) voxels: Voxelization,
 }
 
-impl Gridded {
+impl VoxelizedCage {
     /// # Errors
     /// [`BindError::NoInterior`], or cancelled.
     pub(super) fn new(
@@ -54,7 +52,7 @@ impl Gridded {
         team: Team,
         watch: &Watch<'_>,
     ) -> Result<Self, BindError> {
-        let voxels = team.install(|| Voxels::new(controls, grid, options));
+        let voxels = team.install(|| Voxelization::new(controls, grid, options));
         watch.report(Stage::Voxelize, 1.0, 0, None)?;
         if voxels.hierarchy.levels[0].n_unknowns() == 0 && options.method == Method::Classic {
             return Err(BindError::NoInterior { grid: options.grid });
@@ -63,14 +61,12 @@ impl Gridded {
     }
 }
 
-/// A sampler of either method.
 pub(super) enum AnySampler<'a> {
     Classic(Controls<'a>, &'a ClassicCells, &'a Level, OutsidePolicy),
     Embedded(Box<Sampler<'a>>),
 }
 
-impl Voxels {
-    /// The grid that a bind will use.
+impl Voxelization {
     pub(super) fn grid(cage: &Cage, options: &BindOptions) -> Grid {
         match options.method {
             Method::Embedded => Grid::cubic(cage.bounds(), options.grid),
@@ -151,7 +147,6 @@ impl Voxels {
 }
 
 impl AnySampler<'_> {
-    /// Stencils of points.
     pub(super) fn stencils(&self, points: impl Iterator<Item = DVec3>) -> Stencils {
         match self {
             Self::Classic(controls, cells, level, policy) => {

@@ -1,32 +1,32 @@
-//! Progress of a bind whose parts run on several threads.
+//! Thread-safe progress of a bind.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use crate::progress::{Cancelled, Progress, ProgressEvent, Stage};
 
-/// Share of the whole bind that each stage is given in the progress: where its fraction begins and ends.
+/// Range of the whole bind's progress that a stage covers.
 fn span(stage: Stage) -> [f32; 2] {
     match stage {
         Stage::Voxelize => [0.0, 0.1],
         Stage::Solve => [0.1, 0.9],
         Stage::Sample => [0.9, 1.0],
-        // No part of a bind.
+        // Not part of a bind.
         Stage::Simplify => [0.0, 0.0],
     }
 }
 
-/// Passes progress on, from any thread, and remembers that it was cancelled.
+/// Forwards progress from any thread, and remembers cancellation.
 pub struct Watch<'a> {
     progress: &'a dyn Progress,
     cancelled: AtomicBool,
-    /// Largest fraction reported. Reports pass one at a time, so that none overtakes another and the bar never falls.
+    /// Largest fraction reported. The lock serialises reports, so that progress never decreases.
     fraction: Mutex<f32>,
     done: AtomicU32,
 }
 
 impl<'a> Watch<'a> {
-    /// Watches for whoever wants to know.
+    /// A watch that reports to `progress`.
     #[must_use]
     pub fn new(progress: &'a dyn Progress) -> Self {
         Self {
@@ -37,10 +37,10 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Reports `fraction` of a stage.
+    /// Reports the `fraction` of a stage.
     ///
     /// # Errors
-    /// [`Cancelled`], now or before.
+    /// [`Cancelled`], if this or an earlier report was cancelled.
     pub fn report(
         &self,
         stage: Stage,
@@ -59,28 +59,28 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// Whether the work is to stop.
+    /// Whether a report was cancelled.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
     }
 
-    /// One more piece of `total` is done.
+    /// Counts a finished piece of `total` and reports.
     ///
     /// # Errors
-    /// [`Cancelled`], now or before.
+    /// [`Cancelled`], if this or an earlier report was cancelled.
     pub fn piece_done(&self, stage: Stage, total: usize) -> Result<(), Cancelled> {
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
         self.report(stage, done as f32 / total as f32, 0, None)
     }
 
-    /// How many pieces are done.
+    /// Number of finished pieces.
     #[must_use]
     pub fn done(&self) -> u32 {
         self.done.load(Ordering::Relaxed)
     }
 
-    /// The watcher's clock, milliseconds.
+    /// Clock of the progress, milliseconds.
     #[must_use]
     pub fn now_ms(&self) -> f64 {
         self.progress.now_ms()

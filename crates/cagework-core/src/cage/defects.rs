@@ -1,4 +1,4 @@
-//! What may be wrong with a cage, and what was mended or is worth knowing.
+//! Errors and notices about cages.
 
 use std::fmt;
 
@@ -7,10 +7,10 @@ use thiserror::Error;
 use super::{MAX_DIAGONAL, MAX_FACES, MIN_DIAGONAL};
 use crate::words::{counted, grouped};
 
-/// Most corners of a face: cutting it takes the square of them, or the cube at worst.
+/// Most corners of a face: triangulation takes the square, at worst the cube, of their number.
 pub(super) const MAX_CORNERS: usize = 1000;
 
-/// Why a polygon mesh is not a cage. Vertices and faces are counted from 0.
+/// Why a polygon mesh is not a cage. Indices start at 0.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum CageError {
     /// There are no vertices or no faces.
@@ -24,14 +24,14 @@ pub enum CageError {
         /// Its corners.
         corners: usize,
     },
-    /// A face names a vertex that does not exist.
+    /// A face has the index of a vertex that does not exist.
     #[error("cage face {face} names vertex {vertex}, but there are only {n} vertices (0 to {})", n - 1)]
     Index {
         /// The face.
         face: u32,
-        /// The vertex it names.
+        /// The invalid index.
         vertex: u32,
-        /// Vertices there are.
+        /// Number of vertices.
         n: usize,
     },
     /// A coordinate is infinite or not a number.
@@ -40,7 +40,7 @@ pub enum CageError {
         /// The vertex.
         vertex: u32,
     },
-    /// The cage is too small or too large to compute with.
+    /// The cage is too small or too large for its arithmetic.
     #[error(
         "cage has a bounding box with a diagonal of {diagonal:e}; it must be from {MIN_DIAGONAL:e} to {MAX_DIAGONAL:e}: scale it"
     )]
@@ -53,7 +53,7 @@ pub enum CageError {
     DegenerateFace {
         /// The face.
         face: u32,
-        /// What is wrong with it.
+        /// The defect.
         why: FaceDefect,
     },
     /// Two faces have the same outline.
@@ -64,21 +64,21 @@ pub enum CageError {
         /// The second of the two.
         second: u32,
     },
-    /// Two closed parts lie on each other, face on face.
+    /// Two components coincide face by face.
     #[error("cage component {second} lies on component {first}, face on face: delete one of them")]
     DoubledPart {
-        /// The first of the two, in order of first faces.
+        /// The first component, in order of first faces.
         first: u32,
-        /// The second of the two.
+        /// The second component.
         second: u32,
     },
-    /// More faces than anyone moves by hand.
+    /// The cage has too many faces.
     #[error("cage has {} faces, more than {}: use a simpler mesh around the model", grouped(*faces), grouped(MAX_FACES))]
     TooManyFaces {
-        /// Its faces.
+        /// Number of its faces.
         faces: usize,
     },
-    /// An edge belongs to one face only.
+    /// An edge belongs to only one face.
     #[error(
         "cage is not closed: edge {}-{} belongs to one face ({count} open edges in all): fill the hole or join \
          the faces there", edge[0], edge[1]
@@ -86,10 +86,10 @@ pub enum CageError {
     Open {
         /// The first open edge, lower vertex first.
         edge: [u32; 2],
-        /// All open edges.
+        /// Number of open edges.
         count: usize,
     },
-    /// An edge belongs to three faces or more.
+    /// An edge belongs to three or more faces.
     #[error(
         "cage edge {}-{} belongs to {faces} faces; it must belong to two: remove inner faces or split its vertices",
         edge[0], edge[1]
@@ -97,19 +97,19 @@ pub enum CageError {
     NonManifoldEdge {
         /// The edge, lower vertex first.
         edge: [u32; 2],
-        /// Faces that share it.
+        /// Number of faces that share it.
         faces: usize,
     },
-    /// The faces of a component cannot all be turned the same way, as on a Moebius strip or a Klein bottle.
+    /// Faces cannot be oriented consistently, as on a Moebius strip or a Klein bottle.
     #[error(
         "cage has no inside: its faces cannot be turned consistently (noticed at edge {}-{}): it is one-sided like \
          a Klein bottle", edge[0], edge[1]
     )]
     Inconsistent {
-        /// An edge at which the orientations meet head on.
+        /// An edge at which no consistent orientation exists.
         edge: [u32; 2],
     },
-    /// A component encloses nothing.
+    /// A component encloses no volume.
     #[error(
         "cage component {component} (with face {face}) encloses no volume: it is flat or folded onto itself"
     )]
@@ -121,46 +121,46 @@ pub enum CageError {
     },
 }
 
-/// What is wrong with a face.
+/// Why a face is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum FaceDefect {
-    /// A vertex is a corner more than once.
+    /// A vertex occurs more than once.
     #[error("vertex {vertex} is a corner of it more than once")]
     RepeatedVertex {
         /// The vertex.
         vertex: u32,
     },
-    /// All corners are on a line, or areas cancel.
+    /// All corners lie on a line, or areas cancel.
     #[error("it has no area")]
     NoArea,
-    /// Cutting it into triangles would take too long.
+    /// Triangulation would take too long.
     #[error("it has {corners} corners, more than {MAX_CORNERS}; cut it into triangles")]
     TooManyCorners {
-        /// Its corners.
+        /// Number of corners.
         corners: usize,
     },
-    /// Two of its edges cross.
+    /// Two edges cross.
     #[error("its outline crosses itself; cut it into triangles")]
     CrossesItself,
 }
 
-/// Something about a cage that was mended or does no harm.
+/// A repair of a cage, or a remark about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CageNotice {
-    /// Vertices at one place along open edges were taken as one.
+    /// Vertices at equal positions along open edges were joined.
     Welded {
-        /// Vertices for which another one, the first at the same place, stands.
+        /// Number of vertices that the first one at their position replaces.
         vertices: usize,
         /// The first of them.
         first: u32,
     },
-    /// Faces pointed into the solid and were turned.
+    /// Inverted faces were flipped.
     Flipped {
         /// The component, in order of first faces.
         component: u32,
-        /// Faces that were turned.
+        /// Number of flipped faces.
         faces: usize,
-        /// Faces of the component.
+        /// Number of faces of the component.
         of: usize,
     },
     /// A component lies inside another one.
@@ -168,16 +168,16 @@ pub enum CageNotice {
         /// The component, in order of first faces.
         component: u32,
     },
-    /// Vertices that belong to no face: their weights are zero.
+    /// Vertices without faces: their weights are zero.
     UnusedVertices {
-        /// How many.
+        /// Number of vertices.
         vertices: usize,
         /// The first of them.
         first: u32,
     },
-    /// Parts of the surface meet in a vertex only.
+    /// Parts of the surface meet only in a vertex.
     TouchingVertices {
-        /// How many such vertices there are.
+        /// Number of such vertices.
         vertices: usize,
         /// The first of them.
         first: u32,
@@ -189,8 +189,8 @@ impl fmt::Display for CageNotice {
         match *self {
             Self::Welded { vertices, first } => write!(
                 f,
-                "The cage was split along seams: for {} (from vertex {first} on) another one at the same place is \
-                 used; the weights of the copies are zero.",
+                "The cage was split along seams: joined {} (from vertex {first} on) with others at the same position; the \
+                 weights of the copies are zero.",
                 counted(vertices, "vertex", "vertices")
             ),
             Self::Flipped { component, faces, of } if faces == of => {
@@ -208,7 +208,7 @@ impl fmt::Display for CageNotice {
             }
             Self::UnusedVertices { vertices, first } => write!(
                 f,
-                "The cage has {} of no face (from vertex {first} on): the weights are zero.",
+                "The cage has {} without faces (from vertex {first} on): the weights are zero.",
                 counted(vertices, "vertex", "vertices")
             ),
             Self::TouchingVertices { vertices, first } => write!(

@@ -1,12 +1,12 @@
-//! Barycentric coordinates of planar polygons, robust on sides and corners: the hats' values on faces.
+//! Barycentric coordinates of planar polygons, robust on sides and at corners: the hats' values on faces.
 //!
-//! Sources: Meyer, Lee, Barr, Desbrun 2002, "Generalized barycentric coordinates on irregular polygons" (Wachspress
-//! coordinates); Gordon, Wixom 1974, "Pseudo-harmonic interpolation on convex domains"; Manson, Li, Schaefer 2011,
-//! "Positive Gordon-Wixom coordinates".
+//! Sources: Meyer, Lee, Barr and Desbrun 2002, "Generalized barycentric coordinates on irregular polygons" (Wachspress
+//! coordinates); Gordon and Wixom 1974, "Pseudo-harmonic interpolation on convex domains"; Manson, Li and Schaefer
+//! 2011, "Positive Gordon-Wixom coordinates".
 //!
-//! Changes versus the papers: Meyer's quotients are multiplied by all distances, so that nothing is divided by zero on
-//! a side. Chords end at the nearest sides, which are found by a sweep, and have other weights; their mean is taken by
-//! quadrature, which keeps the sum, the sign and linear precision because every chord has them.
+//! Changes: Meyer's quotients are multiplied by all distances, which avoids division by zero on a side. Chords end at
+//! the nearest sides, found by a sweep, and have other weights. Their mean is taken by quadrature, which keeps sum,
+//! sign and linear precision because every chord has them.
 
 use std::f64::consts::PI;
 
@@ -14,20 +14,20 @@ use glam::DVec2;
 
 use super::triangulate::cross;
 
-/// Distances below this fraction of the polygon are zero: on the corner or side. A few roundings of f64.
-const ON_OUTLINE: f64 = 1e-15;
+/// Distances below this fraction of the polygon's size count as zero: a few roundings of f64.
+const OUTLINE_TOLERANCE: f64 = 1e-15;
 
 /// Nodes of Gauss quadrature on `[0, 1]`: `(1 ± 1 / sqrt(3)) / 2`.
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// Coordinates of `point` in a strictly convex counter-clockwise polygon. `values`: `[n]`, non-negative, sum 1; `areas`:
-/// `[n]`, scratch space. Outside by rounding, a point is treated as if on the side.
+/// Wachspress coordinates of `point` in a strictly convex counter-clockwise polygon. `values`: `[n]`, non-negative, sum
+/// 1; `areas`: `[n]`, scratch. A point that is outside by rounding is treated as on the side.
 pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64], areas: &mut [f64]) {
     let n = outline.len();
     let before = |k: usize| if k == 0 { n - 1 } else { k - 1 };
     let after = |k: usize| if k + 1 == n { 0 } else { k + 1 };
-    // Doubled areas of the triangles between the point and each side, relative to the largest, so that their product
-    // neither overflows nor underflows. Comparisons: wasm has no instruction for `max`.
+    // Doubled areas of the triangles of the point and each side, over the largest, so that their product neither
+    // overflows nor underflows. Comparisons instead of `max`, which has no single wasm instruction.
     let mut largest = f64::MIN_POSITIVE;
     for (k, area) in areas.iter_mut().enumerate() {
         *area = cross(outline[k], outline[after(k)], point);
@@ -39,7 +39,7 @@ pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64], ar
     }
     for (k, value) in values.iter_mut().enumerate() {
         let (first, next) = (before(k), after(k));
-        // All sides but the two that meet in the corner.
+        // All sides except the two that meet in the corner.
         let mut product = cross(outline[first], outline[k], outline[next]);
         let mut side = next;
         while side != first {
@@ -51,10 +51,10 @@ pub(super) fn wachspress(outline: &[DVec2], point: DVec2, values: &mut [f64], ar
     normalize(values);
 }
 
-/// Pseudo-harmonic coordinates of `point` in a simple counter-clockwise polygon that it lies in: the mean, over all chords
-/// through the point, of the linear interpolation between the chord's ends, weighted by `1 / (r s sqrt(r + s))`, where `r` and
-/// `s` are the distances to the ends. On a circle, `1 / (r s)` would make them harmonic; the root reduces the weights of far
-/// corners. `values`: `[n]`, non-negative, sum 1. `O(n (log n + c))`, where a line through the point crosses `c` sides.
+/// Pseudo-harmonic coordinates of `point` in a simple counter-clockwise polygon that contains it: the mean over all chords
+/// through the point of the linear interpolation between the chord's ends, weighted by `1 / (r s sqrt(r + s))` with the distances
+/// r and s to the ends. The weight `1 / (r s)` would make them harmonic on a circle; the root reduces the influence of distant
+/// corners. `values`: `[n]`, non-negative, sum 1. `O(n (log n + c))` if a line through the point crosses `c` sides.
 pub(super) fn pseudo_harmonic(outline: &[DVec2], point: DVec2, values: &mut [f64]) {
     let n = outline.len();
     let next = |k: usize| if k + 1 == n { 0 } else { k + 1 };
@@ -75,10 +75,10 @@ pub(super) fn pseudo_harmonic(outline: &[DVec2], point: DVec2, values: &mut [f64
         values[nearest.1] = 1.0 - nearest.2;
         values[next(nearest.1)] = nearest.2;
     };
-    if nearest.0 <= ON_OUTLINE * extent {
+    if nearest.0 <= OUTLINE_TOLERANCE * extent {
         return on_side(values);
     }
-    // Rotate a line about the point by half a turn. It crosses the same sides from one corner to the next.
+    // Rotate a line about the point by half a turn: between two corners it crosses the same sides.
     let is_above = |k: usize| to(k).y > 0.0 || to(k).y == 0.0 && to(k).x > 0.0;
     let angle = |k: usize| if is_above(k) { to(k).y.atan2(to(k).x) } else { (-to(k).y).atan2(-to(k).x) };
     let mut corners: Vec<(f64, usize)> = (0..n).map(|k| (angle(k), k)).collect();
@@ -94,7 +94,7 @@ pub(super) fn pseudo_harmonic(outline: &[DVec2], point: DVec2, values: &mut [f64
         let end = corners.get(rank + 1).map_or(corners[0].0 + PI, |&(end, _)| end);
         let width = end - start;
         let ways = GAUSS.map(|node| DVec2::from_angle(start + node * width));
-        // The nearest side ahead of the point, and the nearest behind it.
+        // Nearest side in each direction.
         let (mut ends, mut distances) = ([None; 2], [f64::INFINITY; 2]);
         for &k in &crossed {
             let distance = to(k).perp_dot(side(k)) / ways[0].perp_dot(side(k));
@@ -112,7 +112,7 @@ pub(super) fn pseudo_harmonic(outline: &[DVec2], point: DVec2, values: &mut [f64
             let chord = hits[0].2 + hits[1].2;
             for (k, share, distance) in hits {
                 let weight = width / (distance * chord * chord.sqrt());
-                // NaN along a side, in a sector without width.
+                // NaN if the direction is parallel to the side, in a sector of zero width.
                 if weight * share >= 0.0 {
                     values[k] += weight * (1.0 - share);
                     values[next(k)] += weight * share;
@@ -120,11 +120,10 @@ pub(super) fn pseudo_harmonic(outline: &[DVec2], point: DVec2, values: &mut [f64
             }
         }
     }
-    // A point outside by rounding may lie on no chord.
+    // A point that is outside by rounding may have no chord.
     if values.iter().sum::<f64>().is_normal() { normalize(values) } else { on_side(values) }
 }
 
-/// Scales `values` to the sum 1.
 fn normalize(values: &mut [f64]) {
     let scale = 1.0 / values.iter().sum::<f64>();
     for value in values {

@@ -1,21 +1,21 @@
-//! Which side of each component is outside: faces are turned away from the solid.
+//! Orients components: faces point away from the solid.
 
 use glam::{DVec3, Vec3};
 
 use super::defects::{CageError, CageNotice};
-use super::polygon::{FLAT_HEIGHT, Polygon};
+use super::polygon::{MIN_FACE_HEIGHT, Polygon};
 use super::topology::Surface;
 use crate::geometry::winding_number;
 
-/// Points of a component that are tested for lying inside another one. Odd, so that there is a majority; many, because a
-/// point may lie on the other component where they touch, and because components may overlap.
+/// Sample points of a component for the test whether it lies inside another one. Odd, for a majority; many, because
+/// components may touch or overlap.
 const NESTING_SAMPLES: usize = 31;
 
-/// A winding number below this is that of a point outside, not on the surface.
-const CLEARLY_OUTSIDE: f64 = 0.25;
+/// Winding numbers below this mean outside, rather than on the surface.
+const MAX_OUTSIDE_WINDING: f64 = 0.25;
 
-/// Turns the faces of every component away from the solid (outward, or into a cavity) and measures all faces.
-/// `diagonal` of the cage's bounding box.
+/// Orients the faces of every component away from the solid (outward, or into a cavity) and measures all faces.
+/// `diagonal`: of the cage's bounding box.
 pub(super) fn orient(
     positions: &[Vec3],
     surface: &mut Surface,
@@ -39,8 +39,8 @@ pub(super) fn orient(
     }
     let solids: Vec<Solid> = components.into_iter().map(Solid::new).collect();
     for (component, solid) in solids.iter().enumerate() {
-        // Volume over area is the thickness of a sheet: flat if it is lost in the rounding of coordinates.
-        if solid.volume.abs() <= FLAT_HEIGHT * diagonal * solid.area {
+        // Volume over area is the thickness; below the rounding of coordinates the component is flat.
+        if solid.volume.abs() <= MIN_FACE_HEIGHT * diagonal * solid.area {
             return Err(CageError::Flat { component: component as u32, face: faces_of[component][0] as u32 });
         }
     }
@@ -66,7 +66,7 @@ pub(super) fn orient(
     Ok(polygons)
 }
 
-/// One component as a closed set of triangles.
+/// A component as a closed set of triangles.
 struct Solid {
     triangles: Vec<[DVec3; 3]>,
     min: DVec3,
@@ -81,7 +81,7 @@ impl Solid {
         let corners = || triangles.iter().flatten();
         let min = corners().fold(DVec3::INFINITY, |m, &p| m.min(p));
         let max = corners().fold(DVec3::NEG_INFINITY, |m, &p| m.max(p));
-        // Tetrahedra to a point nearby: far from the origin, those to the origin would cancel.
+        // Tetrahedra with a nearby apex: with the origin as apex, volumes would cancel far away from it.
         let center = 0.5 * (min + max);
         let (mut volume, mut area) = (0.0, 0.0);
         for t in &triangles {
@@ -92,7 +92,7 @@ impl Solid {
         Self { triangles, min, max, volume, area }
     }
 
-    /// Whether this component lies inside `other`; not if they overlap.
+    /// Whether this component lies inside `other`; false if they overlap.
     fn is_inside(&self, other: &Self) -> bool {
         if self.min.cmplt(other.min).any() || self.max.cmpgt(other.max).any() {
             return false;
@@ -105,6 +105,6 @@ impl Solid {
         });
         let windings: Vec<f64> = windings.collect();
         let inside = windings.iter().filter(|w| **w > 0.5).count();
-        2 * inside > samples && windings.iter().all(|w| *w > CLEARLY_OUTSIDE)
+        2 * inside > samples && windings.iter().all(|w| *w > MAX_OUTSIDE_WINDING)
     }
 }

@@ -1,26 +1,25 @@
-//! A bent face as a patch: its planar coordinates, lifted to its corners.
+//! A bent face as a patch: the planar coordinates of its outline applied to its corners.
 //!
-//! Over each point of the plane that fits the face best, the patch lies where the planar coordinates of the face's outline
-//! put it: `sum hat_k c_k`. So values on a face depend continuously on its corners, from flat to bent, and reproduce the
-//! patch; over a parallelogram it is the bilinear patch. It is cut into *facets* along rings around its middle. Sides stay
-//! whole, so that neighbours of any kind meet it without gaps.
+//! Over each point of the face's best-fitting plane, the patch is `sum hat_k c_k` with the planar coordinates of the
+//! projected outline. Values on a face therefore depend continuously on its corners, whether flat or bent, and
+//! reproduce the patch; over a parallelogram it is the bilinear patch. The patch is cut into *facets* along rings
+//! around its centre. Sides stay whole, so that any neighbour meets it without gaps.
 
 use glam::DVec2;
 
-/// Sizes of the rings within the outline, in which sides are halved: no facet is further from a bilinear patch than 1.8 %
-/// of how far its fourth corner is off the plane of the other three. Between rings at the distances a and b from the middle
-/// (of half a side) facets are off by `a (a - b) / 16` of that, at the outline by 1/64.
+/// Scales of the rings within the outline, whose sides are halved. No facet is further from a bilinear patch than 1.8 %
+/// of the distance of its fourth corner from the plane of the other three. With rings at the relative distances a and b
+/// from the centre, facets are off by `a (a - b) / 16` of that; at the outline by 1/64.
 const RINGS: [f64; 2] = [0.75, 0.375];
 
-/// The points of a patch inside its outline, and its facets.
 pub(super) struct Facets {
-    /// In the plane.
+    /// Coordinates in the plane.
     pub(super) inner: Vec<DVec2>,
-    /// Corners of the face, then inner points.
+    /// Indices of the face's corners, then of inner points.
     pub(super) facets: Vec<[u32; 3]>,
 }
 
-/// Cuts a strictly convex polygon, counter-clockwise.
+/// Facets of a strictly convex polygon, counter-clockwise.
 pub(super) fn rings(outline: &[DVec2]) -> Facets {
     let n = outline.len();
     let middle = outline.iter().sum::<DVec2>() / n as f64;
@@ -32,7 +31,7 @@ pub(super) fn rings(outline: &[DVec2]) -> Facets {
         }
     }
     inner.push(middle);
-    // Ring r has its corners at even places, the middles of its sides at odd ones.
+    // A ring has its corners at even places and the midpoints of its sides at odd ones.
     let ring = |r: usize, place: usize| (n + 2 * n * r + place % (2 * n)) as u32;
     let last = (n + 2 * n * RINGS.len()) as u32;
     let mut facets = Vec::new();
@@ -52,7 +51,8 @@ pub(super) fn rings(outline: &[DVec2]) -> Facets {
     Facets { inner, facets }
 }
 
-/// Cuts a simple polygon of which `triangles` are given: each into a fan around its middle, with its diagonals halved.
+/// Facets of a simple polygon with the triangulation `triangles`: each triangle becomes a fan around its centroid, with
+/// diagonals halved.
 pub(super) fn fans(outline: &[DVec2], triangles: &[[u32; 3]]) -> Facets {
     let n = outline.len() as u32;
     let (mut inner, mut facets) = (Vec::new(), Vec::new());

@@ -1,4 +1,4 @@
-//! A face as a polygon in its plane: which hats it carries and how it is cut into triangles.
+//! A face projected to its plane: its hats and its triangulation.
 
 use glam::{DVec2, DVec3};
 
@@ -7,42 +7,41 @@ use super::hats;
 use super::patch::{self, Facets};
 use super::triangulate::{cross, ear_clip};
 
-/// A face lower than this fraction of the cage's diagonal has no area: it is lost in the rounding of f32 coordinates
-/// (6e-8 relative).
-pub(super) const FLAT_HEIGHT: f64 = 1e-7;
+/// Height of a face over the cage's diagonal below which it has no area: rounding of f32 coordinates (6e-8 relative).
+pub(super) const MIN_FACE_HEIGHT: f64 = 1e-7;
 
-/// A polygon is planar if its corners are within this fraction of the cage's diagonal of its plane. Six decimals of
-/// an OBJ file move the corners of a model of unit size by so much, and the rest pose can be off by no more.
-pub(super) const PLANAR: f64 = 2e-6;
+/// Distance of corners from the face's plane, over the cage's diagonal, up to which a face is planar. The six decimals
+/// of OBJ files move the corners of a model of unit size by that much. It bounds the rest error on the face.
+pub(super) const PLANE_TOLERANCE: f64 = 2e-6;
 
-/// Smallest sine of the turn at a corner of an outline that is cut as a convex one.
-const MIN_TURN: f64 = 1e-3;
+/// Smallest sine of the exterior angle at the corners of an outline that counts as convex.
+const MIN_CONVEX_SINE: f64 = 1e-3;
 
-/// Quads whose smallest turn has at least this sine (14 degrees) have Meyer's coordinates alone. At a straight corner Meyer's
-/// hat vanishes, so below it they are blended with pseudo-harmonic ones, which the quad has when the corner is straight.
-const MEYER_TURN: f64 = 0.25;
+/// Smallest sine of the exterior angles (14 degrees) for which a quad has Meyer's coordinates alone. At a straight
+/// corner Meyer's hat vanishes, so below this they are blended with pseudo-harmonic coordinates.
+const MIN_MEYER_SINE: f64 = 0.25;
 
-/// Smaller shares of Meyer's coordinates are set to 0: at a straight corner their quotient is 0 / 0.
+/// Smaller shares of Meyer's coordinates are set to 0, because at a straight corner they are 0 / 0.
 const MIN_SHARE: f64 = 1e-6;
 
-/// A face in its plane.
+/// A face projected to its plane.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Polygon {
-    /// Corners in the plane, counter-clockwise seen from outside, then the patch's inner points; empty if hats are linear
-    /// on each facet.
+    /// Corners in the plane, counter-clockwise seen from outside, then inner points of the patch; empty if hats are
+    /// linear on each facet.
     pub(super) outline: Vec<DVec2>,
-    /// Share of Meyer's coordinates in the hats; the rest is pseudo-harmonic coordinates. 0 unless the face is a quad.
+    /// Share of Meyer's coordinates in the hats; the rest is pseudo-harmonic. 0 unless the face is a quad.
     meyer: f64,
-    /// Triangles that cover the face, as corners of it, turned like it.
+    /// Triangulation of the face, as indices of its corners, with its orientation.
     pub(super) triangles: Vec<[u32; 3]>,
-    /// The surface on which hats are prescribed: the triangles, or those of a patch, as corners and inner points.
+    /// The surface on which hats are prescribed: the triangles, or those of a patch. Indices of corners and inner points.
     pub(super) facets: Vec<[u32; 3]>,
-    /// The hats of the patch's inner points. `[n_inner][n_corners]`
+    /// Hats at the inner points of the patch. `[n_inner][n_corners]`
     pub(super) inner: Vec<Vec<f64>>,
 }
 
 impl Polygon {
-    /// Measures a face with three corners or more; `diagonal` of the cage.
+    /// Measures a face with at least three corners. `diagonal`: of the cage.
     pub(super) fn new(corners: &[DVec3], diagonal: f64) -> Result<Self, FaceDefect> {
         let n = corners.len();
         if n > MAX_CORNERS {
@@ -50,10 +49,10 @@ impl Polygon {
         }
         let center = corners.iter().sum::<DVec3>() / n as f64;
         let arms: Vec<DVec3> = corners.iter().map(|&p| p - center).collect();
-        // Newell's normal: its length is twice the area of the projection that has the largest one.
+        // Newell's normal: twice the area vector.
         let normal: DVec3 = (0..n).map(|k| arms[k].cross(arms[(k + 1) % n])).sum();
         let extent = 2.0 * arms.iter().map(|p| p.length()).fold(0.0, f64::max);
-        if normal.length() <= FLAT_HEIGHT * diagonal * extent {
+        if normal.length() <= MIN_FACE_HEIGHT * diagonal * extent {
             return Err(FaceDefect::NoArea);
         }
         if n == 3 {
@@ -62,7 +61,7 @@ impl Polygon {
         let normal = normal.normalize();
         let outline = project(&arms, normal);
         let height = arms.iter().map(|p| p.dot(normal).abs()).fold(0.0, f64::max);
-        let (is_bent, is_convex) = (height > PLANAR * diagonal, is_convex(&outline));
+        let (is_bent, is_convex) = (height > PLANE_TOLERANCE * diagonal, is_convex(&outline));
         let crosses = !is_convex && crosses_itself(&outline);
         if crosses && !is_bent {
             return Err(FaceDefect::CrossesItself);
@@ -96,7 +95,7 @@ impl Polygon {
         Self { outline: Vec::new(), meyer: 0.0, facets, triangles, inner: Vec::new() }
     }
 
-    /// Values of the corners' hats at a point of the plane, not negative. `values`: `[n_corners]`, zeros.
+    /// Hats of the corners at a point of the plane, non-negative. `values`: `[n_corners]`, zero on entry.
     pub(super) fn values(&self, point: DVec2, values: &mut [f64]) {
         let outline = &self.outline[..values.len()];
         if self.meyer < 1.0 {
@@ -112,21 +111,21 @@ impl Polygon {
     }
 }
 
-/// Share of Meyer's coordinates on a quad: from 0 at a straight corner to 1 at [`MEYER_TURN`], by `3 x^2 - 2 x^3`.
+/// Share of Meyer's coordinates on a quad: smoothstep from 0 at a straight corner to 1 at [`MIN_MEYER_SINE`].
 fn meyer_share(quad: &[DVec2]) -> f64 {
     let turns = (0..4).map(|k| {
         let [before, after] =
             [quad[k] - quad[(k + 3) % 4], quad[(k + 1) % 4] - quad[k]].map(DVec2::normalize_or_zero);
         let sine = before.perp_dot(after);
-        // Turns above 90 degrees are far from straight.
+        // Exterior angles above 90 degrees are far from straight.
         if sine > 0.0 && before.dot(after) < 0.0 { 1.0 } else { sine }
     });
-    let x = (turns.fold(1.0, f64::min) / MEYER_TURN).clamp(0.0, 1.0);
+    let x = (turns.fold(1.0, f64::min) / MIN_MEYER_SINE).clamp(0.0, 1.0);
     let share = x * x * (3.0 - 2.0 * x);
     if share < MIN_SHARE { 0.0 } else { share }
 }
 
-/// Coordinates in the plane with this normal, one axis along the longest side, so that a rectangle stays one.
+/// Coordinates in the plane with this normal, with an axis along the longest side, so that rectangles remain axis-aligned.
 fn project(arms: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     let n = arms.len();
     let side = (0..n)
@@ -138,13 +137,13 @@ fn project(arms: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     arms.iter().map(|p| DVec2::new(p.dot(x), p.dot(y))).collect()
 }
 
-/// Whether all corners turn left, clearly, and the outline goes round once.
+/// Whether the outline is strictly convex and winds once.
 fn is_convex(outline: &[DVec2]) -> bool {
     let n = outline.len();
     let mut total = 0.0;
     for k in 0..n {
         let (before, after) = (outline[(k + n - 1) % n], outline[(k + 1) % n]);
-        if turn(before, outline[k], after) < MIN_TURN {
+        if turn(before, outline[k], after) < MIN_CONVEX_SINE {
             return false;
         }
         total += (outline[k] - before).angle_to(after - outline[k]);
@@ -152,12 +151,12 @@ fn is_convex(outline: &[DVec2]) -> bool {
     total < 3.0 * std::f64::consts::PI
 }
 
-/// Sine of the turn at `b` on the way from `a` to `c`; positive to the left.
+/// Sine of the exterior angle at `b` from `a` to `c`; positive to the left.
 fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     (b - a).normalize_or_zero().perp_dot((c - b).normalize_or_zero())
 }
 
-/// Whether two sides cross in a point inside both.
+/// Whether two sides cross at inner points of both.
 fn crosses_itself(outline: &[DVec2]) -> bool {
     let n = outline.len();
     let side = |k: usize| (outline[k], outline[(k + 1) % n]);
@@ -169,8 +168,7 @@ fn crosses_itself(outline: &[DVec2]) -> bool {
     })
 }
 
-/// Splits a quad that is not planar along its shorter diagonal (the first one if they are equal), unless that one lies
-/// outside of it seen along its normal.
+/// Splits a non-planar quad along its shorter diagonal (the first one if equal), unless that lies outside the quad in projection.
 fn split_quad(arms: &[DVec3], normal: DVec3) -> Vec<[u32; 3]> {
     let first = [[0, 1, 2], [0, 2, 3]];
     let second = [[1, 2, 3], [1, 3, 0]];

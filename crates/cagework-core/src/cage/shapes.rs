@@ -1,4 +1,4 @@
-//! Small cages for tests, outward and without fault.
+//! Small valid cages for tests, oriented outward.
 
 use glam::Vec3;
 
@@ -73,7 +73,6 @@ pub(crate) fn c_shape() -> PolygonMesh {
     prism(&outline, 1.0)
 }
 
-/// Both, without common vertices.
 pub(crate) fn together(a: &PolygonMesh, b: &PolygonMesh) -> PolygonMesh {
     let n = a.positions.len() as u32;
     let mut both = a.clone();
@@ -82,7 +81,6 @@ pub(crate) fn together(a: &PolygonMesh, b: &PolygonMesh) -> PolygonMesh {
     both
 }
 
-/// Every face turned.
 pub(crate) fn inside_out(mut mesh: PolygonMesh) -> PolygonMesh {
     for face in &mut mesh.faces {
         face.reverse();

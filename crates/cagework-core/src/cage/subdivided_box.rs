@@ -4,14 +4,14 @@ use glam::{UVec3, Vec3};
 
 use crate::mesh::{Bounds, PolygonMesh};
 
-/// The box is at least this fraction of the model's diagonal thick, so that a flat model gets a cage with a volume.
+/// Minimum thickness of the box over the model's diagonal, so that a flat model gets a cage with a volume.
 const MIN_THICKNESS: f32 = 0.01;
 
-/// A box around `bounds`, its faces cut into `divisions` quads along x, y and z (at least one), faces outward,
-/// vertices shared. `margin`: distance from the bounds, as a fraction of their diagonal; below 0 counts as 0.
+/// A box around `bounds` with shared vertices and outward faces, each side divided into quads by `divisions` along x, y
+/// and z (at least one). `margin`: distance from the bounds over their diagonal; negative values count as 0.
 #[must_use]
 pub fn subdivided_box(bounds: Bounds, margin: f32, divisions: [u32; 3]) -> PolygonMesh {
-    // A model of one point has no size of its own: take the unit of length.
+    // A single point has no size: use the unit of length.
     let diagonal = if bounds.diagonal() > 0.0 { bounds.diagonal() } else { 1.0 };
     let half = (0.5 * bounds.extent() + Vec3::splat(margin.max(0.0) * diagonal))
         .max(Vec3::splat(0.5 * MIN_THICKNESS * diagonal));
@@ -23,7 +23,7 @@ pub fn subdivided_box(bounds: Bounds, margin: f32, divisions: [u32; 3]) -> Polyg
     let slot = |p: UVec3| (p.x + (n.x + 1) * (p.y + (n.y + 1) * p.z)) as usize;
     let mut faces = Vec::new();
     for axis in 0..3 {
-        // (u, v, axis) is right-handed: counter-clockwise in u and v faces along the axis.
+        // (u, v, axis) is right-handed: counter-clockwise in u and v is a normal along the axis.
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         for at in [0, n[axis]] {
             for j in 0..n[v] {
@@ -58,14 +58,14 @@ mod tests {
     const MODEL: Bounds = Bounds { min: Vec3::new(-1.0, 2.0, 0.0), max: Vec3::new(1.0, 5.0, 6.0) };
 
     #[test]
-    fn box_is_a_cage_without_fault_at_the_margin() {
+    fn box_is_a_valid_cage_at_the_margin() {
         // Diagonal 7: a margin of 0.1 is 0.7.
         for [x, y, z] in [[1, 1, 1], [2, 3, 4], [5, 1, 2]] {
             let mesh = subdivided_box(MODEL, 0.1, [x, y, z]);
             let cage = Cage::new(&mesh).unwrap();
             assert_eq!(cage.notices(), []);
             assert_eq!(mesh.faces.len() as u32, 2 * (x * y + y * z + z * x));
-            // All points of the lattice less those inside.
+            // Lattice points minus the inner ones.
             assert_eq!(
                 mesh.positions.len() as u32,
                 (x + 1) * (y + 1) * (z + 1) - (x - 1) * (y - 1) * (z - 1)

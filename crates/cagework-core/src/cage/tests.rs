@@ -1,4 +1,4 @@
-//! What is a cage and what is not.
+//! Validity of cages: accepted, repaired and rejected meshes.
 
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
@@ -8,7 +8,7 @@ use super::*;
 use crate::geometry::winding_number;
 
 fn error(mesh: &PolygonMesh) -> CageError {
-    Cage::new(mesh).expect_err("this is no cage")
+    Cage::new(mesh).expect_err("the mesh must be rejected")
 }
 
 fn defect(mesh: &PolygonMesh) -> (u32, FaceDefect) {
@@ -26,17 +26,17 @@ fn volume6(cage: &Cage) -> f64 {
         .sum()
 }
 
-/// Every edge of a face is run through once each way.
+/// Asserts that every edge has one side in each direction.
 fn assert_closed(faces: &[Vec<u32>]) {
     let mut sides: Vec<[u32; 2]> =
         faces.iter().flat_map(|f| (0..f.len()).map(|k| [f[k], f[(k + 1) % f.len()]])).collect();
     sides.sort_unstable();
-    assert!(sides.windows(2).all(|w| w[0] != w[1]), "an edge is run through twice the same way");
-    assert!(sides.iter().all(|&[a, b]| sides.binary_search(&[b, a]).is_ok()), "an edge has one face only");
+    assert!(sides.windows(2).all(|w| w[0] != w[1]), "an edge has two sides in the same direction");
+    assert!(sides.iter().all(|&[a, b]| sides.binary_search(&[b, a]).is_ok()), "an edge has only one face");
 }
 
 #[test]
-fn sound_cages_are_taken_as_they_are() {
+fn valid_cages_are_unchanged() {
     for (mesh, volume) in [
         (tetrahedron(), 1.0 / 6.0),
         (octahedron(), 4.0 / 3.0),
@@ -64,7 +64,7 @@ fn triangles_know_their_face() {
 }
 
 #[test]
-fn inside_out_cage_is_turned_with_a_notice() {
+fn inverted_cage_is_flipped_with_a_notice() {
     let cage = Cage::new(&inside_out(l_shape())).unwrap();
     assert_eq!(cage.notices(), [CageNotice::Flipped { component: 0, faces: 8, of: 8 }]);
     assert_eq!(volume6(&cage), 18.0);
@@ -75,7 +75,7 @@ fn inside_out_cage_is_turned_with_a_notice() {
 }
 
 #[test]
-fn single_turned_faces_are_turned_back() {
+fn single_inverted_faces_are_flipped() {
     for face in 0..6 {
         let mut mesh = cube();
         mesh.faces[face].reverse();
@@ -86,7 +86,7 @@ fn single_turned_faces_are_turned_back() {
 }
 
 #[test]
-fn components_are_oriented_on_their_own() {
+fn components_are_oriented_independently() {
     let aside = cuboid(Vec3::splat(3.0), Vec3::splat(5.0));
     let cage = Cage::new(&together(&cube(), &inside_out(aside))).unwrap();
     assert_eq!(cage.notices(), [CageNotice::Flipped { component: 1, faces: 6, of: 6 }]);
@@ -94,7 +94,7 @@ fn components_are_oriented_on_their_own() {
 }
 
 #[test]
-fn nested_component_bounds_a_cavity_and_the_next_a_solid_in_it() {
+fn nested_components_alternate_between_cavity_and_solid() {
     let shell = |r: f32| cuboid(Vec3::splat(-r), Vec3::splat(r));
     let nested = together(&together(&shell(1.0), &shell(3.0)), &shell(2.0));
     let cage = Cage::new(&nested).unwrap();
@@ -132,7 +132,7 @@ fn moebius_strip_is_open() {
 
 #[test]
 fn one_sided_surface_is_rejected() {
-    // The projective plane with six vertices: antipodal faces of the icosahedron are one.
+    // The projective plane with six vertices: the icosahedron with opposite faces identified.
     let faces: [[u32; 3]; 10] = [
         [0, 1, 2],
         [0, 2, 3],
@@ -154,7 +154,7 @@ fn one_sided_surface_is_rejected() {
 
 #[test]
 fn edge_of_four_faces_is_rejected() {
-    // Two cubes share vertices 1 and 3 of the first, an edge along y at x = 1, z = 0.
+    // Two cubes share the vertices 1 and 3 of the first, an edge along y at x = 1, z = 0.
     let mut mesh = together(&cube(), &cuboid(Vec3::new(1.0, 0.0, -1.0), Vec3::new(2.0, 1.0, 0.0)));
     for i in mesh.faces.iter_mut().flatten() {
         *i = match *i {
@@ -167,7 +167,7 @@ fn edge_of_four_faces_is_rejected() {
 }
 
 #[test]
-fn touching_in_a_vertex_is_noticed() {
+fn touching_in_a_vertex_gives_a_notice() {
     let mut mesh = together(&cube(), &cuboid(Vec3::ONE, Vec3::splat(2.0)));
     for i in mesh.faces.iter_mut().flatten() {
         *i = if *i == 8 { 7 } else { *i };
@@ -183,7 +183,7 @@ fn touching_in_a_vertex_is_noticed() {
 }
 
 #[test]
-fn doubled_face_is_rejected() {
+fn duplicate_face_is_rejected() {
     let mut mesh = cube();
     mesh.faces.push(vec![3, 2, 0, 1]);
     assert_eq!(error(&mesh), CageError::DuplicateFace { first: 0, second: 6 });
@@ -191,9 +191,9 @@ fn doubled_face_is_rejected() {
     assert_eq!(error(&mesh), CageError::DuplicateFace { first: 0, second: 6 });
 }
 
-/// Such a cage was bound; its solid is empty.
+/// The solid between coinciding components is empty.
 #[test]
-fn part_that_lies_on_another_is_rejected() {
+fn coinciding_component_is_rejected() {
     let beside = cuboid(Vec3::new(5.0, 0.0, 0.0), Vec3::new(6.0, 1.0, 1.0));
     let mut turned = cube();
     turned.faces.reverse();
@@ -202,7 +202,7 @@ fn part_that_lies_on_another_is_rejected() {
         let doubled = together(&together(&cube(), &beside), &copy);
         assert_eq!(error(&doubled), CageError::DoubledPart { first: 0, second: 2 });
     }
-    // Stacked parts share a face, and a nested one has other places.
+    // Stacked components share only one face, and nested ones none.
     let Bounds { min, max } = Cage::new(&cube()).unwrap().bounds();
     let above = cuboid(Vec3::new(min.x, max.y, min.z), Vec3::new(max.x, 2.0 * max.y - min.y, max.z));
     assert!(Cage::new(&together(&cube(), &above)).is_ok());
@@ -211,7 +211,7 @@ fn part_that_lies_on_another_is_rejected() {
 }
 
 #[test]
-fn cage_of_too_many_faces_is_rejected_at_once() {
+fn cage_with_too_many_faces_is_rejected() {
     let faces = MAX_FACES + 1;
     let soup = PolygonMesh { positions: tetrahedron().positions, faces: vec![vec![0, 1, 2]; faces] };
     assert_eq!(
@@ -222,7 +222,7 @@ fn cage_of_too_many_faces_is_rejected_at_once() {
 
 #[test]
 fn seams_are_closed_with_a_notice() {
-    // As a glTF cube with flat normals: four vertices of its own for each face.
+    // A cube as glTF stores it with flat normals: four vertices per face.
     let whole = cube();
     let split = PolygonMesh {
         positions: whole.faces.iter().flatten().map(|&i| whole.positions[i as usize]).collect(),
@@ -239,13 +239,13 @@ fn seams_are_closed_with_a_notice() {
 }
 
 #[test]
-fn vertices_at_one_place_stay_apart_in_a_closed_cage() {
+fn coincident_vertices_of_a_closed_cage_stay_separate() {
     let cage = Cage::new(&together(&cube(), &cuboid(Vec3::ONE, Vec3::splat(2.0)))).unwrap();
     assert_eq!(cage.notices(), []);
 }
 
 #[test]
-fn unused_vertex_is_noticed_and_does_not_count_for_the_bounds() {
+fn unused_vertex_gives_a_notice_and_is_ignored_by_the_bounds() {
     let mut mesh = cube();
     mesh.positions.push(Vec3::splat(100.0));
     let cage = Cage::new(&mesh).unwrap();
@@ -255,7 +255,7 @@ fn unused_vertex_is_noticed_and_does_not_count_for_the_bounds() {
 }
 
 #[test]
-fn bad_faces_and_vertices_are_named() {
+fn invalid_faces_and_vertices_are_errors_with_their_index() {
     assert_eq!(error(&PolygonMesh::default()), CageError::Empty);
     let broken = |change: &dyn Fn(&mut PolygonMesh)| {
         let mut mesh = cube();
@@ -276,7 +276,7 @@ fn bad_faces_and_vertices_are_named() {
 
 #[test]
 fn face_without_area_is_rejected() {
-    // A tetrahedron with one more vertex amid an edge on one side only, filled by a triangle without area.
+    // A tetrahedron with an extra vertex on one side of an edge; the slit is closed by a triangle without area.
     let mut mesh = tetrahedron();
     mesh.positions.push(Vec3::new(0.5, 0.0, 0.0));
     mesh.faces[1] = vec![0, 4, 3];
@@ -285,15 +285,15 @@ fn face_without_area_is_rejected() {
 }
 
 #[test]
-fn crossed_face_is_rejected() {
+fn self_crossing_face_is_rejected() {
     let mut mesh = prism(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [1.0, -1.0], [0.0, 4.0]], 1.0);
     mesh.positions[3].y = -1.0;
     assert_eq!(defect(&mesh), (0, FaceDefect::CrossesItself));
 }
 
-/// Cutting a disc of a million corners took more than their square.
+/// Triangulating a disc takes at least the square of its number of corners.
 #[test]
-fn face_of_too_many_corners_is_rejected() {
+fn face_with_too_many_corners_is_rejected() {
     let disc = |n: u32| (0..n).map(move |k| f64::from(k) / f64::from(n) * std::f64::consts::TAU);
     let outline = |n| disc(n).map(|a| [a.cos() as f32, a.sin() as f32]).collect::<Vec<_>>();
     assert!(Cage::new(&prism(&outline(1000), 1.0)).is_ok());
@@ -308,7 +308,7 @@ fn flat_component_is_rejected() {
     assert_eq!(error(&mesh), CageError::Flat { component: 0, face: 0 });
 }
 
-/// A sound cage, then a few faults.
+/// A valid cage with a few faults.
 fn damaged() -> impl Strategy<Value = PolygonMesh> {
     let shape = prop_oneof![
         Just(tetrahedron()),
@@ -354,7 +354,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
-    fn whatever_is_accepted_is_closed_and_has_hats(mesh in prop_oneof![damaged(), soup()]) {
+    fn accepted_meshes_are_closed_and_have_hats(mesh in prop_oneof![damaged(), soup()]) {
         if let Ok(cage) = Cage::new(&mesh) {
             assert_closed(cage.faces());
             prop_assert!(cage.diagonal() > 0.0);

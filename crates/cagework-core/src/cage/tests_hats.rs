@@ -1,4 +1,4 @@
-//! Boundary values on faces: they are barycentric coordinates of every kind of face.
+//! Hats are barycentric coordinates on every kind of face.
 
 use glam::Vec3;
 use proptest::prelude::*;
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::shapes::*;
 use super::*;
 
-/// Rounding of f64 in coordinates of size 1, times the few dozen operations of a polygon.
+/// f64 rounding of coordinates of size 1 after a few dozen operations.
 const ROUNDING: f64 = 1e-12;
 
 fn hats(cage: &Cage, triangle: u32, barycentric: [f64; 3]) -> Vec<f64> {
@@ -15,7 +15,7 @@ fn hats(cage: &Cage, triangle: u32, barycentric: [f64; 3]) -> Vec<f64> {
     values
 }
 
-/// Points of a triangle: corners, edges, inside, and next to corners and edges.
+/// Barycentric coordinates of corners, edges and inner points, and of points next to corners and edges.
 fn barycentrics() -> Vec<[f64; 3]> {
     let mut points = Vec::new();
     for u in [0.0, 1e-16, 1e-9, 0.2, 0.5, 0.9, 1.0] {
@@ -48,8 +48,8 @@ fn hats_reproduce_points_on_every_kind_of_face() {
     }
 }
 
-/// A facet of a bent face is off its patch by 2 % of the bend at most: of how far corner 7 is off the planes of its faces'
-/// other corners, the cube's.
+/// A facet of a bent face is within 2 % of the bend from its patch. The bend is the distance of corner 7 from the
+/// planes of the cube's other corners.
 #[test]
 fn hats_reproduce_points_on_bent_faces_to_two_per_cent_of_the_bend() {
     for by in [0.5, 0.01, 1e-4] {
@@ -57,7 +57,7 @@ fn hats_reproduce_points_on_bent_faces_to_two_per_cent_of_the_bend() {
         mesh.positions[7] += Vec3::splat(by);
         assert_linear_reproduction(&Cage::new(&mesh).unwrap(), 0.02 * f64::from(by));
     }
-    // A bent pentagon, whose sides are wider apart, and a bent concave face, whose facets are larger.
+    // A bent pentagon, whose facets are wider, and a bent concave face, whose facets are larger.
     let pentagon: Vec<[f32; 2]> =
         (0..5).map(|k| (k as f32 * std::f32::consts::TAU / 5.0).sin_cos()).map(|(y, x)| [x, y]).collect();
     let mut mesh = prism(&pentagon, 1.0);
@@ -70,7 +70,7 @@ fn hats_reproduce_points_on_bent_faces_to_two_per_cent_of_the_bend() {
     assert_linear_reproduction(&Cage::new(&mesh).unwrap(), 0.08 * 0.1);
 }
 
-/// A cube with one corner pulled out, so that three of its quads are not planar.
+/// A cube with one corner pulled out: three quads are not planar.
 fn bent_cube() -> PolygonMesh {
     let mut mesh = cube();
     mesh.positions[7] = Vec3::splat(1.5);
@@ -78,7 +78,7 @@ fn bent_cube() -> PolygonMesh {
 }
 
 #[test]
-fn hats_are_one_at_their_vertex_and_linear_on_edges() {
+fn hats_are_1_at_their_vertex_and_linear_on_edges() {
     for mesh in [cube(), l_shape(), c_shape(), bent_cube()] {
         let cage = Cage::new(&mesh).unwrap();
         for (t, triangle) in cage.facets().iter().enumerate() {
@@ -125,7 +125,7 @@ fn hats_are_bilinear_on_a_box() {
 
 #[test]
 fn bent_quad_is_split_along_its_shorter_diagonal() {
-    // Pulled out, corner 7 makes the diagonals that do not end in it the shorter ones.
+    // Corner 7, pulled out, lengthens the diagonals that end in it.
     let cage = Cage::new(&bent_cube()).unwrap();
     for face in [1, 3, 5] {
         let [first, second]: [[u32; 3]; 2] = (0..cage.triangles().len())
@@ -146,15 +146,15 @@ fn rotated_faces_count_as_planar() {
         *p = turn * *p * 0.37 + Vec3::new(5.0, -3.0, 2.0);
     }
     let cage = Cage::new(&mesh).unwrap();
-    assert!(cage.polygons.iter().all(|p| p.inner.is_empty()), "a face was cut as if it were not planar");
-    // f32 moves the corners out of their planes, and hats reproduce what is in the plane.
-    assert_linear_reproduction(&cage, 2.0 * polygon::PLANAR * f64::from(cage.diagonal()));
+    assert!(cage.polygons.iter().all(|p| p.inner.is_empty()), "a planar face was treated as bent");
+    // f32 rounding moves corners out of their planes; hats reproduce only the projection.
+    assert_linear_reproduction(&cage, 2.0 * polygon::PLANE_TOLERANCE * f64::from(cage.diagonal()));
 }
 
-/// In the C's caps a hat of one arm's end is below 1e-3 in the other arm, whose chords past the re-entrant corner end on the
-/// back (harmonic coordinates have 2e-4), and 0 at that arm's end. None is negative.
+/// On the C's caps the hats of one arm's end are below 1e-3 in the other arm (harmonic coordinates: 2e-4), because
+/// chords past the re-entrant corner end on the back; at the other arm's end they are 0. None is negative.
 #[test]
-fn hats_of_a_concave_face_are_positive_and_hardly_reach_across() {
+fn hats_of_a_concave_face_are_positive_and_small_across_the_gap() {
     let cage = Cage::new(&c_shape()).unwrap();
     for t in 0..cage.facets().len() as u32 {
         for b in barycentrics() {
@@ -194,7 +194,7 @@ fn nearly_straight(d: f64) -> [Vec<DVec2>; 3] {
     [corners(&pentagon), corners(&quad), star]
 }
 
-/// Hats of a flat face at points given by weights of its corners. `[n_points][n]`
+/// Hats of a planar face at `points`. `[n_points][n]`
 fn face_values(outline: &[DVec2], points: &[DVec2]) -> Vec<Vec<f64>> {
     let corners: Vec<DVec3> = outline.iter().map(|p| p.extend(0.0)).collect();
     let polygon = Polygon::new(&corners, outline[0].length() + 1.0).unwrap();
@@ -212,14 +212,14 @@ fn largest_difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// Points between the middle and each corner.
+/// Points between the centre and each corner.
 fn points_inside(outline: &[DVec2]) -> Vec<DVec2> {
     let middle = outline.iter().sum::<DVec2>() / outline.len() as f64;
     outline.iter().flat_map(|&corner| [0.1, 0.5, 0.9, 0.98].map(|t| middle + t * (corner - middle))).collect()
 }
 
-/// A corner that moves by `e` changes no hat by more than `20 e / size`, also where it turns from convex to concave, and
-/// where its turn is 1e-3 (`d = 2.5e-4`).
+/// Moving a corner by `e` changes hats by at most `20 e / size`, also where the corner turns from convex to concave,
+/// and where its exterior angle is 1e-3 (`d = 2.5e-4`).
 #[test]
 fn hats_are_continuous_in_the_corners() {
     for (e, d) in [(1e-5, 0.2), (1e-3, 3e-2), (2e-5, 2.6e-4), (2e-5, 1e-5), (2e-5, -2.4e-4), (1e-5, -0.1)] {
@@ -232,9 +232,9 @@ fn hats_are_continuous_in_the_corners() {
     }
 }
 
-/// Hats do not depend on which corner is first, on the unit, or on the side that a mirror shows.
+/// Hats are invariant under cyclic renumbering, scaling and reflection.
 #[test]
-fn hats_depend_on_the_shape_of_a_face_alone() {
+fn hats_are_invariant_under_renumbering_scaling_and_reflection() {
     for outline in nearly_straight(-1e-3) {
         let points = points_inside(&outline);
         let expected = face_values(&outline, &points);
@@ -257,7 +257,7 @@ fn hats_depend_on_the_shape_of_a_face_alone() {
     }
 }
 
-/// The outline touches itself: corners 4 and 0 are in one place.
+/// The outline touches itself: corners 4 and 0 coincide.
 #[test]
 fn face_with_a_slit_has_hats() {
     let mut mesh = l_shape();
@@ -272,13 +272,13 @@ fn face_with_a_slit_has_hats() {
 }
 
 #[test]
-fn face_of_many_corners_has_hats() {
+fn face_with_many_corners_has_hats() {
     let outline: Vec<[f32; 2]> =
         (0..100).map(|k| (k as f32 * std::f32::consts::TAU / 100.0).sin_cos()).map(|(y, x)| [x, y]).collect();
     assert_linear_reproduction(&Cage::new(&prism(&outline, 1.0)).unwrap(), ROUNDING);
 }
 
-/// Star-shaped outlines: a distance from the origin for each of some ascending angles.
+/// Star-shaped outlines: distances from the origin at ascending angles.
 fn outlines(distance: std::ops::Range<f64>) -> impl Strategy<Value = Vec<DVec2>> {
     prop::collection::vec((0.2..1.0, distance), 4..12).prop_map(|corners| {
         let total: f64 = corners.iter().map(|c| c.0).sum();
@@ -305,8 +305,8 @@ proptest! {
     fn wachspress_is_positive_and_linear_on_convex_polygons(
         outline in outlines(1.0..1.0001), r in 0.0..0.9f64, angle in 0.0..6.3f64,
     ) {
-        // Angles are at least 0.09 apart: an arc rises by 1e-3 between them, so all corners are convex. The origin may
-        // be outside, so start from the mean of the corners.
+        // Angles are at least 0.09 apart, and an arc rises by 1e-3 between them, so all corners are convex. The origin
+        // may be outside: start from the mean of the corners.
         let center = outline.iter().sum::<DVec2>() / outline.len() as f64;
         let toward = outline[(angle * 100.0) as usize % outline.len()];
         let point = center + r * (toward - center);
@@ -321,7 +321,7 @@ proptest! {
         outline in outlines(0.3..1.0), u in 0.0..1.0f64, v in 0.0..1.0f64, k in 0..4usize,
     ) {
         let n = outline.len();
-        // The outline winds around the origin, from which all of it is visible.
+        // The outline winds around the origin and is star-shaped with respect to it.
         prop_assume!((0..n).all(|k| outline[k].perp_dot(outline[(k + 1) % n]) > 1e-3));
         let (a, b) = (outline[k], outline[(k + 1) % n]);
         let point = u * (v * a + (1.0 - v) * b);
@@ -336,7 +336,7 @@ proptest! {
         let twice_area: f64 = (0..n).map(|k| outline[k].perp_dot(outline[(k + 1) % n])).sum();
         let triangles = triangulate::ear_clip(&outline).unwrap();
         prop_assert_eq!(triangles.len(), n - 2);
-        // Triangles that face the right way and have the polygon's area in all neither overlap nor stick out.
+        // Triangles of positive orientation with the polygon's total area neither overlap nor leave it.
         let areas: Vec<f64> = triangles
             .iter()
             .map(|t| t.map(|k| outline[k as usize]))

@@ -1,4 +1,4 @@
-//! Which faces share an edge: closedness, seams, components and consistent orientation.
+//! Adjacency of faces: closedness, seams, components and consistent orientation.
 
 use std::collections::{HashMap, VecDeque};
 use std::hash::{BuildHasher as _, RandomState};
@@ -8,23 +8,23 @@ use glam::Vec3;
 use super::defects::{CageError, CageNotice, FaceDefect};
 use crate::mesh::{PolygonMesh, weld};
 
-/// A side of a face: the edge between `lo` and `hi`, run through from `lo` to `hi` if `forward`.
+/// A side of a face: an edge with the direction in which the face traverses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Side {
-    /// Its smaller vertex.
+    /// The smaller vertex index.
     pub lo: u32,
-    /// Its larger vertex.
+    /// The larger vertex index.
     pub hi: u32,
     /// The face.
     pub face: u32,
-    /// Whether the face runs from `lo` to `hi`.
+    /// Whether the face traverses the edge from `lo` to `hi`.
     pub forward: bool,
 }
 
-/// The sides of some faces, sorted by edge.
+/// Sides of the faces with the indices `some`, sorted by edge.
 #[must_use]
 pub fn sides_of(faces: &[Vec<u32>], some: impl Iterator<Item = u32>) -> Vec<Side> {
-    // As numbers, three of which are sorted elsewhere too: every other kind of key is 2 kB more to download.
+    // Sorts arrays of three numbers: a sort of another key type would add 2 kB to the wasm module.
     let mut keys: Vec<[u32; 3]> = Vec::new();
     for f in some {
         let face = &faces[f as usize];
@@ -37,10 +37,10 @@ pub fn sides_of(faces: &[Vec<u32>], some: impl Iterator<Item = u32>) -> Vec<Side
     keys.into_iter().map(|[lo, hi, f]| Side { lo, hi, face: f >> 1, forward: f & 1 == 1 }).collect()
 }
 
-/// Closed faces whose orientations agree within each component.
+/// Closed faces with consistent orientation within each component.
 pub(super) struct Surface {
     pub(super) faces: Vec<Vec<u32>>,
-    /// Whether each face runs the other way round than in the input.
+    /// Whether each face is reversed relative to the input.
     pub(super) turned: Vec<bool>,
     /// Component of each face, numbered in order of first faces.
     pub(super) component: Vec<u32>,
@@ -48,14 +48,13 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// Turns a face over; its first corner stays the first.
+    /// Reverses a face; its first corner stays the first.
     pub(super) fn turn(&mut self, face: usize) {
         self.faces[face][1..].reverse();
         self.turned[face] = !self.turned[face];
     }
 }
 
-/// No face may name a vertex twice.
 pub(super) fn check_repeats(faces: &[Vec<u32>]) -> Result<(), CageError> {
     let mut corners = Vec::new();
     for (f, face) in faces.iter().enumerate() {
@@ -69,15 +68,14 @@ pub(super) fn check_repeats(faces: &[Vec<u32>]) -> Result<(), CageError> {
     Ok(())
 }
 
-/// Checks that every edge has two faces, closing seams if that is all that is missing, and turns faces until
-/// neighbours agree. Indices must have been checked.
+/// Checks that every edge has two faces, joins seams if necessary, and orients faces consistently. Indices must be valid.
 pub(super) fn close(mesh: &PolygonMesh, notices: &mut Vec<CageNotice>) -> Result<Surface, CageError> {
     let mut faces = mesh.faces.clone();
     let sides = match check_edges(&faces) {
         Err(open @ CageError::Open { .. }) => {
             let notice = weld_seams(&mesh.positions, &mut faces).ok_or(open.clone())?;
             let sides = check_repeats(&faces).and_then(|()| check_edges(&faces)).map_err(|welded| {
-                // Anything but a remaining hole would be a fault of the welding, not of the cage.
+                // Any other fault was created by welding: report the original one.
                 if matches!(welded, CageError::Open { .. }) { welded } else { open }
             })?;
             notices.push(notice);
@@ -88,7 +86,7 @@ pub(super) fn close(mesh: &PolygonMesh, notices: &mut Vec<CageNotice>) -> Result
     agree(faces, &sides)
 }
 
-/// All sides, sorted by edge: on success two of each.
+/// All sides, sorted by edge; checks that each edge has two.
 fn check_edges(faces: &[Vec<u32>]) -> Result<Vec<Side>, CageError> {
     check_duplicates(faces)?;
     let sides = sides_of(faces, 0..faces.len() as u32);
@@ -110,7 +108,7 @@ fn check_edges(faces: &[Vec<u32>]) -> Result<Vec<Side>, CageError> {
     }
 }
 
-/// Two faces must not have the same outline, whichever way round.
+/// Checks that no two faces have the same outline in either direction.
 fn check_duplicates(faces: &[Vec<u32>]) -> Result<(), CageError> {
     let mut first_with: HashMap<Vec<u32>, u32> = HashMap::with_capacity(faces.len());
     for (f, face) in faces.iter().enumerate() {
@@ -121,7 +119,7 @@ fn check_duplicates(faces: &[Vec<u32>]) -> Result<(), CageError> {
     Ok(())
 }
 
-/// The corners of a face, the same wherever they begin and whichever way they run.
+/// Canonical corner sequence of a face, independent of its start and direction.
 fn outline(face: &[u32]) -> Vec<u32> {
     let n = face.len();
     let start = (0..n).min_by_key(|&k| face[k]).unwrap_or(0);
@@ -129,15 +127,15 @@ fn outline(face: &[u32]) -> Vec<u32> {
     (0..n).map(|k| face[(start + if ahead { k } else { n - k }) % n]).collect()
 }
 
-/// No closed part may lie on another one, face on face: the solid between them is empty. Parts that share some faces at
-/// their places are stacked, and have one.
+/// Checks that no two components coincide face by face: the solid between them would be empty. Components that share
+/// only some faces are allowed.
 pub(super) fn check_doubled(positions: &[Vec3], surface: &Surface) -> Result<(), CageError> {
     if surface.n_components < 2 {
         return Ok(());
     }
     let place = weld(positions).unique_of;
     let hasher = RandomState::new();
-    // A sum does not depend on the order of faces.
+    // Sums of hashes do not depend on the order of faces.
     let mut sums = vec![0_u64; surface.n_components];
     for (face, &component) in surface.faces.iter().zip(&surface.component) {
         let places: Vec<u32> = face.iter().map(|&i| place[i as usize]).collect();
@@ -153,8 +151,8 @@ pub(super) fn check_doubled(positions: &[Vec3], surface: &Surface) -> Result<(),
     Ok(())
 }
 
-/// Joins vertices at equal positions, but only those on open edges: elsewhere two vertices at one place are two
-/// handles that the author wanted. `None` if there is nothing to join.
+/// Joins vertices at equal positions on open edges. Elsewhere, vertices at the same position are separate handles by
+/// intention. `None` if there is nothing to join.
 fn weld_seams(positions: &[Vec3], faces: &mut [Vec<u32>]) -> Option<CageNotice> {
     let mut uses: HashMap<[u32; 2], u32> = HashMap::new();
     let edge = |face: &[u32], k: usize| {
@@ -177,7 +175,7 @@ fn weld_seams(positions: &[Vec3], faces: &mut [Vec<u32>]) -> Option<CageNotice> 
     let mut at_place: HashMap<[u32; 3], u32> = HashMap::new();
     let (mut vertices, mut first) = (0, None);
     for v in (0..positions.len()).filter(|&v| on_seam[v]) {
-        // Adding zero turns -0 into +0, so that both have the same bits.
+        // Adding zero turns -0 into +0, so that equal positions have equal bits.
         let place = (positions[v] + Vec3::ZERO).to_array().map(f32::to_bits);
         stands_for[v] = *at_place.entry(place).or_insert(v as u32);
         if stands_for[v] != v as u32 {
@@ -191,7 +189,7 @@ fn weld_seams(positions: &[Vec3], faces: &mut [Vec<u32>]) -> Option<CageNotice> 
     first.map(|first| CageNotice::Welded { vertices, first })
 }
 
-/// Turns faces until all of a component run along shared edges in opposite directions, and numbers the components.
+/// Orients faces consistently within each component, and numbers the components.
 fn agree(faces: Vec<Vec<u32>>, sides: &[Side]) -> Result<Surface, CageError> {
     const NONE: u32 = u32::MAX;
     let n = faces.len();
@@ -234,10 +232,10 @@ fn agree(faces: Vec<Vec<u32>>, sides: &[Side]) -> Result<Surface, CageError> {
     Ok(surface)
 }
 
-/// Notices about vertices: of no face, or with more than one fan of faces around them.
+/// Notices about vertices without faces, or with more than one fan of faces.
 pub(super) fn note_vertices(mesh: &PolygonMesh, surface: &Surface, notices: &mut Vec<CageNotice>) {
-    // The surface is closed and oriented: around a vertex, the corner before leads to exactly one next face. As many
-    // corners as are reached by walking from the first form its fan.
+    // The surface is closed and oriented, so the previous neighbour of a corner identifies the next face around the
+    // vertex. Walking from the first corner visits one fan.
     let mut corners: Vec<[u32; 3]> = Vec::new();
     for face in &surface.faces {
         let n = face.len();
@@ -261,7 +259,7 @@ pub(super) fn note_vertices(mesh: &PolygonMesh, surface: &Surface, notices: &mut
     if let Some(first) = first_touching {
         notices.push(CageNotice::TouchingVertices { vertices: touching, first });
     }
-    // By the input's faces: a vertex that another one stands for is used, and has its own notice.
+    // Uses the input's faces: vertices that were joined with others have a notice of their own.
     let mut used = vec![false; mesh.positions.len()];
     for &i in mesh.faces.iter().flatten() {
         used[i as usize] = true;

@@ -1,29 +1,29 @@
-//! Ear clipping: a simple polygon cut into triangles that use every corner, also straight ones, so that the triangles
-//! of neighbouring faces share whole edges and the cut surface is closed, too.
+//! Ear clipping. The triangulation uses every corner, also straight ones, so that the triangles of neighbouring faces
+//! share whole edges and the triangulated surface is closed, too.
 
 use glam::DVec2;
 
 use super::defects::FaceDefect;
 
-/// Corners above which the first ear is taken, not the best: choosing costs `n^3`.
-const CHOOSY_CORNERS: usize = 128;
+/// Most corners for which the best ear is searched; above, the first one is taken. Searching costs `n^3`.
+const MAX_CORNERS_FOR_SEARCH: usize = 128;
 
 /// An ear is straight if twice its area is below this fraction of the squared extent: rounding of f32 coordinates.
-const STRAIGHT: f64 = 1e-7;
+const MIN_EAR_AREA: f64 = 1e-7;
 
 /// Twice the signed area of a triangle; positive if counter-clockwise.
 pub(super) fn cross(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     (b - a).perp_dot(c - a)
 }
 
-/// Triangles `[n - 2]` that cover a counter-clockwise polygon, as indices of its corners.
+/// Triangulation of a counter-clockwise polygon, as corner indices. `[n - 2]`
 pub(super) fn ear_clip(outline: &[DVec2]) -> Result<Vec<[u32; 3]>, FaceDefect> {
     let extent = outline.iter().map(|p| p.length()).fold(0.0, f64::max);
-    let straight = STRAIGHT * extent * extent;
+    let straight = MIN_EAR_AREA * extent * extent;
     let mut left: Vec<usize> = (0..outline.len()).collect();
     let mut triangles = Vec::with_capacity(outline.len().saturating_sub(2));
     while left.len() > 3 {
-        // Straight ears only when there is nothing else: they would leave triangles without area.
+        // Straight ears last: they would give triangles without area.
         let k = find_ear(outline, &left, straight)
             .or_else(|| find_ear(outline, &left, -straight))
             .ok_or(FaceDefect::CrossesItself)?;
@@ -34,14 +34,14 @@ pub(super) fn ear_clip(outline: &[DVec2]) -> Result<Vec<[u32; 3]>, FaceDefect> {
     Ok(triangles.iter().map(|t| t.map(|k| k as u32)).collect())
 }
 
-/// The triangle that is cut off at the `k`-th corner that is left.
+/// The triangle at the `k`-th remaining corner.
 fn ear(left: &[usize], k: usize) -> [usize; 3] {
     let n = left.len();
     [left[(k + n - 1) % n], left[k], left[(k + 1) % n]]
 }
 
-/// The corner of `left` whose ear is the least pointed, if its doubled area exceeds `min_area` and no other corner is
-/// in it or, unless straight ears are allowed, on its rim.
+/// Position in `left` of the best-shaped ear whose doubled area exceeds `min_area` and which contains no other corner,
+/// also not on its boundary unless straight ears are allowed.
 fn find_ear(outline: &[DVec2], left: &[usize], min_area: f64) -> Option<usize> {
     let rim = -min_area;
     let mut best: Option<(f64, usize)> = None;
@@ -63,7 +63,7 @@ fn find_ear(outline: &[DVec2], left: &[usize], min_area: f64) -> Option<usize> {
         });
         if !blocked {
             best = Some((quality, k));
-            if left.len() > CHOOSY_CORNERS {
+            if left.len() > MAX_CORNERS_FOR_SEARCH {
                 break;
             }
         }

@@ -1,7 +1,7 @@
 //! Controls inside a cage: points, polylines and sheets (Joshi et al. 2007, "interior control structure").
 //!
-//! A point or a line has no capacity in space: on a grid its influence would depend on the size of a cell. So a point is a ball
-//! and a line a tube, with a radius.
+//! On a grid the influence of a point or line would depend on the cell size, as they have zero capacity in space.
+//! Points are therefore balls and lines tubes, with a radius.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -11,30 +11,30 @@ use crate::cage::{CageError, MAX_FACES};
 use crate::options::OutOfRange;
 use crate::words::grouped;
 
-/// Largest radius of balls and tubes, as a share of the cage's longest side.
+/// Largest radius of balls and tubes, over the cage's longest side.
 pub const MAX_RADIUS: f32 = 0.25;
 
-/// Smallest radius, as a share of the same: no grid resolves it, and in 32 bits a smaller ball has faces without area.
+/// Smallest radius, over the cage's longest side: no grid resolves it, and in f32 smaller balls have faces without area.
 const MIN_RADIUS: f32 = 1e-4;
 
-/// The radius unless one is given, as a share of the cage's longest side: two cells of a grid of 64.
+/// Default radius, over the cage's longest side: two cells of a grid of 64.
 const DEFAULT_RADIUS: f32 = 2.0 / 64.0;
 
-/// One element: indices into [`InnerControls::positions`].
+/// An element of inner controls: indices into [`InnerControls::positions`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum InnerElement {
     /// A ball.
     Point(u32),
-    /// A polyline of tubes: two corners or more.
+    /// A polyline of tubes, at least two corners.
     Line(Vec<u32>),
-    /// A face of a sheet, which both sides feel: three corners or more.
+    /// A face of a sheet with values on both sides, at least three corners.
     Face(Vec<u32>),
 }
 
 impl InnerElement {
-    /// Its corners.
+    /// Corner indices.
     #[must_use]
     pub fn corners(&self) -> &[u32] {
         match self {
@@ -43,7 +43,7 @@ impl InnerElement {
         }
     }
 
-    /// What people call it.
+    /// Name for messages.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
@@ -54,28 +54,28 @@ impl InnerElement {
     }
 }
 
-/// Controls inside a cage. Elements that share a vertex hang together, so that a spine bends.
+/// Controls inside a cage. Elements that share a vertex are connected.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct InnerControls {
-    /// Rest positions: columns after those of the cage. `[n_inner]`, object units.
+    /// Rest positions; their columns follow those of the cage. `[n_inner]`, object units.
     pub positions: Vec<Vec3>,
-    /// What they are corners of.
+    /// Elements, with indices into `positions`.
     pub elements: Vec<InnerElement>,
-    /// Radius of points and lines, object units; none: 1/32 of the cage's longest side.
+    /// Radius of points and lines, object units; `None`: 1/32 of the cage's longest side.
     pub radius: Option<f32>,
 }
 
-/// Why controls cannot be used. Vertices and elements inside count from 0.
+/// Why controls cannot be used. Indices start at 0.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ControlError {
-    /// Steps of subdivision out of range.
+    /// Subdivision steps out of range.
     #[error(transparent)]
     Option(#[from] OutOfRange),
-    /// The smooth surface is no cage.
+    /// The subdivided surface is not a valid cage.
     #[error("the smooth surface of the cage cannot be used: {0}; take fewer steps, or a simpler cage")]
     Smooth(CageError),
-    /// There are vertices but no element, or nothing at all.
+    /// Inner controls without elements.
     #[error("there is no control inside: give points (p), polylines (l) or faces (f)")]
     Empty,
     /// A coordinate is not a finite number.
@@ -84,26 +84,26 @@ pub enum ControlError {
         /// The vertex.
         vertex: u32,
     },
-    /// A vertex that does not exist.
+    /// An element has the index of a vertex that does not exist.
     #[error("{what} {element} inside the cage names vertex {vertex}, but there are only {n} (0 to {})", n - 1)]
     Index {
-        /// Point, line or face.
+        /// Kind of element.
         what: &'static str,
         /// The element.
         element: u32,
-        /// The vertex it names.
+        /// The invalid index.
         vertex: u32,
-        /// Vertices there are.
+        /// Number of vertices.
         n: usize,
     },
-    /// An element of no extent.
+    /// An element without extent.
     #[error("{what} {element} inside the cage has {why}")]
     Degenerate {
-        /// Line or face.
+        /// Kind of element.
         what: &'static str,
         /// The element.
         element: u32,
-        /// What is wrong.
+        /// The defect.
         why: &'static str,
     },
     /// A radius out of range.
@@ -111,37 +111,37 @@ pub enum ControlError {
         "the radius of controls inside is {radius}; it must be from {least} to {most}, a quarter of the cage's longest side"
     )]
     Radius {
-        /// What was given, object units.
+        /// The radius, object units.
         radius: f32,
         /// The smallest, object units.
         least: f32,
         /// The largest, object units.
         most: f32,
     },
-    /// More than the surface may have.
+    /// The surface has too many faces.
     #[error(
         "{} points, lines and faces inside need {} faces, more than {}: use fewer",
         grouped(*elements), grouped(*faces), grouped(MAX_FACES)
     )]
     TooMany {
-        /// Elements.
+        /// Number of elements.
         elements: usize,
-        /// Faces of the surface.
+        /// Number of faces of the surface.
         faces: usize,
     },
-    /// A control lies outside.
+    /// A control lies outside the surface.
     #[error("control {vertex} is outside the cage{}: move it in", if *smooth { "'s smooth surface" } else { "" })]
     Outside {
         /// The vertex.
         vertex: u32,
-        /// Whether it is the smooth surface.
+        /// Whether the surface is subdivided.
         smooth: bool,
     },
-    /// Two controls meet.
+    /// Two elements overlap.
     #[error("{} {} and {} {} inside the cage overlap: move them apart, join them at a vertex, or use a smaller radius",
         what[0], elements[0], what[1], elements[1])]
     Overlap {
-        /// Points, lines or faces.
+        /// Kinds of the elements.
         what: [&'static str; 2],
         /// The elements.
         elements: [u32; 2],
@@ -149,26 +149,25 @@ pub enum ControlError {
 }
 
 impl InnerControls {
-    /// The radius in a cage whose longest side is given, object units.
+    /// Radius in a cage with the given longest side, object units.
     #[must_use]
     pub fn radius_in(&self, longest: f32) -> f32 {
         self.radius.unwrap_or(DEFAULT_RADIUS * longest)
     }
 
-    /// Whether an element needs the radius.
+    /// Whether any element is a ball or tube.
     #[must_use]
     pub fn has_radius(&self) -> bool {
         self.elements.iter().any(|element| !matches!(element, InnerElement::Face(_)))
     }
 
-    /// Whether a control is of a ball or tube, whose surface is off it by the radius.
+    /// Whether a control belongs to a ball or tube.
     pub(crate) fn is_rounded(&self, control: usize) -> bool {
         let rounded = self.elements.iter().filter(|element| !matches!(element, InnerElement::Face(_)));
         rounded.flat_map(InnerElement::corners).any(|&i| i as usize == control)
     }
 
-    /// The foot of a place inside of balls and tubes, on the nearest of their points and lines: controls and their shares. Nothing
-    /// without balls and tubes.
+    /// Closest point on the axes of balls and tubes: two controls with their shares. `None` without balls and tubes.
     pub(crate) fn foot(&self, place: DVec3) -> Option<[(u32, f64); 2]> {
         let at = |i: u32| self.positions[i as usize].as_dvec3();
         let rounded = self.elements.iter().filter(|element| !matches!(element, InnerElement::Face(_)));
@@ -185,7 +184,7 @@ impl InnerControls {
         feet.min_by(|(d, _), (e, _)| d.total_cmp(e)).map(|(_, shares)| shares)
     }
 
-    /// Vertices of no element, which move nothing.
+    /// Vertices without elements; they have no influence.
     #[must_use]
     pub fn unused(&self) -> Vec<u32> {
         let mut is_used = vec![false; self.positions.len()];
@@ -193,7 +192,7 @@ impl InnerControls {
         (0u32..).zip(is_used).filter(|(_, is_used)| !is_used).map(|(i, _)| i).collect()
     }
 
-    /// Checks numbers, in a cage whose longest side is given.
+    /// Checks numbers and indices, for a cage with the given longest side.
     pub(super) fn check(&self, longest: f32) -> Result<(), ControlError> {
         if self.elements.is_empty() {
             return Err(ControlError::Empty);
@@ -217,7 +216,7 @@ impl InnerControls {
             let why = match element {
                 InnerElement::Line(_) if corners.len() < 2 => Some("fewer than two corners"),
                 InnerElement::Line(_) if corners.windows(2).any(|w| at(&w[0]) == at(&w[1])) => {
-                    Some("two corners after each other at one place")
+                    Some("two consecutive corners at the same position")
                 }
                 InnerElement::Face(_) if corners.len() < 3 => Some("fewer than three corners"),
                 InnerElement::Face(_) if has_repeats(corners) => Some("a corner more than once"),

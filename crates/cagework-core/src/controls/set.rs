@@ -1,4 +1,4 @@
-//! Controls with a surface of their own: a smooth cage, and controls inside.
+//! Controls whose surface is not the cage: subdivided cages, and inner controls.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -17,11 +17,11 @@ use crate::options::SMOOTH;
 use crate::smooth::subdivide;
 use crate::weights::Weights;
 
-/// How far a corner of a sheet may stick out of the cage, as a share of its diagonal: a sheet that ends at the cage's walls
-/// closes well if it is drawn a little beyond them.
-const STICKS_OUT: f64 = 0.02;
+/// Distance over the cage's diagonal by which corners of a sheet may lie outside: a sheet closes well against the cage
+/// if it is drawn slightly beyond it.
+const MAX_PROTRUSION: f64 = 0.02;
 
-/// What [`Controls`] of a smooth cage, or with controls inside, are made of.
+/// Owned [`Controls`] of a subdivided cage or with inner controls.
 #[derive(Clone, Debug)]
 pub struct ControlSet {
     cage: Cage,
@@ -30,7 +30,7 @@ pub struct ControlSet {
     /// `[n_controls]`
     rest: Vec<Vec3>,
     surface: Cage,
-    /// `[n_surface, n_controls]`; none for the identity.
+    /// B, `[n_surface, n_controls]`; `None` for the identity.
     rows: Option<Weights>,
     /// As in [`Controls`]. `[n_surface_faces]`
     origins: Vec<Option<u32>>,
@@ -47,7 +47,7 @@ impl<'a> From<&'a ControlSet> for Controls<'a> {
 }
 
 impl ControlSet {
-    /// Those of a plain cage.
+    /// Controls of a plain cage.
     #[must_use]
     pub fn plain(cage: &Cage) -> Self {
         Self {
@@ -61,10 +61,10 @@ impl ControlSet {
         }
     }
 
-    /// The controls of a cage whose surface is subdivided `smooth` times (0 to 3), with controls inside, if any.
+    /// Controls of a cage whose surface is subdivided `smooth` times (0 to 3), with optional inner controls.
     ///
     /// # Errors
-    /// [`ControlError`]: too many steps, controls that are not inside, overlap, name what is not there, or are too many.
+    /// [`ControlError`]: too many steps, inner controls that are outside, overlap, have invalid indices, or are too many.
     pub fn new(cage: &Cage, smooth: u32, inner: InnerControls) -> Result<Self, ControlError> {
         SMOOTH.check(smooth)?;
         let mut set = Self::plain(cage);
@@ -93,14 +93,14 @@ impl ControlSet {
         self.smooth
     }
 
-    /// The controls inside.
+    /// The inner controls.
     #[must_use]
     pub fn inner(&self) -> &InnerControls {
         &self.inner
     }
 
-    /// Where the surface is drawn with the controls at `positions` (`[n_controls]`, object units): balls and tubes keep their
-    /// radius and do not turn. `[n_surface]`
+    /// Surface for display with the controls at `positions` (`[n_controls]`, object units): balls and tubes are
+    /// translated without rotation, so they keep their radius. `[n_surface]`
     ///
     /// # Panics
     /// If there is not one position per control.
@@ -122,12 +122,12 @@ impl ControlSet {
         }
         self.check_inside(&inner)?;
         let radius = f64::from(inner.radius_in(extent.max_element()));
-        let mut sizes = vec![Size::Equal; inner.elements.len()];
+        let mut sizes = vec![Size::EqualVolume; inner.elements.len()];
         let mut walls = Walls::new(&inner, &self.cage, radius, &sizes)?;
         let meeting = walls.meeting(&inner);
         if !meeting.is_empty() {
-            // Meshes meet before balls and tubes do.
-            meeting.iter().flatten().for_each(|&element| sizes[element as usize] = Size::Within);
+            // Circumscribed meshes may meet although balls and tubes do not: retry with inscribed ones.
+            meeting.iter().flatten().for_each(|&element| sizes[element as usize] = Size::Inscribed);
             walls = Walls::new(&inner, &self.cage, radius, &sizes)?;
             if let Some(&elements) = walls.meeting(&inner).first() {
                 let what = elements.map(|element| inner.elements[element as usize].name());
@@ -162,9 +162,9 @@ impl ControlSet {
         Ok(())
     }
 
-    /// Whether all corners are inside; those of sheets nearly.
+    /// Checks that all corners are inside; corners of sheets may be slightly outside.
     fn check_inside(&self, inner: &InnerControls) -> Result<(), ControlError> {
-        let near = STICKS_OUT * f64::from(self.surface.diagonal());
+        let near = MAX_PROTRUSION * f64::from(self.surface.diagonal());
         let mut may_stick_out = vec![true; inner.positions.len()];
         for element in inner.elements.iter().filter(|element| !matches!(element, InnerElement::Face(_))) {
             element.corners().iter().for_each(|&i| may_stick_out[i as usize] = false);
@@ -189,7 +189,7 @@ fn steps_of(inner: &InnerControls) -> u32 {
     shapes::ball_steps(inner.elements.iter().filter(|e| matches!(e, InnerElement::Point(_))).count())
 }
 
-/// Faces that an element needs, a ball's cut so often; of a face inside, its triangles from both sides.
+/// Faces of an element's mesh: balls are subdivided `steps` times, sheets have triangles on both sides.
 fn faces_of(element: &InnerElement, steps: u32) -> usize {
     match element {
         InnerElement::Point(_) => shapes::ball_faces(steps),
@@ -198,18 +198,18 @@ fn faces_of(element: &InnerElement, steps: u32) -> usize {
     }
 }
 
-/// Two controls and their shares of a point's value.
-type Mixed = [(u32, f64); 2];
+/// Two controls and their shares in a point's value.
+type ControlShares = [(u32, f64); 2];
 
-/// The meshes of controls inside.
+/// Meshes of the inner controls.
 #[derive(Default)]
 struct Walls {
-    points: Vec<(DVec3, Mixed)>,
+    points: Vec<(DVec3, ControlShares)>,
     faces: Vec<Vec<u32>>,
-    /// Element, and part of elements that hang together, of each face.
+    /// Element and connected part of each face.
     element_of: Vec<u32>,
     part_of: Vec<u32>,
-    /// Corners of sheets: vertices of the surface by control.
+    /// Surface vertex of each control that is a corner of a sheet.
     corners: BTreeMap<u32, u32>,
 }
 
@@ -248,7 +248,7 @@ impl Walls {
         Ok(walls)
     }
 
-    /// The surface's vertex at a corner of a sheet: one for all faces there.
+    /// Surface vertex at a corner of a sheet, shared by all its faces.
     fn corner(&mut self, control: u32, at: DVec3) -> u32 {
         *self.corners.entry(control).or_insert_with(|| {
             self.points.push((at, [(control, 1.0), (control, 0.0)]));
@@ -270,7 +270,7 @@ impl Walls {
         self.part_of.push(part);
     }
 
-    /// Elements that do not hang together and whose meshes meet, in pairs. Where thousands lie on each other, not all pairs.
+    /// Pairs of unconnected elements whose meshes meet. The list is incomplete if there are very many.
     fn meeting(&self, inner: &InnerControls) -> Vec<[u32; 2]> {
         let (mut triangles, mut element_of) = (Vec::new(), Vec::new());
         for (face, &element) in self.faces.iter().zip(&self.element_of) {
@@ -296,11 +296,11 @@ impl Walls {
     }
 }
 
-/// For each element the first one that it hangs together with, by shared vertices.
+/// First element of the connected part of each element; elements are connected by shared vertices.
 fn parts(inner: &InnerControls) -> Vec<u32> {
     let mut part_of_vertex = vec![u32::MAX; inner.positions.len()];
     let mut parts: Vec<u32> = (0..inner.elements.len() as u32).collect();
-    // Until nothing changes: elements are few, and chains of them are mostly in order.
+    // Iterate to a fixed point: elements are few, and chains of them are mostly in order.
     loop {
         let before = parts.clone();
         for (part, element) in parts.iter_mut().zip(&inner.elements) {
@@ -314,7 +314,6 @@ fn parts(inner: &InnerControls) -> Vec<u32> {
     }
 }
 
-/// The cage's triangle closest to a point.
 pub(super) fn nearest_triangle(cage: &Cage, p: DVec3) -> [u32; 3] {
     let distance = |t: u32| closest_point_on_triangle(p, cage.triangle_corners(t)).point.distance(p);
     let nearest = (0..cage.triangles().len() as u32).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));

@@ -1,4 +1,4 @@
-//! Meshes of balls and tubes. Their faces look inwards: to the space between them and the cage, they are its border.
+//! Meshes of balls and tubes, oriented inwards: they are inner boundaries of the space between them and the cage.
 
 use std::f64::consts::{PI, TAU};
 
@@ -6,14 +6,14 @@ use glam::{DQuat, DVec3};
 
 /// Sides of a tube.
 const SIDES: usize = 16;
-/// Rings of a tube's rounded end, without the one where the tube begins and the tip.
+/// Rings of a tube's hemispherical end, excluding its equator and pole.
 const RINGS: usize = 4;
 
-/// Faces of a piece of a tube with its ends.
+/// Faces of a segment of a tube with its ends.
 pub(super) const TUBE_FACES: usize = SIDES * (1 + 2 * (RINGS + 1));
 
-/// How often the faces of one of so many balls are cut into four. Weights beside a ball are off by 2e-3 after three times, by 6e-3 after
-/// two, and by 2e-2 after one; fewer faces each leave room for more balls ([`crate::cage::MAX_FACES`]).
+/// Subdivisions of a ball's icosahedron for a given number of balls. Weights beside a ball are off by 2e-3 after three
+/// subdivisions, 6e-3 after two and 2e-2 after one; fewer faces per ball allow more balls ([`crate::cage::MAX_FACES`]).
 pub(super) fn ball_steps(n_balls: usize) -> u32 {
     match n_balls {
         0..=16 => 3,
@@ -22,28 +22,27 @@ pub(super) fn ball_steps(n_balls: usize) -> u32 {
     }
 }
 
-/// Faces of a ball.
 pub(super) fn ball_faces(steps: u32) -> usize {
     20 << (2 * steps)
 }
 
-/// How large a mesh is made.
+/// Size of a mesh relative to its ball or tube.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Size {
-    /// With the volume of its ball, or the cross-section of its tube; corners stick out by a few per cent of the radius.
-    Equal,
-    /// Within the radius, for neighbours that are closer than that.
-    Within,
+    /// Equal volume (ball) or cross-section (tube); corners exceed the radius by a few per cent.
+    EqualVolume,
+    /// Inscribed, for neighbours closer than that.
+    Inscribed,
 }
 
-/// Points around a control and faces between them.
+/// Mesh of a ball or of a segment of a tube.
 pub(super) struct Shape {
-    /// Places, and how far along the tube their foot is: 0 to 1.
+    /// Position, and parameter of its foot along the segment, 0 to 1.
     pub(super) points: Vec<(DVec3, f64)>,
     pub(super) faces: Vec<Vec<u32>>,
 }
 
-/// A ball: an icosahedron whose faces are cut into four `steps` times.
+/// A ball: an icosahedron with `steps` subdivisions.
 pub(super) fn ball(center: DVec3, radius: f64, steps: u32, size: Size) -> Shape {
     let golden = f64::midpoint(1.0, 5.0_f64.sqrt());
     let corner = |k: usize| {
@@ -53,7 +52,7 @@ pub(super) fn ball(center: DVec3, radius: f64, steps: u32, size: Size) -> Shape 
         DVec3::from(at).normalize()
     };
     let mut points: Vec<DVec3> = (0..12).map(corner).collect();
-    // Corners of an edge are the nearest ones.
+    // Neighbours are at a distance of about 1.05, all other corners are further apart.
     let is_edge = |a: usize, b: usize| points[a].distance(points[b]) < 1.2;
     let mut triangles = Vec::new();
     for a in 0..12 {
@@ -89,17 +88,17 @@ pub(super) fn ball(center: DVec3, radius: f64, steps: u32, size: Size) -> Shape 
             a.dot(c.cross(b)) / 6.0
         })
         .sum();
-    let larger = if size == Size::Equal { (4.0 / 3.0 * PI / volume).cbrt() } else { 1.0 };
+    let larger = if size == Size::EqualVolume { (4.0 / 3.0 * PI / volume).cbrt() } else { 1.0 };
     let size = radius * larger;
     Shape { points: points.into_iter().map(|p| (center + size * p, 0.0)).collect(), faces }
 }
 
-/// A tube from `a` to `b` with rounded ends.
+/// A tube from `a` to `b` with hemispherical ends.
 pub(super) fn tube(a: DVec3, b: DVec3, radius: f64, size: Size) -> Shape {
     let turn = DQuat::from_rotation_arc(DVec3::Z, (b - a).normalize());
     let larger = (TAU / (SIDES as f64 * (TAU / SIDES as f64).sin())).sqrt();
-    let size = if size == Size::Equal { radius * larger } else { radius };
-    // From the tip at a to the tip at b: height over the end, radius, end.
+    let size = if size == Size::EqualVolume { radius * larger } else { radius };
+    // Rings from the pole at a to the pole at b: (index from the equator, end, direction, parameter).
     let rings = (0..=RINGS).rev().map(|k| (k, a, -1.0, 0.0)).chain((0..=RINGS).map(|k| (k, b, 1.0, 1.0)));
     let mut points = vec![(a - turn * (size * DVec3::Z), 0.0)];
     for (k, end, side, share) in rings {
@@ -136,14 +135,14 @@ mod tests {
         shape.faces.iter().map(of_face).sum()
     }
 
-    /// A ball has 4/3 pi r^3; a tube of length l has l pi r^2 and, at its ends, a ball or a little less.
+    /// A ball has the volume 4/3 pi r^3; a tube of length l has l pi r^2 plus slightly less than a ball for its ends.
     #[test]
-    fn balls_and_tubes_look_inwards_and_have_their_volumes() {
-        let ball = ball(DVec3::new(3.0, 2.0, 1.0), 0.5, 2, Size::Equal);
+    fn balls_and_tubes_face_inwards_and_have_their_volumes() {
+        let ball = ball(DVec3::new(3.0, 2.0, 1.0), 0.5, 2, Size::EqualVolume);
         assert_eq!((ball.points.len(), ball.faces.len()), (162, ball_faces(2)));
         assert!((volume(&ball) + 4.0 / 3.0 * PI * 0.125).abs() < 1e-9, "{}", volume(&ball));
         let (a, b) = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(2.0, 4.0, 5.0));
-        let tube = tube(a, b, 0.5, Size::Equal);
+        let tube = tube(a, b, 0.5, Size::EqualVolume);
         assert_eq!(tube.faces.len(), TUBE_FACES);
         let side = 3.0 * PI * 0.25;
         let excess = (-volume(&tube) - side) / (4.0 / 3.0 * PI * 0.125);

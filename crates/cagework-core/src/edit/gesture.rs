@@ -1,42 +1,42 @@
-//! Grab, rotate and scale: from the pointer, or a typed number, to new cage positions.
+//! Grab, rotate and scale: maps the pointer or a typed number to cage positions.
 
 use glam::{Quat, Vec2, Vec3};
 
 use super::pull::Pull;
 use super::view::View;
 
-/// Sine of the angle below which a plane is dragged in the view plane instead: a pixel would be a leap.
+/// Sine of the angle between view and plane below which the view plane is used instead: a pixel would move too far.
 const MIN_PLANE_SINE: f32 = 0.05;
 
-/// Pixels from the middle that a scale gesture starts with at least: nearer, a pixel would be a large factor.
+/// Minimum start distance of a scale gesture from the centre, pixels: below, a pixel would change the factor too much.
 const MIN_SCALE_DISTANCE: f32 = 8.0;
 
-/// What a gesture does.
+/// Kind of gesture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS), ts(rename = "Gesture"))]
 pub enum GestureKind {
-    /// Moves.
+    /// Translation.
     Grab,
-    /// Turns around the middle of the selection.
+    /// Rotation about the centre of the selection.
     Rotate,
-    /// Stretches about the middle of the selection.
+    /// Scaling about the centre of the selection.
     Scale,
 }
 
-/// Which directions a gesture is limited to.
+/// Directions to which a gesture is restricted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Constraint {
-    /// The view plane (grab), the view axis (rotate), all axes alike (scale).
+    /// The view plane (grab), the view axis (rotate), or all axes equally (scale).
     #[default]
     Free,
     /// One axis, 0 to 2.
     Axis(usize),
-    /// The plane across an axis, 0 to 2; for a rotation the same as the axis.
+    /// The plane normal to an axis, 0 to 2; for a rotation, the axis.
     Plane(usize),
 }
 
-/// A gesture under way. Its result is always computed from where it began.
+/// A gesture in progress. Positions are always computed from its start, so that errors do not accumulate.
 #[derive(Clone, Debug)]
 pub struct Gesture {
     kind: GestureKind,
@@ -50,58 +50,58 @@ pub struct Gesture {
 }
 
 impl Gesture {
-    /// Begins at `pointer`. `start`: positions of the moment, `[n_cage]`; `pivot`: middle of the selection.
+    /// Starts at `pointer`. `start`: current positions, `[n_cage]`; `pivot`: centre of the selection.
     #[must_use]
     pub fn new(kind: GestureKind, start: Vec<Vec3>, pull: Pull, pivot: Vec3, pointer: Vec2) -> Self {
         let constraint = Constraint::Free;
         Self { kind, constraint, start, pull, pivot, pointer_start: pointer, pointer, typed: None }
     }
 
-    /// What it does.
+    /// Kind of the gesture.
     #[must_use]
     pub fn kind(&self) -> GestureKind {
         self.kind
     }
 
-    /// Positions when it began. `[n_cage]`
+    /// Positions at the start. `[n_cage]`
     #[must_use]
     pub fn start(&self) -> &[Vec3] {
         &self.start
     }
 
-    /// Where it began to turn and stretch about.
+    /// Centre of rotation and scaling.
     #[must_use]
     pub fn pivot(&self) -> Vec3 {
         self.pivot
     }
 
-    /// Limits it.
+    /// Restricts the gesture.
     pub fn constrain(&mut self, constraint: Constraint) {
         self.constraint = constraint;
     }
 
-    /// Its limit.
+    /// The restriction.
     #[must_use]
     pub fn constraint(&self) -> Constraint {
         self.constraint
     }
 
-    /// Takes another pull: the radius of proportional editing has changed.
+    /// Replaces the shares, for instance when the radius of proportional editing changes.
     pub fn set_pull(&mut self, pull: Pull) {
         self.pull = pull;
     }
 
-    /// Follows the pointer.
+    /// Moves the pointer.
     pub fn drag(&mut self, pointer: Vec2) {
         self.pointer = pointer;
     }
 
-    /// Takes an amount instead of the pointer (object units, degrees, a factor); `None` goes back to the pointer.
+    /// Sets an amount that replaces the pointer (object units, degrees, or a factor); `None` returns to the pointer.
     pub fn type_amount(&mut self, amount: Option<f32>) {
         self.typed = amount.filter(|a| a.is_finite());
     }
 
-    /// Cage positions now. `[n_cage]`
+    /// Current cage positions. `[n_cage]`
     #[must_use]
     pub fn positions(&self, view: &dyn View) -> Vec<Vec3> {
         match self.kind {
@@ -124,7 +124,7 @@ impl Gesture {
         }
     }
 
-    /// What it does now, for a status line: `Move 0.25 along X`.
+    /// Current state for a status line: `Move 0.25 along X`.
     #[must_use]
     pub fn label(&self, view: &dyn View) -> String {
         const NAMES: [&str; 3] = ["X", "Y", "Z"];
@@ -152,7 +152,7 @@ impl Gesture {
         if let Some(amount) = self.typed {
             return match self.constraint {
                 Constraint::Axis(axis) => amount * Vec3::AXES[axis],
-                // Along the first axis of the plane, as typed numbers go to x first.
+                // The first axis of the plane.
                 Constraint::Plane(axis) => amount * Vec3::AXES[if axis == 0 { 1 } else { 0 }],
                 Constraint::Free => amount * view.right(),
             };
@@ -165,7 +165,7 @@ impl Gesture {
                 let from = along_axis(view, self.pointer_start, self.pivot, axis);
                 match from.zip(along_axis(view, self.pointer, self.pivot, axis)) {
                     Some((from, to)) => (to - from) * axis,
-                    // The axis points at the eye: up the picture moves away.
+                    // The axis points at the eye: up on the screen moves away from the eye.
                     None => -free.dot(view.up()) * axis.dot(view.backward()).signum() * axis,
                 }
             }
@@ -180,7 +180,7 @@ impl Gesture {
         }
     }
 
-    /// Axis towards the eye's side and angle, radians.
+    /// Rotation axis and angle, radians.
     fn turn(&self, view: &dyn View) -> (Vec3, f32) {
         let backward = view.backward();
         let axis = match self.constraint {
@@ -195,9 +195,9 @@ impl Gesture {
         if from == Vec2::ZERO || to == Vec2::ZERO {
             return (axis, 0.0);
         }
-        // Pixels run down: what looks counter-clockwise has a negative angle there.
+        // Pixels run down, so a counter-clockwise turn has a negative angle.
         let seen = -from.angle_to(to);
-        // An axis that points away turns the other way round.
+        // About an axis that points away from the eye, the turn appears reversed.
         (axis, if axis.dot(backward) < 0.0 { -seen } else { seen })
     }
 
@@ -207,7 +207,7 @@ impl Gesture {
         }
         let Some((center, _)) = view.project(self.pivot) else { return 1.0 };
         let from = self.pointer_start - center;
-        // The part along the first direction, so that crossing the middle mirrors.
+        // Projection on the initial direction, so that crossing the centre mirrors.
         let reach = from.length().max(MIN_SCALE_DISTANCE);
         let direction = if from == Vec2::ZERO { Vec2::X } else { from.normalize() };
         1.0 + (self.pointer - self.pointer_start).dot(direction) / reach
@@ -227,14 +227,14 @@ impl Gesture {
     }
 }
 
-/// Three digits after the point, none of them for nothing.
+/// At most three decimals, without trailing zeros.
 fn shown(value: f32) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Where on the axis through `through` the pointer's ray passes nearest; nothing if both are parallel.
+/// Coordinate on the axis through `through` that is nearest to the pointer's ray; `None` if they are parallel.
 fn along_axis(view: &dyn View, pointer: Vec2, through: Vec3, axis: Vec3) -> Option<f32> {
     let (origin, direction) = view.ray(pointer);
     let between = through - origin;
@@ -246,7 +246,7 @@ fn along_axis(view: &dyn View, pointer: Vec2, through: Vec3, axis: Vec3) -> Opti
     Some((cosine * direction.dot(between) - axis.dot(between)) / sine_squared)
 }
 
-/// Where the pointer's ray meets the plane; nothing if it grazes it or meets it behind the eye.
+/// Intersection of the pointer's ray with the plane; `None` if it grazes the plane or meets it behind the eye.
 fn in_plane(view: &dyn View, pointer: Vec2, through: Vec3, normal: Vec3) -> Option<Vec3> {
     let (origin, direction) = view.ray(pointer);
     let towards = direction.dot(normal);

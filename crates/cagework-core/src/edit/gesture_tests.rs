@@ -1,11 +1,11 @@
-//! Gestures on the corners of a cube, seen from +z at 100 pixels a unit.
+//! Gestures on the corners of a cube, seen from +z at 100 pixels per unit.
 
 use super::*;
 use crate::cage::shapes::cuboid;
 use crate::edit::{Flat, SelectMode, Selection, SharedPull};
 
 /// Rounding of a few f32 operations on positions of size 1.
-const ROUNDED: f32 = 1e-5;
+const ROUNDING: f32 = 1e-5;
 
 /// Pixel of the world's origin in [`Flat`].
 const ORIGIN: Vec2 = Vec2::new(200.0, 100.0);
@@ -20,7 +20,7 @@ fn gesture(kind: GestureKind, vertices: &[u32], from: Vec2) -> Gesture {
 }
 
 fn close(a: Vec3, b: Vec3) -> bool {
-    a.abs_diff_eq(b, ROUNDED)
+    a.abs_diff_eq(b, ROUNDING)
 }
 
 #[test]
@@ -34,7 +34,7 @@ fn grab_follows_the_pointer_in_the_view_plane() {
 }
 
 #[test]
-fn grab_keeps_to_an_axis_or_a_plane() {
+fn grab_is_restricted_to_an_axis_or_a_plane() {
     let mut grab = gesture(GestureKind::Grab, &[7], ORIGIN);
     grab.drag(ORIGIN + Vec2::new(30.0, 40.0));
     grab.constrain(Constraint::Axis(0));
@@ -42,7 +42,7 @@ fn grab_keeps_to_an_axis_or_a_plane() {
     assert_eq!(grab.label(&Flat), "Move 0.3 along X");
     grab.constrain(Constraint::Plane(2));
     assert!(close(grab.positions(&Flat)[7], Vec3::new(1.3, 0.6, 1.0)));
-    // A plane seen from its edge, and the axis that points at the eye: up the picture is away from the eye.
+    // A plane seen edge-on, and the axis that points at the eye: up on the screen moves away from the eye.
     grab.constrain(Constraint::Plane(0));
     assert!(close(grab.positions(&Flat)[7], Vec3::new(1.0, 0.6, 1.0)));
     grab.constrain(Constraint::Axis(2));
@@ -50,7 +50,7 @@ fn grab_keeps_to_an_axis_or_a_plane() {
 }
 
 #[test]
-fn typed_number_replaces_the_pointer_until_it_is_taken_back() {
+fn typed_number_replaces_the_pointer_until_it_is_removed() {
     let mut grab = gesture(GestureKind::Grab, &[7], ORIGIN);
     grab.drag(ORIGIN + Vec2::new(30.0, 0.0));
     grab.constrain(Constraint::Axis(1));
@@ -61,24 +61,24 @@ fn typed_number_replaces_the_pointer_until_it_is_taken_back() {
 }
 
 #[test]
-fn rotation_turns_with_the_pointer_as_seen() {
-    // Both corners at z = 1, y = 1 around their middle, (0, 1, 1), at pixel (200, 0).
+fn rotation_follows_the_pointer() {
+    // The corners at z = 1, y = 1 about their centre (0, 1, 1), at pixel (200, 0).
     let middle = ORIGIN - Vec2::new(0.0, 100.0);
     let mut turn = gesture(GestureKind::Rotate, &[6, 7], middle + Vec2::new(50.0, 0.0));
     turn.drag(middle - Vec2::new(0.0, 50.0));
-    // From the right to the top: a quarter turn counter-clockwise around +z.
+    // From the right to the top: a quarter turn counter-clockwise about +z.
     let moved = turn.positions(&Flat);
     assert!(close(moved[7], Vec3::new(0.0, 2.0, 1.0)) && close(moved[6], Vec3::new(0.0, 0.0, 1.0)));
     assert_eq!(turn.label(&Flat), "Rotate 90°");
     turn.constrain(Constraint::Axis(1));
     turn.type_amount(Some(90.0));
-    // Around y, x turns to -z.
+    // About y, x turns to -z.
     assert!(close(turn.positions(&Flat)[7], Vec3::new(0.0, 1.0, 0.0)));
     assert_eq!(turn.label(&Flat), "Rotate 90° around Y");
 }
 
 #[test]
-fn scale_is_the_pointers_distance_from_the_middle() {
+fn scale_follows_the_pointers_distance_from_the_centre() {
     let all: Vec<u32> = (0..8).collect();
     let mut scale = gesture(GestureKind::Scale, &all, ORIGIN + Vec2::new(50.0, 0.0));
     scale.drag(ORIGIN + Vec2::new(100.0, 0.0));
@@ -88,7 +88,7 @@ fn scale_is_the_pointers_distance_from_the_middle() {
     assert_eq!(scale.label(&Flat), "Scale × 2 along X");
     scale.constrain(Constraint::Plane(0));
     assert!(close(scale.positions(&Flat)[7], Vec3::new(1.0, 2.0, 2.0)));
-    // Through the middle: mirrored.
+    // Across the centre: mirrored.
     scale.constrain(Constraint::Free);
     scale.drag(ORIGIN - Vec2::new(50.0, 0.0));
     assert!(close(scale.positions(&Flat)[7], Vec3::splat(-1.0)));

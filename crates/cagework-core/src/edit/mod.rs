@@ -1,7 +1,7 @@
-//! Editing a cage by hand: what is picked, selected and moved. Plain mathematics; who draws and who listens is elsewhere.
+//! Editing a cage: picking, selection, gestures and poses, independent of rendering and input events.
 //!
-//! All of it works on cage positions `[n_cage]` in object units and on the faces of a [`crate::Cage`]. Pixels are those
-//! of the [`View`], from the top left corner, x right and y down.
+//! Operates on cage positions `[n_cage]` in object units and on the faces of a [`crate::Cage`]. Pixels are those of the
+//! [`View`], from the top left corner, x right and y down.
 
 mod gesture;
 mod pick;

@@ -1,13 +1,13 @@
-//! What lies under the pointer.
+//! Picking: vertices, edges, faces and surface points under the pointer.
 
 use glam::{Vec2, Vec3};
 
 use super::view::View;
 
-/// Hits of a ray that are nearer to each other, over the distance from the eye, are one.
-const SAME_HIT: f32 = 1e-5;
+/// Ray hits whose distance is below this, over their distance from the eye, count as one.
+const HIT_TOLERANCE: f32 = 1e-5;
 
-/// What a click selects.
+/// Element type that a click selects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
@@ -15,23 +15,23 @@ pub enum Element {
     /// A vertex.
     #[default]
     Vertex,
-    /// An edge: both its ends.
+    /// An edge, by both of its ends.
     Edge,
-    /// A face: all its corners.
+    /// A face, by all of its corners.
     Face,
 }
 
-/// Edges and faces of a cage, as editing needs them.
+/// Edges and faces of a cage, for editing.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Topology {
     /// Corners of each face in order around it. `[n_faces]`
     pub faces: Vec<Vec<u32>>,
-    /// Each edge once, lower vertex first, ascending. `[n_edges]`
+    /// Each edge once, smaller index first, ascending. `[n_edges]`
     pub edges: Vec<[u32; 2]>,
 }
 
 impl Topology {
-    /// Edges of faces; open ones, as a draft of a cage has, are edges too.
+    /// Edges of faces, including open edges of an unfinished cage.
     #[must_use]
     pub fn new(faces: &[Vec<u32>]) -> Self {
         let mut edges: Vec<[u32; 2]> = Vec::new();
@@ -47,8 +47,8 @@ impl Topology {
     }
 }
 
-/// The vertex within `radius` pixels of the pointer; of several, those of faces turned to the viewer come first, those in
-/// front hide those behind, and among those at one depth (up to the size of the radius) the nearest to the pointer counts. Others come only `with_hidden`.
+/// The vertex within `radius` pixels of the pointer. Vertices of front faces take precedence; among those at about the same depth
+/// (within the radius) the one nearest to the pointer, otherwise the one in front. Vertices of back faces only `with_hidden`.
 #[must_use]
 pub fn pick_vertex(
     positions: &[Vec3],
@@ -63,7 +63,7 @@ pub fn pick_vertex(
         let distance = pixel.distance(pointer);
         (distance <= radius).then(|| (i as u32, depth, distance, radius * view.units_per_pixel(p)))
     });
-    // Controls inside, which belong to no face, are drawn through everything: nothing hides them, and the pointer decides.
+    // Inner controls have no face and are drawn on top: nothing occludes them.
     let (of_faces, inside): (Vec<_>, Vec<_>) =
         near.partition(|near| topology.faces.iter().any(|face| face.contains(&near.0)));
     let inside = inside.into_iter().min_by(|a, b| a.2.total_cmp(&b.2));
@@ -80,12 +80,12 @@ pub fn pick_vertex(
     }
 }
 
-/// Whether a face at the vertex is turned to the viewer.
+/// Whether a face at the vertex is front-facing.
 fn is_seen(vertex: u32, positions: &[Vec3], topology: &Topology, view: &dyn View) -> bool {
     topology.faces.iter().filter(|face| face.contains(&vertex)).any(|face| {
         let pixels: Option<Vec<Vec2>> =
             face.iter().map(|&i| view.project(positions[i as usize]).map(|(pixel, _)| pixel)).collect();
-        // Pixels count downwards: an outline that runs counter-clockwise has a negative area.
+        // Pixels run down, so a counter-clockwise outline has a negative area.
         pixels.is_none_or(|pixels| {
             let next = pixels.iter().cycle().skip(1);
             pixels.iter().zip(next).map(|(a, b)| a.perp_dot(*b)).sum::<f32>() < 0.0
@@ -93,8 +93,8 @@ fn is_seen(vertex: u32, positions: &[Vec3], topology: &Topology, view: &dyn View
     })
 }
 
-/// A place within the model under the pointer: half way between where the ray enters it and where it leaves it again; beside
-/// the model, where the ray passes nearest to `center`.
+/// A point inside the model under the pointer: midway between the first two hits of the ray. If the ray misses the
+/// model, its point nearest to `center`.
 #[must_use]
 pub fn pick_middle(
     positions: &[Vec3],
@@ -107,8 +107,8 @@ pub fn pick_middle(
     let meets = |t: &[u32; 3]| ray_meets_triangle(origin, direction, t.map(|v| positions[v as usize]));
     let mut hits: Vec<f32> = triangles.iter().filter_map(meets).map(|(along, _)| along).collect();
     hits.sort_unstable_by(f32::total_cmp);
-    // An edge that the ray hits belongs to two triangles.
-    hits.dedup_by(|b, a| *b - *a <= SAME_HIT * *a);
+    // A ray through an edge hits two triangles.
+    hits.dedup_by(|b, a| *b - *a <= HIT_TOLERANCE * *a);
     let along = match hits[..] {
         [enters, leaves, ..] => f32::midpoint(enters, leaves),
         _ => (center - origin).dot(direction),
@@ -116,8 +116,8 @@ pub fn pick_middle(
     origin + along * direction
 }
 
-/// The edge within `radius` pixels of the pointer, an index into [`Topology::edges`]; of several the one whose nearest
-/// point is in front, unless the pointer is much nearer to another.
+/// The edge within `radius` pixels of the pointer, as index into [`Topology::edges`]; of several, the one whose nearest
+/// point is in front, unless the pointer is much nearer to another one.
 #[must_use]
 pub fn pick_edge(
     positions: &[Vec3],
@@ -139,8 +139,8 @@ pub fn pick_edge(
     in_front(near)
 }
 
-/// Of (number, depth, distance from the pointer, size of the radius there): what is in front hides what is behind, and
-/// among those at one depth the nearest to the pointer counts.
+/// Chooses from (index, depth, distance from the pointer, size of the radius at that depth): the nearest to the pointer
+/// among those at about the depth of the front one.
 fn in_front(near: impl Iterator<Item = (u32, f32, f32, f32)>) -> Option<u32> {
     let near: Vec<_> = near.collect();
     let front = near.iter().map(|n| n.1).fold(f32::INFINITY, f32::min);
@@ -150,7 +150,7 @@ fn in_front(near: impl Iterator<Item = (u32, f32, f32, f32)>) -> Option<u32> {
         .map(|n| n.0)
 }
 
-/// The face under the pointer that is nearest to the eye, by its corners' fan around their mean.
+/// The frontmost face under the pointer, by the triangle fan around its centroid.
 #[must_use]
 pub fn pick_face(positions: &[Vec3], topology: &Topology, view: &dyn View, pointer: Vec2) -> Option<u32> {
     let (origin, direction) = view.ray(pointer);
@@ -169,7 +169,7 @@ pub fn pick_face(positions: &[Vec3], topology: &Topology, view: &dyn View, point
     best.map(|(_, f)| f)
 }
 
-/// The point of a model under the pointer that is nearest to the eye: triangle and barycentric coordinates.
+/// The frontmost point of a model under the pointer: triangle and barycentric coordinates.
 #[must_use]
 pub fn pick_surface(
     positions: &[Vec3],
@@ -190,7 +190,7 @@ pub fn pick_surface(
     nearest.1
 }
 
-/// Vertices whose pixels lie in the rectangle between two corners, ascending; hidden ones too.
+/// Vertices whose pixels lie in the rectangle between two corners, ascending, including occluded ones.
 #[must_use]
 pub fn vertices_in_box(positions: &[Vec3], view: &dyn View, corners: [Vec2; 2]) -> Vec<u32> {
     let (low, high) = (corners[0].min(corners[1]), corners[0].max(corners[1]));
@@ -199,7 +199,7 @@ pub fn vertices_in_box(positions: &[Vec3], view: &dyn View, corners: [Vec2; 2]) 
     (0..positions.len() as u32).filter(|&i| inside(positions[i as usize])).collect()
 }
 
-/// Distance along a ray to a triangle, either side, and barycentric coordinates there (Möller and Trumbore 1997).
+/// Distance along a ray to a triangle of either orientation, and barycentric coordinates (Möller and Trumbore 1997).
 fn ray_meets_triangle(origin: Vec3, direction: Vec3, [a, b, c]: [Vec3; 3]) -> Option<(f32, [f32; 3])> {
     let (ab, ac) = (b - a, c - a);
     let p = direction.cross(ac);
@@ -226,28 +226,28 @@ mod tests {
     }
 
     #[test]
-    fn control_inside_is_taken_through_the_faces_before_it() {
-        // Seen along -z, the faces at the cube's vertex 0 are turned away or on edge.
+    fn inner_control_is_picked_through_faces() {
+        // Seen along -z, the faces at the cube's vertex 0 are back-facing or edge-on.
         let mut cube = cube();
         let topology = Topology::new(&cube.faces);
         cube.positions.push(Vec3::splat(0.5));
         let pick = |at, with_hidden| pick_vertex(&cube.positions, &topology, &Flat, at, 5.0, with_hidden);
         assert_eq!(pick(pixel(0.5, 0.5), false), Some(8));
         assert_eq!(pick(pixel(0.5, 0.5), true), Some(8));
-        // Beside a vertex in front of it the nearer to the pointer counts.
+        // Next to a vertex in front, the one nearer to the pointer is picked.
         cube.positions[8] = Vec3::new(0.97, 1.0, 0.5);
         let pick = |x| pick_vertex(&cube.positions, &topology, &Flat, pixel(x, 1.0), 5.0, false);
         assert_eq!((pick(0.975), pick(0.995)), (Some(8), Some(7)));
     }
 
     #[test]
-    fn middle_of_the_model_is_between_its_two_sides_and_beside_it_level_with_its_centre() {
+    fn picked_middle_is_midway_between_the_hits_or_nearest_to_the_centre() {
         let cube = cube();
         let triangles: Vec<[u32; 3]> =
             cube.faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
         let middle =
             |x, y| pick_middle(&cube.positions, &triangles, &Flat, pixel(x, y), Vec3::new(0.5, 0.5, 0.25));
-        // On a diagonal, whose two triangles are one hit, and off it.
+        // On a diagonal, where two triangles give one hit, and off it.
         for (x, y) in [(0.5, 0.5), (0.25, 0.75), (0.3, 0.8)] {
             assert!(middle(x, y).abs_diff_eq(Vec3::new(x, y, 0.5), 1e-5), "{}", middle(x, y));
         }
@@ -256,22 +256,22 @@ mod tests {
 
     #[test]
     fn vertex_in_front_hides_the_one_behind_it() {
-        // Cube: vertex x + 2 y + 4 z; 7 is in front of 3.
+        // Cube vertices are x + 2 y + 4 z; 7 is in front of 3.
         let cube = cube();
         let topology = Topology::new(&cube.faces);
         let at = pixel(1.0, 1.0) + Vec2::new(3.0, 4.0);
         assert_eq!(pick_vertex(&cube.positions, &topology, &Flat, at, 5.0, true), Some(7));
         assert_eq!(pick_vertex(&cube.positions, &topology, &Flat, at, 4.9, true), None);
-        // Of two at one depth the nearer to the pointer counts.
+        // At the same depth, the one nearer to the pointer is picked.
         let two = [Vec3::ZERO, Vec3::new(0.1, 0.0, 0.0)];
         let none = Topology::default();
         assert_eq!(pick_vertex(&two, &none, &Flat, pixel(0.06, 0.0), 20.0, true), Some(1));
     }
 
     #[test]
-    fn a_finger_takes_what_is_seen_before_what_is_hidden() {
-        // A thin plate whose back is smaller than its front: under a wide finger the back is as near as the front, and its corner
-        // is where the finger is.
+    fn front_vertices_are_picked_before_hidden_ones() {
+        // A thin plate with a back smaller than its front: within a wide finger's radius the back is about as near as
+        // the front, and its corner is at the finger.
         let mut plate = cube();
         for (i, p) in plate.positions.iter_mut().enumerate() {
             p.z *= 0.05;
@@ -285,7 +285,7 @@ mod tests {
         assert_eq!(
             pick_vertex(&plate.positions, &topology, &Flat, at, 1.0, true),
             Some(3),
-            "where nothing else is"
+            "if no front vertex is near"
         );
     }
 
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn box_takes_vertices_whichever_way_it_is_drawn() {
+    fn box_selection_is_independent_of_the_drag_direction() {
         let cube = cube();
         let corners = [pixel(0.5, 1.5), pixel(1.5, -0.5)];
         assert_eq!(vertices_in_box(&cube.positions, &Flat, corners), [1, 3, 5, 7]);

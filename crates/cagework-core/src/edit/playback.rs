@@ -1,9 +1,9 @@
-//! Poses: mixed by their shares, and one after the other as an animation.
+//! Blending of poses, and their playback as an animation.
 
 use glam::Vec3;
 use thiserror::Error;
 
-/// A pose of another cage.
+/// The pose has the wrong number of vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("the pose has {given} vertices, but the cage has {expected}: it belongs to another cage")]
 pub struct PoseError {
@@ -13,11 +13,11 @@ pub struct PoseError {
     pub expected: usize,
 }
 
-/// `rest + sum_k share_k (pose_k - rest)`: exact, because deformation is linear in the cage. A pose without a share
-/// counts as 0.
+/// Linear blend `rest + sum_k share_k (pose_k - rest)`; exact for the model, because deformation is linear in the cage.
+/// A missing share counts as 0.
 ///
 /// # Errors
-/// [`PoseError`] when a pose has not as many vertices as the cage.
+/// [`PoseError`] if a pose and the cage differ in their number of vertices.
 pub fn blend(rest: &[Vec3], poses: &[Vec<Vec3>], shares: &[f32]) -> Result<Vec<Vec3>, PoseError> {
     let mut mixed = rest.to_vec();
     for (k, pose) in poses.iter().enumerate() {
@@ -32,11 +32,11 @@ pub fn blend(rest: &[Vec3], poses: &[Vec<Vec3>], shares: &[f32]) -> Result<Vec<V
     Ok(mixed)
 }
 
-/// The positions `from`, whose blend had the shares `before`, with other shares: `from + sum_k (share_k - before_k) (pose_k -
-/// rest)`. What a hand has moved since the poses were blended stays where it is beside them. `[n_cage]`
+/// Changes the shares of a blend from `before` to `shares`: `from + sum_k (share_k - before_k) (pose_k - rest)`. Edits
+/// made after the blend are kept. `[n_cage]`
 ///
 /// # Errors
-/// [`PoseError`] when a pose has not as many vertices as the cage.
+/// [`PoseError`] if a pose and the cage differ in their number of vertices.
 pub fn reblend(
     rest: &[Vec3],
     poses: &[Vec<Vec3>],
@@ -50,11 +50,10 @@ pub fn reblend(
     Ok(from.iter().zip(&moved).zip(rest).map(|((&from, &moved), &rest)| from + (moved - rest)).collect())
 }
 
-/// A moment of the animation from rest through all poses back to rest, a second each, over and over: the same as an
-/// export plays. `[n_cage]`
+/// Looping animation from rest through all poses back to rest, one second each, at a time; exports play the same. `[n_cage]`
 ///
 /// # Errors
-/// [`PoseError`] when a pose has not as many vertices as the cage.
+/// [`PoseError`] if a pose and the cage differ in their number of vertices.
 pub fn moment(rest: &[Vec3], poses: &[Vec<Vec3>], seconds: f32) -> Result<Vec<Vec3>, PoseError> {
     let stops = poses.len() + 1;
     let time = seconds.rem_euclid(stops as f32);
@@ -85,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn other_shares_leave_what_a_hand_has_moved() {
+    fn reblending_keeps_manual_edits() {
         let rest = [Vec3::ONE];
         let poses = [vec![Vec3::new(3.0, 1.0, 1.0)], vec![Vec3::new(1.0, 5.0, 1.0)]];
         let by_hand = Vec3::new(0.0, 0.0, 0.25);

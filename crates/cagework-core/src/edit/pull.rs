@@ -1,33 +1,33 @@
-//! How much each vertex follows a gesture: the selection wholly, its surroundings in part, mirror images alike.
+//! Share of each vertex in a gesture: the selection, its surroundings by proportional editing, and mirror images.
 
 use glam::Vec3;
 
 use super::selection::Selection;
 use super::symmetry::{Symmetry, reflect};
 
-/// What moves along with the selection.
+/// Vertices that move with the selection.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SharedPull<'a> {
-    /// Proportional editing: vertices nearer than this to a selected one follow in part, object units; 0 for none.
+    /// Radius of proportional editing: vertices nearer than this to a selected one follow in part, object units; 0 for none.
     pub radius: f32,
-    /// Mirror images move alike.
+    /// Mirrors the movement to the other side.
     pub symmetry: Option<&'a Symmetry>,
 }
 
-/// Share of a gesture that each vertex follows, 0 to 1, and whose mirror image it follows.
+/// Share of a gesture that each vertex follows, 0 to 1, directly or as a mirror image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pull {
     share: Vec<f32>,
-    /// The vertex whose movement, mirrored, this one makes.
+    /// Vertex whose mirrored movement a vertex makes.
     mirrors: Vec<Option<u32>>,
-    /// On the plane: moves within it.
+    /// Whether a vertex lies on the mirror plane, in which it then moves.
     on_plane: Vec<bool>,
 }
 
 impl Pull {
     /// Shares for a selection at `positions`.
     ///
-    /// With symmetry, where both of a pair are selected, those on the side of the vertex selected last lead.
+    /// With symmetry, if both vertices of a pair are selected, the side of the vertex selected last leads.
     #[must_use]
     pub fn new(selection: &Selection, positions: &[Vec3], rest: &[Vec3], shared: SharedPull<'_>) -> Self {
         let n = positions.len();
@@ -49,7 +49,7 @@ impl Pull {
             for i in 0..n {
                 match symmetry.partner(i as u32) {
                     Some(p) if p as usize == i => pull.on_plane[i] = true,
-                    // The one that is pulled more leads; the other one does as it does.
+                    // The vertex with the larger share leads, the other one mirrors it.
                     Some(p) if own[p as usize] > own[i] => {
                         pull.share[i] = own[p as usize];
                         pull.mirrors[i] = Some(p);
@@ -67,7 +67,7 @@ impl Pull {
         self.share.iter().all(|&s| s == 0.0)
     }
 
-    /// Positions after every vertex has made its share of `moved(position, share)`.
+    /// Positions after moving every vertex to `moved(position, share)`, mirrored where necessary.
     #[must_use]
     pub fn apply(&self, start: &[Vec3], moved: &dyn Fn(Vec3, f32) -> Vec3) -> Vec<Vec3> {
         (0..start.len())
@@ -90,7 +90,7 @@ impl Pull {
     }
 }
 
-/// 1 for a leader, falling smoothly to 0 at `radius` from the nearest leader.
+/// Smoothstep from 1 at a leader to 0 at `radius` from the nearest leader.
 fn share(i: usize, leads: &[bool], positions: &[Vec3], radius: f32) -> f32 {
     if leads[i] {
         return 1.0;
@@ -116,7 +116,7 @@ mod tests {
         selection
     }
 
-    /// Moves by `(1, 2, 3)` times the share.
+    /// Translates by `(1, 2, 3)` times the share.
     fn shifted(p: Vec3, share: f32) -> Vec3 {
         p + share * Vec3::new(1.0, 2.0, 3.0)
     }
@@ -125,7 +125,7 @@ mod tests {
     fn share_falls_smoothly_with_the_distance() {
         let line: Vec<Vec3> = (0..5).map(|k| k as f32 * Vec3::X).collect();
         let pull = Pull::new(&selection(5, &[0]), &line, &line, SharedPull { radius: 4.0, symmetry: None });
-        // Smoothstep at 1, 3/4, 1/2, 1/4, 0.
+        // Smoothstep at 1, 3/4, 1/2, 1/4 and 0.
         assert_eq!(pull.share, [1.0, 0.84375, 0.5, 0.15625, 0.0]);
         let alone = Pull::new(&selection(5, &[0]), &line, &line, SharedPull::default());
         assert_eq!(alone.share, [1.0, 0.0, 0.0, 0.0, 0.0]);
@@ -133,11 +133,11 @@ mod tests {
     }
 
     #[test]
-    fn mirror_image_moves_alike() {
+    fn mirror_image_moves_symmetrically() {
         let rest = cuboid(Vec3::NEG_ONE, Vec3::ONE).positions;
         let symmetry = Symmetry::new(&rest);
         let shared = SharedPull { radius: 0.0, symmetry: Some(&symmetry) };
-        // One of a pair, or both with vertex 1 selected last: vertex 1 leads, 0 follows.
+        // One vertex of a pair, or both with vertex 1 selected last: vertex 1 leads, 0 mirrors it.
         for vertices in [&[1][..], &[0, 1]] {
             let moved = Pull::new(&selection(8, vertices), &rest, &rest, shared).apply(&rest, &shifted);
             assert_eq!(moved[1], rest[1] + Vec3::new(1.0, 2.0, 3.0));

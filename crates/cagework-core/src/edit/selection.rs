@@ -1,34 +1,34 @@
-//! Which cage vertices are selected.
+//! Selection of cage vertices.
 
 use glam::Vec3;
 
 use super::pick::Topology;
 
-/// How new vertices join those that are selected.
+/// How a set of vertices changes the selection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum SelectMode {
-    /// Only the new ones.
+    /// Selects only the set.
     #[default]
     Replace,
-    /// Both.
+    /// Adds the set.
     Add,
-    /// The old ones without the new ones.
+    /// Removes the set.
     Remove,
-    /// If all new ones are selected they are removed, else added.
+    /// Removes the set if all of it is selected, otherwise adds it.
     Toggle,
 }
 
-/// What turns and scales go about.
+/// Centre of rotation and scaling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[cfg_attr(feature = "typescript", derive(ts_rs::TS))]
 pub enum Pivot {
-    /// The middle of the selection.
+    /// Mean of the selection.
     #[default]
     Middle,
-    /// The middle of those selected vertices that an edge joins with others: a knee turns about it.
+    /// Mean of the selected vertices that share an edge with unselected ones, such as a knee for a lower leg.
     Border,
     /// The vertex selected last.
     Last,
@@ -42,7 +42,7 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Nothing of a cage of `n_cage` vertices.
+    /// Empty selection in a cage of `n_cage` vertices.
     #[must_use]
     pub fn new(n_cage: usize) -> Self {
         Self { selected: vec![false; n_cage], last: None }
@@ -66,13 +66,13 @@ impl Selection {
         !self.selected.contains(&true)
     }
 
-    /// The vertex that was selected last and still is.
+    /// The vertex selected last, if it still is.
     #[must_use]
     pub fn last(&self) -> Option<u32> {
         self.last.filter(|&v| self.contains(v))
     }
 
-    /// Changes the selection; vertices that the cage does not have are ignored.
+    /// Changes the selection by a set of vertices; ignores invalid indices.
     pub fn change(&mut self, vertices: &[u32], mode: SelectMode) {
         let known = |i: &&u32| (**i as usize) < self.selected.len();
         let vertices: Vec<u32> = vertices.iter().filter(known).copied().collect();
@@ -96,7 +96,7 @@ impl Selection {
         }
     }
 
-    /// Selects everything.
+    /// Selects all vertices.
     pub fn all(&mut self) {
         self.selected.fill(true);
         if self.last.is_none() {
@@ -104,9 +104,9 @@ impl Selection {
         }
     }
 
-    /// Extends the selection to the whole connected parts it touches.
+    /// Extends the selection to whole connected parts.
     pub fn linked(&mut self, topology: &Topology) {
-        // Passes over all edges until nothing changes: a cage has a few hundred.
+        // Iterate over all edges to a fixed point: a cage has a few hundred.
         loop {
             let mut changed = false;
             for [a, b] in topology.edges.iter().map(|e| e.map(|i| i as usize)) {
@@ -142,7 +142,7 @@ impl Selection {
         (!vertices.is_empty()).then(|| sum / vertices.len() as f32)
     }
 
-    /// What turns and scales go about. A selection without a border has its middle instead.
+    /// Position of a pivot. A selection without border uses its mean.
     #[must_use]
     pub fn pivot(&self, positions: &[Vec3], topology: &Topology, pivot: Pivot) -> Option<Vec3> {
         let only = |vertices: &[u32]| {
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn linked_takes_the_whole_part_and_no_other() {
+    fn linked_selects_exactly_the_connected_part() {
         let mut two = cube();
         two.positions.extend(cube().positions);
         two.faces.extend(cube().faces.iter().map(|f| f.iter().map(|i| i + 8).collect()));
@@ -211,13 +211,13 @@ mod tests {
     }
 
     #[test]
-    fn pivots_are_the_middle_the_border_and_the_last() {
+    fn pivots_are_mean_border_and_last_vertex() {
         let cube = cube();
         let topology = Topology::new(&cube.faces);
         let mut selection = Selection::new(8);
         let pivot = |s: &Selection, pivot| s.pivot(&cube.positions, &topology, pivot);
         assert_eq!(pivot(&selection, Pivot::Border), None);
-        // One corner is left out: its three neighbours are the border.
+        // All but one corner: its three neighbours are the border.
         selection.all();
         selection.change(&[0], SelectMode::Remove);
         let neighbours: Vec<u32> =

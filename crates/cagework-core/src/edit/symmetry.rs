@@ -4,10 +4,10 @@ use glam::Vec3;
 
 use crate::mesh::Bounds;
 
-/// A vertex's mirror image may be off by this fraction of the diagonal: modellers snap to a grid, exporters round.
-const TOLERANCE: f32 = 2e-3;
+/// Tolerance of mirror images over the diagonal: covers grid snapping and rounding by exporters.
+const IMAGE_TOLERANCE: f32 = 2e-3;
 
-/// Which vertices of a cage are mirror images of each other in the rest pose.
+/// Pairs of mirror-symmetric vertices of a cage in its rest pose.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Symmetry {
     plane: f32,
@@ -15,11 +15,11 @@ pub struct Symmetry {
 }
 
 impl Symmetry {
-    /// Pairs the vertices of a rest cage. The plane is x = 0 or the middle of the bounds, whichever pairs more.
+    /// Pairs the vertices of a rest cage. The plane is x = 0 or x at the centre of the bounds, whichever gives more pairs.
     #[must_use]
     pub fn new(rest: &[Vec3]) -> Self {
         let Some(bounds) = Bounds::of(rest) else { return Self::default() };
-        let tolerance = TOLERANCE * bounds.diagonal();
+        let tolerance = IMAGE_TOLERANCE * bounds.diagonal();
         let [origin, middle] = [0.0, bounds.center().x].map(|plane| Self::about(rest, plane, tolerance));
         let pairs = |s: &Self| s.partner.iter().flatten().count();
         if pairs(&middle) > pairs(&origin) { middle } else { origin }
@@ -33,20 +33,20 @@ impl Symmetry {
             (distance <= tolerance).then_some(j)
         };
         let nearest: Vec<Option<usize>> = (0..rest.len()).map(nearest).collect();
-        // Two that choose each other are a pair.
+        // Vertices are a pair if each is the other's nearest image.
         let partner = (0..rest.len())
             .map(|i| nearest[i].filter(|&j| nearest[j] == Some(i)).map(|j| j as u32))
             .collect();
         Self { plane, partner }
     }
 
-    /// The plane's x, object units.
+    /// x of the mirror plane, object units.
     #[must_use]
     pub fn plane(&self) -> f32 {
         self.plane
     }
 
-    /// A vertex's mirror image: itself on the plane, nothing if it has none.
+    /// Mirror image of a vertex: the vertex itself on the plane, `None` without an image.
     #[must_use]
     pub fn partner(&self, vertex: u32) -> Option<u32> {
         self.partner.get(vertex as usize).copied().flatten()
@@ -65,12 +65,11 @@ impl Symmetry {
     }
 }
 
-/// Mirror image of a point.
 fn reflect_point(p: Vec3, plane: f32) -> Vec3 {
     Vec3::new(2.0 * plane - p.x, p.y, p.z)
 }
 
-/// Mirror image of a movement.
+/// Mirror image of a displacement.
 pub(crate) fn reflect(d: Vec3) -> Vec3 {
     Vec3::new(-d.x, d.y, d.z)
 }
@@ -86,13 +85,13 @@ mod tests {
             let rest = cuboid(Vec3::new(min_x, 0.0, 0.0), Vec3::new(min_x + 2.0, 1.0, 1.0)).positions;
             let symmetry = Symmetry::new(&rest);
             assert!(symmetry.is_complete() && (symmetry.plane() - (min_x + 1.0)).abs() < 1e-6);
-            // Vertex x + 2 y + 4 z: its mirror image differs in the lowest bit.
+            // Vertices are x + 2 y + 4 z: mirror images differ in the lowest bit.
             assert!((0..8).all(|i| symmetry.partner(i) == Some(i ^ 1)));
         }
     }
 
     #[test]
-    fn vertex_on_the_plane_is_its_own_image_and_a_lone_one_has_none() {
+    fn vertex_on_the_plane_is_its_own_image_and_unpaired_ones_have_none() {
         let rest = [Vec3::NEG_X, Vec3::X, Vec3::Y, Vec3::new(0.4, 0.0, 1.0)];
         let symmetry = Symmetry::new(&rest);
         assert_eq!(symmetry.partner(2), Some(2));
@@ -101,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn image_may_be_a_little_off() {
+    fn mirror_images_are_matched_within_a_tolerance() {
         let mut rest = cube().positions;
         rest[1].y += 1e-3;
         assert!(Symmetry::new(&rest).is_complete());

@@ -1,18 +1,18 @@
-//! What editing must know of the camera.
+//! Interface of the camera that editing needs.
 
 use glam::{Vec2, Vec3};
 
-/// A way to look at the world; cameras implement it.
+/// A camera.
 pub trait View {
-    /// Pixel of a point of the world, and its distance from the eye along the view; nothing if it lies behind the eye.
+    /// Pixel of a point, and its depth along the view direction; `None` behind the eye.
     fn project(&self, point: Vec3) -> Option<(Vec2, f32)>;
-    /// Origin and unit direction of the half line behind a pixel.
+    /// Origin and unit direction of the ray through a pixel.
     fn ray(&self, pixel: Vec2) -> (Vec3, Vec3);
     /// Size of a pixel at a point, object units.
     fn units_per_pixel(&self, point: Vec3) -> f32;
-    /// Unit vector to the right of the picture.
+    /// Unit vector to the right of the screen.
     fn right(&self) -> Vec3;
-    /// Unit vector to the top of the picture.
+    /// Unit vector to the top of the screen.
     fn up(&self) -> Vec3;
 
     /// Unit vector towards the eye.
@@ -20,7 +20,7 @@ pub trait View {
         self.right().cross(self.up())
     }
 
-    /// Movement at `point` that follows the pointer by `delta` pixels, in the plane that faces the eye.
+    /// Displacement at `point`, parallel to the screen, for a pointer movement of `delta` pixels.
     fn in_view_plane(&self, point: Vec3, delta: Vec2) -> Vec3 {
         self.units_per_pixel(point) * (delta.x * self.right() - delta.y * self.up())
     }
@@ -30,7 +30,7 @@ pub trait View {
 pub(crate) mod tests {
     use super::*;
 
-    /// Looks along -z, 100 pixels a unit, the origin at pixel (200, 100).
+    /// Orthographic view along -z, 100 pixels per unit, with the origin at pixel (200, 100).
     pub(crate) struct Flat;
 
     impl View for Flat {

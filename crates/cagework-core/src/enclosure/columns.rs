@@ -1,26 +1,26 @@
-//! Winding numbers of many points: by the faces that a line upwards along z crosses.
+//! Winding numbers of many points by counting crossings of a vertical ray (along z) with the surface.
 //!
-//! A closed surface winds around a point as often as a line from it to infinity leaves the surface more than it enters.
-//! Faces are sorted into columns, so that each line meets few. A line that passes an edge, or a point that lies on a
-//! face, as nearly as rounding could matter, is left to [`super::winding_number`].
+//! The winding number is the number of crossings at which the ray leaves the closed surface minus those at which it
+//! enters. Faces are sorted into columns, so that each ray tests few. If rounding could matter, because the ray passes
+//! near an edge or the point lies near a face, the result is left to [`super::winding_number`].
 
 use glam::{DVec2, DVec3};
 
-/// What counts as near: 1e7 times the rounding of f64, over the surface's extent (an area: over its square).
-const NEAR: f64 = 1e-9;
+/// Tolerance over the surface's extent (for areas, over its square): 1e7 times f64 rounding.
+const TOLERANCE: f64 = 1e-9;
 
-/// Columns along x and along y are at most so many: a table of them stays in the cache.
-const MOST_COLUMNS: f64 = 64.0;
+/// Most columns along x and along y: the table stays in the cache.
+const MAX_COLUMNS: f64 = 64.0;
 
-/// Faces of a closed surface by columns along z.
+/// Faces of a closed surface, sorted into columns along z.
 pub(super) struct Columns<'a> {
     triangles: &'a [[DVec3; 3]],
-    /// Corner of the first column, and columns for each unit of length.
+    /// Corner of the first column, and columns per unit of length.
     low: DVec2,
     per_unit: DVec2,
     side: usize,
     extent: f64,
-    /// Numbers of the triangles over each column. `[side * side]`
+    /// Triangles over each column. `[side * side]`
     over: Vec<Vec<u32>>,
 }
 
@@ -33,14 +33,14 @@ impl<'a> Columns<'a> {
         let extent = (all().fold(DVec3::NEG_INFINITY, |a, p| a.max(*p))
             - all().fold(DVec3::INFINITY, |a, p| a.min(*p)))
         .length();
-        let side = (2.0 * (triangles.len() as f64).sqrt()).clamp(1.0, MOST_COLUMNS).floor();
+        let side = (2.0 * (triangles.len() as f64).sqrt()).clamp(1.0, MAX_COLUMNS).floor();
         let per_unit = DVec2::splat(side) / (high - low).max(DVec2::splat(f64::MIN_POSITIVE));
         let side = side as usize;
         let mut columns =
             Self { triangles, low, per_unit, side, extent, over: vec![Vec::new(); side * side] };
         for (number, triangle) in (0u32..).zip(triangles) {
             let corners = triangle.map(DVec3::truncate);
-            let near = DVec2::splat(NEAR * extent);
+            let near = DVec2::splat(TOLERANCE * extent);
             let [first, last] = [
                 columns.column(corners[0].min(corners[1]).min(corners[2]) - near),
                 columns.column(corners[0].max(corners[1]).max(corners[2]) + near),
@@ -54,13 +54,13 @@ impl<'a> Columns<'a> {
         columns
     }
 
-    /// The column of a point; the outermost one beyond them.
+    /// Column of a point, clamped to the outermost ones.
     fn column(&self, p: DVec2) -> [usize; 2] {
         let last = (self.side - 1) as f64;
         ((p - self.low) * self.per_unit).clamp(DVec2::ZERO, DVec2::splat(last)).to_array().map(|x| x as usize)
     }
 
-    /// How often the surface winds around a point; nothing where rounding might matter.
+    /// Winding number of a point; `None` if rounding could matter.
     pub(super) fn winding_number(&self, point: DVec3) -> Option<f64> {
         let p = point.truncate();
         let [x, y] = self.column(p);
@@ -68,14 +68,14 @@ impl<'a> Columns<'a> {
         for &number in &self.over[y * self.side + x] {
             let corners = self.triangles[number as usize];
             let [a, b, c] = corners.map(|q| q.truncate() - p);
-            // Twice the areas of the point with each side.
+            // Doubled areas of the triangles of the point and each side.
             let areas = [b.perp_dot(c), c.perp_dot(a), a.perp_dot(b)];
-            let near = NEAR * self.extent * self.extent;
+            let near = TOLERANCE * self.extent * self.extent;
             if areas.iter().any(|&area| area > near) && areas.iter().any(|&area| area < -near) {
                 continue;
             }
             if areas.iter().any(|area| area.abs() <= near) {
-                let distance = NEAR * self.extent;
+                let distance = TOLERANCE * self.extent;
                 let is_beside = a.min(b).min(c).cmpgt(DVec2::splat(distance)).any()
                     || a.max(b).max(c).cmplt(DVec2::splat(-distance)).any();
                 if is_beside {
@@ -85,7 +85,7 @@ impl<'a> Columns<'a> {
             }
             let total: f64 = areas.iter().sum();
             let height: f64 = areas.iter().zip(corners).map(|(area, q)| area * q.z).sum::<f64>() / total;
-            if (height - point.z).abs() <= NEAR * self.extent {
+            if (height - point.z).abs() <= TOLERANCE * self.extent {
                 return None;
             }
             if height > point.z {

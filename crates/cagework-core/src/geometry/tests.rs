@@ -1,4 +1,4 @@
-//! The geometry against other ways to the same answer.
+//! Comparison with independent computations.
 
 use proptest::prelude::*;
 
@@ -6,19 +6,19 @@ use super::*;
 use crate::cage::Cage;
 use crate::cage::shapes;
 
-/// Rounding of f64 in coordinates of size 1 to 4.
+/// f64 rounding of coordinates of size 1 to 4.
 const ROUNDING: f64 = 1e-13;
 
 fn point() -> impl Strategy<Value = DVec3> {
     [-2.0..2.0f64, -2.0..2.0, -2.0..2.0].prop_map(DVec3::from)
 }
 
-/// Points on a coarse lattice: coincident corners, collinear triangles and exact touching are frequent.
+/// Points on a coarse lattice, so that coincident corners, collinear triangles and exact touching are frequent.
 fn lattice_point() -> impl Strategy<Value = DVec3> {
     [-2..=2i32, -2..=2, -2..=2].prop_map(|p| glam::IVec3::from(p).as_dvec3() * 0.5)
 }
 
-/// The part of the triangle in the box, by clipping it with each of the six planes (Sutherland, Hodgman 1974).
+/// Intersection of triangle and box, by clipping with each of the six planes (Sutherland and Hodgman 1974).
 fn clipped(half: DVec3, triangle: [DVec3; 3]) -> Vec<DVec3> {
     let mut polygon = triangle.to_vec();
     for axis in 0..3 {
@@ -44,7 +44,7 @@ fn assert_closest(p: DVec3, triangle: [DVec3; 3]) {
     let closest = closest_point_on_triangle(p, triangle);
     let [u, v, w] = closest.barycentric;
     assert!(u >= 0.0 && v >= 0.0 && w >= 0.0 && (u + v + w - 1.0).abs() <= ROUNDING);
-    // A point of a convex set is the closest if no corner lies further along the way to `p`.
+    // In a convex set, a point is closest to `p` if no corner lies further in the direction of `p`.
     let way = p - closest.point;
     for corner in triangle {
         assert!((corner - closest.point).dot(way) <= 10.0 * ROUNDING, "{corner} is closer than {closest:?}");
@@ -53,18 +53,18 @@ fn assert_closest(p: DVec3, triangle: [DVec3; 3]) {
 
 proptest! {
     #[test]
-    fn closest_point_is_the_closest(p in point(), triangle in [point(), point(), point()]) {
+    fn closest_point_is_optimal(p in point(), triangle in [point(), point(), point()]) {
         assert_closest(p, triangle);
     }
 
     #[test]
-    fn closest_point_of_degenerate_triangles_is_the_closest(
+    fn closest_point_of_degenerate_triangles_is_optimal(
         p in point(), a in lattice_point(), b in lattice_point(), t in 0..=4i32,
     ) {
         let c = a.lerp(b, f64::from(t) / 4.0);
         for triangle in [[a, b, c], [c, a, b], [b, c, a], [a, a, b], [a, b, b], [a, a, a]] {
             let closest = closest_point_on_triangle(p, triangle);
-            // The closest point of the segment that the triangle is.
+            // Closest point of the segment to which the triangle degenerates.
             let [q, r] = if triangle.contains(&b) { [a, b] } else { [a, a] };
             let along = if q == r { 0.0 } else { ((p - q).dot(r - q) / (r - q).length_squared()).clamp(0.0, 1.0) };
             let distance = p.distance(q.lerp(r, along));
@@ -89,7 +89,7 @@ proptest! {
 }
 
 #[test]
-fn winding_number_tells_inside_from_outside() {
+fn winding_number_separates_inside_from_outside() {
     let cage = Cage::new(&shapes::l_shape()).unwrap();
     let at = |p: [f64; 3]| {
         let triangles = (0..cage.triangles().len() as u32).map(|t| cage.triangle_corners(t));
@@ -100,7 +100,7 @@ fn winding_number_tells_inside_from_outside() {
         ([1.9, 0.9, 0.1], 1.0),
         ([1.5, 1.5, 0.5], 0.0),
         ([3.0, 0.5, 0.5], 0.0),
-        // On a face half of all directions lead inside, on a convex edge a quarter, on a corner an eighth.
+        // Share of directions that lead inside: half on a face, a quarter on a convex edge, an eighth at a corner.
         ([0.5, 0.5, 0.0], 0.5),
         ([0.0, 0.5, 0.0], 0.25),
         ([0.0, 0.0, 0.0], 0.125),

@@ -1,11 +1,11 @@
-//! Builds a level: rows first, then the stencils line by line.
+//! Builds a level: numbers the rows, then builds stencils line by line.
 
 use crate::grid::{Grid, NO_CELL};
 use crate::team::map_indices;
 
 use super::{Boundary, BoundaryTerm, Colour, CutCell, Level, Run};
 
-/// Planes that a thread takes at a time: cells next to the cage, which cost most, are not spread evenly.
+/// Planes per task: small, because the expensive cells next to the cage are unevenly distributed.
 const SLAB: u32 = 8;
 
 impl Level {
@@ -29,7 +29,6 @@ impl Level {
         level
     }
 
-    /// Takes over the planes' stencils, in order.
     fn join(&mut self, slabs: Vec<Slab>) {
         let mut terms = [Vec::new(), Vec::new()];
         for (k, colour) in self.colours.iter_mut().enumerate() {
@@ -58,7 +57,7 @@ impl Level {
         self.boundary.extend(renumbered);
     }
 
-    /// Adds the runs and cut cells of the line (y, z).
+    /// Appends the runs and cut cells of the line (y, z).
     fn add_line(&self, boundary: &dyn Boundary, [y, z]: [u32; 2], slab: &mut Slab) {
         let [nx, ny, nz] = self.grid.dims;
         let line = self.grid.index([0, y, z]);
@@ -111,10 +110,10 @@ impl Level {
     }
 }
 
-/// Stencils of some planes, numbered from 0: what one thread makes.
+/// Stencils of some planes, built by one thread; cut cells are numbered from 0.
 #[derive(Default)]
 struct Slab {
-    /// `n_cells` is not known here.
+    /// Without `n_cells`.
     colours: [Colour; 2],
     terms: [Vec<BoundaryTerm>; 2],
 }
@@ -136,8 +135,8 @@ impl Run {
     }
 }
 
-/// Gives the unknowns their rows: red ones from 0, black ones after the red ones' zero row. A cell whose arms all lead
-/// nowhere is left out. Stencils are still missing.
+/// Assigns rows to the unknowns: red from 0, black after the red zero row. Omits cells without any arm. The level has
+/// no stencils yet.
 fn number_cells(boundary: &dyn Boundary) -> Level {
     let grid = boundary.grid();
     let [nx, ny, _] = grid.dims;
@@ -156,7 +155,7 @@ fn number_cells(boundary: &dyn Boundary) -> Level {
             if !unknowns[x] {
                 continue;
             }
-            // Most have one beside them.
+            // Fast path: most cells have an unknown next to them.
             if unknowns.get(x + 1) == Some(&true) || is_connected(cell, first + x) {
                 let n = &mut n_cells[Grid::colour(cell)];
                 *row = *n;
@@ -166,7 +165,7 @@ fn number_cells(boundary: &dyn Boundary) -> Level {
             }
         }
     }
-    // Black cells were numbered from 0 too.
+    // Black cells were numbered from 0: add their offset.
     let first_black = n_cells[0] + 1;
     for (line, rows) in row_of.chunks_exact_mut(nx as usize).enumerate() {
         let black = 1 - (line as u32 % ny + line as u32 / ny) as usize % 2;
@@ -178,7 +177,7 @@ fn number_cells(boundary: &dyn Boundary) -> Level {
     Level { grid, colours, boundary: Vec::new(), row_of, isolated }
 }
 
-/// Adds the Dirichlet terms of a cell's cut arms, columns ascending; returns the sum of the arms' weights.
+/// Adds the Dirichlet terms of a cell's cut arms, columns ascending. Returns the sum of the arms' weights.
 fn add_terms(
     boundary: &dyn Boundary,
     cell: [u32; 3],

@@ -1,4 +1,4 @@
-//! Stencils in the plainest form, straight from the boundary's definition: what runs and tables are compared with.
+//! Reference stencils, computed directly from the boundary, for comparison with runs and tables.
 
 use glam::{DQuat, DVec3};
 
@@ -8,18 +8,18 @@ use crate::solve::hierarchy::Hierarchy;
 use crate::solve::rows::{LANES, Row};
 use crate::voxelize::embedded::{EmbeddedCells, Embedding};
 
-/// One unknown: `diagonal * u = sum of neighbours + sum of hats`.
+/// The equation of an unknown: `diagonal * u = sum of neighbours + sum of hats`.
 pub(crate) struct PlainCell {
     pub(crate) cell: [u32; 3],
     pub(crate) row: u32,
     /// Rows of the neighbours reached without crossing the cage.
     pub(crate) neighbours: Vec<u32>,
-    /// (column, hat value times the arm's weight)
+    /// `(column, hat value times arm weight)`
     pub(crate) hats: Vec<(u32, f64)>,
     pub(crate) diagonal: f64,
 }
 
-/// All unknowns of a level, in grid order.
+/// Equations of all unknowns of a level, in grid order.
 pub(crate) fn cells(level: &Level, boundary: &dyn Boundary) -> Vec<PlainCell> {
     let row = |cell| level.row_of[level.grid.index(cell)];
     let unknowns = level.grid.cells().filter(|&cell| row(cell) != NO_CELL);
@@ -43,7 +43,7 @@ pub(crate) fn cells(level: &Level, boundary: &dyn Boundary) -> Vec<PlainCell> {
         .collect()
 }
 
-/// A C that lies askew in a grid of odd dimensions.
+/// A rotated C-shape in a grid of odd dimensions.
 pub(crate) fn askew_c() -> (Cage, Grid) {
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, 0.3, -0.6);
     let mut mesh = shapes::c_shape();
@@ -70,7 +70,7 @@ pub(crate) fn hierarchy() -> Hierarchy {
     Hierarchy::new(&Embedding::new(&cage, &grid, true).boundaries((&cage).into()), cage.n_vertices())
 }
 
-/// A field of numbers without order in [0, 1), and its zero rows.
+/// A field of pseudo-random numbers in [0, 1), with zero rows.
 pub(crate) fn some_field(level: &Level, seed: u32) -> Vec<Row> {
     let zero = level.zero_row() as usize;
     (0..level.n_rows())
@@ -84,7 +84,7 @@ pub(crate) fn some_field(level: &Level, seed: u32) -> Vec<Row> {
         .collect()
 }
 
-/// Coordinates of a cell's centre and 1, the functions that the operator must reproduce.
+/// x, y, z and 1 at a cell's centre: functions that the operator must reproduce.
 pub(crate) fn linear(center: DVec3) -> [f64; 4] {
     [center.x, center.y, center.z, 1.0]
 }

@@ -1,12 +1,12 @@
-//! Runs, cut cells and boundary terms say what the boundary's definition says.
+//! Runs, cut cells and boundary terms agree with the boundary's definition.
 
 use super::plain::{cells, linear, on_two_levels};
 use super::*;
 
-/// f32 rounding of sums of at most six arms' weights up to 1,000, relative to the diagonal.
-const ROUNDED: f64 = 1e-6;
+/// f32 rounding of sums of at most six arm weights up to 1,000, relative to the diagonal.
+const ROUNDING: f64 = 1e-6;
 
-/// Neighbours of each row, by runs and cut cells, `NO_CELL`-free; and each row's diagonal.
+/// Neighbours (unknowns only) and diagonal of each row, from runs and cut cells.
 fn tables(level: &Level) -> Vec<(u32, Vec<u32>, f64)> {
     let mut all = Vec::new();
     for (number, colour) in level.colours.iter().enumerate() {
@@ -35,7 +35,7 @@ fn every_unknown_is_in_one_run_or_one_cut_cell() {
         let mut expected: Vec<u32> = level.row_of.iter().copied().filter(|&r| r != NO_CELL).collect();
         expected.sort_unstable();
         assert_eq!(rows, expected);
-        assert!(level.colours.iter().all(|c| !c.runs.is_empty() && !c.cut.is_empty()), "both are tested");
+        assert!(level.colours.iter().all(|c| !c.runs.is_empty() && !c.cut.is_empty()), "both kinds occur");
         assert!(rows.windows(2).all(|w| w[0] < w[1]));
         assert!(!rows.contains(&level.zero_row()) && !rows.contains(&(level.n_rows() as u32 - 1)));
     });
@@ -63,7 +63,7 @@ fn planes_list_their_own_cells() {
 }
 
 #[test]
-fn tables_hold_the_boundarys_neighbours_and_diagonals() {
+fn tables_have_the_neighbours_and_diagonals_of_the_boundary() {
     on_two_levels(|_, level, boundary| {
         let mut tables = tables(level);
         tables.sort_by_key(|(row, ..)| *row);
@@ -74,7 +74,11 @@ fn tables_hold_the_boundarys_neighbours_and_diagonals() {
             neighbours.sort_unstable();
             plain.neighbours.sort_unstable();
             assert_eq!((row, neighbours), (plain.row, plain.neighbours));
-            assert!((diagonal - plain.diagonal).abs() <= ROUNDED * diagonal, "{diagonal} {}", plain.diagonal);
+            assert!(
+                (diagonal - plain.diagonal).abs() <= ROUNDING * diagonal,
+                "{diagonal} {}",
+                plain.diagonal
+            );
         }
     });
 }
@@ -91,8 +95,8 @@ fn neighbours_are_mutual() {
     });
 }
 
-/// Constants and linear functions are solutions: their hat values sum to themselves on the cage, and difference
-/// quotients of a linear function agree on both sides of a centre.
+/// Constants and linear functions are solutions: hats reproduce them on the cage, and their difference quotients agree
+/// on both sides of a centre.
 #[test]
 fn operator_annihilates_linear_functions() {
     on_two_levels(|cage, level, _| {
@@ -118,7 +122,7 @@ fn operator_annihilates_linear_functions() {
             for f in 0..4 {
                 let around: f64 = neighbours.iter().map(|&n| values[n as usize][f]).sum();
                 let residual = around + cut.map_or(0.0, |c| hats[c][f]) - diagonal * values[row as usize][f];
-                assert!(residual.abs() <= 2.0 * ROUNDED * diagonal, "function {f}, row {row}: {residual}");
+                assert!(residual.abs() <= 2.0 * ROUNDING * diagonal, "function {f}, row {row}: {residual}");
             }
         }
     });
@@ -128,6 +132,6 @@ fn operator_annihilates_linear_functions() {
 fn boundary_terms_ascend_by_cell_and_column() {
     on_two_levels(|_, level, _| {
         let keys: Vec<(u32, u32)> = level.boundary.iter().map(|t| (t.cut_cell, t.column)).collect();
-        assert!(keys.windows(2).all(|w| w[0] < w[1]), "sorted, and no column twice in a cell");
+        assert!(keys.windows(2).all(|w| w[0] < w[1]), "sorted, each column once per cell");
     });
 }

@@ -1,8 +1,8 @@
-//! Editing the rest cage: each operation takes a mesh and returns a new one, or says in words why it would break it.
+//! Editing of the rest cage: each operation takes a mesh and returns a new one, or an error if the result would be invalid.
 //!
-//! Nothing is changed in place, so a page undoes by keeping the meshes. Every result is a cage ([`Cage::new`] takes it
-//! without turning a face) and goes through itself nowhere that it did not before. Vertices keep their order;
-//! [`Edited::vertex_of`] says where each went, so that a selection or a pose can follow.
+//! Nothing changes in place, so callers implement undo by keeping the meshes. Every result is a cage ([`Cage::new`]
+//! accepts it without flipping a face) with no more self-intersections than the input. Vertices keep their order;
+//! [`Edited::vertex_of`] maps old to new indices for selections and poses.
 
 mod operations;
 #[cfg(test)]
@@ -17,68 +17,68 @@ use crate::mesh::PolygonMesh;
 
 pub use operations::{collapse_edge, delete_faces, extrude_face, move_vertices, split_edge};
 
-/// An edited cage.
+/// Result of an edit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Edited {
     /// The new mesh.
     pub mesh: PolygonMesh,
-    /// For every old vertex the new one that stands for it; none if it is gone. `[n_old]`
+    /// New index of every old vertex; `None` if it was removed. `[n_old]`
     pub vertex_of: Vec<Option<u32>>,
-    /// Vertices that the operation made or moved: what one would select next.
+    /// New or moved vertices, to be selected next.
     pub touched: Vec<u32>,
 }
 
-/// Why an operation was refused.
+/// Why an edit is not possible.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum RestEditError {
-    /// There is no such vertex, edge or face.
+    /// The vertex, edge or face does not exist.
     #[error("the cage has no {what}")]
     Missing {
         /// `vertex 12`, `edge 3-4`, `face 7`.
         what: String,
     },
-    /// A number is not one.
+    /// A value is not finite.
     #[error("{what} is not a finite number")]
     NotFinite {
-        /// What.
+        /// The quantity.
         what: &'static str,
     },
-    /// The result would not be a cage.
+    /// The result would not be a valid cage.
     #[error("{operation} here would break the cage: {source}")]
     Breaks {
         /// `moving`, `splitting`, ...
         operation: &'static str,
-        /// What would be wrong; vertices and faces are those of the result.
+        /// The fault; indices are those of the result.
         source: CageError,
     },
-    /// The result would be inside out.
+    /// The result would be inverted.
     #[error("{operation} here would turn the cage inside out")]
     InsideOut {
         /// `moving`, `splitting`, ...
         operation: &'static str,
     },
-    /// The result would go through itself.
-    #[error("{operation} here would make the cage go through itself: faces {first} and {second} would meet")]
+    /// The result would intersect itself.
+    #[error("{operation} here would make the cage intersect itself: faces {first} and {second} would meet")]
     Meets {
         /// `moving`, `splitting`, ...
         operation: &'static str,
         /// A face of the result.
         first: u32,
-        /// The face that it would meet.
+        /// The face that it intersects.
         second: u32,
     },
-    /// The hole cannot be closed.
+    /// The hole has too many edges.
     #[error("the hole would have {edges} edges, more than 64: delete fewer faces at a time")]
     LargeHole {
-        /// Its edges.
+        /// Number of its edges.
         edges: usize,
     },
-    /// Nothing would be left.
-    #[error("deleting these faces would leave nothing of the cage")]
+    /// No face would be left.
+    #[error("these are all faces of the cage: keep at least one")]
     NothingLeft,
 }
 
-/// Checks a result against what it was made from.
+/// Checks a result against the mesh before the edit.
 fn finish(operation: &'static str, before: &PolygonMesh, edited: Edited) -> Result<Edited, RestEditError> {
     let cage = Cage::new(&edited.mesh).map_err(|source| RestEditError::Breaks { operation, source })?;
     let was_turned = Cage::new(before).is_ok_and(|c| is_turned(&c));
@@ -86,7 +86,7 @@ fn finish(operation: &'static str, before: &PolygonMesh, edited: Edited) -> Resu
         return Err(RestEditError::InsideOut { operation });
     }
     if let Some([a, b]) = crossings(&cage).first().copied() {
-        // A cage that goes through itself already may be edited: that is how it is mended.
+        // A cage that already intersects itself may be edited, since that is how it is repaired.
         let n_before = Cage::new(before).map_or(usize::MAX, |c| crossings(&c).len());
         if crossings(&cage).len() > n_before {
             let face = |t: u32| cage.face_of_triangle()[t as usize];
@@ -100,7 +100,7 @@ fn is_turned(cage: &Cage) -> bool {
     cage.notices().iter().any(|notice| matches!(notice, CageNotice::Flipped { .. }))
 }
 
-/// Pairs of triangles of different faces that meet.
+/// Pairs of intersecting triangles of different faces.
 fn crossings(cage: &Cage) -> Vec<[u32; 2]> {
     let at = |i: u32| -> DVec3 { cage.positions()[i as usize].as_dvec3() };
     let triangles: Vec<Corners> =

@@ -1,4 +1,4 @@
-//! The operations.
+//! The edit operations.
 
 use glam::{DVec3, Vec3};
 
@@ -6,10 +6,10 @@ use super::{Edited, RestEditError, finish};
 use crate::fill::{loops, triangulate};
 use crate::mesh::PolygonMesh;
 
-/// Puts vertices elsewhere: (vertex, new position in object units).
+/// Moves vertices: `(vertex, new position in object units)`.
 ///
 /// # Errors
-/// [`RestEditError`]: no such vertex, not finite, or the cage would break.
+/// [`RestEditError`]: a vertex does not exist, a position is not finite, or the cage would become invalid.
 pub fn move_vertices(mesh: &PolygonMesh, moves: &[(u32, Vec3)]) -> Result<Edited, RestEditError> {
     let mut edited = unchanged(mesh);
     for &(v, p) in moves {
@@ -23,15 +23,15 @@ pub fn move_vertices(mesh: &PolygonMesh, moves: &[(u32, Vec3)]) -> Result<Edited
     finish("moving", mesh, edited)
 }
 
-/// Puts a new vertex on an edge, `share` of the way from its first end to its second (kept within 0.05 to 0.95). Triangles
-/// beside it are cut in two, larger faces get a corner more. The new vertex is the last one.
+/// Splits an edge at `share` of its length from the first end (clamped to 0.05 to 0.95). Adjacent triangles are
+/// divided; larger faces get another corner. The new vertex is the last one.
 ///
 /// # Errors
-/// [`RestEditError`]: no such edge, not finite, or the cage would break.
+/// [`RestEditError`]: the edge does not exist, `share` is not finite, or the cage would become invalid.
 pub fn split_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<Edited, RestEditError> {
     let [p, q] = ends(mesh, edge)?;
     if !share.is_finite() {
-        return Err(RestEditError::NotFinite { what: "the place on the edge" });
+        return Err(RestEditError::NotFinite { what: "the position on the edge" });
     }
     let mut edited = unchanged(mesh);
     let new = mesh.positions.len() as u32;
@@ -57,14 +57,15 @@ pub fn split_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<Edit
     finish("splitting", mesh, edited)
 }
 
-/// Merges the two ends of an edge into the first one, `share` of the way to the second. Faces that are left with two corners go.
+/// Merges the ends of an edge into the first one, at `share` of the edge's length from it. Faces left with two corners
+/// are removed.
 ///
 /// # Errors
-/// [`RestEditError`]: no such edge, not finite, or the cage would break.
+/// [`RestEditError`]: the edge does not exist, `share` is not finite, or the cage would become invalid.
 pub fn collapse_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<Edited, RestEditError> {
     let [p, q] = ends(mesh, edge)?;
     if !share.is_finite() {
-        return Err(RestEditError::NotFinite { what: "the place on the edge" });
+        return Err(RestEditError::NotFinite { what: "the position on the edge" });
     }
     let [kept, gone] = edge;
     let mut edited = unchanged(mesh);
@@ -85,11 +86,11 @@ pub fn collapse_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<E
     finish("collapsing", mesh, edited)
 }
 
-/// Moves a face along its normal by `distance` (object units, negative: into the cage) and joins it to where it was by
-/// quads. The corners of the moved face are new vertices, the last ones; the face keeps its number.
+/// Moves a face along its normal by `distance` (object units, negative: into the cage) and connects it by quads to its
+/// old position. The corners of the moved face are new vertices, the last ones; the face keeps its index.
 ///
 /// # Errors
-/// [`RestEditError`]: no such face, not finite, or the cage would break.
+/// [`RestEditError`]: the face does not exist, `distance` is not finite, or the cage would become invalid.
 pub fn extrude_face(mesh: &PolygonMesh, face: u32, distance: f32) -> Result<Edited, RestEditError> {
     let corners = mesh.faces.get(face as usize).ok_or_else(|| missing("face", &[face]))?.clone();
     if !distance.is_finite() {
@@ -98,7 +99,7 @@ pub fn extrude_face(mesh: &PolygonMesh, face: u32, distance: f32) -> Result<Edit
     let at: Vec<DVec3> = corners.iter().map(|&i| mesh.positions[i as usize].as_dvec3()).collect();
     let n = at.len();
     let center = at.iter().sum::<DVec3>() / n as f64;
-    // Newell's normal: right also for faces that are not planar or not convex.
+    // Newell's normal, valid also for faces that are not planar or not convex.
     let normal: DVec3 = (0..n).map(|k| (at[k] - center).cross(at[(k + 1) % n] - center)).sum();
     let offset = (normal.normalize_or_zero() * f64::from(distance)).as_vec3();
     let mut edited = unchanged(mesh);
@@ -115,10 +116,10 @@ pub fn extrude_face(mesh: &PolygonMesh, face: u32, distance: f32) -> Result<Edit
     finish("extruding", mesh, edited)
 }
 
-/// Deletes faces, closes the holes with triangles of the smallest area, and drops vertices of no face.
+/// Deletes faces, fills the holes by minimum-area triangulations, and drops vertices without faces.
 ///
 /// # Errors
-/// [`RestEditError`]: no such face, a hole of more than 64 edges, or the cage would break.
+/// [`RestEditError`]: a face does not exist, a hole has more than 64 edges, or the cage would become invalid.
 pub fn delete_faces(mesh: &PolygonMesh, faces: &[u32]) -> Result<Edited, RestEditError> {
     let mut keep = vec![true; mesh.faces.len()];
     for &f in faces {
@@ -130,7 +131,7 @@ pub fn delete_faces(mesh: &PolygonMesh, faces: &[u32]) -> Result<Edited, RestEdi
     if edited.mesh.faces.is_empty() {
         return Err(RestEditError::NothingLeft);
     }
-    // The rim: sides of deleted faces whose other face stays; the filling runs as the deleted faces did.
+    // Boundary: sides of deleted faces whose neighbour stays. The filling has the deleted faces' orientation.
     let sides = |f: usize| {
         let face = &mesh.faces[f];
         (0..face.len()).map(move |k| [face[k], face[(k + 1) % face.len()]])
@@ -160,7 +161,7 @@ fn unchanged(mesh: &PolygonMesh) -> Edited {
     }
 }
 
-/// Drops vertices that belonged to a face before and belong to none now; the others move up.
+/// Drops vertices that have lost their last face, and compacts the indices.
 fn drop_unused(before: &PolygonMesh, edited: &mut Edited) {
     let n = edited.mesh.positions.len();
     let used = |faces: &[Vec<u32>]| {
@@ -189,7 +190,7 @@ fn drop_unused(before: &PolygonMesh, edited: &mut Edited) {
     edited.touched = edited.touched.iter().filter_map(|&v| number[v as usize]).collect();
 }
 
-/// Positions of the ends of an edge that some face has.
+/// Positions of the ends of an edge, which some face must have.
 fn ends(mesh: &PolygonMesh, edge: [u32; 2]) -> Result<[Vec3; 2], RestEditError> {
     if !mesh.faces.iter().any(|face| side(face, edge).is_some()) {
         return Err(missing("edge", &edge));
@@ -197,7 +198,7 @@ fn ends(mesh: &PolygonMesh, edge: [u32; 2]) -> Result<[Vec3; 2], RestEditError> 
     Ok(edge.map(|i| mesh.positions[i as usize]))
 }
 
-/// The corner of a face at which it runs along an edge, either way.
+/// Position in a face of an edge, in either direction.
 fn side(face: &[u32], [a, b]: [u32; 2]) -> Option<usize> {
     (0..face.len()).find(|&k| {
         let (p, q) = (face[k], face[(k + 1) % face.len()]);

@@ -7,7 +7,7 @@ use crate::cage::subdivided_box;
 use crate::crossing::{crossings_of, notices};
 use crate::mesh::{Bounds, PolygonMesh};
 
-/// Positions of the order of 1 in f32.
+/// f32 rounding of positions of size 1.
 const ROUNDING: f32 = 1e-6;
 
 fn cube() -> PolygonMesh {
@@ -39,7 +39,7 @@ fn assert_follows(before: &PolygonMesh, edited: &Edited, except: &[u32]) {
 }
 
 #[test]
-fn moved_vertices_are_where_they_were_put() {
+fn moved_vertices_are_at_their_new_positions() {
     let edited = move_vertices(&cube(), &[(0, vec3(-2.0, -1.5, -1.0))]).unwrap();
     assert_eq!(edited.mesh.positions[0], vec3(-2.0, -1.5, -1.0));
     assert_eq!(edited.mesh.faces, cube().faces);
@@ -47,7 +47,7 @@ fn moved_vertices_are_where_they_were_put() {
 }
 
 #[test]
-fn moves_that_break_the_cage_are_refused_in_words() {
+fn moves_that_break_the_cage_are_errors_with_a_message() {
     let cube = cube();
     let all: Vec<(u32, Vec3)> = (0..8).map(|v| (v, -cube.positions[v as usize])).collect();
     assert_eq!(move_vertices(&cube, &all).unwrap_err(), RestEditError::InsideOut { operation: "moving" });
@@ -73,7 +73,7 @@ fn splitting_an_edge_keeps_the_solid() {
     let cube = cube();
     let (a, b) = (cube.faces[0][0], cube.faces[0][1]);
     let edited = split_edge(&cube, [a, b], 0.5).unwrap();
-    assert_eq!(edited.mesh.faces.iter().filter(|f| f.len() == 5).count(), 2, "two quads have a corner more");
+    assert_eq!(edited.mesh.faces.iter().filter(|f| f.len() == 5).count(), 2, "two quads get a fifth corner");
     assert!((volume(&edited.mesh) - 8.0).abs() < 1e-6);
     assert!(matches!(split_edge(&tetrahedron(), [0, 9], 0.5).unwrap_err(), RestEditError::Missing { .. }));
 }
@@ -95,7 +95,7 @@ fn collapsing_undoes_splitting() {
         faces
     };
     assert_eq!(from_least(&edited.mesh.faces), from_least(&mesh.faces));
-    assert!(collapse_edge(&mesh, [0, 1], 0.5).is_err(), "two triangles on each other are no cage");
+    assert!(collapse_edge(&mesh, [0, 1], 0.5).is_err(), "two coinciding triangles are not a cage");
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn extruding_a_face_adds_a_box() {
         assert_eq!(edited.mesh.faces[face as usize], edited.touched);
         assert_follows(&cube, &edited, &[]);
     }
-    // Into the cage, from the middle one of nine faces of a side: a pit of 2/3 x 2/3.
+    // Into the cage from the central one of a side's nine faces: a pit of 2/3 x 2/3.
     let fine = subdivided_box(Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE }, 0.0, [3; 3]);
     let middle = fine.faces.iter().position(|f| {
         let center: Vec3 = f.iter().map(|&i| fine.positions[i as usize]).sum::<Vec3>() / 4.0;
@@ -118,16 +118,16 @@ fn extruding_a_face_adds_a_box() {
     let middle = middle.unwrap() as u32;
     let edited = extrude_face(&fine, middle, -0.5).unwrap();
     assert!((volume(&edited.mesh) - (8.0 - 0.5 * 4.0 / 9.0)).abs() < 1e-5);
-    assert!(extrude_face(&fine, middle, -2.5).is_err(), "out on the other side");
-    assert!(extrude_face(&cube, 0, -0.5).is_err(), "the pit's walls would lie on the sides");
-    assert!(extrude_face(&cube, 0, 0.0).is_err(), "side faces without area");
+    assert!(extrude_face(&fine, middle, -2.5).is_err(), "through the opposite side");
+    assert!(extrude_face(&cube, 0, -0.5).is_err(), "the pit's walls would coincide with the sides");
+    assert!(extrude_face(&cube, 0, 0.0).is_err(), "side faces would have no area");
 }
 
 #[test]
-fn deleted_faces_are_closed_over() {
+fn holes_of_deleted_faces_are_filled() {
     let cube = cube();
     let tower = extrude_face(&cube, 0, 1.0).unwrap().mesh;
-    // The top and the four sides of the tower: what is left is the cube without a lid, and gets one.
+    // Deletes the top and four sides of the tower: the open cube gets a lid.
     let edited = delete_faces(&tower, &[0, 6, 7, 8, 9]).unwrap();
     assert_eq!(edited.mesh.positions, cube.positions);
     assert!((volume(&edited.mesh) - 8.0).abs() < 1e-6);
@@ -136,8 +136,8 @@ fn deleted_faces_are_closed_over() {
     assert!(matches!(delete_faces(&cube, &[77]).unwrap_err(), RestEditError::Missing { .. }));
 }
 
-/// A corner of a cube leaves a hole of six edges, and two ways to fill it have the same area. One of them lies on the
-/// three faces that stay, and deleting was refused because the cage would have gone through itself.
+/// Without a corner, a cube has a hole of six edges with two fillings of equal area. One of them coincides with the
+/// three remaining faces and must not be chosen.
 #[test]
 fn every_corner_of_a_cube_can_be_deleted() {
     let cube = cube();
@@ -145,13 +145,13 @@ fn every_corner_of_a_cube_can_be_deleted() {
         let around: Vec<u32> = (0..6).filter(|&f| cube.faces[f as usize].contains(&corner)).collect();
         let edited = delete_faces(&cube, &around).unwrap();
         assert_eq!(edited.mesh.positions.len(), 7);
-        // What is cut off is a corner of three half faces: a sixth of the cube's volume of 8.
+        // The removed corner is bounded by three half faces: a sixth of the cube's volume of 8.
         assert!((volume(&edited.mesh) - 8.0 * 5.0 / 6.0).abs() < 1e-6, "corner {corner}");
     }
 }
 
 #[test]
-fn cage_that_meets_itself_already_can_still_be_mended() {
+fn self_intersecting_cage_can_be_edited() {
     let mut mesh = cube();
     mesh.positions.extend(cube().positions.iter().map(|p| *p + vec3(1.5, 0.3, 0.2)));
     mesh.faces.extend(cube().faces.iter().map(|f| f.iter().map(|i| i + 8).collect::<Vec<_>>()));
@@ -166,7 +166,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn whatever_is_done_the_result_is_a_cage(
+    fn any_sequence_of_edits_gives_a_valid_cage(
         steps in prop::collection::vec((0_u8..5, 0_usize..1000, -0.6_f32..0.9), 1..8),
     ) {
         let mut mesh = cube();

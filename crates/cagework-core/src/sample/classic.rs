@@ -1,6 +1,6 @@
-//! Sampling as published: a mesh vertex takes the weights of the cell it lies in.
+//! Sampling as published: a mesh vertex takes the weights of the cell that contains it.
 //!
-//! Where the paper is silent: a vertex in an exterior cell, which has no weights, counts as outside the cage.
+//! The paper does not define weights in exterior cells: a vertex there counts as outside the cage.
 
 use std::cell::LazyCell;
 
@@ -14,7 +14,7 @@ use crate::voxelize::classic::{CellKind, ClassicCells};
 use super::outside::OutsideSampler;
 use super::{Stencil, Stencils};
 
-/// Stencils of points (object units): one cell each.
+/// Stencils of points (object units), one cell each.
 #[must_use]
 pub fn stencils(
     controls: Controls<'_>,

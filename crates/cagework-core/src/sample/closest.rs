@@ -1,4 +1,4 @@
-//! The point of a cage that is closest to a place outside it.
+//! Closest point on a cage.
 
 use glam::DVec3;
 
@@ -6,16 +6,16 @@ use super::Outside;
 use crate::cage::Cage;
 use crate::geometry::closest_point_on_triangle;
 
-/// Boxes around the faces of a cage: of most faces the box alone tells that another one is closer.
+/// Bounding boxes of a cage's faces, by which most faces are skipped in closest-point queries.
 #[derive(Clone, Debug)]
 pub struct ClosestOnCage<'a> {
     cage: &'a Cage,
-    /// Facets and box of each face.
+    /// Facets and bounding box of each face.
     faces: Vec<(std::ops::Range<u32>, [DVec3; 2])>,
 }
 
 impl<'a> ClosestOnCage<'a> {
-    /// Of a cage at rest.
+    /// For a cage in its rest pose.
     #[must_use]
     pub fn new(cage: &'a Cage) -> Self {
         let mut first = 0;
@@ -31,7 +31,7 @@ impl<'a> ClosestOnCage<'a> {
         Self { cage, faces }
     }
 
-    /// The point closest to `point`, on the facet of lowest number if there are several; `vertex` is left 0, `share` 1.
+    /// Closest point to `point`; ties go to the lowest facet. Sets `vertex` to 0 and `share` to 1.
     #[must_use]
     pub fn find(&self, point: DVec3) -> Outside {
         let mut best = Outside {

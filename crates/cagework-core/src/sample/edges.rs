@@ -1,9 +1,9 @@
-//! Re-entrant edges of the cage: where a ray that passes and one that is stopped are next to each other.
+//! Re-entrant edges of the cage, next to which some rays end at a wall and others pass.
 //!
-//! Without care, weights jump there by a few per cent: a ray that just misses the edge goes on to the next centres. So a
-//! ray that passes an edge at less than [`REACH`] is split: the closer it passes, the more of it ends beside the edge, in
-//! a value that tends to the edge's own. What ends and what passes are both values inside the cage, reproduce linear
-//! functions, and together change continuously.
+//! Weights would jump there by a few per cent, because a ray that just misses the edge continues to the next centres. A
+//! ray that passes an edge at less than [`REACH`] is therefore split: the closer it passes, the larger the share that
+//! ends beside the edge, with a value that tends to the edge's own. Both shares are values inside the cage that
+//! reproduce linear functions, and their mean is continuous.
 
 use glam::DVec3;
 
@@ -11,54 +11,54 @@ use super::triangles::{Blocks, TriangleLists};
 use crate::cage::Cage;
 use crate::grid::Grid;
 
-/// Distance, in cells, up to which a passing ray notices an edge.
+/// Distance, in cells, up to which an edge splits a passing ray.
 pub(super) const REACH: f64 = 0.25;
 
-/// Square of how far the middle of a cube may be from an edge that a ray in it notices, or beyond it: half the cube's
-/// diagonal, and [`REACH`] along two axes.
-const NEAR_SQUARED: f64 = 1.5;
+/// Squared distance from the centre of a cube, in cells, within which an edge can split rays in or beyond the cube:
+/// half the cube's diagonal plus [`REACH`] along two axes.
+const MAX_SQUARED_DISTANCE: f64 = 1.5;
 
-/// Sine of the angle by which the cage turns inwards at an edge for rays to notice: at flatter ones little can jump.
-const SHARP: f64 = 0.25;
+/// Smallest sine of the angle by which the cage turns inwards at a re-entrant edge; at flatter edges values hardly jump.
+const MIN_REENTRANT_SINE: f64 = 0.25;
 
-/// A component of a unit normal this small is rounding.
-const PARALLEL: f64 = 1e-9;
+/// Smaller components of a unit normal are rounding.
+const NORMAL_TOLERANCE: f64 = 1e-9;
 
-/// A place no further than this, in cells, from an edge is on it.
-pub(super) const ON_EDGE: f64 = 1e-6;
+/// Distance, in cells, within which a point is on an edge.
+pub(super) const EDGE_TOLERANCE: f64 = 1e-6;
 
-/// A re-entrant edge, in cells.
+/// A re-entrant edge, in cell coordinates.
 #[derive(Clone, Copy, Debug)]
 struct Edge {
     ends: [DVec3; 2],
-    /// One of its facets, and which of its corners the ends are.
+    /// One of its facets, and the corners of that facet at its ends.
     facet: u32,
     corners: [usize; 2],
-    /// For rays along each axis: the other axis along which the edge is closest to them; none if it stops none of them.
+    /// Per axis of a ray, the axis along which the edge is nearest to the ray; `None` if the edge's faces do not stop such rays.
     across: [Option<usize>; 3],
 }
 
-/// Where a ray passes an edge.
+/// Passage of a ray by an edge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Passage {
     /// Distance along the ray, in cells.
     pub(super) distance: f64,
-    /// The way from the ray to the edge: an axis and how far along it, positive upwards; then the other axis, which is 0 but
-    /// for rays that pass beyond the edge's end.
+    /// Offset from the ray to the edge as two steps (axis, signed length). The second is 0 unless the ray passes beyond
+    /// the edge's end.
     pub(super) steps: [(usize, f64); 2],
-    /// Share of the ray that ends here.
+    /// Share of the ray that ends at this edge.
     pub(super) share: f64,
-    /// The place on the edge.
+    /// Nearest point on the edge.
     pub(super) facet: u32,
     pub(super) barycentric: [f64; 3],
 }
 
-/// Falls smoothly from 1 at 0 to 0 at 1 and beyond.
+/// Smoothstep from 1 at 0 to 0 at 1.
 fn fade(x: f64) -> f64 {
     if x < 1.0 { 1.0 - x * x * (3.0 - 2.0 * x) } else { 0.0 }
 }
 
-/// Re-entrant edges, listed by blocks of cells.
+/// Re-entrant edges by blocks of cells.
 #[derive(Clone, Debug)]
 pub(super) struct EdgeLists {
     edges: Vec<Edge>,
@@ -66,7 +66,6 @@ pub(super) struct EdgeLists {
 }
 
 impl EdgeLists {
-    /// Finds the re-entrant edges of a cage.
     pub(super) fn new(cage: &Cage, grid: &Grid, lists: &TriangleLists) -> Self {
         let mut sides: Vec<[u32; 3]> = Vec::with_capacity(3 * cage.facets().len());
         for (number, facet) in (0u32..).zip(cage.facets()) {
@@ -92,7 +91,7 @@ impl EdgeLists {
         Self { edges, blocks }
     }
 
-    /// Edges that rays in the cube between centre `low` and centre `low + 1` may notice.
+    /// Edges that can split rays in the cube between centre `low` and centre `low + 1`.
     pub(super) fn in_cube(&self, low: [u32; 3], found: &mut Vec<u32>) {
         found.clear();
         if self.edges.is_empty() {
@@ -103,14 +102,14 @@ impl EdgeLists {
             let [a, b] = self.edges[number as usize].ends;
             let (way, to) = (b - a, middle - a);
             let s = (to.dot(way) / way.length_squared()).clamp(0.0, 1.0);
-            if (to - s * way).length_squared() < NEAR_SQUARED && !found.contains(&number) {
+            if (to - s * way).length_squared() < MAX_SQUARED_DISTANCE && !found.contains(&number) {
                 found.push(number);
             }
         });
     }
 
-    /// Where a ray from `p` along `axis`, upwards or not, passes some of the edges; nearest first. `end`: where it ends; if
-    /// that is no wall, edges beyond count as well, the less the further they are.
+    /// Passages of a ray from `p` along `axis` by some of the edges, nearest first. `up`: direction; `end`: where the
+    /// ray ends. If that is not a wall, edges beyond it count with a weight that decreases with their distance.
     pub(super) fn passed(
         &self,
         some: &[u32],
@@ -126,15 +125,16 @@ impl EdgeLists {
             let Some(across) = edge.across[axis] else { continue };
             let [a, b] = edge.ends;
             let along = 3 - axis - across;
-            // Beyond its end, an edge stops less and less of the ray: a spike's edges end in its tip, a sheet's in a corner.
+            // Past its end an edge stops a decreasing share of the ray: edges of spikes end in a tip, those of sheets
+            // in a corner.
             let s = ((p[along] - a[along]) / (b[along] - a[along])).clamp(0.0, 1.0);
             let beside = a + s * (b - a) - p;
             let distance = if up { beside[axis] } else { -beside[axis] };
-            // Right beside an edge, only one of the two rays passes it; on a wall that ends at the edge, none.
+            // Level with an edge, only one of the two opposite rays passes it, and none if its wall ends at the edge.
             let ahead = distance > 0.0 || up && distance == 0.0;
             let steps = [across, along].map(|axis| (axis, beside[axis]));
             let apart = beside[across].hypot(beside[along]);
-            let fading = match (distance < end - ON_EDGE, is_wall) {
+            let fading = match (distance < end - EDGE_TOLERANCE, is_wall) {
                 (true, _) => 1.0,
                 (false, true) => 0.0,
                 (false, false) => fade((distance - end).max(0.0) / beyond),
@@ -150,18 +150,17 @@ impl EdgeLists {
         passages
     }
 
-    /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(self.edges.as_slice()) + self.blocks.bytes()
     }
 }
 
-/// Whether two facets are the sides of one sheet inside the cage.
+/// Whether two facets are the two sides of an inner sheet.
 fn is_sheet(cage: &Cage, f: u32, g: u32) -> bool {
     cage.facets()[g as usize].iter().all(|i| cage.facets()[f as usize].contains(i))
 }
 
-/// An edge of a sheet inside the cage, around which there is room on all sides.
+/// A boundary edge of an inner sheet, which is open on all sides.
 fn edge_of_sheet(lists: &TriangleLists, f: u32, k: usize) -> Edge {
     let corners = [k, (k + 1) % 3];
     let triangle = lists.triangle(f);
@@ -170,7 +169,7 @@ fn edge_of_sheet(lists: &TriangleLists, f: u32, k: usize) -> Edge {
     Edge { ends, facet: f, corners, across: across(ends, [normal, -normal]) }
 }
 
-/// The edge between two facets, each with the corner from which it runs along it, if the cage turns inwards there.
+/// The edge between two facets (each with the corner at which the edge starts), if it is re-entrant.
 fn edge_between(lists: &TriangleLists, [(f, k), (g, l)]: [(u32, usize); 2]) -> Option<Edge> {
     let corners = [k, (k + 1) % 3];
     let mine = lists.triangle(f).corners;
@@ -179,7 +178,7 @@ fn edge_between(lists: &TriangleLists, [(f, k), (g, l)]: [(u32, usize); 2]) -> O
     let normals = [f, g].map(|t| lists.triangle(t).unit_normal());
     let way = (ends[1] - ends[0]).normalize_or_zero();
     let sine = (other - ends[0]).reject_from(way).normalize_or_zero().dot(normals[0]);
-    if sine < SHARP && (sine <= 0.0 || normals[0].dot(normals[1]) > 0.0) {
+    if sine < MIN_REENTRANT_SINE && (sine <= 0.0 || normals[0].dot(normals[1]) > 0.0) {
         return None;
     }
     Some(Edge { ends, facet: f, corners, across: across(ends, normals) })
@@ -189,9 +188,9 @@ fn edge_between(lists: &TriangleLists, [(f, k), (g, l)]: [(u32, usize); 2]) -> O
 fn across(ends: [DVec3; 2], normals: [DVec3; 2]) -> [Option<usize>; 3] {
     let way = (ends[1] - ends[0]).normalize_or_zero();
     [0, 1, 2].map(|axis| {
-        let [a, b] = normals.map(|n| if n[axis].abs() < PARALLEL { 0.0 } else { n[axis] });
+        let [a, b] = normals.map(|n| if n[axis].abs() < NORMAL_TOLERANCE { 0.0 } else { n[axis] });
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        // Rays along the axis see the edge as a line, to which the axis less along it is closer to a right angle.
+        // Choose the axis closer to perpendicular to the edge as seen along the ray.
         (a * b <= 0.0 && (a, b) != (0.0, 0.0)).then_some(if way[u].abs() < way[v].abs() { u } else { v })
     })
 }

@@ -1,18 +1,18 @@
-//! Recursive axis interpolation: weights at a point from the centres and the cage around it.
+//! Recursive axis interpolation: weights at a point from nearby centres and the cage.
 //!
-//! From p go along an axis both ways until the face of the cube between eight centres or the cage, whichever comes
-//! first, and interpolate linearly between the two ends. An end on the cage has Dirichlet values; an end on a face
-//! goes on along the second axis, then along the third, whose ends are centres or, again, the cage. Every step is a
-//! convex combination along a straight segment inside the cage: the result is non-negative, sums to 1 and reproduces
-//! linear functions exactly, never reaches a centre behind a wall, and works where no centre is inside at all. In a
-//! cube that the cage does not meet it is trilinear interpolation. The three cyclic orders of the axes are averaged.
-//! Next to re-entrant edges rays are split, see `edges.rs`.
+//! Rays from p in both directions of an axis end at the face of the cube between eight centres or at the cage,
+//! whichever is nearer, and the value at p is interpolated linearly between the two ends. An end on the cage has
+//! Dirichlet values. An end on a cube face is interpolated along the second axis in the same way, then along the third,
+//! whose ends are centres or the cage. Every step is a convex combination along a segment inside the cage: the result
+//! is non-negative, sums to 1, reproduces linear functions exactly and never uses a centre behind a wall, even if no
+//! centre is inside. In a cube without cage faces it is trilinear interpolation. The three cyclic orders of the axes
+//! are averaged. Rays next to re-entrant edges are split, see `edges.rs`.
 
 use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use crate::cage::ON_CAGE;
+use crate::cage::CAGE_TOLERANCE;
 use crate::controls::Controls;
 use crate::geometry::{closest_point_on_triangle, winding_number};
 use crate::grid::{Grid, NO_CELL};
@@ -20,27 +20,27 @@ use crate::levels::Level;
 use crate::options::OutsidePolicy;
 use crate::voxelize::lines::Overlaps;
 
-use super::edges::{EdgeLists, ON_EDGE, Passage};
+use super::edges::{EDGE_TOLERANCE, EdgeLists, Passage};
 use super::outside::OutsideSampler;
 use super::triangles::TriangleLists;
 use super::{Stencil, Stencils};
 
-/// Orders of the axes; their mean has no preferred direction. All six orders cost twice as much and change the error
-/// against finite elements by less than 1 % (Armadillo, g = 32, 64, 128).
+/// Orders of the axes, averaged to avoid a preferred direction. All six orders would cost twice as much and change the
+/// error against finite elements by less than 1 % (Armadillo, g = 32, 64, 128).
 const ORDERS: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
 
-/// Ends that lie outside may carry this much weight (rounding next to an edge of the cage) before the vertex counts
-/// as doubtful and its winding number decides.
-const DOUBT: f64 = 1e-6;
+/// Weight of ends outside the cage (rounding next to an edge) above which a vertex's winding number decides whether it
+/// is outside.
+const MAX_OUTSIDE_WEIGHT: f64 = 1e-6;
 
-/// Without a facet, the winding number of a place on it is half the sum of those on its two sides: 0.5 on a wall, 1 on a
-/// wall that two parts share, 1.5 or more within.
-const WITHIN: f64 = 1.25;
+/// Threshold of a point's winding number without its own facet, which is half the sum of those on both sides: 0.5 on a
+/// wall, 1 on a wall shared by two parts, at least 1.5 inside a part.
+const MIN_INNER_WINDING: f64 = 1.25;
 
-/// Share of the way to a facet's middle by which places on its sides are moved.
-const OFF_SIDES: f64 = 1e-6;
+/// Relative distance by which points on a facet's sides are moved towards its centroid.
+const SIDE_OFFSET: f64 = 1e-6;
 
-/// Makes the stencils of vertices in an embedded grid.
+/// Computes sampling stencils of vertices in an embedded grid.
 #[derive(Debug)]
 pub struct Sampler<'a> {
     controls: Controls<'a>,
@@ -48,58 +48,57 @@ pub struct Sampler<'a> {
     lists: TriangleLists,
     edges: EdgeLists,
     overlaps: &'a Overlaps,
-    /// Made for the first point outside.
+    /// Created for the first point outside.
     beyond: OnceLock<OutsideSampler<'a>>,
     policy: OutsidePolicy,
-    /// Faces no further apart than this, in cells, are in one place.
+    /// Distance, in cells, within which faces coincide.
     same: f64,
 }
 
-/// Scratch space of one thread.
 #[derive(Debug, Default)]
 struct Scratch {
     near: Vec<u32>,
     edges: Vec<u32>,
-    /// Facets near a place beside an edge, and near the one that is away from the edge.
+    /// Facets near a point beside an edge, and near the point away from the edge.
     here: Vec<u32>,
     other: Vec<u32>,
     stencil: Stencil,
-    /// Weight of ends that lie outside the cage.
+    /// Weight of ends outside the cage.
     outside: f64,
 }
 
-/// A place on the cage: facet, barycentric coordinates, and whether the facet faces up the ray's axis.
+/// A point on the cage: facet, barycentric coordinates, and whether the facet faces up the ray's axis.
 type Wall = (u32, [f64; 3], bool);
 
-/// One end of a segment: its distance from the start, and where it lies on the cage if it does.
+/// An end of a segment: distance from the start, and the point on the cage if it ends there.
 type End = (f64, Option<Wall>);
 
-/// A place in a cube between centres, and how it is interpolated.
+/// A point in a cube between centres that is to be interpolated.
 #[derive(Clone, Copy)]
-struct At<'a> {
-    /// The cube's low corner.
+struct Query<'a> {
+    /// The cube's lowest corner.
     low: [u32; 3],
     p: DVec3,
-    /// Axes to interpolate along; the place lies on the cube's border along the others.
+    /// Remaining axes; along the others the point lies on the cube's boundary.
     order: &'a [usize],
     weight: f64,
-    /// Whether rays that pass a re-entrant edge are split.
+    /// Whether rays are split at re-entrant edges.
     splits: bool,
 }
 
-/// What a part of a split ray ends at.
+/// End of a part of a split ray.
 #[derive(Clone, Copy)]
 enum Stop<'a> {
-    /// Beside an edge that it passes.
+    /// Beside an edge.
     Beside(&'a Passage),
-    /// At a wall beyond the plane where the ray ends.
+    /// At a wall beyond the cube.
     Wall(Wall),
-    /// Where the ray ends.
+    /// At the ray's own end.
     End,
 }
 
 impl<'a> Sampler<'a> {
-    /// A sampler for the finest level.
+    /// Sampler of the finest level.
     #[must_use]
     pub fn new(
         controls: Controls<'a>,
@@ -110,11 +109,11 @@ impl<'a> Sampler<'a> {
         let (surface, grid) = (controls.surface(), &level.grid);
         let lists = TriangleLists::new(surface, grid);
         let edges = EdgeLists::new(surface, grid, &lists);
-        let same = ON_CAGE * f64::from(surface.diagonal()) / grid.cell.max_element();
+        let same = CAGE_TOLERANCE * f64::from(surface.diagonal()) / grid.cell.max_element();
         Self { controls, level, lists, edges, overlaps, beyond: OnceLock::new(), policy, same }
     }
 
-    /// Stencils of points (object units). Points outside the cage are listed in `outside`.
+    /// Stencils of points (object units). Lists points outside the cage in `outside`.
     #[must_use]
     pub fn stencils(&self, points: impl Iterator<Item = DVec3>) -> Stencils {
         let mut stencils = Stencils::new();
@@ -137,13 +136,13 @@ impl<'a> Sampler<'a> {
         stencils
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.lists.bytes() + self.edges.bytes()
     }
 
-    /// Fills `scratch.stencil`; false if the point is outside the cage.
+    /// Computes `scratch.stencil`; false if the point is outside the cage.
     fn stencil(&self, point: DVec3, scratch: &mut Scratch) -> bool {
         scratch.stencil.clear();
         scratch.outside = 0.0;
@@ -166,10 +165,10 @@ impl<'a> Sampler<'a> {
         } else {
             for order in ORDERS {
                 let weight = 1.0 / ORDERS.len() as f64;
-                self.descend(At { low, p, order: &order, weight, splits: true }, scratch);
+                self.descend(Query { low, p, order: &order, weight, splits: true }, scratch);
             }
         }
-        let doubtful = scratch.outside > DOUBT && scratch.outside < 1.0 - DOUBT;
+        let doubtful = scratch.outside > MAX_OUTSIDE_WEIGHT && scratch.outside < 1.0 - MAX_OUTSIDE_WEIGHT;
         let inside = if doubtful { self.winds_around(point) } else { scratch.outside < 0.5 };
         if inside && scratch.outside > 0.0 && scratch.outside < 1.0 {
             let scale = 1.0 / (1.0 - scratch.outside);
@@ -181,8 +180,8 @@ impl<'a> Sampler<'a> {
         inside && scratch.outside < 1.0
     }
 
-    /// The triangle that a point lies on, to within the resolution of f32 coordinates. Rays from such a point hit or
-    /// miss what it lies on by rounding: from a cage's own vertex they went out through an edge.
+    /// The triangle on which a point lies, within the resolution of f32. From such a point rays hit or miss the
+    /// triangle by rounding, and may leave the cage through an edge.
     fn touching(&self, p: DVec3, near: &[u32]) -> Option<(u32, [f64; 3])> {
         near.iter().find_map(|&number| {
             let t = self.lists.triangle(number);
@@ -216,9 +215,9 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// Interpolates along the first axis, then along the rest.
-    fn descend(&self, at: At<'_>, scratch: &mut Scratch) {
-        let At { low, p, order, weight, splits } = at;
+    /// Interpolates along the first axis, recursively along the rest.
+    fn descend(&self, at: Query<'_>, scratch: &mut Scratch) {
+        let Query { low, p, order, weight, splits } = at;
         let axis = order[0];
         let below = p[axis] - f64::from(low[axis]);
         let ends = self.ends(p, axis, [below, 1.0 - below], [&scratch.near, &[]]);
@@ -232,21 +231,21 @@ impl<'a> Sampler<'a> {
         }
         let [below, above] = ends;
         let t = share(below.0, above.0);
-        self.follow(At { weight: weight * (1.0 - t), ..at }, 0, below, scratch);
-        self.follow(At { weight: weight * t, ..at }, 1, above, scratch);
+        self.follow(Query { weight: weight * (1.0 - t), ..at }, 0, below, scratch);
+        self.follow(Query { weight: weight * t, ..at }, 1, above, scratch);
     }
 
-    /// The same where rays pass edges: each part of one ray is paired with each part of the other.
-    fn descend_past(&self, at: At<'_>, ends: [End; 2], passed: &[Vec<Passage>; 2], scratch: &mut Scratch) {
+    /// [`Self::descend`] with split rays: pairs each part of one ray with each part of the other.
+    fn descend_past(&self, at: Query<'_>, ends: [End; 2], passed: &[Vec<Passage>; 2], scratch: &mut Scratch) {
         let (p, axis) = (at.p, at.order[0]);
-        // (share of the ray, its length, what it ends at)
+        // (share, length, end) of each part.
         let parts = [0, 1].map(|side| {
             let mut left = 1.0;
             let mut parts = Vec::new();
             for passage in &passed[side] {
                 let mut stop = (passage.distance, Stop::Beside(passage));
                 if passage.distance > ends[side].0 {
-                    // Beyond the plane; a wall may be before it.
+                    // Beyond the cube: a wall may come first.
                     let beyond = along(p, axis, side, passage.distance);
                     self.lists.in_cube(self.cube_of(beyond), &mut scratch.other);
                     let reach = [passage.distance; 2];
@@ -267,7 +266,7 @@ impl<'a> Sampler<'a> {
                 });
                 let weight = at.weight * part * of_pairs.sum::<f64>();
                 match stop {
-                    Stop::End => self.follow(At { weight, ..at }, side, ends[side], scratch),
+                    Stop::End => self.follow(Query { weight, ..at }, side, ends[side], scratch),
                     Stop::Wall(wall) => self.meet(wall, side, weight, scratch),
                     Stop::Beside(passage) => {
                         let place = along(p, axis, side, length);
@@ -278,8 +277,8 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// The value at `p`, beside an edge that `steps` lead to: interpolated along the first step's axis between the edge and the
-    /// place one cell away from it, on the other side of `p`. That place depends on nothing but `p`, be it in another cube or not.
+    /// Value at `p` beside an edge at the offset `steps`: interpolated along the first step's axis between the edge and
+    /// the point one cell away from it, on the other side of `p`. That point depends only on `p`, not on the cube.
     fn descend_beside(
         &self,
         p: DVec3,
@@ -291,7 +290,7 @@ impl<'a> Sampler<'a> {
         let Some((&(axis, offset), steps)) = steps.split_first() else {
             return self.add_wall(passage.facet, passage.barycentric, weight, scratch);
         };
-        if offset.abs() <= ON_EDGE {
+        if offset.abs() <= EDGE_TOLERANCE {
             return self.descend_beside(p, passage, steps, weight, scratch);
         }
         let side = usize::from(offset > 0.0);
@@ -302,15 +301,15 @@ impl<'a> Sampler<'a> {
         self.lists.in_cube(low, &mut scratch.other);
         self.lists.in_cube(self.cube_of(p), &mut scratch.here);
         let mut reach = [1.0 - offset.abs(); 2];
-        // The edge's own faces do not hide it.
-        reach[side] = offset.abs() - ON_EDGE;
+        // The edge's own faces must not occlude it.
+        reach[side] = offset.abs() - EDGE_TOLERANCE;
         let ends = self.ends(p, axis, reach, [&scratch.here, &scratch.other]);
         let t = share(ends[side].0, ends[1 - side].0);
         match ends[1 - side].1 {
             None => {
                 std::mem::swap(&mut scratch.near, &mut scratch.other);
                 let order = [(axis + 1) % 3, (axis + 2) % 3, axis];
-                let at = At { low, p: away, order: &order, weight: weight * t, splits: false };
+                let at = Query { low, p: away, order: &order, weight: weight * t, splits: false };
                 self.descend(at, scratch);
                 std::mem::swap(&mut scratch.near, &mut scratch.other);
             }
@@ -322,15 +321,15 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// The low corner of the cube in which a place lies.
+    /// Lowest corner of the cube that contains a point.
     fn cube_of(&self, p: DVec3) -> [u32; 3] {
         let highest = DVec3::from_array(self.level.grid.dims.map(|d| f64::from(d) - 2.0));
         p.floor().clamp(DVec3::ZERO, highest).to_array().map(|x| x as u32)
     }
 
-    /// Adds the value of a wall that a ray going up (1) or down (0) meets.
+    /// Adds the value of a wall that a ray up (1) or down (0) ends at.
     fn meet(&self, (facet, barycentric, faces_up): Wall, side: usize, weight: f64, scratch: &mut Scratch) {
-        // From inside one meets the back of a face: going up, one that faces up.
+        // From inside, the ray hits the back of a face: going up, a face that faces up.
         if faces_up == (side == 1) {
             self.add_wall(facet, barycentric, weight, scratch);
         } else {
@@ -339,8 +338,8 @@ impl<'a> Sampler<'a> {
     }
 
     /// Adds the value at the upper (1) or lower (0) end of the segment along the first axis.
-    fn follow(&self, at: At<'_>, side: usize, end: End, scratch: &mut Scratch) {
-        let At { low, p, order, weight, .. } = at;
+    fn follow(&self, at: Query<'_>, side: usize, end: End, scratch: &mut Scratch) {
+        let Query { low, p, order, weight, .. } = at;
         if weight == 0.0 {
             return;
         }
@@ -350,7 +349,7 @@ impl<'a> Sampler<'a> {
                 let mut q = p;
                 q[order[0]] = f64::from(low[order[0]]) + side as f64;
                 if order.len() > 1 {
-                    self.descend(At { p: q, order: &order[1..], ..at }, scratch);
+                    self.descend(Query { p: q, order: &order[1..], ..at }, scratch);
                 } else {
                     let bits = [0, 1, 2].map(|a| u32::from(q[a] != f64::from(low[a])));
                     self.add_centre(low, bits, weight, scratch);
@@ -365,8 +364,8 @@ impl<'a> Sampler<'a> {
             .values_at(facet, barycentric, &mut |column, value| stencil.add_hat(column, weight * value));
     }
 
-    /// The two ends of the segment through `p` along `axis` that reaches so far down and up, cut by the cage. Of faces in the
-    /// same place, as where two parts share one, the one that is seen from behind counts.
+    /// Ends of the segment through `p` along `axis` with the given reach down and up, cut by the cage. Of coinciding
+    /// faces, as between two parts, the one seen from behind counts.
     fn ends(&self, p: DVec3, axis: usize, reach: [f64; 2], near: [&[u32]; 2]) -> [End; 2] {
         let mut ends: [End; 2] = reach.map(|reach| (reach, None));
         for &number in near.into_iter().flatten() {
@@ -389,7 +388,7 @@ impl<'a> Sampler<'a> {
         ends
     }
 
-    /// Whether a place on a facet lies inside the cage, where parts of it overlap: no wall.
+    /// Whether a point on a facet lies inside another part of the cage and is not a wall.
     fn is_within(&self, facet: u32, barycentric: [f64; 3]) -> bool {
         let Overlaps { low, high, .. } = self.overlaps;
         if self.overlaps.parts.is_empty() {
@@ -400,20 +399,20 @@ impl<'a> Sampler<'a> {
         if (place + 1.0).cmplt(*low).any() || (place - 1.0).cmpgt(*high).any() {
             return false;
         }
-        // Off the facet's sides, where it is not clear what the neighbours add.
-        let place = place.lerp(corners.iter().sum::<DVec3>() / 3.0, OFF_SIDES);
+        // Move the point off the facet's sides, where the winding number is ambiguous.
+        let place = place.lerp(corners.iter().sum::<DVec3>() / 3.0, SIDE_OFFSET);
         let others = self.lists.all().iter().enumerate().filter(|(k, _)| *k != facet as usize);
-        winding_number(place, others.map(|(_, t)| t.corners)) > WITHIN
+        winding_number(place, others.map(|(_, t)| t.corners)) > MIN_INNER_WINDING
     }
 }
 
-/// Where a ray from `p` up (1) or down (0) an axis is after so many cells.
+/// Point at a distance from `p`, in cells, up (1) or down (0) an axis.
 fn along(mut p: DVec3, axis: usize, side: usize, length: f64) -> DVec3 {
     p[axis] += if side == 1 { length } else { -length };
     p
 }
 
-/// How far along a segment a point lies, from the ends' distances: 0 at the first.
+/// Interpolation parameter from the distances to both ends: 0 at the first.
 fn share(first: f64, second: f64) -> f64 {
     if first + second > 0.0 { first / (first + second) } else { 0.0 }
 }

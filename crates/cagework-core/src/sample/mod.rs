@@ -1,7 +1,7 @@
-//! From the solved field to weights at mesh vertices.
+//! Sampling of solved fields at mesh vertices.
 //!
-//! A vertex's *stencil* (rows of the field with weights, and Dirichlet values with weights) depends on geometry only:
-//! it is computed once per bind and applied to every batch of columns.
+//! A vertex's *stencil* (weights of field rows, called nodes, and of Dirichlet values, called hats) depends only on
+//! geometry. It is computed once per bind and applied to every batch of columns.
 
 pub mod classic;
 mod closest;
@@ -10,53 +10,53 @@ pub mod embedded;
 mod outside;
 pub mod triangles;
 
-use crate::cage::ON_CAGE;
+use crate::cage::CAGE_TOLERANCE;
 use crate::controls::Controls;
 use crate::simd::dispatch;
 use crate::solve::rows::{LANES, Row, ZERO};
 
 pub use closest::ClosestOnCage;
 
-/// A vertex outside the cage and the point of the cage closest to it.
+/// A vertex outside the cage with its closest point on the cage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outside {
     /// Vertex.
     pub vertex: u32,
     /// Facet of the cage with the closest point.
     pub triangle: u32,
-    /// The closest point in it.
+    /// Barycentric coordinates of the closest point.
     pub barycentric: [f64; 3],
     /// Distance, object units.
     pub distance: f64,
-    /// How much of the cage's motion it follows, 0 to 1.
+    /// Share of the cage's motion that it follows, 0 to 1.
     pub share: f64,
 }
 
-/// Sampling stencils of all vertices. The weights of a stencil are positive and sum to 1, but for vertices outside the cage.
+/// Sampling stencils of all vertices. Weights are positive and sum to 1, except for vertices outside the cage.
 #[derive(Clone, Debug, Default)]
 pub struct Stencils {
     node_start: Vec<u32>,
     nodes: Vec<(u32, f32)>,
     hat_start: Vec<u32>,
     hats: Vec<(u32, f32)>,
-    /// Vertices outside the cage or inside of a control, ascending.
+    /// Vertices outside the cage or inside a ball or tube, ascending.
     pub outside: Vec<Outside>,
 }
 
-/// One vertex's nodes or hats: (key, weight).
+/// Nodes or hats of a vertex: `(key, weight)`.
 pub type Entries<'a> = &'a [(u32, f32)];
 
-/// One vertex's stencil while it is made.
+/// Stencil of a vertex under construction.
 #[derive(Clone, Debug, Default)]
 pub struct Stencil {
-    /// (row of the field, weight)
+    /// `(row of the field, weight)`
     pub nodes: Vec<(u32, f64)>,
-    /// (control vertex, weight)
+    /// `(control, weight)`
     pub hats: Vec<(u32, f64)>,
 }
 
 impl Stencil {
-    /// Empties it.
+    /// Removes all entries.
     pub fn clear(&mut self) {
         self.nodes.clear();
         self.hats.clear();
@@ -67,7 +67,7 @@ impl Stencil {
         accumulate(&mut self.nodes, row, weight);
     }
 
-    /// Adds weight to a control vertex's Dirichlet value.
+    /// Adds weight to a control's Dirichlet value.
     pub fn add_hat(&mut self, column: u32, weight: f64) {
         accumulate(&mut self.hats, column, weight);
     }
@@ -81,19 +81,19 @@ fn accumulate(list: &mut Vec<(u32, f64)>, key: u32, weight: f64) {
 }
 
 impl Stencils {
-    /// No stencils yet.
+    /// No stencils.
     #[must_use]
     pub fn new() -> Self {
         Self { node_start: vec![0], hat_start: vec![0], ..Self::default() }
     }
 
-    /// Vertices so far.
+    /// Number of vertices.
     #[must_use]
     pub fn len(&self) -> usize {
         self.node_start.len() - 1
     }
 
-    /// Whether there are none.
+    /// Whether there are no stencils.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -108,15 +108,15 @@ impl Stencils {
         self.hat_start.push(self.hats.len() as u32);
     }
 
-    /// Appends the stencil of a vertex that is outside, and lists it unless it is on the cage.
+    /// Appends the stencil of a vertex outside, and lists it unless it is on the cage.
     pub fn push_outside(&mut self, controls: Controls<'_>, found: Outside, stencil: &Stencil) {
-        if found.distance > ON_CAGE * f64::from(controls.surface().diagonal()) {
+        if found.distance > CAGE_TOLERANCE * f64::from(controls.surface().diagonal()) {
             self.outside.push(Outside { vertex: self.len() as u32, ..found });
         }
         self.push(stencil);
     }
 
-    /// Appends all of another's vertices.
+    /// Appends the stencils of `other`.
     pub fn append(&mut self, other: &Self) {
         let (n, h, v) = (self.nodes.len() as u32, self.hats.len() as u32, self.len() as u32);
         self.nodes.extend_from_slice(&other.nodes);
@@ -128,7 +128,7 @@ impl Stencils {
 
     /// Weights of all vertices for the columns of one batch.
     ///
-    /// `field`: the batch's solution. Returns `[n_vertices]` rows of lanes. GPU twin: `sample_weights`.
+    /// `field`: the batch's solution. Writes `[n_vertices]` rows of lanes to `out`. GPU twin: `sample_weights`.
     pub fn sample_weights(&self, batch: usize, field: &[Row], out: &mut Vec<Row>) {
         dispatch(
             #[inline(always)]
@@ -157,12 +157,12 @@ impl Stencils {
         }
     }
 
-    /// Each vertex's nodes (row of the field, weight) and hats (control vertex, weight).
+    /// Nodes (row of the field, weight) and hats (control, weight) of each vertex.
     pub fn iter(&self) -> impl Iterator<Item = (Entries<'_>, Entries<'_>)> {
         (0..self.len()).map(|vertex| self.at(vertex))
     }
 
-    /// One vertex's nodes and hats.
+    /// Nodes and hats of a vertex.
     #[must_use]
     pub fn at(&self, vertex: usize) -> (Entries<'_>, Entries<'_>) {
         let [nodes, hats] = [&self.node_start, &self.hat_start]
@@ -170,7 +170,7 @@ impl Stencils {
         (&self.nodes[nodes], &self.hats[hats])
     }
 
-    /// Nodes and hats of all vertices together.
+    /// Total numbers of nodes and hats.
     #[must_use]
     pub fn n_entries(&self) -> (u64, u64) {
         (self.nodes.len() as u64, self.hats.len() as u64)
@@ -182,7 +182,7 @@ impl Stencils {
         self.outside.binary_search_by_key(&(vertex as u32), |o| o.vertex).is_ok()
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice())

@@ -1,23 +1,21 @@
 //! Weights of points outside the cage.
 //!
-//! Near the cage they are extended linearly through the closest point p of the cage: `w(x) = (1 + t) w(p) - t w(q)`, with q
-//! mirrored inwards at p and t = 1. Both rows reproduce places, so this one does. Where the cage is thin, q is at most in its
-//! middle. Where there is no inside behind p, at an edge of the cage that is sharper than the angle at which x lies to it, the
-//! row is that of p, and an offset that goes with the whole cage makes up for the rest (`bind/offsets.rs`). With distance all
-//! this fades.
+//! Near the cage they are extrapolated linearly through the closest point p of the cage: `w(x) = (1 + t) w(p) - t w(q)`, with t =
+//! 1 and q the mirror image of x about p. Both rows reproduce positions, so the result does. If the cage is thin, q moves to at
+//! most the middle of it. If q is not inside, at an edge sharper than the angle towards x, the row is that of p, and an offset
+//! that moves with the whole cage adds the rest (`bind/offsets.rs`). All of this fades out with distance.
 
 use glam::DVec3;
 
 use super::{ClosestOnCage, Outside, Stencil};
-use crate::cage::ON_CAGE;
+use crate::cage::CAGE_TOLERANCE;
 use crate::controls::Controls;
 use crate::geometry::distance_along;
 use crate::options::OutsidePolicy;
 
-/// Shares of the cage's diagonal between which a point follows the cage less and less.
-const FADES: [f64; 2] = [0.05, 0.15];
+/// Distances over the cage's diagonal between which a point's share fades from 1 to 0.
+const FADE_RANGE: [f64; 2] = [0.05, 0.15];
 
-/// Makes stencils of points outside.
 #[derive(Debug)]
 pub(super) struct OutsideSampler<'a> {
     controls: Controls<'a>,
@@ -30,8 +28,8 @@ impl<'a> OutsideSampler<'a> {
         Self { controls, closest: ClosestOnCage::new(controls.surface()), policy }
     }
 
-    /// Fills the stencil of a point outside the surface; one inside of a control takes the values of the closest point.
-    /// `inside(q, stencil)`: fills the stencil of a point, or says that it is outside. `vertex` of what is returned is left 0.
+    /// Computes the stencil of a point outside the surface; a point inside a ball or tube takes the values of its foot
+    /// on the axis. `inside(q, stencil)`: computes the stencil of a point inside, or returns false. Returns `vertex` 0.
     pub(super) fn fill(
         &self,
         point: DVec3,
@@ -46,11 +44,11 @@ impl<'a> OutsideSampler<'a> {
         });
         let (distance, diagonal) = (found.distance, f64::from(surface.diagonal()));
         let of_cage = self.controls.cage_face(surface.face_of_facet()[found.triangle as usize]).is_some();
-        if distance <= ON_CAGE * diagonal {
+        if distance <= CAGE_TOLERANCE * diagonal {
             return found;
         }
         if !of_cage {
-            // Where tubes meet, the closest facet may be one inside of another tube.
+            // Where tubes meet, the closest facet may lie inside another tube: use the foot on the axis.
             if let Some(shares) = self.controls.inner().and_then(|inner| inner.foot(point)) {
                 stencil.clear();
                 let first = self.controls.cage().n_vertices() as u32;
@@ -68,11 +66,11 @@ impl<'a> OutsideSampler<'a> {
         let inwards = (at - point) / distance;
         let walls = (0..surface.facets().len() as u32)
             .filter_map(|facet| distance_along(at, inwards, surface.facet_corners(facet)));
-        let open = walls.filter(|&s| s > ON_CAGE * diagonal).fold(f64::INFINITY, f64::min);
+        let open = walls.filter(|&s| s > CAGE_TOLERANCE * diagonal).fold(f64::INFINITY, f64::min);
         let step = distance.min(0.5 * open);
         let (at, mut other) = (at + step * inwards, Stencil::default());
         if inside(at, &mut other) {
-            // Next to a wall beside it, q has that wall's values: as at an edge that is too sharp.
+            // If q is close to another wall, reduce t: q has that wall's values, as at an edge that is too sharp.
             let depth = self.closest.find(at).distance;
             let t = distance.min(open) / step * (2.0 * depth / step).min(1.0);
             for (_, w) in stencil.nodes.iter_mut().chain(&mut stencil.hats) {
@@ -87,12 +85,12 @@ impl<'a> OutsideSampler<'a> {
         found
     }
 
-    /// How much a point follows the cage at a distance over the cage's diagonal.
+    /// Share of the cage's motion at a distance over the cage's diagonal.
     fn share(&self, distance: f64) -> f64 {
         if self.policy == OutsidePolicy::Stay {
             return 0.0;
         }
-        let far = ((distance - FADES[0]) / (FADES[1] - FADES[0])).clamp(0.0, 1.0);
+        let far = ((distance - FADE_RANGE[0]) / (FADE_RANGE[1] - FADE_RANGE[0])).clamp(0.0, 1.0);
         1.0 - far * far * (3.0 - 2.0 * far)
     }
 }

@@ -1,15 +1,15 @@
-//! Which cage triangles pass through a cell: short lists for the short rays of sampling.
+//! Lookup of cage triangles near a cell, for the short rays of sampling.
 
 use glam::DVec3;
 
 use crate::cage::Cage;
 use crate::grid::Grid;
 
-/// Cells along a block's side. A block's list is filtered per cell, so it need only be short, not exact.
+/// Cells along a block's side. Candidates of a block are filtered per cell, so lists need not be exact.
 const BLOCK: u32 = 8;
 
-/// Slack of the overlap tests, in cells, against rounding of the transformed corners (values up to 512 in f64).
-const SLACK: f64 = 1e-9;
+/// Tolerance of the overlap tests, in cells, against rounding of cell coordinates (up to 512 in f64).
+const TOLERANCE: f64 = 1e-9;
 
 /// A facet of the cage in cell coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +21,7 @@ pub struct CellTriangle {
     normal: DVec3,
 }
 
-/// Which of some boxes meet each block of cells.
+/// Lists of boxes per block of cells.
 #[derive(Clone, Debug)]
 pub struct Blocks {
     n_blocks: [u32; 3],
@@ -30,7 +30,7 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// Lists boxes (low and high corner, in cells) by block.
+    /// Sorts boxes (lowest and highest corner, in cells) into blocks.
     pub fn new(grid: &Grid, boxes: impl Iterator<Item = (DVec3, DVec3)> + Clone) -> Self {
         let n_blocks = grid.dims.map(|d| d.div_ceil(BLOCK));
         let mut blocks = Self { n_blocks, start: Vec::new(), list: Vec::new() };
@@ -69,11 +69,11 @@ impl Blocks {
         ((z * self.n_blocks[1] + y) * self.n_blocks[0] + x) as usize
     }
 
-    /// Boxes that may meet the cube between centre `low` and centre `low + 1` (along every axis), some several times.
+    /// Calls `found` with boxes that may meet the cube between centre `low` and centre `low + 1`, some of them several times.
     #[inline]
     pub fn near(&self, low: [u32; 3], mut found: impl FnMut(u32)) {
-        // A cube may reach over a block's upper border by one cell centre: the block of its low corner and of its
-        // high corner may differ, but every box that meets the cube is listed in one of those blocks.
+        // The cube may extend over the block's upper side by a cell: visit the blocks of both of its corners, which
+        // together list every box that meets it.
         let first = low.map(|x| x / BLOCK);
         let last = low.map(|x| (x + 1) / BLOCK);
         for z in first[2]..=last[2].min(self.n_blocks[2] - 1) {
@@ -88,14 +88,14 @@ impl Blocks {
         }
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(self.start.as_slice()) + size_of_val(self.list.as_slice())
     }
 }
 
-/// Facets of the cage, listed by blocks of cells.
+/// Facets of the cage by blocks of cells.
 #[derive(Clone, Debug)]
 pub struct TriangleLists {
     triangles: Vec<CellTriangle>,
@@ -103,7 +103,7 @@ pub struct TriangleLists {
 }
 
 impl TriangleLists {
-    /// Lists the cage's facets by block.
+    /// Sorts the cage's facets into blocks.
     #[must_use]
     pub fn new(cage: &Cage, grid: &Grid) -> Self {
         let points: Vec<DVec3> = cage.facet_points().iter().map(|&p| grid.to_grid(p)).collect();
@@ -115,8 +115,8 @@ impl TriangleLists {
                 let [a, b, c] = corners;
                 CellTriangle {
                     corners,
-                    low: a.min(b).min(c) - SLACK,
-                    high: a.max(b).max(c) + SLACK,
+                    low: a.min(b).min(c) - TOLERANCE,
+                    high: a.max(b).max(c) + TOLERANCE,
                     normal: (b - a).cross(c - a),
                 }
             })
@@ -125,7 +125,7 @@ impl TriangleLists {
         Self { triangles, blocks }
     }
 
-    /// Triangles that may meet the cube between centre `low` and centre `low + 1` (along every axis).
+    /// Triangles that meet the cube between centre `low` and centre `low + 1`, conservatively.
     pub fn in_cube(&self, low: [u32; 3], found: &mut Vec<u32>) {
         found.clear();
         let cube_low = DVec3::from_array(low.map(f64::from));
@@ -136,7 +136,7 @@ impl TriangleLists {
             if t.low.cmple(cube_high).all()
                 && t.high.cmpge(cube_low).all()
                 && (middle - t.corners[0]).dot(t.normal).abs()
-                    <= 0.5 * t.normal.abs().element_sum() * (1.0 + SLACK) + SLACK
+                    <= 0.5 * t.normal.abs().element_sum() * (1.0 + TOLERANCE) + TOLERANCE
                 && !found.contains(&number)
             {
                 found.push(number);
@@ -144,29 +144,29 @@ impl TriangleLists {
         });
     }
 
-    /// All of them.
+    /// All triangles.
     #[must_use]
     pub fn all(&self) -> &[CellTriangle] {
         &self.triangles
     }
 
-    /// One triangle.
+    /// A triangle.
     #[must_use]
     pub fn triangle(&self, number: u32) -> &CellTriangle {
         &self.triangles[number as usize]
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(self.triangles.as_slice()) + self.blocks.bytes()
     }
 }
 
-/// Where a line from a point meets a triangle.
+/// Intersection of an axis-parallel line through a point with a triangle.
 #[derive(Clone, Copy, Debug)]
 pub struct Crossing {
-    /// Signed distance along the axis, in cells.
+    /// Signed distance from the point along the axis, in cells.
     pub distance: f64,
     /// Barycentric coordinates.
     pub barycentric: [f64; 3],
@@ -189,7 +189,7 @@ impl CellTriangle {
         height * height <= reach * reach * self.normal.length_squared()
     }
 
-    /// Where the line through `p` along `axis` meets the triangle, borders included.
+    /// Intersection of the line through `p` along `axis` with the triangle, including its boundary.
     #[inline]
     #[must_use]
     pub fn crossing(&self, p: DVec3, axis: usize) -> Option<Crossing> {

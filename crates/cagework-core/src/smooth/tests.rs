@@ -2,10 +2,11 @@ use super::*;
 use crate::cage::shapes::{cube, prism, tetrahedron};
 
 /// f32 rounding of rows.
-const ROUNDED: f64 = 1e-6;
+const ROUNDING: f64 = 1e-6;
 
-/// One step on quads by another route: faces are split linearly, then each vertex moves to the mean of its quads' middles by 4
-/// over its valence. Source: Warren, Schaefer 2004, "A factored approach to subdivision surfaces".
+/// One step on quads by an independent formulation: faces are split bilinearly, then each vertex moves to the mean of
+/// its quads' centroids with a factor of 4 over its valence. Source: Warren and Schaefer 2004, "A factored approach to
+/// subdivision surfaces".
 fn factored(values: &[f64], faces: &[Vec<u32>]) -> (Vec<f64>, Vec<Vec<u32>>) {
     let mut split = values.to_vec();
     let mut middle_of: BTreeMap<[u32; 2], u32> = BTreeMap::new();
@@ -42,9 +43,9 @@ fn factored(values: &[f64], faces: &[Vec<u32>]) -> (Vec<f64>, Vec<Vec<u32>>) {
 }
 
 #[test]
-fn rows_are_those_of_linear_splits_and_averages() {
+fn rows_equal_those_of_the_factored_scheme() {
     let l_shape = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
-    // Quads with three to six around a vertex.
+    // Quads with vertices of valence three to six.
     let of_quads = |mesh| subdivide(&mesh, 1).mesh;
     for mesh in [cube(), of_quads(tetrahedron()), of_quads(prism(&l_shape, 1.0))] {
         let made = subdivide(&mesh, 2);
@@ -57,19 +58,19 @@ fn rows_are_those_of_linear_splits_and_averages() {
             }
             assert_eq!(made.mesh.faces, faces);
             for (expected, actual) in values.iter().zip(made.rows.column(column as u32)) {
-                assert!((expected - f64::from(actual)).abs() < ROUNDED, "{actual}, not {expected}");
+                assert!((expected - f64::from(actual)).abs() < ROUNDING, "{actual}, not {expected}");
                 assert!(actual >= 0.0);
             }
         }
         for (_, row) in made.rows.rows() {
-            assert!((row.iter().map(|&w| f64::from(w)).sum::<f64>() - 1.0).abs() < ROUNDED);
+            assert!((row.iter().map(|&w| f64::from(w)).sum::<f64>() - 1.0).abs() < ROUNDING);
         }
     }
 }
 
-/// A corner of the cube of edge 2: three faces' middles at 1/3 along the diagonal, three edges' at 2/3: (1/3 + 2 2/3) / 3 = 5/9.
+/// Corner of a cube of edge 2: three face centres at 1/3 of the diagonal, three edge midpoints at 2/3; (1/3 + 2 2/3) / 3 = 5/9.
 #[test]
-fn corner_of_a_cube_goes_to_five_ninths() {
+fn corner_of_a_cube_moves_to_five_ninths() {
     let mesh = PolygonMesh { positions: cube().positions.iter().map(|p| 2.0 * p - 1.0).collect(), ..cube() };
     let made = subdivide(&mesh, 1);
     assert!(made.mesh.positions[7].distance(Vec3::splat(5.0 / 9.0)) < 1e-6, "{}", made.mesh.positions[7]);
@@ -77,8 +78,8 @@ fn corner_of_a_cube_goes_to_five_ninths() {
     assert_eq!(made.face_of, (0..24).map(|k| k / 4).collect::<Vec<u32>>());
 }
 
-/// The rules on triangles, with fractions by hand: a vertex of three faces is 1/3 of itself, of its neighbours' mean and of its
-/// faces' middles; an edge's point is the mean of two ends and two middles.
+/// The rules on triangles, evaluated by hand: a vertex of valence three is the mean of itself, of its neighbours' mean
+/// and of its faces' centroids; an edge point is the mean of two ends and two centroids.
 #[test]
 fn rows_of_a_tetrahedron_are_simple_fractions() {
     let rows = subdivide(&tetrahedron(), 1).rows;
@@ -86,7 +87,7 @@ fn rows_of_a_tetrahedron_are_simple_fractions() {
         (0, [12.0 / 27.0, 5.0 / 27.0, 5.0 / 27.0, 5.0 / 27.0]),
         // The edge of vertices 0 and 1 comes first.
         (4, [5.0 / 12.0, 5.0 / 12.0, 1.0 / 12.0, 1.0 / 12.0]),
-        // The first face has no vertex 3.
+        // The first face does not contain vertex 3.
         (10, [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, 0.0]),
     ];
     for (row, expected) in expected {
@@ -98,7 +99,7 @@ fn rows_of_a_tetrahedron_are_simple_fractions() {
 }
 
 #[test]
-fn no_step_changes_nothing_and_unused_vertices_stay() {
+fn zero_steps_are_the_identity_and_unused_vertices_stay() {
     let mut mesh = tetrahedron();
     mesh.positions.push(Vec3::splat(9.0));
     assert_eq!(subdivide(&mesh, 0).mesh, mesh);

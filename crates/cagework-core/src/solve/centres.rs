@@ -1,9 +1,9 @@
-//! The residual where coarse cells have their centres: restriction by half injection.
+//! Restriction by half injection: the residual only at the centres of coarse cells.
 //!
-//! After a red-black sweep that ends with black, the residual is zero on black cells and, once errors are smooth, nearly the
-//! same on neighbouring red ones: the red cell in a coarse cell's centre stands for all that restriction would gather, and
-//! a quarter of the red residuals are enough (measured: docs/notes/multigrid.md). Not for a first
-//! guess, whose residuals differ from cell to cell.
+//! After a red-black sweep that ends with black, the residual is zero on black cells and, once errors are smooth,
+//! nearly equal on neighbouring red ones. The red cell at a coarse cell's centre then represents all cells that full
+//! weighting would gather, so a quarter of the red residuals suffices (measured in docs/notes/multigrid.md). This does
+//! not hold for an initial guess, whose residuals are not smooth.
 
 use crate::grid::NO_CELL;
 use crate::levels::{CutCell, Level};
@@ -11,35 +11,35 @@ use crate::transfer::{RESTRICT_CENTRE, RESTRICT_EDGE, Transfer};
 
 use super::rows::{LANES, Rhs, Row, ZERO, split, sum_around};
 
-/// What full weighting gives to all red cells around a coarse cell: a centre and twelve edges.
+/// Total weight that full weighting gives to the red cells around a coarse cell: a centre and twelve edges.
 pub const INJECT: f32 = RESTRICT_CENTRE + 12.0 * RESTRICT_EDGE;
 
-/// A red fine cell that is the centre of a coarse cell.
+/// A red fine cell at the centre of a coarse cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Centre {
-    /// Its stencil, also where no arm is cut.
+    /// Its stencil, also if no arm is cut.
     stencil: CutCell,
-    /// Its number among red cut cells; [`NO_CELL`] if no arm is cut.
+    /// Index among the red cut cells; [`NO_CELL`] if no arm is cut.
     cut: u32,
 }
 
-/// Centres of a coarse level's cells: for each of its rows but the zero rows, red, then black.
+/// Fine centre of each coarse unknown, red then black.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Centres {
     stencils: [Vec<Centre>; 2],
 }
 
 impl Centres {
-    /// Stencils of the fine cells that `transfer` leads to the coarse ones.
+    /// Centres of the coarse cells of `transfer`.
     #[must_use]
     pub fn new(fine: &Level, transfer: &Transfer) -> Self {
         let [red, black] = &fine.colours;
-        // A coarse cell whose centre is not solved for has no residual.
+        // A coarse cell whose centre is not a fine unknown has no residual.
         let stencil = CutCell { cell: red.n_cells, neighbours: [black.n_cells; 6], diagonal: 1.0 };
         let none = Centre { stencil, cut: NO_CELL };
         let mut stencils = transfer.restrict_rows.each_ref().map(|rows| vec![none; rows.len()]);
         for (rows, stencils) in transfer.restrict_rows.iter().zip(&mut stencils) {
-            // Centres ascend, as runs and cut cells do.
+            // Centres are in ascending order, like runs and cut cells.
             let centres =
                 || rows.iter().map(|around| around[0]).zip(0..).filter(|(cell, _)| *cell != red.n_cells);
             let mut next = centres().peekable();
@@ -63,15 +63,15 @@ impl Centres {
         Self { stencils }
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.stencils.iter().map(|s| size_of_val(s.as_slice())).sum()
     }
 
-    /// The coarse right-hand side `out`, `[n_rows]` of the coarse level, from the residual of `u` at the centres. Returns the
-    /// mean of its squares over the centres and the black cells between them, which have none: over all cells, if residuals
-    /// are as smooth as injection supposes.
+    /// Writes the coarse right-hand side `out`, `[n_rows]` of the coarse level, from the residual of `u` at the
+    /// centres. Returns the mean squared residual over the centres and as many black cells, which estimates that over
+    /// all cells if residuals are smooth.
     #[inline(always)]
     pub fn inject(&self, fine: &Level, coarse: &Level, u: &mut [Row], rhs: Rhs<'_>, out: &mut [Row]) -> f64 {
         let (own, other) = split(fine, u, 0);
@@ -104,8 +104,8 @@ mod tests {
     use crate::levels::plain::{hierarchy, some_field};
     use crate::solve::rows::residual_plane;
 
-    /// Rounding of residuals, which carry diagonals up to some thousands in front of values in [0, 1), in another order.
-    const RESIDUAL: f32 = 1e-3;
+    /// f32 rounding of residuals: diagonals up to some thousands times values in [0, 1).
+    const RESIDUAL_ROUNDING: f32 = 1e-3;
 
     #[test]
     fn injection_is_the_residual_at_the_centres() {
@@ -132,7 +132,10 @@ mod tests {
                     n += 1;
                     for k in 0..LANES {
                         let (r, injected) = (residual[centre][k], f[row as usize][k]);
-                        assert!((2.0 * r - injected).abs() <= RESIDUAL, "{cell:?}: {r} and {injected}");
+                        assert!(
+                            (2.0 * r - injected).abs() <= RESIDUAL_ROUNDING,
+                            "{cell:?}: {r} and {injected}"
+                        );
                         sum += f64::from(r).powi(2);
                     }
                 }

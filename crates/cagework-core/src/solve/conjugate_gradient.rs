@@ -1,15 +1,15 @@
-//! Conjugate gradients on one batch of columns, preconditioned by nothing or by one V-cycle.
+//! Conjugate gradients on a batch of columns, optionally preconditioned by a V-cycle.
 //!
-//! Each lane is a system of its own, with its own step lengths; a batch ends when all of it is done. The direction is updated
-//! by Polak and Ribiere's formula, which allows a preconditioner that is not symmetric, as a V(2,1) cycle is.
+//! Each lane is a separate system with its own step lengths; the batch ends when all lanes have converged. Directions
+//! are updated by the Polak-Ribiere formula, which allows an unsymmetric preconditioner such as a V(2,1) cycle.
 //!
-//! Delta is the error that is expected to remain: changes of the solution fall geometrically but for a ripple, so that what is
-//! left is the latest change times `rate / (1 - rate)`, with the rate of the last `WINDOW` steps.
+//! Delta estimates the remaining error. Changes of the solution decrease geometrically up to a ripple, so the remaining
+//! error is the latest change times `rate / (1 - rate)`, with the rate over the last `WINDOW` steps.
 //!
-//! A V-cycle that diverges for some errors may be indefinite as a preconditioner; a step whose preconditioned residual does not
-//! descend takes the residual itself.
+//! A V-cycle that diverges for some errors may be an indefinite preconditioner. If the preconditioned residual is not a
+//! descent direction, the step uses the residual itself.
 //!
-//! Sources: Hestenes, Stiefel 1952; Notay 2000, "Flexible conjugate gradients".
+//! Sources: Hestenes and Stiefel 1952; Notay 2000, "Flexible conjugate gradients".
 
 use super::BatchSolver;
 use super::hierarchy::Hierarchy;
@@ -19,37 +19,37 @@ use super::rows::{LANES, Rhs, Row, ZERO};
 use super::stop::{SolveReport, StopRule};
 use crate::simd::dispatch;
 
-/// Most steps over which the rate of convergence is measured: longer than the ripple of the changes, 5 to 8 steps.
+/// Most steps over which the convergence rate is measured: longer than the ripple of the changes, 5 to 8 steps.
 const WINDOW: usize = 10;
 
-/// Largest rate that is believed: a solve of a thousand steps.
-const SLOWEST: f64 = 0.99;
+/// Upper bound on the measured rate.
+const RATE_BOUND: f64 = 0.99;
 
-/// A preconditioned solve ends as converged if this many steps bring no smaller delta near the resolution of f32.
-const MAX_STALLED: usize = 8;
+/// A preconditioned solve counts as converged after this many steps without a smaller delta near the resolution of f32.
+const MAX_STALLED_STEPS: usize = 8;
 
 /// Rows whose products are summed in f32 before they are added in f64.
 const ROWS_PER_SUM: usize = 1024;
 
-/// A sum for each lane.
+/// One value per lane.
 type Lanes = [f64; LANES];
 
-/// Fields of one batch on the finest level. `[n_rows]` each
+/// Fields of a batch on the finest level, `[n_rows]` each.
 #[derive(Debug)]
 pub struct ConjugateGradient {
     u: Vec<Row>,
     residual: Vec<Row>,
-    /// The residual, preconditioned.
+    /// Preconditioned residual.
     z: Vec<Row>,
     direction: Vec<Row>,
-    /// The operator times the direction.
+    /// Operator applied to the direction.
     image: Vec<Row>,
     cut_rhs: Vec<Row>,
     multigrid: Option<Workspace>,
 }
 
 impl ConjugateGradient {
-    /// Fields for the finest level, and those of a V-cycle if it preconditions.
+    /// Allocates fields of the finest level, and those of a V-cycle if it preconditions.
     #[must_use]
     pub fn new(hierarchy: &Hierarchy, is_preconditioned: bool) -> Self {
         let field = || vec![ZERO; hierarchy.levels[0].n_rows()];
@@ -64,8 +64,8 @@ impl ConjugateGradient {
         }
     }
 
-    /// Goes on from the field of a workspace whose cycles stalled, and leaves the solution there. `rhs`: one row per cut cell;
-    /// `report`: of the cycles, which count for the limit on iterations.
+    /// Continues from the field of a workspace whose cycles stalled, and stores the solution there. `rhs`: one row per
+    /// cut cell; `report`: of the cycles, which count towards the limit on iterations.
     pub(super) fn resume(
         &mut self,
         hierarchy: &Hierarchy,
@@ -82,7 +82,7 @@ impl ConjugateGradient {
         report
     }
 
-    /// Preconditions the residual. Returns `r . z` and `r . r`.
+    /// Applies the preconditioner to the residual. Returns `r . z` and `r . r`.
     fn precondition(&mut self, hierarchy: &Hierarchy, cycle: &mut Option<&mut Workspace>) -> [Lanes; 2] {
         match cycle {
             None => self.z.copy_from_slice(&self.residual),
@@ -101,7 +101,7 @@ impl ConjugateGradient {
         [products(&self.residual, &self.z), squares]
     }
 
-    /// Steps from `u` and its residual until the rule holds.
+    /// Iterates from `u` and its residual until the stopping rule holds.
     fn iterate(
         &mut self,
         hierarchy: &Hierarchy,
@@ -113,7 +113,7 @@ impl ConjugateGradient {
         let level = &hierarchy.levels[0];
         let n_unknowns = level.n_unknowns().max(1) as f64;
         let (is_preconditioned, mut changes) = (cycle.is_some(), Vec::new());
-        // After cycles that diverged, the first step takes out what they enlarged, and says nothing of the rest.
+        // After diverged cycles, the first step removes the errors that they amplified: exclude it from the rate.
         let unlike = usize::from(report.stalled);
         let [mut descent, mut squares] = self.precondition(hierarchy, &mut cycle);
         self.direction.copy_from_slice(&self.z);
@@ -130,7 +130,7 @@ impl ConjugateGradient {
             let residual = (squares.iter().sum::<f64>() / n_unknowns).sqrt();
             let error = expected_error(&changes[unlike.min(changes.len() - 1)..]);
             let is_done = report.iteration_done(&rule, error, Some(residual));
-            let is_last = is_done || is_preconditioned && report.ends_at_round_off(MAX_STALLED);
+            let is_last = is_done || is_preconditioned && report.ends_at_round_off(MAX_STALLED_STEPS);
             let (iteration, delta) = report.latest();
             if !done(iteration, delta) {
                 return None;
@@ -183,7 +183,7 @@ impl BatchSolver for ConjugateGradient {
     }
 }
 
-/// The error that is expected after changes with these mean squares.
+/// Estimated remaining error from the mean squared changes of all steps.
 fn expected_error(squares: &[f64]) -> f64 {
     let n = squares.len();
     let window = (n / 2).min(WINDOW);
@@ -196,14 +196,14 @@ fn expected_error(squares: &[f64]) -> f64 {
     if now == 0.0 {
         return 0.0;
     }
-    let rate = (now / before).powf(0.5 / window as f64).min(SLOWEST);
-    // As the window lets expect, where one change may lie below the others by the ripple.
+    let rate = (now / before).powf(0.5 / window as f64).min(RATE_BOUND);
+    // Change expected from the window's mean: a single change may lie below it by the ripple.
     let usual = (now / window as f64).sqrt() * rate.powf(0.5 * (window - 1) as f64);
-    // No weight is off by more than 1.
+    // Weights lie between 0 and 1.
     (usual.max(latest) * rate / (1.0 - rate)).min(1.0)
 }
 
-/// `a . b` of each lane.
+/// `a . b` per lane.
 fn products(a: &[Row], b: &[Row]) -> Lanes {
     dispatch(
         #[inline(always)]
@@ -225,7 +225,7 @@ fn products(a: &[Row], b: &[Row]) -> Lanes {
     )
 }
 
-/// `a / b`; 0 for a lane that is done, whose products are all 0.
+/// `a / b` per lane; 0 for a converged lane, whose products are all 0.
 fn quotients(a: &Lanes, b: &Lanes) -> Lanes {
     std::array::from_fn(|k| if b[k] > 0.0 { a[k] / b[k] } else { 0.0 })
 }
@@ -260,17 +260,17 @@ mod tests {
     use super::*;
     use crate::levels::plain::hierarchy;
 
-    /// Changes that fall by 0.8 a step leave four times the latest: 0.8 + 0.64 + ... = 0.8 / (1 - 0.8).
+    /// Changes that decrease by 0.8 per step leave 0.8 + 0.64 + ... = 0.8 / (1 - 0.8), four times the latest.
     #[test]
-    fn geometric_changes_leave_their_sum() {
+    fn remaining_error_of_geometric_changes_is_their_sum() {
         let squares: Vec<f64> = (0..40).map(|k| 0.8f64.powi(2 * k)).collect();
         let (left, latest) = (expected_error(&squares), 0.8f64.powi(39));
         assert!(left >= 3.9 * latest && left < 6.0 * latest, "{left} after {latest}");
     }
 
-    /// Preconditioned or not, it ends where multigrid does, in fewer steps with the V-cycle.
+    /// Plain and preconditioned, the solution is multigrid's; the V-cycle needs fewer steps.
     #[test]
-    fn solution_is_multigrids() {
+    fn solution_equals_that_of_multigrid() {
         let hierarchy = hierarchy();
         let rule = StopRule { tolerance: 1e-6, max_iterations: 500 };
         let mut multigrid = Workspace::new(&hierarchy);

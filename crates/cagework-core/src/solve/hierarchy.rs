@@ -1,4 +1,4 @@
-//! All levels of one bind with their transfers and right-hand sides in batches: what every solver reads.
+//! All levels of a bind with transfers and right-hand sides per batch.
 
 use crate::levels::{Boundary, BoundaryTerm, Level};
 use crate::team::map_indices;
@@ -7,23 +7,23 @@ use crate::transfer::Transfer;
 use super::centres::Centres;
 use super::rows::{LANES, Row};
 
-/// Levels, finest first, and the transfers between neighbours.
+/// Levels with the transfers between them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hierarchy {
     /// Levels, finest first; at least one.
     pub levels: Vec<Level>,
-    /// `transfers[k]` lies between levels k and k + 1.
+    /// `transfers[k]`: between levels k and k + 1.
     pub transfers: Vec<Transfer>,
-    /// Centres of the second level's cells in the finest.
+    /// Fine centres of the second level's cells.
     pub centres: Centres,
-    /// Columns: control vertices.
+    /// Number of columns (controls).
     pub n_columns: usize,
-    /// For each level, where each batch's terms start in `Level::boundary`, which is sorted by batch.
+    /// Per level, the start of each batch's terms in `Level::boundary`, which is sorted by batch.
     batches: Vec<Vec<u32>>,
 }
 
 impl Hierarchy {
-    /// Of what each level's cells see of the cage, finest first ([`coarsened_until_few`](crate::levels::coarsened_until_few)).
+    /// From each level's boundary, finest first ([`coarsened_until_few`](crate::levels::coarsened_until_few)).
     #[must_use]
     pub fn new<B: Boundary>(boundaries: &[B], n_columns: usize) -> Self {
         let n_batches = n_columns.div_ceil(LANES);
@@ -39,7 +39,7 @@ impl Hierarchy {
         Self { levels, transfers, centres, n_columns, batches }
     }
 
-    /// Batches of [`LANES`] columns.
+    /// Number of batches of [`LANES`] columns.
     #[must_use]
     pub fn n_batches(&self) -> usize {
         self.n_columns.div_ceil(LANES)
@@ -50,7 +50,7 @@ impl Hierarchy {
         &self.levels[level].boundary[starts[batch] as usize..starts[batch + 1] as usize]
     }
 
-    /// Dirichlet terms of a level for some columns.
+    /// Dirichlet terms of a level for a range of columns.
     pub fn boundary_terms(
         &self,
         level: usize,
@@ -62,7 +62,7 @@ impl Hierarchy {
             .filter(move |term| columns.contains(&(term.column as usize)))
     }
 
-    /// Writes a batch's right-hand side of the finest level: one row per cut cell.
+    /// Writes a batch's right-hand side of the finest level, one row per cut cell.
     pub fn fill_cut_rhs(&self, batch: usize, f: &mut Vec<Row>) {
         f.clear();
         f.resize(self.levels[0].n_cut(), [0.0; LANES]);
@@ -71,7 +71,7 @@ impl Hierarchy {
         }
     }
 
-    /// Writes a batch's right-hand side of a coarse level: one row per cell.
+    /// Writes a batch's right-hand side of a coarse level, one row per cell.
     pub fn fill_dense_rhs(&self, level: usize, batch: usize, f: &mut [Row]) {
         f.fill([0.0; LANES]);
         for term in self.terms(level, batch) {
@@ -80,7 +80,7 @@ impl Hierarchy {
         }
     }
 
-    /// Bytes held by levels and transfers.
+    /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.levels.iter().map(Level::bytes).sum::<usize>()
@@ -89,7 +89,7 @@ impl Hierarchy {
     }
 }
 
-/// A level's terms sorted by batch, within which they keep their order, and where each batch starts.
+/// Stably sorts a level's terms by batch. Returns them with the start of each batch.
 fn sorted_by_batch(terms: &[BoundaryTerm], n_batches: usize) -> (Vec<BoundaryTerm>, Vec<u32>) {
     let batch_of = |t: &BoundaryTerm| t.column as usize / LANES;
     let mut starts = vec![0u32; n_batches + 1];

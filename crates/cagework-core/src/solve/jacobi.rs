@@ -1,17 +1,17 @@
-//! The paper's smoothing: Algorithm 3, with Eq. 2 as the stop rule.
+//! The paper's solver: Jacobi sweeps (Algorithm 3), with Eq. 2 as stopping rule.
 //!
-//! Every sweep replaces each unknown by the average of its neighbours, old values on the right-hand side, until the
-//! average over cells of the change of a cell's weight vector falls below tau.
+//! Every sweep replaces each unknown by the average of its neighbours' old values, until the mean change of a cell's
+//! weight vector falls below tau.
 //!
 //! Changes versus the paper:
-//! - Two buffers change roles instead of being copied.
-//! - Threads own whole batches of columns, so that no two ever write the same cell: no lock and no queue of cells,
-//!   the two costs that made the paper's threads slower than one.
-//! - A batch runs several sweeps while it is in the cache. The changes of each sweep are kept apart and added over
-//!   batches afterwards, so delta is known after every sweep, and the number of sweeps in a round is chosen from
-//!   delta's decay so that the last round ends where the rule stops.
+//! - Two buffers are swapped instead of copied.
+//! - Each thread owns whole batches of columns, so no two threads write the same cell. This avoids the paper's locks and queue of cells,
+//!   which made its threads slower than one.
+//! - A batch runs several sweeps while it is in the cache. The changes of each sweep are stored separately and summed over batches
+//!   afterwards, so delta is known after every sweep. The number of sweeps per round is predicted from delta's decay, so that the last round
+//!   ends at the sweep at which the rule holds.
 //!
-//! Eq. 2 couples all columns of a cell, so all batches' fields are alive together here, unlike in multigrid.
+//! Eq. 2 couples all columns of a cell, so the fields of all batches are in memory at the same time, unlike in multigrid.
 
 use super::hierarchy::Hierarchy;
 use super::rows::{Changes, LANES, Rhs, Row, ZERO, jacobi_plane};
@@ -22,16 +22,16 @@ use crate::progress::Cancelled;
 use crate::simd::dispatch;
 use crate::team::Team;
 
-/// Most sweeps of a batch in one round: enough to hide a batch's way into the cache.
+/// Most sweeps of a batch per round: enough to amortise loading the batch into the cache.
 const MAX_ROUND: usize = 8;
 
-/// Share of the predicted number of remaining sweeps that a round dares to do.
-const CAUTION: f64 = 0.8;
+/// Share of the predicted remaining sweeps that a round runs.
+const PREDICTION_SHARE: f64 = 0.8;
 
-/// Cells whose changes a thread adds up at a time.
+/// Cells per task when changes are summed.
 const CELLS_PER_PIECE: usize = 4096;
 
-/// Old and new values of one batch, and its right-hand side.
+/// Old and new values of a batch, with its right-hand side.
 #[derive(Debug)]
 struct BatchFields {
     old: Vec<Row>,
@@ -40,14 +40,14 @@ struct BatchFields {
     batch: usize,
 }
 
-/// The batches of one thread, and per sweep of a round the changes of its cells.
+/// Batches of a thread, with the changes of its cells per sweep of a round.
 #[derive(Debug)]
-struct Share {
+struct ThreadBatches {
     batches: Vec<BatchFields>,
     changes: Vec<Vec<f32>>,
 }
 
-/// Bytes of fields for `n_unknowns` cells, `n_cut` of them next to the boundary.
+/// Size of the fields for `n_unknowns` cells, `n_cut` of them cut.
 #[must_use]
 pub fn field_bytes(n_unknowns: u64, n_cut: u64, n_columns: u64, threads: u64) -> u64 {
     let row = size_of::<Row>() as u64;
@@ -55,12 +55,12 @@ pub fn field_bytes(n_unknowns: u64, n_cut: u64, n_columns: u64, threads: u64) ->
         + threads * MAX_ROUND as u64 * 4 * (n_unknowns + 2)
 }
 
-/// So many sweeps without a smaller delta only move rounding about.
+/// Stop after this many sweeps without progress: the rest is rounding noise.
 pub const STALLED_SWEEPS: usize = 128;
 
-/// Solves all columns on the finest level. Returns the batches' fields in order.
+/// Solves all columns on the finest level. Returns the fields of the batches in order.
 ///
-/// `sweep_done(sweeps, delta)` is called after each round and cancels by returning false.
+/// Calls `sweep_done(sweeps, delta)` after each round; returning false cancels.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -73,14 +73,15 @@ pub fn solve(
 ) -> Result<(Vec<Vec<Row>>, SolveReport), Cancelled> {
     let level = &hierarchy.levels[0];
     let n_shares = team.n_threads().min(hierarchy.n_batches()).max(1);
-    let mut shares: Vec<Share> = team.share(n_shares, || (), |(), s| Share::new(hierarchy, s, n_shares));
+    let mut shares: Vec<ThreadBatches> =
+        team.share(n_shares, || (), |(), s| ThreadBatches::new(hierarchy, s, n_shares));
     let mut report = SolveReport::default();
     let (mut round, mut is_done) = (1, false);
     while !is_done {
         round = round.min(rule.max_iterations as usize - report.deltas.len());
         team.each_mut(&mut shares, |share| share.sweep(level, round, norm));
         for delta in &mean_deltas(&shares, level, team)[..round] {
-            // A round may pass the sweep at which the rule holds.
+            // A round may run past the sweep at which the rule holds.
             let had_converged = report.converged;
             is_done |= report.iteration_done(&rule, *delta, None);
             report.converged |= had_converged;
@@ -99,7 +100,7 @@ pub fn solve(
     Ok((fields, report))
 }
 
-/// Sweeps that can be done at once without passing the sweep at which delta, which decays geometrically, meets tau.
+/// Number of sweeps that do not run past the sweep at which delta, extrapolated geometrically, meets tau.
 fn next_round(history: &[f64], tau: f64) -> usize {
     let n = history.len();
     if n < 4 {
@@ -108,15 +109,15 @@ fn next_round(history: &[f64], tau: f64) -> usize {
     let rate = history[n - 1].ln() - history[n - 2].ln();
     let remaining = (tau.ln() - history[n - 1].ln()) / rate;
     if remaining.is_finite() && remaining > 0.0 {
-        ((CAUTION * remaining) as usize).clamp(1, MAX_ROUND)
+        ((PREDICTION_SHARE * remaining) as usize).clamp(1, MAX_ROUND)
     } else {
         1
     }
 }
 
-/// Eq. 2 averaged over cells for each sweep of a round, from the changes of all threads' columns. Both readings take
-/// the root of what the kernel summed: squares or absolute values.
-fn mean_deltas(shares: &[Share], level: &Level, team: &Team) -> [f64; MAX_ROUND] {
+/// Delta (Eq. 2) averaged over cells for each sweep of a round, from the changes of all threads. Both norms take the
+/// root of the sums that the kernel accumulated: of squares or of absolute values.
+fn mean_deltas(shares: &[ThreadBatches], level: &Level, team: &Team) -> [f64; MAX_ROUND] {
     let n_rows = level.n_rows();
     let pieces = team.share(
         n_rows.div_ceil(CELLS_PER_PIECE),
@@ -138,9 +139,9 @@ fn mean_deltas(shares: &[Share], level: &Level, team: &Team) -> [f64; MAX_ROUND]
     sums.map(|sum| sum / level.n_unknowns().max(1) as f64)
 }
 
-/// Sum over cells of the root of their change.
+/// Sum of the roots of the changes of some cells.
 #[inline(always)]
-fn sum_of_roots(shares: &[Share], sweep: usize, cells: std::ops::Range<usize>) -> f64 {
+fn sum_of_roots(shares: &[ThreadBatches], sweep: usize, cells: std::ops::Range<usize>) -> f64 {
     let mut sums = ZERO;
     let mut changes = ZERO;
     for start in cells.clone().step_by(LANES) {
@@ -158,8 +159,8 @@ fn sum_of_roots(shares: &[Share], sweep: usize, cells: std::ops::Range<usize>) -
     sums.iter().map(|&s| f64::from(s)).sum()
 }
 
-impl Share {
-    /// Batches `share`, `share + n_shares`, ...: the same ones in every run, so that sums are too.
+impl ThreadBatches {
+    /// Batches `share`, `share + n_shares`, ...: a fixed assignment keeps sums reproducible.
     fn new(hierarchy: &Hierarchy, share: usize, n_shares: usize) -> Self {
         let n_rows = hierarchy.levels[0].n_rows();
         let batches = (share..hierarchy.n_batches())
@@ -173,7 +174,6 @@ impl Share {
         Self { batches, changes: vec![vec![0.0; n_rows]; MAX_ROUND] }
     }
 
-    /// `round` sweeps of each batch.
     fn sweep(&mut self, level: &Level, round: usize, norm: DeltaNorm) {
         for changes in &mut self.changes[..round] {
             changes.fill(0.0);
@@ -188,7 +188,7 @@ impl Share {
     }
 }
 
-/// One sweep of both colours; plane by plane, so that both read a plane while it is near.
+/// A sweep of both colours, plane by plane so that both read a plane while it is cached.
 fn sweep(level: &Level, old: &[Row], new: &mut [Row], f: Rhs<'_>, norm: DeltaNorm, changes: &mut [f32]) {
     dispatch(
         #[inline(always)]

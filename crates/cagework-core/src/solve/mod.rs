@@ -1,7 +1,7 @@
-//! Solvers of Laplace's equation, one right-hand side per control.
+//! Solvers of Laplace's equation with one right-hand side per control.
 //!
-//! A solver needs a level's operator ([`operator`]), its right-hand sides ([`hierarchy::Hierarchy`]), and the stop rule
-//! ([`stop`]). One that solves batch after batch is a [`BatchSolver`]; Jacobi, whose stop rule couples all columns, is not.
+//! A solver uses a level's operator ([`operator`]), right-hand sides ([`hierarchy::Hierarchy`]) and the stopping rule ([`stop`]).
+//! Solvers that work batch by batch implement [`BatchSolver`]; Jacobi does not, since its stopping rule couples all columns.
 
 pub mod centres;
 pub mod conjugate_gradient;
@@ -16,12 +16,13 @@ use hierarchy::Hierarchy;
 use rows::Row;
 use stop::{SolveReport, StopRule};
 
-/// Solves batch after batch of columns on the finest level, with fields that it allocated once.
+/// Solves batches of columns one after another on the finest level, in fields allocated once.
 pub trait BatchSolver {
-    /// Solves a batch, from nothing. `done(iteration, delta)` is called after each iteration and cancels by returning false.
+    /// Solves a batch from an initial guess of its own. Calls `done(iteration, delta)` after each iteration; returning
+    /// false cancels.
     ///
     /// # Errors
-    /// `None` when cancelled.
+    /// `None` if cancelled.
     fn solve(
         &mut self,
         hierarchy: &Hierarchy,
@@ -30,9 +31,9 @@ pub trait BatchSolver {
         done: &mut dyn FnMut(u32, f64) -> bool,
     ) -> Option<SolveReport>;
 
-    /// The solution of the latest batch. `[n_rows]`
+    /// Solution of the latest batch. `[n_rows]`
     fn field(&self) -> &[Row];
 
-    /// Bytes of all fields.
+    /// Size of all fields, bytes.
     fn bytes(&self) -> usize;
 }

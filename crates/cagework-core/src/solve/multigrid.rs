@@ -1,21 +1,22 @@
-//! Full multigrid and V(2,1) cycles on one batch of columns.
+//! Full multigrid with V(2,1) cycles on a batch of columns.
 //!
-//! Solves the discrete Laplace equation of the embedded boundary for [`LANES`] right-hand sides at once. Red-black
-//! Gauss-Seidel relaxes; coarse levels are discretised anew from the cage. The first black half sweep of a cycle goes
-//! `OMEGA` times as far (Yavneh 1996), which costs nothing and makes V(2,1) converge as V(2,2) does without.
-//! Measured on the Armadillo, g = 64, root mean square error of a cell's 16 columns: 5.7e-4 after full multigrid, then
-//! 3.1e-5, 2.5e-6, 2.3e-7 after each further cycle. The first guess of a level is the mean of the coarse solution, not
-//! its trilinear interpolation with zeros outside: the solution is not zero on the cage (7.5e-2 -> 2.9e-2).
+//! Solves the discrete Laplace equation of the embedded boundary for [`LANES`] right-hand sides at once, with red-black
+//! Gauss-Seidel as smoother; each coarse level is discretised from the cage itself. The first black half sweep of a
+//! cycle is over-relaxed by `OMEGA` (Yavneh 1996), at no cost, which makes V(2,1) converge as fast as V(2,2) without.
+//! RMS error of a cell's 16 columns on the Armadillo, g = 64: 5.7e-4 after full multigrid, then 3.1e-5, 2.5e-6 and
+//! 2.3e-7 after one, two and three more cycles. The initial guess of a level is the mean of the coarse solution rather
+//! than its trilinear interpolation with zeros outside, since the solution is not zero on the cage (error 2.9e-2
+//! instead of 7.5e-2).
 //!
-//! From the second cycle on, the finest level's residual is injected ([`centres`](super::centres)): 42 cycles for the
-//! Armadillo's 14 batches instead of 43, the later ones cheaper, and 4e-6 of error left at the end instead of 7e-6 (5e-6 with the
-//! shorter last cycle, `SPARE`).
+//! From the second cycle on, the finest level's residual is injected ([`centres`](super::centres)): the Armadillo's 14
+//! batches take 42 cycles instead of 43, cheaper ones, and end at an error of 4e-6 instead of 7e-6 (5e-6 with the
+//! shorter last cycle, see [`Convergence::is_nearly_done`]).
 //!
-//! Coarse grids do not see balls and cavities smaller than their cells, and correct too much there. If cycles converge slowly or
-//! diverge ([`Convergence::stalls`]), conjugate gradients that they precondition go on from the latest iterate.
+//! Coarse grids do not resolve balls and cavities smaller than their cells, and overcorrect there. If cycles converge slowly or
+//! diverge ([`Convergence::stalls`]), conjugate gradients preconditioned by the cycles continue from the latest iterate.
 //!
-//! All passes between two restrictions are one stream through memory (`stream`): the coarse correction, the sweep after it,
-//! the next cycle's two sweeps and the residual of the red cells follow each other one z-plane apart.
+//! All passes between two restrictions are streamed through memory together (`stream`): coarse correction, post-smoothing, the
+//! next cycle's two pre-smoothing sweeps and the residual of the red cells follow each other one z-plane apart.
 
 mod convergence;
 mod stream;
@@ -32,40 +33,41 @@ use crate::simd::dispatch;
 
 use stream::{BETWEEN, BETWEEN_SHORT, DOWN, DOWN_FROM_COARSE, DOWN_FROM_ZERO, Pass, UP, stream};
 
-/// Over-relaxation of the first black half sweep: 1.1 to 1.3 all lower the error 1.5 to 2 times per cycle (Armadillo).
+/// Over-relaxation of the first black half sweep: values from 1.1 to 1.3 all reduce the error 1.5 to 2 times per cycle
+/// (Armadillo).
 pub const OMEGA: f32 = 1.2;
 
-/// A cycle that is expected to leave so many times less than it may, and to be the last, does with one sweep less.
-const SPARE: f64 = 1.5;
+/// If the last cycle is predicted to land this factor below tolerance, it skips one of its sweeps.
+const SHORT_CYCLE_MARGIN: f64 = 1.5;
 
-/// Sweeps on the coarsest level, which has at most a few hundred unknowns, six or so across.
+/// Sweeps on the coarsest level, which has at most a few hundred unknowns, about six across.
 pub const COARSEST_SWEEPS: usize = 8;
 
-/// Their over-relaxation. Six cells across, Jacobi leaves 0.90 of the error, for which 1.4 is Young's optimum: 0.4 are
-/// left after a sweep, where 0.8 are without.
+/// Over-relaxation of those sweeps. For six cells across, Jacobi contracts by 0.90, for which 1.4 is Young's optimum: a
+/// sweep then contracts by 0.4 instead of 0.8.
 pub const COARSEST_OMEGA: f32 = 1.4;
 
-/// Fields of one batch on every level; allocated once per thread, used for batch after batch.
+/// Fields of a batch on every level; allocated once per thread and reused for all its batches.
 #[derive(Debug)]
 pub struct Workspace {
-    /// `u[k]`: the solution, on coarse levels the correction. `[n_rows]`
+    /// `u[k]`: the solution; on coarse levels, the correction. `[n_rows]`
     u: Vec<Vec<Row>>,
-    /// `f[0]`: one row per cut cell, or, for [`Self::precondition`], per cell; `f[k]`: one row per cell.
+    /// `f[0]`: one row per cut cell or, in [`Self::precondition`], per cell; `f[k]`: one row per cell.
     f: Vec<Vec<Row>>,
-    /// Residual of the red cells of the level under way, and a zero row.
+    /// Residual of the red cells of the current level, and a zero row.
     residual: Vec<Row>,
     /// Whether `f[0]` has one row per cell.
     is_finest_dense: bool,
-    /// Takes over when cycles stall; allocated then.
+    /// Conjugate gradients for stalled cycles, allocated on demand.
     rescue: Option<Box<ConjugateGradient>>,
 }
 
 impl Workspace {
-    /// Fields for all levels.
+    /// Allocates fields of all levels.
     #[must_use]
     pub fn new(hierarchy: &Hierarchy) -> Self {
         let fields = || hierarchy.levels.iter().map(|l| vec![ZERO; l.n_rows()]);
-        // The finest level's right-hand side is made as long as its kind asks for.
+        // Sized later: its length depends on the kind of right-hand side.
         let mut f: Vec<_> = fields().collect();
         f[0] = Vec::new();
         Self {
@@ -77,7 +79,7 @@ impl Workspace {
         }
     }
 
-    /// One V(2,1) cycle from zero for any right-hand side: `z` becomes roughly the solution of `A z = r`. Both `[n_rows]`.
+    /// One V(2,1) cycle from zero for any right-hand side: an approximate solution `z` of `A z = r`. Both `[n_rows]`.
     pub fn precondition(&mut self, hierarchy: &Hierarchy, r: &mut Vec<Row>, z: &mut Vec<Row>) {
         self.is_finest_dense = true;
         std::mem::swap(&mut self.f[0], r);
@@ -87,36 +89,35 @@ impl Workspace {
         std::mem::swap(&mut self.u[0], z);
     }
 
-    /// Exchanges the finest level's field with another of its length.
+    /// Swaps the finest level's field with another one of its length.
     pub(super) fn swap_field(&mut self, u: &mut Vec<Row>) {
         std::mem::swap(&mut self.u[0], u);
     }
 
-    /// One full relaxation of the finest level, both colours, as the solver does it: the unit in which a solve's
-    /// cost is measured. After a [`Self::solve`].
+    /// One red-black sweep of the finest level: the unit in which benchmarks measure the cost of a solve. Call after
+    /// [`Self::solve`].
     pub fn sweep(&mut self, hierarchy: &Hierarchy) {
         let (level, u, f) = (&hierarchy.levels[0], &mut self.u[0], Rhs::Cut(&self.f[0]));
         relax(level, u, f);
     }
 
-    /// One V(2,1) cycle on the finest level, after [`Self::solve`] has set up a batch: for measuring.
+    /// One V(2,1) cycle on the finest level, for benchmarks. Call after [`Self::solve`].
     pub fn v_cycle(&mut self, hierarchy: &Hierarchy) {
         self.cycle(hierarchy, 0, DOWN);
     }
 
-    /// One V(2,1) cycle from level k down, which begins with `start`.
+    /// One V(2,1) cycle on level k and below, with the pre-smoothing passes `start`.
     fn cycle(&mut self, hierarchy: &Hierarchy, k: usize, start: &[Pass]) {
         self.down(hierarchy, k, start);
         self.up(hierarchy, k, UP);
     }
 
-    /// The right-hand side of level k.
     fn rhs(f: &[Vec<Row>], k: usize, is_finest_dense: bool) -> Rhs<'_> {
         if k == 0 && !is_finest_dense { Rhs::Cut(&f[0]) } else { Rhs::Dense(&f[k]) }
     }
 
-    /// A cycle's way down on level k, by the passes `start`, and all of it on coarser levels. Returns (squared norm of the
-    /// coarse correction, on level 0; mean squared residual).
+    /// Pre-smoothing of level k by the passes `start`, and cycles on all coarser levels. Returns the squared norm of
+    /// the coarse correction (on level 0) and the mean squared residual.
     fn down(&mut self, hierarchy: &Hierarchy, k: usize, start: &[Pass]) -> (f64, f64) {
         let level = &hierarchy.levels[k];
         if k + 1 == hierarchy.levels.len() {
@@ -135,7 +136,7 @@ impl Workspace {
         let mean_square = dispatch(
             #[inline(always)]
             || {
-                // What follows a coarse correction ends without a residual.
+                // Passes after a coarse correction do not compute a residual: inject it.
                 if start.last() != Some(&Pass::Residual) {
                     return hierarchy.centres.inject(level, coarse, &mut u[0], rhs, &mut coarse_f[0]);
                 }
@@ -149,7 +150,7 @@ impl Workspace {
         (correction, mean_square)
     }
 
-    /// A cycle's way up on level k, by `passes`.
+    /// Coarse correction and post-smoothing of level k by `passes`.
     fn up(&mut self, hierarchy: &Hierarchy, k: usize, passes: &[Pass]) {
         if k + 1 < hierarchy.levels.len() {
             let (u, coarse_u) = self.u.split_at_mut(k + 1);
@@ -203,7 +204,7 @@ impl BatchSolver for Workspace {
             }
             start = match coarsest {
                 0 => DOWN,
-                _ if convergence.is_nearly_done(SPARE) => BETWEEN_SHORT,
+                _ if convergence.is_nearly_done(SHORT_CYCLE_MARGIN) => BETWEEN_SHORT,
                 _ => BETWEEN,
             };
         }
@@ -219,7 +220,7 @@ impl BatchSolver for Workspace {
     }
 }
 
-/// A plain red-black sweep.
+/// A red-black Gauss-Seidel sweep.
 fn relax(level: &Level, u: &mut [Row], f: Rhs<'_>) {
     dispatch(
         #[inline(always)]
@@ -233,7 +234,7 @@ fn relax(level: &Level, u: &mut [Row], f: Rhs<'_>) {
     );
 }
 
-/// Sweeps on the coarsest level. Returns the squared norm of the change per unknown.
+/// Solves the coarsest level by sweeps. Returns the squared norm of the change per unknown.
 fn relax_coarsest(level: &Level, u: &mut [Row], f: Rhs<'_>) -> f64 {
     let before = u.to_vec();
     dispatch(
@@ -258,7 +259,7 @@ fn sum_squares(rows: &[Row]) -> f64 {
     dispatch(
         #[inline(always)]
         || {
-            // One partial sum per few thousand rows keeps f32 accurate enough for a stop rule.
+            // f32 partial sums over a few thousand rows are accurate enough for a stopping rule.
             rows.chunks(4096)
                 .map(|chunk| {
                     let mut sum = ZERO;

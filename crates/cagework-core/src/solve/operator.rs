@@ -1,13 +1,14 @@
-//! The discrete Laplace operator of a level: all that a solver needs to know of the cage.
+//! The discrete Laplace operator of a level: the solvers' interface to the cage.
 //!
-//! For the unknown of cell c with arms of weight a: `(A u)_c = (sum a) u_c - sum over whole arms of u_neighbour`, symmetric and
-//! positive definite for both methods; arms that end on the cage are in the right-hand side. Source: Gibou et al. 2002.
+//! For the unknown of cell c and arms of weight a: `(A u)_c = (sum of a) u_c - sum of u over neighbours on whole arms`.
+//! A is symmetric positive definite for both methods. Arms that end on the cage contribute to the right-hand side.
+//! Source: Gibou et al. 2002.
 
 use super::rows::{Rhs, Row, ZERO, residual_plane};
 use crate::levels::Level;
 use crate::simd::dispatch;
 
-/// `out = A u`. `u`, `out`: `[n_rows]`, the zero rows of `u` hold zeros.
+/// `out = A u`. `u`, `out`: `[n_rows]`; the zero rows of `u` must be zero.
 pub fn apply(level: &Level, u: &[Row], out: &mut [Row]) {
     residual(level, u, Rhs::Zero, out);
     for row in out {
@@ -15,7 +16,7 @@ pub fn apply(level: &Level, u: &[Row], out: &mut [Row]) {
     }
 }
 
-/// `out = f - A u`. `u`, `out`: `[n_rows]`, the zero rows of `u` hold zeros. Returns the sum of its squares for each lane.
+/// `out = f - A u`. `u`, `out`: `[n_rows]`; the zero rows of `u` must be zero. Returns its sum of squares per lane.
 pub fn residual(level: &Level, u: &[Row], f: Rhs<'_>, out: &mut [Row]) -> Row {
     dispatch(
         #[inline(always)]

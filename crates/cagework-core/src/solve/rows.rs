@@ -1,8 +1,8 @@
-//! Fields and the kernels that stream through them: the fast twins of `stencil`'s plain loops.
+//! Fields and streaming kernels: optimised versions of the plain loops in `stencil`.
 //!
-//! A field holds one *batch* of control vertices: a row of [`LANES`] values a cell, rows in the level's order
-//! (`[red .., 0, black .., 0]`). Every kernel works on one z-plane of one colour, so that callers can let several
-//! half sweeps follow each other a plane apart and a whole smoothing pass reads the field from memory once.
+//! A field holds one *batch* of controls: a row of [`LANES`] values per cell, in the level's order (`[red .., 0, black
+//! .., 0]`). Every kernel works on one z-plane of one colour, so that callers can run several half sweeps a plane apart
+//! and read the field from memory once.
 
 use crate::levels::Level;
 use crate::options::DeltaNorm;
@@ -13,20 +13,20 @@ mod rhs;
 use rhs::ColourRhs;
 pub use rhs::Rhs;
 
-/// Columns of a batch: one AVX register, two of SSE, NEON or wasm. Measured on the Armadillo: with 16, a solve takes
-/// 25 % less time at g = 64, where a batch fits the second-level cache, and 40 % more at g = 128, where it does not.
+/// Columns per batch: one AVX register, two of SSE, NEON or wasm. With 16, the Armadillo's solve takes 25 % less time
+/// at g = 64, where a batch fits into the second-level cache, and 40 % more at g = 128, where it does not.
 pub const LANES: usize = 8;
 
-/// One cell's values for the columns of a batch.
+/// Values of a cell for the columns of a batch.
 pub type Row = [f32; LANES];
 
 /// A row of zeros.
 pub const ZERO: Row = [0.0; LANES];
 
-/// Changes of a weight below this do not count: their squares would be denormal numbers.
-const NEGLIGIBLE: f32 = 1e-18;
+/// Smaller changes of a weight count as zero: their squares would be denormal.
+const MIN_CHANGE: f32 = 1e-18;
 
-/// Both colours of a field: (the one that is written, the one that is read).
+/// Splits a field by colour: (`colour`, the other one).
 #[inline(always)]
 pub fn split<'a>(level: &Level, field: &'a mut [Row], colour: usize) -> (&'a mut [Row], &'a mut [Row]) {
     let (red, black) = field.split_at_mut(level.first_row(1));
@@ -46,7 +46,7 @@ fn add(sum: &mut Row, row: &Row) {
     }
 }
 
-/// Sum of the rows of `field` that a cell has for neighbours.
+/// Sum of the rows of a cell's neighbours.
 #[inline(always)]
 pub(super) fn sum_around(field: &[Row], neighbours: &[u32; 6]) -> Row {
     let mut sum = ZERO;
@@ -56,30 +56,30 @@ pub(super) fn sum_around(field: &[Row], neighbours: &[u32; 6]) -> Row {
     sum
 }
 
-/// One cell of a plane under way.
+/// A cell as a kernel visits it.
 struct Visit {
-    /// The cell, within its colour.
+    /// Index within its colour.
     cell: usize,
-    /// What it holds, if that was asked for; else zero.
+    /// Its old value if requested, otherwise zero.
     old: Row,
-    /// Sum of its neighbours and its right-hand side.
+    /// Sum of its neighbours and right-hand side.
     sum: Row,
     diagonal: f32,
 }
 
-/// A field, as one colour sees it.
+/// A field split by colour.
 #[derive(Clone, Copy)]
 struct Halves<'a> {
-    /// Its own values; may be empty where they are not looked at.
+    /// Values of the visited colour; may be empty if old values are not requested.
     own: &'a [Row],
-    /// The other colour's.
+    /// Values of the other colour.
     other: &'a [Row],
 }
 
-/// Calls `each(row of out, visit)` for each cell of a colour's plane; `old`, if `OLD`, is the field that [`Visit::old`]
-/// comes from, else it may be empty.
+/// Calls `each(row of out, visit)` for each cell of a colour's plane. With `OLD`, [`Visit::old`] is read from the
+/// field's own colour, which may otherwise be empty.
 ///
-/// Rows are handed over from slices cut once per run, so that whole runs need no check of an index.
+/// Slices are cut once per run, so that runs need no bounds checks per cell.
 #[inline(always)]
 fn visit_plane<const OLD: bool>(
     level: &Level,
@@ -133,14 +133,14 @@ fn visit_plane<const OLD: bool>(
 
 /// Gauss-Seidel on one plane of one colour: `u = (sum of neighbours + f) / diagonal`.
 ///
-/// A division, here and in all kernels that relax: a product with 1/6, which f32 rounds up by 3e-8, pulls each cell to the same
-/// side, and columns whose sum should be 1 are off by 2.7e-5 at g = 128 ([`BindReport::raw_error`](crate::BindReport)).
+/// Divides, like all relaxation kernels: f32 rounds 1/6 up by 3e-8, so a product would bias each cell in the same
+/// direction, and column sums would be off by 2.7e-5 at g = 128 ([`BindReport::raw_error`](crate::BindReport)).
 #[inline(always)]
 pub fn relax_plane(level: &Level, colour: usize, plane: usize, u: &mut [Row], rhs: Rhs<'_>) {
     over_relax_zeros_plane(level, colour, plane, 1.0, u, rhs);
 }
 
-/// [`over_relax_plane`] where this colour is still zero, whatever its rows hold.
+/// [`over_relax_plane`] with zeros in this colour, whose stored values are ignored.
 #[inline(always)]
 pub fn over_relax_zeros_plane(
     level: &Level,
@@ -165,7 +165,7 @@ pub fn over_relax_zeros_plane(
     );
 }
 
-/// [`relax_plane`] of red cells where both colours are still zero, whatever their rows hold: `u = f / diagonal`.
+/// [`relax_plane`] of red cells with zeros in both colours, whose stored values are ignored: `u = f / diagonal`.
 #[inline(always)]
 pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: Rhs<'_>) {
     let red = &level.colours[0];
@@ -193,7 +193,7 @@ pub fn relax_zeros_plane(level: &Level, plane: usize, u: &mut [Row], rhs: Rhs<'_
     }
 }
 
-/// [`relax_plane`] that goes `omega` times as far.
+/// Gauss-Seidel with the over-relaxation factor `omega`.
 #[inline(always)]
 pub fn over_relax_plane(level: &Level, colour: usize, plane: usize, omega: f32, u: &mut [Row], rhs: Rhs<'_>) {
     let (own, other) = split(level, u, colour);
@@ -214,8 +214,8 @@ pub fn over_relax_plane(level: &Level, colour: usize, plane: usize, omega: f32, 
     );
 }
 
-/// Residual `f + sum of neighbours - diagonal u` of one plane of one colour, into that colour's rows `residual`; adds its
-/// squares to `squares`.
+/// Writes the residual `f + sum of neighbours - diagonal u` of one plane of one colour to that colour's rows
+/// `residual`, and adds its squares to `squares`.
 #[inline(always)]
 pub fn residual_plane(
     level: &Level,
@@ -249,16 +249,16 @@ pub fn residual_plane(
     *squares = sum_squares;
 }
 
-/// Where a sweep adds up how far cells have moved.
+/// Accumulates the changes of cells in a sweep.
 #[derive(Debug)]
 pub struct Changes<'a> {
-    /// What is summed over lanes: squares, or, literally, absolute values.
+    /// Norm of the sum over lanes: squares, or absolute values as in the literal Eq. 2.
     pub norm: DeltaNorm,
-    /// Of each cell of the colour.
+    /// Sum of each cell of the colour.
     pub of_cells: &'a mut [f32],
 }
 
-/// Jacobi on one plane of one colour, from `old` to `new`, both `[n_rows]`; `changes` grow by the cells' changes.
+/// Jacobi on one plane of one colour, from `old` to `new`, both `[n_rows]`. Adds the cells' changes to `changes`.
 #[inline(always)]
 pub fn jacobi_plane(
     level: &Level,
@@ -284,9 +284,9 @@ pub fn jacobi_plane(
             for k in 0..LANES {
                 new[k] = sum[k] / diagonal;
                 let d = (new[k] - old[k]).abs();
-                // Values spread from the cage by a factor of 6 a cell, and squares below 1e-38 would be denormal:
-                // sweeps measured three times slower for changes that no delta can feel.
-                let d = if d > NEGLIGIBLE { d } else { 0.0 };
+                // Values decay by a factor of 6 per cell from the cage, and squares below 1e-38 are denormal, which
+                // makes sweeps three times slower for changes without effect on delta.
+                let d = if d > MIN_CHANGE { d } else { 0.0 };
                 change[k] = d * if is_literal { 1.0 } else { d };
             }
             *out = new;
@@ -295,7 +295,7 @@ pub fn jacobi_plane(
     );
 }
 
-/// Sum of a row in a fixed order that vectorises.
+/// Sum of a row in a fixed order that the compiler vectorises.
 #[inline(always)]
 fn tree_sum(mut row: Row) -> f32 {
     let mut n = LANES / 2;
@@ -308,7 +308,7 @@ fn tree_sum(mut row: Row) -> f32 {
     row[0]
 }
 
-/// Restriction: coarse right-hand side from the red residuals around each coarse cell.
+/// Restriction: computes the coarse right-hand side from the red residuals around each coarse cell.
 #[inline(always)]
 pub fn restrict_residual(coarse: &Level, transfer: &Transfer, residual: &[Row], f: &mut [Row]) {
     for (colour, rows) in transfer.restrict_rows.iter().enumerate() {
@@ -333,12 +333,12 @@ fn gather_edges(residual: &[Row], around: &RestrictRow) -> Row {
     sum
 }
 
-/// What prolongation does with a black cell's interpolated value.
+/// How prolongation combines the interpolated value with a black cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Prolong {
     /// Adds the coarse correction, zero outside the cage.
     Correct,
-    /// Replaces the value by the mean of the coarse solution where there is one.
+    /// Replaces the value by the mean of those coarse cells that are unknowns, if any.
     Replace,
 }
 

@@ -1,55 +1,54 @@
-//! When a solve is done, and what it reports: one rule and one report for every solver and back end.
+//! Stopping rule and report, shared by all solvers and back ends.
 //!
-//! Delta is what the rule looks at. Jacobi: Eq. 2, the average change of a cell in a sweep. Multigrid and conjugate gradients:
-//! the error that is expected to remain, root mean square over cells, so that there tau bounds the error itself.
+//! The rule compares delta with a tolerance. Jacobi: delta is Eq. 2, the mean change of a cell per sweep. Multigrid and
+//! conjugate gradients: delta is the estimated remaining error, RMS over cells, so that tau bounds the error itself.
 
-/// When a solve is done.
+/// Stopping rule of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopRule {
-    /// Done once delta is not above it. Dimensionless, as weights are.
+    /// Converged if delta is at most this. Dimensionless, like weights.
     pub tolerance: f64,
-    /// Largest number of iterations: sweeps, V-cycles, or steps of conjugate gradients.
+    /// Limit on iterations: sweeps, V-cycles, or steps of conjugate gradients.
     pub max_iterations: u32,
 }
 
-/// Most V-cycles, alone or as preconditioner, of a batch: halving 60 times is beyond f32.
+/// Limit on V-cycles of a batch, alone or as preconditioner: halving the error 60 times exceeds f32.
 pub const MAX_CYCLES: u32 = 60;
 
 impl StopRule {
-    /// The rule for a solver by V-cycles: see [`MAX_CYCLES`].
+    /// The rule for V-cycles, limited by [`MAX_CYCLES`].
     #[must_use]
     pub fn of_cycles(self) -> Self {
         Self { max_iterations: self.max_iterations.min(MAX_CYCLES), ..self }
     }
 
-    /// The rule for one of `n_batches` that are solved one by one. Deltas add up in squares: each may keep its share.
+    /// The rule for one of `n_batches` batches. Deltas add in squares, so each gets an equal share.
     #[must_use]
     pub fn of_batch(self, n_batches: usize) -> Self {
         Self { tolerance: self.tolerance / (n_batches.max(1) as f64).sqrt(), ..self }
     }
 }
 
-/// How a solve went.
+/// Report of a solve.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SolveReport {
     /// Delta after each iteration.
     pub deltas: Vec<f64>,
-    /// Root mean square residual before each iteration; empty for Jacobi.
+    /// RMS residual before each iteration; empty for Jacobi.
     pub residuals: Vec<f64>,
-    /// Whether delta met the tolerance, or f32 has no more digits to give.
+    /// Whether delta met the tolerance, or f32 precision was exhausted.
     pub converged: bool,
-    /// Whether it was f32 that ended it, above the tolerance.
+    /// Whether f32 precision ended the solve above the tolerance.
     pub at_round_off: bool,
-    /// Whether V-cycles converged slowly or diverged, so that conjugate gradients took over.
+    /// Whether V-cycles converged slowly or diverged, and conjugate gradients continued.
     pub stalled: bool,
 }
 
-/// Below this delta f32 may have no more digits to give: what is left of changes is rounding (3e-8 to 1e-7 on a C-shaped
-/// cage, g = 16 to 40).
+/// Delta below which f32 may be exhausted: remaining changes are rounding noise (3e-8 to 1e-7 on a C-shaped cage, g = 16 to 40).
 pub const ROUND_OFF: f64 = 1e-6;
 
 impl SolveReport {
-    /// Takes down an iteration. Returns whether it was the last.
+    /// Records an iteration. Returns whether it is the last one.
     pub fn iteration_done(&mut self, rule: &StopRule, delta: f64, residual: Option<f64>) -> bool {
         self.deltas.push(delta);
         self.residuals.extend(residual);
@@ -57,8 +56,8 @@ impl SolveReport {
         self.converged || self.deltas.len() >= rule.max_iterations as usize
     }
 
-    /// Ends the solve as converged if none of the latest `n` deltas is below all before, near [`ROUND_OFF`]. Returns whether
-    /// it did.
+    /// Ends the solve as converged if none of the latest `n` deltas is below all earlier ones, near [`ROUND_OFF`].
+    /// Returns whether it did.
     pub fn ends_at_round_off(&mut self, n: usize) -> bool {
         let (before, latest) = self.deltas.split_at(self.deltas.len().saturating_sub(n));
         let least = |deltas: &[f64]| deltas.iter().copied().fold(f64::INFINITY, f64::min);
@@ -74,12 +73,12 @@ impl SolveReport {
         (self.deltas.len() as u32, self.deltas.last().copied().unwrap_or(f64::INFINITY))
     }
 
-    /// The report of batches that were solved one by one, as if together: deltas and residuals add up in squares.
+    /// Combines the reports of separately solved batches; deltas and residuals add in squares.
     #[must_use]
     pub fn together(batches: &[Self]) -> Self {
         let history = |of: fn(&Self) -> &[f64]| -> Vec<f64> {
             let longest = batches.iter().map(|r| of(r).len()).max().unwrap_or(0);
-            // A batch that was done earlier keeps what its last iteration left.
+            // A batch that ended earlier keeps its last value.
             let at = |r: &Self, k: usize| of(r).get(k).or(of(r).last()).copied();
             (0..longest)
                 .map(|k| batches.iter().filter_map(|r| at(r, k)).map(|x| x * x).sum::<f64>().sqrt())
@@ -111,9 +110,9 @@ mod tests {
     }
 
     #[test]
-    fn batches_add_up_in_squares_and_the_finished_keep_their_last() {
+    fn batches_add_in_squares_and_finished_ones_keep_their_last_value() {
         let rule = StopRule { tolerance: 5.0, max_iterations: 9 };
-        // sqrt(3^2 + 4^2) = 5: two batches at their shares are together at the tolerance.
+        // sqrt(3^2 + 4^2) = 5: two batches that each meet their share meet the tolerance together.
         assert_eq!(rule.of_batch(4).tolerance, 2.5);
         let batch = |deltas: &[f64]| SolveReport {
             deltas: deltas.to_vec(),

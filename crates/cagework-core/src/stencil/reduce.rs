@@ -1,11 +1,11 @@
-//! Sums in the fixed order of the GPU's workgroups.
+//! Reductions in the fixed order of the GPU's workgroups.
 
-/// Invocations of a reducing workgroup.
+/// Invocations per reducing workgroup.
 pub const REDUCE_LANES: usize = 256;
-/// Values that one workgroup reduces to a partial sum.
+/// Values that a workgroup reduces to a partial sum.
 pub const REDUCE_VALUES: usize = 4096;
 
-/// Each lane's sum of every 256th value, then the sum of the lanes as a tree.
+/// Sums every 256th value per lane, then the lanes as a tree.
 fn tree_sum(values: impl Iterator<Item = f32>) -> f32 {
     let mut sums = [0.0f32; REDUCE_LANES];
     for (i, value) in values.enumerate() {
@@ -21,7 +21,7 @@ fn tree_sum(values: impl Iterator<Item = f32>) -> f32 {
     sums[0]
 }
 
-/// Partial sums of the squares of a field's values, one per 4096 quads. GPU twin: `shaders/sum_squares.wgsl`.
+/// Partial sums of squares of a field, one per 4096 quads of values. GPU twin: `shaders/sum_squares.wgsl`.
 #[must_use]
 pub fn sum_squares(field: &[f32]) -> Vec<f32> {
     field
@@ -30,13 +30,13 @@ pub fn sum_squares(field: &[f32]) -> Vec<f32> {
         .collect()
 }
 
-/// Partial sums of roots, one per 4096 values. GPU twin: `shaders/sum_roots.wgsl`.
+/// Partial sums of square roots, one per 4096 values. GPU twin: `shaders/sum_roots.wgsl`.
 #[must_use]
 pub fn sum_roots(changes: &[f32]) -> Vec<f32> {
     changes.chunks(REDUCE_VALUES).map(|part| tree_sum(part.iter().map(|x| x.sqrt()))).collect()
 }
 
-/// The sum of partial sums. GPU twin: `shaders/reduce_sum.wgsl`.
+/// Sum of partial sums. GPU twin: `shaders/reduce_sum.wgsl`.
 #[must_use]
 pub fn reduce_sum(partials: &[f32]) -> f32 {
     tree_sum(partials.iter().copied())

@@ -1,4 +1,4 @@
-//! The arrays that kernels and twins read: geometry flattened to plain numbers, ready to be uploaded.
+//! Geometry as flat arrays of numbers, for upload and for the kernels' twins.
 
 use std::ops::Range;
 
@@ -11,70 +11,70 @@ use crate::weights::Weights;
 /// Numbers before the coarse rows in an entry of a prolongation table.
 pub const ENTRY_HEAD: usize = 2;
 
-/// Vertices that one invocation deforms, so that a control vertex is read once for all of them. Measured on lavapipe,
-/// 50,000 vertices with 112 weights each, normals included, fastest frame: 16.3 ms one vertex an invocation, 9.0 four.
+/// Vertices per invocation in deformation, so that each control is read once for all of them. Fastest frame on lavapipe
+/// with 50,000 vertices, 112 weights each and normals: 16.3 ms with one vertex per invocation, 9.0 ms with four.
 pub const BUNDLE: usize = 4;
 
-/// Bundles of a slice of [`SlicedWeights`]: 128 bytes of a GPU's memory in one go, and little padding.
+/// Bundles per slice of [`SlicedWeights`]: fills 128-byte memory transactions, with little padding.
 pub const SLICE: usize = 8;
 
-/// One level's stencils, an entry per row, zero rows included.
+/// Stencils of a level, one entry per row, including zero rows.
 #[derive(Clone, Debug, Default)]
 pub struct LevelTable {
-    /// Rows of the neighbours; a zero row where an arm is cut. Zero rows point to themselves. `[n_rows]`
+    /// Rows of the neighbours; a zero row for cut arms. Zero rows refer to themselves. `[n_rows]`
     pub neighbours: Vec<[u32; 6]>,
-    /// Sum of the arms' weights; 1 for zero rows. `[n_rows]`
+    /// Sum of the arm weights; 1 for zero rows. `[n_rows]`
     pub diagonal: Vec<f32>,
-    /// Row of the right-hand side: the number of the cut cell on the finest level (`NO_CELL` for whole cells), the row
-    /// itself on coarser ones. `[n_rows]`
+    /// Row of the right-hand side. Finest level: index of the cut cell, `NO_CELL` for other cells; coarse levels: the
+    /// row itself. `[n_rows]`
     pub rhs_of_row: Vec<u32>,
 }
 
-/// How a level and the next coarser one exchange fields.
+/// Restriction and prolongation between a level and the next coarser one.
 #[derive(Clone, Debug, Default)]
 pub struct TransferTable {
     /// Fine rows around each coarse row. `[n coarse rows]`
     pub around: Vec<RestrictRow>,
-    /// Entries (fine row, bits of 1 over the number of coarse unknowns, 2 coarse rows).
+    /// Entries: fine row, bits of the inverse number of coarse unknowns, 2 coarse rows.
     pub faces: Vec<u32>,
-    /// Entries (fine row, bits of 1 over the number of coarse unknowns, 8 coarse rows).
+    /// Entries: fine row, bits of the inverse number of coarse unknowns, 8 coarse rows.
     pub corners: Vec<u32>,
 }
 
 /// Sampling stencils of all vertices.
 #[derive(Clone, Debug, Default)]
 pub struct SamplingTable {
-    /// Where each vertex's entries start in `nodes` and `hats`. `[n_vertices + 1]`
+    /// First entry of each vertex in `nodes` and `hats`. `[n_vertices + 1]`
     pub starts: Vec<[u32; 2]>,
-    /// (row of the field, bits of its weight)
+    /// `(row of the field, bits of its weight)`
     pub nodes: Vec<[u32; 2]>,
-    /// (control vertex, bits of its weight)
+    /// `(control, bits of its weight)`
     pub hats: Vec<[u32; 2]>,
 }
 
-/// Weights in bundles of [`BUNDLE`] rows that share a list of columns, in slices of [`SLICE`] bundles, each slice as
-/// wide as its longest list and stored column by column, so that neighbouring GPU invocations read neighbouring entries.
+/// Weights in bundles of [`BUNDLE`] rows with a common list of columns. [`SLICE`] bundles form a slice, padded to its longest
+/// list and stored column by column, so that neighbouring GPU invocations read neighbouring entries (sliced ELLPACK).
 #[derive(Clone, Debug, Default)]
 pub struct SlicedWeights {
-    /// Where each slice starts in `columns` and `weights`, over [`SLICE`]. `[n_slices + 1]`
+    /// Start of each slice in `columns` and `weights`, over [`SLICE`]. `[n_slices + 1]`
     pub slices: Vec<u32>,
-    /// Control vertices; short lists end in weights of 0. `[slice][k][lane]`
+    /// Controls; short lists are padded with weights of 0. `[slice][k][lane]`
     pub columns: Vec<u32>,
-    /// Their weights for the bundle's rows. `[slice][k][lane]`
+    /// Weights of the bundle's rows. `[slice][k][lane]`
     pub weights: Vec<[f32; BUNDLE]>,
 }
 
-/// Each vertex's triangles.
+/// Triangles of each vertex.
 #[derive(Clone, Debug, Default)]
 pub struct NormalTable {
-    /// Where each vertex's triangles start in `others`. `[n_vertices + 1]`
+    /// First triangle of each vertex in `others`. `[n_vertices + 1]`
     pub starts: Vec<u32>,
-    /// A triangle's next two vertices, counter-clockwise after the one it is listed for, triangles ascending.
+    /// The other two vertices of a triangle, counter-clockwise; triangles ascending.
     pub others: Vec<[u32; 2]>,
 }
 
 impl LevelTable {
-    /// The table of a level; `finest`: its right-hand side has one row per cut cell only.
+    /// Table of a level; on the `finest` one the right-hand side has one row per cut cell.
     #[must_use]
     pub fn new(level: &Level, finest: bool) -> Self {
         let n_rows = level.n_rows();
@@ -111,7 +111,7 @@ impl LevelTable {
 }
 
 impl TransferTable {
-    /// The table of the transfer between `fine` and `coarse`.
+    /// Table of the transfer between `fine` and `coarse`.
     #[must_use]
     pub fn new(fine: &Level, coarse: &Level, transfer: &Transfer) -> Self {
         let mut around = vec![[fine.zero_row(); 13]; coarse.n_rows()];
@@ -138,7 +138,7 @@ fn entries<const N: usize>(first_black: u32, rows: &[ProlongRow<N>]) -> Vec<u32>
 }
 
 impl SamplingTable {
-    /// The table of sampling stencils.
+    /// Table of sampling stencils.
     #[must_use]
     pub fn new(stencils: &Stencils) -> Self {
         let mut table = Self { starts: vec![[0; 2]], ..Self::default() };
@@ -158,12 +158,12 @@ impl SlicedWeights {
         Self::of_rows(weights, 0..weights.n_rows())
     }
 
-    /// Slices of some of its rows.
+    /// Slices of a range of rows.
     #[must_use]
     pub fn of_rows(weights: &Weights, range: Range<usize>) -> Self {
         let n_slices = range.len().div_ceil(BUNDLE * SLICE);
         let mut sliced = Self { slices: vec![0], ..Self::default() };
-        // Where a column stands in the bundle's list: the bundle that listed it last, and where.
+        // For each column, the bundle that listed it last, and its position in that list.
         let mut listed = vec![(u32::MAX, 0); weights.n_columns()];
         let mut lists: [Vec<u32>; SLICE] = Default::default();
         let rows = |slice: usize, lane: usize| {
@@ -181,7 +181,7 @@ impl SlicedWeights {
                         list.push(column);
                     }
                 }
-                // In the order of the matrix, which is the order of additions.
+                // Matrix order, which determines the order of additions.
                 list.sort_unstable();
             }
             let begin = sliced.columns.len();
@@ -207,7 +207,7 @@ impl SlicedWeights {
 }
 
 impl NormalTable {
-    /// The table of a mesh; triangles that name a vertex beyond `n_vertices` are left out.
+    /// Table of a mesh; ignores triangles with indices beyond `n_vertices`.
     #[must_use]
     pub fn new(n_vertices: usize, triangles: &[[u32; 3]]) -> Self {
         let whole = || triangles.iter().filter(|t| t.iter().all(|&v| (v as usize) < n_vertices));

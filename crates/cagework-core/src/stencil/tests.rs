@@ -13,12 +13,12 @@ use crate::solve::stop::StopRule;
 use crate::team::Team;
 use crate::{Cage, deform};
 
-/// f32 values in [0, 1]; the twins add the neighbours one by one, the fast kernels in pairs.
+/// f32 rounding of values in [0, 1]: the twins add neighbours one by one, the fast kernels in pairs.
 const TOLERANCE: f32 = 2e-6;
 
 fn prepared<T>(use_it: impl FnOnce(&Prepared<'_>) -> T) -> T {
     let bounds = Bounds { min: Vec3::new(-1.0, -0.6, -0.8), max: Vec3::new(1.1, 0.7, 0.5) };
-    let cage = Cage::new(&subdivided_box(bounds, 0.0, [2, 1, 1])).expect("a box is a cage");
+    let cage = Cage::new(&subdivided_box(bounds, 0.0, [2, 1, 1])).expect("a box is a valid cage");
     let positions: Vec<Vec3> =
         (0..40).map(|k| 0.45 * Vec3::new((k as f32).sin(), (k as f32).cos(), 0.3)).collect();
     let options = BindOptions { grid: 15, ..BindOptions::default() };
@@ -60,7 +60,7 @@ fn jacobi_twin_equals_the_fast_sweeps() {
     });
 }
 
-/// Full multigrid and one V-cycle by twins, one step after the other, as the GPU does it.
+/// Full multigrid and a V-cycle composed of twins, as on the GPU.
 #[test]
 fn multigrid_of_twins_equals_the_fast_one() {
     prepared(|prepared| {

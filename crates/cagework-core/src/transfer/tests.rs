@@ -1,16 +1,16 @@
-//! Both tables are trilinear interpolation, one read forwards, one backwards.
+//! Both tables are trilinear interpolation: one forwards, one transposed.
 
 use std::collections::BTreeMap;
 
 use super::*;
 use crate::levels::plain::hierarchy;
 
-/// Trilinear weight of a coarse centre at an offset of so many fine cells.
+/// Trilinear weight of a coarse centre at an offset in fine cells.
 fn trilinear(offset: [i32; 3]) -> f32 {
     offset.iter().map(|o| 1.0 - 0.5 * o.abs() as f32).product()
 }
 
-/// Weights (fine row, coarse row) -> trilinear weight between unknowns, by the cells' positions.
+/// Trilinear weight of each pair (fine row, coarse row) of unknowns, computed from cell positions.
 fn expected(fine: &Level, coarse: &Level, colour: usize) -> BTreeMap<(u32, u32), f32> {
     let mut weights = BTreeMap::new();
     for cell in coarse.grid.cells() {
@@ -39,7 +39,7 @@ fn restriction_is_half_the_transpose_on_red_cells() {
                 let to = (coarse.first_row(colour) + number) as u32;
                 for (k, &from) in around.iter().enumerate().filter(|(_, from)| **from != fine.zero_row()) {
                     let weight = if k == 0 { RESTRICT_CENTRE } else { RESTRICT_EDGE };
-                    assert_eq!(weights.insert((from, to), weight / 0.5), None, "a cell counts once");
+                    assert_eq!(weights.insert((from, to), weight / 0.5), None, "each cell occurs once");
                 }
             }
         }
@@ -59,7 +59,11 @@ fn prolongation_is_trilinear_on_black_cells() {
             assert_eq!(mean, expected);
             for to in known {
                 let from = fine.first_row(1) as u32 + cell;
-                assert_eq!(weights.insert((from, to), 1.0 / ends.len() as f32), None, "a cell counts once");
+                assert_eq!(
+                    weights.insert((from, to), 1.0 / ends.len() as f32),
+                    None,
+                    "each cell occurs once"
+                );
             }
         };
         for row in &transfer.faces {
@@ -77,8 +81,8 @@ fn prolongation_is_trilinear_on_black_cells() {
     }
 }
 
-/// A coarse cell amid whole cells gathers half the weight of a constant residual that only red cells carry:
-/// `1/2 (1 + 12 / 4) = 2`; all 27 would give `8 / 2`.
+/// Away from the cage, a constant residual on red cells alone is restricted with half the weight: `1/2 (1 + 12 / 4) =
+/// 2`; all 27 cells would give `8 / 2`.
 #[test]
 fn restriction_of_a_constant_is_two() {
     assert_eq!(RESTRICT_CENTRE + 12.0 * RESTRICT_EDGE, 2.0);

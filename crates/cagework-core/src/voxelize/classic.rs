@@ -1,19 +1,18 @@
-//! Cell kinds and boundary values as published: a cell that the cage touches holds its values.
+//! Cell kinds and boundary values as published: cells that the cage touches take its values.
 //!
 //! Source: Smith, "CSC 473 Harmonic Coordinates", section 3.1, Algorithms 1 and 2.
 //!
 //! Changes versus the paper:
-//! - A triangle meets only the cells of its own rows (the paper proposes its bounding box), and slices of the grid are
-//!   independent, so that they run in parallel and the result does not depend on the number of threads.
-//! - A cell's values are taken at the point of the triangle closest to its centre: barycentric coordinates of the centre
-//!   itself can be negative and exceed 1, because it need not lie over the triangle.
-//! - Of several triangles in one cell the closest to the centre gives the values (the first of equally close ones). The
-//!   paper writes them one over the other, and weights of vertices of different triangles then sum past 1.
-//! - Faces may be polygons of any size; values are those of [`Cage::hats_at`].
-//! - The grid is larger than the cage's box by 1/1000 cell on each side, so that no face lies on its outermost plane.
-//! - Besides the paper's rectangular cells, which make its average over six neighbours something else than Laplace's
-//!   equation, cells can be cubes.
-//! - The exterior is flooded from all outermost cells (the paper's own proposal), row by row, without recursion.
+//! - A triangle is tested only against the cells of its own rows (the paper proposes its bounding box). Slices of the grid are independent,
+//!   so they run in parallel, and the result does not depend on the number of threads.
+//! - A cell's values are taken at the triangle's point closest to its centre. Barycentric coordinates of the centre itself can be negative or
+//!   exceed 1, as it need not lie over the triangle.
+//! - Of several triangles in a cell, the one closest to the centre gives the values (the first one if equal). In the paper each triangle
+//!   overwrites the values of its own vertices, and the sum of a cell's values can exceed 1.
+//! - Faces may be polygons of any size, with the values of [`Cage::hats_at`].
+//! - The grid extends 1/1000 cell beyond the cage's box, so that no face lies on its outermost plane.
+//! - Cells can be cubes. With the paper's rectangular cells, the average over six neighbours does not discretise Laplace's equation.
+//! - The exterior is flooded from all outermost cells (as the paper proposes), row by row, without recursion.
 
 use glam::{DVec3, UVec3};
 
@@ -23,20 +22,20 @@ use crate::geometry::{closest_point_on_triangle, triangle_box_overlaps};
 use crate::options::CellShape;
 use crate::team::map_indices;
 
-/// Room between the cage's box and the grid's end, in cells.
+/// Distance between the cage's box and the end of the grid, in cells.
 const PADDING: f64 = 1e-3;
 
-/// Cells by which ranges are widened against rounding; the overlap test decides.
+/// Enlargement of cell ranges, in cells, against rounding; an exact overlap test follows.
 const RANGE_WIDENING: f64 = 1e-6;
 
-/// What a cell is.
+/// Kind of a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum CellKind {
-    /// Not yet known.
+    /// Not yet classified.
     #[default]
     Untyped,
-    /// The cage passes through it.
+    /// The cage passes through the cell.
     Boundary,
     /// Enclosed by boundary cells.
     Interior,
@@ -44,16 +43,16 @@ pub enum CellKind {
     Exterior,
 }
 
-/// Dirichlet values of boundary cells, compressed rows.
+/// Dirichlet values of boundary cells, in compressed rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BoundaryValues {
     /// The boundary cells, ascending. `[n_boundary]`
     pub cells: Vec<u32>,
-    /// Where each cell's values start. `[n_boundary + 1]`
+    /// First value of each cell. `[n_boundary + 1]`
     pub indptr: Vec<u32>,
-    /// Cage vertex of each value.
+    /// Control of each value.
     pub indices: Vec<u32>,
-    /// The values; those of a cell sum to 1.
+    /// Values; those of a cell sum to 1.
     pub values: Vec<f32>,
 }
 
@@ -64,7 +63,7 @@ impl BoundaryValues {
         self.cells.binary_search(&cell).ok()
     }
 
-    /// Controls and values of one row.
+    /// Controls and values of a row.
     #[must_use]
     pub fn row(&self, row: usize) -> (&[u32], &[f32]) {
         let range = self.indptr[row] as usize..self.indptr[row + 1] as usize;
@@ -81,14 +80,14 @@ pub struct ClassicCells {
     pub origin: DVec3,
     /// Edge lengths of a cell, object units.
     pub cell_size: DVec3,
-    /// x fastest, then y, z; none is untyped. `[nz, ny, nx]`
+    /// Kinds, x fastest, then y, z; none is untyped. `[nz, ny, nx]`
     pub kinds: Vec<CellKind>,
     /// Values of the boundary cells.
     pub boundary: BoundaryValues,
 }
 
-/// Types all cells of a grid around the cage and gives boundary cells their values. `grid`: cells along each axis of
-/// the cage's box, or along the longest one if cells are to be cubes; 1 to 1,024.
+/// Classifies all cells of a grid around the cage and assigns values to boundary cells. `grid`: cells along each axis
+/// of the cage's box, or along the longest one for cubic cells; 1 to 1,024.
 #[must_use]
 pub fn voxelize_classic(controls: Controls<'_>, grid: u32, shape: CellShape) -> ClassicCells {
     let cage = controls.surface();
@@ -129,7 +128,7 @@ pub(crate) fn place_grid(cage: &Cage, grid: u32, shape: CellShape) -> (UVec3, DV
         CellShape::Box => (UVec3::splat(grid), extent / inner),
         CellShape::Cubic => {
             let size = extent.max_element() / inner;
-            // Less a rounding error, so that the longest axis gets `grid` cells and not one more.
+            // Subtract a rounding error, so that the longest axis gets exactly `grid` cells.
             let needed = (extent / size + 2.0 * PADDING - 1e-9).ceil();
             (needed.as_uvec3().clamp(UVec3::ONE, UVec3::splat(grid)), DVec3::splat(size))
         }
@@ -138,13 +137,13 @@ pub(crate) fn place_grid(cage: &Cage, grid: u32, shape: CellShape) -> (UVec3, DV
     (dims, corner + 0.5 * cell_size, cell_size)
 }
 
-/// First and last cell that a range of coordinates, in cells from the grid's corner, may touch.
+/// First and last cell of a range of coordinates, in cells from the grid's corner.
 fn cell_range(low: f64, high: f64, n: u32) -> std::ops::RangeInclusive<u32> {
-    // A cast to u32 clamps below at 0.
+    // A cast to u32 clamps negative values to 0.
     (low - RANGE_WIDENING) as u32..=((high + RANGE_WIDENING) as u32).min(n - 1)
 }
 
-/// For each slice of constant z, the triangles that may meet it, ascending. `[nz]`
+/// Triangles that may meet each slice of constant z, ascending. `[nz]`
 fn triangles_of_slices(cage: &Cage, dims: UVec3, origin: DVec3, cell_size: DVec3) -> Vec<Vec<u32>> {
     let mut slices = vec![Vec::new(); dims.z as usize];
     for t in 0..cage.facets().len() as u32 {
@@ -156,7 +155,7 @@ fn triangles_of_slices(cage: &Cage, dims: UVec3, origin: DVec3, cell_size: DVec3
     slices
 }
 
-/// Boundary cells of one slice (counted from its own first cell) and their values.
+/// Boundary cells of a slice (indices within the slice) and their values.
 fn mark_slice(
     controls: Controls<'_>,
     dims: UVec3,
@@ -177,7 +176,7 @@ fn mark_slice(
     let (mut in_slice, mut in_row, mut scratch) = (Vec::new(), Vec::new(), Vec::new());
     for &t in triangles {
         let triangle = cage.facet_corners(t);
-        // In cells from the grid's corner: a cell is [x, x + 1].
+        // Cell coordinates from the grid's corner: a cell is [x, x + 1].
         let in_cells = triangle.map(|p| (p - origin) / cell_size + DVec3::splat(0.5));
         in_slice.clear();
         in_slice.extend(in_cells);
@@ -224,7 +223,7 @@ fn mark_slice(
     marked
 }
 
-/// Cuts a convex polygon to the layer of cells `at` along `axis`, slightly widened.
+/// Clips a convex polygon to the layer of cells `at` along `axis`, slightly enlarged.
 fn clip(polygon: &mut Vec<DVec3>, scratch: &mut Vec<DVec3>, axis: usize, at: u32) {
     let low = f64::from(at) - RANGE_WIDENING;
     let high = f64::from(at) + 1.0 + RANGE_WIDENING;
@@ -245,7 +244,7 @@ fn clip(polygon: &mut Vec<DVec3>, scratch: &mut Vec<DVec3>, axis: usize, at: u32
     }
 }
 
-/// Smallest and largest coordinate, if there are points.
+/// Smallest and largest coordinate; `None` without points.
 fn range(points: &[DVec3], axis: usize) -> Option<(f64, f64)> {
     let coordinates = || points.iter().map(|p| p[axis]);
     (!points.is_empty()).then(|| {
@@ -253,11 +252,11 @@ fn range(points: &[DVec3], axis: usize) -> Option<(f64, f64)> {
     })
 }
 
-/// Marks as exterior all untyped cells that are connected to an outermost one.
+/// Marks all untyped cells connected to an outermost one as exterior.
 fn fill_exterior(kinds: &mut [CellKind], dims: UVec3) {
     let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
     let untyped = |kinds: &[CellKind], cell: usize| kinds[cell] == CellKind::Untyped;
-    // Cells of which each stands for the run of untyped cells along x around it.
+    // Seed cells, each for a run of untyped cells along x.
     let mut runs = Vec::new();
     for row in 0..ny * nz {
         let (y, z) = (row % ny, row / ny);

@@ -1,11 +1,10 @@
-//! The embedded boundary: which cell centres are inside the cage, and how far each is from it along its six arms.
+//! The embedded boundary: which cell centres are inside the cage, and where their six arms end on it.
 //!
-//! Lines through the centres are shot through the cage once, on the finest grid. Parity along a line types each
-//! centre; where the three axes disagree (a crossing lost to rounding, a cage that meets itself) the majority wins
-//! and the cell is counted. An *arm* of an inside centre is whole (1 cell) when the neighbour is reached without
-//! crossing the cage, and otherwise ends on the cage at a distance theta. Two centres with a wall between them are
-//! never neighbours, however thin the wall. Coarser grids keep every second centre, so that their lines are a
-//! subset of the finest grid's and nothing is shot again.
+//! Lines through the centres are intersected with the cage once, on the finest grid. Parity along a line classifies
+//! each centre. Where the three axes disagree (because of rounding, or in a self-intersecting cage) the majority
+//! decides, and the cell is counted. An *arm* of an inside centre is whole (1 cell) if it reaches the neighbour without
+//! crossing the cage; otherwise it ends on the cage at a distance theta. Two centres on either side of a wall are never
+//! neighbours, however thin the wall. Coarser grids keep every second centre, so they reuse a subset of the lines.
 //!
 //! Source: Joshi et al. 2007, section 4, for the grid; Gibou et al. 2002 for the stencil with cut arms.
 
@@ -17,32 +16,32 @@ use crate::levels::{Boundary, coarsened_until_few};
 use super::lines::{Hit, Lines, Overlaps};
 use super::resolution;
 
-/// Shortest arm, in cells: a centre this close to the cage has the cage's value to within the solver's accuracy, and
-/// a shorter arm would only cost f32 digits (1e-3 measured on the Armadillo and the horse).
+/// Shortest arm, in cells. A centre this close to the cage has the cage's value within the solver's accuracy, and
+/// shorter arms would cost f32 precision (measured on the Armadillo and the horse).
 const MIN_ARM: f64 = 1e-3;
 
-/// What the cells of one level are: level k looks at every 2^k-th centre of the finest grid.
+/// Classification of a level's cells. Level k uses every 2^k-th centre of the finest grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cells {
     grid: Grid,
-    /// Distance between this level's centres in cells of the finest grid.
+    /// Distance between this level's centres, in cells of the finest grid.
     step: u32,
     inside: Vec<bool>,
     cut: Vec<u8>,
 }
 
-/// The cage in the grid on all levels: lines through it, and what the cells of every level are.
+/// The cage embedded in all levels: grid lines and the cells of every level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Embedding {
     lines: [Lines; 3],
-    /// Cells about which the axes disagree.
+    /// Number of cells that the axes classify differently.
     pub ambiguous: u64,
-    /// Finest first; at least one.
+    /// Levels, finest first; at least one.
     levels: Vec<Cells>,
 }
 
 impl Embedding {
-    /// Of a cage, on levels of doubling cell size until few unknowns remain, or on the finest only.
+    /// Embeds a cage in levels of doubling cell size until few unknowns remain, or in the finest level only.
     #[must_use]
     pub fn new(cage: &Cage, grid: &Grid, has_coarse_levels: bool) -> Self {
         let lines = shoot_lines(cage, grid);
@@ -57,36 +56,36 @@ impl Embedding {
         Self { lines, ambiguous, levels }
     }
 
-    /// What each level's cells see of the cage, finest first.
+    /// Boundary of each level, finest first.
     #[must_use]
     pub fn boundaries<'a>(&'a self, controls: Controls<'a>) -> Vec<EmbeddedCells<'a>> {
         self.levels.iter().map(|cells| cells.with(controls, &self.lines)).collect()
     }
 
-    /// What a user should know about the cage in this grid. `cells`: along the cage's longest side.
+    /// Notices about the cage in this grid. `cells`: along the cage's longest side.
     #[must_use]
     pub fn notices(&self, controls: Controls<'_>, cells: u32) -> Vec<String> {
         let grid = &self.levels[0].grid;
         resolution::notice(controls, grid, &self.lines, cells).into_iter().collect()
     }
 
-    /// Where parts of the cage overlap: only the walls of their union count.
+    /// Overlaps of parts of the cage; only walls of their union count.
     #[must_use]
     pub fn overlaps(&self) -> Overlaps {
         Overlaps::of(&self.lines)
     }
 
-    /// Bytes held.
+    /// Peak size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         let lines: usize = self.lines.iter().map(Lines::bytes).sum();
-        // Votes were held once.
+        // Votes are temporary.
         let finest = self.levels[0].inside.len();
         lines + finest + self.levels.iter().map(|cells| 2 * cells.inside.len()).sum::<usize>()
     }
 }
 
-/// The cage in the grid, on one level.
+/// The embedded cage on one level.
 #[derive(Debug)]
 pub struct EmbeddedCells<'a> {
     controls: Controls<'a>,
@@ -101,7 +100,7 @@ pub fn shoot_lines(cage: &Cage, grid: &Grid) -> [Lines; 3] {
     lines.try_into().expect("three axes")
 }
 
-/// How many axes say of each centre of the finest grid that it is inside.
+/// Number of axes, 0 to 3, that classify each centre of the finest grid as inside.
 #[must_use]
 pub fn votes(lines: &[Lines; 3], grid: &Grid) -> Vec<u8> {
     let (mut votes, mut flips) = (vec![0u8; grid.n_cells()], vec![0u8; grid.n_cells()]);
@@ -124,7 +123,7 @@ pub fn votes(lines: &[Lines; 3], grid: &Grid) -> Vec<u8> {
         if axis == 0 {
             continue;
         }
-        // Along y and z neighbours are far apart: all of a row or plane go on together.
+        // Along y and z, neighbours are far apart in memory: process whole rows or planes.
         for (flips, votes) in flips.chunks_exact_mut(stride * n).zip(votes.chunks_exact_mut(stride * n)) {
             for s in 1..n {
                 let (before, now) = flips.split_at_mut(s * stride);
@@ -140,12 +139,10 @@ pub fn votes(lines: &[Lines; 3], grid: &Grid) -> Vec<u8> {
     votes
 }
 
-/// Whether most axes say that a centre is inside.
 fn is_inside(votes: u8) -> bool {
     votes >= 2
 }
 
-/// Whether the axes disagree about a centre.
 fn is_ambiguous(votes: u8) -> bool {
     votes == 1 || votes == 2
 }
@@ -169,7 +166,7 @@ impl Cells {
         let (mut cells, mut cut) = (Self { grid, step, inside, cut: Vec::new() }, vec![0; grid.n_cells()]);
         for (axis, lines) in lines.iter().enumerate() {
             for (iu, iv, hits) in lines.crossing() {
-                // Only lines that this level has.
+                // Skip lines that this level does not have.
                 if (iu | iv) & (step - 1) != 0 {
                     continue;
                 }
@@ -189,7 +186,7 @@ impl Cells {
         cells
     }
 
-    /// With the controls on whose surface they were made, and the lines through it.
+    /// Combines the cells with the controls and lines from which they were made.
     #[must_use]
     pub fn with<'a>(&'a self, controls: Controls<'a>, lines: &'a [Lines; 3]) -> EmbeddedCells<'a> {
         EmbeddedCells { controls, lines, cells: self }
@@ -197,7 +194,7 @@ impl Cells {
 }
 
 impl EmbeddedCells<'_> {
-    /// The crossing nearest to a cell along a direction, at most one cell away, and its distance in cells.
+    /// Nearest crossing in a direction within one cell, and its distance in cells.
     fn nearest(&self, cell: [u32; 3], direction: usize) -> Option<(Hit, f64)> {
         let axis = direction / 2;
         let step = self.cells.step;
@@ -213,8 +210,8 @@ impl EmbeddedCells<'_> {
     }
 }
 
-/// The two centres between which a crossing at `t` lies. A crossing exactly on a centre lies below it, as in
-/// [`votes`], where centre s is past the crossing when `t <= s`.
+/// The two centres next to a crossing at `t`. A crossing exactly at a centre lies below it, as in [`votes`], where
+/// centre s is past the crossing if `t <= s`.
 fn wall_between(t: f64) -> (i64, i64) {
     let above = t.ceil() as i64;
     (above - 1, above)
@@ -237,7 +234,7 @@ impl Boundary for EmbeddedCells<'_> {
         let Some((hit, theta)) = self.nearest(cell, direction) else { return 0.0 };
         let [b0, b1] = hit.barycentric;
         self.controls.values_at(hit.triangle, [b0, b1, 1.0 - b0 - b1], hats);
-        // A comparison: wasm has no instruction for `max`.
+        // Comparison instead of `max`, which has no single wasm instruction.
         1.0 / if theta > MIN_ARM { theta } else { MIN_ARM }
     }
 }

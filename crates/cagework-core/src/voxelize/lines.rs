@@ -1,35 +1,36 @@
-//! Axis-parallel grid lines through the cage: where each line of cell centres crosses it.
+//! Intersections of the cage with axis-parallel grid lines through the cell centres.
 //!
-//! Watertight: a triangle covers a line by the signs of three edge functions, and an edge's sign is evaluated from
-//! the same numbers in the same order for both triangles that share it. A line exactly through an edge or a vertex
-//! counts as one a little beside it, the same way for all edges (simulation of simplicity: Edelsbrunner, Muecke 1990),
-//! so that it crosses there exactly once or, at a silhouette, an even number of times.
+//! Watertight: a triangle covers a line by the signs of three edge functions, and an edge's function is evaluated with
+//! the same numbers in the same order for both triangles that share it. A line exactly through an edge or a vertex is
+//! treated as displaced infinitesimally, in the same direction for all edges (simulation of simplicity: Edelsbrunner
+//! and Muecke 1990), so that it crosses there exactly once or, at a silhouette, an even number of times.
 //!
-//! The cage's inside is where its winding number is above zero: of parts that overlap only the walls of their union are
-//! kept, as in Jacobson et al. 2013. Where two parts share a face, a line leaves the one before it enters the other.
+//! The interior is where the winding number is positive: of overlapping parts, only walls of their union are kept, as
+//! in Jacobson et al.
+//! 2013. At a face shared by two parts, a line leaves the first part before it enters the second.
 
 use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::cage::{Cage, ON_CAGE};
+use crate::cage::{CAGE_TOLERANCE, Cage};
 use crate::grid::Grid;
 
-/// One crossing of a grid line and the cage.
+/// An intersection of a grid line and the cage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Position along the line, in cells: cell centres are whole numbers.
+    /// Position along the line, in cells; cell centres are integers.
     pub t: f64,
     /// Facet of the cage.
     pub triangle: u32,
     /// Barycentric coordinates of the first two corners.
     pub barycentric: [f64; 2],
-    /// Whether the triangle faces up the axis: a line going up leaves the cage there.
+    /// Whether the triangle faces up the axis, so that a line going up leaves the cage.
     pub faces_up: bool,
 }
 
-/// All grid lines along one axis; the hits of a line ascend. Lines are numbered `u + n_u * v`, where u and v are the
-/// cell's coordinates along the next two axes in cyclic order.
+/// All grid lines along one axis, with the hits of each line in ascending order. Lines have the index `u + n_u * v`,
+/// where u and v are the cell coordinates along the next two axes in cyclic order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lines {
     axis: usize,
@@ -37,18 +38,18 @@ pub struct Lines {
     start: Vec<u32>,
     hits: Vec<Hit>,
     overlaps: Overlaps,
-    /// Faces that lines meet. `[n_faces]`
+    /// Whether a line meets each face. `[n_faces]`
     met: Vec<bool>,
 }
 
-/// Where the cage encloses a place more than once, as far as lines notice.
+/// Overlaps of parts of the cage, detected along grid lines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overlaps {
-    /// Pairs of parts (numbers of components), the same one twice if it goes through itself.
+    /// Pairs of overlapping components; a component that intersects itself is paired with itself.
     pub parts: Vec<[u32; 2]>,
-    /// The box around all walls that lie inside, in cells.
+    /// Bounding box of all walls inside other parts, in cells: lowest corner.
     pub low: DVec3,
-    /// Its other corner.
+    /// Highest corner.
     pub high: DVec3,
 }
 
@@ -59,7 +60,7 @@ impl Default for Overlaps {
 }
 
 impl Overlaps {
-    /// Adds a wall that lies inside, and the parts that overlap there.
+    /// Adds a wall inside a part, and the pair of parts that overlap there.
     fn add(&mut self, parts: Option<[u32; 2]>, wall: DVec3) {
         (self.low, self.high) = (self.low.min(wall), self.high.max(wall));
         if let Some(pair) = parts.map(|[a, b]| [a.min(b), a.max(b)])
@@ -69,7 +70,7 @@ impl Overlaps {
         }
     }
 
-    /// Those of all three axes.
+    /// Union over the three axes.
     #[must_use]
     pub fn of(lines: &[Lines; 3]) -> Self {
         let mut all = Self::default();
@@ -82,7 +83,7 @@ impl Overlaps {
 }
 
 impl Lines {
-    /// Shoots all lines along `axis` through the cage.
+    /// Intersects all lines along `axis` with the cage.
     #[must_use]
     pub fn shoot(cage: &Cage, grid: &Grid, axis: usize) -> Self {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -95,7 +96,7 @@ impl Lines {
                 found.push((u + n_u * v, Hit { triangle, ..hit }));
             });
         }
-        // Counting sort by line, each line's few hits inserted by position.
+        // Counting sort by line, insertion sort by position within a line.
         let mut start = vec![0u32; n_lines + 1];
         for (line, _) in &found {
             start[*line as usize + 1] += 1;
@@ -115,12 +116,12 @@ impl Lines {
         let mut met = vec![false; cage.faces().len()];
         hits.iter().for_each(|hit| met[cage.face_of_facet()[hit.triangle as usize] as usize] = true);
         let mut lines = Self { axis, n_u, start, hits, overlaps: Overlaps::default(), met };
-        lines.keep_walls(cage, ON_CAGE * f64::from(cage.diagonal()) / grid.cell[axis]);
+        lines.keep_walls(cage, CAGE_TOLERANCE * f64::from(cage.diagonal()) / grid.cell[axis]);
         lines
     }
 
-    /// Keeps the hits in which a line enters or leaves the cage. Hits not further apart than `same` (cells) are in one
-    /// place: inside the cage a line leaves a part there before it enters another.
+    /// Keeps hits at which a line enters or leaves the union of all parts. Hits within `same` cells coincide: there a
+    /// line leaves a part before it enters another.
     fn keep_walls(&mut self, cage: &Cage, same: f64) {
         let part = |hit: &Hit| cage.component_of_face()[cage.face_of_facet()[hit.triangle as usize] as usize];
         let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
@@ -128,7 +129,7 @@ impl Lines {
         for line in 0..self.start.len() - 1 {
             let range = self.range(line);
             self.start[line] = kept as u32;
-            // How many times the line is inside, and of which parts.
+            // Winding number along the line, and the parts that contain the point.
             let mut depth = 0;
             open.clear();
             let mut first = range.start;
@@ -173,13 +174,12 @@ impl Lines {
         self.hits.truncate(kept);
     }
 
-    /// Whether a line meets a face of the cage, be it inside another part.
+    /// Whether a line meets a face of the cage, including faces inside other parts.
     #[must_use]
     pub fn meets_face(&self, face: usize) -> bool {
         self.met[face]
     }
 
-    /// Where a line's hits are.
     fn range(&self, line: usize) -> Range<usize> {
         self.start[line] as usize..self.start[line + 1] as usize
     }
@@ -192,21 +192,21 @@ impl Lines {
         &self.hits[self.range((cell[u] + self.n_u * cell[v]) as usize)]
     }
 
-    /// Each line that crosses the cage, as (u, v, hits).
+    /// `(u, v, hits)` of each line that crosses the cage.
     pub fn crossing(&self) -> impl Iterator<Item = (u32, u32, &[Hit])> {
         self.start.windows(2).enumerate().filter(|(_, w)| w[0] < w[1]).map(|(line, w)| {
             (line as u32 % self.n_u, line as u32 / self.n_u, &self.hits[w[0] as usize..w[1] as usize])
         })
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(self.hits.as_slice()) + size_of_val(self.start.as_slice())
     }
 }
 
-/// Calls `found(u, v, hit)` for every line along `axis` that the triangle covers.
+/// Calls `found(u, v, hit)` for every line along `axis` that meets the triangle.
 fn cover(
     points: &[DVec3],
     corners: [u32; 3],
@@ -226,7 +226,7 @@ fn cover(
         let (lo, hi, sign) = if corners[a] < corners[b] { (p[a], p[b], 1.0) } else { (p[b], p[a], -1.0) };
         let (du, dv) = (hi[u] - lo[u], hi[v] - lo[v]);
         let e = du * (c.1 - lo[v]) - dv * (c.0 - lo[u]);
-        // On the edge: the line is moved by an infinitesimal step along u and an infinitely smaller one along v.
+        // On the edge: displace the line by an infinitesimal step along u and a smaller one along v.
         let left = if e != 0.0 { e > 0.0 } else { dv < 0.0 || (dv == 0.0 && du > 0.0) };
         (sign * e, left == (sign > 0.0))
     };

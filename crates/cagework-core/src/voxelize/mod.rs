@@ -1,4 +1,4 @@
-//! The cage laid into the grid.
+//! Voxelization of the cage.
 
 pub mod classic;
 pub mod embedded;

@@ -1,15 +1,14 @@
-//! The classic method's cells as levels of unknowns: boundary cells are neighbours with fixed values.
+//! Levels of unknowns of the classic method: boundary cells are neighbours with fixed values.
 //!
-//! The finest level is the paper's: all six arms are one cell long, and each cell is the plain average of its
-//! neighbours. Coarser levels, which only multigrid asks for, keep every second cell; an arm ends at the first
-//! boundary cell on the way.
+//! The finest level is the paper's: all six arms are one cell long, and each cell is the average of its neighbours.
+//! Coarser levels, used only by multigrid, keep every second cell; an arm ends at the first boundary cell.
 
 use crate::grid::Grid;
 use crate::levels::Boundary;
 
 use super::classic::{CellKind, ClassicCells};
 
-/// The classic grid, on one level: level k looks at every 2^k-th cell.
+/// The classic grid on one level. Level k uses every 2^k-th cell.
 #[derive(Clone, Debug)]
 pub struct PublishedCells<'a> {
     cells: &'a ClassicCells,
@@ -50,7 +49,7 @@ impl<'a> PublishedCells<'a> {
         self.cells.kinds[self.fine.index(cell)]
     }
 
-    /// The first boundary cell from a cell along a direction, at most `step` cells away, and its distance.
+    /// First boundary cell in a direction within `step` cells, and its distance.
     fn first_boundary(&self, cell: [u32; 3], direction: usize) -> Option<(u32, u32)> {
         let mut at = cell.map(|x| x * self.step);
         for distance in 1..=self.step {

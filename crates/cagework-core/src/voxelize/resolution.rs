@@ -1,7 +1,7 @@
-//! What of a cage a grid cannot resolve: faces that no grid line meets, and parts thinner than a cell.
+//! Detection of parts of a cage that the grid does not resolve: faces without grid lines, and parts thinner than a cell.
 //!
-//! Values on such faces reach the grid by chance: weights change when the cage is turned, and a vertex whose faces no line
-//! meets moves nothing. The weights are still valid ones; a finer grid gives better ones.
+//! Values of such faces reach the grid by chance: weights depend on the cage's orientation, and a vertex whose faces
+//! meet no line has no influence. The weights are still valid; a finer grid gives better ones.
 
 use glam::DVec3;
 
@@ -11,33 +11,33 @@ use crate::options::MAX_GRID;
 
 use super::lines::Lines;
 
-/// Faces whose normals have a scalar product below this are the two sides of a thin part, not of a corner.
-const OPPOSITE: f64 = -0.5;
+/// Largest dot product of the normals of two faces that are opposite sides of a thin part rather than of a corner.
+const MAX_NORMAL_DOT: f64 = -0.5;
 
-/// Cells across a part that is resolved.
-const ENOUGH_CELLS: f64 = 1.0;
+/// Thickness of a resolved part, in cells.
+const MIN_CELLS: f64 = 1.0;
 
-/// Lines that meet a face on average, for it to be sure that one does.
-const ENOUGH_LINES: f64 = 4.0;
+/// Average number of lines per face in the suggested grid, so that every face almost certainly meets a line.
+const LINES_PER_FACE: f64 = 4.0;
 
-/// Lines that meet a face, for it to be judged by all of them.
-const SURE_LINES: u32 = 8;
+/// Lines that a face must meet before it is judged by its depth.
+const MIN_LINES: u32 = 8;
 
-/// What lines say of a face.
+/// Statistics of the lines that meet a face.
 #[derive(Clone, Default)]
-struct Thin {
+struct FaceLines {
     lines: u32,
-    /// Those that leave the cage within a cell, through a face about opposite.
+    /// Number of lines that leave the cage within a cell through a roughly opposite face.
     thin: u32,
-    /// The sum of how thick the cage is there, in cells.
+    /// Sum of the cage's thickness along those lines, in cells.
     thickness: f64,
-    /// How deep below the face the cage reaches along any of the lines, in cells: of a bar, whose lines may leave through any of its
-    /// sides, at most its thickness.
+    /// Largest depth of the cage below the face along any line, in cells. For a bar, whose lines may leave through any
+    /// side, it is at most its thickness.
     depth: f64,
 }
 
-/// What a user should know about it, if anything. `cells`: along the cage's longest side. A face of a smooth cage is met where
-/// one of its parts is; walls inside are not looked at.
+/// A notice about faces that the grid does not resolve. `cells`: along the cage's longest side. A face of a subdivided
+/// cage counts as met if any of its parts is; inner walls are ignored.
 #[must_use]
 pub fn notice(controls: Controls<'_>, grid: &Grid, lines: &[Lines; 3], cells: u32) -> Option<String> {
     let (cage, surface) = (controls.cage(), controls.surface());
@@ -57,7 +57,7 @@ pub fn notice(controls: Controls<'_>, grid: &Grid, lines: &[Lines; 3], cells: u3
             let twice_area = (2..face.len())
                 .map(|k| (at(face[k - 1]) - at(face[0])).cross(at(face[k]) - at(face[0])))
                 .sum::<DVec3>();
-            finer = finer.max((ENOUGH_LINES / (0.5 * twice_area.length())).sqrt());
+            finer = finer.max((LINES_PER_FACE / (0.5 * twice_area.length())).sqrt());
         } else {
             face.iter().for_each(|&i| moves[i as usize] = true);
         }
@@ -72,12 +72,12 @@ pub fn notice(controls: Controls<'_>, grid: &Grid, lines: &[Lines; 3], cells: u3
             (b - a).cross(c - a).normalize_or_zero()
         })
         .collect();
-    let mut faces = vec![Thin::default(); unresolved.len()];
+    let mut faces = vec![FaceLines::default(); unresolved.len()];
     for (axis, lines) in lines.iter().enumerate() {
         for pair in lines.crossing().flat_map(|(_, _, hits)| hits.chunks_exact(2)) {
             let [enters, leaves] = [pair[0], pair[1]].map(|hit| normals[hit.triangle as usize]);
             let thickness = (pair[1].t - pair[0].t) * enters[axis].abs().min(leaves[axis].abs());
-            let is_thin = thickness < ENOUGH_CELLS && enters.dot(leaves) < OPPOSITE;
+            let is_thin = thickness < MIN_CELLS && enters.dot(leaves) < MAX_NORMAL_DOT;
             for (hit, normal) in pair.iter().zip([enters, leaves]) {
                 let part = surface.face_of_facet()[hit.triangle as usize];
                 let Some(face) = controls.cage_face(part) else { continue };
@@ -92,13 +92,13 @@ pub fn notice(controls: Controls<'_>, grid: &Grid, lines: &[Lines; 3], cells: u3
         }
     }
     for (unresolved, face) in unresolved.iter_mut().zip(&faces) {
-        // Some lines are short next to every sharp edge.
+        // Near sharp edges some lines are always short: require a majority.
         if 2 * face.thin > face.lines {
             *unresolved = true;
-            finer = finer.max(ENOUGH_CELLS * f64::from(face.thin) / face.thickness);
-        } else if face.lines >= SURE_LINES && face.depth < ENOUGH_CELLS {
+            finer = finer.max(MIN_CELLS * f64::from(face.thin) / face.thickness);
+        } else if face.lines >= MIN_LINES && face.depth < MIN_CELLS {
             *unresolved = true;
-            finer = finer.max(ENOUGH_CELLS / face.depth);
+            finer = finer.max(MIN_CELLS / face.depth);
         }
     }
     let first = unresolved.iter().position(|&is| is)?;
@@ -116,6 +116,6 @@ pub fn notice(controls: Controls<'_>, grid: &Grid, lines: &[Lines; 3], cells: u3
     };
     Some(format!(
         "The grid does not resolve {n} of the cage's faces (from face {first} on), which are smaller or thinner than a \
-         cell{of_vertices}. Weights there depend on how the cage lies in the grid: {advice}."
+         cell{of_vertices}. Weights there depend on the position of the cage in the grid: {advice}."
     ))
 }

@@ -1,4 +1,4 @@
-//! The correction restores what it promises and touches nothing else.
+//! The correction restores the sums and keeps zeros and signs.
 
 use proptest::prelude::*;
 
@@ -6,45 +6,45 @@ use super::*;
 use crate::cage::Cage;
 use crate::cage::shapes;
 
-/// f32 rounding of a row of some ten weights.
-const RESTORED: f64 = 1e-6;
+/// f32 rounding of a row of about ten weights.
+const ROUNDING: f64 = 1e-6;
 
-/// Rows of the C's 16 columns: some weights around a point inside the tetrahedron of four of them, some zeros.
+/// Rows of the C-shape's 16 columns.
 fn rows_of(weights: &[f32]) -> Vec<Row> {
     weights.chunks(LANES).map(|w| std::array::from_fn(|k| w.get(k).copied().unwrap_or(0.0))).collect()
 }
 
 proptest! {
     #[test]
-    fn sums_are_restored_and_zeros_and_signs_kept(
+    fn correction_restores_sums_and_keeps_zeros_and_signs(
         weights in proptest::collection::vec(0.01..1.0f32, 16),
         dropped in proptest::collection::vec(any::<bool>(), 16),
         noise in proptest::collection::vec(-0.02..0.02f32, 16),
     ) {
         let cage = Cage::new(&shapes::c_shape()).unwrap();
         let columns = Columns::new((&cage).into());
-        // Keep corners of the box at least, so that the row still spans space.
+        // Keep corners of the box so that the row spans space.
         let kept = |i: usize| [0, 1, 6, 7, 8].contains(&i) || !dropped[i];
         let mut exact: Vec<f32> = (0..16).map(|i| if kept(i) { weights[i] } else { 0.0 }).collect();
         let sum: f32 = exact.iter().sum();
         exact.iter_mut().for_each(|w| *w /= sum);
-        // Where exact weights put a vertex is the target; what comes in is off by a few per cent.
+        // The exact weights define the target; the input is off by a few per cent.
         let target: DVec3 =
             exact.iter().zip(cage.positions()).map(|(&w, p)| f64::from(w) * p.as_dvec3()).sum();
         let off: Vec<f32> = exact.iter().zip(&noise).map(|(w, n)| w * (1.0 + n)).collect();
         let mut row = rows_of(&off);
         columns.restore_affine(&mut row, columns.scale(target));
         let Sums { sum, miss } = columns.sums(&row, columns.scale(target));
-        prop_assert!((sum - 1.0).abs() <= RESTORED && miss <= RESTORED, "sum {}, off by {}", sum, miss);
+        prop_assert!((sum - 1.0).abs() <= ROUNDING && miss <= ROUNDING, "sum {}, off by {}", sum, miss);
         for (i, w) in row.iter().flatten().take(16).enumerate() {
             prop_assert_eq!(*w == 0.0, off[i] == 0.0);
-            prop_assert!(*w >= 0.0, "weight {} turned from {} to {}", i, off[i], w);
+            prop_assert!(*w >= 0.0, "weight {} changed from {} to {}", i, off[i], w);
         }
     }
 }
 
 #[test]
-fn right_row_stays_as_it_is() {
+fn exact_row_is_unchanged() {
     let cage = Cage::new(&shapes::cube()).unwrap();
     let columns = Columns::new((&cage).into());
     let mut row = rows_of(&[0.125; 8]);
@@ -61,12 +61,12 @@ fn row_on_a_face_is_corrected_within_its_plane() {
     let target = columns.scale(DVec3::new(0.4, 0.5, 0.0));
     columns.restore_affine(&mut row, target);
     let Sums { sum, miss } = columns.sums(&row, target);
-    assert!((sum - 1.0).abs() <= RESTORED && miss <= RESTORED, "sum {sum}, off by {miss}");
+    assert!((sum - 1.0).abs() <= ROUNDING && miss <= ROUNDING, "sum {sum}, off by {miss}");
     assert!(row[0].iter().all(|w| *w >= 0.0) && row[0][4..].iter().all(|w| *w == 0.0));
 }
 
 #[test]
-fn empty_row_is_left_alone() {
+fn empty_row_stays_empty() {
     let cage = Cage::new(&shapes::cube()).unwrap();
     let columns = Columns::new((&cage).into());
     let mut row = rows_of(&[0.0; 8]);

@@ -10,7 +10,7 @@ fn said(smooth: u32, inner: InnerControls) -> String {
 }
 
 #[test]
-fn controls_that_cannot_be_used_are_refused_with_what_to_do() {
+fn invalid_controls_are_errors_with_a_remedy() {
     use InnerElement::{Face, Line, Point};
     let middle = [[0.5; 3]];
     let cases = [
@@ -26,7 +26,7 @@ fn controls_that_cannot_be_used_are_refused_with_what_to_do() {
         (inner(&middle, vec![Line(vec![0])]), "line 0 inside the cage has fewer than two corners"),
         (
             inner(&middle, vec![Line(vec![0, 0])]),
-            "line 0 inside the cage has two corners after each other at one place",
+            "line 0 inside the cage has two consecutive corners at the same position",
         ),
         (inner(&middle, vec![Face(vec![0, 0])]), "face 0 inside the cage has fewer than three corners"),
         (
@@ -50,7 +50,7 @@ fn controls_that_cannot_be_used_are_refused_with_what_to_do() {
             InnerControls { radius: Some(0.3), ..inner(&middle, vec![Point(0)]) },
             "the radius of controls inside is 0.3; it must be from 0.0001 to 0.25",
         ),
-        // It was said that the smooth surface of this cage has a face without area.
+        // Rejected here, before its mesh would have faces without area.
         (
             InnerControls { radius: Some(1e-9), ..inner(&middle, vec![Point(0)]) },
             "the radius of controls inside is 0.000000001; it must be from 0.0001 to 0.25",
@@ -64,14 +64,14 @@ fn controls_that_cannot_be_used_are_refused_with_what_to_do() {
         let said = said(0, inner);
         assert!(said.starts_with(expected), "{said}");
     }
-    // The cube's corner at (0.1, 0.1, 0.1) is outside once it is rounded.
+    // Subdivision cuts off the cube's corner at (0.1, 0.1, 0.1).
     assert!(said(2, inner(&[[0.1; 3]], vec![Point(0)])).contains("outside the cage's smooth surface"));
     assert_eq!(said(4, InnerControls::default()), "smooth is 4; it must be a whole number from 0 to 3");
 }
 
-/// Elements that share a vertex may meet there: a spine with a rib.
+/// Elements that share a vertex may meet there: two lines that form a spine with a rib.
 #[test]
-fn elements_that_share_a_vertex_hang_together() {
+fn elements_that_share_a_vertex_are_connected() {
     let at = [[0.2, 0.5, 0.5], [0.5, 0.5, 0.5], [0.8, 0.5, 0.5], [0.5, 0.8, 0.5]];
     let lines = vec![InnerElement::Line(vec![0, 1, 2]), InnerElement::Line(vec![3, 1])];
     let set = ControlSet::new(&Cage::new(&cube()).unwrap(), 0, inner(&at, lines)).unwrap();
@@ -90,15 +90,15 @@ fn surface_follows_its_controls() {
     for (a, b) in rest.iter().zip(&posed) {
         assert!((*b - *a - by).length() < 1e-6, "{a} {b}");
     }
-    // A ball's vertices stay around its control, by 1/32 of the smooth cage's side.
+    // A ball's vertices stay on a sphere around its control, with 1/32 of the smooth cage's longest side as radius.
     let radius = set.inner().radius_in(controls.surface().bounds().extent().max_element());
     assert!(posed[posed.len() - 642..].iter().all(|p| (p.distance(by) / radius - 1.0).abs() < 0.1));
 }
 
-/// Balls and tubes of radius 0.05 whose distance is 2.004 radii do not overlap, though meshes of their volume would; at
-/// 1.8 radii they do.
+/// Balls and tubes at a distance of 2.004 radii (of 0.05) do not overlap, although meshes of equal volume would; at 1.8
+/// radii they overlap.
 #[test]
-fn elements_that_nearly_touch_are_taken() {
+fn elements_that_nearly_touch_are_accepted() {
     use InnerElement::{Line, Point};
     let cage = Cage::new(&cube()).unwrap();
     let set = |way: [f32; 3], radii: f32, line: bool| {

@@ -1,41 +1,41 @@
-//! What a V-cycle is expected to leave of the error, the same on every back end.
+//! Convergence estimate of V-cycles, shared by all back ends.
 
 use crate::solve::stop::{ROUND_OFF, SolveReport, StopRule};
 
-/// What a V-cycle leaves of the error, at worst: 0.03 to 0.10 measured, on the Armadillo and on boxes.
+/// Upper bound on the contraction of a V-cycle: 0.03 to 0.10 measured on the Armadillo and on boxes.
 const CONTRACTION: f64 = 0.12;
 
-/// Below [`ROUND_OFF`], cycles that no longer make the correction this many times smaller only move rounding about, and a
-/// tau that asks for more is never met.
-const STALLED: f64 = 0.5;
+/// Below [`ROUND_OFF`], a cycle makes no progress if its correction exceeds this multiple of the previous one: the rest
+/// is rounding noise, and tau may be unreachable.
+const MAX_CORRECTION_RATIO: f64 = 0.5;
 
-/// Cycles that leave more than this share of the error are slower than conjugate gradients that they precondition.
-const SLOW: f64 = 0.5;
+/// Contraction above which cycles are slower than conjugate gradients preconditioned by them.
+const MAX_CONTRACTION: f64 = 0.5;
 
-/// Cycles before contraction is judged by [`SLOW`].
+/// Cycles before contraction is compared with [`MAX_CONTRACTION`].
 const CYCLES_TO_JUDGE: usize = 4;
 
-/// Largest contraction that is believed when the remaining error is extrapolated.
-const SLOWEST: f64 = 0.99;
+/// Upper bound on the contraction with which the remaining error is extrapolated.
+const CONTRACTION_BOUND: f64 = 0.99;
 
-/// See [`STALLED`]: one such cycle may be chance.
-const MAX_STALLED: u32 = 2;
+/// Number of consecutive cycles without progress, see [`MAX_CORRECTION_RATIO`], that end the solve; a single one may be chance.
+const MAX_STALLED_CYCLES: u32 = 2;
 
-/// A batch's way to convergence.
+/// Convergence history of a batch.
 #[derive(Clone, Debug)]
 pub struct Convergence {
     rule: StopRule,
     report: SolveReport,
     /// Norm of the latest coarse correction.
     correction: f64,
-    /// Latest correction over the one before.
+    /// Ratio of the latest correction to the previous one.
     ratio: f64,
-    /// Cycles in a row that only moved rounding about.
+    /// Number of latest consecutive cycles without progress.
     stalled: u32,
 }
 
 impl Convergence {
-    /// Before the first cycle.
+    /// State before the first cycle.
     #[must_use]
     pub fn new(rule: StopRule) -> Self {
         let report = SolveReport::default();
@@ -43,37 +43,37 @@ impl Convergence {
         Self { rule, report, correction: f64::INFINITY, ratio: CONTRACTION, stalled: 0 }
     }
 
-    /// Takes down a cycle by the mean squares of its coarse correction and of its residual, over cells. True if it was the
-    /// last: the stop rule holds for the error that its contraction lets expect, or f32 has no more digits.
+    /// Records a cycle by the mean squared coarse correction and residual over cells. Returns whether it is the last
+    /// one: the estimated error meets the stopping rule, or f32 precision is exhausted.
     pub fn cycle_done(&mut self, correction_square: f64, residual_square: f64) -> bool {
         let correction = correction_square.sqrt();
         let ratio = correction / self.correction;
-        // A correction is the error before the cycle less the error after it: `1 - ratio` of the former.
-        let ahead = ratio.min(SLOWEST);
+        // The correction is the error before minus the error after the cycle: `1 - ratio` of the error before.
+        let ahead = ratio.min(CONTRACTION_BOUND);
         let extrapolated =
             if correction < ROUND_OFF { ratio.min(1.0) } else { (1.0 - CONTRACTION) * ahead / (1.0 - ahead) };
-        // No weight is off by more than 1.
+        // Weights lie between 0 and 1.
         let delta = (extrapolated.max(CONTRACTION) * correction).min(1.0);
         let done = self.report.iteration_done(&self.rule, delta, Some(residual_square.sqrt()));
-        let stalls = correction < ROUND_OFF && correction > STALLED * self.correction;
+        let stalls = correction < ROUND_OFF && correction > MAX_CORRECTION_RATIO * self.correction;
         self.stalled = if stalls { self.stalled + 1 } else { 0 };
-        // The first one has none before it.
+        // The first cycle has no previous correction.
         self.ratio = if ratio > 0.0 { ratio } else { self.ratio };
         self.correction = correction;
-        if !done && self.stalled == MAX_STALLED {
+        if !done && self.stalled == MAX_STALLED_CYCLES {
             (self.report.converged, self.report.at_round_off) = (true, true);
         }
         done || self.report.at_round_off
     }
 
-    /// Whether conjugate gradients should take over.
+    /// Whether conjugate gradients should continue the solve.
     #[must_use]
     pub fn stalls(&self) -> bool {
         let is_judged = self.report.deltas.len() >= CYCLES_TO_JUDGE && self.correction > ROUND_OFF;
-        is_judged && self.ratio > SLOW && !self.report.converged
+        is_judged && self.ratio > MAX_CONTRACTION && !self.report.converged
     }
 
-    /// Whether the next cycle is expected to meet the tolerance with this factor to spare.
+    /// Whether the next cycle is predicted to land a factor `spare` below tolerance.
     #[must_use]
     pub fn is_nearly_done(&self, spare: f64) -> bool {
         spare * self.ratio * self.latest().1 <= self.rule.tolerance
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cycles_that_only_move_rounding_about_end_the_solve() {
+    fn cycles_without_progress_end_the_solve() {
         let mut convergence = Convergence::new(StopRule { tolerance: 0.0, max_iterations: 99 });
         let last = (1..99).find(|_| convergence.cycle_done(1e-7_f64.powi(2), 0.0));
         assert_eq!(last, Some(3));
@@ -105,10 +105,10 @@ mod tests {
         assert!(report.converged && report.at_round_off);
     }
 
-    /// Corrections that fall by 0.8 a cycle sum up to four times the latest: 0.8 + 0.64 + ... = 0.8 / (1 - 0.8). Conjugate
-    /// gradients should take over then, but not at a contraction of 0.4.
+    /// Corrections that decrease by 0.8 per cycle sum to 0.8 / (1 - 0.8), four times the latest. Conjugate gradients
+    /// should then continue, but not at a contraction of 0.4.
     #[test]
-    fn slow_cycles_are_seen_and_their_remainder_is_extrapolated() {
+    fn slow_cycles_are_detected_and_their_remaining_error_extrapolated() {
         for (contraction, stalls) in [(0.8, true), (1.5, true), (0.4, false)] {
             let mut convergence = Convergence::new(StopRule { tolerance: 1e-9, max_iterations: 99 });
             for cycle in 0..4 {
@@ -118,7 +118,7 @@ mod tests {
             assert_eq!(convergence.stalls(), stalls);
             let left = 1e-2 * f64::powi(contraction, 4) / (1.0 - contraction);
             let delta = convergence.latest().1;
-            // The first cycles' usual contraction, 0.12, is taken off.
+            // The estimate assumes one more cycle at the usual contraction of 0.12.
             assert!(contraction > 1.0 || (0.88 * left - delta).abs() < 1e-9, "{delta}, not {left}");
         }
     }

@@ -1,8 +1,8 @@
-//! Several passes over a level in one stream through memory.
+//! Streaming of several passes over a level through memory.
 //!
-//! Each pass follows the one before it one z-plane behind: a half sweep of a plane reads the other colour in that plane and
-//! in the two next to it, which the pass before has just left and the pass after has not yet reached. So a field is read
-//! from memory once for a whole list of passes, and results are those of one pass after another.
+//! Each pass runs one z-plane behind the previous one: a half sweep of a plane reads the other colour in that plane and
+//! its two neighbours, which the previous pass has finished and the next one has not reached. A field is thus read from
+//! memory once per list of passes, with the same results as running them one by one.
 
 use crate::levels::Level;
 use crate::simd::dispatch;
@@ -14,44 +14,44 @@ use crate::transfer::Transfer;
 
 use super::OMEGA;
 
-/// One pass over all planes.
+/// A pass over all planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
-    /// What comes from the coarser level, on black cells: a sweep overwrites red ones.
+    /// Prolongation from the coarser level to black cells; the next sweep overwrites red ones.
     Prolong(Prolong),
     /// Gauss-Seidel on red cells.
     Red,
     /// Gauss-Seidel on black cells.
     Black,
-    /// The same, going [`OMEGA`] times as far.
+    /// Over-relaxation of black cells by [`OMEGA`].
     BlackFurther,
-    /// [`Pass::Red`] where the whole field is zero, whatever its rows hold.
+    /// [`Pass::Red`] on a zero field, whose stored values are ignored.
     RedFromZero,
-    /// [`Pass::BlackFurther`] where black cells are zero, whatever their rows hold.
+    /// [`Pass::BlackFurther`] with zero black cells, whose stored values are ignored.
     BlackFurtherFromZero,
-    /// Residual of the red cells; black ones have none after [`Pass::Black`].
+    /// Residual of the red cells; that of black cells is zero after [`Pass::Black`].
     Residual,
 }
 
 use Pass::{Black, BlackFurther, BlackFurtherFromZero, Red, RedFromZero, Residual};
 
-/// Before the coarse correction, from what the rows hold.
+/// Pre-smoothing and residual, from the stored values.
 pub(super) const DOWN: &[Pass] = &[Red, BlackFurther, Red, Black, Residual];
-/// The same from zero.
+/// Pre-smoothing and residual, from zero.
 pub(super) const DOWN_FROM_ZERO: &[Pass] = &[RedFromZero, BlackFurtherFromZero, Red, Black, Residual];
-/// The same from the coarser level's solution.
+/// Pre-smoothing and residual, from the coarser level's solution.
 pub(super) const DOWN_FROM_COARSE: &[Pass] =
     &[Pass::Prolong(Prolong::Replace), Red, BlackFurther, Red, Black, Residual];
-/// The coarse correction and the sweep after it.
+/// Coarse correction and post-smoothing.
 pub(super) const UP: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, Black];
-/// From one coarse correction of the finest level to the next, whose residual is injected.
+/// On the finest level from one coarse correction to the next, whose residual is injected.
 pub(super) const BETWEEN: &[Pass] =
     &[Pass::Prolong(Prolong::Correct), Red, Black, Red, BlackFurther, Red, Black];
-/// The same before a last cycle that has little to do: a sweep less.
+/// [`BETWEEN`] before a short last cycle, with one sweep less.
 pub(super) const BETWEEN_SHORT: &[Pass] = &[Pass::Prolong(Prolong::Correct), Red, BlackFurther, Red, Black];
 
 /// Runs `passes` over a level's field `u`, `[n_rows]`. `coarse`: the coarser level's field, for [`Pass::Prolong`];
-/// `residual`: `[n red cells + 1]`, for [`Pass::Residual`]. Returns the sum of the residual's squares.
+/// `residual`: `[n red cells + 1]`, for [`Pass::Residual`]. Returns the sum of squared residuals.
 pub(super) fn stream(
     passes: &[Pass],
     level: &Level,
@@ -64,7 +64,7 @@ pub(super) fn stream(
     dispatch(
         #[inline(always)]
         || {
-            // The row for neighbours that are no unknowns.
+            // The zero row stands for cells that are not unknowns.
             if let Some(zero) = residual.last_mut() {
                 *zero = ZERO;
             }

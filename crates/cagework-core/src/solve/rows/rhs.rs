@@ -1,22 +1,22 @@
-//! Right-hand sides: for each cell, or only where they can be other than zero.
+//! Right-hand sides: dense, or restricted to cut cells.
 
 use super::Row;
 use crate::grid::NO_CELL;
 use crate::levels::Level;
 
-/// Right-hand side of one level.
+/// Right-hand side of a level.
 #[derive(Clone, Copy, Debug)]
 pub enum Rhs<'a> {
-    /// One row per cut cell, red ones first: all that the cage's values ask for. The finest level's.
+    /// One row per cut cell, red before black; zero elsewhere. For the finest level.
     Cut(&'a [Row]),
-    /// One row per cell, in field order. A coarse level's.
+    /// One row per cell, in field order. For coarse levels.
     Dense(&'a [Row]),
     /// Zero everywhere.
     Zero,
 }
 
 impl Rhs<'_> {
-    /// The right-hand side of a red cell, which is number `cut` of the red cut cells; none for whole cells that need none.
+    /// Right-hand side of a red cell with the index `cut` among red cut cells; `None` if it is zero.
     #[inline(always)]
     pub(in crate::solve) fn of_red(&self, cell: u32, cut: u32) -> Option<&Row> {
         match self {
@@ -27,7 +27,7 @@ impl Rhs<'_> {
     }
 }
 
-/// One colour's part of a [`Rhs`].
+/// Part of a [`Rhs`] for one colour.
 #[derive(Clone, Copy)]
 pub(super) enum ColourRhs<'a> {
     Cut(&'a [Row]),

@@ -1,4 +1,4 @@
-//! Kernels against the plainest loops over the boundary's definition, on grids of odd dimensions.
+//! Kernels compared with plain loops over the boundary's definition, on grids of odd dimensions.
 
 use super::*;
 use crate::grid::Grid;
@@ -7,13 +7,13 @@ use crate::levels::plain::{cells, hierarchy, on_two_levels, some_field};
 use crate::options::DeltaNorm;
 use crate::solve::operator;
 
-/// Sums of six values in [0, 1) in another order, over a diagonal of at least 3.
-const REORDERED: f32 = 1e-6;
+/// f32 rounding of reordered sums of six values in [0, 1), over a diagonal of at least 3.
+const ROUNDING: f32 = 1e-6;
 
-/// Residuals carry the diagonal, up to some thousands next to the cage, in front of values in [0, 1).
-const RESIDUAL: f32 = 1e-3;
+/// f32 rounding of residuals: diagonals up to some thousands times values in [0, 1).
+const RESIDUAL_ROUNDING: f32 = 1e-3;
 
-/// One right-hand side both ways: a row per cut cell, and the same spread over all cells.
+/// The same right-hand side in both forms: per cut cell, and per cell.
 fn rhs(level: &Level) -> (Vec<Row>, Vec<Row>) {
     let value = |number: usize, k: usize| ((number * 13 + k * 7) % 29) as f32 / 29.0;
     let cut: Vec<Row> = (0..level.n_cut()).map(|n| std::array::from_fn(|k| value(n, k))).collect();
@@ -39,7 +39,7 @@ fn assert_rows_close(a: &[Row], b: &[Row], tolerance: f32) {
     }
 }
 
-/// For each cell of a colour: (row, sum of neighbours + f, diagonal).
+/// `(row, sum of neighbours + f, diagonal)` of each cell of a colour.
 fn plain_sums(
     level: &Level,
     boundary: &dyn crate::levels::Boundary,
@@ -64,7 +64,7 @@ fn sweeps_from_zero_match_sweeps_of_zeros() {
     on_two_levels(|_, level, _| {
         let (_, dense) = rhs(level);
         let mut expected = vec![ZERO; level.n_rows()];
-        // What rows hold must not count, but for the two that stay zero.
+        // Stored values must not matter, except for the two zero rows.
         let mut u = some_field(level, 1);
         for plane in 0..level.grid.dims[2] as usize {
             relax_plane(level, 0, plane, &mut expected, Rhs::Dense(&dense));
@@ -74,7 +74,7 @@ fn sweeps_from_zero_match_sweeps_of_zeros() {
             over_relax_plane(level, 1, plane, 1.2, &mut expected, Rhs::Dense(&dense));
             over_relax_zeros_plane(level, 1, plane, 1.2, &mut u, Rhs::Dense(&dense));
         }
-        assert_rows_close(&u, &expected, REORDERED);
+        assert_rows_close(&u, &expected, ROUNDING);
     });
 }
 
@@ -101,7 +101,7 @@ fn half_sweeps_match_plain_loops() {
                             over_relax_plane(level, colour, plane, omega, &mut u, f);
                         }
                     }
-                    assert_rows_close(&u, &expected, REORDERED);
+                    assert_rows_close(&u, &expected, ROUNDING);
                 }
             }
         }
@@ -137,11 +137,11 @@ fn jacobi_sweep_matches_plain_loops() {
                 }
             }
         }
-        assert_rows_close(&new, &expected, REORDERED);
+        assert_rows_close(&new, &expected, ROUNDING);
         for (row, (a, b)) in
             changes[0].iter().zip(&squares).chain(changes[1].iter().zip(&absolutes)).enumerate()
         {
-            assert!((a - b).abs() <= 10.0 * REORDERED, "{row}: changes {a} and {b}");
+            assert!((a - b).abs() <= 10.0 * ROUNDING, "{row}: changes {a} and {b}");
         }
     });
 }
@@ -165,20 +165,20 @@ fn operator_and_residual_match_plain_loops() {
             }
             let mut residual = zeros.clone();
             let squares = operator::residual(level, &u, f, &mut residual);
-            assert_rows_close(&residual, &expected, RESIDUAL);
+            assert_rows_close(&residual, &expected, RESIDUAL_ROUNDING);
             let sum: f64 = squares.iter().map(|&s| f64::from(s)).sum();
             assert!((sum - square).abs() <= 1e-4 * square, "{sum} and {square}");
             if matches!(f, Rhs::Zero) {
                 let mut image = zeros.clone();
                 operator::apply(level, &u, &mut image);
                 let negative: Vec<Row> = expected.iter().map(|row| row.map(|r| -r)).collect();
-                assert_rows_close(&image, &negative, RESIDUAL);
+                assert_rows_close(&image, &negative, RESIDUAL_ROUNDING);
             }
         }
     });
 }
 
-/// Half the transpose of trilinear interpolation: see [`crate::transfer`].
+/// Half the transpose of trilinear interpolation, see [`crate::transfer`].
 #[test]
 fn restriction_matches_plain_loops() {
     let hierarchy = hierarchy();
@@ -202,7 +202,7 @@ fn restriction_matches_plain_loops() {
                 }
             }
         }
-        assert_rows_close(&f, &expected, REORDERED);
+        assert_rows_close(&f, &expected, ROUNDING);
     }
 }
 
@@ -218,7 +218,7 @@ fn prolongation_matches_plain_loops() {
             for cell in black.filter(|&c| fine.row_of[fine.grid.index(c)] != NO_CELL) {
                 let (mut sum, mut known) = (ZERO, 0.0f32);
                 let mut weight = 1.0;
-                // An odd coordinate lies between two coarse centres, an even one on one.
+                // An odd coordinate lies between two coarse centres, an even one coincides with one.
                 let ends = cell.map(|x| if x % 2 == 1 { vec![x / 2, x / 2 + 1] } else { vec![x / 2] });
                 for end in &ends {
                     weight /= end.len() as f32;
@@ -246,7 +246,7 @@ fn prolongation_matches_plain_loops() {
             for plane in 0..fine.grid.dims[2] as usize {
                 prolong_plane(fine, transfer, plane, &from, &mut u, mode);
             }
-            assert_rows_close(&u, &expected, REORDERED);
+            assert_rows_close(&u, &expected, ROUNDING);
         }
     }
 }

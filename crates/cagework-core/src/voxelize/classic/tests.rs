@@ -1,4 +1,4 @@
-//! Kinds by formula, values against every cell with every triangle as in the paper's Algorithm 1.
+//! Kinds by formula; values compared with a test of every cell against every triangle (Algorithm 1 of the paper).
 
 use glam::{Quat, Vec3};
 use proptest::prelude::*;
@@ -8,7 +8,7 @@ use crate::cage::shapes;
 use crate::geometry::winding_number;
 use crate::mesh::PolygonMesh;
 
-/// f32 values of up to eight vertices.
+/// f32 rounding of sums of up to eight values.
 const SUM_TOLERANCE: f32 = 1e-6;
 
 fn voxelized(mesh: &PolygonMesh, grid: u32, shape: CellShape) -> (Cage, ClassicCells) {
@@ -27,8 +27,8 @@ fn center(cells: &ClassicCells, cell: usize) -> DVec3 {
     cells.origin + at.as_dvec3() * cells.cell_size
 }
 
-/// Values sum to 1, no exterior cell is inside, and all interior ones are but those in pockets that boundary cells cut
-/// off from the outside (`pockets` allowed).
+/// Asserts that values sum to 1, that no exterior cell is inside, and that interior cells are inside, except (with
+/// `pockets`) those that boundary cells separate from the outside.
 fn assert_sound(cage: &Cage, cells: &ClassicCells, pockets: bool) {
     let boundary: Vec<u32> =
         (0u32..).zip(&cells.kinds).filter(|(_, k)| **k == CellKind::Boundary).map(|(c, _)| c).collect();
@@ -64,14 +64,14 @@ fn box_has_one_layer_of_boundary() {
 }
 
 #[test]
-fn box_cells_are_as_many_and_cubic_cells_as_long_on_every_axis() {
+fn box_cells_are_equally_many_and_cubic_cells_equally_long_per_axis() {
     let long = shapes::cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 1.0));
     let (_, cells) = voxelized(&long, 16, CellShape::Box);
     assert_eq!(cells.dims, [16; 3]);
-    // 16 cells and 1/500 less are the box's length.
+    // The box is 16 cells minus 1/500 long.
     assert!((cells.cell_size * (16.0 - 2.0 * PADDING) - DVec3::new(4.0, 2.0, 1.0)).length() < 1e-12);
     let (cage, cells) = voxelized(&long, 16, CellShape::Cubic);
-    assert_eq!(cells.dims, [16, 9, 5], "half and a quarter of 16 cells and some padding");
+    assert_eq!(cells.dims, [16, 9, 5], "half and a quarter of 16 cells plus padding");
     assert_eq!(cells.cell_size, DVec3::splat(cells.cell_size.x));
     assert_sound(&cage, &cells, false);
 }
@@ -88,7 +88,7 @@ fn l_shape_has_the_kinds_of_its_outline() {
 
 #[test]
 fn all_eight_corners_of_an_octahedron_are_exterior() {
-    // Each is cut off from the others: the paper's flood from the zeromost cell misses seven of them.
+    // The corners are not connected: flooding from cell (0, 0, 0) alone, as in the paper, misses seven of them.
     let (cage, cells) = voxelized(&shapes::octahedron(), 21, CellShape::Box);
     for corner in 0..8usize {
         let at = |axis: usize| (corner >> axis & 1) * 20;
@@ -99,7 +99,7 @@ fn all_eight_corners_of_an_octahedron_are_exterior() {
 
 #[test]
 fn cavity_is_enclosed_and_counts_as_interior() {
-    // As published: what the exterior's flood does not reach is interior.
+    // As published: cells that the exterior's flood does not reach are interior.
     let hollow = shapes::together(&shapes::cube(), &shapes::cuboid(Vec3::splat(0.3), Vec3::splat(0.7)));
     let (_, cells) = voxelized(&hollow, 21, CellShape::Box);
     assert_eq!(count(&cells, CellKind::Exterior), 0);
@@ -152,7 +152,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
     #[test]
-    fn nothing_leaks_whatever_the_direction(
+    fn exterior_never_leaks_into_rotated_cages(
         axis in [-1.0..1.0f32, -1.0..1.0, 0.1..1.0], angle in 0.0..6.3f32, grid in 1..30u32, cubic in any::<bool>(),
     ) {
         let turn = Quat::from_axis_angle(Vec3::from(axis).normalize(), angle);

@@ -1,4 +1,4 @@
-//! Watertight: every line enters as often as it leaves, and parity is the winding number.
+//! Watertightness: lines enter as often as they leave, and parity equals the winding number.
 
 use glam::{DQuat, Vec3};
 use proptest::prelude::*;
@@ -9,8 +9,8 @@ use crate::geometry::winding_number;
 use crate::mesh::PolygonMesh;
 use crate::voxelize::embedded::{shoot_lines, votes};
 
-/// Asserts that lines cross the cage an even number of times and that parity along each axis and the winding number
-/// agree about every `every`-th centre.
+/// Asserts that lines cross the cage an even number of times, and that parity along each axis and the winding number
+/// agree at every `every`-th centre.
 fn assert_watertight(cage: &Cage, grid: &Grid, every: usize) {
     let lines = shoot_lines(cage, grid);
     for lines in &lines {
@@ -28,7 +28,7 @@ fn assert_watertight(cage: &Cage, grid: &Grid, every: usize) {
     let triangles = || (0..cage.facets().len() as u32).map(|t| cage.facet_corners(t));
     for cell in grid.cells().step_by(every) {
         let winding = winding_number(grid.center(cell), triangles());
-        // In between on the surface itself, where either is right.
+        // On the surface itself, either classification is valid.
         if (winding - winding.round()).abs() < 1e-6 {
             assert_eq!(
                 votes[grid.index(cell)] == 3,
@@ -47,7 +47,7 @@ fn turned(mesh: &PolygonMesh, turn: DQuat) -> Cage {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
-    fn turned_cages_are_watertight(x in -3.2..3.2f64, y in -1.6..1.6f64, z in -3.2..3.2f64, g in 8u32..20) {
+    fn rotated_cages_are_watertight(x in -3.2..3.2f64, y in -1.6..1.6f64, z in -3.2..3.2f64, g in 8u32..20) {
         let turn = DQuat::from_euler(glam::EulerRot::XYZ, x, y, z);
         for mesh in [shapes::c_shape(), shapes::octahedron(), shapes::tetrahedron()] {
             let cage = turned(&mesh, turn);
@@ -56,9 +56,9 @@ proptest! {
     }
 }
 
-/// Lines along edges, through vertices and in the planes of faces: whole numbers for the shapes' corners.
+/// Lines along edges, through vertices and in the planes of faces: the shapes have integer corners.
 #[test]
-fn lines_through_vertices_and_along_edges_are_counted_once() {
+fn lines_through_vertices_and_along_edges_cross_once() {
     for mesh in [shapes::cube(), shapes::c_shape(), shapes::l_shape(), shapes::octahedron()] {
         let cage = Cage::new(&mesh).unwrap();
         for step in [1.0, 0.5, 0.25] {
@@ -92,7 +92,7 @@ fn hits_lie_on_the_cage() {
         assert!(lines.crossing().count() > 0);
         for (_, _, hits) in lines.crossing() {
             let ends: Vec<f64> = hits.iter().map(|h| grid.origin[axis] + grid.cell[axis] * h.t).collect();
-            // One face at 0, the other at the box's size.
+            // One face at 0, the opposite one at the box's size.
             assert!(ends.len() == 2 && ends[0].abs() < 1e-12);
             assert!((ends[1] - f64::from(cage.bounds().max[axis])).abs() < 1e-12);
         }
