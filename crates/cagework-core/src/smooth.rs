@@ -15,7 +15,7 @@ use crate::weights::Weights;
 
 /// A subdivided mesh and its relation to the original.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Subdivided {
+pub struct Subdivision {
     /// Vertices per step: those of the previous mesh, then one per edge (ordered by its ends), then one per face.
     /// Faces: one per corner of each previous face, in order.
     pub mesh: PolygonMesh,
@@ -33,7 +33,7 @@ type Row = BTreeMap<u32, f64>;
 /// # Panics
 /// If a face has an invalid index.
 #[must_use]
-pub fn subdivide(mesh: &PolygonMesh, steps: u32) -> Subdivided {
+pub fn subdivide(mesh: &PolygonMesh, steps: u32) -> Subdivision {
     let mut rows: Vec<Row> = (0..mesh.positions.len() as u32).map(|i| Row::from([(i, 1.0)])).collect();
     let mut faces = mesh.faces.clone();
     let mut face_of: Vec<u32> = (0..faces.len() as u32).collect();
@@ -53,7 +53,7 @@ pub fn subdivide(mesh: &PolygonMesh, steps: u32) -> Subdivided {
         indptr.push(indices.len() as u32);
     }
     let rows = Weights::from_parts(mesh.positions.len() as u32, indptr, indices, data);
-    Subdivided { mesh: PolygonMesh { positions, faces }, rows, face_of }
+    Subdivision { mesh: PolygonMesh { positions, faces }, rows, face_of }
 }
 
 /// One step: rows of the new vertices, new faces, and their original faces.

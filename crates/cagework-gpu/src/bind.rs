@@ -1,7 +1,7 @@
 //! The bind on the GPU: geometry and assembly are the CPU's own, what lies between runs as kernels.
 
 use cagework_core::bind::Watch;
-use cagework_core::bind::pipeline::{FieldsOn, Prepared, Solved};
+use cagework_core::bind::pipeline::{FieldsOn, PreparedBind, Solution};
 use cagework_core::options::{BindOptions, Solver};
 use cagework_core::solve::rows::{Row, ZERO};
 use cagework_core::solve::stop::SolveReport;
@@ -71,7 +71,7 @@ pub async fn bind_on<'a>(
         return Err(GpuError::Solver(options.solver));
     }
     let watch = Watch::new(progress);
-    let mut prepared = Prepared::new(positions, controls.into(), options, FieldsOn::Device, &watch)?;
+    let mut prepared = PreparedBind::new(positions, controls.into(), options, FieldsOn::Device, &watch)?;
     let (hierarchy, stencils) = (prepared.hierarchy(), prepared.stencils());
     let limit = options.memory_limit;
     let plan = Plan::new(hierarchy, stencils, options.solver, context.max_binding_bytes, limit)?;
@@ -83,14 +83,14 @@ pub async fn bind_on<'a>(
     Ok(prepared.finish(solved, &watch)?)
 }
 
-/// Solves all columns. Returns what [`Prepared::finish`] needs.
+/// Solves all columns. Returns what [`PreparedBind::finish`] needs.
 async fn solve_and_sample(
-    prepared: &Prepared<'_>,
+    prepared: &PreparedBind<'_>,
     options: &BindOptions,
     plan: &Plan,
     watch: &Watch<'_>,
     context: &GpuContext,
-) -> Result<Solved, GpuError> {
+) -> Result<Solution, GpuError> {
     let n_batches = prepared.hierarchy().n_batches();
     let mut blocks: Vec<Vec<Row>> = vec![vec![ZERO; prepared.stencils().len()]; n_batches];
     let began = watch.now_ms();
@@ -101,7 +101,7 @@ async fn solve_and_sample(
         multigrid(prepared, options, plan, &mut stream, &mut blocks).await?
     };
     let all_ms = watch.now_ms() - began;
-    Ok(Solved {
+    Ok(Solution {
         blocks,
         report: outcome.report,
         iterations: outcome.iterations,
@@ -114,7 +114,7 @@ async fn solve_and_sample(
 }
 
 async fn multigrid(
-    prepared: &Prepared<'_>,
+    prepared: &PreparedBind<'_>,
     options: &BindOptions,
     plan: &Plan,
     stream: &mut Stream<'_>,
@@ -152,7 +152,7 @@ async fn multigrid(
 }
 
 async fn jacobi(
-    prepared: &Prepared<'_>,
+    prepared: &PreparedBind<'_>,
     options: &BindOptions,
     plan: &Plan,
     stream: &mut Stream<'_>,

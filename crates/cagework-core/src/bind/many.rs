@@ -5,9 +5,9 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::memory::{VertexCounts, estimate, field_bytes};
-use super::pipeline::Prepared;
+use super::pipeline::PreparedBind;
 use super::points::WeldedPoints;
-use super::solving::{Solved, sample_fields, solve_fields};
+use super::solving::{Solution, sample_fields, solve_fields};
 use super::voxels::{Voxelization, VoxelizedCage};
 use super::{BindError, Binding, Watch};
 use crate::controls::Controls;
@@ -26,7 +26,7 @@ pub struct SolvedCage<'a> {
     /// `[n_batches][n_rows]`
     fields: Vec<Vec<Row>>,
     /// Report of the solve, without samples.
-    solved: Solved,
+    solved: Solution,
     elapsed_ms: f64,
 }
 
@@ -96,9 +96,9 @@ impl<'a> SolvedCage<'a> {
         needed.check(mesh.count(), self.controls.n_controls(), options.memory_limit)?;
         let voxelized = Arc::clone(&self.voxelized);
         let prepared =
-            Prepared::in_grid(mesh, self.controls, &options, voxelized, needed.bytes, began, &watch)?;
+            PreparedBind::in_grid(mesh, self.controls, &options, voxelized, needed.bytes, began, &watch)?;
         let blocks = sample_fields(prepared.stencils(), &self.fields, &self.voxelized.team);
-        prepared.finish(Solved { blocks, solve_share: 0.0, ..self.solved.clone() }, &watch)
+        prepared.finish(Solution { blocks, solve_share: 0.0, ..self.solved.clone() }, &watch)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The stages of a bind: voxelize; per batch, solve and sample; assemble.
 //!
-//! All back ends share the first and last stage: [`Prepared::new`], then a solver of the back end produces a
-//! [`Solved`], then [`Prepared::finish`].
+//! All back ends share the first and last stage: [`PreparedBind::new`], then a solver of the back end produces a
+//! [`Solution`], then [`PreparedBind::finish`].
 
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ use super::memory::estimate;
 use super::offsets::{Offsets, needs_all};
 use super::outside::{oversized, refuse_outside};
 use super::points::WeldedPoints;
-pub use super::solving::Solved;
+pub use super::solving::Solution;
 use super::solving::solve_and_sample;
 use super::voxels::{Voxelization, VoxelizedCage};
 use super::watch::Watch;
@@ -45,7 +45,7 @@ pub enum FieldsOn {
 }
 
 /// A bind before the solve: grid and sampling stencils.
-pub struct Prepared<'a> {
+pub struct PreparedBind<'a> {
     mesh: WeldedPoints<'a>,
     controls: Controls<'a>,
     options: &'a BindOptions,
@@ -63,12 +63,12 @@ pub(super) fn run(
     progress: &dyn Progress,
 ) -> Result<Binding, BindError> {
     let watch = Watch::new(progress);
-    let prepared = Prepared::new(positions, controls, options, FieldsOn::Host, &watch)?;
+    let prepared = PreparedBind::new(positions, controls, options, FieldsOn::Host, &watch)?;
     let solved = prepared.solve(&watch)?;
     prepared.finish(solved, &watch)
 }
 
-impl<'a> Prepared<'a> {
+impl<'a> PreparedBind<'a> {
     /// Checks the input, voxelizes the surface and computes every vertex's sampling stencil.
     ///
     /// # Errors
@@ -122,7 +122,7 @@ impl<'a> Prepared<'a> {
         &self.stencils
     }
 
-    fn solve(&self, watch: &Watch<'_>) -> Result<Solved, BindError> {
+    fn solve(&self, watch: &Watch<'_>) -> Result<Solution, BindError> {
         Ok(solve_and_sample(self.hierarchy(), &self.stencils, self.options, &self.voxelized.team, watch)?)
     }
 
@@ -130,7 +130,7 @@ impl<'a> Prepared<'a> {
     ///
     /// # Errors
     /// Memory above the limit, or cancelled.
-    pub fn solve_on_host(&mut self, watch: &Watch<'_>) -> Result<Solved, BindError> {
+    pub fn solve_on_host(&mut self, watch: &Watch<'_>) -> Result<Solution, BindError> {
         let (vertices, threads) = (self.mesh.count(), self.voxelized.team.n_threads());
         let needed =
             estimate(self.controls, &self.hierarchy().levels[0].grid, vertices, threads, self.options);
@@ -143,7 +143,7 @@ impl<'a> Prepared<'a> {
     ///
     /// # Errors
     /// Cancelled.
-    pub fn finish(self, mut solved: Solved, watch: &Watch<'_>) -> Result<Binding, BindError> {
+    pub fn finish(self, mut solved: Solution, watch: &Watch<'_>) -> Result<Binding, BindError> {
         let sampled = watch.now_ms();
         watch.report(Stage::Sample, 0.5, solved.iterations, None)?;
         let row_options = RowOptions {
@@ -166,7 +166,7 @@ impl<'a> Prepared<'a> {
         self,
         (rows, frames): (AssembledWeights, Frames),
         blocks_bytes: usize,
-        solved: Solved,
+        solved: Solution,
         sampled: f64,
         watch: &Watch<'_>,
     ) -> Result<Binding, BindError> {

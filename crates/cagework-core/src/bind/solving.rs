@@ -21,7 +21,7 @@ const JACOBI_DECADES: f64 = 4.0;
 
 /// Sampled columns with statistics of the solve.
 #[derive(Clone, Debug, Default)]
-pub struct Solved {
+pub struct Solution {
     /// `[n_batches][n_points]` rows of lanes.
     pub blocks: Vec<Vec<Row>>,
     /// Report of the solve of all columns.
@@ -50,7 +50,7 @@ pub(super) fn solve_and_sample(
     options: &BindOptions,
     team: &Team,
     watch: &Watch<'_>,
-) -> Result<Solved, Cancelled> {
+) -> Result<Solution, Cancelled> {
     if options.solver == Solver::Jacobi {
         let begin = watch.now_ms();
         let (fields, mut solved) = jacobi_fields(hierarchy, options, team, watch)?;
@@ -63,7 +63,7 @@ pub(super) fn solve_and_sample(
     }
     let take = |batch, field: &[Row]| sample(stencils, batch, field);
     let (blocks, solved) = solve_batches(hierarchy, options, team, watch, take)?;
-    Ok(Solved { blocks, ..solved })
+    Ok(Solution { blocks, ..solved })
 }
 
 /// Solves all columns and returns their fields, `[n_batches][n_rows]`, for [`sample_fields`].
@@ -75,7 +75,7 @@ pub(super) fn solve_fields(
     options: &BindOptions,
     team: &Team,
     watch: &Watch<'_>,
-) -> Result<(Vec<Vec<Row>>, Solved), Cancelled> {
+) -> Result<(Vec<Vec<Row>>, Solution), Cancelled> {
     if options.solver == Solver::Jacobi {
         return jacobi_fields(hierarchy, options, team, watch);
     }
@@ -94,7 +94,7 @@ fn solve_batches<T: Send>(
     team: &Team,
     watch: &Watch<'_>,
     take: impl Fn(usize, &[Row]) -> T + Sync,
-) -> Result<(Vec<T>, Solved), Cancelled> {
+) -> Result<(Vec<T>, Solution), Cancelled> {
     let n_batches = hierarchy.n_batches();
     let rule = options.stop_rule().of_batch(n_batches);
     let (spent, bytes) = (SolveTimes::default(), AtomicU64::new(0));
@@ -122,13 +122,13 @@ fn solve_batches<T: Send>(
     let solved: Vec<_> = solved.into_iter().collect::<Option<_>>().ok_or(Cancelled)?;
     let (reports, taken): (Vec<_>, Vec<_>) = solved.into_iter().unzip();
     let report = SolveReport::together(&reports);
-    let solved = Solved {
+    let solved = Solution {
         iterations: report.latest().0,
         delta_interval: 1,
         report,
         field_bytes: bytes.into_inner() as usize * team.n_threads().min(n_batches),
         solve_share: spent.solve_share(),
-        ..Solved::default()
+        ..Solution::default()
     };
     Ok((taken, solved))
 }
@@ -174,14 +174,14 @@ fn jacobi_fields(
     options: &BindOptions,
     team: &Team,
     watch: &Watch<'_>,
-) -> Result<(Vec<Vec<Row>>, Solved), Cancelled> {
+) -> Result<(Vec<Vec<Row>>, Solution), Cancelled> {
     let rule = options.stop_rule();
     let (fields, report) = jacobi::solve(hierarchy, team, rule, options.delta_norm, |sweeps, delta| {
         let to_go = (delta / rule.tolerance).max(1.0).log10() / JACOBI_DECADES;
         watch.report(Stage::Solve, 1.0 - to_go as f32, sweeps, Some(delta as f32)).is_ok()
     })?;
     let level = &hierarchy.levels[0];
-    let solved = Solved {
+    let solved = Solution {
         iterations: report.latest().0,
         delta_interval: 1,
         report,
@@ -192,7 +192,7 @@ fn jacobi_fields(
             team.n_threads() as u64,
         ) as usize,
         solve_share: 1.0,
-        ..Solved::default()
+        ..Solution::default()
     };
     Ok((fields, solved))
 }

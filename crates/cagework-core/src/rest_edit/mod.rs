@@ -2,7 +2,7 @@
 //!
 //! Nothing changes in place, so callers implement undo by keeping the meshes. Every result is a cage ([`Cage::new`]
 //! accepts it without flipping a face) with no more self-intersections than the input. Vertices keep their order;
-//! [`Edited::vertex_of`] maps old to new indices for selections and poses.
+//! [`CageEdit::vertex_of`] maps old to new indices for selections and poses.
 
 mod operations;
 #[cfg(test)]
@@ -19,7 +19,7 @@ pub use operations::{collapse_edge, delete_faces, extrude_face, move_vertices, s
 
 /// Result of an edit.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Edited {
+pub struct CageEdit {
     /// The new mesh.
     pub mesh: PolygonMesh,
     /// New index of every old vertex; `None` if it was removed. `[n_old]`
@@ -79,7 +79,11 @@ pub enum RestEditError {
 }
 
 /// Checks a result against the mesh before the edit.
-fn finish(operation: &'static str, before: &PolygonMesh, edited: Edited) -> Result<Edited, RestEditError> {
+fn finish(
+    operation: &'static str,
+    before: &PolygonMesh,
+    edited: CageEdit,
+) -> Result<CageEdit, RestEditError> {
     let cage = Cage::new(&edited.mesh).map_err(|source| RestEditError::Breaks { operation, source })?;
     let was_turned = Cage::new(before).is_ok_and(|c| is_turned(&c));
     if is_turned(&cage) && !was_turned {

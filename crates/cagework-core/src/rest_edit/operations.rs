@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::{Edited, RestEditError, finish};
+use super::{CageEdit, RestEditError, finish};
 use crate::fill::{loops, triangulate};
 use crate::mesh::PolygonMesh;
 
@@ -10,7 +10,7 @@ use crate::mesh::PolygonMesh;
 ///
 /// # Errors
 /// [`RestEditError`]: a vertex does not exist, a position is not finite, or the cage would become invalid.
-pub fn move_vertices(mesh: &PolygonMesh, moves: &[(u32, Vec3)]) -> Result<Edited, RestEditError> {
+pub fn move_vertices(mesh: &PolygonMesh, moves: &[(u32, Vec3)]) -> Result<CageEdit, RestEditError> {
     let mut edited = unchanged(mesh);
     for &(v, p) in moves {
         if !p.is_finite() {
@@ -28,7 +28,7 @@ pub fn move_vertices(mesh: &PolygonMesh, moves: &[(u32, Vec3)]) -> Result<Edited
 ///
 /// # Errors
 /// [`RestEditError`]: the edge does not exist, `share` is not finite, or the cage would become invalid.
-pub fn split_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<Edited, RestEditError> {
+pub fn split_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<CageEdit, RestEditError> {
     let [p, q] = ends(mesh, edge)?;
     if !share.is_finite() {
         return Err(RestEditError::NotFinite { what: "the position on the edge" });
@@ -62,7 +62,7 @@ pub fn split_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<Edit
 ///
 /// # Errors
 /// [`RestEditError`]: the edge does not exist, `share` is not finite, or the cage would become invalid.
-pub fn collapse_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<Edited, RestEditError> {
+pub fn collapse_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<CageEdit, RestEditError> {
     let [p, q] = ends(mesh, edge)?;
     if !share.is_finite() {
         return Err(RestEditError::NotFinite { what: "the position on the edge" });
@@ -91,7 +91,7 @@ pub fn collapse_edge(mesh: &PolygonMesh, edge: [u32; 2], share: f32) -> Result<E
 ///
 /// # Errors
 /// [`RestEditError`]: the face does not exist, `distance` is not finite, or the cage would become invalid.
-pub fn extrude_face(mesh: &PolygonMesh, face: u32, distance: f32) -> Result<Edited, RestEditError> {
+pub fn extrude_face(mesh: &PolygonMesh, face: u32, distance: f32) -> Result<CageEdit, RestEditError> {
     let corners = mesh.faces.get(face as usize).ok_or_else(|| missing("face", &[face]))?.clone();
     if !distance.is_finite() {
         return Err(RestEditError::NotFinite { what: "the distance" });
@@ -120,7 +120,7 @@ pub fn extrude_face(mesh: &PolygonMesh, face: u32, distance: f32) -> Result<Edit
 ///
 /// # Errors
 /// [`RestEditError`]: a face does not exist, a hole has more than 64 edges, or the cage would become invalid.
-pub fn delete_faces(mesh: &PolygonMesh, faces: &[u32]) -> Result<Edited, RestEditError> {
+pub fn delete_faces(mesh: &PolygonMesh, faces: &[u32]) -> Result<CageEdit, RestEditError> {
     let mut keep = vec![true; mesh.faces.len()];
     for &f in faces {
         *keep.get_mut(f as usize).ok_or_else(|| missing("face", &[f]))? = false;
@@ -153,8 +153,8 @@ pub fn delete_faces(mesh: &PolygonMesh, faces: &[u32]) -> Result<Edited, RestEdi
     finish("deleting", mesh, edited)
 }
 
-fn unchanged(mesh: &PolygonMesh) -> Edited {
-    Edited {
+fn unchanged(mesh: &PolygonMesh) -> CageEdit {
+    CageEdit {
         mesh: mesh.clone(),
         vertex_of: (0..mesh.positions.len() as u32).map(Some).collect(),
         touched: Vec::new(),
@@ -162,7 +162,7 @@ fn unchanged(mesh: &PolygonMesh) -> Edited {
 }
 
 /// Drops vertices that have lost their last face, and compacts the indices.
-fn drop_unused(before: &PolygonMesh, edited: &mut Edited) {
+fn drop_unused(before: &PolygonMesh, edited: &mut CageEdit) {
     let n = edited.mesh.positions.len();
     let used = |faces: &[Vec<u32>]| {
         let mut used = vec![false; n];

@@ -1,7 +1,7 @@
 use glam::{Vec3, vec3};
 use proptest::prelude::*;
 
-use super::{Edited, RestEditError, collapse_edge, delete_faces, extrude_face, move_vertices, split_edge};
+use super::{CageEdit, RestEditError, collapse_edge, delete_faces, extrude_face, move_vertices, split_edge};
 use crate::cage::Cage;
 use crate::cage::subdivided_box;
 use crate::crossing::{crossings_of, notices};
@@ -30,7 +30,7 @@ fn volume(mesh: &PolygonMesh) -> f64 {
     six / 6.0
 }
 
-fn assert_follows(before: &PolygonMesh, edited: &Edited, except: &[u32]) {
+fn assert_follows(before: &PolygonMesh, edited: &CageEdit, except: &[u32]) {
     for (old, new) in edited.vertex_of.iter().enumerate() {
         if !except.contains(&(old as u32)) {
             assert_eq!(before.positions[old], edited.mesh.positions[new.unwrap() as usize], "vertex {old}");

@@ -1,6 +1,6 @@
 use super::*;
 use crate::bind::Watch;
-use crate::bind::pipeline::{FieldsOn, Prepared};
+use crate::bind::pipeline::{FieldsOn, PreparedBind};
 use crate::cage::subdivided_box;
 use crate::mesh::Bounds;
 use crate::options::BindOptions;
@@ -16,14 +16,16 @@ use crate::{Cage, deform};
 /// f32 rounding of values in [0, 1]: the twins add neighbours one by one, the fast kernels in pairs.
 const TOLERANCE: f32 = 2e-6;
 
-fn prepared<T>(use_it: impl FnOnce(&Prepared<'_>) -> T) -> T {
+fn prepared<T>(use_it: impl FnOnce(&PreparedBind<'_>) -> T) -> T {
     let bounds = Bounds { min: Vec3::new(-1.0, -0.6, -0.8), max: Vec3::new(1.1, 0.7, 0.5) };
     let cage = Cage::new(&subdivided_box(bounds, 0.0, [2, 1, 1])).expect("a box is a valid cage");
     let positions: Vec<Vec3> =
         (0..40).map(|k| 0.45 * Vec3::new((k as f32).sin(), (k as f32).cos(), 0.3)).collect();
     let options = BindOptions { grid: 15, ..BindOptions::default() };
     let watch = Watch::new(&Silent);
-    use_it(&Prepared::new(&positions, (&cage).into(), &options, FieldsOn::Host, &watch).expect("good input"))
+    use_it(
+        &PreparedBind::new(&positions, (&cage).into(), &options, FieldsOn::Host, &watch).expect("good input"),
+    )
 }
 
 fn assert_close(twin: &[f32], fast: &[Row]) {

@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "every test binary uses its part")]
 
 use cagework_core::bind::Watch;
-use cagework_core::bind::pipeline::{FieldsOn, Prepared};
+use cagework_core::bind::pipeline::{FieldsOn, PreparedBind};
 use cagework_core::options::BindOptions;
 use cagework_core::progress::Silent;
 use cagework_core::{Bounds, Cage, TriMesh, subdivided_box};
@@ -115,10 +115,10 @@ pub(crate) fn with_prepared<T>(
     positions: &[Vec3],
     cage: &Cage,
     options: &BindOptions,
-    use_it: impl FnOnce(&Prepared<'_>) -> T,
+    use_it: impl FnOnce(&PreparedBind<'_>) -> T,
 ) -> T {
     let watch = Watch::new(&Silent);
-    let prepared = Prepared::new(positions, cage.into(), options, FieldsOn::Device, &watch)
+    let prepared = PreparedBind::new(positions, cage.into(), options, FieldsOn::Device, &watch)
         .expect("the tests' input is good");
     use_it(&prepared)
 }

@@ -3,7 +3,7 @@
 use cagework_cage::check::Places;
 use cagework_core::edit::SelectMode;
 use cagework_core::enclosure::Enclosure;
-use cagework_core::rest_edit::{Edited, collapse_edge, delete_faces, extrude_face, split_edge};
+use cagework_core::rest_edit::{CageEdit, collapse_edge, delete_faces, extrude_face, split_edge};
 use cagework_core::{ControlSet, Controls, InnerControls, PolygonMesh};
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -101,7 +101,7 @@ impl State {
         self.selection.vertices().into_iter().filter(|&v| v as usize >= self.made.n_cage()).collect()
     }
 
-    fn edited(&self, edit: RestEdit) -> Answer<Edited> {
+    fn edited(&self, edit: RestEdit) -> Answer<CageEdit> {
         let mesh = self.shown_mesh();
         let (mut edges, faces) = (self.selection.edges(&self.topology), self.selection.faces(&self.topology));
         edges.retain(|edge| edge.iter().all(|&i| (i as usize) < mesh.positions.len()));
@@ -136,9 +136,9 @@ impl State {
 fn each<T, E>(
     mesh: &PolygonMesh,
     items: &[T],
-    edit: impl Fn(&PolygonMesh, &T) -> Result<Edited, E>,
-) -> Result<Option<Edited>, E> {
-    let mut all: Option<Edited> = None;
+    edit: impl Fn(&PolygonMesh, &T) -> Result<CageEdit, E>,
+) -> Result<Option<CageEdit>, E> {
+    let mut all: Option<CageEdit> = None;
     for item in items {
         let mut next = edit(all.as_ref().map_or(mesh, |e| &e.mesh), item)?;
         if let Some(before) = all {
