@@ -86,8 +86,8 @@ impl Cage {
         Ok(Self::assembled(mesh.positions.clone(), faces, polygons, component, bounds, notices))
     }
 
-    /// This cage with additional faces, which are not checked: walls inside it, which need not enclose anything. A wall
-    /// that separates both sides has its faces twice, back to back.
+    /// This cage with walls inside it: additional faces that are not checked and need not enclose anything. A wall with
+    /// values on both sides has each of its faces twice, back to back.
     ///
     /// `positions`, `faces`: additional vertices and faces, whose indices count from the cage's first vertex; `parts`:
     /// number of the connected part of each face.

@@ -60,7 +60,7 @@ pub enum RepairError {
     #[error(transparent)]
     NotSmooth(#[from] ControlError),
     /// The model is still partly outside.
-    #[error("{left} model vertices are still outside after growing: make a new cage")]
+    #[error("{} still outside after growing: make a new cage", counted(*left, "model vertex is", "model vertices are"))]
     StillOutside {
         /// Number of model vertices outside.
         left: usize,
@@ -154,7 +154,9 @@ fn weld(repaired: &mut RepairedMesh) {
     }
     let keep: Vec<bool> = first.iter().enumerate().map(|(v, &f)| v as u32 == f).collect();
     repaired.keep_vertices(&keep);
-    repaired.done.push(format!("Joined {joined} vertices with others at the same place."));
+    repaired
+        .done
+        .push(format!("Joined {} with others at the same position.", counted(joined, "vertex", "vertices")));
 }
 
 fn drop_degenerate(repaired: &mut RepairedMesh) {
@@ -166,7 +168,7 @@ fn drop_degenerate(repaired: &mut RepairedMesh) {
             face.pop();
         }
     }
-    // A repeated corner splits an outline into two: keep each part that is a valid face.
+    // Consecutive repeats of a corner are merged above; drop faces that are still invalid.
     let sound = shape::sound_faces(&repaired.mesh, &mut Vec::new());
     let keep: HashSet<u32> = sound.into_iter().collect();
     let mut number = 0..;
@@ -178,11 +180,14 @@ fn drop_degenerate(repaired: &mut RepairedMesh) {
     let unused = used.iter().filter(|u| !**u).count();
     if unused > 0 {
         repaired.keep_vertices(&used);
-        repaired.done.push(format!("Dropped {unused} vertices of no face."));
+        repaired.done.push(format!("Dropped {} without faces.", counted(unused, "vertex", "vertices")));
     }
     let dropped = before - repaired.mesh.faces.len();
     if dropped > 0 {
-        repaired.done.push(format!("Dropped {dropped} faces without area or with the corners of others."));
+        repaired.done.push(format!(
+            "Dropped {} without area or with the corners of others.",
+            counted(dropped, "face", "faces")
+        ));
     }
 }
 
@@ -204,7 +209,7 @@ fn fill_holes(repaired: &mut RepairedMesh) {
         }
     }
     if filled > 0 {
-        repaired.done.push(format!("Filled {filled} {}.", if filled == 1 { "hole" } else { "holes" }));
+        repaired.done.push(format!("Filled {}.", counted(filled, "hole", "holes")));
     }
 }
 

@@ -47,7 +47,7 @@ use verify::{verified, verified_faces};
 /// Limit on the lattices that are tried to meet the target.
 const MAX_LATTICES: usize = 4;
 
-/// Vertices of a cage over the target above which a coarser lattice is tried.
+/// A coarser lattice is tried if a cage has more than this multiple of the target number of vertices.
 const MAX_TARGET_RATIO: f64 = 1.1;
 
 /// Layers of voxels around the hull to which the cage is confined, tried in this order until the target is met. Narrow
@@ -60,11 +60,11 @@ const MIN_GAP_SHARES: [f64; 3] = [0.0, 0.3, f64::INFINITY];
 /// Number of bands, from the first, in which the cage is collapsed as far as the budget allows.
 const N_NARROW_BANDS: usize = 3;
 
-/// For models in several pieces: vertices within the budget, over the target, above which a coarser lattice is tried at
-/// once, as bridges between pieces cannot be collapsed.
+/// For models in several pieces: a coarser lattice is tried at once if collapsing within the budget leaves more than this multiple
+/// of the target, as bridges between pieces cannot be collapsed.
 const MAX_FIRST_RATIO: f64 = 5.0;
 
-/// For such models: vertices within the budget over the final number of vertices.
+/// For such models: ratio of the vertices that collapsing within the budget leaves to the final number of vertices.
 const LATER_RATIO: f64 = 3.7;
 
 /// Estimated vertices per open gap: a ring on each side.

@@ -175,7 +175,7 @@ pub struct CageReport {
     pub voxels: u32,
     /// Edge of a voxel, object units. Gaps narrower than three voxels are closed.
     pub voxel_size: f32,
-    /// Smallest distance from the model along at least one axis, object units.
+    /// Distance from the model that every point of the cage keeps along at least one axis, object units.
     pub clearance: f32,
     /// Mirror symmetry of the cage.
     pub mirror: Option<Mirror>,

@@ -32,7 +32,7 @@ const ROW_BYTES: f64 = 44.0;
 /// exists twice while threads' results are joined, and statistics of its row.
 const POINT_BYTES: f64 = 470.0;
 
-/// Bytes per row of offsets: three entries for each of four frames. (The bind of the joints to the cage alone uses an
+/// Bytes per row of offsets: three entries for each of four holds. (The bind of the joints to the cage alone uses an
 /// eighth of the cells and starts after the fields have been freed.)
 const OFFSET_BYTES: f64 = 3.0 * 4.0 * 8.0;
 

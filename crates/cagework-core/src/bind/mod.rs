@@ -25,7 +25,7 @@ use crate::options::{BindOptions, OutOfRange};
 use crate::progress::{Cancelled, Progress};
 use crate::report::BindReport;
 use crate::weights::Weights;
-use crate::words::grouped;
+use crate::words::{counted, grouped};
 
 /// The result of a bind.
 #[derive(Clone, Debug)]
@@ -89,7 +89,7 @@ pub enum BindError {
         grid: u32,
     },
     /// Vertices are outside, and the policy is to fail.
-    #[error("{count} mesh vertices are outside the cage, the first is vertex {first}: enlarge the cage")]
+    #[error("{} outside the cage, the first is vertex {first}: enlarge the cage", counted(*count as usize, "mesh vertex is", "mesh vertices are"))]
     Outside {
         /// Number of vertices outside.
         count: u32,

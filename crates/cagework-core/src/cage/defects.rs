@@ -17,7 +17,7 @@ pub enum CageError {
     #[error("cage has no faces")]
     Empty,
     /// A face has one or two corners.
-    #[error("cage face {face} has {corners} corners; it needs at least 3")]
+    #[error("cage face {face} has {}; it needs at least 3", counted(*corners, "corner", "corners"))]
     TooFewCorners {
         /// The face.
         face: u32,
@@ -40,7 +40,7 @@ pub enum CageError {
         /// The vertex.
         vertex: u32,
     },
-    /// The cage is too small or too large for its arithmetic.
+    /// The cage is too small or too large for f32 and f64 arithmetic.
     #[error(
         "cage has a bounding box with a diagonal of {diagonal:e}; it must be from {MIN_DIAGONAL:e} to {MAX_DIAGONAL:e}: scale it"
     )]
