@@ -15,12 +15,12 @@ const MAX_ROUNDS: usize = 40;
 /// Gap left beyond each point, over the cage's diagonal.
 const MARGIN: f64 = 0.004;
 
-fn smoothed(mesh: &PolygonMesh, smooth: u32) -> Result<ControlSet, RepairError> {
+fn control_set(mesh: &PolygonMesh, smooth: u32) -> Result<ControlSet, RepairError> {
     Ok(ControlSet::new(&Cage::new(mesh)?, smooth, InnerControls::default())?)
 }
 
 fn outside(mesh: &PolygonMesh, smooth: u32, model: &[Vec3]) -> Result<Vec<u32>, RepairError> {
-    Ok(Enclosure::new(Controls::from(&smoothed(mesh, smooth)?).surface(), model).outside())
+    Ok(Enclosure::new(Controls::from(&control_set(mesh, smooth)?).surface(), model).outside())
 }
 
 /// Moves vertices outward until the surface, subdivided `smooth` times, encloses the model. Returns the number of moved vertices.
@@ -28,7 +28,7 @@ pub(crate) fn grow(mesh: &mut PolygonMesh, model: &[Vec3], smooth: u32) -> Resul
     let before = mesh.positions.clone();
     let mut left = 0;
     for _ in 0..MAX_ROUNDS {
-        let set = smoothed(mesh, smooth)?;
+        let set = control_set(mesh, smooth)?;
         let controls = Controls::from(&set);
         let outside = Enclosure::new(controls.surface(), model).outside();
         left = outside.len();

@@ -101,7 +101,7 @@ pub(super) fn narrow_gaps(
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
 ) -> Result<NarrowGaps, Cancelled> {
     let lattice = Lattice::around(bounds, MAX_VOXELS, DVec3::ONE, MARGIN_VOXELS);
-    let solid = lattice.touched(positions, triangles, go_on)?.filled();
+    let solid = lattice.voxelize(positions, triangles, go_on)?.filled();
     let n = MAX_VOXELS as f64;
     let reach = (0.5 * MIN_OPEN_WIDTH * n / base as f64).ceil() as usize;
     let mut found = gaps(&solid, &solid, reach);
@@ -147,7 +147,7 @@ fn resolution_of_narrows(
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
 ) -> Result<f64, Cancelled> {
     let lattice = Lattice::around(bounds, MAX_VOXELS, stretch, MARGIN_VOXELS);
-    let solid = lattice.touched(positions, triangles, go_on)?.filled();
+    let solid = lattice.voxelize(positions, triangles, go_on)?.filled();
     let axis = stretch.max_position();
     let n = MAX_VOXELS as f64;
     let reach = (MIN_OPEN_NARROW_WIDTH * stretch.max_element()).ceil() as usize;

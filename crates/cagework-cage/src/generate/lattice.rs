@@ -81,7 +81,7 @@ impl Lattice {
     ///
     /// # Errors
     /// If `go_on` cancels.
-    pub(super) fn touched(
+    pub(super) fn voxelize(
         &self,
         positions: &[Vec3],
         triangles: &[[u32; 3]],

@@ -42,7 +42,7 @@ pub use options::{
 };
 use quads::Faces;
 use shell::Shell;
-use verify::{verified, verified_faces};
+use verify::{verify_faces, verify_surface};
 
 /// Limit on the lattices that are tried to meet the target.
 const MAX_LATTICES: usize = 4;
@@ -140,7 +140,7 @@ fn generate_plain(
             continue;
         }
         let simplify = |share| go_on(Stage::Simplify, 0.4 + 0.6 * share);
-        let (cage, hull) = match simplified(&shell, options, may_coarsen, &simplify)? {
+        let (cage, hull) = match simplify_hull(&shell, options, may_coarsen, &simplify)? {
             Simplification::Cage(cage, hull) => (*cage, hull),
             Simplification::TooMany(left) => {
                 let ratio = (target as f64 / left as f64).sqrt().clamp(0.4, 0.7);
@@ -187,7 +187,7 @@ enum Simplification {
 }
 
 /// Simplifies a hull to as few vertices as its shape needs, at most the target if possible, and verifies the result.
-fn simplified(
+fn simplify_hull(
     shell: &Shell,
     options: &CageOptions,
     may_coarsen: bool,
@@ -240,14 +240,14 @@ fn simplified(
         }
         // Rescale so that relaxation weighs distance against shape as on the target's lattice.
         let quadrics: Vec<_> = collapser.quadrics.iter().map(|q| q.in_units(shell.fineness)).collect();
-        if let Some(cage) = relaxed(shell, guarded, &quadrics, options.quads, go_on)? {
+        if let Some(cage) = relax_and_verify(shell, guarded, &quadrics, options.quads, go_on)? {
             return Ok(Simplification::Cage(Box::new(cage), false));
         }
         target = left.max(target) * 2;
         budget = budget.map(|budget| 0.5 * budget);
     }
     for surface in [&shell.hull, &shell.stairs] {
-        if let Some(cage) = verified(shell, surface) {
+        if let Some(cage) = verify_surface(shell, surface) {
             return Ok(Simplification::Cage(Box::new(cage), true));
         }
     }
@@ -255,7 +255,7 @@ fn simplified(
 }
 
 /// Relaxes a collapsed surface, pairs triangles into quads where the result passes verification, and returns the cage.
-fn relaxed(
+fn relax_and_verify(
     shell: &Shell,
     mut guarded: GuardedSurface<'_>,
     quadrics: &[quadric::Quadric],
@@ -269,14 +269,14 @@ fn relaxed(
         let mut pairing = quads::quads(&mut guarded, quadrics, &|share| go_on(0.8 + 0.2 * share))?;
         for _ in 0..MAX_SPLIT_ROUNDS {
             let Faces { positions, faces, first } = quads::faces(&guarded, &pairing);
-            match verified_faces(shell, &positions, faces) {
+            match verify_faces(shell, &positions, faces) {
                 Ok(cage) => return Ok(Some(cage)),
                 Err(wrong) if wrong.is_empty() => break,
                 Err(wrong) => wrong.iter().for_each(|&face| pairing.part(first[face as usize])),
             }
         }
     }
-    Ok(verified(shell, &triangles).or_else(|| verified(shell, &collapsed)))
+    Ok(verify_surface(shell, &triangles).or_else(|| verify_surface(shell, &collapsed)))
 }
 
 fn n_parts(cage: &Cage) -> u32 {

@@ -127,7 +127,7 @@ impl Shell {
         let layers = layers_for(rough.shortest());
         let lattice = Lattice::around(bounds, n, stretch, MARGIN_VOXELS + layers);
         let touched = match options.shape {
-            Shape::Follow => lattice.touched(positions, triangles, &|f| go_on(0.5 * f))?,
+            Shape::Follow => lattice.voxelize(positions, triangles, &|f| go_on(0.5 * f))?,
             Shape::Hull => slab_hull(&lattice, positions),
         };
         let mut solid = touched.filled();
@@ -135,7 +135,7 @@ impl Shell {
             find_mirror(&solid, n, options.symmetry)
         } else {
             let cubes = Lattice::around(bounds, n, DVec3::ONE, MARGIN_VOXELS);
-            find_mirror(&cubes.touched(positions, triangles, go_on)?.filled(), n, options.symmetry)
+            find_mirror(&cubes.voxelize(positions, triangles, go_on)?.filled(), n, options.symmetry)
         };
         if let Some(axis) = mirror {
             let image = solid.mirrored(axis);
@@ -143,12 +143,12 @@ impl Shell {
             solid = solid.filled();
         }
         go_on(0.6)?;
-        let mut hull = grown(&solid, layers, mirror);
+        let mut hull = dilate_hull(&solid, layers, mirror);
         let separate = hull.parts().len();
         if !options.per_component {
             while bridge(&mut solid, &hull, layers, mirror) {
                 go_on(0.7)?;
-                hull = grown(&solid, layers, mirror);
+                hull = dilate_hull(&solid, layers, mirror);
             }
         }
         go_on(0.8)?;
@@ -162,7 +162,7 @@ impl Shell {
             keep_out = keep_out.dilated();
         }
         let obstacle = Obstacle { voxels: keep_out, clearance: clearance - whole, stretch };
-        let hull = smoothed(&stairs, &obstacle);
+        let hull = smooth_hull(&stairs, &obstacle);
         let parts = solid.parts();
         let reach = (MAX_GAP_HALF * n as f64).ceil() as usize;
         let most = options.target as usize / VERTICES_PER_GAP;
@@ -247,7 +247,7 @@ impl Shell {
 }
 
 /// The solid dilated by `layers`, with filled cavities and a 2-manifold boundary.
-fn grown(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
+fn dilate_hull(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
     let mut hull = solid.clone();
     for _ in 0..layers {
         hull = hull.dilated();
@@ -265,7 +265,7 @@ fn grown(solid: &Voxels, layers: usize, mirror: Option<usize>) -> Voxels {
 }
 
 /// Smoothed hull; vertices of triangles that intersect others return to their stairs until none do.
-fn smoothed(stairs: &Surface, obstacle: &Obstacle) -> Surface {
+fn smooth_hull(stairs: &Surface, obstacle: &Obstacle) -> Surface {
     let mut smooth = stairs.clone();
     smooth.smooth();
     loop {

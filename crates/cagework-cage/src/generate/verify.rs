@@ -21,9 +21,9 @@ const WINDING_TOLERANCE: f64 = 1e-3;
 
 /// The cage of a whole surface if it passes verification: closed, manifold, outward, free of self-intersections, clear
 /// of the solid and around every part of it. The solid contains the model, so the cage strictly encloses it.
-pub(super) fn verified(shell: &Shell, surface: &Surface) -> Option<Cage> {
+pub(super) fn verify_surface(shell: &Shell, surface: &Surface) -> Option<Cage> {
     let whole = surface.whole();
-    verified_faces(shell, &whole.positions, whole.triangles.iter().map(|t| t.to_vec()).collect()).ok()
+    verify_faces(shell, &whole.positions, whole.triangles.iter().map(|t| t.to_vec()).collect()).ok()
 }
 
 /// Verifies vertices (centred voxel units) and faces. Bent faces must pass both as triangles and as the finer facets
@@ -31,7 +31,7 @@ pub(super) fn verified(shell: &Shell, surface: &Surface) -> Option<Cage> {
 ///
 /// # Errors
 /// Indices of the faces that fail, ascending; empty if the cage fails as a whole.
-pub(super) fn verified_faces(
+pub(super) fn verify_faces(
     shell: &Shell,
     positions: &[DVec3],
     faces: Vec<Vec<u32>>,

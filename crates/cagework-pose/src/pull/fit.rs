@@ -173,7 +173,7 @@ impl Pull {
         let factors = matrix.cholesky().ok_or(PullError::Singular)?;
         let rest = flat(&self.cage);
         let moments = self.moments(&self.references(&self.cage), CAGE_WEIGHT);
-        let start = flat(&self.brought(goals));
+        let start = flat(&self.align_rest(goals));
         let columns = |flat: &DVector<f64>| DMatrix::from_column_slice(n, 3, flat.as_slice());
         let constant = &goals.right + energy_weight * regular * columns(&start);
         let (mut cage, mut anderson) = (start, Anderson::default());
@@ -206,7 +206,7 @@ impl Pull {
     }
 
     /// Rest cage moved rigidly onto the targets: initial guess of the rotations.
-    fn brought(&self, goals: &Goals<'_>) -> Vec<DVec3> {
+    fn align_rest(&self, goals: &Goals<'_>) -> Vec<DVec3> {
         let points = goals.used().map(|(row, _, to)| {
             let at = place(row, &self.cage);
             (at, to.as_dvec3() - at)

@@ -16,7 +16,7 @@ use cagework_core::mesh::{Bounds, TriMesh};
 use cagework_core::progress::Silent;
 use cagework_core::{BindOptions, Weights, bind, subdivided_box};
 
-struct Bound {
+struct BoundSample {
     mesh: TriMesh,
     weights: Weights,
     cage: Cage,
@@ -24,7 +24,7 @@ struct Bound {
     size: f64,
 }
 
-fn bound(id: &str) -> Bound {
+fn bound(id: &str) -> BoundSample {
     let sample = samples::build(id).unwrap();
     let (mesh, cage) = (sample.mesh, Cage::new(&sample.cage).unwrap());
     let options = BindOptions { grid: 32, ..BindOptions::default() };
@@ -36,16 +36,16 @@ fn bound(id: &str) -> Bound {
     let of_probes = weights(probes.points());
     let pull = Pull::new(&mesh, &cage, probes, &of_probes).unwrap();
     let (size, weights) = (pull.size, weights(&mesh.positions));
-    Bound { mesh, weights, cage, pull, size }
+    BoundSample { mesh, weights, cage, pull, size }
 }
 
 /// The humanoid; bound once for all tests.
-fn humanoid() -> &'static Bound {
-    static BOUND: OnceLock<Bound> = OnceLock::new();
+fn humanoid() -> &'static BoundSample {
+    static BOUND: OnceLock<BoundSample> = OnceLock::new();
     BOUND.get_or_init(|| bound("humanoid"))
 }
 
-impl Bound {
+impl BoundSample {
     fn rest(&self) -> Vec<DVec3> {
         self.cage.positions().iter().copied().map(Vec3::as_dvec3).collect()
     }

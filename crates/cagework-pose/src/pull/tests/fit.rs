@@ -2,12 +2,12 @@
 
 use glam::{DQuat, DVec3, Vec3};
 
-use super::{Bound, bound, humanoid};
+use super::{BoundSample, bound, humanoid};
 use crate::pull::{Fit, FitOptions, PullError};
 use cagework_core::deform::deform_vertices;
 
 /// A map that bends, twists, stretches and translates the cage; lengths over the model's size.
-fn moved(bound: &Bound, cage: &[DVec3]) -> Vec<DVec3> {
+fn moved(bound: &BoundSample, cage: &[DVec3]) -> Vec<DVec3> {
     let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 0.5).normalize(), 1.0);
     let size = bound.size;
     let map = |p: DVec3| {
@@ -40,7 +40,7 @@ fn narrow(cage: &[DVec3]) -> Vec<Vec3> {
     cage.iter().map(|p| p.as_vec3()).collect()
 }
 
-impl Bound {
+impl BoundSample {
     fn model(&self, cage: &[DVec3]) -> Vec<Vec3> {
         deform_vertices(&self.weights, &narrow(cage))
     }
