@@ -5,31 +5,31 @@
  */
 export type ErrorName = "Cancelled" | "Compressed" | "Format" | "Memory" | "WeightsMemory" | "Outside" | "NoneInside" | "NoAdapter" | "NoDevice" | "DeviceLost" | "Gpu" | "Canvas" | "Missing" | "Error";
 /**
- * How the cage meets the grid.
+ * Discretisation of the cage.
  */
 export type Method = "classic" | "embedded";
 /**
- * How Laplace's equation is solved.
+ * Solver of Laplace's equation.
  */
 export type Solver = "jacobi" | "multigrid" | "cg";
 /**
- * What conjugate gradients are preconditioned by.
+ * Preconditioner of conjugate gradients.
  */
 export type Preconditioner = "none" | "v_cycle";
 /**
- * Where a bind is computed.
+ * Processor of a bind.
  */
 export type Backend = "cpu" | "gpu";
 /**
- * Shape of the classic method's cells.
+ * Cell shape of the classic method.
  */
 export type CellShape = "box" | "cubic";
 /**
- * How Eq. 2 is read.
+ * Interpretation of Eq. 2.
  */
 export type DeltaNorm = "euclidean" | "literal";
 /**
- * What happens to a mesh vertex outside the cage.
+ * Treatment of mesh vertices outside the cage.
  */
 export type OutsidePolicy = "extend" | "stay" | "refuse";
 /**
@@ -41,27 +41,27 @@ export type BindOptions = { backend: Backend,
  */
 grid: number,
 /**
- * Default embedded.
+ * Discretisation of the cage. Default embedded.
  */
 method: Method,
 /**
- * Default multigrid.
+ * Solver of Laplace's equation. Default multigrid.
  */
 solver: Solver,
 /**
- * Default none; only conjugate gradients look at it.
+ * Preconditioner of conjugate gradients. Default none.
  */
 preconditioner: Preconditioner,
 /**
- * Default box; only the classic method looks at it.
+ * Cell shape of the classic method. Default box.
  */
 cell_shape: CellShape,
 /**
- * Default Euclidean; only Jacobi looks at it.
+ * Delta of Jacobi sweeps. Default Euclidean.
  */
 delta_norm: DeltaNorm,
 /**
- * Stop when delta falls below it. Default 1e-5.
+ * Convergence threshold for delta. Default 1e-5.
  */
 tau: number,
 /**
@@ -69,19 +69,19 @@ tau: number,
  */
 max_iterations: number,
 /**
- * In each row the smallest weights, up to this total, are dropped; then sum and rest position are restored. 0 keeps all. Default 0.
+ * Drops the smallest weights of each row up to this total, then restores sum and rest position. 0 keeps all. Default 0.
  */
 sparsify: number,
 /**
- * Refuse to start above this many bytes of memory, `held` ones included. Default 4 GiB; 2 GiB in wasm.
+ * Fails before the bind if it needs more bytes of memory, including `held`. Default 4 GiB; 2 GiB in wasm.
  */
 memory_limit: number,
 /**
- * Default extend.
+ * Treatment of vertices outside the cage. Default extend.
  */
 outside: OutsidePolicy, };
 /**
- * The stages of a bind, in order, and those of making a cage.
+ * Stages of a bind, in order, and of cage generation.
  */
 export type Stage = "voxelize" | "solve" | "sample" | "simplify";
 /**
@@ -89,12 +89,12 @@ export type Stage = "voxelize" | "solve" | "sample" | "simplify";
  */
 export type Progress = { stage: Stage, fraction: number, iteration: number, delta: number | null, };
 /**
- * The columns of a bind's weights after those of its controls.
+ * Columns of a bind's weights that follow those of its controls.
  */
 export type Frames = {
 /**
- * What each vertex of the cage adds to the matrix of the whole cage's motion, per object unit; nothing where there are no frames.
- * `[n_cage]`
+ * Contribution of each cage vertex to the matrix of the whole cage's motion, per object unit; empty without
+ * frames. `[n_cage]`
  */
 whole: Array<[number, number, number]>,
 /**
@@ -102,7 +102,7 @@ whole: Array<[number, number, number]>,
  */
 joints: Array<number>,
 /**
- * The two joints of each bone, counted in `joints`; those of one line in order. `[n_bones]`
+ * The two joints of each bone, as indices into `joints`; bones of a line are consecutive. `[n_bones]`
  */
 bones: Array<[number, number]>,
 /**
@@ -118,11 +118,11 @@ export type OutsideVertex = {
  */
 vertex: number,
 /**
- * How far it is from the cage, object units.
+ * Distance from the cage, object units.
  */
 distance: number,
 /**
- * How much of the cage's motion it follows: 1 near the cage, 0 where it stays.
+ * Share of the cage's motion that it follows: 1 near the cage, 0 if it stays in place.
  */
 share: number, };
 /**
@@ -138,7 +138,7 @@ frames: Frames,
  */
 outside: Array<OutsideVertex>, };
 /**
- * Everything worth knowing about one bind.
+ * Report of a bind.
  */
 export type BindReport = {
 /**
@@ -150,27 +150,27 @@ method: Method,
  */
 solver: Solver,
 /**
- * What conjugate gradients were preconditioned by.
+ * Preconditioner of conjugate gradients.
  */
 preconditioner: Preconditioner,
 /**
- * Where it was computed.
+ * Processor that computed the bind.
  */
 backend: Backend,
 /**
- * Name of the GPU that solved.
+ * Name of the GPU, if it solved.
  */
 adapter?: string,
 /**
- * Threads that solved.
+ * Number of threads that solved.
  */
 threads: number,
 /**
- * Cells along the longest side, as asked for.
+ * Requested number of cells along the longest side.
  */
 grid: number,
 /**
- * Cells along x, y, z of the grid that was built.
+ * Cells of the grid along x, y, z.
  */
 dims: [number, number, number],
 /**
@@ -182,46 +182,44 @@ cell_size: [number, number, number],
  */
 cell_shape: CellShape,
 /**
- * How Eq. 2 is read.
+ * Interpretation of Eq. 2.
  */
 delta_norm: DeltaNorm,
 /**
- * Stop threshold for delta.
+ * Convergence threshold for delta.
  */
 tau: number,
 /**
- * Cells of each kind on the finest grid.
+ * Cells of the finest grid by kind.
  */
 cells: CellCounts,
 /**
- * Cells to be solved for on each level, finest first; one entry for Jacobi.
+ * Unknowns of each level, finest first; one entry for Jacobi.
  */
 levels: Array<number>,
 /**
- * Jacobi sweeps, V-cycles on the finest level, or steps of conjugate gradients (the largest number over the batches).
+ * Jacobi sweeps, V-cycles on the finest level, or steps of conjugate gradients; maximum over batches.
  */
 iterations: number,
 /**
- * Whether delta fell below tau before the limit on iterations.
+ * Whether delta fell below tau within the limit on iterations.
  */
 converged: boolean,
 /**
- * Whether f32 ended the solve, having no more digits to give, before delta met tau.
+ * Whether f32 precision ended the solve before delta fell below tau.
  */
 at_round_off: boolean,
 /**
- * Delta after every `delta_interval` iterations. Jacobi: Eq. 2, the sweep's average change of a cell. The others:
- * the error that is expected to remain, root mean square over cells.
- * `[iterations / delta_interval]`, rounded up.
+ * Delta after every `delta_interval` iterations. Jacobi: Eq. 2, the mean change of a cell per sweep. Other
+ * solvers: estimated remaining error, RMS over cells. `[iterations / delta_interval]`, rounded up.
  */
 delta_history: Array<number>,
 /**
- * Iterations between two entries of `delta_history`: 1, but for the GPU's Jacobi sweeps, which are checked now
- * and then.
+ * Iterations per entry of `delta_history`: 1 except for Jacobi on the GPU.
  */
 delta_interval: number,
 /**
- * Root mean square residual of the finest level before each iteration; empty for Jacobi. `[iterations]`
+ * RMS residual of the finest level before each iteration; empty for Jacobi. `[iterations]`
  */
 residual_history: Array<number>,
 /**
@@ -233,11 +231,11 @@ timings_ms: Timings,
  */
 memory_bytes: MemoryBytes,
 /**
- * Distance between `sum_i w_i c_i` and the mesh vertex (Eq. 3), over vertices inside the cage.
+ * Rest error: distance of `sum_i w_i c_i` from the mesh vertex (Eq. 3), over vertices inside the cage.
  */
 rest_error: RestError,
 /**
- * The same and the rows' sums before rows were restored: the solver's doing alone.
+ * Error of the rows before correction: that of the solver alone.
  */
 raw_error: RawError,
 /**
@@ -245,55 +243,55 @@ raw_error: RawError,
  */
 weights: WeightStats,
 /**
- * Mesh vertices (rows).
+ * Number of mesh vertices (rows).
  */
 vertices: number,
 /**
- * Cage vertices (the first columns).
+ * Number of cage vertices (the first columns).
  */
 cage_vertices: number,
 /**
- * Controls inside the cage (the columns after them).
+ * Number of inner controls (the next columns).
  */
 inner_controls: number,
 /**
- * Steps of subdivision between the cage and its smooth surface.
+ * Subdivision steps of the smooth surface.
  */
 smooth: number,
 /**
- * Mesh vertices outside the cage.
+ * Number of mesh vertices outside the cage.
  */
 outside_vertices: number,
 /**
- * Those of them that stay where they are.
+ * Number of vertices outside that stay in place.
  */
 staying_vertices: number,
 /**
- * How far the furthest of them is from the cage, object units.
+ * Largest distance of a vertex from the cage, object units.
  */
 outside_distance: number,
 /**
- * Mesh vertices inside of controls.
+ * Number of mesh vertices inside balls and tubes.
  */
 held_vertices: number,
 /**
- * Cells about which the three axes disagreed whether they are inside.
+ * Number of cells that lines along the three axes classify differently.
  */
 ambiguous_cells: number,
 /**
- * Remarks in whole sentences (cage was inside out, unused vertices, ...).
+ * Notices in whole sentences, such as flipped faces or unused vertices.
  */
 notices: Array<string>, };
 /**
- * Cells per kind.
+ * Numbers of cells by kind.
  */
 export type CellCounts = {
 /**
- * Cells that are solved for.
+ * Unknowns.
  */
 interior: number,
 /**
- * Cells that the cage's surface passes through.
+ * Cells that the cage's surface intersects.
  */
 boundary: number,
 /**
@@ -305,19 +303,19 @@ exterior: number, };
  */
 export type Timings = {
 /**
- * Cage into grid, levels, transfer tables.
+ * Voxelization, levels and transfer tables.
  */
 voxelize: number,
 /**
- * Laplace's equation for all columns.
+ * Solve of all columns.
  */
 solve: number,
 /**
- * Weights at the vertices, sparsification.
+ * Sampling and assembly.
  */
 sample: number,
 /**
- * Whole bind.
+ * The whole bind.
  */
 total: number, };
 /**
@@ -325,11 +323,11 @@ total: number, };
  */
 export type MemoryBytes = {
 /**
- * Estimated before anything was allocated.
+ * Estimate before the bind.
  */
 estimated: number,
 /**
- * Sum of the buffers that were alive together at the worst moment.
+ * Largest sum of buffers alive at the same time.
  */
 peak: number, };
 /**
@@ -357,8 +355,8 @@ mean_rel: number,
  */
 max_rel: number, };
 /**
- * What was off before rows were restored, over vertices inside the cage. The operator and the sampling reproduce linear
- * functions exactly, so with the embedded method this is what the solver left.
+ * Error of the rows before correction, over vertices inside the cage. Operator and sampling reproduce linear functions
+ * exactly, so with the embedded method it is that of the solver.
  */
 export type RawError = {
 /**
@@ -370,11 +368,11 @@ sum: MeanMax,
  */
 point_rel: MeanMax,
 /**
- * Smallest value, before negative ones were taken for 0.
+ * Smallest value, before negative values are clamped to 0.
  */
 min_weight: number, };
 /**
- * Mean and largest of some numbers.
+ * Mean and maximum.
  */
 export type MeanMax = {
 /**
@@ -398,15 +396,15 @@ min: number,
  */
 max: number,
 /**
- * Largest |sum of a row - 1|.
+ * Largest `|sum of a row - 1|`.
  */
 max_sum_error: number,
 /**
- * Stored weights.
+ * Number of stored weights.
  */
 nonzeros: number, };
 /**
- * What the cage follows.
+ * Shape that the cage follows.
  */
 export type Shape = "follow" | "hull";
 export type CageSymmetry = "auto" | "on" | "off";
@@ -419,7 +417,7 @@ export type CageOptions = { vertices: number, detail: number, quads: boolean, ma
  */
 export type Bounds = { min: [number, number, number], max: [number, number, number], };
 /**
- * One element: indices into [`InnerControls::positions`].
+ * An element of inner controls: indices into [`InnerControls::positions`].
  */
 export type InnerElement = { "point": number } | { "line": Array<number> } | { "face": Array<number> };
 /**
@@ -463,11 +461,11 @@ export type CageState = { usable: boolean, info: CageInfo, controls: CageControl
  */
 radius: number, };
 /**
- * What is wrong. The names are stable: programs may rely on them.
+ * Kinds of problems. The names are part of the file format and stay stable.
  */
 export type Code = "empty" | "not_finite" | "bad_index" | "degenerate_face" | "duplicate_face" | "duplicate_vertex" | "open_edge" | "non_manifold_edge" | "non_manifold_vertex" | "flipped" | "one_sided" | "self_intersection" | "unused_vertex" | "model_outside" | "thin_part" | "not_a_cage";
 /**
- * How bad it is.
+ * Severity of a problem.
  */
 export type Severity = "error" | "warning" | "note";
 /**
@@ -730,19 +728,19 @@ export type Legend = { low: number, high: number, logarithmic: boolean, map: Col
  */
 largest: Largest | null, };
 /**
- * What a click selects.
+ * Element type that a click selects.
  */
 export type Element = "vertex" | "edge" | "face";
 /**
- * What turns and scales go about.
+ * Centre of rotation and scaling.
  */
 export type Pivot = "middle" | "border" | "last";
 /**
- * How new vertices join those that are selected.
+ * How a set of vertices changes the selection.
  */
 export type SelectMode = "replace" | "add" | "remove" | "toggle";
 /**
- * What a gesture does.
+ * Kind of gesture.
  */
 export type Gesture = "grab" | "rotate" | "scale";
 /**
