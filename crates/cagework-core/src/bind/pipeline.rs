@@ -103,10 +103,10 @@ impl<'a> PreparedBind<'a> {
         began: f64,
         watch: &Watch<'_>,
     ) -> Result<Self, BindError> {
-        let voxelized = watch.now_ms();
+        let voxelized_ms = watch.now_ms();
         let stencils = sampling_stencils(controls, &voxelized, &mesh.points, options.outside, watch)?;
         refuse_outside(controls, &mesh, &stencils, options)?;
-        let times_ms = [began, voxelized, watch.now_ms()];
+        let times_ms = [began, voxelized_ms, watch.now_ms()];
         Ok(Self { mesh, controls, options, voxelized, stencils, estimated, times_ms })
     }
 
