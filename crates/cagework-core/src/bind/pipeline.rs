@@ -17,7 +17,7 @@ use crate::mesh::Weld;
 use crate::options::{Backend, BindOptions, Method, OutsidePolicy};
 use crate::progress::{Progress, Stage};
 use crate::report::{BindReport, MemoryBytes, Timings, WeightStats};
-use crate::sample::{Outside, Stencils};
+use crate::sample::{OutsidePoint, Stencils};
 use crate::solve::hierarchy::Hierarchy;
 use crate::team::{Team, VERTEX_RUN};
 
@@ -276,7 +276,7 @@ fn sampling_stencils(
 /// Rows outside the cage, and how many of the first `n_vertices` lie inside a ball or tube.
 fn outside_of(
     controls: Controls<'_>,
-    points: &[Outside],
+    points: &[OutsidePoint],
     welded: &Weld,
     n_vertices: usize,
 ) -> (Vec<OutsideVertex>, u64) {

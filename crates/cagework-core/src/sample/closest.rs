@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::Outside;
+use super::OutsidePoint;
 use crate::cage::Cage;
 use crate::geometry::closest_point_on_triangle;
 
@@ -33,8 +33,8 @@ impl<'a> ClosestOnCage<'a> {
 
     /// Closest point to `point`; ties go to the lowest facet. Sets `vertex` to 0 and `share` to 1.
     #[must_use]
-    pub fn find(&self, point: DVec3) -> Outside {
-        let mut best = Outside {
+    pub fn find(&self, point: DVec3) -> OutsidePoint {
+        let mut best = OutsidePoint {
             vertex: 0,
             triangle: 0,
             barycentric: [1.0, 0.0, 0.0],
@@ -54,7 +54,7 @@ impl<'a> ClosestOnCage<'a> {
                 let closest = closest_point_on_triangle(point, self.cage.facet_corners(triangle));
                 let distance = closest.point.distance(point);
                 if distance < best.distance || distance == best.distance && triangle < best.triangle {
-                    best = Outside {
+                    best = OutsidePoint {
                         vertex: 0,
                         triangle,
                         barycentric: closest.barycentric,

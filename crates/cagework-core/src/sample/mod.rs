@@ -19,7 +19,7 @@ pub use closest::ClosestOnCage;
 
 /// A vertex outside the cage with its closest point on the cage.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outside {
+pub struct OutsidePoint {
     /// Vertex.
     pub vertex: u32,
     /// Facet of the cage with the closest point.
@@ -40,7 +40,7 @@ pub struct Stencils {
     hat_start: Vec<u32>,
     hats: Vec<(u32, f32)>,
     /// Vertices outside the cage or inside a ball or tube, ascending.
-    pub outside: Vec<Outside>,
+    pub outside: Vec<OutsidePoint>,
 }
 
 /// Nodes or hats of a vertex: `(key, weight)`.
@@ -109,9 +109,9 @@ impl Stencils {
     }
 
     /// Appends the stencil of a vertex outside, and lists it unless it is on the cage.
-    pub fn push_outside(&mut self, controls: Controls<'_>, found: Outside, stencil: &Stencil) {
+    pub fn push_outside(&mut self, controls: Controls<'_>, found: OutsidePoint, stencil: &Stencil) {
         if found.distance > CAGE_TOLERANCE * f64::from(controls.surface().diagonal()) {
-            self.outside.push(Outside { vertex: self.len() as u32, ..found });
+            self.outside.push(OutsidePoint { vertex: self.len() as u32, ..found });
         }
         self.push(stencil);
     }
@@ -123,7 +123,7 @@ impl Stencils {
         self.hats.extend_from_slice(&other.hats);
         self.node_start.extend(other.node_start[1..].iter().map(|s| s + n));
         self.hat_start.extend(other.hat_start[1..].iter().map(|s| s + h));
-        self.outside.extend(other.outside.iter().map(|o| Outside { vertex: o.vertex + v, ..*o }));
+        self.outside.extend(other.outside.iter().map(|o| OutsidePoint { vertex: o.vertex + v, ..*o }));
     }
 
     /// Weights of all vertices for the columns of one batch.

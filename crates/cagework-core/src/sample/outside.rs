@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 
-use super::{ClosestOnCage, Outside, Stencil};
+use super::{ClosestOnCage, OutsidePoint, Stencil};
 use crate::cage::CAGE_TOLERANCE;
 use crate::controls::Controls;
 use crate::geometry::distance_along;
@@ -35,7 +35,7 @@ impl<'a> OutsideSampler<'a> {
         point: DVec3,
         stencil: &mut Stencil,
         inside: impl FnOnce(DVec3, &mut Stencil) -> bool,
-    ) -> Outside {
+    ) -> OutsidePoint {
         let surface = self.controls.surface();
         let mut found = self.closest.find(point);
         stencil.clear();

@@ -146,7 +146,7 @@ mod tests {
     use cagework_core::deform::deform_bound;
 
     /// f32 rounding of positions of size 1 after sums of 64 terms.
-    const ROUNDED: f32 = 2e-6;
+    const ROUNDING: f32 = 2e-6;
 
     fn hashed(n: u32, seed: u32) -> impl Iterator<Item = f32> {
         (0..n).map(move |k| ((k.wrapping_add(seed).wrapping_mul(2_654_435_761) >> 8) % 1000) as f32 / 1000.0)
@@ -194,7 +194,7 @@ mod tests {
         let moved = frame.clone();
         hold_parts(&ready.rest, &ready.piece_of, &ready.motions(&posed), &mut frame);
         for (v, (a, b)) in frame.iter().zip(&expected).enumerate() {
-            assert!(a.distance(*b) <= ROUNDED, "vertex {v}: {a} instead of {b}");
+            assert!(a.distance(*b) <= ROUNDING, "vertex {v}: {a} instead of {b}");
         }
         assert_eq!(frame[0], rest[0], "a fixed vertex keeps its rest position exactly");
         assert_eq!(frame[39], moved[39], "a free vertex keeps its deformed position exactly");

@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 use glam::Vec3;
 
-use super::nearest::Nearest;
+use super::nearest::KdTree;
 use cagework_core::mesh::weld;
 
 /// Minimum length of a bridge, over the model's size.
@@ -99,7 +99,7 @@ fn bridges(points: &[Vec3], edges: &[[u32; 2]]) -> Vec<[u32; 2]> {
     }
     let belongs = |i: &u32| roots[*i as usize] as usize == largest;
     let (inside, others): (Vec<u32>, Vec<u32>) = (0..points.len() as u32).partition(belongs);
-    let nearest = Nearest::new(points, inside);
+    let nearest = KdTree::new(points, inside);
     let mut best: Vec<Option<([u32; 2], f32)>> = vec![None; points.len()];
     for i in others {
         let best = &mut best[roots[i as usize] as usize];

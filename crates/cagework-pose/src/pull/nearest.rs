@@ -3,12 +3,12 @@
 use glam::Vec3;
 
 /// Implicit k-d tree: the median of each range splits it, along x, y and z cyclically.
-pub(super) struct Nearest<'a> {
+pub(super) struct KdTree<'a> {
     points: &'a [Vec3],
     order: Vec<u32>,
 }
 
-impl<'a> Nearest<'a> {
+impl<'a> KdTree<'a> {
     /// Tree of the points with the indices `order`.
     pub(super) fn new(points: &'a [Vec3], mut order: Vec<u32>) -> Self {
         sort(points, &mut order, 0);
@@ -60,7 +60,7 @@ mod tests {
         let points: Vec<Vec3> = (0..200_u32)
             .map(|i| Vec3::new((i * 73 % 101) as f32, (i * 37 % 89) as f32, (i * 11 % 53) as f32))
             .collect();
-        let nearest = Nearest::new(&points, (0..200).collect());
+        let nearest = KdTree::new(&points, (0..200).collect());
         for at in [Vec3::ZERO, Vec3::splat(40.5), Vec3::new(90.0, 3.0, 200.0)] {
             let all = points.iter().map(|p| p.distance_squared(at)).fold(f32::INFINITY, f32::min);
             assert_eq!(nearest.find(at, f32::INFINITY).map(|found| found.1), Some(all));
