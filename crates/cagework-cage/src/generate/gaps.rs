@@ -90,6 +90,7 @@ pub(super) struct NarrowGaps {
 
 /// Finds the large gaps that a lattice of `base` voxels closes or nearly closes, and a lattice of at most `most` voxels
 /// that leaves them open.
+/// A distance of `clearance` to each wall (object units) closes narrower ones on any lattice; these are left out.
 ///
 /// # Errors
 /// If `go_on` cancels.
@@ -97,6 +98,7 @@ pub(super) fn narrow_gaps(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
     bounds: [DVec3; 2],
+    clearance: f64,
     [base, most]: [usize; 2],
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
 ) -> Result<NarrowGaps, Cancelled> {
@@ -105,7 +107,11 @@ pub(super) fn narrow_gaps(
     let n = MAX_VOXELS as f64;
     let reach = (0.5 * MIN_OPEN_WIDTH * n / base as f64).ceil() as usize;
     let mut found = gaps(&solid, &solid, reach);
-    found.retain(|gap| gap.area >= MIN_GAP_AREA * n * n && !gap.is_hollow(&lattice, positions, triangles));
+    found.retain(|gap| {
+        gap.area >= MIN_GAP_AREA * n * n
+            && gap.width * lattice.cell > 2.0 * clearance
+            && !gap.is_hollow(&lattice, positions, triangles)
+    });
     let of_model = |gap: Gap| ModelGap {
         points: gap
             .voxels
@@ -122,7 +128,7 @@ pub(super) fn narrow_gaps(
     let mut stretch = if found.len() > most { DVec3::ONE } else { stretch(&found, base) };
     let mut voxels = base;
     if stretch != DVec3::ONE {
-        let resolution = resolution_of_narrows(positions, triangles, bounds, stretch, go_on)?;
+        let resolution = resolution_of_narrows(positions, triangles, bounds, (clearance, stretch), go_on)?;
         if resolution > MAX_RESOLUTION {
             stretch = stretch.map(|times| if times > 1.0 { STRETCHES[1] } else { 1.0 });
         }
@@ -135,7 +141,7 @@ pub(super) fn narrow_gaps(
 }
 
 /// Resolution (longest side over voxel thickness) that leaves open the narrow parts of the large gaps across the thin
-/// axis of `stretch`; 0 without such gaps.
+/// axis of `stretch`, as far as they are wider than two clearances; 0 without such gaps.
 ///
 /// # Errors
 /// If `go_on` cancels.
@@ -143,7 +149,7 @@ fn resolution_of_narrows(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
     bounds: [DVec3; 2],
-    stretch: DVec3,
+    (clearance, stretch): (f64, DVec3),
     go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
 ) -> Result<f64, Cancelled> {
     let lattice = Lattice::around(bounds, MAX_VOXELS, stretch, MARGIN_VOXELS);
@@ -155,6 +161,7 @@ fn resolution_of_narrows(
     found.retain(|gap| {
         gap.area >= MIN_GAP_AREA * n * n
             && gap.across[axis] > MIN_ACROSS
+            && gap.narrow_width * lattice.shortest() > 2.0 * clearance
             && !gap.is_hollow(&lattice, positions, triangles)
     });
     let narrowest = found.iter().map(|gap| gap.narrow_width).fold(f64::INFINITY, f64::min);

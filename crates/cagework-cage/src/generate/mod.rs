@@ -112,10 +112,14 @@ fn generate_plain(
     let most_gaps = target / VERTICES_PER_GAP;
     let NarrowGaps { gaps, stretch, voxels: finest } = match (options.shape, options.smooth) {
         // With subdivision the clearance keeps the surface off the model, and a finer lattice would halve it.
-        (Shape::Follow, 0) => gaps::narrow_gaps(positions, triangles, bounds, [base, most_gaps], &|_| {
-            let event = ProgressEvent { stage: Stage::Voxelize, fraction: 0.0, iteration: 0, delta: None };
-            if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
-        })?,
+        (Shape::Follow, 0) => {
+            let clearance = options.distance(bounds);
+            gaps::narrow_gaps(positions, triangles, bounds, clearance, [base, most_gaps], &|_| {
+                let event =
+                    ProgressEvent { stage: Stage::Voxelize, fraction: 0.0, iteration: 0, delta: None };
+                if progress.report(event).is_break() { Err(Cancelled) } else { Ok(()) }
+            })?
+        }
         _ => NarrowGaps { gaps: Vec::new(), stretch: DVec3::ONE, voxels: base },
     };
     let mut voxels = if options.voxels > 0 { options.voxels as usize } else { finest };

@@ -136,6 +136,11 @@ impl Default for CageOptions {
 }
 
 impl CageOptions {
+    /// [`CageOptions::clearance`] of a model with the box `min`..`max`, object units.
+    pub(super) fn distance(&self, [min, max]: [DVec3; 2]) -> f64 {
+        f64::from(self.clearance) * max.distance(min)
+    }
+
     /// Checks the range of every option.
     ///
     /// # Errors

@@ -118,8 +118,7 @@ impl Shell {
         options: &CageOptions,
         go_on: &dyn Fn(f32) -> Result<(), Cancelled>,
     ) -> Result<Self, Cancelled> {
-        let [min, max] = bounds;
-        let asked = f64::from(options.clearance) * max.distance(min);
+        let asked = options.distance(bounds);
         // Layers of voxels between solid and hull that give the requested clearance.
         let layers_for =
             |cell: f64| ((asked / cell).max(DEFAULT_CLEARANCE) + 1.0 - HULL_CLEARANCE).ceil() as usize;
@@ -172,7 +171,7 @@ impl Shell {
             gaps,
             clearance: clearance * lattice.shortest(),
             fineness: n as f64 / first_voxels(options.target as usize) as f64,
-            longest: (max - min).max_element(),
+            longest: (bounds[1] - bounds[0]).max_element(),
             lattice,
             obstacle,
             filled,

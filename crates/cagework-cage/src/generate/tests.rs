@@ -192,6 +192,20 @@ fn a_gap_that_no_lattice_resolves_is_reported() {
     assert_eq!(generate(&open.0, &open.1, &options(120), &Silent).unwrap().report.notices, [""; 0]);
 }
 
+/// A clearance closes narrow gaps on any lattice. Thin voxels for them took 17 GB: hundreds of layers for the clearance, each as
+/// many times too thick along the other axes as voxels are thinner across the gap.
+#[test]
+fn clearance_that_closes_a_gap_asks_for_no_finer_lattice() {
+    let (positions, triangles) = mannequin(0.03, 0.07);
+    let narrow = make(&(positions.clone(), triangles.clone()), &options(80)).report;
+    assert!(narrow.notices.is_empty(), "it stays open: {narrow:?}");
+    let made = make(&(positions.clone(), triangles), &CageOptions { clearance: 0.25, ..options(80) });
+    let (model, cage) = (Bounds::of(&positions).unwrap(), Bounds::of(made.cage.positions()).unwrap());
+    let farthest = (model.min - cage.min).max(cage.max - model.max).max_element();
+    let most = made.report.clearance + 5.0 * made.report.voxel_size;
+    assert!(farthest < most, "{farthest} instead of {}: {:?}", made.report.clearance, made.report);
+}
+
 /// A sword in one hand is less than 1.5 % of the model's voxels.
 #[test]
 fn an_accessory_on_one_side_prevents_mirroring() {
