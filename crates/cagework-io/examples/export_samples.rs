@@ -23,6 +23,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let mut mirrored_skin = skinned();
     mirrored_skin.json["nodes"][1]["scale"] = json!([-1.0, 1.0, 1.0]);
+    // A place on a map, where 32-bit numbers have steps of 0.5.
+    let far = |mut model: common::Builder| {
+        model.json["nodes"][0]["translation"] = json!([500_000.25, 0.125, 4_500_000.5]);
+        model
+    };
     let inputs = [
         ("plain.glb", plain_cube().glb()),
         ("textured.glb", textured_square().glb()),
@@ -30,6 +35,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("skinned.glb", skinned().glb()),
         ("rigged.glb", rigged().glb()),
         ("mirrored-skin.glb", mirrored_skin.glb()),
+        ("far.glb", far(plain_cube()).glb()),
+        ("far-rigged.glb", far(rigged()).glb()),
         ("quantized.glb", quantized().glb()),
         ("flattened.glb", flat.glb()),
         ("no-nodes.glb", bare.glb()),
@@ -69,7 +76,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                         let posed = player.at(Some(0), seconds, &[]);
                         let at = skin_vertices(&player.skin, &posed.palette, &posed.targets);
                         let positions: Vec<f32> = at.iter().flat_map(Vec3::to_array).collect();
-                        json!({ "seconds": seconds, "positions": positions })
+                        json!({ "seconds": seconds, "positions": positions, "origin": model.origin().to_array() })
                     })
                     .collect();
                 let name = format!("{stem}-reshaped.played.json");

@@ -183,8 +183,12 @@ fn what_a_document_becomes_is_counted_before_it_is_allocated() {
     b.json["meshes"][0]["primitives"] = vec![primitive; 1000].into();
     let message = within(&b, u64::MAX).unwrap_err().to_string();
     assert!(message.contains("vertices: 800000000, more than the limit of 16777216"), "{message}");
-    b.json["nodes"] = vec![json!({}); 1 << 19].into();
-    assert!(fault(&b.glb()).contains("nodes: 524288, more than the limit of 262144"));
+    for list in ["nodes", "materials"] {
+        b.json[list] = vec![json!({}); 1 << 19].into();
+        let message = fault(&b.glb());
+        assert!(message.contains(&format!("{list}: 524288, more than the limit of 262144")), "{message}");
+        b.json[list] = json!([]);
+    }
     let message = fault_of(|b| {
         let zeros = json!({ "componentType": U32, "count": 1 << 20, "type": "SCALAR" });
         let zeros = b.push("accessors", zeros);

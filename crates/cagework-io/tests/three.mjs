@@ -2,7 +2,8 @@
 //
 // usage: node three.mjs DIRECTORY
 //
-// NAME.played.json: for each of some times of the first clip `seconds` and `positions`, three numbers a vertex of the only primitive.
+// NAME.played.json: for each of some times of the first clip `seconds` and `positions`, three numbers a vertex of the only primitive,
+// as seen from `origin`.
 
 import { readdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -32,12 +33,13 @@ for (const name of names) {
   });
   const mixer = new AnimationMixer(gltf.scene);
   mixer.clipAction(gltf.animations[0]).play();
-  for (const { seconds, positions } of JSON.parse(readFileSync(join(directory, name), "utf8"))) {
+  for (const { seconds, positions, origin } of JSON.parse(readFileSync(join(directory, name), "utf8"))) {
     mixer.setTime(seconds);
     gltf.scene.updateMatrixWorld(true);
     const size = Math.max(...positions) - Math.min(...positions);
     for (let v = 0; v < positions.length / 3; v += 1) {
       const at = mesh.getVertexPosition(v, new Vector3()).applyMatrix4(mesh.matrixWorld);
+      at.sub(new Vector3().fromArray(origin));
       const expected = new Vector3().fromArray(positions, 3 * v);
       worst = Math.max(worst, at.distanceTo(expected) / size);
       compared += 1;

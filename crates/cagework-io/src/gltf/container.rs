@@ -19,8 +19,11 @@ use crate::siblings::{Absent, Image, NO_IMAGE, Resolve, Siblings};
 /// Extensions that hide geometry from a reader without their decoder; meshopt's has the same streams by both names.
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
-/// Most nodes of a document: they take a kilobyte each.
-const MAX_NODES: u64 = 1 << 18;
+/// Most items of each of [`LISTS`]: one takes up to a kilobyte while a file is written.
+const MAX_ITEMS: u64 = 1 << 18;
+/// Lists of a document whose items take no bytes elsewhere in the file.
+const LISTS: [&str; 9] =
+    ["nodes", "meshes", "materials", "textures", "images", "samplers", "skins", "animations", "cameras"];
 /// Bytes of a GLB's header.
 const GLB_HEADER: usize = 12;
 /// Parts of the document that geometry does not need: a fault in one of them must not refuse the file.
@@ -58,9 +61,11 @@ pub(crate) fn load(
     let mut json = parsed(&json)?;
     check_version(&json)?;
     write_integers(&mut json, false);
-    let nodes = json["nodes"].as_array().map_or(0, Vec::len) as u64;
-    if nodes > MAX_NODES {
-        return Err(GltfError::TooLarge { what: "nodes", count: nodes, limit: MAX_NODES });
+    for what in LISTS {
+        let count = json[what].as_array().map_or(0, Vec::len) as u64;
+        if count > MAX_ITEMS {
+            return Err(GltfError::TooLarge { what, count, limit: MAX_ITEMS });
+        }
     }
     #[cfg(not(feature = "decompress"))]
     check_compression(name, &json)?;

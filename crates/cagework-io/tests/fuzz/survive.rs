@@ -165,8 +165,10 @@ fn as_model(model: &Model, choice: u32) {
     };
     if let Ok(made) = generate(&model.positions, &model.triangles, &options, &Silent) {
         assert_eq!(made.cage.notices(), []);
-        let options = bind_options(choice);
-        match bind(&model.positions, &made.cage, &options, &Silent) {
+        let (smooth, options) = (options.smooth, bind_options(choice));
+        // The surface that encloses the model is the smooth one, if that was asked for.
+        let smooth = ControlSet::new(&made.cage, smooth, InnerControls::default()).expect("it was one");
+        match bind(&model.positions, &smooth, &options, &Silent) {
             Ok(binding) => {
                 assert_eq!(binding.weights.n_rows(), model.positions.len());
                 assert!(binding.weights.data().iter().all(|w| w.is_finite()));
