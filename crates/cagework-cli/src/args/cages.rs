@@ -55,6 +55,7 @@ pub(crate) struct CageArgs {
     #[arg(long)]
     pub(crate) per_component: bool,
     /// Distance to keep from the model, as a fraction of its bounding box's diagonal [default: half a voxel].
+    /// Gaps up to twice as wide are closed.
     #[arg(long, default_value_t = 0.0, value_name = "FRACTION", value_parser = fraction)]
     pub(crate) clearance: f32,
     /// Voxels along the model's longest side, 8 to 128; gaps below three of them are closed. 0: by the vertices.
