@@ -178,6 +178,13 @@ fn what_a_document_becomes_is_counted_before_it_is_allocated() {
     let within = |b: &Builder, limit| Model::read_within("x.glb", &b.glb(), &mut |_| None, limit);
     let message = within(&b, 128 << 20).unwrap_err().to_string();
     assert!(message.contains("MiB of memory, more than the limit of 128 MiB"), "{message}");
+    // Base64 that is decoded would be refused for another reason: it is damaged.
+    let mut embedded = plain_cube().json;
+    embedded["buffers"] =
+        json!([{ "byteLength": 72, "uri": format!("data:;base64,{}", "!".repeat(4 << 20)) }]);
+    let text = serde_json::to_vec(&embedded).unwrap();
+    let message = Model::read_within("x.gltf", &text, &mut |_| None, 14 << 20).unwrap_err().to_string();
+    assert!(message.contains("needs about 16 MiB of memory"), "{message}");
     // A thousand primitives at each node; no more of them are looked at than there are.
     let primitive = b.primitive(0).clone();
     b.json["meshes"][0]["primitives"] = vec![primitive; 1000].into();

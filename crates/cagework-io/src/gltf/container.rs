@@ -56,7 +56,7 @@ pub(crate) fn load(
 ) -> Result<Loaded, GltfError> {
     let (json, bin) = split(bytes)?;
     let of_json = bytes_of_json(&json);
-    MemoryError::check(of_json + bytes.len() as u64, memory_limit)?;
+    MemoryError::check(of_json + decoded_bytes(&json) + bytes.len() as u64, memory_limit)?;
     let text = bin.is_some().then(|| json.to_vec());
     let mut json = parsed(&json)?;
     check_version(&json)?;
@@ -138,6 +138,12 @@ fn bytes_of_json(text: &[u8]) -> u64 {
     // Those in strings are counted too: names have few, and data of a buffer has one.
     let values = text.iter().filter(|b| matches!(b, b',' | b':' | b'[' | b'{')).count() as u64;
     2 * text.len() as u64 + VALUE_BYTES * values
+}
+
+/// Bytes that base64 in JSON will have once it is decoded.
+fn decoded_bytes(text: &[u8]) -> u64 {
+    let strings = text.split(|&b| b == b'"').filter(|string| string.starts_with(b"data:"));
+    strings.map(|uri| uri.len() as u64 / 4 * 3).sum()
 }
 
 /// JSON and binary chunk of a GLB; a file without the GLB magic is JSON itself.
