@@ -37,7 +37,7 @@ describe("share links", () => {
 
   it("report damaged links", async () => {
     await expect(decodeShare("#sample=rat&pose=****")).rejects.toThrow("its pose cannot be read");
-    await expect(decodeShare(`#sample=rat&pose=${"A".repeat(20_000)}`)).rejects.toThrow("16384 letters");
+    await expect(decodeShare(`#sample=rat&pose=${"A".repeat(20_000)}`)).rejects.toThrow("16384 characters");
     await expect(decodeShare("#sample=&pose=AAAA")).rejects.toThrow("which sample");
     const link = await encodeShare({ sample: "rat", pose });
     await expect(decodeShare(link.slice(0, -60))).rejects.toThrow("its pose cannot be read");
