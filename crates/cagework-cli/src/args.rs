@@ -1,4 +1,4 @@
-//! The command line: what can be said, and what is refused before any work starts (exit code 2).
+//! Definition of the command line. Arguments that do not parse end the command with exit code 2 before any work starts.
 
 mod cages;
 mod controls;
@@ -21,7 +21,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 pub(crate) use controls::{ControlArgs, SmoothArgs};
 pub(crate) use many::RefitArgs;
 pub(crate) use pose::{FitArgs, PoseArgs};
-pub(crate) use render::{Compared, RenderArgs, Show};
+pub(crate) use render::{CompareArg, RenderArgs, ShowArg};
 pub(crate) use rig::RigArgs;
 pub(crate) use solve::{MemoryArgs, SolveArgs};
 
@@ -37,7 +37,6 @@ pub(crate) use solve::{MemoryArgs, SolveArgs};
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose gallop.obj -o gallop.glb"
 )]
 pub(crate) struct Cli {
-    /// What to do.
     #[command(subcommand)]
     pub(crate) command: Command,
     /// Print the result as JSON on stdout, and no text.
@@ -45,32 +44,32 @@ pub(crate) struct Cli {
     pub(crate) json: bool,
 }
 
-/// The commands.
+/// Subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Describe a model, and whether it is valid as a cage.
+    /// Describe a model, and check whether it is a valid cage.
     Info(InfoArgs),
     /// Compute the weights that tie a mesh to a cage.
     Bind(BindArgs),
-    /// Move the cage, and the mesh with it.
+    /// Move the cage, and deform the mesh with it.
     Deform(DeformArgs),
-    /// Deform many models with one cage and one pose: one solve, and a file for each model.
+    /// Deform many models with one cage and one pose. The cage is solved once; each model gets its own output file.
     Refit(RefitArgs),
-    /// Move points of the model to given places, and solve for the pose of the cage.
+    /// Move points of the model to given positions by solving for the pose of the cage.
     Pull(PullArgs),
-    /// Find the pose of the cage that brings a model to a target: another model with the same vertices, or landmarks.
+    /// Find the cage pose that deforms a model into a target: another model with the same vertices, or landmarks.
     Fit(FitArgs),
-    /// Draw a picture of a model in its cage (needs a GPU, or the software one of mesa-vulkan-drivers).
+    /// Draw a picture of a model in its cage (needs a GPU, or the software adapter of mesa-vulkan-drivers).
     Render(RenderArgs),
-    /// Make a cage for a model: one that follows it, its convex hull, or a subdivided box.
+    /// Make a cage for a model: a cage that follows its limbs, its convex hull, or a subdivided box.
     Cage(CageArgs),
     /// List the faults of a cage and repair them.
     Check(CheckArgs),
-    /// Time the published method against the default, on one thread and on all.
+    /// Time the published method and the default method, on one thread and on all threads.
     Bench(BenchArgs),
-    /// Repeat the paper's evaluation: times, errors and reconstructions, as CSV, SVG, GLB and text.
+    /// Repeat the paper's evaluation: times, errors and reconstructions, as CSV, SVG, GLB and a text report.
     Evaluate(EvaluateArgs),
-    /// Bind and deform the built-in sample, and print what happened.
+    /// Bind and deform the built-in sample.
     Demo(DemoArgs),
 }
 
@@ -78,8 +77,8 @@ pub(crate) enum Command {
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  cagework info horse.glb\n  cagework info cage.obj --json")]
 pub(crate) struct InfoArgs {
-    /// Model to look at.
-    #[arg(help = model_help("Model to look at"))]
+    /// Model to describe.
+    #[arg(help = model_help("Model to describe"))]
     pub(crate) model: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
@@ -99,23 +98,23 @@ pub(crate) struct BindArgs {
     pub(crate) mesh: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
-    /// Cage: a file; auto or auto:VERTICES for one that follows the mesh; hull or hull:VERTICES; box or
+    /// Cage: a file; auto or auto:VERTICES for a cage that follows the mesh; hull or hull:VERTICES for its convex hull; box or
     /// box:DIVISIONS for a subdivided box.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
     /// Cells along the longest side of the cage, 8 to 512.
     #[arg(short, long, default_value_t = 64, value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: u32,
-    /// Write the rest pose as the weights reconstruct it; the name's ending says the format.
+    /// Write the rest pose as reconstructed from the weights; the file extension selects the format.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<ModelOutput>,
     /// Write the weights (.npz; one row per vertex of the mesh file, one column per cage vertex, then one per control inside).
     #[arg(long, value_name = "FILE", value_parser = npz_output)]
     pub(crate) weights: Option<PathBuf>,
-    /// Of a rigged model, bind and write the shape alone, without joints and morph targets; then deform needs --static as well.
+    /// For a rigged model, bind the mesh only, without joints and morph targets; `deform` then needs --static too.
     #[arg(long = "static")]
-    pub(crate) plain: bool,
-    /// Write the report as JSON; - for stdout.
+    pub(crate) shape_only: bool,
+    /// Write the report as JSON; use - for stdout.
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
     /// Write the cage that was used (.obj).
@@ -127,11 +126,11 @@ pub(crate) struct BindArgs {
     pub(crate) solve: SolveArgs,
 }
 
-/// How models are read: shared by all that show a model, or make or read its cage.
+/// How models are read: shared by all commands that read a model or a cage.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct ReadArgs {
-    /// Axis that points up in the files. With z, model, cage and poses are turned to Y up when they are read, and what
-    /// is written is turned back.
+    /// Up axis of the files. With z, models, cages and poses are rotated to y up when they are read, and rotated back when
+    /// they are written.
     #[arg(long, value_enum, default_value_t = UpArg::Y, value_name = "AXIS")]
     up: UpArg,
     #[command(flatten)]
@@ -139,7 +138,7 @@ pub(crate) struct ReadArgs {
 }
 
 impl ReadArgs {
-    /// The axis.
+    /// The up axis of the files.
     pub(crate) fn axis(self) -> UpAxis {
         match self.up {
             UpArg::Y => UpAxis::Y,
@@ -151,41 +150,41 @@ impl ReadArgs {
 /// `cagework deform`
 #[derive(Args, Debug)]
 #[command(
-    after_help = "One pose gives the deformed model, several give a GLB with one morph target per pose and an \
+    after_help = "One pose gives the deformed model. Several give a GLB with one morph target per pose and an \
     animation that plays them.\n\n\
     Examples:\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose gallop.obj -o gallop.glb\n  \
     cagework deform horse.glb --cage cage.obj --weights horse.npz --pose a.obj --pose b.obj -o poses.glb"
 )]
 pub(crate) struct DeformArgs {
-    /// The mesh that was bound.
-    #[arg(help = model_help("The mesh that was bound"))]
+    /// Mesh that was bound.
+    #[arg(help = model_help("Mesh that was bound"))]
     pub(crate) mesh: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
-    /// The cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
+    /// Cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
-    /// The weights that `cagework bind --weights` wrote; not needed with --dynamic.
+    /// Weights that `cagework bind --weights` wrote; not needed with --dynamic.
     #[arg(long, value_name = "FILE", required_unless_present = "dynamic")]
     pub(crate) weights: Option<PathBuf>,
-    /// The cage, moved: same vertices in the same order. May be given several times. Keys of a clip or shape keys in a file are a
-    /// pose each.
+    /// Moved cage: the same vertices in the same order. May be given several times. Each keyframe of a clip and each shape
+    /// key in the file is a pose.
     #[arg(long, value_name = "FILE", required = true)]
     pub(crate) pose: Vec<PathBuf>,
-    /// The controls inside, moved (.obj): same vertices in the same order; one for each --pose, or none if they stay.
+    /// Moved inner controls (.obj): the same vertices in the same order. Give one per --pose, or none if they do not move.
     #[arg(long, value_name = "FILE")]
     pub(crate) pose_controls: Vec<PathBuf>,
-    /// File to write; the name's ending says the format.
+    /// File to write; the extension selects the format.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,
     #[command(flatten)]
     pub(crate) rig: RigArgs,
-    /// Experimental: let the cage bend the model while a clip moves it, instead of its shape at rest; writes the clip's frames as
-    /// morph targets, without skeleton.
-    #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "mask", "plain"])]
+    /// Experimental: apply the clip to the model first, then bend every frame with the cage. Writes the frames as morph
+    /// targets, without a skeleton.
+    #[arg(long, value_name = "CLIP", conflicts_with_all = ["weights", "joints", "keep_travel", "rigid", "mask", "shape_only"])]
     pub(crate) dynamic: Option<String>,
-    /// With --dynamic: smooth the cage by so many steps, as for `bind`.
+    /// With --dynamic: steps of Catmull-Clark subdivision of the cage, as for `bind`.
     #[arg(long, default_value_t = 0, value_name = "STEPS", requires = "dynamic", value_parser = number::<u32>(options::SMOOTH))]
     pub(crate) smooth: u32,
 }
@@ -197,15 +196,15 @@ pub(crate) struct DeformArgs {
     {\"triangle\": 7, \"bary\": [0.2, 0.3, 0.5]}, {\"cage\": 4}],\n   \"reach\": null, \"start\": \"pose.obj\", \
     \"relax\": 0.5, \"frames\": 30}\n\n\
     A grab or pin is a vertex of the model, a point of a triangle, or a vertex of the cage. Only \"grabs\" is \
-    required.\n\"reach\": how far along the surface the model follows: null for automatic, a share of its diagonal, or \
-    \"all\".\n\"start\": the pose to begin with, the cage at rest unless given. \"relax\": 0 keeps what was shaped by \
-    hand, 1 goes back to the shape at rest.\n\n\
+    required.\n\"reach\": how far along the surface the model follows: null for automatic, a fraction of the model's diagonal, or \
+    \"all\".\n\"start\": the initial pose; the default is the cage at rest. \"relax\": 0 keeps the details of the initial pose, \
+    1 restores those of the rest shape.\n\n\
     Example:\n  cagework pull horse.glb --cage cage.obj --weights horse.npz --job rear.json -o rear.obj"
 )]
 pub(crate) struct PullArgs {
     #[command(flatten)]
     pub(crate) pose: PoseArgs,
-    /// What is pulled where, as JSON.
+    /// Grabs, pins and their targets, as JSON.
     #[arg(long, value_name = "FILE")]
     pub(crate) job: PathBuf,
 }
@@ -224,7 +223,7 @@ pub(crate) struct BenchArgs {
     /// Cells along the longest side of the cage; several, separated by commas.
     #[arg(short, long, value_delimiter = ',', default_value = "64", value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: Vec<u32>,
-    /// Binds of each kind; medians are reported.
+    /// Timed binds per case; medians are reported.
     #[arg(long, default_value_t = 5, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) runs: u32,
 }
@@ -234,19 +233,19 @@ pub(crate) struct BenchArgs {
 #[command(after_help = "Examples:\n  cagework evaluate\n  cagework evaluate --runs 5 -o evening\n  \
     cagework evaluate --mesh horse.obj --cage cage.obj -g 32 -o horse")]
 pub(crate) struct EvaluateArgs {
-    /// Mesh to bind; the built-in sample unless given.
+    /// Mesh to bind [default: the built-in sample].
     #[arg(long, requires = "cage")]
     pub(crate) mesh: Option<PathBuf>,
-    /// Cage: a file, auto:VERTICES, hull:VERTICES or box:DIVISIONS; the sample's own unless given.
+    /// Cage: a file, auto:VERTICES, hull:VERTICES or box:DIVISIONS [default: the sample's own cage].
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: Option<CageSource>,
-    /// Cells of the finest grid along the longest side of the cage; a half and a quarter of them are run too.
+    /// Cells of the finest grid along the longest side of the cage; grids of half and a quarter of that are run as well.
     #[arg(short, long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(32..=512))]
     pub(crate) grid: u32,
-    /// Folder to write to; it is made if it is missing.
+    /// Folder to write to; created if it does not exist.
     #[arg(short, long, value_name = "FOLDER", default_value = "evaluation")]
     pub(crate) output: PathBuf,
-    /// Timed binds of each kind: the median is reported, and what is claimed must stand out of their spread.
+    /// Timed binds per case. The median is reported; a speed-up is claimed only if the ranges of times do not overlap.
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
     pub(crate) runs: u32,
 }
@@ -255,17 +254,16 @@ pub(crate) struct EvaluateArgs {
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  cagework demo -o out")]
 pub(crate) struct DemoArgs {
-    /// Folder to write to; it is made if it is missing.
+    /// Folder to write to; created if it does not exist.
     #[arg(short, long, value_name = "FOLDER", default_value = "out")]
     pub(crate) output: PathBuf,
 }
 
-/// A model's file to write.
+/// A model file to write.
 #[derive(Clone, Debug)]
 pub(crate) struct ModelOutput {
-    /// The file.
     pub(crate) path: PathBuf,
-    /// The format that its name asks for.
+    /// Selected by the file extension.
     pub(crate) format: ModelFormat,
 }
 
@@ -280,18 +278,19 @@ impl FromStr for ModelOutput {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
+/// Up axis of the files.
 enum UpArg {
     Y,
     Z,
 }
 
-/// What an argument is, and which files it takes: a model's.
+/// Help for a model argument: `what`, then the supported file extensions.
 fn model_help(what: &str) -> String {
     let endings = ModelFormat::ALL.map(ModelFormat::endings).concat().join(", .");
     format!("{what} (.{endings})")
 }
 
-/// The words of an option.
+/// Parser of an option that takes one of several words.
 fn words<T>() -> impl TypedValueParser<Value = T>
 where
     T: Choice + FromStr<Err: Error + Send + Sync> + Send + Sync,
@@ -300,7 +299,7 @@ where
     PossibleValuesParser::new(values).try_map(|word| word.parse::<T>())
 }
 
-/// A number in an option's range.
+/// Parser of a number within an option's range.
 fn number<T>(option: Number) -> impl TypedValueParser<Value = T>
 where
     T: FromStr + Into<f64> + Copy + Send + Sync + 'static,

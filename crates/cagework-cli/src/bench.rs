@@ -1,4 +1,4 @@
-//! `cagework bench`: the paper's way and the default, on one thread and on all, in one process.
+//! `cagework bench`: times the published method and the default method, on one thread and on all threads.
 
 use std::fmt::Write as _;
 
@@ -15,13 +15,13 @@ use crate::error::CliError;
 use crate::files::{json, print};
 use crate::load::{built_in, load_cage, load_model};
 
-/// Results of all grids; its JSON is the output of `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
 struct Bench {
     mesh: String,
     vertices: usize,
     cage_vertices: usize,
-    /// Threads of the machine, which "all threads" means.
+    /// Number of threads in the cases that use all threads.
     threads: usize,
     runs: u32,
     grids: Vec<GridBench>,
@@ -32,11 +32,11 @@ struct Bench {
 struct GridBench {
     grid: u32,
     cases: Vec<Case>,
-    /// Quotients of median total times.
+    /// Ratios of the medians of total times.
     ratios: Ratios,
 }
 
-/// One kind of bind.
+/// Timings of one method on one number of threads.
 #[derive(Debug, Serialize)]
 struct Case {
     method: Method,
@@ -44,13 +44,13 @@ struct Case {
     threads: usize,
     iterations: u32,
     converged: bool,
-    /// Medians of the stages, each over all runs.
+    /// Median over all runs, for each stage separately.
     median_ms: Timings,
     min_total_ms: f64,
     max_total_ms: f64,
 }
 
-/// How many times faster, by the medians of the whole bind.
+/// Ratios of the median total times.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct Ratios {
     /// Classic Jacobi over embedded multigrid, both on one thread.
@@ -63,7 +63,7 @@ struct Ratios {
     embedded_threads: f64,
 }
 
-/// Method, solver, threads (0: all), in the order of [`Ratios::of`].
+/// Method, solver, number of threads (0: all), in the order that [`Ratios::of`] expects.
 const CASES: [(Method, Solver, usize); 4] = [
     (Method::Classic, Solver::Jacobi, 1),
     (Method::Classic, Solver::Jacobi, 0),
@@ -74,7 +74,7 @@ const CASES: [(Method, Solver, usize); 4] = [
 /// Runs `cagework bench`.
 ///
 /// # Errors
-/// When a file cannot be read or a bind fails or is cancelled.
+/// If a file cannot be read, or a bind fails or is cancelled.
 pub(crate) fn run(args: &BenchArgs, as_json: bool) -> Result<(), CliError> {
     let (name, model, cage) = match (&args.mesh, &args.cage) {
         (Some(mesh), Some(cage)) => {
@@ -102,7 +102,7 @@ pub(crate) fn run(args: &BenchArgs, as_json: bool) -> Result<(), CliError> {
 
 fn bench_grid(model: &Model, cage: &Cage, grid: u32, runs: u32) -> Result<GridBench, CliError> {
     let mut reports: [Vec<BindReport>; CASES.len()] = Default::default();
-    // Round-robin: a machine that slows down meanwhile slows all cases alike, so ratios hold.
+    // Round-robin, so that a change of the machine's speed affects all cases equally and cancels in the ratios.
     for _ in 0..runs {
         for (reports, (method, solver, threads)) in reports.iter_mut().zip(CASES) {
             let options = BindOptions { grid, method, solver, threads, ..BindOptions::default() };
@@ -115,7 +115,7 @@ fn bench_grid(model: &Model, cage: &Cage, grid: u32, runs: u32) -> Result<GridBe
 }
 
 impl Case {
-    /// The case that all `reports` are of, at least one.
+    /// Summarises the reports of one case. `reports` must not be empty.
     fn of(reports: &[BindReport]) -> Self {
         let sorted = |time: fn(&Timings) -> f64| -> Vec<f64> {
             let mut times: Vec<f64> = reports.iter().map(|r| time(&r.timings_ms)).collect();
@@ -155,7 +155,7 @@ impl Ratios {
     }
 }
 
-/// Median of sorted values, at least one.
+/// Median of sorted values. `sorted` must not be empty.
 fn median(sorted: &[f64]) -> f64 {
     let n = sorted.len();
     0.5 * (sorted[(n - 1) / 2] + sorted[n / 2])
@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     #[expect(clippy::float_cmp, reason = "halves of small whole numbers are exact")]
-    fn median_is_the_middle_or_between_the_two_in_the_middle() {
+    fn median_averages_the_two_middle_values() {
         assert_eq!(median(&[3.0]), 3.0);
         assert_eq!(median(&[1.0, 2.0, 9.0]), 2.0);
         assert_eq!(median(&[1.0, 2.0, 5.0, 9.0]), 3.5);

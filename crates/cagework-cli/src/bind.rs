@@ -1,4 +1,4 @@
-//! `cagework bind`: from a mesh and a cage to weights, a report and the reconstructed rest pose.
+//! `cagework bind`: computes the weights of a mesh in a cage, a report, and the reconstructed rest pose.
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,7 @@ use crate::rig;
 /// Runs `cagework bind`.
 ///
 /// # Errors
-/// When a file cannot be read or written, the cage is no cage, or the bind fails or is cancelled.
+/// If a file cannot be read or written, the cage is invalid, or the bind fails or is cancelled.
 pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     let report_file = args.report.as_deref().filter(|path| *path != Path::new("-"));
     let report_to_stdout = as_json || (args.report.is_some() && report_file.is_none());
@@ -43,7 +43,7 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     let (cage, controls) = (&loaded.cage, loaded.controls());
     refuse_files_read(&outputs)?;
     let (points, extra_points) =
-        if args.plain { (model.positions.clone(), 0) } else { rig::points(&model, &args.mesh)? };
+        if args.shape_only { (model.positions.clone(), 0) } else { rig::points(&model, &args.mesh)? };
     let options =
         BindOptions { held: model.bytes(), extra_points, ..args.solve.options(args.grid, args.read.memory) };
     let weights = weights_bytes(points.len(), controls.n_controls());
@@ -64,7 +64,7 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     }
     if let Some(output) = &args.output {
         let rest = deform(&binding, controls.rest());
-        let bytes = if output.format == ModelFormat::Gltf && model.is_rigged() && !args.plain {
+        let bytes = if output.format == ModelFormat::Gltf && model.is_rigged() && !args.shape_only {
             let by: Vec<DVec3> = rest.iter().zip(&points).map(|(a, b)| a.as_dvec3() - b.as_dvec3()).collect();
             let outside: Vec<u32> = binding.outside.iter().map(|o| o.vertex).collect();
             let written = model.write_reshaped(&by, &outside, &[], &ReshapeOptions::default());
@@ -89,10 +89,10 @@ pub(crate) fn run(args: &BindArgs, as_json: bool) -> Result<(), CliError> {
     print(&card::of(&binding.report, &model.notices, &written))
 }
 
-/// Binds all vertices of a model, with progress on the terminal.
+/// Binds all vertices of a model, with a progress bar.
 ///
 /// # Errors
-/// When the bind fails or is cancelled.
+/// If the bind fails or is cancelled.
 pub(crate) fn bind_model(model: &Model, cage: &Cage, options: &BindOptions) -> Result<Binding, CliError> {
     let bar = Bar::start();
     Ok(bind(&model.positions, cage, options, &bar)?)
@@ -105,10 +105,10 @@ fn save_cage(args: &BindArgs, cage: &Cage, model: &Model) -> Result<(), CliError
     write(path, &made.write(ModelFormat::Obj, &mesh.positions).map_err(|e| CliError::file(path, e))?)
 }
 
-/// Bytes that are in use at once while a file is written that takes so many: what is held, the weights, and that.
+/// Memory in use while a file of `to_write` bytes is encoded: `held`, the weights and the file. Bytes.
 ///
 /// # Errors
-/// When they are more than the limit.
+/// If that exceeds the limit.
 pub(crate) fn check_memory(
     options: &BindOptions,
     points: usize,
@@ -120,10 +120,10 @@ pub(crate) fn check_memory(
     if needed > limit { Err(BindError::WeightsMemory { needed, limit, points, columns }) } else { Ok(needed) }
 }
 
-/// Binds positions on the GPU or the processor, with progress on the terminal.
+/// Binds positions on the GPU or the processor, with a progress bar.
 ///
 /// # Errors
-/// When the bind fails or is cancelled, or there is no GPU.
+/// If the bind fails or is cancelled, or no GPU is available.
 pub(crate) fn bind_positions(
     positions: &[Vec3],
     controls: Controls<'_>,
@@ -138,10 +138,10 @@ pub(crate) fn bind_positions(
     Ok(bind(positions, controls, options, &bar)?)
 }
 
-/// Binds positions on a GPU, with progress on the terminal.
+/// Binds positions on a GPU, with a progress bar.
 ///
 /// # Errors
-/// When the bind fails or is cancelled.
+/// If the bind fails or is cancelled.
 pub(crate) fn bind_on(
     context: &GpuContext,
     positions: &[Vec3],
@@ -152,15 +152,15 @@ pub(crate) fn bind_on(
     Ok(pollster::block_on(bind_on_gpu(positions, controls, options, &bar, context))?)
 }
 
-/// Where the bound vertices go for posed controls. `[n_vertices]`, object units.
+/// Positions of the bound points for posed controls. `[n_points]`, object units.
 pub(crate) fn deform(binding: &Binding, cage_positions: &[Vec3]) -> Vec<Vec3> {
     deform_bound(&binding.weights, &binding.frames, cage_positions)
 }
 
-/// The model's own document with new positions, in the format that the output asks for.
+/// Encodes the model's own document with new positions, in the output's format.
 ///
 /// # Errors
-/// When the model cannot be written in that format.
+/// If the model cannot be written in that format.
 pub(crate) fn export(model: &Model, positions: &[Vec3], output: &ModelOutput) -> Result<Vec<u8>, CliError> {
     model.write(output.format, positions).map_err(|e| CliError::file(&output.path, e))
 }

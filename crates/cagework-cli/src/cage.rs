@@ -1,4 +1,4 @@
-//! `cagework cage`: a cage for a model.
+//! `cagework cage`: makes a cage for a model.
 
 use cagework_cage::generate::CageReport;
 use cagework_core::PolygonMesh;
@@ -12,9 +12,9 @@ use crate::error::CliError;
 use crate::files::{check_outputs, json, print, write};
 use crate::load::{box_mesh, generate_for, load_model};
 
-/// What was made; its JSON is the output of `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
-struct Made {
+struct CageSummary {
     output: String,
     kind: &'static str,
     vertices: usize,
@@ -23,7 +23,7 @@ struct Made {
     divisions: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     margin: Option<f32>,
-    /// How a generated cage came about.
+    /// Of a generated cage.
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<CageReport>,
 }
@@ -31,11 +31,11 @@ struct Made {
 /// Runs `cagework cage`.
 ///
 /// # Errors
-/// When the model cannot be read or the cage cannot be made or written.
+/// If the model cannot be read, or the cage cannot be made or written.
 pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
     check_outputs(&[&args.output.path], &[&args.model])?;
     let model = load_model(&args.model, args.read.axis(), args.read.memory)?;
-    let mut made = Made {
+    let mut summary = CageSummary {
         output: args.output.path.display().to_string(),
         kind: "box",
         vertices: 0,
@@ -47,35 +47,35 @@ pub(crate) fn run(args: &CageArgs, as_json: bool) -> Result<(), CliError> {
     let cage = match args.kind() {
         KindArg::Box => {
             let divisions = args.divisions.unwrap_or(DEFAULT_DIVISIONS);
-            (made.divisions, made.margin) = (Some(divisions), Some(args.margin));
+            (summary.divisions, summary.margin) = (Some(divisions), Some(args.margin));
             let states = model.states(args.around_clip.as_deref());
             let (positions, _) = states.map_err(|e| CliError::file(&args.model, e))?;
             box_mesh(&positions, divisions, args.margin)?
         }
         kind => {
-            made.kind = if kind == KindArg::Hull { "hull" } else { "auto" };
+            summary.kind = if kind == KindArg::Hull { "hull" } else { "auto" };
             let (cage, report) = generate_for(&model, args.around_clip.as_deref(), &args.options())?;
-            made.report = Some(report);
+            summary.report = Some(report);
             cage
         }
     };
-    (made.vertices, made.faces) = (cage.positions.len(), cage.faces.len());
+    (summary.vertices, summary.faces) = (cage.positions.len(), cage.faces.len());
     write_cage(&args.output, &model.up().mesh_turned_back(&cage), model.origin())?;
     if as_json {
-        return print(&json(&made));
+        return print(&json(&summary));
     }
-    print(&text(&made))
+    print(&text(&summary))
 }
 
-/// Writes a cage, its positions from an origin, in the format that the output asks for.
+/// Writes a cage in the output's format. `origin` is added to its positions.
 ///
 /// # Errors
-/// When it cannot be written.
+/// If the file cannot be written.
 pub(crate) fn write_cage(output: &ModelOutput, cage: &PolygonMesh, origin: DVec3) -> Result<(), CliError> {
     write(&output.path, &export(&Model::of_mesh("cage.obj", cage, origin)?, &cage.positions, output)?)
 }
 
-/// A length of a model of any size, to three digits.
+/// A length with three significant digits.
 fn three_digits(length: f32) -> String {
     let after_point = 2.0 - length.log10().floor();
     match after_point {
@@ -84,34 +84,33 @@ fn three_digits(length: f32) -> String {
     }
 }
 
-fn text(made: &Made) -> String {
-    let Some(report) = &made.report else {
+fn text(summary: &CageSummary) -> String {
+    let Some(report) = &summary.report else {
         return format!(
             "wrote {}: a box of {} vertices and {} faces",
-            shown(&made.output),
-            made.vertices,
-            made.faces
+            shown(&summary.output),
+            summary.vertices,
+            summary.faces
         );
     };
     let mut text = format!(
-        "wrote {}: {} vertices and {} faces ({:.0} % quads) in {:.0} ms; it keeps {} from the model",
-        shown(&made.output),
-        made.vertices,
-        made.faces,
+        "wrote {}: {} vertices and {} faces ({:.0} % quads) in {:.0} ms; minimum distance from the model {}",
+        shown(&summary.output),
+        summary.vertices,
+        summary.faces,
         100.0 * f64::from(report.quads) / f64::from(report.faces.max(1)),
         report.elapsed_ms,
         three_digits(report.clearance)
     );
     if let Some(mirror) = report.mirror {
-        text.push_str(&format!(", is symmetric in {}", format!("{mirror:?}").to_lowercase()));
+        text.push_str(&format!(", symmetric in {}", format!("{mirror:?}").to_lowercase()));
     }
     if report.parts > 1 {
-        text.push_str(&format!(", has {} closed parts", report.parts));
+        text.push_str(&format!(", {} closed parts", report.parts));
     }
     if report.vertices > report.target {
         text.push_str(&format!(
-            ".\nnote: the model's holes and gaps need {} vertices instead of {}; --voxels with a smaller number than \
-             {} closes more of them",
+            ".\nnote: the model's holes and gaps need {} vertices instead of {}; fewer --voxels than {} close more of them",
             report.vertices, report.target, report.voxels
         ));
     }
@@ -126,7 +125,7 @@ mod tests {
     use super::three_digits;
 
     #[test]
-    fn lengths_of_small_and_large_models_keep_three_digits() {
+    fn lengths_have_three_significant_digits() {
         for (length, text) in
             [(0.0213, "0.0213"), (3.79, "3.79"), (50_100.0, "50100"), (2.5e-8, "2.50e-8"), (0.0, "0.00e0")]
         {

@@ -1,4 +1,4 @@
-//! The result card: a bind's report in a dozen lines for people.
+//! The summary of a bind that the command prints: a dozen lines from its report.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -6,16 +6,16 @@ use std::path::PathBuf;
 use cagework_core::BindReport;
 use cagework_core::options::{CellShape, Method, Preconditioner, Solver};
 
-use crate::controls::inner_controls;
+use crate::controls::inner_controls_text;
 use crate::files::shown_path;
 
-/// Lines on one bind. `model_notices`: what reading the mesh had to say; `written`: files that were written.
+/// Formats a report. `model_notices`: notices from reading the mesh; `written`: files that were written.
 pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathBuf]) -> String {
     let mut out = format!(
         "bound {} vertices to {} cage vertices{}\n",
         report.vertices,
         report.cage_vertices,
-        inner_controls(report.inner_controls as usize)
+        inner_controls_text(report.inner_controls as usize)
     );
     let mut row = |name: &str, value: String| {
         let _ = writeln!(out, "  {name:<14}{value}");
@@ -38,7 +38,7 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
     let delta = report.delta_history.last().map_or(String::new(), |d| format!(", delta {d:.1e}"));
     let state = match (report.converged, report.at_round_off) {
         (true, false) => "converged",
-        (true, true) => "converged to f32",
+        (true, true) => "converged to f32 precision",
         _ => "NOT converged",
     };
     row("solve", format!("{} {unit}, {state}{delta}", report.iterations));
@@ -64,7 +64,7 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
     row(
         "solver error",
         format!(
-            "mean {:.1e}, max {:.1e} of the diagonal, |sum - 1| at most {:.1e}, before rows were restored",
+            "mean {:.1e}, max {:.1e} of the diagonal, |sum - 1| at most {:.1e}, before the rows were restored",
             raw.point_rel.mean, raw.point_rel.max, raw.sum.max
         ),
     );
@@ -84,7 +84,7 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
         row("smooth", format!("{} steps of subdivision", report.smooth));
     }
     if report.held_vertices > 0 {
-        row("held", format!("{} vertices inside of controls", report.held_vertices));
+        row("held", format!("{} vertices inside inner controls", report.held_vertices));
     }
 
     if !report.converged {
@@ -95,7 +95,11 @@ pub(crate) fn of(report: &BindReport, model_notices: &[String], written: &[PathB
         );
     }
     if report.ambiguous_cells > 0 {
-        let _ = writeln!(out, "note: the axes disagree about {} cells of the grid", report.ambiguous_cells);
+        let _ = writeln!(
+            out,
+            "note: grid lines along x, y and z disagree whether {} cells are inside",
+            report.ambiguous_cells
+        );
     }
     for notice in model_notices.iter().chain(&report.notices) {
         let _ = writeln!(out, "note: {notice}");
@@ -123,7 +127,7 @@ fn solver(report: &BindReport) -> &'static str {
     }
 }
 
-/// Milliseconds for people.
+/// Formats milliseconds with a suitable unit.
 pub(crate) fn duration(ms: f64) -> String {
     if ms < 10.0 {
         format!("{ms:.1} ms")
@@ -143,7 +147,7 @@ mod tests {
     use super::duration;
 
     #[test]
-    fn durations_choose_their_unit() {
+    fn durations_have_a_suitable_unit() {
         assert_eq!(duration(0.44), "0.4 ms");
         assert_eq!(duration(46.2), "46 ms");
         assert_eq!(duration(12_345.0), "12.35 s");

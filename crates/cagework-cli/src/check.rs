@@ -1,4 +1,4 @@
-//! `cagework check`: everything that is wrong with a cage, and what can be mended.
+//! `cagework check`: lists the faults of a cage and repairs them.
 
 use std::fmt::Write as _;
 
@@ -12,15 +12,15 @@ use crate::error::CliError;
 use crate::files::{check_outputs, json, print, shown_path};
 use crate::load::{cage_mesh, load_model};
 
-/// What `check` says; its JSON is the output of `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
-struct Checked {
+struct CheckSummary {
     file: String,
-    /// What was mended, a sentence each.
+    /// A sentence per repair.
     repaired: Vec<String>,
-    /// The mended cage's file.
+    /// File of the repaired cage.
     output: Option<String>,
-    /// The state after the repairs.
+    /// Faults after the repairs.
     #[serde(flatten)]
     check: CageCheck,
 }
@@ -28,13 +28,13 @@ struct Checked {
 /// Runs `cagework check`.
 ///
 /// # Errors
-/// When a file cannot be read or written, or the mesh cannot be used as a cage.
+/// If a file cannot be read or written, or the mesh is not a valid cage.
 pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
     let inputs: Vec<_> =
         std::iter::once(&args.cage).chain(&args.mesh).map(std::path::PathBuf::as_path).collect();
     let outputs: Vec<_> = args.output.iter().map(|output| output.path.as_path()).collect();
     check_outputs(&outputs, &inputs)?;
-    // Which way is up makes no difference to what is wrong with a cage.
+    // The faults of a cage do not depend on the up axis.
     let load = |path| load_model(path, UpAxis::Y, args.memory);
     let refused = |source| CliError::Cage { name: args.cage.display().to_string(), source };
     let of_cage = load(&args.cage)?;
@@ -43,7 +43,7 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
     model.iter_mut().for_each(|model| model.see_from(of_cage.origin()));
     let inside = model.as_ref().map(|m| m.positions.as_slice());
     let smooth = args.smooth.smooth;
-    let mut checked = Checked {
+    let mut summary = CheckSummary {
         file: args.cage.display().to_string(),
         repaired: Vec::new(),
         output: None,
@@ -51,40 +51,40 @@ pub(crate) fn run(args: &CheckArgs, as_json: bool) -> Result<(), CliError> {
     };
     if let Some(output) = &args.output {
         let repairs: Vec<Repair> = args.repair.iter().map(|&r| r.into()).collect();
-        let mended = repair_smooth(&cage, &repairs, inside, smooth)?;
-        cage = mended.mesh;
+        let repaired = repair_smooth(&cage, &repairs, inside, smooth)?;
+        cage = repaired.mesh;
         write_cage(output, &cage, of_cage.origin())?;
-        checked.repaired = mended.done;
-        checked.output = Some(output.path.display().to_string());
-        checked.check = check_smooth(&cage, inside, Some(args.grid), smooth);
+        summary.repaired = repaired.done;
+        summary.output = Some(output.path.display().to_string());
+        summary.check = check_smooth(&cage, inside, Some(args.grid), smooth);
     }
-    print(&if as_json { json(&checked) } else { text(&checked) })?;
-    if checked.check.valid {
+    print(&if as_json { json(&summary) } else { text(&summary) })?;
+    if summary.check.valid {
         return Ok(());
     }
-    let errors = checked.check.problems.iter().filter(|p| p.severity == Severity::Error).count();
+    let errors = summary.check.problems.iter().filter(|p| p.severity == Severity::Error).count();
     Err(CliError::Mismatch {
         message: format!(
             "{} cannot be used as a cage: {errors} {}",
             shown_path(&args.cage),
             if errors == 1 { "kind of fault" } else { "kinds of faults" }
         ),
-        hint: "`cagework check CAGE --repair weld,drop-degenerate,fill-holes,flip -o FILE` mends what it can",
+        hint: "`cagework check CAGE --repair weld,drop-degenerate,fill-holes,flip -o FILE` repairs most faults",
     })
 }
 
-fn text(checked: &Checked) -> String {
-    let check = &checked.check;
+fn text(summary: &CheckSummary) -> String {
+    let check = &summary.check;
     let mut out = format!(
         "{}: {} vertices, {} faces, {} {}\n",
-        shown(&checked.file),
+        shown(&summary.file),
         check.vertices,
         check.faces,
         check.components,
         if check.components == 1 { "component" } else { "components" }
     );
-    for done in &checked.repaired {
-        let _ = writeln!(out, "mended: {done}");
+    for done in &summary.repaired {
+        let _ = writeln!(out, "repaired: {done}");
     }
     for p in &check.problems {
         let name = match p.severity {
@@ -106,18 +106,18 @@ fn text(checked: &Checked) -> String {
         out.push_str("valid as a cage");
         match check.encloses {
             Some(true) => out.push_str(", and the whole model is inside"),
-            Some(false) => out.push_str(", but not all of the model is inside"),
+            Some(false) => out.push_str(", but part of the model is outside"),
             None => {}
         }
         out.push('\n');
     }
-    if let Some(output) = &checked.output {
+    if let Some(output) = &summary.output {
         let _ = writeln!(out, "wrote {}", shown(output));
     }
     out
 }
 
-/// The first place of a problem in words, if its sentence names none.
+/// The first element with this fault. `None` for self-intersections, whose message names it already.
 fn place(p: &cagework_cage::check::Problem) -> Option<String> {
     if p.code == Code::SelfIntersection {
         return None;

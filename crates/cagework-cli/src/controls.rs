@@ -1,4 +1,4 @@
-//! Controls inside a cage, from files and back.
+//! Inner controls: reads them and their poses.
 
 use std::path::{Path, PathBuf};
 
@@ -10,11 +10,11 @@ use crate::args::{ControlArgs, MemoryArgs};
 use crate::error::CliError;
 use crate::files::{read, shown_path};
 
-/// The controls of a cage that the arguments ask for; none if that is the plain cage. `axes`: what points up in the
-/// files, and what the cage is seen from.
+/// Builds the controls that the arguments describe. Returns `None` if the vertices of the cage are the only controls. `axes`:
+/// up axis of the files, and origin of the cage's positions.
 ///
 /// # Errors
-/// When the file cannot be read, or names what cannot be a control.
+/// If the file cannot be read, or a control is invalid.
 pub(crate) fn load_controls(
     cage: &Cage,
     args: &ControlArgs,
@@ -26,14 +26,14 @@ pub(crate) fn load_controls(
         None => InnerControls::default(),
         Some(path) => InnerControls { radius: args.radius, ..load_inner(path, axes, memory)? },
     };
-    // What the elements are is asked for even if there is none.
+    // `ControlSet::new` accepts an empty set, which is a mistake if a file was given.
     if args.controls.is_some() && inner.elements.is_empty() {
-        return Err(wrong(args, cagework_core::ControlError::Empty));
+        return Err(control_error(args, cagework_core::ControlError::Empty));
     }
-    ControlSet::new(cage, args.smooth.smooth, inner).map(Some).map_err(|e| wrong(args, e))
+    ControlSet::new(cage, args.smooth.smooth, inner).map(Some).map_err(|e| control_error(args, e))
 }
 
-fn wrong(args: &ControlArgs, error: cagework_core::ControlError) -> CliError {
+fn control_error(args: &ControlArgs, error: cagework_core::ControlError) -> CliError {
     match &args.controls {
         Some(path) => CliError::file(path, error),
         None => error.into(),
@@ -51,10 +51,10 @@ fn load_inner(
     Ok(inner)
 }
 
-/// Poses of all controls: those of the cage, each followed by the controls inside, at rest where `files` says nothing.
+/// Appends the inner controls to each pose of the cage: `files[k]` to pose k, or `rest` if there are no files.
 ///
 /// # Errors
-/// When a file cannot be read or has another number of vertices, or there are too few or too many files.
+/// If a file cannot be read or has another number of vertices, or the number of files is neither zero nor that of the poses.
 pub(crate) fn with_inner(
     poses: Vec<Vec<Vec3>>,
     files: &[PathBuf],
@@ -64,7 +64,7 @@ pub(crate) fn with_inner(
 ) -> Result<Vec<Vec<Vec3>>, CliError> {
     if !files.is_empty() && files.len() != poses.len() {
         return Err(CliError::Mismatch {
-            message: format!("{} --pose-controls for {} poses", files.len(), poses.len()),
+            message: format!("{} --pose-controls were given for {} --pose", files.len(), poses.len()),
             hint: "give one for each --pose, in the same order, or none",
         });
     }
@@ -75,12 +75,12 @@ pub(crate) fn with_inner(
         }
         Err(CliError::Mismatch {
             message: format!(
-                "{}: has {} vertices, but {} controls inside the cage were bound",
+                "{}: has {} vertices, but {} inner controls were bound",
                 shown_path(path),
                 positions.len(),
                 rest.len()
             ),
-            hint: "a pose of controls is their file with vertices moved: same number, same order",
+            hint: "the pose of inner controls is their file with moved vertices: same number, same order",
         })
     };
     let inner: Vec<Vec<Vec3>> = files.iter().map(inner).collect::<Result<_, _>>()?;
@@ -88,12 +88,16 @@ pub(crate) fn with_inner(
     Ok(poses.into_iter().enumerate().map(|(k, pose)| [pose.as_slice(), of(k)].concat()).collect())
 }
 
-/// Where all controls of saved weights rest.
+/// Rest positions of the cage's vertices, then of the inner controls. `[n_controls]`, object units.
 pub(crate) fn rest_of(cage: &Cage, saved: &SavedWeights) -> Vec<Vec3> {
     [cage.positions(), &saved.inner_controls].concat()
 }
 
-/// How many controls there are inside, after the number of cage vertices.
-pub(crate) fn inner_controls(n: usize) -> String {
-    if n == 0 { String::new() } else { format!(" and {n} controls inside") }
+/// Text for `n` inner controls that follows the number of cage vertices; empty for zero.
+pub(crate) fn inner_controls_text(n: usize) -> String {
+    match n {
+        0 => String::new(),
+        1 => " and 1 inner control".into(),
+        n => format!(" and {n} inner controls"),
+    }
 }

@@ -1,4 +1,4 @@
-//! `cagework deform`: the mesh follows a moved cage.
+//! `cagework deform`: deforms a bound mesh by a moved cage.
 
 use std::path::Path;
 use std::time::Instant;
@@ -13,28 +13,27 @@ use serde::Serialize;
 
 use crate::args::{CageSource, ControlArgs, DeformArgs, MemoryArgs, ModelOutput};
 use crate::bind::export;
-use crate::controls::{inner_controls, rest_of, with_inner};
+use crate::controls::{inner_controls_text, rest_of, with_inner};
 use crate::error::CliError;
 use crate::files::{check_outputs, json, print, read, shown_path, write};
 use crate::load::{load_cage, load_model};
 use crate::{dynamic, rig};
 
-/// What was done; its JSON is the output of `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
-struct Deformed {
+struct DeformSummary {
     output: String,
     vertices: usize,
     cage_vertices: usize,
-    /// Controls inside the cage.
     inner_controls: usize,
     outside_vertices: usize,
-    /// Of them, those that stay where they are.
+    /// Outside vertices that do not follow the cage at all.
     staying_vertices: usize,
     poses: Vec<String>,
-    /// What became of skeleton, morph targets and animations, if there are any and they are kept.
+    /// Changes of skeleton, morph targets and clips; absent if the model has none or `--static` drops them.
     #[serde(flatten)]
     rig: Option<ReshapeReport>,
-    /// Computing all poses, without reading and writing files.
+    /// Time to compute all poses, without file input and output.
     deform_ms: f64,
     notices: Vec<String>,
 }
@@ -42,12 +41,12 @@ struct Deformed {
 /// Runs `cagework deform`.
 ///
 /// # Errors
-/// When a file cannot be read or written, or files do not belong together.
+/// If a file cannot be read or written, or files do not match.
 pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     let weights = match (&args.weights, &args.dynamic) {
         (_, Some(clip)) => return dynamic::run(args, clip, as_json),
         (Some(weights), None) => weights,
-        // The command line's own rules leave no such case.
+        // Excluded by clap: --weights is required without --dynamic.
         (None, None) => return Ok(()),
     };
     let mut inputs = vec![args.mesh.as_path(), weights.as_path()];
@@ -64,11 +63,11 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         }
         Err(CliError::Mismatch {
             message: format!(
-                "{}: a file of format {} holds one pose, but {n_poses} were given",
+                "{}: format {} stores one pose, but there are {n_poses}",
                 shown_path(output),
                 format.name(),
             ),
-            hint: "write a .glb, which gets one morph target per pose, or run the command once per pose",
+            hint: "write a .glb, which stores one morph target per pose, or run the command once per pose",
         })
     };
     require_room(args.pose.len())?;
@@ -102,7 +101,7 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     let outside = || saved.outside.iter().filter(|o| (o.vertex as usize) < n_vertices);
     let outside_vertices = outside().count();
     let staying_vertices = outside().filter(|o| o.share == 0.0).count();
-    // Times of one file: those of several files have nothing to do with each other.
+    // Keyframe times are kept for one file; those of several files are unrelated.
     if args.pose.len() == 1 && seconds.len() == poses.len() {
         options.pose_seconds = seconds;
     }
@@ -110,14 +109,14 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
     notices.extend(outside_in_words(outside(), cage.cage.diagonal()));
     let poses = Poses { names, rest, positions: poses };
     let started = Instant::now();
-    let posed = Posed::new(&model, saved, &poses, format, (&options, args.rig.plain));
+    let deformation = Deformation::new(&model, saved, &poses, format, (&options, args.rig.shape_only));
     let deform_ms = started.elapsed().as_secs_f64() * 1e3;
-    let (bytes, rig) = posed.into_file(&model, &poses.names, &args.output, &options)?;
+    let (bytes, rig) = deformation.into_file(&model, &poses.names, &args.output, &options)?;
     notices.extend(rig.iter().flat_map(ReshapeReport::notices));
     notices.extend(model.lost_in(format));
     write(output, &bytes)?;
 
-    let done = Deformed {
+    let summary = DeformSummary {
         output: output.display().to_string(),
         vertices: n_vertices,
         cage_vertices: n_cage,
@@ -129,51 +128,50 @@ pub(crate) fn run(args: &DeformArgs, as_json: bool) -> Result<(), CliError> {
         deform_ms,
         notices,
     };
-    print(&if as_json { json(&done) } else { text(&done) })
+    print(&if as_json { json(&summary) } else { text(&summary) })
 }
 
-/// Poses of a cage and the controls inside.
+/// Poses of all controls.
 pub(crate) struct Poses {
-    /// What they are called.
     pub(crate) names: Vec<String>,
-    /// All controls at rest. `[n_controls]`, object units
+    /// Controls at rest. `[n_controls]`, object units
     pub(crate) rest: Vec<Vec3>,
-    /// All controls in each pose. `[n_poses][n_controls]`, object units
+    /// Controls in each pose. `[n_poses][n_controls]`, object units
     pub(crate) positions: Vec<Vec<Vec3>>,
 }
 
-/// Where poses put a model.
-pub(crate) enum Posed {
-    /// How far each bound point of a rigged model goes in each pose, and which of them are outside.
-    Rigged { by: Vec<Vec<DVec3>>, outside: Vec<u32> },
-    /// Where each vertex goes in each pose.
-    Plain(Vec<Vec<Vec3>>),
+/// A model in all poses.
+pub(crate) enum Deformation {
+    /// Displacements of all bound points, `[n_poses][n_points]`, object units; and the indices of the points outside the cage.
+    Rig { by: Vec<Vec<DVec3>>, outside: Vec<u32> },
+    /// Vertex positions. `[n_poses][n_vertices]`, object units
+    Shape(Vec<Vec<Vec3>>),
 }
 
-impl Posed {
-    /// What poses make of a model. `plain`: of its shape alone.
+impl Deformation {
+    /// Deforms a model. `shape_only`: ignore its rig.
     pub(crate) fn new(
         model: &Model,
         saved: SavedWeights,
         poses: &Poses,
         format: ModelFormat,
-        (options, plain): (&ReshapeOptions, bool),
+        (options, shape_only): (&ReshapeOptions, bool),
     ) -> Self {
-        if format == ModelFormat::Gltf && model.is_rigged() && !plain {
+        if format == ModelFormat::Gltf && model.is_rigged() && !shape_only {
             let by = |pose: &Vec<Vec3>| displacements(&saved.weights, &saved.frames, &poses.rest, pose);
             let by = poses.positions.iter().map(by).collect();
-            return Self::Rigged { by, outside: saved.outside.iter().map(|o| o.vertex).collect() };
+            return Self::Rig { by, outside: saved.outside.iter().map(|o| o.vertex).collect() };
         }
         let saved = saved.of_vertices();
         let bound = (&saved.weights, &saved.frames);
         let posed = |pose: &Vec<Vec3>| model.deformed(bound, (&poses.rest, pose), &options.parts);
-        Self::Plain(poses.positions.iter().map(posed).collect())
+        Self::Shape(poses.positions.iter().map(posed).collect())
     }
 
-    /// The model in its pose, or at rest with several as morph targets, as a file; and what became of its rig.
+    /// Encodes the model: deformed by a single pose, or at rest with several poses as morph targets. Also returns the changes of its rig.
     ///
     /// # Errors
-    /// When the weights lack the rig's points, or the model cannot be written in that format.
+    /// If the weights lack the rig's points, or the model cannot be written in that format.
     pub(crate) fn into_file(
         self,
         model: &Model,
@@ -182,11 +180,11 @@ impl Posed {
         options: &ReshapeOptions,
     ) -> Result<(Vec<u8>, Option<ReshapeReport>), CliError> {
         match self {
-            Self::Rigged { by, outside } => {
+            Self::Rig { by, outside } => {
                 let (bytes, report) = rig::write(model, &outside, names, by, (&output.path, options))?;
                 Ok((bytes, Some(report)))
             }
-            Self::Plain(posed) => {
+            Self::Shape(posed) => {
                 let bytes = if let [only] = posed.as_slice() {
                     export(model, only, output)?
                 } else {
@@ -204,10 +202,10 @@ impl Posed {
     }
 }
 
-/// Reads weights and checks that they belong to a mesh and a cage.
+/// Reads weights and checks that they match a mesh and a cage.
 ///
 /// # Errors
-/// When the file cannot be read; with both numbers when they do not agree.
+/// If the file cannot be read, or the numbers of vertices differ.
 pub(crate) fn load_weights(
     path: &Path,
     model: &Model,
@@ -223,40 +221,40 @@ pub(crate) fn load_weights(
     }
     Err(CliError::Mismatch {
         message: format!(
-            "{}: holds weights of {} mesh vertices for {} cage vertices, but the mesh has {n_vertices} vertices and \
+            "{}: has weights of {} mesh vertices for {} cage vertices, but the mesh has {n_vertices} vertices and \
              the cage {n_cage}",
             shown_path(path),
             saved.n_vertices(),
             n_bound,
         ),
-        hint: "use the mesh and the cage that were bound, or bind these two",
+        hint: "use the mesh and the cage that were bound, or bind these again",
     })
 }
 
-/// A pose is called as its file is, without folder and ending.
+/// Name of a pose: the file name without folder and extension.
 pub(crate) fn pose_name(path: &Path) -> String {
     path.file_stem().map_or_else(|| "pose".into(), |stem| stem.to_string_lossy().into_owned())
 }
 
-fn text(done: &Deformed) -> String {
-    let poses = if let [only] = done.poses.as_slice() {
+fn text(summary: &DeformSummary) -> String {
+    let poses = if let [only] = summary.poses.as_slice() {
         format!("pose {}", shown(only))
     } else {
         format!(
             "{} poses as morph targets ({}) and an animation",
-            done.poses.len(),
-            shown(&done.poses.join(", "))
+            summary.poses.len(),
+            shown(&summary.poses.join(", "))
         )
     };
     let mut out = format!(
         "deformed {} vertices by {} cage vertices{} in {:.1} ms\nwrote {}: {poses}\n",
-        done.vertices,
-        done.cage_vertices,
-        inner_controls(done.inner_controls),
-        done.deform_ms,
-        shown(&done.output)
+        summary.vertices,
+        summary.cage_vertices,
+        inner_controls_text(summary.inner_controls),
+        summary.deform_ms,
+        shown(&summary.output)
     );
-    for notice in &done.notices {
+    for notice in &summary.notices {
         out += &format!("note: {notice}\n");
     }
     out

@@ -1,4 +1,4 @@
-//! `cagework demo`: the whole way once, on the built-in sample.
+//! `cagework demo`: binds and deforms the built-in sample, and writes all files of the workflow.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -14,11 +14,11 @@ use crate::bind::{bind_model, deform};
 use crate::card;
 use crate::error::CliError;
 use crate::files::{json, make_folder, print, write};
-use crate::load::{BuiltIn, built_in};
+use crate::load::{BuiltInSample, built_in};
 
-/// What was done; its JSON is the output of `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
-struct Done<'a> {
+struct DemoSummary<'a> {
     folder: String,
     files: Vec<String>,
     total_ms: f64,
@@ -28,14 +28,14 @@ struct Done<'a> {
 /// Runs `cagework demo`.
 ///
 /// # Errors
-/// When the folder cannot be written to or the bind is cancelled.
+/// If the folder cannot be written to or the bind is cancelled.
 pub(crate) fn run(args: &DemoArgs, as_json: bool) -> Result<(), CliError> {
     let started = Instant::now();
     let folder = args.output.as_path();
     make_folder(folder)?;
     let mut files = Files { folder, written: Vec::new() };
 
-    let BuiltIn { name: sample, mesh, model, cage, poses: cage_poses } = built_in()?;
+    let BuiltInSample { name: sample, mesh, model, cage, poses: cage_poses } = built_in()?;
     let binding = bind_model(&model, &cage, &BindOptions::default())?;
 
     files.write(&format!("{sample}.obj"), &write_cage_obj(&mesh, DVec3::ZERO))?;
@@ -65,19 +65,19 @@ pub(crate) fn run(args: &DemoArgs, as_json: bool) -> Result<(), CliError> {
     if as_json {
         let written = files.written.iter().map(|path| path.display().to_string()).collect();
         let folder = folder.display().to_string();
-        return print(&json(&Done { folder, files: written, total_ms, report: &binding.report }));
+        return print(&json(&DemoSummary { folder, files: written, total_ms, report: &binding.report }));
     }
     let posed_cage = posed_cage.unwrap_or_else(|| "cage.obj".to_owned());
     print(&text(folder, &sample, &posed_cage, &binding.report, &files.written, total_ms))
 }
 
-/// A pose's name as a file name: lower-case words, joined by hyphens.
+/// File name of a pose: its name as lower-case words joined by hyphens.
 fn file_stem(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
 }
 
-/// Files of one folder.
+/// Writes files into one folder and collects their paths.
 struct Files<'a> {
     folder: &'a Path,
     written: Vec<PathBuf>,
@@ -107,12 +107,12 @@ fn text(
 ) -> String {
     let at = |name: &str| folder.join(name).display().to_string();
     format!(
-        "Cagework made a {sample} of {} vertices and a cage of {} vertices around it, bound one to the other by \
-         harmonic coordinates in {}, and posed the cage. All in all {}.\n\n\
+        "Cagework generated a {sample} of {} vertices with a cage of {} vertices, bound it by \
+         harmonic coordinates in {}, and posed the cage. Total time: {}.\n\n\
          {}\n\
-         Look at {} (an animation of all poses). To go on from here:\n  \
+         {} shows all poses as an animation. Next, edit a pose in a 3-D program (keep its vertices) and apply it:\n  \
          cagework deform {} --cage {} --weights {} --pose {} -o {}\n\
-         where cagework is target/release/cagework, and the pose any edit of the cage that keeps its vertices.",
+         (the command is target/release/cagework).",
         report.vertices,
         report.cage_vertices,
         card::duration(report.timings_ms.total),

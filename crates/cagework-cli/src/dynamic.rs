@@ -1,4 +1,4 @@
-//! `cagework deform --dynamic`: the cage bends the model while a clip moves it.
+//! `cagework deform --dynamic`: a clip moves the model, and the cage bends each frame.
 
 use cagework_core::BindOptions;
 use cagework_core::dynamic::{DisplacementField, Lattice, bend_vertices};
@@ -11,9 +11,9 @@ use crate::error::CliError;
 use crate::files::{check_outputs, json, print, shown_path, write};
 use crate::load::{load_cage, load_model};
 
-/// What was done; its JSON is the output of `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
-struct Baked {
+struct DynamicSummary {
     output: String,
     clip: String,
     frames: usize,
@@ -25,12 +25,12 @@ struct Baked {
 /// Writes the frames of a clip, each bent by the posed cage.
 ///
 /// # Errors
-/// When a file cannot be read or written, there is no such clip, or files do not belong together.
+/// If a file cannot be read or written, the model has no such clip, or files do not match.
 pub(crate) fn run(args: &DeformArgs, clip: &str, as_json: bool) -> Result<(), CliError> {
     let output = &args.output.path;
     let [pose] = args.pose.as_slice() else {
         return Err(CliError::Mismatch {
-            message: format!("--dynamic bends by one pose, but {} were given", args.pose.len()),
+            message: format!("--dynamic takes one pose, but {} were given", args.pose.len()),
             hint: "run the command once per pose",
         });
     };
@@ -42,7 +42,7 @@ pub(crate) fn run(args: &DeformArgs, clip: &str, as_json: bool) -> Result<(), Cl
     if args.output.format != ModelFormat::Gltf {
         return Err(CliError::Mismatch {
             message: format!(
-                "{}: a file of format {} holds no clip",
+                "{}: format {} cannot store a clip",
                 shown_path(output),
                 args.output.format.name()
             ),
@@ -68,7 +68,7 @@ pub(crate) fn run(args: &DeformArgs, clip: &str, as_json: bool) -> Result<(), Cl
     let n = frames.len();
     let bytes = model.write_baked(number, &at_rest, frames).map_err(|e| CliError::file(output, e))?;
     write(output, &bytes)?;
-    let done = Baked {
+    let summary = DynamicSummary {
         output: output.display().to_string(),
         clip: clip.to_owned(),
         frames: n,
@@ -79,8 +79,8 @@ pub(crate) fn run(args: &DeformArgs, clip: &str, as_json: bool) -> Result<(), Cl
     let text = format!(
         "bent {n} frames of clip {} ({:.2} s)\nwrote {}: its frames as morph targets and an animation, without skeleton\n",
         shown(clip),
-        done.seconds,
-        shown(&done.output)
+        summary.seconds,
+        shown(&summary.output)
     );
-    print(&if as_json { json(&done) } else { text })
+    print(&if as_json { json(&summary) } else { text })
 }

@@ -1,4 +1,4 @@
-//! What can go wrong with a command, said once on stderr.
+//! Errors of the command, with hints.
 
 use std::error::Error;
 use std::io::Write as _;
@@ -13,7 +13,7 @@ use cagework_gpu::GpuError;
 use cagework_io::{GltfError, ObjError, ReadError, shown};
 use thiserror::Error;
 
-/// A path for a message.
+/// A path with control characters escaped.
 pub(crate) fn shown_path(path: &Path) -> String {
     shown(&path.display().to_string())
 }
@@ -21,56 +21,51 @@ pub(crate) fn shown_path(path: &Path) -> String {
 /// Why a command failed.
 #[derive(Debug, Error)]
 pub(crate) enum CliError {
-    /// Something about a file.
+    /// A failure that concerns one file.
     #[error("{}: {source}", shown_path(path))]
     File {
-        /// The file.
         path: PathBuf,
-        /// What about it.
+        /// What failed.
         source: Box<dyn Error + Send + Sync>,
     },
-    /// A file's own reader already names it.
+    /// A model could not be read. The source names the file.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A pose is not one of the cage.
+    /// A file is not a pose of the cage.
     #[error(transparent)]
     Pose(#[from] cagework_io::PoseError),
-    /// The cage is not one.
+    /// A mesh is not a valid cage.
     #[error("{}: {source}", shown(name))]
     Cage {
         /// File or description of the cage.
         name: String,
-        /// What is wrong with it.
         source: CageError,
     },
-    /// The bind did not come about.
+    /// The bind failed.
     #[error(transparent)]
     Bind(#[from] BindError),
-    /// The GPU, or a bind on it.
+    /// The GPU, or a bind on it, failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// No cage was generated.
+    /// Cage generation failed.
     #[error(transparent)]
     CageGen(#[from] CageGenError),
-    /// The cage has no smooth surface.
+    /// The cage cannot be subdivided, or a control inside it is invalid.
     #[error(transparent)]
     Controls(#[from] ControlError),
-    /// The cage could not be mended.
+    /// A repair of the cage failed.
     #[error(transparent)]
     Repair(#[from] RepairError),
-    /// There are no coordinates by formula to compare with.
+    /// Mean value or Green coordinates could not be computed.
     #[error(transparent)]
     ClosedForm(#[from] ClosedFormError),
-    /// A plot could not be drawn.
+    /// A plot or picture could not be drawn or encoded.
     #[error("a plot cannot be drawn: {message}")]
-    Plot {
-        /// Why.
-        message: String,
-    },
-    /// Files that do not belong together, outputs that would destroy inputs and the like.
+    Plot { message: String },
+    /// Files that do not match each other, outputs that would overwrite inputs, and other conflicts between arguments.
     #[error("{message}")]
     Mismatch {
-        /// What is wrong, with both numbers or names.
+        /// What is wrong, with the conflicting numbers or names.
         message: String,
         /// What to do.
         hint: &'static str,
@@ -83,22 +78,22 @@ impl CliError {
         Self::File { path: path.to_path_buf(), source: source.into() }
     }
 
-    /// The whole message: the error and its causes, each once.
+    /// The error followed by its causes, each once.
     pub(crate) fn message(&self) -> String {
         let mut text = self.to_string();
         let mut cause = self.source();
         while let Some(error) = cause {
-            let said = error.to_string();
-            // Some errors quote their cause, others leave that to us.
-            if !text.contains(&said) {
-                text = format!("{text}: {said}");
+            let cause_text = error.to_string();
+            // Some errors already include their cause.
+            if !text.contains(&cause_text) {
+                text = format!("{text}: {cause_text}");
             }
             cause = error.source();
         }
         text
     }
 
-    /// What to do about it, where that is known and not yet said.
+    /// What the user can do about the error.
     pub(crate) fn hint(&self) -> Option<&'static str> {
         match self {
             Self::Mismatch { hint, .. } => Some(hint),
@@ -107,37 +102,37 @@ impl CliError {
             }
             Self::Bind(BindError::Outside { .. }) | Self::Gpu(GpuError::Bind(BindError::Outside { .. })) => {
                 Some(
-                    "`--outside extend` lets such vertices follow the cage near it, `--outside stay` leaves them where they are",
+                    "`--outside extend` lets vertices near the cage follow it, `--outside stay` leaves them in place",
                 )
             }
             Self::Bind(BindError::NoneInside { .. })
             | Self::Gpu(GpuError::Bind(BindError::NoneInside { .. })) => Some(
-                "`--outside` cannot help: it is for vertices next to others that are inside; `--cage auto` makes a cage that fits",
+                "`--outside` applies only if some vertices are inside; `--cage auto` makes a cage that fits",
             ),
             Self::Gpu(GpuError::NoAdapter { .. }) => Some(
-                "a bind does not need one: leave out `--backend gpu`; CAGEWORK_ADAPTER chooses among several",
+                "binding works without a GPU: leave out `--backend gpu`; CAGEWORK_ADAPTER selects one of several adapters",
             ),
             Self::Bind(BindError::Memory { .. }) | Self::Gpu(GpuError::Bind(BindError::Memory { .. })) => {
                 Some("the limit is set by --memory-limit, in MiB")
             }
             Self::Bind(BindError::WeightsMemory { .. })
             | Self::Gpu(GpuError::Bind(BindError::WeightsMemory { .. })) => Some(
-                "the limit is set by --memory-limit, in MiB; of a rigged model `bind --static` binds the shape alone, without \
+                "the limit is set by --memory-limit, in MiB; `bind --static` binds a rigged model's mesh only, without \
                  joints and morph targets",
             ),
             Self::Read(
                 ReadError::Obj { source: ObjError::Memory(_), .. }
                 | ReadError::Gltf { source: GltfError::Memory(_), .. },
             ) => Some("the limit is set by --memory-limit, in MiB"),
-            Self::Repair(RepairError::NoModel) => Some("`--mesh` names it"),
+            Self::Repair(RepairError::NoModel) => Some("give the model with `--mesh`"),
             _ => None,
         }
     }
 }
 
-/// Says on stderr what went wrong, and what to do about it where that is known.
-pub(crate) fn say(message: &str, hint: Option<&str>) {
+/// Prints an error and its hint on stderr.
+pub(crate) fn print_error(message: &str, hint: Option<&str>) {
     let hint = hint.map_or_else(String::new, |hint| format!("hint: {hint}\n"));
-    // A closed stderr leaves nobody to tell.
+    // Ignored: if stderr is closed, the error cannot be reported.
     let _ = write!(std::io::stderr(), "error: {message}\n{hint}");
 }

@@ -1,4 +1,4 @@
-//! The GPU from the command's side: opening one, and models as they are drawn.
+//! Opens a GPU, and converts models to what it draws.
 
 use std::io::Cursor;
 use std::sync::Arc;
@@ -10,30 +10,30 @@ use image::ImageReader;
 
 use crate::error::CliError;
 
-/// Most pixels of a texture that is decoded, 8192 x 8192: a damaged file may claim anything.
+/// Largest texture that is decoded, pixels (8192 x 8192). A damaged header may claim any size.
 const MAX_TEXTURE_PIXELS: u64 = 1 << 26;
 
-/// Most pixels of all textures together: a quarter of a gigabyte here, and a third on the GPU.
-const MAX_PIXELS: u64 = 1 << 26;
+/// Largest number of pixels of all textures together: 256 MiB of memory here, a third more on the GPU with mipmaps.
+const MAX_TOTAL_PIXELS: u64 = 1 << 26;
 
-/// Larger textures are drawn with fewer pixels: no picture shows more, pixels along a side.
-const DRAWN_SIDE: u32 = 2048;
+/// Textures with a longer side are scaled down to it, pixels.
+const MAX_TEXTURE_SIDE: u32 = 2048;
 
 /// Opens a GPU.
 ///
 /// # Errors
-/// When there is none.
+/// If no adapter is available.
 pub(crate) fn open() -> Result<GpuContext, GpuError> {
     pollster::block_on(GpuContext::new(&ContextOptions::default()))
 }
 
-/// A model as it is drawn, and what the user should know about its textures.
+/// Converts a model for drawing. Also returns notices about textures that are scaled down or not drawn.
 pub(crate) fn draw_model(model: &Model) -> (DrawModel, Vec<String>) {
     let look = model.look();
     let mut notices = Vec::new();
     let mut textures = Vec::new();
-    let mut left = MAX_PIXELS;
-    // Images that cannot be decoded leave the plain colour.
+    let mut left = MAX_TOTAL_PIXELS;
+    // Groups with an undecodable image are drawn in their base colour.
     let numbers: Vec<Option<u32>> = look
         .images
         .iter()
@@ -92,7 +92,7 @@ fn wrap(wrap: LookWrap) -> Wrap {
     }
 }
 
-/// Decodes a texture, of at most `left` pixels, and takes its pixels off them; what the user should know about it.
+/// Decodes a texture and subtracts its pixels from `left`. Also returns a notice if it was scaled down.
 fn decode(image: &LookImage, left: &mut u64) -> Result<(DrawTexture, Option<String>), String> {
     let reader = || {
         let reader = ImageReader::new(Cursor::new(&image.bytes)).with_guessed_format();
@@ -105,14 +105,15 @@ fn decode(image: &LookImage, left: &mut u64) -> Result<(DrawTexture, Option<Stri
             "it has {width} x {height} pixels, more than the limit of {MAX_TEXTURE_PIXELS}: make it smaller"
         ));
     }
-    let drawn = pixels.min(u64::from(DRAWN_SIDE).pow(2));
+    let drawn = pixels.min(u64::from(MAX_TEXTURE_SIDE).pow(2));
     let rest = left.checked_sub(drawn);
-    *left =
-        rest.ok_or_else(|| format!("all textures have more than {MAX_PIXELS} pixels: make them smaller"))?;
+    *left = rest.ok_or_else(|| {
+        format!("the textures have more than {MAX_TOTAL_PIXELS} pixels in total: make them smaller")
+    })?;
     let mut decoded = reader()?.decode().map_err(|e| e.to_string())?;
     let mut notice = None;
-    if width.max(height) > DRAWN_SIDE {
-        decoded = decoded.thumbnail(DRAWN_SIDE, DRAWN_SIDE);
+    if width.max(height) > MAX_TEXTURE_SIDE {
+        decoded = decoded.thumbnail(MAX_TEXTURE_SIDE, MAX_TEXTURE_SIDE);
         let size =
             format!("{width} x {height} pixels: drawn with {} x {}", decoded.width(), decoded.height());
         notice = Some(format!("texture '{}' has {size}", image.name));
@@ -122,15 +123,15 @@ fn decode(image: &LookImage, left: &mut u64) -> Result<(DrawTexture, Option<Stri
     Ok((DrawTexture { width, height, rgba: rgba.into_raw(), ..DrawTexture::default() }, notice))
 }
 
-/// RGBA pixels as the bytes of a PNG.
+/// Encodes RGBA pixels as a PNG.
 ///
 /// # Errors
-/// When they cannot be encoded.
+/// If the number of bytes does not match the size, or encoding fails.
 pub(crate) fn png(rgba: Vec<u8>, [width, height]: [u32; 2]) -> Result<Vec<u8>, CliError> {
     let failed = |message: String| CliError::Plot { message };
     let picture = image::RgbaImage::from_raw(width, height, rgba)
-        .ok_or_else(|| failed("the picture has another size than asked for".into()))?;
-    // Opaque: a quarter less to store and to look through.
+        .ok_or_else(|| failed(format!("the pixels do not fill {width} x {height}")))?;
+    // Pictures are opaque; without alpha the file is a quarter smaller.
     let picture = image::DynamicImage::ImageRgba8(picture).into_rgb8();
     let mut bytes = Cursor::new(Vec::new());
     picture.write_to(&mut bytes, image::ImageFormat::Png).map_err(|e| failed(e.to_string()))?;

@@ -1,4 +1,4 @@
-//! `cagework info`: what is in a model, and whether it would do as a cage.
+//! `cagework info`: describes a model, and whether it is a valid cage.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -15,7 +15,7 @@ use crate::error::CliError;
 use crate::files::{json, print, read};
 use crate::load::{cage_mesh, load_model};
 
-/// What `info` says; its JSON is the output of `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
 struct Info {
     file: String,
@@ -30,16 +30,16 @@ struct Info {
     joints: usize,
     morph_targets: usize,
     clips: Vec<Clip>,
-    /// Names of what hangs on joints without a skin: `--rigid` takes them.
+    /// Names of nodes that carry a mesh on a joint but no skin, such as a hat; `--rigid` accepts them.
     props: Vec<String>,
     bounds: BoundsInfo,
-    /// Every edge belongs to two triangles, once equal positions are welded.
+    /// Whether every edge belongs to two triangles after equal positions are welded.
     closed: bool,
     cage: CageInfo,
     notices: Vec<String>,
 }
 
-/// Corners and diagonal of the bounding box, object units.
+/// The bounding box, object units.
 #[derive(Debug, Serialize)]
 struct BoundsInfo {
     min: [f64; 3],
@@ -47,11 +47,11 @@ struct BoundsInfo {
     diagonal: f32,
 }
 
-/// Whether the model would do as a cage.
+/// Whether the model is a valid cage.
 #[derive(Debug, Serialize)]
 struct CageInfo {
     valid: bool,
-    /// Why not.
+    /// The first fault.
     problem: Option<String>,
     notices: Vec<String>,
 }
@@ -59,11 +59,11 @@ struct CageInfo {
 /// Runs `cagework info`.
 ///
 /// # Errors
-/// When the model cannot be read.
+/// If the model cannot be read.
 pub(crate) fn run(args: &InfoArgs, as_json: bool) -> Result<(), CliError> {
     let inner = inner_info(args)?;
     let model = match (load_model(&args.model, args.read.axis(), args.read.memory), &inner) {
-        // A file of controls need not have faces.
+        // Files of inner controls may contain only points and lines.
         (Err(_), Some(inner)) => return print(&if as_json { json(inner) } else { inner.to_string() }),
         (model, _) => model?,
     };
@@ -71,12 +71,12 @@ pub(crate) fn run(args: &InfoArgs, as_json: bool) -> Result<(), CliError> {
     print(&if as_json { json(&info) } else { text(&info) })
 }
 
-/// Controls inside a cage, as an OBJ file names them.
+/// Contents of an OBJ file of inner controls.
 #[derive(Debug, Serialize)]
 struct InnerInfo {
     file: String,
     format: &'static str,
-    /// Columns of the weights.
+    /// Each is a column of the weights.
     vertices: usize,
     points: usize,
     lines: usize,
@@ -86,12 +86,12 @@ struct InnerInfo {
 impl std::fmt::Display for InnerInfo {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { file, vertices, points, lines, faces, .. } = self;
-        writeln!(f, "{} (OBJ), controls inside a cage: `cagework bind --controls`", shown(file))?;
+        writeln!(f, "{} (OBJ), inner controls for `cagework bind --controls`", shown(file))?;
         writeln!(f, "  vertices    {vertices}\n  elements    {points} points, {lines} lines, {faces} faces")
     }
 }
 
-/// What an OBJ file says of controls, if it has points or lines.
+/// Reads a model file as inner controls. `None` unless it is an OBJ file with points or lines.
 fn inner_info(args: &InfoArgs) -> Result<Option<InnerInfo>, CliError> {
     if ModelFormat::of_export(&args.model.to_string_lossy()) != Some(ModelFormat::Obj) {
         return Ok(None);
@@ -127,7 +127,7 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
         joints: counts.joints,
         morph_targets: counts.morph_targets,
         clips: model.clips(),
-        // What is wrong with a rig is said where it is used.
+        // Errors of the rig are reported by the commands that deform it.
         props: model.props().unwrap_or_default(),
         bounds: BoundsInfo {
             min: in_world(model, bounds.min),
@@ -140,7 +140,7 @@ fn inspect(file: &str, model: &Model) -> Result<Info, CliError> {
     })
 }
 
-/// A position of a model, Y up, with the digits of its file.
+/// A position in world space, Y up, rounded to the decimal digits of the file.
 fn in_world(model: &Model, position: Vec3) -> [f64; 3] {
     let origin = model.up().vector_turned(model.origin()).to_array();
     let mut axes = origin.into_iter().zip(position.to_array()).map(|(origin, x)| {
@@ -149,7 +149,7 @@ fn in_world(model: &Model, position: Vec3) -> [f64; 3] {
     std::array::from_fn(|_| axes.next().unwrap_or_default())
 }
 
-/// Whether every edge belongs to exactly two triangles; triangles without area between welded vertices do not count.
+/// Whether every edge belongs to exactly two triangles. Triangles with two equal corners after welding are ignored.
 fn is_closed(triangles: &[[u32; 3]], unique_of: &[u32]) -> bool {
     let mut uses: HashMap<(u32, u32), u32> = HashMap::new();
     for triangle in triangles {
@@ -208,7 +208,7 @@ mod tests {
     const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
 
     #[test]
-    fn tetrahedron_is_closed_and_open_without_a_face() {
+    fn tetrahedron_is_closed_until_a_face_is_removed() {
         let same = [0, 1, 2, 3];
         assert!(is_closed(&TETRAHEDRON, &same));
         assert!(!is_closed(&TETRAHEDRON[1..], &same));
@@ -216,8 +216,8 @@ mod tests {
     }
 
     #[test]
-    fn seams_do_not_open_a_surface() {
-        // Vertex 4 is a second copy of vertex 0.
+    fn seams_between_welded_vertices_are_closed() {
+        // Vertex 4 is a copy of vertex 0.
         let mut split = TETRAHEDRON;
         split[0][0] = 4;
         assert!(!is_closed(&split, &[0, 1, 2, 3, 4]));

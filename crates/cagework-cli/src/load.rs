@@ -1,4 +1,4 @@
-//! From files to models, cages and poses that fit each other.
+//! Reads models, cages and poses, and checks that they match each other.
 
 use std::path::Path;
 
@@ -18,41 +18,40 @@ use crate::error::CliError;
 use crate::files::{read, read_beside, shown_path};
 use crate::progress::Bar;
 
-/// A cage with the document that it came from, which knows how a pose of it is read.
+/// A cage, and the model it was read from, which its pose files must match.
 #[derive(Debug)]
 pub(crate) struct LoadedCage {
-    /// The cage.
     pub(crate) cage: Cage,
     model: Model,
-    /// What points up in the files of its poses.
+    /// Up axis of the cage's file and its pose files.
     up: UpAxis,
-    /// Memory that a pose may take.
+    /// Memory limit for reading a pose.
     memory: MemoryArgs,
-    /// Controls that are not the plain cage's, if the arguments ask for some.
+    /// Set if the cage is subdivided or has inner controls.
     set: Option<ControlSet>,
 }
 
-/// Reads a model with faces. `up`: what points up in the file.
+/// Reads a model with faces. `up`: up axis of the file.
 ///
 /// # Errors
-/// When the file cannot be read or has no faces, or the memory does not suffice.
+/// If the file cannot be read, has no faces, or needs more than the memory limit.
 pub(crate) fn load_model(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
     let model = load_any(path, up, memory)?;
     model.require_faces()?;
     Ok(model)
 }
 
-/// A model as a cage that was not looked at yet.
+/// The polygons of a model, not yet checked to be a cage.
 ///
 /// # Errors
-/// When it has too many faces.
+/// If it has more than [`MAX_FACES`] faces.
 pub(crate) fn cage_mesh(model: &Model) -> Result<PolygonMesh, CageError> {
-    // Before the faces are listed: that takes more memory than the model.
+    // Checked before the faces are listed, because the list takes more memory than the model.
     let faces = model.n_faces();
     if faces > MAX_FACES { Err(CageError::TooManyFaces { faces }) } else { Ok(model.cage_mesh()) }
 }
 
-/// Reads a model, or a bare list of positions.
+/// Reads a model, or a point cloud without faces.
 fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliError> {
     let bytes = read(path)?;
     let name = path.display().to_string();
@@ -62,26 +61,25 @@ fn load_any(path: &Path, up: UpAxis, memory: MemoryArgs) -> Result<Model, CliErr
     Ok(model)
 }
 
-/// The built-in sample: what `demo`, `bench` and `evaluate` work on unless told otherwise.
+/// The built-in sample: the default input of `demo`, `bench` and `evaluate`.
 #[derive(Debug)]
-pub(crate) struct BuiltIn {
-    /// What people call it.
+pub(crate) struct BuiltInSample {
+    /// Identifier, such as `rat`.
     pub(crate) name: String,
-    /// Its mesh, to be written.
+    /// Mesh for `write_cage_obj`.
     pub(crate) mesh: PolygonMesh,
-    /// The model that its file would be.
+    /// The same mesh as a model.
     pub(crate) model: Model,
-    /// Its own cage.
     pub(crate) cage: Cage,
-    /// Poses of that cage, by name. `[n_cage]` each
+    /// Names and positions of the poses. `[n_poses][n_cage]`, object units.
     pub(crate) poses: Vec<(String, Vec<Vec3>)>,
 }
 
-/// Builds the first sample, the one that the page opens with.
+/// Builds the first sample, which is also the page's initial model.
 ///
 /// # Errors
-/// None in practice: tests of the core bind every sample.
-pub(crate) fn built_in() -> Result<BuiltIn, CliError> {
+/// Never for the samples as they are: tests of cagework-core bind each of them.
+pub(crate) fn built_in() -> Result<BuiltInSample, CliError> {
     let missing = || CliError::Cage { name: "built-in sample".into(), source: CageError::Empty };
     let id = samples::all().first().ok_or_else(missing)?.id;
     let Sample { mesh, cage, poses, .. } = samples::build(id).ok_or_else(missing)?;
@@ -89,13 +87,13 @@ pub(crate) fn built_in() -> Result<BuiltIn, CliError> {
     let mesh = PolygonMesh { positions, faces: triangles.iter().map(|t| t.to_vec()).collect() };
     let model = Model::of_mesh(&format!("{id}.obj"), &mesh, DVec3::ZERO)?;
     let cage = Cage::new(&cage).map_err(|source| CliError::Cage { name: id.into(), source })?;
-    Ok(BuiltIn { name: id.to_owned(), mesh, model, cage, poses })
+    Ok(BuiltInSample { name: id.to_owned(), mesh, model, cage, poses })
 }
 
-/// The cage that `source` names, for a model; a file has the model's axes.
+/// Reads or generates the cage for a model. A cage file has the model's up axis.
 ///
 /// # Errors
-/// When the file cannot be read or is no cage.
+/// If the file cannot be read or is not a valid cage, or no cage can be generated.
 pub(crate) fn load_cage(
     source: &CageSource,
     around: &Model,
@@ -118,10 +116,10 @@ pub(crate) fn load_cage(
     LoadedCage::new(model, around.up(), memory, controls)
 }
 
-/// The cage of a file. `up`: what points up in it; `origin`: of its positions, near the cage unless said.
+/// Reads a cage file. `up`: up axis of the file; `origin`: subtracted from its positions, by default a point near the cage.
 ///
 /// # Errors
-/// When the file cannot be read or is no cage.
+/// If the file cannot be read or is not a valid cage.
 pub(crate) fn load_cage_file(
     path: &Path,
     up: UpAxis,
@@ -134,10 +132,10 @@ pub(crate) fn load_cage_file(
     LoadedCage::new(model, up, memory, controls)
 }
 
-/// A generated cage around a model, its morph targets and a clip, with progress on the terminal.
+/// Generates a cage around a model, its morph targets and the frames of a clip, with a progress bar.
 ///
 /// # Errors
-/// Those of [`generate`]; a clip that is not there.
+/// Those of [`generate`], and if the model has no such clip.
 pub(crate) fn generate_for(
     model: &Model,
     clip: Option<&str>,
@@ -149,17 +147,17 @@ pub(crate) fn generate_for(
     Ok((made.cage.to_polygon_mesh(), made.report))
 }
 
-/// A subdivided box around positions. `margin`: fraction of their bounding box's diagonal.
+/// A subdivided box around positions. `margin`: distance between both, as a fraction of their bounding box's diagonal.
 ///
 /// # Errors
-/// When there are no positions, or numbers have no room for such a box: too large, or too far from the origin.
+/// If `positions` is empty, or the box overflows or degenerates in `f32`.
 pub(crate) fn box_mesh(positions: &[Vec3], divisions: u32, margin: f32) -> Result<PolygonMesh, CliError> {
     let bounds = Bounds::of(positions)
         .ok_or_else(|| CliError::Cage { name: "box cage".into(), source: CageError::Empty })?;
     let mesh = subdivided_box(bounds, margin, [divisions; 3]);
     Cage::new(&mesh).map_err(|source| CliError::Mismatch {
-        message: format!("box cage: numbers of 32 bits have no room for it: {source}"),
-        hint: "move the model nearer to the origin, scale it, or give a smaller --margin",
+        message: format!("box cage: its coordinates do not fit in 32-bit floats: {source}"),
+        hint: "move the model closer to the origin, scale it, or give a smaller --margin",
     })?;
     Ok(mesh)
 }
@@ -173,74 +171,71 @@ impl LoadedCage {
         Ok(Self { cage, model, up, memory, set })
     }
 
-    /// What its positions are seen from, in the axes of its file.
+    /// Point that was subtracted from all positions, in the axes of the file.
     pub(crate) fn origin(&self) -> DVec3 {
         self.model.origin()
     }
 
-    /// What a model is bound to.
+    /// Controls to bind to: the cage's vertices, and the inner controls.
     pub(crate) fn controls(&self) -> Controls<'_> {
         self.set.as_ref().map_or_else(|| Controls::from(&self.cage), Controls::from)
     }
 
-    /// Controls inside, if there are any.
+    /// Inner controls.
     pub(crate) fn inner(&self) -> Option<&InnerControls> {
         self.controls().inner()
     }
 
-    /// Refuses a format in which a pose of this cage would come back as another one.
+    /// Rejects output formats that reorder vertices, because poses are matched to the cage by vertex order.
     ///
     /// # Errors
-    /// When its vertices would have another order there.
+    /// If the cage's vertices would be reordered.
     pub(crate) fn require_order_in(&self, output: &ModelOutput) -> Result<(), CliError> {
         if self.model.keeps_order_in(output.format) {
             return Ok(());
         }
         Err(CliError::Mismatch {
-            message: format!(
-                "{}: the cage's vertices would be in another order there",
-                shown_path(&output.path)
-            ),
-            hint: "a pose keeps the order of the cage: write it as .obj or .ply",
+            message: format!("{}: this format would reorder the cage's vertices", shown_path(&output.path)),
+            hint: "poses are matched to the cage by vertex order: write .obj or .ply",
         })
     }
 
-    /// A pose of this cage, `[n_cage]`, as a file of it.
+    /// Encodes a pose in the output's format and with the cage file's axes. `pose`: `[n_cage]`, object units.
     ///
     /// # Errors
-    /// When it cannot be written in that format.
+    /// If the pose cannot be written in that format.
     pub(crate) fn write_pose(&self, pose: &[Vec3], output: &ModelOutput) -> Result<Vec<u8>, CliError> {
         let mut positions = self.model.posed_as_cage(pose);
-        // A cage that was made has no file whose axes it would keep.
+        // Generated cages have y up; the pose gets the axes of the model file.
         if self.model.up() != self.up {
             positions = self.up.turned_back(&positions).into_owned();
         }
         self.model.write(output.format, &positions).map_err(|e| CliError::file(&output.path, e))
     }
 
-    /// The positions of a pose of this cage, in the cage's own order. `[n_cage]`, object units.
+    /// Reads the pose in a file. `[n_cage]`, object units, in the cage's vertex order.
     ///
     /// # Errors
-    /// When the file cannot be read, has another number of vertices than the cage, or holds several states.
+    /// If the file cannot be read, has another number of vertices than the cage, or contains several poses.
     pub(crate) fn load_pose(&self, path: &Path) -> Result<Vec<Vec3>, CliError> {
         let mut states = self.load_states(path)?;
         match states.pop() {
             Some(only) if states.is_empty() => Ok(only.positions),
             _ => Err(CliError::Mismatch {
                 message: format!(
-                    "pose {} holds {} states, as keys of a clip or as shape keys, but one is needed here",
+                    "pose {} contains {} poses (keyframes or shape keys), but one is expected",
                     shown_path(path),
                     states.len() + 1
                 ),
-                hint: "export one of them alone; `cagework deform` takes them all and writes a .glb",
+                hint: "export a single pose; `cagework deform` accepts several and writes a .glb",
             }),
         }
     }
 
-    /// The states that the file of a pose holds.
+    /// Reads all poses in a file: keyframes, shape keys, or its positions.
     ///
     /// # Errors
-    /// When the file cannot be read or has another number of vertices than the cage.
+    /// If the file cannot be read, or has another number of vertices than the cage.
     pub(crate) fn load_states(&self, path: &Path) -> Result<Vec<PoseState>, CliError> {
         let mut pose = load_any(path, self.up, self.memory)?;
         pose.see_from(self.model.origin());

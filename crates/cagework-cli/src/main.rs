@@ -1,6 +1,6 @@
-//! The `cagework` command: bind a mesh to a cage by harmonic coordinates, deform it, and say how well that went.
+//! The `cagework` command: binds a mesh to a cage by harmonic coordinates, deforms it, and reports the accuracy.
 //!
-//! Results go to stdout (`--json`: as JSON), errors to stderr. Exit code 0: done, 1: error, 2: wrong command line.
+//! Results go to stdout (as JSON with `--json`), errors to stderr. Exit codes: 0 success, 1 error, 2 invalid command line.
 
 mod args;
 mod bench;
@@ -32,8 +32,8 @@ use std::process::ExitCode;
 use args::{Cli, Command};
 use clap::Parser as _;
 
-/// A bind allocates and frees some 30 MB in a few milliseconds; the system's allocator hands such blocks back and
-/// forth to the kernel, and a fifth of a bind at g = 64 went into page faults.
+/// A bind allocates and frees about 30 MB within milliseconds. The system allocator returns such blocks to the kernel each
+/// time; the page faults took a fifth of a bind at g = 64.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
@@ -57,7 +57,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            error::say(&error.message(), error.hint());
+            error::print_error(&error.message(), error.hint());
             ExitCode::FAILURE
         }
     }

@@ -1,4 +1,4 @@
-//! A bound model whose cage is posed by the program: what `pull` and `fit` share.
+//! Input and output of the commands that solve for a pose of the cage: `pull` and `fit`.
 
 use std::path::{Path, PathBuf};
 
@@ -16,8 +16,8 @@ use crate::error::CliError;
 use crate::files::{check_outputs, shown_path, write};
 use crate::load::{LoadedCage, load_cage, load_model};
 
-/// A model, its cage and its weights.
-pub(crate) struct Bound {
+/// A model, its cage and their weights.
+pub(crate) struct BoundModel {
     pub(crate) model: Model,
     pub(crate) cage: LoadedCage,
     pub(crate) weights: Weights,
@@ -25,22 +25,22 @@ pub(crate) struct Bound {
     pub(crate) outside: Vec<OutsideVertex>,
 }
 
-impl Bound {
-    /// Rows that are linear in the controls: what is solved with.
+impl BoundModel {
+    /// Weights whose offsets are folded in, so that positions are linear in the controls. `[n_vertices, n_controls]`
     pub(crate) fn rows(&self) -> Weights {
         self.frames.folded(&self.weights)
     }
 
-    /// Reads all three; `others` are read besides, and must not be written over either.
+    /// Reads model, cage and weights. No output may overwrite these files or `other_inputs`.
     ///
     /// # Errors
-    /// When a file cannot be read, or they do not belong together.
+    /// If a file cannot be read, or the files do not match.
     pub(crate) fn load<'a>(
         args: &'a PoseArgs,
-        others: impl Iterator<Item = &'a Path>,
+        other_inputs: impl Iterator<Item = &'a Path>,
     ) -> Result<Self, CliError> {
         let mut inputs = vec![args.mesh.as_path(), args.weights.as_path()];
-        inputs.extend(others);
+        inputs.extend(other_inputs);
         if let CageSource::File(path) = &args.cage {
             inputs.push(path);
         }
@@ -57,22 +57,22 @@ impl Bound {
         if inner_controls != inner {
             return Err(CliError::Mismatch {
                 message: format!(
-                    "{}: was bound with {} controls inside the cage, but {} are given, or they are elsewhere",
+                    "{}: was bound with {} inner controls, but {} were given, or at other positions",
                     shown_path(&args.weights),
                     inner_controls.len(),
                     inner.len()
                 ),
-                hint: "give the --controls and --smooth of `cagework bind`",
+                hint: "give the same --controls and --smooth as for `cagework bind`",
             });
         }
         Ok(Self { model, cage, weights, frames, outside })
     }
 }
 
-/// What a pull needs once per binding.
+/// Precomputation of a pull, shared by all grabs: binds the probes and factorises the energy.
 ///
 /// # Errors
-/// When the cage is too large, or the probes cannot be bound.
+/// If the cage is too large, or the probes cannot be bound.
 pub(crate) fn pull(model: &Model, controls: Controls<'_>, args: &PoseArgs) -> Result<Pull, CliError> {
     let mesh = model.tri_mesh();
     let wrong = |e| CliError::file(&args.mesh, e);
@@ -83,10 +83,10 @@ pub(crate) fn pull(model: &Model, controls: Controls<'_>, args: &PoseArgs) -> Re
     Pull::new(&mesh, controls, probes, &bound.frames.folded(&bound.weights)).map_err(wrong)
 }
 
-/// Writes a pose of the cage, and of the controls inside if they are asked for. `pose`: `[n_controls]`.
+/// Writes a pose of the cage, and that of the inner controls with `--save-controls`. `pose`: `[n_controls]`, object units.
 ///
 /// # Errors
-/// When they cannot be written.
+/// If a file cannot be written.
 pub(crate) fn write_pose(
     model: &Model,
     cage: &LoadedCage,

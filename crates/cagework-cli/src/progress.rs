@@ -1,4 +1,4 @@
-//! Progress on a terminal.
+//! The progress bar.
 
 use std::io::IsTerminal as _;
 use std::ops::ControlFlow;
@@ -6,19 +6,19 @@ use std::ops::ControlFlow;
 use cagework_core::progress::{Progress, ProgressEvent, Stage};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::signals::{self, Asking};
+use crate::signals::{self, CancelGuard};
 
-/// Steps of the bar: more than a terminal has columns.
+/// Resolution of the bar, finer than the columns of a terminal.
 const STEPS: u64 = 1000;
 
-/// A progress bar on stderr when that is a terminal, and nothing otherwise; cancels on Ctrl-C and SIGTERM.
+/// A progress bar on stderr, hidden unless stderr is a terminal. Cancels the work on Ctrl-C and SIGTERM.
 pub(crate) struct Bar {
     bar: ProgressBar,
-    _asking: Asking,
+    _guard: CancelGuard,
 }
 
 impl Bar {
-    /// Shows the bar; from now on Ctrl-C cancels.
+    /// Shows the bar and starts to poll for cancellation.
     pub(crate) fn start() -> Self {
         let bar =
             if std::io::stderr().is_terminal() { ProgressBar::new(STEPS) } else { ProgressBar::hidden() };
@@ -26,7 +26,7 @@ impl Bar {
             .expect("the template is a constant")
             .progress_chars("=> ");
         bar.set_style(style);
-        Self { bar, _asking: Asking::start() }
+        Self { bar, _guard: CancelGuard::start() }
     }
 }
 
@@ -43,7 +43,7 @@ impl Progress for Bar {
         }
         if !self.bar.is_hidden() {
             self.bar.set_prefix(stage_name(event.stage));
-            // Threads report out of order: a bar never goes back.
+            // Threads report out of order; keep the bar from moving backwards.
             let position = (f64::from(event.fraction.clamp(0.0, 1.0)) * STEPS as f64) as u64;
             self.bar.set_position(position.max(self.bar.position()));
             if let Some(delta) = event.delta {

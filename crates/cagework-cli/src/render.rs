@@ -1,4 +1,4 @@
-//! `cagework render`: a picture of the model in its cage, drawn by the GPU.
+//! `cagework render`: draws a picture of a model in its cage on the GPU.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use cagework_io::{Model, shown};
 use glam::Vec3;
 use serde::Serialize;
 
-use crate::args::{CageSource, Compared, RenderArgs, Show};
+use crate::args::{CageSource, CompareArg, RenderArgs, ShowArg};
 use crate::bind::bind_positions;
 use crate::controls::with_inner;
 use crate::deform::load_weights;
@@ -24,16 +24,16 @@ use crate::gpu;
 use crate::load::{LoadedCage, load_cage, load_model};
 use crate::progress::Bar;
 
-/// What was done; its JSON is the output of `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
-struct Rendered {
+struct RenderSummary {
     output: String,
     size: [u32; 2],
     adapter: String,
-    /// What is on the left and on the right, with `--compare`.
+    /// Coordinates of the left and the right picture, with `--compare`.
     #[serde(skip_serializing_if = "Option::is_none")]
     compared: Option<[&'static str; 2]>,
-    /// Drawing and reading back, without files and binding.
+    /// Time to draw and read back, without binding, file input and output.
     render_ms: f64,
     notices: Vec<String>,
 }
@@ -41,7 +41,7 @@ struct Rendered {
 /// Runs `cagework render`.
 ///
 /// # Errors
-/// When a file cannot be read or written, files do not belong together, there is no GPU, or the bind fails.
+/// If a file cannot be read or written, files do not match, no GPU is available, or the bind fails.
 pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     let mut inputs = vec![args.model.as_path()];
     inputs.extend(args.pose.as_deref());
@@ -52,7 +52,7 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
         inputs.push(path);
     }
     check_outputs(&[&args.output], &inputs)?;
-    check_compared(args)?;
+    check_compare(args)?;
     let model = load_model(&args.model, args.read.axis(), args.read.memory)?;
     let cage = args
         .cage
@@ -76,18 +76,18 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
         let n_controls = cage.controls().n_controls();
         let limit = args.read.memory.bytes();
         match compared {
-            Compared::MeanValue => {
+            CompareArg::MeanValue => {
                 let weights = mean_value_weights(&model.positions, &cage.cage, limit, &Bar::start())?
                     .widened(n_controls);
                 pollster::block_on(twin.adopt(weights, Frames::default()))?;
             }
-            Compared::Plain => {
+            CompareArg::Plain => {
                 let options = args.solve.options(args.grid, args.read.memory);
                 let Binding { weights, frames, .. } =
                     bind_positions(&model.positions, (&cage.cage).into(), args.solve.on_gpu(), &options)?;
                 pollster::block_on(twin.adopt(weights.widened(n_controls), frames))?;
             }
-            Compared::Green => {
+            CompareArg::Green => {
                 let weights = green_weights(&model.positions, &cage.cage, limit, &Bar::start())?;
                 pollster::block_on(twin.adopt_green(weights))?;
             }
@@ -109,9 +109,9 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     let started = Instant::now();
     let mut rgba = pollster::block_on(session.picture(part, args.scale))?;
     let compared = args.compare.map(|compared| match compared {
-        Compared::MeanValue => ["harmonic coordinates", "mean value coordinates"],
-        Compared::Green => ["harmonic coordinates", "Green coordinates"],
-        Compared::Plain => ["harmonic coordinates", "harmonic coordinates of the plain cage"],
+        CompareArg::MeanValue => ["harmonic coordinates", "mean value coordinates"],
+        CompareArg::Green => ["harmonic coordinates", "Green coordinates"],
+        CompareArg::Plain => ["harmonic coordinates", "harmonic coordinates of the plain cage"],
     });
     if let Some(mut other) = other {
         *other.camera_mut() = *session.camera();
@@ -120,7 +120,7 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
     }
     let render_ms = started.elapsed().as_secs_f64() * 1e3;
     write(&args.output, &gpu::png(rgba, size)?)?;
-    let done = Rendered {
+    let summary = RenderSummary {
         output: args.output.display().to_string(),
         size,
         adapter: session.context().adapter_name(),
@@ -128,45 +128,45 @@ pub(crate) fn run(args: &RenderArgs, as_json: bool) -> Result<(), CliError> {
         render_ms,
         notices,
     };
-    print(&if as_json { json(&done) } else { text(&done) })
+    print(&if as_json { json(&summary) } else { text(&summary) })
 }
 
-/// Refuses a comparison of what no weights move.
-fn check_compared(args: &RenderArgs) -> Result<(), CliError> {
+/// Rejects comparisons without anything to compare.
+fn check_compare(args: &RenderArgs) -> Result<(), CliError> {
     let hint = "leave out --compare, or --show the model";
-    if args.compare.is_some() && matches!(args.show, Show::Cells | Show::Slice) {
-        let message = "--compare needs a model that moves, but a slice of the grid is asked for".to_owned();
+    if args.compare.is_some() && matches!(args.show, ShowArg::Cells | ShowArg::Slice) {
+        let message = "--compare shows a deformed model, but --show is a slice of the grid".to_owned();
         return Err(CliError::Mismatch { message, hint });
     }
-    if args.compare == Some(Compared::Green) && args.controls.controls.is_some() {
-        let message = "Green coordinates have no controls inside the cage".to_owned();
+    if args.compare == Some(CompareArg::Green) && args.controls.controls.is_some() {
+        let message = "Green coordinates do not support inner controls".to_owned();
         return Err(CliError::Mismatch {
             message,
             hint: "compare with mean-value or plain, or leave out --controls",
         });
     }
-    if args.compare.is_some() && args.size.0[0] < NARROWEST_PAIR {
-        let message = format!("--compare needs a picture at least {NARROWEST_PAIR} pixels wide");
+    if args.compare.is_some() && args.size.0[0] < MIN_PAIR_WIDTH {
+        let message = format!("--compare needs a picture at least {MIN_PAIR_WIDTH} pixels wide");
         return Err(CliError::Mismatch { message, hint: "give a larger --size" });
     }
     Ok(())
 }
 
-/// Narrowest picture of two, pixels: a column each and the divider.
-const NARROWEST_PAIR: u32 = 2 + DIVIDER;
+/// Minimum width of two pictures side by side, pixels: one column each, and the divider.
+const MIN_PAIR_WIDTH: u32 = 2 + DIVIDER_WIDTH;
 
-/// Width of the line between two pictures, pixels.
-const DIVIDER: u32 = 2;
+/// Width of the divider between two pictures, pixels.
+const DIVIDER_WIDTH: u32 = 2;
 
-/// Its colour, seen on dark and on light.
+/// RGBA colour of the divider, visible on dark and light backgrounds.
 const DIVIDER_COLOR: [u8; 4] = [128, 128, 128, 255];
 
-/// Width of each of two pictures side by side.
+/// Width of each of two pictures side by side in a picture of `width`, pixels.
 fn half(width: u32) -> u32 {
-    (width - DIVIDER) / 2
+    (width - DIVIDER_WIDTH) / 2
 }
 
-/// Two pictures of `part` columns side by side in one of `width`, with a line between them. RGBA
+/// Joins two RGBA pictures of `part` columns to one of `width` columns, with the divider between them.
 fn beside(left: &[u8], right: &[u8], part: u32, width: u32) -> Vec<u8> {
     let row = 4 * part as usize;
     let line = DIVIDER_COLOR.repeat((width - 2 * part) as usize);
@@ -174,22 +174,23 @@ fn beside(left: &[u8], right: &[u8], part: u32, width: u32) -> Vec<u8> {
     rows.flat_map(|(left, right)| [left, &line, right].concat()).collect()
 }
 
-/// What is drawn, as far as the arguments alone say.
+/// Scene options that follow from the arguments alone.
 fn scene_of(args: &RenderArgs) -> SceneOptions {
     let column = args.column;
     let mesh = match args.show {
-        Show::Solid | Show::Edges => MeshStyle::Solid,
-        Show::Clay | Show::Wireframe => MeshStyle::Clay,
-        Show::Weights => MeshStyle::Weights { column },
-        Show::Error => MeshStyle::Errors,
-        Show::Cells | Show::Slice => MeshStyle::Hidden,
+        ShowArg::Solid | ShowArg::Edges => MeshStyle::Solid,
+        ShowArg::Clay | ShowArg::Wireframe => MeshStyle::Clay,
+        ShowArg::Weights => MeshStyle::Weights { column },
+        ShowArg::Error => MeshStyle::Errors,
+        ShowArg::Cells | ShowArg::Slice => MeshStyle::Hidden,
     };
-    let chosen = if matches!(args.show, Show::Weights | Show::Slice) { vec![column] } else { Vec::new() };
+    let chosen =
+        if matches!(args.show, ShowArg::Weights | ShowArg::Slice) { vec![column] } else { Vec::new() };
     SceneOptions {
         theme: args.theme.into(),
         mesh,
-        mesh_edges: args.show == Show::Edges,
-        base_wireframe: args.show == Show::Wireframe,
+        mesh_edges: args.show == ShowArg::Edges,
+        base_wireframe: args.show == ShowArg::Wireframe,
         cage_lines: !args.no_cage,
         handles: !args.no_cage && !args.no_handles,
         floor: !args.no_floor,
@@ -198,7 +199,7 @@ fn scene_of(args: &RenderArgs) -> SceneOptions {
     }
 }
 
-/// Weights, pose and slice, as far as the picture needs them. Returns where the cage is, at rest and posed.
+/// Sets the weights, pose and slice that the picture needs. Returns the control positions at rest and posed, for framing.
 fn prepare(
     args: &RenderArgs,
     model: &Model,
@@ -208,15 +209,15 @@ fn prepare(
 ) -> Result<Vec<Vec3>, CliError> {
     let controls = cage.controls();
     let n_cage = controls.n_controls();
-    if matches!(args.show, Show::Weights | Show::Slice) && args.column as usize >= n_cage {
+    if matches!(args.show, ShowArg::Weights | ShowArg::Slice) && args.column as usize >= n_cage {
         return Err(CliError::Mismatch {
-            message: format!("--column is {}, but the cage has {n_cage} vertices", args.column),
-            hint: "cage vertices are counted from 0",
+            message: format!("--column is {}, but the weights have {n_cage} columns", args.column),
+            hint: "columns are counted from 0",
         });
     }
     let needs_weights = args.compare.is_some()
         || args.pose.is_some()
-        || matches!(args.show, Show::Wireframe | Show::Weights | Show::Error);
+        || matches!(args.show, ShowArg::Wireframe | ShowArg::Weights | ShowArg::Error);
     if needs_weights {
         let (weights, frames) = match &args.weights {
             Some(path) => {
@@ -248,7 +249,7 @@ fn prepare(
         session.pose(&pose);
         places.extend(pose);
     }
-    if matches!(args.show, Show::Cells | Show::Slice) {
+    if matches!(args.show, ShowArg::Cells | ShowArg::Slice) {
         scene.slice = Some(slice(args, controls)?);
     }
     Ok(places)
@@ -258,7 +259,7 @@ fn slice(args: &RenderArgs, controls: Controls<'_>) -> Result<SliceView, CliErro
     let options = args.solve.options(args.grid, args.read.memory);
     let mut slice = Slice::new(controls, &options, args.axis as usize, args.at);
     let mut column = None;
-    if args.show == Show::Slice && !slice.cells.is_empty() {
+    if args.show == ShowArg::Slice && !slice.cells.is_empty() {
         let weights: Weights =
             bind_positions(&slice.centers(), controls, args.solve.on_gpu(), &options)?.weights;
         slice.set_weights(weights).map_err(|e| CliError::file(Path::new("slice"), e))?;
@@ -267,18 +268,18 @@ fn slice(args: &RenderArgs, controls: Controls<'_>) -> Result<SliceView, CliErro
     Ok(SliceView { slice: Arc::new(slice), column })
 }
 
-fn text(done: &Rendered) -> String {
-    let [width, height] = done.size;
+fn text(summary: &RenderSummary) -> String {
+    let [width, height] = summary.size;
     let mut out = format!(
         "drew {width} x {height} pixels on {} in {:.0} ms\nwrote {}\n",
-        done.adapter,
-        done.render_ms,
-        shown(&done.output)
+        summary.adapter,
+        summary.render_ms,
+        shown(&summary.output)
     );
-    if let Some([left, right]) = done.compared {
+    if let Some([left, right]) = summary.compared {
         out += &format!("left: {left}; right: {right}\n");
     }
-    for notice in &done.notices {
+    for notice in &summary.notices {
         out += &format!("note: {notice}\n");
     }
     out

@@ -1,4 +1,4 @@
-//! Rigged models: what is bound with them, and what a reshape says.
+//! Rigged models: the points that are bound with them, and writing them deformed.
 
 use std::path::Path;
 
@@ -7,11 +7,11 @@ use glam::{DVec3, Vec3};
 
 use crate::error::CliError;
 
-/// Writes a rigged model deformed by one pose, or at rest with all poses as morph targets. `by`: displacements of all bound
-/// points for each pose; `outside`: those of them outside the cage.
+/// Encodes a rigged model deformed by one pose, or at rest with several poses as morph targets. `by`: displacements of all bound
+/// points, `[n_poses][n_points]`, object units; `outside`: indices of the points outside the cage.
 ///
 /// # Errors
-/// When the weights lack the rig's points, or the model cannot be written.
+/// If the weights lack the rig's points, or the model cannot be written.
 pub(crate) fn write(
     model: &Model,
     outside: &[u32],
@@ -27,7 +27,7 @@ pub(crate) fn write(
                 given.saturating_sub(n),
                 expected - n
             ),
-            hint: "bind the model again, or export it without its rig (--static)",
+            hint: "bind the model again, or write it without its rig (--static)",
         },
         e => CliError::file(output, e),
     };
@@ -39,10 +39,10 @@ pub(crate) fn write(
     model.write_reshaped(&rest, outside, &poses, options).map_err(wrong)
 }
 
-/// The points to bind: vertices, then those of the rig; and how many the latter are.
+/// Points to bind: the vertices, then the points of the rig. Also returns the number of the latter.
 ///
 /// # Errors
-/// When the rig cannot be read.
+/// If the rig cannot be read.
 pub(crate) fn points(model: &Model, name: &Path) -> Result<(Vec<Vec3>, usize), CliError> {
     let extra = model.extra_points().map_err(|e| CliError::file(name, e))?;
     let n = extra.len();

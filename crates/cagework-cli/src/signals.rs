@@ -1,61 +1,61 @@
-//! Ctrl-C, SIGTERM, SIGHUP and other ends, and the file-size limit: work is cancelled, and no file is left half written.
+//! Signals: cancel the work, or end the process without leaving a partial file.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Set by Ctrl-C or SIGTERM.
-static CANCELLED: AtomicBool = AtomicBool::new(false);
+/// Set by the first Ctrl-C, SIGTERM or SIGHUP.
+static IS_CANCELLED: AtomicBool = AtomicBool::new(false);
 
-/// How many pieces of work are under way that ask whether they are cancelled.
-static ASKING: AtomicUsize = AtomicUsize::new(0);
+/// Number of running operations that poll [`cancelled`].
+static N_POLLING: AtomicUsize = AtomicUsize::new(0);
 
-/// Whether Ctrl-C or SIGTERM came while work was under way.
+/// Whether a signal has cancelled the work.
 pub(crate) fn cancelled() -> bool {
-    CANCELLED.load(Ordering::SeqCst)
+    IS_CANCELLED.load(Ordering::SeqCst)
 }
 
-/// Work that asks whether it is [`cancelled`]; it is over when this is dropped.
-pub(crate) struct Asking(());
+/// Guard of an operation that polls [`cancelled`]. While one exists, the first signal cancels instead of ending the process.
+pub(crate) struct CancelGuard(());
 
-impl Asking {
+impl CancelGuard {
     pub(crate) fn start() -> Self {
-        ASKING.fetch_add(1, Ordering::SeqCst);
+        N_POLLING.fetch_add(1, Ordering::SeqCst);
         Self(())
     }
 }
 
-impl Drop for Asking {
+impl Drop for CancelGuard {
     fn drop(&mut self) {
-        ASKING.fetch_sub(1, Ordering::SeqCst);
+        N_POLLING.fetch_sub(1, Ordering::SeqCst);
     }
 }
 
-/// Starts to listen: the first Ctrl-C, SIGTERM or SIGHUP ends work in good order, if there is some that asks; any other of these
-/// signals, SIGQUIT, SIGXCPU or SIGUSR1 end the process through `abandon`, without the file that is being written.
+/// Installs the handlers. The first Ctrl-C, SIGTERM or SIGHUP cancels if an operation polls for it. A second one, SIGQUIT,
+/// SIGXCPU and SIGUSR1 end the process through `abandon`, which deletes the partial file. SIGXFSZ (`ulimit -f`) is ignored, so that
+/// the write fails with an error.
 #[cfg(unix)]
 pub(crate) fn listen(abandon: fn(&mut dyn FnMut())) {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1, SIGXCPU, SIGXFSZ};
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
 
-    // Without a handler a signal ends the program, which is what it is for.
+    // Without handlers the signals end the process, which is their default action.
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU, SIGUSR1, SIGXFSZ]) else {
         return;
     };
     std::thread::spawn(move || {
         for signal in signals.forever() {
-            // That somebody listens is enough: the write ends with an error, and not the process.
             if signal == SIGXFSZ {
                 continue;
             }
             let cancels = matches!(signal, SIGINT | SIGTERM | SIGHUP);
-            let first = cancels && !CANCELLED.swap(true, Ordering::SeqCst);
-            if !first || ASKING.load(Ordering::SeqCst) == 0 {
+            let first = cancels && !IS_CANCELLED.swap(true, Ordering::SeqCst);
+            if !first || N_POLLING.load(Ordering::SeqCst) == 0 {
                 abandon(&mut || drop(emulate_default_handler(signal)));
             }
         }
     });
 }
 
-/// Elsewhere a signal ends the program at once.
+/// On other systems signals keep their default action.
 #[cfg(not(unix))]
 pub(crate) fn listen(_abandon: fn(&mut dyn FnMut())) {}

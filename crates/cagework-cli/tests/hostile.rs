@@ -1,5 +1,5 @@
-//! Files that ask for endless work or memory: small ones of every kind, through five commands, within limits that the
-//! system enforces. The table of what each took is printed (`--nocapture`).
+//! Small files that try to provoke endless work or allocation: five commands on each, under limits of the operating system.
+//! Prints a table of times and memory (`--nocapture`).
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
 #![cfg(target_os = "linux")]
@@ -13,21 +13,21 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-/// Seconds that a command may take, of a build without optimisation.
+/// Time limit of a command, seconds; for a build without optimisation.
 const SECONDS: f64 = 10.0;
 
-/// Memory that a command may take, MB.
+/// Memory limit of a command, MB.
 const MEGABYTES: u64 = 1000;
 
-/// What one command took.
+/// Result of one command.
 struct Run {
     code: Option<i32>,
     seconds: f64,
     megabytes: u64,
-    said: String,
+    stderr: String,
 }
 
-/// Runs the command in `folder` with 4 GB of addresses and looks at its memory until it ends.
+/// Runs the command in `folder` with 4 GB of address space, and polls its memory until it ends.
 fn run(folder: &Path, args: &str) -> Run {
     let limits = format!("ulimit -v 4000000; exec timeout -s KILL {SECONDS} \"$0\" {args}");
     let stderr = folder.with_extension("stderr");
@@ -52,11 +52,11 @@ fn run(folder: &Path, args: &str) -> Run {
         code: status.code(),
         seconds: began.elapsed().as_secs_f64(),
         megabytes: kilobytes / 1000,
-        said: fs::read_to_string(stderr).unwrap(),
+        stderr: fs::read_to_string(stderr).unwrap(),
     }
 }
 
-/// Most memory that a process, or the one that it started, has had so far, kB.
+/// Peak memory so far of a process, or of its child process if it has one, kB.
 fn peak_of(process: u32) -> Option<u64> {
     let children = fs::read_to_string(format!("/proc/{process}/task/{process}/children")).ok()?;
     let process = children.split_whitespace().next().map_or(process.to_string(), str::to_owned);
@@ -68,10 +68,10 @@ fn peak_of(process: u32) -> Option<u64> {
 const TETRAHEDRON: [[f32; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 const V: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\n";
 const F: &str = "f 1/1 3/1 2/1\nf 1/1 2/1 4/1\nf 1/1 4/1 3/1\nf 2/1 3/1 4/1\n";
-/// Elements of an accessor of zeros.
-const MANY: u32 = 1 << 24;
+/// Length of the accessors of zeros.
+const N_ZEROS: u32 = 1 << 24;
 
-/// A tetrahedron as GLB, its document changed; accessor 2 is of `MANY` zeros.
+/// A tetrahedron as GLB after `change` of its document. Accessors 2 and 3 have `N_ZEROS` zeros and no buffer.
 fn glb(change: impl FnOnce(&mut Value)) -> Vec<u8> {
     let mut bin: Vec<u8> = TETRAHEDRON.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
     bin.extend([0_u16, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3].iter().flat_map(|i| i.to_le_bytes()));
@@ -81,8 +81,8 @@ fn glb(change: impl FnOnce(&mut Value)) -> Vec<u8> {
         "accessors": [
             { "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3" },
             { "bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR" },
-            { "componentType": 5126, "count": MANY, "type": "VEC3" },
-            { "componentType": 5125, "count": MANY, "type": "SCALAR" },
+            { "componentType": 5126, "count": N_ZEROS, "type": "VEC3" },
+            { "componentType": 5125, "count": N_ZEROS, "type": "SCALAR" },
         ],
         "bufferViews": [
             { "buffer": 0, "byteLength": 48 },
@@ -103,7 +103,7 @@ fn glb(change: impl FnOnce(&mut Value)) -> Vec<u8> {
     out
 }
 
-/// `n` nodes; `child(i)` hangs below node i.
+/// Gives the document `n` nodes with a mesh: as a chain of children, or all at the root.
 fn nodes(json: &mut Value, n: usize, is_chain: bool) {
     let node = |i: usize| {
         if is_chain && i + 1 < n { json!({ "mesh": 0, "children": [i + 1] }) } else { json!({ "mesh": 0 }) }
@@ -112,7 +112,7 @@ fn nodes(json: &mut Value, n: usize, is_chain: bool) {
     json["scenes"][0]["nodes"] = if is_chain { json!([0]) } else { (0..n).collect() };
 }
 
-/// An animation of `channels` channels that share one sampler of so many keys and values, all zeros.
+/// Gives the document an animation of `channels` channels that share one sampler with this number of keys and values, all zeros.
 fn clip(json: &mut Value, [keys, values]: [Value; 2], interpolation: &str, channels: usize) {
     json["accessors"].as_array_mut().unwrap().extend([
         json!({ "componentType": 5126, "count": keys, "type": "SCALAR" }),
@@ -123,7 +123,7 @@ fn clip(json: &mut Value, [keys, values]: [Value; 2], interpolation: &str, chann
         "samplers": [{ "input": 4, "output": 5, "interpolation": interpolation }] }]);
 }
 
-/// A corner of a star of `n` corners.
+/// Corner i of a star with `n` corners.
 fn star(i: usize, n: usize) -> [f64; 3] {
     let (angle, radius) = (std::f64::consts::TAU * i as f64 / n as f64, 1.0 - 0.5 * (i % 2) as f64);
     [radius * angle.cos(), radius * angle.sin(), 0.0]
@@ -133,7 +133,7 @@ const PLY_FACES: &[u8] =
     b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
     element face 3000000\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n";
 
-/// A file whose only face has `n` corners at three places.
+/// A file with a single face of `n` corners at three positions.
 fn ply_of_one_face(n: u32) -> Vec<u8> {
     let mut bytes =
         b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
@@ -145,14 +145,14 @@ fn ply_of_one_face(n: u32) -> Vec<u8> {
     bytes
 }
 
-/// A PNG of one colour.
+/// A black PNG.
 fn png(width: u32, height: u32) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     image::GrayImage::new(width, height).write_to(&mut bytes, image::ImageFormat::Png).unwrap();
     bytes.into_inner()
 }
 
-/// A polygon of `n` corners at `place(i)`.
+/// A polygon with corners `place(0)` to `place(n - 1)`, as OBJ.
 fn polygon(n: usize, place: impl Fn(usize) -> [f64; 3]) -> String {
     let mut text: String = (0..n).map(place).map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
     text.push('f');
@@ -160,7 +160,7 @@ fn polygon(n: usize, place: impl Fn(usize) -> [f64; 3]) -> String {
     text
 }
 
-/// A number from 0 to 1, the same in each run.
+/// A pseudorandom number from 0 to 1, the same in each run.
 fn noise(i: usize) -> f64 {
     (i as f64 * 12.9898).sin().mul_add(43_758.545, 0.0).rem_euclid(1.0)
 }
@@ -173,7 +173,7 @@ fn triangles_that_all_meet(n: usize) -> String {
     text
 }
 
-/// Every kind of file, small, by name; those without a name of a model are only named by others.
+/// All files by name; some are materials and textures that the models name.
 fn files() -> Vec<(&'static str, Vec<u8>)> {
     let obj = |head: &str| format!("{head}{V}usemtl a\n{F}").into_bytes();
     let textured: String = (0..40).map(|i| format!("usemtl a{i}\n{F}")).collect();
@@ -226,8 +226,8 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
             "skin_zero.glb",
             glb(|d| {
                 d["accessors"].as_array_mut().unwrap().extend([
-                    json!({ "componentType": 5121, "count": MANY, "type": "VEC4" }),
-                    json!({ "componentType": 5126, "count": MANY, "type": "VEC4" }),
+                    json!({ "componentType": 5121, "count": N_ZEROS, "type": "VEC4" }),
+                    json!({ "componentType": 5126, "count": N_ZEROS, "type": "VEC4" }),
                 ]);
                 d["meshes"][0]["primitives"][0] =
                     json!({ "attributes": { "POSITION": 2, "JOINTS_0": 4, "WEIGHTS_0": 5 } });
@@ -299,23 +299,27 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// What may be said when something is refused, and nothing else.
-fn assert_in_good_order(what: &str, run: &Run) {
+/// Asserts that the command succeeded, or failed with an error message, within the memory limit.
+fn assert_orderly_end(name: &str, run: &Run) {
     assert!(
         matches!(run.code, Some(0 | 1)),
-        "{what}: {:?} after {:.1} s: {}",
+        "{name}: {:?} after {:.1} s: {}",
         run.code,
         run.seconds,
-        run.said
+        run.stderr
     );
-    assert!(run.code == Some(0) || run.said.starts_with("error: "), "{what}: {}", run.said);
-    assert!(!run.said.contains("panicked") && !run.said.contains("is not there"), "{what}: {}", run.said);
-    assert!(run.megabytes <= MEGABYTES, "{what}: {} MB", run.megabytes);
+    assert!(run.code == Some(0) || run.stderr.starts_with("error: "), "{name}: {}", run.stderr);
+    assert!(
+        !run.stderr.contains("panicked") && !run.stderr.contains("is not there"),
+        "{name}: {}",
+        run.stderr
+    );
+    assert!(run.megabytes <= MEGABYTES, "{name}: {} MB", run.megabytes);
 }
 
 #[test]
-fn every_command_ends_with_a_result_or_a_sentence() {
-    // They stay there: the page's tests drop them too (web/e2e/hostile.spec.ts).
+fn every_command_ends_with_success_or_an_error_message() {
+    // The files are kept, because the page's tests open them too (web/e2e/hostile.spec.ts).
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("hostile");
     let (folder, files) = (folder.as_path(), files());
     fs::create_dir_all(folder).unwrap();
@@ -333,25 +337,29 @@ fn every_command_ends_with_a_result_or_a_sentence() {
             "render FILE -o ../out.png --size 64x64",
         ] {
             let run = run(folder, &command.replace("FILE", name));
-            let (word, said) =
-                (command.split(' ').next().unwrap(), run.said.lines().next().unwrap_or_default());
-            let (code, seconds, said) =
-                (run.code.unwrap_or(-1), run.seconds, said.chars().take(100).collect::<String>());
-            writeln!(table, "| {name} | {word} | {code} | {seconds:.1} | {} | {said} |", run.megabytes)
-                .unwrap();
-            assert_in_good_order(&format!("{table}\n{name}, {word}"), &run);
+            let (subcommand, message) =
+                (command.split(' ').next().unwrap(), run.stderr.lines().next().unwrap_or_default());
+            let (code, seconds, message) =
+                (run.code.unwrap_or(-1), run.seconds, message.chars().take(100).collect::<String>());
+            writeln!(
+                table,
+                "| {name} | {subcommand} | {code} | {seconds:.1} | {} | {message} |",
+                run.megabytes
+            )
+            .unwrap();
+            assert_orderly_end(&format!("{table}\n{name}, {subcommand}"), &run);
         }
     }
     std::io::stdout().write_all(table.as_bytes()).unwrap();
 }
 
-/// On a file with repeated positions it was a ten thousandth of what was used.
+/// Files with repeated, distinct and instanced positions, because weights are shared by equal positions only.
 #[test]
-fn estimate_is_near_the_memory_that_is_used() {
+fn memory_estimate_is_near_the_peak() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let points = |n: usize, different: usize| {
-        let place = |i: usize| [0, 1, 2].map(|k| noise(3 * (i % different) + k));
+    let points = |n: usize, distinct: usize| {
+        let place = |i: usize| [0, 1, 2].map(|k| noise(3 * (i % distinct) + k));
         let vertices: String =
             (0..n).map(place).map(|[x, y, z]| format!("v {x:.5} {y:.5} {z:.5}\n")).collect();
         let faces = (0..n / 3).map(|i| format!("f {} {} {}\n", 3 * i + 1, 3 * i + 2, 3 * i + 3));
@@ -359,27 +367,27 @@ fn estimate_is_near_the_memory_that_is_used() {
     };
     fs::write(folder.join("tetrahedron.glb"), glb(|_| ())).unwrap();
     fs::write(folder.join("repeated.obj"), points(600_000, 500)).unwrap();
-    fs::write(folder.join("different.obj"), points(200_000, 200_000)).unwrap();
+    fs::write(folder.join("distinct.obj"), points(200_000, 200_000)).unwrap();
     let many = glb(|d| {
         nodes(d, 60_000, false);
         let nodes = d["nodes"].as_array_mut().unwrap().iter_mut().enumerate();
         nodes.for_each(|(i, node)| node["translation"] = json!([i as f64 * 1e-5, 0.0, 0.0]));
     });
     fs::write(folder.join("nodes.glb"), many).unwrap();
-    let of_program = run(folder, "bind tetrahedron.glb --cage box:2 -g 8").megabytes;
+    let program = run(folder, "bind tetrahedron.glb --cage box:2 -g 8").megabytes;
     for bind in [
         "repeated.obj --cage box:2 -g 16 --weights out.npz",
-        "different.obj --cage box:2 -g 16",
+        "distinct.obj --cage box:2 -g 16",
         "nodes.glb --cage box:2 -g 16",
         "tetrahedron.glb --cage box:4 -g 80 --threads 8",
     ] {
         let run = run(folder, &format!("bind {bind} --report report.json"));
-        assert_eq!(run.code, Some(0), "{bind}: {}", run.said);
+        assert_eq!(run.code, Some(0), "{bind}: {}", run.stderr);
         let report: Value = serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap();
         let estimated = report["memory_bytes"]["estimated"].as_f64().unwrap() / 1e6;
-        let used = (run.megabytes - of_program) as f64;
+        let used = (run.megabytes - program) as f64;
         println!("{bind}: {estimated:.0} MB estimated, {used} MB used");
-        // The peak of a run differs by a tenth from that of the next: threads free their fields in another order.
+        // Peaks differ by a tenth between runs, because threads free their fields in a different order.
         assert!(
             (0.75..=1.35).contains(&(estimated / used)),
             "{bind}: {estimated:.0} MB estimated, {used} MB used"

@@ -1,4 +1,4 @@
-//! What can be said about cages: where one comes from, how one is made, what is checked and mended.
+//! Arguments about cages: where a cage comes from, how it is generated, checked and repaired.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -9,16 +9,16 @@ use clap::{Args, ValueEnum};
 
 use super::{MemoryArgs, ModelOutput, ReadArgs, SmoothArgs, fraction, positive};
 
-/// Quads along each edge of a box cage unless said otherwise.
+/// Default number of quads along each edge of a box cage.
 pub(crate) const DEFAULT_DIVISIONS: u32 = 2;
-/// Room around the model in a box cage, as a fraction of its bounding box's diagonal.
+/// Default distance between the model and a box cage, as a fraction of the diagonal of the model's bounding box.
 pub(crate) const DEFAULT_MARGIN: f32 = 0.05;
-/// 16 divisions make 1,538 cage vertices: more than anyone moves by hand, and still solved in minutes.
+/// Largest number of quads along each edge of a box cage: 16 give 1,538 vertices, which are solved in minutes.
 const MAX_DIVISIONS: u32 = 16;
-/// Vertices of a generated cage unless said otherwise: enough for body, head and four limbs.
-const DEFAULT_TARGET: u32 = 80;
-/// Vertices of a hull unless said otherwise.
-const DEFAULT_HULL: u32 = 24;
+/// Default number of vertices of a generated cage: enough for a body, a head and four limbs.
+const DEFAULT_VERTICES: u32 = 80;
+/// Default number of vertices of a hull.
+const DEFAULT_HULL_VERTICES: u32 = 24;
 
 /// `cagework cage`
 #[derive(Args, Debug)]
@@ -32,50 +32,50 @@ pub(crate) struct CageArgs {
     pub(crate) model: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
-    /// File to write (.obj keeps the cage's vertices as they are, .glb opens anywhere).
+    /// File to write (.obj keeps the order of the cage's vertices; .glb opens in any viewer).
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,
-    /// What the cage follows: the model limb by limb, its box, or its convex hull
+    /// Kind of cage: auto follows the model's limbs, box is its bounding box, hull its convex hull
     /// [default: auto; box if --divisions is given].
     #[arg(long, value_enum)]
     pub(crate) kind: Option<KindArg>,
-    /// Most vertices of the cage, 8 to 400: a shape that needs fewer gets fewer [default: 80; 24 for a hull].
+    /// Maximum number of vertices of the cage, 8 to 400; simple shapes get fewer [default: 80; 24 for a hull].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(i64::from(MIN_TARGET)..=i64::from(MAX_TARGET)))]
     pub(crate) vertices: Option<u32>,
-    /// How far the cage may be from the model's shape, as a fraction of its longest side, 0.005 to 0.2.
+    /// Largest distance of the cage from the model's surface, as a fraction of the model's longest side, 0.005 to 0.2.
     #[arg(long, default_value_t = CageOptions::default().detail, value_name = "FRACTION", value_parser = super::number::<f32>(DETAIL))]
     pub(crate) detail: f32,
-    /// Triangles only, no quads.
+    /// Triangles only; no quads.
     #[arg(long)]
     pub(crate) triangles: bool,
-    /// Make the cage its own mirror image: if the model is (auto), never, or along an axis in any case.
+    /// Make the cage symmetric: if the model is symmetric (auto), never (none), or always across one axis.
     #[arg(long, default_value_t, value_parser = super::words::<Symmetry>())]
     pub(crate) symmetry: Symmetry,
-    /// One closed part for each separate part of the model, instead of bridges between them.
+    /// One closed part per connected component of the model, without bridges between them.
     #[arg(long)]
     pub(crate) per_component: bool,
-    /// Distance to keep from the model, as a fraction of its bounding box's diagonal [default: half a voxel].
+    /// Minimum distance from the model, as a fraction of the diagonal of its bounding box [default: half a voxel].
     /// Gaps up to twice as wide are closed.
     #[arg(long, default_value_t = 0.0, value_name = "FRACTION", value_parser = fraction)]
     pub(crate) clearance: f32,
-    /// Voxels along the model's longest side, 8 to 128; gaps below three of them are closed. 0: by the vertices.
+    /// Voxels along the model's longest side, 8 to 128; gaps narrower than three voxels are closed. 0: derived from --vertices.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub(crate) voxels: u32,
     #[command(flatten)]
     pub(crate) smooth: SmoothArgs,
-    /// Name of a clip of which the cage encloses every frame, too.
+    /// Enclose every frame of the clip with this name as well.
     #[arg(long, value_name = "NAME")]
     pub(crate) around_clip: Option<String>,
-    /// Quads along each edge of a box.
+    /// Quads along each edge of a box cage.
     #[arg(long, value_name = "N", value_parser = divisions)]
     pub(crate) divisions: Option<u32>,
-    /// Room around the model in a box, as a fraction of its bounding box's diagonal.
+    /// Distance between the model and a box cage, as a fraction of the diagonal of the model's bounding box.
     #[arg(long, default_value_t = DEFAULT_MARGIN, value_name = "FRACTION", value_parser = positive)]
     pub(crate) margin: f32,
 }
 
 impl CageArgs {
-    /// The kind that was asked for, by name or by an option that only one kind has.
+    /// The kind: given by --kind, or implied by --divisions.
     pub(crate) fn kind(&self) -> KindArg {
         let guess = if self.divisions.is_some() { KindArg::Box } else { KindArg::Auto };
         self.kind.unwrap_or(guess)
@@ -85,7 +85,7 @@ impl CageArgs {
     pub(crate) fn options(&self) -> CageOptions {
         let hull = self.kind() == KindArg::Hull;
         CageOptions {
-            target: self.vertices.unwrap_or(if hull { DEFAULT_HULL } else { DEFAULT_TARGET }),
+            target: self.vertices.unwrap_or(if hull { DEFAULT_HULL_VERTICES } else { DEFAULT_VERTICES }),
             detail: self.detail,
             quads: !self.triangles,
             shape: if hull { Shape::Hull } else { Shape::Follow },
@@ -100,26 +100,26 @@ impl CageArgs {
 
 /// `cagework check`
 #[derive(Args, Debug)]
-#[command(after_help = "The exit code is 1 if the mesh cannot be used as a cage.\n\n\
+#[command(after_help = "The exit code is 1 if the mesh is not a valid cage.\n\n\
     Examples:\n  \
     cagework check cage.obj\n  \
     cagework check cage.obj --mesh horse.glb -g 64 --json\n  \
     cagework check cage.obj --repair weld,fill-holes,flip -o mended.obj\n  \
     cagework check cage.obj --mesh horse.glb --repair grow -o grown.obj")]
 pub(crate) struct CheckArgs {
-    /// The cage.
-    #[arg(help = super::model_help("The cage"))]
+    /// Cage to check.
+    #[arg(help = super::model_help("Cage to check"))]
     pub(crate) cage: PathBuf,
-    /// The model that should be inside.
+    /// Model that should be inside the cage.
     #[arg(long, value_name = "FILE")]
     pub(crate) mesh: Option<PathBuf>,
-    /// Look for parts thinner than a cell of a grid with so many cells, 8 to 512.
+    /// Report parts of the cage thinner than a cell of a grid with this many cells along its longest side, 8 to 512.
     #[arg(short, long, default_value_t = 64, value_parser = super::number::<u32>(cagework_core::options::GRID))]
     pub(crate) grid: u32,
-    /// Mend it first; several, separated by commas.
+    /// Repairs to apply before the check; several, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT", requires = "output")]
     pub(crate) repair: Vec<RepairArg>,
-    /// Write the mended cage; the name's ending says the format.
+    /// File for the repaired cage; the extension selects the format.
     #[arg(short, long, value_name = "FILE", requires = "repair")]
     pub(crate) output: Option<ModelOutput>,
     #[command(flatten)]
@@ -131,7 +131,6 @@ pub(crate) struct CheckArgs {
 /// Where a cage comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum CageSource {
-    /// A file.
     File(PathBuf),
     /// A subdivided box around the mesh.
     Box {
@@ -153,8 +152,8 @@ impl FromStr for CageSource {
         };
         match kind {
             "box" => Ok(Self::Box { divisions: number.map_or(Ok(DEFAULT_DIVISIONS), divisions)? }),
-            "auto" => generated(Shape::Follow, DEFAULT_TARGET),
-            "hull" => generated(Shape::Hull, DEFAULT_HULL),
+            "auto" => generated(Shape::Follow, DEFAULT_VERTICES),
+            "hull" => generated(Shape::Hull, DEFAULT_HULL_VERTICES),
             _ => Ok(Self::File(PathBuf::from(text))),
         }
     }
@@ -171,17 +170,17 @@ pub(crate) enum KindArg {
 /// Repairs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum RepairArg {
-    /// Join vertices at one place.
+    /// Merge vertices at the same position.
     Weld,
-    /// Drop faces without area, doubled faces and unused vertices.
+    /// Remove faces of zero area, duplicate faces and unused vertices.
     DropDegenerate,
-    /// Add the other half of a cage that ends in a plane across an axis.
+    /// Complete half a cage: reflect it across its planar open boundary.
     Mirror,
     /// Close holes.
     FillHoles,
-    /// Turn faces outward.
+    /// Orient all faces outward.
     Flip,
-    /// Move vertices outward until the model is inside.
+    /// Move vertices outward until the cage encloses the model.
     Grow,
 }
 
@@ -201,15 +200,15 @@ impl From<RepairArg> for Repair {
 fn divisions(text: &str) -> Result<u32, String> {
     match text.parse() {
         Ok(n) if (1..=MAX_DIVISIONS).contains(&n) => Ok(n),
-        _ => Err(format!("divisions of a box cage are a whole number from 1 to {MAX_DIVISIONS}")),
+        _ => Err(format!("divisions of a box cage: expected a whole number from 1 to {MAX_DIVISIONS}")),
     }
 }
 
 fn target(text: &str) -> Result<u32, String> {
     match text.parse() {
         Ok(n) if (MIN_TARGET..=MAX_TARGET).contains(&n) => Ok(n),
-        _ => {
-            Err(format!("vertices of a generated cage are a whole number from {MIN_TARGET} to {MAX_TARGET}"))
-        }
+        _ => Err(format!(
+            "vertices of a generated cage: expected a whole number from {MIN_TARGET} to {MAX_TARGET}"
+        )),
     }
 }

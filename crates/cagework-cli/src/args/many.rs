@@ -1,4 +1,4 @@
-//! Many models in one cage.
+//! Arguments of `cagework refit`.
 
 use std::path::PathBuf;
 
@@ -10,34 +10,34 @@ use super::{ControlArgs, ReadArgs, RigArgs, SolveArgs, number};
 /// `cagework refit`
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Each model is written under its own name (a .gltf as .glb) as soon as it is done. What fails is named, and \
-    the rest goes on; the exit code is 1 then.\n\n\
+    after_help = "Each model is written under its own name (.gltf as .glb) as soon as it is done. If a model fails, the \
+    error is printed and the other models are still written; the exit code is then 1.\n\n\
     Examples:\n  \
     cagework refit jacket.glb trousers.glb --cage body.obj --pose bulky.obj -o out\n  \
     cagework refit --manifest garments.txt --cage body.obj --pose bulky.obj -o out --resume --json"
 )]
 pub(crate) struct RefitArgs {
-    /// Models in the cage.
-    #[arg(value_name = "MODEL", required_unless_present = "manifest", help = super::model_help("Models in the cage"))]
+    /// Models inside the cage.
+    #[arg(value_name = "MODEL", required_unless_present = "manifest", help = super::model_help("Models inside the cage"))]
     pub(crate) models: Vec<PathBuf>,
-    /// Read the names of more models from a text file, one a line; empty lines and those that begin with # say nothing.
+    /// Text file with more models, one name per line; empty lines and lines that start with # are ignored.
     #[arg(long, value_name = "FILE")]
     pub(crate) manifest: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
-    /// The cage of all of them, a file.
+    /// File of the cage that encloses all models.
     #[arg(long, value_name = "FILE")]
     pub(crate) cage: PathBuf,
-    /// The cage, moved: same vertices in the same order.
+    /// Moved cage: the same vertices in the same order.
     #[arg(long, value_name = "FILE")]
     pub(crate) pose: PathBuf,
-    /// The controls inside, moved (.obj): same vertices in the same order; at rest unless given.
+    /// Moved inner controls (.obj): the same vertices in the same order [default: at rest].
     #[arg(long, value_name = "FILE", requires = "controls")]
     pub(crate) pose_controls: Option<PathBuf>,
-    /// Folder to write to; it is made if it is missing.
+    /// Folder to write to; created if it does not exist.
     #[arg(short, long, value_name = "FOLDER")]
     pub(crate) output: PathBuf,
-    /// Leave what is newer than its model, cage, pose and controls. Options are not looked at.
+    /// Skip outputs that are newer than their model, cage, pose and controls. Options are not compared.
     #[arg(long)]
     pub(crate) resume: bool,
     /// Cells along the longest side of the cage, 8 to 512.

@@ -1,4 +1,4 @@
-//! A bound model whose cage is posed by the program.
+//! Arguments of commands that solve for a pose of the cage: `pull` and `fit`.
 
 use std::path::PathBuf;
 
@@ -7,29 +7,29 @@ use clap::Args;
 
 use super::{CageSource, ControlArgs, ModelOutput, ReadArgs, model_help, number, obj_output};
 
-/// What is posed, and where the pose goes.
+/// The bound model, and the files for the resulting pose.
 #[derive(Args, Debug)]
 pub(crate) struct PoseArgs {
-    /// The mesh that was bound.
-    #[arg(help = model_help("The mesh that was bound"))]
+    /// Mesh that was bound.
+    #[arg(help = model_help("Mesh that was bound"))]
     pub(crate) mesh: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArgs,
-    /// The cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
+    /// Cage that it was bound to: a file, or the same auto:VERTICES, hull:VERTICES or box:DIVISIONS.
     #[arg(long, value_name = "CAGE")]
     pub(crate) cage: CageSource,
-    /// The weights that `cagework bind --weights` wrote.
+    /// Weights that `cagework bind --weights` wrote.
     #[arg(long, value_name = "FILE")]
     pub(crate) weights: PathBuf,
-    /// The cage's pose to write; the name's ending says the format.
+    /// File for the pose of the cage; the extension selects the format.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: ModelOutput,
-    /// Cells along the longest side of the cage, for the gradients of the weights.
+    /// Cells along the longest side of the cage; the solver samples the gradients of the weights on this grid.
     #[arg(short, long, default_value_t = 64, value_parser = number::<u32>(options::GRID))]
     pub(crate) grid: u32,
     #[command(flatten)]
     pub(crate) controls: ControlArgs,
-    /// The pose of the controls inside to write (.obj).
+    /// File for the pose of the inner controls (.obj).
     #[arg(long, value_name = "FILE", requires = "controls", value_parser = obj_output)]
     pub(crate) save_controls: Option<PathBuf>,
 }
@@ -39,22 +39,22 @@ pub(crate) struct PoseArgs {
 #[command(after_help = "LANDMARKS is a list of pairs, such as\n\n  \
     [{\"vertex\": 1204, \"to\": [0.4, 1.1, 0]},\n   {\"triangle\": 88, \"bary\": [0.2, 0.3, 0.5], \"to\": [0, 1, 0]},\n   \
     {\"point\": [0.1, 1.7, 0.1], \"to\": [0.1, 1.9, 0.2]}]\n\n\
-    A landmark is a vertex of the model, a point of a triangle, or the point of the model that is nearest to a place. \
-    \"weight\" says how much it counts, 1 unless given.\n\n\
+    A landmark is a vertex of the model, a point of a triangle, or the model's closest point to a position. \
+    \"weight\" is its weight in the sum, 1 by default.\n\n\
     Examples:\n  cagework fit shirt.glb --cage cage.obj --weights shirt.npz --target shirt-large.glb -o large.obj\n  \
     cagework fit shirt.glb --cage cage.obj --weights shirt.npz --landmarks body.json -o body.obj")]
 #[command(group = clap::ArgGroup::new("to").required(true).args(["target", "landmarks"]))]
 pub(crate) struct FitArgs {
     #[command(flatten)]
     pub(crate) pose: PoseArgs,
-    /// The model as it should be: the same vertices in the same order.
+    /// Target model: the same vertices in the same order.
     #[arg(long, value_name = "MESH")]
     pub(crate) target: Option<PathBuf>,
-    /// Where points of the model should be, as JSON.
+    /// Target positions of points of the model, as JSON.
     #[arg(long, value_name = "FILE")]
     pub(crate) landmarks: Option<PathBuf>,
-    /// How much bending counts beside the distance from the target; unless given, as much as the noise of the target asks for, and 1e-5
-    /// with landmarks.
+    /// Weight of the bending energy relative to the squared distance from the target [default: estimated from the noise of
+    /// the target; 1e-5 with landmarks].
     #[arg(long, value_name = "NUMBER")]
     pub(crate) lambda: Option<f64>,
 }

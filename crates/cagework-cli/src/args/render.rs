@@ -11,14 +11,16 @@ use super::{CageSource, ControlArgs, ReadArgs, SolveArgs, output};
 
 /// `cagework render`
 #[derive(Args, Debug)]
-#[command(after_help = "What needs weights binds the model first, unless --weights brings them.\n\n\
+#[command(
+    after_help = "The model is bound first if the picture needs weights and --weights is not given.\n\n\
     Examples:\n  \
     cagework render horse.glb -o horse.png\n  \
     cagework render horse.glb --cage cage.obj --pose gallop.obj -o gallop.png\n  \
     cagework render horse.glb --cage cage.obj --pose gallop.obj --compare -o beside-mean-value.png\n  \
     cagework render horse.glb --cage cage.obj --show weights --column 17 -o weights.png\n  \
     cagework render horse.glb --cage cage.obj --show wireframe --method classic -g 16 --no-cage -o figure-4.png\n  \
-    cagework render horse.glb --cage cage.obj --show cells --axis x --at 0.5 --theme light -o cells.png")]
+    cagework render horse.glb --cage cage.obj --show cells --axis x --at 0.5 --theme light -o cells.png"
+)]
 pub(crate) struct RenderArgs {
     /// Model to draw.
     #[arg(help = super::model_help("Model to draw"))]
@@ -30,54 +32,54 @@ pub(crate) struct RenderArgs {
         ("show", "wireframe"), ("show", "weights"), ("show", "error"), ("show", "cells"), ("show", "slice"),
     ])]
     pub(crate) cage: Option<CageSource>,
-    /// The cage, moved: the model follows.
+    /// Moved cage that deforms the model.
     #[arg(long, value_name = "FILE", requires = "cage")]
     pub(crate) pose: Option<PathBuf>,
-    /// The controls inside, moved (.obj).
+    /// Moved inner controls (.obj).
     #[arg(long, value_name = "FILE", requires_all = ["pose", "controls"])]
     pub(crate) pose_controls: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) controls: ControlArgs,
-    /// Weights that `cagework bind --weights` wrote, instead of binding here.
+    /// Weights that `cagework bind --weights` wrote; without them the model is bound first.
     #[arg(long, value_name = "FILE", requires = "cage")]
     pub(crate) weights: Option<PathBuf>,
-    /// Draw two pictures side by side: on the left as always, on the right moved by other coordinates.
+    /// Draw two pictures side by side: harmonic coordinates on the left, these coordinates on the right.
     #[arg(long, value_enum, num_args = 0..=1, default_missing_value = "mean-value", requires = "cage")]
-    pub(crate) compare: Option<Compared>,
+    pub(crate) compare: Option<CompareArg>,
     /// What to draw.
-    #[arg(long, value_enum, default_value_t = Show::Solid)]
-    pub(crate) show: Show,
+    #[arg(long, value_enum, default_value_t = ShowArg::Solid)]
+    pub(crate) show: ShowArg,
     /// Cage vertex whose weights are drawn, counted from 0.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub(crate) column: u32,
-    /// Axis that a slice lies across.
+    /// Axis perpendicular to the slice.
     #[arg(long, value_enum, default_value_t = AxisArg::Z)]
     pub(crate) axis: AxisArg,
-    /// Where along the axis, 0 to 1.
+    /// Position of the slice along the axis, 0 to 1.
     #[arg(long, default_value_t = 0.5, value_name = "FRACTION")]
     pub(crate) at: f32,
     /// Width and height in pixels.
     #[arg(long, default_value = "1280x960", value_name = "WxH")]
     pub(crate) size: Size,
-    /// Pixels per unit of line widths and handle sizes: 2 for pictures that are shown at half their size.
+    /// Pixels per unit of line widths and handle sizes; use 2 for pictures that are displayed at half their size.
     #[arg(long, default_value_t = 1.0, value_parser = super::positive)]
     pub(crate) scale: f32,
-    /// Colours of the surroundings.
+    /// Colours of background and floor.
     #[arg(long, value_enum, default_value_t = ThemeArg::Dark)]
     pub(crate) theme: ThemeArg,
-    /// From where: default, front, back, left, right, top, bottom, or YAW,PITCH in degrees (0,0 is front; pitch looks down).
+    /// Camera direction: default, front, back, left, right, top, bottom, or YAW,PITCH in degrees (0,0 is the front; positive pitch looks down).
     #[arg(long, default_value = "default", allow_hyphen_values = true)]
     pub(crate) view: View,
-    /// Draw without perspective.
+    /// Use an orthographic projection.
     #[arg(long)]
     pub(crate) orthographic: bool,
-    /// Draw no cage.
+    /// Hide the cage.
     #[arg(long)]
     pub(crate) no_cage: bool,
-    /// Draw the cage without its vertices.
+    /// Hide the vertices of the cage.
     #[arg(long)]
     pub(crate) no_handles: bool,
-    /// Draw no floor.
+    /// Hide the floor.
     #[arg(long)]
     pub(crate) no_floor: bool,
     /// Picture to write (.png).
@@ -90,39 +92,39 @@ pub(crate) struct RenderArgs {
     pub(crate) solve: SolveArgs,
 }
 
-/// Coordinates by formula, to compare harmonic ones with.
+/// Coordinates to compare harmonic coordinates with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Compared {
-    /// Mean value coordinates, which see through the cage's walls.
+pub(crate) enum CompareArg {
+    /// Mean value coordinates (closed form; a vertex also moves parts of the model across a gap of the cage).
     MeanValue,
-    /// Green coordinates, which keep the shape of details and are not held inside the cage.
+    /// Green coordinates (closed form; they preserve the shape of details and do not interpolate the cage).
     Green,
-    /// Harmonic coordinates of the plain cage, beside those of --smooth and --controls.
+    /// Harmonic coordinates of the cage without --smooth and --controls.
     Plain,
 }
 
-/// What is drawn.
+/// What to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Show {
+pub(crate) enum ShowArg {
     /// The model with its materials.
     Solid,
-    /// The model in one plain colour.
+    /// The model in one colour.
     Clay,
     /// The model with its edges.
     Edges,
-    /// The rest pose as the weights reconstruct it, under a wireframe of the model: the paper's figures 2 to 5.
+    /// The rest pose reconstructed from the weights, with the base mesh as a wireframe: the paper's figures 2 to 5.
     Wireframe,
     /// Weights of one cage vertex as colours.
     Weights,
-    /// How far the weights miss the rest pose, as colours, logarithmic.
+    /// Distance between the reconstructed and the true rest position, as colours on a logarithmic scale.
     Error,
-    /// A slice of the grid: kinds of cells.
+    /// A slice of the grid: interior, boundary and exterior cells.
     Cells,
-    /// A slice of the grid: values of one cage vertex.
+    /// A slice of the grid: weights of one cage vertex.
     Slice,
 }
 
-/// An axis.
+/// A coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum AxisArg {
     X,
@@ -130,7 +132,7 @@ pub(crate) enum AxisArg {
     Z,
 }
 
-/// Colours of the surroundings.
+/// Colours of background and floor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ThemeArg {
     Dark,
@@ -146,7 +148,7 @@ impl From<ThemeArg> for Theme {
     }
 }
 
-/// Width and height of a picture.
+/// Width and height of a picture, pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Size(pub(crate) [u32; 2]);
 
@@ -156,12 +158,12 @@ impl FromStr for Size {
     fn from_str(text: &str) -> Result<Self, String> {
         let side = |text: &str| text.parse().ok().filter(|s| (1..=MAX_PICTURE).contains(s));
         text.split_once('x').and_then(|(width, height)| Some(Self([side(width)?, side(height)?]))).ok_or_else(
-            || format!("a size is WIDTHxHEIGHT, such as 800x600, with sides of 1 to {MAX_PICTURE}"),
+            || format!("expected WIDTHxHEIGHT, such as 800x600, with sides of 1 to {MAX_PICTURE}"),
         )
     }
 }
 
-/// From where a picture is taken.
+/// Camera direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct View {
     yaw: f32,
@@ -192,7 +194,7 @@ impl FromStr for View {
                 let angle = |text: &str| text.trim().parse::<f32>().ok().filter(|a| a.is_finite());
                 let angles = text.split_once(',').and_then(|(y, p)| Some((angle(y)?, angle(p)?)));
                 let (yaw, pitch) = angles.filter(|(_, pitch)| pitch.abs() <= 90.0).ok_or(
-                    "a view is default, front, back, left, right, top, bottom or YAW,PITCH in degrees",
+                    "expected default, front, back, left, right, top, bottom or YAW,PITCH in degrees",
                 )?;
                 return Ok(Self { yaw: yaw.to_radians(), pitch: pitch.to_radians() });
             }

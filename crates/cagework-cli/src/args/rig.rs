@@ -1,4 +1,4 @@
-//! What becomes of a rig.
+//! Arguments about rigged models and parts of models.
 
 use std::path::Path;
 
@@ -7,14 +7,14 @@ use clap::{Args, ValueEnum};
 
 use crate::error::CliError;
 
-/// What of a model the cage does not bend.
+/// Parts of a model that the cage does not bend.
 #[derive(Args, Debug)]
 pub(crate) struct PartArgs {
-    /// A part that keeps its shape, piece by piece: buckles, eyes, teeth. The name of a material, a node, a joint (the vertices
-    /// it holds most) or an OBJ group; where several have it, material:NAME, node:NAME and so on. May be given several times.
+    /// Part that keeps its shape, such as buckles, eyes or teeth: each connected piece moves rigidly. The name of a material, a node,
+    /// a joint (the vertices it influences most) or an OBJ group; use material:NAME, node:NAME, joint:NAME or group:NAME if several have the name. May be given several times.
     #[arg(long, value_name = "NAME")]
     rigid: Vec<String>,
-    /// A part that stays as it is, named in the same way; =0.5 after the name lets it follow half the way. May be given several
+    /// Part that stays in place, named as for --rigid; with =0.5 after the name it follows half the way. May be given several
     /// times.
     #[arg(long, value_name = "NAME[=AMOUNT]", value_parser = mask)]
     mask: Vec<(String, f32)>,
@@ -28,27 +28,28 @@ fn mask(text: &str) -> Result<(String, f32), String> {
     if (0.0..=1.0).contains(&amount) {
         return Ok((name.to_owned(), amount));
     }
-    Err(format!("the amount {amount} is not between 0, which follows the cage, and 1, which stays"))
+    Err(format!("the amount is {amount}; expected 0 (follows the cage) to 1 (stays in place)"))
 }
 
-/// How a rigged model is deformed.
+/// Treatment of the rig of a model.
 #[derive(Args, Debug)]
 pub(crate) struct RigArgs {
-    /// What joints, and other nodes that clips move or that carry meshes, do: follow the cage and keep their directions; stay where they are, for skeletons that other files share; or
-    /// turn with the shape as well.
+    /// Joints, and other nodes that clips animate or that carry meshes: follow moves them with the cage and keeps their rotations; stay leaves
+    /// them, for skeletons that several files share; turn also rotates them with the shape.
     #[arg(long, value_enum, default_value_t = JointsArg::Follow)]
     joints: JointsArg,
-    /// Keep how far clips travel; otherwise it grows as the height of the hips does.
+    /// Keep the travel distance of clips; by default it is scaled with the height of the hips.
     #[arg(long)]
     keep_travel: bool,
     #[command(flatten)]
     pub(crate) parts: PartArgs,
-    /// Write the shape alone: no skin, no morph targets but those of several poses.
+    /// Write the mesh only, without skin and clips; several poses still become morph targets.
     #[arg(long = "static")]
-    pub(crate) plain: bool,
+    pub(crate) shape_only: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
+/// Treatment of joints.
 enum JointsArg {
     Follow,
     Stay,
@@ -56,19 +57,19 @@ enum JointsArg {
 }
 
 impl RigArgs {
-    /// As the library takes them.
+    /// Options of a reshape.
     ///
     /// # Errors
-    /// When the model has no part of a name.
+    /// If no part of the model has a given name.
     pub(crate) fn options(&self, model: &Model, path: &Path) -> Result<ReshapeOptions, CliError> {
         self.options_with(model, path, &self.parts)
     }
 
-    /// As the library takes them for one of many models: without the names of parts that it does not have, which come back.
+    /// Options for one of many models, and the part names that this model does not have.
     ///
     /// # Errors
-    /// When a name means several parts, or the rig cannot be read.
-    pub(crate) fn options_of_one(
+    /// If a name is ambiguous, or the rig cannot be read.
+    pub(crate) fn options_for_one(
         &self,
         model: &Model,
         path: &Path,
@@ -89,13 +90,13 @@ impl RigArgs {
         Ok((self.options_with(model, path, &PartArgs { rigid, mask })?, missing))
     }
 
-    /// Names of parts that something is to become of.
+    /// Names given by --rigid and --mask.
     pub(crate) fn part_names(&self) -> impl Iterator<Item = &String> {
         self.parts.rigid.iter().chain(self.parts.mask.iter().map(|(name, _)| name))
     }
 
     fn props(&self, model: &Model, path: &Path) -> Result<Vec<String>, CliError> {
-        if self.plain { Ok(Vec::new()) } else { model.props().map_err(|e| CliError::file(path, e)) }
+        if self.shape_only { Ok(Vec::new()) } else { model.props().map_err(|e| CliError::file(path, e)) }
     }
 
     fn options_with(&self, model: &Model, path: &Path, parts: &PartArgs) -> Result<ReshapeOptions, CliError> {

@@ -1,4 +1,4 @@
-//! What is run: the paper's cases, and ours beside them.
+//! The cases of the evaluation: the paper's, and the same grids with the embedded method.
 
 use cagework_core::Frames;
 use cagework_core::bind::Binding;
@@ -14,30 +14,30 @@ use crate::error::CliError;
 
 use super::spread::Spread;
 
-/// A way to the weights.
+/// A combination of method, solver and processor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Way {
+pub(super) enum Implementation {
     /// The published algorithm on one thread.
     PaperOneThread,
-    /// The same on all threads.
+    /// The published algorithm on all threads.
     PaperThreads,
-    /// The same on the GPU.
+    /// The published algorithm on the GPU.
     PaperGpu,
     /// Embedded conjugate gradients on one thread.
     CgOneThread,
-    /// The same on all threads.
+    /// Embedded conjugate gradients on all threads.
     CgThreads,
     /// Embedded multigrid on one thread.
     MultigridOneThread,
     /// Embedded multigrid on all threads.
     MultigridThreads,
-    /// The same on the GPU.
+    /// Embedded multigrid on the GPU.
     MultigridGpu,
 }
 
-impl Way {
-    /// In the order of the plots.
+impl Implementation {
+    /// All implementations, in the order of the plots.
     pub(super) const ALL: [Self; 8] = [
         Self::PaperOneThread,
         Self::PaperThreads,
@@ -77,7 +77,7 @@ impl Way {
         }
     }
 
-    /// What an iteration of it is called.
+    /// Name of its iterations.
     pub(super) fn iterations(self) -> &'static str {
         match self {
             Self::PaperOneThread | Self::PaperThreads | Self::PaperGpu => "sweeps",
@@ -86,7 +86,7 @@ impl Way {
         }
     }
 
-    /// Whether the GPU solves.
+    /// Whether it solves on the GPU.
     pub(super) fn is_gpu(self) -> bool {
         matches!(self, Self::PaperGpu | Self::MultigridGpu)
     }
@@ -105,26 +105,26 @@ impl Way {
     }
 }
 
-/// One case of the evaluation.
+/// Result of one case.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Run {
-    pub(super) way: Way,
-    /// Of the bind with the median time.
+    pub(super) implementation: Implementation,
+    /// Report of the bind with the median total time.
     pub(super) report: BindReport,
-    /// Shortest and longest time of all binds of this case.
+    /// Shortest and longest total time.
     pub(super) total_ms: Spread,
 }
 
 impl Run {
-    /// The median of several binds of one case, which differ in nothing but their times.
-    fn median(way: Way, mut reports: Vec<BindReport>) -> Option<Self> {
+    /// The median of several binds of one case, which differ only in their times. `None` if `reports` is empty.
+    fn median(implementation: Implementation, mut reports: Vec<BindReport>) -> Option<Self> {
         let total_ms = Spread::of(reports.iter().map(|r| r.timings_ms.total))?;
         reports.sort_by(|a, b| a.timings_ms.total.total_cmp(&b.timings_ms.total));
         let report = reports.swap_remove(reports.len() / 2);
-        Some(Self { way, report, total_ms })
+        Some(Self { implementation, report, total_ms })
     }
 
-    /// (milliseconds of solving, delta) after each iteration. Iterations of one solve cost the same.
+    /// (milliseconds of solving, delta) after each iteration, assuming that all iterations take the same time.
     pub(super) fn delta_over_time(&self) -> impl Iterator<Item = (f64, f32)> + '_ {
         let each = self.report.timings_ms.solve / f64::from(self.report.iterations.max(1));
         let every = f64::from(self.report.delta_interval);
@@ -136,16 +136,16 @@ impl Run {
 /// A reconstruction of the rest pose: figures 2 to 5.
 #[derive(Clone, Debug)]
 pub(super) struct Reconstruction {
-    /// File name without its end.
+    /// File name without extension.
     pub(super) figure: &'static str,
-    /// What it shows.
+    /// Caption in the report.
     pub(super) caption: String,
     pub(super) report: BindReport,
     pub(super) weights: Weights,
     pub(super) frames: Frames,
 }
 
-/// Everything that was run.
+/// All results.
 #[derive(Clone, Debug)]
 pub(super) struct Evaluation {
     pub(super) mesh: String,
@@ -154,16 +154,16 @@ pub(super) struct Evaluation {
     pub(super) threads: usize,
     pub(super) runs: u32,
     pub(super) grids: Grids,
-    /// Name of the GPU, or why there is none.
+    /// Name of the GPU, or why it is not available.
     pub(super) adapter: Result<String, String>,
-    /// Figures 8 to 11: every way at every g and tau; medians of the total time.
+    /// Figures 8 to 11: every implementation at every g and tau.
     pub(super) timed: Vec<Run>,
     /// Figure 12.
     pub(super) errors: Vec<Run>,
     pub(super) reconstructions: Vec<Reconstruction>,
 }
 
-/// The JSON of `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
 pub(super) struct Summary<'a> {
     mesh: &'a str,
@@ -181,7 +181,7 @@ pub(super) const TIMED_TAUS: [f32; 2] = [1e-4, 1e-5];
 /// Thresholds of figure 12.
 pub(super) const ERROR_TAUS: [f32; 3] = [1e-3, 1e-4, 1e-5];
 
-/// The grids that are run: 16, 32 and 64 in the paper.
+/// Numbers of cells along the cage's longest side; 16, 32 and 64 in the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Grids {
     pub(super) coarse: u32,
@@ -194,12 +194,12 @@ impl Grids {
         Self { coarse: fine / 4, middle: fine / 2, fine }
     }
 
-    /// Those of figures 8 to 11.
+    /// Grids of figures 8 to 11.
     pub(super) fn timed(self) -> [u32; 2] {
         [self.middle, self.fine]
     }
 
-    /// Those of figure 12.
+    /// Grids of figure 12.
     pub(super) fn all(self) -> [u32; 3] {
         [self.coarse, self.middle, self.fine]
     }
@@ -214,11 +214,13 @@ impl Evaluation {
         args: &EvaluateArgs,
         gpu: Result<&GpuContext, &GpuError>,
     ) -> Result<Self, CliError> {
-        let bind = |way: Way, grid, tau| -> Result<Binding, CliError> {
-            eprintln!("{}, g = {grid}, tau = {tau:e}", way.name());
-            let options = way.options(grid, tau);
+        let bind = |implementation: Implementation, grid, tau| -> Result<Binding, CliError> {
+            eprintln!("{}, g = {grid}, tau = {tau:e}", implementation.name());
+            let options = implementation.options(grid, tau);
             match gpu {
-                Ok(context) if way.is_gpu() => bind_on(context, &model.positions, cage.into(), &options),
+                Ok(context) if implementation.is_gpu() => {
+                    bind_on(context, &model.positions, cage.into(), &options)
+                }
                 _ => bind_model(model, cage, &options),
             }
         };
@@ -226,35 +228,38 @@ impl Evaluation {
         let (mut timed, mut errors) = (Vec::new(), Vec::new());
         for grid in grids.timed() {
             for tau in TIMED_TAUS {
-                let ways: Vec<Way> = Way::ALL.into_iter().filter(|w| gpu.is_ok() || !w.is_gpu()).collect();
-                let mut reports = vec![Vec::new(); ways.len()];
-                // Round-robin: a machine that slows down meanwhile slows all ways alike.
+                let implementations: Vec<Implementation> =
+                    Implementation::ALL.into_iter().filter(|w| gpu.is_ok() || !w.is_gpu()).collect();
+                let mut reports = vec![Vec::new(); implementations.len()];
+                // Round-robin, so that a change of the machine's speed affects all implementations equally.
                 for _ in 0..args.runs {
-                    for (&way, reports) in ways.iter().zip(&mut reports) {
-                        reports.push(bind(way, grid, tau)?.report);
+                    for (&implementation, reports) in implementations.iter().zip(&mut reports) {
+                        reports.push(bind(implementation, grid, tau)?.report);
                     }
                 }
-                let runs = ways.into_iter().zip(reports);
-                timed.extend(runs.filter_map(|(way, reports)| Run::median(way, reports)));
+                let runs = implementations.into_iter().zip(reports);
+                timed.extend(
+                    runs.filter_map(|(implementation, reports)| Run::median(implementation, reports)),
+                );
             }
         }
         for grid in grids.all() {
-            let paper = ERROR_TAUS.map(|tau| (Way::PaperThreads, tau));
-            for (way, tau) in paper.into_iter().chain([(Way::MultigridThreads, 1e-5)]) {
-                errors.extend(Run::median(way, vec![bind(way, grid, tau)?.report]));
+            let paper = ERROR_TAUS.map(|tau| (Implementation::PaperThreads, tau));
+            for (implementation, tau) in paper.into_iter().chain([(Implementation::MultigridThreads, 1e-5)]) {
+                errors.extend(Run::median(implementation, vec![bind(implementation, grid, tau)?.report]));
             }
         }
-        let figures: [(&str, &str, Way, u32, f32); 4] = [
-            ("figure-2", ": insufficient smoothing", Way::PaperThreads, grids.middle, 1e-3),
-            ("figure-3", "", Way::PaperThreads, grids.middle, 1e-5),
-            ("figure-4", ": quantisation", Way::PaperThreads, grids.coarse, 1e-5),
-            ("figure-5-ours", ": embedded multigrid", Way::MultigridThreads, grids.coarse, 1e-5),
+        let figures: [(&str, &str, Implementation, u32, f32); 4] = [
+            ("figure-2", ": insufficient smoothing", Implementation::PaperThreads, grids.middle, 1e-3),
+            ("figure-3", "", Implementation::PaperThreads, grids.middle, 1e-5),
+            ("figure-4", ": quantisation", Implementation::PaperThreads, grids.coarse, 1e-5),
+            ("figure-5-ours", ": embedded multigrid", Implementation::MultigridThreads, grids.coarse, 1e-5),
         ];
         let reconstructions = figures
             .into_iter()
-            .map(|(figure, what, way, grid, tau)| {
+            .map(|(figure, what, implementation, grid, tau)| {
                 let caption = format!("g = {grid}, tau = {tau:e}{what}");
-                let Binding { weights, frames, report, .. } = bind(way, grid, tau)?;
+                let Binding { weights, frames, report, .. } = bind(implementation, grid, tau)?;
                 Ok(Reconstruction { figure, caption, report, weights, frames })
             })
             .collect::<Result<_, CliError>>()?;
@@ -272,25 +277,28 @@ impl Evaluation {
         })
     }
 
-    /// The timed run of a way at one g and tau.
-    pub(super) fn timed(&self, way: Way, grid: u32, tau: f32) -> Option<&Run> {
-        self.timed.iter().find(|run| run.way == way && run.report.grid == grid && run.report.tau == tau)
+    /// The timed run of an implementation at one g and tau.
+    pub(super) fn timed(&self, implementation: Implementation, grid: u32, tau: f32) -> Option<&Run> {
+        self.timed.iter().find(|run| {
+            run.implementation == implementation && run.report.grid == grid && run.report.tau == tau
+        })
     }
 
-    /// The run of figure 7.
-    pub(super) fn delta_run(&self, way: Way) -> Option<&Run> {
-        self.timed(way, self.grids.middle, 1e-5)
+    /// The run that figure 7 shows.
+    pub(super) fn delta_run(&self, implementation: Implementation) -> Option<&Run> {
+        self.timed(implementation, self.grids.middle, 1e-5)
     }
 
-    /// Mean error over the cage's diagonal at one g and tau.
-    pub(super) fn mean_rel(&self, way: Way, grid: u32, tau: f32) -> Option<f64> {
+    /// Mean rest error of an implementation at one g and tau, relative to the cage's diagonal.
+    pub(super) fn mean_rel(&self, implementation: Implementation, grid: u32, tau: f32) -> Option<f64> {
         self.errors
             .iter()
-            .find(|run| run.way == way && run.report.grid == grid && run.report.tau == tau)
+            .find(|run| {
+                run.implementation == implementation && run.report.grid == grid && run.report.tau == tau
+            })
             .map(|run| run.report.rest_error.mean_rel)
     }
 
-    /// What `--json` prints.
     pub(super) fn summary(&self) -> Summary<'_> {
         Summary {
             mesh: &self.mesh,

@@ -1,6 +1,6 @@
-//! `cagework evaluate`: the paper's evaluation run anew, with our method beside it.
+//! `cagework evaluate`: repeats the paper's evaluation, with the embedded method for comparison.
 //!
-//! Figures are numbered as in the paper: 2-5 reconstructions, 6 a deformation, 7 delta over time, 8-11 time to completion, 12 error.
+//! Figures have the paper's numbers: 2-5 reconstructions, 6 a deformation, 7 delta over time, 8-11 time to completion, 12 error.
 
 mod cases;
 mod pictures;
@@ -18,14 +18,14 @@ use crate::args::{ControlArgs, EvaluateArgs, MemoryArgs};
 use crate::error::CliError;
 use crate::files::{json, make_folder, print, shown_path, write};
 use crate::gpu;
-use crate::load::{BuiltIn, built_in, load_cage, load_model};
+use crate::load::{BuiltInSample, built_in, load_cage, load_model};
 
-use cases::{Evaluation, Way};
+use cases::{Evaluation, Implementation};
 
 /// Runs `cagework evaluate`.
 ///
 /// # Errors
-/// When a file cannot be read or written, or a bind fails or is cancelled.
+/// If a file cannot be read or written, or a bind fails or is cancelled.
 pub(crate) fn run(args: &EvaluateArgs, as_json: bool) -> Result<(), CliError> {
     let (name, model, cage) = input(args)?;
     make_folder(&args.output)?;
@@ -59,7 +59,7 @@ fn input(args: &EvaluateArgs) -> Result<(String, Model, Cage), CliError> {
         let cage = load_cage(cage, &model, MemoryArgs::default(), &ControlArgs::default())?.cage;
         return Ok((mesh.display().to_string(), model, cage));
     }
-    let BuiltIn { name, model, cage: own, .. } = built_in()?;
+    let BuiltInSample { name, model, cage: own, .. } = built_in()?;
     let cage = match &args.cage {
         Some(source) => load_cage(source, &model, MemoryArgs::default(), &ControlArgs::default())?.cage,
         None => own,
@@ -67,7 +67,7 @@ fn input(args: &EvaluateArgs) -> Result<(String, Model, Cage), CliError> {
     Ok((format!("built-in sample, {name}"), model, cage))
 }
 
-/// Figures 2 to 5: the rest pose as each way's weights reconstruct it.
+/// Writes figures 2 to 5: the rest pose reconstructed from the weights of each implementation.
 fn reconstructions(
     model: &Model,
     cage: &Cage,
@@ -83,14 +83,15 @@ fn reconstructions(
 }
 
 fn time_csv(evaluation: &Evaluation) -> String {
-    let mut csv =
-        String::from("way,g,tau,threads,iterations,converged,solve_ms,total_ms,runs,min_ms,max_ms\n");
+    let mut csv = String::from(
+        "implementation,g,tau,threads,iterations,converged,solve_ms,total_ms,runs,min_ms,max_ms\n",
+    );
     for run in &evaluation.timed {
         let r = &run.report;
         let _ = writeln!(
             csv,
             "{},{},{:e},{},{},{},{:.3},{:.3},{},{:.3},{:.3}",
-            run.way.id(),
+            run.implementation.id(),
             r.grid,
             r.tau,
             r.threads,
@@ -107,13 +108,13 @@ fn time_csv(evaluation: &Evaluation) -> String {
 }
 
 fn error_csv(evaluation: &Evaluation) -> String {
-    let mut csv = String::from("way,g,tau,iterations,mean_error,mean_rel,max_rel\n");
+    let mut csv = String::from("implementation,g,tau,iterations,mean_error,mean_rel,max_rel\n");
     for run in &evaluation.errors {
         let (r, e) = (&run.report, &run.report.rest_error);
         let _ = writeln!(
             csv,
             "{},{},{:e},{},{:e},{:e},{:e}",
-            run.way.id(),
+            run.implementation.id(),
             r.grid,
             r.tau,
             r.iterations,
@@ -126,12 +127,17 @@ fn error_csv(evaluation: &Evaluation) -> String {
 }
 
 fn delta_csv(evaluation: &Evaluation) -> String {
-    let mut csv = String::from("way,iteration,time_ms,delta\n");
-    for way in [Way::PaperOneThread, Way::PaperGpu, Way::CgThreads, Way::MultigridThreads] {
-        if let Some(run) = evaluation.delta_run(way) {
+    let mut csv = String::from("implementation,iteration,time_ms,delta\n");
+    for implementation in [
+        Implementation::PaperOneThread,
+        Implementation::PaperGpu,
+        Implementation::CgThreads,
+        Implementation::MultigridThreads,
+    ] {
+        if let Some(run) = evaluation.delta_run(implementation) {
             for (k, (time, delta)) in run.delta_over_time().enumerate() {
                 let iteration = (k as u32 + 1) * run.report.delta_interval;
-                let _ = writeln!(csv, "{},{iteration},{time:.4},{delta:e}", way.id());
+                let _ = writeln!(csv, "{},{iteration},{time:.4},{delta:e}", implementation.id());
             }
         }
     }

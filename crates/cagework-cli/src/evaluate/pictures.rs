@@ -1,4 +1,4 @@
-//! Figures 2 to 6 as pictures.
+//! Figures 2 to 6 as PNG pictures.
 
 use cagework_core::Cage;
 use cagework_gpu::render::{MeshStyle, SceneOptions, Theme};
@@ -12,7 +12,7 @@ use crate::gpu::{draw_model, png};
 
 use super::cases::Evaluation;
 
-/// Width and height of a picture.
+/// Width and height of a picture, pixels.
 const SIZE: [u32; 2] = [720, 540];
 
 /// Angle by which the cage of figure 6 is bent from end to end, radians.
@@ -21,7 +21,7 @@ const BEND_ANGLE: f32 = 0.9;
 /// All pictures as (file name, PNG).
 ///
 /// # Errors
-/// When the GPU fails.
+/// If the GPU fails.
 pub(super) fn all(
     context: GpuContext,
     model: &Model,
@@ -38,7 +38,7 @@ pub(super) fn all(
         ..SceneOptions::default()
     };
     session.camera_mut().set_viewport(glam::Vec2::from(SIZE.map(|s| s as f32)));
-    // Before there is a cage, which figures 2 to 5 do not show.
+    // Framed before the cage is set, because figures 2 to 5 do not show it.
     session.frame_all();
     block_on(session.set_cage(cage))?;
     let mut pictures = Vec::new();
@@ -48,17 +48,17 @@ pub(super) fn all(
         let rgba = block_on(session.picture(SIZE, 1.0))?;
         pictures.push((format!("{}.png", r.figure), png(rgba, SIZE)?));
     }
-    // The last reconstruction is ours; its weights move the mesh.
+    // The weights of the last reconstruction, by the embedded method, are still set.
     session.set_scene(SceneOptions { cage_lines: true, handles: true, ..bare });
-    session.pose(&bent(cage));
+    session.pose(&bent_cage(cage));
     session.frame_all();
     let rgba = block_on(session.picture(SIZE, 1.0))?;
     pictures.push(("figure-6.png".to_owned(), png(rgba, SIZE)?));
     Ok(pictures)
 }
 
-/// The cage bent along its longest horizontal axis, upwards at both ends.
-fn bent(cage: &Cage) -> Vec<Vec3> {
+/// The cage bent upwards at both ends along its longest horizontal axis. `[n_cage]`, object units.
+fn bent_cage(cage: &Cage) -> Vec<Vec3> {
     let bounds = cage.bounds();
     let (center, extent) = (bounds.center(), bounds.extent());
     let along_x = extent.x > extent.z;

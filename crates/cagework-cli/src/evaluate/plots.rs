@@ -4,12 +4,12 @@ use plotters::prelude::*;
 
 use crate::error::CliError;
 
-use super::cases::{ERROR_TAUS, Evaluation, TIMED_TAUS, Way};
+use super::cases::{ERROR_TAUS, Evaluation, Implementation, TIMED_TAUS};
 
-/// Width and height of a plot.
+/// Width and height of a plot, pixels.
 const SIZE: (u32, u32) = (960, 460);
 
-/// Distinguishable without colour vision (Okabe and Ito 2008).
+/// Colours that remain distinguishable with colour blindness (Okabe and Ito 2008).
 const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
@@ -28,7 +28,7 @@ type Plot = Result<String, Box<dyn std::error::Error>>;
 /// All plots as (file name, SVG).
 ///
 /// # Errors
-/// When a plot cannot be drawn.
+/// If a plot cannot be drawn.
 pub(super) fn all(evaluation: &Evaluation) -> Result<Vec<(String, String)>, CliError> {
     let failed = |error: Box<dyn std::error::Error>| CliError::Plot { message: error.to_string() };
     let mut plots = vec![
@@ -47,9 +47,13 @@ pub(super) fn all(evaluation: &Evaluation) -> Result<Vec<(String, String)>, CliE
 
 /// Figures 8 to 11: time to completion, logarithmic.
 fn times(evaluation: &Evaluation, grid: u32, tau: f32) -> Plot {
-    let bars: Vec<(Way, f64)> = Way::ALL
+    let bars: Vec<(Implementation, f64)> = Implementation::ALL
         .into_iter()
-        .filter_map(|way| evaluation.timed(way, grid, tau).map(|run| (way, run.report.timings_ms.total)))
+        .filter_map(|implementation| {
+            evaluation
+                .timed(implementation, grid, tau)
+                .map(|run| (implementation, run.report.timings_ms.total))
+        })
         .collect();
     let (low, high) = decades(bars.iter().map(|bar| bar.1));
     let mut svg = String::new();
@@ -72,14 +76,14 @@ fn times(evaluation: &Evaluation, grid: u32, tau: f32) -> Plot {
             .axis_desc_style(FONT)
             .y_label_formatter(&|y| format!("{y}"))
             .draw()?;
-        for (k, (way, time)) in bars.iter().enumerate() {
+        for (k, (implementation, time)) in bars.iter().enumerate() {
             let (left, right) = (k as f64 + 0.15, k as f64 + 0.85);
             chart.draw_series([Rectangle::new([(left, low), (right, *time)], COLOURS[k].filled())])?;
             let label = format!("{time:.0} ms");
             chart.draw_series([Text::new(label, (left, time * 1.45), ("sans-serif", 15))])?;
-            // What stands left of the plot, and its share of the rest.
+            // Left edge of the plot area, and width of a bar with its gaps, pixels.
             let (edge, width) = (12 + 70, (SIZE.0 as i32 - 94) / n.max(1) as i32);
-            let name = way.name().replace("conjugate gradients", "conjugate, gradients");
+            let name = implementation.name().replace("conjugate gradients", "conjugate, gradients");
             for (line, part) in (0..).zip(name.split(", ")) {
                 let place = (edge + width * k as i32 + width / 7, SIZE.1 as i32 - 66 + 17 * line);
                 root.draw(&Text::new(part, place, ("sans-serif", 14)))?;
@@ -92,12 +96,15 @@ fn times(evaluation: &Evaluation, grid: u32, tau: f32) -> Plot {
 
 /// Figure 7: delta over time, both axes logarithmic.
 fn delta(evaluation: &Evaluation) -> Plot {
-    let series: Vec<(Way, Vec<(f64, f64)>)> = Way::ALL
+    let series: Vec<(Implementation, Vec<(f64, f64)>)> = Implementation::ALL
         .into_iter()
-        .filter(|way| *way != Way::MultigridOneThread)
-        .filter_map(|way| {
-            let run = evaluation.delta_run(way)?;
-            Some((way, run.delta_over_time().map(|(t, d)| (t.max(1e-3), f64::from(d).max(1e-12))).collect()))
+        .filter(|implementation| *implementation != Implementation::MultigridOneThread)
+        .filter_map(|implementation| {
+            let run = evaluation.delta_run(implementation)?;
+            Some((
+                implementation,
+                run.delta_over_time().map(|(t, d)| (t.max(1e-3), f64::from(d).max(1e-12))).collect(),
+            ))
         })
         .collect();
     let (left, right) = decades(series.iter().flat_map(|s| s.1.iter().map(|p| p.0)));
@@ -107,7 +114,10 @@ fn delta(evaluation: &Evaluation) -> Plot {
         ["milliseconds of solving", "delta (Eq. 2)"],
         [left, right],
         [low, high],
-        &series.into_iter().map(|(way, points)| (way.name().to_owned(), points)).collect::<Vec<_>>(),
+        &series
+            .into_iter()
+            .map(|(implementation, points)| (implementation.name().to_owned(), points))
+            .collect::<Vec<_>>(),
         SeriesLabelPosition::UpperRight,
     )
 }
@@ -118,13 +128,15 @@ fn error(evaluation: &Evaluation) -> Plot {
     for grid in evaluation.grids.all() {
         let points: Vec<(f64, f64)> = ERROR_TAUS
             .into_iter()
-            .filter_map(|tau| Some((f64::from(tau), evaluation.mean_rel(Way::PaperThreads, grid, tau)?)))
+            .filter_map(|tau| {
+                Some((f64::from(tau), evaluation.mean_rel(Implementation::PaperThreads, grid, tau)?))
+            })
             .collect();
         series.push((format!("paper, g = {grid}"), points));
     }
     for grid in evaluation.grids.all() {
-        if let Some(error) = evaluation.mean_rel(Way::MultigridThreads, grid, 1e-5) {
-            // Its tau bounds the solver's error; the plot shows the one run over the whole width.
+        if let Some(error) = evaluation.mean_rel(Implementation::MultigridThreads, grid, 1e-5) {
+            // Multigrid reaches the same error for any tau; its one run is drawn as a horizontal line.
             let points = ERROR_TAUS.map(|tau| (f64::from(tau), error)).to_vec();
             series.push((format!("embedded, g = {grid}"), points));
         }
@@ -190,7 +202,7 @@ fn lines(
     Ok(svg)
 }
 
-/// The decades around positive values.
+/// Powers of ten that enclose positive values.
 fn decades(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) =
         values.filter(|v| *v > 0.0).fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));

@@ -1,8 +1,8 @@
-//! Times scatter: what several measurements allow to be said, and what they do not.
+//! Ranges of repeated time measurements, and when one is significantly shorter than another.
 
 use serde::Serialize;
 
-/// Shortest and longest of several measurements of the same thing.
+/// Range of repeated measurements.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(super) struct Spread {
     pub(super) n: u32,
@@ -10,21 +10,21 @@ pub(super) struct Spread {
     pub(super) max: f64,
 }
 
-/// What two spreads say about the first thing against the second.
+/// Result of comparing two ranges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Comparison {
-    /// Every measurement of the first is shorter than every one of the second, by these factors at least and at most.
+    /// All times are shorter, by a factor between `least` and `most`.
     Faster { least: f64, most: f64 },
-    /// The other way round.
+    /// All times are longer.
     Slower,
-    /// The spreads overlap.
+    /// The ranges overlap.
     WithinSpread,
-    /// One measurement of either says nothing about how much it scatters.
+    /// Fewer than two measurements on one side.
     Unknown,
 }
 
 impl Spread {
-    /// Of measurements; `None` without any.
+    /// Range of `values`; `None` if there are none.
     pub(super) fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         values.fold(None, |spread, value| {
             let Self { n, min, max } = spread.unwrap_or(Self { n: 0, min: value, max: value });
@@ -32,7 +32,7 @@ impl Spread {
         })
     }
 
-    /// Compares times.
+    /// Compares two ranges of times.
     pub(super) fn against(self, other: Self) -> Comparison {
         if self.n < 2 || other.n < 2 {
             Comparison::Unknown
@@ -55,17 +55,17 @@ mod tests {
     }
 
     #[test]
-    fn only_spreads_that_lie_apart_are_told_apart() {
+    fn disjoint_ranges_decide_and_overlapping_ones_do_not() {
         let fast = spread(&[12.0, 10.0, 11.0]);
         let slow = spread(&[30.0, 24.0]);
         assert_eq!(fast.against(slow), Comparison::Faster { least: 2.0, most: 3.0 });
         assert_eq!(slow.against(fast), Comparison::Slower);
         assert_eq!(fast.against(spread(&[9.0, 10.5])), Comparison::WithinSpread);
-        assert_eq!(fast.against(spread(&[12.0, 13.0])), Comparison::WithinSpread, "they touch");
+        assert_eq!(fast.against(spread(&[12.0, 13.0])), Comparison::WithinSpread, "common end point");
     }
 
     #[test]
-    fn one_measurement_claims_nothing() {
+    fn a_single_measurement_decides_nothing() {
         assert_eq!(spread(&[1.0]).against(spread(&[1e6, 2e6])), Comparison::Unknown);
         assert_eq!(spread(&[1e6, 2e6]).against(spread(&[1.0])), Comparison::Unknown);
         assert_eq!(Spread::of(std::iter::empty()), None);

@@ -1,29 +1,35 @@
-//! What the figures say, in words: where the paper's findings hold and where they turn around.
+//! The report: which findings of the paper hold in this run.
 
 use std::fmt::Write as _;
 
-use super::cases::{ERROR_TAUS, Evaluation, Run, TIMED_TAUS, Way};
+use super::cases::{ERROR_TAUS, Evaluation, Implementation, Run, TIMED_TAUS};
 use super::spread::{Comparison, Spread};
 
-/// The findings, a line each, from the numbers of this run. A time is called shorter only where the spreads lie apart.
+/// The findings, one per line. A time is called shorter only if the ranges of times do not overlap.
 pub(super) fn verdicts(evaluation: &Evaluation) -> String {
     let mut out = String::new();
     for grid in evaluation.grids.timed() {
-        let run = |way| evaluation.timed(way, grid, 1e-5);
-        if let (Some(one), Some(all)) = (run(Way::PaperOneThread), run(Way::PaperThreads)) {
+        let run = |implementation| evaluation.timed(implementation, grid, 1e-5);
+        if let (Some(one), Some(all)) =
+            (run(Implementation::PaperOneThread), run(Implementation::PaperThreads))
+        {
             let _ = writeln!(
                 out,
                 "- \"Threaded smoothing is slower than one thread\" {} at g = {grid}: {} on one thread, {} on {}{}.",
-                turned(all, one),
+                verdict_of_slower(all, one),
                 times(one),
                 times(all),
                 evaluation.threads,
                 factors(all, one)
             );
         }
-        let beside = (run(Way::PaperOneThread), run(Way::CgOneThread), run(Way::MultigridOneThread));
+        let beside = (
+            run(Implementation::PaperOneThread),
+            run(Implementation::CgOneThread),
+            run(Implementation::MultigridOneThread),
+        );
         if let (Some(paper), Some(cg), Some(multigrid)) = beside {
-            let needs = |run: &Run| format!("{} {}", run.report.iterations, run.way.iterations());
+            let needs = |run: &Run| format!("{} {}", run.report.iterations, run.implementation.iterations());
             let _ = writeln!(
                 out,
                 "- At g = {grid} the paper's algorithm needs {}, conjugate gradients in our cells {}, multigrid {}; on one thread \
@@ -36,7 +42,9 @@ pub(super) fn verdicts(evaluation: &Evaluation) -> String {
                 times(multigrid)
             );
         }
-        if let (Some(paper), Some(ours)) = (run(Way::PaperOneThread), run(Way::MultigridThreads)) {
+        if let (Some(paper), Some(ours)) =
+            (run(Implementation::PaperOneThread), run(Implementation::MultigridThreads))
+        {
             let _ = writeln!(
                 out,
                 "- Embedded multigrid on all threads takes {} at g = {grid}, the paper's algorithm on one thread {}{}.",
@@ -52,23 +60,23 @@ pub(super) fn verdicts(evaluation: &Evaluation) -> String {
     out
 }
 
-/// What becomes of the paper's finding that `new` is slower than `old`.
-fn turned(new: &Run, old: &Run) -> &'static str {
+/// Whether the paper's finding that `new` is slower than `old` holds.
+fn verdict_of_slower(new: &Run, old: &Run) -> &'static str {
     match new.total_ms.against(old.total_ms) {
-        Comparison::Faster { .. } => "turns around",
+        Comparison::Faster { .. } => "is reversed",
         Comparison::Slower => "holds here",
-        Comparison::WithinSpread | Comparison::Unknown => "is not decided",
+        Comparison::WithinSpread | Comparison::Unknown => "is undecided",
     }
 }
 
-/// A median with the shortest and the longest time.
+/// The median time, followed by the range.
 fn times(run: &Run) -> String {
     let Spread { n, min, max } = run.total_ms;
     let median = run.report.timings_ms.total;
     if n < 2 { format!("{median:.1} ms") } else { format!("{median:.1} ms ({min:.1} to {max:.1})") }
 }
 
-/// How many times as fast `new` is, as far as the spreads allow to say.
+/// How many times as fast `new` is, if the ranges do not overlap.
 fn factors(new: &Run, old: &Run) -> String {
     match new.total_ms.against(old.total_ms) {
         Comparison::Faster { least, most } => {
@@ -76,12 +84,14 @@ fn factors(new: &Run, old: &Run) -> String {
             format!(": {} times as fast ({} to {})", digits(median), digits(least), digits(most))
         }
         Comparison::Slower => ", which is slower".to_owned(),
-        Comparison::WithinSpread => ", which is within the spread of the runs".to_owned(),
-        Comparison::Unknown => ", one measurement each, which may be within the spread".to_owned(),
+        Comparison::WithinSpread => ", a difference within the spread of the runs".to_owned(),
+        Comparison::Unknown => {
+            ", from one measurement each, a difference that may be within the spread".to_owned()
+        }
     }
 }
 
-/// Two or three digits of a factor.
+/// A factor with two or three significant digits.
 fn digits(factor: f64) -> String {
     if factor < 10.0 { format!("{factor:.2}") } else { format!("{factor:.0}") }
 }
@@ -90,21 +100,25 @@ fn gpu_verdicts(evaluation: &Evaluation, out: &mut String) {
     let adapter = match &evaluation.adapter {
         Ok(adapter) => adapter,
         Err(reason) => {
-            let _ = writeln!(out, "- No GPU, so nothing about the paper's third implementation: {reason}.");
+            let _ = writeln!(out, "- The paper's GPU implementation was not run: {reason}.");
             return;
         }
     };
     for grid in evaluation.grids.timed() {
-        let run = |way| evaluation.timed(way, grid, 1e-5);
-        let ways = (run(Way::PaperOneThread), run(Way::PaperGpu), run(Way::MultigridGpu));
-        if let (Some(one), Some(gpu), Some(ours)) = ways {
+        let run = |implementation| evaluation.timed(implementation, grid, 1e-5);
+        let implementations = (
+            run(Implementation::PaperOneThread),
+            run(Implementation::PaperGpu),
+            run(Implementation::MultigridGpu),
+        );
+        if let (Some(one), Some(gpu), Some(ours)) = implementations {
             let _ = writeln!(
                 out,
-                "- \"GPU-based smoothing is slower than one thread\" {} at g = {grid} on {adapter}: {} against {}{}, with \
-                 the field left on the GPU and one number read back every ten sweeps. Multigrid on the same GPU takes {}{}.",
-                turned(gpu, one),
-                times(gpu),
+                "- \"GPU-based smoothing is slower than one thread\" {} at g = {grid} on {adapter}: {} on one thread, {} on the GPU{}; \
+                 the field stays on the GPU, and one number is read back every ten sweeps. Multigrid on the same GPU takes {}{}.",
+                verdict_of_slower(gpu, one),
                 times(one),
+                times(gpu),
                 factors(gpu, one),
                 times(ours),
                 factors(ours, one).replace("as fast", "as fast as the paper's algorithm on one thread")
@@ -113,11 +127,11 @@ fn gpu_verdicts(evaluation: &Evaluation, out: &mut String) {
     }
 }
 
-/// Largest ratio of two decay rates (logarithms of the factor for a sweep) that count as one.
+/// Two decay rates (logarithms of the factor per sweep) count as equal if their ratio is at most this.
 const MAX_DECAY_RATIO: f64 = 1.25;
 
 fn delta_verdict(evaluation: &Evaluation, out: &mut String) {
-    let Some(run) = evaluation.delta_run(Way::PaperOneThread) else { return };
+    let Some(run) = evaluation.delta_run(Implementation::PaperOneThread) else { return };
     let h = &run.report.delta_history;
     let rate = |from: usize, to: usize| {
         let quotient = f64::from(*h.get(to)?) / f64::from(*h.get(from)?);
@@ -127,22 +141,22 @@ fn delta_verdict(evaluation: &Evaluation, out: &mut String) {
     if let (Some(third), Some(fourth)) = (rate(last / 2, 3 * last / 4), rate(3 * last / 4, last)) {
         let bend = third.ln() / fourth.ln();
         let straight = if bend < MAX_DECAY_RATIO && bend > 1.0 / MAX_DECAY_RATIO {
-            "which is geometric decay: a straight line over the number of sweeps"
+            "a geometric decay, which is a straight line over the number of sweeps"
         } else {
-            "which is no single geometric decay"
+            "so the decay is not geometric"
         };
         let _ = writeln!(
             out,
-            "- \"Delta appears to decrease logarithmically\": it falls by the factor {third:.4} a sweep in the third \
-             quarter of the solve and by {fourth:.4} in the last, {straight} (figure 7).",
+            "- \"Delta appears to decrease logarithmically\": it falls by the factor {third:.4} per sweep in the third \
+             quarter of the solve and by {fourth:.4} in the last quarter, {straight} (figure 7).",
         );
     }
 }
 
-/// Errors do not scatter: two binds with the same options give the same bits.
+/// Two binds with the same options give identical bits, so errors have no spread.
 fn error_verdicts(evaluation: &Evaluation, out: &mut String) {
     let fine = evaluation.grids.fine;
-    let paper = |tau| evaluation.mean_rel(Way::PaperThreads, fine, tau);
+    let paper = |tau| evaluation.mean_rel(Implementation::PaperThreads, fine, tau);
     if let (Some(a), Some(b)) = (paper(1e-4), paper(1e-5)) {
         let verdict = if a > b { "holds" } else { "does not hold here" };
         let _ = writeln!(
@@ -151,20 +165,22 @@ fn error_verdicts(evaluation: &Evaluation, out: &mut String) {
              g = {fine}: {a:.1e} of the diagonal at tau = 1e-4, {b:.1e} at 1e-5.",
         );
     }
-    if let (Some(paper), Some(ours)) = (paper(1e-5), evaluation.mean_rel(Way::MultigridThreads, fine, 1e-5)) {
-        let verdict = if ours < paper { "belongs to the method, not to the grid" } else { "holds here" };
+    if let (Some(paper), Some(ours)) =
+        (paper(1e-5), evaluation.mean_rel(Implementation::MultigridThreads, fine, 1e-5))
+    {
+        let verdict = if ours < paper { "is due to the method, not to the grid" } else { "holds here" };
         let _ = writeln!(
             out,
             "- \"Low values of g result in excessive quantization error\" {verdict}: at g = {fine} the paper's weights \
-             miss the rest pose by {paper:.1e} of the diagonal on average, the embedded ones by {ours:.1e}.",
+             reconstruct the rest pose with a mean error of {paper:.1e} of the diagonal, the embedded ones with {ours:.1e}.",
         );
     }
 }
 
-/// `report.md`.
+/// Contents of `report.md`.
 pub(super) fn report(evaluation: &Evaluation) -> String {
     let mut out = format!(
-        "# The paper's evaluation, run anew\n\n{}: {} vertices, {} cage vertices. {} threads, {} {}; GPU: {}. Each time is \
+        "# The paper's evaluation, repeated\n\n{}: {} vertices, {} cage vertices. {} threads, {} {}; GPU: {}. Each time is \
          {} (voxelize, solve, sample).\nMade by `cagework evaluate`, version {}.\n\n\
          ## Findings\n\n{}\n",
         evaluation.mesh,
@@ -180,12 +196,12 @@ pub(super) fn report(evaluation: &Evaluation) -> String {
     );
     time_table(evaluation, &mut out);
     out.push_str(
-        "## Delta over time (figure 7)\n\nWhat is left to do while each solver runs: for the paper's the change of the last sweep, for the others \
-         the error that is expected to remain.\n\n![delta over time](figure-7.svg)\n\n",
+        "## Delta over time (figure 7)\n\nDelta is the average change of the last sweep for the paper's solver, and the estimated \
+         remaining error for the other solvers.\n\n![delta over time](figure-7.svg)\n\n",
     );
     error_table(evaluation, &mut out);
     out.push_str(
-        "## Reconstructions (figures 2 to 5)\n\n| file | what | mean error | largest |\n|---|---|---|---|\n",
+        "## Reconstructions (figures 2 to 5)\n\n| file | case | mean error | largest error |\n|---|---|---|---|\n",
     );
     for r in &evaluation.reconstructions {
         let e = &r.report.rest_error;
@@ -194,44 +210,50 @@ pub(super) fn report(evaluation: &Evaluation) -> String {
     }
     if evaluation.adapter.is_ok() {
         out.push_str(
-            "\nThe base mesh is drawn as a wireframe, the reconstruction as a solid: where lines show, the mesh was \
-             larger.\n\n",
+            "\nThe wireframe is the base mesh, the solid its reconstruction: where lines are visible, the reconstruction is \
+             smaller.\n\n",
         );
         for r in &evaluation.reconstructions {
             let _ = writeln!(out, "![{}]({}.png)\n", r.caption, r.figure);
         }
-        out.push_str("## Deformation (figure 6)\n\n![the cage moved, the mesh follows](figure-6.png)\n");
+        out.push_str("## Deformation (figure 6)\n\n![the mesh deformed by the bent cage](figure-6.png)\n");
     }
-    out.push_str("\nErrors are over the diagonal of the cage's bounding box.\n");
+    out.push_str("\nErrors are relative to the diagonal of the cage's bounding box.\n");
     out
 }
 
-/// What a time in the report is.
+/// Describes a time in the report.
 fn measured(runs: u32) -> String {
     match runs {
-        1 => "one whole bind, whose scatter nobody knows".to_owned(),
-        _ => format!("the median of {runs} whole binds, with the shortest and the longest"),
+        1 => "a single bind, without a range".to_owned(),
+        _ => format!("the median of {runs} binds, with the shortest and the longest"),
     }
 }
 
 fn time_table(evaluation: &Evaluation, out: &mut String) {
     out.push_str(
-        "## Time to completion (figures 8 to 11)\n\nA row is a grid of g cells along the cage and the threshold tau below which a solver \
-         stops; a column is a way to the weights. In it: how long a whole bind takes, and how many iterations of the solver. \
-         Conjugate gradients and multigrid solve our cells.\n\n| g | tau |",
+        "## Time to completion (figures 8 to 11)\n\nEach row is a grid of g cells along the cage and a threshold tau at which the solver \
+         stops; each column is an implementation. Cells give the time of a whole bind and the number of iterations. \
+         Conjugate gradients and multigrid use the embedded method.\n\n| g | tau |",
     );
-    for way in Way::ALL {
-        let _ = write!(out, " {} |", way.name());
+    for implementation in Implementation::ALL {
+        let _ = write!(out, " {} |", implementation.name());
     }
-    let _ = writeln!(out, "\n|---|---|{}", "---|".repeat(Way::ALL.len()));
+    let _ = writeln!(out, "\n|---|---|{}", "---|".repeat(Implementation::ALL.len()));
     for grid in evaluation.grids.timed() {
         for tau in TIMED_TAUS {
             let _ = write!(out, "| {grid} | {tau:e} |");
-            for way in Way::ALL {
-                match evaluation.timed(way, grid, tau) {
+            for implementation in Implementation::ALL {
+                match evaluation.timed(implementation, grid, tau) {
                     Some(run) => {
                         let r = &run.report;
-                        let _ = write!(out, " {}, {} {} |", times(run), r.iterations, way.iterations());
+                        let _ = write!(
+                            out,
+                            " {}, {} {} |",
+                            times(run),
+                            r.iterations,
+                            implementation.iterations()
+                        );
                     }
                     None => out.push_str(" - |"),
                 }
@@ -247,8 +269,8 @@ fn time_table(evaluation: &Evaluation, out: &mut String) {
 
 fn error_table(evaluation: &Evaluation, out: &mut String) {
     out.push_str(
-        "## Mean reconstruction error (figure 12)\n\nHow far the weights put a point of the model from where it is at rest, on average: 1e-2 \
-         is a hundredth of the cage's diagonal.\n\n| g |",
+        "## Mean reconstruction error (figure 12)\n\nMean distance between the reconstructed and the true rest position, relative to the \
+         cage's diagonal.\n\n| g |",
     );
     for tau in ERROR_TAUS {
         let _ = write!(out, " paper, tau = {tau:e} |");
@@ -257,10 +279,10 @@ fn error_table(evaluation: &Evaluation, out: &mut String) {
     for grid in evaluation.grids.all() {
         let _ = write!(out, "| {grid} |");
         for tau in ERROR_TAUS {
-            let error = evaluation.mean_rel(Way::PaperThreads, grid, tau);
+            let error = evaluation.mean_rel(Implementation::PaperThreads, grid, tau);
             let _ = write!(out, " {} |", error.map_or("-".to_owned(), |e| format!("{e:.1e}")));
         }
-        let error = evaluation.mean_rel(Way::MultigridThreads, grid, 1e-5);
+        let error = evaluation.mean_rel(Implementation::MultigridThreads, grid, 1e-5);
         let _ = writeln!(out, " {} |", error.map_or("-".to_owned(), |e| format!("{e:.1e}")));
     }
     out.push_str("\n![mean error](figure-12.svg)\n\n");

@@ -1,4 +1,4 @@
-//! Outputs: none destroys an input, a file that an input names, or another output.
+//! Outputs: checks that they overwrite no input and no other output, and writes them.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
@@ -11,42 +11,42 @@ use cagework_core::progress::Cancelled;
 use cagework_io::Model;
 
 use super::whole::replace;
-use super::{READ, folder_of, read, read_beside, reason};
+use super::{INPUT_FILES, folder_of, read, read_beside, reason};
 use crate::error::{CliError, shown_path};
 use crate::signals;
 
-/// Most symbolic links on the way to a file, as on Linux.
+/// Largest number of symbolic links that are followed, as in Linux.
 const MAX_LINKS: usize = 40;
 
-/// Folders whose names stand for files that are open already, such as `/dev/stdout`.
-const OPEN_FILES: [&str; 2] = ["/proc", "/dev/fd"];
+/// Folders whose entries are open file descriptors.
+const DESCRIPTOR_FOLDERS: [&str; 2] = ["/proc", "/dev/fd"];
 
-/// Checks, before the work starts, that outputs can be written and will not destroy an input or each other.
+/// Checks, before the work starts, that the folders of outputs exist and that no output is an input or another output.
 ///
 /// # Errors
-/// When a folder is missing or two names mean one file.
+/// Names the missing folder or the conflicting file.
 pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), CliError> {
-    let inputs: Vec<Named> = inputs.iter().map(|path| Named::new(path)).collect();
-    let named: Vec<Named> = outputs.iter().map(|path| Named::new(path)).collect();
-    for (i, (output, name)) in outputs.iter().zip(&named).enumerate() {
+    let inputs: Vec<FileIdentity> = inputs.iter().map(|path| FileIdentity::new(path)).collect();
+    let identities: Vec<FileIdentity> = outputs.iter().map(|path| FileIdentity::new(path)).collect();
+    for (i, (output, identity)) in outputs.iter().zip(&identities).enumerate() {
         let folder = folder_of(output);
         if !folder.is_dir() {
             return Err(CliError::Mismatch {
                 message: format!(
-                    "{}: cannot be written, there is no folder {}",
+                    "{}: cannot be written, the folder {} does not exist",
                     shown_path(output),
                     shown_path(folder)
                 ),
-                hint: "make the folder first",
+                hint: "create the folder first",
             });
         }
         if output.is_dir() {
-            return Err(CliError::file(output, "cannot be written, it is a folder"));
+            return Err(CliError::file(output, "cannot be written, a folder has this name"));
         }
-        refuse_inputs(name, &inputs)?;
-        if named[..i].iter().any(|other| other.is(name)) {
+        refuse_inputs(identity, &inputs)?;
+        if identities[..i].iter().any(|other| other.is_same(identity)) {
             return Err(CliError::Mismatch {
-                message: format!("{}: is named for two outputs", shown_path(output)),
+                message: format!("{}: is given for two outputs", shown_path(output)),
                 hint: "choose different names",
             });
         }
@@ -54,16 +54,16 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
     Ok(())
 }
 
-/// Checks, once all inputs are read and before anything is written, that no output is one of the files that were read.
+/// Checks, after all inputs are read and before anything is written, that no output is a file that was read.
 ///
 /// # Errors
-/// When an output is such a file, under this or another name.
+/// Names the output.
 pub(crate) fn refuse_files_read(outputs: &[&Path]) -> Result<(), CliError> {
-    let read = READ.lock().unwrap_or_else(PoisonError::into_inner);
-    outputs.iter().try_for_each(|output| refuse_inputs(&Named::new(output), &read))
+    let read = INPUT_FILES.lock().unwrap_or_else(PoisonError::into_inner);
+    outputs.iter().try_for_each(|output| refuse_inputs(&FileIdentity::new(output), &read))
 }
 
-/// Checks, before anything is written, that no output is a file that one of several models names: it may be read later.
+/// Checks, before anything is written, that no output is a file that one of the models names and that is read later.
 ///
 /// # Errors
 /// Names the output and the model.
@@ -72,22 +72,22 @@ pub(crate) fn refuse_files_named(
     outputs: &[&Path],
     memory_limit: u64,
 ) -> Result<(), CliError> {
-    let outputs: Vec<Named> = outputs.iter().map(|path| Named::new(path)).collect();
+    let outputs: Vec<FileIdentity> = outputs.iter().map(|path| FileIdentity::new(path)).collect();
     for model in models {
-        // What a model names is in its folder or below it.
+        // A model can name files in its own folder and below only.
         let folder = fs::canonicalize(folder_of(model)).unwrap_or_default();
         let is_below =
-            |output: &&Named| output.place.as_ref().is_some_and(|place| place.starts_with(&folder));
-        let beside: Vec<&Named> = outputs.iter().filter(is_below).collect();
+            |output: &&FileIdentity| output.place.as_ref().is_some_and(|place| place.starts_with(&folder));
+        let beside: Vec<&FileIdentity> = outputs.iter().filter(is_below).collect();
         if beside.is_empty() {
             continue;
         }
-        // A model that cannot be read is an error of its own, in its turn.
+        // Unreadable models fail later, when they are refitted.
         let Ok(bytes) = read(model) else { continue };
         let mut resolve = |name: &str| read_beside(model, name);
         for name in Model::named_files(&model.to_string_lossy(), &bytes, &mut resolve, memory_limit) {
-            let named = Named::new(&folder_of(model).join(name));
-            if let Some(output) = beside.iter().find(|output| output.is(&named)) {
+            let identity = FileIdentity::new(&folder_of(model).join(name));
+            if let Some(output) = beside.iter().find(|output| output.is_same(&identity)) {
                 return Err(CliError::Mismatch {
                     message: format!(
                         "{}: would be overwritten, but {} names it",
@@ -102,26 +102,26 @@ pub(crate) fn refuse_files_named(
     Ok(())
 }
 
-/// Writes a whole file, or leaves the older one as it was. A symbolic link stays, and the file that it leads to is
-/// replaced; devices, pipes and files that are open already are written to as they are.
+/// Replaces or creates a file atomically: on failure the previous file is kept. A symbolic link is followed and kept. Devices,
+/// pipes and open descriptors are appended to.
 ///
 /// # Errors
-/// When it cannot be written, is a file that was read, or the work was cancelled meanwhile.
+/// If the file cannot be written or is an input, or the work was cancelled.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    // The work may have been over before it asked.
+    // A signal may arrive after the work last polled.
     if signals::cancelled() {
         return Err(BindError::Cancelled(Cancelled).into());
     }
     refuse_files_read(&[path])?;
     let written = place(path).and_then(|place| match place {
         Some(file) => replace(&file, bytes),
-        None => open_as_it_is(path).and_then(|mut file| file.write_all(bytes)),
+        None => open_for_append(path).and_then(|mut file| file.write_all(bytes)),
     });
     written.map_err(|e| CliError::file(path, format!("cannot be written: {}", reason(&e))))
 }
 
-fn refuse_inputs(output: &Named, inputs: &[Named]) -> Result<(), CliError> {
-    if inputs.iter().any(|input| input.is(output)) {
+fn refuse_inputs(output: &FileIdentity, inputs: &[FileIdentity]) -> Result<(), CliError> {
+    if inputs.iter().any(|input| input.is_same(output)) {
         return Err(CliError::Mismatch {
             message: format!("{}: is an input and would be overwritten", shown_path(&output.path)),
             hint: "choose another name for the output",
@@ -130,34 +130,34 @@ fn refuse_inputs(output: &Named, inputs: &[Named]) -> Result<(), CliError> {
     Ok(())
 }
 
-/// A name of a file, and what the disk says of it: asked once, as thousands are compared with each other.
-pub(super) struct Named {
+/// Identity of a file, which may not exist yet. Stored, because thousands of files are compared with each other.
+pub(super) struct FileIdentity {
     path: PathBuf,
-    /// Length and last change of a regular file; none if it is not there.
+    /// Length and modification time; `None` unless it is an existing regular file.
     state: Option<(u64, Option<SystemTime>)>,
-    /// None for devices, which may well be named twice, and for what is open already.
+    /// Canonical path; `None` for devices, which may be used twice, and for open descriptors.
     place: Option<PathBuf>,
 }
 
-impl Named {
+impl FileIdentity {
     pub(super) fn new(path: &Path) -> Self {
         let state =
             fs::metadata(path).ok().filter(fs::Metadata::is_file).map(|m| (m.len(), m.modified().ok()));
         Self { path: path.into(), state, place: place(path).ok().flatten() }
     }
 
-    /// Whether two names mean one regular file; neither need exist.
-    fn is(&self, other: &Self) -> bool {
-        // Hard links and descriptors have other names than the file that they are.
+    /// Whether both names refer to one regular file.
+    fn is_same(&self, other: &Self) -> bool {
+        // Hard links and descriptors have different paths. Equal lengths and times rule out most pairs cheaply.
         let may_be_linked = self.state.is_some() && self.state == other.state;
         (self.place.is_some() && self.place == other.place)
             || (may_be_linked && same_file::is_same_file(&self.path, &other.path).unwrap_or(false))
     }
 }
 
-/// A device or pipe, or the descriptor that a name such as `/dev/fd/3` stands for, at the place where it is: what is open
-/// already is neither truncated nor opened again.
-fn open_as_it_is(path: &Path) -> io::Result<File> {
+/// Opens a device or pipe for appending. A name such as `/dev/fd/3` yields a duplicate of that descriptor, because opening the
+/// name would truncate the file or start at its beginning.
+fn open_for_append(path: &Path) -> io::Result<File> {
     #[cfg(target_os = "linux")]
     if let Some(number) = descriptor(path) {
         use rustix::process::{PidfdFlags, PidfdGetfdFlags, getpid, pidfd_getfd, pidfd_open};
@@ -167,7 +167,7 @@ fn open_as_it_is(path: &Path) -> io::Result<File> {
     OpenOptions::new().append(true).open(path)
 }
 
-/// The number of this process's descriptor that a name leads to.
+/// Number of this process's descriptor that a name leads to through symbolic links.
 #[cfg(target_os = "linux")]
 fn descriptor(path: &Path) -> Option<i32> {
     let own = fs::canonicalize("/proc/self/fd").ok()?;
@@ -183,8 +183,7 @@ fn descriptor(path: &Path) -> Option<i32> {
     None
 }
 
-/// The file that a name leads to through symbolic links, which need not exist. `None`: a device, a pipe or a file that
-/// is open already.
+/// Resolves symbolic links; the final file need not exist. `None` for a device, a pipe or an open descriptor.
 fn place(path: &Path) -> io::Result<Option<PathBuf>> {
     if fs::metadata(path).is_ok_and(|m| !m.is_file()) {
         return Ok(None);
@@ -192,7 +191,7 @@ fn place(path: &Path) -> io::Result<Option<PathBuf>> {
     let mut place = path.to_path_buf();
     for _ in 0..MAX_LINKS {
         let folder = fs::canonicalize(folder_of(&place))?;
-        if OPEN_FILES.iter().any(|open| folder.starts_with(open)) {
+        if DESCRIPTOR_FOLDERS.iter().any(|descriptors| folder.starts_with(descriptors)) {
             return Ok(None);
         }
         let file = folder.join(place.file_name().unwrap_or_default());
@@ -201,5 +200,5 @@ fn place(path: &Path) -> io::Result<Option<PathBuf>> {
             Err(_) => return Ok(Some(file)),
         }
     }
-    Err(io::Error::other("its symbolic links go round in a circle"))
+    Err(io::Error::other("its symbolic links form a circle"))
 }

@@ -1,4 +1,4 @@
-//! Files appear whole or not at all: each is written beside its place, then renamed.
+//! Atomic writes: to a temporary file in the same folder, which is then renamed.
 
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
@@ -10,61 +10,62 @@ use tempfile::{Builder, NamedTempFile};
 
 use super::folder_of;
 
-/// How the names of parts begin and end.
+/// Prefix and suffix of the names of temporary files.
 const PREFIX: &str = ".cagework-";
 const SUFFIX: &str = ".part";
 
-/// The file that is being written beside its place. Locked while it comes and goes, so that a signal finds it.
-static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
+/// The temporary file that is being written. The lock is held while it is created, renamed or removed, so that the signal
+/// handler can delete it.
+static TEMPORARY_FILE: Mutex<Option<PathBuf>> = Mutex::new(None);
 
-/// Replaces a file by one with these bytes and the permissions of the older one, if there is one.
+/// Replaces or creates a file. Keeps the permissions of an existing file.
 ///
 /// # Errors
-/// When that is not possible; the older file is then as it was.
+/// If that fails; an existing file is then unchanged.
 pub(super) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    // Opened only to ask: renaming replaces even a file that must not be written to.
+    // Renaming would replace a read-only file, so check first that the file can be opened for writing.
     let permissions = match OpenOptions::new().write(true).open(path) {
         Ok(older) => Some(older.metadata()?.permissions()),
         Err(e) if e.kind() == ErrorKind::NotFound => None,
         Err(e) => return Err(e),
     };
-    sweep(folder_of(path));
+    remove_stale_files(folder_of(path));
     let mut file = {
-        let mut unfinished = unfinished();
-        let file = create_part(folder_of(path))?;
-        *unfinished = Some(file.path().to_path_buf());
+        let mut temporary = lock_temporary_file();
+        let file = create_temporary_file(folder_of(path))?;
+        *temporary = Some(file.path().to_path_buf());
         file
     };
     let written = file
         .as_file_mut()
         .write_all(bytes)
         .and_then(|()| permissions.map_or(Ok(()), |permissions| file.as_file().set_permissions(permissions)))
-        // Some disks say only now that they are full.
+        // Some file systems report a full disk only here.
         .and_then(|()| file.as_file().sync_all());
-    let mut unfinished = unfinished();
-    // What is not renamed is removed before the lock is.
+    let mut temporary = lock_temporary_file();
+    // On failure, dropping `file` removes it before the lock is released.
     let renamed = written.and_then(|()| Ok(file.persist(path).map(drop)?));
-    *unfinished = None;
+    *temporary = None;
     renamed
 }
 
-/// A new part, locked until it is closed: [`sweep`] leaves it alone.
-fn create_part(folder: &Path) -> io::Result<NamedTempFile<File>> {
+/// Creates a temporary file and locks it, so that [`remove_stale_files`] in another process keeps it.
+fn create_temporary_file(folder: &Path) -> io::Result<NamedTempFile<File>> {
     loop {
-        // Made as any new file is, not for the user alone as temporary files are.
+        // `File::create_new` applies the umask; tempfile's default would be private to the user.
         let part =
             Builder::new().prefix(PREFIX).suffix(SUFFIX).make_in(folder, |path| File::create_new(path))?;
-        // A sweep may have removed it before it was locked. Where there are no locks there are no sweeps.
+        // Retry if another process removed it before it was locked. File systems without locks never remove any.
         if part.as_file().lock().is_err() || part.path().exists() {
             return Ok(part);
         }
     }
 }
 
-/// Removes what killed processes left in a folder, once for each folder: parts that nobody holds a lock on.
-fn sweep(folder: &Path) {
-    static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-    if !SWEPT.lock().unwrap_or_else(PoisonError::into_inner).insert(folder.to_path_buf()) {
+/// Removes temporary files of killed processes, which hold no lock. Runs once per folder.
+fn remove_stale_files(folder: &Path) {
+    static CLEANED_FOLDERS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    if !CLEANED_FOLDERS.lock().unwrap_or_else(PoisonError::into_inner).insert(folder.to_path_buf()) {
         return;
     }
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
@@ -76,22 +77,22 @@ fn sweep(folder: &Path) {
             && let Ok(part) = OpenOptions::new().write(true).open(entry.path())
             && part.try_lock().is_ok()
         {
-            // What cannot be removed stays.
+            // Failure is harmless: the file is only litter.
             let _ = std::fs::remove_file(entry.path());
         }
     }
 }
 
-/// Removes an unfinished file and does `end`, which is to end the process; nothing is renamed meanwhile.
+/// Deletes the temporary file, then calls `end`, which ends the process. Holding the lock prevents a rename in between.
 pub(crate) fn abandon(end: &mut dyn FnMut()) {
-    let unfinished = unfinished();
-    if let Some(path) = &*unfinished {
-        // Nobody is left to tell.
+    let temporary = lock_temporary_file();
+    if let Some(path) = &*temporary {
+        // Ignored: the process ends anyway.
         let _ = std::fs::remove_file(path);
     }
     end();
 }
 
-fn unfinished() -> MutexGuard<'static, Option<PathBuf>> {
-    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock_temporary_file() -> MutexGuard<'static, Option<PathBuf>> {
+    TEMPORARY_FILE.lock().unwrap_or_else(PoisonError::into_inner)
 }

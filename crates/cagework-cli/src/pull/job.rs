@@ -1,4 +1,4 @@
-//! What to pull where: the JSON of `cagework pull --job`.
+//! The JSON of `cagework pull --job`.
 
 use std::path::{Path, PathBuf};
 
@@ -10,21 +10,21 @@ use serde::Deserialize;
 use crate::error::CliError;
 use crate::files::{read, shown_path};
 
-/// Largest file of a job, bytes: thousands of grabs.
+/// Largest job file, bytes; enough for thousands of grabs.
 const MAX_JOB_BYTES: usize = 1 << 20;
 
-/// Most frames of a drag.
+/// Largest number of frames of a drag.
 const MAX_FRAMES: u32 = 10_000;
 
-/// A job as its file says it.
+/// The file's contents.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Said {
-    grabs: Vec<HandleSaid>,
+struct JobJson {
+    grabs: Vec<HandleJson>,
     #[serde(default)]
-    pins: Vec<HandleSaid>,
+    pins: Vec<HandleJson>,
     #[serde(default)]
-    reach: Option<ReachSaid>,
+    reach: Option<ReachJson>,
     start: Option<PathBuf>,
     #[serde(default = "half")]
     relax: f64,
@@ -34,7 +34,7 @@ struct Said {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct HandleSaid {
+struct HandleJson {
     vertex: Option<u32>,
     triangle: Option<u32>,
     bary: Option<[f64; 3]>,
@@ -44,8 +44,8 @@ struct HandleSaid {
 
 #[derive(Debug, Deserialize)]
 #[serde(untagged)]
-enum ReachSaid {
-    Of(f64),
+enum ReachJson {
+    Fraction(f64),
     Word(String),
 }
 
@@ -57,29 +57,29 @@ fn thirty() -> u32 {
     30
 }
 
-/// A job.
+/// A validated job.
 pub(super) struct Job {
     pub(super) grabs: Vec<Handle>,
-    /// Where each grab goes, in the file's axes. `[n_grabs]`, object units
+    /// Target of each grab, in the file's axes. `[n_grabs]`, object units
     to: Vec<DVec3>,
     pub(super) pins: Vec<Handle>,
     pub(super) reach: Reach,
-    /// A pose of the cage to begin with.
+    /// File of the initial pose.
     pub(super) start: Option<PathBuf>,
     pub(super) relax: f64,
     pub(super) frames: u32,
 }
 
 impl Job {
-    /// Where each grab goes, in the file's axes, as seen from an origin. `[n_grabs]`, object units
+    /// Target of each grab relative to an origin, in the file's axes. `[n_grabs]`, object units
     pub(super) fn to(&self, origin: DVec3) -> Vec<Vec3> {
         self.to.iter().map(|&to| (to - origin).as_vec3()).collect()
     }
 
-    /// Reads a job; numbers of vertices are checked by who knows the model.
+    /// Reads a job. Indices are not checked here, because that needs the model.
     ///
     /// # Errors
-    /// When the file cannot be read, is no JSON, or asks for what there is not.
+    /// If the file cannot be read or is larger than [`MAX_JOB_BYTES`], or its JSON or a value is invalid.
     pub(super) fn read(path: &Path) -> Result<Self, CliError> {
         let bytes = read(path)?;
         let wrong = |what: String| CliError::Mismatch {
@@ -88,56 +88,60 @@ impl Job {
         };
         if bytes.len() > MAX_JOB_BYTES {
             return Err(wrong(format!(
-                "is {} kB long; a job has at most {} kB",
+                "has {} kB; a job has at most {} kB",
                 bytes.len() >> 10,
                 MAX_JOB_BYTES >> 10
             )));
         }
-        let said: Said = serde_json::from_slice(&bytes)
-            .map_err(|e| wrong(format!("is no job: {}", json_fault(&bytes, &e))))?;
-        let handle = |list: &str, k: usize, said: &HandleSaid| match said {
-            HandleSaid { vertex: Some(v), triangle: None, bary: None, cage: None, .. } => {
+        let file: JobJson = serde_json::from_slice(&bytes)
+            .map_err(|e| wrong(format!("not a job: {}", json_fault(&bytes, &e))))?;
+        let handle = |list: &str, k: usize, handle: &HandleJson| match handle {
+            HandleJson { vertex: Some(v), triangle: None, bary: None, cage: None, .. } => {
                 Ok(Handle::Vertex(*v))
             }
-            HandleSaid { triangle: Some(t), vertex: None, cage: None, bary, .. } => {
+            HandleJson { triangle: Some(t), vertex: None, cage: None, bary, .. } => {
                 Ok(Handle::Triangle(*t, bary.unwrap_or([1.0 / 3.0; 3])))
             }
-            HandleSaid { cage: Some(i), vertex: None, triangle: None, bary: None, .. } => {
+            HandleJson { cage: Some(i), vertex: None, triangle: None, bary: None, .. } => {
                 Ok(Handle::Cage(*i))
             }
-            _ => Err(wrong(format!("{list} {k} must name one of vertex, triangle (with bary) and cage"))),
+            _ => Err(wrong(format!("{list} {k} needs one of vertex, triangle (with bary) and cage"))),
         };
-        let reach = match said.reach {
+        let reach = match file.reach {
             None => Reach::Automatic,
-            Some(ReachSaid::Of(share)) => Reach::Of(share),
-            Some(ReachSaid::Word(word)) if word == "all" => Reach::Whole,
-            Some(ReachSaid::Word(word)) => {
+            Some(ReachJson::Fraction(fraction)) => Reach::Of(fraction),
+            Some(ReachJson::Word(word)) if word == "all" => Reach::Whole,
+            Some(ReachJson::Word(word)) => {
                 return Err(wrong(format!(
                     "the reach is '{}'; it must be null, a number or \"all\"",
                     shown(&word)
                 )));
             }
         };
-        if !(1..=MAX_FRAMES).contains(&said.frames) {
-            return Err(wrong(format!("frames is {}; it must be from 1 to {MAX_FRAMES}", said.frames)));
+        if !(1..=MAX_FRAMES).contains(&file.frames) {
+            return Err(wrong(format!("frames is {}; it must be from 1 to {MAX_FRAMES}", file.frames)));
         }
-        let mut grabs = Vec::with_capacity(said.grabs.len());
-        let mut to = Vec::with_capacity(said.grabs.len());
-        for (k, grab) in said.grabs.iter().enumerate() {
+        let mut grabs = Vec::with_capacity(file.grabs.len());
+        let mut to = Vec::with_capacity(file.grabs.len());
+        for (k, grab) in file.grabs.iter().enumerate() {
             grabs.push(handle("grab", k, grab)?);
             let target = grab.to.ok_or_else(|| wrong(format!("grab {k} has no target \"to\": [x, y, z]")))?;
             if let Some(x) = target.map(|x| x as f32).iter().find(|x| !x.is_finite()) {
-                return Err(wrong(format!("grab {k} goes to {x}: numbers of 32 bits end at {:e}", f32::MAX)));
+                return Err(wrong(format!(
+                    "grab {k} has the target coordinate {x}; 32-bit floats end at {:e}",
+                    f32::MAX
+                )));
             }
             to.push(DVec3::from_array(target));
         }
         let pins =
-            said.pins.iter().enumerate().map(|(k, pin)| handle("pin", k, pin)).collect::<Result<_, _>>()?;
-        let beside = |start: PathBuf| {
+            file.pins.iter().enumerate().map(|(k, pin)| handle("pin", k, pin)).collect::<Result<_, _>>()?;
+        // Relative to the job's folder if the file exists there, otherwise to the working directory.
+        let resolve = |start: PathBuf| {
             let beside = path.parent().unwrap_or(Path::new("")).join(&start);
             if beside.exists() { beside } else { start }
         };
-        let start = said.start.map(beside);
-        Ok(Self { grabs, to, pins, reach, start, relax: said.relax, frames: said.frames })
+        let start = file.start.map(resolve);
+        Ok(Self { grabs, to, pins, reach, start, relax: file.relax, frames: file.frames })
     }
 }

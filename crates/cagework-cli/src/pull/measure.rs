@@ -1,25 +1,25 @@
-//! How a pulled model looks, in numbers.
+//! Quality of a pull: edge stretch, and motion outside the reach.
 
 use cagework_io::Model;
 use cagework_pose::pull::Drag;
 use glam::Vec3;
 use serde::Serialize;
 
-/// Edges shorter than this, over the model's size, say nothing about stretching.
-const SHORTEST: f32 = 1e-9;
-/// What is farther than so many times the reach should not move.
-const BEYOND: f64 = 1.2;
+/// Edges shorter than this fraction of the model's size are ignored: their stretch is rounding noise.
+const MIN_EDGE_RATIO: f32 = 1e-9;
+/// Vertices farther than this multiple of the reach should not move.
+const FAR_REACH_RATIO: f64 = 1.2;
 
-/// Lengths of edges over those at rest.
+/// Edge lengths relative to the rest lengths.
 #[derive(Debug, Serialize)]
 pub(super) struct Stretches {
     pub(super) stretch_max: f64,
-    /// The 99th and the first of hundred, between two edges in proportion.
+    /// 99th and first percentile, interpolated linearly.
     pub(super) stretch_99: f64,
     pub(super) stretch_1: f64,
 }
 
-/// Of a model's edges, each once.
+/// Stretch of a model's edges; each edge counts once.
 pub(super) fn stretches(mesh: &Model, posed: &[Vec3]) -> Stretches {
     let mut edges: Vec<[u32; 2]> = mesh
         .triangles
@@ -34,7 +34,7 @@ pub(super) fn stretches(mesh: &Model, posed: &[Vec3]) -> Stretches {
     let mut all: Vec<f64> = edges
         .into_iter()
         .map(|edge| (length(&mesh.positions, edge), length(posed, edge)))
-        .filter(|(rest, _)| *rest > SHORTEST * size)
+        .filter(|(rest, _)| *rest > MIN_EDGE_RATIO * size)
         .map(|(rest, posed)| f64::from(posed) / f64::from(rest))
         .collect();
     all.sort_by(f64::total_cmp);
@@ -46,9 +46,9 @@ pub(super) fn stretches(mesh: &Model, posed: &[Vec3]) -> Stretches {
     Stretches { stretch_max: at(1.0), stretch_99: at(0.99), stretch_1: at(0.01) }
 }
 
-/// Mean movement of what is far beyond the reach, object units; none where nothing is.
+/// Mean displacement of the vertices beyond the reach, object units; `None` if all vertices are within it.
 pub(super) fn far_mean(drag: &Drag, before: &[Vec3], after: &[Vec3]) -> Option<f64> {
-    let limit = BEYOND * drag.reach_length();
+    let limit = FAR_REACH_RATIO * drag.reach_length();
     let moves = drag.walks().iter().zip(before.iter().zip(after));
     let far: Vec<f64> = moves
         .filter(|(walk, _)| f64::from(**walk) > limit)

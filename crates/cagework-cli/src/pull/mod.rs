@@ -1,4 +1,4 @@
-//! `cagework pull`: points of the model are pulled, and the cage is solved for.
+//! `cagework pull`: solves for the pose of the cage that moves points of the model to given positions.
 
 mod job;
 mod measure;
@@ -15,34 +15,35 @@ use serde::Serialize;
 use crate::args::PullArgs;
 use crate::error::CliError;
 use crate::files::{json, print};
-use crate::pose::{Bound, pull, write_pose};
+use crate::pose::{BoundModel, pull, write_pose};
 use job::Job;
 use measure::{Stretches, far_mean, stretches};
 
-/// What was done; its JSON is the output of `--json`. Lengths are shares of the model's size, but for `lag` and `far_mean`.
+/// Output of `--json`. Lengths are fractions of the model's size, except `lag` and `far_mean`.
 #[derive(Debug, Serialize)]
-struct Pulled {
+struct PullSummary {
     output: String,
     samples: usize,
     groups: usize,
     cage: usize,
-    /// Once per binding, with the bind of the probes.
+    /// Time of the precomputation for this model and cage, including the bind of the probes.
     precompute_ms: f64,
-    /// Once per grab.
+    /// Time to start a grab.
     grab_ms: f64,
-    /// Mean of a frame.
+    /// Mean time of a frame.
     frame_ms: f64,
-    /// How far the drag reaches; null for the whole model.
+    /// Reach of the drag; null if the whole model follows.
     reach: Option<f64>,
     /// Largest distance of a grab or pin from its target.
     error: f64,
-    /// How far the model still moved after the last target, at most, over the drag.
+    /// Largest motion after the targets have stopped, relative to the length of the drag.
     lag: f64,
-    /// Frames until it moved no more.
+    /// Frames until the pose converged.
     settle_frames: u32,
     #[serde(flatten)]
     stretches: Stretches,
-    /// Mean movement of what is farther than 1.2 times the reach, over the drag; null where there is none.
+    /// Mean displacement of the vertices farther than 1.2 times the reach, relative to the length of the drag; null if there
+    /// are none.
     far_mean: Option<f64>,
     notices: Vec<String>,
 }
@@ -50,12 +51,13 @@ struct Pulled {
 /// Runs `cagework pull`.
 ///
 /// # Errors
-/// When a file cannot be read or written, files do not belong together, or the job asks for what there is not.
+/// If a file cannot be read or written, files do not match, or the job is invalid.
 pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let job = Job::read(&given.job)?;
     let inputs = [Some(given.job.as_path()), job.start.as_deref()];
     let args = &given.pose;
-    let Bound { model, cage, weights, frames, .. } = Bound::load(args, inputs.into_iter().flatten())?;
+    let BoundModel { model, cage, weights, frames, .. } =
+        BoundModel::load(args, inputs.into_iter().flatten())?;
     let (controls, output) = (cage.controls(), &args.output.path);
     let inner = &controls.rest()[cage.cage.n_vertices()..];
     let start = match &job.start {
@@ -92,10 +94,10 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
     let settle_frames = drag.settle(&to);
     let cage_pose = pose(&drag);
     let after = deformed(&cage_pose);
-    let way = grabbed.iter().zip(&to).map(|(a, b)| a.distance(*b)).fold(f64::MIN_POSITIVE, f64::max);
+    let drag_length = grabbed.iter().zip(&to).map(|(a, b)| a.distance(*b)).fold(f64::MIN_POSITIVE, f64::max);
     let apart = |(a, b): (&Vec3, &Vec3)| f64::from(a.distance(*b));
     write_pose(&model, &cage, &cage_pose, args)?;
-    let done = Pulled {
+    let summary = PullSummary {
         output: output.display().to_string(),
         samples: pull.n_samples(),
         groups: pull.n_groups(),
@@ -105,40 +107,40 @@ pub(crate) fn run(given: &PullArgs, as_json: bool) -> Result<(), CliError> {
         frame_ms,
         reach: drag.reach().is_finite().then(|| drag.reach()),
         error: drag.error(),
-        lag: after.iter().zip(&at_stop).map(apart).fold(0.0, f64::max) / way,
+        lag: after.iter().zip(&at_stop).map(apart).fold(0.0, f64::max) / drag_length,
         settle_frames,
         stretches: stretches(&model, &after),
-        far_mean: far_mean(&drag, &before, &after).map(|mean| mean / way),
+        far_mean: far_mean(&drag, &before, &after).map(|mean| mean / drag_length),
         notices: model.notices,
     };
-    print(&if as_json { json(&done) } else { text(&done, output) })
+    print(&if as_json { json(&summary) } else { text(&summary, output) })
 }
 
 fn since(begun: Instant) -> f64 {
     begun.elapsed().as_secs_f64() * 1e3
 }
 
-fn text(done: &Pulled, output: &Path) -> String {
-    let reach = done.reach.map_or_else(
+fn text(summary: &PullSummary, output: &Path) -> String {
+    let reach = summary.reach.map_or_else(
         || "the whole model".to_owned(),
         |reach| format!("{:.0} % of the model's size", 100.0 * reach),
     );
     let mut out = format!(
-        "pulled by {} samples and {} cage vertices: {:.2} ms a frame, {:.1} ms a grab, {:.0} ms once\n\
-         reach {reach}; grabs within {:.1e} of the model's size; edges stretched to {:.2} (99 of 100 to at most {:.2}, \
-         at least {:.2})\nwrote {}\n",
-        done.samples,
-        done.cage,
-        done.frame_ms,
-        done.grab_ms,
-        done.precompute_ms,
-        done.error,
-        done.stretches.stretch_max,
-        done.stretches.stretch_99,
-        done.stretches.stretch_1,
+        "pulled by {} samples and {} cage vertices: {:.2} ms per frame, {:.1} ms per grab, {:.0} ms precomputation\n\
+         reach {reach}; grabs within {:.1e} of the model's size; edges stretched to at most {:.2} (99th percentile {:.2}, \
+         first percentile {:.2})\nwrote {}\n",
+        summary.samples,
+        summary.cage,
+        summary.frame_ms,
+        summary.grab_ms,
+        summary.precompute_ms,
+        summary.error,
+        summary.stretches.stretch_max,
+        summary.stretches.stretch_99,
+        summary.stretches.stretch_1,
         shown(&output.display().to_string()),
     );
-    for notice in &done.notices {
+    for notice in &summary.notices {
         out += &format!("note: {notice}\n");
     }
     out

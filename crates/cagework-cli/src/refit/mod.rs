@@ -1,4 +1,4 @@
-//! `cagework refit`: many models follow one cage, which is solved for once.
+//! `cagework refit`: deforms many models with one cage, which is solved once.
 
 mod report;
 
@@ -18,7 +18,7 @@ use glam::{DVec3, Vec3};
 use crate::args::{ModelOutput, RefitArgs};
 use crate::bind::{bind_positions, check_memory};
 use crate::controls::with_inner;
-use crate::deform::{Posed, Poses, pose_name};
+use crate::deform::{Deformation, Poses, pose_name};
 use crate::error::CliError;
 use crate::files::{
     check_outputs, is_newer, json, make_folder, print, read, refuse_files_named, shown_path, write,
@@ -26,54 +26,53 @@ use crate::files::{
 use crate::load::{load_cage_file, load_model};
 use crate::progress::Bar;
 use crate::rig;
-use crate::signals::{self, Asking};
+use crate::signals::{self, CancelGuard};
 
-use report::{Entry, Outcome, Refitted, Written, tell, text};
+use report::{ModelEntry, ModelReport, Outcome, RefitSummary, print_entry, text};
 
-/// A model to be read and the file to be written.
+/// A model to read, and the file to write.
 struct Job {
     model: PathBuf,
     output: ModelOutput,
 }
 
-/// What binds models to one cage.
+/// Binds models to one cage.
 struct Binder<'a> {
     args: &'a RefitArgs,
     controls: Controls<'a>,
-    /// What the cage is seen from.
+    /// Origin of the cage's positions.
     origin: DVec3,
-    /// Made for the first model that is not skipped; none if its fields are too large to be kept.
+    /// Created for the first model that is not skipped; `None` if the fields do not fit in half of the memory limit.
     solved: OnceCell<Option<SolvedCage<'a>>>,
-    /// Names of parts that no model had so far.
+    /// Part names that no model has had so far.
     unnamed: RefCell<Vec<String>>,
 }
 
-/// A model in its pose, to be written.
-struct Bound<'a> {
+/// A deformed model, ready to be written.
+struct DeformedModel<'a> {
     job: &'a Job,
     model: Model,
-    posed: Posed,
+    deformation: Deformation,
     options: ReshapeOptions,
-    /// What there is to say so far.
-    written: Written,
+    /// Complete except for the total time and the rig.
+    report: ModelReport,
     started: Instant,
 }
 
-/// A model that is being written.
+/// The model that another thread is writing.
 type Writing<'scope, 'a> = Option<(&'a Job, ScopedJoinHandle<'scope, Outcome>)>;
 
-/// Models of which reading and writing takes a larger share of the memory limit than one in so many are written before the
-/// next one is read.
-const LARGE_SHARE: u64 = 16;
+/// A model is written in parallel with reading the next one, unless both need more than 1/16 of the memory limit.
+const PARALLEL_MEMORY_DIVISOR: u64 = 16;
 
 /// Runs `cagework refit`.
 ///
 /// # Errors
-/// When cage or pose cannot be used, two models would be written to one file, a model failed, or the work was cancelled.
+/// If the cage or pose is invalid, two models have the same output, a model failed, or the work was cancelled.
 pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     if args.solve.on_gpu() {
         return Err(CliError::Mismatch {
-            message: "the cage is solved for once on the processor only".into(),
+            message: "refit solves on the processor only".into(),
             hint: "leave out `--backend gpu`",
         });
     }
@@ -89,8 +88,8 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     check_outputs(&outputs, &inputs)?;
     refuse_files_named(&named.collect::<Vec<_>>(), &outputs, args.read.memory.bytes())?;
 
-    // From here on Ctrl-C ends the work after what is being written.
-    let _asking = Asking::start();
+    // From here on Ctrl-C takes effect after the current write.
+    let _guard = CancelGuard::start();
     let (up, memory) = (args.read.axis(), args.read.memory);
     let cage = load_cage_file(&args.cage, up, None, memory, &args.controls)?;
     let controls = cage.controls();
@@ -105,31 +104,30 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
     let binder = Binder { args, controls, origin: cage.origin(), solved: OnceCell::new(), unnamed };
     let mut models = Vec::with_capacity(jobs.len());
     let mut settle = |job: &Job, outcome: Outcome| -> Result<(), CliError> {
-        // That it was cancelled is not its own fault.
+        // A cancelled model is not reported as failed.
         if matches!(outcome, Outcome::Failed { .. }) && signals::cancelled() {
             return Ok(());
         }
         let text = |path: &Path| path.display().to_string();
-        let entry = Entry { input: text(&job.model), output: text(&job.output.path), outcome };
-        tell(&entry, as_json)?;
+        let entry = ModelEntry { input: text(&job.model), output: text(&job.output.path), outcome };
+        print_entry(&entry, as_json)?;
         models.push(entry);
         Ok(())
     };
-    // A model is written while the next one is read and bound, unless it is large.
     std::thread::scope(|scope| {
         let mut writing = None;
         for job in jobs.iter().take_while(|_| !signals::cancelled()) {
             let inputs: Vec<&Path> = shared.iter().copied().chain([job.model.as_path()]).collect();
             let is_done = args.resume && is_newer(&job.output.path, &inputs);
-            let bound = if is_done { None } else { Some(binder.refit(job, &poses, inner)) };
+            let deformed = if is_done { None } else { Some(binder.refit(job, &poses, inner)) };
             settle_one(&mut writing, &mut settle)?;
-            match bound {
+            match deformed {
                 None => settle(job, Outcome::Skipped)?,
                 Some(Err(error)) => settle(job, Outcome::of_error(&error, &job.model))?,
-                Some(Ok(bound)) => {
-                    let is_large = bound.bytes() > args.read.memory.bytes() / LARGE_SHARE;
+                Some(Ok(deformed)) => {
+                    let is_large = deformed.bytes() > args.read.memory.bytes() / PARALLEL_MEMORY_DIVISOR;
                     let names = &poses.names;
-                    writing = Some((job, scope.spawn(move || bound.write(names))));
+                    writing = Some((job, scope.spawn(move || deformed.write(names))));
                     if is_large {
                         settle_one(&mut writing, &mut settle)?;
                     }
@@ -138,28 +136,28 @@ pub(crate) fn run(args: &RefitArgs, as_json: bool) -> Result<(), CliError> {
         }
         settle_one(&mut writing, &mut settle)
     })?;
-    let done = binder.report(models);
-    print(&if as_json { json(&done) } else { text(&done, jobs.len()) })?;
+    let summary = binder.summary(models);
+    print(&if as_json { json(&summary) } else { text(&summary, jobs.len()) })?;
     let unnamed = binder.unnamed.borrow();
     match unnamed.first() {
         _ if signals::cancelled() => Err(BindError::Cancelled(Cancelled).into()),
-        _ if done.failed > 0 => Err(CliError::Mismatch {
-            message: format!("{} of {} models failed", done.failed, jobs.len()),
-            hint: "when they are mended, run it again with --resume: what is done is left as it is",
+        _ if summary.failed > 0 => Err(CliError::Mismatch {
+            message: format!("{} of {} models failed", summary.failed, jobs.len()),
+            hint: "repair them and run the command again with --resume, which skips finished models",
         }),
-        // Those that were skipped were not asked.
-        Some(name) if done.skipped == 0 => Err(CliError::Mismatch {
-            message: format!("no model has a part that is called '{}'", shown(name)),
-            hint: "what was written is without it: mend the name and run it again, without --resume",
+        // The parts of skipped models are unknown.
+        Some(name) if summary.skipped == 0 => Err(CliError::Mismatch {
+            message: format!("no model has a part called '{}'", shown(name)),
+            hint: "all models were written without it: correct the name and run the command again, without --resume",
         }),
         _ => Ok(()),
     }
 }
 
-/// All models and where they are written.
+/// All models and their outputs.
 ///
 /// # Errors
-/// When the manifest cannot be read, there is no model, or two would be written to one file.
+/// If the manifest cannot be read or names no model, or two models have the same output.
 fn jobs(args: &RefitArgs) -> Result<Vec<Job>, CliError> {
     let mut models = args.models.clone();
     if let Some(path) = &args.manifest {
@@ -173,7 +171,8 @@ fn jobs(args: &RefitArgs) -> Result<Vec<Job>, CliError> {
     let mut by_output: BTreeMap<PathBuf, &PathBuf> = BTreeMap::new();
     let mut jobs = Vec::with_capacity(models.len());
     for model in &models {
-        let name = Path::new(model.file_name().ok_or_else(|| CliError::file(model, "is no name of a file"))?);
+        let name =
+            Path::new(model.file_name().ok_or_else(|| CliError::file(model, "is not the name of a file"))?);
         let output = match ModelFormat::of_export(&name.to_string_lossy()) {
             Some(format) => ModelOutput { path: args.output.join(name), format },
             None => ModelOutput {
@@ -184,8 +183,8 @@ fn jobs(args: &RefitArgs) -> Result<Vec<Job>, CliError> {
         if let Some(other) = by_output.insert(output.path.clone(), model) {
             if other == model {
                 return Err(CliError::Mismatch {
-                    message: format!("{} is named twice", shown_path(model)),
-                    hint: "name each model once, here or in the manifest",
+                    message: format!("{} is given twice", shown_path(model)),
+                    hint: "give each model once, as an argument or in the manifest",
                 });
             }
             return Err(CliError::Mismatch {
@@ -195,7 +194,7 @@ fn jobs(args: &RefitArgs) -> Result<Vec<Job>, CliError> {
                     shown_path(model),
                     shown_path(&output.path)
                 ),
-                hint: "rename one of them, or run the command once for each with another -o",
+                hint: "rename one of them, or run the command once for each, with different -o",
             });
         }
         jobs.push(Job { model: model.clone(), output });
@@ -204,21 +203,21 @@ fn jobs(args: &RefitArgs) -> Result<Vec<Job>, CliError> {
 }
 
 impl Binder<'_> {
-    /// One model up to its pose; nothing but that stays of its weights.
-    fn refit<'j>(&self, job: &'j Job, poses: &Poses, inner: &[Vec3]) -> Result<Bound<'j>, CliError> {
+    /// Reads, binds and deforms a model.
+    fn refit<'j>(&self, job: &'j Job, poses: &Poses, inner: &[Vec3]) -> Result<DeformedModel<'j>, CliError> {
         let started = Instant::now();
         let Self { args, controls, .. } = self;
         let (path, format) = (&job.model, job.output.format);
         let mut model = load_model(path, args.read.axis(), args.read.memory)?;
         model.see_from(self.origin);
-        let is_static = args.rig.plain || format != ModelFormat::Gltf;
+        let is_static = args.rig.shape_only || format != ModelFormat::Gltf;
         let (points, extra_points) =
             if is_static { (model.positions.clone(), 0) } else { rig::points(&model, path)? };
-        let (options, missing) = args.rig.options_of_one(&model, path)?;
+        let (options, missing) = args.rig.options_for_one(&model, path)?;
         let held = model.bytes();
         let Binding { weights, frames, outside, report } = self.bind(&points, held, extra_points)?;
-        let bound = BindOptions { held: held + self.held(), ..self.options() };
-        check_memory(&bound, points.len(), *controls, model.bytes_to_write(format))?;
+        let options_with_fields = BindOptions { held: held + self.field_bytes(), ..self.options() };
+        check_memory(&options_with_fields, points.len(), *controls, model.bytes_to_write(format))?;
         let saved = SavedWeights {
             weights,
             frames,
@@ -226,11 +225,11 @@ impl Binder<'_> {
             extra_points: points[model.positions.len()..].to_vec(),
             inner_controls: inner.to_vec(),
         };
-        let posing = Instant::now();
-        let posed = Posed::new(&model, saved, poses, format, (&options, args.rig.plain));
-        let deform_ms = elapsed_ms(posing);
+        let deform_start = Instant::now();
+        let deformation = Deformation::new(&model, saved, poses, format, (&options, args.rig.shape_only));
+        let deform_ms = elapsed_ms(deform_start);
         let mut notices = model.notices.clone();
-        notices.extend(missing.iter().map(|name| format!("no part is called '{}' here", shown(name))));
+        notices.extend(missing.iter().map(|name| format!("this model has no part called '{}'", shown(name))));
         self.unnamed.borrow_mut().retain(|name| missing.contains(name));
         if !report.converged {
             notices.push(format!(
@@ -238,7 +237,7 @@ impl Binder<'_> {
                 report.iterations
             ));
         }
-        let written = Written {
+        let report = ModelReport {
             vertices: model.positions.len(),
             outside_vertices: report.outside_vertices as usize,
             bind_ms: report.timings_ms.total,
@@ -247,15 +246,15 @@ impl Binder<'_> {
             rig: None,
             notices,
         };
-        Ok(Bound { job, model, posed, options, written, started })
+        Ok(DeformedModel { job, model, deformation, options, report, started })
     }
 
     fn options(&self) -> BindOptions {
         self.args.solve.options(self.args.grid, self.args.read.memory)
     }
 
-    /// Bytes of the fields that are kept.
-    fn held(&self) -> u64 {
+    /// Memory of the solved fields, bytes; 0 if they are not kept.
+    fn field_bytes(&self) -> u64 {
         self.solved.get().and_then(Option::as_ref).map_or(0, SolvedCage::bytes)
     }
 
@@ -266,7 +265,7 @@ impl Binder<'_> {
                 Err(BindError::Memory { .. }) => None,
                 solved => Some(solved?),
             };
-            // It is not there yet.
+            // Cannot fail: the cell is empty.
             let _ = self.solved.set(solved);
         }
         match self.solved.get() {
@@ -275,18 +274,18 @@ impl Binder<'_> {
         }
     }
 
-    fn report(&self, models: Vec<Entry>) -> Refitted {
+    fn summary(&self, models: Vec<ModelEntry>) -> RefitSummary {
         let count = |is: fn(&Outcome) -> bool| models.iter().filter(|entry| is(&entry.outcome)).count();
         let n_cage = self.controls.cage().n_vertices();
         let mut notices = cagework_core::crossing::notices(self.controls.cage());
         if matches!(self.solved.get(), Some(None)) {
             notices.push(format!(
-                "The fields of this grid are too large to be kept in half of {} MiB: the cage was solved for anew for each \
-                 model. A smaller --grid or a larger --memory-limit avoids that.",
+                "The fields of this grid do not fit in half of {} MiB, so the cage was solved again for each model. \
+                 A smaller --grid or a larger --memory-limit avoids that.",
                 self.options().memory_limit >> 20
             ));
         }
-        Refitted {
+        RefitSummary {
             output: self.args.output.display().to_string(),
             cage_vertices: n_cage,
             inner_controls: self.controls.n_controls() - n_cage,
@@ -300,28 +299,28 @@ impl Binder<'_> {
     }
 }
 
-impl Bound<'_> {
-    /// Bytes that it takes until it is written.
+impl DeformedModel<'_> {
+    /// Memory of the model until it is written, bytes.
     fn bytes(&self) -> u64 {
         self.model.bytes() + self.model.bytes_to_write(self.job.output.format)
     }
 
     fn write(self, names: &[String]) -> Outcome {
-        let Self { job, model, posed, options, mut written, started } = self;
-        let made = posed.into_file(&model, names, &job.output, &options);
-        match made.and_then(|(bytes, rig)| write(&job.output.path, &bytes).map(|()| rig)) {
+        let Self { job, model, deformation, options, mut report, started } = self;
+        let encoded = deformation.into_file(&model, names, &job.output, &options);
+        match encoded.and_then(|(bytes, rig)| write(&job.output.path, &bytes).map(|()| rig)) {
             Err(error) => Outcome::of_error(&error, &job.model),
             Ok(rig) => {
-                written.notices.extend(rig.iter().flat_map(ReshapeReport::notices));
-                written.notices.extend(model.lost_in(job.output.format));
-                written.total_ms = elapsed_ms(started);
-                Outcome::Written(Box::new(Written { rig, ..written }))
+                report.notices.extend(rig.iter().flat_map(ReshapeReport::notices));
+                report.notices.extend(model.lost_in(job.output.format));
+                report.total_ms = elapsed_ms(started);
+                Outcome::Written(Box::new(ModelReport { rig, ..report }))
             }
         }
     }
 }
 
-/// Waits until a model is written, if one is.
+/// Waits for the model that is being written, if any, and passes its outcome to `settle`.
 fn settle_one<'a>(
     writing: &mut Writing<'_, 'a>,
     settle: &mut impl FnMut(&'a Job, Outcome) -> Result<(), CliError>,

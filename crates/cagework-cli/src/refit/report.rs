@@ -1,4 +1,4 @@
-//! What a refit says: a line for each model when it is done, and everything as JSON in the end.
+//! Output of `refit`: a line per model as soon as it is done, and a summary at the end.
 
 use std::path::Path;
 
@@ -6,41 +6,39 @@ use cagework_io::ReshapeReport;
 use serde::Serialize;
 
 use crate::card::duration;
-use crate::error::{CliError, say};
+use crate::error::{CliError, print_error};
 use crate::files::{print, shown_path};
 
-/// What was done; its JSON is the output of `--json`.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
-pub(super) struct Refitted {
-    /// The folder.
+pub(super) struct RefitSummary {
+    /// Folder of the outputs.
     pub(super) output: String,
     pub(super) cage_vertices: usize,
-    /// Controls inside the cage.
     pub(super) inner_controls: usize,
-    /// Voxelizing and solving once for all models; none if no model asked for it, or if each was bound on its own.
+    /// Time to voxelise and solve; `None` if all models were skipped, or if the cage was solved again for each model.
     pub(super) solve_ms: Option<f64>,
     pub(super) written: usize,
     pub(super) skipped: usize,
     pub(super) failed: usize,
     pub(super) notices: Vec<String>,
-    pub(super) models: Vec<Entry>,
+    pub(super) models: Vec<ModelEntry>,
 }
 
-/// One model.
+/// Result for one model.
 #[derive(Debug, Serialize)]
-pub(super) struct Entry {
+pub(super) struct ModelEntry {
     pub(super) input: String,
     pub(super) output: String,
     #[serde(flatten)]
     pub(super) outcome: Outcome,
 }
 
-/// What became of it.
 #[derive(Debug, Serialize)]
 #[serde(tag = "state", rename_all = "snake_case")]
 pub(super) enum Outcome {
-    Written(Box<Written>),
-    /// It is newer than its inputs.
+    Written(Box<ModelReport>),
+    /// With `--resume`: the output is newer than its inputs.
     Skipped,
     Failed {
         error: String,
@@ -49,13 +47,13 @@ pub(super) enum Outcome {
 }
 
 #[derive(Debug, Serialize)]
-pub(super) struct Written {
+pub(super) struct ModelReport {
     pub(super) vertices: usize,
     pub(super) outside_vertices: usize,
-    /// Its samples and weights, without the solve that all models share.
+    /// Time to sample and assemble the weights, without the shared solve.
     pub(super) bind_ms: f64,
     pub(super) deform_ms: f64,
-    /// All of it, reading and writing included.
+    /// Time for the model, including reading and writing.
     pub(super) total_ms: f64,
     #[serde(flatten)]
     pub(super) rig: Option<ReshapeReport>,
@@ -68,18 +66,18 @@ impl Outcome {
     }
 }
 
-/// An error with the name of the model, unless it says it.
+/// The error message, prefixed with the name of the model unless it contains it.
 fn named(error: &CliError, model: &Path) -> String {
     let (message, name) = (error.message(), shown_path(model));
     if message.contains(&name) { message } else { format!("{name}: {message}") }
 }
 
-/// Says what became of a model, at once; for JSON, only on stderr what failed.
-pub(super) fn tell(entry: &Entry, as_json: bool) -> Result<(), CliError> {
+/// Prints the result for one model. With `--json`, prints errors only, on stderr.
+pub(super) fn print_entry(entry: &ModelEntry, as_json: bool) -> Result<(), CliError> {
     let output = shown_path(entry.output.as_ref());
     match &entry.outcome {
         Outcome::Failed { error, hint } => {
-            say(error, *hint);
+            print_error(error, *hint);
             Ok(())
         }
         _ if as_json => Ok(()),
@@ -99,13 +97,13 @@ pub(super) fn tell(entry: &Entry, as_json: bool) -> Result<(), CliError> {
     }
 }
 
-pub(super) fn text(done: &Refitted, n: usize) -> String {
-    let solve = done.solve_ms.map_or(String::new(), |ms| format!("; one solve of {}", duration(ms)));
+pub(super) fn text(summary: &RefitSummary, n: usize) -> String {
+    let solve = summary.solve_ms.map_or(String::new(), |ms| format!("; one solve of {}", duration(ms)));
     let mut out = format!(
         "refitted {} of {n} models, {} skipped, {} failed{solve}\n",
-        done.written, done.skipped, done.failed
+        summary.written, summary.skipped, summary.failed
     );
-    for notice in &done.notices {
+    for notice in &summary.notices {
         out += &format!("note: {notice}\n");
     }
     out

@@ -1,4 +1,4 @@
-//! Every bad input ends in exit code 1 and a message that names the file; nothing panics.
+//! Invalid input ends with exit code 1 and a message that names the file, without a panic.
 
 use std::fs::File;
 
@@ -7,17 +7,17 @@ use predicates::str::contains;
 
 use crate::support::{CORNERS, Sandbox, box_obj, sphere_obj};
 
-/// The command fails in good order, and the message says all of `words`.
+/// Asserts that the command fails without a panic, and that its message contains all of `words`.
 fn assert_refused(sandbox: &Sandbox, args: &str, words: &[&str]) {
     let assert = sandbox.run(args).code(1).stdout("");
     let assert = assert.stderr(predicates::str::starts_with("error: ").and(contains("panicked").not()));
     for word in words {
-        let said = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
-        assert!(said.contains(word), "`cagework {args}` does not say '{word}': {said}");
+        let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+        assert!(message.contains(word), "`cagework {args}` does not print '{word}': {message}");
     }
 }
 
-/// A GLB header, and one chunk of JSON whose length is claimed to be `claimed`.
+/// A GLB with one JSON chunk, whose length field is `claimed`.
 fn glb(json: &str, claimed: u32) -> Vec<u8> {
     let mut bytes = b"glTF".to_vec();
     bytes.extend(2_u32.to_le_bytes());
@@ -29,15 +29,15 @@ fn glb(json: &str, claimed: u32) -> Vec<u8> {
 }
 
 #[test]
-fn files_that_are_no_models_are_refused() {
+fn files_that_are_not_models_are_rejected() {
     let sandbox = Sandbox::with_sphere_in_box();
     let huge = r#"{"asset":{"version":"2.0"},"buffers":[{"byteLength":12}],"bufferViews":[{"buffer":0,"byteLength":12}],
         "accessors":[{"bufferView":0,"componentType":5126,"count":4000000000,"type":"VEC3"}],
         "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}]} "#;
     sandbox.write("empty.obj", "");
     sandbox.write("empty.glb", "");
-    sandbox.write("text.glb", "this is not a glTF file, whatever its name says");
-    sandbox.write("text.gltf", "this is not a glTF file, whatever its name says");
+    sandbox.write("text.glb", "this is not a glTF file");
+    sandbox.write("text.gltf", "this is not a glTF file");
     sandbox.write("noise.obj", [0x80, 0xff, 0x00, 0x13, 0x37].repeat(50));
     sandbox.write("truncated.glb", &glb(r#"{"asset":{"version":"2.0"}} "#, 28)[..22]);
     sandbox.write("overlong.glb", glb(r#"{"asset":{"version":"2.0"}} "#, u32::MAX));
@@ -75,15 +75,15 @@ fn files_that_are_no_models_are_refused() {
 }
 
 #[test]
-fn file_too_large_is_refused_without_reading_it() {
+fn file_above_the_size_limit_is_not_read() {
     let sandbox = Sandbox::new();
-    // Sparse: takes no room on the disk.
+    // A sparse file, which occupies no disk space.
     File::create(sandbox.path("large.obj")).unwrap().set_len(3 << 30).unwrap();
     assert_refused(&sandbox, "info large.obj", &["large.obj", "3072 MiB", "2048 MiB"]);
 }
 
 #[test]
-fn meshes_that_are_no_cages_are_refused_with_the_place() {
+fn invalid_cages_are_rejected_with_the_location() {
     let sandbox = Sandbox::with_sphere_in_box();
     let closed = box_obj(&CORNERS);
     sandbox.write("open.obj", closed.replace("f 5 6 8 7\n", ""));
@@ -102,7 +102,7 @@ fn outputs_are_checked_before_the_work() {
     assert_refused(
         &sandbox,
         "bind mesh.obj --cage cage.obj -o nowhere/out.glb",
-        &["nowhere/out.glb", "no folder"],
+        &["nowhere/out.glb", "the folder nowhere does not exist"],
     );
     assert_refused(&sandbox, "bind mesh.obj --cage cage.obj -o mesh.obj", &["mesh.obj", "overwritten"]);
     assert_refused(&sandbox, "bind mesh.obj --cage cage.obj -o ./cage.obj", &["cage.obj", "overwritten"]);
@@ -129,27 +129,30 @@ fn vertices_outside_the_cage_can_be_refused() {
     );
 }
 
-/// Such a bind succeeded with all vertices outside, each of which then followed a far triangle.
 #[test]
-fn cage_elsewhere_or_in_another_unit_is_refused_whatever_is_to_be_done_outside() {
+fn cage_that_contains_no_vertex_is_rejected_by_every_outside_policy() {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.write("far.obj", box_obj(&CORNERS.map(|[x, y, z]| [x + 10_001.7, y, z])));
     sandbox.write("small.obj", box_obj(&CORNERS.map(|c| c.map(|x| 0.01 * x))));
     for policy in ["extend", "stay", "refuse"] {
-        for (cage, said) in [
-            // From 0.7 to 10,000.7.
+        for (cage, message) in [
+            // The gap from 0.7 to 10,000.7.
             ("far.obj", "none of the model's 178 vertices is inside the cage; the cage is 1e4 away from it"),
             ("small.obj", "the cage is 70 times smaller than the model"),
         ] {
             let args = format!("bind mesh.obj --cage {cage} -g 8 --outside {policy}");
-            assert_refused(&sandbox, &args, &[said, "`--outside` cannot help"]);
+            assert_refused(
+                &sandbox,
+                &args,
+                &[message, "`--outside` applies only if some vertices are inside"],
+            );
         }
     }
 }
 
-/// Both ended in a panic: a cube with a vertex far away, and one with two corners of a face at one place.
+/// A cube with a vertex far away, and one with two corners of a face at the same position.
 #[test]
-fn damaged_cages_are_checked_and_mended_as_far_as_can_be() {
+fn degenerate_cages_are_checked_and_repaired_without_a_panic() {
     let sandbox = Sandbox::with_sphere_in_box();
     let closed = box_obj(&CORNERS);
     sandbox.write("far.obj", closed.replacen("v -1 -1 -1", "v -1 -1429490.567295 -1", 1));
@@ -157,20 +160,20 @@ fn damaged_cages_are_checked_and_mended_as_far_as_can_be() {
     sandbox.run("check far.obj --mesh mesh.obj").success().stdout(contains("valid as a cage"));
     for repair in ["weld,drop-degenerate,fill-holes,flip", "weld", "grow"] {
         for file in ["far.obj", "damaged.obj"] {
-            let args = format!("check {file} --mesh mesh.obj --repair {repair} -o mended.obj");
+            let args = format!("check {file} --mesh mesh.obj --repair {repair} -o repaired.obj");
             sandbox.run(&args).stderr(contains("panicked").not());
         }
     }
 }
 
 #[test]
-fn memory_limit_is_kept_with_the_number() {
+fn memory_limit_is_an_error_that_names_the_limit() {
     let sandbox = Sandbox::with_sphere_in_box();
     assert_refused(&sandbox, "bind mesh.obj --cage cage.obj -g 512 --memory-limit 1", &["MiB", "limit"]);
 }
 
 #[test]
-fn weights_files_that_are_none_are_refused() {
+fn invalid_weights_files_are_rejected() {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.write("empty.npz", "");
     sandbox.write("text.npz", "not a zip archive");
@@ -181,12 +184,11 @@ fn weights_files_that_are_none_are_refused() {
     }
 }
 
-/// They were written, with coordinates that are not numbers and with faces without area.
 #[test]
-fn box_cages_without_room_are_refused() {
+fn box_cage_that_overflows_is_rejected_and_a_far_one_is_valid() {
     let sandbox = Sandbox::with_sphere_in_box();
     assert_refused(&sandbox, "cage mesh.obj --kind box --margin 3e38 -o box.obj", &["box cage"]);
-    // At 16,777,216 and beyond f32 has whole numbers only: such a model is seen from an origin near it.
+    // Above 16,777,216 = 2^24, f32 represents whole numbers only, so positions are stored relative to an origin near the model.
     let far: String = CORNERS.iter().map(|[x, y, z]| format!("v {} {y} {z}\n", x + 3e7)).collect();
     let closed = box_obj(&CORNERS);
     sandbox.write("far.obj", far + closed.split_at(closed.find('f').expect("a box has faces")).1);

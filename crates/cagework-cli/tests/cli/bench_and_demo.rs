@@ -4,7 +4,7 @@ use predicates::str::contains;
 use crate::support::{Sandbox, glb_json, obj_positions};
 
 #[test]
-fn bench_times_both_ways_on_one_thread_and_on_all() {
+fn bench_times_both_methods_on_one_thread_and_on_all() {
     let sandbox = Sandbox::with_sphere_in_box();
     let bench = sandbox.json("bench mesh.obj --cage cage.obj -g 8,16 --runs 2 --json");
     let grids = bench["grids"].as_array().unwrap();
@@ -27,18 +27,18 @@ fn bench_times_both_ways_on_one_thread_and_on_all() {
 }
 
 #[test]
-fn demo_writes_everything_it_names() {
+fn demo_writes_every_file_that_it_lists() {
     let sandbox = Sandbox::new();
-    let done = sandbox.json("demo -o made/here --json");
+    let done = sandbox.json("demo -o new/folder --json");
     for file in done["files"].as_array().unwrap() {
         assert!(sandbox.path(file.as_str().unwrap()).is_file(), "{file} is missing");
     }
-    let document = glb_json(&sandbox.read("made/here/poses.glb"));
+    let document = glb_json(&sandbox.read("new/folder/poses.glb"));
     assert_eq!(document["meshes"][0]["primitives"][0]["targets"].as_array().unwrap().len(), 2);
     let report = &done["report"];
-    let sample = obj_positions(&sandbox.read("made/here/rat.obj")).len();
+    let sample = obj_positions(&sandbox.read("new/folder/rat.obj")).len();
     assert_eq!(report["vertices"], sample);
-    assert_eq!(report["cage_vertices"], obj_positions(&sandbox.read("made/here/cage.obj")).len());
+    assert_eq!(report["cage_vertices"], obj_positions(&sandbox.read("new/folder/cage.obj")).len());
     assert_eq!(report["outside_vertices"], 0);
     assert_eq!(report["converged"], true);
 }

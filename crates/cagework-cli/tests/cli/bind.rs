@@ -4,10 +4,10 @@ use serde_json::Value;
 
 use crate::support::{CORNERS, Sandbox, assert_close, box_obj, obj_positions, sphere_obj};
 
-/// Weights are stored as `f32`: sums of 8 of them over coordinates up to 1, and a solve to round-off, stay below this.
+/// Weights are `f32`: the sum of 8 weighted coordinates up to 1 is exact to this.
 const REST_TOLERANCE: f64 = 1e-4;
 
-/// What scripts may rely on.
+/// Keys of the report that are guaranteed to scripts.
 const REPORT_KEYS: &[&str] = &[
     "/method",
     "/solver",
@@ -39,11 +39,11 @@ const REPORT_KEYS: &[&str] = &[
 ];
 
 fn number(report: &Value, pointer: &str) -> f64 {
-    report.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer} is no number"))
+    report.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer} is not a number"))
 }
 
 #[test]
-fn report_has_every_key_of_the_contract() {
+fn report_has_every_guaranteed_key() {
     let sandbox = Sandbox::with_sphere_in_box();
     for options in ["", "--solver jacobi", "--method classic", "--method classic --solver multigrid"] {
         let report = sandbox.json(&format!("bind mesh.obj --cage cage.obj -g 16 --json {options}"));
@@ -62,7 +62,7 @@ fn report_has_every_key_of_the_contract() {
 }
 
 #[test]
-fn classic_means_jacobi_and_embedded_means_multigrid_unless_said() {
+fn default_solver_is_jacobi_for_classic_and_multigrid_for_embedded() {
     let sandbox = Sandbox::with_sphere_in_box();
     let classic = sandbox.json("bind mesh.obj --cage cage.obj -g 8 --method classic --json");
     assert_eq!([&classic["method"], &classic["solver"]], ["classic", "jacobi"]);
@@ -71,7 +71,7 @@ fn classic_means_jacobi_and_embedded_means_multigrid_unless_said() {
 }
 
 #[test]
-fn report_goes_to_file_or_stdout_alike() {
+fn report_in_a_file_and_on_stdout_have_the_same_keys() {
     let sandbox = Sandbox::with_sphere_in_box();
     let printed = sandbox.json("bind mesh.obj --cage cage.obj -g 8 --report -");
     assert_eq!(printed["grid"], 8);
@@ -88,7 +88,7 @@ fn report_goes_to_file_or_stdout_alike() {
 fn rest_pose_is_reconstructed() {
     let sandbox = Sandbox::with_sphere_in_box();
     let report = sandbox.json("bind mesh.obj --cage cage.obj -g 16 -o rest.obj --json");
-    assert!(number(&report, "/rest_error/max_rel") <= 5e-5, "the bar of the default method");
+    assert!(number(&report, "/rest_error/max_rel") <= 5e-5, "default method");
     assert!(number(&report, "/weights/min") >= -1e-6);
     assert!(number(&report, "/weights/max_sum_error") <= 1e-5);
     let mesh = obj_positions(&sandbox.read("mesh.obj"));
@@ -107,7 +107,7 @@ fn runs_are_bit_identical() {
 }
 
 #[test]
-fn sparsified_weights_are_fewer_and_keep_the_rest_pose() {
+fn sparsify_removes_weights_and_keeps_the_rest_pose() {
     let sandbox = Sandbox::with_sphere_in_box();
     let dense = sandbox.json("bind mesh.obj --cage box:4 -g 16 --json");
     let sparse = sandbox.json("bind mesh.obj --cage box:4 -g 16 --sparsify 1e-3 -o rest.obj --json");
@@ -119,18 +119,18 @@ fn sparsified_weights_are_fewer_and_keep_the_rest_pose() {
 #[test]
 fn box_cage_is_generated_and_saved() {
     let sandbox = Sandbox::with_sphere_in_box();
-    let report = sandbox.json("bind mesh.obj --cage box:3 --save-cage made.obj -g 8 --json");
-    // Lattice points of a cube's surface with n divisions: (n + 1)^3 - (n - 1)^3, 56 for n = 3.
+    let report = sandbox.json("bind mesh.obj --cage box:3 --save-cage box.obj -g 8 --json");
+    // Lattice points on the surface of a cube with n divisions: (n + 1)^3 - (n - 1)^3, 56 for n = 3.
     assert_eq!(report["cage_vertices"], 56);
-    assert_eq!(obj_positions(&sandbox.read("made.obj")).len(), 56);
-    let again = sandbox.json("bind mesh.obj --cage made.obj -g 8 --json");
+    assert_eq!(obj_positions(&sandbox.read("box.obj")).len(), 56);
+    let again = sandbox.json("bind mesh.obj --cage box.obj -g 8 --json");
     assert_eq!(again["cage_vertices"], 56);
 }
 
 #[test]
-fn inverted_cage_is_turned_with_a_notice() {
+fn inside_out_cage_is_flipped_with_a_notice() {
     let sandbox = Sandbox::with_sphere_in_box();
-    // Mirrored: the faces now point inwards.
+    // Reflected, so that the faces point inwards.
     sandbox.write("cage.obj", box_obj(&CORNERS.map(|[x, y, z]| [-x, y, z])));
     sandbox
         .run("bind mesh.obj --cage cage.obj -g 8")
@@ -139,7 +139,7 @@ fn inverted_cage_is_turned_with_a_notice() {
 }
 
 #[test]
-fn not_converged_is_a_warning() {
+fn reaching_the_iteration_limit_is_a_warning() {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox
         .run("bind mesh.obj --cage cage.obj -g 16 --method classic --max-iterations 2")

@@ -4,7 +4,7 @@ use serde_json::json;
 use crate::support::{CORNERS, Sandbox, box_obj, obj_positions};
 
 #[test]
-fn info_counts_what_is_there() {
+fn info_counts_vertices_and_faces() {
     let sandbox = Sandbox::with_sphere_in_box();
     let info = sandbox.json("info cage.obj --json");
     assert_eq!(info["vertices"], 8);
@@ -21,7 +21,7 @@ fn info_counts_what_is_there() {
 }
 
 #[test]
-fn info_says_why_a_model_is_no_cage() {
+fn info_explains_why_a_model_is_not_a_valid_cage() {
     let sandbox = Sandbox::new();
     sandbox.write("open.obj", box_obj(&CORNERS).replace("f 5 6 8 7\n", ""));
     let info = sandbox.json("info open.obj --json");
@@ -31,13 +31,13 @@ fn info_says_why_a_model_is_no_cage() {
 }
 
 #[test]
-fn box_cage_encloses_the_model_with_its_margin() {
+fn box_cage_keeps_its_margin() {
     let sandbox = Sandbox::with_sphere_in_box();
     let made = sandbox.json("cage mesh.obj -o box.obj --divisions 3 --margin 0.1 --json");
-    // Lattice points of a cube's surface with n divisions: (n + 1)^3 - (n - 1)^3; n^2 quads on each of six sides.
+    // Lattice points on the surface of a cube with n divisions: (n + 1)^3 - (n - 1)^3; n^2 quads on each of six sides.
     assert_eq!(made["vertices"], 56);
     assert_eq!(made["faces"], 54);
-    // The bounding box of a sphere of radius 0.7 has a diagonal of 1.4 sqrt(3): a tenth of it on either side.
+    // The bounding box of a sphere of radius 0.7 has the diagonal 1.4 sqrt(3); a tenth of it is added on each side.
     let half = 0.7 + 0.14 * 3.0_f64.sqrt();
     for p in obj_positions(&sandbox.read("box.obj")) {
         assert!(p.iter().any(|x| (x.abs() - half).abs() < 1e-6), "{p:?} is not on the box");

@@ -3,7 +3,7 @@ use predicates::str::contains;
 use crate::support::{CORNERS, Sandbox, box_obj, glb_json};
 
 #[test]
-fn generated_cage_encloses_the_model_and_is_bound_without_outsiders() {
+fn generated_cage_encloses_the_model() {
     let sandbox = Sandbox::with_sphere_in_box();
     let made = sandbox.json("cage mesh.obj -o auto.obj --vertices 40 --json");
     assert_eq!(made["kind"], "auto");
@@ -18,7 +18,7 @@ fn generated_cage_encloses_the_model_and_is_bound_without_outsiders() {
 }
 
 #[test]
-fn kinds_of_cages_can_be_named_wherever_a_cage_is() {
+fn every_kind_of_cage_can_be_bound() {
     let sandbox = Sandbox::with_sphere_in_box();
     for (name, at_most) in [("auto:24", 27), ("hull:16", 18), ("auto", 88), ("box:1", 8)] {
         let bound = sandbox.json(&format!("bind mesh.obj --cage {name} -g 16 --save-cage c.obj --json"));
@@ -26,9 +26,10 @@ fn kinds_of_cages_can_be_named_wherever_a_cage_is() {
         assert_eq!(bound["outside_vertices"], 0, "{name}");
         sandbox.run("check c.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
     }
-    for (name, word) in [("auto:5", "from 8 to 400"), ("hull:x", "whole number"), ("box:99", "from 1 to 16")]
+    for (name, message) in
+        [("auto:5", "from 8 to 400"), ("hull:x", "whole number"), ("box:99", "from 1 to 16")]
     {
-        sandbox.run(&format!("bind mesh.obj --cage {name}")).code(2).stderr(contains(word));
+        sandbox.run(&format!("bind mesh.obj --cage {name}")).code(2).stderr(contains(message));
     }
 }
 
@@ -41,7 +42,7 @@ fn cage_is_written_as_glb_too() {
 }
 
 #[test]
-fn symmetric_model_gets_a_mirror_and_may_be_refused_one() {
+fn cage_of_a_symmetric_model_is_symmetric_unless_disabled() {
     let sandbox = Sandbox::with_sphere_in_box();
     let made = sandbox.json("cage mesh.obj -o a.obj --vertices 30 --json");
     assert_eq!(made["report"]["mirror"], "x");
@@ -50,7 +51,7 @@ fn symmetric_model_gets_a_mirror_and_may_be_refused_one() {
 }
 
 #[test]
-fn check_names_the_fault_and_repair_mends_it() {
+fn check_names_the_fault_and_repair_fixes_it() {
     let sandbox = Sandbox::new();
     sandbox.write("open.obj", box_obj(&CORNERS).replace("f 5 6 8 7\n", "").replace("f 1 2 6 5", "f 5 6 2 1"));
     let assert = sandbox.run("check open.obj --json").code(1).stderr(contains("cannot be used as a cage"));
@@ -62,20 +63,19 @@ fn check_names_the_fault_and_repair_mends_it() {
     assert_eq!(problem["fixes"][0]["repair"], "fill_holes");
     sandbox.run("check open.obj").code(1).stdout(contains("--repair fill-holes"));
 
-    let mended = sandbox.json("check open.obj --repair fill-holes,flip -o mended.obj --json");
-    assert_eq!(mended["valid"], true);
-    assert_eq!(mended["repaired"].as_array().unwrap().len(), 2);
-    assert_eq!(sandbox.json("info mended.obj --json")["cage"]["notices"].as_array().unwrap().len(), 0);
+    let repaired = sandbox.json("check open.obj --repair fill-holes,flip -o repaired.obj --json");
+    assert_eq!(repaired["valid"], true);
+    assert_eq!(repaired["repaired"].as_array().unwrap().len(), 2);
+    assert_eq!(sandbox.json("info repaired.obj --json")["cage"]["notices"].as_array().unwrap().len(), 0);
 }
 
-/// `info` called it valid, `check` unusable, and `bind` bound it.
 #[test]
-fn cage_through_itself_is_bound_with_the_warning_that_info_and_check_give() {
+fn self_intersecting_cage_gives_the_same_warning_in_info_check_and_bind() {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.run("cage mesh.obj -o box.obj --kind box --divisions 3").success();
     let text = String::from_utf8(sandbox.read("box.obj")).unwrap();
     let mut is_pushed = false;
-    // A vertex in the middle of one side, out through the side across.
+    // Push a vertex in the middle of one side through the opposite side.
     let pushed = text.lines().map(|line| {
         let p: Vec<f64> = line.split(' ').skip(1).filter_map(|x| x.parse().ok()).collect();
         if is_pushed || !line.starts_with("v ") || p[1].abs().max(p[2].abs()) > -0.5 * p[0] {
@@ -88,12 +88,12 @@ fn cage_through_itself_is_bound_with_the_warning_that_info_and_check_give() {
     let check = sandbox.json("check through.obj --json");
     let problem = &check["problems"][0];
     assert_eq!((&check["valid"], problem["severity"].as_str()), (&true.into(), Some("warning")));
-    let said = problem["message"].as_str().unwrap();
-    assert!(said.contains("goes through itself") && said.contains("the first of faces"), "{said}");
+    let message = problem["message"].as_str().unwrap();
+    assert!(message.contains("goes through itself") && message.contains("the first of faces"), "{message}");
     let info = &sandbox.json("info through.obj --json")["cage"];
-    assert_eq!((&info["valid"], &info["notices"]), (&true.into(), &serde_json::json!([said])));
+    assert_eq!((&info["valid"], &info["notices"]), (&true.into(), &serde_json::json!([message])));
     let bound = sandbox.json("bind mesh.obj --cage through.obj -g 16 --json");
-    assert!(bound["notices"].as_array().unwrap().contains(&said.into()), "{}", bound["notices"]);
+    assert!(bound["notices"].as_array().unwrap().contains(&message.into()), "{}", bound["notices"]);
 }
 
 #[test]

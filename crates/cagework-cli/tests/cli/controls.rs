@@ -1,10 +1,10 @@
-//! Smooth cages and controls inside, by the command.
+//! Smooth cages and inner controls.
 
 use predicates::str::contains;
 
 use crate::support::{Sandbox, assert_close, obj_positions, sphere_obj};
 
-/// A spine of two pieces, a point in front of it, and a file of them moved.
+/// A polyline of two segments and a point in front of it; then the same with the point moved.
 const SPINE: &str = "v -0.3 -0.4 -0.2\nv 0 0 -0.2\nv 0.3 0.4 -0.2\nv 0 0 0.4\nl 1 2 3\np 4\n";
 const SPINE_MOVED: &str = "v -0.3 -0.4 -0.2\nv 0 0 -0.2\nv 0.3 0.4 -0.2\nv 0 0 0.6\nl 1 2 3\np 4\n";
 
@@ -15,13 +15,13 @@ fn with_spine() -> Sandbox {
 }
 
 #[test]
-fn smooth_cage_keeps_the_rest_pose_and_says_what_is_outside() {
+fn smooth_cage_keeps_the_rest_pose_and_reports_outside_vertices() {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.write("mesh.obj", sphere_obj(0.9));
     let report =
         sandbox.json("bind mesh.obj --cage cage.obj -g 16 --smooth 2 --weights w.npz -o rest.obj --json");
     assert_eq!((&report["smooth"], &report["cage_vertices"]), (&2.into(), &8.into()));
-    // The sphere nearly fills the cube, whose corners are rounded off.
+    // The smooth surface of a cube cuts its corners, where the sphere is now outside.
     assert!(report["outside_vertices"].as_u64().unwrap() > 0);
     assert_close(&obj_positions(&sandbox.read("rest.obj")), &obj_positions(&sandbox.read("mesh.obj")), 1e-6);
     sandbox.run("check cage.obj --mesh mesh.obj --smooth 2").success().stdout(contains("outside"));
@@ -38,7 +38,7 @@ fn smooth_cage_keeps_the_rest_pose_and_says_what_is_outside() {
 }
 
 #[test]
-fn controls_inside_are_columns_after_the_cage_and_move_the_model() {
+fn inner_controls_are_columns_after_the_cage_and_move_the_model() {
     let sandbox = with_spine();
     let report = sandbox.json(
         "bind mesh.obj --cage cage.obj -g 16 --controls spine.obj --radius 0.15 --weights w.npz -o rest.obj --json",
@@ -48,55 +48,57 @@ fn controls_inside_are_columns_after_the_cage_and_move_the_model() {
     assert_close(&obj_positions(&sandbox.read("rest.obj")), &rest, 1e-6);
 
     let deform = "deform mesh.obj --cage cage.obj --weights w.npz --pose cage.obj -o out.obj";
-    sandbox.run(deform).success().stdout(contains("by 8 cage vertices and 4 controls inside"));
+    sandbox.run(deform).success().stdout(contains("by 8 cage vertices and 4 inner controls"));
     assert_close(&obj_positions(&sandbox.read("out.obj")), &rest, 1e-6);
     sandbox.write("moved.obj", SPINE_MOVED);
     sandbox.run(&format!("{deform} --pose-controls moved.obj")).success();
     let posed = obj_positions(&sandbox.read("out.obj"));
-    // The front, near the point, follows it most; the back hardly.
-    let by = |front: f64| {
+    // The front, near the point, moves most; the back hardly moves.
+    let motion = |front: f64| {
         let far = (0..rest.len()).max_by(|&a, &b| (front * rest[a][2]).total_cmp(&(front * rest[b][2])));
         let v = far.unwrap();
         posed[v][2] - rest[v][2]
     };
-    assert!(by(1.0) > 0.02 && by(-1.0).abs() < 0.25 * by(1.0), "{} {}", by(1.0), by(-1.0));
+    assert!(
+        motion(1.0) > 0.02 && motion(-1.0).abs() < 0.25 * motion(1.0),
+        "{} {}",
+        motion(1.0),
+        motion(-1.0)
+    );
 
     sandbox.run("info spine.obj").success().stdout(contains("1 points, 1 lines, 0 faces"));
     sandbox.write("few.obj", "v 0 0 0\np 1\n");
     sandbox
         .run(&format!("{deform} --pose-controls few.obj"))
         .failure()
-        .stderr(contains("has 1 vertices, but 4 controls inside the cage were bound"));
+        .stderr(contains("has 1 vertices, but 4 inner controls were bound"));
     sandbox
         .run(&format!("{deform} --pose-controls moved.obj --pose-controls moved.obj"))
         .failure()
-        .stderr(contains("2 --pose-controls for 1 poses"));
+        .stderr(contains("2 --pose-controls were given for 1 --pose"));
 }
 
 #[test]
-fn pull_moves_controls_inside_along() {
+fn pull_moves_inner_controls() {
     let sandbox = with_spine();
     let controls = "--controls spine.obj --radius 0.15";
     sandbox.run(&format!("bind mesh.obj --cage cage.obj -g 16 {controls} --weights w.npz")).success();
     sandbox.write("job.json", r#"{"grabs": [{"cage": 11, "to": [0, 0, 0.7]}], "reach": "all"}"#);
     let pull = "pull mesh.obj --cage cage.obj --weights w.npz --job job.json -o pose.obj";
     sandbox.run(&format!("{pull} {controls} -g 16 --save-controls posed.obj")).success();
-    // Column 11 is the point.
+    // Control 11 is the point: 8 cage vertices and 3 of the polyline precede it.
     let posed = obj_positions(&sandbox.read("posed.obj"));
     assert_eq!(posed.len(), 4);
     assert!((posed[3][2] - 0.7).abs() < 1e-2, "{:?}", posed[3]);
-    sandbox
-        .run(pull)
-        .failure()
-        .stderr(contains("was bound with 4 controls inside the cage, but 0 are given"));
+    sandbox.run(pull).failure().stderr(contains("was bound with 4 inner controls, but 0 were given"));
 }
 
 #[test]
-fn controls_that_cannot_be_used_end_in_a_sentence() {
+fn invalid_inner_controls_are_rejected() {
     let sandbox = with_spine();
     let many: String = (0..10_000).map(|k| format!("v 0 0 {}\n", f64::from(k) * 1e-5)).collect();
     let points: String = (1..=10_000).map(|k| format!("p {k}\n")).collect();
-    for (file, said) in [
+    for (file, message) in [
         ("", "is empty"),
         ("# nothing\n", "no vertices"),
         ("v 0 0 0\n", "there is no control inside: give points (p), polylines (l) or faces (f)"),
@@ -113,7 +115,7 @@ fn controls_that_cannot_be_used_end_in_a_sentence() {
             .run("bind mesh.obj --cage cage.obj -g 16 --controls wrong.obj")
             .failure()
             .stderr(contains("wrong.obj"))
-            .stderr(contains(said));
+            .stderr(contains(message));
     }
     sandbox
         .run("bind mesh.obj --cage cage.obj -g 16 --controls spine.obj --radius 0.05")

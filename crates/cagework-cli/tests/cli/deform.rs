@@ -3,10 +3,10 @@ use predicates::str::contains;
 
 use crate::support::{CORNERS, Sandbox, assert_close, box_obj, glb_json, obj_positions, sphere_obj};
 
-/// Weights are stored as `f32`, coordinates stay below 10.
+/// Weights are `f32`, and coordinates are below 10.
 const TOLERANCE: f64 = 1e-4;
 
-/// An affine map that is none of the special ones.
+/// A general affine map: scale, shear and translation.
 fn affine([x, y, z]: [f64; 3]) -> [f64; 3] {
     [1.5 * x + 0.25 * y + 3.0, 0.75 * y - 0.5 * z, z + 0.1 * x - 2.0]
 }
@@ -20,8 +20,8 @@ fn bound() -> Sandbox {
 }
 
 #[test]
-fn affine_motion_of_the_cage_moves_the_mesh_alike() {
-    // Linear reproduction: sum w = 1 and sum w c = v give sum w A(c) = A(v).
+fn affine_map_of_the_cage_is_applied_to_the_mesh() {
+    // Linear precision: sum w = 1 and sum w c = v imply sum w A(c) = A(v).
     let sandbox = bound();
     sandbox
         .run("deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj -o out.obj")
@@ -34,13 +34,13 @@ fn affine_motion_of_the_cage_moves_the_mesh_alike() {
 #[test]
 fn vertices_outside_follow_affine_maps() {
     let sandbox = Sandbox::with_sphere_in_box();
-    // By 4.3 % of the cage's diagonal at most.
+    // At most 4.3 % of the cage's diagonal outside.
     sandbox.write("mesh.obj", sphere_obj(1.15));
     sandbox.run("bind mesh.obj --cage cage.obj -g 16 --weights w.npz").success();
     let moved = |[x, y, z]: [f64; 3]| [-1.5 * y + 1.0, x + 0.2 * z, z + 2.0];
-    sandbox.write("turned.obj", box_obj(&CORNERS.map(moved)));
+    sandbox.write("rotated.obj", box_obj(&CORNERS.map(moved)));
     let done =
-        sandbox.json("deform mesh.obj --cage cage.obj --weights w.npz --pose turned.obj -o out.obj --json");
+        sandbox.json("deform mesh.obj --cage cage.obj --weights w.npz --pose rotated.obj -o out.obj --json");
     assert!(done["outside_vertices"].as_u64().unwrap() > 0 && done["staying_vertices"] == 0);
     assert!(done["notices"][0].as_str().unwrap().contains("vertices are outside the cage, up to 4.33 %"));
     let expected: Vec<_> = obj_positions(&sandbox.read("mesh.obj")).into_iter().map(moved).collect();
@@ -61,9 +61,8 @@ fn several_poses_become_morph_targets_and_an_animation() {
     assert_eq!(document["animations"].as_array().unwrap().len(), 1);
 }
 
-/// Poses were multiplied out by nobody: 3,000 of a model of 15,000 vertices took 5 GB.
 #[test]
-fn more_poses_than_memory_holds_are_refused_before_they_are_computed() {
+fn poses_above_the_memory_limit_are_rejected_before_they_are_computed() {
     let many = " --pose lifted.obj".repeat(300);
     bound()
         .run(&format!("deform mesh.obj --cage cage.obj --weights w.npz{many} -o out.glb --memory-limit 4"))
@@ -72,26 +71,26 @@ fn more_poses_than_memory_holds_are_refused_before_they_are_computed() {
 }
 
 #[test]
-fn one_pose_makes_a_plain_glb() {
+fn one_pose_is_written_without_morph_targets() {
     let sandbox = bound();
     sandbox.run("deform mesh.obj --cage cage.obj --weights w.npz --pose lifted.obj -o out.glb").success();
     let document = glb_json(&sandbox.read("out.glb"));
     assert!(document["meshes"][0]["primitives"][0].get("targets").is_none());
     assert!(document.get("animations").is_none());
-    // What was written is a model again, and still holds the mesh.
+    // The output can be read, and has all vertices.
     assert_eq!(sandbox.json("info out.glb --json")["unique_vertices"], 178);
 }
 
 #[test]
-fn several_poses_do_not_fit_an_obj() {
+fn several_poses_are_rejected_for_obj() {
     bound()
         .run("deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj --pose lifted.obj -o out.obj")
         .code(1)
-        .stderr(contains("one pose, but 2").and(contains("hint: ")));
+        .stderr(contains("one pose, but there are 2").and(contains("hint: ")));
 }
 
 #[test]
-fn pose_of_another_size_is_refused_with_both_numbers() {
+fn pose_with_another_vertex_count_is_rejected_with_both_numbers() {
     let sandbox = bound();
     sandbox.write("long.obj", box_obj(&CORNERS) + "v 0 0 0\n");
     sandbox
@@ -101,7 +100,7 @@ fn pose_of_another_size_is_refused_with_both_numbers() {
 }
 
 #[test]
-fn weights_of_another_mesh_or_cage_are_refused_with_the_numbers() {
+fn weights_of_another_mesh_or_cage_are_rejected_with_the_numbers() {
     let sandbox = bound();
     sandbox
         .run("deform cage.obj --cage cage.obj --weights w.npz --pose affine.obj -o out.obj")
@@ -121,7 +120,7 @@ fn output_does_not_overwrite_a_pose() {
         .stderr(contains("affine.obj").and(contains("overwritten")));
 }
 
-/// `--up z` turns what is read and turns back what is written: nothing about the files changes.
+/// `--up z` rotates inputs and rotates outputs back, so that the files agree with each other.
 #[test]
 fn files_with_z_up_keep_their_axes() {
     let sandbox = bound();
@@ -146,18 +145,21 @@ fn files_with_z_up_keep_their_axes() {
     let expected: Vec<_> = mesh.iter().copied().map(affine).collect();
     assert_close(&obj_positions(&sandbox.read("out.obj")), &expected, TOLERANCE);
 
-    // The long side stands upright, and a cage that is made lies as the model does.
+    // The long side is vertical in `info`, and a generated cage has the axes of the file.
     let bounds = &sandbox.json("info mesh.obj --up z --json")["bounds"];
-    let upright = |corner: &str| bounds[corner][1].as_f64().unwrap();
-    assert!((upright("min") - 3.6).abs() < TOLERANCE && (upright("max") - 6.4).abs() < TOLERANCE, "{bounds}");
-    sandbox.run("cage mesh.obj --up z --vertices 24 -o made.obj").success();
-    sandbox.run("check made.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
+    let y = |corner: &str| bounds[corner][1].as_f64().unwrap();
+    assert!((y("min") - 3.6).abs() < TOLERANCE && (y("max") - 6.4).abs() < TOLERANCE, "{bounds}");
+    sandbox.run("cage mesh.obj --up z --vertices 24 -o generated.obj").success();
+    sandbox
+        .run("check generated.obj --mesh mesh.obj")
+        .success()
+        .stdout(contains("the whole model is inside"));
 }
 
 #[test]
-fn a_pose_whose_vertices_are_in_another_order_is_refused() {
+fn pose_with_another_vertex_order_is_rejected() {
     let sandbox = bound();
-    // The same box, but two corners that lie across a face have each other's number.
+    // The same box, with the indices of two diagonally opposite corners of a face swapped.
     let [a, b] = [
         0,
         CORNERS
@@ -167,7 +169,7 @@ fn a_pose_whose_vertices_are_in_another_order_is_refused() {
     ];
     let mut corners = CORNERS.map(affine);
     corners.swap(a, b);
-    let renamed = |word: &str| match word.parse::<usize>() {
+    let renumbered = |word: &str| match word.parse::<usize>() {
         Ok(corner) if corner == a + 1 => (b + 1).to_string(),
         Ok(corner) if corner == b + 1 => (a + 1).to_string(),
         _ => word.to_owned(),
@@ -177,7 +179,7 @@ fn a_pose_whose_vertices_are_in_another_order_is_refused() {
         .map(|line| {
             let words: Vec<String> = line
                 .split(' ')
-                .map(|word| if line.starts_with('f') { renamed(word) } else { word.into() })
+                .map(|word| if line.starts_with('f') { renumbered(word) } else { word.into() })
                 .collect();
             words.join(" ") + "\n"
         })
@@ -189,9 +191,9 @@ fn a_pose_whose_vertices_are_in_another_order_is_refused() {
         .stderr(contains("its vertices are in another order"));
 }
 
-/// On a map, 32-bit floats have steps of 0.5: model, cage and poses are seen from one origin near the model.
+/// At map coordinates `f32` has steps of 0.5, so model, cage and poses are stored relative to an origin near the model.
 #[test]
-fn models_far_from_the_origin_are_deformed_as_near_ones() {
+fn models_far_from_the_origin_are_deformed_with_the_same_accuracy() {
     let place = |[x, y, z]: [f64; 3]| [x + 500_000.25, y + 100.0, z + 4_500_000.5];
     let moved = |text: &str| {
         let mut places = obj_positions(text.as_bytes()).into_iter().map(place);
@@ -214,7 +216,7 @@ fn models_far_from_the_origin_are_deformed_as_near_ones() {
     assert_close(&obj_positions(&sandbox.read("out.obj")), &expected, 1e-5);
     sandbox.run("refit mesh.obj --cage cage.obj --pose affine.obj -g 16 -o fitted").success();
     assert_close(&obj_positions(&sandbox.read("fitted/mesh.obj")), &expected, 1e-5);
-    // A cage that is made is there too, and holds the model.
+    // Generated cages have the same origin.
     sandbox.run("cage mesh.obj --kind box --divisions 1 -o box.obj").success();
     sandbox.run("check box.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
     let bounds = &sandbox.json("info box.obj --json")["bounds"];
@@ -223,12 +225,12 @@ fn models_far_from_the_origin_are_deformed_as_near_ones() {
     sandbox.run("check auto.obj --mesh mesh.obj").success().stdout(contains("the whole model is inside"));
 }
 
-/// A pose whose file has several states is as many poses; commands that take one say so.
+/// Each keyframe in a pose file is a pose. Commands that accept one pose reject such a file.
 #[test]
-fn states_of_a_pose_file_are_poses_of_their_own() {
+fn keyframes_of_a_pose_file_are_separate_poses() {
     let sandbox = bound();
     sandbox.run("bind mesh.obj --cage cage.obj -g 8 -o mesh.glb").success();
-    // The sphere as its own cage: its animated file, as a pose.
+    // The bound sphere serves as a cage, and its animated file as a pose.
     sandbox
         .run(
             "deform mesh.obj --cage cage.obj --weights w.npz --pose affine.obj --pose lifted.obj -o keys.glb",
@@ -246,8 +248,9 @@ fn states_of_a_pose_file_are_poses_of_their_own() {
     sandbox
         .run("deform small.obj --cage mesh.glb --weights s.npz --pose keys.glb -o out.obj")
         .failure()
-        .stderr(contains("a file of format obj holds one pose, but 4 were given"));
-    sandbox.run("refit small.obj --cage mesh.glb --pose keys.glb -g 8 -o fitted").failure().stderr(contains(
-        "pose keys.glb holds 4 states, as keys of a clip or as shape keys, but one is needed here",
-    ));
+        .stderr(contains("format obj stores one pose, but there are 4"));
+    sandbox
+        .run("refit small.obj --cage mesh.glb --pose keys.glb -g 8 -o fitted")
+        .failure()
+        .stderr(contains("pose keys.glb contains 4 poses (keyframes or shape keys), but one is expected"));
 }

@@ -1,4 +1,4 @@
-//! Every command that README.md and docs/cli.md show in a block runs as it is written.
+//! Runs every command in the code blocks of README.md and docs/cli.md.
 
 use std::path::Path;
 
@@ -7,12 +7,12 @@ use cagework_io::write_mesh_glb;
 
 use crate::support::Sandbox;
 
-/// The files that the documents name: the humanoid as the horse, its clothes and the fox.
+/// The files that the documents name; the humanoid sample stands for every model.
 fn files() -> Sandbox {
     let sandbox = Sandbox::new();
     let sample = samples::build("humanoid").unwrap();
     let positions = &sample.mesh.positions;
-    assert!(positions.len() > 1680, "a job names that vertex");
+    assert!(positions.len() > 1680, "rear.json grabs vertex 1680");
     let horse = write_mesh_glb("horse", &sample.mesh, &sample.colours, None).unwrap();
     for name in ["horse", "shirt", "body", "jacket", "trousers", "boots"] {
         sandbox.write(&format!("{name}.glb"), &horse);
@@ -52,7 +52,7 @@ fn files() -> Sandbox {
     sandbox
 }
 
-/// A cage of the folder, stretched along x.
+/// A cage file of the folder, stretched along x.
 fn wider(sandbox: &Sandbox, cage: &str) -> String {
     let text = String::from_utf8(sandbox.read(cage)).unwrap();
     let stretch = |line: &str| match line.strip_prefix("v ").and_then(|xyz| xyz.split_once(' ')) {
@@ -62,7 +62,7 @@ fn wider(sandbox: &Sandbox, cage: &str) -> String {
     text.lines().map(stretch).collect()
 }
 
-/// Blocks of a document: their language and lines.
+/// Language and lines of each code block.
 fn blocks(text: &str) -> Vec<(&str, Vec<&str>)> {
     let mut blocks = Vec::new();
     let mut lines = text.lines();
@@ -87,7 +87,7 @@ fn commands_of_the_documents_run() {
             }
         }
         for (_, lines) in blocks(&text).into_iter().filter(|block| block.0 == "sh") {
-            // What a block writes is for that block alone.
+            // Each block runs in its own copy of the folder.
             let sandbox = Sandbox::new();
             for name in files.names() {
                 sandbox.write(&name, files.read(&name));

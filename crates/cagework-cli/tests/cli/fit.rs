@@ -2,7 +2,7 @@ use predicates::str::contains;
 
 use crate::support::{CORNERS, Sandbox, box_obj, obj_positions};
 
-/// A sphere in a box, bound; the box bent, and the sphere as that bends it.
+/// A folder with a bound sphere, a bent cage, and the sphere deformed by it as the target.
 fn bound() -> Sandbox {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.run("bind mesh.obj --cage cage.obj -g 16 --weights w.npz").success();
@@ -14,7 +14,7 @@ fn bound() -> Sandbox {
 
 const FIT: &str = "fit mesh.obj --cage cage.obj --weights w.npz -o pose.obj";
 
-fn off(sandbox: &Sandbox, a: &str, b: &str) -> f64 {
+fn max_distance(sandbox: &Sandbox, a: &str, b: &str) -> f64 {
     let [a, b] = [a, b].map(|name| obj_positions(&sandbox.read(name)));
     assert_eq!(a.len(), b.len());
     let apart = |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
@@ -22,11 +22,11 @@ fn off(sandbox: &Sandbox, a: &str, b: &str) -> f64 {
 }
 
 #[test]
-fn the_pose_of_a_cage_is_found_from_the_model_that_it_made() {
+fn fit_recovers_the_pose_that_deformed_the_target() {
     let sandbox = bound();
     let done = sandbox.json(&format!("{FIT} --target target.obj --json"));
-    // The box's diagonal is above 3.
-    assert!(off(&sandbox, "pose.obj", "bent.obj") <= 1e-4, "{done}");
+    // The diagonal of the box is 3.46.
+    assert!(max_distance(&sandbox, "pose.obj", "bent.obj") <= 1e-4, "{done}");
     assert_eq!(
         (&done["points"], &done["left_out"], &done["settled"]),
         (&178.into(), &0.into(), &true.into())
@@ -39,27 +39,27 @@ fn the_pose_of_a_cage_is_found_from_the_model_that_it_made() {
 }
 
 #[test]
-fn landmarks_bring_the_model_to_where_they_are() {
+fn landmarks_recover_the_pose_and_a_single_one_translates_the_model() {
     let sandbox = bound();
     let [rest, target] = ["mesh.obj", "target.obj"].map(|name| obj_positions(&sandbox.read(name)));
-    let say = |p: [f64; 3]| format!("[{}, {}, {}]", p[0], p[1], p[2]);
-    // Every third by its number, the others by the place on the model where they are.
+    let json = |p: [f64; 3]| format!("[{}, {}, {}]", p[0], p[1], p[2]);
+    // Every third landmark is a vertex index, the others are points of the surface.
     let landmarks = (0..rest.len()).map(|v| {
         let named =
-            if v % 3 == 0 { format!("\"vertex\": {v}") } else { format!("\"point\": {}", say(rest[v])) };
-        format!("{{{named}, \"to\": {}}}", say(target[v]))
+            if v % 3 == 0 { format!("\"vertex\": {v}") } else { format!("\"point\": {}", json(rest[v])) };
+        format!("{{{named}, \"to\": {}}}", json(target[v]))
     });
     sandbox.write("all.json", format!("[{}]", landmarks.collect::<Vec<_>>().join(",")));
     let done = sandbox.json(&format!("{FIT} --landmarks all.json --json"));
-    assert!(off(&sandbox, "pose.obj", "bent.obj") <= 1e-3, "{done}");
+    assert!(max_distance(&sandbox, "pose.obj", "bent.obj") <= 1e-3, "{done}");
 
-    // One alone shifts the whole.
-    sandbox.write("one.json", format!("[{{\"vertex\": 7, \"to\": {}}}]", say(rest[7].map(|x| x + 0.5))));
+    // A single landmark is a translation.
+    sandbox.write("one.json", format!("[{{\"vertex\": 7, \"to\": {}}}]", json(rest[7].map(|x| x + 0.5))));
     sandbox
         .run(&format!("{FIT} --landmarks one.json"))
         .success()
-        .stdout(contains("to 1 points"))
-        .stdout(contains("note: 1 landmarks leave turns open"));
+        .stdout(contains("to 1 point in"))
+        .stdout(contains("note: 1 landmark does not determine the rotation"));
     let [pose, cage] = ["pose.obj", "cage.obj"].map(|name| obj_positions(&sandbox.read(name)));
     for (a, b) in pose.iter().zip(&cage) {
         assert!((0..3).all(|k| (a[k] - b[k] - 0.5).abs() < 1e-3), "{a:?} {b:?}");
@@ -67,46 +67,50 @@ fn landmarks_bring_the_model_to_where_they_are() {
 }
 
 #[test]
-fn what_cannot_be_fitted_is_said_and_nothing_written() {
+fn invalid_targets_are_rejected_and_nothing_is_written() {
     let sandbox = bound();
     sandbox.run(FIT).failure().stderr(contains("--target <MESH>|--landmarks <FILE>"));
     sandbox
         .run(&format!("{FIT} --target cage.obj"))
         .failure()
-        .stderr(contains(
-            "cage.obj: has 8 vertices, but mesh.obj has 178: vertices are matched by their order",
-        ))
-        .stderr(contains("hint: give some --landmarks"));
+        .stderr(contains("cage.obj: has 8 vertices, but mesh.obj has 178; vertices are matched by index"))
+        .stderr(contains("hint: for a target with other vertices use --landmarks"));
     sandbox
         .run(&format!("{FIT} --target target.obj --lambda=-1"))
         .failure()
         .stderr(contains("lambda is -1; it must be a number from 0 on"));
-    for (landmarks, said) in [
-        ("[]", "bad.json: 0 landmarks; there must be 1 to 10000"),
+    for (landmarks, message) in [
+        ("[]", "bad.json: has 0 landmarks; expected 1 to 10000"),
         ("{}", "bad.json: a value is of another kind than is needed, at line 1, column 0"),
-        ("[{\"vertex\": 178, \"to\": [0, 0, 0]}]", "landmark 0 names vertex 178: they count from 0 to 177"),
-        ("[{\"to\": [0, 0, 0]}]", "landmark 0 must name one of vertex, triangle (with bary) and point"),
-        ("[{\"triangle\": 0, \"bary\": [1, 1, 1], \"to\": [0, 0, 0]}]", "which is no point of a triangle"),
+        ("[{\"vertex\": 178, \"to\": [0, 0, 0]}]", "landmark 0 names vertex 178; indices go from 0 to 177"),
+        ("[{\"to\": [0, 0, 0]}]", "landmark 0 needs one of vertex, triangle (with bary) and point"),
+        (
+            "[{\"triangle\": 0, \"bary\": [1, 1, 1], \"to\": [0, 0, 0]}]",
+            "expected numbers from 0 on that sum to 1",
+        ),
         ("[{\"vertex\": 1, \"to\": [0, 0, 1e39]}]", "landmark 0 has the coordinate inf"),
-        ("[{\"vertex\": 1, \"to\": [0, 0, 1], \"weight\": 0}]", "landmark 0 weighs 0; it must be above 0"),
+        (
+            "[{\"vertex\": 1, \"to\": [0, 0, 1], \"weight\": 0}]",
+            "landmark 0 has the weight 0; it must be above 0",
+        ),
     ] {
         sandbox.write("bad.json", landmarks);
-        sandbox.run(&format!("{FIT} --landmarks bad.json")).failure().stderr(contains(said));
+        sandbox.run(&format!("{FIT} --landmarks bad.json")).failure().stderr(contains(message));
     }
     assert!(!sandbox.path("pose.obj").exists());
 }
 
 #[test]
-fn a_pose_is_not_written_where_its_vertices_lose_their_order() {
+fn pose_formats_that_reorder_vertices_are_rejected() {
     let sandbox = bound();
     let fit =
         |pose: &str| format!("fit mesh.obj --cage cage.obj --weights w.npz --target target.obj -o {pose}");
     for pose in ["pose.stl", "pose.glb"] {
-        let said = format!("{pose}: the cage's vertices would be in another order there");
-        sandbox.run(&fit(pose)).failure().stderr(contains(said)).stderr(contains("write it as .obj or .ply"));
+        let message = format!("{pose}: this format would reorder the cage's vertices");
+        sandbox.run(&fit(pose)).failure().stderr(contains(message)).stderr(contains("write .obj or .ply"));
         assert!(!sandbox.path(pose).exists());
     }
     sandbox.run(&fit("pose.ply")).success();
     sandbox.run("deform mesh.obj --cage cage.obj --weights w.npz --pose pose.ply -o fitted.obj").success();
-    assert!(off(&sandbox, "fitted.obj", "target.obj") <= 1e-4);
+    assert!(max_distance(&sandbox, "fitted.obj", "target.obj") <= 1e-4);
 }

@@ -1,4 +1,4 @@
-//! The command as a user runs it: files in, files and messages out, exit codes.
+//! Runs the command as a user does: input files, output files, messages, exit codes.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests: a panic is a failed test")]
 

@@ -1,4 +1,4 @@
-//! Outputs appear whole or not at all, and destroy nothing.
+//! Outputs are written atomically and overwrite no input.
 
 use std::fs::{Permissions, hard_link, metadata, set_permissions};
 use std::os::unix::fs::{PermissionsExt as _, symlink};
@@ -11,13 +11,13 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use crate::support::{Sandbox, sphere_obj};
 
-/// Length of the comment that makes `mesh.obj` and what is made of it large, bytes.
+/// Length of the comment in `mesh.obj`, bytes. `-o out.obj` copies it, which makes the write slow enough to be interrupted.
 const COMMENT: usize = 32 << 20;
 
-/// Moments of a write at which the command is killed.
-const MOMENTS: u64 = 10;
+/// Number of times that the command is killed, at equal steps of the output's length.
+const N_KILLS: u64 = 10;
 
-/// A folder whose mesh is of tens of megabytes and quickly bound, with what `out.obj` was before.
+/// A folder with a 32 MiB mesh that is bound quickly, and an older `out.obj`.
 fn with_large_mesh() -> Sandbox {
     let sandbox = Sandbox::with_sphere_in_box();
     let line = format!("# {}\n", "large ".repeat(1000));
@@ -26,16 +26,15 @@ fn with_large_mesh() -> Sandbox {
     sandbox
 }
 
-/// A signal in the middle of a write left half a file in the place of the older one.
 #[test]
-fn command_killed_while_it_writes_leaves_the_older_file_or_the_whole_new_one_and_no_litter() {
+fn killed_command_leaves_the_old_or_the_complete_new_file_and_no_temporary_file() {
     const ARGS: &str = "bind mesh.obj --cage cage.obj -g 8 -o out.obj";
     let sandbox = with_large_mesh();
     let before = sandbox.names();
     sandbox.run(ARGS).success();
     let whole = sandbox.read("out.obj");
     let mut killed = 0;
-    for moment in 0..MOMENTS {
+    for moment in 0..N_KILLS {
         sandbox.write("out.obj", "older");
         let mut child = Command::new(cargo_bin!("cagework"))
             .args(ARGS.split(' '))
@@ -43,18 +42,18 @@ fn command_killed_while_it_writes_leaves_the_older_file_or_the_whole_new_one_and
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
-        // The file grows in its place or under a new name.
-        let grown = || {
+        // Size of the output or of a temporary file; 5 is the length of "older".
+        let written = || {
             let sizes =
                 sandbox.names().into_iter().filter(|name| name == "out.obj" || !before.contains(name));
             sizes.filter_map(|name| metadata(sandbox.path(&name)).ok()).map(|m| m.len()).find(|&n| n != 5)
         };
-        let enough = whole.len() as u64 * moment / MOMENTS;
+        let enough = whole.len() as u64 * moment / N_KILLS;
         let status = loop {
             if let Some(status) = child.try_wait().unwrap() {
                 break status;
             }
-            if grown().is_some_and(|n| n >= enough) {
+            if written().is_some_and(|n| n >= enough) {
                 let signals =
                     [Signal::TERM, Signal::INT, Signal::HUP, Signal::USR1, Signal::QUIT, Signal::XCPU];
                 let signal = signals[moment as usize % signals.len()];
@@ -67,12 +66,11 @@ fn command_killed_while_it_writes_leaves_the_older_file_or_the_whole_new_one_and
         assert!(now == b"older" || now == whole, "moment {moment}: {} of {} bytes", now.len(), whole.len());
         assert_eq!(sandbox.names(), before, "moment {moment}");
     }
-    assert!(killed > 0, "no signal came before the command was done");
+    assert!(killed > 0, "the command always ended before the signal");
 }
 
-/// The process was killed by SIGXFSZ and left as much of the file as may be.
 #[test]
-fn file_size_limit_is_an_error_and_leaves_the_older_file() {
+fn file_size_limit_is_an_error_and_keeps_the_older_file() {
     let sandbox = with_large_mesh();
     let before = sandbox.names();
     let output = Command::new("sh")
@@ -82,14 +80,14 @@ fn file_size_limit_is_an_error_and_leaves_the_older_file() {
         .output()
         .unwrap();
     assert_eq!(output.status.code(), Some(1), "{:?}", output.status);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(said.contains("out.obj: cannot be written") && said.contains("ulimit"), "{said}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(message.contains("out.obj: cannot be written") && message.contains("ulimit"), "{message}");
     assert_eq!(sandbox.read("out.obj"), b"older");
     assert_eq!(sandbox.names(), before);
 }
 
 #[test]
-fn permissions_of_the_older_file_are_kept_and_a_new_one_gets_those_of_any_file() {
+fn replaced_file_keeps_its_permissions_and_a_new_one_gets_the_default() {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.write("out.obj", "older");
     set_permissions(sandbox.path("out.obj"), Permissions::from_mode(0o604)).unwrap();
@@ -97,12 +95,12 @@ fn permissions_of_the_older_file_are_kept_and_a_new_one_gets_those_of_any_file()
     sandbox.run("cage mesh.obj --kind box -o new.obj").success();
     let mode = |name| metadata(sandbox.path(name)).unwrap().permissions().mode() & 0o777;
     assert_eq!(mode("out.obj"), 0o604);
-    // Made by the test, with the same umask.
+    // The test created mesh.obj with the same umask.
     assert_eq!(mode("new.obj"), mode("mesh.obj"));
 }
 
 #[test]
-fn symbolic_link_stays_and_its_target_is_written() {
+fn symbolic_link_is_kept_and_its_target_is_written() {
     let sandbox = Sandbox::with_sphere_in_box();
     std::fs::create_dir(sandbox.path("elsewhere")).unwrap();
     sandbox.write("elsewhere/old.obj", "older");
@@ -113,11 +111,14 @@ fn symbolic_link_stays_and_its_target_is_written() {
         assert!(sandbox.read(target).starts_with(b"v "), "{target}");
     }
     symlink("circle.obj", sandbox.path("circle.obj")).unwrap();
-    sandbox.run("cage mesh.obj --kind box -o circle.obj").code(1).stderr(contains("circle"));
+    sandbox
+        .run("cage mesh.obj --kind box -o circle.obj")
+        .code(1)
+        .stderr(contains("symbolic links form a circle"));
 }
 
 #[test]
-fn devices_and_stdout_are_written_to_and_stay() {
+fn devices_and_stdout_are_written_to_and_not_replaced() {
     let sandbox = Sandbox::with_sphere_in_box();
     symlink("/dev/null", sandbox.path("null.obj")).unwrap();
     sandbox.run("bind mesh.obj --cage cage.obj -g 8 --report /dev/null -o null.obj").success();
@@ -126,7 +127,7 @@ fn devices_and_stdout_are_written_to_and_stay() {
         .run("bind mesh.obj --cage cage.obj -g 8 --report /dev/stdout")
         .success()
         .stdout(contains("\"grid\": 8"));
-    // A file as stdout: what holds it open must find the report in it.
+    // If stdout is a file, the report must go to the open file, not to a new one of the same name.
     let file = std::fs::File::create(sandbox.path("stdout.txt")).unwrap();
     let status = Command::new(cargo_bin!("cagework"))
         .args("bind mesh.obj --cage cage.obj -g 8 --report /dev/stdout --save-cage c.obj".split(' '))
@@ -138,9 +139,8 @@ fn devices_and_stdout_are_written_to_and_stay() {
     assert!(file.metadata().unwrap().len() > 0, "the report went to another file of that name");
 }
 
-/// A report to a descriptor opened the file again: it overwrote an input, and cut off what a log already had.
 #[test]
-fn descriptors_are_written_to_where_they_are_and_are_no_inputs() {
+fn open_descriptors_are_appended_to_unless_they_are_inputs() {
     let sandbox = Sandbox::with_sphere_in_box();
     let run = |shell: &str| {
         let mut sh = Command::new("sh");
@@ -151,8 +151,8 @@ fn descriptors_are_written_to_where_they_are_and_are_no_inputs() {
     symlink("/dev/fd/3", sandbox.path("link.json")).unwrap();
     for report in ["/dev/fd/3", "/proc/self/fd/3", "link.json"] {
         let output = run(&format!("{bind} --report {report} 3<>mesh.obj"));
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(said.contains("is an input and would be overwritten"), "{report}: {said}");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(message.contains("is an input and would be overwritten"), "{report}: {message}");
         assert_eq!(sandbox.read("mesh.obj"), mesh, "{report}");
     }
     for (name, shell) in [
@@ -171,9 +171,9 @@ fn descriptors_are_written_to_where_they_are_and_are_no_inputs() {
     }
 }
 
-/// What a killed command leaves is removed by the next one; what a running one writes is not.
+/// Temporary files of killed commands are removed; that of a running command is locked and kept.
 #[test]
-fn litter_of_killed_commands_is_removed() {
+fn temporary_files_of_killed_commands_are_removed() {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.write(".cagework-dead00.part", "half a file");
     sandbox.write(".cagework-alive0.part", "half a file");
@@ -183,36 +183,34 @@ fn litter_of_killed_commands_is_removed() {
     assert_eq!(sandbox.names(), [".cagework-alive0.part", "cage.obj", "mesh.obj", "out.obj"]);
 }
 
-/// Only names were compared: a hard link was overwritten, and with it the input.
 #[test]
-fn output_is_no_input_and_no_other_output_under_another_name() {
+fn outputs_that_are_links_to_inputs_or_outputs_are_rejected() {
     let sandbox = Sandbox::with_sphere_in_box();
     hard_link(sandbox.path("mesh.obj"), sandbox.path("hard.obj")).unwrap();
     symlink("mesh.obj", sandbox.path("soft.obj")).unwrap();
     sandbox.write("a.obj", "older");
     hard_link(sandbox.path("a.obj"), sandbox.path("b.obj")).unwrap();
     symlink("missing.obj", sandbox.path("c.obj")).unwrap();
-    for (args, said) in [
+    for (args, message) in [
         ("cage mesh.obj -o hard.obj", "hard.obj: is an input"),
         ("cage mesh.obj -o soft.obj", "soft.obj: is an input"),
         ("bind mesh.obj --cage cage.obj -g 8 --report hard.obj", "hard.obj: is an input"),
         ("check cage.obj --mesh mesh.obj --repair weld -o hard.obj", "hard.obj: is an input"),
-        ("bind mesh.obj --cage cage.obj -g 8 -o a.obj --save-cage b.obj", "b.obj: is named for two outputs"),
-        ("bind mesh.obj --cage cage.obj -g 8 -o c.obj --save-cage missing.obj", "named for two outputs"),
+        ("bind mesh.obj --cage cage.obj -g 8 -o a.obj --save-cage b.obj", "b.obj: is given for two outputs"),
+        ("bind mesh.obj --cage cage.obj -g 8 -o c.obj --save-cage missing.obj", "given for two outputs"),
     ] {
-        sandbox.run(args).code(1).stderr(contains(said));
+        sandbox.run(args).code(1).stderr(contains(message));
     }
     assert!(sandbox.read("mesh.obj").starts_with(b"v "));
     assert_eq!(sandbox.read("a.obj"), b"older");
 }
 
-/// Files that a model names were overwritten by an output of the same name, and the model was lost with them.
 #[test]
-fn output_is_no_file_that_an_input_names() {
+fn outputs_that_an_input_refers_to_are_rejected() {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.write("mesh.obj", format!("mtllib look.mtl\n{}", sphere_obj(0.7)));
     sandbox.write("look.mtl", "newmtl skin\nmap_Kd skin.obj\n");
-    sandbox.write("skin.obj", "a texture, whatever its name");
+    sandbox.write("skin.obj", "a texture");
     let triangle: Vec<u8> =
         [0.0_f32, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.5, 0.0].into_iter().flat_map(f32::to_le_bytes).collect();
     sandbox.write("buffer.obj", &triangle);
@@ -235,9 +233,9 @@ fn output_is_no_file_that_an_input_names() {
         ("check cage.obj --mesh mesh.obj --repair weld -o skin.obj", "skin.obj"),
     ] {
         sandbox.run(args).code(1).stderr(contains(format!("{output}: is an input")));
-        // Found before the first output was written.
+        // Rejected before the first output was written.
         assert_eq!(sandbox.names(), before, "{args}");
     }
     assert_eq!(sandbox.read("buffer.obj"), triangle);
-    assert_eq!(sandbox.read("skin.obj"), b"a texture, whatever its name");
+    assert_eq!(sandbox.read("skin.obj"), b"a texture");
 }

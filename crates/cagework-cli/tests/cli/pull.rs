@@ -12,7 +12,7 @@ fn bound() -> Sandbox {
 const PULL: &str = "pull mesh.obj --cage cage.obj --weights w.npz --job job.json -o pose.obj";
 
 #[test]
-fn a_vertex_goes_where_it_is_pulled_to_and_a_pin_stays() {
+fn grabbed_vertex_reaches_its_target_and_a_pin_stays() {
     let sandbox = bound();
     let rest = obj_positions(&sandbox.read("mesh.obj"));
     let farthest = |sign: f64| {
@@ -53,11 +53,11 @@ fn a_vertex_goes_where_it_is_pulled_to_and_a_pin_stays() {
 }
 
 #[test]
-fn a_job_that_cannot_be_done_says_what_is_wrong_and_writes_nothing() {
+fn invalid_jobs_are_rejected_and_write_nothing() {
     let sandbox = bound();
-    for (job, said) in [
-        ("grab it", "job.json: is no job: its JSON is damaged, at line 1, column 1, after 'g'"),
-        ("[]", "job.json: is no job: a value is of another kind"),
+    for (job, message) in [
+        ("grab it", "job.json: not a job: its JSON is damaged, at line 1, column 1, after 'g'"),
+        ("[]", "job.json: not a job: a value is of another kind"),
         (
             "{\"grabs\": [],\n \"pin\": []}",
             "'pin' is not known; it must be one of grabs, pins, reach, start, relax, frames, at line 2, column 6, after '\"pin\"'",
@@ -79,7 +79,7 @@ fn a_job_that_cannot_be_done_says_what_is_wrong_and_writes_nothing() {
         (r#"{"grabs": [{"cage": 8, "to": [0, 0, 0]}]}"#, "no vertex of the cage 8: indices run from 0 to 7"),
         (r#"{"grabs": [{"vertex": 0}]}"#, "grab 0 has no target"),
         (r#"{"grabs": [{"to": [0, 0, 0]}]}"#, "one of vertex, triangle"),
-        (r#"{"grabs": [{"vertex": 0, "to": [0, 1e300, 0]}]}"#, "grab 0 goes to inf"),
+        (r#"{"grabs": [{"vertex": 0, "to": [0, 1e300, 0]}]}"#, "grab 0 has the target coordinate inf"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 1e999, 0]}]}"#, "a number is out of range, at line 1"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "reach": -1}"#, "the reach is -1"),
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "reach": "far"}"#, "the reach is 'far'"),
@@ -89,7 +89,7 @@ fn a_job_that_cannot_be_done_says_what_is_wrong_and_writes_nothing() {
         (r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}], "start": "mesh.obj"}"#, "178"),
     ] {
         sandbox.write("job.json", job);
-        sandbox.run(PULL).failure().code(1).stderr(contains("error:").and(contains(said)));
+        sandbox.run(PULL).failure().code(1).stderr(contains("error:").and(contains(message)));
         assert!(!sandbox.path("pose.obj").exists(), "{job}");
     }
     let pins: Vec<String> = (0..178).map(|v| format!(r#"{{"vertex": {v}}}"#)).collect();
@@ -105,7 +105,7 @@ fn a_job_that_cannot_be_done_says_what_is_wrong_and_writes_nothing() {
 }
 
 #[test]
-fn weights_of_another_model_are_refused() {
+fn weights_of_another_model_are_rejected() {
     let sandbox = bound();
     sandbox.write("job.json", r#"{"grabs": [{"vertex": 0, "to": [0, 0, 0]}]}"#);
     sandbox
@@ -115,7 +115,7 @@ fn weights_of_another_model_are_refused() {
 }
 
 #[test]
-fn targets_and_poses_have_the_axes_of_the_files() {
+fn targets_and_poses_use_the_axes_of_the_files() {
     let sandbox = Sandbox::with_sphere_in_box();
     let rest = obj_positions(&sandbox.read("mesh.obj"));
     let top = (0..rest.len()).max_by(|&a, &b| rest[a][2].total_cmp(&rest[b][2])).unwrap();

@@ -1,4 +1,4 @@
-//! Many models in one cage, with one solve.
+//! `cagework refit`: many models in one cage, with one solve.
 
 use std::time::{Duration, SystemTime};
 
@@ -8,7 +8,7 @@ use predicates::str::contains;
 use crate::rigs;
 use crate::support::{CORNERS, Sandbox, box_obj, sphere_obj};
 
-/// Spheres `a.obj` and `b.obj` in `cage.obj`, and `wide.obj`, its pose.
+/// A folder with the spheres `a.obj` and `b.obj`, their cage `cage.obj`, and its pose `wide.obj`.
 fn spheres() -> Sandbox {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.write("a.obj", sphere_obj(0.7));
@@ -19,8 +19,8 @@ fn spheres() -> Sandbox {
 
 const REFIT: &str = "refit --cage cage.obj --pose wide.obj -g 8 -o out";
 
-/// Asserts that files of `out` are what `bind` and `deform` make of each model alone.
-fn assert_as_alone(sandbox: &Sandbox, names: &[&str], bind: &str, deform: &str) {
+/// Asserts that the files in `out` are identical to the outputs of `bind` and `deform` for each model.
+fn assert_same_as_deform(sandbox: &Sandbox, names: &[&str], bind: &str, deform: &str) {
     for name in names {
         sandbox.run(&format!("bind {name} --cage cage.obj --weights w.npz {bind}")).success();
         let alone =
@@ -33,8 +33,8 @@ fn assert_as_alone(sandbox: &Sandbox, names: &[&str], bind: &str, deform: &str) 
 }
 
 #[test]
-fn models_together_are_the_bytes_of_each_alone() {
-    // Rigged ones, one wider than its cage, and a shape.
+fn refit_equals_bind_and_deform_of_each_model() {
+    // Two rigged models, one of them wider than the cage, and one without a rig.
     let sandbox = rigs::bound();
     sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
     sandbox
@@ -46,49 +46,53 @@ fn models_together_are_the_bytes_of_each_alone() {
         let options = format!("{} {deform}", bind.trim_end_matches("--static"));
         let done = sandbox.json(&format!("{refit} {options} --json"));
         assert_eq!([&done["written"], &done["failed"], &done["skipped"]], [3, 0, 0]);
-        assert_as_alone(&sandbox, &names, &format!("-g 24 {bind}"), deform);
+        assert_same_as_deform(&sandbox, &names, &format!("-g 24 {bind}"), deform);
         let joints = &done["models"][0]["joints"];
         assert_eq!((joints == 16, joints.is_null()), (bind.is_empty(), !bind.is_empty()), "{done}");
     }
 }
 
 #[test]
-fn parts_are_named_for_all_models_and_looked_for_in_each() {
+fn parts_missing_in_some_models_are_notices_and_in_all_an_error() {
     let sandbox = rigs::bound();
     sandbox
         .run("deform humanoid.glb --cage cage.obj --weights w.npz --pose wide.obj -o larger.glb")
         .success();
-    // A shape without names.
+    // A model without named parts.
     sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
     let parts = "--mask joint:head=0.5 --rigid joint:spine";
     let refit = "refit humanoid.glb larger.glb shape.obj --cage cage.obj --pose wide.obj -g 24 -o out";
     let done = sandbox.json(&format!("{refit} {parts} --json"));
-    assert_as_alone(&sandbox, &["humanoid.glb", "larger.glb"], "-g 24", parts);
-    assert_as_alone(&sandbox, &["shape.obj"], "-g 24", "");
+    assert_same_as_deform(&sandbox, &["humanoid.glb", "larger.glb"], "-g 24", parts);
+    assert_same_as_deform(&sandbox, &["shape.obj"], "-g 24", "");
     let notices = &done["models"][2]["notices"];
-    let said = ["joint:spine", "joint:head"].map(|name| format!("no part is called '{name}' here"));
-    assert!(said.iter().all(|said| notices.as_array().unwrap().contains(&said.as_str().into())), "{notices}");
+    let expected =
+        ["joint:spine", "joint:head"].map(|name| format!("this model has no part called '{name}'"));
+    assert!(
+        expected.iter().all(|text| notices.as_array().unwrap().contains(&text.as_str().into())),
+        "{notices}"
+    );
     sandbox
         .run(&format!("{refit} {parts} --rigid Hed"))
         .code(1)
         .stdout(contains("refitted 3 of 3 models"))
-        .stderr(contains("error: no model has a part that is called 'Hed'\nhint: "));
+        .stderr(contains("error: no model has a part called 'Hed'\nhint: "));
 }
 
 #[test]
-fn fields_too_large_to_keep_are_solved_for_each_model() {
+fn cage_is_solved_per_model_if_its_fields_exceed_half_of_the_memory_limit() {
     let sandbox = spheres();
     let refit = "refit a.obj b.obj --cage cage.obj --pose wide.obj -g 64 -o out --json";
     assert!(sandbox.json(refit)["solve_ms"].as_f64().is_some());
-    // 64^3 rows of 32 bytes are 8 MiB: kept, above half of 64 MiB with what solving takes; alone, below 64.
+    // The fields take 64^3 * 32 bytes = 8 MiB. With the memory of the solver they exceed half of 64 MiB; one bind stays below 64 MiB.
     let done = sandbox.json(&format!("{refit} --memory-limit 64"));
     assert!(done["solve_ms"].is_null());
-    assert!(done["notices"][0].as_str().unwrap().contains("kept in half of 64 MiB"), "{done}");
-    assert_as_alone(&sandbox, &["a.obj", "b.obj"], "-g 64", "");
+    assert!(done["notices"][0].as_str().unwrap().contains("do not fit in half of 64 MiB"), "{done}");
+    assert_same_as_deform(&sandbox, &["a.obj", "b.obj"], "-g 64", "");
 }
 
 #[test]
-fn what_fails_is_named_and_the_rest_goes_on() {
+fn failed_models_are_reported_and_the_others_are_written() {
     let sandbox = spheres();
     sandbox.write("broken.glb", "glTF");
     sandbox.write("far.obj", box_obj(&CORNERS.map(|[x, y, z]| [x + 9.0, y, z])));
@@ -120,7 +124,7 @@ fn what_fails_is_named_and_the_rest_goes_on() {
     assert_eq!(states, ["written", "failed", "failed", "failed", "written"]);
     assert_eq!(done["models"][1]["error"], "missing.obj: there is no such file");
 
-    // A fault of the cage or the pose is one of all models.
+    // An invalid pose fails the command before any model is read.
     sandbox.write("short.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     sandbox
         .run("refit a.obj b.obj --cage cage.obj --pose short.obj -o other")
@@ -131,7 +135,7 @@ fn what_fails_is_named_and_the_rest_goes_on() {
 }
 
 #[test]
-fn outputs_that_meet_are_refused_before_anything_starts() {
+fn models_with_the_same_output_are_rejected_before_the_work() {
     let sandbox = spheres();
     std::fs::create_dir(sandbox.path("more")).unwrap();
     sandbox.write("more/a.obj", sphere_obj(0.3));
@@ -144,8 +148,8 @@ fn outputs_that_meet_are_refused_before_anything_starts() {
     sandbox
         .run(&format!("{REFIT} a.obj --manifest list.txt"))
         .code(1)
-        .stderr(contains("a.obj is named twice\nhint: name each model once"));
-    // Whatever .gltf and .glb hold, both would be a .glb.
+        .stderr(contains("a.obj is given twice\nhint: give each model once"));
+    // A .gltf is written as .glb.
     sandbox.run(&format!("{REFIT} x.gltf x.glb")).code(1).stderr(contains("both be written to out/x.glb"));
     assert!(!sandbox.path("out").exists());
     let in_place = REFIT.replace("-o out", "-o .");
@@ -153,9 +157,9 @@ fn outputs_that_meet_are_refused_before_anything_starts() {
     assert_eq!(sandbox.read("b.obj"), sphere_obj(0.5).as_bytes());
 }
 
-/// The first model was written over a buffer or material of the second one, which was read after that.
+/// Writing the first model would destroy a buffer or material that the second model needs.
 #[test]
-fn outputs_over_files_that_later_models_name_are_refused_before_anything_is_written() {
+fn outputs_that_later_models_refer_to_are_rejected_before_anything_is_written() {
     let sandbox = spheres();
     std::fs::create_dir_all(sandbox.path("kit/out")).unwrap();
     let named = "newmtl m\nKd 1 0 0\nmap_Kd out/a.obj\n";
@@ -182,7 +186,7 @@ fn outputs_over_files_that_later_models_name_are_refused_before_anything_is_writ
         assert_eq!(sandbox.read("kit/out/a.obj"), named.as_bytes(), "{content}");
         std::fs::remove_file(sandbox.path(model)).unwrap();
     }
-    // Through a link at the output's name, too; a file of that name in another folder is none of this.
+    // A file of the same name in another folder is no conflict, but a link to the referenced file is.
     sandbox.write("kit/b.obj", obj("textured.mtl"));
     sandbox.write("kit/textured.mtl", "newmtl m\nmap_Kd a.obj\n");
     sandbox.run(&format!("{REFIT} a.obj kit/b.obj")).success();
@@ -195,7 +199,7 @@ fn outputs_over_files_that_later_models_name_are_refused_before_anything_is_writ
 }
 
 #[test]
-fn resume_leaves_what_is_newer_than_its_inputs() {
+fn resume_skips_outputs_newer_than_their_inputs() {
     let sandbox = spheres();
     sandbox.write("list.txt", "\u{feff}# garments\r\n\r\n  a.obj\r\nb.obj\n");
     let now = SystemTime::now();
@@ -214,8 +218,8 @@ fn resume_leaves_what_is_newer_than_its_inputs() {
     assert_eq!(states(), ["written", "written"]);
     assert_eq!(states(), ["skipped", "skipped"]);
     let all_skipped = sandbox.json(&resume);
-    assert!(all_skipped["solve_ms"].is_null(), "nothing was solved for");
-    // Each input is newer than what was made of it in turn, or as old, which may be older.
+    assert!(all_skipped["solve_ms"].is_null(), "no model needed the solve");
+    // The outputs are 3 hours old. An input of the same age counts as newer, because clocks are coarse.
     let older = || ["out/a.obj", "out/b.obj"].map(|name| set_age(name, 3));
     for (name, hours, expected) in [
         ("b.obj", 2, ["skipped", "written"]),

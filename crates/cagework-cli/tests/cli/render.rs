@@ -3,7 +3,7 @@ use predicates::str::contains;
 
 use crate::support::{CORNERS, Sandbox, box_obj};
 
-/// Width and height of a PNG, from its first chunk (PNG specification, 11.2.2).
+/// Width and height in the IHDR chunk of a PNG (PNG specification, 11.2.2).
 fn png_size(bytes: &[u8]) -> [u32; 2] {
     assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n");
     let word = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());
@@ -11,9 +11,9 @@ fn png_size(bytes: &[u8]) -> [u32; 2] {
 }
 
 #[test]
-fn every_kind_of_picture_is_drawn() {
+fn every_style_draws_a_different_picture() {
     let sandbox = Sandbox::with_sphere_in_box();
-    // Clay looks as a model without material does anyway.
+    // Without `clay`, which equals `solid` for a model without materials.
     let kinds = ["solid", "edges", "wireframe", "weights", "error", "cells", "slice"];
     let pictures = kinds.map(|show| {
         let drawn = sandbox.json(&format!(
@@ -33,7 +33,7 @@ fn every_kind_of_picture_is_drawn() {
 }
 
 #[test]
-fn pose_and_weights_of_a_bind_are_drawn() {
+fn saved_weights_draw_the_same_picture_as_a_bind() {
     let sandbox = Sandbox::with_sphere_in_box();
     sandbox.write("pose.obj", box_obj(&CORNERS.map(|[x, y, z]| [1.5 * x, y, z])));
     sandbox.run("bind mesh.obj --cage cage.obj -g 12 --weights w.npz").success();
@@ -42,11 +42,11 @@ fn pose_and_weights_of_a_bind_are_drawn() {
     sandbox.run(&format!("{base} a.png --pose pose.obj --weights w.npz")).success();
     sandbox.run(&format!("{base} b.png --pose pose.obj -g 12")).success();
     assert_ne!(sandbox.read("rest.png"), sandbox.read("a.png"));
-    assert_eq!(sandbox.read("a.png"), sandbox.read("b.png"), "weights from the file, or bound here");
+    assert_eq!(sandbox.read("a.png"), sandbox.read("b.png"), "weights from a file and from a bind");
 }
 
 #[test]
-fn bind_on_the_gpu_says_which() {
+fn bind_on_the_gpu_reports_the_adapter() {
     let sandbox = Sandbox::with_sphere_in_box();
     let cpu = sandbox.json("bind mesh.obj --cage cage.obj -g 16 --json");
     let gpu = sandbox.json("bind mesh.obj --cage cage.obj -g 16 --backend gpu --json");
@@ -58,7 +58,7 @@ fn bind_on_the_gpu_says_which() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_refused_before_the_work() {
+fn invalid_arguments_are_rejected_before_the_work() {
     let sandbox = Sandbox::with_sphere_in_box();
     for (args, message) in [
         ("render mesh.obj -o p.jpg", "must end in .png"),
@@ -73,9 +73,9 @@ fn what_cannot_be_drawn_is_refused_before_the_work() {
     sandbox.run(args).code(1).stderr(contains("the cage has 8 vertices"));
 }
 
-/// 20,000 triangles that fill the picture took the software adapter minutes. Tests draw on no other.
+/// 20,000 triangles that fill the picture take the software adapter minutes, so they are rejected.
 #[test]
-fn triangles_over_each_other_are_counted() {
+fn too_many_overlapping_triangles_are_rejected() {
     let sandbox = Sandbox::new();
     let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
     for (n, code) in [(100, 0), (20_000, 1)] {
@@ -87,9 +87,9 @@ fn triangles_over_each_other_are_counted() {
     }
 }
 
-/// A C of boxes: two arms along x with a gap between them, from 0 to 1 in y. `v` and quads, counter-clockwise outside.
+/// A C-shaped solid as OBJ: two arms along x with a gap between them. `room`: offset outwards; `lift`: motion of the upper arm's tip.
 fn clamp_obj(room: f64, lift: f64) -> String {
-    // The outline of the C in x and y, and how much of `lift` each corner takes: the tip of the upper arm.
+    // Corner in x and y, outward direction, and share of `lift`.
     const OUTLINE: [([f64; 2], [f64; 2], f64); 8] = [
         ([0.0, 0.0], [-1.0, -1.0], 0.0),
         ([3.0, 0.0], [1.0, -1.0], 0.0),
@@ -106,7 +106,7 @@ fn clamp_obj(room: f64, lift: f64) -> String {
             text += &format!("v {} {} {z}\n", x + room * dx, y + room * dy + lift * share);
         }
     }
-    // Caps in convex parts, then the sides.
+    // Both caps, each in three convex quads, then the sides.
     for [a, b, c, d] in [[1, 2, 3, 4], [1, 4, 5, 8], [5, 6, 7, 8]] {
         text += &format!("f {d} {c} {b} {a}\nf {} {} {} {}\n", a + 8, b + 8, c + 8, d + 8);
     }
@@ -117,11 +117,11 @@ fn clamp_obj(room: f64, lift: f64) -> String {
     text
 }
 
-/// Pixels at an edge that two ways to the same positions may fill differently: weights are `f32`, and edges are smoothed.
-const ROUND_OFF: usize = 10;
+/// Largest number of pixels that differ between equal shapes, because `f32` rounding moves antialiased edges.
+const MAX_ROUND_OFF_PIXELS: usize = 10;
 
 #[test]
-fn comparison_draws_both_ways_side_by_side() {
+fn compare_draws_both_coordinates_side_by_side() {
     let sandbox = Sandbox::new();
     sandbox.write("mesh.obj", clamp_obj(0.0, 0.0));
     sandbox.write("cage.obj", clamp_obj(0.2, 0.0));
@@ -133,7 +133,7 @@ fn comparison_draws_both_ways_side_by_side() {
         assert_eq!(picture.dimensions(), (202, 120));
         (picture, done)
     };
-    // Where the halves differ. Two columns lie between them, so that each has 100.
+    // Number of pixels that differ between the halves, which have 100 columns each with two columns between them.
     let differing = |picture: &image::RgbImage| {
         let differs = |x, y| {
             let pair = [picture.get_pixel(x, y), picture.get_pixel(x + 102, y)].map(|p| p.0);
@@ -141,18 +141,18 @@ fn comparison_draws_both_ways_side_by_side() {
         };
         (0..100).flat_map(|x| (0..120).map(move |y| (x, y))).filter(|&(x, y)| differs(x, y)).count()
     };
-    // At rest both ways give the model back.
+    // Both coordinates reproduce the rest shape.
     let (rest, done) = picture("--compare");
     assert_eq!(done["compared"], serde_json::json!(["harmonic coordinates", "mean value coordinates"]));
-    assert!(differing(&rest) <= ROUND_OFF, "{} pixels differ at rest", differing(&rest));
-    // The lower arm stays where it is by harmonic coordinates; mean value coordinates see across the gap.
+    assert!(differing(&rest) <= MAX_ROUND_OFF_PIXELS, "{} pixels differ at rest", differing(&rest));
+    // Only mean value coordinates move the lower arm, because they act across the gap.
     let (posed, _) = picture("--compare --pose pose.obj");
-    assert!(differing(&posed) > 10 * ROUND_OFF, "{} pixels differ", differing(&posed));
+    assert!(differing(&posed) > 10 * MAX_ROUND_OFF_PIXELS, "{} pixels differ", differing(&posed));
     let (rest, done) = picture("--compare green");
     assert_eq!(done["compared"], serde_json::json!(["harmonic coordinates", "Green coordinates"]));
-    assert!(differing(&rest) <= ROUND_OFF, "{} pixels differ at rest", differing(&rest));
+    assert!(differing(&rest) <= MAX_ROUND_OFF_PIXELS, "{} pixels differ at rest", differing(&rest));
     let (green, _) = picture("--compare green --pose pose.obj");
-    assert!(differing(&green) > 10 * ROUND_OFF && green != posed);
+    assert!(differing(&green) > 10 * MAX_ROUND_OFF_PIXELS && green != posed);
     let (alone, done) = picture("--pose pose.obj");
     assert!(done.get("compared").is_none());
     assert_ne!(alone, posed);

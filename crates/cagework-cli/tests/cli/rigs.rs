@@ -1,4 +1,4 @@
-//! A rigged model through the commands: the humanoid, who walks.
+//! Commands on a rigged and animated model: the humanoid sample.
 
 use cagework_cage::samples;
 use cagework_io::{Model, write_mesh_glb};
@@ -6,7 +6,7 @@ use predicates::str::contains;
 
 use crate::support::Sandbox;
 
-/// The humanoid and a cage of it, bound, and the cage with everything above the hips wider.
+/// A folder with the humanoid bound to a cage, and `wide.obj`: the cage scaled by 1.3 in x above the hips.
 pub(crate) fn bound() -> Sandbox {
     let sandbox = Sandbox::new();
     let sample = samples::build("humanoid").unwrap();
@@ -27,7 +27,7 @@ pub(crate) fn bound() -> Sandbox {
 const DEFORM: &str = "deform humanoid.glb --cage cage.obj --weights w.npz";
 
 #[test]
-fn a_rigged_model_keeps_its_rig_and_an_unmoved_one_its_bytes() {
+fn rig_is_kept_and_an_unmoved_model_is_byte_identical() {
     let sandbox = bound();
     let info = sandbox.json("info humanoid.glb --json");
     assert_eq!((&info["joints"], &info["clips"][0]["name"]), (&16.into(), &"Walk".into()));
@@ -39,7 +39,7 @@ fn a_rigged_model_keeps_its_rig_and_an_unmoved_one_its_bytes() {
     let done = sandbox.json(&format!("{DEFORM} --pose wide.obj -o wide.vrm --json"));
     assert_eq!(done["joints"], 16);
     assert!(done["joints_moved"].as_u64().unwrap() >= 6, "{done}");
-    assert!(done["tracks"].as_u64().unwrap() <= 1, "rotations stay: {done}");
+    assert!(done["tracks"].as_u64().unwrap() <= 1, "rotations are kept: {done}");
     let wide = sandbox.read("wide.vrm");
     let read = |bytes: &[u8]| Model::read("model.glb", bytes, &mut |_| None).unwrap();
     assert_eq!((read(&wide).counts.skins, read(&wide).clips().len()), (1, 1));
@@ -48,7 +48,7 @@ fn a_rigged_model_keeps_its_rig_and_an_unmoved_one_its_bytes() {
     assert_eq!((&stay["joints_moved"], &stay["tracks"]), (&0.into(), &0.into()));
     let plain = sandbox.json(&format!("{DEFORM} --pose wide.obj --static -o plain.glb --json"));
     assert!(plain.get("joints").is_none());
-    // At rest all three are the same shape.
+    // The rest shape is the same in all three.
     let shapes = [wide, sandbox.read("stay.glb"), sandbox.read("plain.glb")].map(|bytes| read(&bytes));
     for other in &shapes[1..] {
         let pairs = shapes[0].positions.iter().zip(&other.positions);
@@ -58,7 +58,7 @@ fn a_rigged_model_keeps_its_rig_and_an_unmoved_one_its_bytes() {
 }
 
 #[test]
-fn what_a_rig_needs_is_said() {
+fn missing_parts_clips_and_rig_points_are_reported() {
     let sandbox = bound();
     sandbox
         .run(&format!("{DEFORM} --pose wide.obj --rigid hat -o out.glb"))
@@ -69,7 +69,7 @@ fn what_a_rig_needs_is_said() {
         .failure()
         .stderr(contains("there is no clip 'Run'; the model has Walk"));
     sandbox.run("cage humanoid.glb --around-clip Walk -o walk.obj").success();
-    // Weights of the shape alone.
+    // Weights without the points of the rig.
     sandbox.run("deform humanoid.glb --cage cage.obj --weights w.npz --pose cage.obj -o shape.obj").success();
     sandbox.run("bind shape.obj --cage cage.obj -g 24 --weights w.npz").success();
     sandbox
@@ -80,7 +80,7 @@ fn what_a_rig_needs_is_said() {
 }
 
 #[test]
-fn parts_stay_or_keep_their_shape() {
+fn masked_parts_stay_and_rigid_parts_keep_their_shape() {
     let sandbox = bound();
     let read = |bytes: &[u8]| Model::read("model.glb", bytes, &mut |_| None).unwrap();
     let rest = read(&sandbox.read("humanoid.glb"));
@@ -110,21 +110,21 @@ fn parts_stay_or_keep_their_shape() {
     sandbox
         .run(&format!("{DEFORM} --pose wide.obj --mask {joint}=2 -o out.glb"))
         .failure()
-        .stderr(contains("the amount 2 is not between 0, which follows the cage, and 1, which stays"));
+        .stderr(contains("the amount is 2; expected 0 (follows the cage) to 1 (stays in place)"));
 }
 
 #[test]
-fn the_cage_bends_the_moving_model_into_frames() {
+fn dynamic_deform_bends_every_frame_of_a_clip() {
     let sandbox = bound();
     const DYNAMIC: &str = "deform humanoid.glb --cage cage.obj --dynamic";
     let done = sandbox.json(&format!("{DYNAMIC} Walk --pose wide.obj -o bent.glb --json"));
-    // Thirty a second, at most sixty, and the last.
+    // The clip of 2 s has 60 frames (the maximum, 30 per second) and the last one.
     assert_eq!((&done["frames"], &done["clip"]), (&61.into(), &"Walk".into()));
     let read = |name: &str| Model::read("model.glb", &sandbox.read(name), &mut |_| None).unwrap();
     let (model, bent) = (read("humanoid.glb"), read("bent.glb"));
     assert_eq!((bent.clips().len(), bent.clips()[0].seconds), (1, 2.0));
     let (before, after) = (model.frames(0).unwrap(), bent.frames(0).unwrap());
-    // Above the hips and inside the cage everything is 1.3 times as wide, wherever it has walked to.
+    // The chest is 1.3 times as wide in every frame, as in the posed cage.
     let chest = |p: &&glam::Vec3| p.y > 1.2 && p.y < 1.4 && p.x.abs() > 0.05 && p.x.abs() < 0.12;
     for (old, new) in before.iter().zip(&after).step_by(20) {
         let pairs = old.iter().zip(new).filter(|(old, _)| chest(old));
@@ -139,9 +139,9 @@ fn the_cage_bends_the_moving_model_into_frames() {
     sandbox
         .run(&format!("{DYNAMIC} Walk --pose wide.obj --pose cage.obj -o bent.glb"))
         .failure()
-        .stderr(contains("--dynamic bends by one pose, but 2 were given"));
+        .stderr(contains("--dynamic takes one pose, but 2 were given"));
     sandbox
         .run(&format!("{DYNAMIC} Walk --pose wide.obj -o bent.obj"))
         .failure()
-        .stderr(contains("holds no clip"));
+        .stderr(contains("cannot store a clip"));
 }

@@ -1,4 +1,4 @@
-//! What a model names: only regular files in its folder are read, and only images are taken for images.
+//! Files that a model refers to: only regular files in its folder are read, and only images are embedded as textures.
 
 use std::fmt::Write as _;
 use std::os::unix::fs::symlink;
@@ -11,12 +11,12 @@ use serde_json::{Value, json};
 
 use crate::support::{Sandbox, glb_json};
 
-/// What must not leave its file, after a header that makes it pass for an image.
+/// Content that must not reach the output, with a PNG signature so that it passes as an image.
 const SECRET: &[u8] = b"\x89PNG\r\n\x1a\nTOP-SECRET";
-/// Far more than it takes to refuse a file, far less than a pipe nobody writes to.
-const AT_ONCE: Duration = Duration::from_secs(20);
+/// Time limit of a command that must not block on a pipe.
+const TIMEOUT: Duration = Duration::from_secs(20);
 
-/// A tetrahedron in a buffer of its own, with these images.
+/// A tetrahedron with an embedded buffer, and these image URIs.
 fn gltf(images: &[&str]) -> Value {
     let positions = [[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let corners = [0_u16, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3];
@@ -40,7 +40,7 @@ fn gltf(images: &[&str]) -> Value {
     })
 }
 
-/// A folder `model` with a file beside it that is none of a model's business.
+/// An empty folder `model`, and the file `secret.png` outside it.
 fn with_secret() -> Sandbox {
     let sandbox = Sandbox::new();
     std::fs::create_dir(sandbox.path("model")).unwrap();
@@ -52,7 +52,6 @@ fn make_pipe(sandbox: &Sandbox, name: &str) {
     assert!(Command::new("mkfifo").arg(sandbox.path(name)).status().unwrap().success());
 }
 
-/// Any file of the user could be had by its name: `../../.ssh/id_ed25519` was embedded in the GLB that went out.
 #[test]
 fn files_outside_the_models_folder_are_not_embedded() {
     let sandbox = with_secret();
@@ -82,7 +81,7 @@ fn files_outside_the_models_folder_are_not_embedded() {
 }
 
 #[test]
-fn images_in_the_models_folder_are_embedded_through_links_too() {
+fn images_in_the_models_folder_are_embedded_even_through_links() {
     let sandbox = with_secret();
     std::fs::create_dir(sandbox.path("model/textures")).unwrap();
     sandbox.write("model/textures/inside.png", SECRET);
@@ -97,9 +96,9 @@ fn images_in_the_models_folder_are_embedded_through_links_too() {
     }
 }
 
-/// A model's `mimeType` was believed: any text beside it was embedded as an image.
+/// The content decides, not the `mimeType` in the model.
 #[test]
-fn what_is_no_image_is_not_embedded() {
+fn files_that_are_not_images_are_not_embedded() {
     let sandbox = with_secret();
     sandbox.write("model/notes.txt", "TOP-SECRET");
     sandbox.write("model/m.gltf", gltf(&["notes.txt", "data:image/png,TOP-SECRET"]).to_string());
@@ -118,7 +117,7 @@ fn what_is_no_image_is_not_embedded() {
 #[test]
 fn buffer_outside_the_models_folder_is_an_error_that_names_it() {
     let sandbox = with_secret();
-    for (uri, said) in [
+    for (uri, message) in [
         ("../secret.png", "it needs the file '../secret.png', which leads out of the model's folder"),
         ("textures", "it needs the file 'textures', which is a folder"),
         ("gone.bin", "it needs the file 'gone.bin', which is not there"),
@@ -128,7 +127,7 @@ fn buffer_outside_the_models_folder_is_an_error_that_names_it() {
         model["buffers"][0] = json!({ "byteLength": 18, "uri": uri });
         std::fs::create_dir_all(sandbox.path("model/textures")).unwrap();
         sandbox.write("model/m.gltf", model.to_string());
-        sandbox.run("info model/m.gltf").code(1).stderr(contains("model/m.gltf").and(contains(said)));
+        sandbox.run("info model/m.gltf").code(1).stderr(contains("model/m.gltf").and(contains(message)));
     }
 }
 
@@ -149,39 +148,38 @@ fn materials_of_an_obj_come_from_its_folder() {
         .stdout(contains("texture 'own.mtl' is no PNG, JPEG, WebP or KTX2 image: it is left out"));
 }
 
-/// A pipe in a model's folder held the command for ever, and `/dev/zero` filled the memory.
 #[test]
-fn pipes_devices_and_folders_are_refused_at_once() {
+fn pipes_devices_and_folders_are_rejected_without_blocking() {
     let sandbox = with_secret();
     make_pipe(&sandbox, "model/pipe");
     make_pipe(&sandbox, "pipe.obj");
     std::fs::create_dir(sandbox.path("model/folder")).unwrap();
     symlink("/dev/zero", sandbox.path("model/zero")).unwrap();
     sandbox.write("model/m.gltf", gltf(&["pipe", "folder", "zero"]).to_string());
-    let at_once = |args: &str| sandbox.command(args).timeout(AT_ONCE).assert();
-    at_once("info model/m.gltf")
+    let run = |args: &str| sandbox.command(args).timeout(TIMEOUT).assert();
+    run("info model/m.gltf")
         .success()
         .stdout(contains("texture 'pipe' is a pipe or a device, not a regular file"))
         .stdout(contains("texture 'folder' is a folder"))
         .stdout(contains("texture 'zero' leads out of the model's folder"));
     sandbox.write("model/m.obj", "mtllib pipe\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    at_once("info model/m.obj").success().stdout(contains("material file 'pipe' is a pipe or a device"));
+    run("info model/m.obj").success().stdout(contains("material file 'pipe' is a pipe or a device"));
     let mut model = gltf(&[]);
     model["buffers"][0]["uri"] = "pipe".into();
     sandbox.write("model/m.gltf", model.to_string());
-    at_once("info model/m.gltf").code(1).stderr(contains("the file 'pipe', which is a pipe or a device"));
+    run("info model/m.gltf").code(1).stderr(contains("the file 'pipe', which is a pipe or a device"));
     for file in ["pipe.obj", "/dev/zero"] {
-        let said = contains(format!("{file}: is a pipe or a device, not a regular file"));
-        at_once(&format!("info {file}")).code(1).stderr(said.clone());
-        at_once(&format!("bind model/m.obj --cage {file}")).code(1).stderr(said.clone());
+        let message = contains(format!("{file}: is a pipe or a device, not a regular file"));
+        run(&format!("info {file}")).code(1).stderr(message.clone());
+        run(&format!("bind model/m.obj --cage {file}")).code(1).stderr(message.clone());
         let args = format!("deform model/m.obj --cage box --weights {file} --pose {file} -o out.obj");
-        at_once(&args).code(1).stderr(said);
+        run(&args).code(1).stderr(message);
     }
 }
 
-/// An OBJ could set the title of the terminal, clear it, or write a line of its own.
+/// Escape sequences could set the terminal's title, clear the screen or fake a message.
 #[test]
-fn control_characters_of_files_are_shown_as_escapes() {
+fn control_characters_in_files_are_printed_as_escapes() {
     let sandbox = with_secret();
     let escape = || contains("\u{1b}").or(contains("\u{202e}"));
     sandbox.write("model/m.obj", "v 0 0 \u{1b}]0;mine\u{7}\n");
@@ -209,15 +207,14 @@ fn control_characters_of_files_are_shown_as_escapes() {
         .stderr(contains(r"m\u{1b}.gltf: it needs the file 'gone\u{1b}.bin', which").and(escape().not()));
 }
 
-/// "It is not there", the command said of a file that was too large for the memory.
 #[test]
-fn file_that_does_not_fit_the_memory_is_not_called_missing() {
+fn file_that_exceeds_the_memory_is_not_reported_as_missing() {
     let sandbox = with_secret();
-    // Sparse: takes no room on the disk.
+    // A sparse file, which occupies no disk space.
     std::fs::File::create(sandbox.path("model/large.png")).unwrap().set_len(2 << 30).unwrap();
     sandbox.write("model/m.gltf", gltf(&["large.png"]).to_string());
     let command = sandbox.command("info model/m.gltf");
-    // In KiB: half of what the texture needs.
+    // In KiB: half of the memory that the texture needs.
     let limited = Command::new("sh")
         .args(["-c", "ulimit -v 1048576; exec \"$0\" info model/m.gltf"])
         .arg(command.get_program())
@@ -225,8 +222,5 @@ fn file_that_does_not_fit_the_memory_is_not_called_missing() {
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&limited.stdout).into_owned();
-    assert!(
-        said.contains("texture 'large.png' needs 2048 MiB of memory to be read, more than there is"),
-        "{said}"
-    );
+    assert!(said.contains("texture 'large.png' needs 2048 MiB of memory, more than is available"), "{said}");
 }

@@ -1,4 +1,4 @@
-//! A folder of generated files to run the command in.
+//! Folders of generated files in which tests run the command.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -21,10 +21,10 @@ pub(crate) const CORNERS: [[f64; 3]; 8] = [
     [1.0, 1.0, 1.0],
 ];
 
-/// Faces of that box, seen from outside counter-clockwise, counted from 1 as in OBJ.
+/// Faces of that box, counter-clockwise seen from outside, numbered from 1 as in OBJ.
 const QUADS: &str = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
 
-/// A fresh folder; it goes when this does.
+/// A temporary folder, deleted on drop.
 pub(crate) struct Sandbox {
     folder: TempDir,
 }
@@ -67,26 +67,26 @@ impl Sandbox {
         names
     }
 
-    /// `cagework` in the folder with words separated by blanks, not run yet.
+    /// `cagework` in the folder, not yet started. `args` are separated by whitespace.
     pub(crate) fn command(&self, args: &str) -> Command {
         let mut command = cargo_bin_cmd!("cagework");
         command.current_dir(self.folder.path()).args(args.split_whitespace());
         command
     }
 
-    /// Runs `cagework` in the folder with words separated by blanks.
+    /// Runs `cagework` in the folder. `args` are separated by whitespace.
     pub(crate) fn run(&self, args: &str) -> Assert {
         self.command(args).assert()
     }
 
-    /// Runs `cagework`, which must succeed, and returns its stdout as JSON.
+    /// Runs `cagework`, asserts success, and parses its stdout as JSON.
     pub(crate) fn json(&self, args: &str) -> Value {
         let output = self.run(args).success().get_output().stdout.clone();
         serde_json::from_slice(&output).unwrap()
     }
 }
 
-/// A sphere of quads and two caps of triangles.
+/// A sphere of quads, with triangles at both poles.
 pub(crate) fn sphere_obj(radius: f64) -> String {
     const RINGS: usize = 12;
     const SEGMENTS: usize = 16;
@@ -113,13 +113,13 @@ pub(crate) fn sphere_obj(radius: f64) -> String {
     text
 }
 
-/// A box of six quads with these corners, in the order of [`CORNERS`].
+/// A box with these corners, in the order of [`CORNERS`].
 pub(crate) fn box_obj(corners: &[[f64; 3]; 8]) -> String {
     let vertices = corners.map(|[x, y, z]| format!("v {x} {y} {z}\n")).concat();
     vertices + QUADS
 }
 
-/// The `v` lines of an OBJ.
+/// Positions of the `v` lines of an OBJ.
 pub(crate) fn obj_positions(bytes: &[u8]) -> Vec<[f64; 3]> {
     std::str::from_utf8(bytes)
         .unwrap()
@@ -139,7 +139,7 @@ pub(crate) fn glb_json(bytes: &[u8]) -> Value {
     serde_json::from_slice(&bytes[20..20 + length]).unwrap()
 }
 
-/// Asserts that two lists of positions agree.
+/// Asserts that corresponding coordinates differ by at most `tolerance`.
 pub(crate) fn assert_close(actual: &[[f64; 3]], expected: &[[f64; 3]], tolerance: f64) {
     assert_eq!(actual.len(), expected.len());
     for (v, (a, e)) in actual.iter().zip(expected).enumerate() {

@@ -16,7 +16,7 @@ fn version_and_help_succeed() {
 }
 
 #[test]
-fn wrong_command_line_exits_with_2() {
+fn invalid_command_line_exits_with_2() {
     let sandbox = Sandbox::with_sphere_in_box();
     for args in [
         "",
